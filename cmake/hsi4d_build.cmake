@@ -1,0 +1,55 @@
+# Flags that every target shares, and the function that turns a folder into a layer of the library.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+# Arithmetic. Contraction would make forward and backward disagree by an ulp (docs/numerics.md); errno and trapping
+# semantics stand in the way of vector code and change no result. Never fast-math: isfinite must keep working.
+add_library(hsi4d_arithmetic INTERFACE)
+add_library(hsi4d::arithmetic ALIAS hsi4d_arithmetic)
+set_target_properties(hsi4d_arithmetic PROPERTIES EXPORT_NAME arithmetic)
+target_compile_options(hsi4d_arithmetic INTERFACE -ffp-contract=off -fno-math-errno -fno-trapping-math)
+target_compile_features(hsi4d_arithmetic INTERFACE cxx_std_20)
+
+# Warnings: ours alone, never those of a project that uses us.
+add_library(hsi4d_warnings INTERFACE)
+target_compile_options(hsi4d_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion
+                                                -Wno-sign-conversion -Wno-psabi
+                                                $<$<BOOL:${HSI4D_WARNINGS_AS_ERRORS}>:-Werror>)
+
+if(HSI4D_SANITIZE)
+  add_compile_options(-fsanitize=${HSI4D_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${HSI4D_SANITIZE})
+endif()
+
+# hsi4d_add_layer(NAME [DEPENDS layer...] [LINK target...] [PRIVATE_LINK target...])
+# Every source file of folder NAME becomes the static library hsi4d::NAME; a new file needs no edit here.
+function(hsi4d_add_layer name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "DEPENDS;LINK;PRIVATE_LINK")
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${name}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/cli/main\\.cpp$")
+  list(TRANSFORM arg_DEPENDS PREPEND hsi4d::)
+  if(sources)
+    add_library(hsi4d_${name} STATIC ${sources})
+    set(scope PUBLIC)
+    target_link_libraries(hsi4d_${name} PRIVATE $<BUILD_INTERFACE:hsi4d_warnings> ${arg_PRIVATE_LINK})
+    set_target_properties(hsi4d_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  else()
+    add_library(hsi4d_${name} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(hsi4d::${name} ALIAS hsi4d_${name})
+  set_target_properties(hsi4d_${name} PROPERTIES EXPORT_NAME ${name})
+  target_link_libraries(hsi4d_${name} ${scope} hsi4d::arithmetic ${arg_DEPENDS} ${arg_LINK})
+  target_include_directories(hsi4d_${name} ${scope}
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/hsi4d>)
+  set_property(GLOBAL APPEND PROPERTY HSI4D_LAYERS hsi4d_${name})
+endfunction()

@@ -1,0 +1,18 @@
+# `cmake --install`: headers under include/hsi4d, static libraries, the program, and a package for find_package(hsi4d).
+include(CMakePackageConfigHelpers)
+
+get_property(layers GLOBAL PROPERTY HSI4D_LAYERS)
+install(TARGETS ${layers} hsi4d_arithmetic EXPORT hsi4d_targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+foreach(folder core autodiff splat body optim pipelines)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hsi4d FILES_MATCHING PATTERN "*.h")
+endforeach()
+install(TARGETS hsi4d RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/configs DESTINATION ${CMAKE_INSTALL_DATADIR}/hsi4d)
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/hsi4d)
+install(EXPORT hsi4d_targets NAMESPACE hsi4d:: DESTINATION ${package_dir})
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/hsi4d-config.cmake.in ${PROJECT_BINARY_DIR}/hsi4d-config.cmake
+                              INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/hsi4d-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/hsi4d-config.cmake ${PROJECT_BINARY_DIR}/hsi4d-config-version.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/hsi4d_dependencies.cmake DESTINATION ${package_dir})
