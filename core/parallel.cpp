@@ -1,0 +1,122 @@
+#include "core/parallel.h"
+
+#include <exception>
+#include <mutex>
+#include <string>
+
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "core/check.h"
+
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
+
+namespace hsi4d {
+
+namespace {
+
+/// Keeps the exception of the lowest chunk.
+class FirstError {
+ public:
+  void keep(Index chunk, std::exception_ptr error) {
+    const std::lock_guard lock(mutex_);
+    if (!error_ || chunk < chunk_) {
+      chunk_ = chunk;
+      error_ = std::move(error);
+    }
+  }
+  void rethrow() const {
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  std::mutex mutex_;
+  Index chunk_ = 0;
+  std::exception_ptr error_;
+};
+
+}  // namespace
+
+void run_chunks(Index chunks, FunctionRef<void(Index)> body) {
+  if (chunks <= 0) return;
+  if (chunks == 1) {
+    const FlushDenormals flush;
+    body(0);
+    return;
+  }
+  FirstError first_error;
+  const auto run = [&](Index chunk) {
+    const FlushDenormals flush;
+    try {
+      body(chunk);
+    } catch (...) {
+      first_error.keep(chunk, std::current_exception());
+    }
+  };
+  if (thread_count() == 1) {
+    for (Index chunk = 0; chunk < chunks; ++chunk) run(chunk);
+  } else {
+    tbb::parallel_for(Index(0), chunks, run);
+  }
+  first_error.rethrow();
+}
+
+double pairwise_sum(const double* values, Index n) {
+  if (n <= 0) return 0;
+  if (n == 1) return values[0];
+  const Index half = n / 2;
+  return pairwise_sum(values, half) + pairwise_sum(values + half, n - half);
+}
+
+int thread_count() { return tbb::this_task_arena::max_concurrency(); }
+
+void with_threads(int threads, FunctionRef<void()> body) {
+  HSI4D_CHECK(threads >= 1, "threads = " + std::to_string(threads));
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+  tbb::task_arena arena(threads);
+  arena.execute([&] { body(); });
+}
+
+#if defined(__SSE2__)
+namespace {
+constexpr unsigned kFlushToZero = 0x8000;       // results
+constexpr unsigned kDenormalsAreZero = 0x0040;  // inputs
+}  // namespace
+
+FlushDenormals::FlushDenormals() : saved_(_mm_getcsr()) {
+  const unsigned wanted = saved_ | kFlushToZero | kDenormalsAreZero;
+  if (wanted != saved_) _mm_setcsr(wanted);
+}
+FlushDenormals::~FlushDenormals() {
+  // The status bits that arithmetic raised meanwhile stay; only the two modes go back.
+  const unsigned now = _mm_getcsr();
+  constexpr unsigned kModes = kFlushToZero | kDenormalsAreZero;
+  const unsigned restored = (now & ~kModes) | (saved_ & kModes);
+  if (restored != now) _mm_setcsr(restored);
+}
+#elif defined(__aarch64__)
+namespace {
+constexpr std::uint64_t kFlushBit = std::uint64_t(1) << 24;
+std::uint64_t control_register() {
+  std::uint64_t value;
+  asm volatile("mrs %0, fpcr" : "=r"(value));
+  return value;
+}
+void set_control_register(std::uint64_t value) { asm volatile("msr fpcr, %0" ::"r"(value)); }
+}  // namespace
+
+FlushDenormals::FlushDenormals() : saved_((control_register() & kFlushBit) != 0) {
+  set_control_register(control_register() | kFlushBit);
+}
+FlushDenormals::~FlushDenormals() {
+  if (!saved_) set_control_register(control_register() & ~kFlushBit);
+}
+#else
+FlushDenormals::FlushDenormals() : saved_(0) {}
+FlushDenormals::~FlushDenormals() = default;
+#endif
+
+}  // namespace hsi4d

@@ -1,0 +1,53 @@
+#include "core/simd.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "core/check.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr std::array kAll = {Isa::kBaseline, Isa::kAvx2, Isa::kAvx512};
+
+Isa supported_isa() {
+#if defined(HSI4D_ISA_CLONES)
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512bw")) {
+    return Isa::kAvx512;
+  }
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return Isa::kAvx2;
+#endif
+  return Isa::kBaseline;
+}
+
+Isa choose_isa() {
+  const char* wish = std::getenv("HSI4D_ISA");
+  if (wish == nullptr || *wish == '\0') return supported_isa();
+  for (const Isa isa : kAll) {
+    if (std::string_view(wish) == isa_name(isa)) return std::min(isa, supported_isa());
+  }
+  throw UserError("environment variable HSI4D_ISA: '" + std::string(wish) + "' is unknown; allowed: baseline, avx2, avx512");
+}
+
+}  // namespace
+
+Isa best_isa() {
+  static const Isa isa = choose_isa();
+  return isa;
+}
+
+const char* isa_name(Isa isa) {
+  switch (isa) {
+    case Isa::kAvx512: return "avx512";
+    case Isa::kAvx2: return "avx2";
+    case Isa::kBaseline: break;
+  }
+  return "baseline";
+}
+
+}  // namespace hsi4d
