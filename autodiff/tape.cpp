@@ -1,0 +1,489 @@
+#include "autodiff/tape.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "autodiff/finite.h"
+#include "core/parallel.h"
+
+namespace hsi4d {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double nanoseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::nano>(Clock::now() - start).count();
+}
+
+std::string describe(const NonFiniteError::Place& p) {
+  std::ostringstream text;
+  text << p.value << " in " << p.phase << " of '" << p.node << "' (recorded at " << p.source << "), "
+       << (p.phase == "forward" ? "value" : "gradient") << " of array '" << p.array << "', ";
+  if (p.plane != 0) text << "plane " << p.plane << ", ";
+  text << "row " << p.row << ", column " << p.col;
+  return text.str();
+}
+
+/// Copies `values`, row-major without padding, into `to`.
+template <class S>
+void copy_in(std::span<const S> values, const Array<S>& to) {
+  HSI4D_CHECK_EQ(static_cast<Index>(values.size()), to.shape.count());
+  const std::size_t row_bytes = static_cast<std::size_t>(to.shape.cols) * sizeof(S);
+  for (Index r = 0; r < to.total_rows() && row_bytes > 0; ++r) {
+    std::memcpy(to.row(r), values.data() + r * to.shape.cols, row_bytes);
+  }
+}
+
+}  // namespace
+
+std::ostream& operator<<(std::ostream& stream, const Shape& shape) {
+  stream << '[';
+  if (shape.planes != 1) stream << shape.planes << ',';
+  return stream << shape.rows << ',' << shape.cols << ']';
+}
+
+NonFiniteError::NonFiniteError(Place place) : std::runtime_error(describe(place)), place_(std::move(place)) {}
+
+template <class S>
+Tape<S>::~Tape() {
+  for (const NodeRecord& node : nodes_) node.table->destroy(node.op);
+}
+
+// --- recording -------------------------------------------------------------------------------------------------------
+
+template <class S>
+std::uint32_t Tape<S>::checked(Var<S> var) const {
+  if (var.tape == this && var.id < arrays_.size() && arrays_[var.id].stamp == var.stamp) return var.id;
+  throw InternalError(var.tape == nullptr  ? "an empty Var was used"
+                      : var.tape != this ? "a Var of another tape was used"
+                                         : "a Var from before a rewind was used");
+}
+
+template <class S>
+std::uint32_t Tape<S>::add_array(const Shape& shape, std::uint32_t producer, const Source& where) {
+  HSI4D_CHECK(shape.planes >= 0 && shape.rows >= 0 && shape.cols >= 0 && shape.stride >= shape.cols,
+              detail::both_values("shape", shape));
+  ArrayRecord array;
+  array.shape = shape;
+  array.value = arena_.template allocate<S>(shape.memory());
+  std::memset(array.value, 0, static_cast<std::size_t>(shape.memory()) * sizeof(S));
+  array.producer = producer;
+  array.stamp = next_stamp_++;
+  array.where = where;
+  arrays_.push_back(std::move(array));
+  ++structure_;
+  return static_cast<std::uint32_t>(arrays_.size() - 1);
+}
+
+template <class S>
+Var<S> Tape<S>::add_leaf(std::string_view name, const Shape& shape, bool constant, const Source& where) {
+  const std::uint32_t id = add_array(shape, kLeaf, where);
+  arrays_[id].name = name;
+  arrays_[id].constant = arrays_[id].frozen = constant;
+  arrays_[id].version = ++clock_;
+  return handle(id);
+}
+
+template <class S>
+Var<S> Tape<S>::parameter(std::string_view name, const Shape& shape, Source where) {
+  return add_leaf(name, shape, false, where);
+}
+
+template <class S>
+Var<S> Tape<S>::constant(std::string_view name, const Shape& shape, Source where) {
+  return add_leaf(name, shape, true, where);
+}
+
+template <class S>
+Var<S> Tape<S>::constant(S value, Source where) {
+  const Var<S> var = add_leaf("", kScalarShape, true, where);
+  arrays_[var.id].value[0] = value;
+  return var;
+}
+
+template <class S>
+Var<S> Tape<S>::add_node(const OperatorTable<S>* table, void* op, std::span<const Var<S>> inputs,
+                         std::span<const Shape> outputs, const Source& where) {
+  HSI4D_CHECK(inputs.size() <= 64 && !outputs.empty(), detail::both_values(inputs.size(), outputs.size()));
+  NodeRecord node;
+  node.table = table;
+  node.op = op;
+  node.first_edge = static_cast<std::uint32_t>(edges_.size());
+  node.edge_count = static_cast<std::uint32_t>(inputs.size());
+  node.first_output = static_cast<std::uint32_t>(arrays_.size());
+  node.output_count = static_cast<std::uint32_t>(outputs.size());
+  node.where = where;
+  for (const Var<S>& input : inputs) edges_.push_back(input.id);
+  nodes_.push_back(node);
+  for (const Shape& shape : outputs) add_array(shape, static_cast<std::uint32_t>(nodes_.size() - 1), where);
+  return handle(node.first_output);
+}
+
+template <class S>
+Var<S> Tape<S>::output(Var<S> first, int j) const {
+  const std::uint32_t producer = arrays_[checked(first)].producer;
+  HSI4D_CHECK(producer != kLeaf && j >= 0 && static_cast<std::uint32_t>(j) < nodes_[producer].output_count,
+              "output " + std::to_string(j));
+  return handle(nodes_[producer].first_output + static_cast<std::uint32_t>(j));
+}
+
+template <class S>
+Var<S> Tape<S>::name(Var<S> var, std::string_view text) {
+  arrays_[checked(var)].name = text;
+  return var;
+}
+
+template <class S>
+void Tape<S>::set_frozen(Var<S> var, bool frozen) {
+  ArrayRecord& array = arrays_[checked(var)];
+  HSI4D_CHECK(frozen || !array.constant, "constant '" + array.name + "' can not be unfrozen");
+  if (array.frozen == frozen) return;
+  array.frozen = frozen;
+  ++structure_;
+}
+
+template <class S>
+void Tape<S>::rewind(const Mark& mark) {
+  HSI4D_CHECK(mark.arrays <= arrays_.size() && mark.nodes <= nodes_.size(), "mark lies ahead of the recording");
+  for (std::size_t n = nodes_.size(); n > mark.nodes; --n) nodes_[n - 1].table->destroy(nodes_[n - 1].op);
+  nodes_.resize(mark.nodes);
+  arrays_.resize(mark.arrays);
+  edges_.resize(mark.edges);
+  arena_.rewind(mark.memory);
+  std::erase_if(plans_, [&](const Plan& plan) { return plan.result >= mark.arrays; });
+  if (active_result_ >= mark.arrays) active_structure_ = 0;
+  ++structure_;
+}
+
+// --- values ----------------------------------------------------------------------------------------------------------
+
+template <class S>
+Array<S> Tape<S>::write(Var<S> leaf) {
+  ArrayRecord& array = arrays_[checked(leaf)];
+  HSI4D_CHECK(array.producer == kLeaf, "only leaves are written; '" + array.name + "' is computed");
+  array.version = ++clock_;
+  return {array.value, array.shape};
+}
+
+template <class S>
+void Tape<S>::set(Var<S> leaf, std::span<const S> values) {
+  copy_in(values, write(leaf));
+}
+
+template <class S>
+bool Tape<S>::has_gradient(Var<S> var) const {
+  const ArrayRecord& array = arrays_[checked(var)];
+  return array.adjoint != nullptr && !array.frozen;
+}
+
+template <class S>
+ConstArray<S> Tape<S>::gradient(Var<S> var) const {
+  HSI4D_CHECK(has_gradient(var), "array '" + arrays_[var.id].name +
+                                     "' has no gradient: it is frozen, or the last backward did not depend on it");
+  return adjoint_view(var.id);
+}
+
+// --- running ---------------------------------------------------------------------------------------------------------
+
+template <class S>
+NodeIo<S> Tape<S>::io_of(const NodeRecord& node) {
+  NodeIo<S> io;
+  io.tape_ = this;
+  io.input_ids_ = edges_.data() + node.first_edge;
+  io.input_count_ = node.edge_count;
+  io.first_output_ = node.first_output;
+  return io;
+}
+
+/// Works out which arrays need a gradient; a node whose wants changed must run again, for it may save other things.
+template <class S>
+void Tape<S>::update_structure() {
+  if (current_structure_ == structure_) return;
+  for (ArrayRecord& array : arrays_) {
+    if (array.producer == kLeaf) array.needs_gradient = !array.frozen;
+  }
+  for (NodeRecord& node : nodes_) {
+    std::uint64_t wants = 0;
+    for (std::uint32_t i = 0; i < node.edge_count; ++i) {
+      wants |= std::uint64_t(arrays_[edges_[node.first_edge + i]].needs_gradient) << i;
+    }
+    if (wants != node.wants_mask) node.ran_at = 0;
+    node.wants_mask = wants;
+    for (std::uint32_t j = 0; j < node.output_count; ++j) {
+      ArrayRecord& output = arrays_[node.first_output + j];
+      output.needs_gradient = wants != 0 && !output.frozen;
+    }
+  }
+  current_structure_ = structure_;
+}
+
+template <class S>
+typename Tape<S>::Plan& Tape<S>::plan_for(std::uint32_t result) {
+  update_structure();
+  auto found = std::find_if(plans_.begin(), plans_.end(), [&](const Plan& plan) { return plan.result == result; });
+  if (found == plans_.end()) {
+    found = plans_.emplace(plans_.end());
+    found->result = result;
+  }
+  if (found->structure != structure_) build(*found);
+  return *found;
+}
+
+template <class S>
+void Tape<S>::build(Plan& plan) {
+  plan.leaves.clear();
+  plan.forward_nodes.clear();
+  plan.backward_nodes.clear();
+  plan.adjoints.clear();
+  plan.adjoint_size = 0;
+  plan.forward_at = 0;
+  reached_.assign(arrays_.size(), 0);
+  reached_[plan.result] = 1;
+  for (std::size_t n = nodes_.size(); n-- > 0;) {
+    const NodeRecord& node = nodes_[n];
+    const auto outputs = reached_.begin() + node.first_output;
+    if (std::none_of(outputs, outputs + node.output_count, [](std::uint8_t hit) { return hit != 0; })) continue;
+    plan.forward_nodes.push_back(static_cast<std::uint32_t>(n));
+    for (std::uint32_t i = 0; i < node.edge_count; ++i) reached_[edges_[node.first_edge + i]] = 1;
+  }
+  std::reverse(plan.forward_nodes.begin(), plan.forward_nodes.end());
+  for (std::uint32_t id = 0; id < arrays_.size(); ++id) {
+    if (!reached_[id]) continue;
+    if (arrays_[id].producer == kLeaf) plan.leaves.push_back(id);
+    if (!arrays_[id].needs_gradient) continue;
+    plan.adjoints.push_back({id, plan.adjoint_size});
+    plan.adjoint_size += round_up(arrays_[id].shape.memory(), kAlignment / static_cast<Index>(sizeof(S)));
+  }
+  // A node takes part in backward when a reached output carries a gradient on (a frozen output stops it).
+  for (auto n = plan.forward_nodes.rbegin(); n != plan.forward_nodes.rend(); ++n) {
+    const NodeRecord& node = nodes_[*n];
+    for (std::uint32_t j = node.first_output; j < node.first_output + node.output_count; ++j) {
+      if (!reached_[j] || !arrays_[j].needs_gradient) continue;
+      plan.backward_nodes.push_back(*n);
+      break;
+    }
+  }
+  plan.structure = structure_;
+}
+
+template <class S>
+void Tape<S>::activate(const Plan& plan) {
+  if (active_result_ == plan.result && active_structure_ == plan.structure) return;
+  for (ArrayRecord& array : arrays_) array.adjoint = nullptr;
+  adjoints_.resize(plan.adjoint_size);
+  for (const auto& slot : plan.adjoints) arrays_[slot.array].adjoint = adjoints_.data() + slot.offset;
+  active_result_ = plan.result;
+  active_structure_ = plan.structure;
+}
+
+template <class S>
+bool Tape<S>::up_to_date(const NodeRecord& node) const {
+  if (node.ran_at == 0) return false;
+  const std::uint32_t* edge = edges_.data() + node.first_edge;
+  for (std::uint32_t i = 0; i < node.edge_count; ++i) {
+    if (arrays_[edge[i]].version > node.ran_at) return false;
+  }
+  return true;
+}
+
+template <class S>
+void Tape<S>::forward_node(NodeRecord& node) {
+  NodeIo<S> io = io_of(node);
+  const auto start = profiling_ ? Clock::now() : Clock::time_point{};
+  node.ran_at = 0;  // stays so if the operator throws
+  if (node.table->state_key != nullptr) {
+    const std::uint64_t key = node.table->state_key(node.op, io);
+    if (!node.state_valid || key != node.state_key) {
+      node.state_valid = false;
+      node.table->build_state(node.op, io);
+      node.state_key = key;
+      node.state_valid = true;
+    }
+  }
+  node.table->forward(node.op, io);
+  scratch_.reset();
+  node.ran_at = ++clock_;
+  for (std::uint32_t j = 0; j < node.output_count; ++j) arrays_[node.first_output + j].version = clock_;
+  ++node.forward_runs;
+  if (profiling_) node.forward_ns += nanoseconds_since(start);
+}
+
+template <class S>
+void Tape<S>::backward_node(NodeRecord& node) {
+  NodeIo<S> io = io_of(node);
+  const auto start = profiling_ ? Clock::now() : Clock::time_point{};
+  node.table->backward(node.op, io);
+  scratch_.reset();
+  ++node.backward_runs;
+  if (profiling_) node.backward_ns += nanoseconds_since(start);
+}
+
+template <class S>
+void Tape<S>::run_forward(Plan& plan) {
+  plan.forward_at = 0;
+  if (anomaly_) {
+    for (const std::uint32_t leaf : plan.leaves) check_finite(leaf, nullptr, false);
+  }
+  for (const std::uint32_t n : plan.forward_nodes) {
+    NodeRecord& node = nodes_[n];
+    if (up_to_date(node)) {
+      ++node.forward_skips;
+      continue;
+    }
+    forward_node(node);
+    if (!anomaly_) continue;
+    for (std::uint32_t j = 0; j < node.output_count; ++j) check_finite(node.first_output + j, &node, false);
+  }
+  plan.forward_at = clock_;
+}
+
+template <class S>
+void Tape<S>::run_backward(Plan& plan) {
+  for (const std::uint32_t n : plan.backward_nodes) {
+    NodeRecord& node = nodes_[n];
+    backward_node(node);
+    if (!anomaly_) continue;
+    for (std::uint32_t i = 0; i < node.edge_count; ++i) {
+      const std::uint32_t input = edges_[node.first_edge + i];
+      if (arrays_[input].needs_gradient) check_finite(input, &node, true);
+    }
+  }
+}
+
+template <class S>
+void Tape<S>::forward(Var<S> result) {
+  const std::uint32_t id = checked(result);
+  const FlushDenormals flush;
+  scratch_.reset();
+  run_forward(plan_for(id));
+}
+
+template <class S>
+void Tape<S>::check_leaves(const Plan& plan) const {
+  if (plan.forward_at == 0) {
+    throw StaleError("Stale: backward without a forward of the same result since it was recorded, frozen or failed");
+  }
+  for (const std::uint32_t leaf : plan.leaves) {
+    if (arrays_[leaf].version > plan.forward_at) {
+      throw StaleError("Stale: array '" + arrays_[leaf].name + "' was written after the forward run");
+    }
+  }
+}
+
+template <class S>
+void Tape<S>::backward(Var<S> loss) {
+  HSI4D_CHECK(shape(loss).is_scalar(), detail::both_values("a loss is one number; shape", shape(loss)));
+  const S one = 1;
+  backward(loss, std::span(&one, 1));
+}
+
+template <class S>
+void Tape<S>::backward(Var<S> result, std::span<const S> cotangent) {
+  const std::uint32_t id = checked(result);
+  HSI4D_CHECK_EQ(static_cast<Index>(cotangent.size()), arrays_[id].shape.count());
+  Plan& plan = plan_for(id);
+  check_leaves(plan);
+  activate(plan);
+  const FlushDenormals flush;
+  scratch_.reset();
+  if (plan.adjoint_size > 0) std::memset(adjoints_.data(), 0, static_cast<std::size_t>(plan.adjoint_size) * sizeof(S));
+  if (!arrays_[id].needs_gradient) return;
+  copy_in(cotangent, adjoint_view(id));
+  try {
+    run_backward(plan);
+  } catch (...) {
+    plan.forward_at = 0;    // what nodes saved may be half used
+    active_structure_ = 0;  // gradients are not to be read
+    for (ArrayRecord& array : arrays_) array.adjoint = nullptr;
+    throw;
+  }
+}
+
+template <class S>
+std::uint64_t Tape<S>::signature(Var<S> result) {
+  Signature signature;
+  for (const std::uint32_t n : plan_for(checked(result)).forward_nodes) {
+    if (nodes_[n].table->add_signature == nullptr) continue;
+    NodeIo<S> io = io_of(nodes_[n]);
+    nodes_[n].table->add_signature(nodes_[n].op, signature, io);
+  }
+  return signature.value();
+}
+
+template <class S>
+void Tape<S>::drop_state() {
+  for (NodeRecord& node : nodes_) {
+    if (node.table->state_key == nullptr) continue;
+    node.state_valid = false;
+    node.ran_at = 0;
+  }
+}
+
+// --- looking inside --------------------------------------------------------------------------------------------------
+
+template <class S>
+void Tape<S>::check_finite(std::uint32_t id, const NodeRecord* node, bool adjoint) const {
+  const ArrayRecord& array = arrays_[id];
+  const ConstArray<S> numbers = adjoint ? adjoint_view(id) : view(id);
+  const Index bad = first_non_finite(numbers);
+  if (bad < 0) return;
+  const Index row = bad / array.shape.cols;
+  const Index plane = row / array.shape.rows;
+  NonFiniteError::Place place;
+  place.node = node == nullptr ? "leaf" : node->table->name;
+  place.array = array.name.empty() ? "#" + std::to_string(id) : array.name;
+  place.source = source_name(node == nullptr ? array.where : node->where);
+  place.phase = adjoint ? "backward" : "forward";
+  place.plane = plane;
+  place.row = row - plane * array.shape.rows;
+  place.col = bad % array.shape.cols;
+  place.value = static_cast<double>(numbers.row(row)[place.col]);
+  throw NonFiniteError(std::move(place));
+}
+
+template <class S>
+std::vector<NodeStatistics> Tape<S>::statistics() const {
+  std::vector<NodeStatistics> all;
+  all.reserve(nodes_.size());
+  for (const NodeRecord& node : nodes_) {
+    NodeStatistics s;
+    s.name = node.table->name;
+    s.source = source_name(node.where);
+    s.forward_runs = node.forward_runs;
+    s.forward_skips = node.forward_skips;
+    s.backward_runs = node.backward_runs;
+    s.forward_ns = node.forward_ns;
+    s.backward_ns = node.backward_ns;
+    for (std::uint32_t j = node.first_output; j < node.first_output + node.output_count; ++j) {
+      const Index bytes = arrays_[j].shape.memory() * static_cast<Index>(sizeof(S));
+      s.value_bytes += bytes;
+      if (arrays_[j].adjoint != nullptr) s.adjoint_bytes += bytes;
+    }
+    if (node.table->saved_bytes != nullptr) s.saved_bytes = node.table->saved_bytes(node.op);
+    all.push_back(std::move(s));
+  }
+  return all;
+}
+
+template <class S>
+void Tape<S>::clear_statistics() {
+  for (NodeRecord& node : nodes_) {
+    node.forward_runs = node.forward_skips = node.backward_runs = 0;
+    node.forward_ns = node.backward_ns = 0;
+  }
+}
+
+template <class S>
+Index Tape<S>::memory_bytes() const {
+  Index bytes = arena_.capacity_bytes() + scratch_.capacity_bytes() + adjoints_.capacity_bytes();
+  for (const NodeRecord& node : nodes_) {
+    if (node.table->saved_bytes != nullptr) bytes += node.table->saved_bytes(node.op);
+  }
+  return bytes;
+}
+
+template class Tape<float>;
+template class Tape<double>;
+
+}  // namespace hsi4d

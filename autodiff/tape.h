@@ -1,0 +1,374 @@
+// The reverse-mode tape.
+//
+// A tape holds arrays and nodes. A leaf array is a parameter or a constant; every other array is the output of a node,
+// which is one operator with a hand-written adjoint. The graph is recorded once and replayed:
+//
+//   Tape<double> tape;
+//   Var<double> x = tape.parameter("x", shape_of(10, 3));
+//   Var<double> loss = sum(square(x));          // records nodes; computes nothing
+//   fill(tape.write(x), ...);                   // any number of times:
+//   tape.forward(loss);                         //   runs the nodes whose inputs changed
+//   tape.backward(loss);                        //   d loss / d every unfrozen parameter
+//   ... tape.gradient(x), tape.write(x) ...
+//
+// forward runs the nodes on the way to the loss whose inputs were written or recomputed since they last ran, so what
+// does not change (a frozen body's shape, a target's statistics) is computed once. backward visits the nodes between
+// unfrozen parameters and the loss only; arrays outside of that have no adjoint at all. A steady iteration allocates
+// nothing. See docs/architecture.md for how to write an operator.
+#pragma once
+
+#include <cstring>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "autodiff/arena.h"
+#include "autodiff/array.h"
+#include "core/check.h"
+
+namespace hsi4d {
+
+template <class S>
+class Tape;
+template <class S>
+class TapeInspector;
+
+/// Handle of an array on a tape: plain data, copied freely, valid until the tape is rewound past it.
+template <class S>
+struct Var {
+  Tape<S>* tape = nullptr;
+  std::uint32_t id = 0;
+  std::uint32_t stamp = 0;  ///< tells a handle from before a rewind
+
+  const Shape& shape() const;
+};
+
+/// backward was asked for after a value had been written, or a parameter frozen, since the forward run.
+class StaleError : public InternalError {
+ public:
+  using InternalError::InternalError;
+};
+
+/// The first non-finite number that anomaly mode met.
+class NonFiniteError : public std::runtime_error {
+ public:
+  struct Place {
+    std::string node;      ///< operator, or "leaf"
+    std::string array;     ///< name of the array, or its number
+    std::string source;    ///< file:line that recorded it
+    std::string phase;     ///< "forward" or "backward"
+    Index plane, row, col;
+    double value;
+  };
+  explicit NonFiniteError(Place place);
+  const Place& place() const { return place_; }
+
+ private:
+  Place place_;
+};
+
+/// Hash of an operator's discrete choices (visibility, order, branches): equal when the same choices were made, so that
+/// a gradient check can tell a kink from a bug.
+class Signature {
+ public:
+  void add(std::uint64_t word) {
+    hash_ = (hash_ ^ word) * 0x9E3779B97F4A7C15u;
+    hash_ ^= hash_ >> 29;
+  }
+  template <class T>
+  void add_all(std::span<const T> values) {
+    for (const T value : values) add(static_cast<std::uint64_t>(value));
+  }
+  std::uint64_t value() const { return hash_; }
+
+ private:
+  std::uint64_t hash_ = 0x243F6A8885A308D3u;
+};
+
+/// What a running node sees: its inputs, outputs and their adjoints.
+template <class S>
+class NodeIo {
+ public:
+  int inputs() const { return static_cast<int>(input_count_); }
+  ConstArray<S> in(int i) const { return tape_->view(input_ids_[i]); }
+  Array<S> out(int j = 0) const { return tape_->view(first_output_ + static_cast<std::uint32_t>(j)); }
+  /// True when input i needs a gradient; only then may d_in(i) be asked for. Fixed between forward and its backward, so
+  /// forward may save only what backward will need.
+  bool wants(int i) const { return tape_->arrays_[input_ids_[i]].needs_gradient; }
+  /// Adjoint of input i, to be added to, never overwritten.
+  Array<S> d_in(int i) const { return tape_->adjoint_view(input_ids_[i]); }
+  /// Adjoint of output j; empty (false) when the loss does not depend on output j, which only operators with several
+  /// outputs can meet.
+  ConstArray<S> d_out(int j = 0) const { return tape_->adjoint_view(first_output_ + static_cast<std::uint32_t>(j)); }
+  /// Uninitialised memory for the duration of this call. Ask before going parallel, not inside chunks.
+  template <class T = S>
+  std::span<T> scratch(Index count) const {
+    return {tape_->scratch_.template allocate<T>(count), static_cast<std::size_t>(count)};
+  }
+
+ private:
+  friend class Tape<S>;
+  friend class TapeInspector<S>;
+  Tape<S>* tape_ = nullptr;
+  const std::uint32_t* input_ids_ = nullptr;
+  std::uint32_t input_count_ = 0;
+  std::uint32_t first_output_ = 0;
+};
+
+/// The functions of an operator type, made from its members by Tape::record.
+template <class S>
+struct OperatorTable {
+  const char* name;
+  void (*forward)(void*, NodeIo<S>&);
+  void (*backward)(void*, NodeIo<S>&);
+  void (*destroy)(void*);
+  std::uint64_t (*state_key)(void*, NodeIo<S>&);  // null: no state is kept between runs
+  void (*build_state)(void*, NodeIo<S>&);
+  void (*add_signature)(void*, Signature&, NodeIo<S>&);  // null: no discrete choices
+  Index (*saved_bytes)(const void*);                     // null: nothing saved
+  bool persistent_outputs;
+};
+
+/// Figures of one node since the tape was made or `clear_statistics`.
+struct NodeStatistics {
+  std::string name;
+  std::string source;
+  Index forward_runs = 0, forward_skips = 0, backward_runs = 0;
+  double forward_ns = 0, backward_ns = 0;  ///< only while profiling
+  Index value_bytes = 0, adjoint_bytes = 0, saved_bytes = 0;
+};
+
+/// Reverse-mode tape of arrays; see the top of the file. S is float or double. Not copyable; not for use from two threads
+/// at once, while its nodes may work in parallel inside.
+template <class S>
+class Tape {
+ public:
+  /// Point in the recording to come back to with rewind.
+  struct Mark {
+    std::size_t arrays = 0, nodes = 0, edges = 0;
+    Arena::Position memory;
+  };
+
+  Tape() = default;
+  ~Tape();
+  Tape(const Tape&) = delete;
+  Tape& operator=(const Tape&) = delete;
+
+  // --- recording ---------------------------------------------------------------------------------------------------
+
+  /// A leaf with a gradient, all zeros until written. `name` appears in messages and graph dumps.
+  Var<S> parameter(std::string_view name, const Shape& shape, Source where = Source::current());
+  /// A leaf without a gradient, all zeros until written.
+  Var<S> constant(std::string_view name, const Shape& shape, Source where = Source::current());
+  /// A constant scalar.
+  Var<S> constant(S value, Source where = Source::current());
+
+  /// Records operator `op`; returns its first output. Nothing is computed.
+  ///
+  /// Op is a struct with `static constexpr const char* kName`, `void forward(NodeIo<S>&)`, `void backward(NodeIo<S>&)`,
+  /// and any of these, each optional:
+  ///   `std::uint64_t state_key(NodeIo<S>&)`, `void build_state(NodeIo<S>&)`  state kept between runs: a function of the
+  ///       key alone. It is built before forward whenever the key differs from the last one, or state was dropped.
+  ///   `void add_signature(Signature&, NodeIo<S>&)`  its discrete choices in the last forward.
+  ///   `Index saved_bytes() const`                   memory held between forward and backward, for statistics.
+  ///   `static constexpr bool kPersistentOutputs = true`  outputs are updated in place, not rewritten.
+  template <class Op>
+  Var<S> record(Op op, std::span<const Var<S>> inputs, std::span<const Shape> outputs, Source where);
+  template <class Op>
+  Var<S> record(Op op, std::initializer_list<Var<S>> inputs, const Shape& output, Source where) {
+    return record(std::move(op), std::span(inputs.begin(), inputs.size()), std::span(&output, 1), where);
+  }
+  /// Output j of the node whose first output is `first`.
+  Var<S> output(Var<S> first, int j) const;
+
+  /// Names an array for messages and graph dumps. Returns it.
+  Var<S> name(Var<S> var, std::string_view text);
+
+  /// No gradient flows into `var` (a leaf or an intermediate) from now on / again.
+  void freeze(Var<S> var) { set_frozen(var, true); }
+  void unfreeze(Var<S> var) { set_frozen(var, false); }
+  bool frozen(Var<S> var) const { return arrays_[checked(var)].frozen; }
+
+  Mark mark() const { return {arrays_.size(), nodes_.size(), edges_.size(), arena_.position()}; }
+  /// Forgets all that was recorded after `mark`. Handles of it become invalid; values before it stay.
+  void rewind(const Mark& mark);
+
+  // --- values ------------------------------------------------------------------------------------------------------
+
+  const Shape& shape(Var<S> var) const { return arrays_[checked(var)].shape; }
+  /// The value of a leaf, to be changed: everything that depends on it is stale until the next forward.
+  Array<S> write(Var<S> leaf);
+  /// Writes the numbers of a leaf in row-major order without padding. Throws InternalError when the count differs.
+  void set(Var<S> leaf, std::span<const S> values);
+  void set(Var<S> leaf, std::initializer_list<S> values) { set(leaf, std::span(values.begin(), values.size())); }
+  /// The value as last computed or written.
+  ConstArray<S> value(Var<S> var) const { return view(checked(var)); }
+  /// d loss / d var of the last backward. Throws InternalError where has_gradient is false.
+  ConstArray<S> gradient(Var<S> var) const;
+  /// False when var is frozen, or the loss of the last backward does not depend on it.
+  bool has_gradient(Var<S> var) const;
+
+  // --- running -----------------------------------------------------------------------------------------------------
+
+  /// Brings `result` up to date. When a node throws, the tape needs another forward before a backward.
+  void forward(Var<S> result);
+  /// Adjoint of everything between the unfrozen parameters and the scalar `loss`, starting from 1.
+  /// Throws StaleError when forward(loss) is not the state of the values.
+  void backward(Var<S> loss);
+  /// As above for an array of any shape, starting from `cotangent` (row-major, without padding).
+  void backward(Var<S> result, std::span<const S> cotangent);
+  /// Discrete choices of the last forward(result).
+  std::uint64_t signature(Var<S> result);
+  /// Drops the state of every node that keeps some (start of a frame, rollback, resume): it is built anew from its key.
+  void drop_state();
+
+  // --- looking inside ----------------------------------------------------------------------------------------------
+
+  /// Anomaly mode: forward and backward stop with NonFiniteError at the first number that is not finite.
+  void set_anomaly(bool on) { anomaly_ = on; }
+  /// Measures the time of each node (two clock readings a run).
+  void set_profiling(bool on) { profiling_ = on; }
+  std::vector<NodeStatistics> statistics() const;
+  void clear_statistics();
+  /// Bytes held: values, operators and their saved buffers, adjoints, scratch.
+  Index memory_bytes() const;
+
+ private:
+  friend class NodeIo<S>;
+  friend class TapeInspector<S>;
+
+  struct ArrayRecord {
+    Shape shape;
+    S* value = nullptr;
+    S* adjoint = nullptr;        // inside the adjoint buffer of the active plan; null when there is none
+    std::uint64_t version = 0;   // clock of the last write
+    std::uint32_t producer = 0;  // node, or kLeaf
+    std::uint32_t stamp = 0;
+    bool constant = false;       // a leaf that can not be unfrozen
+    bool frozen = false;
+    bool needs_gradient = false;  // depends on an unfrozen parameter; of the current structure
+    std::string name;
+    Source where;
+  };
+  struct NodeRecord {
+    const OperatorTable<S>* table = nullptr;
+    void* op = nullptr;
+    std::uint32_t first_edge = 0, edge_count = 0;
+    std::uint32_t first_output = 0, output_count = 0;
+    std::uint64_t ran_at = 0;      // clock of the last forward; 0: must run
+    std::uint64_t wants_mask = 0;  // which inputs needed a gradient when it ran
+    std::uint64_t state_key = 0;
+    bool state_valid = false;
+    Index forward_runs = 0, forward_skips = 0, backward_runs = 0;
+    double forward_ns = 0, backward_ns = 0;
+    Source where;
+  };
+  /// What running one result takes; rebuilt when the structure (recording, freezing) changed.
+  struct Plan {
+    struct Slot {
+      std::uint32_t array;
+      Index offset;
+    };
+    std::uint32_t result = 0;
+    std::uint64_t structure = 0;
+    std::uint64_t forward_at = 0;  // clock when forward finished; 0: never, or not since the structure changed
+    std::vector<std::uint32_t> leaves, forward_nodes, backward_nodes;
+    std::vector<Slot> adjoints;
+    Index adjoint_size = 0;
+  };
+
+  static constexpr std::uint32_t kLeaf = ~std::uint32_t(0);
+
+  std::uint32_t checked(Var<S> var) const;
+  Array<S> view(std::uint32_t id) const { return {arrays_[id].value, arrays_[id].shape}; }
+  Array<S> adjoint_view(std::uint32_t id) const { return {arrays_[id].adjoint, arrays_[id].shape}; }
+  NodeIo<S> io_of(const NodeRecord& node);
+  Var<S> handle(std::uint32_t id) const { return {const_cast<Tape*>(this), id, arrays_[id].stamp}; }
+
+  Var<S> add_leaf(std::string_view name, const Shape& shape, bool constant, const Source& where);
+  std::uint32_t add_array(const Shape& shape, std::uint32_t producer, const Source& where);
+  Var<S> add_node(const OperatorTable<S>* table, void* op, std::span<const Var<S>> inputs, std::span<const Shape> outputs,
+                  const Source& where);
+  void set_frozen(Var<S> var, bool frozen);
+
+  void update_structure();
+  Plan& plan_for(std::uint32_t result);
+  void build(Plan& plan);
+  void activate(const Plan& plan);
+  void run_forward(Plan& plan);
+  void run_backward(Plan& plan);
+  void forward_node(NodeRecord& node);
+  void backward_node(NodeRecord& node);
+  bool up_to_date(const NodeRecord& node) const;
+  void check_leaves(const Plan& plan) const;
+  void check_finite(std::uint32_t array, const NodeRecord* node, bool adjoint) const;
+
+  Arena arena_;    // values and operators
+  Arena scratch_;  // within one call of one node
+  std::vector<ArrayRecord> arrays_;
+  std::vector<NodeRecord> nodes_;
+  std::vector<std::uint32_t> edges_;  // input ids of all nodes
+  std::vector<Plan> plans_;
+  std::vector<std::uint8_t> reached_;  // scratch of build
+  Buffer<S> adjoints_;
+  std::uint64_t clock_ = 1;
+  std::uint64_t structure_ = 1;          // changes with recording and freezing
+  std::uint64_t current_structure_ = 0;  // the one that needs_gradient describes
+  std::uint64_t active_structure_ = 0;   // plan whose adjoints the arrays point into
+  std::uint32_t active_result_ = 0;
+  std::uint32_t next_stamp_ = 1;
+  bool anomaly_ = false;
+  bool profiling_ = false;
+};
+
+template <class S>
+const Shape& Var<S>::shape() const {
+  return tape->shape(*this);
+}
+
+namespace detail {
+
+template <class S, class Op>
+constexpr OperatorTable<S> make_operator_table() {
+  OperatorTable<S> table{};
+  table.name = Op::kName;
+  table.forward = [](void* op, NodeIo<S>& io) { static_cast<Op*>(op)->forward(io); };
+  table.backward = [](void* op, NodeIo<S>& io) { static_cast<Op*>(op)->backward(io); };
+  table.destroy = [](void* op) { static_cast<Op*>(op)->~Op(); };
+  if constexpr (requires(Op op, NodeIo<S> io) { op.state_key(io); }) {
+    table.state_key = [](void* op, NodeIo<S>& io) { return static_cast<Op*>(op)->state_key(io); };
+    table.build_state = [](void* op, NodeIo<S>& io) { static_cast<Op*>(op)->build_state(io); };
+  }
+  if constexpr (requires(Op op, Signature s, NodeIo<S> io) { op.add_signature(s, io); }) {
+    table.add_signature = [](void* op, Signature& signature, NodeIo<S>& io) {
+      static_cast<Op*>(op)->add_signature(signature, io);
+    };
+  }
+  if constexpr (requires(const Op op) { op.saved_bytes(); }) {
+    table.saved_bytes = [](const void* op) { return static_cast<const Op*>(op)->saved_bytes(); };
+  }
+  if constexpr (requires { Op::kPersistentOutputs; }) table.persistent_outputs = Op::kPersistentOutputs;
+  return table;
+}
+
+template <class S, class Op>
+inline constexpr OperatorTable<S> kOperatorTable = make_operator_table<S, Op>();
+
+}  // namespace detail
+
+template <class S>
+template <class Op>
+Var<S> Tape<S>::record(Op op, std::span<const Var<S>> inputs, std::span<const Shape> outputs, Source where) {
+  static_assert(alignof(Op) <= kAlignment);
+  for (const Var<S>& input : inputs) checked(input);
+  void* memory = arena_.allocate(static_cast<Index>(sizeof(Op)));
+  return add_node(&detail::kOperatorTable<S, Op>, new (memory) Op(std::move(op)), inputs, outputs, where);
+}
+
+extern template class Tape<float>;
+extern template class Tape<double>;
+
+}  // namespace hsi4d
