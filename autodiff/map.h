@@ -1,0 +1,298 @@
+// Elementwise functions and sums of them, from a lambda: no adjoint is written by hand.
+//
+//   map({a, b}, [](auto x, auto y) { return x * exp(-y); })            an array of the (broadcast) shape
+//   sum_over({a, b}, [](auto x, auto y) { return square(x - y); })     one number
+//
+// The lambda is evaluated on plain numbers for the value and on dual numbers for the derivatives, block by block in
+// vector code. It must be a pure function of its arguments, written with the mathematics of dual.h.
+#pragma once
+
+#include "autodiff/blocks.h"
+#include "autodiff/dual.h"
+#include "autodiff/tape.h"
+#include "core/simd.h"
+
+namespace hsi4d {
+
+namespace detail {
+
+/// Makes an elementwise function of a lambda: the value as it is, the partial derivatives by dual numbers.
+template <class F>
+struct ByDualNumbers {
+  static constexpr const char* kName = "map";
+  F f;
+
+  template <class... T>
+  auto value(T... x) const {
+    return f(x...);
+  }
+  /// Value, and d value / d x_k into partial[k].
+  template <class S, class... T>
+  S partials(S* partial, T... x) const {
+    constexpr int kInputs = sizeof...(T);
+    int k = 0;
+    // Braces evaluate left to right, so that each argument gets its own index.
+    const std::array<Dual<S, kInputs>, kInputs> arguments{Dual<S, kInputs>::variable(x, k++)...};
+    const Dual<S, kInputs> y = std::apply(f, arguments);
+    for (int i = 0; i < kInputs; ++i) partial[i] = y.d[static_cast<std::size_t>(i)];
+    return y.value;
+  }
+};
+
+/// Calls g(x[0][i], …, x[K−1][i]).
+template <class G, class S, std::size_t K, std::size_t... k>
+auto call_at(const G& g, const std::array<const S*, K>& x, Index i, std::index_sequence<k...>) {
+  return g(x[k][i]...);
+}
+
+template <class S, std::size_t K>
+using Partials = S[K][kBlock];
+
+/// Values of a block.
+template <class S, std::size_t K, class F>
+void block_values(const F& f, const Block<S, K>& block, S* y) {
+  const auto x = block.x;
+  const auto value = [&f](auto... arguments) { return f.value(arguments...); };
+  for (Index i = 0; i < block.n; ++i) y[i] = call_at(value, x, i, std::make_index_sequence<K>());
+}
+
+/// Values of a block, and its partial derivatives times weight(i).
+template <class S, std::size_t K, class F, class W>
+void block_partials(const F& f, const Block<S, K>& block, S* y, Partials<S, K>& partial, const W& weight) {
+  const auto x = block.x;
+  for (Index i = 0; i < block.n; ++i) {
+    S p[K];
+    y[i] = call_at([&](auto... arguments) { return f.template partials<S>(p, arguments...); }, x, i,
+                   std::make_index_sequence<K>());
+    for (std::size_t k = 0; k < K; ++k) partial[k][i] = p[k] * weight(i);
+  }
+}
+
+/// Sum of a block's numbers in double: eight running sums, combined in a fixed order on every instruction set.
+template <class S>
+double block_sum(const S* y, Index n) {
+  double sums[8] = {};
+  Index i = 0;
+  for (; i + 8 <= n; i += 8) {
+    for (Index lane = 0; lane < 8; ++lane) sums[lane] += static_cast<double>(y[i + lane]);
+  }
+  for (Index lane = 0; i + lane < n; ++lane) sums[lane] += static_cast<double>(y[i + lane]);
+  return ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
+}
+
+/// Adds blocks of partial derivatives to the adjoints of K operands, in parallel, the same bits for any thread count.
+/// An operand that several chunks share gets one double slot a chunk, summed in order at the end.
+template <class S, std::size_t K>
+class AdjointSink {
+ public:
+  AdjointSink(NodeIo<S>& io, const BlockWalk<S, K>& walk, Index chunks) : walk_(walk), chunks_(chunks) {
+    for (std::size_t k = 0; k < K; ++k) {
+      wants_[k] = io.wants(static_cast<int>(k));
+      if (!wants_[k]) continue;
+      d_in_[k] = io.d_in(static_cast<int>(k));
+      if (!walk.shared_by_units(k)) continue;
+      slots_[k] = io.template scratch<double>(chunks * d_in_[k].shape.memory()).data();
+      std::fill_n(slots_[k], chunks * d_in_[k].shape.memory(), 0.0);
+    }
+  }
+  bool wants(std::size_t k) const { return wants_[k]; }
+
+  void add(Index chunk, const Block<S, K>& block, const Partials<S, K>& partial) const {
+    for (std::size_t k = 0; k < K; ++k) {
+      if (!wants_[k]) continue;
+      const Index step = walk_.column_step(k);
+      if (slots_[k] != nullptr) {
+        double* slot = slots_[k] + chunk * d_in_[k].shape.memory() + block.in[k];
+        if (step == 0) {
+          *slot += block_sum(partial[k], block.n);
+        } else {
+          for (Index i = 0; i < block.n; ++i) slot[i] += static_cast<double>(partial[k][i]);
+        }
+      } else if (step == 0) {
+        d_in_[k].data[block.in[k]] += static_cast<S>(block_sum(partial[k], block.n));
+      } else {
+        S* d = d_in_[k].data + block.in[k];
+        const S* p = partial[k];
+        for (Index i = 0; i < block.n; ++i) d[i] += p[i];
+      }
+    }
+  }
+
+  void finish() const {
+    for (std::size_t k = 0; k < K; ++k) {
+      if (!wants_[k] || slots_[k] == nullptr) continue;
+      const Index size = d_in_[k].shape.memory();
+      for (Index i = 0; i < size; ++i) {
+        double sum = 0;
+        for (Index chunk = 0; chunk < chunks_; ++chunk) sum += slots_[k][chunk * size + i];
+        d_in_[k].data[i] += static_cast<S>(sum);
+      }
+    }
+  }
+
+ private:
+  const BlockWalk<S, K>& walk_;
+  Index chunks_;
+  std::array<bool, K> wants_{};
+  std::array<Array<S>, K> d_in_{};
+  std::array<double*, K> slots_{};
+};
+
+template <class S, std::size_t K>
+BlockWalk<S, K> walk_inputs(const NodeIo<S>& io, const Shape& out) {
+  std::array<ConstArray<S>, K> in;
+  for (std::size_t k = 0; k < K; ++k) in[k] = io.in(static_cast<int>(k));
+  return BlockWalk<S, K>(out, in);
+}
+
+template <class S, std::size_t K>
+Shape broadcast_all(const Var<S>* inputs) {
+  Shape shape = inputs[0].shape();
+  for (std::size_t k = 1; k < K; ++k) shape = broadcast_shape(shape, inputs[k].shape());
+  return shape;
+}
+
+}  // namespace detail
+
+/// y = f(x_1, …, x_K) elementwise. F has `value(x...)` and `partials<S>(S* partial, x...)`.
+template <class S, std::size_t K, class F>
+struct MapOp {
+  static constexpr const char* kName = F::kName;
+  F f;
+
+  void forward(NodeIo<S>& io) {
+    const Array<S> y = io.out();
+    const auto walk = detail::walk_inputs<S, K>(io, y.shape);
+    const Partition part = walk.partition();
+    parallel_for(part.n, part.grain, [&](Index begin, Index end) {
+      on_best_isa([&] {
+        walk.run(begin, end, [&](const Block<S, K>& block) {
+          alignas(kAlignment) S values[kBlock];
+          detail::block_values(f, block, values);
+          std::copy_n(values, block.n, y.data + block.out);
+        });
+      });
+    });
+  }
+
+  void backward(NodeIo<S>& io) {
+    const ConstArray<S> d_y = io.d_out();
+    const auto walk = detail::walk_inputs<S, K>(io, d_y.shape);
+    const Partition all = walk.partition();
+    const Partition part = reduction_partition(all.n, all.grain);
+    const detail::AdjointSink<S, K> sink(io, walk, part.chunks());
+    parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+      on_best_isa([&] {
+        walk.run(begin, end, [&](const Block<S, K>& block) {
+          alignas(kAlignment) S values[kBlock];
+          alignas(kAlignment) detail::Partials<S, K> partial;
+          const S* d = d_y.data + block.out;
+          detail::block_partials(f, block, values, partial, [d](Index i) { return d[i]; });
+          sink.add(chunk, block, partial);
+        });
+      });
+    });
+    sink.finish();
+  }
+};
+
+/// Σ f(x_1, …, x_K) over all elements, in double. When a gradient is wanted the forward run evaluates the partial
+/// derivatives with the values and keeps them, so that the lambda is evaluated once an iteration.
+template <class S, std::size_t K, class F>
+struct SumOverOp {
+  static constexpr const char* kName = "sum_over";
+  F f;
+  Shape shape;           // of the broadcast inputs
+  Buffer<S> saved = {};  // partial derivatives: for each block in the order of the walk, K runs of its numbers
+
+  Index saved_bytes() const { return saved.capacity_bytes(); }
+
+  void forward(NodeIo<S>& io) {
+    const auto walk = detail::walk_inputs<S, K>(io, shape);
+    bool gradient = false;
+    for (std::size_t k = 0; k < K; ++k) gradient = gradient || io.wants(static_cast<int>(k));
+    if (gradient) saved.resize(shape.count() * static_cast<Index>(K));
+    const Partition all = walk.partition();
+    io.out().scalar() = static_cast<S>(parallel_sum(all.n, all.grain, [&](Index begin, Index end) {
+      return gradient ? sum_and_save(walk, begin, end) : sum_only(walk, begin, end);
+    }));
+  }
+
+  void backward(NodeIo<S>& io) {
+    const S d_sum = io.d_out().scalar();
+    const auto walk = detail::walk_inputs<S, K>(io, shape);
+    const Partition all = walk.partition();
+    const Partition part = reduction_partition(all.n, all.grain);
+    const detail::AdjointSink<S, K> sink(io, walk, part.chunks());
+    parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+      on_best_isa([&] {
+        const S* kept = saved_of(walk, begin);
+        walk.run(begin, end, [&](const Block<S, K>& block) {
+          alignas(kAlignment) detail::Partials<S, K> partial;
+          for (std::size_t k = 0; k < K; ++k) {
+            for (Index i = 0; i < block.n; ++i) partial[k][i] = kept[i] * d_sum;
+            kept += block.n;
+          }
+          sink.add(chunk, block, partial);
+        });
+      });
+    });
+    sink.finish();
+  }
+
+ private:
+  S* saved_of(const BlockWalk<S, K>& walk, Index unit) {
+    return saved.data() + unit * (shape.count() / std::max<Index>(1, walk.partition().n)) * static_cast<Index>(K);
+  }
+
+  double sum_only(const BlockWalk<S, K>& walk, Index begin, Index end) const {
+    double sum = 0;
+    on_best_isa([&] {
+      walk.run(begin, end, [&](const Block<S, K>& block) {
+        alignas(kAlignment) S values[kBlock];
+        detail::block_values(f, block, values);
+        sum += detail::block_sum(values, block.n);
+      });
+    });
+    return sum;
+  }
+
+  double sum_and_save(const BlockWalk<S, K>& walk, Index begin, Index end) {
+    double sum = 0;
+    on_best_isa([&] {
+      S* keep = saved_of(walk, begin);
+      walk.run(begin, end, [&](const Block<S, K>& block) {
+        alignas(kAlignment) S values[kBlock];
+        alignas(kAlignment) detail::Partials<S, K> partial;
+        detail::block_partials(f, block, values, partial, [](Index) { return S(1); });
+        for (std::size_t k = 0; k < K; ++k) keep = std::copy_n(partial[k], block.n, keep);
+        sum += detail::block_sum(values, block.n);
+      });
+    });
+    return sum;
+  }
+};
+
+/// y = f(x_1, …, x_K) elementwise, with broadcasting; f is a pure function written with the mathematics of dual.h.
+///
+/// @param inputs  arrays whose planes, rows and columns are each equal or 1
+/// @return        array of the common shape, with the padding of the first input of that shape
+/// Adjoint: every input, by dual numbers; where f branches, of the branch taken.
+/// Throws InternalError naming both shapes when they do not fit.
+template <class S, std::size_t K, class F>
+Var<S> map(const Var<S> (&inputs)[K], F f, Source where = Source::current()) {
+  using Function = detail::ByDualNumbers<F>;
+  return inputs[0].tape->record(MapOp<S, K, Function>{Function{f}}, std::span<const Var<S>>(inputs),
+                                std::array{detail::broadcast_all<S, K>(inputs)}, where);
+}
+
+/// Σ f(x_1, …, x_K) over all elements of the broadcast inputs: a scalar, summed in double in a fixed order.
+/// Arguments, adjoint and errors as `map`.
+template <class S, std::size_t K, class F>
+Var<S> sum_over(const Var<S> (&inputs)[K], F f, Source where = Source::current()) {
+  using Function = detail::ByDualNumbers<F>;
+  return inputs[0].tape->record(SumOverOp<S, K, Function>{Function{f}, detail::broadcast_all<S, K>(inputs)},
+                                std::span<const Var<S>>(inputs), std::array{kScalarShape}, where);
+}
+
+}  // namespace hsi4d
