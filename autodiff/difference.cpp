@@ -12,7 +12,7 @@ template <class S, std::size_t K, class F>
 Var<S> mean_over(const Var<S> (&inputs)[K], const F& f, const Source& where) {
   const Index count = detail::broadcast_all<S, K>(inputs).count();
   HSI4D_CHECK(count > 0, "mean of an empty array");
-  return sum_over(inputs, f, where) * Operand<S>(S(1) / static_cast<S>(count), where);
+  return sum_over(inputs, f, where) * Operand<S>(1.0 / static_cast<double>(count), where);
 }
 
 }  // namespace

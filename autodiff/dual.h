@@ -1,6 +1,7 @@
 // Dual numbers, and the mathematics that lambdas of `map` and `sum_over` may use on plain and dual numbers alike
 // (complex_step.h adds complex ones). A lambda that is not in namespace hsi4d says `using namespace hsi4d` or `using
-// hsi4d::sqrt`: the functions of <cmath> do not know dual numbers, and std::abs, min, max break them.
+// hsi4d::sqrt`: the functions of <cmath> do not know dual numbers, and std::abs, min, max break them. Constants are best floats (0.5f), which
+// serve both precisions.
 #pragma once
 
 #include <array>
@@ -86,8 +87,12 @@ template <class S, int K>
 S value_of(const Dual<S, K>& x) {
   return x.value;
 }
-/// `yes` where the condition holds, else `no`. The branch not taken contributes nothing, not even a NaN.
+/// Numbers that lambdas work on: plain, dual, complex-step.
 template <class T>
+concept LambdaNumber = requires(const T& x) { value_of(x); };
+
+/// `yes` where the condition holds, else `no`. The branch not taken contributes nothing, not even a NaN.
+template <LambdaNumber T>
 T select(bool condition, const T& yes, const T& no) {
   return condition ? yes : no;
 }
@@ -108,22 +113,22 @@ Dual<S, K> abs(const Dual<S, K>& x) {
   return x.chain(std::fabs(x.value), S(x.value > 0) - S(x.value < 0));
 }
 /// The larger / smaller; on a tie the first.
-template <class T>
+template <LambdaNumber T>
 T max(const T& a, const std::type_identity_t<T>& b) {
   return select(value_of(b) > value_of(a), b, a);
 }
-template <class T>
+template <LambdaNumber T>
 T min(const T& a, const std::type_identity_t<T>& b) {
   return select(value_of(b) < value_of(a), b, a);
 }
 
 /// x held within [low, high]; no gradient where it is held.
-template <class T, class B>
+template <LambdaNumber T, class B>
 T clamp(const T& x, B low, B high) {
   return min(max(x, T(low)), T(high));
 }
 
-template <class T>
+template <LambdaNumber T>
 T square(const T& x) {
   return x * x;
 }

@@ -59,6 +59,18 @@ struct NumberOver {
 };
 
 template <class S>
+struct OverNumber {
+  static constexpr const char* kName = "divide";
+  S number;
+  S value(S x) const { return x / number; }
+  template <class>
+  S partials(S* p, S x) const {
+    p[0] = 1 / number;
+    return x / number;
+  }
+};
+
+template <class S>
 struct Add {
   static constexpr const char* kName = "add";
   S value(S a, S b) const { return a + b; }
@@ -303,7 +315,7 @@ Var<S> operator*(Var<S> a, std::type_identity_t<Operand<S>> b) {
 }
 template <class S>
 Var<S> operator/(Var<S> a, std::type_identity_t<Operand<S>> b) {
-  if (b.is_number()) return unary(a, ScaleBy<S>{1 / b.number}, b.where);
+  if (b.is_number()) return unary(a, OverNumber<S>{b.number}, b.where);
   return binary(a, b.var, Divide<S>{}, b.where);
 }
 template <class S>
@@ -330,8 +342,8 @@ Var<S> operator-(Var<S> a) {
 // clang-format off
 template <class S> Var<S> min(Var<S> a, Var<S> b, Source where) { return binary(a, b, Minimum<S>{}, where); }
 template <class S> Var<S> max(Var<S> a, Var<S> b, Source where) { return binary(a, b, Maximum<S>{}, where); }
-template <class S> Var<S> clamp(Var<S> x, std::type_identity_t<S> low, std::type_identity_t<S> high, Source where) {
-  return unary(x, Clamp<S>{low, high}, where);
+template <class S> Var<S> clamp(Var<S> x, double low, double high, Source where) {
+  return unary(x, Clamp<S>{static_cast<S>(low), static_cast<S>(high)}, where);
 }
 template <class S> Var<S> abs(Var<S> x, Source where) { return unary(x, Absolute<S>{}, where); }
 template <class S> Var<S> square(Var<S> x, Source where) { return unary(x, Square<S>{}, where); }
@@ -343,8 +355,8 @@ template <class S> Var<S> cos(Var<S> x, Source where) { return unary(x, Cosine<S
 template <class S> Var<S> tanh(Var<S> x, Source where) { return unary(x, HyperbolicTangent<S>{}, where); }
 template <class S> Var<S> sigmoid(Var<S> x, Source where) { return unary(x, Sigmoid<S>{}, where); }
 template <class S> Var<S> softplus(Var<S> x, Source where) { return unary(x, Softplus<S>{}, where); }
-template <class S> Var<S> leaky_relu(Var<S> x, std::type_identity_t<S> slope, Source where) {
-  return unary(x, LeakyRelu<S>{slope}, where);
+template <class S> Var<S> leaky_relu(Var<S> x, double slope, Source where) {
+  return unary(x, LeakyRelu<S>{static_cast<S>(slope)}, where);
 }
 template <class S> Var<S> stop_gradient(Var<S> x, Source where) {
   Var<S> y = x.tape->record(StopGradientOp<S>{}, {x}, x.shape(), where);
@@ -364,7 +376,7 @@ template <class S> Var<S> stop_gradient(Var<S> x, Source where) {
   template Var<S> operator-(Var<S>);                                            \
   template Var<S> min(Var<S>, Var<S>, Source);                                  \
   template Var<S> max(Var<S>, Var<S>, Source);                                  \
-  template Var<S> clamp(Var<S>, std::type_identity_t<S>, std::type_identity_t<S>, Source); \
+  template Var<S> clamp(Var<S>, double, double, Source);             \
   template Var<S> abs(Var<S>, Source);                                          \
   template Var<S> square(Var<S>, Source);                                       \
   template Var<S> sqrt(Var<S>, Source);                                         \
@@ -375,7 +387,7 @@ template <class S> Var<S> stop_gradient(Var<S> x, Source where) {
   template Var<S> tanh(Var<S>, Source);                                         \
   template Var<S> sigmoid(Var<S>, Source);                                      \
   template Var<S> softplus(Var<S>, Source);                                     \
-  template Var<S> leaky_relu(Var<S>, std::type_identity_t<S>, Source);          \
+  template Var<S> leaky_relu(Var<S>, double, Source);                           \
   template Var<S> stop_gradient(Var<S>, Source);
 HSI4D_ELEMENTWISE(float)
 HSI4D_ELEMENTWISE(double)

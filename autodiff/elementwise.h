@@ -12,7 +12,7 @@ namespace hsi4d {
 template <class S>
 struct Operand {
   Operand(Var<S> v, Source w = Source::current()) : var(v), where(w) {}     // NOLINT(google-explicit-constructor)
-  Operand(S x, Source w = Source::current()) : number(x), where(w) {}      // NOLINT(google-explicit-constructor)
+  Operand(double x, Source w = Source::current()) : number(static_cast<S>(x)), where(w) {}  // NOLINT(google-explicit-constructor)
   bool is_number() const { return var.tape == nullptr; }
 
   Var<S> var;
@@ -23,7 +23,7 @@ struct Operand {
 /// Left-hand side that is a plain number.
 template <class S>
 struct Number {
-  Number(S x, Source w = Source::current()) : value(x), where(w) {}  // NOLINT(google-explicit-constructor)
+  Number(double x, Source w = Source::current()) : value(static_cast<S>(x)), where(w) {}  // NOLINT(google-explicit-constructor)
   S value;
   Source where;
 };
@@ -43,8 +43,7 @@ template <class S> Var<S> operator-(Var<S> a);
 template <class S> Var<S> min(Var<S> a, Var<S> b, Source where = Source::current());
 template <class S> Var<S> max(Var<S> a, Var<S> b, Source where = Source::current());
 /// x held within [low, high]; the gradient is zero where it is held.
-template <class S> Var<S> clamp(Var<S> x, std::type_identity_t<S> low, std::type_identity_t<S> high,
-                                Source where = Source::current());
+template <class S> Var<S> clamp(Var<S> x, double low, double high, Source where = Source::current());
 /// |x|; the gradient at 0 is 0.
 template <class S> Var<S> abs(Var<S> x, Source where = Source::current());
 template <class S> Var<S> square(Var<S> x, Source where = Source::current());
@@ -60,7 +59,7 @@ template <class S> Var<S> sigmoid(Var<S> x, Source where = Source::current());
 /// log(1 + eˣ).
 template <class S> Var<S> softplus(Var<S> x, Source where = Source::current());
 /// x where x > 0, else slope·x; the gradient at 0 is slope.
-template <class S> Var<S> leaky_relu(Var<S> x, std::type_identity_t<S> slope, Source where = Source::current());
+template <class S> Var<S> leaky_relu(Var<S> x, double slope, Source where = Source::current());
 /// The value of x with no gradient behind it.
 template <class S> Var<S> stop_gradient(Var<S> x, Source where = Source::current());
 // clang-format on

@@ -53,7 +53,7 @@ template <class S, std::size_t K, class F>
 void block_values(const F& f, const Block<S, K>& block, S* y) {
   const auto x = block.x;
   const auto value = [&f](auto... arguments) { return f.value(arguments...); };
-  for (Index i = 0; i < block.n; ++i) y[i] = call_at(value, x, i, std::make_index_sequence<K>());
+  for (Index i = 0; i < block.n; ++i) y[i] = static_cast<S>(call_at(value, x, i, std::make_index_sequence<K>()));
 }
 
 /// Values of a block, and its partial derivatives times weight(i).

@@ -1,0 +1,230 @@
+#include "autodiff/gradcheck.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "autodiff/inspect.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// Uniform number in [−1, 1) that depends on (seed, i) alone [splitmix64].
+double random_at(std::uint64_t seed, std::uint64_t i) {
+  std::uint64_t z = seed * 0xD1342543DE82EF95u + (i + 1) * 0x9E3779B97F4A7C15u;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
+}
+
+std::vector<double> random_cotangent(std::uint64_t seed, Index count) {
+  std::vector<double> u(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < u.size(); ++i) u[i] = random_at(seed, i);
+  return u;
+}
+
+/// Σ u_i y_i over the numbers of y, without padding.
+double dot(const std::vector<double>& u, const ConstArray<double>& y) {
+  double sum = 0;
+  for (Index r = 0; r < y.total_rows(); ++r) {
+    for (Index c = 0; c < y.shape.cols; ++c) sum += u[static_cast<std::size_t>(r * y.shape.cols + c)] * y.row(r)[c];
+  }
+  return sum;
+}
+
+double root_mean_square(const ConstArray<double>& x) {
+  double sum = 0;
+  for (Index r = 0; r < x.total_rows(); ++r) {
+    for (Index c = 0; c < x.shape.cols; ++c) sum += x.row(r)[c] * x.row(r)[c];
+  }
+  return std::sqrt(sum / static_cast<double>(std::max<Index>(1, x.shape.count())));
+}
+
+/// A scalar function of one array, its value and the discrete choices that were made on the way.
+struct Probe {
+  Array<double> x;
+  ConstArray<double> gradient;  // what the adjoint says
+  std::function<double()> value;
+  std::function<std::uint64_t()> choices;
+  GradcheckFailure place;  // filled but for the entry
+};
+
+class Checker {
+ public:
+  Checker(const GradcheckOptions& options, GradcheckReport& report) : options_(options), report_(report) {}
+
+  void check(const Probe& probe) {
+    const std::uint64_t choices = probe.choices();
+    const double scale = std::max(root_mean_square(probe.x), 1e-3);
+    const double typical = root_mean_square(probe.gradient);
+    const Index count = probe.x.shape.count();
+    for (Index k = 0; k < std::min(count, options_.entries); ++k) {
+      Index entry = k;
+      if (count > options_.entries) {
+        const double u = 0.5 * (1 + random_at(options_.seed + 77, static_cast<std::uint64_t>(k)));
+        entry = std::min(count - 1, static_cast<Index>(u * static_cast<double>(count)));
+      }
+      check_entry(probe, entry, choices, scale, typical);
+    }
+  }
+
+ private:
+  /// Central difference of sixth order; false when a discrete choice changed on the way.
+  bool difference(const Probe& probe, double* x, double step, std::uint64_t choices, double& derivative) const {
+    static constexpr double kWeights[3] = {45.0 / 60, -9.0 / 60, 1.0 / 60};
+    const double centre = *x;
+    bool smooth = true;
+    derivative = 0;
+    for (int i = 1; i <= 3; ++i) {
+      for (const int side : {1, -1}) {
+        *x = centre + side * i * step;
+        derivative += side * kWeights[i - 1] * probe.value();
+        smooth = smooth && probe.choices() == choices;
+      }
+    }
+    *x = centre;
+    derivative /= step;
+    return smooth;
+  }
+
+  void check_entry(const Probe& probe, Index entry, std::uint64_t choices, double scale, double typical) {
+    ++report_.entries;
+    const Index cols = probe.x.shape.cols;
+    double* x = probe.x.row(entry / cols) + entry % cols;
+    const double computed = probe.gradient.row(entry / cols)[entry % cols];
+    const double step = options_.step * std::max(std::fabs(*x), scale);
+    const auto error_of = [&](double expected) {
+      const double size = std::max({std::fabs(expected), std::fabs(computed), typical, 1e-30});
+      const double error = std::fabs(computed - expected) / size;
+      return std::isfinite(error) ? error : HUGE_VAL;
+    };
+    double wide = 0, narrow = 0;
+    if (!difference(probe, x, step, choices, wide)) {
+      ++report_.kinks;
+      return;
+    }
+    double error = error_of(wide);
+    if (error > options_.tolerance) {
+      // A second opinion with another step: where the two differ by more than allowed the difference is no judge.
+      const bool smooth = difference(probe, x, step / 8, choices, narrow);
+      const double disagreement = std::fabs(wide - narrow) / std::max({std::fabs(wide), std::fabs(narrow), typical, 1e-30});
+      if (error_of(narrow) < error) error = error_of(narrow);
+      if (error > options_.tolerance && (!smooth || disagreement > 0.1 * error)) {
+        ++report_.kinks;
+        return;
+      }
+    }
+    report_.worst_error = std::max(report_.worst_error, error);
+    if (error <= options_.tolerance) return;
+    GradcheckFailure failure = probe.place;
+    const Index row = entry / cols;
+    failure.plane = row / std::max<Index>(1, probe.x.shape.rows);
+    failure.row = row % std::max<Index>(1, probe.x.shape.rows);
+    failure.col = entry % cols;
+    failure.expected = narrow != 0 ? narrow : wide;
+    failure.computed = computed;
+    report_.failures.push_back(std::move(failure));
+  }
+
+  const GradcheckOptions& options_;
+  GradcheckReport& report_;
+};
+
+/// The gradient of each unfrozen leaf through the whole tape.
+void check_leaves(Tape<double>& tape, Var<double> result, const std::vector<double>& u, Checker& checker) {
+  TapeInspector<double> inspect(tape);
+  for (std::uint32_t id = 0; id < inspect.arrays(); ++id) {
+    if (!inspect.is_leaf(id) || !inspect.adjoint(id)) continue;
+    Probe probe;
+    probe.x = inspect.value(id);
+    probe.gradient = inspect.adjoint(id);
+    probe.value = [&] {
+      tape.write(inspect.handle(id));
+      tape.forward(result);
+      return dot(u, tape.value(result));
+    };
+    probe.choices = [&] { return tape.signature(result); };
+    probe.place = {"whole tape", "", inspect.array_name(id)};
+    checker.check(probe);
+    tape.write(inspect.handle(id));
+  }
+  tape.forward(result);
+}
+
+/// One operator by itself: its adjoint on random output adjoints against differences of its own forward.
+void check_node(TapeInspector<double>& inspect, std::uint32_t n, std::uint64_t seed, Checker& checker) {
+  std::vector<std::pair<std::uint32_t, std::vector<double>>> cotangents;
+  for (const std::uint32_t id : inspect.outputs(n)) {
+    const Array<double> d = inspect.adjoint(id);
+    if (!d) continue;
+    cotangents.emplace_back(id, random_cotangent(seed + id, d.shape.count()));
+    const auto& u = cotangents.back().second;
+    for (Index i = 0; i < d.shape.count(); ++i) d.row(i / d.shape.cols)[i % d.shape.cols] = u[static_cast<std::size_t>(i)];
+  }
+  if (cotangents.empty()) return;
+  for (const std::uint32_t id : inspect.inputs(n)) {
+    if (const Array<double> d = inspect.adjoint(id)) std::fill_n(d.data, d.shape.memory(), 0.0);
+  }
+  inspect.backward(n);
+  const std::vector<std::uint32_t> inputs = inspect.inputs(n);
+  for (auto id = inputs.begin(); id != inputs.end(); ++id) {
+    if (!inspect.adjoint(*id) || std::find(inputs.begin(), id, *id) != id) continue;
+    Probe probe;
+    probe.x = inspect.value(*id);
+    probe.gradient = inspect.adjoint(*id);
+    probe.value = [&] {
+      inspect.forward(n);
+      double sum = 0;
+      for (const auto& [output, u] : cotangents) sum += dot(u, inspect.value(output));
+      return sum;
+    };
+    probe.choices = [&] { return inspect.signature(n); };
+    probe.place = {inspect.operator_name(n), inspect.source(n), inspect.array_name(*id)};
+    checker.check(probe);
+  }
+  inspect.forward(n);
+}
+
+}  // namespace
+
+GradcheckReport gradcheck(Tape<double>& tape, Var<double> result, const GradcheckOptions& options) {
+  GradcheckReport report;
+  Checker checker(options, report);
+  const std::vector<double> u = random_cotangent(options.seed, tape.shape(result).count());
+  tape.forward(result);
+  tape.backward(result, u);
+  check_leaves(tape, result, u, checker);
+  if (options.each_node) {
+    TapeInspector<double> inspect(tape);
+    for (const std::uint32_t n : inspect.nodes_of(result)) check_node(inspect, n, options.seed, checker);
+    tape.backward(result, u);
+  }
+  report.too_many_kinks =
+      static_cast<double>(report.kinks) > options.kink_share * static_cast<double>(std::max<Index>(1, report.entries));
+  return report;
+}
+
+std::string GradcheckReport::text() const {
+  std::ostringstream text;
+  text << *this;
+  return text.str();
+}
+
+std::ostream& operator<<(std::ostream& stream, const GradcheckReport& report) {
+  stream << report.entries << " entries, " << report.kinks << " at kinks, worst relative error " << report.worst_error;
+  if (report.too_many_kinks) stream << "\ntoo many entries at kinks to judge";
+  constexpr std::size_t kShown = 8;
+  for (std::size_t i = 0; i < std::min(kShown, report.failures.size()); ++i) {
+    const GradcheckFailure& f = report.failures[i];
+    stream << "\n" << f.node;
+    if (!f.source.empty()) stream << " (" << f.source << ")";
+    stream << ": gradient of '" << f.array << "' at ";
+    if (f.plane != 0) stream << "plane " << f.plane << ", ";
+    stream << "row " << f.row << ", column " << f.col << ": expected " << f.expected << ", computed " << f.computed;
+  }
+  if (report.failures.size() > kShown) stream << "\n… and " << report.failures.size() - kShown << " more";
+  return stream;
+}
+
+}  // namespace hsi4d
