@@ -9,7 +9,8 @@
 
 namespace hsi4d {
 
-/// Shape of an array: `planes` × `rows` × `cols` numbers, row-major, rows `stride` numbers apart, planes following each other.
+/// Shape of an array: `planes` × `rows` × `cols` numbers, row-major, rows `stride` numbers apart, planes following each
+/// other.
 ///
 /// A plain array such as points [N,3] has one plane, N rows and stride = cols = 3. Transforms [J,3,4] are J rows of 12.
 /// An image [C,H,W] has C planes, H rows, W columns and a padded stride (see image_shape).
@@ -27,7 +28,9 @@ struct Shape {
   bool dense() const { return stride == cols; }
   bool is_scalar() const { return count() == 1; }
   /// Same planes, rows and columns; the padding may differ.
-  bool same_size(const Shape& other) const { return planes == other.planes && rows == other.rows && cols == other.cols; }
+  bool same_size(const Shape& other) const {
+    return planes == other.planes && rows == other.rows && cols == other.cols;
+  }
   bool operator==(const Shape&) const = default;
 };
 
@@ -47,7 +50,9 @@ struct Array {
   Shape shape;
 
   S& operator()(Index row, Index col) const { return data[row * shape.stride + col]; }
-  S& operator()(Index plane, Index row, Index col) const { return data[(plane * shape.rows + row) * shape.stride + col]; }
+  S& operator()(Index plane, Index row, Index col) const {
+    return data[(plane * shape.rows + row) * shape.stride + col];
+  }
   /// First number of `row`, rows counted through all planes.
   S* row(Index row) const { return data + row * shape.stride; }
   /// Rows of all planes.
@@ -56,8 +61,7 @@ struct Array {
   S& scalar() const { return *data; }
   explicit operator bool() const { return data != nullptr; }
   operator Array<const S>() const  // NOLINT(google-explicit-constructor): as T* becomes const T*
-    requires(!std::is_const_v<S>)
-  {
+      requires(!std::is_const_v<S>) {
     return {data, shape};
   }
 };

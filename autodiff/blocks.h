@@ -2,8 +2,8 @@
 //
 // A block is up to kBlock numbers of every operand, contiguous in memory: an operand that is broadcast along columns is
 // spread into a small buffer first. Loops over a block are plain counted loops, which the compiler turns into vector
-// code. The walk is cut into units for parallel loops: single numbers where all operands are dense, else rows (each with
-// all its planes), so that an operand that is broadcast over planes is touched by one chunk only.
+// code. The walk is cut into units for parallel loops: single numbers where all operands are dense, else rows (each
+// with all its planes), so that an operand that is broadcast over planes is touched by one chunk only.
 #pragma once
 
 #include <algorithm>
@@ -26,10 +26,10 @@ Shape broadcast_shape(const Shape& a, const Shape& b);
 
 template <class S, std::size_t K>
 struct Block {
-  Index n = 0;                     ///< numbers in this block
-  Index out = 0;                   ///< offset of the first in the output
-  std::array<Index, K> in{};       ///< offset of the first in each operand
-  std::array<const S*, K> x{};     ///< the numbers of each operand
+  Index n = 0;                  ///< numbers in this block
+  Index out = 0;                ///< offset of the first in the output
+  std::array<Index, K> in{};    ///< offset of the first in each operand
+  std::array<const S*, K> x{};  ///< the numbers of each operand
 };
 
 /// The walk over K operands that are broadcast to `out`.

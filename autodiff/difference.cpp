@@ -19,22 +19,26 @@ Var<S> mean_over(const Var<S> (&inputs)[K], const F& f, const Source& where) {
 
 template <class S>
 Var<S> l1(Var<S> a, Var<S> b, Source where) {
-  return mean_over({a, b}, [](auto x, auto y) { return abs(x - y); }, where);
+  return mean_over(
+      {a, b}, [](auto x, auto y) { return abs(x - y); }, where);
 }
 
 template <class S>
 Var<S> l1(Var<S> a, Var<S> b, Var<S> weight, Source where) {
-  return mean_over({a, b, weight}, [](auto x, auto y, auto w) { return w * abs(x - y); }, where);
+  return mean_over(
+      {a, b, weight}, [](auto x, auto y, auto w) { return w * abs(x - y); }, where);
 }
 
 template <class S>
 Var<S> l2(Var<S> a, Var<S> b, Source where) {
-  return mean_over({a, b}, [](auto x, auto y) { return square(x - y); }, where);
+  return mean_over(
+      {a, b}, [](auto x, auto y) { return square(x - y); }, where);
 }
 
 template <class S>
 Var<S> l2(Var<S> a, Var<S> b, Var<S> weight, Source where) {
-  return mean_over({a, b, weight}, [](auto x, auto y, auto w) { return w * square(x - y); }, where);
+  return mean_over(
+      {a, b, weight}, [](auto x, auto y, auto w) { return w * square(x - y); }, where);
 }
 
 template <class S>
@@ -64,12 +68,12 @@ Var<S> charbonnier(Var<S> a, Var<S> b, double epsilon, Source where) {
       where);
 }
 
-#define HSI4D_DIFFERENCE(S)                               \
-  template Var<S> l1(Var<S>, Var<S>, Source);             \
-  template Var<S> l1(Var<S>, Var<S>, Var<S>, Source);     \
-  template Var<S> l2(Var<S>, Var<S>, Source);             \
-  template Var<S> l2(Var<S>, Var<S>, Var<S>, Source);     \
-  template Var<S> huber(Var<S>, Var<S>, double, Source);  \
+#define HSI4D_DIFFERENCE(S)                              \
+  template Var<S> l1(Var<S>, Var<S>, Source);            \
+  template Var<S> l1(Var<S>, Var<S>, Var<S>, Source);    \
+  template Var<S> l2(Var<S>, Var<S>, Source);            \
+  template Var<S> l2(Var<S>, Var<S>, Var<S>, Source);    \
+  template Var<S> huber(Var<S>, Var<S>, double, Source); \
   template Var<S> charbonnier(Var<S>, Var<S>, double, Source);
 HSI4D_DIFFERENCE(float)
 HSI4D_DIFFERENCE(double)

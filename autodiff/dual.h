@@ -1,7 +1,7 @@
 // Dual numbers, and the mathematics that lambdas of `map` and `sum_over` may use on plain and dual numbers alike
 // (complex_step.h adds complex ones). A lambda that is not in namespace hsi4d says `using namespace hsi4d` or `using
-// hsi4d::sqrt`: the functions of <cmath> do not know dual numbers, and std::abs, min, max break them. Constants are best floats (0.5f), which
-// serve both precisions.
+// hsi4d::sqrt`: the functions of <cmath> do not know dual numbers, and std::abs, min, max break them. Constants are
+// best floats (0.5f), which serve both precisions.
 #pragma once
 
 #include <array>
@@ -20,8 +20,8 @@ struct Dual {
   Dual() = default;
   Dual(S v) : value(v) {}  // NOLINT(google-explicit-constructor): constants in formulas
   template <class T>
-    requires(std::is_arithmetic_v<T> && !std::same_as<T, S>)
-  Dual(T v) : value(static_cast<S>(v)) {}  // NOLINT(google-explicit-constructor)
+  requires(std::is_arithmetic_v<T> && !std::same_as<T, S>) Dual(T v)
+      : value(static_cast<S>(v)) {}  // NOLINT(google-explicit-constructor)
 
   /// The k-th variable.
   static Dual variable(S v, int k) {
@@ -89,7 +89,9 @@ S value_of(const Dual<S, K>& x) {
 }
 /// Numbers that lambdas work on: plain, dual, complex-step.
 template <class T>
-concept LambdaNumber = requires(const T& x) { value_of(x); };
+concept LambdaNumber = requires(const T& x) {
+  value_of(x);
+};
 
 /// `yes` where the condition holds, else `no`. The branch not taken contributes nothing, not even a NaN.
 template <LambdaNumber T>

@@ -1,18 +1,20 @@
 // Elementwise arithmetic and functions of arrays, with broadcasting.
 //
-// Sizes of planes, rows and columns must be equal or 1. Either operand of + − * / may be a plain number. Derivatives are
-// written by hand, so that a factor 0 never meets an infinity (row C11 of the stability catalogue).
+// Sizes of planes, rows and columns must be equal or 1. Either operand of + − * / may be a plain number. Derivatives
+// are written by hand, so that a factor 0 never meets an infinity (row C11 of the stability catalogue).
 #pragma once
 
 #include "autodiff/tape.h"
 
 namespace hsi4d {
 
-/// Right-hand side of an arithmetic operator: an array or a number. Converts implicitly, and so learns the caller's line.
+/// Right-hand side of an arithmetic operator: an array or a number. Converts implicitly, and so learns the caller's
+/// line.
 template <class S>
 struct Operand {
-  Operand(Var<S> v, Source w = Source::current()) : var(v), where(w) {}     // NOLINT(google-explicit-constructor)
-  Operand(double x, Source w = Source::current()) : number(static_cast<S>(x)), where(w) {}  // NOLINT(google-explicit-constructor)
+  Operand(Var<S> v, Source w = Source::current()) : var(v), where(w) {}  // NOLINT(google-explicit-constructor)
+  Operand(double x, Source w = Source::current())
+      : number(static_cast<S>(x)), where(w) {}  // NOLINT(google-explicit-constructor)
   bool is_number() const { return var.tape == nullptr; }
 
   Var<S> var;
@@ -23,7 +25,8 @@ struct Operand {
 /// Left-hand side that is a plain number.
 template <class S>
 struct Number {
-  Number(double x, Source w = Source::current()) : value(static_cast<S>(x)), where(w) {}  // NOLINT(google-explicit-constructor)
+  Number(double x, Source w = Source::current())
+      : value(static_cast<S>(x)), where(w) {}  // NOLINT(google-explicit-constructor)
   S value;
   Source where;
 };

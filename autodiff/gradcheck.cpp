@@ -10,6 +10,9 @@ namespace hsi4d {
 
 namespace {
 
+/// Stands for an operator's name where the gradient is that of a leaf through everything.
+constexpr const char* kWholeTape = "whole tape";
+
 /// Uniform number in [−1, 1) that depends on (seed, i) alone [splitmix64].
 double random_at(std::uint64_t seed, std::uint64_t i) {
   std::uint64_t z = seed * 0xD1342543DE82EF95u + (i + 1) * 0x9E3779B97F4A7C15u;
@@ -69,7 +72,29 @@ class Checker {
     }
   }
 
+  /// Checks that every entry of `twice` is two times that of `once` (both with padding).
+  void check_doubled(const Array<double>& twice, const std::vector<double>& once, const GradcheckFailure& place) {
+    double size = 0;
+    for (const double g : once) size = std::max(size, std::fabs(g));
+    for (Index i = 0; i < twice.shape.count(); ++i) {
+      const Index row = i / twice.shape.cols, col = i % twice.shape.cols;
+      const double expected = 2 * once[static_cast<std::size_t>(row * twice.shape.stride + col)];
+      if (std::fabs(twice.row(row)[col] - expected) > 1e-12 * size)
+        fail_at(place, twice.shape, i, expected, twice.row(row)[col]);
+    }
+  }
+
  private:
+  void fail_at(GradcheckFailure failure, const Shape& shape, Index entry, double expected, double computed) {
+    const Index row = entry / shape.cols;
+    failure.plane = row / shape.rows;
+    failure.row = row % shape.rows;
+    failure.col = entry % shape.cols;
+    failure.expected = expected;
+    failure.computed = computed;
+    report_.failures.push_back(std::move(failure));
+  }
+
   /// Central difference of sixth order; false when a discrete choice changed on the way.
   bool difference(const Probe& probe, double* x, double step, std::uint64_t choices, double& derivative) const {
     static constexpr double kWeights[3] = {45.0 / 60, -9.0 / 60, 1.0 / 60};
@@ -108,7 +133,8 @@ class Checker {
     if (error > options_.tolerance) {
       // A second opinion with another step: where the two differ by more than allowed the difference is no judge.
       const bool smooth = difference(probe, x, step / 8, choices, narrow);
-      const double disagreement = std::fabs(wide - narrow) / std::max({std::fabs(wide), std::fabs(narrow), typical, 1e-30});
+      const double disagreement =
+          std::fabs(wide - narrow) / std::max({std::fabs(wide), std::fabs(narrow), typical, 1e-30});
       if (error_of(narrow) < error) error = error_of(narrow);
       if (error > options_.tolerance && (!smooth || disagreement > 0.1 * error)) {
         ++report_.kinks;
@@ -117,14 +143,7 @@ class Checker {
     }
     report_.worst_error = std::max(report_.worst_error, error);
     if (error <= options_.tolerance) return;
-    GradcheckFailure failure = probe.place;
-    const Index row = entry / cols;
-    failure.plane = row / std::max<Index>(1, probe.x.shape.rows);
-    failure.row = row % std::max<Index>(1, probe.x.shape.rows);
-    failure.col = entry % cols;
-    failure.expected = narrow != 0 ? narrow : wide;
-    failure.computed = computed;
-    report_.failures.push_back(std::move(failure));
+    fail_at(probe.place, probe.x.shape, entry, narrow != 0 ? narrow : wide, computed);
   }
 
   const GradcheckOptions& options_;
@@ -145,11 +164,29 @@ void check_leaves(Tape<double>& tape, Var<double> result, const std::vector<doub
       return dot(u, tape.value(result));
     };
     probe.choices = [&] { return tape.signature(result); };
-    probe.place = {"whole tape", "", inspect.array_name(id)};
+    probe.place = {kWholeTape, "", inspect.array_name(id)};
     checker.check(probe);
     tape.write(inspect.handle(id));
   }
   tape.forward(result);
+}
+
+/// An adjoint adds: called a second time it doubles what is there. Leaves the adjoints of one call.
+void check_adds(TapeInspector<double>& inspect, std::uint32_t n, Checker& checker) {
+  std::vector<std::vector<double>> once;
+  for (const std::uint32_t id : inspect.inputs(n)) {
+    const Array<double> d = inspect.adjoint(id);
+    once.emplace_back(d.data, d.data + (d ? d.shape.memory() : 0));
+  }
+  inspect.backward(n);
+  for (std::size_t i = 0; i < once.size(); ++i) {
+    const std::uint32_t id = inspect.inputs(n)[i];
+    const Array<double> d = inspect.adjoint(id);
+    if (!d) continue;
+    checker.check_doubled(d, once[i], {inspect.operator_name(n), inspect.source(n), inspect.array_name(id)});
+  }
+  for (std::size_t i = 0; i < once.size(); ++i)
+    std::copy(once[i].begin(), once[i].end(), inspect.adjoint(inspect.inputs(n)[i]).data);
 }
 
 /// One operator by itself: its adjoint on random output adjoints against differences of its own forward.
@@ -160,14 +197,16 @@ void check_node(TapeInspector<double>& inspect, std::uint32_t n, std::uint64_t s
     if (!d) continue;
     cotangents.emplace_back(id, random_cotangent(seed + id, d.shape.count()));
     const auto& u = cotangents.back().second;
-    for (Index i = 0; i < d.shape.count(); ++i) d.row(i / d.shape.cols)[i % d.shape.cols] = u[static_cast<std::size_t>(i)];
+    for (Index i = 0; i < d.shape.count(); ++i)
+      d.row(i / d.shape.cols)[i % d.shape.cols] = u[static_cast<std::size_t>(i)];
   }
   if (cotangents.empty()) return;
   for (const std::uint32_t id : inspect.inputs(n)) {
     if (const Array<double> d = inspect.adjoint(id)) std::fill_n(d.data, d.shape.memory(), 0.0);
   }
-  inspect.backward(n);
   const std::vector<std::uint32_t> inputs = inspect.inputs(n);
+  inspect.backward(n);
+  check_adds(inspect, n, checker);
   for (auto id = inputs.begin(); id != inputs.end(); ++id) {
     if (!inspect.adjoint(*id) || std::find(inputs.begin(), id, *id) != id) continue;
     Probe probe;
@@ -214,16 +253,33 @@ std::string GradcheckReport::text() const {
 std::ostream& operator<<(std::ostream& stream, const GradcheckReport& report) {
   stream << report.entries << " entries, " << report.kinks << " at kinks, worst relative error " << report.worst_error;
   if (report.too_many_kinks) stream << "\ntoo many entries at kinks to judge";
-  constexpr std::size_t kShown = 8;
-  for (std::size_t i = 0; i < std::min(kShown, report.failures.size()); ++i) {
-    const GradcheckFailure& f = report.failures[i];
+  // One line for each wrong gradient, with its worst entry; single operators first, for they are the culprits.
+  std::vector<const GradcheckFailure*> worst;
+  std::vector<Index> counts;
+  for (const bool whole : {false, true}) {
+    for (const GradcheckFailure& f : report.failures) {
+      if ((f.node == kWholeTape) != whole) continue;
+      const auto same = std::find_if(worst.begin(), worst.end(), [&](const GradcheckFailure* w) {
+        return w->node == f.node && w->source == f.source && w->array == f.array;
+      });
+      if (same == worst.end()) {
+        worst.push_back(&f);
+        counts.push_back(1);
+        continue;
+      }
+      ++counts[static_cast<std::size_t>(same - worst.begin())];
+      if (std::fabs(f.computed - f.expected) > std::fabs((*same)->computed - (*same)->expected)) *same = &f;
+    }
+  }
+  for (std::size_t i = 0; i < worst.size(); ++i) {
+    const GradcheckFailure& f = *worst[i];
     stream << "\n" << f.node;
     if (!f.source.empty()) stream << " (" << f.source << ")";
-    stream << ": gradient of '" << f.array << "' at ";
+    stream << ": gradient of '" << f.array << "' is wrong at " << counts[i] << (counts[i] == 1 ? " entry" : " entries")
+           << ", most at ";
     if (f.plane != 0) stream << "plane " << f.plane << ", ";
     stream << "row " << f.row << ", column " << f.col << ": expected " << f.expected << ", computed " << f.computed;
   }
-  if (report.failures.size() > kShown) stream << "\n… and " << report.failures.size() - kShown << " more";
   return stream;
 }
 

@@ -1,7 +1,7 @@
 // Checks the adjoints of a recorded tape against central differences, and names the operator that is wrong.
 //
-// Works on any tape, also inside a real optimisation: values are restored afterwards. Each check takes a random cotangent
-// (the sum of the outputs alone misses errors that cancel).
+// Works on any tape, also inside a real optimisation: values are restored afterwards. Each check takes a random
+// cotangent (the sum of the outputs alone misses errors that cancel).
 #pragma once
 
 #include <iosfwd>

@@ -80,16 +80,17 @@ std::string graphviz(Tape<S>& tape, Var<S> result) {
     for (const std::uint32_t id : inspect.outputs(n)) origin[id] = "n" + std::to_string(n);
     const std::uint32_t first = inspect.outputs(n).front();
     const std::string name = inspect.array_name(first);
-    dot << "  n" << n << " [shape=box, style=rounded, color=" << colour(first) << ", label=\"" << inspect.operator_name(n)
-        << (name[0] == '#' ? "" : "\\n" + escaped(name)) << "\\n" << inspect.source(n) << "\"];\n";
+    dot << "  n" << n << " [shape=box, style=rounded, color=" << colour(first) << ", label=\""
+        << inspect.operator_name(n) << (name[0] == '#' ? "" : "\\n" + escaped(name)) << "\\n"
+        << inspect.source(n) << "\"];\n";
     for (const std::uint32_t id : inspect.inputs(n)) {
       if (inspect.is_leaf(id) && leaves.insert(id).second) {
         origin[id] = "a" + std::to_string(id);
         dot << "  a" << id << " [shape=ellipse, color=" << colour(id) << ", label=\"" << escaped(inspect.array_name(id))
             << "\"];\n";
       }
-      dot << "  " << origin[id] << " -> n" << n << " [color=" << colour(id) << ", label=\"" << text_of(inspect.shape(id))
-          << "\"];\n";
+      dot << "  " << origin[id] << " -> n" << n << " [color=" << colour(id) << ", label=\""
+          << text_of(inspect.shape(id)) << "\"];\n";
     }
   }
   dot << "}\n";

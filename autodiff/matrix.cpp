@@ -19,7 +19,8 @@ using Matrix = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>
 template <class S>
 auto rows_of(const Array<S>& x, Index first, Index count) {
   using Stored = std::conditional_t<std::is_const_v<S>, const Matrix<std::remove_const_t<S>>, Matrix<S>>;
-  return Eigen::Map<Stored, 0, Eigen::OuterStride<>>(x.row(first), count, x.shape.cols, Eigen::OuterStride<>(x.shape.stride));
+  return Eigen::Map<Stored, 0, Eigen::OuterStride<>>(x.row(first), count, x.shape.cols,
+                                                     Eigen::OuterStride<>(x.shape.stride));
 }
 
 template <class S>
@@ -27,7 +28,9 @@ auto matrix_of(const Array<S>& x) {
   return rows_of(x, 0, x.shape.rows);
 }
 
-void check_plane(const Shape& shape) { HSI4D_CHECK(shape.planes == 1, detail::both_values("one plane is wanted", shape)); }
+void check_plane(const Shape& shape) {
+  HSI4D_CHECK(shape.planes == 1, detail::both_values("one plane is wanted", shape));
+}
 
 /// y = a b.   d_a = d_y bᵀ,   d_b = aᵀ d_y.   Rows of the result are cut into fixed chunks, so that the order of every
 /// sum is that of the product kernel and does not depend on the threads.
@@ -142,7 +145,9 @@ struct GatherRowsOp {
     std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
     for (std::size_t i = 0; i < index.size(); ++i) users[next[index[i]]++] = static_cast<std::uint32_t>(i);
   }
-  Index saved_bytes() const { return static_cast<Index>((index.size() + starts.size() + users.size()) * sizeof(std::uint32_t)); }
+  Index saved_bytes() const {
+    return static_cast<Index>((index.size() + starts.size() + users.size()) * sizeof(std::uint32_t));
+  }
 
   void forward(NodeIo<S>& io) {
     const ConstArray<S> x = io.in(0);
@@ -243,14 +248,14 @@ Var<S> gather_rows(Var<S> x, std::vector<std::uint32_t> index, Source where) {
   return x.tape->record(GatherRowsOp<S>(std::move(index), shape.rows), {x}, shape_of(rows, shape.cols), where);
 }
 
-#define HSI4D_MATRIX(S)                                               \
-  template Var<S> matmul(Var<S>, Var<S>, Source);                     \
-  template Var<S> transpose(Var<S>, Source);                          \
-  template Var<S> reshape(Var<S>, Index, Index, Source);              \
-  template Var<S> slice_rows(Var<S>, Index, Index, Source);           \
-  template Var<S> slice_cols(Var<S>, Index, Index, Source);           \
-  template Var<S> concat_rows(std::span<const Var<S>>, Source);       \
-  template Var<S> concat_cols(std::span<const Var<S>>, Source);       \
+#define HSI4D_MATRIX(S)                                         \
+  template Var<S> matmul(Var<S>, Var<S>, Source);               \
+  template Var<S> transpose(Var<S>, Source);                    \
+  template Var<S> reshape(Var<S>, Index, Index, Source);        \
+  template Var<S> slice_rows(Var<S>, Index, Index, Source);     \
+  template Var<S> slice_cols(Var<S>, Index, Index, Source);     \
+  template Var<S> concat_rows(std::span<const Var<S>>, Source); \
+  template Var<S> concat_cols(std::span<const Var<S>>, Source); \
   template Var<S> gather_rows(Var<S>, std::vector<std::uint32_t>, Source);
 HSI4D_MATRIX(float)
 HSI4D_MATRIX(double)

@@ -128,11 +128,11 @@ Var<S> norm_cols(Var<S> x, Source where) {
   return sqrt(sum_cols(square(x, where), where), where);
 }
 
-#define HSI4D_REDUCE(S)                      \
-  template Var<S> sum(Var<S>, Source);       \
-  template Var<S> mean(Var<S>, Source);      \
-  template Var<S> sum_rows(Var<S>, Source);  \
-  template Var<S> sum_cols(Var<S>, Source);  \
+#define HSI4D_REDUCE(S)                     \
+  template Var<S> sum(Var<S>, Source);      \
+  template Var<S> mean(Var<S>, Source);     \
+  template Var<S> sum_rows(Var<S>, Source); \
+  template Var<S> sum_cols(Var<S>, Source); \
   template Var<S> norm_cols(Var<S>, Source);
 HSI4D_REDUCE(float)
 HSI4D_REDUCE(double)

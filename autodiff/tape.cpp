@@ -55,9 +55,9 @@ Tape<S>::~Tape() {
 template <class S>
 std::uint32_t Tape<S>::checked(Var<S> var) const {
   if (var.tape == this && var.id < arrays_.size() && arrays_[var.id].stamp == var.stamp) return var.id;
-  throw InternalError(var.tape == nullptr  ? "an empty Var was used"
-                      : var.tape != this ? "a Var of another tape was used"
-                                         : "a Var from before a rewind was used");
+  throw InternalError(var.tape == nullptr ? "an empty Var was used"
+                      : var.tape != this  ? "a Var of another tape was used"
+                                          : "a Var from before a rewind was used");
 }
 
 template <class S>

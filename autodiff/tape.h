@@ -56,10 +56,10 @@ class StaleError : public InternalError {
 class NonFiniteError : public std::runtime_error {
  public:
   struct Place {
-    std::string node;      ///< operator, or "leaf"
-    std::string array;     ///< name of the array, or its number
-    std::string source;    ///< file:line that recorded it
-    std::string phase;     ///< "forward" or "backward"
+    std::string node;    ///< operator, or "leaf"
+    std::string array;   ///< name of the array, or its number
+    std::string source;  ///< file:line that recorded it
+    std::string phase;   ///< "forward" or "backward"
     Index plane, row, col;
     double value;
   };
@@ -141,8 +141,8 @@ struct NodeStatistics {
   Index value_bytes = 0, adjoint_bytes = 0, saved_bytes = 0;
 };
 
-/// Reverse-mode tape of arrays; see the top of the file. S is float or double. Not copyable; not for use from two threads
-/// at once, while its nodes may work in parallel inside.
+/// Reverse-mode tape of arrays; see the top of the file. S is float or double. Not copyable; not for use from two
+/// threads at once, while its nodes may work in parallel inside.
 template <class S>
 class Tape {
  public:
@@ -170,7 +170,8 @@ class Tape {
   ///
   /// Op is a struct with `static constexpr const char* kName`, `void forward(NodeIo<S>&)`, `void backward(NodeIo<S>&)`,
   /// and any of these, each optional:
-  ///   `std::uint64_t state_key(NodeIo<S>&)`, `void build_state(NodeIo<S>&)`  state kept between runs: a function of the
+  ///   `std::uint64_t state_key(NodeIo<S>&)`, `void build_state(NodeIo<S>&)`  state kept between runs: a function of
+  ///   the
   ///       key alone. It is built before forward whenever the key differs from the last one, or state was dropped.
   ///   `void add_signature(Signature&, NodeIo<S>&)`  its discrete choices in the last forward.
   ///   `Index saved_bytes() const`                   memory held between forward and backward, for statistics.
@@ -247,7 +248,7 @@ class Tape {
     std::uint64_t version = 0;   // clock of the last write
     std::uint32_t producer = 0;  // node, or kLeaf
     std::uint32_t stamp = 0;
-    bool constant = false;       // a leaf that can not be unfrozen
+    bool constant = false;  // a leaf that can not be unfrozen
     bool frozen = false;
     bool needs_gradient = false;  // depends on an unfrozen parameter; of the current structure
     std::string name;
@@ -290,8 +291,8 @@ class Tape {
 
   Var<S> add_leaf(std::string_view name, const Shape& shape, bool constant, const Source& where);
   std::uint32_t add_array(const Shape& shape, std::uint32_t producer, const Source& where);
-  Var<S> add_node(const OperatorTable<S>* table, void* op, std::span<const Var<S>> inputs, std::span<const Shape> outputs,
-                  const Source& where);
+  Var<S> add_node(const OperatorTable<S>* table, void* op, std::span<const Var<S>> inputs,
+                  std::span<const Shape> outputs, const Source& where);
   void set_frozen(Var<S> var, bool frozen);
 
   void update_structure();

@@ -34,7 +34,8 @@ class Buffer {
     if (size > capacity_) {
       const Index capacity = std::max(size, capacity_ + capacity_ / 2);
       release();
-      data_ = static_cast<T*>(::operator new(static_cast<std::size_t>(capacity) * sizeof(T), std::align_val_t(kAlignment)));
+      data_ =
+          static_cast<T*>(::operator new(static_cast<std::size_t>(capacity) * sizeof(T), std::align_val_t(kAlignment)));
       capacity_ = capacity;
     }
     size_ = size;

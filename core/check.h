@@ -46,11 +46,12 @@ std::string both_values(const A& a, const B& b) {
 }  // namespace hsi4d
 
 /// Throws InternalError naming the condition and the source line unless `condition` holds.
-#define HSI4D_CHECK(condition, message) \
-  (static_cast<bool>(condition) ? void() : ::hsi4d::detail::fail_check(#condition, (message), ::hsi4d::Source::current()))
+#define HSI4D_CHECK(condition, message)  \
+  (static_cast<bool>(condition) ? void() \
+                                : ::hsi4d::detail::fail_check(#condition, (message), ::hsi4d::Source::current()))
 
 /// As HSI4D_CHECK for a == b; the message holds both values.
-#define HSI4D_CHECK_EQ(a, b)                                                                         \
-  ((a) == (b) ? void()                                                                               \
+#define HSI4D_CHECK_EQ(a, b)                                                                      \
+  ((a) == (b) ? void()                                                                            \
               : ::hsi4d::detail::fail_check(#a " == " #b, ::hsi4d::detail::both_values((a), (b)), \
                                             ::hsi4d::Source::current()))

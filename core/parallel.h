@@ -1,7 +1,8 @@
 // Parallel loops and reductions whose results are bitwise the same for any number of threads.
 //
 // Work is cut into chunks by (n, grain) alone, never by the number of threads; a chunk's result goes to the chunk's own
-// slot; slots are combined in a fixed order. Each chunk runs with denormals flushed to zero and restores the mode after.
+// slot; slots are combined in a fixed order. Each chunk runs with denormals flushed to zero and restores the mode
+// after.
 #pragma once
 
 #include <algorithm>
@@ -54,9 +55,8 @@ template <class F>
 double parallel_sum(Index n, Index grain, F&& partial) {
   std::array<double, kReductionSlots> slots;
   const Partition part = reduction_partition(n, grain);
-  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-    slots[static_cast<std::size_t>(chunk)] = partial(begin, end);
-  });
+  parallel_chunks(
+      part, [&](Index chunk, Index begin, Index end) { slots[static_cast<std::size_t>(chunk)] = partial(begin, end); });
   return pairwise_sum(slots.data(), part.chunks());
 }
 

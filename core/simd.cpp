@@ -31,7 +31,8 @@ Isa choose_isa() {
   for (const Isa isa : kAll) {
     if (std::string_view(wish) == isa_name(isa)) return std::min(isa, supported_isa());
   }
-  throw UserError("environment variable HSI4D_ISA: '" + std::string(wish) + "' is unknown; allowed: baseline, avx2, avx512");
+  throw UserError("environment variable HSI4D_ISA: '" + std::string(wish) +
+                  "' is unknown; allowed: baseline, avx2, avx512");
 }
 
 }  // namespace
@@ -43,9 +44,12 @@ Isa best_isa() {
 
 const char* isa_name(Isa isa) {
   switch (isa) {
-    case Isa::kAvx512: return "avx512";
-    case Isa::kAvx2: return "avx2";
-    case Isa::kBaseline: break;
+    case Isa::kAvx512:
+      return "avx512";
+    case Isa::kAvx2:
+      return "avx2";
+    case Isa::kBaseline:
+      break;
   }
   return "baseline";
 }

@@ -1,8 +1,8 @@
 // Run-time choice of the instruction set for plain loops.
 //
-// `on_best_isa(f)` calls f inside a function that is compiled for the best instruction set of the processor; the compiler
-// inlines f there and vectorises its loops with it. Results do not depend on the choice: contraction is off and the
-// order of every sum is written out. Kernels that need explicit vectors use Highway instead.
+// `on_best_isa(f)` calls f inside a function that is compiled for the best instruction set of the processor; the
+// compiler inlines f there and vectorises its loops with it. Results do not depend on the choice: contraction is off
+// and the order of every sum is written out. Kernels that need explicit vectors use Highway instead.
 #pragma once
 
 #include <utility>

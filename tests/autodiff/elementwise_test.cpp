@@ -55,12 +55,15 @@ TEST_CASE("elementwise functions pass the operator checks", "[parallel]") {
 
 TEST_CASE("map and its dual numbers pass the operator checks", "[parallel]") {
   const auto bump = [](auto x, auto y, auto w) { return w * exp(-square(x - y) / (1 + abs(y))) + max(x, y * 0.5f); };
-  check_operator("map", {{"x", kImage}, {"y", kImage}, {"w", kMask}},
-                 [&](const auto& in) { return map({in[0], in[1], in[2]}, bump); });
-  check_operator("sum_over", {{"x", kImage}, {"y", kImage}, {"w", kMask}},
-                 [&](const auto& in) { return sum_over({in[0], in[1], in[2]}, bump); });
-  check_operator("sum_over, many chunks", {{"x", kLarge}, {"y", kLarge}, {"w", shape_of(1, 7)}},
-                 [&](const auto& in) { return sum_over({in[0], in[1], in[2]}, bump); });
+  check_operator("map", {{"x", kImage}, {"y", kImage}, {"w", kMask}}, [&](const auto& in) {
+    return map({in[0], in[1], in[2]}, bump);
+  });
+  check_operator("sum_over", {{"x", kImage}, {"y", kImage}, {"w", kMask}}, [&](const auto& in) {
+    return sum_over({in[0], in[1], in[2]}, bump);
+  });
+  check_operator("sum_over, many chunks", {{"x", kLarge}, {"y", kLarge}, {"w", shape_of(1, 7)}}, [&](const auto& in) {
+    return sum_over({in[0], in[1], in[2]}, bump);
+  });
 }
 
 TEST_CASE("stop_gradient copies the value and has no gradient behind it") {
@@ -121,7 +124,8 @@ TEST_CASE("results are the same bits on every instruction set") {
   for (const Isa isa : {Isa::kBaseline, Isa::kAvx2, Isa::kAvx512}) {
     if (isa > best_isa()) continue;
     on_isa(isa, [&] {
-      for (std::size_t i = 0; i < x.size(); ++i) y[i] = x[i] * x[i] * 1.1 + std::sqrt(std::fabs(x[i])) / (1 + x[i] * x[i]);
+      for (std::size_t i = 0; i < x.size(); ++i)
+        y[i] = x[i] * x[i] * 1.1 + std::sqrt(std::fabs(x[i])) / (1 + x[i] * x[i]);
     });
     if (isa == Isa::kBaseline) reference = y;
     CHECK(y == reference);

@@ -12,4 +12,6 @@ TEST_CASE("a failed check names the source line and both values") {
   CHECK_NOTHROW(HSI4D_CHECK_EQ(rows, 3));
 }
 
-TEST_CASE("the version has three numbers") { CHECK(std::string(hsi4d::version()).find_first_of('.') != std::string::npos); }
+TEST_CASE("the version has three numbers") {
+  CHECK(std::string(hsi4d::version()).find_first_of('.') != std::string::npos);
+}

@@ -1,13 +1,13 @@
 #include "core/parallel.h"
 
-#include <catch2/catch.hpp>
-
 #include <atomic>
 #include <cmath>
 #include <limits>
 #include <set>
 #include <stdexcept>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 using namespace hsi4d;
 
@@ -48,10 +48,12 @@ TEST_CASE("the exception of the lowest chunk is reported and the other chunks st
     with_threads(threads, [&] {
       for (int repeat = 0; repeat < 20; ++repeat) {
         std::atomic<int> ran = 0;
-        CHECK_THROWS_WITH(run_chunks(50, [&](Index chunk) {
-          ++ran;
-          if (chunk % 10 == 7) throw std::runtime_error("chunk " + std::to_string(chunk));
-        }), "chunk 7");
+        CHECK_THROWS_WITH(run_chunks(50,
+                                     [&](Index chunk) {
+                                       ++ran;
+                                       if (chunk % 10 == 7) throw std::runtime_error("chunk " + std::to_string(chunk));
+                                     }),
+                          "chunk 7");
         CHECK(ran == 50);
       }
     });

@@ -248,7 +248,8 @@ void check_recorded(Recorded<double>& r, const std::vector<double>& cotangent, c
   check_path_independence(r, cotangent);
 }
 
-void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vector<double>& cotangent, double tolerance) {
+void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vector<double>& cotangent,
+                 double tolerance) {
   const std::vector<float> rounded(cotangent.begin(), cotangent.end());
   const auto expected = gradients(exact, std::vector<double>(rounded.begin(), rounded.end()));
   const auto computed = gradients(fast, rounded);

@@ -6,12 +6,12 @@
 // The callable is generic: it records the operator on a Tape<double> or a Tape<float>. See check_operator for the list.
 #pragma once
 
-#include <catch2/catch.hpp>
-
 #include <functional>
 #include <random>
 #include <string>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "autodiff/gradcheck.h"
 #include "autodiff/inspect.h"
@@ -55,7 +55,8 @@ struct Recorded {
 template <class S>
 std::vector<S> numbers(const ConstArray<S>& array) {
   std::vector<S> result;
-  for (Index r = 0; r < array.total_rows(); ++r) result.insert(result.end(), array.row(r), array.row(r) + array.shape.cols);
+  for (Index r = 0; r < array.total_rows(); ++r)
+    result.insert(result.end(), array.row(r), array.row(r) + array.shape.cols);
   return result;
 }
 
@@ -82,7 +83,8 @@ void record(Recorded<S>& r, const std::vector<OperatorInput>& inputs, const Valu
 }
 
 /// Values and gradients in float against double.
-void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vector<double>& cotangent, double tolerance);
+void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vector<double>& cotangent,
+                 double tolerance);
 
 }  // namespace detail
 
