@@ -191,10 +191,10 @@ struct SquareRoot {
 template <class S>
 struct Exponential {
   static constexpr const char* kName = "exp";
-  S value(S x) const { return std::exp(x); }
+  S value(S x) const { return vector_exp(x); }
   template <class>
   S partials(S* p, S x) const {
-    return p[0] = std::exp(x);
+    return p[0] = vector_exp(x);
   }
 };
 
@@ -238,7 +238,7 @@ struct HyperbolicTangent {
   template <class>
   S partials(S* p, S x) const {
     // 1 − tanh² = 1 / cosh², which keeps its relative accuracy in saturation.
-    const S e = std::exp(-2 * std::fabs(x));
+    const S e = vector_exp(-2 * std::fabs(x));
     p[0] = 4 * e / ((1 + e) * (1 + e));
     return std::tanh(x);
   }

@@ -67,8 +67,7 @@ TEST_CASE("dual numbers agree with complex step on the same lambda") {
   };
   for (const std::array<double, 3> at :
        {std::array{0.3, -0.7, 1.2}, std::array{-1.5, 0.2, 0.1}, std::array{2.0, 3.0, -2.0}}) {
-    using D = Dual<double, 3>;
-    const D y = f(D::variable(at[0], 0), D::variable(at[1], 1), D::variable(at[2], 2));
+    const Dual<double, 7u> y = f(dual_variable<0>(at[0]), dual_variable<1>(at[1]), dual_variable<2>(at[2]));
     CHECK(y.value == Approx(f(at[0], at[1], at[2])).epsilon(1e-15));
     for (std::size_t k = 0; k < 3; ++k)
       CHECK(y.d[k] == Approx(complex_step_derivative(f, at, k)).epsilon(1e-13).margin(1e-15));
