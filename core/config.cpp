@@ -268,11 +268,11 @@ ConfigField& ConfigFields::add_choice(std::string_view name, std::vector<std::st
                    const ConfigValue& value, const std::string& pointer, ConfigProblems& problems) {
     if (value.kind != Kind::kString)
       return report(value, pointer, problems,
-                    shown(value) + " is " + kind_name(value) + ", not one of the words for this", allowed);
+                    shown(value) + " is " + kind_name(value) + ", not one of the choices", allowed);
     for (std::size_t i = 0; i < words.size(); ++i) {
       if (words[i] == value.text) return set(i);
     }
-    report(value, pointer, problems, shown(value) + " is not one of the words for this",
+    report(value, pointer, problems, shown(value) + " is not one of the choices",
            allowed + did_you_mean(value.text, words));
   };
   field.write = [words, get = std::move(get)] {

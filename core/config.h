@@ -37,8 +37,8 @@ namespace hsi4d {
 /// Which numbers are allowed: `min` and `max` are allowed themselves, `above` and `below` are not. All must be finite.
 struct NumberRange {
   double min = -std::numeric_limits<double>::infinity();
-  double max = std::numeric_limits<double>::infinity();
   double above = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
   double below = std::numeric_limits<double>::infinity();
 };
 

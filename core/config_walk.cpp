@@ -11,7 +11,7 @@ namespace {
 using Kind = ConfigValue::Kind;
 using FieldKind = ConfigField::Kind;
 
-constexpr std::size_t kMostSuggested = 20;  // problems after which nobody reads suggestions any more
+constexpr std::size_t kMostSuggested = 50;  // problems after which nobody reads suggestions any more
 constexpr std::size_t kMostListed = 12;     // keys that a message lists
 
 bool is_free_key(const std::string& key) {
