@@ -267,8 +267,8 @@ ConfigField& ConfigFields::add_choice(std::string_view name, std::vector<std::st
   field.read = [words, allowed = field.allowed, set = std::move(set)](
                    const ConfigValue& value, const std::string& pointer, ConfigProblems& problems) {
     if (value.kind != Kind::kString)
-      return report(value, pointer, problems,
-                    shown(value) + " is " + kind_name(value) + ", not one of the choices", allowed);
+      return report(value, pointer, problems, shown(value) + " is " + kind_name(value) + ", not one of the choices",
+                    allowed);
     for (std::size_t i = 0; i < words.size(); ++i) {
       if (words[i] == value.text) return set(i);
     }

@@ -115,8 +115,10 @@ class Reader {
   void report_unknown(const ConfigMember& member, const std::vector<std::string>& known, const std::string& pointer) {
     std::string hint;
     if (problems_.size() < kMostSuggested) {
-      hint = did_you_mean(member.key, known);
-      if (hint.empty()) hint = elsewhere(member.key);
+      const std::string near = nearest_name(member.key, known);
+      const bool is_slip = !near.empty() && edit_distance(member.key, near) <= 1;
+      if (!is_slip) hint = elsewhere(member.key);
+      if (hint.empty()) hint = did_you_mean(member.key, known);
       if (hint.empty()) hint = listed(known);
     }
     problems_.add(member.key_origin, child_pointer(pointer, member.key), "unknown key" + hint);

@@ -107,7 +107,20 @@ struct Log {
     logger.set_level(spdlog::level::off);
     logger.set_error_handler([](const std::string&) {});  // spdlog's own writes to stderr
   }
-  void update_level() { logger.set_level(sinks->least_level()); }
+
+  void install(const spdlog::sink_ptr& target) {
+    const std::lock_guard lock(mutex_);
+    sinks->add(target);
+    logger.set_level(sinks->least_level());
+  }
+  void remove(const spdlog::sink_ptr& target) {
+    const std::lock_guard lock(mutex_);
+    sinks->remove(target);
+    logger.set_level(sinks->least_level());
+  }
+
+ private:
+  std::mutex mutex_;  // the sinks and the level that follows from them change together
 };
 
 Log& the_log() {
@@ -118,11 +131,12 @@ Log& the_log() {
 }  // namespace
 
 struct LogSink::State {
+  explicit State(spdlog::sink_ptr installed) : sink(std::move(installed)) { the_log().install(sink); }
+  ~State() { the_log().remove(sink); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
   spdlog::sink_ptr sink;
-  ~State() {
-    the_log().sinks->remove(sink);
-    the_log().update_level();
-  }
 };
 
 LogSink::LogSink(std::shared_ptr<State> state) : state_(std::move(state)) {}
@@ -134,9 +148,7 @@ namespace {
 
 LogSink install(spdlog::sink_ptr sink, LogLevel least) {
   sink->set_level(spdlog_level(least));
-  the_log().sinks->add(sink);
-  the_log().update_level();
-  return LogSink(std::make_shared<LogSink::State>(LogSink::State{std::move(sink)}));
+  return LogSink(std::make_shared<LogSink::State>(std::move(sink)));
 }
 
 }  // namespace
