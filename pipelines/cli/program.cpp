@@ -82,13 +82,17 @@ std::string join(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Refuses a first word that is no command, with the nearest one: CLI11 would only call it unexpected.
+/// Refuses a first word that is no command or option, with the nearest one: CLI11 would only call it unexpected.
 void check_command_word(int argc, const char* const* argv, CommandLine& line) {
   const std::vector<std::string> names = line.command_names();
   if (argc < 2) throw UserError("hsi4d: give a command: " + join(names) + "; `hsi4d --help` explains them");
   const std::string word = argv[1];
-  if (word.starts_with("-") || std::find(names.begin(), names.end(), word) != names.end()) return;
-  throw UserError("hsi4d: there is no command \"" + word + "\"; known: " + join(names) + did_you_mean(word, names));
+  const std::vector<std::string> options = {"-h", "--help", "--version"};
+  const bool is_option = word.starts_with("-");
+  const std::vector<std::string>& known = is_option ? options : names;
+  if (std::find(known.begin(), known.end(), word) != known.end()) return;
+  throw UserError("hsi4d: there is no " + std::string(is_option ? "option" : "command") + " \"" + word +
+                  "\"; known: " + join(known) + did_you_mean(word, known));
 }
 
 void run_commands(int argc, const char* const* argv, const std::vector<LossDescription>& losses) {

@@ -148,8 +148,8 @@ TEST_CASE("mistakes on the command line end with 2 and one message") {
         "arguments\n");
   CHECK(mistake({"check", "a.json", "--set"}) ==
         "hsi4d check: --set: 1 required KEY=VALUE missing; `hsi4d check --help` explains its arguments\n");
-  CHECK(mistake({"--frob"}) ==
-        "hsi4d: The following argument was not expected: --frob; `hsi4d --help` explains its arguments\n");
+  CHECK(mistake({"--vresion"}) ==
+        "hsi4d: there is no option \"--vresion\"; known: -h, --help, --version; did you mean \"--version\"?\n");
 }
 
 TEST_CASE("output that cannot be written is an error, not silence") {
