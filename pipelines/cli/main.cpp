@@ -1,3 +1,3 @@
 #include "pipelines/cli/program.h"
 
-int main(int argc, char** argv) { return hsi4d::cli::run_program(argc, argv); }
+int main(int argc, char** argv) { return hsi4d::cli::run_program(argc, argv, hsi4d::loss_descriptions()); }

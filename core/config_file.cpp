@@ -1,0 +1,260 @@
+#include "core/config_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+#include <iterator>
+#include <optional>
+
+#include "core/check.h"
+#include "core/config_parse.h"
+#include "core/suggest.h"
+
+namespace hsi4d {
+namespace {
+
+namespace fs = std::filesystem;
+using Kind = ConfigValue::Kind;
+using SourcePtr = std::shared_ptr<const ConfigSource>;
+
+constexpr int kFirstOverride = 1 << 20;  // overrides are told after every file
+
+SourcePtr make_source(std::string name, fs::path folder, int order, bool is_command_line) {
+  auto source = std::make_shared<ConfigSource>();
+  *source = {std::move(name), std::move(folder), order, is_command_line};
+  return source;
+}
+
+/// "; did you mean "other.json"?" from the files beside a missing one.
+std::string suggest_file(const fs::path& missing) {
+  std::vector<std::string> names;
+  std::error_code error;
+  const fs::path folder = missing.has_parent_path() ? missing.parent_path() : fs::path(".");
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+    names.push_back(it->path().filename().string());
+  std::sort(names.begin(), names.end());
+  const std::string name = nearest_name(missing.filename().string(), names);
+  return name.empty() ? "" : "; did you mean \"" + (missing.parent_path() / name).generic_string() + "\"?";
+}
+
+/// The bytes of a file, or why there are none.
+struct FileText {
+  std::string text, problem;
+};
+
+FileText read_file(const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (!fs::exists(status)) return {"", "there is no such file" + suggest_file(file)};
+  if (fs::is_directory(status)) return {"", "this is a folder, not a config file"};
+  if (fs::is_regular_file(status) && fs::file_size(file, error) > kLargestConfig)
+    return {"", "the file is larger than " + std::to_string(kLargestConfig >> 20U) + " MiB; a config is not"};
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) return {"", "the file cannot be opened for reading"};
+  std::string text(kLargestConfig + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad()) return {"", "the file cannot be read"};
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (text.size() > kLargestConfig) return {"", "the file is larger than 8 MiB; a config is not"};
+  return {std::move(text), ""};
+}
+
+/// Removes a member of the top level and hands it out.
+std::optional<ConfigMember> take_member(ConfigValue& tree, const std::string& key) {
+  for (std::size_t i = 0; i < tree.members.size(); ++i) {
+    if (tree.members[i].key != key) continue;
+    ConfigMember taken = std::move(tree.members[i]);
+    tree.members.erase(tree.members.begin() + static_cast<std::ptrdiff_t>(i));
+    return taken;
+  }
+  return std::nullopt;
+}
+
+/// Reads a chain of files.
+class Loader {
+ public:
+  explicit Loader(ConfigProblems& problems) : problems_(problems) {}
+
+  ConfigValue load(const std::string& text, const SourcePtr& source) {
+    ConfigValue tree;
+    if (!parse_config_text(text, source, problems_, tree)) {
+      broken_ = true;
+      return ConfigValue::make_object();
+    }
+    if (tree.kind != Kind::kObject) {
+      problems_.add(tree.origin, "", shown(tree) + " is " + kind_name(tree) + "; a config is an object: {...}");
+      broken_ = true;
+      return ConfigValue::make_object();
+    }
+    const auto schema = take_member(tree, "$schema");
+    if (schema && schema->value.kind != Kind::kString)
+      problems_.add(
+          schema->value.origin, "/$schema",
+          shown(schema->value) + " is " + kind_name(schema->value) + ", not a string: the file or address of a schema");
+    const auto extends = take_member(tree, "extends");
+    return extends ? merged(load_base(extends->value, *source), std::move(tree)) : tree;
+  }
+
+  /// The files that are being read, outermost first, to find cycles.
+  void enter(const fs::path& file) { chain_.push_back(file); }
+  bool broken() const { return broken_; }
+
+ private:
+  ConfigValue load_base(const ConfigValue& extends, const ConfigSource& source) {
+    ConfigValue nothing = ConfigValue::make_object();
+    if (extends.kind == Kind::kUnreadable) return nothing;
+    if (extends.kind != Kind::kString || extends.text.empty()) {
+      fail(extends, shown(extends) +
+                        (extends.kind == Kind::kString ? " is empty" : " is " + kind_name(extends) + ", not a string") +
+                        "; write the path of a config, relative to this file");
+      return nothing;
+    }
+    const fs::path file = (source.folder / extends.text).lexically_normal();
+    if (extends.text.find('\0') != std::string::npos) {
+      fail(extends, shown(extends) + " is not a path");
+      return nothing;
+    }
+    for (const fs::path& open : chain_) {
+      std::error_code error;
+      if (!fs::equivalent(open, file, error)) continue;
+      std::string names;
+      for (const fs::path& link : chain_) names += link.generic_string() + " -> ";
+      fail(extends, "the files extend each other in a circle: " + names + file.generic_string());
+      return nothing;
+    }
+    FileText content = read_file(file);
+    if (!content.problem.empty()) {
+      fail(extends, shown(extends) + ": " + content.problem + " (looked for " + file.generic_string() + ")");
+      return nothing;
+    }
+    chain_.push_back(file);
+    const int order = static_cast<int>(chain_.size());
+    return load(content.text, make_source(file.generic_string(), file.parent_path(), order, false));
+  }
+
+  // A base that is missing makes every later complaint about missing keys noise.
+  void fail(const ConfigValue& extends, const std::string& message) {
+    problems_.add(extends.origin, "/extends", message);
+    broken_ = true;
+  }
+
+  ConfigProblems& problems_;
+  std::vector<fs::path> chain_;
+  bool broken_ = false;
+};
+
+std::vector<std::string> split_dots(const std::string& key) {
+  std::vector<std::string> parts(1);
+  for (const char c : key) {
+    if (c == '.') {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+/// The value of an override: JSON, or else the text itself.
+std::optional<ConfigValue> override_value(const std::string& text, const SourcePtr& source) {
+  ConfigValue value;
+  if (parse_json_value(text, source, value)) return value;
+  if (!parse_json_value(json_string(text), source, value)) return std::nullopt;  // not UTF-8
+  return value;
+}
+
+void forget_lines(ConfigValue& value) {
+  value.origin.line = 0;
+  for (ConfigValue& item : value.items) forget_lines(item);
+  for (ConfigMember& member : value.members) {
+    member.key_origin.line = 0;
+    forget_lines(member.value);
+  }
+}
+
+/// One step down a dotted path: the place that `part` names in `node`, made if it is a new key of an object.
+ConfigValue* step_down(ConfigValue& node, const std::string& part, const std::string& pointer,
+                       const ConfigOrigin& origin, ConfigProblems& problems) {
+  if (node.kind == Kind::kArray) {
+    std::size_t index = 0;
+    const auto end = std::from_chars(part.data(), part.data() + part.size(), index);
+    if (end.ec == std::errc() && end.ptr == part.data() + part.size() && index < node.items.size())
+      return &node.items[index];
+    problems.add(origin, pointer,
+                 part + " is not an index of this array; allowed: 0 to " +
+                     std::to_string(static_cast<std::ptrdiff_t>(node.items.size()) - 1));
+    return nullptr;
+  }
+  if (node.kind != Kind::kObject) {
+    problems.add(origin, pointer, shown(node) + " is " + kind_name(node) + " and has no key \"" + part + "\"");
+    return nullptr;
+  }
+  for (ConfigMember& member : node.members) {
+    if (member.key == part) return &member.value;
+  }
+  ConfigValue made = ConfigValue::make_object();
+  made.origin = origin;
+  ConfigValue& placed = node.add(part, std::move(made));
+  node.members.back().key_origin = origin;
+  node.members.back().made_by_set = true;
+  return &placed;
+}
+
+void apply_override(ConfigValue& tree, const std::string& text, int order, ConfigProblems& problems) {
+  const SourcePtr source = make_source("--set " + text, fs::path(), order, true);
+  const ConfigOrigin origin{source, 0, 0, 0};
+  const std::size_t equals = text.find('=');
+  const std::vector<std::string> parts = split_dots(text.substr(0, equals));
+  const bool has_empty = std::any_of(parts.begin(), parts.end(), [](const std::string& part) { return part.empty(); });
+  if (equals == std::string::npos || has_empty || parts.size() > kDeepestConfig) {
+    problems.add(origin, "", "write --set KEY=VALUE with dots between nested keys, for example --set render.blur=0.1");
+    return;
+  }
+  std::optional<ConfigValue> value = override_value(text.substr(equals + 1), source);
+  if (!value) {
+    problems.add(origin, "", "the value is not UTF-8");
+    return;
+  }
+  forget_lines(*value);
+  ConfigValue* node = &tree;
+  std::string pointer;
+  for (const std::string& part : parts) {
+    node = step_down(*node, part, pointer, origin, problems);
+    if (!node) return;
+    pointer = child_pointer(pointer, part);
+  }
+  *node = std::move(*value);
+  node->origin = origin;
+}
+
+ConfigValue with_overrides(ConfigValue tree, const std::vector<std::string>& overrides, ConfigProblems& problems) {
+  int order = kFirstOverride;
+  for (const std::string& text : overrides) apply_override(tree, text, order++, problems);
+  return tree;
+}
+
+}  // namespace
+
+ConfigValue load_config(const fs::path& file, const std::vector<std::string>& overrides, ConfigProblems& problems) {
+  FileText content = read_file(file);
+  if (!content.problem.empty()) throw UserError(file.generic_string() + ": " + content.problem);
+  Loader loader(problems);
+  loader.enter(file);
+  ConfigValue tree = loader.load(content.text, make_source(file.generic_string(), file.parent_path(), 0, false));
+  if (loader.broken()) problems.throw_if_any();
+  return with_overrides(std::move(tree), overrides, problems);
+}
+
+ConfigValue config_from_overrides(const std::vector<std::string>& overrides, ConfigProblems& problems) {
+  return with_overrides(ConfigValue::make_object(), overrides, problems);
+}
+
+ConfigValue load_config_text(const std::string& text, const std::string& name, const fs::path& folder,
+                             const std::vector<std::string>& overrides, ConfigProblems& problems) {
+  Loader loader(problems);
+  ConfigValue tree = loader.load(text, make_source(name, folder, 0, false));
+  if (loader.broken()) problems.throw_if_any();
+  return with_overrides(std::move(tree), overrides, problems);
+}
+
+}  // namespace hsi4d

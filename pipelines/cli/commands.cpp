@@ -1,0 +1,97 @@
+#include "pipelines/cli/commands.h"
+
+#include <algorithm>
+#include <span>
+
+#include "core/check.h"
+#include "core/suggest.h"
+#include "pipelines/run_config.h"
+
+namespace hsi4d::cli {
+namespace {
+
+std::string count_of(std::size_t count, const std::string& one) {
+  return std::to_string(count) + " " + one + (count == 1 ? "" : one.ends_with("s") ? "es" : "s");
+}
+
+template <class T>
+std::string names_of(const ConfigMap<T>& map) {
+  std::string names;
+  for (const auto& [name, value] : map) names += (names.empty() ? "" : ", ") + name;
+  return names.empty() ? "" : " (" + names + ")";
+}
+
+std::string stage_summary(const std::string& name, const StageSettings& stage) {
+  return "  stage " + name + ": " + count_of(static_cast<std::size_t>(stage.iterations), "iteration") + ", " +
+         count_of(stage.optimize.size(), "parameter group") + names_of(stage.optimize) + ", " +
+         count_of(stage.losses.size(), "loss") + names_of(stage.losses) + "\n";
+}
+
+std::string summary(const std::filesystem::path& file, const RunConfig& config) {
+  const RenderSettings& render = config.render;
+  std::string text = file.generic_string() + ": OK\n";
+  text += "  seed " + std::to_string(config.seed) + ", ";
+  text +=
+      config.threads == 0 ? "one thread a core\n" : count_of(static_cast<std::size_t>(config.threads), "thread") + "\n";
+  text += "  render: quality " + std::string(choice_name<Quality>(kQualities, render.quality));
+  if (render.compatibility != Compatibility::kNone)
+    text += ", as " + std::string(choice_name<Compatibility>(kCompatibilities, render.compatibility));
+  text += "\n";
+  for (const auto& [name, stage] : config.stages) text += stage_summary(name, stage);
+  if (config.stages.empty()) text += "  no stages\n";
+  return text;
+}
+
+/// Columns of equal width, two blanks apart.
+std::string table(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  std::string text;
+  for (const auto& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      text += row[i];
+      if (i + 1 < row.size()) text.append(widths[i] - row[i].size() + 2, ' ');
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string list_losses(const std::vector<LossDescription>& losses) {
+  std::vector<std::vector<std::string>> rows;
+  for (const LossDescription& loss : losses) rows.push_back({loss.name, loss.summary});
+  return table(rows);
+}
+
+std::string list_all_settings(const std::vector<LossDescription>& losses) {
+  std::vector<std::vector<std::string>> rows = {{"SETTING", "DEFAULT", "ALLOWED", "MEANING"}};
+  for (const ConfigSetting& setting : run_config_settings(losses))
+    rows.push_back({setting.pointer, setting.initial, setting.allowed, setting.summary});
+  return table(rows);
+}
+
+}  // namespace
+
+std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
+                          bool print_config, const std::vector<LossDescription>& losses) {
+  const RunConfig run = load_run_config(config, overrides, losses);
+  return print_config ? resolved_config(run, losses) : summary(config, run);
+}
+
+std::string schema_command(const std::vector<LossDescription>& losses) { return run_config_schema(losses); }
+
+std::vector<std::string> list_topics() { return {"losses", "settings"}; }
+
+std::string list_command(const std::string& topic, const std::vector<LossDescription>& losses) {
+  if (topic == "losses") return list_losses(losses);
+  if (topic == "settings") return list_all_settings(losses);
+  std::string known;
+  for (const std::string& name : list_topics()) known += (known.empty() ? "" : ", ") + name;
+  throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + known +
+                  did_you_mean(topic, list_topics()));
+}
+
+}  // namespace hsi4d::cli

@@ -1,0 +1,39 @@
+// The only home of the renderer's thresholds: alpha, blur and stop constants. Everything else reads RenderSettings,
+// whose defaults and presets are made of these.
+#pragma once
+
+namespace hsi4d {
+
+/// Alpha is held at or below this. 1 − 2⁻¹² leaks less than a sixteenth of an 8-bit step through an opaque Gaussian,
+/// and dividing T by 1 − α on the way back stays exact to a few ulp (stability B2, B16).
+inline constexpr double kAlphaCap = 1.0 - 1.0 / 4096;
+/// No cap: needs the backward pass that does not divide.
+inline constexpr double kNoAlphaCap = 1.0;
+inline constexpr double kAlphaCapCompatible = 0.99;
+
+/// A Gaussian fainter than this at a pixel is skipped there: one 8-bit step (stability B5).
+inline constexpr double kAlphaMin = 1.0 / 255;
+inline constexpr double kAlphaMinAccurate = 1e-5;
+
+/// Compositing of a pixel ends when the transmittance falls below this (stability B4).
+inline constexpr double kTransmittanceStop = 1e-4;
+inline constexpr double kTransmittanceStopFast = 1e-3;
+inline constexpr double kTransmittanceStopAccurate = 1e-7;
+
+/// Variance of the low-pass filter added to every projected covariance, pixels².
+inline constexpr double kBlur = 0.3;
+
+/// Gaussians at or nearer than this camera z are culled, metres.
+inline constexpr double kNear = 0.01;
+inline constexpr double kNearInria = 0.2;
+
+/// x/z and y/z of the projection's Jacobian are held within this many half-widths of the view.
+inline constexpr double kFrustumClamp = 1.3;
+
+/// Highest degree of the spherical harmonics.
+inline constexpr int kHighestShDegree = 3;
+
+/// Side of a square tile, pixels.
+inline constexpr int kTile = 16;
+
+}  // namespace hsi4d

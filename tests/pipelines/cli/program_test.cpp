@@ -1,0 +1,162 @@
+#include "pipelines/cli/program.h"
+
+#include <algorithm>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/version.h"
+#include "pipelines/cli/commands.h"
+#include "pipelines/run_config.h"
+#include "tests/support/program.h"
+#include "tests/support/test_losses.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+using Catch::Matchers::Equals;
+
+namespace {
+
+std::vector<std::filesystem::path> shipped_configs() {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(HSI4D_SOURCE_DIR) / "configs")) {
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+cli::Failure failure_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (...) {
+    return cli::describe_failure(std::current_exception());
+  }
+  return {0, ""};
+}
+
+}  // namespace
+
+TEST_CASE("exit statuses tell the user's mistakes from our bugs") {
+  CHECK(failure_of([] { throw UserError("mistake"); }).status == 2);
+  CHECK(failure_of([] { throw DataError("bad file"); }).message == "bad file");
+  CHECK(failure_of([] { throw DataError("bad file"); }).status == 2);
+  const cli::Failure bug = failure_of([] { throw InternalError("impossible"); });
+  CHECK(bug.status == 3);
+  CHECK(bug.message == "this is a bug in hsi4d, please report it: impossible");
+  CHECK(failure_of([] { throw std::runtime_error("other"); }).status == 3);
+  CHECK(failure_of([] { throw 7; }).message ==
+        "this is a bug in hsi4d, please report it: an exception of unknown type");
+}
+
+TEST_CASE("every shipped config passes check, and reads back from its resolved form") {
+  const TemporaryFolder folder;
+  REQUIRE(shipped_configs().size() >= 2);
+  for (const std::filesystem::path& file : shipped_configs()) {
+    INFO(file);
+    const ProgramResult check = run_hsi4d({"check", file.string()});
+    CHECK(check.status == 0);
+    CHECK(check.err.empty());
+    CHECK_THAT(check.out, Contains(": OK\n"));
+    const ProgramResult printed = run_hsi4d({"check", file.string(), "--print-config"});
+    CHECK(printed.status == 0);
+    folder.write("resolved.json", printed.out);
+    const ProgramResult again = run_hsi4d({"check", "resolved.json", "--print-config"});
+    CHECK(again.status == 0);
+    CHECK(again.out == printed.out);
+  }
+}
+
+TEST_CASE("check takes overrides before and after the config") {
+  const TemporaryFolder folder;
+  folder.write("a.json", "{}");
+  const ProgramResult result =
+      run_hsi4d({"check", "--set", "render.blur=0.5", "a.json", "--set", "seed=4", "--print-config"});
+  CHECK(result.err.empty());
+  CHECK_THAT(result.out, Contains("\"blur\": 0.5") && Contains("\"seed\": 4"));
+  CHECK_THAT(run_hsi4d({"check", "a.json", "--set", "threads=1"}).out,
+             Equals("a.json: OK\n  seed 0, 1 thread\n  render: quality default\n  no stages\n"));
+}
+
+TEST_CASE("the summary of check tells what will run") {
+  const TemporaryFolder folder;
+  folder.write("a.json", R"({"render": {"compatibility": "gsplat"}, "stages": {"camera": {"iterations": 1,
+    "optimize": {"camera": {"lr": 1}}, "losses": {"photo": {}, "centre": {}}}}})");
+  CHECK_THAT(cli::check_command("a.json", {}, false, test_losses()),
+             Equals("a.json: OK\n  seed 0, one thread a core\n  render: quality default, as gsplat\n"
+                    "  stage camera: 1 iteration, 1 parameter group (camera), 2 losses (photo, centre)\n"));
+}
+
+TEST_CASE("schema prints JSON that refuses unknown keys") {
+  const TemporaryFolder folder;
+  const ProgramResult result = run_hsi4d({"schema"});
+  CHECK(result.status == 0);
+  const nlohmann::json schema = nlohmann::json::parse(result.out);
+  CHECK(schema["additionalProperties"] == false);
+  CHECK(schema["properties"]["render"]["properties"]["blur"]["default"] == 0.3);
+  CHECK(result.out == run_config_schema(loss_descriptions()));
+}
+
+TEST_CASE("list tells losses and settings") {
+  CHECK_THAT(cli::list_command("losses", test_losses()),
+             Equals("photo   Difference of images\ncentre  Distance of centres\n"));
+  CHECK_THAT(cli::list_command("settings", test_losses()),
+             Contains("/render/blur") && Contains("/stages/NAME/losses/photo/ssim_share"));
+  CHECK_THROWS_MATCHES(
+      cli::list_command("loses", test_losses()), UserError,
+      Catch::Matchers::Message("hsi4d list: there is nothing called \"loses\" to list; known: losses, settings; "
+                               "did you mean \"losses\"?"));
+  const TemporaryFolder folder;
+  const ProgramResult result = run_hsi4d({"list", "losses"});
+  CHECK(result.status == 0);
+  CHECK(result.out == cli::list_command("losses", loss_descriptions()));
+}
+
+TEST_CASE("--version and --help, of the program and of every subcommand") {
+  const TemporaryFolder folder;
+  const ProgramResult version_text = run_hsi4d({"--version"});
+  CHECK(version_text.status == 0);
+  CHECK(version_text.out == std::string("hsi4d ") + version() + "\n");
+  const ProgramResult help = run_hsi4d({"--help"});
+  CHECK(help.status == 0);
+  for (const char* command : {"check", "schema", "list"}) {
+    CHECK_THAT(help.out, Contains(command));
+    const ProgramResult own = run_hsi4d({command, "--help"});
+    CHECK(own.status == 0);
+    CHECK(own.err.empty());
+    CHECK_THAT(own.out, Contains(std::string("hsi4d ") + command));
+  }
+}
+
+TEST_CASE("mistakes on the command line end with 2 and one message") {
+  const TemporaryFolder folder;
+  const auto mistake = [](const std::vector<std::string>& arguments) {
+    const ProgramResult result = run_hsi4d(arguments);
+    CHECK(result.status == 2);
+    CHECK(result.out.empty());
+    return result.err;
+  };
+  CHECK(mistake({"chek"}) ==
+        "hsi4d: there is no command \"chek\"; known: check, schema, list; did you mean \"check\"?\n");
+  CHECK(mistake({"frobnicate"}) == "hsi4d: there is no command \"frobnicate\"; known: check, schema, list\n");
+  CHECK(mistake({}) == "hsi4d: give a command: check, schema, list; `hsi4d --help` explains them\n");
+  CHECK(mistake({"check"}) == "hsi4d check: CONFIG is required; `hsi4d check --help` explains its arguments\n");
+  CHECK(mistake({"check", "a.json", "--sett", "x=1"}) ==
+        "hsi4d check: The following arguments were not expected: x=1 --sett; `hsi4d check --help` explains its "
+        "arguments\n");
+  CHECK(mistake({"check", "a.json", "--set"}) ==
+        "hsi4d check: --set: 1 required KEY=VALUE missing; `hsi4d check --help` explains its arguments\n");
+  CHECK(mistake({"--vresion"}) ==
+        "hsi4d: there is no option \"--vresion\"; known: -h, --help, --version; did you mean \"--version\"?\n");
+}
+
+TEST_CASE("output that cannot be written is an error, not silence") {
+  const TemporaryFolder folder;
+  if (!std::filesystem::exists("/dev/full")) return;
+  const std::string command = std::string("'") + HSI4D_PROGRAM + "' schema > /dev/full 2> stderr.txt";
+  const int status = std::system(command.c_str());
+  CHECK(WEXITSTATUS(status) == 2);
+  CHECK(file_text("stderr.txt") == "hsi4d: standard output cannot be written to\n");
+}
