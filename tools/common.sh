@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # What the commands of this folder share. Sourced by them, not run.
 
 hsi4d_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
