@@ -1,0 +1,52 @@
+# cmake -DBUILD=build folder -DSCRATCH=folder -DGENERATOR=… -DCOMPILER=… -DFLAGS=… -DVERSION=… -DROOT=source tree
+#       -P install_test.cmake
+# Installs the build into a fresh prefix, moves that prefix, and builds and runs the outside project of tests/install
+# against it.
+cmake_minimum_required(VERSION 3.25)
+
+# run(TITLE COMMAND…): stops with the output when it fails; else leaves the output in `output`.
+function(run title)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(result)
+    message(FATAL_ERROR "${title} failed (${result}):\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+# check_equal(WHAT FOUND WANTED)
+function(check_equal what found wanted)
+  if(NOT found STREQUAL wanted)
+    message(FATAL_ERROR "${what} is \"${found}\" and not \"${wanted}\"")
+  endif()
+endfunction()
+
+file(REMOVE_RECURSE ${SCRATCH})
+run("The installation" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${SCRATCH}/first)
+file(RENAME ${SCRATCH}/first ${SCRATCH}/prefix)
+
+# Nothing in the package points back to the trees that it was made from.
+file(GLOB_RECURSE package_files ${SCRATCH}/prefix/*.cmake)
+if(NOT package_files)
+  message(FATAL_ERROR "No CMake package was installed under ${SCRATCH}/prefix")
+endif()
+foreach(file ${package_files})
+  file(READ ${file} text)
+  string(REPLACE "${SCRATCH}" "" text "${text}")
+  foreach(folder ${BUILD} ${ROOT})
+    string(FIND "${text}" "${folder}/" at)
+    if(NOT at EQUAL -1)
+      message(FATAL_ERROR "${file} names a folder of the build machine: ${folder}")
+    endif()
+  endforeach()
+endforeach()
+
+run("Configuring the outside project"
+  ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/install -B ${SCRATCH}/outside -G ${GENERATOR}
+                   -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_FLAGS=${FLAGS} -DCMAKE_BUILD_TYPE=Release
+                   -DCMAKE_PREFIX_PATH=${SCRATCH}/prefix -DCMAKE_FIND_USE_PACKAGE_REGISTRY=OFF)
+run("Building the outside project" ${CMAKE_COMMAND} --build ${SCRATCH}/outside)
+run("The outside program" ${SCRATCH}/outside/outside)
+check_equal("What the outside program prints" "${output}" "hsi4d ${VERSION}\n")
+run("The installed program" ${SCRATCH}/prefix/bin/hsi4d --version)
+check_equal("What the installed program prints" "${output}" "hsi4d ${VERSION}\n")
+file(REMOVE_RECURSE ${SCRATCH})

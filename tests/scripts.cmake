@@ -1,0 +1,15 @@
+# The tests that are CMake scripts: of the source tree and of the installation rather than of functions.
+add_test(NAME layering
+  COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/layering
+                           -P ${CMAKE_CURRENT_SOURCE_DIR}/layering_test.cmake)
+
+set(sanitizer_flags "")
+if(HSI4D_SANITIZE)
+  set(sanitizer_flags "-fsanitize=${HSI4D_SANITIZE}")
+endif()
+add_test(NAME install
+  COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DBUILD=${PROJECT_BINARY_DIR}
+                           -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/install -DGENERATOR=${CMAKE_GENERATOR}
+                           -DCOMPILER=${CMAKE_CXX_COMPILER} -DFLAGS=${sanitizer_flags} -DVERSION=${PROJECT_VERSION}
+                           -P ${CMAKE_CURRENT_SOURCE_DIR}/install_test.cmake)
+set_tests_properties(layering install PROPERTIES LABELS quick TIMEOUT 300)

@@ -1,0 +1,64 @@
+# shellcheck shell=bash
+# What the commands of this folder share. Sourced by them, not run.
+
+hsi4d_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+say() { printf '\n== %s\n' "$*"; }
+
+fail() {
+  printf '%s: %s\n' "${0##*/}" "$*" >&2
+  exit 1
+}
+
+# timed TITLE COMMAND...: runs the command and prints how long it took.
+timed() {
+  local title=$1 start=$SECONDS status=0
+  shift
+  say "$title"
+  "$@" || status=$?
+  if [[ $status -eq 0 ]]; then
+    printf -- '-- %s: %d s\n' "$title" $((SECONDS - start))
+  else
+    printf -- '-- %s: failed (exit %d) after %d s\n' "$title" "$status" $((SECONDS - start))
+  fi
+  return "$status"
+}
+
+# Memory that may still be used, KiB: what the kernel has to give, or a container's limit where that is lower.
+available_memory_kib() {
+  local available limit
+  available=$(awk '/^MemAvailable:/ {print $2}' /proc/meminfo)
+  limit=$(cat /sys/fs/cgroup/memory.max 2>/dev/null || echo max)
+  if [[ $limit =~ ^[0-9]+$ ]] && ((limit / 1024 < available)); then
+    available=$((limit / 1024))
+  fi
+  echo "$available"
+}
+
+# Compilers to run at once: one a core, as far as memory goes (the largest files need about 2 GiB each).
+build_jobs() {
+  local jobs by_memory
+  if [[ -n ${CMAKE_BUILD_PARALLEL_LEVEL:-} ]]; then
+    echo "$CMAKE_BUILD_PARALLEL_LEVEL"
+    return
+  fi
+  jobs=$(nproc)
+  by_memory=$(($(available_memory_kib) / (2 * 1024 * 1024)))
+  if ((by_memory < jobs)); then jobs=$by_memory; fi
+  if ((jobs < 1)); then jobs=1; fi
+  echo "$jobs"
+}
+
+configure() { timed "configure $1" cmake --preset "$1"; }
+
+# compile PRESET [TARGET...]: builds the targets (everything, if none is named) of a configured preset.
+compile() {
+  local preset=$1 jobs
+  shift
+  jobs=$(build_jobs)
+  timed "build $preset${*:+: $*} (jobs: $jobs)" \
+    cmake --build --preset "$preset" --parallel "$jobs" ${1:+--target "$@"}
+}
+
+# print_usage FILE: the comment at the top of a command.
+print_usage() { sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$1"; }
