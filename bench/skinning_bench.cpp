@@ -5,6 +5,7 @@
 
 #include "body/skinning.h"
 #include "core/parallel.h"
+#include "core/simd.h"
 
 namespace {
 
@@ -54,11 +55,13 @@ DenseWeights dense_weights(Index vertices, Index joints) {
   return normalized_weights(w, "bench");
 }
 
+/// Aligned as the arrays of a tape are.
 template <class S>
-std::vector<S> random_array(Index n) {
+Buffer<S> random_array(Index n) {
   Numbers numbers;
-  std::vector<S> a(static_cast<std::size_t>(n));
-  for (S& x : a) x = static_cast<S>(numbers.next());
+  Buffer<S> a;
+  a.resize(n);
+  for (S& x : a.span()) x = static_cast<S>(numbers.next());
   return a;
 }
 
@@ -66,11 +69,13 @@ std::vector<S> random_array(Index n) {
 template <class S>
 struct DotConstant {
   static constexpr const char* kName = "dot_constant";
-  std::vector<S> cotangent;
+  Buffer<S> cotangent;
   void forward(NodeIo<S>& io) { io.out().scalar() = io.in(0).data[0]; }
   void backward(NodeIo<S>& io) {
     S* d = io.d_in(0).data;
-    for (std::size_t i = 0; i < cotangent.size(); ++i) d[i] += cotangent[i];
+    on_best_isa([&] {
+      for (Index i = 0; i < cotangent.size(); ++i) d[i] += cotangent[i];
+    });
   }
 };
 
@@ -78,7 +83,8 @@ template <class S>
 void primal(benchmark::State& state, const SkinWeights<S>& weights) {
   const auto transforms = random_array<S>(weights.joints() * 12);
   const auto points = random_array<S>(weights.vertices() * 3);
-  std::vector<S> result(points.size());
+  Buffer<S> result;
+  result.resize(points.size());
   with_threads(1, [&] {
     for (auto _ : state) {
       skin_points(weights, transforms.data(), points.data(), result.data());
@@ -96,12 +102,12 @@ void gradient(benchmark::State& state, const SkinWeights<S>& weights, bool wants
   const Var<S> a = tape.parameter("transforms", shape_of(weights.joints(), 12));
   const Var<S> x = tape.parameter("points", shape_of(weights.vertices(), 3));
   if (!wants_points) tape.freeze(x);
-  tape.set(x, points);
+  tape.set(x, points.span());
   const Var<S> y = skin_points(weights, a, x);
-  const Var<S> loss = tape.record(DotConstant<S>{points}, {y}, kScalarShape, Source::current());
+  const Var<S> loss = tape.record(DotConstant<S>{random_array<S>(points.size())}, {y}, kScalarShape, Source::current());
   with_threads(1, [&] {
     for (auto _ : state) {
-      tape.set(a, transforms);
+      tape.set(a, transforms.span());
       tape.forward(loss);
       tape.backward(loss);
       benchmark::DoNotOptimize(tape.gradient(a).data);

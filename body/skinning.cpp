@@ -78,6 +78,7 @@ void transpose(const SparseWeights& from, SparseTable<S>& to) {
     }
     for (std::size_t j = 0; j < of_joint.size(); ++j) {
       if (of_joint[j].empty()) continue;
+      if (of_joint[j].size() % 2 != 0) of_joint[j].push_back({of_joint[j].back().offset, S(0)});
       entries.insert(entries.end(), of_joint[j].begin(), of_joint[j].end());
       segments.push_back({static_cast<std::int32_t>(j), static_cast<std::int32_t>(entries.size())});
       of_joint[j].clear();
@@ -169,10 +170,13 @@ void gather_transforms(NodeIo<S>& io, const SkinTables<S>& tables, F&& chunk) {
   S* d_transforms = io.d_in(0).data;
   if (tables.is_dense) return kernels<S>().dense_reduce(tables.dense, partials.data(), part.chunks(), d_transforms);
   on_best_isa([&] {
-    for (Index e = 0; e < numbers; ++e) {
-      double sum = 0;
-      for (Index c = 0; c < part.chunks(); ++c) sum += static_cast<double>(partials[static_cast<std::size_t>(c * numbers + e)]);
-      d_transforms[e] += static_cast<S>(sum);
+    for (Index first = 0; first < numbers; first += kTransformSize) {
+      double sum[kTransformSize] = {};
+      for (Index c = 0; c < part.chunks(); ++c) {
+        const S* term = partials.data() + c * numbers + first;
+        for (Index i = 0; i < kTransformSize; ++i) sum[i] += static_cast<double>(term[i]);
+      }
+      for (Index i = 0; i < kTransformSize; ++i) d_transforms[first + i] += static_cast<S>(sum[i]);
     }
   });
 }

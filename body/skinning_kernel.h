@@ -17,14 +17,15 @@
 namespace hsi4d::detail {
 
 inline constexpr Index kTransformSize = 12;
-inline constexpr Index kSparseBlock = 256;  ///< vertices: 24 KB of outer products in double
+inline constexpr Index kSparseBlock = 128;  ///< vertices: 12 KB of outer products in double
 inline constexpr Index kDenseBlock = 256;   ///< vertices; a multiple of kPanel
 inline constexpr Index kPanel = 32;         ///< vertices side by side in a panel of dense weights
 inline constexpr Index kSkinGrain = 2048;   ///< vertices of a parallel chunk; a multiple of both blocks
 inline constexpr Index kMaxLanes = 16;      ///< of any instruction set, in float
 static_assert(kSkinGrain % kSparseBlock == 0 && kSkinGrain % kDenseBlock == 0 && kDenseBlock % kPanel == 0);
 
-/// The entries of one joint in one block: up to `end`, from the end of the segment before.
+/// The entries of one joint in one block: up to `end`, from the end of the segment before. Their number is even, the
+/// last one being repeated with weight 0 where needed, so that two sums run side by side without a branch at the end.
 struct SkinSegment {
   std::int32_t joint;
   std::int32_t end;

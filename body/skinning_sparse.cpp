@@ -101,8 +101,9 @@ struct TransformSum<S, true> {
   HWY_INLINE static TransformSum zero() { return {hn::Zero(D8()), hn::Zero(D4())}; }
 
   HWY_INLINE void add_scaled(const S* transform, S weight) {
-    rows01 = hn::MulAdd(hn::LoadU(D8(), transform), hn::Set(D8(), weight), rows01);
-    row2 = hn::MulAdd(hn::LoadU(D4(), transform + 8), hn::Set(D4(), weight), row2);
+    const auto w = hn::Set(D8(), weight);
+    rows01 = hn::MulAdd(hn::LoadU(D8(), transform), w, rows01);
+    row2 = hn::MulAdd(hn::LoadU(D4(), transform + 8), hn::LowerHalf(D4(), w), row2);
   }
   HWY_INLINE Quad<S> get(int r) const {
     return {{r == 0 ? hn::LowerHalf(D4(), rows01) : r == 1 ? hn::UpperHalf(D4(), rows01) : row2}};
@@ -118,15 +119,20 @@ struct TransformSum<S, true> {
 };
 #endif
 
-/// B_v. K = 0: as many weights as the table has.
-template <class S, int K>
-HWY_INLINE TransformSum<S> blend(const SparseTable<S>& table, const S* HWY_RESTRICT transforms, Index v) {
-  const Index count = K == 0 ? table.per_vertex : K;
-  const std::int32_t* HWY_RESTRICT offsets = table.offsets.data() + v * count;
-  const S* HWY_RESTRICT weights = table.weights.data() + v * count;
-  TransformSum<S> sum = TransformSum<S>::zero();
-  for (Index k = 0; k < count; ++k) sum.add_scaled(transforms + offsets[k], weights[k]);
-  return sum;
+/// B_v of `Count` vertices, together so that their chains of additions overlap. K = 0: as many weights as the table has.
+template <class S, int K, int Count>
+HWY_INLINE void blend(const SparseTable<S>& table, const S* HWY_RESTRICT transforms, Index v,
+                      TransformSum<S> (&sum)[Count]) {
+  const Index weights_per_vertex = K == 0 ? table.per_vertex : K;
+  const std::int32_t* HWY_RESTRICT offsets = table.offsets.data() + v * weights_per_vertex;
+  const S* HWY_RESTRICT weights = table.weights.data() + v * weights_per_vertex;
+  for (int i = 0; i < Count; ++i) sum[i] = TransformSum<S>::zero();
+  for (Index k = 0; k < weights_per_vertex; ++k) {
+    for (int i = 0; i < Count; ++i) {
+      const Index at = i * weights_per_vertex + k;
+      sum[i].add_scaled(transforms + offsets[at], weights[at]);
+    }
+  }
 }
 
 /// The four quads with lanes and numbers exchanged.
@@ -198,11 +204,12 @@ HWY_INLINE void add_points(const Quad<S>& x, const Quad<S>& y, const Quad<S>& z,
 template <class S, int K>
 HWY_INLINE void four_points(const SparseTable<S>& table, const S* HWY_RESTRICT transforms, const S* points, S* result,
                             Index v) {
+  TransformSum<S> b[4];
+  blend<S, K>(table, transforms, v, b);
   Quad<S> product[3][4];
   for (int i = 0; i < 4; ++i) {
-    const TransformSum<S> b = blend<S, K>(table, transforms, v + i);
     const Quad<S> x1 = load_point(points + 3 * i);
-    for (int r = 0; r < 3; ++r) product[r][i] = mul(b.get(r), x1);
+    for (int r = 0; r < 3; ++r) product[r][i] = mul(b[i].get(r), x1);
   }
   store_points(lane_sums(product[0]), lane_sums(product[1]), lane_sums(product[2]), result);
 }
@@ -211,13 +218,14 @@ HWY_INLINE void four_points(const SparseTable<S>& table, const S* HWY_RESTRICT t
 template <class S, int K>
 HWY_INLINE void four_point_adjoints(const SparseTable<S>& table, const S* HWY_RESTRICT transforms, const S* d_result,
                                     S* d_points, Index v) {
+  TransformSum<S> b[4];
+  blend<S, K>(table, transforms, v, b);
   Quad<S> g[4], t[4];
   for (int i = 0; i < 4; ++i) {
-    const TransformSum<S> b = blend<S, K>(table, transforms, v + i);
     const S* d_y = d_result + 3 * i;
-    g[i] = mul(b.get(0), Quad<S>::fill(d_y[0]));
-    g[i] = mul_add(b.get(1), Quad<S>::fill(d_y[1]), g[i]);
-    g[i] = mul_add(b.get(2), Quad<S>::fill(d_y[2]), g[i]);
+    g[i] = mul(b[i].get(0), Quad<S>::fill(d_y[0]));
+    g[i] = mul_add(b[i].get(1), Quad<S>::fill(d_y[1]), g[i]);
+    g[i] = mul_add(b[i].get(2), Quad<S>::fill(d_y[2]), g[i]);
   }
   transpose(g, t);
   add_points(t[0], t[1], t[2], d_points);
@@ -254,7 +262,17 @@ void point_adjoint_of(const SparseTable<S>& table, const S* transforms, const S*
 
 template <class S, int K>
 void blend_of(const SparseTable<S>& table, const S* transforms, S* blended, Index begin, Index end) {
-  for (Index v = begin; v < end; ++v) blend<S, K>(table, transforms, v).store(blended + kTransformSize * v);
+  Index v = begin;
+  for (; v + 4 <= end; v += 4) {
+    TransformSum<S> b[4];
+    blend<S, K>(table, transforms, v, b);
+    for (int i = 0; i < 4; ++i) b[i].store(blended + kTransformSize * (v + i));
+  }
+  for (; v < end; ++v) {
+    TransformSum<S> b[1];
+    blend<S, K>(table, transforms, v, b);
+    b[0].store(blended + kTransformSize * v);
+  }
 }
 
 template <class S>
@@ -283,13 +301,9 @@ void add_block(const SparseTable<S>& table, Index block, const S* HWY_RESTRICT o
   for (Index s = first[0]; s < first[1]; ++s) {
     const SkinSegment segment = table.segments[s];
     TransformSum<S> even = TransformSum<S>::zero(), odd = even;
-    for (; e + 2 <= segment.end; e += 2) {
+    for (; e < segment.end; e += 2) {
       even.add_scaled(outer + offset[e], weight[e]);
       odd.add_scaled(outer + offset[e + 1], weight[e + 1]);
-    }
-    if (e < segment.end) {
-      even.add_scaled(outer + offset[e], weight[e]);
-      ++e;
     }
     even.add(odd);
     S* to = partial + kTransformSize * segment.joint;
