@@ -119,8 +119,7 @@ void gradient(benchmark::State& state, const SkinWeights<S>& weights, bool wants
 /// Multiply-adds of the maths itself, for the share of the processor's peak.
 void count_work(benchmark::State& state, double weights_per_vertex, double vertices, double passes) {
   const double multiply_adds = vertices * (weights_per_vertex * 12 + 9) * passes;
-  state.counters["GFMA/s"] =
-      benchmark::Counter(multiply_adds * 1e-9, benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["GFMA/s"] = benchmark::Counter(multiply_adds * 1e-9, benchmark::Counter::kIsIterationInvariantRate);
 }
 
 template <class S>
@@ -154,15 +153,24 @@ void dense_gradient_both(benchmark::State& state) {
   count_work(state, 55, static_cast<double>(state.range(0)), 2);
 }
 
-#define SPARSE(F)                                                                                        \
-  BENCHMARK(F<double>)->ArgNames({"vertices", "coherent"})->Args({2000, 0})->Args({2000, 1})->Unit(benchmark::kMicrosecond); \
-  BENCHMARK(F<float>)->ArgNames({"vertices", "coherent"})->Args({2000, 0})->Args({2000, 1})->Args({10475, 1})->Unit(benchmark::kMicrosecond)
+#define SPARSE(F)                          \
+  BENCHMARK(F<double>)                     \
+      ->ArgNames({"vertices", "coherent"}) \
+      ->Args({2000, 0})                    \
+      ->Args({2000, 1})                    \
+      ->Unit(benchmark::kMicrosecond);     \
+  BENCHMARK(F<float>)                      \
+      ->ArgNames({"vertices", "coherent"}) \
+      ->Args({2000, 0})                    \
+      ->Args({2000, 1})                    \
+      ->Args({10475, 1})                   \
+      ->Unit(benchmark::kMicrosecond)
 SPARSE(sparse_primal);
 SPARSE(sparse_gradient_transforms);
 SPARSE(sparse_gradient_both);
 #undef SPARSE
-#define DENSE(F)                                                                          \
-  BENCHMARK(F<float>)->ArgName("vertices")->Arg(10475)->Unit(benchmark::kMicrosecond);    \
+#define DENSE(F)                                                                       \
+  BENCHMARK(F<float>)->ArgName("vertices")->Arg(10475)->Unit(benchmark::kMicrosecond); \
   BENCHMARK(F<double>)->ArgName("vertices")->Arg(10475)->Unit(benchmark::kMicrosecond)
 DENSE(dense_primal);
 DENSE(dense_gradient_both);

@@ -47,14 +47,16 @@ void normalize(double* weights, Index count) {
 
 void check_joint(std::int32_t joint, Index joints, std::string_view source, Index vertex) {
   if (joint >= 0 && joint < joints) return;
-  fail(source, vertex, "joint " + std::to_string(joint) + " does not exist; allowed: 0 to " + std::to_string(joints - 1));
+  fail(source, vertex,
+       "joint " + std::to_string(joint) + " does not exist; allowed: 0 to " + std::to_string(joints - 1));
 }
 
 }  // namespace
 
 SparseWeights normalized_weights(SparseWeights raw, std::string_view source) {
   const Index count = raw.per_vertex;
-  HSI4D_CHECK(count >= 1 && count <= kMaxWeightsPerVertex, std::to_string(count) + " weights per vertex; allowed: 1 to 8");
+  HSI4D_CHECK(count >= 1 && count <= kMaxWeightsPerVertex,
+              std::to_string(count) + " weights per vertex; allowed: 1 to 8");
   HSI4D_CHECK_EQ(static_cast<Index>(raw.indices.size()), raw.vertices * count);
   HSI4D_CHECK_EQ(static_cast<Index>(raw.weights.size()), raw.vertices * count);
   for (Index v = 0; v < raw.vertices; ++v) {

@@ -11,18 +11,6 @@ namespace hsi4d {
 using detail::kSkinGrain;
 using detail::kTransformSize;
 
-namespace detail {
-
-/// One of the two is used.
-template <class S>
-struct SkinTables {
-  bool is_dense = false;
-  SparseTable<S> sparse;
-  DenseTable<S> dense;
-};
-
-}  // namespace detail
-
 namespace {
 
 using detail::DenseTable;
@@ -102,9 +90,7 @@ void check_sizes(const SparseWeights& w) {
   HSI4D_CHECK_EQ(static_cast<Index>(w.weights.size()), w.vertices * w.per_vertex);
 }
 
-void check_sizes(const DenseWeights& w) {
-  HSI4D_CHECK_EQ(static_cast<Index>(w.weights.size()), w.vertices * w.joints);
-}
+void check_sizes(const DenseWeights& w) { HSI4D_CHECK_EQ(static_cast<Index>(w.weights.size()), w.vertices * w.joints); }
 
 template <class S>
 void fill(SparseTable<S>& table, const SparseWeights& from) {
@@ -122,7 +108,8 @@ void fill(SparseTable<S>& table, const SparseWeights& from) {
   }
   for (Index i = 0; i < from.vertices * count; ++i) {
     const std::int32_t joint = from.indices[static_cast<std::size_t>(i)];
-    HSI4D_CHECK(joint >= 0 && joint < from.joints, "joint " + std::to_string(joint) + " of " + std::to_string(from.joints));
+    HSI4D_CHECK(joint >= 0 && joint < from.joints,
+                "joint " + std::to_string(joint) + " of " + std::to_string(from.joints));
     table.offsets[i] = static_cast<std::int32_t>(joint * kTransformSize);
   }
   transpose(from, table);
@@ -359,11 +346,11 @@ Var<S> transform_points(Var<S> transforms, Var<S> points, Source where) {
   return transforms.tape->record(TransformPoints<S>{}, {transforms, points}, points.shape(), where);
 }
 
-#define HSI4D_INSTANTIATE(S)                                                                 \
-  template class SkinWeights<S>;                                                             \
-  template void skin_points(const SkinWeights<S>&, const S*, const S*, S*);                  \
-  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Source);                \
-  template Var<S> blend_transforms(const SkinWeights<S>&, Var<S>, Source);                   \
+#define HSI4D_INSTANTIATE(S)                                                  \
+  template class SkinWeights<S>;                                              \
+  template void skin_points(const SkinWeights<S>&, const S*, const S*, S*);   \
+  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Source); \
+  template Var<S> blend_transforms(const SkinWeights<S>&, Var<S>, Source);    \
   template Var<S> transform_points(Var<S>, Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

@@ -2,8 +2,8 @@
 //
 //   B_v = Σ_j w_vj A_j         y_v = B_v (x_v, 1)         [Loper et al. 2015, SMPL, eq. 2]
 //
-// A_j [3,4] takes the rest pose of joint j to its pose. B_v is an affine map and in general no rotation: it shrinks, and
-// is singular for two opposite bones. No rotation is ever extracted from it; Gaussians use its linear part as it is
+// A_j [3,4] takes the rest pose of joint j to its pose. B_v is an affine map and in general no rotation: it shrinks,
+// and is singular for two opposite bones. No rotation is ever extracted from it; Gaussians use its linear part as it is
 // (docs/numerics.md, D2), so everything here is finite and linear in A and in x.
 //
 // skin_points is for vertices: B_v never leaves the registers. Gaussians, which need B_v itself for their axes, take
@@ -43,12 +43,14 @@ struct DenseWeights {
 /// The weights of a file, made to sum to 1: tiny ones dropped, the rest divided by their sum, in double.
 ///
 /// @param source  the file and key, for messages
-/// Throws DataError naming the vertex when a weight is not finite or negative, a joint is out of range, or a sum is further
-/// than kWeightSumTolerance from 1; InternalError when the arrays do not have V·K, V·J numbers or K is not 1 to 8.
+/// Throws DataError naming the vertex when a weight is not finite or negative, a joint is out of range, or a sum is
+/// further than kWeightSumTolerance from 1; InternalError when the arrays do not have V·K, V·J numbers or K is not 1
+/// to 8.
 SparseWeights normalized_weights(SparseWeights raw, std::string_view source);
 DenseWeights normalized_weights(DenseWeights raw, std::string_view source);
 
-/// The `per_vertex` largest weights of each vertex (ties: the lower joint), normalised. SMPL-X has few that are not zero.
+/// The `per_vertex` largest weights of each vertex (ties: the lower joint), normalised. SMPL-X has few that are not
+/// zero.
 ///
 /// Throws DataError naming the vertex as normalized_weights does, of which the dropped weights count towards the sum.
 SparseWeights largest_weights(const DenseWeights& dense, Index per_vertex, std::string_view source);
@@ -58,8 +60,8 @@ template <class S>
 struct SkinTables;
 }
 
-/// Weights prepared for the kernels in precision S: rounded so that they still sum to 1, and transposed once. Immutable,
-/// a handle: copies share the tables.
+/// Weights prepared for the kernels in precision S: rounded so that they still sum to 1, and transposed once.
+/// Immutable, a handle: copies share the tables.
 template <class S>
 class SkinWeights {
  public:

@@ -1,12 +1,12 @@
-// Dense kernels of skinning_kernel.h: matrix products [V,J] × [J,12] with vertices in the lanes, so that the transform of
-// each vertex, its point and the adjoints are formed in registers without shuffles.
+// Dense kernels of skinning_kernel.h: matrix products [V,J] × [J,12] with vertices in the lanes, so that the transform
+// of each vertex, its point and the adjoints are formed in registers without shuffles.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "body/skinning_dense.cpp"
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
+#include <algorithm>
+
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-
-#include <algorithm>
 
 #include "body/skinning_kernel.h"
 
@@ -61,7 +61,8 @@ HWY_INLINE void panel_points(const S* panel, const S* transforms, Index joints, 
       hn::LoadInterleaved3(d, points + 3 * at, x, y, z);
 #pragma GCC unroll 3
       for (int r = 0; r < 3; ++r) {
-        sum[r] = hn::MulAdd(b[4 * r][m], x, hn::MulAdd(b[4 * r + 1][m], y, hn::MulAdd(b[4 * r + 2][m], z, b[4 * r + 3][m])));
+        sum[r] =
+            hn::MulAdd(b[4 * r][m], x, hn::MulAdd(b[4 * r + 1][m], y, hn::MulAdd(b[4 * r + 2][m], z, b[4 * r + 3][m])));
       }
       hn::StoreInterleaved3(sum[0], sum[1], sum[2], d, result + 3 * at);
       if (saved == nullptr) continue;
@@ -238,7 +239,8 @@ void dense_reduce(const DenseTable<S>& table, const S* partials, Index chunks, S
   const Index numbers = table.joints * kTransformSize;
   for (Index e = 0; e < numbers; ++e) {
     auto sum = hn::Zero(d);
-    for (Index chunk = 0; chunk < chunks; ++chunk) sum = hn::Add(sum, hn::LoadU(d, partials + (chunk * numbers + e) * kMaxLanes));
+    for (Index chunk = 0; chunk < chunks; ++chunk)
+      sum = hn::Add(sum, hn::LoadU(d, partials + (chunk * numbers + e) * kMaxLanes));
     d_transforms[e] += hn::GetLane(hn::SumOfLanes(d, sum));
   }
 }

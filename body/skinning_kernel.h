@@ -50,8 +50,16 @@ struct DenseTable {
   Buffer<S> panels;
 };
 
-/// Kernels of one instruction set. [begin, end) are vertices; begin is a multiple of kSkinGrain, end too unless it is V.
-/// A `partial` is overwritten with the chunk's own sum: [J,12] where sparse, [J,12,kMaxLanes] where dense.
+/// What SkinWeights holds; one of the two tables is used.
+template <class S>
+struct SkinTables {
+  bool is_dense = false;
+  SparseTable<S> sparse;
+  DenseTable<S> dense;
+};
+
+/// Kernels of one instruction set. [begin, end) are vertices; begin is a multiple of kSkinGrain, end too unless it is
+/// V. A `partial` is overwritten with the chunk's own sum: [J,12] where sparse, [J,12,kMaxLanes] where dense.
 template <class S>
 struct SkinKernels {
   using Sparse = const SparseTable<S>&;

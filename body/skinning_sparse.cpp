@@ -1,12 +1,13 @@
 // Sparse kernels of skinning_kernel.h. A transform is three rows of four lanes; the inner loops are K (forward) or
-// entries of a joint (adjoint) multiply-adds of whole transforms, and everything else is done for four vertices at once.
+// entries of a joint (adjoint) multiply-adds of whole transforms, and everything else is done for four vertices at
+// once.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "body/skinning_sparse.cpp"
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
+#include <algorithm>
+
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-
-#include <algorithm>
 
 #include "body/skinning_kernel.h"
 
@@ -119,7 +120,8 @@ struct TransformSum<S, true> {
 };
 #endif
 
-/// B_v of `Count` vertices, together so that their chains of additions overlap. K = 0: as many weights as the table has.
+/// B_v of `Count` vertices, together so that their chains of additions overlap. K = 0: as many weights as the table
+/// has.
 template <class S, int K, int Count>
 HWY_INLINE void blend(const SparseTable<S>& table, const S* HWY_RESTRICT transforms, Index v,
                       TransformSum<S> (&sum)[Count]) {
@@ -276,7 +278,8 @@ void blend_of(const SparseTable<S>& table, const S* transforms, S* blended, Inde
 }
 
 template <class S>
-void sparse_points(const SparseTable<S>& table, const S* transforms, const S* points, S* result, Index begin, Index end) {
+void sparse_points(const SparseTable<S>& table, const S* transforms, const S* points, S* result, Index begin,
+                   Index end) {
   (table.per_vertex == 4 ? points_of<S, 4> : points_of<S, 0>)(table, transforms, points, result, begin, end);
 }
 template <class S>
