@@ -26,20 +26,16 @@ const SkinKernels<S>& kernels() {
 
 // --- tables ----------------------------------------------------------------------------------------------------------
 
-/// Rounds `count` weights of a vertex to S; the largest takes what rounding left over, so that a body far from the
-/// origin does not drift (a sum off by 1e-7 is a tenth of a millimetre at a kilometre).
+/// Rounds the `count` weights of a vertex to S. In float their sum is then off by 1e-7 at most: at a kilometre no more
+/// than the rounding of the result itself.
 template <class S>
 void round_weights(const double* weights, Index count, Index vertex, S* rounded) {
-  double sum = 0, rounded_sum = 0;
-  Index largest = 0;
+  double sum = 0;
   for (Index k = 0; k < count; ++k) {
     rounded[k] = static_cast<S>(weights[k]);
     sum += weights[k];
-    rounded_sum += static_cast<double>(rounded[k]);
-    if (weights[k] > weights[largest]) largest = k;
   }
   HSI4D_CHECK(std::abs(sum - 1) < 1e-9, "weights of vertex " + std::to_string(vertex) + " are not normalised");
-  rounded[largest] = static_cast<S>(static_cast<double>(rounded[largest]) + (1 - rounded_sum));
 }
 
 /// Lists the entries of each block of vertices by joint, then by vertex; weights of 0 are left out.

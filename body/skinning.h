@@ -60,8 +60,8 @@ template <class S>
 struct SkinTables;
 }
 
-/// Weights prepared for the kernels in precision S: rounded so that they still sum to 1, and transposed once.
-/// Immutable, a handle: copies share the tables.
+/// Weights prepared for the kernels in precision S: rounded to S, and transposed once. Immutable; copies share the
+/// tables.
 template <class S>
 class SkinWeights {
  public:
