@@ -2,7 +2,6 @@
 // [j, j+1] × [i, i+1]; its centre is (j + 0.5, i + 0.5).
 #pragma once
 
-#include <string>
 #include <string_view>
 
 #include "core/linear.h"

@@ -100,8 +100,7 @@ void add_doubled(const Stumpff<S>& half, Stumpff<S>& c) {
 /// c1 and c2 alone (the others are left 0): all that the value of a rotation needs.
 ///
 /// @param x  squared angle in radians², ≥ 0
-/// @return   within 4 ulp for t ≤ 2.5 (c2 everywhere); c1 within one rounding error of 1 around its zeros at multiples
-/// of π
+/// @return   c1 within 4 ulp for t ≤ 2.5, c2 for t ≤ 5; around their zeros (π, 2π, …) within one rounding error of 1
 template <class S>
 Stumpff<S> stumpff_12(const S& x) {
   if (!(detail::real_part(x) < kStumpffSines)) return detail::stumpff_from_sines(x);
