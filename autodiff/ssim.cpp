@@ -19,7 +19,7 @@ using detail::SsimSweep;
 static_assert(kSsimTilePx == detail::kSsimTile);
 
 constexpr Index kStripTiles = 64;   // widest sweep: its rows have to stay in the second-level cache
-constexpr Index kMinBandTiles = 6;  // a band repeats 10 rows of its neighbours
+constexpr Index kMinBandTiles = 8;  // a band repeats 10 rows of its neighbours
 constexpr Index kWantedUnits = 12;  // so that a few threads are busy
 constexpr Index kMostWorkspaces = 256;
 
@@ -290,7 +290,8 @@ Var<S> ssim_tile_sums(Var<S> base, Var<S> target, const SsimSettings& settings, 
 }
 
 template <class S>
-Var<S> d_ssim(Var<S> image, Var<S> target, const SsimRegion<S>& region, const SsimSettings& settings, Source where) {
+Var<S> d_ssim_region(Var<S> image, Var<S> target, const SsimRegion<S>& region, const SsimSettings& settings,
+                     Source where) {
   check_images(image.shape(), target.shape(), settings);
   const Shape sums = tile_sums_shape(image.shape());
   HSI4D_CHECK_EQ(region.tile_sums.shape(), sums);
@@ -321,12 +322,12 @@ double mean_ssim(const ConstArray<S>& image, const ConstArray<S>& target, const 
   return ssim_map(image, target, Array<S>(), settings);
 }
 
-#define HSI4D_SSIM(S)                                                                         \
-  template Var<S> d_ssim(Var<S>, Var<S>, const SsimSettings&, Source);                        \
-  template Var<S> ssim(Var<S>, Var<S>, const SsimSettings&, Source);                          \
-  template Var<S> ssim_tile_sums(Var<S>, Var<S>, const SsimSettings&, Source);                \
-  template Var<S> d_ssim(Var<S>, Var<S>, const SsimRegion<S>&, const SsimSettings&, Source);  \
-  template double mean_ssim(const ConstArray<S>&, const ConstArray<S>&, const SsimSettings&); \
+#define HSI4D_SSIM(S)                                                                               \
+  template Var<S> d_ssim(Var<S>, Var<S>, const SsimSettings&, Source);                              \
+  template Var<S> ssim(Var<S>, Var<S>, const SsimSettings&, Source);                                \
+  template Var<S> ssim_tile_sums(Var<S>, Var<S>, const SsimSettings&, Source);                      \
+  template Var<S> d_ssim_region(Var<S>, Var<S>, const SsimRegion<S>&, const SsimSettings&, Source); \
+  template double mean_ssim(const ConstArray<S>&, const ConstArray<S>&, const SsimSettings&);       \
   template double ssim_map(const ConstArray<S>&, const ConstArray<S>&, const Array<S>&, const SsimSettings&);
 HSI4D_SSIM(float)
 HSI4D_SSIM(double)
