@@ -1,0 +1,104 @@
+// SSIM: forward, and forward with backward, of whole images and of a region, single precision unless named otherwise.
+#include <random>
+
+#include <benchmark/benchmark.h>
+
+#include "autodiff/ssim.h"
+#include "core/parallel.h"
+
+namespace {
+
+using namespace hsi4d;
+
+constexpr Index kChannels = 3;
+
+template <class S>
+void fill(Array<S> image, unsigned seed) {
+  std::minstd_rand random(seed);
+  std::uniform_real_distribution<S> uniform(0, 1);
+  for (Index r = 0; r < image.total_rows(); ++r) {
+    for (Index c = 0; c < image.shape.cols; ++c) image.row(r)[c] = uniform(random);
+  }
+}
+
+void report(benchmark::State& state, Index rows, Index cols) {
+  state.counters["pixels"] = static_cast<double>(rows * cols);
+  state.counters["values/s"] =
+      benchmark::Counter(static_cast<double>(rows * cols * kChannels), benchmark::Counter::kIsIterationInvariantRate);
+}
+
+/// d_ssim on a tape; arguments: rows, cols, threads, with backward.
+template <class S>
+void whole(benchmark::State& state) {
+  const Index rows = state.range(0), cols = state.range(1);
+  const bool with_backward = state.range(3) != 0;
+  with_threads(static_cast<int>(state.range(2)), [&] {
+    Tape<S> tape;
+    const Shape shape{kChannels, rows, cols, cols + 16};
+    const auto image = tape.parameter("image", shape), target = tape.constant("target", shape);
+    fill(tape.write(image), 1);
+    fill(tape.write(target), 2);
+    const auto loss = d_ssim(image, target);
+    if (!with_backward) tape.freeze(image);
+    for (auto _ : state) {
+      tape.write(image);
+      tape.forward(loss);
+      if (with_backward) tape.backward(loss);
+    }
+  });
+  report(state, rows, cols);
+}
+BENCHMARK(whole<float>)
+    ->Name("d_ssim")
+    ->ArgNames({"rows", "cols", "threads", "backward"})
+    ->Args({1024, 1024, 1, 0})
+    ->Args({1024, 1024, 1, 1})
+    ->Args({1024, 1024, 2, 1})
+    ->Args({512, 512, 1, 1})
+    ->Args({1080, 1920, 1, 1})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(whole<double>)
+    ->Name("d_ssim_double")
+    ->ArgNames({"rows", "cols", "threads", "backward"})
+    ->Args({1024, 1024, 1, 1})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+/// d_ssim_region with a moving rectangle inside 1024 × 1024; arguments: rows, cols of the rectangle, threads.
+void region(benchmark::State& state) {
+  constexpr Index kSide = 1024;
+  const Index rows = state.range(0), cols = state.range(1);
+  with_threads(static_cast<int>(state.range(2)), [&] {
+    Tape<float> tape;
+    const Shape shape{kChannels, kSide, kSide, kSide + 16};
+    const auto image = tape.parameter("image", shape);
+    const auto target = tape.constant("target", shape), base = tape.constant("base", shape);
+    const auto touched = tape.constant("touched", shape_of(ssim_tiles(kSide), ssim_tiles(kSide)));
+    fill(tape.write(image), 1);
+    fill(tape.write(base), 1);
+    fill(tape.write(target), 2);
+    for (Index r = 160; r < 160 + rows; r += kSsimTilePx) {
+      for (Index c = 160; c < 160 + cols; c += kSsimTilePx) {
+        tape.write(touched)(r / kSsimTilePx, c / kSsimTilePx) = 1;
+      }
+    }
+    const auto loss = d_ssim_region(image, target, SsimRegion<float>{touched, ssim_tile_sums(base, target)});
+    for (auto _ : state) {
+      tape.write(image);
+      tape.forward(loss);
+      tape.backward(loss);
+    }
+  });
+  report(state, rows, cols);
+}
+BENCHMARK(region)
+    ->Name("d_ssim_region")
+    ->ArgNames({"rows", "cols", "threads"})
+    ->Args({256, 670, 1})
+    ->Args({670, 256, 1})
+    ->Args({670, 256, 2})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+}  // namespace
