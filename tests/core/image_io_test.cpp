@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "tests/crc32.h"
 #include "tests/temporary_folder.h"
 
 using namespace hsi4d;
@@ -39,21 +40,12 @@ void put_be32(Bytes& file, size_t at, uint32_t value) {
   for (int i = 0; i < 4; ++i) file[at + i] = static_cast<uint8_t>(value >> (24 - 8 * i));
 }
 
-uint32_t crc32_of(const uint8_t* data, size_t size) {
-  uint32_t crc = 0xffffffffu;
-  for (size_t i = 0; i < size; ++i) {
-    crc ^= data[i];
-    for (int k = 0; k < 8; ++k) crc = (crc >> 1) ^ ((crc & 1) ? 0xedb88320u : 0);
-  }
-  return ~crc;
-}
-
 /// A PNG whose header claims another size.
 Bytes png_claiming(uint32_t width, uint32_t height) {
   Bytes file = encode_image("a.png", steps(3, 4, 4, 255));
   put_be32(file, 16, width);
   put_be32(file, 20, height);
-  put_be32(file, 29, crc32_of(file.data() + 12, 17));
+  put_be32(file, 29, crc32_of(std::span(file).subspan(12, 17)));
   return file;
 }
 
