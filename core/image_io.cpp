@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <string_view>
 
 #include <OpenImageIO/filesystem.h>
@@ -40,7 +39,10 @@ template <class Number>
 Image read_as(OIIO::ImageInput& input, const std::string& name, OIIO::TypeDesc type, float scale) {
   const OIIO::ImageSpec spec = input.spec();
   std::vector<Number> values(static_cast<size_t>(spec.image_pixels()) * static_cast<size_t>(spec.nchannels));
-  const bool done = input.read_image(0, 0, 0, -1, type, values.data());
+  // read_image takes and clears 64 MB for any image, ten times a small JPEG's own cost.
+  const bool as_is = spec.tile_width == 0 && spec.format == type && spec.channelformats.empty();
+  const bool done = as_is ? input.read_native_scanlines(0, 0, spec.y, spec.y + spec.height, spec.z, values.data())
+                          : input.read_image(0, 0, 0, -1, type, values.data());
   // A truncated JPEG is filled with grey and leaves only a note behind.
   if (!done || input.has_error()) fail(name, "cannot be decoded: " + error_of(&input));
   Image image(spec.nchannels, spec.height, spec.width);
@@ -54,20 +56,40 @@ Image read_as(OIIO::ImageInput& input, const std::string& name, OIIO::TypeDesc t
   return image;
 }
 
-/// @param file_bytes  of a packed file, to refuse a header that claims more than it can hold
-Image read_opened(OIIO::ImageInput& input, const std::string& name, const ImageLimits& limits,
-                  std::optional<int64_t> file_bytes) {
+Image read_opened(OIIO::ImageInput& input, const std::string& name, const ImageLimits& limits) {
   const OIIO::ImageSpec& spec = input.spec();
   if (spec.deep || spec.depth > 1) fail(name, "holds deep or volume data, which is not read");
   if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1) fail(name, "has no pixels");
   check_image_size(name, spec.nchannels, spec.height, spec.width, limits);
-  if (file_bytes) check_packed_size(name, spec.height, spec.width, *file_bytes);
   if (spec.format == OIIO::TypeDesc::UINT8) return read_as<uint8_t>(input, name, OIIO::TypeDesc::UINT8, 255.0f);
   if (spec.format == OIIO::TypeDesc::UINT16) return read_as<uint16_t>(input, name, OIIO::TypeDesc::UINT16, 65535.0f);
   return read_as<float>(input, name, OIIO::TypeDesc::FLOAT, 1.0f);
 }
 
+/// Refuses by the frame header (ISO 10918-1, B.2.2) what is too large, since opening a progressive JPEG takes its
+/// memory.
+void check_jpeg_size(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
+  const auto number = [&](size_t at) { return int64_t{file[at]} << 8 | file[at + 1]; };
+  size_t at = 2;
+  while (at + 9 < file.size()) {
+    if (file[at] != 0xff || file[at + 1] == 0x00 || file[at + 1] == 0xff) {
+      ++at;  // between markers, as libjpeg has it
+      continue;
+    }
+    const uint8_t marker = file[at + 1];
+    if (marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc) {
+      const int64_t height = std::max<int64_t>(1, number(at + 5)), width = std::max<int64_t>(1, number(at + 7));
+      check_image_size(name, file[at + 9], height, width, limits);
+      return check_packed_size(name, height, width, std::ssize(file));
+    }
+    const bool alone = marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8);
+    at += alone ? 2 : 2 + static_cast<size_t>(number(at + 2));
+  }
+  fail(name, "cannot be decoded: it has no JPEG frame");
+}
+
 Image decode_jpeg(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
+  check_jpeg_size(file, name, limits);
   OIIO::Filesystem::IOMemReader reader(file.data(), file.size());
   const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create("jpeg");
   HSI4D_CHECK(input != nullptr, "OpenImageIO reads no JPEG: " + error_of(nullptr));
@@ -75,7 +97,7 @@ Image decode_jpeg(std::span<const uint8_t> file, const std::string& name, const 
   if (!input->set_ioproxy(&reader) || !input->open(name, spec)) {
     fail(name, "cannot be decoded: " + error_of(input.get()));
   }
-  return read_opened(*input, name, limits, std::ssize(file));
+  return read_opened(*input, name, limits);
 }
 
 Image decode_exr(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
@@ -91,7 +113,7 @@ Image read_other(const std::string& path, const ImageLimits& limits) {
   options.attribute("oiio:UnassociatedAlpha", 1);
   const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &options);
   if (!input) fail(path, "cannot be decoded: " + error_of(nullptr));
-  return read_opened(*input, path, limits, std::nullopt);
+  return read_opened(*input, path, limits);
 }
 
 std::string ending_of(const std::string& path) {

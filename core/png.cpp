@@ -48,7 +48,15 @@ bool read_header(Decoder& decoder) {
   png_set_read_fn(decoder.png, &decoder, on_read);
   // Our own limits have the better message.
   png_set_user_limits(decoder.png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+  // libpng takes a chunk's memory on its word, 8 MB at a time.
+  png_set_chunk_malloc_max(decoder.png, decoder.content.size() + 1);
   png_read_info(decoder.png, decoder.info);
+  return true;
+}
+
+/// Takes the memory of a few rows.
+bool choose_expansions(Decoder& decoder) {
+  if (setjmp(png_jmpbuf(decoder.png)) != 0) return false;
   png_set_expand(decoder.png);
   png_set_swap(decoder.png);  // 16-bit numbers are big-endian in the file
   png_set_interlace_handling(decoder.png);
@@ -100,9 +108,11 @@ Image decode_png(std::span<const uint8_t> file, const std::string& name, const I
   if (!read_header(decoder)) fail(name, decoder);
   const int64_t height = png_get_image_height(decoder.png, decoder.info);
   const int64_t width = png_get_image_width(decoder.png, decoder.info);
-  const int channels = png_get_channels(decoder.png, decoder.info);
-  check_image_size(name, channels, height, width, limits);
+  check_image_size(name, png_get_channels(decoder.png, decoder.info), height, width, limits);
   check_packed_size(name, height, width, std::ssize(file));
+  if (!choose_expansions(decoder)) fail(name, decoder);
+  const int channels = png_get_channels(decoder.png, decoder.info);  // a palette's pixels have three or four
+  check_image_size(name, channels, height, width, limits);
   const size_t row_bytes = png_get_rowbytes(decoder.png, decoder.info);
   std::vector<uint8_t> packed(row_bytes * static_cast<size_t>(height));
   std::vector<png_bytep> rows(static_cast<size_t>(height));

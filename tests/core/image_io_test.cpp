@@ -1,7 +1,9 @@
 #include "core/image_io.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 #include <unistd.h>
 
@@ -211,6 +213,16 @@ TEST_CASE("a header that claims too much is refused before memory is taken") {
                     "a.png: has 70000 x 3 pixels; a side has at most 65536");
   CHECK_THROWS_WITH(decode_image(png_claiming(65000, 65000), "a.png"),
                     "a.png: 3 channels of 65000 x 65000 pixels need more than the 4294967296 bytes allowed");
+  Bytes jpeg = encode_image("a.jpg", steps(3, 4, 4, 255));
+  const uint8_t frame[] = {0xff, 0xc0, 0x00, 0x11, 0x08};
+  const auto at = std::search(jpeg.begin(), jpeg.end(), std::begin(frame), std::end(frame));
+  REQUIRE(at != jpeg.end());
+  std::fill_n(at + 5, 4, uint8_t{0xff});
+  CHECK_THROWS_WITH(decode_image(jpeg, "a.jpg"),
+                    "a.jpg: 3 channels of 65535 x 65535 pixels need more than the 4294967296 bytes allowed");
+  std::fill_n(at + 5, 4, uint8_t{0x40});
+  CHECK_THROWS_WITH(decode_image(jpeg, "a.jpg"), Contains("a.jpg: its header claims 16448 x 16448 pixels, more than "));
+  CHECK_THROWS_WITH(decode_image(std::span(jpeg.data(), 8), "a.jpg"), "a.jpg: cannot be decoded: it has no JPEG frame");
   CHECK_THROWS_WITH(
       decode_image(png_claiming(16000, 16000), "a.png"),
       Contains("a.png: its header claims 16000 x 16000 pixels, more than its ") && Contains(" bytes can hold"));
