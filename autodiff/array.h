@@ -40,6 +40,12 @@ std::ostream& operator<<(std::ostream& stream, const Shape& shape);
 /// Shape of a plain array [rows, cols].
 constexpr Shape shape_of(Index rows, Index cols) { return {1, rows, cols, cols}; }
 
+/// Shape of an image [channels, height, width] with padded rows.
+template <class S>
+constexpr Shape image_shape(Index channels, Index height, Index width) {
+  return {channels, height, width, padded_row<S>(width)};
+}
+
 /// One number.
 inline constexpr Shape kScalarShape = {1, 1, 1, 1};
 

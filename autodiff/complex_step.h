@@ -3,6 +3,7 @@
 #pragma once
 
 #include <complex>
+#include <tuple>
 
 #include "autodiff/dual.h"
 

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "autodiff/inspect.h"
+#include "core/random.h"
 
 namespace hsi4d {
 
@@ -13,17 +14,10 @@ namespace {
 /// Stands for an operator's name where the gradient is that of a leaf through everything.
 constexpr const char* kWholeTape = "whole tape";
 
-/// Uniform number in [−1, 1) that depends on (seed, i) alone [splitmix64].
-double random_at(std::uint64_t seed, std::uint64_t i) {
-  std::uint64_t z = seed * 0xD1342543DE82EF95u + (i + 1) * 0x9E3779B97F4A7C15u;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
-}
-
 std::vector<double> random_cotangent(std::uint64_t seed, Index count) {
   std::vector<double> u(static_cast<std::size_t>(count));
-  for (std::size_t i = 0; i < u.size(); ++i) u[i] = random_at(seed, i);
+  const Random random(seed, random_stream("gradcheck.cotangent"));
+  for (std::size_t i = 0; i < u.size(); ++i) u[i] = random.uniform(i, -1, 1);
   return u;
 }
 
@@ -55,7 +49,8 @@ struct Probe {
 
 class Checker {
  public:
-  Checker(const GradcheckOptions& options, GradcheckReport& report) : options_(options), report_(report) {}
+  Checker(const GradcheckOptions& options, GradcheckReport& report)
+      : options_(options), report_(report), entries_(options.seed, random_stream("gradcheck.entries")) {}
 
   void check(const Probe& probe) {
     const std::uint64_t choices = probe.choices();
@@ -63,11 +58,9 @@ class Checker {
     const double typical = root_mean_square(probe.gradient);
     const Index count = probe.x.shape.count();
     for (Index k = 0; k < std::min(count, options_.entries); ++k) {
-      Index entry = k;
-      if (count > options_.entries) {
-        const double u = 0.5 * (1 + random_at(options_.seed + 77, static_cast<std::uint64_t>(k)));
-        entry = std::min(count - 1, static_cast<Index>(u * static_cast<double>(count)));
-      }
+      const Index entry = count <= options_.entries
+                              ? k
+                              : static_cast<Index>(entries_.below(static_cast<std::uint64_t>(k), static_cast<std::uint64_t>(count)));
       check_entry(probe, entry, choices, scale, typical);
     }
   }
@@ -148,6 +141,7 @@ class Checker {
 
   const GradcheckOptions& options_;
   GradcheckReport& report_;
+  Random entries_;
 };
 
 /// The gradient of each unfrozen leaf through the whole tape.

@@ -1,7 +1,6 @@
 // Errors, and checks that print both values.
 #pragma once
 
-#include <source_location>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -26,8 +25,23 @@ class InternalError : public std::logic_error {
   using std::logic_error::logic_error;
 };
 
-/// A place in the source; taken as a defaulted last argument so that it names the caller.
-using Source = std::source_location;
+/// A place in the source; `Source where = Source::current()` as a last argument names the caller.
+/// (std::source_location does the same, but not with clang 14, which builds the fuzzers.)
+class Source {
+ public:
+  static constexpr Source current(const char* file = __builtin_FILE(), int line = __builtin_LINE()) {
+    Source here;
+    here.file_ = file;
+    here.line_ = line;
+    return here;
+  }
+  constexpr const char* file_name() const { return file_; }
+  constexpr int line() const { return line_; }
+
+ private:
+  const char* file_ = "";
+  int line_ = 0;
+};
 
 /// "file.cpp:12", the file without its folders.
 std::string source_name(const Source& where);

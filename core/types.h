@@ -13,10 +13,27 @@ namespace hsi4d {
 using Index = std::int64_t;
 
 /// Alignment of all array memory: one cache line, one AVX-512 vector.
-inline constexpr std::size_t kAlignment = 64;
+inline constexpr Index kAlignment = 64;
 
 /// `value` rounded up to a multiple of `unit`.
 constexpr Index round_up(Index value, Index unit) { return (value + unit - 1) / unit * unit; }
+
+/// Elements from one row of an image or array to the next.
+///
+///   bytes = 64 ceil(width sizeof(S) / 64),  and 64 more where that is a multiple of 1024
+///
+/// Every row then begins on a cache line. Rows a multiple of 1024 bytes apart would share 4 or fewer of the 64 sets of
+/// a first-level cache, so that a column of a tile evicts itself; this covers the powers of two from 1024 on.
+///
+/// @param width  elements, ≥ 0
+/// @return       elements, ≥ width; 0 for 0
+template <class S>
+constexpr Index padded_row(Index width) {
+  constexpr Index size = sizeof(S);
+  static_assert(kAlignment % size == 0, "an element must not straddle cache lines");
+  const Index bytes = round_up(width * size, kAlignment);
+  return (bytes > 0 && bytes % 1024 == 0 ? bytes + kAlignment : bytes) / size;
+}
 
 template <class Signature>
 class FunctionRef;

@@ -32,9 +32,6 @@ LossDescription describe_loss(std::string name, std::string summary, Settings de
           [](ConfigFields& fields, std::any& settings) { describe(fields, *std::any_cast<Settings>(&settings)); }};
 }
 
-/// Every loss term that this library comes with, in the order of optim/losses/list.h.
-const std::vector<LossDescription>& loss_descriptions();
-
 /// One entry of a stage's `losses`: the weight, and the term's own settings beside it.
 struct LossSettings {
   double weight = 1;

@@ -37,12 +37,3 @@ TEST_CASE("a loss without settings has a weight only") {
   CHECK(fields.names() == std::vector<std::string>{"weight"});
   CHECK_THROWS_AS(settings.own_as<smooth::Settings>(), InternalError);
 }
-
-TEST_CASE("the library's own terms have different names and a summary") {
-  std::vector<std::string> names;
-  for (const LossDescription& loss : loss_descriptions()) {
-    CHECK(std::find(names.begin(), names.end(), loss.name) == names.end());
-    CHECK_FALSE(loss.summary.empty());
-    names.push_back(loss.name);
-  }
-}

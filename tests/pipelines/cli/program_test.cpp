@@ -1,3 +1,4 @@
+#include "optim/loss_term.h"
 #include "pipelines/cli/program.h"
 
 #include <algorithm>
@@ -96,7 +97,7 @@ TEST_CASE("schema prints JSON that refuses unknown keys") {
   const nlohmann::json schema = nlohmann::json::parse(result.out);
   CHECK(schema["additionalProperties"] == false);
   CHECK(schema["properties"]["render"]["properties"]["blur"]["default"] == 0.3);
-  CHECK(result.out == run_config_schema(loss_descriptions()));
+  CHECK(result.out == run_config_schema(descriptions_of(loss_terms())));
 }
 
 TEST_CASE("list tells losses and settings") {
@@ -111,7 +112,7 @@ TEST_CASE("list tells losses and settings") {
   const TemporaryFolder folder;
   const ProgramResult result = run_hsi4d({"list", "losses"});
   CHECK(result.status == 0);
-  CHECK(result.out == cli::list_command("losses", loss_descriptions()));
+  CHECK(result.out == cli::list_command("losses", descriptions_of(loss_terms())));
 }
 
 TEST_CASE("--version and --help, of the program and of every subcommand") {

@@ -1,0 +1,65 @@
+// Loss terms: what they may read, and how they are listed. docs/adding_a_loss.md shows how to write one.
+#pragma once
+
+#include <vector>
+
+#include "autodiff/tape.h"
+#include "optim/loss_description.h"
+
+namespace hsi4d {
+
+/// What a loss term may read, by name. A Var without a tape stands for what the stage does not have; `given` asks.
+template <class S>
+struct LossInputs {
+  Var<S> rendered;  ///< [3,H,W] the image of the present state, sRGB values as they are
+  Var<S> target;    ///< [3,H,W] the video's frame
+  Var<S> weight;    ///< [1,H,W] how much a pixel counts, 0 to 1
+
+  static bool given(Var<S> input) { return input.tape != nullptr; }
+};
+
+/// A loss term: its description, and the function that records it on a tape and returns a scalar.
+struct LossTerm {
+  LossDescription description;
+  Var<float> (*record_float)(const LossInputs<float>& inputs, const std::any& settings) = nullptr;
+  Var<double> (*record_double)(const LossInputs<double>& inputs, const std::any& settings) = nullptr;
+
+  /// Records the term. `settings` is what description.describe_settings filled in, or description.defaults.
+  template <class S>
+  Var<S> record(const LossInputs<S>& inputs, const std::any& settings) const {
+    if constexpr (std::is_same_v<S, float>) {
+      return record_float(inputs, settings);
+    } else {
+      return record_double(inputs, settings);
+    }
+  }
+};
+
+/// A loss term from a function of (inputs, settings) that is generic in the precision. F is a captureless lambda.
+template <class Settings, class F>
+LossTerm make_loss_term(std::string name, std::string summary, F) {
+  return {describe_loss<Settings>(std::move(name), std::move(summary)),
+          [](const LossInputs<float>& inputs, const std::any& settings) {
+            return F{}(inputs, std::any_cast<const Settings&>(settings));
+          },
+          [](const LossInputs<double>& inputs, const std::any& settings) {
+            return F{}(inputs, std::any_cast<const Settings&>(settings));
+          }};
+}
+
+/// A loss term without settings of its own; F is generic in (inputs).
+template <class F>
+LossTerm make_loss_term(std::string name, std::string summary, F) {
+  return {describe_loss(std::move(name), std::move(summary)),
+          [](const LossInputs<float>& inputs, const std::any&) { return F{}(inputs); },
+          [](const LossInputs<double>& inputs, const std::any&) { return F{}(inputs); }};
+}
+
+/// The terms that this library comes with, in the order of optim/losses/list.h. A project of a user's own appends its terms
+/// to this list and passes their descriptions to the program.
+const std::vector<LossTerm>& loss_terms();
+
+/// The descriptions of some terms, for configs.
+std::vector<LossDescription> descriptions_of(const std::vector<LossTerm>& terms);
+
+}  // namespace hsi4d

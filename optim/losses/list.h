@@ -1,0 +1,19 @@
+// The loss terms of the library, one line each. HSI4D_LOSS(name) stands for `LossTerm name_loss()` in
+// optim/losses/name.cpp; every term listed here is found by configs, by `hsi4d list losses` and by the gradient tests.
+#pragma once
+
+#include "optim/loss_term.h"
+
+// clang-format off
+#define HSI4D_LOSSES      \
+  HSI4D_LOSS(photometric) \
+  HSI4D_LOSS(masked_l2)
+// clang-format on
+
+namespace hsi4d {
+
+#define HSI4D_LOSS(name) LossTerm name##_loss();
+HSI4D_LOSSES
+#undef HSI4D_LOSS
+
+}  // namespace hsi4d

@@ -1,0 +1,331 @@
+#include "core/npz.h"
+
+#include <filesystem>
+#include <iostream>
+#include <numeric>
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+#include "tests/crc32.h"
+#include "tests/temporary_folder.h"
+
+using namespace hsi4d;
+using Catch::Contains;
+
+namespace {
+
+void put(Bytes& out, uint64_t value, int bytes) {
+  for (int i = 0; i < bytes; ++i) out.push_back(static_cast<uint8_t>(value >> (8 * i)));
+}
+
+void put(Bytes& out, const std::string& text) { out.insert(out.end(), text.begin(), text.end()); }
+
+/// A member of an archive made by hand. Fields that are set differ from the truth.
+struct ZipMember {
+  std::string name;
+  Bytes content;
+  int method = 0;
+  int flags = 0;
+  int64_t claimed_size = -1;
+  int64_t claimed_packed = -1;
+  bool zip64 = false;
+};
+
+/// The fields from "flags" to "extra length" that both headers share.
+void put_fields(Bytes& out, const ZipMember& member, uint64_t extra_bytes) {
+  const uint64_t size = member.claimed_size >= 0 ? member.claimed_size : member.content.size();
+  const uint64_t packed = member.claimed_packed >= 0 ? member.claimed_packed : member.content.size();
+  put(out, member.flags, 2);
+  put(out, member.method, 2);
+  put(out, 0x00210000, 4);
+  put(out, crc32_of(member.content), 4);
+  put(out, member.zip64 ? 0xffffffffu : packed, 4);
+  put(out, member.zip64 ? 0xffffffffu : size, 4);
+  put(out, member.name.size(), 2);
+  put(out, extra_bytes, 2);
+}
+
+void put_extra(Bytes& out, const ZipMember& member) {
+  put(out, 1, 2);
+  put(out, 16, 2);
+  put(out, member.content.size(), 8);
+  put(out, member.content.size(), 8);
+}
+
+/// APPNOTE.TXT sections 4.3.7 (local header), 4.3.12 (central), 4.3.14 and 4.3.15 (zip64 end), 4.3.16 (end).
+Bytes archive_of(const std::vector<ZipMember>& members, bool zip64_end) {
+  Bytes file, central;
+  for (const ZipMember& member : members) {
+    const uint64_t offset = file.size(), extra_bytes = member.zip64 ? 20 : 0;
+    put(file, "PK\3\4");
+    put(file, 45, 2);
+    put_fields(file, member, extra_bytes);
+    put(file, member.name);
+    if (member.zip64) put_extra(file, member);
+    file.insert(file.end(), member.content.begin(), member.content.end());
+    put(central, "PK\1\2");
+    put(central, 45, 2);
+    put(central, 45, 2);
+    put_fields(central, member, extra_bytes);
+    put(central, 0, 10);  // comment length, disk, attributes
+    put(central, offset, 4);
+    put(central, member.name);
+    if (member.zip64) put_extra(central, member);
+  }
+  const uint64_t central_offset = file.size();
+  file.insert(file.end(), central.begin(), central.end());
+  if (zip64_end) {
+    const uint64_t end64_offset = file.size();
+    put(file, "PK\6\6");
+    put(file, 44, 8);
+    put(file, 45, 2);
+    put(file, 45, 2);
+    put(file, 0, 8);
+    put(file, members.size(), 8);
+    put(file, members.size(), 8);
+    put(file, central.size(), 8);
+    put(file, central_offset, 8);
+    put(file, "PK\6\7");
+    put(file, 0, 4);
+    put(file, end64_offset, 8);
+    put(file, 1, 4);
+  }
+  put(file, "PK\5\6");
+  put(file, 0, 4);
+  put(file, zip64_end ? 0xffff : members.size(), 2);
+  put(file, zip64_end ? 0xffff : members.size(), 2);
+  put(file, zip64_end ? 0xffffffffu : central.size(), 4);
+  put(file, zip64_end ? 0xffffffffu : central_offset, 4);
+  put(file, 0, 2);
+  return file;
+}
+
+Bytes floats(std::initializer_list<float> values) {
+  const int64_t count = std::ssize(values);
+  return encode_npy(std::span(&count, 1), std::span<const float>(values.begin(), values.size()));
+}
+
+Bytes objects() {
+  const std::string dict = "{'descr': '|O', 'fortran_order': False, 'shape': (), }";
+  Bytes file;
+  put(file, std::string("\x93NUMPY\1\0", 8));
+  put(file, dict.size(), 2);
+  put(file, dict + "\x80\x04.");
+  return file;
+}
+
+NpzWriter example() {
+  NpzWriter writer;
+  writer.add<float>("weights", {2, 3}, {1, 2, 3, 4, 5, 6});
+  writer.add<int64_t>("kintree_table", {2}, {4294967295, 0});
+  writer.add_scalar("mocap_framerate", 59.94);
+  writer.add_text("gender", "neutral");
+  writer.add_texts("names", std::vector<std::string>{"left hand", "\xc3\xa4"});
+  writer.add<double>("empty", {0, 3}, {});
+  return writer;
+}
+
+std::string error_of(const std::vector<ZipMember>& members) {
+  try {
+    Npz::decode(archive_of(members, false), "a.npz");
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+std::string member_name(int i) {
+  std::string name = "x";
+  name += std::to_string(i);
+  return name;
+}
+
+/// The file if this checkout has it beside it; says so when not.
+std::string shared_file(const std::string& name) {
+  const std::string path = std::string(HSI4D_SOURCE_DIR) + "/../shared/data/" + name;
+  if (std::filesystem::exists(path)) return path;
+  WARN("skipped: there is no " << path);
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("an archive comes back as it was written") {
+  for (const NpzPacking packing : {NpzPacking::stored, NpzPacking::deflated}) {
+    const Npz npz = Npz::decode(example().encode(packing), "a.npz");
+    CHECK(npz.names() ==
+          std::vector<std::string>{"weights", "kintree_table", "mocap_framerate", "gender", "names", "empty"});
+    CHECK(npz.skipped().empty());
+    CHECK(npz.array("weights").require_shape({-1, 3}).as<double>() == std::vector<double>{1, 2, 3, 4, 5, 6});
+    CHECK(npz.array("kintree_table").as<int64_t>() == std::vector<int64_t>{4294967295, 0});
+    CHECK(npz.array("mocap_framerate").scalar<double>() == 59.94);
+    CHECK(npz.array("gender").text() == "neutral");
+    CHECK(npz.array("names").strings() == std::vector<std::string>{"left hand", "\xc3\xa4"});
+    CHECK(npz.array("empty").shape() == std::vector<int64_t>{0, 3});
+    CHECK(npz.has("weights"));
+    CHECK_FALSE(npz.has("weight"));
+  }
+}
+
+TEST_CASE("asking for an absent array or a wrong shape names file and array") {
+  const Npz npz = Npz::decode(example().encode(), "a.npz");
+  CHECK_THROWS_WITH(npz.array("weight"),
+                    "a.npz: has no array 'weight'; there are: weights, kintree_table, mocap_framerate, gender, names, "
+                    "empty");
+  CHECK_THROWS_WITH(npz.array("weights").require_shape({-1, 55}),
+                    "a.npz: array 'weights': has shape [2,3]; [*,55] is needed");
+  CHECK_THROWS_WITH(npz.array("gender").as<float>(),
+                    "a.npz: array 'gender': holds text (dtype '<U7'); numbers are needed");
+  CHECK_THROWS_WITH(Npz::decode(NpzWriter().encode(), "e.npz").array("x"), "e.npz: has no array 'x'; there are: none");
+}
+
+TEST_CASE("equal arrays give equal files, in memory and on disk") {
+  const TemporaryFolder folder;
+  for (const NpzPacking packing : {NpzPacking::stored, NpzPacking::deflated}) {
+    example().write(folder / "a.npz", packing);
+    CHECK(read_file(folder / "a.npz") == example().encode(packing));
+    CHECK(Npz::read(folder / "a.npz").array("weights").size() == 6);
+  }
+  NpzWriter().write(folder / "empty.npz");
+  CHECK(Npz::read(folder / "empty.npz").names().empty());
+  CHECK(folder.count() == 2);
+  write_text_file(folder / "plain", "");
+  CHECK(std::filesystem::status(folder / "a.npz").permissions() ==
+        std::filesystem::status(folder / "plain").permissions());
+  CHECK_THROWS_WITH(example().write(folder / "no/a.npz"), Contains("no/a.npz: cannot be written: No such file"));
+  CHECK_THROWS_AS(Npz::read(folder / "absent.npz"), UserError);
+}
+
+TEST_CASE("stored files are plain zip members dated 1980") {
+  ZipMember member{"x.npy", floats({1, 2})};
+  NpzWriter writer;
+  writer.add<float>("x", {2}, {1, 2});
+  const Bytes file = writer.encode();
+  const Bytes by_hand = archive_of({member}, false);
+  // From the method on, the local headers agree: date, checksum, sizes, name, data.
+  REQUIRE(file.size() == by_hand.size());
+  CHECK(Bytes(file.begin() + 8, file.begin() + 30 + 5 + 136) ==
+        Bytes(by_hand.begin() + 8, by_hand.begin() + 30 + 5 + 136));
+}
+
+TEST_CASE("names that cannot be are a bug of the caller") {
+  NpzWriter writer;
+  writer.add_scalar("x", 1.0);
+  CHECK_THROWS_WITH(writer.add_scalar("x", 2.0), Contains("array 'x' is there twice"));
+  CHECK_THROWS_WITH(writer.add_text("", "a"), Contains("array name ''"));
+  CHECK_THROWS_WITH(writer.add<float>("y", {2, 2}, {1, 2, 3}), Contains("shape [2,2] for 3 values"));
+  CHECK(Npz::decode(writer.encode(), "a.npz").array("x").scalar<double>() == 1);
+}
+
+TEST_CASE("zip64 archives are read") {
+  const std::vector<ZipMember> members = {{.name = "x.npy", .content = floats({1, 2}), .zip64 = true},
+                                          {.name = "y.npy", .content = floats({3}), .zip64 = true}};
+  for (const bool zip64_end : {false, true}) {
+    const Npz npz = Npz::decode(archive_of(members, zip64_end), "a.npz");
+    CHECK(npz.array("x").as<float>() == std::vector<float>{1, 2});
+    CHECK(npz.array("y").as<float>() == std::vector<float>{3});
+  }
+}
+
+TEST_CASE("what is not an array is skipped and said") {
+  const Npz npz = Npz::decode(
+      archive_of({{"joint2num.npy", objects()}, {"x.npy", floats({1})}, {"readme.txt", {'h', 'i'}}}, false), "a.npz");
+  CHECK(npz.names() == std::vector<std::string>{"x"});
+  REQUIRE(npz.skipped().size() == 2);
+  CHECK(npz.skipped()[0].name == "joint2num");
+  CHECK(npz.skipped()[0].reason == "holds Python objects (dtype '|O'), which are not unpickled");
+  CHECK(npz.skipped()[1].reason == "is no .npy member");
+  CHECK_FALSE(npz.has("joint2num"));
+  CHECK_THROWS_WITH(npz.array("joint2num"),
+                    "a.npz: array 'joint2num': holds Python objects (dtype '|O'), which are not unpickled");
+}
+
+TEST_CASE("archives that lie are errors") {
+  const Bytes content = floats({1, 2, 3});  // 140 bytes
+  CHECK(error_of({{"x.npy", content}, {"x.npy", content}}) == "a.npz: holds 'x.npy' twice");
+  CHECK(error_of({{.name = "x.npy", .content = content, .flags = 1}}) ==
+        "a.npz: array 'x': is encrypted, which is not read");
+  CHECK(error_of({{.name = "x.npy", .content = content, .method = 12}}) ==
+        "a.npz: array 'x': is packed by method 12; stored and deflated members are read");
+  CHECK_THAT(error_of({{.name = "x.npy", .content = content, .claimed_size = 1 << 30}}),
+             Contains("a.npz: array 'x': claims 1073741824 bytes packed as 140 in a file of "));
+  CHECK_THAT(error_of({{.name = "x.npy", .content = content, .claimed_size = 1 << 30, .claimed_packed = 1 << 30}}),
+             Contains("a.npz: array 'x': claims 1073741824 bytes packed as 1073741824 in a file of "));
+  CHECK_THAT(error_of({{.name = "x.npy", .content = content, .method = 8, .claimed_size = 140}}),
+             Contains("a.npz: array 'x': cannot be unpacked: "));
+  CHECK_THAT(error_of({{.name = "x.npy", .content = content, .claimed_size = 139}}), Contains("a.npz: array 'x': "));
+  CHECK(error_of({{"x.npy", Bytes(content.begin(), content.end() - 1)}}) ==
+        "a.npz: array 'x': shape [3] of '<f4' needs 12 bytes, but 11 are there (truncated)");
+  CHECK(error_of({{"x.npy", {'a'}}}) == "a.npz: array 'x': is not an npy file");
+}
+
+TEST_CASE("damage is noticed by the checksum, truncation by the directory") {
+  NpzWriter writer;
+  writer.add<float>("x", {3}, {1, 2, 3});
+  for (const NpzPacking packing : {NpzPacking::stored, NpzPacking::deflated}) {
+    Bytes file = writer.encode(packing);
+    CHECK_THROWS_WITH(Npz::decode(std::span(file.data(), file.size() / 2), "a.npz"),
+                      Contains("a.npz: cannot be read as a zip archive: "));
+    file[30 + 5 + (packing == NpzPacking::stored ? 135 : 30)] ^= 1;
+    CHECK_THROWS_WITH(Npz::decode(file, "a.npz"), Contains("a.npz: array 'x': cannot be unpacked: "));
+  }
+  CHECK_THROWS_WITH(Npz::decode({}, "a.npz"), "a.npz: is empty");
+  CHECK_THROWS_WITH(Npz::decode(writer.encode(), "a.npz", 100),
+                    "a.npz: array 'x': brings the arrays to 140 bytes; at most 100 are read");
+}
+
+TEST_CASE("more members than a plain archive can count", "[full]") {
+  NpzWriter writer;
+  const int count = 66000;
+  for (int i = 0; i < count; ++i) writer.add_scalar(member_name(i), i);
+  const TemporaryFolder folder;
+  writer.write(folder / "many.npz");
+  const Npz npz = Npz::read(folder / "many.npz");
+  REQUIRE(npz.names().size() == count);
+  for (int i = 0; i < count; i += 997) CHECK(npz.array(member_name(i)).scalar<int>() == i);
+}
+
+TEST_CASE("more bytes than a plain archive can count", "[full]") {
+  const int64_t count = (int64_t{1} << 32) + 5;
+  const TemporaryFolder folder;
+  {
+    NpzWriter writer;
+    std::vector<uint8_t> values(static_cast<size_t>(count));
+    values.back() = 7;
+    writer.add<uint8_t>("large", {count}, values);
+    values = {};
+    writer.add_scalar("after", 2.5);
+    writer.write(folder / "large.npz", NpzPacking::deflated);
+  }
+  const Npz npz = Npz::read(folder / "large.npz");
+  CHECK(npz.array("large").shape() == std::vector<int64_t>{count});
+  CHECK(npz.array("after").scalar<double>() == 2.5);
+}
+
+TEST_CASE("a body model file is read") {
+  const std::string path = shared_file("bodies/makehuman_smplx_layout.npz");
+  if (path.empty()) return;
+  const Npz npz = Npz::read(path);
+  CHECK(npz.names().size() + npz.skipped().size() == 16);
+  const int64_t vertices = npz.array("v_template").shape().at(0);
+  CHECK(vertices == 13524);
+  npz.array("shapedirs").require_shape({vertices, 3, -1});
+  const std::vector<double> weights = npz.array("weights").require_shape({vertices, 55}).as<double>();
+  for (int64_t v = 0; v < vertices; v += 100) {
+    CHECK(std::accumulate(weights.begin() + v * 55, weights.begin() + (v + 1) * 55, 0.0) == Approx(1).epsilon(1e-6));
+  }
+  CHECK(npz.array("joint_names").strings().at(0) == "pelvis");
+  const std::vector<int64_t> parents = npz.array("kintree_table").require_shape({2, 55}).as<int64_t>();
+  CHECK((parents[0] == -1 || parents[0] == 4294967295));
+}
+
+TEST_CASE("photographs with cameras are read") {
+  const std::string path = shared_file("splats/test_garden.npz");
+  if (path.empty()) return;
+  const Npz npz = Npz::read(path);
+  CHECK(npz.array("Ks").require_shape({3, 3, 3}).as<double>().size() == 27);
+  CHECK(npz.array("viewmats").require_shape({3, 4, 4}).as<double>()[15] == 1);
+  CHECK(npz.array("height").scalar<int>() == 420);
+  CHECK(npz.array("width").scalar<int>() == 648);
+}
