@@ -1,6 +1,7 @@
 # shellcheck shell=bash
 # What the commands of this folder share. Sourced by them, not run.
 
+# shellcheck disable=SC2034  # used by the commands
 hsi4d_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 say() { printf '\n== %s\n' "$*"; }

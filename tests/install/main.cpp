@@ -1,6 +1,5 @@
 // Prints the version of the hsi4d that it was linked to.
 #include <hsi4d/core/version.h>
-
 #include <iostream>
 
 int main() {
