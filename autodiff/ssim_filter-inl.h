@@ -52,8 +52,8 @@ struct Moments {
   Vec<S> variance[kGroup];
 };
 
-/// Mean and variance of four windows whose inputs have means `mean(i)` and variances `variance(i)` themselves:
-/// Var = Σ w (v + (m−k)²) − (Σ w (m−k))².
+/// Mean and variance of four windows whose inputs have means m = mean(i) and variances v themselves:
+/// Var = Σ w (v + (m−k)²) − (Σ w (m−k))², where squares(i, m−k) gives v + (m−k)².
 template <class S, class Mean, class AddVariance>
 HWY_INLINE void central_moments(const Window<S>& window, Mean&& mean, AddVariance&& squares, Moments<S>& out) {
   Vec<S> in[kInputs];

@@ -12,9 +12,12 @@
 //
 // Sweep. Step g loads rows 4g+5 … 4g+8, makes the map of rows 4g … 4g+3 and the gradient of rows 4g−5 … 4g−2:
 //
-//   load_rows        x, y → ring of s = x+y, d = x−y            columns_forward  moments down the columns
-//   row_forward      moments along the rows, map, its derivatives  row_adjoint     adjoint filter along the rows → ring
-//   columns_adjoint  adjoint filter down the columns            store_gradient   back to rows of pixels
+//   load_rows        x, y → ring of s = x+y and d = x−y
+//   columns_forward  moments down the columns
+//   row_forward      moments along the rows, the map and its derivatives
+//   row_adjoint      adjoint filter along the rows → ring
+//   columns_adjoint  adjoint filter down the columns
+//   store_gradient   back to rows of pixels
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autodiff/ssim_kernel.cpp"
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
@@ -34,7 +37,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace hsi4d::detail::HWY_NAMESPACE {
 
-constexpr Index kRing = 16;  // rows kept, ≥ kInputs + 2
+constexpr Index kRing = 16;  // rows kept; a filter down the columns reads kInputs of them
 
 enum Statistic { kMeanS, kVarS, kMeanD, kVarD, kPixelD, kStatistics };  // after the filter down the columns
 enum Coefficient { kC, kBd, kBs, kCoefficients };                       // of the map
