@@ -1,38 +1,47 @@
 // Any bytes as a config: the reader answers with a config or with a UserError, and what it accepts it writes and reads
 // back to the same text. The first byte decides how much of the input is an override.
-#include <cstddef>
-#include <cstdint>
-#include <cstdlib>
 #include <string>
-#include <vector>
+#include <string_view>
 
-#include "core/check.h"
 #include "core/config_file.h"
 #include "pipelines/run_config.h"
+#include "tests/fuzz/fuzz.h"
 #include "tests/support/test_losses.h"
 
+namespace hsi4d::fuzz {
 namespace {
 
 std::string resolved(const std::string& text, const std::vector<std::string>& overrides) {
-  const std::vector<hsi4d::LossDescription> losses = hsi4d::test::test_losses();
-  hsi4d::ConfigProblems problems;
-  const hsi4d::ConfigValue tree = hsi4d::load_config_text(text, "fuzz.json", "/nonexistent", overrides, problems);
-  return hsi4d::resolved_config(hsi4d::read_run_config(tree, losses, problems), losses);
+  const std::vector<LossDescription> losses = test::test_losses();
+  ConfigProblems problems;
+  const ConfigValue tree = load_config_text(text, "fuzz.json", "/nonexistent", overrides, problems);
+  return resolved_config(read_run_config(tree, losses, problems), losses);
 }
+
+Bytes bytes_of(std::string_view text) { return Bytes(text.begin(), text.end()); }
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::string bytes(reinterpret_cast<const char*>(data), size);
-  const std::size_t cut = size == 0 ? 0 : 1 + data[0] % 64U;
-  std::vector<std::string> overrides;
-  if (size > 0 && data[0] >= 128 && cut <= size) overrides.push_back(bytes.substr(1, cut - 1));
-  const std::string text = overrides.empty() ? bytes : bytes.substr(cut);
-  try {
-    const std::string once = resolved(text, overrides);
-    if (resolved(once, {}) != once) std::abort();
-  } catch (const hsi4d::UserError&) {
-    return 0;
-  }
-  return 0;
+std::vector<Bytes> corpus() {
+  return {
+      bytes_of(R"({"seed": 3, "threads": 2, "render": {"quality": "accurate", "blur": 0.25, "alpha_min": 1e-4}})"),
+      bytes_of(R"({"render": {"compatibility": "gsplat", "near": 0.2}, "stages": {"camera": {"iterations": 30,
+ "optimize": {"camera": {"lr": 1e-3, "from": 0, "until": 30, "every": 1}}, "losses": {"photo": {"weight": 0.5}},
+ "optimizer": {"kind": "adam", "beta1": 0.9}}}})"),
+      bytes_of("\xa0render.blur=0.5                 {\"render\": {\"blur\": 1}}"),
+  };
 }
+
+bool accepts(std::span<const uint8_t> file) {
+  const std::string bytes(file.begin(), file.end());
+  const std::size_t cut = file.empty() ? 0 : 1 + file[0] % 64U;
+  std::vector<std::string> overrides;
+  if (!file.empty() && file[0] >= 128 && cut <= file.size()) overrides.push_back(bytes.substr(1, cut - 1));
+  const std::string text = overrides.empty() ? bytes : bytes.substr(cut);
+  return is_read([&] {
+    const std::string once = resolved(text, overrides);
+    HSI4D_CHECK_EQ(resolved(once, {}), once);
+  });
+}
+
+}  // namespace hsi4d::fuzz

@@ -115,7 +115,7 @@ TEST_CASE("list tells losses and settings") {
   CHECK(result.out == cli::list_command("losses", descriptions_of(loss_terms())));
 }
 
-TEST_CASE("--version and --help, of the program and of every subcommand") {
+TEST_CASE("the program and every subcommand answer --version and --help") {
   const TemporaryFolder folder;
   const ProgramResult version_text = run_hsi4d({"--version"});
   CHECK(version_text.status == 0);
