@@ -1,10 +1,16 @@
 // Errors, and checks that print both values.
 #pragma once
 
-#include <source_location>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <version>
+
+#ifdef __cpp_lib_source_location
+#include <source_location>
+#else  // clang 14 with g++ 12's library, which the fuzz targets are built with
+#include <experimental/source_location>
+#endif
 
 namespace hsi4d {
 
@@ -27,7 +33,11 @@ class InternalError : public std::logic_error {
 };
 
 /// A place in the source; taken as a defaulted last argument so that it names the caller.
+#ifdef __cpp_lib_source_location
 using Source = std::source_location;
+#else
+using Source = std::experimental::source_location;
+#endif
 
 /// "file.cpp:12", the file without its folders.
 std::string source_name(const Source& where);
