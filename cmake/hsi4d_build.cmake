@@ -19,10 +19,13 @@ target_compile_features(hsi4d_arithmetic INTERFACE cxx_std_20)
 
 # Warnings: ours alone, never those of a project that uses us. (-Wrestrict misfires on std::string in g++ 12, PR 105651; -Wmaybe-uninitialized
 # on std::regex under sanitizers.)
+if(HSI4D_SANITIZE)
+  set(hsi4d_sanitizer_warnings -Wno-maybe-uninitialized)
+endif()
 add_library(hsi4d_warnings INTERFACE)
 target_compile_options(hsi4d_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion
                                                 -Wno-sign-conversion -Wno-psabi -Wno-restrict
-                                                $<$<BOOL:${HSI4D_SANITIZE}>:-Wno-maybe-uninitialized>
+                                                ${hsi4d_sanitizer_warnings}
                                                 $<$<BOOL:${HSI4D_WARNINGS_AS_ERRORS}>:-Werror>)
 
 if(HSI4D_SANITIZE)

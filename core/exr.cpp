@@ -69,6 +69,46 @@ class MemoryOutput : public exr::OStream {
 
 [[noreturn]] void fail(const std::string& name, const std::string& reason) { throw DataError(name + ": " + reason); }
 
+/// Walks over the headers' attributes, each a name, a type, a size and as many bytes. OpenEXR takes the size on its
+/// word, up to 2 GB.
+class AttributeWalk {
+ public:
+  AttributeWalk(std::span<const uint8_t> content, const std::string& name) : content_(content), name_(name) {}
+
+  void check() {
+    skip(4);  // magic number
+    const bool many_parts = (number() & 0x1000) != 0;
+    do {
+      while (skip_text() > 0) {
+        skip_text();
+        skip(number());
+      }
+    } while (many_parts && at_ < content_.size() && content_[at_] != 0);
+  }
+
+ private:
+  void skip(size_t bytes) {
+    if (bytes > content_.size() - at_) fail(name_, "ends within its OpenEXR header");
+    at_ += bytes;
+  }
+  uint32_t number() {
+    skip(4);
+    uint32_t value;
+    std::memcpy(&value, content_.data() + at_ - 4, 4);
+    return value;
+  }
+  size_t skip_text() {
+    const size_t begin = at_;
+    do skip(1);
+    while (content_[at_ - 1] != 0);
+    return at_ - 1 - begin;
+  }
+
+  std::span<const uint8_t> content_;
+  const std::string& name_;
+  size_t at_ = 0;
+};
+
 std::string box_text(const Box2i& box) {
   std::ostringstream text;
   text << '(' << box.min.x << ',' << box.min.y << ")-(" << box.max.x << ',' << box.max.y << ')';
@@ -207,6 +247,7 @@ Layers read_layers(const std::string& path, const ImageLimits& limits) {
 }
 
 Layers decode_layers(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
+  AttributeWalk(file, name).check();
   try {
     MemoryInput stream(file, name);
     // One thread: callers decode several frames at a time. A damaged chunk table is an error, not to be guessed.

@@ -68,7 +68,8 @@ Bytes archive_of(const std::vector<ZipMember>& members, bool zip64_end) {
     put(central, 45, 2);
     put(central, 45, 2);
     put_fields(central, member, extra_bytes);
-    put(central, 0, 10);  // comment length, disk, attributes
+    put(central, 0, 6);  // comment length, disk, internal attributes
+    put(central, 0, 4);  // external attributes
     put(central, offset, 4);
     put(central, member.name);
     if (member.zip64) put_extra(central, member);

@@ -1,4 +1,5 @@
-// Runs a fuzz target as an ordinary test: NAME [MUTATIONS [SEED [trace]]]
+// Runs a fuzz target as an ordinary test: NAME [MUTATIONS [SEED [trace]]], or writes the corpus for libFuzzer:
+// NAME corpus FOLDER.
 // Every corpus file as it is, cut at every length and with every byte flipped, then random mutations.
 // "trace" prints each step before it is run, to find one that crashes.
 #include <algorithm>
@@ -129,6 +130,12 @@ int run_all(int64_t mutations, uint64_t seed, bool trace) {
   return 0;
 }
 
+int write_corpus(const std::string& folder) {
+  int number = 0;
+  for (const Bytes& file : corpus()) write_file(folder + "/corpus" + std::to_string(number++), file);
+  return 0;
+}
+
 template <class T>
 T number_or(int argc, char** argv, int i, T otherwise) {
   if (i >= argc) return otherwise;
@@ -146,6 +153,7 @@ T number_or(int argc, char** argv, int i, T otherwise) {
 }  // namespace hsi4d::fuzz
 
 int main(int argc, char** argv) {
+  if (argc == 3 && std::string_view(argv[1]) == "corpus") return hsi4d::fuzz::write_corpus(argv[2]);
   const int64_t mutations = hsi4d::fuzz::number_or<int64_t>(argc, argv, 1, 2000);
   const uint64_t seed = hsi4d::fuzz::number_or<uint64_t>(argc, argv, 2, 1);
   return hsi4d::fuzz::run_all(mutations, seed, argc > 3 && std::string_view(argv[3]) == "trace");
