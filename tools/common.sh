@@ -50,7 +50,8 @@ build_jobs() {
   echo "$jobs"
 }
 
-configure() { timed "configure $1" cmake --preset "$1"; }
+# configure PRESET [CMAKE-ARGUMENT]...
+configure() { timed "configure $1" cmake --preset "$@"; }
 
 # compile PRESET [TARGET...]: builds the targets (everything, if none is named) of a configured preset.
 compile() {
