@@ -16,7 +16,7 @@
 namespace hsi4d {
 
 /// Numbers of one block.
-inline constexpr Index kBlock = 128;
+inline constexpr Index kBlock = 512;
 /// Numbers of one parallel chunk, at least.
 inline constexpr Index kChunkNumbers = 16384;
 

@@ -18,32 +18,27 @@ namespace hsi4d {
 /// Value and partial derivatives with respect to some of up to 32 variables: those whose bits are set in Mask. What an
 /// expression does not depend on is known when it is compiled and costs nothing; nor does a zero ever meet an infinity.
 /// Comparisons look at the value, so a branch is differentiated where it is taken.
+///
+/// The partial derivatives are factor · d: a function of one argument multiplies one number, however many there are.
 template <class S, unsigned Mask>
 struct Dual {
   static constexpr std::size_t kPartials = std::popcount(Mask);
   S value{};
   std::array<S, kPartials> d{};
+  S factor = 1;
 
   /// True when there is a partial derivative with respect to variable k.
   static constexpr bool depends_on(std::size_t k) { return (Mask >> k & 1u) != 0; }
   /// Partial derivative with respect to variable k, which must be in the mask.
-  S partial(std::size_t k) const { return d[slot(k)]; }
+  S partial(std::size_t k) const { return factor * d[slot(k)]; }
   static constexpr std::size_t slot(std::size_t k) {
     return static_cast<std::size_t>(std::popcount(Mask & ((1u << k) - 1u)));
   }
 
   /// f(x) from f's value and derivative at x.
-  Dual chain(S f, S derivative) const {
-    Dual y{f, {}};
-    for (std::size_t i = 0; i < kPartials; ++i) y.d[i] = derivative * d[i];
-    return y;
-  }
+  Dual chain(S f, S derivative) const { return {f, d, derivative * factor}; }
 
-  Dual operator-() const {
-    Dual y{-value, {}};
-    for (std::size_t i = 0; i < kPartials; ++i) y.d[i] = -d[i];
-    return y;
-  }
+  Dual operator-() const { return {-value, d, -factor}; }
   // An accumulator can only take what depends on no other variables; else write `auto sum = a + b;`.
   template <class B>
   Dual& operator+=(const B& b) {
@@ -97,11 +92,11 @@ Dual<S, (A | B)> combine(S value, const Dual<S, A>& a, const Dual<S, B>& b, cons
   [&]<std::size_t... k>(std::index_sequence<k...>) {
     const auto one = [&]<std::size_t i>(std::integral_constant<std::size_t, i>) {
       if constexpr (Dual<S, A>::depends_on(i) && Dual<S, B>::depends_on(i)) {
-        y.d[y.slot(i)] = both(a.partial(i), b.partial(i));
+        y.d[y.slot(i)] = both(a.d[a.slot(i)], b.d[b.slot(i)]);
       } else if constexpr (Dual<S, A>::depends_on(i)) {
-        y.d[y.slot(i)] = left(a.partial(i));
+        y.d[y.slot(i)] = left(a.d[a.slot(i)]);
       } else if constexpr (Dual<S, B>::depends_on(i)) {
-        y.d[y.slot(i)] = right(b.partial(i));
+        y.d[y.slot(i)] = right(b.d[b.slot(i)]);
       }
     };
     (one(std::integral_constant<std::size_t, k>()), ...);
@@ -110,30 +105,32 @@ Dual<S, (A | B)> combine(S value, const Dual<S, A>& a, const Dual<S, B>& b, cons
   return y;
 }
 
+/// f(a, b) from its value and its two derivatives.
+template <class S, unsigned A, unsigned B>
+Dual<S, (A | B)> chain(S f, const Dual<S, A>& a, S f_a, const Dual<S, B>& b, S f_b) {
+  const S u = f_a * a.factor, v = f_b * b.factor;
+  return combine(
+      f, a, b, [=](S x, S y) { return u * x + v * y; }, [=](S x) { return u * x; }, [=](S y) { return v * y; });
+}
+
 }  // namespace detail
 
 template <class S, unsigned A, unsigned B>
 auto operator+(const Dual<S, A>& a, const Dual<S, B>& b) {
-  return detail::combine(
-      a.value + b.value, a, b, [](S x, S y) { return x + y; }, [](S x) { return x; }, [](S y) { return y; });
+  return detail::chain(a.value + b.value, a, S(1), b, S(1));
 }
 template <class S, unsigned A, unsigned B>
 auto operator-(const Dual<S, A>& a, const Dual<S, B>& b) {
-  return detail::combine(
-      a.value - b.value, a, b, [](S x, S y) { return x - y; }, [](S x) { return x; }, [](S y) { return -y; });
+  return detail::chain(a.value - b.value, a, S(1), b, S(-1));
 }
 template <class S, unsigned A, unsigned B>
 auto operator*(const Dual<S, A>& a, const Dual<S, B>& b) {
-  const S u = a.value, v = b.value;
-  return detail::combine(
-      u * v, a, b, [=](S x, S y) { return x * v + u * y; }, [=](S x) { return x * v; }, [=](S y) { return u * y; });
+  return detail::chain(a.value * b.value, a, b.value, b, a.value);
 }
 template <class S, unsigned A, unsigned B>
 auto operator/(const Dual<S, A>& a, const Dual<S, B>& b) {
   const S inverse = S(1) / b.value, ratio = a.value / b.value;
-  return detail::combine(
-      ratio, a, b, [=](S x, S y) { return (x - ratio * y) * inverse; }, [=](S x) { return x * inverse; },
-      [=](S y) { return -ratio * y * inverse; });
+  return detail::chain(ratio, a, inverse, b, -ratio * inverse);
 }
 
 /// The number that comparisons look at.
@@ -181,9 +178,10 @@ requires(!IsDual<A> && !IsDual<B>) auto select(bool condition, const A& yes, con
 }
 template <class S, unsigned A, unsigned B>
 Dual<S, (A | B)> select(bool condition, const Dual<S, A>& yes, const Dual<S, B>& no) {
+  const S u = yes.factor, v = no.factor;
   return detail::combine(
-      condition ? yes.value : no.value, yes, no, [=](S x, S y) { return condition ? x : y; },
-      [=](S x) { return condition ? x : S(0); }, [=](S y) { return condition ? S(0) : y; });
+      condition ? yes.value : no.value, yes, no, [=](S x, S y) { return condition ? u * x : v * y; },
+      [=](S x) { return condition ? u * x : S(0); }, [=](S y) { return condition ? S(0) : v * y; });
 }
 template <class S, unsigned A>
 Dual<S, A> select(bool condition, const Dual<S, A>& yes, std::type_identity_t<S> no) {

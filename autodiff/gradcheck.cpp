@@ -58,9 +58,10 @@ class Checker {
     const double typical = root_mean_square(probe.gradient);
     const Index count = probe.x.shape.count();
     for (Index k = 0; k < std::min(count, options_.entries); ++k) {
-      const Index entry = count <= options_.entries
-                              ? k
-                              : static_cast<Index>(entries_.below(static_cast<std::uint64_t>(k), static_cast<std::uint64_t>(count)));
+      const Index entry =
+          count <= options_.entries
+              ? k
+              : static_cast<Index>(entries_.below(static_cast<std::uint64_t>(k), static_cast<std::uint64_t>(count)));
       check_entry(probe, entry, choices, scale, typical);
     }
   }

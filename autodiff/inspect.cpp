@@ -45,7 +45,7 @@ void TapeInspector<S>::forward(NodeId n) {
 template <class S>
 void TapeInspector<S>::backward(NodeId n) {
   const FlushDenormals flush;
-  tape_.backward_node(tape_.nodes_[n]);
+  tape_.backward_node(tape_.nodes_[n], 0);
 }
 
 namespace {

@@ -102,16 +102,25 @@ void block_partials(const F& f, const Block<S, K>& block, S* y, const PartialRun
   }
 }
 
-/// Sum of a block's numbers in double: eight running sums, combined in a fixed order on every instruction set.
+/// Sum of a block's numbers in double: 32 running sums (enough to hide the latency of an addition), combined in a fixed
+/// order on every instruction set.
 template <class S>
 double block_sum(const S* y, Index n) {
-  double sums[8] = {};
+  constexpr Index kSums = 32;
+  double total = 0;
   Index i = 0;
-  for (; i + 8 <= n; i += 8) {
-    for (Index lane = 0; lane < 8; ++lane) sums[lane] += static_cast<double>(y[i + lane]);
+  if (n >= kSums) {
+    double sums[kSums] = {};
+    for (; i + kSums <= n; i += kSums) {
+      for (Index lane = 0; lane < kSums; ++lane) sums[lane] += static_cast<double>(y[i + lane]);
+    }
+    for (Index half = kSums / 2; half > 0; half /= 2) {
+      for (Index lane = 0; lane < half; ++lane) sums[lane] += sums[lane + half];
+    }
+    total = sums[0];
   }
-  for (Index lane = 0; i + lane < n; ++lane) sums[lane] += static_cast<double>(y[i + lane]);
-  return ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
+  for (; i < n; ++i) total += static_cast<double>(y[i]);
+  return total;
 }
 
 /// Adds blocks of partial derivatives to the adjoints of K operands, in parallel, the same bits for any thread count.
@@ -124,6 +133,12 @@ class AdjointSink {
       wants_[k] = io.wants(static_cast<int>(k));
       if (!wants_[k]) continue;
       d_in_[k] = io.d_in(static_cast<int>(k));
+      assigns_[k] = io.must_assign(static_cast<int>(k));
+      // An operand that a unit meets more than once is added to, from zero.
+      if (assigns_[k] && walk.broadcast(k) && !walk.shared_by_units(k)) {
+        std::fill_n(d_in_[k].data, d_in_[k].shape.memory(), S(0));
+        assigns_[k] = false;
+      }
       if (!walk.shared_by_units(k)) continue;
       slots_[k] = io.template scratch<double>(chunks * d_in_[k].shape.memory()).data();
       std::fill_n(slots_[k], chunks * d_in_[k].shape.memory(), 0.0);
@@ -140,7 +155,13 @@ class AdjointSink {
       const bool one_number = walk_.column_step(k) == 0;
       double* slot = slots_[k] == nullptr ? nullptr : slots_[k] + chunk * d_in_[k].shape.memory() + block.in[k];
       S* d = d_in_[k].data + block.in[k];
+      if (slot == nullptr && assigns_[k]) {
+#pragma GCC ivdep
+        for (Index i = 0; i < block.n; ++i) d[i] = p[i] * weight(i);
+        continue;
+      }
       if (slot == nullptr && !one_number) {
+#pragma GCC ivdep
         for (Index i = 0; i < block.n; ++i) d[i] += p[i] * weight(i);
         continue;
       }
@@ -163,7 +184,7 @@ class AdjointSink {
       for (Index i = 0; i < size; ++i) {
         double sum = 0;
         for (Index chunk = 0; chunk < chunks_; ++chunk) sum += slots_[k][chunk * size + i];
-        d_in_[k].data[i] += static_cast<S>(sum);
+        d_in_[k].data[i] = static_cast<S>(sum) + (assigns_[k] ? S(0) : d_in_[k].data[i]);
       }
     }
   }
@@ -171,7 +192,7 @@ class AdjointSink {
  private:
   const BlockWalk<S, K>& walk_;
   Index chunks_;
-  std::array<bool, K> wants_{};
+  std::array<bool, K> wants_{}, assigns_{};
   std::array<Array<S>, K> d_in_{};
   std::array<double*, K> slots_{};
 };
@@ -196,6 +217,7 @@ Shape broadcast_all(const Var<S>* inputs) {
 template <class S, std::size_t K, class F>
 struct MapOp {
   static constexpr const char* kName = F::kName;
+  static constexpr bool kAssigns = true;
   F f;
 
   void forward(NodeIo<S>& io) {
@@ -239,6 +261,7 @@ struct MapOp {
 template <class S, std::size_t K, class F>
 struct SumOverOp {
   static constexpr const char* kName = "sum_over";
+  static constexpr bool kAssigns = true;
   F f;
   Shape shape;           // of the broadcast inputs
   Buffer<S> saved = {};  // partial derivatives: for each block in the order of the walk, K runs of its numbers

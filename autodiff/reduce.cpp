@@ -16,6 +16,7 @@ Index rows_grain(Index cols) { return std::max<Index>(1, kChunkNumbers / std::ma
 template <class S>
 struct SumOp {
   static constexpr const char* kName = "sum";
+  static constexpr bool kAssigns = true;
   double scale = 1;
 
   void forward(NodeIo<S>& io) {
@@ -34,9 +35,15 @@ struct SumOp {
   void backward(NodeIo<S>& io) {
     const Array<S> d_x = io.d_in(0);
     const S d = static_cast<S>(scale * static_cast<double>(io.d_out().scalar()));
+    const bool assign = io.must_assign(0);
     parallel_for(d_x.total_rows(), rows_grain(d_x.shape.cols), [&](Index begin, Index end) {
       for (Index r = begin; r < end; ++r) {
-        for (Index c = 0; c < d_x.shape.cols; ++c) d_x.row(r)[c] += d;
+        S* row = d_x.row(r);
+        if (assign) {
+          std::fill_n(row, d_x.shape.cols, d);
+        } else {
+          for (Index c = 0; c < d_x.shape.cols; ++c) row[c] += d;
+        }
       }
     });
   }

@@ -155,8 +155,8 @@ struct Evaluation {
     });
   }
 
-  /// d_in += cotangent · d_x over the planned pixels.
-  void add_gradient(S cotangent, const Buffer<S>& d_x, const Array<S>& d_in) const {
+  /// d_in += cotangent · d_x over the planned pixels; with `assign`, d_in = cotangent · d_x.
+  void add_gradient(S cotangent, const Buffer<S>& d_x, const Array<S>& d_in, bool assign) const {
     const Shape& shape = d_in.shape;
     run_chunks(shape.planes * units.size(), [&](Index chunk) {
       const SsimRect& area = units[chunk % units.size()].gradient;
@@ -165,7 +165,11 @@ struct Evaluation {
         for (Index r = first + area.row_begin; r < first + area.row_end; ++r) {
           const S* from = d_x.data() + r * shape.stride;
           S* to = d_in.row(r);
-          for (Index c = area.col_begin; c < area.col_end; ++c) to[c] += cotangent * from[c];
+          if (assign) {
+            for (Index c = area.col_begin; c < area.col_end; ++c) to[c] = cotangent * from[c];
+          } else {
+            for (Index c = area.col_begin; c < area.col_end; ++c) to[c] += cotangent * from[c];
+          }
         }
       });
     });
@@ -177,6 +181,7 @@ constexpr auto kAllTouched = [](Index, Index) { return true; };
 template <class S>
 struct DSsimOp {
   static constexpr const char* kName = "d_ssim";
+  static constexpr bool kAssigns = true;
   SsimSettings settings;
   Evaluation<S> evaluation = {};
   std::array<Buffer<S>, 2> gradients = {};
@@ -200,7 +205,9 @@ struct DSsimOp {
 
   void backward(NodeIo<S>& io) {
     for (const int i : {0, 1}) {
-      if (io.wants(i)) evaluation.add_gradient(io.d_out().scalar(), gradients[static_cast<std::size_t>(i)], io.d_in(i));
+      if (!io.wants(i)) continue;
+      const Buffer<S>& gradient = gradients[static_cast<std::size_t>(i)];
+      evaluation.add_gradient(io.d_out().scalar(), gradient, io.d_in(i), io.must_assign(i));
     }
   }
 
@@ -253,7 +260,7 @@ struct RegionOp {
   }
 
   void backward(NodeIo<S>& io) {
-    if (io.wants(0)) evaluation.add_gradient(io.d_out().scalar(), gradient, io.d_in(0));
+    if (io.wants(0)) evaluation.add_gradient(io.d_out().scalar(), gradient, io.d_in(0), false);
   }
 
   Index saved_bytes() const { return gradient.capacity_bytes(); }

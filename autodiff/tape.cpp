@@ -255,9 +255,6 @@ void Tape<S>::build(Plan& plan) {
   for (std::uint32_t id = 0; id < arrays_.size(); ++id) {
     if (!reached_[id]) continue;
     if (arrays_[id].producer == kLeaf) plan.leaves.push_back(id);
-    if (!arrays_[id].needs_gradient) continue;
-    plan.adjoints.push_back({id, plan.adjoint_size});
-    plan.adjoint_size += round_up(arrays_[id].shape.memory(), kAlignment / static_cast<Index>(sizeof(S)));
   }
   // A node takes part in backward when a reached output carries a gradient on (a frozen output stops it).
   for (auto n = plan.forward_nodes.rbegin(); n != plan.forward_nodes.rend(); ++n) {
@@ -268,7 +265,38 @@ void Tape<S>::build(Plan& plan) {
       break;
     }
   }
+  place_adjoints(plan);
   plan.structure = structure_;
+}
+
+/// Finds which node is the first to meet each adjoint, and lays the adjoints out: those that must be cleared, then
+/// those whose first node assigns them.
+template <class S>
+void Tape<S>::place_adjoints(Plan& plan) {
+  enum : std::uint8_t { kUntouched, kAdded, kAssigned };
+  assigned_.assign(arrays_.size(), kUntouched);
+  assigned_[plan.result] = kAdded;  // the seed
+  plan.assign_masks.clear();
+  for (const std::uint32_t n : plan.backward_nodes) {
+    const NodeRecord& node = nodes_[n];
+    const auto first = edges_.begin() + node.first_edge, last = first + node.edge_count;
+    std::uint64_t mask = 0;
+    for (auto edge = first; edge != last; ++edge) {
+      if (!arrays_[*edge].needs_gradient || assigned_[*edge] != kUntouched) continue;
+      const bool once = std::count(first, last, *edge) == 1;
+      assigned_[*edge] = node.table->assigns && once ? kAssigned : kAdded;
+      mask |= std::uint64_t(assigned_[*edge] == kAssigned) << (edge - first);
+    }
+    plan.assign_masks.push_back(mask);
+  }
+  for (const bool assigned : {false, true}) {
+    for (std::uint32_t id = 0; id < arrays_.size(); ++id) {
+      if (!reached_[id] || !arrays_[id].needs_gradient || (assigned_[id] == kAssigned) != assigned) continue;
+      plan.adjoints.push_back({id, plan.adjoint_size});
+      plan.adjoint_size += round_up(arrays_[id].shape.memory(), kAlignment / static_cast<Index>(sizeof(S)));
+    }
+    if (!assigned) plan.cleared_size = plan.adjoint_size;
+  }
 }
 
 template <class S>
@@ -276,6 +304,8 @@ void Tape<S>::activate(const Plan& plan) {
   if (active_result_ == plan.result && active_structure_ == plan.structure) return;
   for (ArrayRecord& array : arrays_) array.adjoint = nullptr;
   adjoints_.resize(plan.adjoint_size);
+  // Once for all of them: the padding of adjoints that are assigned is never written again.
+  std::fill_n(adjoints_.data(), plan.adjoint_size, S(0));
   for (const auto& slot : plan.adjoints) arrays_[slot.array].adjoint = adjoints_.data() + slot.offset;
   active_result_ = plan.result;
   active_structure_ = plan.structure;
@@ -314,8 +344,9 @@ void Tape<S>::forward_node(NodeRecord& node) {
 }
 
 template <class S>
-void Tape<S>::backward_node(NodeRecord& node) {
+void Tape<S>::backward_node(NodeRecord& node, std::uint64_t assign_mask) {
   NodeIo<S> io = io_of(node);
+  io.assign_mask_ = assign_mask;
   const auto start = profiling_ ? Clock::now() : Clock::time_point{};
   node.table->backward(node.op, io);
   scratch_.reset();
@@ -344,9 +375,9 @@ void Tape<S>::run_forward(Plan& plan) {
 
 template <class S>
 void Tape<S>::run_backward(Plan& plan) {
-  for (const std::uint32_t n : plan.backward_nodes) {
-    NodeRecord& node = nodes_[n];
-    backward_node(node);
+  for (std::size_t k = 0; k < plan.backward_nodes.size(); ++k) {
+    NodeRecord& node = nodes_[plan.backward_nodes[k]];
+    backward_node(node, plan.assign_masks[k]);
     if (!anomaly_) continue;
     for (std::uint32_t i = 0; i < node.edge_count; ++i) {
       const std::uint32_t input = edges_[node.first_edge + i];
@@ -391,7 +422,7 @@ void Tape<S>::backward(Var<S> result, std::span<const S> cotangent) {
   activate(plan);
   const FlushDenormals flush;
   scratch_.reset();
-  if (plan.adjoint_size > 0) std::memset(adjoints_.data(), 0, static_cast<std::size_t>(plan.adjoint_size) * sizeof(S));
+  std::fill_n(adjoints_.data(), plan.cleared_size, S(0));
   if (!arrays_[id].needs_gradient) return;
   copy_in(cotangent, adjoint_view(id));
   try {

@@ -98,8 +98,11 @@ class NodeIo {
   /// True when input i needs a gradient; only then may d_in(i) be asked for. Fixed between forward and its backward, so
   /// forward may save only what backward will need.
   bool wants(int i) const { return tape_->arrays_[input_ids_[i]].needs_gradient; }
-  /// Adjoint of input i, to be added to, never overwritten.
+  /// Adjoint of input i, to be added to, never overwritten (but see must_assign).
   Array<S> d_in(int i) const { return tape_->adjoint_view(input_ids_[i]); }
+  /// True when nothing has been added to d_in(i) yet and its numbers are undefined: the operator then assigns what it
+  /// else would add. Only operators that declare kAssigns meet it.
+  bool must_assign(int i) const { return (assign_mask_ >> i & 1u) != 0; }
   /// Adjoint of output j; empty (false) when the loss does not depend on output j, which only operators with several
   /// outputs can meet.
   ConstArray<S> d_out(int j = 0) const { return tape_->adjoint_view(first_output_ + static_cast<std::uint32_t>(j)); }
@@ -116,6 +119,7 @@ class NodeIo {
   const std::uint32_t* input_ids_ = nullptr;
   std::uint32_t input_count_ = 0;
   std::uint32_t first_output_ = 0;
+  std::uint64_t assign_mask_ = 0;
 };
 
 /// The functions of an operator type, made from its members by Tape::record.
@@ -130,6 +134,7 @@ struct OperatorTable {
   void (*add_signature)(void*, Signature&, NodeIo<S>&);  // null: no discrete choices
   Index (*saved_bytes)(const void*);                     // null: nothing saved
   bool persistent_outputs;
+  bool assigns;
 };
 
 /// Figures of one node since the tape was made or `clear_statistics`.
@@ -176,6 +181,8 @@ class Tape {
   ///   `void add_signature(Signature&, NodeIo<S>&)`  its discrete choices in the last forward.
   ///   `Index saved_bytes() const`                   memory held between forward and backward, for statistics.
   ///   `static constexpr bool kPersistentOutputs = true`  outputs are updated in place, not rewritten.
+  ///   `static constexpr bool kAssigns = true`  its adjoint asks io.must_assign(i), and then assigns every number of
+  ///       d_in(i): saves clearing that memory and reading it back.
   template <class Op>
   Var<S> record(Op op, std::span<const Var<S>> inputs, std::span<const Shape> outputs, Source where);
   template <class Op>
@@ -277,8 +284,10 @@ class Tape {
     std::uint64_t structure = 0;
     std::uint64_t forward_at = 0;  // clock when forward finished; 0: never, or not since the structure changed
     std::vector<std::uint32_t> leaves, forward_nodes, backward_nodes;
+    std::vector<std::uint64_t> assign_masks;  // of backward_nodes: which inputs they meet first, and assign
     std::vector<Slot> adjoints;
     Index adjoint_size = 0;
+    Index cleared_size = 0;  // the adjoints that are added to from the start lie in front, and are cleared each time
   };
 
   static constexpr std::uint32_t kLeaf = ~std::uint32_t(0);
@@ -298,11 +307,12 @@ class Tape {
   void update_structure();
   Plan& plan_for(std::uint32_t result);
   void build(Plan& plan);
+  void place_adjoints(Plan& plan);
   void activate(const Plan& plan);
   void run_forward(Plan& plan);
   void run_backward(Plan& plan);
   void forward_node(NodeRecord& node);
-  void backward_node(NodeRecord& node);
+  void backward_node(NodeRecord& node, std::uint64_t assign_mask);
   bool up_to_date(const NodeRecord& node) const;
   void check_leaves(const Plan& plan) const;
   void check_finite(std::uint32_t array, const NodeRecord* node, bool adjoint) const;
@@ -313,7 +323,8 @@ class Tape {
   std::vector<NodeRecord> nodes_;
   std::vector<std::uint32_t> edges_;  // input ids of all nodes
   std::vector<Plan> plans_;
-  std::vector<std::uint8_t> reached_;  // scratch of build
+  std::vector<std::uint8_t> reached_;   // scratch of build
+  std::vector<std::uint8_t> assigned_;  // scratch of place_adjoints
   Buffer<S> adjoints_;
   std::uint64_t clock_ = 1;
   std::uint64_t structure_ = 1;          // changes with recording and freezing
@@ -352,6 +363,7 @@ constexpr OperatorTable<S> make_operator_table() {
     table.saved_bytes = [](const void* op) { return static_cast<const Op*>(op)->saved_bytes(); };
   }
   if constexpr (requires { Op::kPersistentOutputs; }) table.persistent_outputs = Op::kPersistentOutputs;
+  if constexpr (requires { Op::kAssigns; }) table.assigns = Op::kAssigns;
   return table;
 }
 

@@ -1,7 +1,7 @@
 // Figures that the project asks of itself, printed beside what a run measured.
 //
-// A benchmark may set the counter "fma" to the fused multiply-adds that one iteration must do; its share of the processor's
-// measured peak is then printed too.
+// A benchmark may set the counter "fma" to the fused multiply-adds that one iteration must do; its share of the
+// processor's measured peak is then printed too.
 #pragma once
 
 #include <string>

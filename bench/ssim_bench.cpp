@@ -1,9 +1,11 @@
 // SSIM: forward, and forward with backward, of whole images and of a region, single precision unless named otherwise.
 #include <random>
+#include <string>
 
 #include <benchmark/benchmark.h>
 
 #include "autodiff/ssim.h"
+#include "bench/goals.h"
 #include "core/parallel.h"
 
 namespace {
@@ -100,5 +102,11 @@ BENCHMARK(region)
     ->Args({670, 256, 2})
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
+
+const bench::AtStart goals([] {
+  const std::string whole_image = "d_ssim/rows:1024/cols:1024/threads:1/backward:1/real_time";
+  bench::ask_time("D-SSIM of 1024 x 1024 x 3, forward + backward", whole_image, 16e6);
+  bench::ask_time("  the same, for each pixel", whole_image, 16e6 / (1024.0 * 1024.0), 1024.0 * 1024.0);
+});
 
 }  // namespace

@@ -55,8 +55,8 @@ LossTerm make_loss_term(std::string name, std::string summary, F) {
           [](const LossInputs<double>& inputs, const std::any&) { return F{}(inputs); }};
 }
 
-/// The terms that this library comes with, in the order of optim/losses/list.h. A project of a user's own appends its terms
-/// to this list and passes their descriptions to the program.
+/// The terms that this library comes with, in the order of optim/losses/list.h. A project of a user's own appends its
+/// terms to this list and passes their descriptions to the program.
 const std::vector<LossTerm>& loss_terms();
 
 /// The descriptions of some terms, for configs.

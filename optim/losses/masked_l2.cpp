@@ -7,7 +7,8 @@ namespace hsi4d {
 LossTerm masked_l2_loss() {
   return make_loss_term("masked_l2", "Squared difference of the rendered image and the frame where the weight says so",
                         [](const auto& in) {
-                          return in.given(in.weight) ? l2(in.rendered, in.target, in.weight) : l2(in.rendered, in.target);
+                          return in.given(in.weight) ? l2(in.rendered, in.target, in.weight)
+                                                     : l2(in.rendered, in.target);
                         });
 }
 

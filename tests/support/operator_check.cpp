@@ -87,6 +87,20 @@ void check_accumulation(Recorded<double>& r, const std::vector<double>& cotangen
   r.tape.drop_state();
 }
 
+/// backward clears or assigns every adjoint: nothing of what lay in their memory survives.
+void check_no_leftovers(Recorded<double>& r, const std::vector<double>& cotangent) {
+  const Vectors clean = gradients(r, cotangent);
+  TapeInspector<double> inspect(r.tape);
+  for (std::uint32_t id = 0; id < inspect.arrays(); ++id) {
+    const Array<double> d = inspect.adjoint(id);
+    if (!d) continue;
+    for (Index row = 0; row < d.total_rows(); ++row) {
+      std::fill_n(d.row(row), d.shape.cols, std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+  CHECK(same_bits(gradients(r, cotangent), clean));
+}
+
 void check_freezing(Recorded<double>& r, const std::vector<double>& cotangent, double tolerance) {
   const Vectors all = gradients(r, cotangent);
   for (std::size_t frozen = 0; frozen < r.in.size(); ++frozen) {
@@ -242,6 +256,7 @@ void check_recorded(Recorded<double>& r, const std::vector<double>& cotangent, c
   for (const auto& gradient : gradients(r, std::vector<double>(cotangent.size(), 0.0))) {
     CHECK(std::all_of(gradient.begin(), gradient.end(), [](double g) { return g == 0; }));
   }
+  check_no_leftovers(r, cotangent);
   check_freezing(r, cotangent, options.freeze_tolerance);
   check_threads(r, cotangent);
   check_every_output_written(r);

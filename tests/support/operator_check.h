@@ -90,7 +90,8 @@ void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vect
 
 /// Checks operator f (a generic callable: vector of input Vars → result Var) for several seeds:
 /// 1. every adjoint entry against central differences in double, random cotangent, each node by itself and the whole;
-/// 2. adjoints add: noise put in before survives; called twice they double;
+/// 2. adjoints add: noise put in before survives; called twice they double; where they assign instead (kAssigns),
+///    nothing of the memory's old content survives;
 /// 3. a zero cotangent gives zero gradients;
 /// 4. freezing any input leaves the gradients of the others bitwise unchanged, and the frozen one has none;
 /// 5. 1, 2, 3 and 8 threads give the same bits, values and gradients;
