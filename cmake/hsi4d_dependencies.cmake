@@ -2,6 +2,11 @@
 # OpenImageIO and libzip come through pkg-config: Debian's CMake files of both insist on command-line tools
 # that are in other packages.
 include(CMakeFindDependencyMacro)
+# In the build itself no find_package(hsi4d) stands behind this: a missing library has to stop it here, by name.
+if(NOT CMAKE_FIND_PACKAGE_NAME)
+  set(CMAKE_FIND_PACKAGE_NAME hsi4d)
+  set(hsi4d_FIND_REQUIRED TRUE)
+endif()
 find_dependency(PkgConfig)
 find_dependency(Eigen3)
 find_dependency(TBB)
