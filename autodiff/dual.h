@@ -129,8 +129,11 @@ auto operator*(const Dual<S, A>& a, const Dual<S, B>& b) {
 }
 template <class S, unsigned A, unsigned B>
 auto operator/(const Dual<S, A>& a, const Dual<S, B>& b) {
-  const S inverse = S(1) / b.value, ratio = a.value / b.value;
-  return detail::chain(ratio, a, inverse, b, -ratio * inverse);
+  // (d_a − ratio d_b) / b: the division goes into the common factor.
+  const S ratio = a.value / b.value;
+  auto y = detail::chain(ratio, a, S(1), b, -ratio);
+  y.factor = S(1) / b.value;
+  return y;
 }
 
 /// The number that comparisons look at.

@@ -92,13 +92,14 @@ void block_values(const F& f, const Block<S, K>& block, S* y) {
 template <class S, std::size_t K, class F>
 void block_partials(const F& f, const Block<S, K>& block, S* y, const PartialRuns<S, K>& partial) {
   const auto x = block.x;
+  const auto runs = partial;
   // The runs overlap no operand; without saying so the compiler gives up comparing 2K + 1 pointers.
 #pragma GCC ivdep
   for (Index i = 0; i < block.n; ++i) {
     S p[K];
     y[i] = call_at([&](auto... arguments) { return f.template partials<S>(p, arguments...); }, x, i,
                    std::make_index_sequence<K>());
-    for (std::size_t k = 0; k < K; ++k) partial[k][i] = p[k];
+    for (std::size_t k = 0; k < K; ++k) runs[k][i] = p[k];
   }
 }
 

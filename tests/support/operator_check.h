@@ -37,6 +37,8 @@ struct OperatorCheck {
   double freeze_tolerance = 0;
   /// Share of entries that may lie at kinks.
   double kink_share = 0.1;
+  /// Entries of each input that are tried (see GradcheckOptions); fewer for an operator that is slow.
+  Index entries = 64;
 };
 
 /// Seeds of every run: two fixed ones, and a fresh one that is printed; HSI4D_TEST_SEED=n repeats it.
