@@ -1,6 +1,6 @@
-#include <catch2/catch.hpp>
-
 #include <memory>
+
+#include <catch2/catch.hpp>
 
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"

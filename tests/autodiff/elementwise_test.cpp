@@ -15,6 +15,7 @@ const Shape kColumn = shape_of(5, 1);
 const Shape kImage = {3, 5, 7, 16};
 const Shape kMask = {1, 5, 7, 16};
 const Shape kLarge = shape_of(9000, 7);  // several parallel chunks
+const OperatorCheck kFew{.entries = 8};  // for them: each evaluation takes its time
 }  // namespace
 
 TEST_CASE("elementwise arithmetic passes the operator checks", "[parallel]") {
@@ -32,8 +33,10 @@ TEST_CASE("elementwise arithmetic passes the operator checks", "[parallel]") {
 }
 
 TEST_CASE("broadcasting over many chunks passes the operator checks", "[parallel]") {
-  check_operator("large * row", {{"a", kLarge}, {"b", shape_of(1, 7)}}, [](const auto& in) { return in[0] * in[1]; });
-  check_operator("large * scalar", {{"a", kLarge}, {"b", kScalarShape}}, [](const auto& in) { return in[0] * in[1]; });
+  check_operator(
+      "large * row", {{"a", kLarge}, {"b", shape_of(1, 7)}}, [](const auto& in) { return in[0] * in[1]; }, kFew);
+  check_operator(
+      "large * scalar", {{"a", kLarge}, {"b", kScalarShape}}, [](const auto& in) { return in[0] * in[1]; }, kFew);
 }
 
 TEST_CASE("elementwise functions pass the operator checks", "[parallel]") {
@@ -61,9 +64,12 @@ TEST_CASE("map and its dual numbers pass the operator checks", "[parallel]") {
   check_operator("sum_over", {{"x", kImage}, {"y", kImage}, {"w", kMask}}, [&](const auto& in) {
     return sum_over({in[0], in[1], in[2]}, bump);
   });
-  check_operator("sum_over, many chunks", {{"x", kLarge}, {"y", kLarge}, {"w", shape_of(1, 7)}}, [&](const auto& in) {
-    return sum_over({in[0], in[1], in[2]}, bump);
-  });
+  check_operator(
+      "sum_over, many chunks", {{"x", kLarge}, {"y", kLarge}, {"w", shape_of(1, 7)}},
+      [&](const auto& in) {
+        return sum_over({in[0], in[1], in[2]}, bump);
+      },
+      kFew);
 }
 
 TEST_CASE("stop_gradient copies the value and has no gradient behind it") {
