@@ -1,8 +1,11 @@
 #include "tests/support/allocation_counter.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstddef>
+
+#include "core/parallel.h"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define HSI4D_COUNT_ALLOCATIONS 1
@@ -61,5 +64,17 @@ bool allocations_are_counted() {
 }
 
 std::int64_t allocation_count() { return count; }
+
+std::int64_t steady_allocations(FunctionRef<void()> round) {
+  round();
+  std::int64_t least = INT64_MAX;
+  const int rounds = thread_count() == 1 ? 1 : 10;
+  for (int i = 0; i < rounds && least > 0; ++i) {
+    const std::int64_t before = allocation_count();
+    round();
+    least = std::min(least, allocation_count() - before);
+  }
+  return least;
+}
 
 }  // namespace hsi4d::test
