@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -30,12 +31,23 @@ struct Measured {
   std::optional<double> fma;
 };
 
-/// Passes runs on to the console and keeps the medians of the processor time: what is asked for is on one thread, and
+std::string time_text(double ns) {
+  char text[32];
+  const char* unit = ns < 1e3 ? "ns" : ns < 1e6 ? "us" : "ms";
+  std::snprintf(text, sizeof text, "%.4g %s", ns < 1e3 ? ns : ns < 1e6 ? ns / 1e3 : ns / 1e6, unit);
+  return text;
+}
+
+/// Prints the median of each benchmark and keeps it. It is the processor time: what is asked for is on one thread, and
 /// other programs of the machine do not count.
-class MedianReporter : public benchmark::ConsoleReporter {
+class MedianReporter : public benchmark::BenchmarkReporter {
  public:
   std::map<std::string, Measured> medians;
 
+  bool ReportContext(const Context&) override {
+    std::printf("medians of processor time\n");
+    return true;
+  }
   void ReportRuns(const std::vector<Run>& runs) override {
     for (const Run& run : runs) {
       if (run.run_type != Run::RT_Aggregate || run.aggregate_name != "median") continue;
@@ -43,17 +55,11 @@ class MedianReporter : public benchmark::ConsoleReporter {
       m.median_ns = run.GetAdjustedCPUTime() * 1e9 / benchmark::GetTimeUnitMultiplier(run.time_unit);
       if (const auto fma = run.counters.find("fma"); fma != run.counters.end()) m.fma = fma->second.value;
       medians[run.run_name.str()] = m;
+      std::printf("%-72s %12s\n", run.run_name.str().c_str(), time_text(m.median_ns).c_str());
+      std::fflush(stdout);
     }
-    ConsoleReporter::ReportRuns(runs);
   }
 };
-
-std::string time_text(double ns) {
-  char text[32];
-  const char* unit = ns < 1e3 ? "ns" : ns < 1e6 ? "us" : "ms";
-  std::snprintf(text, sizeof text, "%.4g %s", ns < 1e3 ? ns : ns < 1e6 ? ns / 1e3 : ns / 1e6, unit);
-  return text;
-}
 
 /// ", 34 % of peak" where the benchmark counts its multiply-adds.
 std::string share_text(const MedianReporter& reporter, const std::string& name) {
