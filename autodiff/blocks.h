@@ -56,6 +56,8 @@ class BlockWalk {
   }
   Index column_step(std::size_t k) const { return flat_ ? (scalar_[k] && out_.count() != 1 ? 0 : 1) : column_step_[k]; }
 
+  /// Numbers of the output that one unit of the walk covers.
+  Index numbers_per_unit() const { return flat_ ? 1 : out_.planes * out_.cols; }
   /// How the walk is cut for parallel loops.
   Partition partition() const {
     if (flat_) return {out_.count(), kChunkNumbers};

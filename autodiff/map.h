@@ -299,7 +299,7 @@ struct SumOverOp {
 
  private:
   S* saved_of(const BlockWalk<S, K>& walk, Index unit) {
-    return saved.data() + unit * (shape.count() / std::max<Index>(1, walk.partition().n)) * static_cast<Index>(K);
+    return saved.data() + unit * walk.numbers_per_unit() * static_cast<Index>(K);
   }
 
   /// The next block's runs in the saved numbers; advances `at` past them.
