@@ -288,34 +288,36 @@ struct StopGradientOp {
 
 template <class S, class F>
 Var<S> unary(Var<S> x, const F& f, const Source& where) {
-  return x.tape->record(MapOp<S, 1, F>{f}, {x}, x.shape(), where);
+  const Shape shape = x.shape();
+  return x.owner().record(MapOp<S, 1, F>{f}, {x}, shape, where);
 }
 
 template <class S, class F>
 Var<S> binary(Var<S> a, Var<S> b, const F& f, const Source& where) {
-  return a.tape->record(MapOp<S, 2, F>{f}, {a, b}, broadcast_shape(a.shape(), b.shape()), where);
+  const Shape shape = broadcast_shape(a.shape(), b.shape());
+  return a.owner().record(MapOp<S, 2, F>{f}, {a, b}, shape, where);
 }
 
 }  // namespace
 
 template <class S>
 Var<S> operator+(Var<S> a, std::type_identity_t<Operand<S>> b) {
-  if (b.is_number()) return unary(a, AddNumber<S>{b.number}, b.where);
+  if (b.is_number) return unary(a, AddNumber<S>{b.number}, b.where);
   return binary(a, b.var, Add<S>{}, b.where);
 }
 template <class S>
 Var<S> operator-(Var<S> a, std::type_identity_t<Operand<S>> b) {
-  if (b.is_number()) return unary(a, AddNumber<S>{-b.number}, b.where);
+  if (b.is_number) return unary(a, AddNumber<S>{-b.number}, b.where);
   return binary(a, b.var, Subtract<S>{}, b.where);
 }
 template <class S>
 Var<S> operator*(Var<S> a, std::type_identity_t<Operand<S>> b) {
-  if (b.is_number()) return unary(a, ScaleBy<S>{b.number}, b.where);
+  if (b.is_number) return unary(a, ScaleBy<S>{b.number}, b.where);
   return binary(a, b.var, Multiply<S>{}, b.where);
 }
 template <class S>
 Var<S> operator/(Var<S> a, std::type_identity_t<Operand<S>> b) {
-  if (b.is_number()) return unary(a, OverNumber<S>{b.number}, b.where);
+  if (b.is_number) return unary(a, OverNumber<S>{b.number}, b.where);
   return binary(a, b.var, Divide<S>{}, b.where);
 }
 template <class S>
@@ -359,7 +361,7 @@ template <class S> Var<S> leaky_relu(Var<S> x, double slope, Source where) {
   return unary(x, LeakyRelu<S>{static_cast<S>(slope)}, where);
 }
 template <class S> Var<S> stop_gradient(Var<S> x, Source where) {
-  Var<S> y = x.tape->record(StopGradientOp<S>{}, {x}, x.shape(), where);
+  Var<S> y = x.owner().record(StopGradientOp<S>{}, {x}, x.shape(), where);
   x.tape->freeze(y);
   return y;
 }

@@ -14,11 +14,11 @@ template <class S>
 struct Operand {
   Operand(Var<S> v, Source w = Source::current()) : var(v), where(w) {}  // NOLINT(google-explicit-constructor)
   Operand(double x, Source w = Source::current())
-      : number(static_cast<S>(x)), where(w) {}  // NOLINT(google-explicit-constructor)
-  bool is_number() const { return var.tape == nullptr; }
+      : number(static_cast<S>(x)), is_number(true), where(w) {}  // NOLINT(google-explicit-constructor)
 
   Var<S> var;
   S number = 0;
+  bool is_number = false;
   Source where;
 };
 

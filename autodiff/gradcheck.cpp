@@ -73,7 +73,7 @@ class Checker {
     for (Index i = 0; i < twice.shape.count(); ++i) {
       const Index row = i / twice.shape.cols, col = i % twice.shape.cols;
       const double expected = 2 * once[static_cast<std::size_t>(row * twice.shape.stride + col)];
-      if (std::fabs(twice.row(row)[col] - expected) > 1e-12 * size)
+      if (!(std::fabs(twice.row(row)[col] - expected) <= 1e-12 * size))
         fail_at(place, twice.shape, i, expected, twice.row(row)[col]);
     }
   }
@@ -89,20 +89,26 @@ class Checker {
     report_.failures.push_back(std::move(failure));
   }
 
+  /// Puts a number back, also when an evaluation throws.
+  struct Restore {
+    double* x;
+    double value;
+    ~Restore() { *x = value; }
+  };
+
   /// Central difference of sixth order; false when a discrete choice changed on the way.
   bool difference(const Probe& probe, double* x, double step, std::uint64_t choices, double& derivative) const {
     static constexpr double kWeights[3] = {45.0 / 60, -9.0 / 60, 1.0 / 60};
-    const double centre = *x;
+    const Restore centre{x, *x};
     bool smooth = true;
     derivative = 0;
     for (int i = 1; i <= 3; ++i) {
       for (const int side : {1, -1}) {
-        *x = centre + side * i * step;
+        *x = centre.value + side * i * step;
         derivative += side * kWeights[i - 1] * probe.value();
         smooth = smooth && probe.choices() == choices;
       }
     }
-    *x = centre;
     derivative /= step;
     return smooth;
   }

@@ -42,7 +42,8 @@ struct GradcheckReport {
   std::vector<GradcheckFailure> failures;
   bool too_many_kinks = false;
 
-  bool ok() const { return failures.empty() && !too_many_kinks; }
+  /// True when something was tried and nothing was wrong.
+  bool ok() const { return entries > 0 && failures.empty() && !too_many_kinks; }
   /// A few lines: what was tried, the worst error, the first failures.
   std::string text() const;
 };

@@ -38,7 +38,6 @@ class TapeInspector {
   /// The name given, or "#id".
   std::string array_name(ArrayId id) const;
   bool is_leaf(ArrayId id) const { return tape_.arrays_[id].producer == Tape<S>::kLeaf; }
-  bool is_constant(ArrayId id) const { return tape_.arrays_[id].constant; }
   bool needs_gradient(ArrayId id) const { return tape_.arrays_[id].needs_gradient; }
   const Shape& shape(ArrayId id) const { return tape_.arrays_[id].shape; }
   Array<S> value(ArrayId id) { return tape_.view(id); }

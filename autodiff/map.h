@@ -344,8 +344,8 @@ struct SumOverOp {
 template <class S, std::size_t K, class F>
 Var<S> map(const Var<S> (&inputs)[K], F f, Source where = Source::current()) {
   using Function = detail::ByDualNumbers<F>;
-  return inputs[0].tape->record(MapOp<S, K, Function>{Function{f}}, std::span<const Var<S>>(inputs),
-                                std::array{detail::broadcast_all<S, K>(inputs)}, where);
+  return inputs[0].owner().record(MapOp<S, K, Function>{Function{f}}, std::span<const Var<S>>(inputs),
+                                  std::array{detail::broadcast_all<S, K>(inputs)}, where);
 }
 
 /// Σ f(x_1, …, x_K) over all elements of the broadcast inputs: a scalar, summed in double in a fixed order.
@@ -353,8 +353,8 @@ Var<S> map(const Var<S> (&inputs)[K], F f, Source where = Source::current()) {
 template <class S, std::size_t K, class F>
 Var<S> sum_over(const Var<S> (&inputs)[K], F f, Source where = Source::current()) {
   using Function = detail::ByDualNumbers<F>;
-  return inputs[0].tape->record(SumOverOp<S, K, Function>{Function{f}, detail::broadcast_all<S, K>(inputs)},
-                                std::span<const Var<S>>(inputs), std::array{kScalarShape}, where);
+  return inputs[0].owner().record(SumOverOp<S, K, Function>{Function{f}, detail::broadcast_all<S, K>(inputs)},
+                                  std::span<const Var<S>>(inputs), std::array{kScalarShape}, where);
 }
 
 }  // namespace hsi4d

@@ -182,7 +182,7 @@ Var<S> concat(std::span<const Var<S>> parts, bool along_rows, const Source& wher
     HSI4D_CHECK(fits, detail::both_values(shape, next));
     (along_rows ? shape.rows : shape.cols) += along_rows ? next.rows : next.cols;
   }
-  return parts[0].tape->record(ConcatOp<S>{along_rows}, parts, std::array{shape_of(shape.rows, shape.cols)}, where);
+  return parts[0].owner().record(ConcatOp<S>{along_rows}, parts, std::array{shape_of(shape.rows, shape.cols)}, where);
 }
 
 template <class S>
@@ -191,7 +191,7 @@ Var<S> slice(Var<S> x, Index row, Index col, Index rows, Index cols, const Sourc
   check_plane(shape);
   HSI4D_CHECK(row >= 0 && col >= 0 && rows >= 0 && cols >= 0 && row + rows <= shape.rows && col + cols <= shape.cols,
               detail::both_values(shape_of(row + rows, col + cols), shape));
-  return x.tape->record(SliceOp<S>{row, col}, {x}, shape_of(rows, cols), where);
+  return x.owner().record(SliceOp<S>{row, col}, {x}, shape_of(rows, cols), where);
 }
 
 }  // namespace
@@ -201,19 +201,19 @@ Var<S> matmul(Var<S> a, Var<S> b, Source where) {
   check_plane(a.shape());
   check_plane(b.shape());
   HSI4D_CHECK(a.shape().cols == b.shape().rows, detail::both_values(a.shape(), b.shape()));
-  return a.tape->record(MatmulOp<S>{}, {a, b}, shape_of(a.shape().rows, b.shape().cols), where);
+  return a.owner().record(MatmulOp<S>{}, {a, b}, shape_of(a.shape().rows, b.shape().cols), where);
 }
 
 template <class S>
 Var<S> transpose(Var<S> x, Source where) {
   check_plane(x.shape());
-  return x.tape->record(TransposeOp<S>{}, {x}, shape_of(x.shape().cols, x.shape().rows), where);
+  return x.owner().record(TransposeOp<S>{}, {x}, shape_of(x.shape().cols, x.shape().rows), where);
 }
 
 template <class S>
 Var<S> reshape(Var<S> x, Index rows, Index cols, Source where) {
   HSI4D_CHECK_EQ(rows * cols, x.shape().count());
-  return x.tape->record(ReshapeOp<S>{}, {x}, shape_of(rows, cols), where);
+  return x.owner().record(ReshapeOp<S>{}, {x}, shape_of(rows, cols), where);
 }
 
 template <class S>
@@ -245,7 +245,7 @@ Var<S> gather_rows(Var<S> x, std::vector<std::uint32_t> index, Source where) {
                 "index[" + std::to_string(i) + "] = " + std::to_string(index[i]) + " of " + std::to_string(shape.rows));
   }
   const auto rows = static_cast<Index>(index.size());
-  return x.tape->record(GatherRowsOp<S>(std::move(index), shape.rows), {x}, shape_of(rows, shape.cols), where);
+  return x.owner().record(GatherRowsOp<S>(std::move(index), shape.rows), {x}, shape_of(rows, shape.cols), where);
 }
 
 #define HSI4D_MATRIX(S)                                         \

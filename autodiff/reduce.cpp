@@ -110,24 +110,24 @@ struct SumColsOp {
 
 template <class S>
 Var<S> sum(Var<S> x, Source where) {
-  return x.tape->record(SumOp<S>{}, {x}, kScalarShape, where);
+  return x.owner().record(SumOp<S>{}, {x}, kScalarShape, where);
 }
 
 template <class S>
 Var<S> mean(Var<S> x, Source where) {
   const Index count = x.shape().count();
   HSI4D_CHECK(count > 0, "mean of an empty array");
-  return x.tape->record(SumOp<S>{1.0 / static_cast<double>(count)}, {x}, kScalarShape, where);
+  return x.owner().record(SumOp<S>{1.0 / static_cast<double>(count)}, {x}, kScalarShape, where);
 }
 
 template <class S>
 Var<S> sum_rows(Var<S> x, Source where) {
-  return x.tape->record(SumRowsOp<S>{}, {x}, shape_of(1, x.shape().cols), where);
+  return x.owner().record(SumRowsOp<S>{}, {x}, shape_of(1, x.shape().cols), where);
 }
 
 template <class S>
 Var<S> sum_cols(Var<S> x, Source where) {
-  return x.tape->record(SumColsOp<S>{}, {x}, Shape{x.shape().planes, x.shape().rows, 1, 1}, where);
+  return x.owner().record(SumColsOp<S>{}, {x}, Shape{x.shape().planes, x.shape().rows, 1, 1}, where);
 }
 
 template <class S>

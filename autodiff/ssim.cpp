@@ -282,7 +282,7 @@ Shape tile_sums_shape(const Shape& image) {
 template <class S>
 Var<S> d_ssim(Var<S> image, Var<S> target, const SsimSettings& settings, Source where) {
   check_images(image.shape(), target.shape(), settings);
-  return image.tape->record(DSsimOp<S>{settings}, {image, target}, kScalarShape, where);
+  return image.owner().record(DSsimOp<S>{settings}, {image, target}, kScalarShape, where);
 }
 
 template <class S>
@@ -293,7 +293,7 @@ Var<S> ssim(Var<S> image, Var<S> target, const SsimSettings& settings, Source wh
 template <class S>
 Var<S> ssim_tile_sums(Var<S> base, Var<S> target, const SsimSettings& settings, Source where) {
   check_images(base.shape(), target.shape(), settings);
-  return base.tape->record(TileSumsOp<S>{settings}, {base, target}, tile_sums_shape(base.shape()), where);
+  return base.owner().record(TileSumsOp<S>{settings}, {base, target}, tile_sums_shape(base.shape()), where);
 }
 
 template <class S>
@@ -304,8 +304,8 @@ Var<S> d_ssim_region(Var<S> image, Var<S> target, const SsimRegion<S>& region, c
   HSI4D_CHECK_EQ(region.tile_sums.shape(), sums);
   HSI4D_CHECK(region.touched.shape().same_size(shape_of(sums.rows, sums.cols)),
               detail::both_values(region.touched.shape(), shape_of(sums.rows, sums.cols)));
-  return image.tape->record(RegionOp<S>{settings}, {image, target, region.touched, region.tile_sums}, kScalarShape,
-                            where);
+  return image.owner().record(RegionOp<S>{settings}, {image, target, region.touched, region.tile_sums}, kScalarShape,
+                              where);
 }
 
 template <class S>

@@ -25,6 +25,11 @@ std::string describe(const NonFiniteError::Place& p) {
   return text.str();
 }
 
+void check_shape(const Shape& shape) {
+  HSI4D_CHECK(shape.planes >= 0 && shape.rows >= 0 && shape.cols >= 0 && shape.stride >= shape.cols,
+              detail::both_values("shape", shape));
+}
+
 /// Copies `values`, row-major without padding, into `to`.
 template <class S>
 void copy_in(std::span<const S> values, const Array<S>& to) {
@@ -66,8 +71,7 @@ std::uint32_t Tape<S>::checked(Var<S> var) const {
 
 template <class S>
 std::uint32_t Tape<S>::add_array(const Shape& shape, std::uint32_t producer, const Source& where) {
-  HSI4D_CHECK(shape.planes >= 0 && shape.rows >= 0 && shape.cols >= 0 && shape.stride >= shape.cols,
-              detail::both_values("shape", shape));
+  check_shape(shape);
   ArrayRecord array;
   array.shape = shape;
   array.value = arena_.template allocate<S>(shape.memory());
@@ -107,9 +111,17 @@ Var<S> Tape<S>::constant(S value, Source where) {
 }
 
 template <class S>
+void Tape<S>::check_node(const char* name, std::span<const Var<S>> inputs, std::span<const Shape> outputs) const {
+  for (const Var<S>& input : inputs) checked(input);
+  HSI4D_CHECK(inputs.size() <= kMostInputs, std::string(name) + ": " + std::to_string(inputs.size()) +
+                                                " inputs; at most " + std::to_string(kMostInputs));
+  HSI4D_CHECK(!outputs.empty(), std::string(name) + ": no output");
+  for (const Shape& shape : outputs) check_shape(shape);
+}
+
+template <class S>
 Var<S> Tape<S>::add_node(const OperatorTable<S>* table, void* op, std::span<const Var<S>> inputs,
                          std::span<const Shape> outputs, const Source& where) {
-  HSI4D_CHECK(inputs.size() <= 64 && !outputs.empty(), detail::both_values(inputs.size(), outputs.size()));
   NodeRecord node;
   node.table = table;
   node.op = op;
@@ -149,7 +161,8 @@ void Tape<S>::set_frozen(Var<S> var, bool frozen) {
 
 template <class S>
 void Tape<S>::rewind(const Mark& mark) {
-  HSI4D_CHECK(mark.arrays <= arrays_.size() && mark.nodes <= nodes_.size(), "mark lies ahead of the recording");
+  HSI4D_CHECK(mark.arrays <= arrays_.size() && (mark.arrays == 0 || arrays_[mark.arrays - 1].stamp == mark.stamp),
+              "the mark is of a recording that was rewound");
   for (std::size_t n = nodes_.size(); n > mark.nodes; --n) nodes_[n - 1].table->destroy(nodes_[n - 1].op);
   nodes_.resize(mark.nodes);
   arrays_.resize(mark.arrays);
@@ -256,13 +269,17 @@ void Tape<S>::build(Plan& plan) {
     if (!reached_[id]) continue;
     if (arrays_[id].producer == kLeaf) plan.leaves.push_back(id);
   }
-  // A node takes part in backward when a reached output carries a gradient on (a frozen output stops it).
+  // A node takes part in backward when a gradient arrives at one of its outputs: not behind a frozen array.
+  carries_.assign(arrays_.size(), 0);
+  carries_[plan.result] = arrays_[plan.result].needs_gradient;
   for (auto n = plan.forward_nodes.rbegin(); n != plan.forward_nodes.rend(); ++n) {
     const NodeRecord& node = nodes_[*n];
-    for (std::uint32_t j = node.first_output; j < node.first_output + node.output_count; ++j) {
-      if (!reached_[j] || !arrays_[j].needs_gradient) continue;
-      plan.backward_nodes.push_back(*n);
-      break;
+    const auto outputs = carries_.begin() + node.first_output;
+    if (std::none_of(outputs, outputs + node.output_count, [](std::uint8_t hit) { return hit != 0; })) continue;
+    plan.backward_nodes.push_back(*n);
+    for (std::uint32_t i = 0; i < node.edge_count; ++i) {
+      const std::uint32_t input = edges_[node.first_edge + i];
+      if (arrays_[input].needs_gradient) carries_[input] = 1;
     }
   }
   place_adjoints(plan);
@@ -291,7 +308,7 @@ void Tape<S>::place_adjoints(Plan& plan) {
   }
   for (const bool assigned : {false, true}) {
     for (std::uint32_t id = 0; id < arrays_.size(); ++id) {
-      if (!reached_[id] || !arrays_[id].needs_gradient || (assigned_[id] == kAssigned) != assigned) continue;
+      if (!carries_[id] || (assigned_[id] == kAssigned) != assigned) continue;
       plan.adjoints.push_back({id, plan.adjoint_size});
       plan.adjoint_size += round_up(arrays_[id].shape.memory(), kAlignment / static_cast<Index>(sizeof(S)));
     }
@@ -373,6 +390,13 @@ void Tape<S>::run_forward(Plan& plan) {
   plan.forward_at = clock_;
 }
 
+/// After an error: these nodes run again, and no result counts as up to date.
+template <class S>
+void Tape<S>::invalidate(const std::vector<std::uint32_t>& nodes) {
+  for (const std::uint32_t n : nodes) nodes_[n].ran_at = 0;
+  for (Plan& plan : plans_) plan.forward_at = 0;
+}
+
 template <class S>
 void Tape<S>::run_backward(Plan& plan) {
   for (std::size_t k = 0; k < plan.backward_nodes.size(); ++k) {
@@ -391,7 +415,13 @@ void Tape<S>::forward(Var<S> result) {
   const std::uint32_t id = checked(result);
   const FlushDenormals flush;
   scratch_.reset();
-  run_forward(plan_for(id));
+  Plan& plan = plan_for(id);
+  try {
+    run_forward(plan);
+  } catch (...) {
+    invalidate(plan.forward_nodes);
+    throw;
+  }
 }
 
 template <class S>
@@ -428,8 +458,8 @@ void Tape<S>::backward(Var<S> result, std::span<const S> cotangent) {
   try {
     run_backward(plan);
   } catch (...) {
-    plan.forward_at = 0;    // what nodes saved may be half used
-    active_structure_ = 0;  // gradients are not to be read
+    invalidate(plan.backward_nodes);  // what nodes saved may be half used
+    active_structure_ = 0;            // gradients are not to be read
     for (ArrayRecord& array : arrays_) array.adjoint = nullptr;
     throw;
   }
@@ -453,9 +483,19 @@ void Tape<S>::drop_state() {
     node.state_valid = false;
     node.ran_at = 0;
   }
+  for (Plan& plan : plans_) plan.forward_at = 0;
 }
 
 // --- looking inside --------------------------------------------------------------------------------------------------
+
+template <class S>
+void Tape<S>::set_anomaly(bool on) {
+  if (on && !anomaly_) {  // what ran before was not looked at
+    for (NodeRecord& node : nodes_) node.ran_at = 0;
+    for (Plan& plan : plans_) plan.forward_at = 0;
+  }
+  anomaly_ = on;
+}
 
 template <class S>
 void Tape<S>::check_finite(std::uint32_t id, const NodeRecord* node, bool adjoint) const {

@@ -44,6 +44,8 @@ struct Var {
   std::uint32_t stamp = 0;  ///< tells a handle from before a rewind
 
   const Shape& shape() const;
+  /// The tape. Throws InternalError for an empty handle.
+  Tape<S>& owner() const;
 };
 
 /// backward was asked for after a value had been written, or a parameter frozen, since the forward run.
@@ -77,10 +79,6 @@ class Signature {
   void add(std::uint64_t word) {
     hash_ = (hash_ ^ word) * 0x9E3779B97F4A7C15u;
     hash_ ^= hash_ >> 29;
-  }
-  template <class T>
-  void add_all(std::span<const T> values) {
-    for (const T value : values) add(static_cast<std::uint64_t>(value));
   }
   std::uint64_t value() const { return hash_; }
 
@@ -151,9 +149,13 @@ struct NodeStatistics {
 template <class S>
 class Tape {
  public:
+  /// Inputs that one operator may have.
+  static constexpr std::size_t kMostInputs = 64;
+
   /// Point in the recording to come back to with rewind.
   struct Mark {
     std::size_t arrays = 0, nodes = 0, edges = 0;
+    std::uint32_t stamp = 0;  // of the last array: tells a mark whose recording was rewound
     Arena::Position memory;
   };
 
@@ -171,7 +173,7 @@ class Tape {
   /// A constant scalar.
   Var<S> constant(S value, Source where = Source::current());
 
-  /// Records operator `op`; returns its first output. Nothing is computed.
+  /// Records operator `op` with up to kMostInputs inputs; returns its first output. Nothing is computed.
   ///
   /// Op is a struct with `static constexpr const char* kName`, `void forward(NodeIo<S>&)`, `void backward(NodeIo<S>&)`,
   /// and any of these, each optional:
@@ -200,14 +202,18 @@ class Tape {
   void unfreeze(Var<S> var) { set_frozen(var, false); }
   bool frozen(Var<S> var) const { return arrays_[checked(var)].frozen; }
 
-  Mark mark() const { return {arrays_.size(), nodes_.size(), edges_.size(), arena_.position()}; }
+  Mark mark() const {
+    const std::uint32_t stamp = arrays_.empty() ? 0 : arrays_.back().stamp;
+    return {arrays_.size(), nodes_.size(), edges_.size(), stamp, arena_.position()};
+  }
   /// Forgets all that was recorded after `mark`. Handles of it become invalid; values before it stay.
   void rewind(const Mark& mark);
 
   // --- values ------------------------------------------------------------------------------------------------------
 
   const Shape& shape(Var<S> var) const { return arrays_[checked(var)].shape; }
-  /// The value of a leaf, to be changed: everything that depends on it is stale until the next forward.
+  /// The value of a leaf, to be changed: everything that depends on it is stale until the next forward. The view is
+  /// good until then; ask again for the next change, which is not seen otherwise.
   Array<S> write(Var<S> leaf);
   /// Writes the numbers of a leaf in row-major order without padding. Throws InternalError when the count differs.
   void set(Var<S> leaf, std::span<const S> values);
@@ -236,7 +242,7 @@ class Tape {
   // --- looking inside ----------------------------------------------------------------------------------------------
 
   /// Anomaly mode: forward and backward stop with NonFiniteError at the first number that is not finite.
-  void set_anomaly(bool on) { anomaly_ = on; }
+  void set_anomaly(bool on);
   /// Measures the time of each node (two clock readings a run).
   void set_profiling(bool on) { profiling_ = on; }
   std::vector<NodeStatistics> statistics() const;
@@ -302,6 +308,7 @@ class Tape {
   std::uint32_t add_array(const Shape& shape, std::uint32_t producer, const Source& where);
   Var<S> add_node(const OperatorTable<S>* table, void* op, std::span<const Var<S>> inputs,
                   std::span<const Shape> outputs, const Source& where);
+  void check_node(const char* name, std::span<const Var<S>> inputs, std::span<const Shape> outputs) const;
   void set_frozen(Var<S> var, bool frozen);
 
   void update_structure();
@@ -315,6 +322,7 @@ class Tape {
   void backward_node(NodeRecord& node, std::uint64_t assign_mask);
   bool up_to_date(const NodeRecord& node) const;
   void check_leaves(const Plan& plan) const;
+  void invalidate(const std::vector<std::uint32_t>& nodes);
   void check_finite(std::uint32_t array, const NodeRecord* node, bool adjoint) const;
 
   Arena arena_;    // values and operators
@@ -323,7 +331,8 @@ class Tape {
   std::vector<NodeRecord> nodes_;
   std::vector<std::uint32_t> edges_;  // input ids of all nodes
   std::vector<Plan> plans_;
-  std::vector<std::uint8_t> reached_;   // scratch of build
+  std::vector<std::uint8_t> reached_;   // scratch of build: the result depends on it
+  std::vector<std::uint8_t> carries_;   // scratch of build: a gradient arrives at it
   std::vector<std::uint8_t> assigned_;  // scratch of place_adjoints
   Buffer<S> adjoints_;
   std::uint64_t clock_ = 1;
@@ -337,8 +346,14 @@ class Tape {
 };
 
 template <class S>
+Tape<S>& Var<S>::owner() const {
+  HSI4D_CHECK(tape != nullptr, "an empty Var was used");
+  return *tape;
+}
+
+template <class S>
 const Shape& Var<S>::shape() const {
-  return tape->shape(*this);
+  return owner().shape(*this);
 }
 
 namespace detail {
@@ -376,9 +391,16 @@ template <class S>
 template <class Op>
 Var<S> Tape<S>::record(Op op, std::span<const Var<S>> inputs, std::span<const Shape> outputs, Source where) {
   static_assert(alignof(Op) <= kAlignment);
-  for (const Var<S>& input : inputs) checked(input);
-  void* memory = arena_.allocate(static_cast<Index>(sizeof(Op)));
-  return add_node(&detail::kOperatorTable<S, Op>, new (memory) Op(std::move(op)), inputs, outputs, where);
+  check_node(Op::kName, inputs, outputs);
+  const Mark before = mark();
+  Op* placed = new (arena_.allocate(static_cast<Index>(sizeof(Op)))) Op(std::move(op));
+  try {
+    return add_node(&detail::kOperatorTable<S, Op>, placed, inputs, outputs, where);
+  } catch (...) {  // out of memory
+    if (nodes_.size() == before.nodes) placed->~Op();
+    rewind(before);
+    throw;
+  }
 }
 
 extern template class Tape<float>;

@@ -325,13 +325,13 @@ template <class S>
 Var<S> skin_points(const SkinWeights<S>& weights, Var<S> transforms, Var<S> points, Source where) {
   HSI4D_CHECK_EQ(transforms.shape(), shape_of(weights.joints(), kTransformSize));
   HSI4D_CHECK_EQ(points.shape(), shape_of(weights.vertices(), 3));
-  return transforms.tape->record(SkinPoints<S>{weights, {}}, {transforms, points}, points.shape(), where);
+  return transforms.owner().record(SkinPoints<S>{weights, {}}, {transforms, points}, points.shape(), where);
 }
 
 template <class S>
 Var<S> blend_transforms(const SkinWeights<S>& weights, Var<S> transforms, Source where) {
   HSI4D_CHECK_EQ(transforms.shape(), shape_of(weights.joints(), kTransformSize));
-  return transforms.tape->record(BlendTransforms<S>{weights}, {transforms},
+  return transforms.owner().record(BlendTransforms<S>{weights}, {transforms},
                                  shape_of(weights.vertices(), kTransformSize), where);
 }
 
@@ -339,7 +339,7 @@ template <class S>
 Var<S> transform_points(Var<S> transforms, Var<S> points, Source where) {
   HSI4D_CHECK_EQ(points.shape(), shape_of(points.shape().rows, 3));
   HSI4D_CHECK_EQ(transforms.shape(), shape_of(points.shape().rows, kTransformSize));
-  return transforms.tape->record(TransformPoints<S>{}, {transforms, points}, points.shape(), where);
+  return transforms.owner().record(TransformPoints<S>{}, {transforms, points}, points.shape(), where);
 }
 
 #define HSI4D_INSTANTIATE(S)                                                  \

@@ -124,6 +124,33 @@ TEST_CASE("a kink is told from a bug, and too many kinks are not a pass") {
   CHECK_FALSE(report.ok());
 }
 
+namespace {
+
+/// y = x², which throws away from its first value.
+struct FragileOp {
+  static constexpr const char* kName = "fragile";
+  void forward(NodeIo<double>& io) {
+    if (io.in(0).scalar() > 3.001) throw DataError("too far");
+    io.out().scalar() = io.in(0).scalar() * io.in(0).scalar();
+  }
+  void backward(NodeIo<double>& io) { io.d_in(0).scalar() += 2 * io.in(0).scalar() * io.d_out().scalar(); }
+};
+
+}  // namespace
+
+TEST_CASE("values are restored when an evaluation throws, and a check of nothing is no pass") {
+  Tape<double> tape;
+  const auto x = tape.parameter("x", kScalarShape);
+  tape.set(x, {3});
+  const auto y = tape.record(FragileOp{}, {x}, kScalarShape, Source::current());
+  CHECK_THROWS_AS(gradcheck(tape, y), DataError);
+  CHECK(tape.value(x).scalar() == 3);
+  tape.forward(y);
+  CHECK(tape.value(y).scalar() == 9);
+  tape.freeze(x);
+  CHECK_FALSE(gradcheck(tape, y).ok());
+}
+
 TEST_CASE("values are restored after a check") {
   Tape<double> tape;
   const auto x = tape.parameter("x", shape_of(3, 3));

@@ -206,6 +206,23 @@ TEST_CASE("an intermediate can be frozen: no gradient flows behind it") {
   CHECK(tape.gradient(x).scalar() == 12);
 }
 
+TEST_CASE("nothing runs backward behind a frozen array, and no NaN leaks from there (row C11)") {
+  Counted c;
+  const auto x = c.tape.parameter("x", kScalarShape);
+  c.tape.set(x, {0});
+  const auto far = c.add(c.add(log(x)));
+  const auto loss = exp(stop_gradient(min(far, 5.0 + 0.0 * x))) + x;
+  c.tape.forward(loss);
+  c.tape.backward(loss);
+  CHECK(c.backwards == 0);
+  CHECK(c.tape.gradient(x).scalar() == 1);
+  const auto only_behind = stop_gradient(c.add(x)) * 2.0;
+  c.tape.forward(only_behind);
+  c.tape.backward(only_behind);
+  CHECK(c.backwards == 0);
+  CHECK_FALSE(c.tape.has_gradient(x));
+}
+
 TEST_CASE("an operator may have several outputs; an unused one has no adjoint") {
   Tape<double> tape;
   bool first = false, second = false;
@@ -253,6 +270,32 @@ TEST_CASE("mark and rewind forget a suffix; old handles are refused") {
   Tape<double> other;
   CHECK_THROWS_WITH(other.forward(loss), Contains("another tape"));
   CHECK_THROWS_WITH(other.forward({}), Contains("empty Var"));
+}
+
+TEST_CASE("a mark of a rewound recording is refused") {
+  Tape<double> tape;
+  const auto start = tape.mark();
+  tape.parameter("old", shape_of(10, 1));
+  const auto stale = tape.mark();
+  tape.rewind(start);
+  tape.parameter("first", shape_of(1000, 1));
+  tape.parameter("second", shape_of(1000, 1));
+  CHECK_THROWS_WITH(tape.rewind(stale), Contains("recording that was rewound"));
+}
+
+TEST_CASE("a record that fails leaves the tape as it was") {
+  Tape<double> tape;
+  const auto x = tape.parameter("x", kScalarShape);
+  bool fail = false;
+  CHECK_THROWS_AS(tape.record(ThrowingOp{&fail}, {x}, Shape{1, 2, 3, 1}, Source::current()), InternalError);
+  const std::vector<Var<double>> many(65, x);
+  CHECK_THROWS_WITH(tape.record(ThrowingOp{&fail}, many, std::array{kScalarShape}, Source::current()),
+                    Contains("throwing: 65 inputs; at most 64"));
+  CHECK(tape.statistics().empty());
+  const auto loss = square(x);
+  tape.set(x, {3});
+  tape.forward(loss);
+  CHECK(tape.value(loss).scalar() == 9);
 }
 
 TEST_CASE("declared state is a function of its key, and can be dropped") {
@@ -326,6 +369,31 @@ TEST_CASE("anomaly mode names the first non-finite number") {
   CHECK_FALSE(tape.has_gradient(x));
 }
 
+TEST_CASE("anomaly mode looks at what ran before it was switched on, and again after an error") {
+  Tape<double> tape;
+  const auto x = tape.parameter("x", kScalarShape);
+  const auto loss = log(x);
+  tape.set(x, {-1});
+  tape.forward(loss);
+  tape.set_anomaly(true);
+  for (int repeat = 0; repeat < 2; ++repeat) CHECK_THROWS_AS(tape.forward(loss), NonFiniteError);
+  CHECK_THROWS_AS(tape.backward(loss), StaleError);
+}
+
+TEST_CASE("after an error other results that share its nodes want a forward too") {
+  Tape<double> tape;
+  bool fail = false;
+  const auto x = tape.parameter("x", kScalarShape);
+  const auto shared = tape.record(ThrowingOp{&fail}, {square(x)}, kScalarShape, Source::current());
+  const auto first = shared * 2.0, second = shared + x;
+  tape.forward(first);
+  tape.forward(second);
+  fail = true;
+  tape.write(x);
+  CHECK_THROWS_AS(tape.forward(first), DataError);
+  CHECK_THROWS_AS(tape.backward(second), StaleError);
+}
+
 TEST_CASE("statistics count runs, skips, time and memory") {
   Tape<float> tape;
   tape.set_profiling(true);
@@ -368,6 +436,10 @@ TEST_CASE("misuse is refused with a clear message") {
   const auto c = tape.constant("c", kScalarShape);
   const auto y = square(x);
   tape.name(y, "y");
+  const Var<double> empty;
+  CHECK_THROWS_WITH(x * empty, Contains("an empty Var"));
+  CHECK_THROWS_WITH(empty * x, Contains("an empty Var"));
+  CHECK_THROWS_WITH(sum(empty), Contains("an empty Var"));
   CHECK_THROWS_WITH(tape.write(y), Contains("only leaves are written; 'y' is computed"));
   CHECK_THROWS_WITH(tape.set(x, {1, 2}), Contains("2 against 6"));
   CHECK_THROWS_WITH(tape.unfreeze(c), Contains("constant 'c' can not be unfrozen"));
