@@ -10,6 +10,7 @@
 
 #include "core/linear.h"
 #include "core/random.h"
+#include "tests/support/seeds.h"
 
 namespace hsi4d::testing {
 
@@ -105,24 +106,28 @@ inline void check_adjoint_result(const AdjointResult& r, double tolerance) {
 }
 
 /// f: column of N scalars (double or complex) to a column of M; adjoint(x, g, d_x) adds to d_x. Checks with a random
-/// cotangent that it is the gradient (complex step, to `tolerance` of its norm; central differences, to 1e-6), that it
-/// adds, that twice adds twice, and that a zero cotangent adds nothing.
+/// cotangent, and again with one of this run's fresh seed, that it is the gradient (complex step, to `tolerance` of its
+/// norm; central differences, to 1e-6), that it adds, that twice adds twice, and that a zero cotangent adds nothing.
 template <int M, int N, class F, class A>
 void check_adjoint(const F& f, const A& adjoint, const Column<double, N>& x, RandomSequence& random,
                    double tolerance = 1e-12) {
-  const Column<double, M> g = random_column<M>(random);
-  const Column<double, N> noise = random_column<N>(random);
-  Column<double, N> once = Column<double, N>::Zero();
-  adjoint(x, g, once);
-  Column<double, N> added = noise;
-  adjoint(x, g, added);
-  Column<double, N> twice = added;
-  adjoint(x, g, twice);
-  Column<double, N> untouched = noise;
-  adjoint(x, Column<double, M>(Column<double, M>::Zero()), untouched);
-  check_adjoint_result(
-      {x, once, complex_step_gradient<N>(f, x, g), central_gradient<N>(f, x, g), noise, added, twice, untouched},
-      tolerance);
+  static RandomSequence fresh(test::fresh_seed());
+  for (RandomSequence* sequence : {&random, &fresh}) {
+    const Column<double, M> g = random_column<M>(*sequence);
+    const Column<double, N> noise = random_column<N>(*sequence);
+    Column<double, N> once = Column<double, N>::Zero();
+    adjoint(x, g, once);
+    Column<double, N> added = noise;
+    adjoint(x, g, added);
+    Column<double, N> twice = added;
+    adjoint(x, g, twice);
+    Column<double, N> untouched = noise;
+    adjoint(x, Column<double, M>(Column<double, M>::Zero()), untouched);
+    INFO("fresh seed of this run: " << test::fresh_seed());
+    check_adjoint_result(
+        {x, once, complex_step_gradient<N>(f, x, g), central_gradient<N>(f, x, g), noise, added, twice, untouched},
+        tolerance);
+  }
 }
 
 }  // namespace hsi4d::testing

@@ -1,26 +1,15 @@
 #include "tests/support/operator_check.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
-#include <iostream>
 #include <limits>
 
 #include "core/parallel.h"
+#include "tests/support/seeds.h"
 
 namespace hsi4d::test {
 
 namespace {
-
-std::uint64_t fresh_seed() {
-  static const std::uint64_t seed = [] {
-    const char* wish = std::getenv("HSI4D_TEST_SEED");
-    const std::uint64_t value = wish != nullptr ? std::strtoull(wish, nullptr, 10) : std::random_device()();
-    std::cout << "fresh seed " << value << " (HSI4D_TEST_SEED=" << value << " repeats it)" << std::endl;
-    return value;
-  }();
-  return seed;
-}
 
 using detail::gradients;
 using detail::numbers;
