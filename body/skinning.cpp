@@ -332,7 +332,7 @@ template <class S>
 Var<S> blend_transforms(const SkinWeights<S>& weights, Var<S> transforms, Source where) {
   HSI4D_CHECK_EQ(transforms.shape(), shape_of(weights.joints(), kTransformSize));
   return transforms.owner().record(BlendTransforms<S>{weights}, {transforms},
-                                 shape_of(weights.vertices(), kTransformSize), where);
+                                   shape_of(weights.vertices(), kTransformSize), where);
 }
 
 template <class S>

@@ -378,6 +378,8 @@ Diagnosis diagnose(const std::string& text, const Stop& stop) {
   if (here == '"' && stop.end > stop.start && (stop.end == text.size() || text[stop.end - 1] == '\n') &&
       stop.reason.find("invalid string") != std::string::npos)
     return {stop.start, "", "not valid JSON: this string has no closing quote on its line", 0, 0, "", false};
+  if (stop.reason.find("expected ':'") != std::string::npos)
+    return {stop.start, "", "not valid JSON: a colon is missing between a key and its value", 0, 0, "", false};
   const bool adjacent = stop.start > 0 && is_word_part(text[stop.start - 1]);
   if (!adjacent) {
     if (auto comma = diagnose_comma(text, stop)) return *comma;
@@ -402,6 +404,7 @@ bool parse_config_text(const std::string& text, const std::shared_ptr<const Conf
   }
   std::string copy = text;
   std::set<std::size_t> unreadable;
+  std::size_t repaired_at = std::string::npos;
   for (int repair = 0;; ++repair) {
     value = {};
     const char* furthest = copy.data();
@@ -413,7 +416,9 @@ bool parse_config_text(const std::string& text, const std::shared_ptr<const Conf
       fault = diagnose(copy, builder.stop);
       problems.add({source, fault.at, lines.line(fault.at), lines.column(fault.at)}, fault.pointer, fault.message);
     }
-    const bool last = whole || fault.begin == fault.end || repair == kMostRepairs;
+    // A repair that leads back to the same place did not help.
+    const bool last = whole || fault.begin == fault.end || fault.begin == repaired_at || repair == kMostRepairs;
+    repaired_at = fault.begin;
     if (last) {
       for (const Duplicate& twice : builder.duplicates)
         problems.add(twice.second, twice.pointer,

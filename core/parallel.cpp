@@ -41,8 +41,8 @@ class FirstError {
 };
 
 #if defined(__SANITIZE_THREAD__)
-// Debian's TBB is not instrumented, so ThreadSanitizer can not see what orders its tasks and finds races in all of them.
-// Under it chunks run on plain threads instead: what is tested is the code of the chunks.
+// Debian's TBB is not instrumented, so ThreadSanitizer can not see what orders its tasks and finds races in all of
+// them. Under it chunks run on plain threads instead: what is tested is the code of the chunks.
 template <class F>
 void run_on_threads(Index chunks, const F& run) {
   const Index count = std::min<Index>(chunks, thread_count());

@@ -7,8 +7,8 @@
 
 namespace hsi4d {
 
-/// eˣ, within 2 ulp; exactly 1 at 0; 0 below the smallest normal number's logarithm (the result is flushed), ∞ above the
-/// largest's; NaN stays NaN. The same bits on every instruction set.
+/// eˣ, within 2 ulp; exactly 1 at 0; 0 below the smallest normal number's logarithm (the result is flushed), ∞ above
+/// the largest's; NaN stays NaN. The same bits on every instruction set.
 ///
 /// x = n ln 2 + r with |r| ≤ ½ ln 2 (ln 2 in two parts, so that n ln 2 is exact in the first), eʳ by its Taylor series,
 /// 2ⁿ by two exponents, so that the ends of the range come out right.

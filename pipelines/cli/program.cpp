@@ -66,9 +66,7 @@ struct CommandLine {
 
  private:
   void add_overrides(CLI::App& command) {
-    command
-        .add_option("--set", overrides,
-                    "Change one setting: stages.camera.iterations=100. The value is JSON, or else text")
+    command.add_option("--set", overrides, "Change one setting: render.blur=0.1. The value is JSON, or else text")
         ->type_name("KEY=VALUE")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)

@@ -90,6 +90,8 @@ TEST_CASE("syntax errors say what to do") {
   CHECK_THAT(fault("{\"a\": \"x\n}"),
              Equals("a.json:1:7: not valid JSON: this string has no closing quote on its line"));
   CHECK_THAT(fault("{\"a\": \"x"), Equals("a.json:1:7: not valid JSON: this string has no closing quote on its line"));
+  CHECK_THAT(fault("{\"seed\" 1}"),
+             Equals("a.json:1:9: not valid JSON: a colon is missing between a key and its value"));
   CHECK_THAT(fault("\n{\"a\": [1, 2"),
              Equals("a.json:2:12: not valid JSON: the file ends inside the array that line 2 opens"));
   CHECK_THAT(fault("{\"a\": 1"),

@@ -1,9 +1,9 @@
 #include "core/vector_exp.h"
 
-#include <catch2/catch.hpp>
-
 #include <cmath>
 #include <limits>
+
+#include <catch2/catch.hpp>
 
 using namespace hsi4d;
 

@@ -1,11 +1,10 @@
 // A project outside of the source tree: a loss term of its own, its gradient checked, and the program that knows it.
 #include <cmath>
-#include <iostream>
-#include <vector>
-
 #include <hsi4d/autodiff/gradcheck.h>
 #include <hsi4d/core/version.h>
 #include <hsi4d/pipelines/cli/program.h>
+#include <iostream>
+#include <vector>
 
 #include "saturation.h"
 

@@ -30,13 +30,13 @@ inline hsi4d::LossTerm saturation_loss() {
       "saturation", "Difference of the colours' saturation", [](const auto& in, const SaturationSettings& settings) {
         const auto x = in.rendered, y = in.target;
         const float floor = static_cast<float>(settings.floor);
-        const auto total = sum_over(
-            {channel(x, 0), channel(x, 1), channel(x, 2), channel(y, 0), channel(y, 1), channel(y, 2)},
-            [floor](auto r, auto g, auto b, auto R, auto G, auto B) {
-              const auto s = max(max(r, max(g, b)) - min(r, min(g, b)), floor);
-              const auto t = max(max(R, max(G, B)) - min(R, min(G, B)), floor);
-              return square(s - t);
-            });
+        const auto total =
+            sum_over({channel(x, 0), channel(x, 1), channel(x, 2), channel(y, 0), channel(y, 1), channel(y, 2)},
+                     [floor](auto r, auto g, auto b, auto R, auto G, auto B) {
+                       const auto s = max(max(r, max(g, b)) - min(r, min(g, b)), floor);
+                       const auto t = max(max(R, max(G, B)) - min(R, min(G, B)), floor);
+                       return square(s - t);
+                     });
         return total * (3.0 / static_cast<double>(x.shape().count()));
       });
 }

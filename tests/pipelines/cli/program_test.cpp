@@ -1,4 +1,3 @@
-#include "optim/loss_term.h"
 #include "pipelines/cli/program.h"
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 
 #include "core/check.h"
 #include "core/version.h"
+#include "optim/loss_term.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/run_config.h"
 #include "tests/support/program.h"
