@@ -8,6 +8,7 @@ using namespace hsi4d::test;
 namespace {
 
 enum class Fault {
+  kNone,
   kHalvedAdjoint,
   kOverwrites,
   kIgnoresAssign,
@@ -55,6 +56,9 @@ void check_faulty(Fault fault) {
 }
 
 }  // namespace
+
+// Without a fault the same operator passes, so that each failure below is its fault's.
+TEST_CASE("check_operator passes the operator that has no fault") { check_faulty(Fault::kNone); }
 
 TEST_CASE("check_operator sees an adjoint that is half of what it should be", "[!shouldfail]") {
   check_faulty(Fault::kHalvedAdjoint);
