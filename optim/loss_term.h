@@ -9,16 +9,24 @@
 namespace hsi4d {
 
 /// What a loss term may read, by name. A Var without a tape stands for what the stage does not have; `given` asks.
+/// Every input may carry a gradient. O counts the moving objects.
 template <class S>
 struct LossInputs {
   Var<S> rendered;  ///< [3,H,W] the image of the present state, sRGB values as they are
   Var<S> target;    ///< [3,H,W] the video's frame
   Var<S> weight;    ///< [1,H,W] how much a pixel counts, 0 to 1
 
+  Var<S> object_opacity;  ///< [O,H,W] rendered opacity Σ T α of each object's Gaussians, occluders included, 0 to 1
+  Var<S> object_center_target;  ///< [O,3] centre of each object in the frame: x px, y px (pixel centres at +0.5), and
+                                ///< 1, or 0 where the frame shows none of it
+  Var<S> object_depth;         ///< [O,1] mean camera z of each object's Gaussian centres, metres
+  Var<S> object_depth_target;  ///< [O,1] what it was in the clip's first frame, metres
+
   static bool given(Var<S> input) { return input.tape != nullptr; }
 };
 
-/// A loss term: its description, and the function that records it on a tape and returns a scalar.
+/// A loss term: its description, and the function that records it on a tape and returns a scalar, or an empty Var where
+/// an input that it needs is not given: the term is off then, and the stage reports it.
 struct LossTerm {
   LossDescription description;
   Var<float> (*record_float)(const LossInputs<float>& inputs, const std::any& settings) = nullptr;

@@ -5,49 +5,11 @@
 namespace hsi4d {
 namespace {
 
-constexpr int kMostIterations = 1000000;
 constexpr int kMostThreads = 1024;
 /// The largest whole number that every JSON tool keeps (RFC 8259, section 6).
 constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 
-std::vector<ConfigKey<LossSettings>> loss_keys(const std::vector<LossDescription>& losses) {
-  std::vector<ConfigKey<LossSettings>> keys;
-  for (const LossDescription& loss : losses)
-    keys.push_back({loss.name, loss.summary, {1, loss.defaults, loss.describe_settings}});
-  return keys;
-}
-
 }  // namespace
-
-void describe(ConfigFields& f, OptimizerSettings& s) {
-  f.choice("kind", s.kind, kOptimizerKinds, "The method");
-  f.number("beta1", s.beta1, {.min = 0, .below = 1}, "Decay of the first moment");
-  f.number("beta2", s.beta2, {.min = 0, .below = 1}, "Decay of the second moment");
-  f.number("eps", s.eps, {.above = 0, .max = 1}, "Added to the root of the second moment");
-}
-
-void describe(ConfigFields& f, ParameterGroupSettings& s) {
-  const IntegerRange iterations = {.min = 0, .max = kMostIterations};
-  f.number("lr", s.lr, {.min = 0, .max = 1000}, "Learning rate").required();
-  f.integer("from", s.from, iterations, "First iteration in which the group moves");
-  f.optional(s.until, [iterations](ConfigFields& inner, int& until) {
-    inner.integer("until", until, iterations,
-                  "First iteration in which it no longer moves; null: the end of the stage");
-  });
-  f.integer("every", s.every, {.min = 1, .max = kMostIterations}, "It moves in every this many-th iteration");
-  f.rule("until", [&s]() -> std::string {
-    if (!s.until || *s.until > s.from) return "";
-    return std::to_string(*s.until) + " is not after from, which is " + std::to_string(s.from) +
-           "; the group would never move";
-  });
-}
-
-void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescription>& losses) {
-  f.integer("iterations", s.iterations, {.min = 1, .max = kMostIterations}, "Steps of the optimiser").required();
-  f.map("optimize", s.optimize, "What moves: parameter groups by name");
-  f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
-  f.object("optimizer", s.optimizer, "How gradients become steps");
-}
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of everything that is random");

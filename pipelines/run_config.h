@@ -3,43 +3,15 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/config.h"
 #include "optim/loss_description.h"
+#include "optim/stage_settings.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d {
-
-enum class OptimizerKind { kAdam };
-
-inline constexpr std::array<ConfigChoice<OptimizerKind>, 1> kOptimizerKinds = {{{OptimizerKind::kAdam, "adam"}}};
-
-/// How gradients become steps.
-struct OptimizerSettings {
-  OptimizerKind kind = OptimizerKind::kAdam;
-  double beta1 = 0.9;
-  double beta2 = 0.999;
-  double eps = 1e-8;
-};
-
-/// When and how far one group of parameters moves.
-struct ParameterGroupSettings {
-  double lr = 0;
-  int from = 0;              ///< the first iteration in which it moves
-  std::optional<int> until;  ///< the first in which it does not move any more; none: the end of the stage
-  int every = 1;             ///< it moves in iterations from, from + every, ...
-};
-
-/// One stage of the method.
-struct StageSettings {
-  int iterations = 0;
-  ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
-  ConfigMap<LossSettings> losses;              ///< by loss term
-  OptimizerSettings optimizer;
-};
 
 /// A whole run.
 struct RunConfig {
@@ -49,10 +21,7 @@ struct RunConfig {
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 
-/// Describe the sections. `losses` are the terms that a stage may name.
-void describe(ConfigFields& fields, OptimizerSettings& settings);
-void describe(ConfigFields& fields, ParameterGroupSettings& settings);
-void describe(ConfigFields& fields, StageSettings& settings, const std::vector<LossDescription>& losses);
+/// Describes the config of a run. `losses` are the terms that a stage may name.
 void describe(ConfigFields& fields, RunConfig& config, const std::vector<LossDescription>& losses);
 
 /// Reads and checks a config file. Throws one UserError that tells every problem of the file, of the files that it

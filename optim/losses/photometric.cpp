@@ -24,6 +24,7 @@ LossTerm photometric_loss() {
   return make_loss_term<PhotometricSettings>(
       "photometric", "L1 and structural difference of the rendered image and the frame",
       [](const auto& in, const PhotometricSettings& settings) {
+        if (!in.given(in.rendered) || !in.given(in.target)) return decltype(in.rendered){};
         const double share = settings.ssim_share;
         if (share == 0) return l1(in.rendered, in.target);
         if (share == 1) return d_ssim(in.rendered, in.target);

@@ -28,6 +28,7 @@ inline hsi4d::LossTerm saturation_loss() {
   using namespace hsi4d;
   return make_loss_term<SaturationSettings>(
       "saturation", "Difference of the colours' saturation", [](const auto& in, const SaturationSettings& settings) {
+        if (!in.given(in.rendered) || !in.given(in.target)) return decltype(in.rendered){};
         const auto x = in.rendered, y = in.target;
         const float floor = static_cast<float>(settings.floor);
         const auto total =

@@ -10,16 +10,32 @@ using namespace hsi4d::test;
 
 namespace {
 
-constexpr Index kHeight = 13, kWidth = 21;
+constexpr Index kHeight = 13, kWidth = 21, kObjects = 3;
 
-/// A term with its default settings on the arrays of `in`: rendered, target, weight.
+/// One of every input that a term may read, in the order of inputs_of. The third object is not to be seen in the frame.
+std::vector<OperatorInput> all_inputs() {
+  // The stride is that of double; float arrays may have the same padding.
+  const Shape image = image_shape<double>(3, kHeight, kWidth), mask = image_shape<double>(1, kHeight, kWidth);
+  return {{"rendered", image, 0, 1},
+          {"target", image, 0, 1},
+          {"weight", mask, 0, 1},
+          {"object_opacity", image_shape<double>(kObjects, kHeight, kWidth), 0, 1},
+          {"object_center_target", shape_of(kObjects, 3), 0, 1, {4.5, 6, 1, 12.25, 3.5, 1, 0, 0, 0}},
+          {"object_depth", shape_of(kObjects, 1), 1, 3},
+          {"object_depth_target", shape_of(kObjects, 1), 1, 3}};
+}
+
 template <class S>
-Var<S> record_term(const LossTerm& term, const std::vector<Var<S>>& in) {
+LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   LossInputs<S> inputs;
   inputs.rendered = in[0];
   inputs.target = in[1];
   inputs.weight = in[2];
-  return term.record(inputs, term.description.defaults);
+  inputs.object_opacity = in[3];
+  inputs.object_center_target = in[4];
+  inputs.object_depth = in[5];
+  inputs.object_depth_target = in[6];
+  return inputs;
 }
 
 }  // namespace
@@ -27,10 +43,17 @@ Var<S> record_term(const LossTerm& term, const std::vector<Var<S>>& in) {
 TEST_CASE("every registered loss term passes the gradient check", "[parallel]") {
   REQUIRE_FALSE(loss_terms().empty());
   for (const LossTerm& term : loss_terms()) {
-    // The stride is that of double; float arrays may have the same padding.
-    const Shape image = image_shape<double>(3, kHeight, kWidth), mask = image_shape<double>(1, kHeight, kWidth);
-    check_operator(term.description.name, {{"rendered", image, 0, 1}, {"target", image, 0, 1}, {"weight", mask, 0, 1}},
-                   [&](const auto& in) { return record_term(term, in); }, {.entries = 24});
+    check_operator(term.description.name, all_inputs(),
+                   [&](const auto& in) { return term.record(inputs_of(in), term.description.defaults); },
+                   {.entries = 24});
+  }
+}
+
+TEST_CASE("a registered loss term whose inputs are not given is off") {
+  for (const LossTerm& term : loss_terms()) {
+    INFO(term.description.name);
+    CHECK(term.record(LossInputs<double>{}, term.description.defaults).tape == nullptr);
+    CHECK(term.record(LossInputs<float>{}, term.description.defaults).tape == nullptr);
   }
 }
 

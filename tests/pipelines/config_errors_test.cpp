@@ -88,6 +88,10 @@ TEST_CASE("values out of range") {
              Equals("a.json:2: /stages/camera/iterations: 0 is out of range; allowed: 1 to 1000000"));
   CHECK_THAT(fault(stage(R"("iterations": 1, "losses": {"photo": {"weight": -1}})")),
              Equals("a.json:2: /stages/camera/losses/photo/weight: -1 is out of range; allowed: at least 0"));
+  CHECK_THAT(
+      fault(stage(R"("iterations": 1, "optimize": {"root": {"lr": 0.1, "lr_final_share": 0}})")),
+      Equals(
+          "a.json:2: /stages/camera/optimize/root/lr_final_share: 0 is out of range; allowed: above 0 and at most 1"));
   CHECK_THAT(fault(stage(R"("iterations": 1, "optimizer": {"beta1": 1})")),
              Equals("a.json:2: /stages/camera/optimizer/beta1: 1 is out of range; allowed: at least 0 and below 1"));
 }

@@ -20,9 +20,9 @@ constexpr const char* kRun = R"({
     "camera": {"iterations": 30, "optimize": {"camera": {"lr": 1e-3}}, "losses": {"centre": {}}},
     "interaction": {
       "iterations": 300,
-      "optimize": {"root": {"lr": 0.01}, "body": {"lr": 0.01, "from": 30, "until": 250, "every": 5}},
+      "optimize": {"root": {"lr": 0.01, "lr_final_share": 0.1}, "body": {"lr": 0.01, "from": 30, "until": 250, "every": 5}},
       "losses": {"photo": {"weight": 0.5, "masked": true}, "centre": {"weight": 1e-3}},
-      "optimizer": {"kind": "adam", "beta1": 0.8}
+      "optimizer": {"kind": "adam", "beta1": 0.8, "max_rollbacks": 3}
     }
   }
 })";
@@ -43,10 +43,13 @@ TEST_CASE("a run config is read into its structs") {
   const StageSettings& stage = *find_entry(run.stages, "interaction");
   CHECK(stage.optimizer.beta1 == 0.8);
   CHECK(stage.optimizer.beta2 == 0.999);
+  CHECK(stage.optimizer.max_rollbacks == 3);
   const ParameterGroupSettings& body = *find_entry(stage.optimize, "body");
   CHECK(body.from == 30);
   CHECK(body.until == 250);
   CHECK(body.every == 5);
+  CHECK(body.lr_final_share == 1);
+  CHECK(find_entry(stage.optimize, "root")->lr_final_share == 0.1);
   CHECK_FALSE(find_entry(stage.optimize, "root")->until.has_value());
   const LossSettings& photo = *find_entry(stage.losses, "photo");
   CHECK(photo.weight == 0.5);

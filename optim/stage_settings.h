@@ -1,0 +1,48 @@
+// What a config says about one stage: what moves and how far, which losses count, how gradients become steps.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "core/config.h"
+#include "optim/loss_description.h"
+
+namespace hsi4d {
+
+enum class OptimizerKind { kAdam };
+
+inline constexpr std::array<ConfigChoice<OptimizerKind>, 1> kOptimizerKinds = {{{OptimizerKind::kAdam, "adam"}}};
+
+/// How gradients become steps.
+struct OptimizerSettings {
+  OptimizerKind kind = OptimizerKind::kAdam;
+  double beta1 = 0.9;
+  double beta2 = 0.999;
+  double eps = 1e-8;
+  int max_rollbacks = 10;  ///< bad steps of a stage that are taken back; one more is an error
+};
+
+/// When and how far one group of parameters moves.
+struct ParameterGroupSettings {
+  double lr = 0;
+  double lr_final_share = 1;  ///< the last iteration's learning rate is lr times this; it falls geometrically
+  int from = 0;               ///< the first iteration in which it moves
+  std::optional<int> until;   ///< the first in which it does not move any more; none: the end of the stage
+  int every = 1;              ///< it moves in iterations from, from + every, ...
+};
+
+/// One stage of the method.
+struct StageSettings {
+  int iterations = 0;
+  ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
+  ConfigMap<LossSettings> losses;              ///< by loss term
+  OptimizerSettings optimizer;
+};
+
+/// Describe the sections. `losses` are the terms that a stage may name.
+void describe(ConfigFields& fields, OptimizerSettings& settings);
+void describe(ConfigFields& fields, ParameterGroupSettings& settings);
+void describe(ConfigFields& fields, StageSettings& settings, const std::vector<LossDescription>& losses);
+
+}  // namespace hsi4d
