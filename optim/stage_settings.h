@@ -32,9 +32,21 @@ struct ParameterGroupSettings {
   int every = 1;              ///< it moves in iterations from, from + every, ...
 };
 
+/// What a stage renders.
+enum class Draw { kAll, kScene };
+
+/// Which pixels count where a loss term uses weights.
+enum class PixelWeight { kAll, kUnoccluded };
+
+inline constexpr std::array<ConfigChoice<Draw>, 2> kDraws = {{{Draw::kAll, "all"}, {Draw::kScene, "scene"}}};
+inline constexpr std::array<ConfigChoice<PixelWeight>, 2> kPixelWeights = {
+    {{PixelWeight::kAll, "all"}, {PixelWeight::kUnoccluded, "unoccluded"}}};
+
 /// One stage of the method.
 struct StageSettings {
   int iterations = 0;
+  Draw draw = Draw::kAll;
+  PixelWeight weight = PixelWeight::kAll;
   ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
   ConfigMap<LossSettings> losses;              ///< by loss term
   OptimizerSettings optimizer;

@@ -9,14 +9,31 @@
 #include "core/config.h"
 #include "optim/loss_description.h"
 #include "optim/stage_settings.h"
+#include "pipelines/data_settings.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d {
 
+/// The type in which a run computes.
+enum class Precision { kFloat, kDouble };
+
+/// The numbers by which rotations are optimised.
+enum class RotationParameters { kSixD, kAxisAngle };
+
+inline constexpr std::array<ConfigChoice<Precision>, 2> kPrecisions = {
+    {{Precision::kFloat, "float"}, {Precision::kDouble, "double"}}};
+inline constexpr std::array<ConfigChoice<RotationParameters>, 2> kRotationParameters = {
+    {{RotationParameters::kSixD, "6d"}, {RotationParameters::kAxisAngle, "axis_angle"}}};
+
 /// A whole run.
 struct RunConfig {
+  std::string name;
   std::int64_t seed = 0;
   int threads = 0;  ///< 0: one a core
+  Precision precision = Precision::kFloat;
+  RotationParameters rotations = RotationParameters::kSixD;
+  std::array<double, 3> background{};  ///< colour behind everything
+  DataSettings data;
   RenderSettings render;
   ConfigMap<StageSettings> stages;  ///< in the order written
 };

@@ -1,6 +1,4 @@
 #include "optim/loss_term.h"
 #include "pipelines/cli/program.h"
 
-int main(int argc, char** argv) {
-  return hsi4d::cli::run_program(argc, argv, hsi4d::descriptions_of(hsi4d::loss_terms()));
-}
+int main(int argc, char** argv) { return hsi4d::cli::run_program(argc, argv, hsi4d::loss_terms()); }

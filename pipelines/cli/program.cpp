@@ -13,6 +13,8 @@
 #include "core/suggest.h"
 #include "core/version.h"
 #include "pipelines/cli/commands.h"
+#include "pipelines/cli/run_command.h"
+#include "pipelines/reconstruct.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -35,26 +37,29 @@ struct CommandLine {
   std::string config, topic;
   std::vector<std::string> overrides;
   bool print_config = false;
+  RunArguments run_arguments;
+  std::vector<LossDescription> losses;
   std::function<std::string()> run;
 
-  explicit CommandLine(const std::vector<LossDescription>& losses) {
+  explicit CommandLine(const std::vector<LossTerm>& terms) : losses(descriptions_of(terms)) {
     app.set_version_flag("--version", std::string("hsi4d ") + version());
     app.require_subcommand(1);
     app.failure_message(CLI::FailureMessage::simple);
 
+    add_run(terms);
+
     CLI::App* check = app.add_subcommand("check", "Check a config and everything that it extends; tells all problems");
     check->add_option("CONFIG", config, "The config file")->required();
-    add_overrides(*check);
+    add_overrides(*check, overrides);
     check->add_flag("--print-config", print_config, "Print the config with every default filled in");
-    check->callback(
-        [this, &losses] { run = [this, &losses] { return check_command(config, overrides, print_config, losses); }; });
+    check->callback([this] { run = [this] { return check_command(config, overrides, print_config, losses); }; });
 
     CLI::App* schema = app.add_subcommand("schema", "Print the JSON Schema of configs, for editors");
-    schema->callback([this, &losses] { run = [&losses] { return schema_command(losses); }; });
+    schema->callback([this] { run = [this] { return schema_command(losses); }; });
 
     CLI::App* list = app.add_subcommand("list", "List what configs can name: losses, settings");
     list->add_option("TOPIC", topic, "losses or settings")->required();
-    list->callback([this, &losses] { run = [this, &losses] { return list_command(topic, losses); }; });
+    list->callback([this] { run = [this] { return list_command(topic, losses); }; });
   }
 
   std::vector<std::string> command_names() {
@@ -65,7 +70,21 @@ struct CommandLine {
   }
 
  private:
-  void add_overrides(CLI::App& command) {
+  void add_run(const std::vector<LossTerm>& terms) {
+    RunArguments& a = run_arguments;
+    CLI::App* command = app.add_subcommand("run", "Reconstruct a clip as a config says, into a run folder");
+    command->add_option("CONFIG", a.config, "The config file")->required();
+    add_overrides(*command, a.overrides);
+    command->add_option("--out", a.out, "The run folder; default: runs/NAME, with the config's name");
+    command->add_flag("--resume", a.resume, "Go on with the run in the folder; the result has the same bits");
+    command->add_option("--threads", a.threads, "Threads; results do not depend on it")->check(CLI::Range(1, 1024));
+    command->add_option("--seed", a.seed, "Seed, instead of the config's");
+    command->add_flag("--dry-run", a.dry_run, "Check config and inputs, tell what would be done, write nothing");
+    command->add_flag("--print-config", a.print_config, "Print the config with every default filled in, and stop");
+    command->callback([this, &terms] { run = [this, &terms] { return run_command(run_arguments, terms); }; });
+  }
+
+  static void add_overrides(CLI::App& command, std::vector<std::string>& overrides) {
     command.add_option("--set", overrides, "Change one setting: render.blur=0.1. The value is JSON, or else text")
         ->type_name("KEY=VALUE")
         ->expected(1)
@@ -93,7 +112,7 @@ void check_command_word(int argc, const char* const* argv, CommandLine& line) {
                   "\"; known: " + join(known) + did_you_mean(word, known));
 }
 
-void run_commands(int argc, const char* const* argv, const std::vector<LossDescription>& losses) {
+void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
   CommandLine line(losses);
   check_command_word(argc, argv, line);
   try {
@@ -119,6 +138,8 @@ Failure describe_failure(const std::exception_ptr& error) {
     return {kUserMistake, mistake.what()};
   } catch (const DataError& mistake) {
     return {kUserMistake, mistake.what()};
+  } catch (const Interrupted& stop) {
+    return {kInterrupted, "hsi4d: " + std::string(stop.what())};
   } catch (const std::bad_alloc&) {
     return {kUserMistake, "hsi4d: there is not enough memory for this"};
   } catch (const std::exception& bug) {
@@ -128,7 +149,7 @@ Failure describe_failure(const std::exception_ptr& error) {
   }
 }
 
-int run_program(int argc, const char* const* argv, const std::vector<LossDescription>& losses) {
+int run_program(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
   try {
     const LogSink to_stderr = log_to(
         [](LogLevel level, std::string_view message) {

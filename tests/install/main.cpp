@@ -38,5 +38,5 @@ int main() {
   terms.push_back(outside::saturation_loss());
   if (!gradient_is_right(terms.back())) return 1;
   const char* arguments[] = {"outside", "list", "losses"};
-  return hsi4d::cli::run_program(3, arguments, hsi4d::descriptions_of(terms));
+  return hsi4d::cli::run_program(3, arguments, terms);
 }

@@ -1,0 +1,193 @@
+#include "pipelines/clip.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/config_file.h"
+#include "core/image_io.h"
+#include "splat/io_ply.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// initial.json: the state of frame 0, and estimated poses of all frames.
+struct InitialPose {
+  std::array<double, 3> rotation{}, translation{};
+};
+
+struct InitialSettings {
+  fs::path motion;
+  ConfigMap<InitialPose> objects;
+};
+
+void describe(ConfigFields& f, InitialPose& s) {
+  f.numbers("rotation", s.rotation, {}, "Axis-angle, radians").required();
+  f.numbers("translation", s.translation, {}, "Position of the object's centroid, metres").required();
+}
+
+void describe(ConfigFields& f, InitialSettings& s) {
+  f.path("motion", s.motion, {.must_exist = true, .may_be_empty = false},
+         "Poses (.npz): frame 0 exact, the others estimates; one frame alone: no estimates")
+      .required();
+  f.map("objects", s.objects, "Poses of the objects at frame 0, by name");
+}
+
+InitialSettings read_initial(const fs::path& file) {
+  ConfigProblems problems;
+  const ConfigValue tree = load_config(file, {}, problems);
+  InitialSettings settings;
+  ConfigFields fields;
+  describe(fields, settings);
+  read_config(tree, fields, problems);
+  problems.throw_if_any();
+  return settings;
+}
+
+void require_given(const fs::path& path, const char* key, const char* what) {
+  if (path.empty()) throw UserError(std::string("/data/") + key + ": not given; a run needs " + what);
+}
+
+void require_all(const DataSettings& data) {
+  require_given(data.scene, "scene", "a scene");
+  require_given(data.avatar, "avatar", "an avatar");
+  require_given(data.frames, "frames", "the frames of a video");
+  require_given(data.masks, "masks", "masks of the human and the objects");
+  require_given(data.camera, "camera", "the camera of frame 0");
+  require_given(data.initial, "initial", "the state of frame 0");
+}
+
+std::vector<std::string> png_names(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".png") names.push_back(entry.path().filename().string());
+  }
+  if (error) throw UserError(folder.string() + ": cannot be listed as a folder of frames: " + error.message());
+  std::sort(names.begin(), names.end());
+  if (names.size() < 2) {
+    throw UserError(folder.string() + ": holds " + std::to_string(names.size()) +
+                    " .png files; a clip needs at least 2 frames");
+  }
+  return names;
+}
+
+/// Means relative to their centroid, whatever the file's were.
+Gaussians centred(Gaussians gaussians, const fs::path& file) {
+  if (gaussians.count() == 0) throw DataError(file.string() + ": holds no Gaussians");
+  const Index count = gaussians.count();
+  for (Index c = 0; c < 3; ++c) {
+    double sum = 0;
+    for (Index i = 0; i < count; ++i) sum += static_cast<double>(gaussians.means[static_cast<std::size_t>(3 * i + c)]);
+    const double mean = sum / static_cast<double>(count);
+    for (Index i = 0; i < count; ++i) {
+      float& x = gaussians.means[static_cast<std::size_t>(3 * i + c)];
+      x = static_cast<float>(static_cast<double>(x) - mean);
+    }
+  }
+  gaussians.origin_world.setZero();
+  return gaussians;
+}
+
+ObjectPose initial_pose(const InitialSettings& initial, const std::string& name, const fs::path& file) {
+  const InitialPose* pose = find_entry(initial.objects, name);
+  if (pose == nullptr) throw DataError(file.string() + ": /objects: there is no pose of the object \"" + name + "\"");
+  return {Vector3<double>(pose->rotation.data()), Vector3<double>(pose->translation.data())};
+}
+
+/// Estimated poses: those of the motion file when it has more than frame 0.
+std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, Index frames) {
+  const auto count = static_cast<Index>(motion.poses.size());
+  if (count == 0) throw DataError(file.string() + ": holds no frames");
+  if (count == 1) return {};
+  if (count != frames) {
+    throw DataError(file.string() + ": holds " + std::to_string(count) + " poses, the video has " +
+                    std::to_string(frames) + " frames; allowed: that many, or frame 0 alone");
+  }
+  return motion.poses;
+}
+
+std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, Index frames) {
+  const auto expect = [&](std::size_t count, const char* file) {
+    if (static_cast<Index>(count) == frames) return;
+    throw DataError((folder / file).string() + ": has " + std::to_string(count) + " frames, the video " +
+                    std::to_string(frames));
+  };
+  std::vector<SceneState> truth(static_cast<std::size_t>(frames));
+  const Motion motion = read_motion((folder / "motion.npz").string());
+  expect(motion.poses.size(), "motion.npz");
+  const std::vector<Camera> cameras = read_cameras((folder / "cameras.json").string());
+  expect(cameras.size(), "cameras.json");
+  std::vector<std::vector<ObjectPose>> objects(truth.size());
+  if (!names.empty()) {
+    objects = read_object_tracks((folder / "objects.npz").string(), names);
+    expect(objects.size(), "objects.npz");
+  }
+  for (std::size_t t = 0; t < truth.size(); ++t) {
+    truth[t] = {cameras[t].camera_from_world, objects[t], motion.poses[t]};
+  }
+  return truth;
+}
+
+Image read_mask(const fs::path& file, const Clip& clip) {
+  if (!fs::exists(file)) return Image(1, clip.camera.height, clip.camera.width);
+  Image mask = read_image(file.string());
+  if (mask.height() != clip.camera.height || mask.width() != clip.camera.width) {
+    throw DataError(file.string() + ": is " + std::to_string(mask.width()) + "x" + std::to_string(mask.height()) +
+                    " pixels, the camera's image " + std::to_string(clip.camera.width) + "x" +
+                    std::to_string(clip.camera.height));
+  }
+  return take_channels(mask, 0, 1);
+}
+
+}  // namespace
+
+Clip read_clip(const DataSettings& data) {
+  require_all(data);
+  Clip clip;
+  clip.frame_files = png_names(data.frames);
+  clip.scene = read_ply(data.scene.string()).gaussians;
+  clip.avatar = read_avatar(data.avatar.string());
+  clip.camera = read_camera(data.camera.string());
+  const InitialSettings initial = read_initial(data.initial);
+  clip.first.camera_from_world = clip.camera.camera_from_world;
+  std::vector<std::string> names;
+  for (const auto& [name, object] : data.objects) {
+    const Gaussians read = read_ply(object.gaussians.string()).gaussians;
+    clip.objects.push_back({name, centred(read, object.gaussians)});
+    clip.first.objects.push_back(initial_pose(initial, name, data.initial));
+    names.push_back(name);
+  }
+  const Motion motion = read_motion(initial.motion.string());
+  clip.estimate = estimate_of(motion, initial.motion, clip.frames());
+  clip.first.body = motion.poses.front();
+  clip.frame_rate = motion.frame_rate;
+  if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.frames());
+  return clip;
+}
+
+ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index) {
+  const std::string& name = clip.frame_files.at(static_cast<std::size_t>(index));
+  const fs::path file = data.frames / name;
+  ClipFrame frame;
+  frame.target = read_image(file.string());
+  if (frame.target.channels() < 3 || frame.target.height() != clip.camera.height ||
+      frame.target.width() != clip.camera.width) {
+    throw DataError(file.string() + ": is " + std::to_string(frame.target.width()) + "x" +
+                    std::to_string(frame.target.height()) + " with " + std::to_string(frame.target.channels()) +
+                    " channels; the camera's image is " + std::to_string(clip.camera.width) + "x" +
+                    std::to_string(clip.camera.height) + " with 3");
+  }
+  frame.target = take_channels(frame.target, 0, 3);
+  frame.human_mask = read_mask(data.masks / "human" / name, clip);
+  for (const ClipObject& object : clip.objects) {
+    frame.object_masks.push_back(read_mask(data.masks / object.name / name, clip));
+  }
+  return frame;
+}
+
+}  // namespace hsi4d

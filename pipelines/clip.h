@@ -1,0 +1,54 @@
+// What a reconstruction reads: scene, objects, avatar, the video's frames and masks, the state of frame 0.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "body/avatar.h"
+#include "body/motion_io.h"
+#include "core/camera.h"
+#include "core/image.h"
+#include "pipelines/data_settings.h"
+#include "pipelines/state.h"
+#include "splat/gaussians.h"
+
+namespace hsi4d {
+
+/// One rigid object that moves.
+struct ClipObject {
+  std::string name;
+  Gaussians gaussians;  ///< relative to the centroid of their means
+};
+
+/// All that stays the same over the clip. Frames are read one by one (read_frame).
+struct Clip {
+  Gaussians scene;
+  std::vector<ClipObject> objects;
+  Avatar avatar;
+  Camera camera;                         ///< of frame 0; size and intrinsics of all frames
+  SceneState first;                      ///< state of frame 0, given
+  std::vector<BodyPose> estimate;        ///< estimated poses by frame; empty: none
+  double frame_rate = 10;                ///< frames a second
+  std::vector<std::string> frame_files;  ///< in order
+  std::optional<std::vector<SceneState>> truth;
+
+  Index frames() const { return static_cast<Index>(frame_files.size()); }
+};
+
+/// One frame of the video.
+struct ClipFrame {
+  Image target;                     ///< [3,H,W]
+  Image human_mask;                 ///< [1,H,W] coverage
+  std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
+};
+
+/// Reads everything but the frames. Throws UserError or DataError naming the file: missing, damaged, sizes that do not
+/// fit each other.
+Clip read_clip(const DataSettings& data);
+
+/// Reads frame `index` and its masks. A mask that has no file counts as empty. Throws as read_clip.
+ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index);
+
+}  // namespace hsi4d

@@ -1,0 +1,28 @@
+#include "pipelines/data_settings.h"
+
+namespace hsi4d {
+
+void describe(ConfigFields& f, ObjectSettings& s) {
+  f.path("gaussians", s.gaussians, {.must_exist = true},
+         "Its Gaussians (.ply), relative to the centroid of their means")
+      .required();
+}
+
+void describe(ConfigFields& f, DataSettings& s) {
+  f.path("scene", s.scene, {.must_exist = true}, "The static scene (.ply), metres, z up");
+  f.map("objects", s.objects, "Rigid objects that move, by name");
+  f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.npz)");
+  f.path("frames", s.frames, {.must_exist = true},
+         "Folder of the video's frames: .png files in the order of their names");
+  f.path("masks", s.masks, {.must_exist = true},
+         "Folder of masks: human/ and one folder an object, grey .png files with the names of the frames");
+  f.path("camera", s.camera, {.must_exist = true}, "Camera of frame 0 (.json)");
+  f.path("initial", s.initial, {.must_exist = true}, "State of frame 0 and estimated poses (.json)");
+  f.path("truth", s.truth, {.must_exist = true},
+         "Folder with motion.npz, objects.npz, cameras.json to compare the result with; empty: none");
+  f.number("mask_threshold", s.mask_threshold, {.above = 0, .max = 1}, "Coverage from which a pixel belongs to a mask");
+  f.integer("mask_margin_px", s.mask_margin_px, {.min = 0, .max = 64},
+            "Pixels by which masks grow before they keep the camera stage from what is not scene");
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,32 @@
+// Config section `data`: the files that a run reads.
+#pragma once
+
+#include <filesystem>
+
+#include "core/config.h"
+
+namespace hsi4d {
+
+/// One rigid object.
+struct ObjectSettings {
+  std::filesystem::path gaussians;
+};
+
+/// The inputs of a run. Relative paths are relative to the file that names them.
+struct DataSettings {
+  std::filesystem::path scene;
+  ConfigMap<ObjectSettings> objects;  ///< by name
+  std::filesystem::path avatar;
+  std::filesystem::path frames;
+  std::filesystem::path masks;
+  std::filesystem::path camera;
+  std::filesystem::path initial;
+  std::filesystem::path truth;
+  double mask_threshold = 0.5;
+  int mask_margin_px = 1;
+};
+
+void describe(ConfigFields& fields, ObjectSettings& settings);
+void describe(ConfigFields& fields, DataSettings& settings);
+
+}  // namespace hsi4d

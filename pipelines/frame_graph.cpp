@@ -1,0 +1,342 @@
+#include "pipelines/frame_graph.h"
+
+#include <algorithm>
+#include <array>
+
+#include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
+#include "autodiff/reduce.h"
+#include "autodiff/rotations.h"
+#include "body/kinematics.h"
+#include "core/check.h"
+#include "core/rotation.h"
+#include "core/rotation_6d.h"
+#include "splat/covariance.h"
+#include "splat/sh.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// Rows of the SMPL-X pose that a group of parameters holds.
+struct JointGroup {
+  const char* name;
+  Index first, count;
+};
+constexpr std::array<JointGroup, 7> kJointGroups = {{{"global_orient", 0, 1},
+                                                     {"body_pose", 1, 21},
+                                                     {"jaw_pose", 22, 1},
+                                                     {"leye_pose", 23, 1},
+                                                     {"reye_pose", 24, 1},
+                                                     {"left_hand_pose", 25, 15},
+                                                     {"right_hand_pose", 40, 15}}};
+constexpr Index kJoints = 55;
+constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_scales", "opacity_logits", "sh"};
+
+template <class S>
+void write_numbers(Tape<S>& tape, Var<S> leaf, const double* values) {
+  const Array<S> array = tape.write(leaf);
+  for (Index i = 0; i < array.shape.count(); ++i) array.data[i] = static_cast<S>(values[i]);
+}
+
+template <class S>
+void write_image(Tape<S>& tape, Var<S> leaf, const Image& image) {
+  const Array<S> array = tape.write(leaf);
+  HSI4D_CHECK_EQ(array.shape.planes, static_cast<Index>(image.channels()));
+  HSI4D_CHECK_EQ(array.shape.rows, static_cast<Index>(image.height()));
+  HSI4D_CHECK_EQ(array.shape.cols, static_cast<Index>(image.width()));
+  for (int c = 0; c < image.channels(); ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      std::copy_n(image.row(c, y), image.width(), array.row(c * array.shape.rows + y));
+    }
+  }
+}
+
+template <class S>
+Vector3<double> read_vector(Tape<S>& tape, Var<S> leaf) {
+  const ConstArray<S> array = tape.value(leaf);
+  return {static_cast<double>(array(0, 0)), static_cast<double>(array(0, 1)), static_cast<double>(array(0, 2))};
+}
+
+/// [1,12], the rows of [R | t].
+template <class S>
+Var<S> rigid_rows(Var<S> rotation, Var<S> translation) {
+  std::array<Var<S>, 6> parts;
+  for (Index r = 0; r < 3; ++r) {
+    parts[static_cast<std::size_t>(2 * r)] = slice_cols(rotation, 3 * r, 3);
+    parts[static_cast<std::size_t>(2 * r + 1)] = slice_cols(translation, r, 1);
+  }
+  return concat_cols<S>(parts);
+}
+
+template <class S, class Member>
+Var<S> stacked(const std::vector<SplatInputs<S>>& parts, Member member) {
+  if (parts.size() == 1) return parts.front().*member;
+  std::vector<Var<S>> rows;
+  for (const SplatInputs<S>& part : parts) rows.push_back(part.*member);
+  return concat_rows<S>(rows);
+}
+
+}  // namespace
+
+std::vector<std::string> parameter_group_names(Draw draw) {
+  std::vector<std::string> names = {"camera", "background"};
+  const auto add_classes = [&names](const std::string& part) {
+    for (const char* name : kGaussianClasses) names.push_back(part + "_" + name);
+  };
+  add_classes("scene");
+  if (draw == Draw::kScene) return names;
+  names.insert(names.end(), {"object_orient", "object_transl", "transl"});
+  for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
+  add_classes("object");
+  add_classes("human");
+  names.back() = "human_colors";
+  return names;
+}
+
+template <class S>
+FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
+                          const FrameGraphSettings& settings)
+    : tape_(tape), settings_(settings), view_{clip.camera, clip.scene.origin_world, settings.render} {
+  view_.camera.camera_from_world = camera_from_world;
+  camera_update_ = leaf("camera", "camera_update", 1, 6, nullptr);
+  const Vector3<float> background = settings.background.cast<float>();
+  background_ = leaf("background", "background", 1, 3, background.data());
+  std::vector<Part> parts = {record_scene(clip)};
+  if (settings_.draw == Draw::kAll) {
+    for (const ClipObject& object : clip.objects) parts.push_back(record_object(object));
+    parts.push_back(record_human(clip.avatar));
+  }
+  record_render(parts, 1);
+  for (const ParameterGroup<S>& group : groups_) {
+    for (const Var<S> block : group.blocks) tape_.freeze(block);
+  }
+}
+
+template <class S>
+Var<S> FrameGraph<S>::leaf(const std::string& group, const std::string& name, Index rows, Index cols,
+                           const float* values) {
+  const Var<S> var = tape_.parameter(name, shape_of(rows, cols));
+  if (values != nullptr) {
+    const Array<S> array = tape_.write(var);
+    std::copy_n(values, rows * cols, array.data);
+  }
+  add_to_group(group, var);
+  return var;
+}
+
+template <class S>
+void FrameGraph<S>::add_to_group(const std::string& group, Var<S> leaf) {
+  for (ParameterGroup<S>& known : groups_) {
+    if (known.name == group) return known.blocks.push_back(leaf);
+  }
+  groups_.push_back({group, {leaf}});
+}
+
+template <class S>
+typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Clip& clip) {
+  const Gaussians& g = clip.scene;
+  const Index n = g.count();
+  const Var<S> means = leaf("scene_means", "scene means", n, 3, g.means.data());
+  const Var<S> quats = leaf("scene_quats", "scene quats", n, 4, g.quats.data());
+  const Var<S> scales = leaf("scene_log_scales", "scene log_scales", n, 3, g.log_scales.data());
+  const Var<S> logits = leaf("scene_opacity_logits", "scene opacity_logits", n, 1, g.opacity_logits.data());
+  const Var<S> sh = leaf("scene_sh", "scene sh", n, 3 * g.sh_coefficients(), g.sh.data());
+  return {{means, gaussian_axes(quats, scales), sigmoid(logits), sh_colors(sh, means, camera_update_, view_)}, n};
+}
+
+template <class S>
+typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& object) {
+  const Gaussians& g = object.gaussians;
+  const Index n = g.count();
+  const Var<S> centred = leaf("object_means", object.name + " means", n, 3, g.means.data());
+  const Var<S> quats = leaf("object_quats", object.name + " quats", n, 4, g.quats.data());
+  const Var<S> scales = leaf("object_log_scales", object.name + " log_scales", n, 3, g.log_scales.data());
+  const Var<S> logits = leaf("object_opacity_logits", object.name + " opacity_logits", n, 1, g.opacity_logits.data());
+  const Var<S> sh = leaf("object_sh", object.name + " sh", n, 3 * g.sh_coefficients(), g.sh.data());
+  const Index numbers = settings_.rotations == RotationParameters::kSixD ? 6 : 3;
+  const Var<S> orient = leaf("object_orient", object.name + " orient", 1, numbers, nullptr);
+  const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
+  objects_.push_back({orient, transl});
+
+  const Var<S> rotation = record_rotations(orient);
+  const Var<S> transform = rigid_rows(rotation, transl);
+  const Var<S> means = matmul(centred, transpose(reshape(rotation, 3, 3))) + transl;
+  const Var<S> axes = transform_axes(transform, gaussian_axes(quats, scales));
+  return {{means, axes, sigmoid(logits), sh_colors(sh, means, camera_update_, view_, transform)}, n};
+}
+
+template <class S>
+typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
+  const auto n = static_cast<Index>(avatar.opacity_logits.size());
+  HSI4D_CHECK_EQ(static_cast<Index>(avatar.parents.size()), kJoints);
+  const Var<S> rest = leaf("human_means", "human means", n, 3, avatar.means.data());
+  const Var<S> quats = leaf("human_quats", "human quats", n, 4, avatar.quats.data());
+  const Var<S> scales = leaf("human_log_scales", "human log_scales", n, 3, avatar.log_scales.data());
+  const Var<S> logits = leaf("human_opacity_logits", "human opacity_logits", n, 1, avatar.opacity_logits.data());
+  const Var<S> colors = leaf("human_colors", "human colors", n, 3, avatar.colors.data());
+  const Index numbers = settings_.rotations == RotationParameters::kSixD ? 6 : 3;
+  for (const JointGroup& joints : kJointGroups) {
+    joint_rotations_.push_back(leaf(joints.name, joints.name, joints.count, numbers, nullptr));
+  }
+  transl_ = leaf("transl", "transl", 1, 3, nullptr);
+
+  const Var<S> rotations = record_rotations(concat_rows<S>(joint_rotations_));
+  const PosedSkeleton<S> skeleton = kinematic_chain(rotations, transl_, avatar.parents, avatar.joints);
+  const Var<S> blended = blend_transforms(SkinWeights<S>(avatar.weights), skeleton.transforms);
+  const Var<S> means = transform_points(blended, rest);
+  return {{means, transform_axes(blended, gaussian_axes(quats, scales)), sigmoid(logits), colors}, n};
+}
+
+template <class S>
+Var<S> FrameGraph<S>::record_rotations(Var<S> parameters) const {
+  return settings_.rotations == RotationParameters::kSixD ? rotations_from_6d(parameters)
+                                                          : rotations_from_axis_angle(parameters);
+}
+
+template <class S>
+void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t first_object) {
+  std::vector<SplatInputs<S>> splats;
+  RenderRequest request;
+  Index row = 0;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    splats.push_back(parts[p].splats);
+    const bool is_object = p >= first_object && p < first_object + objects_.size();
+    if (is_object) request.groups.emplace_back(row, row + parts[p].count);
+    row += parts[p].count;
+  }
+  const SplatInputs<S> all = {stacked(splats, &SplatInputs<S>::means), stacked(splats, &SplatInputs<S>::axes),
+                              stacked(splats, &SplatInputs<S>::opacities), stacked(splats, &SplatInputs<S>::colors)};
+  rendered_ = render(all, camera_update_, background_, view_, request);
+  inputs_.rendered = rendered_.image;
+  inputs_.target = tape_.constant("target", rendered_.image.shape());
+  inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
+  if (!request.groups.empty()) record_object_inputs(parts, first_object);
+}
+
+template <class S>
+void FrameGraph<S>::record_object_inputs(const std::vector<Part>& parts, std::size_t first_object) {
+  const auto count = static_cast<Index>(objects_.size());
+  std::vector<Var<S>> depths;
+  Index row = 0;
+  for (std::size_t p = 0; p < first_object + objects_.size(); ++p) {
+    if (p >= first_object) depths.push_back(mean(slice_rows(rendered_.projected.depths, row, parts[p].count)));
+    row += parts[p].count;
+  }
+  inputs_.object_opacity = rendered_.group_opacity;
+  inputs_.object_depth = concat_rows<S>(depths);
+  inputs_.object_center_target = tape_.constant("object_center_target", shape_of(count, 3));
+  inputs_.object_depth_target = tape_.constant("object_depth_target", shape_of(count, 1));
+}
+
+template <class S>
+void FrameGraph<S>::write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle) {
+  S* numbers = tape_.write(leaf).row(row);
+  if (settings_.rotations == RotationParameters::kAxisAngle) {
+    for (Index i = 0; i < 3; ++i) numbers[i] = static_cast<S>(axis_angle[i]);
+    return;
+  }
+  const Matrix3<double> rotation = so3_exp(axis_angle);
+  for (Index i = 0; i < 6; ++i) numbers[i] = static_cast<S>(rotation(i % 3, i / 3));
+}
+
+template <class S>
+Vector3<double> FrameGraph<S>::read_rotation(Var<S> leaf, Index row) const {
+  const S* numbers = tape_.value(leaf).row(row);
+  Vector3<double> first(numbers[0], numbers[1], numbers[2]);
+  if (settings_.rotations == RotationParameters::kAxisAngle) {
+    wrap_axis_angle(first);
+    return first;
+  }
+  return so3_log(rotation_from_6d(first, Vector3<double>(numbers[3], numbers[4], numbers[5])));
+}
+
+template <class S>
+void FrameGraph<S>::set_state(const SceneState& state) {
+  const std::array<double, 6> no_update{};
+  write_numbers(tape_, camera_update_, no_update.data());
+  if (settings_.draw == Draw::kScene) return;
+  HSI4D_CHECK_EQ(state.objects.size(), objects_.size());
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    write_rotation(objects_[o].orient, 0, state.objects[o].rotation);
+    write_numbers(tape_, objects_[o].transl, state.objects[o].translation.data());
+  }
+  write_numbers(tape_, transl_, state.body.transl.data());
+  for (std::size_t g = 0; g < kJointGroups.size(); ++g) {
+    for (Index j = 0; j < kJointGroups[g].count; ++j) {
+      const double* axis_angle = state.body.axis_angle.data() + 3 * (kJointGroups[g].first + j);
+      write_rotation(joint_rotations_[g], j, Vector3<double>(axis_angle));
+    }
+  }
+}
+
+template <class S>
+void FrameGraph<S>::read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const {
+  const auto is_moved = [&moved](const char* group) { return find_entry(moved, group) != nullptr; };
+  if (is_moved("camera")) {
+    Vector6<double> xi;
+    for (Index i = 0; i < 6; ++i) xi[i] = static_cast<double>(tape_.value(camera_update_)(0, i));
+    state.camera_from_world = se3_update(xi, view_.camera.camera_from_world);
+  }
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    if (is_moved("object_orient")) state.objects[o].rotation = read_rotation(objects_[o].orient, 0);
+    if (is_moved("object_transl")) state.objects[o].translation = read_vector(tape_, objects_[o].transl);
+  }
+  if (is_moved("transl")) state.body.transl = read_vector(tape_, transl_);
+  for (std::size_t g = 0; g < joint_rotations_.size(); ++g) {
+    if (!is_moved(kJointGroups[g].name)) continue;
+    for (Index j = 0; j < kJointGroups[g].count; ++j) {
+      const Vector3<double> axis_angle = read_rotation(joint_rotations_[g], j);
+      std::copy_n(axis_angle.data(), 3, state.body.axis_angle.data() + 3 * (kJointGroups[g].first + j));
+    }
+  }
+}
+
+template <class S>
+void FrameGraph<S>::set_targets(const FrameTargets& targets) {
+  HSI4D_CHECK(targets.image != nullptr, "a frame needs an image to be compared with");
+  write_image(tape_, inputs_.target, *targets.image);
+  if (targets.weight != nullptr) {
+    write_image(tape_, inputs_.weight, *targets.weight);
+  } else {
+    const Array<S> weight = tape_.write(inputs_.weight);
+    for (Index r = 0; r < weight.total_rows(); ++r) std::fill_n(weight.row(r), weight.shape.cols, S(1));
+  }
+  if (!inputs_.given(inputs_.object_depth)) return;
+  HSI4D_CHECK_EQ(targets.centers.size(), objects_.size());
+  HSI4D_CHECK_EQ(targets.depths.size(), objects_.size());
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    S* center = tape_.write(inputs_.object_center_target).row(static_cast<Index>(o));
+    for (Index i = 0; i < 3; ++i) center[i] = static_cast<S>(targets.centers[o][i]);
+  }
+  write_numbers(tape_, inputs_.object_depth_target, targets.depths.data());
+}
+
+Vector3<double> mask_center(const Image& mask) {
+  double mass = 0, x_sum = 0, y_sum = 0;
+  for (int y = 0; y < mask.height(); ++y) {
+    const float* row = mask.row(0, y);
+    for (int x = 0; x < mask.width(); ++x) {
+      const auto m = static_cast<double>(row[x]);
+      mass += m;
+      x_sum += m * (x + 0.5);
+      y_sum += m * (y + 0.5);
+    }
+  }
+  return mass > 0 ? Vector3<double>(x_sum / mass, y_sum / mass, 1) : Vector3<double>::Zero();
+}
+
+double mean_depth(const Gaussians& object, const ObjectPose& pose, const Rigid<double>& camera_from_world) {
+  Vector3<double> sum = Vector3<double>::Zero();
+  for (Index i = 0; i < object.count(); ++i) {
+    sum += Vector3<float>(object.means.data() + 3 * i).cast<double>();
+  }
+  const Vector3<double> centre = sum / static_cast<double>(object.count());
+  const Vector3<double> world = so3_exp(pose.rotation) * centre + pose.translation;
+  return transform_point(camera_from_world, world)[2];
+}
+
+template class FrameGraph<float>;
+template class FrameGraph<double>;
+
+}  // namespace hsi4d

@@ -1,0 +1,102 @@
+// One frame on a tape: from the parameters of camera, human and objects to the image and the inputs of the losses.
+//
+//   scene       means, quats, log_scales, opacity_logits, sh                                ─┐
+//   object o    the same, moved by [exp(orient) | transl]                                     ├─ render ─ image, masks
+//   human       rotations → kinematic chain → blended transforms → means, axes; colours     ─┘
+//
+// Every number that the image depends on is a leaf, frozen unless a stage moves it, so that each can be optimised, and
+// checked, by its group's name.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "optim/loss_term.h"
+#include "optim/parameters.h"
+#include "pipelines/clip.h"
+#include "pipelines/run_config.h"
+#include "pipelines/state.h"
+#include "splat/render.h"
+
+namespace hsi4d {
+
+/// What a frame graph draws and how.
+struct FrameGraphSettings {
+  RenderSettings render;
+  RotationParameters rotations = RotationParameters::kSixD;
+  Draw draw = Draw::kAll;
+  Vector3<double> background = Vector3<double>::Zero();
+};
+
+/// What a frame is compared with.
+struct FrameTargets {
+  const Image* image = nullptr;          ///< [3,H,W]
+  const Image* weight = nullptr;         ///< [1,H,W]; null: every pixel counts
+  std::vector<Vector3<double>> centers;  ///< by object: x px, y px, 1 or 0 (none)
+  std::vector<double> depths;            ///< by object: mean camera z at the clip's first frame, metres
+};
+
+/// Names of the groups that a stage may move, by what it draws.
+std::vector<std::string> parameter_group_names(Draw draw);
+
+/// The frame graph. The tape and the clip must outlive it.
+template <class S>
+class FrameGraph {
+ public:
+  /// Records the graph; nothing is computed. `camera_from_world` is the camera about which the update is taken.
+  FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
+             const FrameGraphSettings& settings);
+
+  /// Writes the state into the leaves. The camera's update becomes zero: `state` must have the camera that the graph
+  /// was recorded with.
+  void set_state(const SceneState& state);
+  /// Reads the leaves of the groups named in `moved` back into `state`; the rest of it keeps its bits. Rotations come
+  /// as axis-angle with angles up to π.
+  void read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const;
+  /// Writes the frame: target, the weight of pixels, centres of the objects' masks. See FrameTargets.
+  void set_targets(const FrameTargets& targets);
+
+  const Rendered<S>& rendered() const { return rendered_; }
+  const LossInputs<S>& loss_inputs() const { return inputs_; }
+  /// Everything that may move, all of it frozen.
+  const std::vector<ParameterGroup<S>>& groups() const { return groups_; }
+
+ private:
+  struct Part {  // rows of all Gaussians that belong together
+    SplatInputs<S> splats;
+    Index count = 0;
+  };
+  struct Object {
+    Var<S> orient, transl;
+  };
+
+  Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
+  void add_to_group(const std::string& group, Var<S> leaf);
+  Part record_scene(const Clip& clip);
+  Part record_object(const ClipObject& object);
+  Part record_human(const Avatar& avatar);
+  Var<S> record_rotations(Var<S> parameters) const;
+  void record_render(const std::vector<Part>& parts, std::size_t first_object);
+  void record_object_inputs(const std::vector<Part>& parts, std::size_t first_object);
+  void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
+  Vector3<double> read_rotation(Var<S> leaf, Index row) const;
+
+  Tape<S>& tape_;
+  FrameGraphSettings settings_;
+  SplatView view_;
+  std::vector<ParameterGroup<S>> groups_;
+  Var<S> camera_update_, background_;
+  std::vector<Object> objects_;
+  Var<S> transl_;
+  std::vector<Var<S>> joint_rotations_;  // by kJointGroups
+  Rendered<S> rendered_;
+  LossInputs<S> inputs_;
+};
+
+/// Centre of a mask (pixel centres at +0.5) in x and y, and 1; zeros for an empty mask.
+Vector3<double> mask_center(const Image& mask);
+
+/// Mean camera z of an object's Gaussian centres, metres.
+double mean_depth(const Gaussians& object, const ObjectPose& pose, const Rigid<double>& camera_from_world);
+
+}  // namespace hsi4d

@@ -1,0 +1,356 @@
+#include "pipelines/reconstruct.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+#include "body/kinematics.h"
+#include "body/motion_io.h"
+#include "core/camera_file.h"
+#include "core/image_io.h"
+#include "core/rotation.h"
+#include "optim/metrics.h"
+#include "optim/stage.h"
+#include "pipelines/evaluate.h"
+#include "pipelines/frame_graph.h"
+#include "pipelines/run_state.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// The difference image shows differences this many times as large as they are.
+constexpr float kDifferenceGain = 4;
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// Pixels of `mask` at or above the threshold, grown by `margin` pixels to all sides, are set in `covered`.
+void add_covered(const Image& mask, double threshold, int margin, Image& covered) {
+  const int height = mask.height(), width = mask.width();
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (static_cast<double>(mask(0, y, x)) < threshold) continue;
+      for (int i = std::max(0, y - margin); i <= std::min(height - 1, y + margin); ++i) {
+        std::fill(covered.row(0, i) + std::max(0, x - margin), covered.row(0, i) + std::min(width, x + margin + 1),
+                  1.0F);
+      }
+    }
+  }
+}
+
+void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered) {
+  add_covered(frame.human_mask, data.mask_threshold, data.mask_margin_px, covered);
+  for (const Image& mask : frame.object_masks) add_covered(mask, data.mask_threshold, data.mask_margin_px, covered);
+}
+
+Image complement(const Image& mask) {
+  Image result(1, mask.height(), mask.width());
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) result(0, y, x) = 1 - mask(0, y, x);
+  }
+  return result;
+}
+
+/// The larger of all masks, pixel by pixel.
+Image foreground_of(const ClipFrame& frame) {
+  Image result = frame.human_mask;
+  for (const Image& mask : frame.object_masks) {
+    for (int y = 0; y < result.height(); ++y) {
+      for (int x = 0; x < result.width(); ++x) result(0, y, x) = std::max(result(0, y, x), mask(0, y, x));
+    }
+  }
+  return result;
+}
+
+Image difference_image(const Image& a, const Image& b) {
+  Image result(a.channels(), a.height(), a.width());
+  for (int c = 0; c < a.channels(); ++c) {
+    for (int y = 0; y < a.height(); ++y) {
+      for (int x = 0; x < a.width(); ++x) result(c, y, x) = kDifferenceGain * std::fabs(a(c, y, x) - b(c, y, x));
+    }
+  }
+  return result;
+}
+
+template <class S>
+Image to_image(const ConstArray<S>& array) {
+  Image image(static_cast<int>(array.shape.planes), static_cast<int>(array.shape.rows),
+              static_cast<int>(array.shape.cols));
+  for (int c = 0; c < image.channels(); ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) image(c, y, x) = static_cast<float>(array(c, y, x));
+    }
+  }
+  return image;
+}
+
+/// Where a state puts everything, for the metrics. A stage that draws the scene alone is judged by its camera alone.
+FrameState placed(const Clip& clip, const SceneState& state, Draw draw) {
+  FrameState frame;
+  frame.camera_from_world = state.camera_from_world;
+  if (draw == Draw::kScene) return frame;
+  frame.joints = pose_joints(clip.avatar, state.body);
+  for (const ObjectPose& pose : state.objects) {
+    frame.world_from_object.push_back({so3_exp(pose.rotation), pose.translation});
+  }
+  return frame;
+}
+
+std::vector<FrameState> placed(const Clip& clip, const std::vector<SceneState>& states, Draw draw) {
+  std::vector<FrameState> frames;
+  for (const SceneState& state : states) frames.push_back(placed(clip, state, draw));
+  return frames;
+}
+
+class Reconstruction {
+ public:
+  Reconstruction(const RunConfig& config, const std::vector<LossTerm>& losses, RunFolder& folder,
+                 const RunObserver& observer)
+      : config_(config),
+        losses_(losses),
+        folder_(folder),
+        observer_(observer),
+        resolved_(resolved_config(config, descriptions_of(losses))),
+        clip_(read_clip(config.data)),
+        progress_(first_progress(clip_, config.stages.size())),
+        bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
+
+  RunSummary run() {
+    resume();
+    while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
+    bar_.finish();
+    write_results();
+    const RunSummary summary = summarize();
+    folder_.write_summary(summary);
+    return summary;
+  }
+
+ private:
+  std::int64_t total_steps() const {
+    std::int64_t steps = 0;
+    for (const auto& [name, stage] : config_.stages) steps += stage.iterations;
+    return steps * (clip_.frames() - 1);
+  }
+
+  std::string checkpoint_file() const { return folder_.paths().checkpoint() + "/progress.npz"; }
+
+  void resume() {
+    if (folder_.resumed_from() && std::filesystem::exists(checkpoint_file())) {
+      progress_ = load_progress(checkpoint_file(), resolved_, clip_, config_.stages.size());
+    } else {
+      add_covered(read_frame(config_.data, clip_, 0), config_.data, progress_.covered);
+    }
+    folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
+    bar_.step(total_steps() / (clip_.frames() - 1) * (progress_.frames_done() - 1));
+  }
+
+  /// The state that frame `index` starts from: the one before, with the estimated pose of the limbs.
+  SceneState start_of(Index index) const {
+    SceneState state = progress_.after_stage.back().back();
+    if (clip_.estimate.empty()) return state;
+    const std::vector<double>& estimated = clip_.estimate[static_cast<std::size_t>(index)].axis_angle;
+    std::copy(estimated.begin() + 3, estimated.end(), state.body.axis_angle.begin() + 3);
+    return state;
+  }
+
+  void run_frame(Index index) {
+    const auto begin = std::chrono::steady_clock::now();
+    const ClipFrame frame = read_frame(config_.data, clip_, index);
+    add_covered(frame, config_.data, progress_.covered);
+    SceneState state = start_of(index);
+    std::vector<SceneState> after;
+    for (std::size_t s = 0; s < config_.stages.size(); ++s) {
+      if (config_.precision == Precision::kFloat) {
+        run_frame_stage<float>(index, s, frame, state);
+      } else {
+        run_frame_stage<double>(index, s, frame, state);
+      }
+      after.push_back(state);
+    }
+    const MetricValues errors = write_images(index, frame, state);
+    for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
+    progress_.image_errors.push_back(errors);
+    progress_.seconds += seconds_since(begin);
+    save_progress(checkpoint_file(), resolved_, progress_);
+  }
+
+  FrameGraphSettings graph_settings(Draw draw) const {
+    return {config_.render, config_.rotations, draw, Vector3<double>(config_.background.data())};
+  }
+
+  template <class S>
+  void run_frame_stage(Index index, std::size_t s, const ClipFrame& frame, SceneState& state) {
+    const auto& [name, stage] = config_.stages[s];
+    Tape<S> tape;
+    FrameGraph<S> graph(tape, clip_, state.camera_from_world, graph_settings(stage.draw));
+    graph.set_state(state);
+    const Image weight = complement(progress_.covered);
+    graph.set_targets(targets_of(frame, stage, weight));
+    const StageResult result =
+        run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(),
+                     [&](const IterationReport& report) { note(index, name, report, *graph.rendered().counters); },
+                     {.name = name + ", frame " + std::to_string(index)});
+    graph.read_state(stage.optimize, state);
+    progress_.totals[s].iterations += result.iterations;
+    progress_.totals[s].rollbacks += result.rollbacks;
+    progress_.totals[s].seconds += result.seconds;
+  }
+
+  FrameTargets targets_of(const ClipFrame& frame, const StageSettings& stage, const Image& weight) const {
+    FrameTargets targets;
+    targets.image = &frame.target;
+    targets.weight = stage.weight == PixelWeight::kUnoccluded ? &weight : nullptr;
+    for (const Image& mask : frame.object_masks) targets.centers.push_back(mask_center(mask));
+    for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
+      targets.depths.push_back(
+          mean_depth(clip_.objects[o].gaussians, clip_.first.objects[o], clip_.first.camera_from_world));
+    }
+    return targets;
+  }
+
+  void note(Index frame, const std::string& stage, const IterationReport& report, const RenderCounters& counters) {
+    IterationRecord record;
+    record.frame = static_cast<int>(frame);
+    record.stage = stage;
+    record.iteration = report.iteration;
+    record.loss = report.loss;
+    for (const LossValue& term : report.terms) record.losses.emplace_back(term.name, term.value);
+    record.seconds = report.seconds;
+    record.rolled_back = report.rolled_back;
+    record.counters = {{"tiles", static_cast<double>(counters.tiles)},
+                       {"pairs", static_cast<double>(counters.pairs)},
+                       {"fragments", static_cast<double>(counters.fragments)}};
+    folder_.append_metrics(record);
+    bar_.step_with("loss", report.loss);
+    if (observer_.stop_requested && observer_.stop_requested()) {
+      throw Interrupted("interrupted in frame " + std::to_string(frame) + "; " +
+                        std::to_string(progress_.frames_done()) + " frames are in the checkpoint");
+    }
+  }
+
+  template <class S>
+  Image render_state(const SceneState& state) const {
+    Tape<S> tape;
+    FrameGraph<S> graph(tape, clip_, state.camera_from_world, graph_settings(Draw::kAll));
+    graph.set_state(state);
+    tape.forward(graph.rendered().image);
+    return to_image(tape.value(graph.rendered().image));
+  }
+  Image rendered_image(const SceneState& state) const {
+    return config_.precision == Precision::kFloat ? render_state<float>(state) : render_state<double>(state);
+  }
+
+  MetricValues write_images(Index index, const ClipFrame& frame, const SceneState& state) const {
+    const RunPaths& paths = folder_.paths();
+    const auto number = static_cast<int>(index);
+    const Image image = rendered_image(state);
+    write_image(paths.frame_image(number, "target"), frame.target);
+    write_image(paths.frame_image(number, "render"), image);
+    write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
+    write_image(paths.frame_image(number, "start"), rendered_image(baseline_start(index)));
+    const Image foreground = foreground_of(frame);
+    return image_errors(image, frame.target, &foreground);
+  }
+
+  /// What the run is given for a frame before it does anything.
+  SceneState baseline_start(Index index) const {
+    SceneState state = clip_.first;
+    if (!clip_.estimate.empty()) state.body = clip_.estimate[static_cast<std::size_t>(index)];
+    return state;
+  }
+
+  void write_results() const {
+    const std::vector<SceneState>& result = progress_.after_stage.back();
+    std::vector<std::string> names;
+    for (const ClipObject& object : clip_.objects) names.push_back(object.name);
+    write_motion(folder_.paths().motion(), {clip_.frame_rate, bodies_of(result)});
+    if (!names.empty()) write_object_tracks(folder_.paths().objects(), names, result);
+    write_cameras(folder_.paths().cameras(), cameras_of(result, clip_.camera));
+  }
+
+  RunSummary summarize() const {
+    RunSummary summary;
+    summary.name = config_.name;
+    summary.frames = static_cast<int>(clip_.frames());
+    summary.seconds = progress_.seconds;
+    for (std::size_t s = 0; s < config_.stages.size(); ++s) summary.metrics.push_back(summarize_stage(s));
+    std::vector<FrameMetrics> images;
+    for (std::size_t t = 1; t < progress_.image_errors.size(); ++t) {
+      images.push_back({static_cast<int>(t), progress_.image_errors[t]});
+    }
+    if (clip_.truth) add_errors(summary);
+    for (std::size_t t = 0; t < images.size(); ++t) {
+      if (summary.per_frame.size() <= t) summary.per_frame.push_back({images[t].frame, {}});
+      MetricValues& values = summary.per_frame[t].values;
+      values.insert(values.end(), images[t].values.begin(), images[t].values.end());
+    }
+    MetricValues& final_values = summary.metrics.back().values;
+    const MetricValues means = mean_errors(images);
+    final_values.insert(final_values.end(), means.begin(), means.end());
+    return summary;
+  }
+
+  StageSummary summarize_stage(std::size_t s) const {
+    const auto& [name, stage] = config_.stages[s];
+    const StageTotals& totals = progress_.totals[s];
+    StageSummary summary{name, totals.seconds, totals.iterations, {}};
+    if (clip_.truth) summary.values = errors_of(progress_.after_stage[s], stage.draw);
+    summary.values.emplace_back("rollbacks", static_cast<double>(totals.rollbacks));
+    return summary;
+  }
+
+  MetricValues errors_of(const std::vector<SceneState>& states, Draw draw) const {
+    return sequence_summary(placed(clip_, states, draw), placed(clip_, *clip_.truth, draw), clip_.frame_rate);
+  }
+
+  void add_errors(RunSummary& summary) const {
+    const std::vector<FrameState> truth = placed(clip_, *clip_.truth, Draw::kAll);
+    std::vector<SceneState> start, copy;
+    for (Index t = 0; t < clip_.frames(); ++t) {
+      start.push_back(baseline_start(t));
+      copy.push_back(clip_.first);
+    }
+    for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{"copy_frame_0", &copy}}) {
+      summary.baselines.push_back(
+          {name, errors_of(*states, Draw::kAll), sequence_errors(placed(clip_, *states, Draw::kAll), truth)});
+    }
+    summary.per_frame = sequence_errors(placed(clip_, progress_.after_stage.back(), Draw::kAll), truth);
+  }
+
+  const RunConfig& config_;
+  const std::vector<LossTerm>& losses_;
+  RunFolder& folder_;
+  const RunObserver& observer_;
+  std::string resolved_;
+  Clip clip_;
+  RunProgress progress_;
+  Progress bar_;
+};
+
+}  // namespace
+
+void check_run(const RunConfig& config) {
+  std::string problems;
+  const auto complain = [&problems](const std::string& text) { problems += (problems.empty() ? "" : "\n") + text; };
+  if (config.stages.empty()) complain("/stages: a run needs at least one stage");
+  for (const auto& [name, stage] : config.stages) {
+    try {
+      check_groups(stage, parameter_group_names(stage.draw), "/stages/" + name + "/optimize");
+    } catch (const UserError& mistake) {
+      complain(mistake.what());
+    }
+    if (stage.losses.empty()) complain("/stages/" + name + "/losses: a stage needs a loss");
+  }
+  if (!problems.empty()) throw UserError(problems);
+}
+
+RunSummary reconstruct(const RunConfig& config, const std::vector<LossTerm>& losses, RunFolder& folder,
+                       const RunObserver& observer) {
+  check_run(config);
+  return Reconstruction(config, losses, folder, observer).run();
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,26 @@
+// A run from its config to its folder: lock, state, log, reconstruction, summary, report.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipelines/reconstruct.h"
+
+namespace hsi4d {
+
+/// How a run is carried out; no result depends on it.
+struct RunOptions {
+  std::string folder;   ///< UTF-8
+  bool resume = false;  ///< go on with the run that is in the folder; starts anew where there is none
+  int threads = 0;      ///< 0: what the config says
+  RunObserver observer;
+};
+
+/// Carries out a run and leaves its folder complete, report.html included. status.json then says "done"; "interrupted"
+/// or "failed" when this throws.
+///
+/// Throws UserError and DataError for config, inputs and folder, Interrupted when asked to stop.
+/// @return  what summary.json holds
+RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options);
+
+}  // namespace hsi4d

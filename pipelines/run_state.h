@@ -1,0 +1,44 @@
+// What a run has found so far, and its checkpoint.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/image.h"
+#include "pipelines/clip.h"
+#include "pipelines/run_summary.h"
+#include "pipelines/state.h"
+
+namespace hsi4d {
+
+/// Work and time that a stage has taken over the frames so far.
+struct StageTotals {
+  Index iterations = 0;
+  Index rollbacks = 0;
+  double seconds = 0;
+};
+
+/// Everything that the next frame depends on, or that the end of the run tells.
+struct RunProgress {
+  std::vector<std::vector<SceneState>> after_stage;  ///< [stage][frame]; frame 0 is the given one
+  std::vector<StageTotals> totals;                   ///< by stage
+  std::vector<MetricValues> image_errors;            ///< [frame]; none of frame 0
+  Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
+  double seconds = 0;                                ///< of the frames done
+
+  /// Frames done, frame 0 included.
+  Index frames_done() const { return after_stage.empty() ? 0 : static_cast<Index>(after_stage.front().size()); }
+};
+
+/// Nothing done but the given frame 0.
+RunProgress first_progress(const Clip& clip, std::size_t stages);
+
+/// Writes the checkpoint of a run, in one step.
+/// @param config  the text of the resolved config, to which the checkpoint belongs
+void save_progress(const std::string& file, const std::string& config, const RunProgress& progress);
+
+/// Reads it back, bit for bit. Throws DataError naming the file when it is damaged, of another config, or of another
+/// clip.
+RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages);
+
+}  // namespace hsi4d

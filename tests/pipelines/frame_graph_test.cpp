@@ -1,0 +1,185 @@
+#include "pipelines/frame_graph.h"
+
+#include <catch2/catch.hpp>
+
+#include "autodiff/elementwise.h"
+#include "autodiff/gradcheck.h"
+#include "core/parallel.h"
+#include "core/rotation.h"
+#include "optim/loss_term.h"
+#include "tests/pipelines/small_clip.h"
+
+using namespace hsi4d;
+using test::small_clip;
+
+namespace {
+
+/// Settings without cuts, so that differences of the loss are smooth.
+FrameGraphSettings smooth_settings(RotationParameters rotations) {
+  FrameGraphSettings settings;
+  apply_quality(settings.render, Quality::kReference);
+  settings.rotations = rotations;
+  settings.background = {0.2, 0.4, 0.3};
+  return settings;
+}
+
+Image random_image(int channels, int height, int width, std::uint64_t seed) {
+  Image image(channels, height, width);
+  RandomSequence random(seed);
+  for (int c = 0; c < channels; ++c) {
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) image(c, y, x) = static_cast<float>(random.uniform());
+    }
+  }
+  return image;
+}
+
+template <class S>
+Var<S> loss_of(const FrameGraph<S>& graph) {
+  Var<S> total = {};
+  for (const auto& [name, weight] :
+       {std::pair{"photometric", 1.0}, {"masked_l2", 0.5}, {"center", 0.01}, {"depth", 0.1}}) {
+    for (const LossTerm& term : loss_terms()) {
+      if (term.description.name != name) continue;
+      const Var<S> value = term.record(graph.loss_inputs(), term.description.defaults) * weight;
+      total = total.tape == nullptr ? value : total + value;
+    }
+  }
+  return total;
+}
+
+FrameTargets targets_for(const Image& image, const Image& weight) {
+  return {&image, &weight, {{14.5, 11.25, 1}, {6.5, 14.5, 1}}, {2.5, 3.5}};
+}
+
+}  // namespace
+
+TEST_CASE("the gradient of the whole chain is right for every parameter", "[frame_graph]") {
+  const RotationParameters rotations = GENERATE(RotationParameters::kSixD, RotationParameters::kAxisAngle);
+  const Clip clip = small_clip(24, 20, 40);
+  Tape<double> tape;
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(rotations));
+  graph.set_state(clip.first);
+  const Image image = random_image(3, 20, 24, 3), weight = random_image(1, 20, 24, 4);
+  graph.set_targets(targets_for(image, weight));
+  const Var<double> loss = loss_of(graph);
+  const std::vector<std::string> names = parameter_group_names(Draw::kAll);
+  CHECK(graph.groups().size() == names.size());
+  for (const ParameterGroup<double>& group : graph.groups()) {
+    INFO("group " << group.name);
+    CHECK(std::find(names.begin(), names.end(), group.name) != names.end());
+    for (const Var<double> block : group.blocks) tape.unfreeze(block);
+    GradcheckOptions options;
+    options.tolerance = 1e-6;
+    options.entries = 24;
+    options.each_node = false;
+    const GradcheckReport report = gradcheck(tape, loss, options);
+    CHECK(report.ok());
+    CHECK(report.entries > 0);
+    INFO(report.text());
+    CHECK(report.worst_error <= 1e-6);
+    for (const Var<double> block : group.blocks) tape.freeze(block);
+  }
+}
+
+TEST_CASE("the camera's gradient is right away from the camera that the graph was recorded with", "[frame_graph]") {
+  const Clip clip = small_clip(24, 20, 40);
+  Tape<double> tape;
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(RotationParameters::kSixD));
+  graph.set_state(clip.first);
+  const Image image = random_image(3, 20, 24, 3), weight = random_image(1, 20, 24, 4);
+  graph.set_targets(targets_for(image, weight));
+  const Var<double> camera = graph.groups().front().blocks.front();
+  tape.set(camera, {0.03, -0.02, 0.05, 0.04, 0.06, -0.05});
+  tape.unfreeze(camera);
+  GradcheckOptions options;
+  options.tolerance = 1e-6;
+  options.each_node = false;
+  const GradcheckReport report = gradcheck(tape, loss_of(graph), options);
+  INFO(report.text());
+  CHECK(report.ok());
+}
+
+TEST_CASE("a state survives being written to the leaves and read back", "[frame_graph]") {
+  const RotationParameters rotations = GENERATE(RotationParameters::kSixD, RotationParameters::kAxisAngle);
+  const Clip clip = small_clip(24, 20, 20);
+  Tape<double> tape;
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(rotations));
+  graph.set_state(clip.first);
+  ConfigMap<ParameterGroupSettings> moved;
+  for (const std::string& name : parameter_group_names(Draw::kAll)) moved.emplace_back(name, ParameterGroupSettings{});
+  SceneState state = clip.first;
+  for (double& x : state.body.axis_angle) x = 7;
+  state.body.transl.setConstant(7);
+  state.objects[1] = {};
+  graph.read_state(moved, state);
+  CHECK((state.body.transl - clip.first.body.transl).norm() < 1e-12);
+  for (std::size_t i = 0; i < state.body.axis_angle.size(); ++i) {
+    CHECK(state.body.axis_angle[i] == Approx(clip.first.body.axis_angle[i]).margin(1e-12));
+  }
+  CHECK((state.objects[1].rotation - clip.first.objects[1].rotation).norm() < 1e-12);
+  CHECK((state.objects[1].translation - clip.first.objects[1].translation).norm() < 1e-12);
+
+  const SceneState before = state;
+  tape.set(graph.groups().front().blocks.front(), {0.1, 0, 0, 0, 0, 0});
+  graph.read_state({}, state);
+  CHECK(state.camera_from_world.translation == before.camera_from_world.translation);
+  CHECK(state.body.axis_angle == before.body.axis_angle);
+}
+
+TEST_CASE("image, loss and every gradient have the same bits for any number of threads", "[frame_graph][parallel]") {
+  const Clip clip = small_clip(72, 60, 400);
+  Tape<float> tape;
+  FrameGraphSettings settings;
+  FrameGraph<float> graph(tape, clip, clip.first.camera_from_world, settings);
+  graph.set_state(clip.first);
+  const Image image = random_image(3, 60, 72, 3), weight = random_image(1, 60, 72, 4);
+  graph.set_targets(targets_for(image, weight));
+  const Var<float> loss = loss_of(graph);
+  for (const ParameterGroup<float>& group : graph.groups()) {
+    for (const Var<float> block : group.blocks) tape.unfreeze(block);
+  }
+  std::vector<float> expected;
+  for (const int threads : {1, 2, 3, 8}) {
+    std::vector<float> numbers;
+    with_threads(threads, [&] {
+      tape.set(graph.groups().front().blocks.front(), {0, 0, 0, 0, 0, 0});  // everything runs again
+      tape.forward(loss);
+      tape.backward(loss);
+    });
+    numbers.push_back(tape.value(loss).scalar());
+    const ConstArray<float> rendered = tape.value(graph.rendered().image);
+    for (Index r = 0; r < rendered.total_rows(); ++r) {
+      numbers.insert(numbers.end(), rendered.row(r), rendered.row(r) + rendered.shape.cols);
+    }
+    for (const ParameterGroup<float>& group : graph.groups()) {
+      for (const Var<float> block : group.blocks) {
+        const ConstArray<float> gradient = tape.gradient(block);
+        numbers.insert(numbers.end(), gradient.data, gradient.data + gradient.shape.count());
+      }
+    }
+    if (expected.empty()) expected = numbers;
+    CHECK(std::memcmp(expected.data(), numbers.data(), numbers.size() * sizeof(float)) == 0);
+  }
+}
+
+TEST_CASE("the mean depth of an object on the tape is that of the untaped function", "[frame_graph]") {
+  const Clip clip = small_clip(24, 20, 20);
+  Tape<double> tape;
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(RotationParameters::kSixD));
+  graph.set_state(clip.first);
+  tape.forward(graph.loss_inputs().object_depth);
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    const double untaped = mean_depth(clip.objects[o].gaussians, clip.first.objects[o], clip.first.camera_from_world);
+    CHECK(tape.value(graph.loss_inputs().object_depth)(static_cast<Index>(o), 0) == Approx(untaped).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("the centre of a mask", "[frame_graph]") {
+  Image mask(1, 4, 6);
+  CHECK(mask_center(mask) == Vector3<double>(0, 0, 0));
+  mask(0, 1, 2) = 1;
+  CHECK(mask_center(mask) == Vector3<double>(2.5, 1.5, 1));
+  mask(0, 3, 2) = 1;
+  CHECK(mask_center(mask) == Vector3<double>(2.5, 2.5, 1));
+}

@@ -1,0 +1,55 @@
+// A clip of a few Gaussians, made in memory: a wall and a floor, one object, a body.
+#pragma once
+
+#include "body/procedural_body.h"
+#include "core/random.h"
+#include "pipelines/clip.h"
+
+namespace hsi4d::test {
+
+/// Gaussians of random shape around `center_world`, within `spread` of it to each side, SH of degree 1.
+inline Gaussians random_gaussians(Index count, const Vector3<double>& center_world, double spread, double log_scale,
+                                  std::uint64_t seed) {
+  Gaussians g;
+  g.sh_degree = 1;
+  RandomSequence random(seed);
+  for (Index i = 0; i < count; ++i) {
+    for (int c = 0; c < 3; ++c)
+      g.means.push_back(static_cast<float>(center_world[c] + random.uniform(-spread, spread)));
+    for (int c = 0; c < 4; ++c) g.quats.push_back(static_cast<float>(random.normal()));
+    for (int c = 0; c < 3; ++c) g.log_scales.push_back(static_cast<float>(log_scale + random.uniform(-0.7, 0.7)));
+    g.opacity_logits.push_back(static_cast<float>(random.uniform(-1, 2)));
+    for (int k = 0; k < 12; ++k) g.sh.push_back(static_cast<float>((k < 3 ? 1.0 : 0.15) * random.uniform(-0.5, 1.2)));
+  }
+  return g;
+}
+
+/// A pose with every joint bent a little.
+inline BodyPose bent_pose(std::uint64_t seed) {
+  BodyPose pose = rest_pose(kSmplxJoints);
+  RandomSequence random(seed);
+  for (double& x : pose.axis_angle) x = random.uniform(-0.2, 0.2);
+  pose.set_rotation(0, Vector3<double>(1.5, 0.1, 0.05));  // upright: the body's y to the world's z
+  pose.transl = {0.1, 0.2, 1.1};
+  return pose;
+}
+
+/// The clip: a camera at (0.2, -3, 1.2) that looks at a body at the origin, `gaussians` Gaussians on it.
+inline Clip small_clip(int width, int height, Index gaussians) {
+  Clip clip;
+  clip.scene = random_gaussians(30, {0, 1, 0.9}, 1.2, -1.2, 11);
+  clip.objects.push_back({"box", random_gaussians(8, {0, 0, 0}, 0.12, -2.2, 12)});
+  clip.objects.push_back({"ball", random_gaussians(6, {0, 0, 0}, 0.1, -2.0, 13)});
+  AvatarSettings avatar;
+  avatar.gaussians = gaussians;
+  clip.avatar = surface_avatar(procedural_body(), avatar);
+  clip.camera = {
+      width, height, 1.1 * width, 1.12 * width, 0.52 * width, 0.47 * height, look_at({0.2, -3, 1.2}, {0, 0, 0.9})};
+  clip.first.camera_from_world = clip.camera.camera_from_world;
+  clip.first.objects = {{{0.2, -0.1, 0.3}, {0.5, -0.2, 1.0}}, {{-0.3, 0.2, 0.1}, {-0.5, -0.1, 0.8}}};
+  clip.first.body = bent_pose(14);
+  clip.frame_files = {"0000.png", "0001.png"};
+  return clip;
+}
+
+}  // namespace hsi4d::test
