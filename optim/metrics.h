@@ -89,7 +89,7 @@ inline constexpr double kLargestPsnrDb = 100;
 /// Peak signal-to-noise ratio, −10 log10 of the mean squared difference, for values in [0, 1]; at most kLargestPsnrDb.
 ///
 /// @param image, target  [C,H,W]; not clamped
-std::optional<double> psnr_db(const Image& image, const Image& target);
+double psnr_db(const Image& image, const Image& target);
 
 /// As above over a part of the image: Σ w d² / (C Σ w).
 ///
