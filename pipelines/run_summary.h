@@ -1,0 +1,105 @@
+// What a run came to, as summary.json holds it, and what is known of each metric: unit, direction, digits.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/types.h"
+
+namespace hsi4d {
+
+/// Numbers by name, in the order in which they are shown.
+using MetricValues = std::vector<std::pair<std::string, double>>;
+
+/// The value of that name, or null.
+const double* find_metric(const MetricValues& values, std::string_view name);
+
+/// One stage: its errors at its end, and counters.
+struct StageSummary {
+  std::string stage;
+  double seconds = 0;
+  Index iterations = 0;
+  MetricValues values;
+};
+
+/// The errors of one frame.
+struct FrameMetrics {
+  int frame = 0;
+  MetricValues values;
+};
+
+/// A result without the method, to compare with: "start" (what the run was given), "copy_frame_0" (nothing moves).
+struct Baseline {
+  std::string name;
+  MetricValues values;                  ///< means over the frames
+  std::vector<FrameMetrics> per_frame;  ///< may be empty
+};
+
+/// summary.json. Means are over the frames that were optimised, 1 to T; frame 0 is given.
+struct RunSummary {
+  std::string name;
+  int frames = 0;
+  double seconds = 0;
+  std::vector<StageSummary> metrics;  ///< in order, the last one is the final one
+  std::vector<Baseline> baselines;
+  std::vector<FrameMetrics> per_frame;  ///< of the result
+};
+
+/// The text of summary.json:
+///
+///   {"name", "frames", "seconds", "metrics": [{"stage", "seconds", "iterations", NAME: NUMBER...}...],
+///    "baselines": {NAME: {NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
+///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last only where some baseline has it)
+///
+/// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and
+/// for a name that occurs twice.
+std::string summary_json(const RunSummary& summary);
+
+/// Reads what summary_json writes. Members that it does not know are passed over, as newer versions may add some.
+///
+/// @param name  what messages call the text: the file
+/// Throws DataError naming file, line and member.
+RunSummary parse_summary(const std::string& text, const std::string& name);
+
+/// What is known of a metric.
+struct MetricFacts {
+  std::string_view name;     ///< in summary.json
+  std::string_view label;    ///< for people
+  std::string_view unit;     ///< "" where it has none
+  std::string_view summary;  ///< one line
+  int decimals = 2;
+  int better = -1;  ///< −1: smaller is better, 1: larger is, 0: neither
+};
+
+/// Every metric of summary.json, in the order in which tables show them.
+const std::vector<MetricFacts>& metric_facts();
+
+/// The facts of a metric, or null for other numbers of a stage (counters).
+const MetricFacts* find_metric_facts(std::string_view name);
+
+/// The table of errors: a row for each baseline and each stage, a column for each metric that occurs in some row.
+struct ErrorTable {
+  struct Row {
+    std::string name;
+    bool is_baseline = false;
+    std::vector<const double*> values;  ///< a column each, into the summary; null: not measured
+  };
+  std::vector<const MetricFacts*> columns;
+  std::vector<Row> rows;
+
+  /// True where no row's value as shown (to the decimals of its metric) is better, and some row's is worse.
+  bool is_best(std::size_t row, std::size_t column) const;
+};
+
+/// Baselines first, then stages. It refers to `summary`, which must outlive it.
+ErrorTable make_error_table(const RunSummary& summary);
+
+/// The table of errors as plain text for a terminal, the best value of each column marked with *.
+std::string error_table(const RunSummary& summary);
+
+/// `value` with a fixed number of decimals, whatever the locale; "-0.00" is "0.00". "not finite" for NaN and infinity.
+std::string fixed_number(double value, int decimals);
+
+}  // namespace hsi4d
