@@ -1,6 +1,27 @@
 #include "pipelines/data_settings.h"
 
+#include <algorithm>
+
 namespace hsi4d {
+
+DataSettings dataset_inputs(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  const fs::path base = fs::absolute(folder).lexically_normal();
+  DataSettings data;
+  data.scene = base / "scene.ply";
+  data.avatar = base / "avatar.npz";
+  data.frames = base / "frames";
+  data.masks = base / "masks";
+  data.camera = base / "camera.json";
+  data.initial = base / "initial.json";
+  if (fs::exists(base / "truth")) data.truth = base / "truth";
+  std::error_code error;  // no such folder: no objects
+  for (const fs::directory_entry& entry : fs::directory_iterator(base / "objects", error)) {
+    if (entry.path().extension() == ".ply") data.objects.push_back({entry.path().stem().string(), {entry.path()}});
+  }
+  std::sort(data.objects.begin(), data.objects.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  return data;
+}
 
 void describe(ConfigFields& f, ObjectSettings& s) {
   f.path("gaussians", s.gaussians, {.must_exist = true},

@@ -13,6 +13,7 @@
 #include "core/suggest.h"
 #include "core/version.h"
 #include "pipelines/cli/commands.h"
+#include "pipelines/cli/demo_command.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/reconstruct.h"
 
@@ -38,6 +39,7 @@ struct CommandLine {
   std::vector<std::string> overrides;
   bool print_config = false;
   RunArguments run_arguments;
+  DemoArguments demo_arguments;
   std::vector<LossDescription> losses;
   std::function<std::string()> run;
 
@@ -47,6 +49,7 @@ struct CommandLine {
     app.failure_message(CLI::FailureMessage::simple);
 
     add_run(terms);
+    add_demo(terms);
 
     CLI::App* check = app.add_subcommand("check", "Check a config and everything that it extends; tells all problems");
     check->add_option("CONFIG", config, "The config file")->required();
@@ -82,6 +85,18 @@ struct CommandLine {
     command->add_flag("--dry-run", a.dry_run, "Check config and inputs, tell what would be done, write nothing");
     command->add_flag("--print-config", a.print_config, "Print the config with every default filled in, and stop");
     command->callback([this, &terms] { run = [this, &terms] { return run_command(run_arguments, terms); }; });
+  }
+
+  void add_demo(const std::vector<LossTerm>& terms) {
+    DemoArguments& a = demo_arguments;
+    CLI::App* command = app.add_subcommand("demo", "The method on a generated scene with ground truth");
+    command->add_flag("--quick", a.quick, "256x256 pixels and 8 frames: less than a minute");
+    command->add_option("--out", a.out, "Folder of dataset and run; default: the first free runs/demo, runs/demo-2, ...");
+    add_overrides(*command, a.overrides);
+    command->add_flag("--quiet", a.quiet, "No progress on stderr");
+    command->add_flag("--resume", a.resume, "Go on with the demo in --out; the result has the same bits");
+    command->add_option("--threads", a.threads, "Threads; results do not depend on it")->check(CLI::Range(1, 1024));
+    command->callback([this, &terms] { run = [this, &terms] { return demo_command(demo_arguments, terms); }; });
   }
 
   static void add_overrides(CLI::App& command, std::vector<std::string>& overrides) {
