@@ -19,8 +19,8 @@ struct LossInputs {
   Var<S> object_opacity;  ///< [O,H,W] rendered opacity Σ T α of each object's Gaussians, occluders included, 0 to 1
   Var<S> object_center_target;  ///< [O,3] centre of each object in the frame: x px, y px (pixel centres at +0.5), and
                                 ///< 1, or 0 where the frame shows none of it
-  Var<S> object_depth;         ///< [O,1] mean camera z of each object's Gaussian centres, metres
-  Var<S> object_depth_target;  ///< [O,1] what it was in the clip's first frame, metres
+  Var<S> object_depth;          ///< [O,1] mean camera z of each object's Gaussian centres, metres
+  Var<S> object_depth_target;   ///< [O,1] what it was in the clip's first frame, metres
 
   static bool given(Var<S> input) { return input.tape != nullptr; }
 };
