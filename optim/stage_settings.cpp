@@ -18,7 +18,7 @@ void describe(ConfigFields& f, OptimizerSettings& s) {
   f.choice("kind", s.kind, kOptimizerKinds, "The method");
   f.number("beta1", s.beta1, {.min = 0, .below = 1}, "Decay of the first moment");
   f.number("beta2", s.beta2, {.min = 0, .below = 1}, "Decay of the second moment");
-  f.number("eps", s.eps, {.above = 0, .max = 1}, "Added to the root of the second moment");
+  f.number("eps", s.eps, {.min = 1e-30, .max = 1}, "Added to the root of the second moment");
   f.integer("max_rollbacks", s.max_rollbacks, {.min = 0, .max = kMostIterations},
             "Steps of a stage that may be taken back because a number was not finite; one more is an error");
 }

@@ -7,7 +7,9 @@
 // clang-format off
 #define HSI4D_LOSSES      \
   HSI4D_LOSS(photometric) \
-  HSI4D_LOSS(masked_l2)
+  HSI4D_LOSS(masked_l2)   \
+  HSI4D_LOSS(center)      \
+  HSI4D_LOSS(depth)
 // clang-format on
 
 namespace hsi4d {

@@ -1,8 +1,10 @@
 #include "optim/loss_term.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "autodiff/difference.h"
+#include "core/config_file.h"
 #include "tests/support/operator_check.h"
 
 using namespace hsi4d;
@@ -103,4 +105,77 @@ TEST_CASE("photometric is zero for equal images and its L1 share is that of the 
   const double loss = value_of_flat("photometric", 0.5, false);
   CHECK(loss > 0.9 * 0.5);
   CHECK(loss < 0.9 * 0.5 + 0.1);
+}
+
+namespace {
+
+/// Two objects of a few pixels each on [13,21], and where their masks are.
+struct Objects {
+  Tape<double> tape;
+  LossInputs<double> inputs;
+
+  Objects() {
+    inputs.object_opacity = tape.parameter("opacity", image_shape<double>(2, kHeight, kWidth));
+    inputs.object_center_target = tape.constant("target", shape_of(2, 3));
+    const Array<double> opacity = tape.write(inputs.object_opacity);
+    for (const Index j : {4, 5, 6}) opacity(0, 2, j) = 0.9;  // centre (5.5, 2.5)
+    opacity(1, 7, 10) = opacity(1, 8, 10) = 1;               // centre (10.5, 8)
+    tape.set(inputs.object_center_target, {8.5, 6.5, 1, 10.5, 6, 1});
+  }
+  double value(const std::string& settings = "{}") {
+    const LossTerm& term = term_named("center");
+    LossSettings chosen{1, term.description.defaults, term.description.describe_settings};
+    ConfigFields fields;
+    describe(fields, chosen);
+    ConfigProblems problems;
+    read_config(load_config_text(settings, "a.json", "", {}, problems), fields, problems);
+    problems.throw_if_any();
+    const auto loss = term.record(inputs, chosen.own);
+    tape.forward(loss);
+    tape.backward(loss);
+    return tape.value(loss).scalar();
+  }
+  double largest_slope(Index object) const {
+    double largest = 0;
+    const auto d = tape.gradient(inputs.object_opacity);
+    for (Index i = 0; i < kHeight; ++i) {
+      for (Index j = 0; j < kWidth; ++j) largest = std::max(largest, std::fabs(d(object, i, j)));
+    }
+    return largest;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("center is the mean squared distance of the objects' centres") {
+  Objects objects;
+  CHECK(objects.value() == Approx((9 + 16 + 4) / 2.0).epsilon(1e-14));
+  CHECK(objects.value(R"({"unit": "width"})") == Approx((9 + 16 + 4) / 2.0 / (kWidth * kWidth)).epsilon(1e-14));
+  CHECK(objects.largest_slope(0) > 0);
+}
+
+TEST_CASE("center is off for an object that is hidden or not in the frame's mask") {
+  Objects objects;
+  objects.tape.set(objects.inputs.object_center_target, {8.5, 6.5, 0, 10.5, 6, 1});
+  CHECK(objects.value() == Approx(4 / 2.0).epsilon(1e-14));
+  CHECK(objects.largest_slope(0) == 0);
+  CHECK(objects.largest_slope(1) > 0);
+  CHECK(objects.value(R"({"min_opacity": 2.5})") == 0);  // the second has 2 px
+  CHECK(objects.largest_slope(1) == 0);
+  objects.tape.write(objects.inputs.object_opacity)(1, 7, 10) = 0;  // wholly hidden
+  objects.tape.write(objects.inputs.object_opacity)(1, 8, 10) = 0;
+  CHECK(objects.value() == 0);
+  CHECK(objects.largest_slope(1) == 0);
+}
+
+TEST_CASE("depth is the mean squared difference of the objects' depths") {
+  Tape<double> tape;
+  LossInputs<double> inputs;
+  inputs.object_depth = tape.parameter("depth", shape_of(2, 1));
+  inputs.object_depth_target = tape.constant("target", shape_of(2, 1));
+  tape.set(inputs.object_depth, {2, 3});
+  tape.set(inputs.object_depth_target, {2.5, 2});
+  const auto loss = term_named("depth").record(inputs, {});
+  tape.forward(loss);
+  CHECK(tape.value(loss).scalar() == Approx((0.25 + 1) / 2).epsilon(1e-14));
 }

@@ -1,0 +1,303 @@
+#include "optim/stage.h"
+
+#include <chrono>
+#include <cmath>
+
+#include "autodiff/elementwise.h"
+#include "autodiff/inspect.h"
+#include "core/suggest.h"
+
+namespace hsi4d {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text.empty() ? "none" : text;
+}
+
+std::string message_of(const std::string& stage, const std::string& text) { return "stage '" + stage + "': " + text; }
+
+/// The weighted sum of the terms that are on.
+template <class S>
+struct RecordedLoss {
+  Var<S> total;
+  std::vector<Var<S>> terms;
+  std::vector<LossValue> values;  // of `terms`
+  std::vector<std::string> off;
+};
+
+const LossTerm& term_named(const std::string& name, std::span<const LossTerm> terms, const std::string& stage) {
+  std::vector<std::string> known;
+  for (const LossTerm& term : terms) {
+    if (term.description.name == name) return term;
+    known.push_back(term.description.name);
+  }
+  throw UserError(message_of(
+      stage, "there is no loss term \"" + name + "\"" + did_you_mean(name, known) + " (known: " + joined(known) + ")"));
+}
+
+template <class S>
+RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossTerm> terms, const LossInputs<S>& inputs,
+                            const std::string& stage) {
+  RecordedLoss<S> loss;
+  std::vector<std::string> reasons;
+  for (const auto& [name, chosen] : settings.losses) {
+    const LossTerm& term = term_named(name, terms, stage);
+    const Var<S> value = chosen.weight == 0
+                             ? Var<S>{}
+                             : term.record(inputs, chosen.own.has_value() ? chosen.own : term.description.defaults);
+    if (value.tape == nullptr) {
+      loss.off.push_back(name);
+      reasons.push_back(name + (chosen.weight == 0 ? " has weight 0" : " lacks an input"));
+      continue;
+    }
+    HSI4D_CHECK(value.shape().is_scalar(), "loss term " + name + " gives more than one number");
+    const Var<S> weighted = value * chosen.weight;
+    loss.total = loss.terms.empty() ? weighted : loss.total + weighted;
+    loss.terms.push_back(value);
+    loss.values.push_back({name, chosen.weight, 0});
+  }
+  if (!loss.terms.empty()) return loss;
+  throw UserError(message_of(
+      stage, "no loss term gives anything" + (reasons.empty() ? ": none is named" : ": " + joined(reasons))));
+}
+
+/// The groups that the settings name, in the settings' order.
+template <class S>
+std::vector<AdamGroup<S>> named_groups(const StageSettings& settings, const std::vector<ParameterGroup<S>>& available,
+                                       const std::string& stage) {
+  std::vector<AdamGroup<S>> groups;
+  for (const auto& [name, group_settings] : settings.optimize) {
+    for (const ParameterGroup<S>& group : available) {
+      if (group.name == name) groups.push_back({group, group_settings});
+    }
+  }
+  for (auto a = groups.begin(); a != groups.end(); ++a) {
+    for (auto b = groups.begin(); b != a; ++b) {
+      for (const Var<S> x : a->parameters.blocks) {
+        for (const Var<S> y : b->parameters.blocks) {
+          if (x.id != y.id) continue;
+          throw UserError(message_of(
+              stage, "groups \"" + b->parameters.name + "\" and \"" + a->parameters.name + "\" share the parameter '" +
+                         TapeInspector<S>(x.owner()).array_name(x.id) + "'; only one of them can be optimised"));
+        }
+      }
+    }
+  }
+  return groups;
+}
+
+template <class S>
+void set_frozen(Tape<S>& tape, const ParameterGroup<S>& group, bool frozen) {
+  for (const Var<S> block : group.blocks) frozen ? tape.freeze(block) : tape.unfreeze(block);
+}
+
+/// The tape as it was: nothing recorded, parameters frozen or not as found.
+template <class S>
+class TapeGuard {
+ public:
+  TapeGuard(Tape<S>& tape, const std::vector<ParameterGroup<S>>& available)
+      : tape_(tape), available_(available), mark_(tape.mark()) {
+    for (const ParameterGroup<S>& group : available) {
+      for (const Var<S> block : group.blocks) frozen_.push_back(tape.frozen(block));
+    }
+  }
+  void restore() const {
+    tape_.rewind(mark_);
+    auto was_frozen = frozen_.begin();
+    for (const ParameterGroup<S>& group : available_) {
+      for (const Var<S> block : group.blocks) *was_frozen++ ? tape_.freeze(block) : tape_.unfreeze(block);
+    }
+  }
+
+ private:
+  Tape<S>& tape_;
+  const std::vector<ParameterGroup<S>>& available_;
+  typename Tape<S>::Mark mark_;
+  std::vector<bool> frozen_;
+};
+
+/// A stage in the course of its iterations.
+template <class S>
+class StageRun {
+ public:
+  StageRun(Tape<S>& tape, const StageSettings& settings, std::span<const LossTerm> terms, const LossInputs<S>& inputs,
+           const std::vector<ParameterGroup<S>>& available, const StageOptions& options)
+      : tape_(tape),
+        settings_(settings),
+        options_(options),
+        groups_(named_groups(settings, available, options.name)),
+        loss_(record_loss(settings, terms, inputs, options.name)),
+        adam_(tape, groups_, settings.optimizer) {
+    for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
+    if (options.kept == nullptr) return;
+    for (const AdamGroup<S>& group : groups_) {
+      const auto kept = options.kept->find(group.parameters.name);
+      if (kept != options.kept->end() && !kept->second.blocks.empty())
+        adam_.set_moments(group.parameters.name, kept->second);
+    }
+  }
+
+  StageResult run(const StageCallback& callback) {
+    const auto start = Clock::now();
+    for (Index i = 0; i < settings_.iterations; ++i) iterate(i, callback);
+    evaluate_the_end();
+    keep_moments();
+    return {
+        settings_.iterations, evaluated_loss(), loss_.values, std::move(loss_.off), adam_.rollbacks() + undone_at_end_,
+        seconds_since(start)};
+  }
+
+ private:
+  void iterate(Index i, const StageCallback& callback) {
+    const auto start = Clock::now();
+    for (const AdamGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
+    tape_.forward(loss_.total);
+    tape_.backward(loss_.total);
+    check_reached(i);
+    read_terms();
+    const double loss = evaluated_loss();
+    const StepReport step = adam_.step(i, settings_.iterations, loss);
+    if (step.rolled_back) note_rollback(*step.bad, i);
+    if (!step.rolled_back) offender_.clear();
+    if (!callback) return;
+    callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
+              seconds_since(start)});
+  }
+
+  double evaluated_loss() const { return static_cast<double>(tape_.value(loss_.total).scalar()); }
+
+  void read_terms() {
+    for (std::size_t k = 0; k < loss_.terms.size(); ++k) {
+      loss_.values[k].value = static_cast<double>(tape_.value(loss_.terms[k]).scalar());
+    }
+  }
+
+  /// A group that is on and that no term depends on would silently stay.
+  void check_reached(Index iteration) const {
+    for (const AdamGroup<S>& group : groups_) {
+      const auto& blocks = group.parameters.blocks;
+      if (blocks.empty() || !moves_in(group.settings, iteration)) continue;
+      if (std::any_of(blocks.begin(), blocks.end(), [&](Var<S> block) { return tape_.has_gradient(block); })) continue;
+      std::vector<std::string> names;
+      for (const LossValue& term : loss_.values) names.push_back(term.name);
+      throw UserError(message_of(options_.name, "no loss term depends on the group \"" + group.parameters.name +
+                                                    "\" (terms: " + joined(names) + ")"));
+    }
+  }
+
+  void note_rollback(const BadNumber& bad, Index iteration) {
+    if (offender_.empty()) offender_ = bad.text() + first_bad_node();
+    if (adam_.rollbacks() <= settings_.optimizer.max_rollbacks) return;
+    throw_diverged("iteration " + std::to_string(iteration));
+  }
+
+  [[noreturn]] void throw_diverged(const std::string& when) const {
+    std::string values;
+    for (const LossValue& term : loss_.values)
+      values += (values.empty() ? "" : ", ") + term.name + " " + number_text(term.value);
+    throw StageDivergedError(message_of(options_.name, "given up in " + when + " after " +
+                                                           std::to_string(adam_.rollbacks()) +
+                                                           " steps that had to be taken back (max_rollbacks is " +
+                                                           std::to_string(settings_.optimizer.max_rollbacks) +
+                                                           "): " + offender_ + "; terms: " + values));
+  }
+
+  static std::string number_text(double value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+  }
+
+  /// Runs the tape once more, looking at every number: "; first: nan in forward of 'log' …". Empty where all is finite
+  /// (a gradient may be finite and too large).
+  std::string first_bad_node() {
+    std::string text;
+    tape_.set_anomaly(true);
+    try {
+      tape_.forward(loss_.total);
+      tape_.backward(loss_.total);
+    } catch (const NonFiniteError& error) {
+      text = std::string("; first: ") + error.what();
+    } catch (...) {
+      tape_.set_anomaly(false);
+      throw;
+    }
+    tape_.set_anomaly(false);
+    return text;
+  }
+
+  /// The parameters that are left must not be those of a step into the void.
+  void evaluate_the_end() {
+    tape_.forward(loss_.total);
+    read_terms();
+    if (std::isfinite(evaluated_loss())) return;
+    offender_ = "the loss is " + number_text(evaluated_loss()) + first_bad_node();
+    if (adam_.undo()) {
+      ++undone_at_end_;
+      tape_.forward(loss_.total);
+      read_terms();
+    }
+    if (!std::isfinite(evaluated_loss())) throw_diverged("the last iteration");
+  }
+
+  void keep_moments() const {
+    if (options_.kept == nullptr) return;
+    for (const AdamGroup<S>& group : groups_) {
+      const auto kept = options_.kept->find(group.parameters.name);
+      if (kept != options_.kept->end()) kept->second = adam_.moments(group.parameters.name);
+    }
+  }
+
+  Tape<S>& tape_;
+  const StageSettings& settings_;
+  const StageOptions& options_;
+  std::vector<AdamGroup<S>> groups_;
+  RecordedLoss<S> loss_;
+  Adam<S> adam_;
+  Index undone_at_end_ = 0;
+  std::string offender_;  // of the last evaluation, if it was bad
+};
+
+}  // namespace
+
+void check_groups(const StageSettings& settings, const std::vector<std::string>& names, const std::string& where) {
+  std::string problems;
+  for (const auto& [name, group] : settings.optimize) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    problems += (problems.empty() ? "" : "\n") + where + ": there is no parameter group \"" + name + "\"" +
+                did_you_mean(name, names) + " (known: " + joined(names) + ")";
+  }
+  if (settings.optimize.empty()) problems = where + ": no parameter group is named (known: " + joined(names) + ")";
+  if (!problems.empty()) throw UserError(problems);
+}
+
+template <class S>
+StageResult run_stage(Tape<S>& tape, const StageSettings& settings, std::span<const LossTerm> terms,
+                      const LossInputs<S>& inputs, const std::vector<ParameterGroup<S>>& available,
+                      const StageCallback& callback, const StageOptions& options) {
+  check_groups(settings, names_of(available), "stage '" + options.name + "'");
+  const TapeGuard<S> guard(tape, available);
+  try {
+    StageResult result = StageRun<S>(tape, settings, terms, inputs, available, options).run(callback);
+    guard.restore();
+    return result;
+  } catch (...) {
+    guard.restore();
+    throw;
+  }
+}
+
+template StageResult run_stage(Tape<float>&, const StageSettings&, std::span<const LossTerm>, const LossInputs<float>&,
+                               const std::vector<ParameterGroup<float>>&, const StageCallback&, const StageOptions&);
+template StageResult run_stage(Tape<double>&, const StageSettings&, std::span<const LossTerm>,
+                               const LossInputs<double>&, const std::vector<ParameterGroup<double>>&,
+                               const StageCallback&, const StageOptions&);
+
+}  // namespace hsi4d
