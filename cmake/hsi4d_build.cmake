@@ -69,3 +69,24 @@ function(hsi4d_embed_demo_configs)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/demo_configs.cpp.in ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp @ONLY)
   target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp)
 endfunction()
+
+# hsi4d_find_commit(OUT): the commit that is checked out, or "unknown" where the source is not the top of a git checkout.
+# A commit configures the build anew; changes that are not committed are not told.
+function(hsi4d_find_commit out)
+  set(${out} unknown PARENT_SCOPE)
+  find_program(HSI4D_GIT git)
+  mark_as_advanced(HSI4D_GIT)
+  if(NOT HSI4D_GIT)
+    return()
+  endif()
+  execute_process(COMMAND ${HSI4D_GIT} rev-parse --show-prefix --path-format=absolute --git-path logs/HEAD
+                          --short=12 HEAD
+                  WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} RESULT_VARIABLE status OUTPUT_VARIABLE answer ERROR_QUIET)
+  # Three lines: the folder within the checkout (empty at its top), the file that grows with every commit, the commit.
+  if(status EQUAL 0 AND answer MATCHES "^\n([^\n]+)\n([0-9a-f]+)\n$")
+    set(${out} ${CMAKE_MATCH_2} PARENT_SCOPE)
+    if(EXISTS ${CMAKE_MATCH_1})
+      set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_MATCH_1})
+    endif()
+  endif()
+endfunction()

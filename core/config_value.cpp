@@ -174,9 +174,14 @@ std::string to_json(const ConfigValue& value) {
   return out + '\n';
 }
 
-std::string shown(const ConfigValue& value) {
+std::string to_json_line(const ConfigValue& value) {
   std::string out;
   append_json(out, value, -1);
+  return out;
+}
+
+std::string shown(const ConfigValue& value) {
+  const std::string out = to_json_line(value);
   if (out.size() <= kMostShown) return out;
   std::size_t end = kMostShown - 3;
   while (end > 0 && (static_cast<unsigned char>(out[end]) & 0xC0U) == 0x80U) --end;  // not inside a UTF-8 character

@@ -75,6 +75,9 @@ ConfigValue merged(ConfigValue base, ConfigValue overlay);
 /// JSON text in lines of two-space indentation, arrays of plain values on one line, ending with a newline.
 std::string to_json(const ConfigValue& value);
 
+/// JSON text on one line, without a line break at its end.
+std::string to_json_line(const ConfigValue& value);
+
 /// JSON text on one line, shortened to what a message can show.
 std::string shown(const ConfigValue& value);
 
