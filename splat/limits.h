@@ -2,6 +2,8 @@
 // whose defaults and presets are made of these.
 #pragma once
 
+#include <cstdint>
+
 namespace hsi4d {
 
 /// Alpha is held at or below this. 1 − 2⁻¹² leaks less than a sixteenth of an 8-bit step through an opaque Gaussian,
@@ -35,5 +37,11 @@ inline constexpr int kHighestShDegree = 3;
 
 /// Side of a square tile, pixels.
 inline constexpr int kTile = 16;
+
+/// Log-scales are held within ± this, so that a scale is a finite number of metres (stability A5).
+inline constexpr double kLogScaleLimit = 20;
+
+/// Most (tile, Gaussian) pairs of an image; more are refused before memory is taken for them (stability B10).
+inline constexpr std::int64_t kMostPairs = std::int64_t(1) << 31;
 
 }  // namespace hsi4d

@@ -1,0 +1,51 @@
+// Compositing of projected Gaussians, front to back, and its adjoint without a division.
+//
+//   α_i = min(cap, o_i G_i),  G = exp(−½ dᵀ (V Vᵀ + blur I)⁻¹ d),   w_i = T_i α_i,  T_{i+1} = T_i (1 − α_i),  T_1 = 1
+//   channels = Σ w_i f_i
+//
+// at each pixel centre, d from the mean. α < alpha_min is skipped. With antialias o_i is the opacity times
+// sqrt(det V Vᵀ / det(V Vᵀ + blur I)). Gaussians are sorted once by (depth, index); every tile visits those that can
+// reach it. The adjoint uses what is seen behind each Gaussian (rows B1, B2; M19),
+//
+//   d_α_i = T_i (g·f_i − S_i),   S_{i−1} = α_i g·f_i + (1 − α_i) S_i,   S_n = d_T,
+//
+// with g the gradient of the pixel's channels, never dividing by 1 − α.
+#pragma once
+
+#include <memory>
+
+#include "splat/project.h"
+
+namespace hsi4d {
+
+/// What a forward run did.
+struct RenderCounters {
+  Index visible = 0;    ///< Gaussians that reach a tile
+  Index pairs = 0;      ///< (tile, Gaussian)
+  Index fragments = 0;  ///< (pixel, Gaussian) that were composited
+  Index tiles = 0;      ///< tiles that a Gaussian reaches
+};
+
+template <class S>
+struct Composited {
+  Var<S> channels;                                 ///< [C,H,W] Σ w f, without background
+  Var<S> transmittance;                            ///< [1,H,W] T behind the last Gaussian
+  std::shared_ptr<const RenderCounters> counters;  ///< of the last forward run
+};
+
+/// Composites Gaussians into an image of view.camera's size. Not drawn are: rows whose factors are six zeros, depths ≤
+/// near, rows with a number that is not finite, and, with blur 0, Gaussians without area (rows A4-A6).
+///
+/// @param projected  see project
+/// @param opacities  [N,1] in [0, 1]
+/// @param features   [N,C] what is composited: colours, depths, …; C ≥ 1
+/// @return           image-shaped arrays
+/// Adjoint: projected.means_px, projected.factors, opacities, features; each computed only when wanted. None where o G
+/// > alpha_cap (unless cap_gradient is pass), none through the order, the choice of pixels and the stop. A Gaussian
+/// that is not drawn has gradient 0. Throws InternalError when the shapes do not fit; UserError when there are more
+/// than kMostPairs (tile, Gaussian) pairs.
+template <class S>
+Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> features, const SplatView& view,
+                        Source where = Source::current());
+
+}  // namespace hsi4d
