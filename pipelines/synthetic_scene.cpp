@@ -14,6 +14,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kWall = 2;         // metres from the middle to the walls
 constexpr double kCeiling = 2.6;    // metres
+const Vector2<double> kTableHalf{0.38, 0.27};  // metres
 constexpr double kWainscot = 0.92;  // metres, top of the panelling
 
 const Vector3<double> kToLight = Vector3<double>(-0.35, -0.55, 0.76).normalized();
@@ -103,7 +104,8 @@ class RoomBuilder {
         };
         const double x = -kWall + (row + 1) * kWidth;  // u along +y, v along -x: the outer side is up
         SheetShape shape = [=](double u, double v) { return Point(x - v * kWidth, begin + u * length, 0); };
-        model_.add({shape, paint, 1, 0.06, [this](const Point& p) { return !on_rug(p); }});
+        const double detail = y < 0.2 ? 0.2 : 1.2;  // less where no camera of the clip looks
+        model_.add({shape, paint, detail, 0.06, [this](const Point& p) { return !on_rug(p); }});
       }
     }
   }
@@ -178,11 +180,11 @@ class RoomBuilder {
 
   void add_walls() {
     const double side = 2 * kWall;
-    add_wall(Point(-kWall, kWall, 0), Point(1, 0, 0), side, 0.8);       // back: outer side -y
-    add_wall(Point(-kWall, -kWall, 0), Point(0, 1, 0), side, 0.3);      // left: outer side +x
-    add_wall(Point(kWall, kWall, 0), Point(0, -1, 0), side, 0.3);       // right: outer side -x
+    add_wall(Point(-kWall, kWall, 0), Point(1, 0, 0), side, 1);       // back: outer side -y
+    add_wall(Point(-kWall, -kWall, 0), Point(0, 1, 0), side, 0.1);      // left: outer side +x
+    add_wall(Point(kWall, kWall, 0), Point(0, -1, 0), side, 0.1);       // right: outer side -x
     model_.add_rectangle(Point(-kWall, kWall, kCeiling), Point(side, 0, 0), Point(0, -side, 0),
-                         plain(Rgb(0.93, 0.92, 0.88)), 0.1);
+                         plain(Rgb(0.93, 0.92, 0.88)), 0.03);
   }
 
   /// A flat thing on the back wall with a frame around it.
@@ -341,27 +343,27 @@ class RoomBuilder {
   }
 
   void add_table() {
-    const Vector2<double> half(0.42, 0.3);
-    const Rgb pine(0.8, 0.6, 0.38);
-    const double turn = plan_.table_turn, thick = 0.022;
+    const Vector2<double> half = kTableHalf;
+    const Rgb pine(0.84, 0.65, 0.43);
+    const double turn = plan_.table_turn, thick = 0.016;
     const Point top = plan_.table_top;
     const Matrix3<double> axes = so3_exp(Vector3<double>(0, 0, turn));
     model_.add_box(top - Point(0, 0, thick), Point(half[0], half[1], thick), turn,
                    [&](int face) {
-                     return wood(face == 5 ? pine : Rgb(pine * 0.88), 2 * half[0], face == 5 ? 2 * half[1] : 2 * thick);
+                     return wood(face == 5 ? pine : Rgb(pine * 0.94), 2 * half[0], face == 5 ? 2 * half[1] : 2 * thick);
                    },
                    2.5, 0.08, true);
-    const double leg = 0.025, height = top.z() - 2 * thick;
+    const double leg = 0.021, height = top.z() - 2 * thick;
     for (const double sx : {-1.0, 1.0})
       for (const double sy : {-1.0, 1.0}) {
         const Point at = top + axes * Point(sx * (half[0] - 0.05), sy * (half[1] - 0.05), 0);
         model_.add_box(Point(at.x(), at.y(), height / 2), Point(leg, leg, height / 2), turn,
-                       [&](int) { return wood(pine * 0.8, 2 * leg, height); }, 1.5);
+                       [&](int) { return wood(pine * 0.9, 2 * leg, height); }, 1.5);
       }
     for (const double side : {-1.0, 1.0}) {  // aprons
       const Point middle = top + axes * Point(0, side * (half[1] - 0.05), 0);
-      model_.add_box(Point(middle.x(), middle.y(), height - 0.04), Point(half[0] - 0.06, 0.012, 0.04), turn,
-                     [&](int) { return wood(pine * 0.78, 2 * half[0], 0.08); }, 1.5);
+      model_.add_box(Point(middle.x(), middle.y(), height - 0.03), Point(half[0] - 0.06, 0.01, 0.03), turn,
+                     [&](int) { return wood(pine * 0.88, 2 * half[0], 0.08); }, 1.5);
     }
   }
 
@@ -376,10 +378,10 @@ class RoomBuilder {
 double room_light(const RoomPlan& plan, const Point& p, const Point& normal) {
   double light = faced_light(normal) * corner_light(p);
   if (p.z() < 0.02) {
-    light *= shadow(p, plan.table_top.head<2>(), {0.42, 0.3}, plan.table_turn, 0.38);
+    light *= shadow(p, plan.table_top.head<2>(), kTableHalf, plan.table_turn, 0.38);
     light *= shadow(p, {1.22, 1.82}, {0.5, 0.15}, 0, 0.35) * shadow(p, {-1.5, 1.45}, {0.15, 0.15}, 0, 0.45);
   } else if (p.z() < plan.table_top.z() - 0.02) {
-    light *= 0.5 + 0.5 * shadow(p, plan.table_top.head<2>(), {0.4, 0.28}, plan.table_turn, 0.5);
+    light *= shadow(p, plan.table_top.head<2>(), kTableHalf, plan.table_turn, 0.12);
   }
   return light;
 }

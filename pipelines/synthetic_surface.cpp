@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Standard deviation of a disc in cells: where four cells meet, 2 % of what is behind shows through.
-constexpr double kOverlap = 0.7;
+/// Standard deviation of a disc in cells: where four cells meet, 2 to 3 % of what is behind shows through.
+constexpr double kOverlap = 0.66;
 
 /// Half the thickness of a disc, in parts of the smaller of its widths.
 constexpr double kFlatness = 0.05;
