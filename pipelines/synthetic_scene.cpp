@@ -7,6 +7,7 @@
 #include "core/check.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "pipelines/synthetic_surface.h"
 
 namespace hsi4d {
 namespace {

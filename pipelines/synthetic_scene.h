@@ -2,25 +2,13 @@
 // the seed.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 
-#include "core/config.h"
-#include "pipelines/synthetic_surface.h"
+#include "pipelines/synthetic_settings.h"
 #include "splat/gaussians.h"
 
 namespace hsi4d {
-
-/// What is carried.
-enum class SyntheticObjectKind { kWateringCan, kBox };
-
-inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 2> kSyntheticObjectKinds = {
-    {{SyntheticObjectKind::kWateringCan, "watering_can"}, {SyntheticObjectKind::kBox, "box"}}};
-
-/// Fewest Gaussians that the room and the object can be made of: one for each of their surfaces.
-inline constexpr Index kFewestRoomGaussians = 700;
-inline constexpr Index kFewestObjectGaussians = 60;
 
 /// What the room is arranged around, so that the action fits into it. World coordinates, metres.
 struct RoomPlan {
