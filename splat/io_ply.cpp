@@ -8,6 +8,7 @@
 
 #include "core/check.h"
 #include "core/file.h"
+#include "splat/limits.h"
 #include "splat/ply_table.h"
 
 namespace hsi4d {
@@ -135,8 +136,9 @@ class Collector {
     return -1;
   }
 
-  float held(float value, std::size_t repair) {
-    const float inside = std::clamp(value, -kLargestFileExponent, kLargestFileExponent);
+  float held(float value, double limit, std::size_t repair) {
+    const float bound = static_cast<float>(limit);
+    const float inside = std::clamp(value, -bound, bound);
     if (inside != value) ++repairs_.counts[repair];
     return inside;
   }
@@ -145,8 +147,9 @@ class Collector {
     Gaussians& g = scene_.gaussians;
     std::copy_n(row_.begin() + kMean, 3, g.means.begin() + 3 * n);
     std::copy_n(row_.begin() + kQuat, 4, g.quats.begin() + 4 * n);
-    for (std::size_t c = 0; c < 3; ++c) g.log_scales[static_cast<std::size_t>(3 * n) + c] = held(row_[kScale + c], 0);
-    g.opacity_logits[static_cast<std::size_t>(n)] = held(row_[kOpacity], 1);
+    for (std::size_t c = 0; c < 3; ++c)
+      g.log_scales[static_cast<std::size_t>(3 * n) + c] = held(row_[kScale + c], kLogScaleLimit, 0);
+    g.opacity_logits[static_cast<std::size_t>(n)] = held(row_[kOpacity], kOpacityLogitLimit, 1);
     const auto k_count = static_cast<std::size_t>(coefficients_);
     float* sh = g.sh.data() + 3 * coefficients_ * n;
     for (std::size_t c = 0; c < 3; ++c) {

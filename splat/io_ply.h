@@ -18,10 +18,6 @@
 
 namespace hsi4d {
 
-/// Logits and log-scales of files are held within ± this: exp stays finite, and the sigmoid off 0 and 1 (stability A5,
-/// B15).
-inline constexpr float kLargestFileExponent = 20;
-
 /// What a reader did to the rows of a file.
 struct PlyReport {
   Index rows = 0;                                         ///< of the file
@@ -43,7 +39,7 @@ struct PlyScene {
 ///
 /// Binary of both byte orders, and ascii. Other elements and properties are passed over. A row is left out, and
 /// counted, when a number of it is not finite (an opacity of ±inf is) or its quaternion is zero; opacity logits and
-/// log-scales beyond ±kLargestFileExponent are held there, and counted.
+/// log-scales beyond ±kOpacityLogitLimit and ±kLogScaleLimit are held there, and counted.
 ///
 /// @param path  UTF-8
 /// Throws UserError when the file cannot be read; DataError naming the path, and the header's line or the sizes: no PLY
