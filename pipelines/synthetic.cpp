@@ -1,0 +1,209 @@
+#include "pipelines/synthetic.h"
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <system_error>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+#include "body/avatar.h"
+#include "body/procedural_body.h"
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "core/npz.h"
+#include "core/random.h"
+#include "core/rotation.h"
+#include "pipelines/synthetic_motion.h"
+#include "pipelines/synthetic_render.h"
+#include "pipelines/synthetic_scene.h"
+#include "splat/io_ply.h"
+
+namespace hsi4d {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+/// A folder under a temporary name beside its own, which it gets when it is complete; else it is removed.
+class FolderInMaking {
+ public:
+  explicit FolderInMaking(const fs::path& folder) : folder_(fs::absolute(folder).lexically_normal()) {
+    if (!folder_.has_filename()) folder_ = folder_.parent_path();  // "out/"
+    refuse_unless_free();
+    std::error_code error;
+    fs::create_directories(folder_.parent_path(), error);
+    temporary_ = folder_;
+    temporary_ += "." + std::to_string(::getpid()) + ".tmp";
+    if (error || !fs::create_directory(temporary_, error) || error)
+      throw UserError(folder_.string() + ": the folder cannot be made" + (error ? ": " + error.message() : ""));
+  }
+  ~FolderInMaking() {
+    std::error_code ignored;
+    if (!temporary_.empty()) fs::remove_all(temporary_, ignored);
+  }
+  FolderInMaking(const FolderInMaking&) = delete;
+  FolderInMaking& operator=(const FolderInMaking&) = delete;
+
+  /// Path of a file in it, whose folder is made.
+  std::string file(const fs::path& name) const {
+    const fs::path path = temporary_ / name;
+    std::error_code error;
+    fs::create_directories(path.parent_path(), error);
+    if (error) throw UserError(path.parent_path().string() + ": the folder cannot be made: " + error.message());
+    return path.string();
+  }
+
+  void commit() {
+    refuse_unless_free();
+    std::error_code error;
+    fs::rename(temporary_, folder_, error);  // replaces an empty folder
+    if (error) throw UserError(folder_.string() + ": the folder cannot be made: " + error.message());
+    temporary_.clear();
+  }
+
+ private:
+  void refuse_unless_free() const {
+    std::error_code error;
+    if (!fs::exists(folder_, error) && !error) return;
+    if (!error && !fs::is_directory(folder_, error))
+      throw UserError(folder_.string() + ": there is something that is not a folder; name a new or empty folder");
+    if (!error && !fs::is_empty(folder_, error))
+      throw UserError(folder_.string() + ": the folder is not empty; name a new or empty one");
+    if (error) throw UserError(folder_.string() + ": " + error.message());
+  }
+
+  fs::path folder_, temporary_;
+};
+
+std::string frame_name(std::size_t frame) {
+  std::string digits = std::to_string(frame);
+  if (digits.size() < 4) digits.insert(0, 4 - digits.size(), '0');
+  return digits + ".png";
+}
+
+ConfigValue numbers(const Vector3<double>& v) {
+  return ConfigValue::make_array(
+      {ConfigValue::make_number(v[0]), ConfigValue::make_number(v[1]), ConfigValue::make_number(v[2])});
+}
+
+ConfigValue object_of(std::string_view key, ConfigValue value) {
+  ConfigValue object = ConfigValue::make_object();
+  object.add(key, std::move(value));
+  return object;
+}
+
+std::string initial_json(const std::string& name, const Rigid<double>& pose) {
+  ConfigValue state = ConfigValue::make_object();
+  state.add("rotation", numbers(so3_log(pose.rotation)));
+  state.add("translation", numbers(pose.translation));
+  ConfigValue root = ConfigValue::make_object();
+  root.add("motion", ConfigValue::make_string("initial_motion.npz"));
+  root.add("objects", object_of(name, std::move(state)));
+  return to_json(root);
+}
+
+ConfigValue data_section(const std::string& name) {
+  ConfigValue data = ConfigValue::make_object();
+  const auto add = [&data](std::string_view key, std::string_view file) {
+    data.add(key, ConfigValue::make_string(file));
+  };
+  add("scene", "scene.ply");
+  data.add("objects",
+           object_of(name, object_of("gaussians", ConfigValue::make_string("objects/" + name + ".ply"))));
+  add("avatar", "avatar.npz");
+  add("frames", "frames");
+  add("masks", "masks");
+  add("camera", "camera.json");
+  add("initial", "initial.json");
+  add("truth", "truth");
+  return data;
+}
+
+void write_objects(const std::string& path, const std::string& name, const std::vector<Rigid<double>>& poses) {
+  std::vector<double> rotations, translations;
+  for (const Rigid<double>& pose : poses) {
+    const Vector3<double> w = so3_log(pose.rotation);
+    rotations.insert(rotations.end(), {w[0], w[1], w[2]});
+    translations.insert(translations.end(), {pose.translation[0], pose.translation[1], pose.translation[2]});
+  }
+  const std::int64_t frames = static_cast<std::int64_t>(poses.size());
+  NpzWriter file;
+  file.add(name + "/rotation", {frames, 3}, rotations);
+  file.add(name + "/translation", {frames, 3}, translations);
+  file.write(path);
+}
+
+/// Three independent standard normals.
+Vector3<double> normal_vector(const Random& random, std::uint64_t index) {
+  const auto [x, y] = random.normal_pair(2 * index);
+  return {x, y, random.normal(2 * index + 1)};
+}
+
+}  // namespace
+
+Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings) {
+  const Random random(static_cast<std::uint64_t>(settings.seed), random_stream("synthetic.initial_motion"));
+  Motion motion = truth;
+  for (std::size_t t = 1; t < motion.poses.size(); ++t) {
+    BodyPose& pose = motion.poses[t];
+    const std::uint64_t base = t * static_cast<std::uint64_t>(kSmplxJoints + 1);
+    const auto turn = [&](Index joint, double degrees) {
+      const Vector3<double> noise =
+          normal_vector(random, base + static_cast<std::uint64_t>(joint)) * (degrees * kDegree / std::sqrt(3.0));
+      const Matrix3<double> rotation = so3_exp(pose.rotation_of(joint)) * so3_exp(noise);
+      if (degrees > 0) pose.set_rotation(joint, so3_log(rotation));
+    };
+    turn(0, settings.root_noise_deg);
+    for (Index joint = 1; joint <= 21; ++joint) turn(joint, settings.pose_noise_deg);
+    for (Index joint = 25; joint < kSmplxJoints; ++joint)
+      turn(joint, settings.pose_noise_deg * settings.hand_noise_share);
+    pose.transl += normal_vector(random, base + static_cast<std::uint64_t>(kSmplxJoints)) * settings.root_noise_m;
+  }
+  return motion;
+}
+
+void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const fs::path& folder,
+                   const ProgressSink& progress, const ConfigValue& more_sections) {
+  FolderInMaking out(folder);
+  const std::uint64_t seed = static_cast<std::uint64_t>(settings.seed);
+  const BodyModel body = procedural_body();
+  AvatarSettings avatar_settings;
+  avatar_settings.gaussians = settings.avatar_gaussians;
+  avatar_settings.seed = seed;
+  const Avatar avatar = surface_avatar(body, avatar_settings);
+  const SyntheticObject object = synthetic_object(settings.object, settings.object_gaussians, seed);
+  const SyntheticClip clip =
+      synthetic_clip(body, object, {settings.frames, settings.frame_rate, settings.size_px, settings.camera_drift});
+  const Gaussians room = synthetic_room(settings.scene_gaussians, clip.room, seed);
+
+  write_ply(out.file("scene.ply"), room);
+  write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
+  write_avatar(out.file("avatar.npz"), avatar);
+  write_camera(out.file("camera.json"), clip.cameras.front());
+  write_motion(out.file("initial_motion.npz"), disturbed_motion(clip.motion, settings));
+  write_text_file(out.file("initial.json"), initial_json(object.name, clip.object.front()));
+  write_motion(out.file("truth/motion.npz"), clip.motion);
+  write_objects(out.file("truth/objects.npz"), object.name, clip.object);
+  write_cameras(out.file("truth/cameras.json"), clip.cameras);
+  write_text_file(out.file("config.json"), to_json(merged(object_of("data", data_section(object.name)), more_sections)));
+
+  const SyntheticRenderer renderer(room, object.gaussians, avatar, render);
+  Progress shown("frames", settings.frames, progress);
+  for (std::size_t t = 0; t < clip.cameras.size(); ++t) {
+    const SyntheticFrame frame =
+        renderer.frame(clip.motion.poses[t], clip.object[t], clip.cameras[t], settings.supersample);
+    write_image(out.file(fs::path("frames") / frame_name(t)), frame.color);
+    write_image(out.file(fs::path("masks") / "human" / frame_name(t)), frame.human_mask);
+    write_image(out.file(fs::path("masks") / object.name / frame_name(t)), frame.object_mask);
+    shown.step();
+  }
+  shown.finish();
+  out.commit();
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,37 @@
+// Datasets with exact ground truth, made by code: one room, one object, one motion, seen by a drifting camera.
+//
+//   scene.ply  objects/NAME.ply  avatar.npz                      Gaussians; the object's are relative to their mean
+//   frames/0000.png ...                                          8 bit
+//   masks/human/0000.png ...  masks/NAME/0000.png ...            8 bit grey: the share of the pixel
+//   camera.json  initial.json  initial_motion.npz                frame 0 exact, later frames disturbed
+//   config.json                                                  a run config that names all this
+//   truth/motion.npz  truth/objects.npz  truth/cameras.json
+//
+// An object's pose is x_world = exp(rotation) x_object + translation.
+#pragma once
+
+#include <filesystem>
+
+#include "body/motion_io.h"
+#include "core/config_value.h"
+#include "core/progress.h"
+#include "pipelines/synthetic_settings.h"
+#include "splat/render_settings.h"
+
+namespace hsi4d {
+
+/// `truth` with noise on every frame but the first, as an estimator would have it: joints 1-21 turned by
+/// pose_noise_deg (the root of the mean squared angle, axes uniform), finger joints by hand_noise_share of that, the root
+/// by root_noise_deg and moved by root_noise_m (each coordinate's standard deviation). Jaw and eyes stay.
+Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings);
+
+/// Writes a dataset: the same bytes for the same settings, for any number of threads.
+///
+/// @param folder         new or empty; its parents are made. It appears when everything in it is complete
+/// @param more_sections  an object: sections of config.json beside `data`, for example stages; null: none
+/// Throws UserError when the folder is there and not empty, or cannot be written.
+void write_dataset(const SyntheticSettings& settings, const RenderSettings& render,
+                   const std::filesystem::path& folder, const ProgressSink& progress = {},
+                   const ConfigValue& more_sections = ConfigValue::make_object());
+
+}  // namespace hsi4d

@@ -1,0 +1,42 @@
+// Settings of synthetic datasets: config section `synthetic`.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/config.h"
+#include "core/types.h"
+
+namespace hsi4d {
+
+/// What is carried.
+enum class SyntheticObjectKind { kWateringCan, kBox };
+
+inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 2> kSyntheticObjectKinds = {
+    {{SyntheticObjectKind::kWateringCan, "watering_can"}, {SyntheticObjectKind::kBox, "box"}}};
+
+/// Fewest Gaussians that the room and the object can be made of: one for each of their surfaces.
+inline constexpr Index kFewestRoomGaussians = 700;
+inline constexpr Index kFewestObjectGaussians = 60;
+
+/// What a synthetic dataset holds.
+struct SyntheticSettings {
+  std::int64_t seed = 0;
+  Index frames = 8;
+  double frame_rate = 10;  ///< frames a second
+  int size_px = 256;
+  int supersample = 2;
+  SyntheticObjectKind object = SyntheticObjectKind::kWateringCan;
+  Index scene_gaussians = 12000;
+  Index avatar_gaussians = 5000;
+  Index object_gaussians = 1500;
+  double camera_drift = 1;
+  double pose_noise_deg = 8;
+  double hand_noise_share = 0.25;
+  double root_noise_deg = 2;
+  double root_noise_m = 0.02;
+};
+
+void describe(ConfigFields& fields, SyntheticSettings& settings);
+
+}  // namespace hsi4d
