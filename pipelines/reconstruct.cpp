@@ -163,7 +163,7 @@ class Reconstruction {
     SceneState state = start_of(index);
     std::vector<SceneState> after;
     for (std::size_t s = 0; s < config_.stages.size(); ++s) {
-      if (config_.precision == Precision::kFloat) {
+      if (config_.precision == RunPrecision::kFloat) {
         run_frame_stage<float>(index, s, frame, state);
       } else {
         run_frame_stage<double>(index, s, frame, state);
@@ -240,7 +240,7 @@ class Reconstruction {
     return to_image(tape.value(graph.rendered().image));
   }
   Image rendered_image(const SceneState& state) const {
-    return config_.precision == Precision::kFloat ? render_state<float>(state) : render_state<double>(state);
+    return config_.precision == RunPrecision::kFloat ? render_state<float>(state) : render_state<double>(state);
   }
 
   MetricValues write_images(Index index, const ClipFrame& frame, const SceneState& state) const {

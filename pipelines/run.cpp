@@ -44,7 +44,7 @@ RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losse
   identity.config = resolved_config(config, descriptions_of(losses));
   identity.seed = config.seed;
   identity.threads = options.threads > 0 ? options.threads : config.threads;
-  identity.precision = choice_name<Precision>(kPrecisions, config.precision);
+  identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
   RunFolder folder(options.folder, identity, options.resume);
   const RunSummary summary = reconstruct_into(folder, config, losses, options);
   write_report(options.folder);

@@ -16,11 +16,12 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of everything that is random");
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
             "Threads; 0: one a core. Results do not depend on it");
-  f.choice("precision", s.precision, kPrecisions, "Type of the numbers that a run computes with");
+  f.choice("precision", s.precision, kRunPrecisions, "Type of the numbers that a run computes with");
   f.choice("rotations", s.rotations, kRotationParameters,
            "Numbers by which rotations are optimised: two columns of the matrix, or axis times angle");
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
   f.object("data", s.data, "The files that the run reads");
+  f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
   f.object("render", s.render, "How Gaussians become pixels");
   f.map("stages", s.stages, "The stages of the run by name, in the order in which they run",
         [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });

@@ -10,18 +10,19 @@
 #include "optim/loss_description.h"
 #include "optim/stage_settings.h"
 #include "pipelines/data_settings.h"
+#include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d {
 
 /// The type in which a run computes.
-enum class Precision { kFloat, kDouble };
+enum class RunPrecision { kFloat, kDouble };
 
 /// The numbers by which rotations are optimised.
 enum class RotationParameters { kSixD, kAxisAngle };
 
-inline constexpr std::array<ConfigChoice<Precision>, 2> kPrecisions = {
-    {{Precision::kFloat, "float"}, {Precision::kDouble, "double"}}};
+inline constexpr std::array<ConfigChoice<RunPrecision>, 2> kRunPrecisions = {
+    {{RunPrecision::kFloat, "float"}, {RunPrecision::kDouble, "double"}}};
 inline constexpr std::array<ConfigChoice<RotationParameters>, 2> kRotationParameters = {
     {{RotationParameters::kSixD, "6d"}, {RotationParameters::kAxisAngle, "axis_angle"}}};
 
@@ -30,10 +31,11 @@ struct RunConfig {
   std::string name;
   std::int64_t seed = 0;
   int threads = 0;  ///< 0: one a core
-  Precision precision = Precision::kFloat;
+  RunPrecision precision = RunPrecision::kFloat;
   RotationParameters rotations = RotationParameters::kSixD;
   std::array<double, 3> background{};  ///< colour behind everything
   DataSettings data;
+  SyntheticSettings synthetic;
   RenderSettings render;
   ConfigMap<StageSettings> stages;  ///< in the order written
 };

@@ -1,5 +1,9 @@
 #include "pipelines/run_state.h"
 
+#include <algorithm>
+#include <array>
+#include <span>
+
 #include "core/check.h"
 #include "optim/checkpoint.h"
 
@@ -9,6 +13,11 @@ namespace {
 
 constexpr Index kPoseNumbers = 165;
 constexpr Index kRigidNumbers = 12;
+constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "ssim", "psnr_foreground_db"};  // as image_errors orders
+
+std::string image_error_name(std::size_t frame, const std::string& name) {
+  return "image_errors/" + std::to_string(frame) + "/" + name;
+}
 
 /// One state as numbers: camera [R | t] (12), then 6 an object, then the body's transl (3) and axis-angles (165).
 void append(const SceneState& state, std::vector<double>& numbers) {
@@ -50,6 +59,75 @@ RunProgress first_progress(const Clip& clip, std::size_t stages) {
   progress.totals.resize(stages);
   progress.image_errors.resize(1);
   progress.covered = Image(1, clip.camera.height, clip.camera.width);
+  return progress;
+}
+
+void save_progress(const std::string& file, const std::string& config, const RunProgress& progress) {
+  Checkpoint checkpoint;
+  std::vector<double> states, seconds;
+  std::vector<std::int64_t> counts;
+  for (const auto& stage : progress.after_stage) {
+    for (const SceneState& state : stage) append(state, states);
+  }
+  for (const StageTotals& totals : progress.totals) {
+    counts.push_back(totals.iterations);
+    counts.push_back(totals.rollbacks);
+    seconds.push_back(totals.seconds);
+  }
+  seconds.push_back(progress.seconds);
+  checkpoint.set("frames", std::vector<std::int64_t>{progress.frames_done()});
+  checkpoint.set("states", std::move(states));
+  checkpoint.set("counts", std::move(counts));
+  checkpoint.set("seconds", std::move(seconds));
+  const std::span<const float> covered = progress.covered.data();
+  checkpoint.set("covered", std::vector<float>(covered.begin(), covered.end()));
+  for (std::size_t t = 1; t < progress.image_errors.size(); ++t) {
+    for (const auto& [name, value] : progress.image_errors[t]) {
+      checkpoint.set(image_error_name(t, name), std::vector<double>{value});
+    }
+  }
+  checkpoint.save(file, text_hash(config));
+}
+
+RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages) {
+  const Checkpoint checkpoint = load_checkpoint(file, text_hash(config));
+  const auto expect = [&file](const char* name, std::size_t found, std::size_t wanted) {
+    if (found == wanted) return;
+    throw DataError(file + ": \"" + name + "\" holds " + std::to_string(found) + " numbers, this clip needs " +
+                    std::to_string(wanted) + "; the inputs have changed since the run began");
+  };
+  RunProgress progress = first_progress(clip, stages);
+  const std::vector<std::int64_t>& frames = checkpoint.integers("frames");
+  expect("frames", frames.size(), 1);
+  if (frames[0] < 1 || frames[0] > clip.frames()) {
+    throw DataError(file + ": " + std::to_string(frames[0]) + " frames done, the clip has " +
+                    std::to_string(clip.frames()));
+  }
+  const auto done = static_cast<std::size_t>(frames[0]), per_state = static_cast<std::size_t>(numbers_per_state(clip));
+  const std::vector<double>& states = checkpoint.doubles("states");
+  expect("states", states.size(), stages * done * per_state);
+  const std::vector<std::int64_t>& counts = checkpoint.integers("counts");
+  expect("counts", counts.size(), 2 * stages);
+  const std::vector<double>& seconds = checkpoint.doubles("seconds");
+  expect("seconds", seconds.size(), stages + 1);
+  for (std::size_t s = 0; s < stages; ++s) {
+    progress.after_stage[s].clear();
+    for (std::size_t t = 0; t < done; ++t) {
+      progress.after_stage[s].push_back(state_from(states.data() + (s * done + t) * per_state, clip));
+    }
+    progress.totals[s] = {counts[2 * s], counts[2 * s + 1], seconds[s]};
+  }
+  progress.seconds = seconds.back();
+  const std::vector<float>& covered = checkpoint.floats("covered");
+  expect("covered", covered.size(), progress.covered.data().size());
+  std::copy(covered.begin(), covered.end(), progress.covered.data().begin());
+  progress.image_errors.resize(done);
+  for (std::size_t t = 1; t < done; ++t) {
+    for (const char* name : kImageErrors) {
+      const std::string entry = image_error_name(t, name);
+      if (checkpoint.has(entry)) progress.image_errors[t].emplace_back(name, checkpoint.doubles(entry).at(0));
+    }
+  }
   return progress;
 }
 

@@ -187,6 +187,7 @@ Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, c
   image.planes = kColors;
   group_image.planes = groups;
   Rendered<S> result;
+  result.projected = projected;
   result.counters = composited.counters;
   result.transmittance = composited.transmittance;
   result.image = tape.record(AddBackground<S>{}, {composited.channels, composited.transmittance, background}, image, where);
