@@ -1,0 +1,208 @@
+#include "splat/render.h"
+
+#include <algorithm>
+#include <array>
+
+#include "autodiff/matrix.h"
+#include "core/parallel.h"
+#include "core/simd.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr Index kRows = 16;  // of pixels a chunk
+constexpr Index kColors = 3;
+
+/// image_k = channels_k + T background_k
+template <class S>
+struct AddBackground {
+  static constexpr const char* kName = "add_background";
+  enum Input { kChannels, kTransmittance, kBackground };
+
+  void forward(NodeIo<S>& io) {
+    const ConstArray<S> channels = io.in(kChannels), t = io.in(kTransmittance);
+    const S* background = io.in(kBackground).data;
+    const Array<S> image = io.out();
+    parallel_for(image.shape.rows, kRows, [&](Index begin, Index end) {
+      on_best_isa([&] {
+        for (Index k = 0; k < kColors; ++k) {
+          for (Index r = begin; r < end; ++r) {
+            const S *c = &channels(k, r, 0), *through = t.row(r);
+            S* sum = &image(k, r, 0);
+            for (Index x = 0; x < image.shape.cols; ++x) sum[x] = c[x] + through[x] * background[k];
+          }
+        }
+      });
+    });
+  }
+
+  // d_channels_k = g_k,  d_T = Σ_k background_k g_k,  d_background_k = Σ T g_k
+  void backward(NodeIo<S>& io) {
+    const ConstArray<S> t = io.in(kTransmittance), g = io.d_out();
+    const S* background = io.in(kBackground).data;
+    const Array<S> d_channels = io.wants(kChannels) ? io.d_in(kChannels) : Array<S>{};
+    const Array<S> d_t = io.wants(kTransmittance) ? io.d_in(kTransmittance) : Array<S>{};
+    const bool wants_background = io.wants(kBackground);
+    const Partition part = reduction_partition(g.shape.rows, kRows);
+    const std::span<double> partials = io.template scratch<double>(kColors * part.chunks());
+    parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+      std::array<double, kColors> sums{};
+      on_best_isa([&] {
+        for (Index k = 0; k < kColors; ++k) {
+          for (Index r = begin; r < end; ++r) {
+            const S *d = &g(k, r, 0), *through = t.row(r);
+            if (d_channels) {
+              S* d_c = &d_channels(k, r, 0);
+              for (Index x = 0; x < g.shape.cols; ++x) d_c[x] += d[x];
+            }
+            if (d_t) {
+              S* d_through = d_t.row(r);
+              for (Index x = 0; x < g.shape.cols; ++x) d_through[x] += background[k] * d[x];
+            }
+            for (Index x = 0; wants_background && x < g.shape.cols; ++x) {
+              sums[static_cast<std::size_t>(k)] += static_cast<double>(through[x]) * static_cast<double>(d[x]);
+            }
+          }
+        }
+      });
+      for (Index k = 0; k < kColors; ++k) {
+        partials[static_cast<std::size_t>(k * part.chunks() + chunk)] = sums[static_cast<std::size_t>(k)];
+      }
+    });
+    for (Index k = 0; wants_background && k < kColors; ++k) {
+      io.d_in(kBackground).data[k] += static_cast<S>(pairwise_sum(partials.data() + k * part.chunks(), part.chunks()));
+    }
+  }
+};
+
+/// E = D/A, 0 where A = 0; D and A are planes of the channels.
+template <class S>
+struct NormalizedDepth {
+  static constexpr const char* kName = "normalized_depth";
+  Index sum_plane, weight_plane;
+
+  void forward(NodeIo<S>& io) {
+    const ConstArray<S> channels = io.in(0);
+    const Array<S> depth = io.out();
+    parallel_for(depth.shape.rows, kRows, [&](Index begin, Index end) {
+      for (Index r = begin; r < end; ++r) {
+        for (Index x = 0; x < depth.shape.cols; ++x) {
+          const S weight = channels(weight_plane, r, x);
+          depth(r, x) = weight > S(0) ? channels(sum_plane, r, x) / weight : S(0);
+        }
+      }
+    });
+  }
+
+  // d_D = g/A,  d_A = −g E/A
+  void backward(NodeIo<S>& io) {
+    if (!io.wants(0)) return;
+    const ConstArray<S> channels = io.in(0), depth = io.out(), g = io.d_out();
+    const Array<S> d_channels = io.d_in(0);
+    parallel_for(depth.shape.rows, kRows, [&](Index begin, Index end) {
+      for (Index r = begin; r < end; ++r) {
+        for (Index x = 0; x < depth.shape.cols; ++x) {
+          const S weight = channels(weight_plane, r, x);
+          if (!(weight > S(0))) continue;
+          const S d_sum = g(r, x) / weight;
+          d_channels(sum_plane, r, x) += d_sum;
+          d_channels(weight_plane, r, x) -= d_sum * depth(r, x);
+        }
+      }
+    });
+  }
+
+  void add_signature(Signature& signature, NodeIo<S>& io) {
+    const ConstArray<S> channels = io.in(0);
+    for (Index r = 0; r < channels.shape.rows; ++r) {
+      for (Index x = 0; x < channels.shape.cols; ++x) signature.add(channels(weight_plane, r, x) > S(0) ? 1 : 2);
+    }
+  }
+};
+
+/// Planes [first, first + planes of the output).
+template <class S>
+struct SlicePlanes {
+  static constexpr const char* kName = "slice_planes";
+  Index first;
+
+  void forward(NodeIo<S>& io) {
+    const Array<S> part = io.out();
+    const S* from = io.in(0).row(first * part.shape.rows);
+    std::copy_n(from, part.shape.memory(), part.data);
+  }
+  void backward(NodeIo<S>& io) {
+    if (!io.wants(0)) return;
+    const ConstArray<S> g = io.d_out();
+    const Array<S> d = io.d_in(0);
+    for (Index r = 0; r < g.total_rows(); ++r) {
+      S* to = d.row(first * g.shape.rows + r);
+      for (Index x = 0; x < g.shape.cols; ++x) to[x] += g.row(r)[x];
+    }
+  }
+};
+
+/// [N,1+G]: ones, and for each group 1 in its rows; without the ones when there is no depth.
+template <class S>
+Var<S> indicators(Tape<S>& tape, Index rows, const RenderRequest& request, Source where) {
+  const Index first = request.depth ? 1 : 0, groups = static_cast<Index>(request.groups.size());
+  const Var<S> result = tape.constant("indicators", shape_of(rows, first + groups), where);
+  const Array<S> a = tape.write(result);
+  for (Index n = 0; n < rows; ++n) {
+    if (request.depth) a(n, 0) = S(1);
+    for (Index k = 0; k < groups; ++k) {
+      const auto& [begin, end] = request.groups[static_cast<std::size_t>(k)];
+      a(n, first + k) = n >= begin && n < end ? S(1) : S(0);
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+template <class S>
+Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, const SplatView& view,
+                   const RenderRequest& request, Source where) {
+  Tape<S>& tape = inputs.means.owner();
+  const Index rows = inputs.means.shape().rows, groups = static_cast<Index>(request.groups.size());
+  HSI4D_CHECK_EQ(inputs.colors.shape(), shape_of(rows, kColors));
+  HSI4D_CHECK_EQ(background.shape(), shape_of(1, kColors));
+  for (const auto& [begin, end] : request.groups) {
+    HSI4D_CHECK(begin >= 0 && begin <= end && end <= rows, "group [" + std::to_string(begin) + ", " +
+                                                               std::to_string(end) + ") of " + std::to_string(rows) +
+                                                               " Gaussians");
+  }
+  const Projected<S> projected = project(inputs.means, inputs.axes, xi, view, where);
+  // Channels: colours; depth and 1 if asked for; groups.
+  std::vector<Var<S>> features = {inputs.colors};
+  if (request.depth) features.push_back(projected.depths);
+  if (request.depth || groups > 0) features.push_back(indicators(tape, rows, request, where));
+  const Var<S> all =
+      features.size() == 1 ? inputs.colors : concat_cols(std::span<const Var<S>>(features), where);
+  const Composited<S> composited = composite(projected, inputs.opacities, all, view, where);
+
+  const Shape one = image_shape<S>(1, view.camera.height, view.camera.width);
+  Shape image = one, group_image = one;
+  image.planes = kColors;
+  group_image.planes = groups;
+  Rendered<S> result;
+  result.counters = composited.counters;
+  result.transmittance = composited.transmittance;
+  result.image = tape.record(AddBackground<S>{}, {composited.channels, composited.transmittance, background}, image, where);
+  if (request.depth) {
+    result.depth = tape.record(NormalizedDepth<S>{kColors, kColors + 1}, {composited.channels}, one, where);
+  }
+  if (groups > 0) {
+    const Index first = kColors + (request.depth ? 2 : 0);
+    result.group_opacity = tape.record(SlicePlanes<S>{first}, {composited.channels}, group_image, where);
+  }
+  return result;
+}
+
+template Rendered<float> render(const SplatInputs<float>&, Var<float>, Var<float>, const SplatView&,
+                                const RenderRequest&, Source);
+template Rendered<double> render(const SplatInputs<double>&, Var<double>, Var<double>, const SplatView&,
+                                 const RenderRequest&, Source);
+
+}  // namespace hsi4d

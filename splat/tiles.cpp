@@ -1,0 +1,268 @@
+#include "splat/tiles.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "core/check.h"
+#include "core/parallel.h"
+
+namespace hsi4d::detail {
+
+// --- the ellipse of a Gaussian ---------------------------------------------------------------------------------------
+
+namespace {
+
+/// a d − b c without cancellation: the product b c is corrected by its rounding error (Kahan).
+double difference_of_products(double a, double d, double b, double c) {
+  const double bc = b * c;
+  return std::fma(a, d, -bc) + std::fma(-b, c, bc);
+}
+
+/// Minors m01, m02, m12 of a 2×3 matrix.
+std::array<double, 3> minors(const double* v) {
+  return {difference_of_products(v[0], v[4], v[1], v[3]), difference_of_products(v[0], v[5], v[2], v[3]),
+          difference_of_products(v[1], v[5], v[2], v[4])};
+}
+
+}  // namespace
+
+bool conic_of(const double* v, double blur, Conic& conic) {
+  const double a = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+  const double c = v[3] * v[3] + v[4] * v[4] + v[5] * v[5];
+  const auto m = minors(v);
+  conic.xx = a + blur;
+  conic.yy = c + blur;
+  conic.xy = v[0] * v[3] + v[1] * v[4] + v[2] * v[5];
+  conic.sharp_determinant = m[0] * m[0] + m[1] * m[1] + m[2] * m[2];
+  conic.determinant = conic.sharp_determinant + blur * (a + c) + blur * blur;
+  if (!(conic.determinant > 0) || !std::isfinite(conic.determinant)) return false;
+  const double root_yy = std::sqrt(conic.yy);
+  conic.l11 = root_yy / std::sqrt(conic.determinant);
+  conic.l21 = -conic.xy / conic.yy * conic.l11;
+  conic.l22 = 1 / root_yy;
+  return std::isfinite(conic.l11) && std::isfinite(conic.l21) && std::isfinite(conic.l22);
+}
+
+double blur_compensation(const Conic& conic) { return std::sqrt(conic.sharp_determinant / conic.determinant); }
+
+// log f = ½ (log det V Vᵀ − log det cov), and both determinants are polynomials in V.
+void blur_compensation_adjoint(const double* v, double blur, const Conic& conic, double d, double* d_v) {
+  if (!(conic.sharp_determinant > 0)) return;
+  const auto m = minors(v);
+  // ½ ∂(det V Vᵀ)/∂V = Σ m ∂m/∂V
+  const double half_sharp[6] = {m[0] * v[4] + m[1] * v[5],  m[2] * v[5] - m[0] * v[3], -m[1] * v[3] - m[2] * v[4],
+                                -m[0] * v[1] - m[1] * v[2], m[0] * v[0] - m[2] * v[2], m[1] * v[0] + m[2] * v[1]};
+  const double scale = d * blur_compensation(conic);
+  for (int i = 0; i < 6; ++i) {
+    d_v[i] += scale * (half_sharp[i] / conic.sharp_determinant - (half_sharp[i] + blur * v[i]) / conic.determinant);
+  }
+}
+
+// --- its tiles -------------------------------------------------------------------------------------------------------
+
+TileGrid tile_grid(Index width, Index height, Index tile) {
+  return {width, height, tile, (width + tile - 1) / tile, (height + tile - 1) / tile};
+}
+
+namespace {
+
+/// First whole number ≥ x, held in [0, end]; `end` for NaN.
+Index first_from(double x, Index end) {
+  const double held = x > 0 ? (x < static_cast<double>(end) ? x : static_cast<double>(end)) : 0;
+  return std::isnan(x) ? end : static_cast<Index>(std::ceil(held));
+}
+
+/// One past the last whole number ≤ x, held in [0, end]; 0 for NaN.
+Index last_to(double x, Index end) {
+  if (!(x >= 0)) return 0;
+  return x < static_cast<double>(end) ? static_cast<Index>(std::floor(x)) + 1 : end;
+}
+
+/// Tiles of 16 pixels that INRIA's square of half-width `radius` touches along one axis, as rows or columns of pixels.
+/// Its pixel centres are whole numbers.
+TileSpan square_pixels(double mean, double radius, Index size) {
+  constexpr double kBlock = 16;
+  const double p = mean - 0.5;
+  const double blocks = static_cast<double>(size) / kBlock + 1;
+  const double begin = std::floor((p - radius) / kBlock), end = std::floor((p + radius + (kBlock - 1)) / kBlock);
+  if (!(begin < end)) return {};
+  const auto pixel = [&](double block) {
+    const double held = block > 0 ? (block < blocks ? block : blocks) : 0;
+    return std::min(static_cast<Index>(held * kBlock), size);
+  };
+  return {pixel(begin), pixel(end)};
+}
+
+Extent square_extent(const Conic& conic, double x, double y, const TileGrid& grid) {
+  const double mid = 0.5 * (conic.xx + conic.yy);
+  const double radius = std::ceil(3 * std::sqrt(mid + std::sqrt(std::max(0.1, mid * mid - conic.determinant))));
+  const TileSpan cols = square_pixels(x, radius, grid.width), rows = square_pixels(y, radius, grid.height);
+  Extent result;
+  result.kind = Extent::Kind::kRectangle;
+  if (cols.begin >= cols.end) return result;
+  result.row_begin = rows.begin;
+  result.row_end = rows.end;
+  result.cols = {cols.begin / grid.tile, (cols.end + grid.tile - 1) / grid.tile};
+  return result;
+}
+
+}  // namespace
+
+Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
+                       const RenderSettings& settings, double epsilon) {
+  if (settings.footprint == hsi4d::Footprint::kSquare3Sigma) return square_extent(conic, x, y, grid);
+  Extent result;
+  if (settings.alpha_min <= 0) {
+    result.row_end = grid.height;
+    return result;
+  }
+  result.kind = Extent::Kind::kEllipse;
+  if (!(opacity >= settings.alpha_min * (1 - 4 * epsilon))) return result;
+  // α ≥ alpha_min where u² + w² ≤ 2 ln(o/alpha_min). Rounding: of the exponential and the opacity, and of u, whose two
+  // terms are as large as the ellipse is.
+  const double exact = std::sqrt(std::max(0.0, 2 * std::log(opacity / settings.alpha_min)) + 32 * epsilon);
+  const double width = std::sqrt(conic.xx), height = std::sqrt(conic.yy);
+  result.reach = exact * (1 + 8 * epsilon * (1 + conic.l11 * width + std::abs(conic.l21) * height));
+  result.x = x;
+  result.y = y;
+  result.slope = conic.xy / conic.yy;
+  result.half_width = 1 / conic.l11;
+  result.top_x = conic.xy / width;
+  result.inverse_l22 = height;
+  const double half_height = result.reach * height, half_width = result.reach * width;
+  if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return result;
+  result.row_begin = first_from(y - half_height - 0.5, grid.height);
+  result.row_end = last_to(y + half_height - 0.5, grid.height);
+  return result;
+}
+
+TileSpan tile_columns(const Extent& f, const TileGrid& grid, Index tile_row) {
+  if (f.kind == Extent::Kind::kAll) return {0, grid.cols};
+  if (f.kind == Extent::Kind::kRectangle) return f.cols;
+  const Index top = std::max(f.row_begin, tile_row * grid.tile);
+  const Index bottom = std::min(f.row_end, (tile_row + 1) * grid.tile);
+  if (top >= bottom) return {};
+  // The border's x as a function of dy is slope·dy ± half_width sqrt(reach² − dy²/yy); the band's rightmost point is the
+  // ellipse's if that lies in the band, else at the band's nearer end.
+  const double half_height = f.reach * f.inverse_l22;
+  const double low = std::max(static_cast<double>(top) + 0.5 - f.y, -half_height);
+  const double high = std::min(static_cast<double>(bottom) - 0.5 - f.y, half_height);
+  const auto half_width_at = [&](double dy) {
+    const double w = dy / f.inverse_l22;
+    return f.half_width * std::sqrt(std::max(0.0, f.reach * f.reach - w * w));
+  };
+  const double right_dy = std::clamp(f.reach * f.top_x, low, std::max(low, high));
+  const double left_dy = std::clamp(-f.reach * f.top_x, low, std::max(low, high));
+  const double right = f.slope * right_dy + half_width_at(right_dy), left = f.slope * left_dy - half_width_at(left_dy);
+  const double room = 1e-9 * (1 + std::abs(f.x) + std::abs(right) + std::abs(left));
+  const Index begin = first_from(f.x + left - room - 0.5, grid.width);
+  const Index end = last_to(f.x + right + room - 0.5, grid.width);
+  if (begin >= end) return {};
+  return {begin / grid.tile, (end - 1) / grid.tile + 1};
+}
+
+// --- order -----------------------------------------------------------------------------------------------------------
+
+std::uint64_t depth_bits(float depth) {
+  const std::uint32_t bits = std::bit_cast<std::uint32_t>(depth + 0.0f);  // −0 + 0 = 0
+  return bits ^ (bits >> 31 != 0 ? 0xFFFFFFFFu : 0x80000000u);
+}
+
+std::uint64_t depth_bits(double depth) {
+  const std::uint64_t bits = std::bit_cast<std::uint64_t>(depth + 0.0);
+  return bits ^ (bits >> 63 != 0 ? ~std::uint64_t(0) : std::uint64_t(1) << 63);
+}
+
+std::span<DepthKeyed> sort_by_depth(std::span<DepthKeyed> keys, std::span<DepthKeyed> room) {
+  constexpr int kDigit = 11;
+  constexpr std::size_t kValues = std::size_t(1) << kDigit;
+  const auto digit = [](std::uint64_t key, int shift) { return static_cast<std::size_t>(key >> shift) % kValues; };
+  std::uint64_t all = ~std::uint64_t(0), any = 0;
+  for (const DepthKeyed& k : keys) {
+    all &= k.key;
+    any |= k.key;
+  }
+  for (int shift = 0; shift < 64; shift += kDigit) {
+    if (digit(all, shift) == digit(any, shift)) continue;  // the same in every key
+    std::array<std::uint32_t, kValues> place{};
+    for (const DepthKeyed& k : keys) ++place[digit(k.key, shift)];
+    std::uint32_t sum = 0;
+    for (std::uint32_t& p : place) {
+      const std::uint32_t count = p;
+      p = sum;
+      sum += count;
+    }
+    for (const DepthKeyed& k : keys) room[place[digit(k.key, shift)]++] = k;
+    std::swap(keys, room);
+  }
+  return keys;
+}
+
+// --- lists -----------------------------------------------------------------------------------------------------------
+
+Index total_pairs(std::span<const Index> pairs) {
+  Index total = 0;
+  for (const Index count : pairs) {
+    total += count;
+    if (total > kMostPairs) {
+      throw UserError("more than " + std::to_string(kMostPairs) +
+                      " (tile, Gaussian) pairs in one image: use fewer or smaller Gaussians, a smaller image, or an "
+                      "alpha_min above 0");
+    }
+  }
+  return total;
+}
+
+void TileLists::build(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts) {
+  constexpr Index kGrain = 1024, kMostChunks = 32;
+  const Index ranks = static_cast<Index>(extents.size()), tiles = grid.count();
+  const Partition part{ranks, std::max(kGrain, (ranks + kMostChunks - 1) / kMostChunks)};
+  const auto visit = [&](Index rank, auto&& add) {
+    const Extent& f = extents[static_cast<std::size_t>(rank)];
+    if (f.row_begin >= f.row_end) return;
+    for (Index r = f.row_begin / grid.tile; r <= (f.row_end - 1) / grid.tile; ++r) {
+      const TileSpan span = tile_columns(f, grid, r);
+      for (Index c = span.begin; c < span.end; ++c) add(r * grid.cols + c);
+    }
+  };
+  counts.resize(part.chunks() * tiles);
+  slot_begin.resize(ranks + 1);
+  tile_begin.resize(tiles + 1);
+  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+    Index* const of_tile = counts.data() + chunk * tiles;
+    std::fill_n(of_tile, tiles, Index(0));
+    for (Index rank = begin; rank < end; ++rank) {
+      Index pairs = 0;
+      visit(rank, [&](Index tile) {
+        ++of_tile[tile];
+        ++pairs;
+      });
+      slot_begin[rank] = pairs;
+    }
+  });
+  const Index total = total_pairs({slot_begin.data(), static_cast<std::size_t>(ranks)});
+  Index slot = 0;
+  for (Index rank = 0; rank < ranks; ++rank) slot += std::exchange(slot_begin[rank], slot);
+  slot_begin[ranks] = slot;
+  entries.resize(total);
+  Index place = 0;
+  for (Index tile = 0; tile < tiles; ++tile) {
+    tile_begin[tile] = place;
+    for (Index chunk = 0; chunk < part.chunks(); ++chunk) place += std::exchange(counts[chunk * tiles + tile], place);
+  }
+  tile_begin[tiles] = place;
+  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+    Index* const of_tile = counts.data() + chunk * tiles;
+    for (Index rank = begin; rank < end; ++rank) {
+      Index next = slot_begin[rank];
+      visit(rank, [&](Index tile) {
+        entries[of_tile[tile]++] = {static_cast<std::int32_t>(rank), static_cast<std::uint32_t>(next++)};
+      });
+    }
+  });
+}
+
+}  // namespace hsi4d::detail

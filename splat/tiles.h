@@ -1,0 +1,115 @@
+// Which tiles a projected Gaussian reaches, and the lists of Gaussians of every tile, in depth order. Used by
+// composite.h; not part of the public interface.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/buffer.h"
+#include "core/types.h"
+#include "splat/render_settings.h"
+
+namespace hsi4d::detail {
+
+// --- the ellipse of a Gaussian ---------------------------------------------------------------------------------------
+
+/// The inverse of cov = V Vᵀ + blur I in lower-triangular form, in double,
+///
+///   dᵀ cov⁻¹ d = u² + w²,   u = l11 dx + l21 dy,   w = l22 dy,
+///
+/// from det(V Vᵀ + b I) = m01² + m02² + m12² + b tr(V Vᵀ) + b², m_ij the 2×2 minors of V: all terms are ≥ 0 (row A1).
+struct Conic {
+  double l11, l21, l22;
+  double xx, xy, yy;         ///< cov, pixels²
+  double sharp_determinant;  ///< det V Vᵀ
+  double determinant;        ///< det cov
+};
+
+/// False where cov has no inverse (blur 0 and no area) or a number is not finite.
+///
+/// @param factor  [2,3] V by rows, pixels
+/// @param blur    pixels²
+bool conic_of(const double* factor, double blur, Conic& conic);
+
+/// sqrt(det V Vᵀ / det cov): what the opacity is multiplied with under antialias (row A7).
+double blur_compensation(const Conic& conic);
+
+/// d_V += d · ∂compensation/∂V; nothing where det V Vᵀ = 0.
+void blur_compensation_adjoint(const double* factor, double blur, const Conic& conic, double d, double* d_factor);
+
+// --- its tiles -------------------------------------------------------------------------------------------------------
+
+/// The image in square tiles.
+struct TileGrid {
+  Index width, height, tile;  ///< pixels
+  Index cols, rows;           ///< tiles
+  Index count() const { return cols * rows; }
+};
+
+TileGrid tile_grid(Index width, Index height, Index tile);
+
+struct TileSpan {
+  Index begin = 0, end = 0;
+};
+
+/// The pixels that a Gaussian may touch: all; or a rectangle of tiles; or those whose centre lies in an ellipse.
+struct Extent {
+  enum class Kind : std::uint8_t { kAll, kRectangle, kEllipse } kind = Kind::kAll;
+  Index row_begin = 0, row_end = 0;    ///< rows of pixels; empty: nothing is drawn
+  TileSpan cols;                       ///< of kRectangle, columns of tiles
+  double x = 0, y = 0;                 ///< mean, pixels
+  double reach = 0;                    ///< sqrt(u² + w²) at the border
+  double slope = 0;                    ///< xy/yy: how far the middle of a row moves with dy
+  double half_width = 0;               ///< sqrt(det/yy): half a row's width at the centre is reach times this
+  double top_x = 0, inverse_l22 = 0;   ///< dy of the rightmost point, sqrt(yy): both for reach 1
+};
+
+/// The extent that settings ask for. It never leaves out a pixel where min(cap, o G) ≥ alpha_min, with room for the
+/// rounding of arithmetic in which 1 + `epsilon` is the next number after 1 (row B7).
+///
+/// @param opacity  o, with the antialias factor
+/// @param epsilon  of the precision that α is computed in
+Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
+                       const RenderSettings& settings, double epsilon);
+
+/// Columns of tiles that an extent reaches in one row of tiles.
+TileSpan tile_columns(const Extent& extent, const TileGrid& grid, Index tile_row);
+
+// --- order -----------------------------------------------------------------------------------------------------------
+
+/// Bits whose order as whole numbers is that of the depths (row B9: all signs, −0 as 0).
+std::uint64_t depth_bits(float depth);
+std::uint64_t depth_bits(double depth);
+
+struct DepthKeyed {
+  std::uint64_t key;
+  std::int32_t index;
+};
+
+/// Sorts by key; equal keys stay in order. Returns whichever of the two arrays, of the same length, holds the result.
+std::span<DepthKeyed> sort_by_depth(std::span<DepthKeyed> keys, std::span<DepthKeyed> room);
+
+// --- lists -----------------------------------------------------------------------------------------------------------
+
+struct TileEntry {
+  std::int32_t rank;   ///< place in the depth order
+  std::uint32_t slot;  ///< of this (tile, Gaussian) pair; those of a Gaussian follow each other
+};
+
+/// The sum of the numbers of pairs. Throws UserError if it is above kMostPairs (row B10).
+Index total_pairs(std::span<const Index> pairs);
+
+/// The Gaussians of every tile.
+struct TileLists {
+  Buffer<Index> tile_begin;  ///< [tiles + 1] into entries
+  Buffer<Index> slot_begin;  ///< [ranks + 1] slots of each Gaussian
+  Buffer<TileEntry> entries;
+
+  Index pairs() const { return entries.size(); }
+  /// Fills the lists for extents in depth order. Parallel; the result depends on the arguments alone.
+  ///
+  /// @param counts  workspace, kept between calls
+  void build(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts);
+};
+
+}  // namespace hsi4d::detail
