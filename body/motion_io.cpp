@@ -91,7 +91,7 @@ void read_whole_poses(const NpyArray& array, Motion& motion) {
     allowed += (allowed.empty() ? "" : ", ") + shape_text(std::vector<int64_t>{frames, layout.numbers}) + " (" +
                layout.name + ")";
   }
-  throw DataError(array.source() + " has shape " + shape_text(shape) + "; allowed: " + allowed);
+  throw DataError(array.source() + ": has shape " + shape_text(shape) + "; allowed: " + allowed);
 }
 
 void read_parts(const Npz& file, Motion& motion) {
@@ -111,7 +111,7 @@ double read_frame_rate(const Npz& file) {
   if (array == nullptr) return Motion{}.frame_rate;
   const double rate = array->scalar<double>();
   if (!(rate > 0) || !std::isfinite(rate)) {
-    throw DataError(array->source() + " is " + std::to_string(rate) + "; allowed: a positive number");
+    throw DataError(array->source() + ": is " + std::to_string(rate) + "; allowed: a positive number");
   }
   return rate;
 }
@@ -120,7 +120,7 @@ Motion motion_of(const Npz& file) {
   const NpyArray* trans = find(file, {"trans", "transl"});
   if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'");
   const int64_t frames = trans->require_shape({-1, 3}).shape()[0];
-  if (frames == 0) throw DataError(trans->source() + " holds no frame");
+  if (frames == 0) throw DataError(trans->source() + ": holds no frame");
   const Rows places = rows_of(*trans, frames, 3);
   Motion motion;
   motion.frame_rate = read_frame_rate(file);
