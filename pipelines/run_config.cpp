@@ -54,6 +54,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
             "Threads; 0: one a core. Results do not depend on it");
   f.object("render", s.render, "How Gaussians become pixels");
+  f.object("synthetic", s.synthetic, "What hsi4d synth makes: a dataset with exact ground truth");
   f.map("stages", s.stages, "The stages of the run by name, in the order in which they run",
         [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });
 }

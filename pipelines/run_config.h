@@ -9,6 +9,7 @@
 
 #include "core/config.h"
 #include "optim/loss_description.h"
+#include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d {
@@ -46,6 +47,7 @@ struct RunConfig {
   std::int64_t seed = 0;
   int threads = 0;  ///< 0: one a core
   RenderSettings render;
+  SyntheticSettings synthetic;
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 
