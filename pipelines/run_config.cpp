@@ -51,6 +51,17 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
   return to_json(write_config(fields));
 }
 
+ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses) {
+  RunConfig copy = config;
+  ConfigFields fields;
+  describe(fields, copy, losses);
+  ConfigValue tree = write_config(fields);
+  std::erase_if(tree.members, [](const ConfigMember& member) {
+    return member.key == "data" || member.key == "synthetic" || member.key == "threads";
+  });
+  return tree;
+}
+
 std::string run_config_schema(const std::vector<LossDescription>& losses) {
   RunConfig defaults;
   ConfigFields fields;

@@ -167,6 +167,12 @@ Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings) 
   return motion;
 }
 
+RenderSettings video_render_settings() {
+  RenderSettings settings;
+  apply_quality(settings, Quality::kAccurate);
+  return settings;
+}
+
 void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const fs::path& folder,
                    const ProgressSink& progress, const ConfigValue& more_sections) {
   FolderInMaking out(folder);

@@ -20,6 +20,11 @@
 
 namespace hsi4d {
 
+/// How the video of a dataset is rendered. Not as the reconstruction renders: with hardly a cut, and at the supersampled
+/// size, so that the pixel filter that the reconstruction should use is narrower, blur/supersample² + 1/16 pixels² for a
+/// supersample of 2.
+RenderSettings video_render_settings();
+
 /// `truth` with noise on every frame but the first, as an estimator would have it: joints 1-21 turned by
 /// pose_noise_deg (the root of the mean squared angle, axes uniform), finger joints by hand_noise_share of that, the root
 /// by root_noise_deg and moved by root_noise_m (each coordinate's standard deviation). Jaw and eyes stay.

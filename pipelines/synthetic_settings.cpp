@@ -3,7 +3,8 @@
 namespace hsi4d {
 namespace {
 
-constexpr std::int64_t kLargestSeed = std::int64_t{1} << 53;  // JSON readers elsewhere keep whole numbers up to here
+/// The largest whole number that every JSON tool keeps (RFC 8259, section 6).
+constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 
 }  // namespace
 

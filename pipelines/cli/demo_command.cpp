@@ -32,14 +32,6 @@ fs::path demo_folder(const DemoArguments& arguments, const std::string& name) {
   return folder;
 }
 
-/// The video is not rendered as the reconstruction renders: with fewer cuts, and its pixel filter is that of its own,
-/// larger pixels.
-RenderSettings video_settings() {
-  RenderSettings settings;
-  apply_quality(settings, Quality::kAccurate);
-  return settings;
-}
-
 }  // namespace
 
 std::string demo_command(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
@@ -52,7 +44,9 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
       throw UserError(folder.string() + ": holds a demo already; --resume goes on with it, another --out makes a new one");
     }
     fs::create_directories(folder);
-    write_dataset(config.synthetic, video_settings(), dataset, arguments.quiet ? ProgressSink{} : progress_on_stderr());
+    write_dataset(config.synthetic, video_render_settings(), dataset,
+                  arguments.quiet ? ProgressSink{} : progress_on_stderr(),
+                  sections_beside_data(config, descriptions_of(losses)));
   }
   config.data = dataset_inputs(dataset);
   const std::string run = (folder / "run").string();

@@ -19,6 +19,7 @@
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/render_command.h"
+#include "pipelines/cli/synth_command.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -38,7 +39,7 @@ int complain(const Failure& failure) {
 /// The subcommands with their arguments; `run` is what the chosen one does.
 struct CommandLine {
   CLI::App app{"4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d"};
-  std::string config, topic, file;
+  std::string config, topic, file, out;
   std::vector<std::string> overrides;
   bool print_config = false;
   RunArguments run_arguments;
@@ -72,6 +73,12 @@ struct CommandLine {
     CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
     info->add_option("FILE", file, "A .ply, .npz, .npy, .json, .png, .jpg or .exr file")->required();
     info->callback([this] { run = [this] { return info_command(file); }; });
+
+    CLI::App* synth = app.add_subcommand("synth", "Make a dataset with exact ground truth");
+    synth->add_option("CONFIG", config, "A config; section synthetic says what is made, the rest goes along")->required();
+    synth->add_option("--out", out, "Where to: a new or empty folder")->type_name("DIR")->required();
+    add_overrides(*synth, overrides);
+    synth->callback([this] { run = [this] { return synth_command(config, overrides, out, losses); }; });
 
     add_render();
     add_gradients();

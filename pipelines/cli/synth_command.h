@@ -1,0 +1,20 @@
+// `hsi4d synth`: a dataset with exact ground truth.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "optim/loss_description.h"
+
+namespace hsi4d::cli {
+
+/// Makes the dataset that the config's sections `synthetic` and `render` describe, and tells progress on stderr.
+/// Returns what the command prints.
+///
+/// @param out  a new or empty folder; it appears when everything in it is complete
+/// Throws UserError with all problems of the config, or when the folder is not empty or cannot be written.
+std::string synth_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
+                          const std::filesystem::path& out, const std::vector<LossDescription>& losses);
+
+}  // namespace hsi4d::cli

@@ -1,0 +1,390 @@
+#include "pipelines/synthetic.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include <catch2/catch.hpp>
+
+#include "body/avatar.h"
+#include "body/kinematics.h"
+#include "body/procedural_body.h"
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/config_file.h"
+#include "core/image_io.h"
+#include "core/npz.h"
+#include "core/parallel.h"
+#include "core/rotation.h"
+#include "pipelines/synthetic_motion.h"
+#include "pipelines/synthetic_scene.h"
+#include "splat/io_ply.h"
+#include "tests/support/program.h"
+#include "tests/support/temporary_folder.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+SyntheticSettings small_settings() {
+  SyntheticSettings settings;
+  settings.frames = 3;
+  settings.size_px = 48;
+  settings.scene_gaussians = 1500;
+  settings.avatar_gaussians = 600;
+  settings.object_gaussians = 200;
+  return settings;
+}
+
+const std::vector<std::string>& dataset_files() {
+  static const std::vector<std::string> files = {
+      "avatar.npz",
+      "camera.json",
+      "config.json",
+      "frames/0000.png",
+      "frames/0001.png",
+      "frames/0002.png",
+      "initial.json",
+      "initial_motion.npz",
+      "masks/human/0000.png",
+      "masks/human/0001.png",
+      "masks/human/0002.png",
+      "masks/watering_can/0000.png",
+      "masks/watering_can/0001.png",
+      "masks/watering_can/0002.png",
+      "objects/watering_can.ply",
+      "scene.ply",
+      "truth/cameras.json",
+      "truth/motion.npz",
+      "truth/objects.npz",
+  };
+  return files;
+}
+
+/// Every file under a folder with its bytes.
+std::map<std::string, std::string> content_of(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) files[fs::relative(entry.path(), folder).generic_string()] = file_text(entry.path());
+  return files;
+}
+
+std::vector<std::string> names_in(const std::map<std::string, std::string>& files) {
+  std::vector<std::string> names;
+  for (const auto& [name, bytes] : files) names.push_back(name);
+  return names;
+}
+
+Vector3<double> row(const std::vector<double>& values, std::size_t i) {
+  return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+}
+
+double degrees_between(const Matrix3<double>& a, const Matrix3<double>& b) {
+  return so3_log(Matrix3<double>(a.transpose() * b)).norm() * 180 / std::numbers::pi;
+}
+
+double mean_of(const Image& image) {
+  double sum = 0;
+  for (int c = 0; c < image.channels(); ++c)
+    for (int y = 0; y < image.height(); ++y)
+      for (int x = 0; x < image.width(); ++x) sum += double(image(c, y, x));
+  return sum / (double(image.channels()) * image.height() * image.width());
+}
+
+bool same_camera(const Camera& a, const Camera& b) {
+  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy &&
+         a.camera_from_world.rotation == b.camera_from_world.rotation &&
+         a.camera_from_world.translation == b.camera_from_world.translation;
+}
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+}  // namespace
+
+TEST_CASE("a synthetic dataset is complete, readable and true to itself") {
+  const TemporaryFolder folder;
+  std::int64_t last_done = 0;
+  write_dataset(small_settings(), {}, "data", [&](const ProgressState& state) { last_done = state.done; });
+  CHECK(last_done == 3);
+  CHECK(names_in(content_of("data")) == dataset_files());
+  CHECK(std::distance(fs::directory_iterator("."), fs::directory_iterator()) == 1);  // no temporary is left
+
+  const Gaussians room = read_ply("data/scene.ply").gaussians;
+  CHECK(room.count() <= 1500);
+  CHECK(room.count() > 1000);
+  const PlyScene object = read_ply("data/objects/watering_can.ply");
+  CHECK(object.report.rejected == 0);
+  Vector3<double> sum = Vector3<double>::Zero();
+  for (std::size_t i = 0; i < object.gaussians.means.size(); ++i)
+    sum[Eigen::Index(i % 3)] += double(object.gaussians.means[i]);
+  CHECK(sum.norm() / double(object.gaussians.count()) < 1e-7);
+  CHECK(read_avatar("data/avatar.npz").count() == 600);
+
+  const Motion truth = read_motion("data/truth/motion.npz"), initial = read_motion("data/initial_motion.npz");
+  const std::vector<Camera> cameras = read_cameras("data/truth/cameras.json");
+  const Npz objects = Npz::read("data/truth/objects.npz");
+  const auto rotation = objects.array("watering_can/rotation").require_shape({3, 3}).as<double>();
+  const auto translation = objects.array("watering_can/translation").require_shape({3, 3}).as<double>();
+  REQUIRE(truth.poses.size() == 3);
+  REQUIRE(initial.poses.size() == 3);
+  REQUIRE(cameras.size() == 3);
+  CHECK(truth.frame_rate == 10);
+
+  SECTION("frame 0 is exact, later frames are disturbed") {
+    CHECK(initial.poses[0].axis_angle == truth.poses[0].axis_angle);
+    CHECK(initial.poses[0].transl == truth.poses[0].transl);
+    CHECK(same_camera(read_camera("data/camera.json"), cameras[0]));
+    ConfigProblems problems;
+    const ConfigValue state = load_config("data/initial.json", {}, problems);
+    problems.throw_if_any();
+    CHECK(find_member(state, "motion")->text == "initial_motion.npz");
+    const ConfigValue* can = find_member(*find_member(state, "objects"), "watering_can");
+    for (std::size_t i = 0; i < 3; ++i) {
+      CHECK(std::stod(find_member(*can, "rotation")->items[i].text) == rotation[i]);
+      CHECK(std::stod(find_member(*can, "translation")->items[i].text) == translation[i]);
+    }
+    for (std::size_t t = 1; t < 3; ++t) {
+      CHECK(initial.poses[t].axis_angle != truth.poses[t].axis_angle);
+      CHECK((initial.poses[t].transl - truth.poses[t].transl).norm() > 0);
+      for (Index joint : {22, 23, 24}) CHECK(initial.poses[t].rotation_of(joint) == truth.poses[t].rotation_of(joint));
+    }
+  }
+  SECTION("the object is fixed to the right wrist") {
+    const BodyModel body = procedural_body();
+    const int wrist = smplx_joint("right_wrist");
+    std::vector<Rigid<double>> wrist_from_object;
+    for (std::size_t t = 0; t < 3; ++t) {
+      const Rigid<double> pose{so3_exp(row(rotation, t)), row(translation, t)};
+      wrist_from_object.push_back(compose(inverse(joint_frame(body, truth.poses[t], wrist)), pose));
+    }
+    for (std::size_t t = 1; t < 3; ++t) {
+      CHECK((wrist_from_object[t].translation - wrist_from_object[0].translation).norm() < 1e-12);
+      CHECK((wrist_from_object[t].rotation - wrist_from_object[0].rotation).norm() < 1e-12);
+      CHECK((row(translation, t) - row(translation, 0)).norm() > 0.005);
+    }
+  }
+  SECTION("frames are bright, masks are where things are") {
+    for (const char* name : {"0000.png", "0001.png", "0002.png"}) {
+      const Image frame = read_image(std::string("data/frames/") + name);
+      const Image human = read_image(std::string("data/masks/human/") + name);
+      const Image can = read_image(std::string("data/masks/watering_can/") + name);
+      CHECK(frame.channels() == 3);
+      CHECK(frame.width() == 48);
+      CHECK(human.channels() == 1);
+      CHECK(mean_of(frame) > 0.25);
+      CHECK(mean_of(human) > 0.05);
+      CHECK(mean_of(human) < 0.3);
+      CHECK(mean_of(can) > 0.003);
+      CHECK(mean_of(can) < 0.05);
+      float most = 0;  // a pixel shows the one or the other
+      for (int y = 0; y < 48; ++y)
+        for (int x = 0; x < 48; ++x) most = std::max(most, human(0, y, x) + can(0, y, x));
+      CHECK(most <= 1 + 1.5F / 255);
+    }
+    const Camera camera = cameras[0];  // the middle of the can's mask is where the can is
+    const Image can = read_image("data/masks/watering_can/0000.png");
+    Vector2<double> center(0, 0);
+    double weight = 0;
+    for (int y = 0; y < 48; ++y)
+      for (int x = 0; x < 48; ++x) {
+        center += double(can(0, y, x)) * Vector2<double>(x + 0.5, y + 0.5);
+        weight += double(can(0, y, x));
+      }
+    const Vector2<double> there =
+        project_point(camera, transform_point(camera.camera_from_world, row(translation, 0)));
+    CHECK((center / weight - there).norm() < 2);
+  }
+  SECTION("config.json names the files") {
+    ConfigProblems problems;
+    const ConfigValue config = load_config("data/config.json", {}, problems);
+    problems.throw_if_any();
+    const ConfigValue& data = *find_member(config, "data");
+    for (const char* key : {"scene", "avatar", "frames", "masks", "camera", "initial", "truth"}) {
+      INFO(key);
+      CHECK(fs::exists(fs::path("data") / find_member(data, key)->text));
+    }
+    const ConfigValue* can = find_member(*find_member(data, "objects"), "watering_can");
+    CHECK(find_member(*can, "gaussians")->text == "objects/watering_can.ply");
+  }
+}
+
+TEST_CASE("a synthetic dataset is a function of its settings", "[parallel]") {
+  const TemporaryFolder folder;
+  SyntheticSettings settings = small_settings();
+  with_threads(1, [&] { write_dataset(settings, {}, "one"); });
+  with_threads(3, [&] { write_dataset(settings, {}, "three"); });
+  settings.seed = 1;
+  write_dataset(settings, {}, "other");
+  const auto one = content_of("one"), three = content_of("three"), other = content_of("other");
+  for (const std::string& name : dataset_files()) {
+    INFO(name);
+    CHECK(one.at(name) == three.at(name));
+  }
+  for (const char* name : {"scene.ply", "initial_motion.npz", "frames/0001.png"}) {
+    INFO(name);
+    CHECK(one.at(name) != other.at(name));
+  }
+}
+
+TEST_CASE("a dataset never lands in a folder that holds something") {
+  const TemporaryFolder folder;
+  folder.write("full/note.txt", "mine");
+  const std::string place = (fs::canonical(".") / "full").string();
+  CHECK(message_of([&] { write_dataset(small_settings(), {}, "full"); }) ==
+        place + ": the folder is not empty; name a new or empty one");
+  CHECK(message_of([&] { write_dataset(small_settings(), {}, "full/note.txt"); }) ==
+        place + "/note.txt: there is something that is not a folder; name a new or empty folder");
+  CHECK(names_in(content_of(".")) == std::vector<std::string>{"full/note.txt"});
+  fs::create_directory("empty");
+  SyntheticSettings settings = small_settings();
+  settings.frames = 1;
+  write_dataset(settings, {}, "empty/");
+  CHECK(fs::exists("empty/frames/0000.png"));
+
+  struct Stop {};
+  const auto stop = [](const ProgressState&) { throw Stop(); };
+  CHECK_THROWS_AS(write_dataset(settings, {}, "stopped", stop), Stop);
+  CHECK_FALSE(fs::exists("stopped"));
+  for (const auto& entry : fs::directory_iterator(".")) CHECK(entry.path().extension() != ".tmp");
+}
+
+TEST_CASE("eight frames move as much as can be followed, and no more") {
+  const BodyModel body = procedural_body();
+  const SyntheticObject object = synthetic_object(SyntheticObjectKind::kWateringCan, 1500, 0);
+  const SyntheticSettings defaults;
+  const SyntheticClip clip = synthetic_clip(body, object, {defaults.frames, defaults.frame_rate, 256, 1});
+  REQUIRE(clip.motion.poses.size() == 8);
+  const auto joint_turn = [&](std::size_t a, std::size_t b, Index joint) {
+    return degrees_between(so3_exp(clip.motion.poses[a].rotation_of(joint)),
+                           so3_exp(clip.motion.poses[b].rotation_of(joint)));
+  };
+  const auto root_way = [&](std::size_t a, std::size_t b) {
+    return (clip.motion.poses[a].transl - clip.motion.poses[b].transl).norm();
+  };
+  const auto camera_way = [&](std::size_t a, std::size_t b) {
+    return (camera_center_world(clip.cameras[a]) - camera_center_world(clip.cameras[b])).norm();
+  };
+  const auto camera_turn = [&](std::size_t a, std::size_t b) {
+    return degrees_between(clip.cameras[a].camera_from_world.rotation, clip.cameras[b].camera_from_world.rotation);
+  };
+  for (std::size_t t = 1; t < 8; ++t) {
+    INFO("frame " << t);
+    CHECK(root_way(t - 1, t) <= 0.04);
+    CHECK((clip.object[t].translation - clip.object[t - 1].translation).norm() <= 0.05);
+    CHECK(camera_way(t - 1, t) <= 0.015);
+    CHECK(camera_turn(t - 1, t) <= 0.4);
+    for (Index joint = 0; joint < kSmplxJoints; ++joint) {
+      INFO(body.joint_names[static_cast<std::size_t>(joint)]);
+      CHECK(joint_turn(t - 1, t, joint) <= 12);
+    }
+  }
+  CHECK(root_way(0, 7) > 0.15);
+  CHECK((clip.object[7].translation - clip.object[0].translation).norm() > 0.2);
+  CHECK(degrees_between(clip.object[0].rotation, clip.object[7].rotation) > 15);
+  CHECK(camera_way(0, 7) > 0.09);
+  CHECK(camera_turn(0, 7) > 2);
+  for (const char* name : {"left_knee", "right_shoulder", "left_shoulder", "right_elbow", "right_wrist", "left_index1"}) {
+    INFO(name);
+    CHECK(joint_turn(0, 7, smplx_joint(name)) > 10);
+  }
+}
+
+TEST_CASE("the clip keeps its feet on the floor, its object in reach, and runs on for any number of frames") {
+  const BodyModel body = procedural_body();
+  const SyntheticObject object = synthetic_object(SyntheticObjectKind::kBox, 300, 0);
+  const SyntheticClip clip = synthetic_clip(body, object, {75, 10, 64, 1});
+  const auto start = pose_joints(body, clip.motion.poses[0]);
+  for (std::size_t t = 0; t < 75; ++t) {
+    INFO("frame " << t);
+    const auto joints = pose_joints(body, clip.motion.poses[t]);
+    for (const char* name : {"left_ankle", "right_ankle", "left_foot", "right_foot"}) {
+      const std::size_t joint = static_cast<std::size_t>(smplx_joint(name));
+      CHECK((row(joints, joint) - row(start, joint)).norm() < 1e-9);
+    }
+    CHECK(clip.object[t].translation.z() > 0.7);
+  }
+  for (std::size_t t = 0; t <= 60; ++t) {  // forwards and backwards
+    INFO("frame " << t);
+    CHECK((clip.motion.poses[t].transl - clip.motion.poses[60 - t].transl).norm() < 1e-9);
+  }
+  const Vector3<double> base = clip.object[0].translation - Vector3<double>(0, 0, object.above_ground);
+  CHECK(std::abs(base.z() - clip.room.table_top.z()) < 1e-9);  // it stands on the table
+  CHECK(so3_exp(so3_log(clip.object[0].rotation)).col(2).isApprox(Vector3<double>::UnitZ(), 1e-9));
+}
+
+TEST_CASE("room and object have about as many Gaussians as asked for, all of them sound") {
+  for (const Index most : {kFewestRoomGaussians, Index{3000}, Index{60000}}) {
+    const Gaussians room = synthetic_room(most, {}, 3);
+    INFO(most);
+    CHECK_NOTHROW(check_sizes(room));
+    CHECK(room.count() <= most);
+    if (most > 1000) CHECK(double(room.count()) > 0.85 * double(most));
+    CHECK(std::all_of(room.sh.begin(), room.sh.end(), [](float x) { return std::isfinite(x); }));
+    CHECK(std::all_of(room.log_scales.begin(), room.log_scales.end(), [](float x) { return std::isfinite(x) && x < 1; }));
+    for (std::size_t i = 0; i < room.means.size(); i += 3) {
+      const bool inside = std::abs(room.means[i]) < 2.01F && std::abs(room.means[i + 1]) < 2.01F &&
+                          room.means[i + 2] > -0.01F && room.means[i + 2] < 2.61F;
+      if (!inside) FAIL("a Gaussian outside of the room");
+    }
+  }
+  for (const auto& choice : kSyntheticObjectKinds) {
+    INFO(choice.name);
+    CHECK(synthetic_object(choice.value, kFewestObjectGaussians, 0).gaussians.count() <= kFewestObjectGaussians);
+    CHECK(synthetic_object(choice.value, 1500, 0).gaussians.count() > 1300);
+  }
+}
+
+TEST_CASE("the initial motion is off by about what the settings say") {
+  Motion truth;
+  truth.poses.assign(200, rest_pose(kSmplxJoints));
+  for (BodyPose& pose : truth.poses) pose.set_rotation(4, {0.5, 0.2, -0.1});
+  SyntheticSettings settings;
+  const Motion motion = disturbed_motion(truth, settings);
+  const auto rms = [&](Index first, Index last) {
+    double sum = 0;
+    for (std::size_t t = 1; t < 200; ++t)
+      for (Index joint = first; joint <= last; ++joint)
+        sum += std::pow(degrees_between(so3_exp(truth.poses[t].rotation_of(joint)),
+                                        so3_exp(motion.poses[t].rotation_of(joint))),
+                        2);
+    return std::sqrt(sum / (199.0 * double(last - first + 1)));
+  };
+  CHECK(rms(1, 21) == Approx(8).epsilon(0.05));
+  CHECK(rms(25, 54) == Approx(2).epsilon(0.05));
+  CHECK(rms(0, 0) == Approx(2).epsilon(0.15));
+  CHECK(rms(22, 24) == 0);
+  settings.pose_noise_deg = settings.root_noise_deg = settings.root_noise_m = 0;
+  const Motion same = disturbed_motion(truth, settings);
+  for (std::size_t t = 0; t < 200; ++t) {
+    CHECK(same.poses[t].axis_angle == truth.poses[t].axis_angle);
+    CHECK(same.poses[t].transl == truth.poses[t].transl);
+  }
+}
+
+TEST_CASE("hsi4d synth makes a dataset, and refuses a folder in use") {
+  const TemporaryFolder folder;
+  folder.write("config.json", R"({"synthetic": {"frames": 1, "size_px": 32, "scene_gaussians": 1000,
+    "avatar_gaussians": 300, "object_gaussians": 100}})");
+  const ProgramResult made = run_hsi4d({"synth", "config.json", "--out", "data"});
+  CHECK(made.err.find("rror") == std::string::npos);
+  CHECK(made.out == "data: 1 frame of 32 x 32 pixels with masks and truth\n");
+  REQUIRE(made.status == 0);
+  CHECK(fs::exists("data/frames/0000.png"));
+  const ProgramResult again = run_hsi4d({"synth", "config.json", "--out", "data"});
+  CHECK(again.status == 2);
+  CHECK(again.out.empty());
+  CHECK(again.err == (fs::canonical("data")).string() + ": the folder is not empty; name a new or empty one\n");
+  const ProgramResult wrong = run_hsi4d({"synth", "config.json", "--out", "new", "--set", "synthetic.frames=0"});
+  CHECK(wrong.status == 2);
+  CHECK(wrong.err.find("/synthetic/frames") != std::string::npos);
+  CHECK_FALSE(fs::exists("new"));
+}
