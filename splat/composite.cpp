@@ -85,7 +85,8 @@ struct Composite {
 
   std::uint64_t depth_key(S depth, S rest) const {
     constexpr DepthKey kOwn = std::is_same_v<S, float> ? DepthKey::kFloat : DepthKey::kDouble;
-    if (view.settings.depth_key.value_or(kOwn) == DepthKey::kFloat) return detail::depth_bits(static_cast<float>(depth));
+    if (view.settings.depth_key.value_or(kOwn) == DepthKey::kFloat)
+      return detail::depth_bits(static_cast<float>(depth));
     return detail::depth_bits(static_cast<double>(depth) + static_cast<double>(rest));
   }
 
@@ -139,8 +140,7 @@ struct Composite {
       if (keys[n].index >= 0) keys[drawn++] = keys[n];
     }
     const auto count = static_cast<std::size_t>(drawn);
-    const std::span<const DepthKeyed> order =
-        detail::sort_by_depth(keys.span().first(count), room.span().first(count));
+    const std::span<const DepthKeyed> order = detail::sort_by_depth(keys.span().first(count), room.span().first(count));
     records.resize(drawn);
     extents.resize(drawn);
     parallel_for(drawn, kGrain, [&](Index begin, Index end) {
@@ -270,12 +270,14 @@ struct Composite {
     });
   }
 
-  /// Sums the pairs of a Gaussian in the order of its slots, in double, and adds what they mean to the inputs' gradients.
+  /// Sums the pairs of a Gaussian in the order of its slots, in double, and adds what they mean to the inputs'
+  /// gradients.
   void gather_gaussian(NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index rank) const {
     const Index n = records[rank].index, begin = lists.slot_begin[rank], end = lists.slot_begin[rank + 1];
     const auto sum = [&](Index i) {
       double total = 0;
-      for (Index slot = begin; slot < end; ++slot) total += static_cast<double>(adjoint.sums[slot * adjoint.stride + i]);
+      for (Index slot = begin; slot < end; ++slot)
+        total += static_cast<double>(adjoint.sums[slot * adjoint.stride + i]);
       return total;
     };
     Index place = 0;
@@ -313,8 +315,9 @@ struct Composite {
     }
     if (!io.wants(kFactors)) return;
     double d_v[6];
+    const auto lv = detail::whitened_factor(v, view.settings.blur, conic);
     for (int c = 0; c < 3; ++c) {
-      const double lu = conic.l11 * v[c] + conic.l21 * v[3 + c], lw = conic.l22 * v[3 + c];
+      const double lu = lv[static_cast<std::size_t>(c)], lw = lv[static_cast<std::size_t>(3 + c)];
       const double mu = moments[3] * lu + moments[4] * lw, mw = moments[4] * lu + moments[5] * lw;
       d_v[c] = o * (conic.l11 * mu);
       d_v[3 + c] = o * (conic.l21 * mu + conic.l22 * mw);
@@ -352,8 +355,8 @@ struct Composite {
   }
 
   Index saved_bytes() const {
-    return all_records.capacity_bytes() + all_extents.capacity_bytes() + keys.capacity_bytes() +
-           room.capacity_bytes() + counts.capacity_bytes() + records.capacity_bytes() + extents.capacity_bytes() +
+    return all_records.capacity_bytes() + all_extents.capacity_bytes() + keys.capacity_bytes() + room.capacity_bytes() +
+           counts.capacity_bytes() + records.capacity_bytes() + extents.capacity_bytes() +
            lists.tile_begin.capacity_bytes() + lists.slot_begin.capacity_bytes() + lists.entries.capacity_bytes() +
            last.capacity_bytes() + checkpoint_begin.capacity_bytes() + checkpoints.capacity_bytes() +
            fragments.capacity_bytes();
@@ -377,8 +380,8 @@ Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> 
   HSI4D_CHECK_EQ(features.shape(), shape_of(rows, channels));
   const int tile = view.settings.tile;
   HSI4D_CHECK(tile == 8 || tile == 16, "tile = " + std::to_string(tile) + "; allowed: 8, 16");
-  const std::array inputs = {projected.means_px, projected.factors, projected.depths,
-                             projected.depth_rest, opacities, features};
+  const std::array inputs = {projected.means_px,   projected.factors, projected.depths,
+                             projected.depth_rest, opacities,         features};
   const Index width = view.camera.width, height = view.camera.height;
   const std::array outputs = {image_shape<S>(channels, height, width), image_shape<S>(1, height, width)};
   auto counters = std::make_shared<RenderCounters>();

@@ -1,8 +1,8 @@
 // Vector code of compositing; the mathematics is in splat/composite.h.
 //
-// Pixels of a row are lanes. A Gaussian visits the rows of the tile that its extent meets; what depends on the row alone
-// is computed once: u = l11 dx + (l21 dy), w = l22 dy. Forward and backward get G and α from the same two functions, so
-// that they agree to the last bit on what is composited (row B13).
+// Pixels of a row are lanes. A Gaussian visits the rows of the tile that its extent meets; what depends on the row
+// alone is computed once: u = l11 dx + (l21 dy), w = l22 dy. Forward and backward get G and α from the same two
+// functions, so that they agree to the last bit on what is composited (row B13).
 //
 // The backward pass walks the list from the back in segments. A segment is first replayed from the front (T in front of
 // each Gaussian, and G), starting from T that the forward pass kept: nothing is divided by 1 − α (row B2).
@@ -30,8 +30,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 template <class S, int W>
 using Tag = hn::CappedTag<S, static_cast<size_t>(W)>;
 
-/// eˣ for x ≤ 0 by the method of core/vector_exp.h, within 2 ulp; 0 where the result would not be a normal number, and for
-/// NaN.
+/// eˣ for x ≤ 0 by the method of core/vector_exp.h, within 2 ulp; 0 where the result would not be a normal number, and
+/// for NaN.
 template <class D, class V>
 HWY_INLINE V exp_of_negative(D d, V x) {
   using S = hn::TFromD<D>;

@@ -13,9 +13,9 @@ namespace hsi4d::detail {
 /// What the pixel loops need of a Gaussian.
 template <class S>
 struct SplatRecord {
-  S x, y;           ///< mean, pixels
-  S l11, l21, l22;  ///< see Conic
-  S opacity;        ///< with the antialias factor
+  S x, y;                           ///< mean, pixels
+  S l11, l21, l22;                  ///< see Conic
+  S opacity;                        ///< with the antialias factor
   std::int32_t row_begin, row_end;  ///< pixels
   std::int32_t index;               ///< row of the inputs
 };
