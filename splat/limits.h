@@ -32,6 +32,9 @@ inline constexpr double kNearInria = 0.2;
 /// x/z and y/z of the projection's Jacobian are held within this many half-widths of the view.
 inline constexpr double kFrustumClamp = 1.3;
 
+/// Opacity logits of files are held within ± this: beyond, the sigmoid and its slope are lost (stability B15).
+inline constexpr double kOpacityLogitLimit = 20;
+
 /// Highest degree of the spherical harmonics.
 inline constexpr int kHighestShDegree = 3;
 

@@ -13,6 +13,9 @@
 #include "core/suggest.h"
 #include "core/version.h"
 #include "pipelines/cli/commands.h"
+#include "pipelines/cli/gradients_command.h"
+#include "pipelines/cli/info_command.h"
+#include "pipelines/cli/render_command.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -32,9 +35,11 @@ int complain(const Failure& failure) {
 /// The subcommands with their arguments; `run` is what the chosen one does.
 struct CommandLine {
   CLI::App app{"4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d"};
-  std::string config, topic;
+  std::string config, topic, file;
   std::vector<std::string> overrides;
   bool print_config = false;
+  RenderOptions render;
+  GradientsOptions gradients;
   std::function<std::string()> run;
 
   explicit CommandLine(const std::vector<LossDescription>& losses) {
@@ -55,6 +60,13 @@ struct CommandLine {
     CLI::App* list = app.add_subcommand("list", "List what configs can name: losses, settings");
     list->add_option("TOPIC", topic, "losses or settings")->required();
     list->callback([this, &losses] { run = [this, &losses] { return list_command(topic, losses); }; });
+
+    CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
+    info->add_option("FILE", file, "A .ply, .npz, .npy, .json, .png, .jpg or .exr file")->required();
+    info->callback([this] { run = [this] { return info_command(file); }; });
+
+    add_render();
+    add_gradients();
   }
 
   std::vector<std::string> command_names() {
@@ -65,12 +77,57 @@ struct CommandLine {
   }
 
  private:
-  void add_overrides(CLI::App& command) {
-    command.add_option("--set", overrides, "Change one setting: render.blur=0.1. The value is JSON, or else text")
-        ->type_name("KEY=VALUE")
+  void add_render() {
+    CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image");
+    add_scene(command, render.shared);
+    add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
+        ->type_name("F.ply");
+    command.add_option("--motion", render.motion, "Motion of a body that is drawn too")->type_name("M.npz");
+    command.add_option("--frame", render.frame, "Frame of the motion, from 0")->type_name("I");
+    command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.npz");
+    command.add_option("--out", render.out, "Where to: 8-bit PNG, OpenEXR, or arrays image, alpha, depth")
+        ->type_name("F.{png,exr,npz}")
+        ->required();
+    command.callback([this] { run = [this] { return render_command(render); }; });
+  }
+
+  void add_gradients() {
+    CLI::App& command = *app.add_subcommand("gradients", "Differentiate the difference of a render from an image");
+    add_scene(command, gradients.shared);
+    command.add_option("--target", gradients.target, "The image to compare with")
+        ->type_name("F.{exr,png,npz}")
+        ->required();
+    command.add_option("--out", gradients.out, "Where loss and gradients go")->type_name("F.npz")->required();
+    command.callback([this] { run = [this] { return gradients_command(gradients); }; });
+  }
+
+  void add_scene(CLI::App& command, SceneOptions& options) {
+    command.add_option("--scene", options.scene, "Gaussians")->type_name("F.ply")->required();
+    command.add_option("--camera", options.camera, "A camera, or nerfstudio's transforms.json")
+        ->type_name("C.json")
+        ->required();
+    command.add_option("--camera-frame", options.camera_frame, "Which camera of a file with several, from 0")
+        ->type_name("I");
+    command.add_option("--background", options.background, "Colour behind everything; black without")
+        ->type_name("r,g,b");
+    command.add_option("--precision", options.precision, "float, double, or reference: brute force in double")
+        ->type_name("WORD");
+    add_several(command, "--set", options.settings, "Change a setting of the renderer: render.blur=0.1")
+        ->type_name("render.KEY=VALUE");
+  }
+
+  /// An option that may be given several times, with one value each time.
+  static CLI::Option* add_several(CLI::App& command, const std::string& name, std::vector<std::string>& values,
+                                  const std::string& description) {
+    return command.add_option(name, values, description)
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
         ->allow_extra_args(false);
+  }
+
+  void add_overrides(CLI::App& command) {
+    add_several(command, "--set", overrides, "Change one setting: render.blur=0.1. The value is JSON, or else text")
+        ->type_name("KEY=VALUE");
   }
 };
 

@@ -1,0 +1,30 @@
+// Rotation matrices of arrays of joints, from axis-angle vectors and from pairs of columns ("6D").
+//
+// Each row is one call of so3_exp (core/rotation.h) or rotation_from_6d (core/rotation_6d.h), value and adjoint, so
+// nothing is special at the identity, near half a turn or at parallel columns.
+#pragma once
+
+#include "autodiff/tape.h"
+
+namespace hsi4d {
+
+/// R_j = exp(w_j), Rodrigues' formula with coefficients that are functions of |w|² (rows C1-C4).
+///
+/// @param axis_angle  [J,3] radians
+/// @return            [J,9] rotation matrices, row-major
+/// Adjoint: axis_angle; at 0 it is that of the generators, neither 0 nor NaN.
+/// Throws InternalError when the rows are not of 3.
+template <class S>
+Var<S> rotations_from_axis_angle(Var<S> axis_angle, Source where = Source::current());
+
+/// R_j = [b1 b2 b3] of two columns a, b by Gram and Schmidt. [Zhou et al. 2019, section B; rows C9]
+///
+/// @param columns  [J,6], (a, b): a = x[0..2], b = x[3..5], any lengths
+/// @return         [J,9] rotation matrices, row-major; a rotation in every case
+/// Adjoint: columns. None to a column that had to be replaced (zero, not finite, or b parallel to a within
+/// kParallel6d). Which ones were is part of the signature, so that a gradient check can tell. Throws InternalError when
+/// the rows are not of 6.
+template <class S>
+Var<S> rotations_from_6d(Var<S> columns, Source where = Source::current());
+
+}  // namespace hsi4d

@@ -1,0 +1,138 @@
+#include "body/avatar.h"
+
+#include <cmath>
+
+#include "core/npz.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr const char* kFormat = "hsi4d avatar";
+
+std::vector<float> finite_numbers(const Npz& file, const char* name, std::initializer_list<int64_t> shape) {
+  const NpyArray& array = file.array(name);
+  std::vector<float> numbers = array.require_shape(shape).as<float>();
+  const std::size_t width = shape.size() < 2 ? 1 : static_cast<std::size_t>(*(shape.begin() + 1));
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (std::isfinite(numbers[i])) continue;
+    throw DataError(array.source() + ": row " + std::to_string(i / width) + ", number " + std::to_string(i % width) +
+                    " is not finite");
+  }
+  return numbers;
+}
+
+void check_format(const Npz& file) {
+  if (!file.has("format")) throw DataError(file.source() + ": there is no array 'format'; this is no avatar");
+  const std::string format = file.array("format").text();
+  if (format != kFormat) {
+    throw DataError(file.source() + ": the format is '" + format + "'; allowed: '" + kFormat + "'");
+  }
+  const auto version = file.array("version").scalar<int64_t>();
+  if (version >= 1 && version <= kAvatarVersion) return;
+  throw DataError(file.source() + ": the format's version is " + std::to_string(version) + "; allowed: 1 to " +
+                  std::to_string(kAvatarVersion) + (version > 1 ? " (the file is from a newer program)" : ""));
+}
+
+void check_quaternions(const NpyArray& array, const std::vector<float>& quats) {
+  for (std::size_t i = 0; i < quats.size(); i += 4) {
+    if (quats[i] != 0 || quats[i + 1] != 0 || quats[i + 2] != 0 || quats[i + 3] != 0) continue;
+    throw DataError(array.source() + ": row " + std::to_string(i / 4) + " is zero, which is no rotation");
+  }
+}
+
+void read_skeleton(const Npz& file, Avatar& avatar) {
+  const NpyArray& parents = file.array("parents");
+  avatar.parents = parents.require_shape({-1}).as<std::int32_t>();
+  const std::string fault = tree_fault(avatar.parents);
+  if (!fault.empty()) throw DataError(parents.source() + ": " + fault);
+  const NpyArray& joints = file.array("joints");
+  avatar.joints = joints.require_shape({avatar.joint_count(), 3}).as<double>();
+  for (std::size_t i = 0; i < avatar.joints.size(); ++i) {
+    if (std::isfinite(avatar.joints[i])) continue;
+    throw DataError(joints.source() + ": row " + std::to_string(i / 3) + ", number " + std::to_string(i % 3) +
+                    " is not finite");
+  }
+  avatar.joint_names = file.array("joint_names").require_shape({avatar.joint_count()}).strings();
+}
+
+void read_weights(const Npz& file, Index count, Avatar& avatar) {
+  const NpyArray& indices = file.array("weight_indices");
+  const int64_t per_gaussian = indices.require_shape({count, -1}).shape()[1];
+  if (per_gaussian < 1 || per_gaussian > kMaxWeightsPerVertex) {
+    throw DataError(indices.source() + ": has shape " + shape_text(indices.shape()) +
+                    "; allowed: 1 to 8 weights a Gaussian");
+  }
+  const NpyArray& weights = file.array("weights");
+  avatar.weights = normalized_weights({count, avatar.joint_count(), per_gaussian, indices.as<std::int32_t>(),
+                                       weights.require_shape({count, per_gaussian}).as<double>()},
+                                      weights.source());
+}
+
+Avatar avatar_of(const Npz& file) {
+  check_format(file);
+  Avatar avatar;
+  avatar.means = finite_numbers(file, "means", {-1, 3});
+  const int64_t count = file.array("means").shape()[0];
+  avatar.quats = finite_numbers(file, "quats", {count, 4});
+  check_quaternions(file.array("quats"), avatar.quats);
+  avatar.log_scales = finite_numbers(file, "log_scales", {count, 3});
+  avatar.opacity_logits = finite_numbers(file, "opacity_logits", {count});
+  avatar.colors = finite_numbers(file, "colors", {count, 3});
+  read_skeleton(file, avatar);
+  read_weights(file, count, avatar);
+  return avatar;
+}
+
+}  // namespace
+
+PosedJoints pose_skeleton(const Avatar& avatar, const BodyPose& pose) {
+  return pose_skeleton(avatar.parents, avatar.joints, pose);
+}
+
+std::vector<double> pose_joints(const Avatar& avatar, const BodyPose& pose) {
+  return pose_joints(avatar.parents, avatar.joints, pose);
+}
+
+void check_sizes(const Avatar& avatar) {
+  const std::size_t n = avatar.opacity_logits.size(), j = avatar.parents.size();
+  HSI4D_CHECK_EQ(avatar.means.size(), 3 * n);
+  HSI4D_CHECK_EQ(avatar.quats.size(), 4 * n);
+  HSI4D_CHECK_EQ(avatar.log_scales.size(), 3 * n);
+  HSI4D_CHECK_EQ(avatar.colors.size(), 3 * n);
+  HSI4D_CHECK_EQ(avatar.weights.vertices, avatar.count());
+  HSI4D_CHECK_EQ(avatar.weights.joints, avatar.joint_count());
+  HSI4D_CHECK_EQ(static_cast<Index>(avatar.weights.indices.size()), avatar.count() * avatar.weights.per_vertex);
+  HSI4D_CHECK_EQ(static_cast<Index>(avatar.weights.weights.size()), avatar.count() * avatar.weights.per_vertex);
+  HSI4D_CHECK_EQ(avatar.joints.size(), 3 * j);
+  HSI4D_CHECK_EQ(avatar.joint_names.size(), j);
+  const std::string fault = tree_fault(avatar.parents);
+  HSI4D_CHECK(fault.empty(), fault);
+}
+
+Avatar read_avatar(const std::string& path) { return avatar_of(Npz::read(path)); }
+
+Avatar decode_avatar(std::span<const std::uint8_t> file, const std::string& name) {
+  return avatar_of(Npz::decode(file, name));
+}
+
+void write_avatar(const std::string& path, const Avatar& avatar) {
+  check_sizes(avatar);
+  NpzWriter file;
+  const int64_t n = avatar.count(), k = avatar.weights.per_vertex, j = avatar.joint_count();
+  file.add_text("format", kFormat);
+  file.add_scalar<std::int32_t>("version", kAvatarVersion);
+  file.add<float>("means", {n, 3}, avatar.means);
+  file.add<float>("quats", {n, 4}, avatar.quats);
+  file.add<float>("log_scales", {n, 3}, avatar.log_scales);
+  file.add<float>("opacity_logits", {n}, avatar.opacity_logits);
+  file.add<float>("colors", {n, 3}, avatar.colors);
+  file.add<std::int32_t>("weight_indices", {n, k}, avatar.weights.indices);
+  file.add<double>("weights", {n, k}, avatar.weights.weights);
+  file.add<std::int32_t>("parents", {j}, avatar.parents);
+  file.add<double>("joints", {j, 3}, avatar.joints);
+  file.add_texts("joint_names", avatar.joint_names);
+  file.write(path);
+}
+
+}  // namespace hsi4d

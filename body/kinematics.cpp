@@ -1,0 +1,187 @@
+#include "body/kinematics.h"
+
+#include "core/rotation.h"
+
+namespace hsi4d {
+
+namespace {
+
+using Vector = Vector3<double>;
+using Matrix = Matrix3<double>;
+
+template <class S>
+Vector vector_at(const S* x) {
+  return {static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])};
+}
+
+template <class S>
+Matrix matrix_at(const S* x) {
+  Matrix m;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) m(r, c) = static_cast<double>(x[3 * r + c]);
+  }
+  return m;
+}
+
+/// Rotation and position of a joint, or their cotangents: plain numbers, which buffers hold.
+struct Pose {
+  double rotation_rows[9];
+  double position_numbers[3];
+
+  auto rotation() { return Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation_rows); }
+  auto rotation() const { return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation_rows); }
+  auto position() { return Eigen::Map<Vector>(position_numbers); }
+  auto position() const { return Eigen::Map<const Vector>(position_numbers); }
+};
+
+/// p_j, R_j of all joints.
+template <class S>
+void run_chain(std::span<const int> parents, const double* rest, const S* rotations, Pose* poses) {
+  poses[0].rotation() = matrix_at(rotations);
+  poses[0].position() = vector_at(rest);
+  for (std::size_t j = 1; j < parents.size(); ++j) {
+    const auto q = static_cast<std::size_t>(parents[j]);
+    const Vector bone = vector_at(rest + 3 * j) - vector_at(rest + 3 * q);
+    poses[j].rotation().noalias() = poses[q].rotation() * matrix_at(rotations + 9 * j);
+    poses[j].position() = poses[q].position() + poses[q].rotation() * bone;
+  }
+}
+
+/// A_j and the joint, each rounded to S once.
+template <class S>
+void put_joint(const Pose& pose, const Vector& rest, const Vector& transl, S* transform, S* joint) {
+  const Vector offset = (pose.position() - pose.rotation() * rest) + transl;
+  const Vector place = pose.position() + transl;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) transform[4 * r + c] = static_cast<S>(pose.rotation_rows[3 * r + c]);
+    transform[4 * r + 3] = static_cast<S>(offset[r]);
+    joint[r] = static_cast<S>(place[r]);
+  }
+}
+
+template <class S>
+struct KinematicChain {
+  static constexpr const char* kName = "kinematic_chain";
+  std::vector<int> parents;
+  std::vector<double> rest;
+  Buffer<Pose> poses = {};  // R_j and p_j, which the adjoint needs
+
+  Index joints() const { return static_cast<Index>(parents.size()); }
+  Index saved_bytes() const { return poses.capacity_bytes(); }
+
+  void forward(NodeIo<S>& io) {
+    const Vector transl = vector_at(io.in(1).data);
+    poses.resize(joints());
+    run_chain(parents, rest.data(), io.in(0).data, poses.data());
+    for (Index j = 0; j < joints(); ++j) {
+      put_joint(poses[j], vector_at(rest.data() + 3 * j), transl, io.out(0).row(j), io.out(1).row(j));
+    }
+  }
+
+  /// Cotangents of R_j and p_j as the outputs give them.
+  void seed(NodeIo<S>& io, Pose* d) const {
+    const ConstArray<S> d_transforms = io.d_out(0), d_joints = io.d_out(1);
+    for (Index j = 0; j < joints(); ++j) {
+      d[j] = {};
+      if (d_transforms) {
+        const S* g = d_transforms.row(j);
+        const Vector d_offset(static_cast<double>(g[3]), static_cast<double>(g[7]), static_cast<double>(g[11]));
+        const Vector r = vector_at(rest.data() + 3 * j);
+        for (int row = 0; row < 3; ++row) {
+          for (int c = 0; c < 3; ++c) {
+            d[j].rotation_rows[3 * row + c] = static_cast<double>(g[4 * row + c]) - d_offset[row] * r[c];
+          }
+        }
+        d[j].position() = d_offset;
+      }
+      if (d_joints) d[j].position() += vector_at(d_joints.row(j));
+    }
+  }
+
+  void backward(NodeIo<S>& io) {
+    Pose* d = io.template scratch<Pose>(joints()).data();
+    seed(io, d);
+    if (io.wants(1)) {
+      Vector d_transl = Vector::Zero();
+      for (Index j = 0; j < joints(); ++j) d_transl += d[j].position();
+      for (int i = 0; i < 3; ++i) io.d_in(1).data[i] += static_cast<S>(d_transl[i]);
+    }
+    if (!io.wants(0)) return;
+    for (Index j = joints(); j-- > 0;) {  // children before parents
+      const bool root = j == 0;
+      const Index q = root ? 0 : parents[static_cast<std::size_t>(j)];
+      const Matrix d_local = root ? d[j].rotation() : Matrix(poses[q].rotation().transpose() * d[j].rotation());
+      S* d_rotation = io.d_in(0).row(j);
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) d_rotation[3 * r + c] += static_cast<S>(d_local(r, c));
+      }
+      if (root) continue;
+      const Vector bone = vector_at(rest.data() + 3 * j) - vector_at(rest.data() + 3 * q);
+      d[q].rotation() += d[j].rotation() * matrix_at(io.in(0).row(j)).transpose() + d[j].position() * bone.transpose();
+      d[q].position() += d[j].position();
+    }
+  }
+};
+
+void check_skeleton(std::span<const int> parents, std::span<const double> rest_joints) {
+  HSI4D_CHECK_EQ(rest_joints.size(), 3 * parents.size());
+  const std::string fault = tree_fault(parents);
+  HSI4D_CHECK(fault.empty(), fault);
+}
+
+}  // namespace
+
+template <class S>
+PosedSkeleton<S> kinematic_chain(Var<S> rotations, Var<S> transl, std::vector<int> parents,
+                                 std::vector<double> rest_joints, Source where) {
+  check_skeleton(parents, rest_joints);
+  const Index joints = static_cast<Index>(parents.size());
+  HSI4D_CHECK_EQ(rotations.shape(), shape_of(joints, 9));
+  HSI4D_CHECK_EQ(transl.shape(), shape_of(1, 3));
+  Tape<S>& tape = rotations.owner();
+  const Var<S> transforms =
+      tape.record(KinematicChain<S>{std::move(parents), std::move(rest_joints)}, std::array{rotations, transl},
+                  std::array{shape_of(joints, 12), shape_of(joints, 3)}, where);
+  return {transforms, tape.output(transforms, 1)};
+}
+
+PosedJoints pose_skeleton(std::span<const int> parents, std::span<const double> rest_joints, const BodyPose& pose) {
+  check_skeleton(parents, rest_joints);
+  HSI4D_CHECK_EQ(pose.axis_angle.size(), 3 * parents.size());
+  std::vector<double> rotations(9 * parents.size());
+  for (std::size_t j = 0; j < parents.size(); ++j) {
+    const Matrix r = so3_exp(pose.rotation_of(static_cast<Index>(j)));
+    for (int row = 0; row < 3; ++row) {
+      for (int c = 0; c < 3; ++c) rotations[9 * j + static_cast<std::size_t>(3 * row + c)] = r(row, c);
+    }
+  }
+  std::vector<Pose> poses(parents.size());
+  run_chain(parents, rest_joints.data(), rotations.data(), poses.data());
+  PosedJoints posed{std::vector<double>(12 * parents.size()), std::vector<double>(3 * parents.size())};
+  for (std::size_t j = 0; j < parents.size(); ++j) {
+    put_joint(poses[j], vector_at(rest_joints.data() + 3 * j), pose.transl, posed.transforms.data() + 12 * j,
+              posed.joints.data() + 3 * j);
+  }
+  return posed;
+}
+
+PosedJoints pose_skeleton(const BodyModel& body, const BodyPose& pose) {
+  return pose_skeleton(body.parents, body.joints, pose);
+}
+
+std::vector<double> pose_joints(std::span<const int> parents, std::span<const double> rest_joints,
+                                const BodyPose& pose) {
+  return pose_skeleton(parents, rest_joints, pose).joints;
+}
+
+std::vector<double> pose_joints(const BodyModel& body, const BodyPose& pose) {
+  return pose_joints(body.parents, body.joints, pose);
+}
+
+#define HSI4D_INSTANTIATE(S) \
+  template PosedSkeleton<S> kinematic_chain(Var<S>, Var<S>, std::vector<int>, std::vector<double>, Source);
+HSI4D_INSTANTIATE(float)
+HSI4D_INSTANTIATE(double)
+#undef HSI4D_INSTANTIATE
+
+}  // namespace hsi4d

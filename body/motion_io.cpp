@@ -1,0 +1,177 @@
+#include "body/motion_io.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "body/body_model.h"
+#include "core/npz.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// A run of joints that files keep in an array of its own.
+struct Part {
+  const char* name;  // of AMASS; also what is written
+  const char* also;  // another name that is read
+  std::size_t joint, joints;
+  bool needed;
+};
+
+constexpr Part kParts[] = {
+    {"root_orient", "global_orient", 0, 1, true}, {"pose_body", "body_pose", 1, 21, true},
+    {"pose_jaw", "jaw_pose", 22, 1, false},       {"pose_eye", "eye_pose", 23, 2, false},
+    {"pose_hand", "hand_pose", 25, 30, false},
+};
+
+/// What the numbers of a row of `poses` are: runs of joints, one after the other.
+struct RowLayout {
+  const char* name;
+  int64_t numbers;
+  struct Run {
+    std::size_t from, to, joints;
+  };
+  std::vector<Run> runs;
+};
+
+const std::vector<RowLayout>& row_layouts() {
+  static const std::vector<RowLayout> layouts = {
+      {"SMPL-X", 165, {{0, 0, 55}}},
+      {"SMPL-H", 156, {{0, 0, 22}, {22, 25, 30}}},
+      {"SMPL", 72, {{0, 0, 22}}},
+  };
+  return layouts;
+}
+
+struct Rows {
+  std::vector<double> numbers;
+  std::size_t width;
+  double at(std::size_t frame, std::size_t i) const { return numbers[frame * width + i]; }
+};
+
+void require_finite(const NpyArray& array, const std::vector<double>& numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (std::isfinite(numbers[i])) continue;
+    const std::size_t width = static_cast<std::size_t>(array.shape().empty() ? 1 : array.shape().back());
+    throw DataError(array.source() + ": frame " + std::to_string(i / width) + ", number " + std::to_string(i % width) +
+                    " is not finite");
+  }
+}
+
+Rows rows_of(const NpyArray& array, int64_t frames, int64_t width) {
+  Rows rows{array.require_shape({frames, width}).as<double>(), static_cast<std::size_t>(width)};
+  require_finite(array, rows.numbers);
+  return rows;
+}
+
+const NpyArray* find(const Npz& file, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    if (file.has(name)) return &file.array(name);
+  }
+  return nullptr;
+}
+
+void put_joints(const Rows& rows, std::size_t from, std::size_t to, std::size_t joints, Motion& motion) {
+  for (std::size_t t = 0; t < motion.poses.size(); ++t) {
+    for (std::size_t i = 0; i < 3 * joints; ++i) motion.poses[t].axis_angle[3 * to + i] = rows.at(t, 3 * from + i);
+  }
+}
+
+void read_whole_poses(const NpyArray& array, Motion& motion) {
+  const int64_t frames = static_cast<int64_t>(motion.poses.size());
+  const auto& shape = array.shape();
+  std::string allowed;
+  for (const RowLayout& layout : row_layouts()) {
+    if (shape.size() == 2 && shape[0] == frames && shape[1] == layout.numbers) {
+      const Rows rows = rows_of(array, frames, layout.numbers);
+      for (const auto& run : layout.runs) put_joints(rows, run.from, run.to, run.joints, motion);
+      return;
+    }
+    allowed += (allowed.empty() ? "" : ", ") + shape_text(std::vector<int64_t>{frames, layout.numbers}) + " (" +
+               layout.name + ")";
+  }
+  throw DataError(array.source() + ": has shape " + shape_text(shape) + "; allowed: " + allowed);
+}
+
+void read_parts(const Npz& file, Motion& motion) {
+  for (const Part& part : kParts) {
+    const NpyArray* array = find(file, {part.name, part.also});
+    if (array == nullptr && !part.needed) continue;
+    if (array == nullptr) {
+      throw DataError(file.source() + ": there is neither 'poses' nor '" + part.name + "'");
+    }
+    const int64_t width = static_cast<int64_t>(3 * part.joints);
+    put_joints(rows_of(*array, static_cast<int64_t>(motion.poses.size()), width), 0, part.joint, part.joints, motion);
+  }
+}
+
+double read_frame_rate(const Npz& file) {
+  const NpyArray* array = find(file, {"mocap_frame_rate", "mocap_framerate"});
+  if (array == nullptr) return Motion{}.frame_rate;
+  const double rate = array->scalar<double>();
+  if (!(rate > 0) || !std::isfinite(rate)) {
+    throw DataError(array->source() + ": is " + std::to_string(rate) + "; allowed: a positive number");
+  }
+  return rate;
+}
+
+Motion motion_of(const Npz& file) {
+  const NpyArray* trans = find(file, {"trans", "transl"});
+  if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'");
+  const int64_t frames = trans->require_shape({-1, 3}).shape()[0];
+  if (frames == 0) throw DataError(trans->source() + ": holds no frame");
+  const Rows places = rows_of(*trans, frames, 3);
+  Motion motion;
+  motion.frame_rate = read_frame_rate(file);
+  motion.poses.assign(static_cast<std::size_t>(frames), rest_pose(kSmplxJoints));
+  for (std::size_t t = 0; t < motion.poses.size(); ++t) {
+    motion.poses[t].transl = {places.at(t, 0), places.at(t, 1), places.at(t, 2)};
+  }
+  if (file.has("poses")) {
+    read_whole_poses(file.array("poses"), motion);
+  } else {
+    read_parts(file, motion);
+  }
+  return motion;
+}
+
+void add_joints(NpzWriter& file, const char* name, const Motion& motion, std::size_t first, std::size_t joints) {
+  std::vector<double> numbers;
+  for (const BodyPose& pose : motion.poses) {
+    const auto begin = pose.axis_angle.begin() + static_cast<std::ptrdiff_t>(3 * first);
+    numbers.insert(numbers.end(), begin, begin + static_cast<std::ptrdiff_t>(3 * joints));
+  }
+  file.add<double>(name, {static_cast<int64_t>(motion.poses.size()), static_cast<int64_t>(3 * joints)}, numbers);
+}
+
+}  // namespace
+
+Motion read_motion(const std::string& path) { return motion_of(Npz::read(path)); }
+
+Motion decode_motion(std::span<const std::uint8_t> file, const std::string& name) {
+  return motion_of(Npz::decode(file, name));
+}
+
+void write_motion(const std::string& path, const Motion& motion) {
+  HSI4D_CHECK(!motion.poses.empty(), "a motion without frames");
+  HSI4D_CHECK(motion.frame_rate > 0 && std::isfinite(motion.frame_rate), std::to_string(motion.frame_rate) + " Hz");
+  std::vector<double> trans;
+  for (const BodyPose& pose : motion.poses) {
+    HSI4D_CHECK_EQ(pose.axis_angle.size(), static_cast<std::size_t>(3 * kSmplxJoints));
+    for (int i = 0; i < 3; ++i) trans.push_back(pose.transl[i]);
+  }
+  NpzWriter file;
+  const int64_t frames = static_cast<int64_t>(motion.poses.size());
+  file.add<double>("trans", {frames, 3}, trans);
+  add_joints(file, "poses", motion, 0, static_cast<std::size_t>(kSmplxJoints));
+  for (const Part& part : kParts) add_joints(file, part.name, motion, part.joint, part.joints);
+  file.add<double>("betas", {10}, std::vector<double>(10, 0.0));
+  file.add_text("gender", "neutral");
+  file.add_text("surface_model_type", "smplx");
+  file.add_scalar("mocap_frame_rate", motion.frame_rate);
+  file.add_scalar("mocap_time_length", static_cast<double>(frames) / motion.frame_rate);
+  file.write(path);
+}
+
+}  // namespace hsi4d

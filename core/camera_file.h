@@ -1,0 +1,39 @@
+// Cameras in JSON files.
+//
+//   {"width", "height", "fx", "fy", "cx", "cy", "world_to_camera": 4×4 rows}            one camera
+//   {"format": "hsi4d cameras", "version": 1, "cameras": [{...}, ...]}                 several
+//   {"w", "h", "fl_x", "fl_y", "cx", "cy", "frames": [{"transform_matrix": 4×4, ...}]}  nerfstudio's transforms.json
+//
+// The first two are used as given. Unknown keys are errors in them and passed over in the third, whose intrinsics may
+// also stand in a frame, and whose matrices take OpenGL camera axes (y up, z backward) to the world.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+
+namespace hsi4d {
+
+/// Camera `frame` of a file of any of the three kinds, counted from 0 in the file's order.
+///
+/// Throws UserError naming file, line, JSON pointer, value and what is allowed: a file that cannot be read, is not
+/// such JSON, or holds cameras that check_camera refuses or that distort; a frame that is not there.
+Camera read_camera(const std::string& path, int frame = 0);
+
+/// All cameras of a file of any of the three kinds. Errors as read_camera.
+std::vector<Camera> read_cameras(const std::string& path);
+
+/// As read_cameras, of text in memory.
+/// @param name  what error messages call it
+std::vector<Camera> decode_cameras(const std::string& text, const std::string& name);
+
+/// Writes one camera, so that reading gives the same bits; in one step. Throws UserError for one that check_camera
+/// refuses, and when the path cannot be written.
+void write_camera(const std::string& path, const Camera& camera);
+
+/// Writes a list of cameras. As write_camera.
+void write_cameras(const std::string& path, std::span<const Camera> cameras);
+
+}  // namespace hsi4d

@@ -1,0 +1,95 @@
+#include "pipelines/cli/scene_options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/config_file.h"
+#include "core/log.h"
+#include "core/suggest.h"
+#include "pipelines/cli/text.h"
+
+namespace hsi4d::cli {
+namespace {
+
+/// The part of a config that these commands read.
+struct RenderSection {
+  RenderSettings render;
+};
+
+void describe(ConfigFields& f, RenderSection& s) { f.object("render", s.render, "How Gaussians become pixels"); }
+
+Precision parse_precision(const std::string& word, const std::string& where) {
+  std::vector<std::string> known;
+  for (const ConfigChoice<Precision>& choice : kPrecisions) {
+    if (word == choice.name) return choice.value;
+    known.emplace_back(choice.name);
+  }
+  throw UserError(where + ": \"" + word + "\" is no precision; allowed: " + joined(known) + did_you_mean(word, known));
+}
+
+}  // namespace
+
+RenderSettings render_settings(const std::vector<std::string>& overrides) {
+  ConfigProblems problems;
+  const ConfigValue tree = config_from_overrides(overrides, problems);
+  RenderSection section;
+  ConfigFields fields;
+  describe(fields, section);
+  read_config(tree, fields, problems);
+  problems.throw_if_any();
+  return section.render;
+}
+
+std::array<double, 3> parse_color(const std::string& text, const std::string& where) {
+  const auto refuse = [&] {
+    return UserError(where + ": \"" + text + "\" is no colour; allowed: three numbers r,g,b, for example 0.5,0.5,0.5");
+  };
+  std::array<double, 3> color{};
+  const char* at = text.data();
+  const char* end = text.data() + text.size();
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto done = std::from_chars(at, end, color[c]);
+    if (done.ec != std::errc() || !std::isfinite(color[c])) throw refuse();
+    at = done.ptr;
+    if (c < 2 && (at == end || *at++ != ',')) throw refuse();
+  }
+  if (at != end) throw refuse();
+  return color;
+}
+
+SceneView view_of(const SceneOptions& options, const std::string& command) {
+  SceneView view;
+  view.background = parse_color(options.background, command + ": --background");
+  view.precision = parse_precision(options.precision, command + ": --precision");
+  view.settings = render_settings(options.settings);
+  view.camera = read_camera(options.camera, options.camera_frame);
+  return view;
+}
+
+PlyScene read_scene(const std::string& path) {
+  PlyScene scene = read_ply(path);
+  const std::string text = summary_text(scene.report);
+  if (!text.empty()) log_warning(path + ": " + text);
+  return scene;
+}
+
+void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,
+                 const std::vector<double>& values) {
+  if (precision == Precision::kFloat) {
+    const std::vector<float> rounded(values.begin(), values.end());
+    npz.add<float>(name, shape, rounded);
+  } else {
+    npz.add<double>(name, shape, values);
+  }
+}
+
+std::string check_ending(const std::string& path, const std::string& where, const std::vector<std::string>& allowed) {
+  const std::string ending = file_ending(path);
+  if (std::find(allowed.begin(), allowed.end(), ending) != allowed.end()) return ending;
+  throw UserError(where + ": " + path + " does not end as it must; allowed: " + joined(allowed));
+}
+
+}  // namespace hsi4d::cli

@@ -1,0 +1,47 @@
+// What `hsi4d render` and `hsi4d gradients` share: options, and how they become a scene and a view.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/npz.h"
+#include "pipelines/scene_render.h"
+#include "splat/io_ply.h"
+
+namespace hsi4d::cli {
+
+/// Options as they stand on the command line.
+struct SceneOptions {
+  std::string scene;                  ///< --scene F.ply
+  std::string camera;                 ///< --camera C.json
+  int camera_frame = 0;               ///< --camera-frame I, of a file with several
+  std::string background = "0,0,0";   ///< --background r,g,b
+  std::string precision = "float";    ///< --precision float|double|reference
+  std::vector<std::string> settings;  ///< --set render.KEY=VALUE
+};
+
+/// The camera, colours and settings that the options name.
+///
+/// @param command  "hsi4d render", which messages begin with
+/// Throws UserError that names the option, its value and what is allowed; and what read_camera throws. Settings have
+/// the messages of a config's overrides.
+SceneView view_of(const SceneOptions& options, const std::string& command);
+
+/// Render settings from KEY=VALUE pairs, each of which begins with "render."; all problems in one UserError.
+RenderSettings render_settings(const std::vector<std::string>& overrides);
+
+/// Three finite numbers "r,g,b". @param where  starts the message: "hsi4d render: --background"
+std::array<double, 3> parse_color(const std::string& text, const std::string& where);
+
+/// Gaussians of a file; what the reader left out or put right goes to the log as a warning.
+PlyScene read_scene(const std::string& path);
+
+/// Adds an array of numbers, float32 where the precision is float, else float64.
+void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,
+                 const std::vector<double>& values);
+
+/// Throws UserError unless the path ends in one of `allowed`. Returns the ending.
+std::string check_ending(const std::string& path, const std::string& where, const std::vector<std::string>& allowed);
+
+}  // namespace hsi4d::cli
