@@ -68,8 +68,8 @@ void run(benchmark::State& state) {
   const RenderCounters& counters = *scene.rendered.counters;
   state.counters["pairs"] = static_cast<double>(counters.pairs);
   state.counters["fragments"] = static_cast<double>(counters.fragments);
-  state.counters["fragments/s"] = benchmark::Counter(static_cast<double>(counters.fragments),
-                                                     benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["fragments/s"] =
+      benchmark::Counter(static_cast<double>(counters.fragments), benchmark::Counter::kIsIterationInvariantRate);
 }
 BENCHMARK(run<float>)
     ->Name("render")

@@ -154,6 +154,8 @@ Motion decode_motion(std::span<const std::uint8_t> file, const std::string& name
 }
 
 void write_motion(const std::string& path, const Motion& motion) {
+  HSI4D_CHECK(!motion.poses.empty(), "a motion without frames");
+  HSI4D_CHECK(motion.frame_rate > 0 && std::isfinite(motion.frame_rate), std::to_string(motion.frame_rate) + " Hz");
   std::vector<double> trans;
   for (const BodyPose& pose : motion.poses) {
     HSI4D_CHECK_EQ(pose.axis_angle.size(), static_cast<std::size_t>(3 * kSmplxJoints));

@@ -65,7 +65,7 @@ struct Composite {
   Buffer<Extent> extents = {};
   TileLists lists = {};
   // What the backward pass needs of every tile.
-  Buffer<std::int32_t> last = {};
+  Buffer<detail::ListPosition<S>> last = {};
   Buffer<Index> checkpoint_begin = {};
   Buffer<S> checkpoints = {};
   Buffer<Index> fragments = {};
@@ -85,7 +85,8 @@ struct Composite {
 
   std::uint64_t depth_key(S depth, S rest) const {
     constexpr DepthKey kOwn = std::is_same_v<S, float> ? DepthKey::kFloat : DepthKey::kDouble;
-    if (view.settings.depth_key.value_or(kOwn) == DepthKey::kFloat) return detail::depth_bits(static_cast<float>(depth));
+    if (view.settings.depth_key.value_or(kOwn) == DepthKey::kFloat)
+      return detail::depth_bits(static_cast<float>(depth));
     return detail::depth_bits(static_cast<double>(depth) + static_cast<double>(rest));
   }
 
@@ -139,8 +140,7 @@ struct Composite {
       if (keys[n].index >= 0) keys[drawn++] = keys[n];
     }
     const auto count = static_cast<std::size_t>(drawn);
-    const std::span<const DepthKeyed> order =
-        detail::sort_by_depth(keys.span().first(count), room.span().first(count));
+    const std::span<const DepthKeyed> order = detail::sort_by_depth(keys.span().first(count), room.span().first(count));
     records.resize(drawn);
     extents.resize(drawn);
     parallel_for(drawn, kGrain, [&](Index begin, Index end) {
@@ -262,19 +262,22 @@ struct Composite {
           std::copy_n(&d_transmittance(job.top + r, job.left), job.width, adjoint.behind + r * tiles.tile);
         }
       }
-      detail::composite_tile_adjoint(tiles.tile, scene, job, adjoint, adjoint.segment + 2 * kSegment * pixels);
+      adjoint.feature_sums = adjoint.segment + 2 * kSegment * pixels;
+      detail::composite_tile_adjoint(tiles.tile, scene, job, adjoint);
     });
     parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
       for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, shared, rank);
     });
   }
 
-  /// Sums the pairs of a Gaussian in the order of its slots, in double, and adds what they mean to the inputs' gradients.
+  /// Sums the pairs of a Gaussian in the order of its slots, in double, and adds what they mean to the inputs'
+  /// gradients.
   void gather_gaussian(NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index rank) const {
     const Index n = records[rank].index, begin = lists.slot_begin[rank], end = lists.slot_begin[rank + 1];
     const auto sum = [&](Index i) {
       double total = 0;
-      for (Index slot = begin; slot < end; ++slot) total += static_cast<double>(adjoint.sums[slot * adjoint.stride + i]);
+      for (Index slot = begin; slot < end; ++slot)
+        total += static_cast<double>(adjoint.sums[slot * adjoint.stride + i]);
       return total;
     };
     Index place = 0;
@@ -312,8 +315,9 @@ struct Composite {
     }
     if (!io.wants(kFactors)) return;
     double d_v[6];
+    const auto lv = detail::whitened_factor(v, view.settings.blur, conic);
     for (int c = 0; c < 3; ++c) {
-      const double lu = conic.l11 * v[c] + conic.l21 * v[3 + c], lw = conic.l22 * v[3 + c];
+      const double lu = lv[static_cast<std::size_t>(c)], lw = lv[static_cast<std::size_t>(3 + c)];
       const double mu = moments[3] * lu + moments[4] * lw, mw = moments[4] * lu + moments[5] * lw;
       d_v[c] = o * (conic.l11 * mu);
       d_v[3 + c] = o * (conic.l21 * mu + conic.l22 * mw);
@@ -329,10 +333,9 @@ struct Composite {
   // --- the rest ------------------------------------------------------------------------------------------------------
 
   /// Order, lists, stops, and for each (pixel, Gaussian) pair whether it is cut, composited or held by the cap.
-  void add_signature(Signature& signature, NodeIo<S>& io) {
+  void add_signature(Signature& signature, NodeIo<S>&) {
     const TileGrid tiles = grid();
     const CompositeRules<S> rules = rules_of<S>(view.settings);
-    static_cast<void>(io);
     for (const SplatRecord<S>& record : records.span()) signature.add(static_cast<std::uint64_t>(record.index));
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       const TileJob<S> job = job_of(tiles, tile);
@@ -342,13 +345,9 @@ struct Composite {
         for (Index p = 0; p < job.width * job.height; ++p) {
           const Index r = p / job.width, c = p % job.width;
           if (job.top + r < record.row_begin || job.top + r >= record.row_end) continue;
-          S u, g;
-          detail::row_gaussian<1>(record, static_cast<S>(job.left + c) + S(0.5),
-                                  (static_cast<S>(job.top + r) + S(0.5)) - record.y, &u, &g);
-          const S raw = record.opacity * g;
-          const bool behind_stop = static_cast<std::int32_t>(at) >= job.last[r * tiles.tile + c];
-          if (behind_stop || !(raw >= rules.alpha_min)) continue;
-          signature.add(at * 2 + (raw > rules.alpha_cap ? 1 : 0));
+          const auto pixel = detail::pixel_alpha(record, rules, job.top + r, job.left + c);
+          const bool before_stop = static_cast<Index>(at) < static_cast<Index>(job.last[r * tiles.tile + c]);
+          if (before_stop && pixel.drawn) signature.add(at * 2 + (pixel.capped ? 1 : 0));
         }
         signature.add(at);
       }
@@ -356,8 +355,8 @@ struct Composite {
   }
 
   Index saved_bytes() const {
-    return all_records.capacity_bytes() + all_extents.capacity_bytes() + keys.capacity_bytes() +
-           room.capacity_bytes() + counts.capacity_bytes() + records.capacity_bytes() + extents.capacity_bytes() +
+    return all_records.capacity_bytes() + all_extents.capacity_bytes() + keys.capacity_bytes() + room.capacity_bytes() +
+           counts.capacity_bytes() + records.capacity_bytes() + extents.capacity_bytes() +
            lists.tile_begin.capacity_bytes() + lists.slot_begin.capacity_bytes() + lists.entries.capacity_bytes() +
            last.capacity_bytes() + checkpoint_begin.capacity_bytes() + checkpoints.capacity_bytes() +
            fragments.capacity_bytes();
@@ -381,8 +380,8 @@ Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> 
   HSI4D_CHECK_EQ(features.shape(), shape_of(rows, channels));
   const int tile = view.settings.tile;
   HSI4D_CHECK(tile == 8 || tile == 16, "tile = " + std::to_string(tile) + "; allowed: 8, 16");
-  const std::array inputs = {projected.means_px, projected.factors, projected.depths,
-                             projected.depth_rest, opacities, features};
+  const std::array inputs = {projected.means_px,   projected.factors, projected.depths,
+                             projected.depth_rest, opacities,         features};
   const Index width = view.camera.width, height = view.camera.height;
   const std::array outputs = {image_shape<S>(channels, height, width), image_shape<S>(1, height, width)};
   auto counters = std::make_shared<RenderCounters>();

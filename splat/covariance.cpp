@@ -198,8 +198,8 @@ Var<S> transform_axes(Var<S> transforms, Var<S> axes, Source where) {
   return axes.owner().record(TransformAxes<S>{}, {transforms, axes}, shape_of(rows, 9), where);
 }
 
-#define HSI4D_INSTANTIATE(S)                                  \
-  template Var<S> gaussian_axes(Var<S>, Var<S>, Source);      \
+#define HSI4D_INSTANTIATE(S)                             \
+  template Var<S> gaussian_axes(Var<S>, Var<S>, Source); \
   template Var<S> transform_axes(Var<S>, Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

@@ -169,17 +169,16 @@ Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, c
   HSI4D_CHECK_EQ(inputs.colors.shape(), shape_of(rows, kColors));
   HSI4D_CHECK_EQ(background.shape(), shape_of(1, kColors));
   for (const auto& [begin, end] : request.groups) {
-    HSI4D_CHECK(begin >= 0 && begin <= end && end <= rows, "group [" + std::to_string(begin) + ", " +
-                                                               std::to_string(end) + ") of " + std::to_string(rows) +
-                                                               " Gaussians");
+    HSI4D_CHECK(
+        begin >= 0 && begin <= end && end <= rows,
+        "group [" + std::to_string(begin) + ", " + std::to_string(end) + ") of " + std::to_string(rows) + " Gaussians");
   }
   const Projected<S> projected = project(inputs.means, inputs.axes, xi, view, where);
   // Channels: colours; depth and 1 if asked for; groups.
   std::vector<Var<S>> features = {inputs.colors};
   if (request.depth) features.push_back(projected.depths);
   if (request.depth || groups > 0) features.push_back(indicators(tape, rows, request, where));
-  const Var<S> all =
-      features.size() == 1 ? inputs.colors : concat_cols(std::span<const Var<S>>(features), where);
+  const Var<S> all = features.size() == 1 ? inputs.colors : concat_cols(std::span<const Var<S>>(features), where);
   const Composited<S> composited = composite(projected, inputs.opacities, all, view, where);
 
   const Shape one = image_shape<S>(1, view.camera.height, view.camera.width);
@@ -190,7 +189,8 @@ Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, c
   result.projected = projected;
   result.counters = composited.counters;
   result.transmittance = composited.transmittance;
-  result.image = tape.record(AddBackground<S>{}, {composited.channels, composited.transmittance, background}, image, where);
+  result.image =
+      tape.record(AddBackground<S>{}, {composited.channels, composited.transmittance, background}, image, where);
   if (request.depth) {
     result.depth = tape.record(NormalizedDepth<S>{kColors, kColors + 1}, {composited.channels}, one, where);
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/parallel.h"
 #include "core/simd.h"
@@ -66,8 +67,7 @@ void sh_basis_adjoint(int degree, S x, S y, S z, const S* d, S* d_r) {
           d13 * (S(4) * zz - S(3) * xx - yy) + S(2) * d14 * x * z + S(3) * d15 * (xx - yy);
     dy += S(3) * d9 * (xx - yy) + d10 * x * z + d11 * (S(4) * zz - xx - S(3) * yy) - S(6) * d12 * y * z -
           S(2) * d13 * x * y - S(2) * d14 * y * z - S(6) * d15 * x * y;
-    dz += d10 * x * y + S(8) * d11 * y * z + S(3) * d12 * (S(2) * zz - xx - yy) + S(8) * d13 * x * z +
-          d14 * (xx - yy);
+    dz += d10 * x * y + S(8) * d11 * y * z + S(3) * d12 * (S(2) * zz - xx - yy) + S(8) * d13 * x * z + d14 * (xx - yy);
   }
   d_r[0] += dx, d_r[1] += dy, d_r[2] += dz;
 }
@@ -81,6 +81,13 @@ Direction<double, 3> view_direction(const Vector3<double>& center, const S* mean
   Direction<double, 3> direction = direction_of(Vector3<double>(m - center));
   if (!direction.usable) direction.unit = Vector3<double>::UnitZ();
   return direction;
+}
+
+/// max(0, ½ + Σ Y sh) of a channel; NaN where the sum is not finite, also −∞, so that the Gaussian is not drawn.
+template <class S>
+S held_color(S sum) {
+  if (!std::isfinite(sum)) return std::numeric_limits<S>::quiet_NaN();
+  return sum > S(0) ? sum : S(0);
 }
 
 /// ½ + Σ Y sh of a channel.
@@ -145,8 +152,7 @@ struct ShColors {
         for (Index n = begin; n < end; ++n) {
           const Seen s = seen(io, center, linear, n);
           for (int c = 0; c < 3; ++c) {
-            const S sum = color_sum(s.basis, sh.row(n), coefficients(), c);
-            colors.row(n)[c] = sum <= S(0) ? S(0) : sum;
+            colors.row(n)[c] = held_color(color_sum(s.basis, sh.row(n), coefficients(), c));
           }
         }
       });

@@ -46,6 +46,17 @@ bool conic_of(const double* v, double blur, Conic& conic) {
   return std::isfinite(conic.l11) && std::isfinite(conic.l21) && std::isfinite(conic.l22);
 }
 
+std::array<double, 6> whitened_factor(const double* v, double blur, const Conic& conic) {
+  const auto m = minors(v);
+  const double scale = conic.l11 / conic.yy;
+  return {scale * (v[4] * m[0] + v[5] * m[1] + blur * v[0]),
+          scale * (v[5] * m[2] - v[3] * m[0] + blur * v[1]),
+          scale * (-v[3] * m[1] - v[4] * m[2] + blur * v[2]),
+          conic.l22 * v[3],
+          conic.l22 * v[4],
+          conic.l22 * v[5]};
+}
+
 double blur_compensation(const Conic& conic) { return std::sqrt(conic.sharp_determinant / conic.determinant); }
 
 // log f = ½ (log det V Vᵀ − log det cov), and both determinants are polynomials in V.
@@ -112,7 +123,7 @@ Extent square_extent(const Conic& conic, double x, double y, const TileGrid& gri
 }  // namespace
 
 Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
-                       const RenderSettings& settings, double epsilon) {
+                 const RenderSettings& settings, double epsilon) {
   if (settings.footprint == hsi4d::Footprint::kSquare3Sigma) return square_extent(conic, x, y, grid);
   Extent result;
   if (settings.alpha_min <= 0) {
@@ -145,8 +156,8 @@ TileSpan tile_columns(const Extent& f, const TileGrid& grid, Index tile_row) {
   const Index top = std::max(f.row_begin, tile_row * grid.tile);
   const Index bottom = std::min(f.row_end, (tile_row + 1) * grid.tile);
   if (top >= bottom) return {};
-  // The border's x as a function of dy is slope·dy ± half_width sqrt(reach² − dy²/yy); the band's rightmost point is the
-  // ellipse's if that lies in the band, else at the band's nearer end.
+  // The border's x as a function of dy is slope·dy ± half_width sqrt(reach² − dy²/yy); the band's rightmost point is
+  // the ellipse's if that lies in the band, else at the band's nearer end.
   const double half_height = f.reach * f.inverse_l22;
   const double low = std::max(static_cast<double>(top) + 0.5 - f.y, -half_height);
   const double high = std::min(static_cast<double>(bottom) - 0.5 - f.y, half_height);

@@ -2,6 +2,7 @@
 // composite.h; not part of the public interface.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -31,6 +32,10 @@ struct Conic {
 /// @param blur    pixels²
 bool conic_of(const double* factor, double blur, Conic& conic);
 
+/// L V with L = [l11 l21; 0 l22], 2×3 by rows. Its first row, l11 (v0 − xy/yy v1), cancels for needles; by the minors,
+/// which it is made of here, (v0 − xy/yy v1)_c = (Σ_k v1_k m_ck + b v0_c)/yy, it does not.
+std::array<double, 6> whitened_factor(const double* factor, double blur, const Conic& conic);
+
 /// sqrt(det V Vᵀ / det cov): what the opacity is multiplied with under antialias (row A7).
 double blur_compensation(const Conic& conic);
 
@@ -55,13 +60,13 @@ struct TileSpan {
 /// The pixels that a Gaussian may touch: all; or a rectangle of tiles; or those whose centre lies in an ellipse.
 struct Extent {
   enum class Kind : std::uint8_t { kAll, kRectangle, kEllipse } kind = Kind::kAll;
-  Index row_begin = 0, row_end = 0;    ///< rows of pixels; empty: nothing is drawn
-  TileSpan cols;                       ///< of kRectangle, columns of tiles
-  double x = 0, y = 0;                 ///< mean, pixels
-  double reach = 0;                    ///< sqrt(u² + w²) at the border
-  double slope = 0;                    ///< xy/yy: how far the middle of a row moves with dy
-  double half_width = 0;               ///< sqrt(det/yy): half a row's width at the centre is reach times this
-  double top_x = 0, inverse_l22 = 0;   ///< dy of the rightmost point, sqrt(yy): both for reach 1
+  Index row_begin = 0, row_end = 0;   ///< rows of pixels; empty: nothing is drawn
+  TileSpan cols;                      ///< of kRectangle, columns of tiles
+  double x = 0, y = 0;                ///< mean, pixels
+  double reach = 0;                   ///< sqrt(u² + w²) at the border
+  double slope = 0;                   ///< xy/yy: how far the middle of a row moves with dy
+  double half_width = 0;              ///< sqrt(det/yy): half a row's width at the centre is reach times this
+  double top_x = 0, inverse_l22 = 0;  ///< dy of the rightmost point, sqrt(yy): both for reach 1
 };
 
 /// The extent that settings ask for. It never leaves out a pixel where min(cap, o G) ≥ alpha_min, with room for the
@@ -70,7 +75,7 @@ struct Extent {
 /// @param opacity  o, with the antialias factor
 /// @param epsilon  of the precision that α is computed in
 Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
-                       const RenderSettings& settings, double epsilon);
+                 const RenderSettings& settings, double epsilon);
 
 /// Columns of tiles that an extent reaches in one row of tiles.
 TileSpan tile_columns(const Extent& extent, const TileGrid& grid, Index tile_row);

@@ -37,7 +37,8 @@ void add_camera_gradient(const ConstArray<S>& xi, std::span<const double> partia
   std::array<double, kReductionSlots> column;
   HSI4D_CHECK(chunks <= kReductionSlots, std::to_string(chunks) + " chunks");
   for (Index i = 0; i < 6; ++i) {
-    for (Index c = 0; c < chunks; ++c) column[static_cast<std::size_t>(c)] = partials[static_cast<std::size_t>(6 * c + i)];
+    for (Index c = 0; c < chunks; ++c)
+      column[static_cast<std::size_t>(c)] = partials[static_cast<std::size_t>(6 * c + i)];
     d_delta[i] = pairwise_sum(column.data(), chunks);
   }
   Vector6<double> d = Vector6<double>::Zero();

@@ -15,8 +15,7 @@ class Workspaces {
   static constexpr Index kMost = 256;
 
   /// @param chunks  of the loop
-  explicit Workspaces(Index chunks)
-      : count_(std::clamp<Index>(std::min<Index>(thread_count(), chunks), 1, kMost)) {}
+  explicit Workspaces(Index chunks) : count_(std::clamp<Index>(std::min<Index>(thread_count(), chunks), 1, kMost)) {}
   Index count() const { return count_; }
 
   /// A piece, held while this lives.

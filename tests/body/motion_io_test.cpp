@@ -170,5 +170,7 @@ TEST_CASE("faults of motion files are named") {
   CHECK_THROWS_AS(read_motion("no_such_motion.npz"), UserError);
   const TemporaryFolder folder;
   CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{10, {rest_pose(22)}}), InternalError);
+  CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{10, {}}), InternalError);
+  CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{0, {rest_pose(55)}}), InternalError);
   CHECK(folder.count() == 0);
 }

@@ -490,9 +490,10 @@ TEST_CASE("render and gradients through the program") {
       {"render", "--scene", "clean.ply", "--camera", "camera.json", "--out", "b.npz", "--set", "render.quality=fats"});
   CHECK(mistake.status == 2);
   CHECK(mistake.out.empty());
-  CHECK(mistake.err ==
-        "--set render.quality=fats: /render/quality: fats is not one of the choices; allowed: \"fast\", \"default\", "
-        "\"accurate\", \"reference\"; did you mean \"fast\"?\n");
+  CHECK(
+      mistake.err ==
+      "--set render.quality=fats: /render/quality: \"fats\" is not one of the choices; allowed: \"fast\", \"default\", "
+      "\"accurate\", \"reference\"; did you mean \"fast\"?\n");
   CHECK(!std::filesystem::exists("b.npz"));
   const ProgramResult missing = run_hsi4d({"render", "--scene", "clean.ply", "--out", "b.npz"});
   CHECK(missing.status == 2);

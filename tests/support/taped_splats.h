@@ -1,0 +1,200 @@
+// A test scene on a tape, in float or double, with the loss that its cotangents define; and the same loss of the
+// brute-force renderer.
+#pragma once
+
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "autodiff/elementwise.h"
+#include "autodiff/reduce.h"
+#include "body/skinning.h"
+#include "splat/covariance.h"
+#include "splat/render.h"
+#include "splat/sh.h"
+#include "tests/support/splat_scenes.h"
+
+namespace hsi4d::test {
+
+/// d loss / d what is rendered, in double: colour and group opacities planar [·,H,W], transmittance and depth [H,W].
+/// Empty: not part of the loss.
+struct SplatCotangent {
+  std::vector<double> image, transmittance, depth, groups;
+};
+
+/// Random numbers in [−1, 1], floats.
+inline std::vector<double> random_cotangent(Index count, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<double> numbers(static_cast<std::size_t>(count));
+  for (double& x : numbers) x = static_cast<float>(2 * (static_cast<double>(random() >> 11) * 0x1p-53) - 1);
+  return numbers;
+}
+
+/// Named arrays of numbers: gradients by class, or planes of a render.
+struct NamedNumbers {
+  std::string name;
+  std::vector<double> numbers;
+};
+
+/// |a − b| / |b| (L2); |a| where b is zero.
+inline double relative_l2(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
+  double difference = 0, size = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    difference += (a[i] - b[i]) * (a[i] - b[i]);
+    size += b[i] * b[i];
+  }
+  return std::sqrt(difference) / (size > 0 ? std::sqrt(size) : 1);
+}
+
+inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
+  double worst = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) worst = !(std::abs(a[i] - b[i]) <= worst) ? std::abs(a[i] - b[i]) : worst;
+  return worst;
+}
+
+template <class S>
+std::vector<double> wide_numbers(const ConstArray<S>& a) {
+  std::vector<double> result;
+  for (Index r = 0; r < a.total_rows(); ++r) result.insert(result.end(), a.row(r), a.row(r) + a.shape.cols);
+  return result;
+}
+
+template <class S>
+class TapedSplats {
+ public:
+  Tape<S> tape;
+  Var<S> means, quats, log_scales, opacity_logits, sh, xi, background, transforms;
+  Rendered<S> rendered;
+  Var<S> loss;
+
+  /// @param request     what to render beside the image
+  /// @param transforms  empty, or [N,12] of each Gaussian
+  /// @param origin      the means are stored relative to it
+  TapedSplats(const SplatScene& scene, const SplatCotangent& cotangent, const RenderRequest& request = {},
+              const std::vector<float>& moved_by = {}, const Vector3<double>& origin = Vector3<double>::Zero())
+      : scene_(scene) {
+    const Index n = scene.count(), k = scene.sh_coefficients();
+    means = leaf("means", shape_of(n, 3), scene.means);
+    quats = leaf("quats", shape_of(n, 4), scene.quats);
+    log_scales = leaf("log_scales", shape_of(n, 3), scene.log_scales);
+    opacity_logits = leaf("opacity_logits", shape_of(n, 1), scene.opacity_logits);
+    sh = leaf("sh", shape_of(n, 3 * k), scene.sh);
+    xi = tape.parameter("xi", shape_of(1, 6));
+    background = leaf("background", shape_of(1, 3), {scene.background.begin(), scene.background.end()});
+    SplatView view{scene.camera, origin, scene.settings};
+    Var<S> placed = means, axes = gaussian_axes(quats, log_scales);
+    if (!moved_by.empty()) {
+      transforms = leaf("transforms", shape_of(n, 12), moved_by);
+      placed = transform_points(transforms, means);
+      axes = transform_axes(transforms, axes);
+    }
+    rendered = render<S>({placed, axes, sigmoid(opacity_logits), sh_colors(sh, placed, xi, view)}, xi, background, view,
+                         request);
+    add_term(rendered.image, cotangent.image);
+    add_term(rendered.transmittance, cotangent.transmittance);
+    if (request.depth) add_term(rendered.depth, cotangent.depth);
+    if (!request.groups.empty()) add_term(rendered.group_opacity, cotangent.groups);
+  }
+
+  void run() {
+    tape.forward(loss);
+    tape.backward(loss);
+  }
+
+  std::vector<double> value(Var<S> of) const { return wide_numbers<S>(tape.value(of)); }
+  std::vector<double> gradient(Var<S> of) const { return wide_numbers<S>(tape.gradient(of)); }
+
+  std::vector<NamedNumbers> gradients() const {
+    std::vector<NamedNumbers> all;
+    for (const auto& [name, var] :
+         {std::pair("means", means), std::pair("quats", quats), std::pair("log_scales", log_scales),
+          std::pair("opacity_logits", opacity_logits), std::pair("sh", sh), std::pair("camera", xi),
+          std::pair("background", background), std::pair("transforms", transforms)}) {
+      if (var.tape != nullptr) all.push_back({name, gradient(var)});
+    }
+    return all;
+  }
+
+ private:
+  Var<S> leaf(const char* name, const Shape& shape, const std::vector<float>& numbers) {
+    const Var<S> var = tape.parameter(name, shape);
+    tape.set(var, std::vector<S>(numbers.begin(), numbers.end()));
+    return var;
+  }
+  void add_term(Var<S> image, const std::vector<double>& weights) {
+    if (weights.empty()) return;
+    const Var<S> weight = tape.constant("cotangent", image.shape());
+    tape.set(weight, std::vector<S>(weights.begin(), weights.end()));
+    const Var<S> term = sum(image * weight);
+    loss = loss.tape == nullptr ? term : loss + term;
+  }
+
+  SplatScene scene_;
+};
+
+/// The brute-force renderer's Σ w = 1 − T cancels in pixels less opaque than this: their depth is left out of the loss.
+inline constexpr double kOpaqueEnough = 1e-3;
+
+/// What the brute-force renderer makes of a scene: the same planes and classes of gradients as TapedSplats, in its
+/// order.
+struct ReferenceResult {
+  std::vector<double> image, transmittance, depth, groups;
+  std::vector<NamedNumbers> gradients;
+};
+
+/// @param groups  rows of each group, as in RenderRequest; they must not overlap
+inline ReferenceResult reference_result(const SplatScene& scene, const SplatCotangent& cotangent,
+                                        const RenderRequest& request = {}, const std::vector<float>& moved_by = {}) {
+  reference::Scene<double> input = reference_scene<double>(scene);
+  input.transforms.assign(moved_by.begin(), moved_by.end());
+  if (!request.groups.empty()) {
+    input.groups.assign(static_cast<std::size_t>(scene.count()), -1);
+    for (std::size_t g = 0; g < request.groups.size(); ++g) {
+      for (Index n = request.groups[g].first; n < request.groups[g].second; ++n) {
+        input.groups[static_cast<std::size_t>(n)] = static_cast<int>(g);
+      }
+    }
+  }
+  const reference::Pinhole<double> camera = reference_pinhole<double>(scene.camera);
+  const std::array<double, 3> background = reference_background<double>(scene);
+  const reference::Image<double> image = reference::render(input, camera, background, scene.settings);
+  const std::size_t pixels = image.transmittance.size();
+  ReferenceResult result;
+  result.transmittance = image.transmittance;
+  result.groups = image.group_opacity;
+  result.image.resize(3 * pixels);
+  result.depth.resize(pixels);
+  reference::Image<double> d;
+  d.transmittance = cotangent.transmittance.empty() ? std::vector<double>(pixels, 0.0) : cotangent.transmittance;
+  d.depth_sum.assign(pixels, 0);
+  d.color.assign(3 * pixels, 0);
+  d.group_opacity = cotangent.groups;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      result.image[c * pixels + p] = image.color[3 * p + c];
+      if (!cotangent.image.empty()) d.color[3 * p + c] = cotangent.image[c * pixels + p];
+    }
+    // E = D/A, A = 1 − T
+    const double opacity = 1 - image.transmittance[p];
+    if (!(opacity > 0)) continue;
+    result.depth[p] = image.depth_sum[p] / opacity;
+    if (!request.depth || cotangent.depth.empty() || opacity < kOpaqueEnough) continue;
+    d.depth_sum[p] = cotangent.depth[p] / opacity;
+    d.transmittance[p] += cotangent.depth[p] * result.depth[p] / opacity;
+  }
+  const auto g = reference::gradients(input, camera, background, scene.settings, d);
+  result.gradients = {{"means", g.means},
+                      {"quats", g.quats},
+                      {"log_scales", g.log_scales},
+                      {"opacity_logits", g.opacity_logits},
+                      {"sh", g.sh},
+                      {"camera", {g.camera.begin(), g.camera.end()}},
+                      {"background", {g.background.begin(), g.background.end()}}};
+  if (!g.transforms.empty()) result.gradients.push_back({"transforms", g.transforms});
+  return result;
+}
+
+}  // namespace hsi4d::test
