@@ -13,6 +13,7 @@
 #include "core/suggest.h"
 #include "core/version.h"
 #include "pipelines/cli/commands.h"
+#include "pipelines/cli/report_command.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -33,7 +34,7 @@ int complain(const Failure& failure) {
 struct CommandLine {
   CLI::App app{"4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d"};
   std::string config, topic;
-  std::vector<std::string> overrides;
+  std::vector<std::string> overrides, runs;
   bool print_config = false;
   std::function<std::string()> run;
 
@@ -55,6 +56,10 @@ struct CommandLine {
     CLI::App* list = app.add_subcommand("list", "List what configs can name: losses, settings");
     list->add_option("TOPIC", topic, "losses or settings")->required();
     list->callback([this, &losses] { run = [this, &losses] { return list_command(topic, losses); }; });
+
+    CLI::App* report = app.add_subcommand("report", "Write report.html of runs, and print their errors");
+    report->add_option("RUN", runs, "Folders of runs")->required();
+    report->callback([this] { run = [this] { return report_command(runs); }; });
   }
 
   std::vector<std::string> command_names() {
