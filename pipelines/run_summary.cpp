@@ -191,16 +191,16 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
 
 const std::vector<MetricFacts>& metric_facts() {
   static const std::vector<MetricFacts> facts = {
-      {"mpjpe_mm", "joints", "mm", "Mean joint error, both pelvises at the origin", 1, -1},
-      {"pa_mpjpe_mm", "joints, aligned", "mm", "Mean joint error after the best similarity", 1, -1},
-      {"world_mpjpe_mm", "joints, world", "mm", "Mean joint error in the world", 1, -1},
+      {"mpjpe_mm", "MPJPE", "mm", "Mean joint error, both pelvises at the origin", 1, -1},
+      {"pa_mpjpe_mm", "PA-MPJPE", "mm", "Mean joint error after the best similarity", 1, -1},
+      {"world_mpjpe_mm", "world MPJPE", "mm", "Mean joint error in the world", 1, -1},
       {"world_mpjpe_image_mm", "world, across view", "mm", "Part of the world error across the camera's view", 1, -1},
-      {"world_mpjpe_depth_mm", "world, depth", "mm", "Part of the world error along the camera's axis", 1, -1},
-      {"root_translation_mm", "root", "mm", "Distance of the pelvises", 1, -1},
-      {"object_translation_cm", "object place", "cm", "Distance of the objects' centroids", 2, -1},
-      {"object_rotation_deg", "object turn", "°", "Angle between the objects' rotations", 2, -1},
-      {"camera_translation_cm", "camera place", "cm", "Distance of the camera centres", 2, -1},
-      {"camera_rotation_deg", "camera turn", "°", "Angle between the cameras' rotations", 3, -1},
+      {"world_mpjpe_depth_mm", "world, in depth", "mm", "Part of the world error along the camera's axis", 1, -1},
+      {"root_translation_mm", "root position", "mm", "Distance of the pelvises", 1, -1},
+      {"object_translation_cm", "object position", "cm", "Distance of the objects' centroids", 2, -1},
+      {"object_rotation_deg", "object rotation", "°", "Angle between the objects' rotations", 2, -1},
+      {"camera_translation_cm", "camera position", "cm", "Distance of the camera centres", 2, -1},
+      {"camera_rotation_deg", "camera rotation", "°", "Angle between the cameras' rotations", 3, -1},
       {"psnr_db", "PSNR", "dB", "Peak signal-to-noise ratio, at most 100", 2, 1},
       {"psnr_foreground_db", "PSNR, foreground", "dB", "Peak signal-to-noise ratio of human and objects", 2, 1},
       {"ssim", "SSIM", "", "Structural similarity", 4, 1},
@@ -223,11 +223,11 @@ const MetricFacts* find_metric_facts(std::string_view name) {
 bool ErrorTable::is_best(std::size_t row, std::size_t column) const {
   const MetricFacts& facts = *columns[column];
   const double* const own = rows[row].values[column];
-  if (own == nullptr || facts.better == 0) return false;
+  if (own == nullptr || facts.better == 0 || !std::isfinite(*own)) return false;
   const double shown_own = as_shown(*own, facts.decimals);
   bool some_is_worse = false;
   for (const Row& other : rows) {
-    if (other.values[column] == nullptr) continue;
+    if (other.values[column] == nullptr || !std::isfinite(*other.values[column])) continue;
     const double ahead = (as_shown(*other.values[column], facts.decimals) - shown_own) * facts.better;
     if (ahead > 0) return false;
     some_is_worse = some_is_worse || ahead < 0;

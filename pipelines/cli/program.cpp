@@ -20,6 +20,7 @@
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/render_command.h"
 #include "pipelines/cli/synth_command.h"
+#include "pipelines/cli/report_command.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -40,7 +41,7 @@ int complain(const Failure& failure) {
 struct CommandLine {
   CLI::App app{"4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d"};
   std::string config, topic, file, out;
-  std::vector<std::string> overrides;
+  std::vector<std::string> overrides, runs;
   bool print_config = false;
   RunArguments run_arguments;
   DemoArguments demo_arguments;
@@ -56,32 +57,14 @@ struct CommandLine {
 
     add_run(terms);
     add_demo(terms);
-
-    CLI::App* check = app.add_subcommand("check", "Check a config and everything that it extends; tells all problems");
-    check->add_option("CONFIG", config, "The config file")->required();
-    add_overrides(*check, overrides);
-    check->add_flag("--print-config", print_config, "Print the config with every default filled in");
-    check->callback([this] { run = [this] { return check_command(config, overrides, print_config, losses); }; });
-
-    CLI::App* schema = app.add_subcommand("schema", "Print the JSON Schema of configs, for editors");
-    schema->callback([this] { run = [this] { return schema_command(losses); }; });
-
-    CLI::App* list = app.add_subcommand("list", "List what configs can name: losses, settings");
-    list->add_option("TOPIC", topic, "losses or settings")->required();
-    list->callback([this] { run = [this] { return list_command(topic, losses); }; });
-
-    CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
-    info->add_option("FILE", file, "A .ply, .npz, .npy, .json, .png, .jpg or .exr file")->required();
-    info->callback([this] { run = [this] { return info_command(file); }; });
-
-    CLI::App* synth = app.add_subcommand("synth", "Make a dataset with exact ground truth");
-    synth->add_option("CONFIG", config, "A config; section synthetic says what is made, the rest goes along")->required();
-    synth->add_option("--out", out, "Where to: a new or empty folder")->type_name("DIR")->required();
-    add_overrides(*synth, overrides);
-    synth->callback([this] { run = [this] { return synth_command(config, overrides, out, losses); }; });
-
+    add_synth();
+    add_report();
     add_render();
     add_gradients();
+    add_info();
+    add_check();
+    add_schema();
+    add_list();
   }
 
   std::vector<std::string> command_names() {
@@ -116,6 +99,45 @@ struct CommandLine {
     command->add_flag("--resume", a.resume, "Go on with the demo in --out; the result has the same bits");
     command->add_option("--threads", a.threads, "Threads; results do not depend on it")->check(CLI::Range(1, 1024));
     command->callback([this, &terms] { run = [this, &terms] { return demo_command(demo_arguments, terms); }; });
+  }
+
+  void add_synth() {
+    CLI::App* synth = app.add_subcommand("synth", "Make a dataset with exact ground truth");
+    synth->add_option("CONFIG", config, "A config; section synthetic says what is made, the rest goes along")->required();
+    synth->add_option("--out", out, "Where to: a new or empty folder")->type_name("DIR")->required();
+    add_overrides(*synth, overrides);
+    synth->callback([this] { run = [this] { return synth_command(config, overrides, out, losses); }; });
+  }
+
+  void add_report() {
+    CLI::App* report = app.add_subcommand("report", "Write report.html of runs, and print their errors");
+    report->add_option("RUN", runs, "Folders of runs")->required();
+    report->callback([this] { run = [this] { return report_command(runs); }; });
+  }
+
+  void add_info() {
+    CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
+    info->add_option("FILE", file, "A .ply, .npz, .npy, .json, .png, .jpg or .exr file")->required();
+    info->callback([this] { run = [this] { return info_command(file); }; });
+  }
+
+  void add_check() {
+    CLI::App* check = app.add_subcommand("check", "Check a config and everything that it extends; tells all problems");
+    check->add_option("CONFIG", config, "The config file")->required();
+    add_overrides(*check, overrides);
+    check->add_flag("--print-config", print_config, "Print the config with every default filled in");
+    check->callback([this] { run = [this] { return check_command(config, overrides, print_config, losses); }; });
+  }
+
+  void add_schema() {
+    CLI::App* schema = app.add_subcommand("schema", "Print the JSON Schema of configs, for editors");
+    schema->callback([this] { run = [this] { return schema_command(losses); }; });
+  }
+
+  void add_list() {
+    CLI::App* list = app.add_subcommand("list", "List what configs can name: losses, settings");
+    list->add_option("TOPIC", topic, "losses or settings")->required();
+    list->callback([this] { run = [this] { return list_command(topic, losses); }; });
   }
 
   static void add_overrides(CLI::App& command, std::vector<std::string>& overrides) {

@@ -41,6 +41,7 @@ TEST_CASE("JSON text is indented, with plain arrays on one line") {
   CHECK(to_json(tree) ==
         "{\n  \"a\": [1, null],\n  \"b\": [\n    {\n      \"c\": \"x\\\"\\\\\\n\\u0001\"\n    }\n  ],\n  \"d\": {},\n  "
         "\"e\": true\n}\n");
+  CHECK(to_json_line(tree) == "{\"a\": [1, null], \"b\": [{\"c\": \"x\\\"\\\\\\n\\u0001\"}], \"d\": {}, \"e\": true}");
   CHECK(shown(tree) == "{\"a\": [1, null], \"b\": [{\"c\": \"x\\\"\\\\\\n\\u0001\"}], \"d\": {}, \"e\":...");
 }
 

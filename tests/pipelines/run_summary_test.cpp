@@ -108,10 +108,10 @@ TEST_CASE("the table of errors has baselines, then stages, and marks the best") 
   CHECK(table.is_best(3, 2));        // larger is better
   CHECK_FALSE(table.is_best(0, 2));
   CHECK(error_table(summary) ==
-        "                    start   copy_frame_0   camera   interaction\n"
-        "joints [mm]          60.0           20.0*       -          20.0*\n"
-        "camera place [cm]       -              -     0.12          0.12\n"
-        "SSIM               0.5000              -        -        0.9000*\n");
+        "                       start   copy_frame_0   camera   interaction\n"
+        "MPJPE [mm]              60.0           20.0*       -          20.0*\n"
+        "camera position [cm]       -              -     0.12          0.12\n"
+        "SSIM                  0.5000              -        -        0.9000*\n");
   CHECK(error_table(RunSummary()) == "no errors were measured\n");
 }
 

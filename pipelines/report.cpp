@@ -1,0 +1,19 @@
+#include "pipelines/report.h"
+
+#include "core/file.h"
+#include "pipelines/report_data.h"
+#include "pipelines/report_page.h"
+#include "pipelines/run_folder.h"
+
+namespace hsi4d {
+
+std::string report_html(const std::string& run_folder) { return report_page(read_report_data(run_folder)); }
+
+std::string write_report(const std::string& run_folder) {
+  const std::string page = report_html(run_folder);
+  const std::string path = RunPaths{run_folder}.report();
+  write_text_file(path, page);
+  return path;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,290 @@
+#include "pipelines/report_data.h"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <map>
+#include <system_error>
+
+#include "core/check.h"
+#include "core/config_value.h"
+#include "core/progress.h"
+#include "pipelines/json_text.h"
+#include "pipelines/run_folder.h"
+
+namespace hsi4d {
+namespace {
+
+namespace fs = std::filesystem;
+using Kind = ConfigValue::Kind;
+
+/// More than this of images would make a page that browsers open slowly; every other frame is then left out, and so on.
+constexpr size_t kMostImageBytes = size_t{64} << 20;
+
+bool is_file(const std::string& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+/// A value for people: strings without quotes, everything else as JSON.
+std::string plain_text(const ConfigValue& value) { return value.kind == Kind::kString ? value.text : shown(value); }
+
+// ---- status.json and config.resolved.json ----
+
+void add_fact(ReportData& data, const ConfigValue& tree, std::string_view key, const std::string& label) {
+  const ConfigValue* const member = find_member(tree, key);
+  if (member == nullptr || member->kind == Kind::kNull) return;
+  const bool known =
+      std::any_of(data.facts.begin(), data.facts.end(), [&label](const auto& fact) { return fact.first == label; });
+  if (known) return;
+  std::string text = plain_text(*member);
+  if (key == "threads" && text == "0") text = "one a core";
+  data.facts.emplace_back(label, std::move(text));
+}
+
+ConfigValue read_object(const std::string& path, const std::string& text) {
+  ConfigValue tree = parse_json_text(text, path);
+  check_kind(tree, Kind::kObject, "");
+  return tree;
+}
+
+void read_status(const RunPaths& paths, ReportData& data) {
+  data.state = "unknown";
+  if (!is_file(paths.status())) {
+    data.notes.emplace_back("status.json is missing: nobody knows how the run ended.");
+    return;
+  }
+  const ConfigValue tree = read_object(paths.status(), read_text_file(paths.status()));
+  const std::string state = string_member(tree, "state");
+  if (!state.empty()) data.state = state;
+  data.message = string_member(tree, "message");
+  data.is_orphaned = state == run_state_name(RunState::kRunning) && !is_run_locked(paths.folder.string());
+  for (const auto& [key, label] : {std::pair("version", "version"),
+                                   {"git", "commit"},
+                                   {"host", "host"},
+                                   {"seed", "seed"},
+                                   {"threads", "threads"},
+                                   {"precision", "precision"},
+                                   {"started", "started"},
+                                   {"resumed", "resumed"},
+                                   {"updated", "last update"}})
+    add_fact(data, tree, key, label);
+}
+
+void read_config_file(const RunPaths& paths, ReportData& data) {
+  if (!is_file(paths.config())) {
+    data.notes.emplace_back("config.resolved.json is missing: the settings of the run are not known.");
+    return;
+  }
+  data.config = read_text_file(paths.config());
+  const ConfigValue tree = read_object(paths.config(), data.config);
+  for (const char* const key : {"seed", "threads", "precision"}) add_fact(data, tree, key, key);
+  if (const ConfigValue* const render = find_member(tree, "render")) {
+    add_fact(data, *render, "quality", "quality");
+    add_fact(data, *render, "compatibility", "compatibility");
+  }
+}
+
+void read_summary_file(const RunPaths& paths, ReportData& data) {
+  if (!is_file(paths.summary())) {
+    data.notes.emplace_back("summary.json is missing: the run has not come to its end, so no errors are told.");
+    return;
+  }
+  data.summary = parse_summary(read_text_file(paths.summary()), paths.summary());
+  if (make_error_table(*data.summary).columns.empty())
+    data.notes.emplace_back("summary.json has no errors: the run had no ground truth to compare with.");
+  if (data.summary->baselines.empty())
+    data.notes.emplace_back("summary.json has no baselines: the result is shown without its start.");
+  if (!data.summary->name.empty()) data.name = data.summary->name;
+  data.facts.emplace_back("frames", std::to_string(data.summary->frames));
+  data.facts.emplace_back("time", duration_text(data.summary->seconds));
+}
+
+// ---- metrics.jsonl ----
+
+struct MetricsLine {
+  std::string stage;
+  int frame = 0;
+  double iteration = 0, seconds = 0;
+  std::optional<double> loss;  // null where the step was rolled back
+  bool rolled_back = false;
+};
+
+MetricsLine parse_line(const std::string& text, const std::string& file, int line) {
+  const ConfigValue tree = parse_json_text(text, file, line);
+  check_kind(tree, Kind::kObject, "");
+  const auto member = [&tree](std::string_view key) {
+    const ConfigValue* const found = find_member(tree, key);
+    if (found == nullptr) fail_at(tree, "", "there is no " + json_string(key));
+    return *found;
+  };
+  MetricsLine read;
+  const ConfigValue stage = member("stage");
+  check_kind(stage, Kind::kString, "/stage");
+  read.stage = stage.text;
+  if (const ConfigValue* const frame = find_member(tree, "frame"))
+    read.frame = static_cast<int>(whole_number_of(*frame, "/frame"));
+  read.iteration = static_cast<double>(whole_number_of(member("iteration"), "/iteration"));
+  const ConfigValue loss = member("loss");
+  if (loss.kind != Kind::kNull) read.loss = number_of(loss, "/loss");
+  if (const ConfigValue* const seconds = find_member(tree, "seconds")) read.seconds = number_of(*seconds, "/seconds");
+  const ConfigValue* const rolled_back = find_member(tree, "rolled_back");
+  read.rolled_back = rolled_back != nullptr && rolled_back->kind == Kind::kBoolean && rolled_back->boolean;
+  return read;
+}
+
+void add_line(std::vector<StageCurves>& stages, const MetricsLine& line) {
+  auto at = std::find_if(stages.begin(), stages.end(), [&](const StageCurves& s) { return s.stage == line.stage; });
+  if (at == stages.end()) at = stages.insert(stages.end(), StageCurves{line.stage, 0, 0, 0, {}});
+  at->seconds += line.seconds;
+  ++at->iterations;
+  if (line.rolled_back) ++at->rolled_back;
+  if (at->curves.empty() || at->curves.back().frame != line.frame) at->curves.push_back({line.frame, {}});
+  if (line.loss) at->curves.back().points.emplace_back(line.iteration, *line.loss);
+}
+
+void read_metrics_file(const RunPaths& paths, ReportData& data) {
+  if (!is_file(paths.metrics())) {
+    data.notes.emplace_back("metrics.jsonl is missing: there are no loss curves.");
+    return;
+  }
+  const std::string text = read_text_file(paths.metrics());
+  size_t begin = 0;
+  for (int number = 1; begin < text.size(); ++number) {
+    const size_t end = text.find('\n', begin);
+    if (end == std::string::npos) {
+      data.notes.emplace_back("The last line of metrics.jsonl was cut short and is left out.");
+      break;
+    }
+    const std::string line = text.substr(begin, end - begin);
+    try {
+      add_line(data.stages, parse_line(line, paths.metrics(), 1));
+    } catch (const DataError&) {
+      parse_line(line, paths.metrics(), number);  // the same fault, told with the line of the file
+      throw;
+    }
+    begin = end + 1;
+  }
+  if (data.stages.empty()) data.notes.emplace_back("metrics.jsonl has no lines yet: there are no loss curves.");
+  for (const StageCurves& stage : data.stages) {
+    if (stage.rolled_back > 0)
+      data.notes.push_back("Stage " + stage.stage + ": " + std::to_string(stage.rolled_back) + " of " +
+                           std::to_string(stage.iterations) +
+                           " steps were rolled back because a number in them was not finite.");
+  }
+}
+
+// ---- frames/ ----
+
+/// "0007_render.png" -> 7 and the place of "render" in kFrameKinds.
+std::optional<std::pair<int, size_t>> parse_image_name(const std::string& name) {
+  const size_t bar = name.find('_');
+  if (bar == std::string::npos || bar < 4 || !name.ends_with(".png")) return std::nullopt;
+  int frame = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + bar, frame);
+  if (error != std::errc() || end != name.data() + bar || frame < 0) return std::nullopt;
+  const std::string kind = name.substr(bar + 1, name.size() - bar - 5);
+  const auto* const at = std::find(kFrameKinds.begin(), kFrameKinds.end(), kind);
+  if (at == kFrameKinds.end()) return std::nullopt;
+  return std::pair(frame, static_cast<size_t>(at - kFrameKinds.begin()));
+}
+
+using FrameFiles = std::map<int, std::array<std::string, kFrameKinds.size()>>;
+
+FrameFiles find_images(const fs::path& folder) {
+  FrameFiles files;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const auto parsed = parse_image_name(it->path().filename().string());
+    if (parsed) files[parsed->first][parsed->second] = it->path().string();
+  }
+  return files;
+}
+
+/// Leaves out frames until the images are few enough; every second, third, ... stays.
+void thin_out(FrameFiles& files, std::vector<std::string>& notes) {
+  size_t bytes = 0;
+  for (const auto& [frame, names] : files) {
+    for (const std::string& name : names) {
+      std::error_code error;
+      const auto size = name.empty() ? 0 : fs::file_size(name, error);
+      if (!error) bytes += size;
+    }
+  }
+  const size_t step = (bytes + kMostImageBytes - 1) / kMostImageBytes;
+  if (step <= 1) return;
+  FrameFiles kept;
+  size_t number = 0;
+  for (auto& [frame, names] : files) {
+    if (number++ % step == 0) kept[frame] = std::move(names);
+  }
+  notes.push_back("Of " + std::to_string(files.size()) + " frames with images every " + std::to_string(step) +
+                  "th is shown, to keep this file small.");
+  files = std::move(kept);
+}
+
+bool is_png(const Bytes& file) {
+  constexpr std::array<uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  return file.size() > kSignature.size() && std::equal(kSignature.begin(), kSignature.end(), file.begin());
+}
+
+void read_frames(const RunPaths& paths, ReportData& data) {
+  FrameFiles files = find_images(paths.frames());
+  if (files.empty()) {
+    data.notes.emplace_back("There are no images in frames/.");
+    return;
+  }
+  thin_out(files, data.notes);
+  std::array<size_t, kFrameKinds.size()> missing{};
+  for (const auto& [frame, names] : files) {
+    FrameImages images{frame, {}};
+    for (size_t k = 0; k < names.size(); ++k) {
+      if (names[k].empty()) {
+        ++missing[k];
+        continue;
+      }
+      Bytes file = read_file(names[k]);
+      if (is_png(file)) {
+        images.files[k] = std::move(file);
+      } else {
+        data.notes.push_back("frames/" + fs::path(names[k]).filename().string() + " is not a PNG image.");
+      }
+    }
+    data.frames.push_back(std::move(images));
+  }
+  for (size_t k = 0; k < 3; ++k) {  // `start` is not written by every run
+    if (missing[k] > 0)
+      data.notes.push_back("Of " + std::to_string(files.size()) + " frames " + std::to_string(missing[k]) +
+                           " have no image of the kind \"" + std::string(kFrameKinds[k]) + "\".");
+  }
+}
+
+std::string folder_name(const fs::path& folder) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
+  return last.string();
+}
+
+}  // namespace
+
+ReportData read_report_data(const std::string& run_folder) {
+  const RunPaths paths{run_folder};
+  std::error_code error;
+  if (!fs::exists(run_folder, error)) throw UserError(run_folder + ": there is no such run folder");
+  if (!fs::is_directory(run_folder, error)) throw UserError(run_folder + ": is not a folder; give the folder of a run");
+  const std::array members = {paths.status(), paths.config(), paths.summary(), paths.metrics()};
+  if (std::none_of(members.begin(), members.end(), is_file))
+    throw UserError(run_folder +
+                    ": holds no run: there is neither status.json nor config.resolved.json, summary.json "
+                    "or metrics.jsonl in it");
+  ReportData data;
+  data.name = folder_name(run_folder);
+  read_status(paths, data);
+  read_config_file(paths, data);
+  read_summary_file(paths, data);
+  read_metrics_file(paths, data);
+  read_frames(paths, data);
+  return data;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,43 @@
+// Line plots as SVG text, to stand inside of a page that styles them.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace hsi4d {
+
+/// `text` as HTML text or attribute: & < > " ' escaped, control characters and bytes that are no UTF-8 replaced.
+std::string html_escape(const std::string& text);
+
+struct PlotLine {
+  std::string label;  ///< in tooltips
+  std::string color;  ///< CSS, of this program's making
+  std::vector<std::pair<double, double>> points;
+  bool is_dashed = false;
+  bool has_dots = false;  ///< a dot with a tooltip at every point
+  double opacity = 1;
+};
+
+struct Plot {
+  std::string title;    ///< for screen readers
+  std::string x_label;  ///< under the axis
+  std::string unit;     ///< of y, in tooltips
+  std::vector<PlotLine> lines;
+  bool is_log = false;          ///< y on a logarithmic scale; points ≤ 0 are left out
+  bool begins_at_zero = false;  ///< y, unless it is logarithmic
+  bool has_whole_x = true;      ///< x ticks at whole numbers only
+  int decimals = 2;             ///< of y in tooltips
+  double width = 380;           ///< in the units of the view box, where letters are 12 high; the page scales it
+};
+
+/// The plot as one <svg> element; a few words instead where there is nothing to plot.
+std::string plot_svg(const Plot& plot);
+
+/// A bar of named parts, each as wide as its share. Values ≥ 0.
+std::string share_bar_svg(const std::string& title, const std::vector<std::pair<std::string, double>>& parts);
+
+/// The colour of part i, CSS; parts repeat after eight.
+std::string part_color(size_t i);
+
+}  // namespace hsi4d
