@@ -60,7 +60,7 @@ void read_weights(const Npz& file, Index count, Avatar& avatar) {
   const NpyArray& indices = file.array("weight_indices");
   const int64_t per_gaussian = indices.require_shape({count, -1}).shape()[1];
   if (per_gaussian < 1 || per_gaussian > kMaxWeightsPerVertex) {
-    throw DataError(indices.source() + " has shape " + shape_text(indices.shape()) +
+    throw DataError(indices.source() + ": has shape " + shape_text(indices.shape()) +
                     "; allowed: 1 to 8 weights a Gaussian");
   }
   const NpyArray& weights = file.array("weights");

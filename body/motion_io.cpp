@@ -91,7 +91,7 @@ void read_whole_poses(const NpyArray& array, Motion& motion) {
     allowed += (allowed.empty() ? "" : ", ") + shape_text(std::vector<int64_t>{frames, layout.numbers}) + " (" +
                layout.name + ")";
   }
-  throw DataError(array.source() + " has shape " + shape_text(shape) + "; allowed: " + allowed);
+  throw DataError(array.source() + ": has shape " + shape_text(shape) + "; allowed: " + allowed);
 }
 
 void read_parts(const Npz& file, Motion& motion) {
@@ -111,7 +111,7 @@ double read_frame_rate(const Npz& file) {
   if (array == nullptr) return Motion{}.frame_rate;
   const double rate = array->scalar<double>();
   if (!(rate > 0) || !std::isfinite(rate)) {
-    throw DataError(array->source() + " is " + std::to_string(rate) + "; allowed: a positive number");
+    throw DataError(array->source() + ": is " + std::to_string(rate) + "; allowed: a positive number");
   }
   return rate;
 }
@@ -120,7 +120,7 @@ Motion motion_of(const Npz& file) {
   const NpyArray* trans = find(file, {"trans", "transl"});
   if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'");
   const int64_t frames = trans->require_shape({-1, 3}).shape()[0];
-  if (frames == 0) throw DataError(trans->source() + " holds no frame");
+  if (frames == 0) throw DataError(trans->source() + ": holds no frame");
   const Rows places = rows_of(*trans, frames, 3);
   Motion motion;
   motion.frame_rate = read_frame_rate(file);
@@ -154,6 +154,8 @@ Motion decode_motion(std::span<const std::uint8_t> file, const std::string& name
 }
 
 void write_motion(const std::string& path, const Motion& motion) {
+  HSI4D_CHECK(!motion.poses.empty(), "a motion without frames");
+  HSI4D_CHECK(motion.frame_rate > 0 && std::isfinite(motion.frame_rate), std::to_string(motion.frame_rate) + " Hz");
   std::vector<double> trans;
   for (const BodyPose& pose : motion.poses) {
     HSI4D_CHECK_EQ(pose.axis_angle.size(), static_cast<std::size_t>(3 * kSmplxJoints));

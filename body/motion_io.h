@@ -33,7 +33,8 @@ Motion decode_motion(std::span<const std::uint8_t> file, const std::string& name
 /// Writes a motion, float64, so that reading gives the same bits: `poses` and its parts as above, `trans`, `betas` [10]
 /// zero, `gender` "neutral", `surface_model_type` "smplx", `mocap_frame_rate`, `mocap_time_length`.
 ///
-/// Throws UserError when the file cannot be written, InternalError when a pose has not 55 joints.
+/// Throws UserError when the file cannot be written, InternalError when there is no frame, a
+/// pose has not 55 joints, or the frame rate is not positive.
 void write_motion(const std::string& path, const Motion& motion);
 
 }  // namespace hsi4d

@@ -13,7 +13,7 @@ using Vector = Vector3<double>;
 using Row = std::array<double, kSmplxJoints>;
 
 /// Rounds of averaging along the surface.
-constexpr int kAveraging = 3;
+constexpr int kAveraging = 5;
 
 /// Joint numbers of the left half, and where they are.
 struct Joints {
@@ -95,7 +95,7 @@ Row weights_at(const Joints& joints, const Vector& p) {
   const double arm = smoothstep(-0.060, 0.060, beyond(joints, joints.shoulder, p, {0.9, 0.44, 0})) *
                      smoothstep(1.15, 1.25, p[1]) * (1 - smoothstep(1.460, 1.500, p[1]));
   const double leg = smoothstep(-0.060, 0.070, beyond(joints, joints.hip, p, {0.45, -0.89, 0})) *
-                     smoothstep(0, 0.040, p[0] + std::max(0.820 - p[1], 0.0)) * (1 - smoothstep(1.0, 1.1, p[1]));
+                     smoothstep(0, 0.060, p[0] + std::max(0.785 - p[1], 0.0)) * (1 - smoothstep(1.0, 1.1, p[1]));
   const double beside = smoothstep(0.060, 0.100, p[0]) * (1 - smoothstep(1.470, 1.500, p[1]));
   const double neck =
       (1 - beside) * smoothstep(-0.025, 0.025, beyond(joints, joints.neck, p, {0, 0.97, 0.24})) * (1 - arm);

@@ -65,7 +65,7 @@ struct Composite {
   Buffer<Extent> extents = {};
   TileLists lists = {};
   // What the backward pass needs of every tile.
-  Buffer<std::int32_t> last = {};
+  Buffer<detail::ListPosition<S>> last = {};
   Buffer<Index> checkpoint_begin = {};
   Buffer<S> checkpoints = {};
   Buffer<Index> fragments = {};
@@ -262,7 +262,8 @@ struct Composite {
           std::copy_n(&d_transmittance(job.top + r, job.left), job.width, adjoint.behind + r * tiles.tile);
         }
       }
-      detail::composite_tile_adjoint(tiles.tile, scene, job, adjoint, adjoint.segment + 2 * kSegment * pixels);
+      adjoint.feature_sums = adjoint.segment + 2 * kSegment * pixels;
+      detail::composite_tile_adjoint(tiles.tile, scene, job, adjoint);
     });
     parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
       for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, shared, rank);
@@ -329,10 +330,9 @@ struct Composite {
   // --- the rest ------------------------------------------------------------------------------------------------------
 
   /// Order, lists, stops, and for each (pixel, Gaussian) pair whether it is cut, composited or held by the cap.
-  void add_signature(Signature& signature, NodeIo<S>& io) {
+  void add_signature(Signature& signature, NodeIo<S>&) {
     const TileGrid tiles = grid();
     const CompositeRules<S> rules = rules_of<S>(view.settings);
-    static_cast<void>(io);
     for (const SplatRecord<S>& record : records.span()) signature.add(static_cast<std::uint64_t>(record.index));
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       const TileJob<S> job = job_of(tiles, tile);
@@ -342,13 +342,9 @@ struct Composite {
         for (Index p = 0; p < job.width * job.height; ++p) {
           const Index r = p / job.width, c = p % job.width;
           if (job.top + r < record.row_begin || job.top + r >= record.row_end) continue;
-          S u, g;
-          detail::row_gaussian<1>(record, static_cast<S>(job.left + c) + S(0.5),
-                                  (static_cast<S>(job.top + r) + S(0.5)) - record.y, &u, &g);
-          const S raw = record.opacity * g;
-          const bool behind_stop = static_cast<std::int32_t>(at) >= job.last[r * tiles.tile + c];
-          if (behind_stop || !(raw >= rules.alpha_min)) continue;
-          signature.add(at * 2 + (raw > rules.alpha_cap ? 1 : 0));
+          const auto pixel = detail::pixel_alpha(record, rules, job.top + r, job.left + c);
+          const bool before_stop = static_cast<Index>(at) < static_cast<Index>(job.last[r * tiles.tile + c]);
+          if (before_stop && pixel.drawn) signature.add(at * 2 + (pixel.capped ? 1 : 0));
         }
         signature.add(at);
       }

@@ -9,7 +9,7 @@
 namespace hsi4d::cli {
 
 struct GradientsOptions {
-  SceneOptions shared{.command = "hsi4d gradients"};
+  SceneOptions shared;
   std::string target;  ///< --target F.png, .exr or .npz
   std::string out;     ///< --out grads.npz
 };

@@ -9,7 +9,7 @@
 namespace hsi4d::cli {
 
 struct RenderOptions {
-  SceneOptions shared{.command = "hsi4d render"};
+  SceneOptions shared;
   std::vector<std::string> objects;  ///< --object F.ply, drawn as they lie in their files
   std::string motion;                ///< --motion M.npz, with
   int frame = 0;                     ///< --frame I and

@@ -27,7 +27,7 @@ Precision parse_precision(const std::string& word, const std::string& where) {
     if (word == choice.name) return choice.value;
     known.emplace_back(choice.name);
   }
-  throw UserError(where + ": \"" + word + "\" is none; allowed: " + joined(known) + did_you_mean(word, known));
+  throw UserError(where + ": \"" + word + "\" is no precision; allowed: " + joined(known) + did_you_mean(word, known));
 }
 
 }  // namespace
@@ -60,10 +60,10 @@ std::array<double, 3> parse_color(const std::string& text, const std::string& wh
   return color;
 }
 
-SceneView view_of(const SceneOptions& options) {
+SceneView view_of(const SceneOptions& options, const std::string& command) {
   SceneView view;
-  view.background = parse_color(options.background, options.command + ": --background");
-  view.precision = parse_precision(options.precision, options.command + ": --precision");
+  view.background = parse_color(options.background, command + ": --background");
+  view.precision = parse_precision(options.precision, command + ": --precision");
   view.settings = render_settings(options.settings);
   view.camera = read_camera(options.camera, options.camera_frame);
   return view;
@@ -89,7 +89,7 @@ void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, c
 std::string check_ending(const std::string& path, const std::string& where, const std::vector<std::string>& allowed) {
   const std::string ending = file_ending(path);
   if (std::find(allowed.begin(), allowed.end(), ending) != allowed.end()) return ending;
-  throw UserError(where + ": " + path + " does not end in " + joined(allowed));
+  throw UserError(where + ": " + path + " does not end as it must; allowed: " + joined(allowed));
 }
 
 }  // namespace hsi4d::cli

@@ -13,7 +13,6 @@ namespace hsi4d::cli {
 
 /// Options as they stand on the command line.
 struct SceneOptions {
-  std::string command;                ///< "hsi4d render", which messages begin with
   std::string scene;                  ///< --scene F.ply
   std::string camera;                 ///< --camera C.json
   int camera_frame = 0;               ///< --camera-frame I, of a file with several
@@ -24,9 +23,10 @@ struct SceneOptions {
 
 /// The camera, colours and settings that the options name.
 ///
+/// @param command  "hsi4d render", which messages begin with
 /// Throws UserError that names the option, its value and what is allowed; and what read_camera throws. Settings have
 /// the messages of a config's overrides.
-SceneView view_of(const SceneOptions& options);
+SceneView view_of(const SceneOptions& options, const std::string& command);
 
 /// Render settings from KEY=VALUE pairs, each of which begins with "render."; all problems in one UserError.
 RenderSettings render_settings(const std::vector<std::string>& overrides);

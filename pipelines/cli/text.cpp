@@ -9,7 +9,7 @@ namespace hsi4d::cli {
 std::string short_number(double value) {
   std::array<char, 32> buffer;
   const auto end =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::general, 4).ptr;
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value + 0.0, std::chars_format::general, 4).ptr;
   return {buffer.data(), end};
 }
 

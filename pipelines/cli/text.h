@@ -6,7 +6,7 @@
 
 namespace hsi4d::cli {
 
-/// A number in 4 significant digits, without locale.
+/// A number in 4 significant digits, without locale; 0 for −0.
 std::string short_number(double value);
 
 /// The ending of a path in lower case with its dot, ".ply"; "" without one.

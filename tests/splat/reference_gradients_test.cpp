@@ -209,6 +209,20 @@ TEST_CASE("reference: every class of gradients agrees with differences") {
   check_gradients("degree 1 of 3, no blur", moved);
 }
 
+TEST_CASE("reference: gradients agree with differences where Gaussians are cut and pixels stop") {
+  for (const Compatibility compatibility : {Compatibility::kNone, Compatibility::kGsplat, Compatibility::kInria}) {
+    Inputs<Real> in = inputs_of<Real>(random_splats(8, 9, kSmall));
+    for (Real& x : in.scene.opacity_logits) x = std::min(x + 2, 4.0L);  // below the caps
+    apply_compatibility(in.settings, compatibility);
+    in.settings.alpha_min = 0.02;
+    in.settings.transmittance_stop = 0.1;
+    Inputs<Real> whole = in;
+    whole.settings.transmittance_stop = 0;
+    REQUIRE(whole.render().transmittance != in.render().transmittance);
+    check_gradients("cut and stopped", in);
+  }
+}
+
 TEST_CASE("reference: gradients of quaternions of any length agree with differences") {
   SplatScene scene = random_splats(4, 7, kSmall);
   for (std::size_t i = 0; i < 8; ++i) scene.quats[i] *= i < 4 ? 3.f : 0.25f;
@@ -384,6 +398,10 @@ TEST_CASE("reference: the factor of antialias has no gradient at its floor (A7)"
   CHECK(in.render().transmittance == std::vector<double>(25, 1.));
   for (const std::vector<double>* x : {&g.means, &g.quats, &g.log_scales, &g.opacity_logits, &g.transforms})
     CHECK(all_zero(*x));
+  // Without blur there is no covariance to invert: nothing is drawn.
+  in.settings.blur = 0;
+  CHECK(in.render().transmittance == std::vector<double>(25, 1.));
+  CHECK(all_zero(in.gradients(random_cotangent(in.render(), 3)).opacity_logits));
   in.scene.transforms.clear();
   for (const double log_scale : {-9., -5., 0., 2.3}) {
     Inputs<Real> other = inputs_of<Real>(single(0));

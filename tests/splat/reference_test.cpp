@@ -306,13 +306,13 @@ TEST_CASE("reference: ties go by row, and the type of the depth key decides what
 }
 
 TEST_CASE("reference: INRIA's square support, by its tiles") {
-  for (const auto& [u, begin, end] : {std::tuple{22.5, 0, 32}, {23.5, 16, 32}, {25.5, 16, 32}, {26.5, 16, 40}}) {
-    // Variance 4: λ = 4 + √0.1, radius ceil(3 √λ) = 7, centre u − ½ in INRIA's pixels.
+  for (const auto& [u, begin, end] :
+       {std::tuple{22.5, 0, 32}, {23., 0, 32}, {23.5, 16, 32}, {26., 16, 32}, {26.5, 16, 40}}) {
+    // Variance 3.9: λ = 3.9 + √0.1, radius ceil(3 √λ) = 7 (6 without the 0.1), centre u − ½ in INRIA's pixels.
     SplatScene scene;
     scene.camera = plain_camera({40, 40});
     const double z = 40;
-    scene.add({u - 20, 3.5, z}, 2, 0, {1, 0, 0});  // v = 23.5
-    scene.settings.frustum_clamp = 1;
+    scene.add({u - 20, 3.5, z}, std::sqrt(3.9), 0, {1, 0, 0});  // v = 23.5
     RenderSettings settings = uncut();
     settings.blur = 0;
     settings.footprint = Footprint::kSquare3Sigma;

@@ -122,7 +122,7 @@ TEST_CASE("the program and every subcommand answer --version and --help") {
   CHECK(version_text.out == std::string("hsi4d ") + version() + "\n");
   const ProgramResult help = run_hsi4d({"--help"});
   CHECK(help.status == 0);
-  for (const char* command : {"check", "schema", "list"}) {
+  for (const char* command : {"check", "schema", "list", "info", "render", "gradients"}) {
     CHECK_THAT(help.out, Contains(command));
     const ProgramResult own = run_hsi4d({command, "--help"});
     CHECK(own.status == 0);
@@ -140,9 +140,12 @@ TEST_CASE("mistakes on the command line end with 2 and one message") {
     return result.err;
   };
   CHECK(mistake({"chek"}) ==
-        "hsi4d: there is no command \"chek\"; known: check, schema, list; did you mean \"check\"?\n");
-  CHECK(mistake({"frobnicate"}) == "hsi4d: there is no command \"frobnicate\"; known: check, schema, list\n");
-  CHECK(mistake({}) == "hsi4d: give a command: check, schema, list; `hsi4d --help` explains them\n");
+        "hsi4d: there is no command \"chek\"; known: check, schema, list, info, render, gradients; did you mean "
+        "\"check\"?\n");
+  CHECK(mistake({"frobnicate"}) ==
+        "hsi4d: there is no command \"frobnicate\"; known: check, schema, list, info, render, gradients\n");
+  CHECK(mistake({}) ==
+        "hsi4d: give a command: check, schema, list, info, render, gradients; `hsi4d --help` explains them\n");
   CHECK(mistake({"check"}) == "hsi4d check: CONFIG is required; `hsi4d check --help` explains its arguments\n");
   CHECK(mistake({"check", "a.json", "--sett", "x=1"}) ==
         "hsi4d check: The following arguments were not expected: x=1 --sett; `hsi4d check --help` explains its "

@@ -1,0 +1,176 @@
+#include "body/motion_io.h"
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+
+#include <catch2/catch.hpp>
+
+#include "body/body_model.h"
+#include "core/npz.h"
+#include "core/random.h"
+#include "tests/temporary_folder.h"
+
+using namespace hsi4d;
+
+namespace {
+
+using Numbers = std::vector<double>;
+
+Motion random_motion(std::size_t frames, std::uint64_t seed) {
+  RandomSequence random(seed);
+  Motion motion{29.97, {}};
+  for (std::size_t t = 0; t < frames; ++t) {
+    BodyPose pose = rest_pose(55);
+    for (double& x : pose.axis_angle) x = random.normal();
+    pose.transl = {random.normal(), random.normal(), random.normal()};
+    motion.poses.push_back(pose);
+  }
+  return motion;
+}
+
+/// Numbers 1, 2, 3, … [frames, width].
+Numbers counted(std::size_t frames, std::size_t width) {
+  Numbers numbers(frames * width);
+  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<double>(i + 1);
+  return numbers;
+}
+
+Motion decoded(const std::function<void(NpzWriter&)>& add) {
+  NpzWriter file;
+  add(file);
+  return decode_motion(file.encode(), "m.npz");
+}
+
+std::string message_for(const std::function<void(NpzWriter&)>& add) {
+  try {
+    decoded(add);
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+double angle(const Motion& motion, std::size_t frame, const char* joint, int i) {
+  return motion.poses[frame].rotation_of(smplx_joint(joint))[i];
+}
+
+}  // namespace
+
+TEST_CASE("motion files round-trip bit for bit") {
+  const TemporaryFolder folder;
+  const Motion motion = random_motion(7, 70);
+  write_motion(folder / "m.npz", motion);
+  const Motion read = read_motion(folder / "m.npz");
+  CHECK(read.frame_rate == motion.frame_rate);
+  REQUIRE(read.poses.size() == 7);
+  for (std::size_t t = 0; t < 7; ++t) {
+    CHECK(std::memcmp(read.poses[t].axis_angle.data(), motion.poses[t].axis_angle.data(), 165 * sizeof(double)) == 0);
+    CHECK(read.poses[t].transl == motion.poses[t].transl);
+  }
+}
+
+TEST_CASE("motion files have the arrays that AMASS has") {
+  const TemporaryFolder folder;
+  const Motion motion = random_motion(3, 71);
+  write_motion(folder / "m.npz", motion);
+  const Npz file = Npz::read(folder / "m.npz");
+  CHECK(file.array("poses").shape() == std::vector<int64_t>{3, 165});
+  CHECK(file.array("trans").shape() == std::vector<int64_t>{3, 3});
+  CHECK(file.array("betas").as<double>() == Numbers(10, 0.0));
+  CHECK(file.array("gender").text() == "neutral");
+  CHECK(file.array("surface_model_type").text() == "smplx");
+  CHECK(file.array("mocap_time_length").scalar<double>() == 3 / 29.97);
+  const std::vector<std::pair<std::string, std::size_t>> parts = {
+      {"root_orient", 3}, {"pose_body", 63}, {"pose_jaw", 3}, {"pose_eye", 6}, {"pose_hand", 90}};
+  const Numbers poses = file.array("poses").as<double>();
+  std::size_t first = 0;
+  for (const auto& [name, width] : parts) {
+    const Numbers part = file.array(name).require_shape({3, static_cast<int64_t>(width)}).as<double>();
+    for (std::size_t t = 0; t < 3; ++t) {
+      for (std::size_t i = 0; i < width; ++i) REQUIRE(part[t * width + i] == poses[165 * t + first + i]);
+    }
+    first += width;
+  }
+  CHECK(first == 165);
+}
+
+TEST_CASE("poses of SMPL-X, SMPL-H and SMPL are mapped") {
+  const auto with_poses = [](std::size_t width) {
+    return decoded([width](NpzWriter& f) {
+      f.add<double>("trans", {2, 3}, counted(2, 3));
+      f.add<double>("poses", {2, static_cast<int64_t>(width)}, counted(2, width));
+      f.add_scalar("mocap_framerate", 120.0);
+    });
+  };
+  const Motion x = with_poses(165);
+  CHECK(x.frame_rate == 120);
+  CHECK(x.poses[1].transl == Vector3<double>(4, 5, 6));
+  CHECK(x.poses[0].axis_angle == counted(1, 165));
+  const Motion h = with_poses(156);
+  CHECK(angle(h, 0, "right_wrist", 2) == 66);
+  CHECK(angle(h, 0, "jaw", 0) == 0);
+  CHECK(angle(h, 0, "right_eye_smplhf", 2) == 0);
+  CHECK(angle(h, 0, "left_index1", 0) == 67);
+  CHECK(angle(h, 1, "right_thumb3", 2) == 312);
+  const Motion smpl = with_poses(72);
+  CHECK(angle(smpl, 0, "right_wrist", 2) == 66);
+  CHECK(angle(smpl, 1, "pelvis", 0) == 73);
+  CHECK(angle(smpl, 0, "left_index1", 0) == 0);
+  CHECK(angle(smpl, 1, "jaw", 1) == 0);
+}
+
+TEST_CASE("poses in parts are read; missing parts are zero") {
+  const Motion motion = decoded([](NpzWriter& f) {
+    f.add<float>("transl", {1, 3}, {1, 2, 3});
+    f.add<float>("global_orient", {1, 3}, {4, 5, 6});
+    f.add<double>("body_pose", {1, 63}, counted(1, 63));
+    f.add<double>("pose_hand", {1, 90}, counted(1, 90));
+  });
+  CHECK(motion.frame_rate == 10);
+  CHECK(motion.poses[0].transl == Vector3<double>(1, 2, 3));
+  CHECK(angle(motion, 0, "pelvis", 1) == 5);
+  CHECK(angle(motion, 0, "left_hip", 0) == 1);
+  CHECK(angle(motion, 0, "jaw", 0) == 0);
+  CHECK(angle(motion, 0, "left_index1", 0) == 1);
+  CHECK(angle(motion, 0, "right_index1", 0) == 46);
+}
+
+TEST_CASE("faults of motion files are named") {
+  const auto trans = [](NpzWriter& f) { f.add<double>("trans", {2, 3}, counted(2, 3)); };
+  CHECK(message_for([](NpzWriter& f) {
+          f.add<double>("poses", {2, 72}, counted(2, 72));
+        }) == "m.npz: there is no array 'trans'");
+  CHECK(message_for([&](NpzWriter& f) { trans(f); }) == "m.npz: there is neither 'poses' nor 'root_orient'");
+  CHECK(message_for([&](NpzWriter& f) {
+          trans(f), f.add<double>("poses", {2, 75}, counted(2, 75));
+        }) == "m.npz: array 'poses': has shape [2,75]; allowed: [2,165] (SMPL-X), [2,156] (SMPL-H), [2,72] (SMPL)");
+  CHECK(message_for([&](NpzWriter& f) {
+          trans(f), f.add<double>("poses", {3, 72}, counted(3, 72));
+        }) == "m.npz: array 'poses': has shape [3,72]; allowed: [2,165] (SMPL-X), [2,156] (SMPL-H), [2,72] (SMPL)");
+  CHECK(message_for([](NpzWriter& f) {
+          f.add<double>("trans", {0, 3}, {});
+        }) == "m.npz: array 'trans': holds no frame");
+  CHECK(message_for([](NpzWriter& f) { f.add<double>("trans", {6}, counted(2, 3)); }) ==
+        "m.npz: array 'trans': has shape [6]; [*,3] is needed");
+  CHECK(message_for([&](NpzWriter& f) {
+          trans(f);
+          f.add<double>("root_orient", {2, 3}, counted(2, 3));
+          f.add<double>("pose_body", {2, 62}, counted(2, 62));
+        }) == "m.npz: array 'pose_body': has shape [2,62]; [2,63] is needed");
+  CHECK(message_for([&](NpzWriter& f) {
+          trans(f);
+          Numbers poses = counted(2, 72);
+          poses[72 + 5] = std::numeric_limits<double>::infinity();
+          f.add<double>("poses", {2, 72}, poses);
+        }) == "m.npz: array 'poses': frame 1, number 5 is not finite");
+  CHECK(message_for([&](NpzWriter& f) { trans(f), f.add_scalar("mocap_frame_rate", 0.0); }) ==
+        "m.npz: array 'mocap_frame_rate': is 0.000000; allowed: a positive number");
+  CHECK_THROWS_AS(read_motion("no_such_motion.npz"), UserError);
+  const TemporaryFolder folder;
+  CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{10, {rest_pose(22)}}), InternalError);
+  CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{10, {}}), InternalError);
+  CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{0, {rest_pose(55)}}), InternalError);
+  CHECK(folder.count() == 0);
+}

@@ -1,0 +1,140 @@
+#include "pipelines/posed_avatar.h"
+
+#include <cmath>
+#include <numeric>
+
+#include <catch2/catch.hpp>
+
+#include "body/motion_io.h"
+#include "body/procedural_body.h"
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/npz.h"
+#include "pipelines/cli/render_command.h"
+#include "splat/io_ply.h"
+#include "tests/support/program.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+
+namespace {
+
+/// Two bones along x: joint 0 at the origin, joint 1 at x = 1; a Gaussian on each and one that hangs on both.
+Avatar two_bones() {
+  Avatar a;
+  a.means = {0.5F, 0, 0, 1.5F, 0, 0, 1, 0, 0.25F};
+  a.quats = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+  a.log_scales = {-2, -3, -3, -2, -3, -3, -2, -3, -3};
+  a.opacity_logits = {1, 2, 3};
+  a.colors = {0, 0.5F, 1, 0.25F, 0.5F, 0.75F, 1, 1, 1};
+  a.weights = {3, 2, 2, {0, 1, 1, 0, 0, 1}, {1, 0, 1, 0, 0.5, 0.5}};
+  a.parents = {-1, 0};
+  a.joints = {0, 0, 0, 1, 0, 0};
+  a.joint_names = {"root", "tip"};
+  return a;
+}
+
+Vector3<double> mean_of(const PosedGaussians& posed, std::size_t n) {
+  Vector3<double> result;
+  for (int r = 0; r < 3; ++r) {
+    const double* row = posed.transforms.data() + 12 * n + 4 * static_cast<std::size_t>(r);
+    result[r] = row[3];
+    for (std::size_t c = 0; c < 3; ++c) result[r] += row[c] * static_cast<double>(posed.gaussians.means[3 * n + c]);
+  }
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("an avatar's Gaussians follow their joints") {
+  const Avatar avatar = two_bones();
+  BodyPose pose = rest_pose(2);
+  pose.transl = {10, 20, 30};
+  pose.set_rotation(1, {0, 0, std::acos(-1.0) / 2});  // the tip bends from +x to +y
+  const PosedGaussians posed = posed_avatar(avatar, pose);
+  check_sizes(posed.gaussians);
+  CHECK(posed.gaussians.sh_degree == 0);
+  CHECK((mean_of(posed, 0) - Vector3<double>(10.5, 20, 30)).norm() < 1e-12);
+  CHECK((mean_of(posed, 1) - Vector3<double>(11, 20.5, 30)).norm() < 1e-12);
+  CHECK((mean_of(posed, 2) - Vector3<double>(11, 20, 30.25)).norm() < 1e-12);  // on the joint's axis: both agree
+  CHECK(posed.transforms[12 * 2] == Approx(0.5));                              // a blend, which shrinks
+  for (std::size_t i = 0; i < avatar.colors.size(); ++i)
+    CHECK(0.5 + 0.28209479177387814 * static_cast<double>(posed.gaussians.sh[i]) ==
+          Approx(static_cast<double>(avatar.colors[i])).margin(1e-7));
+  CHECK_THROWS_AS(posed_avatar(avatar, rest_pose(3)), InternalError);
+}
+
+TEST_CASE("parts without transforms stand still beside those that have some") {
+  const PosedGaussians body = posed_avatar(two_bones(), rest_pose(2));
+  const PosedGaussians still{body.gaussians, {}};
+  const std::vector<PosedGaussians> parts = {still, body, still};
+  const PosedGaussians all = concatenated(parts);
+  CHECK(all.gaussians.count() == 9);
+  REQUIRE(all.transforms.size() == 12 * 9);
+  for (std::size_t n = 0; n < 9; ++n) CHECK((mean_of(all, n) - mean_of(body, n % 3)).norm() < 1e-15);
+  CHECK(concatenated(std::vector<PosedGaussians>{still, still}).transforms.empty());
+}
+
+TEST_CASE("render draws a body of a motion, in every precision") {
+  const TemporaryFolder folder;
+  const Avatar avatar = surface_avatar(procedural_body(), {.gaussians = 400});
+  write_avatar("avatar.npz", avatar);
+  Motion motion;
+  for (int frame = 0; frame < 2; ++frame) {
+    BodyPose pose = rest_pose(55);
+    pose.set_rotation(0, {std::acos(-1.0) / 2, 0, 0});  // y up to z up
+    pose.transl = {0.2 * frame, 0, 0};
+    pose.set_rotation(16, {0, 0, -0.9 * frame});  // an arm
+    motion.poses.push_back(pose);
+  }
+  write_motion("motion.npz", motion);
+  Camera camera;
+  camera.width = 40;
+  camera.height = 60;
+  camera.fx = camera.fy = 60;
+  camera.cx = 20;
+  camera.cy = 30;
+  camera.camera_from_world = look_at({0, -3, 0}, {0, 0, 0});
+  write_camera("camera.json", camera);
+  Gaussians ball;
+  ball.sh_degree = 1;
+  ball.means = {0.5F, -0.5F, 0.3F};
+  ball.quats = {1, 0, 0, 0};
+  ball.log_scales = {-2, -2, -2};
+  ball.opacity_logits = {3};
+  ball.sh.assign(12, 0.5F);
+  write_ply("ball.ply", ball);
+
+  cli::RenderOptions options;
+  options.shared.scene = "ball.ply";
+  options.shared.camera = "camera.json";
+  options.motion = "motion.npz";
+  options.avatar = "avatar.npz";
+  std::vector<std::vector<double>> images;
+  for (const int frame : {0, 1}) {
+    for (const char* precision : {"reference", "double", "float"}) {
+      options.frame = frame;
+      options.shared.precision = precision;
+      options.out = "a.npz";
+      CHECK(cli::render_command(options) == "a.npz: 40 x 60 pixels of 401 Gaussians\n");
+      images.push_back(Npz::read("a.npz").array("image").as<double>());
+    }
+  }
+  const auto largest_difference = [&](std::size_t a, std::size_t b) {
+    double largest = 0;
+    for (std::size_t i = 0; i < images[a].size(); ++i)
+      largest = std::max(largest, std::fabs(images[a][i] - images[b][i]));
+    return largest;
+  };
+  CHECK(largest_difference(1, 0) < 1e-9);
+  CHECK(largest_difference(2, 0) < 2e-2);  // a Gaussian at the edge of its footprint may count or not
+  CHECK(largest_difference(4, 3) < 1e-9);
+  CHECK(largest_difference(3, 0) > 0.3);  // the body moved
+  const double sum = std::accumulate(images[0].begin(), images[0].end(), 0.0);
+  CHECK(sum / static_cast<double>(images[0].size()) > 0.03);  // and was seen
+
+  const ProgramResult outside = run_hsi4d({"render", "--scene", "ball.ply", "--camera", "camera.json", "--motion",
+                                           "motion.npz", "--avatar", "avatar.npz", "--frame", "2", "--out", "a.png"});
+  CHECK(outside.status == 2);
+  CHECK(outside.err == "hsi4d render: --frame: motion.npz has no frame 2; allowed: 0 to 1\n");
+}
