@@ -22,6 +22,8 @@ template <class S>
 using Matrix3 = Eigen::Matrix<S, 3, 3>;
 template <class S>
 using Matrix4 = Eigen::Matrix<S, 4, 4>;
+template <class S>
+using Matrix6 = Eigen::Matrix<S, 6, 6>;
 
 namespace detail {
 

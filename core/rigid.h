@@ -106,6 +106,17 @@ void se3_log_adjoint(const Rigid<S>& transform, const Vector6<S>& d_xi, Rigid<S>
   d_transform.translation += so3_left_jacobian_inverse(phi).transpose() * d_rho;
 }
 
+/// The matrix Ad with T Exp(η) T⁻¹ = Exp(Ad η): [R, hat(t) R; 0, R] for ξ = (translation, rotation).
+/// [Barfoot 2017, eq. 7.45]
+template <class S>
+Matrix6<S> se3_adjoint_matrix(const Rigid<S>& transform) {
+  Matrix6<S> ad = Matrix6<S>::Zero();
+  ad.template topLeftCorner<3, 3>() = transform.rotation;
+  ad.template topRightCorner<3, 3>() = hat(transform.translation) * transform.rotation;
+  ad.template bottomRightCorner<3, 3>() = transform.rotation;
+  return ad;
+}
+
 /// Exp(ξ) T, an optimiser's step. Adjoint: compose_adjoint with se3_exp_adjoint; at ξ = 0 se3_update_adjoint_at_zero.
 template <class S>
 Rigid<S> se3_update(const Vector6<S>& xi, const Rigid<S>& transform) {

@@ -99,7 +99,15 @@ FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& 
                           const FrameGraphSettings& settings)
     : tape_(tape), settings_(settings), view_{clip.camera, clip.scene.origin_world, settings.render} {
   view_.camera.camera_from_world = camera_from_world;
+  xi_from_update_ = camera_from_increment(settings.increment, view_.camera, clip.scene);
   camera_update_ = leaf("camera", "camera_update", 1, 6, nullptr);
+  xi_ = camera_update_;
+  if (settings.increment != CameraIncrement::kCamera) {
+    const Var<S> map = tape_.constant("update_from_xi", shape_of(6, 6));  // transposed: it multiplies a row
+    const Matrix6<double> transposed = xi_from_update_;                   // column-major, so its memory is the transpose
+    write_numbers(tape_, map, transposed.data());
+    xi_ = matmul(camera_update_, map);
+  }
   const Vector3<float> background = settings.background.cast<float>();
   background_ = leaf("background", "background", 1, 3, background.data());
   std::vector<Part> parts = {record_scene(clip)};
@@ -142,7 +150,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Clip& clip) {
   const Var<S> scales = leaf("scene_log_scales", "scene log_scales", n, 3, g.log_scales.data());
   const Var<S> logits = leaf("scene_opacity_logits", "scene opacity_logits", n, 1, g.opacity_logits.data());
   const Var<S> sh = leaf("scene_sh", "scene sh", n, 3 * g.sh_coefficients(), g.sh.data());
-  return {{means, gaussian_axes(quats, scales), sigmoid(logits), sh_colors(sh, means, camera_update_, view_)}, n};
+  return {{means, gaussian_axes(quats, scales), sigmoid(logits), sh_colors(sh, means, xi_, view_)}, n};
 }
 
 template <class S>
@@ -163,7 +171,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
   const Var<S> transform = rigid_rows(rotation, transl);
   const Var<S> means = matmul(centred, transpose(reshape(rotation, 3, 3))) + transl;
   const Var<S> axes = transform_axes(transform, gaussian_axes(quats, scales));
-  return {{means, axes, sigmoid(logits), sh_colors(sh, means, camera_update_, view_, transform)}, n};
+  return {{means, axes, sigmoid(logits), sh_colors(sh, means, xi_, view_, transform)}, n};
 }
 
 template <class S>
@@ -207,7 +215,7 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
   }
   const SplatInputs<S> all = {stacked(splats, &SplatInputs<S>::means), stacked(splats, &SplatInputs<S>::axes),
                               stacked(splats, &SplatInputs<S>::opacities), stacked(splats, &SplatInputs<S>::colors)};
-  rendered_ = render(all, camera_update_, background_, view_, request);
+  rendered_ = render(all, xi_, background_, view_, request);
   inputs_.rendered = rendered_.image;
   inputs_.target = tape_.constant("target", rendered_.image.shape());
   inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
@@ -274,8 +282,9 @@ template <class S>
 void FrameGraph<S>::read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const {
   const auto is_moved = [&moved](const char* group) { return find_entry(moved, group) != nullptr; };
   if (is_moved("camera")) {
-    Vector6<double> xi;
-    for (Index i = 0; i < 6; ++i) xi[i] = static_cast<double>(tape_.value(camera_update_)(0, i));
+    Vector6<double> update;
+    for (Index i = 0; i < 6; ++i) update[i] = static_cast<double>(tape_.value(camera_update_)(0, i));
+    const Vector6<double> xi = xi_from_update_ * update;
     state.camera_from_world = se3_update(xi, view_.camera.camera_from_world);
   }
   for (std::size_t o = 0; o < objects_.size(); ++o) {
@@ -324,6 +333,34 @@ Vector3<double> mask_center(const Image& mask) {
     }
   }
   return mass > 0 ? Vector3<double>(x_sum / mass, y_sum / mass, 1) : Vector3<double>::Zero();
+}
+
+namespace {
+
+/// Median camera z of the Gaussians whose centres are in the image, metres; 1 where there are none.
+double median_depth(const Gaussians& scene, const Camera& camera) {
+  const View<double> view = view_of<double>(camera, scene.origin_world);
+  std::vector<double> depths;
+  for (Index i = 0; i < scene.count(); ++i) {
+    const Vector3<double> p =
+        point_in_view(view, Vector3<double>(Vector3<float>(scene.means.data() + 3 * i).cast<double>()));
+    if (!(p[2] > kNear)) continue;
+    const Vector2<double> pixel = project_point(camera, p);
+    if (pixel[0] >= 0 && pixel[0] < camera.width && pixel[1] >= 0 && pixel[1] < camera.height) depths.push_back(p[2]);
+  }
+  if (depths.empty()) return 1;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+}  // namespace
+
+Matrix6<double> camera_from_increment(CameraIncrement increment, const Camera& camera, const Gaussians& scene) {
+  Rigid<double> frame;
+  if (increment == CameraIncrement::kWorld) frame = camera.camera_from_world;
+  if (increment == CameraIncrement::kScene) frame.translation = {0, 0, median_depth(scene, camera)};
+  return se3_adjoint_matrix(frame);
 }
 
 double mean_depth(const Gaussians& object, const ObjectPose& pose, const Rigid<double>& camera_from_world) {

@@ -24,6 +24,7 @@ namespace hsi4d {
 struct FrameGraphSettings {
   RenderSettings render;
   RotationParameters rotations = RotationParameters::kSixD;
+  CameraIncrement increment = CameraIncrement::kCamera;
   Draw draw = Draw::kAll;
   Vector3<double> background = Vector3<double>::Zero();
 };
@@ -85,7 +86,9 @@ class FrameGraph {
   FrameGraphSettings settings_;
   SplatView view_;
   std::vector<ParameterGroup<S>> groups_;
-  Var<S> camera_update_, background_;
+  Matrix6<double> xi_from_update_;
+  Var<S> camera_update_;  // the leaf: numbers in the frame of settings.increment
+  Var<S> xi_, background_;
   std::vector<Object> objects_;
   Var<S> transl_;
   std::vector<Var<S>> joint_rotations_;  // by kJointGroups
@@ -95,6 +98,12 @@ class FrameGraph {
 
 /// Centre of a mask (pixel centres at +0.5) in x and y, and 1; zeros for an empty mask.
 Vector3<double> mask_center(const Image& mask);
+
+/// The matrix that takes six numbers (translation, rotation) in the frame of `increment` to the camera's frame, so that
+/// T ← Exp(ξ) T is the update: the adjoint of the frame's own transform, [R, hat(t) R; 0, R].
+///
+/// @param camera  its pose is the one that the update starts from
+Matrix6<double> camera_from_increment(CameraIncrement increment, const Camera& camera, const Gaussians& scene);
 
 /// Mean camera z of an object's Gaussian centres, metres.
 double mean_depth(const Gaussians& object, const ObjectPose& pose, const Rigid<double>& camera_from_world);

@@ -11,6 +11,12 @@ constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 
 }  // namespace
 
+void describe(ConfigFields& f, CameraSettings& s) {
+  f.choice("increment", s.increment, kCameraIncrements,
+           "Frame of a camera's six numbers: its own (about its centre), the world's, or its own axes about the point at "
+           "the scene's median depth, which keeps turning and moving apart");
+}
+
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {
   f.string("name", s.name, "What the run is called in its report");
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of everything that is random");
@@ -20,6 +26,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.choice("rotations", s.rotations, kRotationParameters,
            "Numbers by which rotations are optimised: two columns of the matrix, or axis times angle");
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
+  f.object("camera", s.camera, "How cameras are optimised");
   f.object("data", s.data, "The files that the run reads");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
   f.object("render", s.render, "How Gaussians become pixels");

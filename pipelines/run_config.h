@@ -21,10 +21,20 @@ enum class RunPrecision { kFloat, kDouble };
 /// The numbers by which rotations are optimised.
 enum class RotationParameters { kSixD, kAxisAngle };
 
+/// The frame in which six numbers move a camera.
+enum class CameraIncrement { kCamera, kWorld, kScene };
+
+inline constexpr std::array<ConfigChoice<CameraIncrement>, 3> kCameraIncrements = {
+    {{CameraIncrement::kCamera, "camera"}, {CameraIncrement::kWorld, "world"}, {CameraIncrement::kScene, "scene"}}};
 inline constexpr std::array<ConfigChoice<RunPrecision>, 2> kRunPrecisions = {
     {{RunPrecision::kFloat, "float"}, {RunPrecision::kDouble, "double"}}};
 inline constexpr std::array<ConfigChoice<RotationParameters>, 2> kRotationParameters = {
     {{RotationParameters::kSixD, "6d"}, {RotationParameters::kAxisAngle, "axis_angle"}}};
+
+/// How cameras are optimised.
+struct CameraSettings {
+  CameraIncrement increment = CameraIncrement::kCamera;
+};
 
 /// A whole run.
 struct RunConfig {
@@ -34,11 +44,14 @@ struct RunConfig {
   RunPrecision precision = RunPrecision::kFloat;
   RotationParameters rotations = RotationParameters::kSixD;
   std::array<double, 3> background{};  ///< colour behind everything
+  CameraSettings camera;
   DataSettings data;
   SyntheticSettings synthetic;
   RenderSettings render;
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
+
+void describe(ConfigFields& fields, CameraSettings& settings);
 
 /// Describes the config of a run. `losses` are the terms that a stage may name.
 void describe(ConfigFields& fields, RunConfig& config, const std::vector<LossDescription>& losses);

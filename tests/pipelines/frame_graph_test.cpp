@@ -83,9 +83,13 @@ TEST_CASE("the gradient of the whole chain is right for every parameter", "[fram
 }
 
 TEST_CASE("the camera's gradient is right away from the camera that the graph was recorded with", "[frame_graph]") {
+  const CameraIncrement increment =
+      GENERATE(CameraIncrement::kCamera, CameraIncrement::kWorld, CameraIncrement::kScene);
   const Clip clip = small_clip(24, 20, 40);
   Tape<double> tape;
-  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(RotationParameters::kSixD));
+  FrameGraphSettings settings = smooth_settings(RotationParameters::kSixD);
+  settings.increment = increment;
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);
   graph.set_state(clip.first);
   const Image image = random_image(3, 20, 24, 3), weight = random_image(1, 20, 24, 4);
   graph.set_targets(targets_for(image, weight));
@@ -161,6 +165,27 @@ TEST_CASE("image, loss and every gradient have the same bits for any number of t
     if (expected.empty()) expected = numbers;
     CHECK(std::memcmp(expected.data(), numbers.data(), numbers.size() * sizeof(float)) == 0);
   }
+}
+
+TEST_CASE("increments of a camera act in the frame that they name", "[frame_graph]") {
+  const Clip clip = small_clip(24, 20, 20);
+  Vector6<double> update;
+  update << 0.1, -0.2, 0.05, 0.3, -0.1, 0.2;
+  const Rigid<double>& before = clip.camera.camera_from_world;
+  const auto updated = [&](CameraIncrement increment) {
+    return se3_update(Vector6<double>(camera_from_increment(increment, clip.camera, clip.scene) * update), before);
+  };
+  const Rigid<double> world = updated(CameraIncrement::kWorld), expected = compose(before, se3_exp(update));
+  CHECK((world.rotation - expected.rotation).norm() < 1e-12);
+  CHECK((world.translation - expected.translation).norm() < 1e-12);
+  CHECK((updated(CameraIncrement::kCamera).translation - se3_update(update, before).translation).norm() < 1e-14);
+  update.head<3>().setZero();  // a turn alone leaves the pivot, a point on the optical axis, where it is
+  const Rigid<double> scene = updated(CameraIncrement::kScene);
+  const Matrix6<double> map = camera_from_increment(CameraIncrement::kScene, clip.camera, clip.scene);
+  const Vector3<double> pivot(0, 0, map(1, 3));
+  const Vector3<double> pivot_world = transform_point(inverse(before), pivot);
+  CHECK(pivot[2] > 1);
+  CHECK((transform_point(scene, pivot_world) - pivot).norm() < 1e-12);
 }
 
 TEST_CASE("the mean depth of an object on the tape is that of the untaped function", "[frame_graph]") {
