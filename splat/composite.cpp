@@ -52,7 +52,7 @@ struct Composite {
   SplatView view;
   std::shared_ptr<RenderCounters> counters;
 
-  enum Input { kMeans, kFactors, kDepths, kRest, kOpacities, kFeatures };
+  enum Input { kMeans, kFactors, kDepths, kRest, kMeansRest, kOpacities, kFeatures };
   enum Output { kChannels, kTransmittance };
 
   // In the order of the inputs, kept for their memory alone.
@@ -93,10 +93,12 @@ struct Composite {
   /// Culls: numbers that are not finite, then near, then the footprint, each before its numbers are used (rows A4-A6).
   bool prepare_gaussian(const NodeIo<S>& io, const TileGrid& tiles, Index n, SplatRecord<S>& record,
                         Extent& extent) const {
-    const S* mean = io.in(kMeans).row(n);
+    const S *mean = io.in(kMeans).row(n), *mean_rest = io.in(kMeansRest).row(n);
     const S depth = io.in(kDepths).data[n], rest = io.in(kRest).data[n], opacity = io.in(kOpacities).data[n];
     const ConstArray<S> features = io.in(kFeatures);
-    if (!all_finite(mean, 2) || !std::isfinite(depth) || !std::isfinite(rest) || !std::isfinite(opacity)) return false;
+    if (!all_finite(mean, 2) || !all_finite(mean_rest, 2) || !std::isfinite(depth) || !std::isfinite(rest) ||
+        !std::isfinite(opacity))
+      return false;
     if (!(static_cast<double>(depth) + static_cast<double>(rest) > view.settings.near)) return false;
     double factor[6];
     read_factor(io, n, factor);
@@ -105,11 +107,13 @@ struct Composite {
     if (!detail::conic_of(factor, view.settings.blur, conic)) return false;
     const double scaled =
         static_cast<double>(opacity) * (view.settings.antialias ? detail::blur_compensation(conic) : 1.0);
-    extent = detail::extent_of(conic, static_cast<double>(mean[0]), static_cast<double>(mean[1]), scaled, tiles,
-                               view.settings, static_cast<double>(std::numeric_limits<S>::epsilon()));
+    const double x = static_cast<double>(mean[0]) + static_cast<double>(mean_rest[0]);
+    const double y = static_cast<double>(mean[1]) + static_cast<double>(mean_rest[1]);
+    extent = detail::extent_of(conic, x, y, scaled, tiles, view.settings,
+                               static_cast<double>(std::numeric_limits<S>::epsilon()));
     if (extent.row_begin >= extent.row_end || !all_finite(features.row(n), features.shape.cols)) return false;
-    record = {mean[0],
-              mean[1],
+    record = {x,
+              y,
               static_cast<S>(conic.l11),
               static_cast<S>(conic.l21),
               static_cast<S>(conic.l22),
@@ -345,7 +349,7 @@ struct Composite {
         for (Index p = 0; p < job.width * job.height; ++p) {
           const Index r = p / job.width, c = p % job.width;
           if (job.top + r < record.row_begin || job.top + r >= record.row_end) continue;
-          const auto pixel = detail::pixel_alpha(record, rules, job.top + r, job.left + c);
+          const auto pixel = detail::pixel_alpha(record, rules, job, r, c);
           const bool before_stop = static_cast<Index>(at) < static_cast<Index>(job.last[r * tiles.tile + c]);
           if (before_stop && pixel.drawn) signature.add(at * 2 + (pixel.capped ? 1 : 0));
         }
@@ -376,12 +380,13 @@ Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> 
   HSI4D_CHECK_EQ(projected.factors.shape(), shape_of(rows, 6));
   HSI4D_CHECK_EQ(projected.depths.shape(), shape_of(rows, 1));
   HSI4D_CHECK_EQ(projected.depth_rest.shape(), shape_of(rows, 1));
+  HSI4D_CHECK_EQ(projected.means_rest.shape(), shape_of(rows, 2));
   HSI4D_CHECK_EQ(opacities.shape(), shape_of(rows, 1));
   HSI4D_CHECK_EQ(features.shape(), shape_of(rows, channels));
   const int tile = view.settings.tile;
   HSI4D_CHECK(tile == 8 || tile == 16, "tile = " + std::to_string(tile) + "; allowed: 8, 16");
-  const std::array inputs = {projected.means_px,   projected.factors, projected.depths,
-                             projected.depth_rest, opacities,         features};
+  const std::array inputs = {projected.means_px,   projected.factors, projected.depths, projected.depth_rest,
+                             projected.means_rest, opacities,         features};
   const Index width = view.camera.width, height = view.camera.height;
   const std::array outputs = {image_shape<S>(channels, height, width), image_shape<S>(1, height, width)};
   auto counters = std::make_shared<RenderCounters>();

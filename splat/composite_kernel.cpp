@@ -64,7 +64,7 @@ HWY_INLINE V exp_of_negative(D d, V x) {
   return hn::IfThenElseZero(hn::Ge(x, lowest), hn::Mul(y, scale));
 }
 
-/// A Gaussian's numbers, ready for lanes.
+/// A Gaussian's numbers, ready for lanes; its mean from the tile's corner.
 template <class D>
 struct Splat {
   using S = hn::TFromD<D>;
@@ -72,8 +72,13 @@ struct Splat {
   V x, l11, opacity;
   S y, l21, l22;
 
-  HWY_INLINE Splat(D d, const SplatRecord<S>& r)
-      : x(hn::Set(d, r.x)), l11(hn::Set(d, r.l11)), opacity(hn::Set(d, r.opacity)), y(r.y), l21(r.l21), l22(r.l22) {}
+  HWY_INLINE Splat(D d, const TileJob<S>& job, const SplatRecord<S>& r)
+      : x(hn::Set(d, static_cast<S>(r.x - static_cast<double>(job.left)))),
+        l11(hn::Set(d, r.l11)),
+        opacity(hn::Set(d, r.opacity)),
+        y(static_cast<S>(r.y - static_cast<double>(job.top))),
+        l21(r.l21),
+        l22(r.l22) {}
 };
 
 /// What a row shares: −½ w², l21 dy, and w.
@@ -109,15 +114,16 @@ HWY_INLINE V alpha_of(D, const Splat<D>& g, V gaussian, V cap) {
   return hn::Min(hn::Mul(g.opacity, gaussian), cap);
 }
 
-/// Centres of the pixels of a row, from column c of the tile.
-template <class D, class S>
-HWY_INLINE hn::Vec<D> centers(D d, const TileJob<S>& job, Index c) {
-  return hn::Add(hn::Iota(d, S(0)), hn::Set(d, static_cast<S>(job.left + c) + S(0.5)));
+/// Centres of the pixels of a row from column c, and of a row, from the tile's corner.
+template <class D>
+HWY_INLINE hn::Vec<D> centers(D d, Index c) {
+  using S = hn::TFromD<D>;
+  return hn::Iota(d, static_cast<S>(c) + S(0.5));
 }
 
 template <class S>
-HWY_INLINE S center_y(const TileJob<S>& job, Index r) {
-  return static_cast<S>(job.top + r) + S(0.5);
+HWY_INLINE S center_y(Index r) {
+  return static_cast<S>(r) + S(0.5);
 }
 
 /// Rows of the tile that a Gaussian may touch.
@@ -172,17 +178,17 @@ Index composite(const CompositeScene<S>& scene, const TileJob<S>& job) {
       std::memcpy(job.checkpoints + (at / kSegment - 1) * kPixels, t, kPixels * sizeof(S));
     }
     const SplatRecord<S>& record = record_at(scene, job, at);
-    const Splat<Tag<S, W>> splat(d, record);
+    const Splat<Tag<S, W>> splat(d, job, record);
     const S* const feature = scene.features + record.index * scene.channels;
     const auto position = hn::Set(di, static_cast<ListPosition<S>>(at + 1));
     const RowRange rows(record, job);
     for (Index r = rows.begin; r < rows.end; ++r) {
       if (!row_alive[r]) continue;
-      const SplatRow<Tag<S, W>> row(d, splat, center_y(job, r));
+      const SplatRow<Tag<S, W>> row(d, splat, center_y<S>(r));
       bool finished = false;
       for (Index c = 0; c < W; c += lanes) {
         const Index p = r * W + c;
-        const V alpha = alpha_of(d, splat, gaussian_of(d, splat, row, centers(d, job, c)), cap);
+        const V alpha = alpha_of(d, splat, gaussian_of(d, splat, row, centers(d, c)), cap);
         auto met = hn::And(hn::Ge(alpha, least), hn::Gt(hn::Load(d, alive + p), zero));
         if (hn::AllFalse(d, met)) continue;
         const V through = hn::Load(d, t + p);
@@ -231,15 +237,15 @@ void replay(const CompositeScene<S>& scene, const TileJob<S>& job, Index begin, 
   }
   for (Index at = begin; at < end; ++at) {
     const SplatRecord<S>& record = record_at(scene, job, at);
-    const Splat<Tag<S, W>> splat(d, record);
+    const Splat<Tag<S, W>> splat(d, job, record);
     const auto position = hn::Set(di, static_cast<ListPosition<S>>(at));
     S* const of_entry = segment + (at - begin) * 2 * kPixels;
     const RowRange rows(record, job);
     for (Index r = rows.begin; r < rows.end; ++r) {
-      const SplatRow<Tag<S, W>> row(d, splat, center_y(job, r));
+      const SplatRow<Tag<S, W>> row(d, splat, center_y<S>(r));
       for (Index c = 0; c < W; c += lanes) {
         const Index p = r * W + c;
-        const V gaussian = gaussian_of(d, splat, row, centers(d, job, c));
+        const V gaussian = gaussian_of(d, splat, row, centers(d, c));
         const V alpha = alpha_of(d, splat, gaussian, cap);
         const auto in_list = hn::RebindMask(d, hn::Gt(hn::Load(di, job.last + p), position));
         const auto met = hn::And(hn::Ge(alpha, least), in_list);
@@ -262,7 +268,7 @@ void adjoint_of_entry(const CompositeScene<S>& scene, const TileJob<S>& job, con
   const Index lanes = static_cast<Index>(hn::Lanes(d));
   const Index channels = kChannels > 0 ? kChannels : scene.channels;
   const S* const feature = scene.features + record.index * scene.channels;
-  const Splat<Tag<S, W>> splat(d, record);
+  const Splat<Tag<S, W>> splat(d, job, record);
   const V cap = hn::Set(d, scene.rules.alpha_cap), one = hn::Set(d, S(1)), zero = hn::Zero(d);
   const V held_gradient = hn::Set(d, scene.rules.pass_cap ? S(1) : S(0));
   V m0 = zero, m1 = zero, m2 = zero, m3 = zero, m4 = zero, m5 = zero;
@@ -270,7 +276,7 @@ void adjoint_of_entry(const CompositeScene<S>& scene, const TileJob<S>& job, con
   if (kChannels == 0) std::memset(adjoint.feature_sums, 0, static_cast<size_t>(channels * lanes) * sizeof(S));
   const RowRange rows(record, job);
   for (Index c = 0; c < W; c += lanes) {
-    const V center_x = centers(d, job, c);
+    const V center_x = centers(d, c);
     for (Index r = rows.begin; r < rows.end; ++r) {
       const Index p = r * W + c;
       const V gaussian = hn::Load(d, of_entry + kPixels + p);
@@ -285,7 +291,7 @@ void adjoint_of_entry(const CompositeScene<S>& scene, const TileJob<S>& job, con
       hn::Store(hn::MulAdd(alpha, shown, hn::Mul(hn::Sub(one, alpha), behind)), d, adjoint.behind + p);
       if (adjoint.wants_shape) {
         const V gate = hn::IfThenElse(hn::Gt(raw, cap), held_gradient, one);
-        const SplatRow<Tag<S, W>> row(d, splat, center_y(job, r));
+        const SplatRow<Tag<S, W>> row(d, splat, center_y<S>(r));
         const V u = u_of(d, splat, row, center_x);
         const V vg = hn::Mul(hn::Mul(through, hn::Sub(shown, behind)), hn::Mul(gaussian, gate));
         const V vgu = hn::Mul(vg, u), vgw = hn::Mul(vg, row.w);
@@ -364,10 +370,11 @@ void backward(Index side, const CompositeScene<S>& scene, const TileJob<S>& job,
 }
 
 template <class S>
-PixelAlpha<S> pixel(const SplatRecord<S>& record, const CompositeRules<S>& rules, Index row, Index col) {
+PixelAlpha<S> pixel(const SplatRecord<S>& record, const CompositeRules<S>& rules, const TileJob<S>& job, Index row,
+                    Index col) {
   const Tag<S, 16> d;
-  const Splat<Tag<S, 16>> splat(d, record);
-  const SplatRow<Tag<S, 16>> at_row(d, splat, static_cast<S>(row) + S(0.5));
+  const Splat<Tag<S, 16>> splat(d, job, record);
+  const SplatRow<Tag<S, 16>> at_row(d, splat, center_y<S>(row));
   const auto gaussian = gaussian_of(d, splat, at_row, hn::Set(d, static_cast<S>(col) + S(0.5)));
   const S alpha = hn::GetLane(alpha_of(d, splat, gaussian, hn::Set(d, rules.alpha_cap)));
   return {alpha, alpha >= rules.alpha_min, hn::GetLane(hn::Mul(splat.opacity, gaussian)) > rules.alpha_cap};
@@ -387,12 +394,13 @@ void backward_double(Index side, const CompositeScene<double>& scene, const Tile
                      const TileAdjoint<double>& adjoint) {
   backward(side, scene, job, adjoint);
 }
-PixelAlpha<float> pixel_float(const SplatRecord<float>& r, const CompositeRules<float>& rules, Index row, Index col) {
-  return pixel(r, rules, row, col);
+PixelAlpha<float> pixel_float(const SplatRecord<float>& r, const CompositeRules<float>& rules,
+                              const TileJob<float>& job, Index row, Index col) {
+  return pixel(r, rules, job, row, col);
 }
-PixelAlpha<double> pixel_double(const SplatRecord<double>& r, const CompositeRules<double>& rules, Index row,
-                                Index col) {
-  return pixel(r, rules, row, col);
+PixelAlpha<double> pixel_double(const SplatRecord<double>& r, const CompositeRules<double>& rules,
+                                const TileJob<double>& job, Index row, Index col) {
+  return pixel(r, rules, job, row, col);
 }
 
 }  // namespace hsi4d::detail::HWY_NAMESPACE
@@ -426,13 +434,14 @@ void composite_tile_adjoint(Index side, const CompositeScene<double>& scene, con
   HWY_DYNAMIC_DISPATCH(backward_double)(side, scene, job, adjoint);
 }
 template <>
-PixelAlpha<float> pixel_alpha(const SplatRecord<float>& r, const CompositeRules<float>& rules, Index row, Index col) {
-  return HWY_DYNAMIC_DISPATCH(pixel_float)(r, rules, row, col);
+PixelAlpha<float> pixel_alpha(const SplatRecord<float>& r, const CompositeRules<float>& rules,
+                              const TileJob<float>& job, Index row, Index col) {
+  return HWY_DYNAMIC_DISPATCH(pixel_float)(r, rules, job, row, col);
 }
 template <>
-PixelAlpha<double> pixel_alpha(const SplatRecord<double>& r, const CompositeRules<double>& rules, Index row,
-                               Index col) {
-  return HWY_DYNAMIC_DISPATCH(pixel_double)(r, rules, row, col);
+PixelAlpha<double> pixel_alpha(const SplatRecord<double>& r, const CompositeRules<double>& rules,
+                               const TileJob<double>& job, Index row, Index col) {
+  return HWY_DYNAMIC_DISPATCH(pixel_double)(r, rules, job, row, col);
 }
 }  // namespace hsi4d::detail
 #endif

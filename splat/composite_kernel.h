@@ -13,9 +13,9 @@ namespace hsi4d::detail {
 /// What the pixel loops need of a Gaussian.
 template <class S>
 struct SplatRecord {
-  S x, y;                           ///< mean, pixels
-  S l11, l21, l22;                  ///< see Conic
-  S opacity;                        ///< with the antialias factor
+  double x, y;      ///< mean, pixels; the loops use its place in the tile, which S holds to far more digits
+  S l11, l21, l22;  ///< see Conic
+  S opacity;        ///< with the antialias factor
   std::int32_t row_begin, row_end;  ///< pixels
   std::int32_t index;               ///< row of the inputs
 };
@@ -85,13 +85,14 @@ template <class S>
 void composite_tile_adjoint(Index side, const CompositeScene<S>& scene, const TileJob<S>& job,
                             const TileAdjoint<S>& adjoint);
 
-/// α at a pixel and whether it is composited there, stop aside, by the same functions.
+/// α at a pixel of the tile and whether it is composited there, stop aside, by the same functions.
 template <class S>
 struct PixelAlpha {
   S alpha;
   bool drawn, capped;
 };
 template <class S>
-PixelAlpha<S> pixel_alpha(const SplatRecord<S>& record, const CompositeRules<S>& rules, Index row, Index col);
+PixelAlpha<S> pixel_alpha(const SplatRecord<S>& record, const CompositeRules<S>& rules, const TileJob<S>& job,
+                          Index row, Index col);
 
 }  // namespace hsi4d::detail

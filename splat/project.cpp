@@ -86,12 +86,15 @@ bool all_finite(const S* x, int n) {
 
 /// Mean and factor in the image. False, and all zeros, for a Gaussian that is not to be drawn.
 template <class S>
-bool project_gaussian(const Lens& lens, const Vector3<double>& p, const S* axes, S* mean_px, S* factor) {
+bool project_gaussian(const Lens& lens, const Vector3<double>& p, const S* axes, S* mean_px, S* mean_rest, S* factor) {
   if (std::isfinite(p[0]) && std::isfinite(p[1]) && p[2] > lens.near && std::isfinite(p[2])) {
     InCamera g;
     take_into_camera(lens, p, axes, g);
-    mean_px[0] = static_cast<S>(lens.fx * g.x * g.inverse_z + lens.cx);
-    mean_px[1] = static_cast<S>(lens.fy * g.y * g.inverse_z + lens.cy);
+    const double mean[2] = {lens.fx * g.x * g.inverse_z + lens.cx, lens.fy * g.y * g.inverse_z + lens.cy};
+    for (int i = 0; i < 2; ++i) {
+      mean_px[i] = static_cast<S>(mean[i]);
+      mean_rest[i] = static_cast<S>(mean[i] - static_cast<double>(mean_px[i]));
+    }
     for (int c = 0; c < 3; ++c) {
       factor[c] = static_cast<S>(lens.fx * g.inverse_z * (g.axes[0][c] - g.ratio_x.value * g.axes[2][c]));
       factor[3 + c] = static_cast<S>(lens.fy * g.inverse_z * (g.axes[1][c] - g.ratio_y.value * g.axes[2][c]));
@@ -100,6 +103,7 @@ bool project_gaussian(const Lens& lens, const Vector3<double>& p, const S* axes,
     if (all_finite(mean_px, 2) && all_finite(factor, 6) && !no_axes) return true;
   }
   std::fill_n(mean_px, 2, S(0));
+  std::fill_n(mean_rest, 2, S(0));
   std::fill_n(factor, 6, S(0));
   return false;
 }
@@ -142,18 +146,18 @@ struct Project {
   static constexpr const char* kName = "project";
   SplatView view;
 
-  enum Output { kMeans, kFactors, kDepths, kRest };
+  enum Output { kMeans, kFactors, kDepths, kRest, kMeansRest };
 
   void forward(NodeIo<S>& io) {
     const ConstArray<S> means = io.in(0), axes = io.in(1);
     const Array<S> means_px = io.out(kMeans), factors = io.out(kFactors);
-    const Array<S> depths = io.out(kDepths), rest = io.out(kRest);
+    const Array<S> depths = io.out(kDepths), rest = io.out(kRest), means_rest = io.out(kMeansRest);
     const Lens lens = lens_of(view, detail::camera_update(io.in(2)));
     parallel_for(means.shape.rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
         for (Index n = begin; n < end; ++n) {
           const Vector3<double> p = point_in_camera(lens, means.row(n));
-          project_gaussian(lens, p, axes.row(n), means_px.row(n), factors.row(n));
+          project_gaussian(lens, p, axes.row(n), means_px.row(n), means_rest.row(n), factors.row(n));
           const S depth = static_cast<S>(p[2]);
           const bool usable = std::isfinite(depth);
           depths.data[n] = usable ? depth : S(0);
@@ -225,8 +229,8 @@ struct Project {
     const Lens lens = lens_of(view, detail::camera_update(io.in(2)));
     for (Index n = 0; n < means.shape.rows; ++n) {
       const Vector3<double> p = point_in_camera(lens, means.row(n));
-      S mean_px[2], factor[6];
-      if (!project_gaussian(lens, p, axes.row(n), mean_px, factor)) {
+      S mean_px[2], mean_rest[2], factor[6];
+      if (!project_gaussian(lens, p, axes.row(n), mean_px, mean_rest, factor)) {
         signature.add(1);
         continue;
       }
@@ -247,11 +251,12 @@ Projected<S> project(Var<S> means, Var<S> axes, Var<S> xi, const SplatView& view
   HSI4D_CHECK_EQ(axes.shape(), shape_of(rows, 9));
   HSI4D_CHECK_EQ(xi.shape(), shape_of(1, 6));
   const std::array inputs = {means, axes, xi};
-  const std::array outputs = {shape_of(rows, 2), shape_of(rows, 6), shape_of(rows, 1), shape_of(rows, 1)};
+  const std::array outputs = {shape_of(rows, 2), shape_of(rows, 6), shape_of(rows, 1), shape_of(rows, 1),
+                              shape_of(rows, 2)};
   Tape<S>& tape = means.owner();
   const Var<S> first =
       tape.record(Project<S>{view}, std::span<const Var<S>>(inputs), std::span<const Shape>(outputs), where);
-  return {first, tape.output(first, 1), tape.output(first, 2), tape.output(first, 3)};
+  return {first, tape.output(first, 1), tape.output(first, 2), tape.output(first, 3), tape.output(first, 4)};
 }
 
 template Projected<float> project(Var<float>, Var<float>, Var<float>, const SplatView&, Source);

@@ -20,6 +20,7 @@ struct Projected {
   Var<S> factors;     ///< [N,6] V, 2×3 by rows, pixels
   Var<S> depths;      ///< [N,1] camera z, metres; 0 where it is not finite
   Var<S> depth_rest;  ///< [N,1] what rounding took from the depths in float, zeros in double; has no adjoint
+  Var<S> means_rest;  ///< [N,2] what rounding took from the means, likewise
 };
 
 /// Projects Gaussians with the camera Exp(ξ) · view.camera.

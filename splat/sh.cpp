@@ -178,9 +178,11 @@ struct ShColors {
       Matrix3<double> sum_a = Matrix3<double>::Zero();
       on_best_isa([&] {
         for (Index n = begin; n < end; ++n) {
+          const S* color = colors.row(n);
+          if (!std::isfinite(color[0] + color[1] + color[2])) continue;  // keeps 0·∞ out
           S g[3];
-          for (int c = 0; c < 3; ++c) g[c] = colors.row(n)[c] > S(0) ? d_colors.row(n)[c] : S(0);
-          if (g[0] == S(0) && g[1] == S(0) && g[2] == S(0)) continue;  // also keeps 0·∞ of undrawn rows out
+          for (int c = 0; c < 3; ++c) g[c] = color[c] > S(0) ? d_colors.row(n)[c] : S(0);
+          if (g[0] == S(0) && g[1] == S(0) && g[2] == S(0)) continue;
           const Seen s = seen(io, center, linear, n);
           if (d_sh) {
             for (int k = 0; k < coefficients(); ++k) {

@@ -21,8 +21,8 @@ inline constexpr double kShC0 = 0.28209479177387814;
 /// @param transform  empty, or [1,12], rows [3,4]: how a rigid object was moved. Directions are taken back into its own
 ///                   axes, r ← Aᵀ r with A the linear part
 /// @return           [N,3] ≥ 0; NaN where a number that it depends on is not finite, and then not drawn
-/// Adjoint: sh, means, xi, transform (as an unconstrained matrix). None where the sum is ≤ 0, nor for the direction
-/// where the mean is the camera's centre. Throws InternalError when the shapes do not fit.
+/// Adjoint: sh, means, xi, transform (as an unconstrained matrix). None where the sum is ≤ 0 or a Gaussian's colour is
+/// NaN, nor for the direction where the mean is the camera's centre. Throws InternalError when the shapes do not fit.
 template <class S>
 Var<S> sh_colors(Var<S> sh, Var<S> means, Var<S> xi, const SplatView& view, Var<S> transform = {},
                  Source where = Source::current());

@@ -48,6 +48,28 @@ inline double relative_l2(const std::vector<double>& a, const std::vector<double
   return std::sqrt(difference) / (size > 0 ? std::sqrt(size) : 1);
 }
 
+/// Relative L2 errors of gradients, by class. That of quaternions is zero but for rounding where Gaussians are round:
+/// if it is below 1e-6 of the log-scales', it is measured against that.
+inline std::vector<NamedNumbers> gradient_errors(const std::vector<NamedNumbers>& computed,
+                                                 const std::vector<NamedNumbers>& expected) {
+  const auto norm = [&](const std::string& name) {
+    for (const NamedNumbers& e : expected) {
+      if (e.name == name) return relative_l2(e.numbers, std::vector<double>(e.numbers.size(), 0.0));
+    }
+    return 0.0;
+  };
+  std::vector<NamedNumbers> errors;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const std::string& name = expected[i].name;
+    const double own = norm(name);
+    double size = own;
+    if (name == "quats" && own < 1e-6 * norm("log_scales")) size = norm("log_scales");
+    const double error = relative_l2(computed[i].numbers, expected[i].numbers);
+    errors.push_back({name, {own > 0 ? error * own / size : error}});
+  }
+  return errors;
+}
+
 inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
   double worst = 0;
@@ -60,6 +82,57 @@ std::vector<double> wide_numbers(const ConstArray<S>& a) {
   std::vector<double> result;
   for (Index r = 0; r < a.total_rows(); ++r) result.insert(result.end(), a.row(r), a.row(r) + a.shape.cols);
   return result;
+}
+
+/// Every family of settings whose numbers differ, applied to those of a scene; the scene's `near` is not lowered.
+struct SettingsVariant {
+  std::string name;
+  void (*change)(RenderSettings&);
+  void apply(RenderSettings& settings) const {
+    const double near = settings.near;
+    change(settings);
+    settings.near = std::max(near, settings.near);
+  }
+};
+
+inline std::vector<SettingsVariant> settings_variants() {
+  return {
+      {"default", [](RenderSettings&) {}},
+      {"accurate", [](RenderSettings& s) { apply_quality(s, Quality::kAccurate); }},
+      {"reference", [](RenderSettings& s) { apply_quality(s, Quality::kReference); }},
+      {"gsplat", [](RenderSettings& s) { apply_compatibility(s, Compatibility::kGsplat); }},
+      {"inria", [](RenderSettings& s) { apply_compatibility(s, Compatibility::kInria); }},
+      {"antialias", [](RenderSettings& s) { s.antialias = true; }},
+      {"antialias, reference, hardly any blur",
+       [](RenderSettings& s) {
+         apply_quality(s, Quality::kReference);
+         s.antialias = true;
+         s.blur = 0.01;
+       }},
+      {"small tiles, degree 1, float keys",
+       [](RenderSettings& s) {
+         s.tile = 8;
+         s.sh_degree = 1;
+         s.depth_key = DepthKey::kFloat;
+       }},
+      {"inria in small tiles, inclusive",
+       [](RenderSettings& s) {
+         apply_compatibility(s, Compatibility::kInria);
+         s.stop_rule = StopRule::kInclusive;
+         s.tile = 8;
+       }},
+  };
+}
+
+/// Random cotangents for a render of `camera`.
+inline SplatCotangent cotangent_of(const Camera& camera, Index groups = 0, bool depth = false) {
+  const Index pixels = static_cast<Index>(camera.width) * camera.height;
+  SplatCotangent d;
+  d.image = random_cotangent(3 * pixels, 1);
+  d.transmittance = random_cotangent(pixels, 2);
+  if (depth) d.depth = random_cotangent(pixels, 3);
+  if (groups > 0) d.groups = random_cotangent(groups * pixels, 4);
+  return d;
 }
 
 template <class S>

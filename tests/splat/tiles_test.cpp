@@ -1,0 +1,303 @@
+#include "splat/tiles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "splat/composite_kernel.h"
+
+using namespace hsi4d;
+using namespace hsi4d::detail;
+
+namespace {
+
+const double kInf = std::numeric_limits<double>::infinity(), kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// Random factor of a needle of the given length and width, turned by any angle; numbers are those of S.
+template <class S>
+std::array<double, 6> needle(RandomSequence& random, double length, double width) {
+  const double angle = random.uniform(0, 3.141592653589793), mix = random.uniform(0, 6.283185307179586);
+  const double c = std::cos(angle), s = std::sin(angle);
+  // V = rotation · diag(length, width) · rows of a rotation in three dimensions
+  const double a[3] = {std::cos(mix), std::sin(mix), 0}, b[3] = {-0.6 * std::sin(mix), 0.6 * std::cos(mix), 0.8};
+  std::array<double, 6> v;
+  for (std::size_t k = 0; k < 3; ++k) {
+    v[k] = static_cast<S>(c * length * a[k] - s * width * b[k]);
+    v[3 + k] = static_cast<S>(s * length * a[k] + c * width * b[k]);
+  }
+  return v;
+}
+
+long double exact_determinant(const std::array<double, 6>& v, long double blur) {
+  const auto minor = [&](std::size_t i, std::size_t j) {
+    return static_cast<long double>(v[i]) * v[3 + j] - static_cast<long double>(v[j]) * v[3 + i];
+  };
+  const long double m01 = minor(0, 1), m02 = minor(0, 2), m12 = minor(1, 2);
+  long double trace = 0;
+  for (const double x : v) trace += static_cast<long double>(x) * x;
+  return m01 * m01 + m02 * m02 + m12 * m12 + blur * trace + blur * blur;
+}
+
+/// ½ dᵀ cov⁻¹ d.
+long double exact_exponent(const std::array<double, 6>& v, long double blur, long double dx, long double dy) {
+  long double xx = blur, yy = blur, xy = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    xx += static_cast<long double>(v[k]) * v[k];
+    yy += static_cast<long double>(v[3 + k]) * v[3 + k];
+    xy += static_cast<long double>(v[k]) * v[3 + k];
+  }
+  // As a sum of squares, pivot on the larger.
+  const long double det = exact_determinant(v, blur);
+  if (xx < yy) std::swap(xx, yy), std::swap(dx, dy);
+  const long double across = dy - xy / xx * dx;
+  return 0.5L * (dx * dx / xx + across * across * xx / det);
+}
+
+template <class S>
+SplatRecord<S> record_of(const Conic& conic, double x, double y, double opacity) {
+  SplatRecord<S> r{};
+  r.x = x, r.y = y;
+  r.l11 = static_cast<S>(conic.l11), r.l21 = static_cast<S>(conic.l21), r.l22 = static_cast<S>(conic.l22);
+  r.opacity = static_cast<S>(opacity);
+  return r;
+}
+
+/// What α is at a pixel of the image, in the tile that it lies in.
+template <class S>
+PixelAlpha<S> alpha_at(const SplatRecord<S>& record, const RenderSettings& settings, Index row, Index col) {
+  const CompositeRules<S> rules{static_cast<S>(settings.alpha_cap), static_cast<S>(settings.alpha_min), 0, false,
+                                false};
+  TileJob<S> job{};
+  job.left = col / 16 * 16, job.top = row / 16 * 16;
+  return pixel_alpha(record, rules, job, row - job.top, col - job.left);
+}
+
+}  // namespace
+
+TEST_CASE("the determinant of needles is right, in double from factors of float [A1]") {
+  RandomSequence random(1, 2);
+  double worst = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const double length = std::pow(10, random.uniform(0, 5));
+    const auto v = needle<float>(random, length, 0.01);
+    for (const double blur : {0., 0.1, 0.3}) {
+      Conic conic;
+      REQUIRE(conic_of(v.data(), blur, conic));
+      const long double exact = exact_determinant(v, blur);
+      worst = std::max(worst, static_cast<double>(std::abs(conic.determinant - exact) / exact));
+    }
+  }
+  CHECK(worst < 1e-12);
+}
+
+TEST_CASE("the exponent of needles is right in float and never negative [A1]") {
+  RandomSequence random(2, 2);
+  double worst = 0;
+  RenderSettings settings;
+  settings.alpha_min = 0;
+  settings.alpha_cap = 1;
+  for (int i = 0; i < 20000; ++i) {
+    const double length = std::pow(10, random.uniform(0, 4));
+    const auto v = needle<float>(random, length, 0.01);
+    for (const double blur : {0.1, 0.3}) {
+      Conic conic;
+      REQUIRE(conic_of(v.data(), blur, conic));
+      // A pixel near the axis, within the image that the needle reaches over.
+      const double norm = std::hypot(conic.xx, conic.xy), along = random.uniform(-1, 1) * std::min(length, 1000.0);
+      const double x = 500 + random.uniform(0, 1), y = 500 + random.uniform(0, 1);
+      const Index col = static_cast<Index>(std::clamp(x + along * conic.xx / norm + random.uniform(-2, 2), 0., 999.));
+      const Index row = static_cast<Index>(std::clamp(y + along * conic.xy / norm + random.uniform(-2, 2), 0., 999.));
+      const long double exact =
+          exact_exponent(v, blur, static_cast<long double>(col) + 0.5L - x, static_cast<long double>(row) + 0.5L - y);
+      const float g = alpha_at(record_of<float>(conic, x, y, 1), settings, row, col).alpha;
+      REQUIRE(g <= 1);
+      if (exact < 10) worst = std::max(worst, std::abs(-std::log(static_cast<double>(g)) - static_cast<double>(exact)));
+    }
+  }
+  CHECK(worst < 1e-3);
+}
+
+TEST_CASE("the antialias factor and its gradient are right at every size [A7]") {
+  RandomSequence random(3, 2);
+  const double blur = 0.3;
+  const auto exact = [&](const std::array<double, 6>& v) {
+    return std::sqrt(exact_determinant(v, 0) / exact_determinant(v, blur));
+  };
+  for (double size = 1e-8; size < 11; size *= 10) {
+    for (int i = 0; i < 100; ++i) {
+      const auto v = needle<double>(random, size, size * random.uniform(0.01, 1));
+      Conic conic;
+      REQUIRE(conic_of(v.data(), blur, conic));
+      CHECK(static_cast<double>(std::abs(blur_compensation(conic) / exact(v) - 1)) < 1e-12);
+      std::array<double, 6> d{};
+      blur_compensation_adjoint(v.data(), blur, conic, 1, d.data());
+      double error = 0, norm = 0;
+      for (std::size_t k = 0; k < 6; ++k) {
+        std::array<double, 6> up = v, down = v;
+        up[k] += 1e-5 * size * 0.01, down[k] -= 1e-5 * size * 0.01;
+        const double slope =
+            static_cast<double>((exact(up) - exact(down)) / (static_cast<long double>(up[k]) - down[k]));
+        error = std::max(error, std::abs(slope - d[k]));
+        norm = std::max(norm, std::abs(slope));
+      }
+      CHECK(error < 1e-5 * norm);
+    }
+  }
+  // A Gaussian without area has the factor 0 and no gradient.
+  const std::array<double, 6> flat = {1, 0, 0, 2, 0, 0};
+  Conic conic;
+  REQUIRE(conic_of(flat.data(), blur, conic));
+  CHECK(blur_compensation(conic) == 0);
+  std::array<double, 6> d{};
+  blur_compensation_adjoint(flat.data(), blur, conic, 1, d.data());
+  CHECK(d == std::array<double, 6>{});
+  CHECK_FALSE(conic_of(flat.data(), 0, conic));
+}
+
+TEST_CASE("a factor that is left out of a tile has no pixel there that it would be drawn at [B7]") {
+  RandomSequence random(4, 2);
+  const TileGrid grid = tile_grid(75, 50, 16);
+  RenderSettings settings;
+  Index left_out = 0, kept = 0, empty = 0;
+  for (int i = 0; i < 12000; ++i) {
+    settings.alpha_min = i % 3 == 0 ? 1e-5 : 1.0 / 255;
+    const double length = std::pow(10, random.uniform(-1, 2)), width = length * std::pow(10, random.uniform(-3, 0));
+    const auto v = needle<float>(random, length, width);
+    const double x = static_cast<float>(random.uniform(-40, 115)), y = static_cast<float>(random.uniform(-40, 90));
+    const double opacity =
+        static_cast<float>(i % 5 == 0 ? settings.alpha_min * random.uniform(0.9, 1.5) : random.uniform(0, 1));
+    Conic conic;
+    REQUIRE(conic_of(v.data(), 0.3, conic));
+    const Extent extent = extent_of(conic, x, y, opacity, grid, settings, std::numeric_limits<float>::epsilon());
+    for (Index tile = 0; tile < grid.count(); ++tile) {
+      const Index tile_row = tile / grid.cols, tile_col = tile % grid.cols;
+      const TileSpan span = tile_columns(extent, grid, tile_row);
+      bool drawn = false, drawn_in_rows = false;
+      for (Index p = 0; p < 256; ++p) {
+        const Index row = tile_row * 16 + p / 16, col = tile_col * 16 + p % 16;
+        if (row >= grid.height || col >= grid.width) continue;
+        const bool here = alpha_at(record_of<float>(conic, x, y, opacity), settings, row, col).drawn ||
+                          alpha_at(record_of<double>(conic, x, y, opacity), settings, row, col).drawn;
+        drawn = drawn || here;
+        drawn_in_rows = drawn_in_rows || (here && row >= extent.row_begin && row < extent.row_end);
+      }
+      const bool listed = tile_col >= span.begin && tile_col < span.end;
+      REQUIRE(drawn == drawn_in_rows);
+      if (drawn) REQUIRE(listed);
+      listed ? (drawn ? ++kept : ++empty) : ++left_out;
+    }
+  }
+  CHECK(left_out > 50000);
+  CHECK(static_cast<double>(empty) < 0.1 * static_cast<double>(kept));  // and the test is sharp
+}
+
+TEST_CASE("extents of wild numbers stay inside of the image [A6]") {
+  const TileGrid grid = tile_grid(40, 30, 8);
+  for (const double size : {0., 1e-300, 1e-8, 1., 1e8, 1e150, 1e300, kInf, kNan}) {
+    for (const double at : {-kInf, -1e300, -1e20, -1., 0., 20., 1e10, 1e300, kInf, kNan}) {
+      for (const double opacity : {0., 1e-30, 0.5, 1., kInf, kNan}) {
+        for (const hsi4d::Footprint kind : {hsi4d::Footprint::kExact, hsi4d::Footprint::kSquare3Sigma}) {
+          for (const double alpha_min : {0., 1.0 / 255}) {
+            RenderSettings settings;
+            settings.footprint = kind;
+            settings.alpha_min = alpha_min;
+            const std::array<double, 6> v = {size, 0.1 * size, 0, 0, size, -0.1 * size};
+            Conic conic;
+            if (!conic_of(v.data(), 0.3, conic)) continue;
+            const Extent e = extent_of(conic, at, at, opacity, grid, settings, 1e-7);
+            CHECK((e.row_begin >= 0 && e.row_end <= grid.height));
+            for (Index r = 0; r < grid.rows; ++r) {
+              const TileSpan span = tile_columns(e, grid, r);
+              CHECK((span.begin >= 0 && span.end <= grid.cols));
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("depth keys are in the order of the depths [B9]") {
+  const float depths[] = {-std::numeric_limits<float>::infinity(), -1, -1e-38f, 0, 1e-38f, 0.5f, 1, 1e30f,
+                          std::numeric_limits<float>::infinity()};
+  for (std::size_t i = 0; i + 1 < std::size(depths); ++i) {
+    CHECK(depth_bits(depths[i]) < depth_bits(depths[i + 1]));
+    CHECK(depth_bits(static_cast<double>(depths[i])) < depth_bits(static_cast<double>(depths[i + 1])));
+  }
+  CHECK(depth_bits(-0.0f) == depth_bits(0.0f));
+  CHECK(depth_bits(-0.0) == depth_bits(0.0));
+}
+
+TEST_CASE("the sort by depth is stable [B8]") {
+  RandomSequence random(5, 2);
+  for (const int kinds : {1, 3, 1000, 1 << 30}) {
+    std::vector<DepthKeyed> keys, room(20000);
+    for (std::int32_t i = 0; i < 20000; ++i) {
+      const double z = kinds == 1 ? 2.5 : std::floor(random.uniform(0, kinds)) / 7 - 3;
+      keys.push_back({i % 2 == 0 ? depth_bits(z) : depth_bits(z), i});
+    }
+    std::vector<DepthKeyed> expected = keys;
+    std::stable_sort(expected.begin(), expected.end(),
+                     [](const DepthKeyed& a, const DepthKeyed& b) { return a.key < b.key; });
+    const auto sorted = sort_by_depth(keys, room);
+    CHECK(std::equal(sorted.begin(), sorted.end(), expected.begin(), expected.end(),
+                     [](const DepthKeyed& a, const DepthKeyed& b) { return a.key == b.key && a.index == b.index; }));
+  }
+  std::vector<DepthKeyed> none;
+  CHECK(sort_by_depth(none, none).empty());
+}
+
+TEST_CASE("more pairs than fit are refused before memory is taken [B10]") {
+  const std::vector<Index> pairs = {1'000'000'000, 1'000'000'000, 1'000'000'000};
+  CHECK_THROWS_WITH(total_pairs(pairs), Catch::Contains("more than 2147483648 (tile, Gaussian) pairs"));
+  CHECK_THROWS_AS(total_pairs(pairs), UserError);
+  CHECK(total_pairs(std::span(pairs).first(2)) == 2'000'000'000);
+}
+
+TEST_CASE("tile lists hold every pair once, in depth order, on any number of threads", "[parallel]") {
+  RandomSequence random(6, 2);
+  const TileGrid grid = tile_grid(150, 90, 16);
+  RenderSettings settings;
+  std::vector<Extent> extents;
+  for (int i = 0; i < 5000; ++i) {
+    const auto v = needle<double>(random, random.uniform(0.1, 10), random.uniform(0.1, 3));
+    Conic conic;
+    REQUIRE(conic_of(v.data(), 0.3, conic));
+    extents.push_back(extent_of(conic, random.uniform(-10, 160), random.uniform(-10, 100), random.uniform(0, 1), grid,
+                                settings, 1e-7));
+  }
+  std::vector<std::vector<std::int32_t>> expected(static_cast<std::size_t>(grid.count()));
+  Index pairs = 0;
+  for (std::size_t rank = 0; rank < extents.size(); ++rank) {
+    for (Index tile = 0; tile < grid.count(); ++tile) {
+      const TileSpan span = tile_columns(extents[rank], grid, tile / grid.cols);
+      if (tile % grid.cols < span.begin || tile % grid.cols >= span.end) continue;
+      expected[static_cast<std::size_t>(tile)].push_back(static_cast<std::int32_t>(rank));
+      ++pairs;
+    }
+  }
+  for (const int threads : {1, 2, 8}) {
+    TileLists lists;
+    Buffer<Index> counts;
+    with_threads(threads, [&] { lists.build(extents, grid, counts); });
+    CHECK(lists.pairs() == pairs);
+    std::vector<bool> used(static_cast<std::size_t>(pairs), false);
+    for (Index tile = 0; tile < grid.count(); ++tile) {
+      std::vector<std::int32_t> ranks;
+      for (Index e = lists.tile_begin[tile]; e < lists.tile_begin[tile + 1]; ++e) {
+        const TileEntry entry = lists.entries[e];
+        ranks.push_back(entry.rank);
+        CHECK(entry.slot >= lists.slot_begin[entry.rank]);
+        CHECK(entry.slot < lists.slot_begin[entry.rank + 1]);
+        CHECK_FALSE(used[entry.slot]);
+        used[entry.slot] = true;
+      }
+      CHECK(ranks == expected[static_cast<std::size_t>(tile)]);
+    }
+  }
+}
