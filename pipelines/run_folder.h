@@ -37,9 +37,9 @@ struct IterationRecord {
   Index iteration = 0;
   double loss = 0;
   std::vector<std::pair<std::string, double>> losses;  ///< the terms
-  MetricValues counters;                               ///< work done: tiles, pairs, fragments
   double seconds = 0;
   bool rolled_back = false;  ///< the step was undone; numbers that are not finite are then written as null
+  MetricValues counters = {};  ///< work done: tiles, pairs, fragments
 };
 
 /// The paths of a run folder's members.
