@@ -73,7 +73,9 @@ struct Composite {
   TileGrid grid() const {
     return detail::tile_grid(view.camera.width, view.camera.height, static_cast<Index>(view.settings.tile));
   }
-  bool wants_shape(const NodeIo<S>& io) const { return io.wants(kMeans) || io.wants(kFactors) || io.wants(kOpacities); }
+  bool wants_shape(const NodeIo<S>& io) const {
+    return io.wants(kMeans) || io.wants(kMeansRest) || io.wants(kFactors) || io.wants(kOpacities);
+  }
   bool wants_gradient(const NodeIo<S>& io) const { return wants_shape(io) || io.wants(kFeatures); }
 
   // --- Gaussians -----------------------------------------------------------------------------------------------------
@@ -312,8 +314,9 @@ struct Composite {
       io.d_in(kOpacities).data[n] +=
           static_cast<S>(antialias ? moments[0] * detail::blur_compensation(conic) : moments[0]);
     }
-    if (io.wants(kMeans)) {
-      S* d_mean = io.d_in(kMeans).row(n);
+    for (const int input : {kMeans, kMeansRest}) {
+      if (!io.wants(input)) continue;
+      S* d_mean = io.d_in(input).row(n);
       d_mean[0] += static_cast<S>(o * (conic.l11 * moments[1]));
       d_mean[1] += static_cast<S>(o * (conic.l21 * moments[1] + conic.l22 * moments[2]));
     }
