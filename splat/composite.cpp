@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "core/parallel.h"
+#include "core/simd.h"
 #include "splat/composite_kernel.h"
 #include "splat/tiles.h"
 #include "splat/workspaces.h"
@@ -135,11 +136,13 @@ struct Composite {
     keys.resize(rows);
     room.resize(rows);
     parallel_for(rows, kGrain, [&](Index begin, Index end) {
-      for (Index n = begin; n < end; ++n) {
-        const bool drawn = prepare_gaussian(io, tiles, n, all_records[n], all_extents[n]);
-        keys[n].index = drawn ? static_cast<std::int32_t>(n) : -1;
-        if (drawn) keys[n].key = depth_key(io.in(kDepths).data[n], io.in(kRest).data[n]);
-      }
+      on_best_isa([&] {
+        for (Index n = begin; n < end; ++n) {
+          const bool drawn = prepare_gaussian(io, tiles, n, all_records[n], all_extents[n]);
+          keys[n].index = drawn ? static_cast<std::int32_t>(n) : -1;
+          if (drawn) keys[n].key = depth_key(io.in(kDepths).data[n], io.in(kRest).data[n]);
+        }
+      });
     });
     Index drawn = 0;
     for (Index n = 0; n < rows; ++n) {
@@ -272,7 +275,9 @@ struct Composite {
       detail::composite_tile_adjoint(tiles.tile, scene, job, adjoint);
     });
     parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
-      for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, shared, rank);
+      on_best_isa([&] {
+        for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, shared, rank);
+      });
     });
   }
 
@@ -280,21 +285,24 @@ struct Composite {
   /// gradients.
   void gather_gaussian(NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index rank) const {
     const Index n = records[rank].index, begin = lists.slot_begin[rank], end = lists.slot_begin[rank + 1];
-    const auto sum = [&](Index i) {
-      double total = 0;
-      for (Index slot = begin; slot < end; ++slot)
-        total += static_cast<double>(adjoint.sums[slot * adjoint.stride + i]);
-      return total;
-    };
-    Index place = 0;
+    if (begin == end) return;
+    const S* sums = adjoint.sums + begin * adjoint.stride;
     if (adjoint.wants_shape) {
-      double moments[kMoments];
-      for (double& m : moments) m = sum(place++);
+      double moments[kMoments] = {};
+      for (Index slot = begin; slot < end; ++slot) {
+        for (Index i = 0; i < kMoments; ++i)
+          moments[i] += static_cast<double>(sums[(slot - begin) * adjoint.stride + i]);
+      }
       add_shape_gradient(io, records[rank], n, moments);
+      sums += kMoments;
     }
     if (!adjoint.wants_features) return;
     const Array<S> d_features = io.d_in(kFeatures);
-    for (Index k = 0; k < d_features.shape.cols; ++k) d_features.row(n)[k] += static_cast<S>(sum(place++));
+    for (Index k = 0; k < d_features.shape.cols; ++k) {
+      double sum = 0;
+      for (Index i = 0; i < end - begin; ++i) sum += static_cast<double>(sums[i * adjoint.stride + k]);
+      d_features.row(n)[k] += static_cast<S>(sum);
+    }
   }
 
   /// With L = [l11 l21; 0 l22] and M the moments (Σ g u², …) as a symmetric matrix, from ds = −(L d)ᵀ L d_mean and

@@ -220,7 +220,8 @@ Index composite(const CompositeScene<S>& scene, const TileJob<S>& job) {
 
 // --- backward --------------------------------------------------------------------------------------------------------
 
-/// T in front of each Gaussian of list positions [begin, end), and its G: 0 where it was not composited.
+/// T in front of each Gaussian of list positions [begin, end), and its G: 0 where it was not composited. T is left out
+/// for vectors without a G.
 template <int W, class S>
 void replay(const CompositeScene<S>& scene, const TileJob<S>& job, Index begin, Index end, S* segment) {
   const Tag<S, W> d;
@@ -249,9 +250,10 @@ void replay(const CompositeScene<S>& scene, const TileJob<S>& job, Index begin, 
         const V alpha = alpha_of(d, splat, gaussian, cap);
         const auto in_list = hn::RebindMask(d, hn::Gt(hn::Load(di, job.last + p), position));
         const auto met = hn::And(hn::Ge(alpha, least), in_list);
+        hn::Store(hn::IfThenElseZero(met, gaussian), d, of_entry + kPixels + p);
+        if (hn::AllFalse(d, met)) continue;
         const V through = hn::Load(d, t + p);
         hn::Store(through, d, of_entry + p);
-        hn::Store(hn::IfThenElseZero(met, gaussian), d, of_entry + kPixels + p);
         hn::Store(hn::IfThenElse(met, hn::Mul(through, hn::Sub(one, alpha)), through), d, t + p);
       }
     }
