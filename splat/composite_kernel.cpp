@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include "core/check.h"
@@ -139,6 +140,13 @@ HWY_INLINE const SplatRecord<S>& record_at(const CompositeScene<S>& scene, const
   return scene.records[static_cast<size_t>(job.entries[static_cast<size_t>(at)].rank)];
 }
 
+/// Fetches the record that will be looked at a few list positions later: they lie far apart.
+template <class S>
+HWY_INLINE void fetch_ahead(const CompositeScene<S>& scene, const TileJob<S>& job, Index at) {
+  constexpr Index kAhead = 4;
+  if (at + kAhead < static_cast<Index>(job.entries.size())) hwy::Prefetch(&record_at(scene, job, at + kAhead));
+}
+
 template <int W, class S>
 HWY_INLINE bool any_alive(const S* alive_row) {
   bool any = false;
@@ -177,6 +185,7 @@ Index composite(const CompositeScene<S>& scene, const TileJob<S>& job) {
     if (at % kSegment == 0 && at > 0 && job.checkpoints != nullptr) {
       std::memcpy(job.checkpoints + (at / kSegment - 1) * kPixels, t, kPixels * sizeof(S));
     }
+    fetch_ahead(scene, job, at);
     const SplatRecord<S>& record = record_at(scene, job, at);
     const Splat<Tag<S, W>> splat(d, job, record);
     const S* const feature = scene.features + record.index * scene.channels;
@@ -237,6 +246,7 @@ void replay(const CompositeScene<S>& scene, const TileJob<S>& job, Index begin, 
     std::memcpy(t, job.checkpoints + (begin / kSegment - 1) * kPixels, kPixels * sizeof(S));
   }
   for (Index at = begin; at < end; ++at) {
+    fetch_ahead(scene, job, at);
     const SplatRecord<S>& record = record_at(scene, job, at);
     const Splat<Tag<S, W>> splat(d, job, record);
     const auto position = hn::Set(di, static_cast<ListPosition<S>>(at));
