@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "core/parallel.h"
+#include "core/simd.h"
 #include "splat/composite_kernel.h"
 #include "splat/tiles.h"
 #include "splat/workspaces.h"
@@ -46,6 +47,12 @@ bool all_finite(const S* x, Index n) {
   return std::all_of(x, x + n, [](S v) { return std::isfinite(v); });
 }
 
+/// Copies a row of a tile; nearly all are 16 pixels, and known lengths copy faster.
+template <class S>
+void copy_row(const S* from, Index n, S* to) {
+  n == 16 ? std::copy_n(from, 16, to) : std::copy_n(from, n, to);
+}
+
 template <class S>
 struct Composite {
   static constexpr const char* kName = "composite";
@@ -73,7 +80,9 @@ struct Composite {
   TileGrid grid() const {
     return detail::tile_grid(view.camera.width, view.camera.height, static_cast<Index>(view.settings.tile));
   }
-  bool wants_shape(const NodeIo<S>& io) const { return io.wants(kMeans) || io.wants(kFactors) || io.wants(kOpacities); }
+  bool wants_shape(const NodeIo<S>& io) const {
+    return io.wants(kMeans) || io.wants(kMeansRest) || io.wants(kFactors) || io.wants(kOpacities);
+  }
   bool wants_gradient(const NodeIo<S>& io) const { return wants_shape(io) || io.wants(kFeatures); }
 
   // --- Gaussians -----------------------------------------------------------------------------------------------------
@@ -133,11 +142,13 @@ struct Composite {
     keys.resize(rows);
     room.resize(rows);
     parallel_for(rows, kGrain, [&](Index begin, Index end) {
-      for (Index n = begin; n < end; ++n) {
-        const bool drawn = prepare_gaussian(io, tiles, n, all_records[n], all_extents[n]);
-        keys[n].index = drawn ? static_cast<std::int32_t>(n) : -1;
-        if (drawn) keys[n].key = depth_key(io.in(kDepths).data[n], io.in(kRest).data[n]);
-      }
+      on_best_isa([&] {
+        for (Index n = begin; n < end; ++n) {
+          const bool drawn = prepare_gaussian(io, tiles, n, all_records[n], all_extents[n]);
+          keys[n].index = drawn ? static_cast<std::int32_t>(n) : -1;
+          if (drawn) keys[n].key = depth_key(io.in(kDepths).data[n], io.in(kRest).data[n]);
+        }
+      });
     });
     Index drawn = 0;
     for (Index n = 0; n < rows; ++n) {
@@ -211,9 +222,9 @@ struct Composite {
       job.channels = job.transmittance + pixels;
       fragments[tile] = detail::composite_tile(tiles.tile, scene, job);
       for (Index r = 0; r < job.height; ++r) {
-        std::copy_n(job.transmittance + r * tiles.tile, job.width, &transmittance(job.top + r, job.left));
+        copy_row(job.transmittance + r * tiles.tile, job.width, &transmittance(job.top + r, job.left));
         for (Index k = 0; k < channels; ++k) {
-          std::copy_n(job.channels + k * pixels + r * tiles.tile, job.width, &image(k, job.top + r, job.left));
+          copy_row(job.channels + k * pixels + r * tiles.tile, job.width, &image(k, job.top + r, job.left));
         }
       }
     });
@@ -260,17 +271,19 @@ struct Composite {
       std::fill_n(d_channels, (channels + 1) * pixels, S(0));
       for (Index r = 0; r < job.height; ++r) {
         for (Index k = 0; d_image && k < channels; ++k) {
-          std::copy_n(&d_image(k, job.top + r, job.left), job.width, d_channels + k * pixels + r * tiles.tile);
+          copy_row(&d_image(k, job.top + r, job.left), job.width, d_channels + k * pixels + r * tiles.tile);
         }
         if (d_transmittance) {
-          std::copy_n(&d_transmittance(job.top + r, job.left), job.width, adjoint.behind + r * tiles.tile);
+          copy_row(&d_transmittance(job.top + r, job.left), job.width, adjoint.behind + r * tiles.tile);
         }
       }
       adjoint.feature_sums = adjoint.segment + 2 * kSegment * pixels;
       detail::composite_tile_adjoint(tiles.tile, scene, job, adjoint);
     });
     parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
-      for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, shared, rank);
+      on_best_isa([&] {
+        for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, shared, rank);
+      });
     });
   }
 
@@ -278,21 +291,24 @@ struct Composite {
   /// gradients.
   void gather_gaussian(NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index rank) const {
     const Index n = records[rank].index, begin = lists.slot_begin[rank], end = lists.slot_begin[rank + 1];
-    const auto sum = [&](Index i) {
-      double total = 0;
-      for (Index slot = begin; slot < end; ++slot)
-        total += static_cast<double>(adjoint.sums[slot * adjoint.stride + i]);
-      return total;
-    };
-    Index place = 0;
+    if (begin == end) return;
+    const S* sums = adjoint.sums + begin * adjoint.stride;
     if (adjoint.wants_shape) {
-      double moments[kMoments];
-      for (double& m : moments) m = sum(place++);
+      double moments[kMoments] = {};
+      for (Index slot = begin; slot < end; ++slot) {
+        for (Index i = 0; i < kMoments; ++i)
+          moments[i] += static_cast<double>(sums[(slot - begin) * adjoint.stride + i]);
+      }
       add_shape_gradient(io, records[rank], n, moments);
+      sums += kMoments;
     }
     if (!adjoint.wants_features) return;
     const Array<S> d_features = io.d_in(kFeatures);
-    for (Index k = 0; k < d_features.shape.cols; ++k) d_features.row(n)[k] += static_cast<S>(sum(place++));
+    for (Index k = 0; k < d_features.shape.cols; ++k) {
+      double sum = 0;
+      for (Index i = 0; i < end - begin; ++i) sum += static_cast<double>(sums[i * adjoint.stride + k]);
+      d_features.row(n)[k] += static_cast<S>(sum);
+    }
   }
 
   /// With L = [l11 l21; 0 l22] and M the moments (Σ g u², …) as a symmetric matrix, from ds = −(L d)ᵀ L d_mean and
@@ -312,8 +328,9 @@ struct Composite {
       io.d_in(kOpacities).data[n] +=
           static_cast<S>(antialias ? moments[0] * detail::blur_compensation(conic) : moments[0]);
     }
-    if (io.wants(kMeans)) {
-      S* d_mean = io.d_in(kMeans).row(n);
+    for (const int input : {kMeans, kMeansRest}) {
+      if (!io.wants(input)) continue;
+      S* d_mean = io.d_in(input).row(n);
       d_mean[0] += static_cast<S>(o * (conic.l11 * moments[1]));
       d_mean[1] += static_cast<S>(o * (conic.l21 * moments[1] + conic.l22 * moments[2]));
     }

@@ -40,10 +40,10 @@ struct Composited {
 /// @param opacities  [N,1] in [0, 1]
 /// @param features   [N,C] what is composited: colours, depths, …; C ≥ 1
 /// @return           image-shaped arrays
-/// Adjoint: projected.means_px, projected.factors, opacities, features; each computed only when wanted. None where o G
-/// > alpha_cap (unless cap_gradient is pass), none through the order, the choice of pixels and the stop. A Gaussian
-/// that is not drawn has gradient 0. Throws InternalError when the shapes do not fit; UserError when there are more
-/// than kMostPairs (tile, Gaussian) pairs.
+/// Adjoint: projected.means_px and means_rest (of whose sum it is), projected.factors, opacities, features; each
+/// computed only when wanted. None where o G > alpha_cap (unless cap_gradient is pass), none through the order, the
+/// choice of pixels and the stop. A Gaussian that is not drawn has gradient 0. Throws InternalError when the shapes do
+/// not fit; UserError when there are more than kMostPairs (tile, Gaussian) pairs.
 template <class S>
 Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> features, const SplatView& view,
                         Source where = Source::current());

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include "core/check.h"
@@ -139,6 +140,13 @@ HWY_INLINE const SplatRecord<S>& record_at(const CompositeScene<S>& scene, const
   return scene.records[static_cast<size_t>(job.entries[static_cast<size_t>(at)].rank)];
 }
 
+/// Fetches the record that will be looked at a few list positions later: they lie far apart.
+template <class S>
+HWY_INLINE void fetch_ahead(const CompositeScene<S>& scene, const TileJob<S>& job, Index at) {
+  constexpr Index kAhead = 4;
+  if (at + kAhead < static_cast<Index>(job.entries.size())) hwy::Prefetch(&record_at(scene, job, at + kAhead));
+}
+
 template <int W, class S>
 HWY_INLINE bool any_alive(const S* alive_row) {
   bool any = false;
@@ -177,6 +185,7 @@ Index composite(const CompositeScene<S>& scene, const TileJob<S>& job) {
     if (at % kSegment == 0 && at > 0 && job.checkpoints != nullptr) {
       std::memcpy(job.checkpoints + (at / kSegment - 1) * kPixels, t, kPixels * sizeof(S));
     }
+    fetch_ahead(scene, job, at);
     const SplatRecord<S>& record = record_at(scene, job, at);
     const Splat<Tag<S, W>> splat(d, job, record);
     const S* const feature = scene.features + record.index * scene.channels;
@@ -220,7 +229,8 @@ Index composite(const CompositeScene<S>& scene, const TileJob<S>& job) {
 
 // --- backward --------------------------------------------------------------------------------------------------------
 
-/// T in front of each Gaussian of list positions [begin, end), and its G: 0 where it was not composited.
+/// T in front of each Gaussian of list positions [begin, end), and its G: 0 where it was not composited. T is left out
+/// for vectors without a G.
 template <int W, class S>
 void replay(const CompositeScene<S>& scene, const TileJob<S>& job, Index begin, Index end, S* segment) {
   const Tag<S, W> d;
@@ -236,6 +246,7 @@ void replay(const CompositeScene<S>& scene, const TileJob<S>& job, Index begin, 
     std::memcpy(t, job.checkpoints + (begin / kSegment - 1) * kPixels, kPixels * sizeof(S));
   }
   for (Index at = begin; at < end; ++at) {
+    fetch_ahead(scene, job, at);
     const SplatRecord<S>& record = record_at(scene, job, at);
     const Splat<Tag<S, W>> splat(d, job, record);
     const auto position = hn::Set(di, static_cast<ListPosition<S>>(at));
@@ -249,9 +260,10 @@ void replay(const CompositeScene<S>& scene, const TileJob<S>& job, Index begin, 
         const V alpha = alpha_of(d, splat, gaussian, cap);
         const auto in_list = hn::RebindMask(d, hn::Gt(hn::Load(di, job.last + p), position));
         const auto met = hn::And(hn::Ge(alpha, least), in_list);
+        hn::Store(hn::IfThenElseZero(met, gaussian), d, of_entry + kPixels + p);
+        if (hn::AllFalse(d, met)) continue;
         const V through = hn::Load(d, t + p);
         hn::Store(through, d, of_entry + p);
-        hn::Store(hn::IfThenElseZero(met, gaussian), d, of_entry + kPixels + p);
         hn::Store(hn::IfThenElse(met, hn::Mul(through, hn::Sub(one, alpha)), through), d, t + p);
       }
     }

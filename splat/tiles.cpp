@@ -11,67 +11,6 @@
 
 namespace hsi4d::detail {
 
-// --- the ellipse of a Gaussian ---------------------------------------------------------------------------------------
-
-namespace {
-
-/// a d − b c without cancellation: the product b c is corrected by its rounding error (Kahan).
-double difference_of_products(double a, double d, double b, double c) {
-  const double bc = b * c;
-  return std::fma(a, d, -bc) + std::fma(-b, c, bc);
-}
-
-/// Minors m01, m02, m12 of a 2×3 matrix.
-std::array<double, 3> minors(const double* v) {
-  return {difference_of_products(v[0], v[4], v[1], v[3]), difference_of_products(v[0], v[5], v[2], v[3]),
-          difference_of_products(v[1], v[5], v[2], v[4])};
-}
-
-}  // namespace
-
-bool conic_of(const double* v, double blur, Conic& conic) {
-  const double a = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-  const double c = v[3] * v[3] + v[4] * v[4] + v[5] * v[5];
-  const auto m = minors(v);
-  conic.xx = a + blur;
-  conic.yy = c + blur;
-  conic.xy = v[0] * v[3] + v[1] * v[4] + v[2] * v[5];
-  conic.sharp_determinant = m[0] * m[0] + m[1] * m[1] + m[2] * m[2];
-  conic.determinant = conic.sharp_determinant + blur * (a + c) + blur * blur;
-  if (!(conic.determinant > 0) || !std::isfinite(conic.determinant)) return false;
-  const double root_yy = std::sqrt(conic.yy);
-  conic.l11 = root_yy / std::sqrt(conic.determinant);
-  conic.l21 = -conic.xy / conic.yy * conic.l11;
-  conic.l22 = 1 / root_yy;
-  return std::isfinite(conic.l11) && std::isfinite(conic.l21) && std::isfinite(conic.l22);
-}
-
-std::array<double, 6> whitened_factor(const double* v, double blur, const Conic& conic) {
-  const auto m = minors(v);
-  const double scale = conic.l11 / conic.yy;
-  return {scale * (v[4] * m[0] + v[5] * m[1] + blur * v[0]),
-          scale * (v[5] * m[2] - v[3] * m[0] + blur * v[1]),
-          scale * (-v[3] * m[1] - v[4] * m[2] + blur * v[2]),
-          conic.l22 * v[3],
-          conic.l22 * v[4],
-          conic.l22 * v[5]};
-}
-
-double blur_compensation(const Conic& conic) { return std::sqrt(conic.sharp_determinant / conic.determinant); }
-
-// log f = ½ (log det V Vᵀ − log det cov), and both determinants are polynomials in V.
-void blur_compensation_adjoint(const double* v, double blur, const Conic& conic, double d, double* d_v) {
-  if (!(conic.sharp_determinant > 0)) return;
-  const auto m = minors(v);
-  // ½ ∂(det V Vᵀ)/∂V = Σ m ∂m/∂V
-  const double half_sharp[6] = {m[0] * v[4] + m[1] * v[5],  m[2] * v[5] - m[0] * v[3], -m[1] * v[3] - m[2] * v[4],
-                                -m[0] * v[1] - m[1] * v[2], m[0] * v[0] - m[2] * v[2], m[1] * v[0] + m[2] * v[1]};
-  const double scale = d * blur_compensation(conic);
-  for (int i = 0; i < 6; ++i) {
-    d_v[i] += scale * (half_sharp[i] / conic.sharp_determinant - (half_sharp[i] + blur * v[i]) / conic.determinant);
-  }
-}
-
 // --- its tiles -------------------------------------------------------------------------------------------------------
 
 TileGrid tile_grid(Index width, Index height, Index tile) {
@@ -82,14 +21,16 @@ namespace {
 
 /// First whole number ≥ x, held in [0, end]; `end` for NaN.
 Index first_from(double x, Index end) {
-  const double held = x > 0 ? (x < static_cast<double>(end) ? x : static_cast<double>(end)) : 0;
-  return std::isnan(x) ? end : static_cast<Index>(std::ceil(held));
+  if (!(x < static_cast<double>(end))) return end;
+  if (!(x > 0)) return 0;
+  const Index whole = static_cast<Index>(x);
+  return whole + (static_cast<double>(whole) < x ? 1 : 0);
 }
 
 /// One past the last whole number ≤ x, held in [0, end]; 0 for NaN.
 Index last_to(double x, Index end) {
   if (!(x >= 0)) return 0;
-  return x < static_cast<double>(end) ? static_cast<Index>(std::floor(x)) + 1 : end;
+  return x < static_cast<double>(end) ? static_cast<Index>(x) + 1 : end;
 }
 
 /// Tiles of 16 pixels that INRIA's square of half-width `radius` touches along one axis, as rows or columns of pixels.

@@ -2,45 +2,15 @@
 // composite.h; not part of the public interface.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 
 #include "core/buffer.h"
 #include "core/types.h"
+#include "splat/conic.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d::detail {
-
-// --- the ellipse of a Gaussian ---------------------------------------------------------------------------------------
-
-/// The inverse of cov = V Vᵀ + blur I in lower-triangular form, in double,
-///
-///   dᵀ cov⁻¹ d = u² + w²,   u = l11 dx + l21 dy,   w = l22 dy,
-///
-/// from det(V Vᵀ + b I) = m01² + m02² + m12² + b tr(V Vᵀ) + b², m_ij the 2×2 minors of V: all terms are ≥ 0 (row A1).
-struct Conic {
-  double l11, l21, l22;
-  double xx, xy, yy;         ///< cov, pixels²
-  double sharp_determinant;  ///< det V Vᵀ
-  double determinant;        ///< det cov
-};
-
-/// False where cov has no inverse (blur 0 and no area) or a number is not finite.
-///
-/// @param factor  [2,3] V by rows, pixels
-/// @param blur    pixels²
-bool conic_of(const double* factor, double blur, Conic& conic);
-
-/// L V with L = [l11 l21; 0 l22], 2×3 by rows. Its first row, l11 (v0 − xy/yy v1), cancels for needles; by the minors,
-/// which it is made of here, (v0 − xy/yy v1)_c = (Σ_k v1_k m_ck + b v0_c)/yy, it does not.
-std::array<double, 6> whitened_factor(const double* factor, double blur, const Conic& conic);
-
-/// sqrt(det V Vᵀ / det cov): what the opacity is multiplied with under antialias (row A7).
-double blur_compensation(const Conic& conic);
-
-/// d_V += d · ∂compensation/∂V; nothing where det V Vᵀ = 0.
-void blur_compensation_adjoint(const double* factor, double blur, const Conic& conic, double d, double* d_factor);
 
 // --- its tiles -------------------------------------------------------------------------------------------------------
 
