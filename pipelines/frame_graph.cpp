@@ -104,7 +104,7 @@ FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& 
   xi_ = camera_update_;
   if (settings.increment != CameraIncrement::kCamera) {
     const Var<S> map = tape_.constant("update_from_xi", shape_of(6, 6));  // transposed: it multiplies a row
-    const Matrix6<double> transposed = xi_from_update_;                   // column-major, so its memory is the transpose
+    const Matrix6<double> transposed = xi_from_update_;  // column-major, so its memory is the transpose
     write_numbers(tape_, map, transposed.data());
     xi_ = matmul(camera_update_, map);
   }

@@ -178,7 +178,8 @@ class Reconstruction {
   }
 
   FrameGraphSettings graph_settings(Draw draw) const {
-    return {config_.render, config_.rotations, config_.camera.increment, draw, Vector3<double>(config_.background.data())};
+    return {config_.render, config_.rotations, config_.camera.increment, draw,
+            Vector3<double>(config_.background.data())};
   }
 
   template <class S>

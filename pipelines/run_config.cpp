@@ -12,9 +12,10 @@ constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 }  // namespace
 
 void describe(ConfigFields& f, CameraSettings& s) {
-  f.choice("increment", s.increment, kCameraIncrements,
-           "Frame of a camera's six numbers: its own (about its centre), the world's, or its own axes about the point at "
-           "the scene's median depth, which keeps turning and moving apart");
+  f.choice(
+      "increment", s.increment, kCameraIncrements,
+      "Frame of a camera's six numbers: its own (about its centre), the world's, or its own axes about the point at "
+      "the scene's median depth, which keeps turning and moving apart");
 }
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {

@@ -135,7 +135,8 @@ std::string metrics_line(const IterationRecord& record) {
   for (const auto& [name, value] : record.losses)
     losses.add(name, record_number(value, child_pointer("/losses", name), record.rolled_back));
   line.add("losses", std::move(losses));
-  for (const auto& [name, value] : record.counters) line.add(name, record_number(value, child_pointer("", name), false));
+  for (const auto& [name, value] : record.counters)
+    line.add(name, record_number(value, child_pointer("", name), false));
   line.add("seconds", record_number(record.seconds, "/seconds", false));
   if (record.rolled_back) line.add("rolled_back", ConfigValue::make_boolean(true));
   return to_json_line(line) + "\n";

@@ -38,7 +38,7 @@ struct IterationRecord {
   double loss = 0;
   std::vector<std::pair<std::string, double>> losses;  ///< the terms
   double seconds = 0;
-  bool rolled_back = false;  ///< the step was undone; numbers that are not finite are then written as null
+  bool rolled_back = false;    ///< the step was undone; numbers that are not finite are then written as null
   MetricValues counters = {};  ///< work done: tiles, pairs, fragments
 };
 

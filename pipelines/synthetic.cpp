@@ -113,8 +113,7 @@ ConfigValue data_section(const std::string& name) {
     data.add(key, ConfigValue::make_string(file));
   };
   add("scene", "scene.ply");
-  data.add("objects",
-           object_of(name, object_of("gaussians", ConfigValue::make_string("objects/" + name + ".ply"))));
+  data.add("objects", object_of(name, object_of("gaussians", ConfigValue::make_string("objects/" + name + ".ply"))));
   add("avatar", "avatar.npz");
   add("frames", "frames");
   add("masks", "masks");
@@ -196,7 +195,8 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_motion(out.file("truth/motion.npz"), clip.motion);
   write_objects(out.file("truth/objects.npz"), object.name, clip.object);
   write_cameras(out.file("truth/cameras.json"), clip.cameras);
-  write_text_file(out.file("config.json"), to_json(merged(object_of("data", data_section(object.name)), more_sections)));
+  write_text_file(out.file("config.json"),
+                  to_json(merged(object_of("data", data_section(object.name)), more_sections)));
 
   const SyntheticRenderer renderer(room, object.gaussians, avatar, render);
   Progress shown("frames", settings.frames, progress);

@@ -20,14 +20,14 @@
 
 namespace hsi4d {
 
-/// How the video of a dataset is rendered. Not as the reconstruction renders: with hardly a cut, and at the supersampled
-/// size, so that the pixel filter that the reconstruction should use is narrower, blur/supersample² + 1/16 pixels² for a
-/// supersample of 2.
+/// How the video of a dataset is rendered. Not as the reconstruction renders: with hardly a cut, and at the
+/// supersampled size, so that the pixel filter that the reconstruction should use is narrower, blur/supersample² + 1/16
+/// pixels² for a supersample of 2.
 RenderSettings video_render_settings();
 
 /// `truth` with noise on every frame but the first, as an estimator would have it: joints 1-21 turned by
-/// pose_noise_deg (the root of the mean squared angle, axes uniform), finger joints by hand_noise_share of that, the root
-/// by root_noise_deg and moved by root_noise_m (each coordinate's standard deviation). Jaw and eyes stay.
+/// pose_noise_deg (the root of the mean squared angle, axes uniform), finger joints by hand_noise_share of that, the
+/// root by root_noise_deg and moved by root_noise_m (each coordinate's standard deviation). Jaw and eyes stay.
 Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings);
 
 /// Writes a dataset: the same bytes for the same settings, for any number of threads.
@@ -35,8 +35,7 @@ Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings);
 /// @param folder         new or empty; its parents are made. It appears when everything in it is complete
 /// @param more_sections  an object: sections of config.json beside `data`, for example stages; null: none
 /// Throws UserError when the folder is there and not empty, or cannot be written.
-void write_dataset(const SyntheticSettings& settings, const RenderSettings& render,
-                   const std::filesystem::path& folder, const ProgressSink& progress = {},
-                   const ConfigValue& more_sections = ConfigValue::make_object());
+void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const std::filesystem::path& folder,
+                   const ProgressSink& progress = {}, const ConfigValue& more_sections = ConfigValue::make_object());
 
 }  // namespace hsi4d

@@ -32,28 +32,73 @@ constexpr double kFocal = 1.12;
 /// forward, y turns left, z leans right.
 struct KeyPose {
   double seconds;
-  Vector pelvis;      ///< up is relative to standing
+  Vector pelvis;  ///< up is relative to standing
   Vector pelvis_turn;
-  Vector spine;       ///< of three joints together
-  Vector head;        ///< of neck and head together
-  Vector palm;        ///< the right one
-  Vector object_turn; ///< against time 0, about (left, forward, up)
+  Vector spine;        ///< of three joints together
+  Vector head;         ///< of neck and head together
+  Vector palm;         ///< the right one
+  Vector object_turn;  ///< against time 0, about (left, forward, up)
   Vector left_wrist;
-  Vector left_hand;   ///< rotation of the left wrist
+  Vector left_hand;        ///< rotation of the left wrist
   double curl, left_curl;  ///< of every finger joint
 };
 
 const std::array<KeyPose, 5> kKeys = {{
-    {0, {-0.02, 0.07, -0.12}, {14, -6, 0}, {26, -10, 2}, {14, -6, 0}, {-0.1, 0.58, 0.92}, {0, 0, 0},
-     {0.27, 0.2, 0.78}, {0, 0, 0}, 52, 14},
-    {0.7, {0.04, -0.05, -0.02}, {2, 6, 1}, {4, 8, -2}, {16, 4, 0}, {-0.08, 0.4, 1.06}, {20, 0, 6},
-     {0.22, 0.25, 1.05}, {12, 0, 16}, 62, 42},
-    {1.5, {0.07, -0.02, -0.03}, {3, 14, 3}, {6, 22, -3}, {20, 10, 0}, {0.02, 0.42, 1.1}, {42, 0, 16},
-     {0.28, 0.27, 1.07}, {10, 0, 10}, 64, 30},
-    {2.3, {0.1, 0.02, -0.05}, {6, 16, 3}, {12, 20, -4}, {24, 10, 0}, {0.06, 0.46, 1.06}, {52, 0, 22},
-     {0.3, 0.27, 1.03}, {6, 0, 4}, 64, 22},
-    {kClipSeconds, {0.03, -0.04, -0.02}, {2, 4, 0}, {2, 4, 0}, {8, 0, 0}, {-0.06, 0.38, 1.02}, {6, 0, 4},
-     {0.22, 0.25, 1.0}, {8, 0, 6}, 60, 36},
+    {0,
+     {-0.02, 0.07, -0.12},
+     {14, -6, 0},
+     {26, -10, 2},
+     {14, -6, 0},
+     {-0.1, 0.58, 0.92},
+     {0, 0, 0},
+     {0.27, 0.2, 0.78},
+     {0, 0, 0},
+     52,
+     14},
+    {0.7,
+     {0.04, -0.05, -0.02},
+     {2, 6, 1},
+     {4, 8, -2},
+     {16, 4, 0},
+     {-0.08, 0.4, 1.06},
+     {20, 0, 6},
+     {0.22, 0.25, 1.05},
+     {12, 0, 16},
+     62,
+     42},
+    {1.5,
+     {0.07, -0.02, -0.03},
+     {3, 14, 3},
+     {6, 22, -3},
+     {20, 10, 0},
+     {0.02, 0.42, 1.1},
+     {42, 0, 16},
+     {0.28, 0.27, 1.07},
+     {10, 0, 10},
+     64,
+     30},
+    {2.3,
+     {0.1, 0.02, -0.05},
+     {6, 16, 3},
+     {12, 20, -4},
+     {24, 10, 0},
+     {0.06, 0.46, 1.06},
+     {52, 0, 22},
+     {0.3, 0.27, 1.03},
+     {6, 0, 4},
+     64,
+     22},
+    {kClipSeconds,
+     {0.03, -0.04, -0.02},
+     {2, 4, 0},
+     {2, 4, 0},
+     {8, 0, 0},
+     {-0.06, 0.38, 1.02},
+     {6, 0, 4},
+     {0.22, 0.25, 1.0},
+     {8, 0, 6},
+     60,
+     36},
 }};
 
 /// From 0 to 1: constant acceleration, constant speed (1.25 of the mean), constant braking.
@@ -186,10 +231,10 @@ class Figure {
 /// The numbers of one body and object that stay the same through the clip.
 struct Stage {
   const BodyModel& body;
-  double standing = 0;      ///< height of the pelvis over the soles, metres
-  double ankle = 0;         ///< height of the ankles over the soles, metres
-  Vector palm;              ///< of the right hand, in the wrist's frame
-  Matrix grasp;             ///< rotation of the right wrist at time 0, world
+  double standing = 0;  ///< height of the pelvis over the soles, metres
+  double ankle = 0;     ///< height of the ankles over the soles, metres
+  Vector palm;          ///< of the right hand, in the wrist's frame
+  Matrix grasp;         ///< rotation of the right wrist at time 0, world
   Rigid<double> wrist_from_object;
 };
 
@@ -227,7 +272,8 @@ void curl_fingers(Figure& figure, const std::string& side, double degrees) {
     for (int i = 1; i <= 3; ++i)
       figure.set_local(smplx_joint(side + "_" + finger + std::to_string(i)), Vector(0, 0, sign * degrees));
   for (int i = 1; i <= 3; ++i)
-    figure.set_local(smplx_joint(side + "_thumb" + std::to_string(i)), Vector(0.25 * degrees, sign * -0.35 * degrees, 0));
+    figure.set_local(smplx_joint(side + "_thumb" + std::to_string(i)),
+                     Vector(0.25 * degrees, sign * -0.35 * degrees, 0));
 }
 
 void pose_legs(Figure& figure, const Stage& stage) {
@@ -252,7 +298,8 @@ BodyPose pose_at(const Stage& stage, const KeyPose& key) {
                   upright * so3_exp(Vector(key.pelvis_turn * kDegree)));
   for (const char* joint : {"spine1", "spine2", "spine3"}) figure.set_local(smplx_joint(joint), Vector(key.spine / 3));
   for (const char* joint : {"neck", "head"}) figure.set_local(smplx_joint(joint), Vector(key.head / 2));
-  for (const char* joint : {"jaw", "left_eye_smplhf", "right_eye_smplhf"}) figure.set_local(smplx_joint(joint), Vector(0, 0, 0));
+  for (const char* joint : {"jaw", "left_eye_smplhf", "right_eye_smplhf"})
+    figure.set_local(smplx_joint(joint), Vector(0, 0, 0));
   pose_legs(figure, stage);
   figure.set_local(smplx_joint("left_collar"), Vector(0, -4, -6));
   figure.set_local(smplx_joint("right_collar"), Vector(0, 8, 5));

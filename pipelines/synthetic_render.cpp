@@ -43,7 +43,8 @@ Var<float> transform_var(Tape<float>& tape, const Rigid<double>& rigid) {
 Vars room_vars(Tape<float>& tape, const Gaussians& g, Var<float> xi, const SplatView& view) {
   Vars vars;
   vars.means = constant(tape, "room means", g.means, 3);
-  vars.axes = gaussian_axes(constant(tape, "room quats", g.quats, 4), constant(tape, "room log_scales", g.log_scales, 3));
+  vars.axes =
+      gaussian_axes(constant(tape, "room quats", g.quats, 4), constant(tape, "room log_scales", g.log_scales, 3));
   vars.opacities = sigmoid(constant(tape, "room opacity_logits", g.opacity_logits, 1));
   vars.colors = sh_colors(constant(tape, "room sh", g.sh, 3 * g.sh_coefficients()), vars.means, xi, view);
   return vars;
@@ -59,14 +60,12 @@ Vars object_vars(Tape<float>& tape, const Gaussians& g, const Rigid<double>& pos
   vars.axes = transform_axes(transform, gaussian_axes(constant(tape, "object quats", g.quats, 4),
                                                       constant(tape, "object log_scales", g.log_scales, 3)));
   vars.opacities = sigmoid(constant(tape, "object opacity_logits", g.opacity_logits, 1));
-  vars.colors =
-      sh_colors(constant(tape, "object sh", g.sh, 3 * g.sh_coefficients()), vars.means, xi, view, transform);
+  vars.colors = sh_colors(constant(tape, "object sh", g.sh, 3 * g.sh_coefficients()), vars.means, xi, view, transform);
   return vars;
 }
 
 Vars avatar_vars(Tape<float>& tape, const Avatar& avatar, const BodyPose& pose) {
-  const Var<float> rotations =
-      rotations_from_axis_angle(constant(tape, "pose", as_floats(pose.axis_angle), 3));
+  const Var<float> rotations = rotations_from_axis_angle(constant(tape, "pose", as_floats(pose.axis_angle), 3));
   const std::array<double, 3> transl = {pose.transl[0], pose.transl[1], pose.transl[2]};
   const PosedSkeleton<float> skeleton =
       kinematic_chain(rotations, constant(tape, "transl", as_floats(transl), 3), avatar.parents, avatar.joints);
@@ -102,8 +101,8 @@ Image held_image(const ConstArray<float>& values, int first, int count) {
 
 SyntheticFrame SyntheticRenderer::frame(const BodyPose& pose, const Rigid<double>& world_from_object,
                                         const Camera& camera, int supersample) const {
-  const SplatView view{resized(camera, camera.width * supersample, camera.height * supersample),
-                       room_.origin_world, settings_};
+  const SplatView view{resized(camera, camera.width * supersample, camera.height * supersample), room_.origin_world,
+                       settings_};
   Tape<float> tape;
   const Var<float> xi = tape.constant("xi", shape_of(1, 6));
   const std::array<Vars, 3> parts = {room_vars(tape, room_, xi, view),

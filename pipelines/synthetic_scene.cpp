@@ -13,10 +13,10 @@ namespace hsi4d {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kWall = 2;         // metres from the middle to the walls
-constexpr double kCeiling = 2.6;    // metres
+constexpr double kWall = 2;                    // metres from the middle to the walls
+constexpr double kCeiling = 2.6;               // metres
 const Vector2<double> kTableHalf{0.38, 0.27};  // metres
-constexpr double kWainscot = 0.92;  // metres, top of the panelling
+constexpr double kWainscot = 0.92;             // metres, top of the panelling
 
 const Vector3<double> kToLight = Vector3<double>(-0.35, -0.55, 0.76).normalized();
 
@@ -43,7 +43,8 @@ double corner_light(const Point& p) {
 }
 
 /// Share of light left under a thing that stands at `center` and is about `half` wide; 1 far from it.
-double shadow(const Point& p, const Vector2<double>& center, const Vector2<double>& half, double turn, double strength) {
+double shadow(const Point& p, const Vector2<double>& center, const Vector2<double>& half, double turn,
+              double strength) {
   const Vector2<double> d(p.x() - center[0], p.y() - center[1]);
   const double x = std::abs(std::cos(turn) * d[0] + std::sin(turn) * d[1]) - half[0];
   const double y = std::abs(std::cos(turn) * d[1] - std::sin(turn) * d[0]) - half[1];
@@ -63,7 +64,7 @@ class RoomBuilder {
     add_window();
     add_pictures();
     add_bookcase();
-    add_plant(Point(-1.5, 1.45, 0));
+    add_plant(Point(-1.44, 1.45, 0));
     add_table();
   }
   const SurfaceModel& model() const { return model_; }
@@ -181,9 +182,9 @@ class RoomBuilder {
 
   void add_walls() {
     const double side = 2 * kWall;
-    add_wall(Point(-kWall, kWall, 0), Point(1, 0, 0), side, 1);       // back: outer side -y
-    add_wall(Point(-kWall, -kWall, 0), Point(0, 1, 0), side, 0.1);      // left: outer side +x
-    add_wall(Point(kWall, kWall, 0), Point(0, -1, 0), side, 0.1);       // right: outer side -x
+    add_wall(Point(-kWall, kWall, 0), Point(1, 0, 0), side, 1);     // back: outer side -y
+    add_wall(Point(-kWall, -kWall, 0), Point(0, 1, 0), side, 0.1);  // left: outer side +x
+    add_wall(Point(kWall, kWall, 0), Point(0, -1, 0), side, 0.1);   // right: outer side -x
     model_.add_rectangle(Point(-kWall, kWall, kCeiling), Point(side, 0, 0), Point(0, -side, 0),
                          plain(Rgb(0.93, 0.92, 0.88)), 0.03);
   }
@@ -195,7 +196,8 @@ class RoomBuilder {
     model_.add_rectangle(Point(left, y, low), Point(right - left, 0, 0), Point(0, 0, high - low), paint, detail);
     const double front = y - 0.02;
     const auto bar = [&](double x0, double x1, double z0, double z1) {
-      model_.add_rectangle(Point(x0, front, z0), Point(x1 - x0, 0, 0), Point(0, 0, z1 - z0), plain(frame_color), detail);
+      model_.add_rectangle(Point(x0, front, z0), Point(x1 - x0, 0, 0), Point(0, 0, z1 - z0), plain(frame_color),
+                           detail);
     };
     bar(left - frame, right + frame, high, high + frame);
     bar(left - frame, right + frame, low - frame, low);
@@ -207,7 +209,8 @@ class RoomBuilder {
     const double left = -1.35, right = -0.45, low = 1.08, high = 2.12;
     const Paint view = [this](double u, double v) {
       const Rgb sky = mixed(Rgb(0.93, 0.95, 0.95), Rgb(0.45, 0.69, 0.93), v * 1.3 - 0.3);
-      const double cloud = ramp(0.1, 0.5, noise_.at(Point(u * 4, v * 9, 20)) + 0.5 * noise_.at(Point(u * 9, v * 20, 5)));
+      const double cloud =
+          ramp(0.1, 0.5, noise_.at(Point(u * 4, v * 9, 20)) + 0.5 * noise_.at(Point(u * 9, v * 20, 5)));
       const double far = 0.36 + 0.06 * std::sin(6 * u + 1) + 0.03 * std::sin(15 * u);
       const double near = 0.22 + 0.07 * std::sin(4 * u + 3.5);
       if (v < near) return mixed(Rgb(0.25, 0.47, 0.19), Rgb(0.45, 0.62, 0.25), v / near);
@@ -220,8 +223,9 @@ class RoomBuilder {
                          plain(Rgb(white, white, white * 0.97)), 2);
     model_.add_rectangle(Point(left, y, low + 0.66), Point(right - left, 0, 0), Point(0, 0, 0.035),
                          plain(Rgb(white, white, white * 0.97)), 2);
-    model_.add_box(Point(middle, kWall - 0.09, low - 0.07), Point(0.6, 0.09, 0.018), 0,
-                   [](int) { return plain(Rgb(0.95, 0.94, 0.9)); }, 1.5);
+    model_.add_box(
+        Point(middle, kWall - 0.09, low - 0.07), Point(0.6, 0.09, 0.018), 0,
+        [](int) { return plain(Rgb(0.95, 0.94, 0.9)); }, 1.5);
     add_curtain(left - 0.3, left + 0.02, 0.35, 2.3);
     add_curtain(right - 0.02, right + 0.3, 0.35, 2.3);
     model_.add_tube([=](double v) { return Point(left - 0.4 + v * (right - left + 0.8), kWall - 0.12, 2.32); },
@@ -250,7 +254,8 @@ class RoomBuilder {
       Rgb color = mixed(Rgb(0.95, 0.8, 0.55), Rgb(0.93, 0.55, 0.4), v);
       if (r < 0.2) color = Rgb(0.98, 0.93, 0.75);
       for (int i = 0; i < 3; ++i)
-        if (v < 0.42 - 0.12 * i + 0.05 * std::sin(9 * u + 2 * i)) color = mixed(Rgb(0.2, 0.5, 0.62), Rgb(0.08, 0.22, 0.4), i / 2.0);
+        if (v < 0.42 - 0.12 * i + 0.05 * std::sin(9 * u + 2 * i))
+          color = mixed(Rgb(0.2, 0.5, 0.62), Rgb(0.08, 0.22, 0.4), i / 2.0);
       return color;
     };
     add_framed(0.02, 0.5, 1.62, 2.22, 0.035, Rgb(0.2, 0.14, 0.1), abstract, 3, 0.04);
@@ -269,9 +274,9 @@ class RoomBuilder {
     const double front = kWall - kDepth - 0.02;
     const Rgb oak(0.5, 0.32, 0.19);
     const auto board = [&](double x0, double x1, double z0, double z1) {
-      model_.add_box(Point((x0 + x1) / 2, front + kDepth / 2, (z0 + z1) / 2),
-                     Point((x1 - x0) / 2, kDepth / 2, (z1 - z0) / 2), 0,
-                     [&](int) { return wood(oak, x1 - x0 + z1 - z0, kDepth); }, 1.2);
+      model_.add_box(
+          Point((x0 + x1) / 2, front + kDepth / 2, (z0 + z1) / 2), Point((x1 - x0) / 2, kDepth / 2, (z1 - z0) / 2), 0,
+          [&](int) { return wood(oak, x1 - x0 + z1 - z0, kDepth); }, 1.2);
     };
     board(kLeft, kLeft + kBoard, 0, kTop);
     board(kRight - kBoard, kRight, 0, kTop);
@@ -280,14 +285,14 @@ class RoomBuilder {
     for (int i = 0; i <= kShelves; ++i) board(kLeft + kBoard, kRight - kBoard, i * kStep, i * kStep + kBoard);
     model_.add_rectangle(Point(kLeft, kWall - 0.03, 0), Point(kRight - kLeft, 0, 0), Point(0, 0, kTop),
                          plain(oak * 0.45), 0.8);
-    for (int i = 0; i < kShelves; ++i) add_books(kLeft + kBoard + 0.01, kRight - kBoard - 0.01, front, i * kStep + kBoard, kStep - kBoard);
+    for (int i = 0; i < kShelves; ++i)
+      add_books(kLeft + kBoard + 0.01, kRight - kBoard - 0.01, front, i * kStep + kBoard, kStep - kBoard);
   }
 
   void add_books(double left, double right, double front, double ground, double room) {
-    const std::array<Rgb, 10> covers = {Rgb(0.72, 0.2, 0.17),  Rgb(0.16, 0.32, 0.55), Rgb(0.2, 0.45, 0.3),
-                                        Rgb(0.88, 0.7, 0.25),  Rgb(0.85, 0.82, 0.74), Rgb(0.42, 0.22, 0.42),
-                                        Rgb(0.12, 0.13, 0.17), Rgb(0.82, 0.44, 0.2),  Rgb(0.3, 0.6, 0.65),
-                                        Rgb(0.55, 0.3, 0.2)};
+    const std::array<Rgb, 10> covers = {
+        Rgb(0.72, 0.2, 0.17),  Rgb(0.16, 0.32, 0.55), Rgb(0.2, 0.45, 0.3),  Rgb(0.88, 0.7, 0.25), Rgb(0.85, 0.82, 0.74),
+        Rgb(0.42, 0.22, 0.42), Rgb(0.12, 0.13, 0.17), Rgb(0.82, 0.44, 0.2), Rgb(0.3, 0.6, 0.65),  Rgb(0.55, 0.3, 0.2)};
     double x = left;
     while (x < right - 0.03) {
       const double width = std::min(right - x, 0.035 + 0.045 * random_.uniform());
@@ -319,8 +324,9 @@ class RoomBuilder {
       return zigzag ? Rgb(0.93, 0.86, 0.72) : Rgb(0.72, 0.38, 0.24);
     };
     model_.add_revolution(foot, pot, clay, 2);
-    model_.add_revolution(foot + Point(0, 0, 0.29), [](double v) { return Vector2<double>(0.17 * (1 - v), 0.01 * v); },
-                          plain(Rgb(0.2, 0.14, 0.1)), 1);
+    model_.add_revolution(
+        foot + Point(0, 0, 0.29), [](double v) { return Vector2<double>(0.17 * (1 - v), 0.01 * v); },
+        plain(Rgb(0.2, 0.14, 0.1)), 1);
     constexpr int kLeaves = 26;
     for (int i = 0; i < kLeaves; ++i) {
       const double turn = 2.399963 * i + 0.4 * random_.uniform();  // golden angle
@@ -349,22 +355,25 @@ class RoomBuilder {
     const double turn = plan_.table_turn, thick = 0.016;
     const Point top = plan_.table_top;
     const Matrix3<double> axes = so3_exp(Vector3<double>(0, 0, turn));
-    model_.add_box(top - Point(0, 0, thick), Point(half[0], half[1], thick), turn,
-                   [&](int face) {
-                     return wood(face == 5 ? pine : Rgb(pine * 0.94), 2 * half[0], face == 5 ? 2 * half[1] : 2 * thick);
-                   },
-                   2.5, 0.08, true);
+    model_.add_box(
+        top - Point(0, 0, thick), Point(half[0], half[1], thick), turn,
+        [&](int face) {
+          return wood(face == 5 ? pine : Rgb(pine * 0.94), 2 * half[0], face == 5 ? 2 * half[1] : 2 * thick);
+        },
+        2.5, 0.08, true);
     const double leg = 0.021, height = top.z() - 2 * thick;
     for (const double sx : {-1.0, 1.0})
       for (const double sy : {-1.0, 1.0}) {
         const Point at = top + axes * Point(sx * (half[0] - 0.05), sy * (half[1] - 0.05), 0);
-        model_.add_box(Point(at.x(), at.y(), height / 2), Point(leg, leg, height / 2), turn,
-                       [&](int) { return wood(pine * 0.9, 2 * leg, height); }, 1.5);
+        model_.add_box(
+            Point(at.x(), at.y(), height / 2), Point(leg, leg, height / 2), turn,
+            [&](int) { return wood(pine * 0.9, 2 * leg, height); }, 1.5);
       }
     for (const double side : {-1.0, 1.0}) {  // aprons
       const Point middle = top + axes * Point(0, side * (half[1] - 0.05), 0);
-      model_.add_box(Point(middle.x(), middle.y(), height - 0.03), Point(half[0] - 0.06, 0.01, 0.03), turn,
-                     [&](int) { return wood(pine * 0.88, 2 * half[0], 0.08); }, 1.5);
+      model_.add_box(
+          Point(middle.x(), middle.y(), height - 0.03), Point(half[0] - 0.06, 0.01, 0.03), turn,
+          [&](int) { return wood(pine * 0.88, 2 * half[0], 0.08); }, 1.5);
     }
   }
 
@@ -400,38 +409,46 @@ void add_can(SurfaceModel& model) {
   };
   const auto body = [](double v) { return Vector2<double>(kRadius * (1.08 - 0.16 * v), kHeight * v); };
   model.add_revolution(Point::Zero(), body, enamel, 1.2, 0.1);
-  model.add_revolution(Point(0, 0, kHeight), [](double v) { return Vector2<double>(kRadius * 0.92 * (1 - v), 0.03 * std::sin(v * kPi / 2)); },
-                       plain(Rgb(0.06, 0.4, 0.43)), 1, 0.1);
-  model.add_revolution(Point::Zero(), [](double v) { return Vector2<double>(kRadius * 1.08 * v, 0); }, plain(Rgb(0.05, 0.3, 0.33)), 0.5);
+  model.add_revolution(
+      Point(0, 0, kHeight),
+      [](double v) { return Vector2<double>(kRadius * 0.92 * (1 - v), 0.03 * std::sin(v * kPi / 2)); },
+      plain(Rgb(0.06, 0.4, 0.43)), 1, 0.1);
+  model.add_revolution(
+      Point::Zero(), [](double v) { return Vector2<double>(kRadius * 1.08 * v, 0); }, plain(Rgb(0.05, 0.3, 0.33)), 0.5);
   const auto spout = [](double v) { return Point(0.075 + 0.135 * v, 0, 0.035 + 0.16 * v + 0.02 * v * v); };
-  model.add_tube(spout, [](double v) { return 0.021 - 0.008 * v; }, plain(Rgb(0.08, 0.5, 0.52)), 1, 0.1);
+  model.add_tube(
+      spout, [](double v) { return 0.021 - 0.008 * v; }, plain(Rgb(0.08, 0.5, 0.52)), 1, 0.1);
   const Point end = spout(1), along = (spout(1) - spout(0.95)).normalized();
   const auto rose = [=](double v) { return Point(end + 0.035 * v * along); };
-  model.add_tube(rose, [](double v) { return 0.013 + 0.024 * v; }, plain(Rgb(0.97, 0.79, 0.2)), 1, 0.1);
-  model.add_tube([=](double v) { return Point(rose(1) + 0.002 * v * along); }, [](double v) { return 0.037 * (1.001 - v); },
-                 plain(Rgb(0.6, 0.45, 0.12)), 1);
+  model.add_tube(
+      rose, [](double v) { return 0.013 + 0.024 * v; }, plain(Rgb(0.97, 0.79, 0.2)), 1, 0.1);
+  model.add_tube([=](double v) { return Point(rose(1) + 0.002 * v * along); },
+                 [](double v) { return 0.037 * (1.001 - v); }, plain(Rgb(0.6, 0.45, 0.12)), 1);
   const auto handle = [](double v) {
     const double angle = kPi * (1.12 - 1.12 * v) + 0.02;
     return Point(0.085 * std::cos(angle), 0, 0.165 + 0.105 * std::sin(angle));
   };
-  model.add_tube(handle, [](double) { return 0.011; }, plain(Rgb(0.97, 0.79, 0.2)), 1.2, 0.1);
+  model.add_tube(
+      handle, [](double) { return 0.011; }, plain(Rgb(0.97, 0.79, 0.2)), 1.2, 0.1);
 }
 
 void add_striped_box(SurfaceModel& model) {
   const Point half(0.15, 0.11, 0.1);
   const std::array<Rgb, 6> tints = {Rgb(0.85, 0.3, 0.22), Rgb(0.2, 0.45, 0.75), Rgb(0.93, 0.75, 0.25),
                                     Rgb(0.3, 0.62, 0.38), Rgb(0.55, 0.4, 0.28), Rgb(0.75, 0.58, 0.4)};
-  model.add_box(Point(0, 0, half.z()), half, 0,
-                [&](int face) {
-                  const Rgb tint = tints[static_cast<std::size_t>(face)];
-                  return [tint, face](double u, double v) {
-                    const double along = face == 5 ? v * 4 : (face % 2 == 0 ? u + v : u - v) * 4;
-                    return along - std::floor(along) < 0.5 ? tint : Rgb(0.82, 0.68, 0.5);
-                  };
-                },
-                1, 0, true);
+  model.add_box(
+      Point(0, 0, half.z()), half, 0,
+      [&](int face) {
+        const Rgb tint = tints[static_cast<std::size_t>(face)];
+        return [tint, face](double u, double v) {
+          const double along = face == 5 ? v * 4 : (face % 2 == 0 ? u + v : u - v) * 4;
+          return along - std::floor(along) < 0.5 ? tint : Rgb(0.82, 0.68, 0.5);
+        };
+      },
+      1, 0, true);
   const auto handle = [=](double v) { return Point(0.1 * (2 * v - 1), 0, 0.2 + 0.06 * std::sin(kPi * v)); };
-  model.add_tube(handle, [](double) { return 0.011; }, plain(Rgb(0.25, 0.2, 0.18)), 1.2);
+  model.add_tube(
+      handle, [](double) { return 0.011; }, plain(Rgb(0.25, 0.2, 0.18)), 1.2);
 }
 
 }  // namespace
@@ -452,12 +469,14 @@ SyntheticObject synthetic_object(SyntheticObjectKind kind, Index most, std::uint
   }
   SyntheticObject object;
   object.name = choice_name<SyntheticObjectKind>(kSyntheticObjectKinds, kind);
-  object.gaussians = model.covered(most, [](const Point&, const Point& normal) { return faced_light(normal); }, seed);
+  object.gaussians = model.covered(
+      most, [](const Point&, const Point& normal) { return faced_light(normal); }, seed);
   std::vector<float>& means = object.gaussians.means;
   Point sum = Point::Zero();
   for (std::size_t i = 0; i < means.size(); ++i) sum[Eigen::Index(i % 3)] += double(means[i]);
   const Point centroid = sum / double(object.gaussians.count());
-  for (std::size_t i = 0; i < means.size(); ++i) means[i] = static_cast<float>(double(means[i]) - centroid[Eigen::Index(i % 3)]);
+  for (std::size_t i = 0; i < means.size(); ++i)
+    means[i] = static_cast<float>(double(means[i]) - centroid[Eigen::Index(i % 3)]);
   object.grip = Point(0, 0, is_can ? 0.27 : 0.26) - centroid;
   object.above_ground = centroid.z();
   return object;

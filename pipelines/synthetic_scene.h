@@ -26,10 +26,10 @@ Gaussians synthetic_room(Index most, const RoomPlan& plan, std::uint64_t seed);
 
 /// An object with its own origin at the mean of its Gaussian centres, z up as it stands.
 struct SyntheticObject {
-  std::string name;        ///< the word of its kind
-  Gaussians gaussians;     ///< relative to the mean of its centres
-  Vector3<double> grip;    ///< where a hand holds it: the middle of its handle, which runs along x, metres
-  double above_ground = 0; ///< height of the origin over the ground that it stands on, metres
+  std::string name;         ///< the word of its kind
+  Gaussians gaussians;      ///< relative to the mean of its centres
+  Vector3<double> grip;     ///< where a hand holds it: the middle of its handle, which runs along x, metres
+  double above_ground = 0;  ///< height of the origin over the ground that it stands on, metres
 };
 
 /// @param most  Gaussians, at least kFewestObjectGaussians

@@ -165,8 +165,8 @@ void SurfaceModel::add_revolution(const Vector3<double>& base, const std::functi
                                   Paint color, double detail, double gloss) {
   add({[=](double u, double v) {
          const Vector2<double> rz = profile(v);
-         return Vector3<double>(base + Vector3<double>(rz[0] * std::cos(2 * kPi * u), rz[0] * std::sin(2 * kPi * u),
-                                                       rz[1]));
+         return Vector3<double>(base +
+                                Vector3<double>(rz[0] * std::cos(2 * kPi * u), rz[0] * std::sin(2 * kPi * u), rz[1]));
        },
        std::move(color), detail, gloss});
 }

@@ -25,10 +25,10 @@ struct RenderRequest {
 
 template <class S>
 struct Rendered {
-  Var<S> image;          ///< [3,H,W] Σ w c + T background, not clamped
-  Var<S> transmittance;  ///< [1,H,W]
-  Var<S> depth;          ///< [1,H,W] Σ w z / Σ w, metres, 0 where Σ w = 0; empty unless asked for
-  Var<S> group_opacity;  ///< [G,H,W] Σ w over each group; empty unless asked for
+  Var<S> image;            ///< [3,H,W] Σ w c + T background, not clamped
+  Var<S> transmittance;    ///< [1,H,W]
+  Var<S> depth;            ///< [1,H,W] Σ w z / Σ w, metres, 0 where Σ w = 0; empty unless asked for
+  Var<S> group_opacity;    ///< [G,H,W] Σ w over each group; empty unless asked for
   Projected<S> projected;  ///< what was composited, for losses on depths and positions
   std::shared_ptr<const RenderCounters> counters;  ///< of the last forward run
 };

@@ -41,7 +41,8 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
   const fs::path dataset = folder / "dataset";
   if (!arguments.resume || !fs::exists(dataset)) {
     if (fs::exists(dataset)) {
-      throw UserError(folder.string() + ": holds a demo already; --resume goes on with it, another --out makes a new one");
+      throw UserError(folder.string() +
+                      ": holds a demo already; --resume goes on with it, another --out makes a new one");
     }
     fs::create_directories(folder);
     write_dataset(config.synthetic, video_render_settings(), dataset,

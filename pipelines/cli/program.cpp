@@ -14,13 +14,13 @@
 #include "core/version.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/demo_command.h"
-#include "pipelines/cli/run_command.h"
-#include "pipelines/reconstruct.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/render_command.h"
-#include "pipelines/cli/synth_command.h"
 #include "pipelines/cli/report_command.h"
+#include "pipelines/cli/run_command.h"
+#include "pipelines/cli/synth_command.h"
+#include "pipelines/reconstruct.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -93,7 +93,8 @@ struct CommandLine {
     DemoArguments& a = demo_arguments;
     CLI::App* command = app.add_subcommand("demo", "The method on a generated scene with ground truth");
     command->add_flag("--quick", a.quick, "256x256 pixels and 8 frames: less than a minute");
-    command->add_option("--out", a.out, "Folder of dataset and run; default: the first free runs/demo, runs/demo-2, ...");
+    command->add_option("--out", a.out,
+                        "Folder of dataset and run; default: the first free runs/demo, runs/demo-2, ...");
     add_overrides(*command, a.overrides);
     command->add_flag("--quiet", a.quiet, "No progress on stderr");
     command->add_flag("--resume", a.resume, "Go on with the demo in --out; the result has the same bits");
@@ -103,7 +104,8 @@ struct CommandLine {
 
   void add_synth() {
     CLI::App* synth = app.add_subcommand("synth", "Make a dataset with exact ground truth");
-    synth->add_option("CONFIG", config, "A config; section synthetic says what is made, the rest goes along")->required();
+    synth->add_option("CONFIG", config, "A config; section synthetic says what is made, the rest goes along")
+        ->required();
     synth->add_option("--out", out, "Where to: a new or empty folder")->type_name("DIR")->required();
     add_overrides(*synth, overrides);
     synth->callback([this] { run = [this] { return synth_command(config, overrides, out, losses); }; });

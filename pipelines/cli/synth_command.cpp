@@ -10,8 +10,9 @@ namespace hsi4d::cli {
 std::string synth_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           const std::filesystem::path& out, const std::vector<LossDescription>& losses) {
   const RunConfig run = load_run_config(config, overrides, losses);
-  with_threads(run.threads > 0 ? run.threads : thread_count(),
-               [&] { write_dataset(run.synthetic, video_render_settings(), out, progress_on_stderr(), sections_beside_data(run, losses)); });
+  with_threads(run.threads > 0 ? run.threads : thread_count(), [&] {
+    write_dataset(run.synthetic, video_render_settings(), out, progress_on_stderr(), sections_beside_data(run, losses));
+  });
   const std::string frames = std::to_string(run.synthetic.frames) + (run.synthetic.frames == 1 ? " frame" : " frames");
   const std::string size = std::to_string(run.synthetic.size_px);
   return out.generic_string() + ": " + frames + " of " + size + " x " + size + " pixels with masks and truth\n";

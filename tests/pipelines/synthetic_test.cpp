@@ -199,8 +199,7 @@ TEST_CASE("a synthetic dataset is complete, readable and true to itself") {
         center += double(can(0, y, x)) * Vector2<double>(x + 0.5, y + 0.5);
         weight += double(can(0, y, x));
       }
-    const Vector2<double> there =
-        project_point(camera, transform_point(camera.camera_from_world, row(translation, 0)));
+    const Vector2<double> there = project_point(camera, transform_point(camera.camera_from_world, row(translation, 0)));
     CHECK((center / weight - there).norm() < 2);
   }
   SECTION("config.json names the files") {
@@ -292,7 +291,8 @@ TEST_CASE("eight frames move as much as can be followed, and no more") {
   CHECK(degrees_between(clip.object[0].rotation, clip.object[7].rotation) > 15);
   CHECK(camera_way(0, 7) > 0.09);
   CHECK(camera_turn(0, 7) > 2);
-  for (const char* name : {"left_knee", "right_shoulder", "left_shoulder", "right_elbow", "right_wrist", "left_index1"}) {
+  for (const char* name :
+       {"left_knee", "right_shoulder", "left_shoulder", "right_elbow", "right_wrist", "left_index1"}) {
     INFO(name);
     CHECK(joint_turn(0, 7, smplx_joint(name)) > 10);
   }
@@ -329,11 +329,14 @@ TEST_CASE("room and object have about as many Gaussians as asked for, all of the
     CHECK(room.count() <= most);
     if (most > 1000) CHECK(double(room.count()) > 0.85 * double(most));
     CHECK(std::all_of(room.sh.begin(), room.sh.end(), [](float x) { return std::isfinite(x); }));
-    CHECK(std::all_of(room.log_scales.begin(), room.log_scales.end(), [](float x) { return std::isfinite(x) && x < 1; }));
+    CHECK(
+        std::all_of(room.log_scales.begin(), room.log_scales.end(), [](float x) { return std::isfinite(x) && x < 1; }));
     for (std::size_t i = 0; i < room.means.size(); i += 3) {
       const bool inside = std::abs(room.means[i]) < 2.01F && std::abs(room.means[i + 1]) < 2.01F &&
                           room.means[i + 2] > -0.01F && room.means[i + 2] < 2.61F;
-      if (!inside) FAIL("a Gaussian outside of the room");
+      if (!inside)
+        FAIL("a Gaussian outside of the room, at " << room.means[i] << ' ' << room.means[i + 1] << ' '
+                                                   << room.means[i + 2]);
     }
   }
   for (const auto& choice : kSyntheticObjectKinds) {
@@ -353,9 +356,9 @@ TEST_CASE("the initial motion is off by about what the settings say") {
     double sum = 0;
     for (std::size_t t = 1; t < 200; ++t)
       for (Index joint = first; joint <= last; ++joint)
-        sum += std::pow(degrees_between(so3_exp(truth.poses[t].rotation_of(joint)),
-                                        so3_exp(motion.poses[t].rotation_of(joint))),
-                        2);
+        sum += std::pow(
+            degrees_between(so3_exp(truth.poses[t].rotation_of(joint)), so3_exp(motion.poses[t].rotation_of(joint))),
+            2);
     return std::sqrt(sum / (199.0 * double(last - first + 1)));
   };
   CHECK(rms(1, 21) == Approx(8).epsilon(0.05));

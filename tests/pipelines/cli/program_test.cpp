@@ -141,8 +141,7 @@ TEST_CASE("mistakes on the command line end with 2 and one message") {
     return result.err;
   };
   const std::string commands = "run, demo, synth, report, render, gradients, info, check, schema, list";
-  CHECK(mistake({"chek"}) ==
-        "hsi4d: there is no command \"chek\"; known: " + commands + "; did you mean \"check\"?\n");
+  CHECK(mistake({"chek"}) == "hsi4d: there is no command \"chek\"; known: " + commands + "; did you mean \"check\"?\n");
   CHECK(mistake({"frobnicate"}) == "hsi4d: there is no command \"frobnicate\"; known: " + commands + "\n");
   CHECK(mistake({}) == "hsi4d: give a command: " + commands + "; `hsi4d --help` explains them\n");
   CHECK(mistake({"check"}) == "hsi4d check: CONFIG is required; `hsi4d check --help` explains its arguments\n");
