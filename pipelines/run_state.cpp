@@ -13,8 +13,8 @@ namespace {
 
 constexpr Index kPoseNumbers = 165;
 constexpr Index kRigidNumbers = 12;
-constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "ssim",
-                                                     "psnr_foreground_db"};  // as image_errors orders
+constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "psnr_foreground_db",
+                                                     "ssim"};  // as image_errors orders
 
 std::string image_error_name(std::size_t frame, const std::string& name) {
   return "image_errors/" + std::to_string(frame) + "/" + name;
