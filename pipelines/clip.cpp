@@ -156,7 +156,8 @@ void check_inputs(const DataSettings& data) {
   expect(data.initial, "initial", "the state of frame 0");
   for (const auto& [name, object] : data.objects) {
     if (name.empty()) complain("/data/objects: an object's name is empty; it names the folder of its masks");
-    if (name == kHumanMasks) complain("/data/objects/human: \"human\" is the folder of the human's masks; use another name");
+    if (name == kHumanMasks)
+      complain("/data/objects/human: \"human\" is the folder of the human's masks; use another name");
   }
   if (!problems.empty()) throw UserError(problems);
 }
@@ -167,6 +168,10 @@ Clip read_clip(const DataSettings& data) {
   clip.frame_files = png_names(data.frames);
   clip.scene = read_ply(data.scene.string()).gaussians;
   clip.avatar = read_avatar(data.avatar.string());
+  if (clip.avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
+    throw DataError(data.avatar.string() + ": has " + std::to_string(clip.avatar.parents.size()) +
+                    " joints; a run needs the " + std::to_string(kSmplxJoints) + " of SMPL-X");
+  }
   clip.camera = read_camera(data.camera.string());
   const InitialSettings initial = read_initial(data.initial);
   clip.first.camera_from_world = clip.camera.camera_from_world;

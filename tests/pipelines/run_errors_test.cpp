@@ -95,8 +95,7 @@ TEST_CASE("inputs that are not given are all told before anything is written", "
         "/data/masks: not given; a run needs masks of the human and the objects\n");
   CHECK_FALSE(fs::exists("run"));
   const ProgramResult missing = run_hsi4d({"run", tiny_config_file(), "--set", "data.scene=none.ply"});
-  check_refusal(missing,
-                "--set data.scene=none.ply: /data/scene: \"none.ply\" does not exist (looked for none.ply)");
+  check_refusal(missing, "--set data.scene=none.ply: /data/scene: \"none.ply\" does not exist (looked for none.ply)");
 }
 
 TEST_CASE("stages that cannot work are refused before anything is written", "[run]") {
@@ -124,8 +123,7 @@ TEST_CASE("an object's name must not be the human's", "[run]") {
   dataset.edit_config([](nlohmann::ordered_json& config) {
     config["data"]["objects"] = {{"human", config["data"]["objects"][kTinyObject]}};
   });
-  check_refusal(dataset.run(),
-                "/data/objects/human: \"human\" is the folder of the human's masks; use another name");
+  check_refusal(dataset.run(), "/data/objects/human: \"human\" is the folder of the human's masks; use another name");
   CHECK_FALSE(fs::exists("run"));
 }
 
@@ -133,15 +131,15 @@ TEST_CASE("frames and masks of the wrong size are told when they are read", "[ru
   const SpoiltDataset dataset;
   SECTION("a frame") {
     write_image(dataset.file("frames/0002.png"), black(40, 48));
-    check_failure(dataset, dataset.file("frames/0002.png") +
-                               ": is 40x48 with 3 channels; the camera's image is 48x48 with 3");
+    check_failure(dataset,
+                  dataset.file("frames/0002.png") + ": is 40x48 with 3 channels; the camera's image is 48x48 with 3");
     CHECK(metrics_of("run").back()["frame"] == 1);  // what was done is in the checkpoint
     CHECK(fs::exists("run/checkpoint/progress.npz"));
   }
   SECTION("a frame without colours") {
     write_image(dataset.file("frames/0001.png"), black(48, 48, 1));
-    check_failure(dataset, dataset.file("frames/0001.png") +
-                               ": is 48x48 with 1 channels; the camera's image is 48x48 with 3");
+    check_failure(dataset,
+                  dataset.file("frames/0001.png") + ": is 48x48 with 1 channels; the camera's image is 48x48 with 3");
     CHECK(metrics_of("run").empty());
   }
   SECTION("the human's mask") {
@@ -201,7 +199,8 @@ TEST_CASE("a folder of masks that is not there is a warning", "[run]") {
   fs::remove_all(dataset.file("masks/watering_can"));
   const ProgramResult result = dataset.run();
   CHECK(result.status == 0);
-  const std::string warning = dataset.file("masks/watering_can") + ": there is no such folder; all its masks are empty\n";
+  const std::string warning =
+      dataset.file("masks/watering_can") + ": there is no such folder; all its masks are empty\n";
   CHECK_THAT(result.err, Contains("hsi4d: warning: " + warning));
   CHECK_THAT(file_text("run/log.txt"), Contains(" warning " + warning));
 }
@@ -211,8 +210,9 @@ TEST_CASE("a folder that holds a run is not run into, and resumed with its own c
   CHECK(dataset.run().status == 0);
   const auto before = result_of("run");
   const std::string status = file_text("run/status.json");
-  check_refusal(dataset.run(), "run: holds a run that is done; choose another folder, remove this one, or go on with it "
-                               "by --resume");
+  check_refusal(dataset.run(),
+                "run: holds a run that is done; choose another folder, remove this one, or go on with it "
+                "by --resume");
   check_refusal(dataset.run({"--resume", "--seed", "3", "--set", "stages.camera.iterations=9"}),
                 "run/config.resolved.json: the run cannot be resumed, its config is another one:\n"
                 "  /seed: 0 in the folder, 3 now\n"
@@ -230,8 +230,9 @@ TEST_CASE("a damaged checkpoint is told, and how to go on without it", "[run]") 
     fs::resize_file(file, 1000);
     const ProgramResult result = dataset.run({"--resume"});
     CHECK(result.status == 2);
-    const std::string message = file + ": cannot be read as a zip archive: Not a zip archive; without this file the run "
-                                       "begins anew";
+    const std::string message = file +
+                                ": cannot be read as a zip archive: Not a zip archive; without this file the run "
+                                "begins anew";
     CHECK_THAT(result.err, Catch::Matchers::EndsWith(message + "\n"));
     CHECK(json_of("run/status.json")["state"] == "failed");
     CHECK(json_of("run/status.json")["message"] == message);

@@ -167,8 +167,9 @@ TEST_CASE("a run that was killed and resumed has the bits of one that never was"
     CHECK(state_of(run) == "running");
     const ProgramResult refused = run_hsi4d(run_arguments(run));
     CHECK(refused.status == 2);
-    CHECK(refused.err == run + ": holds a run that is not finished (running); choose another folder, remove this one, "
-                               "or go on with it by --resume\n");
+    CHECK(refused.err == run +
+                             ": holds a run that is not finished (running); choose another folder, remove this one, "
+                             "or go on with it by --resume\n");
     const ProgramResult resumed = run_hsi4d(with_resume(run_arguments(run)));
     INFO(resumed.err);
     CHECK(resumed.status == 0);
@@ -235,10 +236,9 @@ TEST_CASE("a demo that was killed and resumed has the bits of one that never was
   const TemporaryFolder here;
   const auto arguments = [](const std::string& out) {
     std::vector<std::string> words = {"demo", "--quick", "--quiet", "--threads", "1", "--out", out};
-    for (const char* setting :
-         {"synthetic.frames=3", "synthetic.size_px=48", "synthetic.scene_gaussians=1500",
-          "synthetic.avatar_gaussians=500", "synthetic.object_gaussians=150", "stages.camera.iterations=5",
-          "stages.interaction.iterations=10"}) {
+    for (const char* setting : {"synthetic.frames=3", "synthetic.size_px=48", "synthetic.scene_gaussians=1500",
+                                "synthetic.avatar_gaussians=500", "synthetic.object_gaussians=150",
+                                "stages.camera.iterations=5", "stages.interaction.iterations=10"}) {
       words.insert(words.end(), {"--set", setting});
     }
     return words;
@@ -265,8 +265,8 @@ TEST_CASE("a demo that was killed and resumed has the bits of one that never was
   const ProgramResult nowhere = run_hsi4d({"demo", "--quick", "--resume"});
   CHECK(nowhere.status == 2);
   CHECK(nowhere.err == "hsi4d demo: --resume needs --out, to know with what\n");
-  const ProgramResult wrong =
-      run_hsi4d({"demo", "--quick", "--out", "wrong", "--set", "stages.camera.draw=scene", "--set", "synthetic.frames=0"});
+  const ProgramResult wrong = run_hsi4d(
+      {"demo", "--quick", "--out", "wrong", "--set", "stages.camera.draw=scene", "--set", "synthetic.frames=0"});
   CHECK(wrong.status == 2);
   CHECK_FALSE(fs::exists("wrong"));
 }

@@ -27,9 +27,7 @@ std::set<std::string> names_in(const fs::path& folder) {
 }
 
 /// Iterations that are enough for a result better than its baselines.
-RunConfig longer_config() {
-  return tiny_config({"stages.camera.iterations=30", "stages.interaction.iterations=40"});
-}
+RunConfig longer_config() { return tiny_config({"stages.camera.iterations=30", "stages.interaction.iterations=40"}); }
 
 void check_frames(const fs::path& run) {
   for (int frame = 1; frame < kTinyFrames; ++frame) {
@@ -102,18 +100,18 @@ TEST_CASE("a run leaves a whole run folder, and a result better than its baselin
   CHECK(camera["iterations"] == 30 * (kTinyFrames - 1));
   CHECK_FALSE(camera.contains("mpjpe_mm"));
   CHECK(last["stage"] == "interaction");
-  for (const char* name : {"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "world_mpjpe_image_mm", "world_mpjpe_depth_mm",
-                           "root_translation_mm", "object_translation_cm", "object_rotation_deg",
-                           "camera_translation_cm", "camera_rotation_deg", "psnr_db", "psnr_foreground_db", "ssim",
-                           "jitter", "seconds"}) {
+  for (const char* name :
+       {"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "world_mpjpe_image_mm", "world_mpjpe_depth_mm",
+        "root_translation_mm", "object_translation_cm", "object_rotation_deg", "camera_translation_cm",
+        "camera_rotation_deg", "psnr_db", "psnr_foreground_db", "ssim", "jitter", "seconds"}) {
     CHECK(number_at(last, name) > 0);
   }
   CHECK(last["rollbacks"] == 0);
   REQUIRE(written["per_frame"].size() == kTinyFrames - 1);
   // No rotation of the object: of its few pixels it cannot be told.
   for (const char* baseline : {"start", "copy_frame_0"}) {
-    for (const char* name : {"mpjpe_mm", "world_mpjpe_mm", "object_translation_cm", "camera_translation_cm",
-                             "camera_rotation_deg"}) {
+    for (const char* name :
+         {"mpjpe_mm", "world_mpjpe_mm", "object_translation_cm", "camera_translation_cm", "camera_rotation_deg"}) {
       INFO(name << " against " << baseline);
       CHECK(number_at(last, name) < number_at(written["baselines"][baseline], name));
     }
