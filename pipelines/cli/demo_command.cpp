@@ -4,6 +4,7 @@
 
 #include "core/check.h"
 #include "core/config_file.h"
+#include "core/parallel.h"
 #include "pipelines/cli/demo_configs.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/terminal.h"
@@ -48,9 +49,12 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
                       ": holds a demo already; --resume goes on with it, another --out makes a new one");
     }
     fs::create_directories(folder);
-    write_dataset(config.synthetic, video_render_settings(), dataset,
-                  arguments.quiet ? ProgressSink{} : progress_on_stderr(),
-                  sections_beside_data(config, descriptions_of(losses)));
+    const int threads = arguments.threads > 0 ? arguments.threads : config.threads;
+    with_threads(threads > 0 ? threads : thread_count(), [&] {
+      write_dataset(config.synthetic, video_render_settings(), dataset,
+                    arguments.quiet ? ProgressSink{} : progress_on_stderr(),
+                    sections_beside_data(config, descriptions_of(losses)));
+    });
   }
   config.data = dataset_inputs(dataset);  // now that its objects and truth are there
   const std::string run = (folder / "run").string();
