@@ -20,7 +20,7 @@ void describe(ConfigFields& f, CameraSettings& s) {
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {
   f.string("name", s.name, "What the run is called in its report");
-  f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of everything that is random");
+  f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of what is random in a run; nothing is so far (a dataset has synthetic.seed)");
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
             "Threads; 0: one a core. Results do not depend on it");
   f.choice("precision", s.precision, kRunPrecisions, "Type of the numbers that a run computes with");
