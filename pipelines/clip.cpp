@@ -7,6 +7,7 @@
 #include "core/check.h"
 #include "core/config_file.h"
 #include "core/image_io.h"
+#include "core/log.h"
 #include "splat/io_ply.h"
 
 namespace hsi4d {
@@ -14,6 +15,9 @@ namespace hsi4d {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Folder of the human's masks; the others are named by their objects.
+constexpr const char* kHumanMasks = "human";
 
 /// initial.json: the state of frame 0, and estimated poses of all frames.
 struct InitialPose {
@@ -46,19 +50,6 @@ InitialSettings read_initial(const fs::path& file) {
   read_config(tree, fields, problems);
   problems.throw_if_any();
   return settings;
-}
-
-void require_given(const fs::path& path, const char* key, const char* what) {
-  if (path.empty()) throw UserError(std::string("/data/") + key + ": not given; a run needs " + what);
-}
-
-void require_all(const DataSettings& data) {
-  require_given(data.scene, "scene", "a scene");
-  require_given(data.avatar, "avatar", "an avatar");
-  require_given(data.frames, "frames", "the frames of a video");
-  require_given(data.masks, "masks", "masks of the human and the objects");
-  require_given(data.camera, "camera", "the camera of frame 0");
-  require_given(data.initial, "initial", "the state of frame 0");
 }
 
 std::vector<std::string> png_names(const fs::path& folder) {
@@ -144,14 +135,43 @@ Image read_mask(const fs::path& file, const Clip& clip) {
   return take_channels(mask, 0, 1);
 }
 
+/// A folder of masks that is not there is more often a wrong name than a clip without masks.
+void warn_without_masks(const fs::path& folder) {
+  if (!fs::is_directory(folder)) log_warning(folder.string() + ": there is no such folder; all its masks are empty");
+}
+
 }  // namespace
 
+void check_inputs(const DataSettings& data) {
+  std::string problems;
+  const auto complain = [&problems](const std::string& text) { problems += (problems.empty() ? "" : "\n") + text; };
+  const auto expect = [&complain](const fs::path& path, const std::string& key, const std::string& what) {
+    if (path.empty()) complain("/data/" + key + ": not given; a run needs " + what);
+  };
+  expect(data.scene, "scene", "a scene");
+  expect(data.avatar, "avatar", "an avatar");
+  expect(data.frames, "frames", "the frames of a video");
+  expect(data.masks, "masks", "masks of the human and the objects");
+  expect(data.camera, "camera", "the camera of frame 0");
+  expect(data.initial, "initial", "the state of frame 0");
+  for (const auto& [name, object] : data.objects) {
+    if (name.empty()) complain("/data/objects: an object's name is empty; it names the folder of its masks");
+    if (name == kHumanMasks)
+      complain("/data/objects/human: \"human\" is the folder of the human's masks; use another name");
+  }
+  if (!problems.empty()) throw UserError(problems);
+}
+
 Clip read_clip(const DataSettings& data) {
-  require_all(data);
+  check_inputs(data);
   Clip clip;
   clip.frame_files = png_names(data.frames);
   clip.scene = read_ply(data.scene.string()).gaussians;
   clip.avatar = read_avatar(data.avatar.string());
+  if (clip.avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
+    throw DataError(data.avatar.string() + ": has " + std::to_string(clip.avatar.parents.size()) +
+                    " joints; a run needs the " + std::to_string(kSmplxJoints) + " of SMPL-X");
+  }
   clip.camera = read_camera(data.camera.string());
   const InitialSettings initial = read_initial(data.initial);
   clip.first.camera_from_world = clip.camera.camera_from_world;
@@ -161,7 +181,9 @@ Clip read_clip(const DataSettings& data) {
     clip.objects.push_back({name, centred(read, object.gaussians)});
     clip.first.objects.push_back(initial_pose(initial, name, data.initial));
     names.push_back(name);
+    warn_without_masks(data.masks / name);
   }
+  warn_without_masks(data.masks / kHumanMasks);
   const Motion motion = read_motion(initial.motion.string());
   clip.estimate = estimate_of(motion, initial.motion, clip.frames());
   clip.first.body = motion.poses.front();
@@ -183,7 +205,7 @@ ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index) {
                     std::to_string(clip.camera.height) + " with 3");
   }
   frame.target = take_channels(frame.target, 0, 3);
-  frame.human_mask = read_mask(data.masks / "human" / name, clip);
+  frame.human_mask = read_mask(data.masks / kHumanMasks / name, clip);
   for (const ClipObject& object : clip.objects) {
     frame.object_masks.push_back(read_mask(data.masks / object.name / name, clip));
   }

@@ -98,6 +98,7 @@ template <class S>
 FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
                           const FrameGraphSettings& settings)
     : tape_(tape), settings_(settings), view_{clip.camera, clip.scene.origin_world, settings.render} {
+  HSI4D_CHECK(clip.scene.origin_world.isZero(0), "what moves is placed in the world, not relative to an origin");
   view_.camera.camera_from_world = camera_from_world;
   xi_from_update_ = camera_from_increment(settings.increment, view_.camera, clip.scene);
   camera_update_ = leaf("camera", "camera_update", 1, 6, nullptr);
@@ -116,6 +117,10 @@ FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& 
     parts.push_back(record_human(clip.avatar));
   }
   record_render(parts, 1);
+  for (const std::string& name : parameter_group_names(settings_.draw)) {  // without objects some have no leaves
+    const auto known = [&name](const ParameterGroup<S>& group) { return group.name == name; };
+    if (std::none_of(groups_.begin(), groups_.end(), known)) groups_.push_back({name, {}});
+  }
   for (const ParameterGroup<S>& group : groups_) {
     for (const Var<S> block : group.blocks) tape_.freeze(block);
   }

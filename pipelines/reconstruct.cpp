@@ -137,9 +137,17 @@ class Reconstruction {
 
   std::string checkpoint_file() const { return folder_.paths().checkpoint() + "/progress.npz"; }
 
+  RunProgress checkpointed() const {
+    try {
+      return load_progress(checkpoint_file(), resolved_, clip_, config_.stages.size());
+    } catch (const DataError& damage) {
+      throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
+    }
+  }
+
   void resume() {
     if (folder_.resumed_from() && std::filesystem::exists(checkpoint_file())) {
-      progress_ = load_progress(checkpoint_file(), resolved_, clip_, config_.stages.size());
+      progress_ = checkpointed();
     } else {
       add_covered(read_frame(config_.data, clip_, 0), config_.data, progress_.covered);
     }
@@ -336,6 +344,11 @@ class Reconstruction {
 void check_run(const RunConfig& config) {
   std::string problems;
   const auto complain = [&problems](const std::string& text) { problems += (problems.empty() ? "" : "\n") + text; };
+  try {
+    check_inputs(config.data);
+  } catch (const UserError& mistake) {
+    complain(mistake.what());
+  }
   if (config.stages.empty()) complain("/stages: a run needs at least one stage");
   for (const auto& [name, stage] : config.stages) {
     try {

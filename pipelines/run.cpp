@@ -17,6 +17,17 @@ void on_threads(int threads, F&& body) {
   body();
 }
 
+/// Notes how the run ended. Where that cannot be written either (a full disk), what ended it is still what is thrown.
+void note_end(RunFolder& folder, RunState state, const std::string& message) noexcept {
+  try {
+    folder.set_state(state, message);
+    // In the run's log alone: whoever called gets the exception, and would read the message twice.
+    const LogSink to_log = log_to_file(folder.paths().log(), LogLevel::kDebug);
+    log_debug(std::string(run_state_name(state)) + ": " + message);
+  } catch (const std::exception&) {
+  }
+}
+
 RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const std::vector<LossTerm>& losses,
                             const RunOptions& options) {
   try {
@@ -26,12 +37,10 @@ RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const st
     folder.set_state(RunState::kDone);
     return summary;
   } catch (const Interrupted& stop) {
-    log_info(stop.what());
-    folder.set_state(RunState::kInterrupted, stop.what());
+    note_end(folder, RunState::kInterrupted, stop.what());
     throw;
   } catch (const std::exception& failure) {
-    log_error(failure.what());
-    folder.set_state(RunState::kFailed, failure.what());
+    note_end(folder, RunState::kFailed, failure.what());
     throw;
   }
 }
@@ -43,7 +52,8 @@ RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losse
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));
   identity.seed = config.seed;
-  identity.threads = options.threads > 0 ? options.threads : config.threads;
+  const int threads = options.threads > 0 ? options.threads : config.threads;
+  identity.threads = threads > 0 ? threads : thread_count();
   identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
   RunFolder folder(options.folder, identity, options.resume);
   const RunSummary summary = reconstruct_into(folder, config, losses, options);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <span>
 
 #include "core/check.h"
 #include "optim/checkpoint.h"
@@ -13,8 +12,8 @@ namespace {
 
 constexpr Index kPoseNumbers = 165;
 constexpr Index kRigidNumbers = 12;
-constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "ssim",
-                                                     "psnr_foreground_db"};  // as image_errors orders
+constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "psnr_foreground_db",
+                                                     "ssim"};  // as image_errors orders
 
 std::string image_error_name(std::size_t frame, const std::string& name) {
   return "image_errors/" + std::to_string(frame) + "/" + name;
@@ -32,6 +31,19 @@ void append(const SceneState& state, std::vector<double>& numbers) {
   }
   numbers.insert(numbers.end(), state.body.transl.data(), state.body.transl.data() + 3);
   numbers.insert(numbers.end(), state.body.axis_angle.begin(), state.body.axis_angle.end());
+}
+
+/// The pixels of a mask, row by row, without what pads its rows.
+std::vector<float> pixels_of(const Image& mask) {
+  std::vector<float> pixels;
+  for (int y = 0; y < mask.height(); ++y) pixels.insert(pixels.end(), mask.row(0, y), mask.row(0, y) + mask.width());
+  return pixels;
+}
+
+void set_pixels(const std::vector<float>& pixels, Image& mask) {
+  for (int y = 0; y < mask.height(); ++y) {
+    std::copy_n(pixels.data() + static_cast<std::ptrdiff_t>(y) * mask.width(), mask.width(), mask.row(0, y));
+  }
 }
 
 Index numbers_per_state(const Clip& clip) {
@@ -80,8 +92,8 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("states", std::move(states));
   checkpoint.set("counts", std::move(counts));
   checkpoint.set("seconds", std::move(seconds));
-  const std::span<const float> covered = progress.covered.data();
-  checkpoint.set("covered", std::vector<float>(covered.begin(), covered.end()));
+  checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
+  checkpoint.set("covered", pixels_of(progress.covered));
   for (std::size_t t = 1; t < progress.image_errors.size(); ++t) {
     for (const auto& [name, value] : progress.image_errors[t]) {
       checkpoint.set(image_error_name(t, name), std::vector<double>{value});
@@ -92,7 +104,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
 
 RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages) {
   const Checkpoint checkpoint = load_checkpoint(file, text_hash(config));
-  const auto expect = [&file](const char* name, std::size_t found, std::size_t wanted) {
+  const auto expect = [&file](const std::string& name, std::size_t found, std::size_t wanted) {
     if (found == wanted) return;
     throw DataError(file + ": \"" + name + "\" holds " + std::to_string(found) + " numbers, this clip needs " +
                     std::to_string(wanted) + "; the inputs have changed since the run began");
@@ -103,6 +115,13 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   if (frames[0] < 1 || frames[0] > clip.frames()) {
     throw DataError(file + ": " + std::to_string(frames[0]) + " frames done, the clip has " +
                     std::to_string(clip.frames()));
+  }
+  const std::vector<std::int64_t>& size = checkpoint.integers("size_px");
+  expect("size_px", size.size(), 2);
+  if (size[0] != clip.camera.width || size[1] != clip.camera.height) {
+    throw DataError(file + ": of a video of " + std::to_string(size[0]) + "x" + std::to_string(size[1]) +
+                    " pixels, the camera's image is " + std::to_string(clip.camera.width) + "x" +
+                    std::to_string(clip.camera.height) + "; the inputs have changed since the run began");
   }
   const auto done = static_cast<std::size_t>(frames[0]), per_state = static_cast<std::size_t>(numbers_per_state(clip));
   const std::vector<double>& states = checkpoint.doubles("states");
@@ -120,13 +139,16 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   }
   progress.seconds = seconds.back();
   const std::vector<float>& covered = checkpoint.floats("covered");
-  expect("covered", covered.size(), progress.covered.data().size());
-  std::copy(covered.begin(), covered.end(), progress.covered.data().begin());
+  expect("covered", covered.size(), pixels_of(progress.covered).size());
+  set_pixels(covered, progress.covered);
   progress.image_errors.resize(done);
   for (std::size_t t = 1; t < done; ++t) {
     for (const char* name : kImageErrors) {
       const std::string entry = image_error_name(t, name);
-      if (checkpoint.has(entry)) progress.image_errors[t].emplace_back(name, checkpoint.doubles(entry).at(0));
+      if (!checkpoint.has(entry)) continue;
+      const std::vector<double>& error = checkpoint.doubles(entry);
+      expect(entry, error.size(), 1);
+      progress.image_errors[t].emplace_back(name, error[0]);
     }
   }
   return progress;

@@ -7,6 +7,7 @@
 #include "pipelines/cli/demo_configs.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/terminal.h"
+#include "pipelines/reconstruct.h"
 #include "pipelines/synthetic.h"
 
 namespace hsi4d::cli {
@@ -39,6 +40,8 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
   RunConfig config = demo_config(arguments, losses);
   const fs::path folder = demo_folder(arguments, config.name);
   const fs::path dataset = folder / "dataset";
+  config.data = dataset_inputs(dataset);
+  check_run(config);  // before a dataset is made for nothing
   if (!arguments.resume || !fs::exists(dataset)) {
     if (fs::exists(dataset)) {
       throw UserError(folder.string() +
@@ -49,7 +52,7 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
                   arguments.quiet ? ProgressSink{} : progress_on_stderr(),
                   sections_beside_data(config, descriptions_of(losses)));
   }
-  config.data = dataset_inputs(dataset);
+  config.data = dataset_inputs(dataset);  // now that its objects and truth are there
   const std::string run = (folder / "run").string();
   const RunSummary summary = run_on_terminal(config, losses, run, arguments.resume, arguments.threads, arguments.quiet);
   return result_text(summary, run);

@@ -13,17 +13,26 @@ extern "C" void note_interrupt(int signal) {
   std::signal(signal, SIG_DFL);  // the next one is not asked twice
 }
 
+/// A signal that whoever started the program wants ignored (a job of a script's in the background, nohup) stays so.
+void watch(int signal) {
+  if (std::signal(signal, note_interrupt) == SIG_IGN) std::signal(signal, SIG_IGN);
+}
+
+void unwatch(int signal) {
+  if (std::signal(signal, SIG_DFL) == SIG_IGN) std::signal(signal, SIG_IGN);
+}
+
 }  // namespace
 
 InterruptWatch::InterruptWatch() {
   interrupt_requested = 0;
-  std::signal(SIGINT, note_interrupt);
-  std::signal(SIGTERM, note_interrupt);
+  watch(SIGINT);
+  watch(SIGTERM);
 }
 
 InterruptWatch::~InterruptWatch() {
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
+  unwatch(SIGINT);
+  unwatch(SIGTERM);
 }
 
 bool InterruptWatch::requested() { return interrupt_requested != 0; }

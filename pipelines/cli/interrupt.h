@@ -3,8 +3,8 @@
 
 namespace hsi4d::cli {
 
-/// While it lives, the first SIGINT or SIGTERM is noted instead of ending the program; a second one ends it at once.
-/// One at a time.
+/// While it lives, the first SIGINT or SIGTERM is noted instead of ending the program; a second one ends it at once. A
+/// signal that was ignored before stays ignored. One at a time.
 class InterruptWatch {
  public:
   InterruptWatch();

@@ -1,0 +1,226 @@
+#include "pipelines/clip.h"
+
+#include <algorithm>
+#include <fstream>
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+#include "core/image_io.h"
+#include "core/log.h"
+#include "splat/io_ply.h"
+#include "tests/pipelines/tiny_run.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+using Catch::Matchers::Message;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A copy of the dataset, to be changed.
+struct CopiedDataset {
+  TemporaryFolder folder;
+  fs::path path = folder.path() / "data";
+
+  CopiedDataset() { fs::copy(TinyDataset::folder(), path, fs::copy_options::recursive); }
+  Clip read() const { return read_clip(dataset_inputs(path)); }
+};
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const UserError& error) {
+    return error.what();
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+Vector3<double> centroid(const Gaussians& g) {
+  Vector3<double> sum = Vector3<double>::Zero();
+  for (std::size_t i = 0; i < g.means.size(); ++i) sum[Eigen::Index(i % 3)] += static_cast<double>(g.means[i]);
+  return sum / static_cast<double>(g.count());
+}
+
+}  // namespace
+
+TEST_CASE("a dataset's folder tells its inputs") {
+  const TemporaryFolder here;
+  const fs::path base = TinyDataset::folder();
+  const DataSettings data = dataset_inputs(base);
+  CHECK(data.scene == base / "scene.ply");
+  CHECK(data.truth == base / "truth");
+  REQUIRE(data.objects.size() == 1);
+  CHECK(data.objects[0].first == kTinyObject);
+  CHECK(data.objects[0].second.gaussians == base / "objects" / "watering_can.ply");
+  for (const char* name : {"objects/b.ply", "objects/a.ply", "objects/notes.txt"})
+    here.write(std::string("d/") + name, "");
+  const DataSettings other = dataset_inputs("d");  // relative, nothing there but two objects
+  CHECK(other.scene == here.path() / "d" / "scene.ply");
+  CHECK(other.truth.empty());
+  REQUIRE(other.objects.size() == 2);
+  CHECK(other.objects[0].first == "a");
+  CHECK(other.objects[1].first == "b");
+  CHECK(dataset_inputs("nowhere").objects.empty());
+}
+
+TEST_CASE("a clip has what the dataset's files have") {
+  const DataSettings data = dataset_inputs(TinyDataset::folder());
+  const Clip clip = read_clip(data);
+  CHECK(clip.frames() == kTinyFrames);
+  CHECK(clip.frame_files == std::vector<std::string>{"0000.png", "0001.png", "0002.png", "0003.png"});
+  CHECK(clip.camera.width == kTinyPixels);
+  CHECK(clip.scene.count() > 1000);
+  CHECK(clip.avatar.count() == 500);
+  CHECK(clip.frame_rate == 10);
+  REQUIRE(clip.objects.size() == 1);
+  CHECK(clip.objects[0].name == kTinyObject);
+  REQUIRE(clip.estimate.size() == kTinyFrames);
+  CHECK(clip.first.body.axis_angle == clip.estimate[0].axis_angle);
+  REQUIRE(clip.truth.has_value());
+  REQUIRE(clip.truth->size() == kTinyFrames);
+  const SceneState& truth = clip.truth->front();  // frame 0 is given exactly
+  CHECK(clip.first.body.axis_angle == truth.body.axis_angle);
+  CHECK((clip.first.objects[0].translation - truth.objects[0].translation).norm() < 1e-12);
+  CHECK(clip.first.camera_from_world.translation == truth.camera_from_world.translation);
+
+  const ClipFrame frame = read_frame(data, clip, 2);
+  CHECK(frame.target.channels() == 3);
+  REQUIRE(frame.object_masks.size() == 1);
+  CHECK(frame.human_mask.channels() == 1);
+  const Image human = read_image((TinyDataset::folder() / "masks/human/0002.png").string());
+  for (int y = 0; y < kTinyPixels; ++y) {
+    for (int x = 0; x < kTinyPixels; ++x) REQUIRE(frame.human_mask(0, y, x) == human(0, y, x));
+  }
+}
+
+TEST_CASE("objects are about the centroid of their means, wherever their file has them") {
+  const CopiedDataset dataset;
+  const std::string file = (dataset.path / "objects" / "watering_can.ply").string();
+  Gaussians moved = read_ply(file).gaussians;
+  for (std::size_t i = 0; i < moved.means.size(); ++i) moved.means[i] += i % 3 == 0 ? 5.0F : -2.0F;
+  write_ply(file, moved);
+  const Gaussians read = dataset.read().objects[0].gaussians;
+  CHECK(centroid(read).norm() < 1e-6);
+  CHECK(read.origin_world == Vector3<double>::Zero());
+  const Gaussians plain = read_clip(dataset_inputs(TinyDataset::folder())).objects[0].gaussians;
+  for (std::size_t i = 0; i < plain.means.size(); ++i) {
+    CHECK(static_cast<double>(read.means[i]) == Approx(static_cast<double>(plain.means[i])).margin(2e-6));
+  }
+}
+
+TEST_CASE("one frame of a motion is no estimate, no truth is no truth") {
+  const CopiedDataset dataset;
+  const std::string file = (dataset.path / "initial_motion.npz").string();
+  Motion motion = read_motion(file);
+  motion.poses.resize(1);
+  write_motion(file, motion);
+  fs::remove_all(dataset.path / "truth");
+  const Clip clip = dataset.read();
+  CHECK(clip.estimate.empty());
+  CHECK_FALSE(clip.truth.has_value());
+  CHECK(clip.first.body.axis_angle == motion.poses[0].axis_angle);
+}
+
+TEST_CASE("frames may have alpha, masks may have colours or be missing") {
+  const CopiedDataset dataset;
+  Image with_alpha(4, kTinyPixels, kTinyPixels), coloured(3, kTinyPixels, kTinyPixels);
+  with_alpha(0, 1, 2) = with_alpha(3, 1, 2) = 1;
+  coloured(0, 5, 6) = 1;
+  write_image((dataset.path / "frames/0001.png").string(), with_alpha);
+  write_image((dataset.path / "masks/human/0001.png").string(), coloured);
+  fs::remove(dataset.path / "masks/watering_can/0001.png");
+  const DataSettings data = dataset_inputs(dataset.path);
+  const Clip clip = read_clip(data);
+  const ClipFrame frame = read_frame(data, clip, 1);
+  CHECK(frame.target.channels() == 3);
+  CHECK(frame.target(0, 1, 2) == 1);
+  CHECK(frame.human_mask.channels() == 1);
+  CHECK(frame.human_mask(0, 5, 6) == 1);
+  REQUIRE(frame.object_masks.size() == 1);
+  for (int y = 0; y < kTinyPixels; ++y) {
+    for (int x = 0; x < kTinyPixels; ++x) REQUIRE(frame.object_masks[0](0, y, x) == 0);
+  }
+}
+
+TEST_CASE("a folder of masks that is missing is warned of, by name") {
+  const CopiedDataset dataset;
+  std::vector<std::string> messages;
+  const LogSink sink = log_to([&](LogLevel level, std::string_view text) {
+    messages.push_back(std::string(log_level_name(level)) + " " + std::string(text));
+  });
+  dataset.read();
+  CHECK(messages.empty());
+  fs::remove_all(dataset.path / "masks" / "human");
+  dataset.read();
+  const std::string folder = (dataset.path / "masks" / "human").string();
+  CHECK(messages ==
+        std::vector<std::string>{"warning " + folder + ": there is no such folder; all its masks are empty"});
+}
+
+TEST_CASE("inputs that are missing or damaged are told by name") {
+  const CopiedDataset dataset;
+  DataSettings data = dataset_inputs(dataset.path);
+  const auto message = [&data] { return message_of([&data] { read_clip(data); }); };
+  SECTION("not given") {
+    data.scene.clear();
+    data.camera.clear();
+    CHECK(message() ==
+          "/data/scene: not given; a run needs a scene\n/data/camera: not given; a run needs the camera of frame 0");
+  }
+  SECTION("an object without a name") {
+    data.objects[0].first = "";
+    CHECK(message() == "/data/objects: an object's name is empty; it names the folder of its masks");
+  }
+  SECTION("a folder of frames that is a file") {
+    data.frames = data.scene;
+    CHECK(message() == data.scene.string() + ": cannot be listed as a folder of frames: Not a directory");
+  }
+  SECTION("an empty object") {
+    Gaussians none = read_ply(data.objects[0].second.gaussians.string()).gaussians;
+    none.means.clear();
+    none.quats.clear();
+    none.log_scales.clear();
+    none.opacity_logits.clear();
+    none.sh.clear();
+    write_ply(data.objects[0].second.gaussians.string(), none);
+    CHECK(message() == data.objects[0].second.gaussians.string() + ": holds no Gaussians");
+  }
+  SECTION("an avatar of another skeleton") {
+    Avatar avatar = read_avatar(data.avatar.string());
+    std::fill(avatar.weights.indices.begin(), avatar.weights.indices.end(), 0);
+    avatar.weights.joints = 1;
+    avatar.parents.resize(1);
+    avatar.joints.resize(3);
+    avatar.joint_names.resize(1);
+    write_avatar(data.avatar.string(), avatar);
+    CHECK(message() == data.avatar.string() + ": has 1 joints; a run needs the 55 of SMPL-X");
+  }
+  SECTION("an unknown key of the state of frame 0") {
+    std::ofstream(data.initial) << R"({"motion": "initial_motion.npz", "object": {}})";
+    CHECK_THAT(message(), Contains(data.initial.string() + ":1: /object: ") && Contains("\"objects\""));
+  }
+  SECTION("a pose of two numbers") {
+    std::ofstream(data.initial)
+        << R"({"motion": "initial_motion.npz", "objects": {"watering_can": {"rotation": [0, 0], "translation": [0, 0, 0]}}})";
+    CHECK_THAT(message(), Contains(data.initial.string() + ":1: /objects/watering_can/rotation: "));
+  }
+  SECTION("no motion") {
+    std::ofstream(data.initial) << "{}";
+    CHECK_THAT(message(), Contains(data.initial.string()) && Contains("motion"));
+  }
+  SECTION("a motion that is cut short") {
+    const fs::path motion = dataset.path / "initial_motion.npz";
+    fs::resize_file(motion, 500);
+    CHECK_THAT(message(), Contains(motion.string()));
+  }
+  SECTION("a frame that is none") {
+    const Clip clip = read_clip(data);
+    std::ofstream(dataset.path / "frames/0003.png") << "text";
+    CHECK_THAT(message_of([&] { read_frame(data, clip, 3); }), Contains((dataset.path / "frames/0003.png").string()));
+    CHECK(message_of([&] { read_frame(data, clip, 2); }) == "no error");
+  }
+}

@@ -1,0 +1,266 @@
+#include <fstream>
+
+#include <catch2/catch.hpp>
+
+#include "body/motion_io.h"
+#include "core/camera_file.h"
+#include "core/image_io.h"
+#include "core/npz.h"
+#include "pipelines/state.h"
+#include "tests/pipelines/tiny_run.h"
+#include "tests/support/program.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder with a copy of the dataset, to be spoilt, and the run of it.
+class SpoiltDataset {
+ public:
+  SpoiltDataset() { fs::copy(TinyDataset::folder(), data(), fs::copy_options::recursive); }
+
+  fs::path data() const { return folder_.path() / "data"; }
+  std::string file(const std::string& name) const { return (data() / name).string(); }
+
+  ProgramResult run(std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"run", file("config.json"), "--out", "run", "--threads", "1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_hsi4d(arguments);
+  }
+
+  /// Changes config.json.
+  template <class F>
+  void edit_config(F&& change) const {
+    nlohmann::ordered_json config = nlohmann::ordered_json::parse(file_text(file("config.json")));
+    change(config);
+    std::ofstream(file("config.json")) << config.dump(2);
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+/// What is left of a run that failed once it had begun: its state and message, no results, nothing half-written.
+void check_failed_run(const std::string& message) {
+  const nlohmann::json status = json_of("run/status.json");
+  CHECK(status["state"] == "failed");
+  CHECK(status["message"] == message);
+  CHECK_THAT(file_text("run/log.txt"), Contains("failed: " + message + "\n"));
+  CHECK(temporaries_in("run").empty());
+  for (const char* name : {"summary.json", "motion.npz", "objects.npz", "cameras.json", "report.html"}) {
+    INFO(name);
+    CHECK_FALSE(fs::exists(fs::path("run") / name));
+  }
+}
+
+/// The run fails with this message, told once.
+void check_failure(const SpoiltDataset& dataset, const std::string& message) {
+  const ProgramResult result = dataset.run();
+  CHECK(result.status == 2);
+  CHECK(result.out.empty());
+  CHECK_THAT(result.err, Catch::Matchers::EndsWith(message + "\n"));
+  CHECK(result.err.find(message) == result.err.rfind(message));
+  check_failed_run(message);
+}
+
+/// The run is refused with this message before anything is written.
+void check_refusal(const ProgramResult& result, const std::string& message) {
+  CHECK(result.status == 2);
+  CHECK(result.out.empty());
+  CHECK(result.err == message + "\n");
+}
+
+Image black(int width, int height, int channels = 3) { return Image(channels, height, width); }
+
+}  // namespace
+
+TEST_CASE("inputs that are not given are all told before anything is written", "[run]") {
+  const TemporaryFolder here;
+  here.write("empty.json", "{}");
+  const std::string inputs =
+      "/data/scene: not given; a run needs a scene\n"
+      "/data/avatar: not given; a run needs an avatar\n"
+      "/data/frames: not given; a run needs the frames of a video\n"
+      "/data/masks: not given; a run needs masks of the human and the objects\n"
+      "/data/camera: not given; a run needs the camera of frame 0\n"
+      "/data/initial: not given; a run needs the state of frame 0\n";
+  check_refusal(run_hsi4d({"run", "empty.json", "--out", "run"}), inputs + "/stages: a run needs at least one stage");
+  check_refusal(run_hsi4d({"run", "empty.json", "--dry-run"}), inputs + "/stages: a run needs at least one stage");
+  here.write("tiny.json", kTinyStages);
+  CHECK(run_hsi4d({"run", "tiny.json", "--out", "run"}).err == inputs);
+  CHECK(run_hsi4d({"run", tiny_config_file(), "--out", "run", "--set", "data.masks="}).err ==
+        "/data/masks: not given; a run needs masks of the human and the objects\n");
+  CHECK_FALSE(fs::exists("run"));
+  const ProgramResult missing = run_hsi4d({"run", tiny_config_file(), "--set", "data.scene=none.ply"});
+  check_refusal(missing, "--set data.scene=none.ply: /data/scene: \"none.ply\" does not exist (looked for none.ply)");
+}
+
+TEST_CASE("stages that cannot work are refused before anything is written", "[run]") {
+  const SpoiltDataset dataset;
+  dataset.edit_config([](nlohmann::ordered_json& config) {
+    config["stages"]["camera"]["optimize"]["transl"] = {{"lr", 0.1}};
+    config["stages"]["interaction"]["optimize"] = {{"bodypose", {{"lr", 0.1}}}};
+    config["stages"]["last"] = {{"iterations", 1}, {"optimize", nlohmann::ordered_json::object()}};
+  });
+  const ProgramResult result = dataset.run();
+  CHECK(result.status == 2);
+  CHECK_THAT(result.err, Contains("/stages/camera/optimize: there is no parameter group \"transl\" (known: camera, "
+                                  "background, scene_means, scene_quats, scene_log_scales, scene_opacity_logits, "
+                                  "scene_sh)\n"));
+  CHECK_THAT(result.err, Contains("/stages/interaction/optimize: there is no parameter group \"bodypose\"; did you "
+                                  "mean \"body_pose\"? (known: camera, background, "));
+  CHECK_THAT(result.err, Contains("/stages/last/optimize: no parameter group is named (known: "));
+  CHECK_THAT(result.err, Contains("/stages/last/losses: a stage needs a loss\n"));
+  CHECK_FALSE(fs::exists("run"));
+  CHECK(dataset.run({"--dry-run"}).err == result.err);
+}
+
+TEST_CASE("an object's name must not be the human's", "[run]") {
+  const SpoiltDataset dataset;
+  dataset.edit_config([](nlohmann::ordered_json& config) {
+    config["data"]["objects"] = {{"human", config["data"]["objects"][kTinyObject]}};
+  });
+  check_refusal(dataset.run(), "/data/objects/human: \"human\" is the folder of the human's masks; use another name");
+  CHECK_FALSE(fs::exists("run"));
+}
+
+TEST_CASE("frames and masks of the wrong size are told when they are read", "[run]") {
+  const SpoiltDataset dataset;
+  SECTION("a frame") {
+    write_image(dataset.file("frames/0002.png"), black(40, 48));
+    check_failure(dataset,
+                  dataset.file("frames/0002.png") + ": is 40x48 with 3 channels; the camera's image is 48x48 with 3");
+    CHECK(metrics_of("run").back()["frame"] == 1);  // what was done is in the checkpoint
+    CHECK(fs::exists("run/checkpoint/progress.npz"));
+  }
+  SECTION("a frame without colours") {
+    write_image(dataset.file("frames/0001.png"), black(48, 48, 1));
+    check_failure(dataset,
+                  dataset.file("frames/0001.png") + ": is 48x48 with 1 channels; the camera's image is 48x48 with 3");
+    CHECK(metrics_of("run").empty());
+  }
+  SECTION("the human's mask") {
+    write_image(dataset.file("masks/human/0001.png"), black(48, 24, 1));
+    check_failure(dataset, dataset.file("masks/human/0001.png") + ": is 48x24 pixels, the camera's image 48x48");
+  }
+  SECTION("an object's mask of frame 0") {
+    write_image(dataset.file("masks/watering_can/0000.png"), black(47, 48, 1));
+    check_failure(dataset, dataset.file("masks/watering_can/0000.png") + ": is 47x48 pixels, the camera's image 48x48");
+  }
+}
+
+TEST_CASE("inputs of another length are told with both", "[run]") {
+  const SpoiltDataset dataset;
+  SECTION("truth of the motion") {
+    Motion motion = read_motion(dataset.file("truth/motion.npz"));
+    motion.poses.resize(3);
+    write_motion(dataset.file("truth/motion.npz"), motion);
+    check_failure(dataset, dataset.file("truth/motion.npz") + ": has 3 frames, the video 4");
+  }
+  SECTION("truth of the cameras") {
+    std::vector<Camera> cameras = read_cameras(dataset.file("truth/cameras.json"));
+    cameras.push_back(cameras.front());
+    write_cameras(dataset.file("truth/cameras.json"), cameras);
+    check_failure(dataset, dataset.file("truth/cameras.json") + ": has 5 frames, the video 4");
+  }
+  SECTION("truth of the objects") {
+    std::vector<SceneState> frames(2);
+    for (SceneState& frame : frames) frame.objects.resize(1);
+    write_object_tracks(dataset.file("truth/objects.npz"), {kTinyObject}, frames);
+    check_failure(dataset, dataset.file("truth/objects.npz") + ": has 2 frames, the video 4");
+  }
+  SECTION("the estimate") {
+    Motion motion = read_motion(dataset.file("initial_motion.npz"));
+    motion.poses.resize(2);
+    write_motion(dataset.file("initial_motion.npz"), motion);
+    check_failure(dataset, dataset.file("initial_motion.npz") +
+                               ": holds 2 poses, the video has 4 frames; allowed: that many, or frame 0 alone");
+  }
+  SECTION("the video") {
+    for (const char* name : {"frames/0001.png", "frames/0002.png", "frames/0003.png"}) fs::remove(dataset.file(name));
+    check_failure(dataset, dataset.file("frames") + ": holds 1 .png files; a clip needs at least 2 frames");
+  }
+}
+
+TEST_CASE("an object without a pose is told", "[run]") {
+  const SpoiltDataset dataset;
+  fs::copy_file(dataset.file("objects/watering_can.ply"), dataset.file("objects/box.ply"));
+  dataset.edit_config([](nlohmann::ordered_json& config) {
+    config["data"]["objects"]["box"] = {{"gaussians", "objects/box.ply"}};
+  });
+  check_failure(dataset, dataset.file("initial.json") + ": /objects: there is no pose of the object \"box\"");
+}
+
+TEST_CASE("a folder of masks that is not there is a warning", "[run]") {
+  const SpoiltDataset dataset;
+  fs::remove_all(dataset.file("masks/watering_can"));
+  const ProgramResult result = dataset.run();
+  CHECK(result.status == 0);
+  const std::string warning =
+      dataset.file("masks/watering_can") + ": there is no such folder; all its masks are empty\n";
+  CHECK_THAT(result.err, Contains("hsi4d: warning: " + warning));
+  CHECK_THAT(file_text("run/log.txt"), Contains(" warning " + warning));
+}
+
+TEST_CASE("a folder that holds a run is not run into, and resumed with its own config only", "[run]") {
+  const SpoiltDataset dataset;
+  CHECK(dataset.run().status == 0);
+  const auto before = result_of("run");
+  const std::string status = file_text("run/status.json");
+  check_refusal(dataset.run(),
+                "run: holds a run that is done; choose another folder, remove this one, or go on with it "
+                "by --resume");
+  check_refusal(dataset.run({"--resume", "--seed", "3", "--set", "stages.camera.iterations=9"}),
+                "run/config.resolved.json: the run cannot be resumed, its config is another one:\n"
+                "  /seed: 0 in the folder, 3 now\n"
+                "  /stages/camera/iterations: 8 in the folder, 9 now");
+  CHECK(result_of("run") == before);
+  CHECK(file_text("run/status.json") == status);
+}
+
+TEST_CASE("a damaged checkpoint is told, and how to go on without it", "[run]") {
+  const SpoiltDataset dataset;
+  CHECK(dataset.run().status == 0);
+  const auto before = result_of("run");
+  const std::string file = "run/checkpoint/progress.npz";
+  SECTION("cut short") {
+    fs::resize_file(file, 1000);
+    const ProgramResult result = dataset.run({"--resume"});
+    CHECK(result.status == 2);
+    const std::string message = file +
+                                ": cannot be read as a zip archive: Not a zip archive; without this file the run "
+                                "begins anew";
+    CHECK_THAT(result.err, Catch::Matchers::EndsWith(message + "\n"));
+    CHECK(json_of("run/status.json")["state"] == "failed");
+    CHECK(json_of("run/status.json")["message"] == message);
+  }
+  SECTION("a bit flipped") {
+    std::string bytes = file_text(file);
+    bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 4);
+    std::ofstream(file, std::ios::binary) << bytes;
+    const ProgramResult result = dataset.run({"--resume"});
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Contains(file + ": ") && Contains("; without this file the run begins anew\n"));
+  }
+  fs::remove(file);
+  CHECK(dataset.run({"--resume"}).status == 0);
+  CHECK(result_of("run") == before);
+}
+
+TEST_CASE("a checkpoint of other inputs is refused", "[run]") {
+  const SpoiltDataset dataset;
+  CHECK(dataset.run().status == 0);
+  const fs::path smaller = dataset.data() / "frames" / "0003.png";
+  fs::remove(smaller);
+  for (const char* name : {"truth/motion.npz", "initial_motion.npz"}) {
+    Motion motion = read_motion(dataset.file(name));
+    motion.poses.resize(3);
+    write_motion(dataset.file(name), motion);
+  }
+  const ProgramResult result = dataset.run({"--resume"});
+  CHECK(result.status == 2);
+  CHECK(json_of("run/status.json")["state"] == "failed");
+}

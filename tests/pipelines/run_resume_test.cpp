@@ -1,0 +1,272 @@
+#include <chrono>
+#include <csignal>
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+#include "tests/pipelines/tiny_run.h"
+#include "tests/support/program.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kPerFrame = 18;  // iterations of kTinyStages
+
+/// The program, running beside the test.
+class RunningProgram {
+ public:
+  explicit RunningProgram(const std::vector<std::string>& arguments) {
+    std::vector<std::string> words = {HSI4D_PROGRAM};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    process_ = ::fork();
+    if (process_ != 0) return;
+    const int out = ::open("running.txt", O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    ::dup2(out, STDOUT_FILENO);
+    ::dup2(out, STDERR_FILENO);
+    ::signal(SIGINT, SIG_DFL);  // whatever started the tests may have it ignored
+    ::execv(argv[0], argv.data());
+    ::_exit(126);
+  }
+  ~RunningProgram() {
+    if (!is_running()) return;
+    ::kill(process_, SIGKILL);
+    ::waitpid(process_, &status_, 0);
+  }
+  RunningProgram(const RunningProgram&) = delete;
+  RunningProgram& operator=(const RunningProgram&) = delete;
+
+  bool is_running() {
+    if (!has_ended_) has_ended_ = ::waitpid(process_, &status_, WNOHANG) == process_;
+    return !has_ended_;
+  }
+
+  /// Sends a signal as soon as `moment` has come, and waits for the end. False when it ended before that.
+  template <class F>
+  bool signal_at(int signal, F&& moment) {
+    while (!moment()) {
+      if (!is_running()) return false;
+      ::usleep(200);
+    }
+    ::kill(process_, signal);
+    if (!has_ended_) ::waitpid(process_, &status_, 0);
+    has_ended_ = true;
+    return WIFSIGNALED(status_) || WEXITSTATUS(status_) != 0;
+  }
+
+  /// The exit status, or the negative of the signal that ended it.
+  int result() const { return WIFSIGNALED(status_) ? -WTERMSIG(status_) : WEXITSTATUS(status_); }
+  std::string text() const { return file_text("running.txt"); }
+
+ private:
+  pid_t process_ = -1;
+  bool has_ended_ = false;
+  int status_ = 0;
+};
+
+/// True when metrics.jsonl has a line of this frame.
+bool has_reached(const std::string& run, int frame) {
+  return file_text(run + "/metrics.jsonl").find("{\"frame\": " + std::to_string(frame) + ",") != std::string::npos;
+}
+
+/// Runs the program into `folder` and sends it the signal in this frame; tries again where it was too quick for that.
+int run_and_signal(const std::vector<std::string>& arguments, const std::string& run, int signal, int frame) {
+  for (int attempt = 0; attempt < 20; ++attempt) {
+    RunningProgram program(arguments);
+    if (program.signal_at(signal, [&] { return has_reached(run, frame); })) {
+      INFO(program.text());
+      return program.result();
+    }
+    fs::remove_all(run);
+  }
+  return 0;
+}
+
+std::vector<std::string> run_arguments(const std::string& out) {
+  return {"run", tiny_config_file(), "--out", out, "--threads", "1"};
+}
+
+std::vector<std::string> with_resume(std::vector<std::string> arguments) {
+  arguments.push_back("--resume");
+  return arguments;
+}
+
+std::string state_of(const std::string& run) { return json_of(run + "/status.json")["state"]; }
+
+const std::vector<std::string> kNone;
+
+}  // namespace
+
+TEST_CASE("a run that was stopped anywhere and resumed has the bits of one that never was", "[run]") {
+  const TemporaryFolder here;
+  const RunConfig config = tiny_config();
+  carry_out_tiny(config, "whole");
+  // The iterations after which it is stopped: the very first one; within the first frame; the last one before a
+  // checkpoint; the first one after it; in the last frame.
+  for (const int last : {1, 10, kPerFrame, kPerFrame + 1, 2 * kPerFrame + 11}) {
+    INFO("stopped after iteration " << last);
+    const std::string run = "stopped" + std::to_string(last);
+    int count = 0;
+    const auto stop = [&] { return ++count == last; };
+    const int frame = (last - 1) / kPerFrame + 1;
+    CHECK_THROWS_MATCHES(carry_out_tiny(config, run, 1, false, stop), Interrupted,
+                         Catch::Matchers::Message("interrupted in frame " + std::to_string(frame) + "; " +
+                                                  std::to_string(frame) + " frames are in the checkpoint"));
+    CHECK(count == last);
+    CHECK(state_of(run) == "interrupted");
+    CHECK(metrics_of(run).size() == static_cast<std::size_t>(last));
+    CHECK(fs::exists(run + "/checkpoint/progress.npz") == (frame > 1));
+    CHECK_FALSE(fs::exists(run + "/summary.json"));
+    CHECK_FALSE(fs::exists(run + "/motion.npz"));
+    count = 0;
+    carry_out_tiny(config, run, 2, true, [&] { return ++count < 0; });
+    CHECK(count == (kTinyFrames - frame) * kPerFrame);  // no frame that was done is done again
+    CHECK(state_of(run) == "done");
+    CHECK(json_of(run + "/status.json").contains("resumed"));
+    CHECK(differences("whole", run) == kNone);
+  }
+}
+
+TEST_CASE("a run can be stopped and resumed again and again", "[run]") {
+  const TemporaryFolder here;
+  const RunConfig config = tiny_config();
+  carry_out_tiny(config, "whole");
+  bool is_done = false;
+  int rounds = 0;
+  while (!is_done && rounds < 10) {
+    int count = 0;
+    try {  // a frame and a bit more each time
+      carry_out_tiny(config, "run", 1, true, [&] { return ++count == kPerFrame + 3; });
+      is_done = true;
+    } catch (const Interrupted&) {
+    }
+    ++rounds;
+  }
+  CHECK(rounds == kTinyFrames - 1);
+  CHECK(differences("whole", "run") == kNone);
+  carry_out_tiny(config, "run", 1, true);  // a run that is done: nothing changes
+  CHECK(differences("whole", "run") == kNone);
+}
+
+TEST_CASE("a run that was killed and resumed has the bits of one that never was", "[run]") {
+  const TemporaryFolder here;
+  carry_out_tiny(tiny_config(), "whole");
+  for (const int frame : {1, 2}) {  // before the first checkpoint, and after it
+    INFO("killed in frame " << frame);
+    const std::string run = "killed" + std::to_string(frame);
+    REQUIRE(run_and_signal(run_arguments(run), run, SIGKILL, frame) == -SIGKILL);
+    CHECK(state_of(run) == "running");
+    const ProgramResult refused = run_hsi4d(run_arguments(run));
+    CHECK(refused.status == 2);
+    CHECK(refused.err == run +
+                             ": holds a run that is not finished (running); choose another folder, remove this one, "
+                             "or go on with it by --resume\n");
+    const ProgramResult resumed = run_hsi4d(with_resume(run_arguments(run)));
+    INFO(resumed.err);
+    CHECK(resumed.status == 0);
+    CHECK(state_of(run) == "done");
+    CHECK(differences("whole", run) == kNone);
+  }
+}
+
+TEST_CASE("lines that a kill cut short are written again", "[run]") {
+  const TemporaryFolder here;
+  const RunConfig config = tiny_config();
+  carry_out_tiny(config, "whole");
+  int count = 0;
+  CHECK_THROWS_AS(carry_out_tiny(config, "run", 1, false, [&] { return ++count == kPerFrame + 5; }), Interrupted);
+  fs::resize_file("run/metrics.jsonl", fs::file_size("run/metrics.jsonl") - 7);
+  std::ofstream("run/frames/0002_render.png") << "half a file";
+  std::ofstream("run/status.json") << "{\"state\": \"runn";
+  carry_out_tiny(config, "run", 1, true);
+  CHECK(differences("whole", "run") == kNone);
+  CHECK(state_of("run") == "done");
+}
+
+TEST_CASE("SIGINT ends a run in good order", "[run]") {
+  const TemporaryFolder here;
+  carry_out_tiny(tiny_config(), "whole");
+  for (const int signal : {SIGINT, SIGTERM}) {
+    INFO("signal " << signal);
+    const std::string run = "run" + std::to_string(signal);
+    REQUIRE(run_and_signal(run_arguments(run), run, signal, 2) == 130);
+    CHECK(state_of(run) == "interrupted");
+    const std::string message = json_of(run + "/status.json")["message"];
+    CHECK_THAT(message, Catch::Matchers::Matches("interrupted in frame [23]; [23] frames are in the checkpoint"));
+    const std::string said = file_text("running.txt");
+    const std::string last_line = "hsi4d: " + message + "\n";
+    INFO(said);
+    CHECK(said.ends_with(last_line));
+    CHECK(said.find(last_line) == said.size() - last_line.size());  // once
+    CHECK_THAT(file_text(run + "/log.txt"), Contains("interrupted: " + message + "\n"));
+    const ProgramResult resumed = run_hsi4d(with_resume(run_arguments(run)));
+    INFO(resumed.err);
+    CHECK(resumed.status == 0);
+    CHECK(differences("whole", run) == kNone);
+  }
+}
+
+TEST_CASE("a run that fails in the middle goes on once the cause is gone", "[run]") {
+  const TemporaryFolder here;
+  const fs::path data = fs::absolute("data");
+  fs::copy(TinyDataset::folder(), data, fs::copy_options::recursive);
+  const RunConfig config = load_run_config(data / "config.json", {}, descriptions_of(loss_terms()));
+  carry_out_tiny(config, "whole");
+  const std::string frame = (data / "frames" / "0002.png").string(), bytes = file_text(frame);
+  std::ofstream(frame) << "no image";
+  CHECK_THROWS_AS(carry_out_tiny(config, "run"), DataError);
+  CHECK(state_of("run") == "failed");
+  CHECK_THAT(json_of("run/status.json")["message"].get<std::string>(), Contains(frame));
+  CHECK(metrics_of("run").size() == kPerFrame);
+  std::ofstream(frame, std::ios::binary) << bytes;
+  carry_out_tiny(config, "run", 1, true);
+  CHECK(differences("whole", "run") == kNone);
+}
+
+TEST_CASE("a demo that was killed and resumed has the bits of one that never was", "[run][demo]") {
+  const TemporaryFolder here;
+  const auto arguments = [](const std::string& out) {
+    std::vector<std::string> words = {"demo", "--quick", "--quiet", "--threads", "1", "--out", out};
+    for (const char* setting : {"synthetic.frames=3", "synthetic.size_px=48", "synthetic.scene_gaussians=1500",
+                                "synthetic.avatar_gaussians=500", "synthetic.object_gaussians=150",
+                                "stages.camera.iterations=5", "stages.interaction.iterations=10"}) {
+      words.insert(words.end(), {"--set", setting});
+    }
+    return words;
+  };
+  const ProgramResult whole = run_hsi4d(arguments("whole"));
+  INFO(whole.err);
+  REQUIRE(whole.status == 0);
+  CHECK(whole.err.empty());
+  CHECK_THAT(whole.out, Contains("3 frames in ") && Contains("; report: whole/run/report.html\n"));
+  CHECK(fs::exists("whole/dataset/truth/motion.npz"));
+
+  const ProgramResult refused = run_hsi4d(arguments("whole"));
+  CHECK(refused.status == 2);
+  CHECK(refused.err == "whole: holds a demo already; --resume goes on with it, another --out makes a new one\n");
+
+  // The configs differ in nothing but the folder of their data, so the first demo is moved away to be compared with.
+  fs::rename("whole", "before");
+  REQUIRE(run_and_signal(with_resume(arguments("whole")), "whole/run", SIGKILL, 2) == -SIGKILL);
+  const ProgramResult resumed = run_hsi4d(with_resume(arguments("whole")));
+  INFO(resumed.err);
+  CHECK(resumed.status == 0);
+  CHECK(differences("before/run", "whole/run") == kNone);
+
+  const ProgramResult nowhere = run_hsi4d({"demo", "--quick", "--resume"});
+  CHECK(nowhere.status == 2);
+  CHECK(nowhere.err == "hsi4d demo: --resume needs --out, to know with what\n");
+  const ProgramResult wrong = run_hsi4d(
+      {"demo", "--quick", "--out", "wrong", "--set", "stages.camera.draw=scene", "--set", "synthetic.frames=0"});
+  CHECK(wrong.status == 2);
+  CHECK_FALSE(fs::exists("wrong"));
+}

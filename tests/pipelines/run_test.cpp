@@ -1,0 +1,310 @@
+#include "pipelines/run.h"
+
+#include <cmath>
+#include <set>
+
+#include <catch2/catch.hpp>
+
+#include "body/motion_io.h"
+#include "core/camera_file.h"
+#include "core/image_io.h"
+#include "core/parallel.h"
+#include "pipelines/state.h"
+#include "tests/pipelines/tiny_run.h"
+#include "tests/support/program.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+std::set<std::string> names_in(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+  return names;
+}
+
+/// Iterations that are enough for a result better than its baselines.
+RunConfig longer_config() { return tiny_config({"stages.camera.iterations=30", "stages.interaction.iterations=40"}); }
+
+void check_frames(const fs::path& run) {
+  for (int frame = 1; frame < kTinyFrames; ++frame) {
+    for (const char* kind : {"target", "render", "difference", "start"}) {
+      const std::string file = RunPaths{run}.frame_image(frame, kind);
+      INFO(file);
+      const Image image = read_image(file);
+      CHECK(image.channels() == 3);
+      CHECK(image.width() == kTinyPixels);
+      CHECK(image.height() == kTinyPixels);
+    }
+  }
+  CHECK(names_in(run / "frames").size() == 4 * (kTinyFrames - 1));
+}
+
+void check_metrics_lines(const fs::path& run, int camera_iterations, int interaction_iterations) {
+  const std::vector<nlohmann::json> lines = metrics_of(run);
+  REQUIRE(lines.size() == static_cast<std::size_t>((kTinyFrames - 1) * (camera_iterations + interaction_iterations)));
+  std::size_t at = 0;
+  for (int frame = 1; frame < kTinyFrames; ++frame) {
+    for (const auto& [stage, iterations] :
+         {std::pair{"camera", camera_iterations}, std::pair{"interaction", interaction_iterations}}) {
+      for (int i = 0; i < iterations; ++i) {
+        const nlohmann::json& line = lines[at++];
+        INFO("line " << at << ": " << line.dump());
+        REQUIRE(line["frame"] == frame);
+        REQUIRE(line["stage"] == stage);
+        REQUIRE(line["iteration"] == i);
+        REQUIRE(std::isfinite(line["loss"].get<double>()));
+        REQUIRE(line["losses"].size() == (std::string(stage) == "camera" ? 1 : 3));
+        REQUIRE(line["seconds"].get<double>() > 0);
+        REQUIRE(line["tiles"].get<double>() > 0);
+        REQUIRE(line["pairs"].get<double>() > 0);
+        REQUIRE(line["fragments"].get<double>() >= line["tiles"].get<double>());
+      }
+    }
+  }
+}
+
+double number_at(const nlohmann::json& object, const char* name) {
+  INFO(name << " in " << object.dump());
+  REQUIRE(object.contains(name));
+  return object[name].get<double>();
+}
+
+}  // namespace
+
+TEST_CASE("a run leaves a whole run folder, and a result better than its baselines", "[run]") {
+  const TemporaryFolder here;
+  const RunSummary summary = carry_out_tiny(longer_config(), "run");
+  const fs::path run = "run";
+  CHECK(names_in(run) == std::set<std::string>{".lock", "cameras.json", "checkpoint", "config.resolved.json", "frames",
+                                               "log.txt", "metrics.jsonl", "motion.npz", "objects.npz", "report.html",
+                                               "status.json", "summary.json"});
+  CHECK(temporaries_in(run).empty());
+  CHECK(json_of(run / "status.json")["state"] == "done");
+  CHECK(json_of(run / "status.json")["threads"] == 1);
+  CHECK_FALSE(json_of(run / "status.json").contains("message"));
+  CHECK(names_in(run / "checkpoint") == std::set<std::string>{"progress.npz"});
+  CHECK_THAT(file_text(run / "report.html"), Contains("interaction") && Contains("</html>"));
+  CHECK(file_text(run / "config.resolved.json") == resolved_config(longer_config(), descriptions_of(loss_terms())));
+  check_metrics_lines(run, 30, 40);
+  check_frames(run);
+
+  const nlohmann::json written = json_of(run / "summary.json");
+  CHECK(summary_json(parse_summary(file_text(run / "summary.json"), "summary.json")) == summary_json(summary));
+  REQUIRE(written["metrics"].size() == 2);
+  const nlohmann::json &camera = written["metrics"][0], &last = written["metrics"][1];
+  CHECK(camera["stage"] == "camera");
+  CHECK(camera["iterations"] == 30 * (kTinyFrames - 1));
+  CHECK_FALSE(camera.contains("mpjpe_mm"));
+  CHECK(last["stage"] == "interaction");
+  for (const char* name :
+       {"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "world_mpjpe_image_mm", "world_mpjpe_depth_mm",
+        "root_translation_mm", "object_translation_cm", "object_rotation_deg", "camera_translation_cm",
+        "camera_rotation_deg", "psnr_db", "psnr_foreground_db", "ssim", "jitter", "seconds"}) {
+    CHECK(number_at(last, name) > 0);
+  }
+  CHECK(last["rollbacks"] == 0);
+  REQUIRE(written["per_frame"].size() == kTinyFrames - 1);
+  // No rotation of the object: of its few pixels it cannot be told.
+  for (const char* baseline : {"start", "copy_frame_0"}) {
+    for (const char* name :
+         {"mpjpe_mm", "world_mpjpe_mm", "object_translation_cm", "camera_translation_cm", "camera_rotation_deg"}) {
+      INFO(name << " against " << baseline);
+      CHECK(number_at(last, name) < number_at(written["baselines"][baseline], name));
+    }
+  }
+  CHECK(number_at(last, "psnr_db") > 30);
+
+  const Motion motion = read_motion("run/motion.npz");
+  CHECK(motion.frame_rate == 10);
+  CHECK(motion.poses.size() == kTinyFrames);
+  CHECK(read_cameras("run/cameras.json").size() == kTinyFrames);
+  CHECK(read_object_tracks("run/objects.npz", {kTinyObject}).size() == kTinyFrames);
+  const Motion given = read_motion((TinyDataset::folder() / "initial_motion.npz").string());
+  CHECK(motion.poses[0].axis_angle == given.poses[0].axis_angle);  // frame 0 is given
+  CHECK(motion.poses[0].transl == given.poses[0].transl);
+  CHECK(motion.poses[3].transl != given.poses[3].transl);
+}
+
+TEST_CASE("a run has the same bits for any number of threads", "[run][parallel]") {
+  const TemporaryFolder here;
+  const RunConfig config = tiny_config();
+  carry_out_tiny(config, "one", 1);
+  for (const int threads : {2, 3}) {
+    const std::string folder = std::to_string(threads);
+    carry_out_tiny(config, folder, threads);
+    CHECK(json_of(folder + "/status.json")["threads"] == threads);
+    CHECK(differences("one", folder) == std::vector<std::string>{});
+  }
+}
+
+TEST_CASE("the comparison of runs sees what differs", "[run]") {
+  const TemporaryFolder here;
+  carry_out_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "a");
+  fs::copy("a", "b", fs::copy_options::recursive);
+  CHECK(differences("a", "b").empty());
+  fs::copy_file("b/frames/0001_target.png", "b/frames/0002_target.png", fs::copy_options::overwrite_existing);
+  fs::remove("b/frames/0003_render.png");
+  CHECK(differences("a", "b").size() == 2);
+  carry_out_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=2"}), "c");
+  CHECK(differences("a", "c").size() > 5);
+}
+
+TEST_CASE("a run without truth has no errors against it, but images", "[run]") {
+  const TemporaryFolder here;
+  RunConfig config = tiny_config();
+  config.data.truth.clear();
+  const RunSummary summary = carry_out_tiny(config, "run");
+  CHECK(summary.baselines.empty());
+  for (const StageSummary& stage : summary.metrics) {
+    for (const char* name : {"mpjpe_mm", "object_translation_cm", "camera_translation_cm", "jitter"}) {
+      INFO(stage.stage << " " << name);
+      CHECK(find_metric(stage.values, name) == nullptr);
+    }
+  }
+  REQUIRE(summary.per_frame.size() == kTinyFrames - 1);
+  CHECK(summary.per_frame[2].frame == 3);
+  CHECK(number_in(summary.per_frame[2].values, "psnr_db") > 15);
+  CHECK(number_in(summary.metrics.back().values, "psnr_db") > 15);
+  CHECK(number_in(summary.metrics.back().values, "ssim") > 0.3);
+  CHECK(fs::exists("run/report.html"));
+}
+
+TEST_CASE("a run without objects has no terms and no files of them", "[run]") {
+  const TemporaryFolder here;
+  RunConfig config = tiny_config();
+  config.data.objects.clear();
+  const RunSummary summary = carry_out_tiny(config, "run");
+  CHECK_FALSE(fs::exists("run/objects.npz"));
+  CHECK(find_metric(summary.metrics.back().values, "object_translation_cm") == nullptr);
+  CHECK(number_in(summary.metrics.back().values, "mpjpe_mm") > 0);
+  for (const nlohmann::json& line : metrics_of("run")) {
+    INFO(line.dump());
+    CHECK_FALSE(line["losses"].contains("center"));
+    CHECK_FALSE(line["losses"].contains("depth"));
+  }
+}
+
+TEST_CASE("without estimates every frame starts from the one before", "[run]") {
+  const TemporaryFolder here;
+  const fs::path data = fs::absolute("data");
+  fs::copy(TinyDataset::folder(), data, fs::copy_options::recursive);
+  Motion motion = read_motion((data / "initial_motion.npz").string());
+  motion.poses.resize(1);
+  write_motion((data / "initial_motion.npz").string(), motion);
+  const RunConfig config = load_run_config(data / "config.json", {}, descriptions_of(loss_terms()));
+  const RunSummary summary = carry_out_tiny(config, "run");
+  REQUIRE(summary.baselines.size() == 2);
+  CHECK(number_in(summary.baselines[0].values, "mpjpe_mm") == number_in(summary.baselines[1].values, "mpjpe_mm"));
+  const Motion result = read_motion("run/motion.npz");
+  REQUIRE(result.poses.size() == kTinyFrames);
+  const Index finger = 3 * 30;  // fingers are not optimised: they stay as in frame 0
+  for (const BodyPose& pose : result.poses) {
+    CHECK(std::equal(pose.axis_angle.begin() + finger, pose.axis_angle.end(),
+                     motion.poses[0].axis_angle.begin() + finger));
+  }
+  CHECK(result.poses[3].transl != motion.poses[0].transl);
+}
+
+TEST_CASE("estimated limbs are where frames start from, the root is the one before's", "[run]") {
+  const TemporaryFolder here;
+  RunConfig config = tiny_config();
+  std::erase_if(config.stages.back().second.optimize,  // the body stays where frames start
+                [](const auto& group) { return group.first != "object_transl"; });
+  carry_out_tiny(config, "run");
+  const Motion result = read_motion("run/motion.npz");
+  const Motion given = read_motion((TinyDataset::folder() / "initial_motion.npz").string());
+  for (std::size_t t = 1; t < result.poses.size(); ++t) {
+    INFO("frame " << t);
+    CHECK(result.poses[t].transl == given.poses[0].transl);
+    CHECK(result.poses[t].rotation_of(0) == given.poses[0].rotation_of(0));
+    CHECK(std::equal(result.poses[t].axis_angle.begin() + 3, result.poses[t].axis_angle.end(),
+                     given.poses[t].axis_angle.begin() + 3));
+  }
+}
+
+TEST_CASE("a run in double and with axis-angles finds about what one in float finds", "[run]") {
+  const TemporaryFolder here;
+  const RunSummary plain = carry_out_tiny(tiny_config(), "float");
+  const RunSummary precise = carry_out_tiny(tiny_config({"precision=double"}), "double");
+  CHECK(json_of("double/status.json")["precision"] == "double");
+  const RunSummary vectors = carry_out_tiny(tiny_config({"rotations=axis_angle"}), "vectors");
+  const auto last = [](const RunSummary& summary, const char* name) {
+    return number_in(summary.metrics.back().values, name);
+  };
+  CHECK(last(precise, "mpjpe_mm") == Approx(last(plain, "mpjpe_mm")).epsilon(0.05));
+  CHECK(last(precise, "psnr_db") == Approx(last(plain, "psnr_db")).epsilon(0.01));
+  CHECK(last(precise, "mpjpe_mm") != last(plain, "mpjpe_mm"));
+  CHECK(last(vectors, "mpjpe_mm") < number_in(vectors.baselines[0].values, "mpjpe_mm"));
+  CHECK(last(vectors, "mpjpe_mm") != last(plain, "mpjpe_mm"));
+  CHECK(last(vectors, "psnr_db") == Approx(last(plain, "psnr_db")).margin(2));
+}
+
+TEST_CASE("the camera is found with increments in any frame", "[run]") {
+  const TemporaryFolder here;
+  std::set<double> found;
+  for (const char* increment : {"camera", "world", "scene"}) {
+    INFO(increment);
+    const RunSummary summary = carry_out_tiny(
+        tiny_config({std::string("camera.increment=") + increment, "stages.camera.iterations=30"}), increment);
+    const double error = number_in(summary.metrics[0].values, "camera_rotation_deg");
+    CHECK(error < number_in(summary.baselines[0].values, "camera_rotation_deg"));
+    found.insert(error);
+  }
+  CHECK(found.size() == 3);
+}
+
+TEST_CASE("--dry-run and --print-config write nothing, --seed and --threads are noted", "[run]") {
+  const TemporaryFolder here;
+  const std::string config = tiny_config_file();
+  const ProgramResult plan = run_hsi4d({"run", config, "--dry-run", "--out", "out"});
+  CHECK(plan.status == 0);
+  CHECK(plan.err.empty());
+  CHECK_THAT(plan.out, Contains("would write out\n  4 frames of 48x48, scene of "));
+  CHECK_THAT(plan.out, Contains("  object watering_can of "));
+  CHECK_THAT(plan.out, Contains("  stage camera: 8 iterations a frame\n  stage interaction: 10 iterations a frame\n"));
+  CHECK_THAT(run_hsi4d({"run", config, "--dry-run"}).out, Contains("would write runs/tiny\n"));
+
+  const ProgramResult printed = run_hsi4d({"run", config, "--print-config", "--seed", "5"});
+  CHECK(printed.status == 0);
+  CHECK(printed.err.empty());
+  CHECK(printed.out == resolved_config(tiny_config({"seed=5"}), descriptions_of(loss_terms())));
+  CHECK(names_in(".") == std::set<std::string>{"stdout.txt", "stderr.txt"});
+
+  const ProgramResult done =
+      run_hsi4d({"run", config, "--seed", "5", "--threads", "2", "--set", "stages.interaction.iterations=1"});
+  CHECK(done.status == 0);
+  CHECK_THAT(done.out, Contains("copy_frame_0") && Contains("report: runs/tiny/report.html\n"));
+  const nlohmann::json status = json_of("runs/tiny/status.json");
+  CHECK(status["seed"] == 5);
+  CHECK(status["threads"] == 2);
+  CHECK(json_of("runs/tiny/config.resolved.json")["seed"] == 5);
+  CHECK(json_of("runs/tiny/config.resolved.json")["threads"] == 0);
+  for (const char* bad : {"0", "1025", "many"}) {
+    const ProgramResult refused = run_hsi4d({"run", config, "--threads", bad});
+    CHECK(refused.status == 2);
+    CHECK_THAT(refused.err, Contains("hsi4d run: --threads: "));
+  }
+}
+
+TEST_CASE("every shipped schedule runs", "[run]") {
+  const TemporaryFolder here;
+  const DataSettings data = dataset_inputs(TinyDataset::folder());
+  for (const char* name : {"demo_quick", "demo", "paper"}) {
+    INFO(name);
+    const fs::path file = fs::path(HSI4D_SOURCE_DIR) / "configs" / (std::string(name) + ".json");
+    RunConfig config = load_run_config(file, {"stages.camera.iterations=2", "stages.interaction.iterations=2"},
+                                       descriptions_of(loss_terms()));
+    for (auto& [stage, settings] : config.stages) {
+      for (auto& [group, moved] : settings.optimize) moved.from = 0;  // as later iterations would be
+    }
+    config.data = data;
+    const RunSummary summary = carry_out_tiny(config, name);
+    CHECK(summary.metrics.size() == 2);
+    CHECK(number_in(summary.metrics.back().values, "psnr_db") > 10);
+    CHECK(json_of(std::string(name) + "/status.json")["state"] == "done");
+  }
+}
