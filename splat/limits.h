@@ -6,8 +6,8 @@
 
 namespace hsi4d {
 
-/// Alpha is held at or below this. 1 − 2⁻¹² leaks less than a sixteenth of an 8-bit step through an opaque Gaussian, and
-/// leaves room for a backward pass that divides T by 1 − α (stability B2, B16).
+/// Alpha is held at or below this. 1 − 2⁻¹² leaks less than a sixteenth of an 8-bit step through an opaque Gaussian,
+/// and leaves room for a backward pass that divides T by 1 − α (stability B2, B16).
 inline constexpr double kAlphaCap = 1.0 - 1.0 / 4096;
 /// No cap: for a backward pass that does not divide, as ours.
 inline constexpr double kNoAlphaCap = 1.0;

@@ -108,8 +108,8 @@ TEST_CASE("float agrees with double at the same depth keys") {
   }
   std::printf("float against double: %ld of %ld pixels flip a cut\n", static_cast<long>(count.flips),
               static_cast<long>(count.pixels));
-  std::printf("  largest: mean image error %.2g, gradients %.2g, away from flips %.2g\n", count.mean_image, count.gradients,
-              count.gradients_elsewhere);
+  std::printf("  largest: mean image error %.2g, gradients %.2g, away from flips %.2g\n", count.mean_image,
+              count.gradients, count.gradients_elsewhere);
   CHECK(static_cast<double>(count.flips) <= 1e-3 * static_cast<double>(count.pixels));
 }
 
