@@ -8,6 +8,7 @@
 #include "core/config_file.h"
 #include "core/image_io.h"
 #include "core/log.h"
+#include "core/parallel.h"
 #include "splat/io_ply.h"
 
 namespace hsi4d {
@@ -52,6 +53,21 @@ InitialSettings read_initial(const fs::path& file) {
   return settings;
 }
 
+/// Refuses 8.png, 9.png, 10.png: in the order of their names 10 comes first.
+void check_numbering(const std::vector<std::string>& names, const fs::path& folder) {
+  const auto is_number = [](const std::string& name) {
+    const std::string stem = fs::path(name).stem().string();
+    return !stem.empty() && std::all_of(stem.begin(), stem.end(), [](char c) { return c >= '0' && c <= '9'; });
+  };
+  if (!std::all_of(names.begin(), names.end(), is_number)) return;
+  for (const std::string& name : names) {
+    if (name.size() == names.front().size()) continue;
+    throw DataError(
+        folder.string() + ": \"" + names.front() + "\" and \"" + name +
+        "\" have different numbers of digits; frames are taken in the order of their names, so fill up with zeros");
+  }
+}
+
 std::vector<std::string> png_names(const fs::path& folder) {
   std::vector<std::string> names;
   std::error_code error;
@@ -60,6 +76,7 @@ std::vector<std::string> png_names(const fs::path& folder) {
   }
   if (error) throw UserError(folder.string() + ": cannot be listed as a folder of frames: " + error.message());
   std::sort(names.begin(), names.end());
+  check_numbering(names, folder);
   if (names.size() < 2) {
     throw UserError(folder.string() + ": holds " + std::to_string(names.size()) +
                     " .png files; a clip needs at least 2 frames");
@@ -67,9 +84,17 @@ std::vector<std::string> png_names(const fs::path& folder) {
   return names;
 }
 
+/// The Gaussians of a file; what its reader rejected or held is told in the log.
+Gaussians read_gaussians(const fs::path& file) {
+  PlyScene read = read_ply(file.string());
+  const std::string remarks = summary_text(read.report);
+  if (!remarks.empty()) log_warning(file.string() + ": " + remarks);
+  if (read.gaussians.count() == 0) throw DataError(file.string() + ": holds no Gaussians that can be used");
+  return std::move(read.gaussians);
+}
+
 /// Means relative to their centroid, whatever the file's were.
-Gaussians centred(Gaussians gaussians, const fs::path& file) {
-  if (gaussians.count() == 0) throw DataError(file.string() + ": holds no Gaussians");
+Gaussians centred(Gaussians gaussians) {
   const Index count = gaussians.count();
   for (Index c = 0; c < 3; ++c) {
     double sum = 0;
@@ -135,9 +160,14 @@ Image read_mask(const fs::path& file, const Clip& clip) {
   return take_channels(mask, 0, 1);
 }
 
-/// A folder of masks that is not there is more often a wrong name than a clip without masks.
-void warn_without_masks(const fs::path& folder) {
-  if (!fs::is_directory(folder)) log_warning(folder.string() + ": there is no such folder; all its masks are empty");
+/// A folder of masks that is not there is a wrong name. Single masks may be missing: nothing is seen in that frame.
+void check_masks(const fs::path& folder, const std::vector<std::string>& frames) {
+  if (!fs::is_directory(folder)) throw DataError(folder.string() + ": there is no such folder of masks");
+  const auto missing =
+      std::count_if(frames.begin(), frames.end(), [&](const std::string& name) { return !fs::exists(folder / name); });
+  if (missing == 0) return;
+  log_warning(folder.string() + ": has no mask for " + std::to_string(missing) + " of " +
+              std::to_string(frames.size()) + " frames; these count as empty");
 }
 
 }  // namespace
@@ -166,7 +196,7 @@ Clip read_clip(const DataSettings& data) {
   check_inputs(data);
   Clip clip;
   clip.frame_files = png_names(data.frames);
-  clip.scene = read_ply(data.scene.string()).gaussians;
+  clip.scene = read_gaussians(data.scene);
   clip.avatar = read_avatar(data.avatar.string());
   if (clip.avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
     throw DataError(data.avatar.string() + ": has " + std::to_string(clip.avatar.parents.size()) +
@@ -177,19 +207,25 @@ Clip read_clip(const DataSettings& data) {
   clip.first.camera_from_world = clip.camera.camera_from_world;
   std::vector<std::string> names;
   for (const auto& [name, object] : data.objects) {
-    const Gaussians read = read_ply(object.gaussians.string()).gaussians;
-    clip.objects.push_back({name, centred(read, object.gaussians)});
+    const Gaussians read = read_gaussians(object.gaussians);
+    clip.objects.push_back({name, centred(read)});
     clip.first.objects.push_back(initial_pose(initial, name, data.initial));
     names.push_back(name);
-    warn_without_masks(data.masks / name);
+    check_masks(data.masks / name, clip.frame_files);
   }
-  warn_without_masks(data.masks / kHumanMasks);
+  check_masks(data.masks / kHumanMasks, clip.frame_files);
   const Motion motion = read_motion(initial.motion.string());
   clip.estimate = estimate_of(motion, initial.motion, clip.frames());
   clip.first.body = motion.poses.front();
   clip.frame_rate = motion.frame_rate;
   if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.frames());
   return clip;
+}
+
+void check_frames(const DataSettings& data, const Clip& clip) {
+  parallel_for(clip.frames(), 1, [&](Index begin, Index end) {
+    for (Index index = begin; index < end; ++index) read_frame(data, clip, index);
+  });
 }
 
 ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index) {

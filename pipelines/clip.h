@@ -52,6 +52,10 @@ void check_inputs(const DataSettings& data);
 /// fit each other.
 Clip read_clip(const DataSettings& data);
 
+/// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on. Throws
+/// as read_frame.
+void check_frames(const DataSettings& data, const Clip& clip);
+
 /// Reads frame `index` and its masks. A mask that has no file counts as empty. Throws as read_clip.
 ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index);
 

@@ -79,15 +79,22 @@ Var<S> stacked(const std::vector<SplatInputs<S>>& parts, Member member) {
 
 }  // namespace
 
+std::vector<std::string> state_group_names(Draw draw) {
+  std::vector<std::string> names = {"camera"};
+  if (draw == Draw::kScene) return names;
+  names.insert(names.end(), {"object_orient", "object_transl", "transl"});
+  for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
+  return names;
+}
+
 std::vector<std::string> parameter_group_names(Draw draw) {
-  std::vector<std::string> names = {"camera", "background"};
+  std::vector<std::string> names = state_group_names(draw);
+  names.emplace_back("background");
   const auto add_classes = [&names](const std::string& part) {
     for (const char* name : kGaussianClasses) names.push_back(part + "_" + name);
   };
   add_classes("scene");
   if (draw == Draw::kScene) return names;
-  names.insert(names.end(), {"object_orient", "object_transl", "transl"});
-  for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
   add_classes("object");
   add_classes("human");
   names.back() = "human_colors";
@@ -326,18 +333,20 @@ void FrameGraph<S>::set_targets(const FrameTargets& targets) {
   write_numbers(tape_, inputs_.object_depth_target, targets.depths.data());
 }
 
-Vector3<double> mask_center(const Image& mask) {
+Vector3<double> mask_center(const Image& mask, double threshold) {
   double mass = 0, x_sum = 0, y_sum = 0;
+  bool is_seen = false;
   for (int y = 0; y < mask.height(); ++y) {
     const float* row = mask.row(0, y);
     for (int x = 0; x < mask.width(); ++x) {
       const auto m = static_cast<double>(row[x]);
+      is_seen = is_seen || m >= threshold;
       mass += m;
       x_sum += m * (x + 0.5);
       y_sum += m * (y + 0.5);
     }
   }
-  return mass > 0 ? Vector3<double>(x_sum / mass, y_sum / mass, 1) : Vector3<double>::Zero();
+  return is_seen ? Vector3<double>(x_sum / mass, y_sum / mass, 1) : Vector3<double>::Zero();
 }
 
 namespace {

@@ -37,8 +37,12 @@ struct FrameTargets {
   std::vector<double> depths;            ///< by object: mean camera z at the clip's first frame, metres
 };
 
-/// Names of the groups that a stage may move, by what it draws.
+/// Names of the groups of a frame graph, by what it draws.
 std::vector<std::string> parameter_group_names(Draw draw);
+
+/// Those of them that a stage may move: what read_state brings back. The Gaussians' own numbers and the background are
+/// groups for gradient checks.
+std::vector<std::string> state_group_names(Draw draw);
 
 /// The frame graph. The tape and the clip must outlive it.
 template <class S>
@@ -96,8 +100,9 @@ class FrameGraph {
   LossInputs<S> inputs_;
 };
 
-/// Centre of a mask (pixel centres at +0.5) in x and y, and 1; zeros for an empty mask.
-Vector3<double> mask_center(const Image& mask);
+/// Centre of a mask's coverage (pixel centres at +0.5) in x and y, and 1; zeros for a mask that nowhere reaches the
+/// threshold, as its faint pixels may be anything.
+Vector3<double> mask_center(const Image& mask, double threshold);
 
 /// The matrix that takes six numbers (translation, rotation) in the frame of `increment` to the camera's frame, so that
 /// T ← Exp(ξ) T is the update: the adjoint of the frame's own transform, [R, hat(t) R; 0, R].

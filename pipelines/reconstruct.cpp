@@ -9,6 +9,7 @@
 #include "body/motion_io.h"
 #include "core/camera_file.h"
 #include "core/image_io.h"
+#include "core/log.h"
 #include "core/rotation.h"
 #include "optim/metrics.h"
 #include "optim/stage.h"
@@ -105,16 +106,18 @@ std::vector<FrameState> placed(const Clip& clip, const std::vector<SceneState>& 
   return frames;
 }
 
+void add_problem(std::string& problems, const std::string& text) { problems += (problems.empty() ? "" : "\n") + text; }
+
 class Reconstruction {
  public:
-  Reconstruction(const RunConfig& config, const std::vector<LossTerm>& losses, RunFolder& folder,
+  Reconstruction(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
                  const RunObserver& observer)
       : config_(config),
         losses_(losses),
         folder_(folder),
         observer_(observer),
         resolved_(resolved_config(config, descriptions_of(losses))),
-        clip_(read_clip(config.data)),
+        clip_(clip),
         progress_(first_progress(clip_, config.stages.size())),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
 
@@ -213,19 +216,28 @@ class Reconstruction {
     graph.set_targets(targets_of(frame, stage, weight));
     const StageResult result =
         run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(),
-                     [&](const IterationReport& report) { note(index, name, report, *graph.rendered().counters); },
+                     [&](const IterationReport& report) { note(index, s, report, *graph.rendered().counters); },
                      {.name = name + ", frame " + std::to_string(index)});
     graph.read_state(stage.optimize, state);
-    progress_.totals[s].iterations += result.iterations;
-    progress_.totals[s].rollbacks += result.rollbacks;
-    progress_.totals[s].seconds += result.seconds;
+    StageTotals& totals = progress_.totals[s];
+    totals.iterations += result.iterations;
+    totals.rollbacks += result.rollbacks;
+    totals.seconds += result.seconds;
+    if (index == 1) tell_terms_off(name, result.off);
+  }
+
+  static void tell_terms_off(const std::string& stage, const std::vector<std::string>& off) {
+    for (const std::string& term : off) {
+      log_warning("stage " + stage + ": the loss \"" + term + "\" is off: its weight is 0, or an input is not given");
+    }
   }
 
   FrameTargets targets_of(const ClipFrame& frame, const StageSettings& stage, const Image& weight) const {
     FrameTargets targets;
     targets.image = &frame.target;
     targets.weight = stage.weight == PixelWeight::kUnoccluded ? &weight : nullptr;
-    for (const Image& mask : frame.object_masks) targets.centers.push_back(mask_center(mask));
+    for (const Image& mask : frame.object_masks)
+      targets.centers.push_back(mask_center(mask, config_.data.mask_threshold));
     for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
       targets.depths.push_back(
           mean_depth(clip_.objects[o].gaussians, clip_.first.objects[o], clip_.first.camera_from_world));
@@ -233,7 +245,16 @@ class Reconstruction {
     return targets;
   }
 
-  void note(Index frame, const std::string& stage, const IterationReport& report, const RenderCounters& counters) {
+  void note(Index frame, std::size_t s, const IterationReport& report, const RenderCounters& counters) {
+    const std::string& stage = config_.stages[s].first;
+    StageTotals& totals = progress_.totals[s];
+    totals.tiles += counters.tiles;
+    totals.pairs += counters.pairs;
+    totals.fragments += counters.fragments;
+    if (report.rolled_back) {
+      log_warning("frame " + std::to_string(frame) + ", stage " + stage + ", iteration " +
+                  std::to_string(report.iteration) + ": no step, " + std::string(report.offender));
+    }
     IterationRecord record;
     record.frame = static_cast<int>(frame);
     record.stage = stage;
@@ -320,7 +341,12 @@ class Reconstruction {
     const StageTotals& totals = progress_.totals[s];
     StageSummary summary{name, totals.seconds, totals.iterations, {}};
     if (clip_.truth) summary.values = errors_of(progress_.after_stage[s], stage.draw);
-    summary.values.emplace_back("rollbacks", static_cast<double>(totals.rollbacks));
+    for (const auto& [counter, count] : {std::pair{"rollbacks", totals.rollbacks},
+                                         {"tiles", totals.tiles},
+                                         {"pairs", totals.pairs},
+                                         {"fragments", totals.fragments}}) {
+      summary.values.emplace_back(counter, static_cast<double>(count));
+    }
     return summary;
   }
 
@@ -347,37 +373,50 @@ class Reconstruction {
   RunFolder& folder_;
   const RunObserver& observer_;
   std::string resolved_;
-  Clip clip_;
+  const Clip& clip_;
   RunProgress progress_;
   Progress bar_;
 };
 
 }  // namespace
 
-void check_run(const RunConfig& config) {
+void check_stages(const RunConfig& config) {
   std::string problems;
-  const auto complain = [&problems](const std::string& text) { problems += (problems.empty() ? "" : "\n") + text; };
-  try {
-    check_inputs(config.data);
-  } catch (const UserError& mistake) {
-    complain(mistake.what());
-  }
-  if (config.stages.empty()) complain("/stages: a run needs at least one stage");
   for (const auto& [name, stage] : config.stages) {
+    const std::string where = "/stages/" + name;
     try {
-      check_groups(stage, parameter_group_names(stage.draw), "/stages/" + name + "/optimize");
+      check_groups(stage, state_group_names(stage.draw), where + "/optimize");
     } catch (const UserError& mistake) {
-      complain(mistake.what());
+      add_problem(problems, mistake.what());
     }
-    if (stage.losses.empty()) complain("/stages/" + name + "/losses: a stage needs a loss");
+    if (stage.losses.empty()) add_problem(problems, where + "/losses: a stage needs a loss");
+    for (const auto& [group, settings] : stage.optimize) {
+      if (settings.from < stage.iterations) continue;
+      add_problem(problems, where + "/optimize/" + group + "/from: " + std::to_string(settings.from) +
+                                " is beyond the stage's " + std::to_string(stage.iterations) +
+                                " iterations; the group would never move");
+    }
   }
   if (!problems.empty()) throw UserError(problems);
 }
 
-RunSummary reconstruct(const RunConfig& config, const std::vector<LossTerm>& losses, RunFolder& folder,
-                       const RunObserver& observer) {
-  check_run(config);
-  return Reconstruction(config, losses, folder, observer).run();
+void check_run(const RunConfig& config) {
+  std::string problems;
+  if (config.stages.empty()) add_problem(problems, "/stages: a run needs at least one stage");
+  for (const auto& check : {std::function<void()>([&] { check_stages(config); }),
+                            std::function<void()>([&] { check_inputs(config.data); })}) {
+    try {
+      check();
+    } catch (const UserError& mistake) {
+      add_problem(problems, mistake.what());
+    }
+  }
+  if (!problems.empty()) throw UserError(problems);
+}
+
+RunSummary reconstruct(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses,
+                       RunFolder& folder, const RunObserver& observer) {
+  return Reconstruction(config, clip, losses, folder, observer).run();
 }
 
 }  // namespace hsi4d

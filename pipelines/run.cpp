@@ -28,13 +28,14 @@ void note_end(RunFolder& folder, RunState state, const std::string& message) noe
   }
 }
 
-RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const std::vector<LossTerm>& losses,
-                            const RunOptions& options) {
+RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Clip& clip,
+                            const std::vector<LossTerm>& losses, const RunOptions& options) {
   try {
     RunSummary summary;
     on_threads(options.threads > 0 ? options.threads : config.threads,
-               [&] { summary = reconstruct(config, losses, folder, options.observer); });
-    folder.set_state(RunState::kDone);
+               [&] { summary = reconstruct(config, clip, losses, folder, options.observer); });
+    folder.set_state(RunState::kDone);  // the report tells it
+    write_report(options.folder);
     return summary;
   } catch (const Interrupted& stop) {
     note_end(folder, RunState::kInterrupted, stop.what());
@@ -49,6 +50,8 @@ RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const st
 
 RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
   check_run(config);
+  const Clip clip = read_clip(config.data);  // before anything is written
+  check_frames(config.data, clip);
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));
   identity.seed = config.seed;
@@ -56,9 +59,7 @@ RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losse
   identity.threads = threads > 0 ? threads : thread_count();
   identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
   RunFolder folder(options.folder, identity, options.resume);
-  const RunSummary summary = reconstruct_into(folder, config, losses, options);
-  write_report(options.folder);
-  return summary;
+  return reconstruct_into(folder, config, clip, losses, options);
 }
 
 }  // namespace hsi4d

@@ -20,7 +20,8 @@ void describe(ConfigFields& f, CameraSettings& s) {
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {
   f.string("name", s.name, "What the run is called in its report");
-  f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of everything that is random");
+  f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed},
+            "Seed of what is random in a run; nothing is so far (a dataset has synthetic.seed)");
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
             "Threads; 0: one a core. Results do not depend on it");
   f.choice("precision", s.precision, kRunPrecisions, "Type of the numbers that a run computes with");
@@ -64,9 +65,12 @@ ConfigValue sections_beside_data(const RunConfig& config, const std::vector<Loss
   ConfigFields fields;
   describe(fields, copy, losses);
   ConfigValue tree = write_config(fields);
-  std::erase_if(tree.members, [](const ConfigMember& member) {
-    return member.key == "data" || member.key == "synthetic" || member.key == "threads";
-  });
+  std::erase_if(tree.members,
+                [](const ConfigMember& member) { return member.key == "synthetic" || member.key == "threads"; });
+  for (ConfigMember& member : tree.members) {
+    if (member.key != "data") continue;
+    std::erase_if(member.value.members, [](const ConfigMember& own) { return !own.key.starts_with("mask_"); });
+  }
   return tree;
 }
 

@@ -298,8 +298,6 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
   const Found found = look_at_folder(paths_);  // as it is now that nobody else writes
   check_resumable(paths_, found, identity_.config, resume);
   remove_temporaries(paths_.folder);
-  make_folder(paths_.frames());
-  make_folder(paths_.checkpoint());
   started_ = now_text();
   if (found.is_run) {
     resumed_from_ = found_state(found.status);
@@ -307,7 +305,11 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
     const std::string before = found_member(found.status, "started");
     if (!before.empty()) started_ = before;
   } else {
-    write_text_file(paths_.config(), identity_.config);
+    write_text_file(paths_.config(), identity_.config);  // first: it makes the folder one of a run, should we be killed
+  }
+  for (const std::string& folder : {paths_.frames(), paths_.checkpoint()}) {
+    make_folder(folder);
+    remove_temporaries(folder);
   }
   metrics_ = std::make_unique<Appender>(paths_.metrics());
   log_.emplace(log_to_file(paths_.log()));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/check.h"
 #include "optim/checkpoint.h"
@@ -12,6 +13,7 @@ namespace {
 
 constexpr Index kPoseNumbers = 165;
 constexpr Index kRigidNumbers = 12;
+constexpr std::size_t kCounts = 5;  // whole numbers of a stage's totals
 constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "psnr_foreground_db",
                                                      "ssim"};  // as image_errors orders
 
@@ -83,8 +85,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
     for (const SceneState& state : stage) append(state, states);
   }
   for (const StageTotals& totals : progress.totals) {
-    counts.push_back(totals.iterations);
-    counts.push_back(totals.rollbacks);
+    counts.insert(counts.end(), {totals.iterations, totals.rollbacks, totals.tiles, totals.pairs, totals.fragments});
     seconds.push_back(totals.seconds);
   }
   seconds.push_back(progress.seconds);
@@ -126,8 +127,11 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   const auto done = static_cast<std::size_t>(frames[0]), per_state = static_cast<std::size_t>(numbers_per_state(clip));
   const std::vector<double>& states = checkpoint.doubles("states");
   expect("states", states.size(), stages * done * per_state);
+  if (!std::all_of(states.begin(), states.end(), [](double x) { return std::isfinite(x); })) {
+    throw DataError(file + ": \"states\" holds a number that is not finite");
+  }
   const std::vector<std::int64_t>& counts = checkpoint.integers("counts");
-  expect("counts", counts.size(), 2 * stages);
+  expect("counts", counts.size(), kCounts * stages);
   const std::vector<double>& seconds = checkpoint.doubles("seconds");
   expect("seconds", seconds.size(), stages + 1);
   for (std::size_t s = 0; s < stages; ++s) {
@@ -135,7 +139,8 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
     for (std::size_t t = 0; t < done; ++t) {
       progress.after_stage[s].push_back(state_from(states.data() + (s * done + t) * per_state, clip));
     }
-    progress.totals[s] = {counts[2 * s], counts[2 * s + 1], seconds[s]};
+    const std::int64_t* count = counts.data() + kCounts * s;
+    progress.totals[s] = {count[0], count[1], count[2], count[3], count[4], seconds[s]};
   }
   progress.seconds = seconds.back();
   const std::vector<float>& covered = checkpoint.floats("covered");

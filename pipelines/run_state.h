@@ -15,6 +15,7 @@ namespace hsi4d {
 struct StageTotals {
   Index iterations = 0;
   Index rollbacks = 0;
+  Index tiles = 0, pairs = 0, fragments = 0;  ///< rendered, over all iterations
   double seconds = 0;
 };
 

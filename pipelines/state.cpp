@@ -1,5 +1,7 @@
 #include "pipelines/state.h"
 
+#include <cmath>
+
 #include "core/check.h"
 #include "core/npz.h"
 
@@ -19,7 +21,12 @@ std::vector<double> track(const std::vector<SceneState>& frames, std::size_t obj
 
 /// An array [T,3] of the archive; T = -1 takes any.
 std::vector<double> read_track(const Npz& npz, const std::string& name, std::int64_t frames) {
-  return npz.array(name).require_shape({frames, 3}).as<double>();
+  std::vector<double> track = npz.array(name).require_shape({frames, 3}).as<double>();
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    if (std::isfinite(track[i])) continue;
+    throw DataError(npz.array(name).source() + ": row " + std::to_string(i / 3) + " holds a number that is not finite");
+  }
+  return track;
 }
 
 }  // namespace

@@ -195,6 +195,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_motion(out.file("truth/motion.npz"), clip.motion);
   write_objects(out.file("truth/objects.npz"), object.name, clip.object);
   write_cameras(out.file("truth/cameras.json"), clip.cameras);
+  write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings));
   write_text_file(out.file("config.json"),
                   to_json(merged(object_of("data", data_section(object.name)), more_sections)));
 

@@ -5,6 +5,7 @@
 //   masks/human/0000.png ...  masks/NAME/0000.png ...            8 bit grey: the share of the pixel
 //   camera.json  initial.json  initial_motion.npz                frame 0 exact, later frames disturbed
 //   config.json                                                  a run config that names all this
+//   synthetic.json                                               the settings that it was made with
 //   truth/motion.npz  truth/objects.npz  truth/cameras.json
 //
 // An object's pose is x_world = exp(rotation) x_object + translation.

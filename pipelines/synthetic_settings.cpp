@@ -30,4 +30,11 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
            "Standard deviation of each coordinate of the initial motion's root, metres");
 }
 
+std::string synthetic_settings_json(const SyntheticSettings& settings) {
+  SyntheticSettings copy = settings;  // a description binds to something that it could change
+  ConfigFields fields;
+  describe(fields, copy);
+  return to_json(write_config(fields));
+}
+
 }  // namespace hsi4d

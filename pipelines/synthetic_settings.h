@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include "core/config.h"
 #include "core/types.h"
@@ -38,5 +39,8 @@ struct SyntheticSettings {
 };
 
 void describe(ConfigFields& fields, SyntheticSettings& settings);
+
+/// The settings as JSON text: what a dataset's synthetic.json holds.
+std::string synthetic_settings_json(const SyntheticSettings& settings);
 
 }  // namespace hsi4d

@@ -7,9 +7,9 @@
 namespace hsi4d {
 
 /// Alpha is held at or below this. 1 − 2⁻¹² leaks less than a sixteenth of an 8-bit step through an opaque Gaussian,
-/// and dividing T by 1 − α on the way back stays exact to a few ulp (stability B2, B16).
+/// and leaves room for a backward pass that divides T by 1 − α (stability B2, B16).
 inline constexpr double kAlphaCap = 1.0 - 1.0 / 4096;
-/// No cap: needs the backward pass that does not divide.
+/// No cap: for a backward pass that does not divide, as ours.
 inline constexpr double kNoAlphaCap = 1.0;
 inline constexpr double kAlphaCapCompatible = 0.99;
 

@@ -1,5 +1,5 @@
-// L = (1 − λ) L1 + λ (1 − SSIM), the difference of the rendered image and the frame.   [3DGS, eq. 7; λ: method, stage
-// 2]
+// L = (1 − λ) L1 + λ (1 − SSIM), the difference of the rendered image and the frame.
+// [3DGS, eq. 7; λ: method, stage 2]
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/ssim.h"

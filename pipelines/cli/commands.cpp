@@ -5,6 +5,7 @@
 
 #include "core/check.h"
 #include "core/suggest.h"
+#include "pipelines/reconstruct.h"
 #include "pipelines/run_config.h"
 
 namespace hsi4d::cli {
@@ -78,6 +79,7 @@ std::string list_all_settings(const std::vector<LossDescription>& losses) {
 std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           bool print_config, const std::vector<LossDescription>& losses) {
   const RunConfig run = load_run_config(config, overrides, losses);
+  check_stages(run);
   return print_config ? resolved_config(run, losses) : summary(config, run);
 }
 

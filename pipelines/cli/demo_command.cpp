@@ -4,8 +4,10 @@
 
 #include "core/check.h"
 #include "core/config_file.h"
+#include "core/file.h"
 #include "core/parallel.h"
 #include "pipelines/cli/demo_configs.h"
+#include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/reconstruct.h"
@@ -34,6 +36,38 @@ fs::path demo_folder(const DemoArguments& arguments, const std::string& name) {
   return folder;
 }
 
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw UserError(folder.string() + ": the folder cannot be made: " + error.message());
+}
+
+void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, const DemoArguments& arguments,
+                  const fs::path& dataset) {
+  const InterruptWatch watch;
+  const int threads = arguments.threads > 0 ? arguments.threads : config.threads;
+  with_threads(threads > 0 ? threads : thread_count(), [&] {
+    write_dataset(config.synthetic, video_render_settings(), dataset,
+                  stopping_progress(arguments.quiet ? ProgressSink{} : progress_on_stderr()),
+                  sections_beside_data(config, descriptions_of(losses)));
+  });
+}
+
+/// The dataset that is gone on with must be the one that the config asks for.
+void check_dataset(const RunConfig& config, const fs::path& dataset) {
+  const std::string file = (dataset / "synthetic.json").string();
+  if (read_text_file(file) == synthetic_settings_json(config.synthetic)) return;
+  throw UserError(file + ": the dataset was made with other settings than these; make a new one in another folder");
+}
+
+/// Names the files of a dataset and keeps the other settings.
+void name_inputs(const fs::path& dataset, DataSettings& data) {
+  DataSettings named = dataset_inputs(dataset);
+  named.mask_threshold = data.mask_threshold;
+  named.mask_margin_px = data.mask_margin_px;
+  data = std::move(named);
+}
+
 }  // namespace
 
 std::string demo_command(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
@@ -41,22 +75,19 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
   RunConfig config = demo_config(arguments, losses);
   const fs::path folder = demo_folder(arguments, config.name);
   const fs::path dataset = folder / "dataset";
-  config.data = dataset_inputs(dataset);
+  name_inputs(dataset, config.data);
   check_run(config);  // before a dataset is made for nothing
   if (!arguments.resume || !fs::exists(dataset)) {
     if (fs::exists(dataset)) {
       throw UserError(folder.string() +
                       ": holds a demo already; --resume goes on with it, another --out makes a new one");
     }
-    fs::create_directories(folder);
-    const int threads = arguments.threads > 0 ? arguments.threads : config.threads;
-    with_threads(threads > 0 ? threads : thread_count(), [&] {
-      write_dataset(config.synthetic, video_render_settings(), dataset,
-                    arguments.quiet ? ProgressSink{} : progress_on_stderr(),
-                    sections_beside_data(config, descriptions_of(losses)));
-    });
+    make_folder(folder);
+    make_dataset(config, losses, arguments, dataset);
+  } else {
+    check_dataset(config, dataset);
   }
-  config.data = dataset_inputs(dataset);  // now that its objects and truth are there
+  name_inputs(dataset, config.data);  // now that its objects and truth are there
   const std::string run = (folder / "run").string();
   const RunSummary summary = run_on_terminal(config, losses, run, arguments.resume, arguments.threads, arguments.quiet);
   return result_text(summary, run);

@@ -119,7 +119,7 @@ struct CommandLine {
 
   void add_info() {
     CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
-    info->add_option("FILE", file, "A .ply, .npz, .npy, .json, .png, .jpg or .exr file")->required();
+    info->add_option("FILE", file, "A .ply, .npz, .npy, .json, .png, .jpg, .jpeg or .exr file")->required();
     info->callback([this] { run = [this] { return info_command(file); }; });
   }
 

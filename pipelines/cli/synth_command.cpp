@@ -1,6 +1,7 @@
 #include "pipelines/cli/synth_command.h"
 
 #include "core/parallel.h"
+#include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/run_config.h"
 #include "pipelines/synthetic.h"
@@ -10,8 +11,10 @@ namespace hsi4d::cli {
 std::string synth_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           const std::filesystem::path& out, const std::vector<LossDescription>& losses) {
   const RunConfig run = load_run_config(config, overrides, losses);
+  const InterruptWatch watch;
   with_threads(run.threads > 0 ? run.threads : thread_count(), [&] {
-    write_dataset(run.synthetic, video_render_settings(), out, progress_on_stderr(), sections_beside_data(run, losses));
+    write_dataset(run.synthetic, video_render_settings(), out, stopping_progress(progress_on_stderr()),
+                  sections_beside_data(run, losses));
   });
   const std::string frames = std::to_string(run.synthetic.frames) + (run.synthetic.frames == 1 ? " frame" : " frames");
   const std::string size = std::to_string(run.synthetic.size_px);

@@ -206,9 +206,11 @@ TEST_CASE("the mean depth of an object on the tape is that of the untaped functi
 
 TEST_CASE("the centre of a mask", "[frame_graph]") {
   Image mask(1, 4, 6);
-  CHECK(mask_center(mask) == Vector3<double>(0, 0, 0));
+  CHECK(mask_center(mask, 0.5) == Vector3<double>(0, 0, 0));
+  mask(0, 1, 2) = 0.25;
+  CHECK(mask_center(mask, 0.5) == Vector3<double>(0, 0, 0));  // too faint to be the object
   mask(0, 1, 2) = 1;
-  CHECK(mask_center(mask) == Vector3<double>(2.5, 1.5, 1));
+  CHECK(mask_center(mask, 0.5) == Vector3<double>(2.5, 1.5, 1));
   mask(0, 3, 2) = 1;
-  CHECK(mask_center(mask) == Vector3<double>(2.5, 2.5, 1));
+  CHECK(mask_center(mask, 0.5) == Vector3<double>(2.5, 2.5, 1));
 }

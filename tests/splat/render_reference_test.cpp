@@ -1,4 +1,7 @@
 // The taped renderer in double against the brute-force one, which shares no code with it.
+#include <algorithm>
+#include <cstdio>
+
 #include <catch2/catch.hpp>
 
 #include "tests/support/real_splats.h"
@@ -9,6 +12,16 @@ using namespace hsi4d::test;
 
 namespace {
 
+/// The largest errors seen since the last report.
+struct WorstErrors {
+  double image = 0, gradient = 0;
+
+  void report(const char* what) {
+    std::printf("double against brute force, %s: image %.2g, gradients %.2g\n", what, image, gradient);
+    *this = {};
+  }
+} worst_errors;
+
 void check_against_reference(const SplatScene& scene, double gradient_tolerance, const RenderRequest& request = {},
                              const std::vector<float>& moved_by = {}) {
   SplatCotangent cotangent = cotangent_of(scene.camera, static_cast<Index>(request.groups.size()), request.depth);
@@ -17,7 +30,9 @@ void check_against_reference(const SplatScene& scene, double gradient_tolerance,
   for (std::size_t p = 0; p < cotangent.depth.size(); ++p) cotangent.depth[p] *= opaque_enough(p) ? 1 : 0;
   TapedSplats<double> taped(scene, cotangent, request, moved_by);
   taped.run();
-  CHECK(largest_difference(taped.value(taped.rendered.image), expected.image) <= 1e-10);
+  const double image_error = largest_difference(taped.value(taped.rendered.image), expected.image);
+  CHECK(image_error <= 1e-10);
+  worst_errors.image = std::max(worst_errors.image, image_error);
   CHECK(largest_difference(taped.value(taped.rendered.transmittance), expected.transmittance) <= 1e-10);
   if (request.depth) {
     const std::vector<double> depth = taped.value(taped.rendered.depth);
@@ -41,6 +56,7 @@ void check_against_reference(const SplatScene& scene, double gradient_tolerance,
   for (const NamedNumbers& error : gradient_errors(gradients, expected.gradients)) {
     INFO("gradient of " << error.name);
     CHECK(error.numbers[0] <= gradient_tolerance);
+    worst_errors.gradient = std::max(worst_errors.gradient, error.numbers[0]);
   }
 }
 
@@ -54,6 +70,7 @@ TEST_CASE("double agrees with the brute-force renderer: every kind of scene and 
       check_against_reference(scene, 1e-9);
     }
   }
+  worst_errors.report("all scenes, all settings");
 }
 
 TEST_CASE("double agrees with the brute-force renderer: needles, to 1e-16 times their condition number") {
@@ -67,6 +84,7 @@ TEST_CASE("double agrees with the brute-force renderer: needles, to 1e-16 times 
       check_against_reference(scene, std::max(1e-9, 1e-16 * condition * condition));
     }
   }
+  worst_errors.report("needles");
 }
 
 TEST_CASE("double agrees with the brute-force renderer: numbers that are broken") {
@@ -82,6 +100,7 @@ TEST_CASE("double agrees with the brute-force renderer: numbers that are broken"
     variant.apply(scene.settings);
     check_against_reference(scene, 1e-9);
   }
+  worst_errors.report("broken numbers");
 }
 
 TEST_CASE("double agrees with the brute-force renderer: depth, groups and moved Gaussians") {
@@ -99,6 +118,7 @@ TEST_CASE("double agrees with the brute-force renderer: depth, groups and moved 
     }
     check_against_reference(scene, 1e-9, request, moved_by);
   }
+  worst_errors.report("depth, groups, transforms");
 }
 
 TEST_CASE("double agrees with the brute-force renderer: real scenes") {
@@ -117,4 +137,5 @@ TEST_CASE("double agrees with the brute-force renderer: real scenes") {
       check_against_reference(changed, 1e-9);
     }
   }
+  worst_errors.report("real scenes");
 }
