@@ -146,7 +146,7 @@ TEST_CASE("frames may have alpha, masks may have colours or be missing") {
   }
 }
 
-TEST_CASE("a folder of masks that is missing is warned of, by name") {
+TEST_CASE("masks that are missing are warned of, a missing folder is an error") {
   const CopiedDataset dataset;
   std::vector<std::string> messages;
   const LogSink sink = log_to([&](LogLevel level, std::string_view text) {
@@ -154,11 +154,32 @@ TEST_CASE("a folder of masks that is missing is warned of, by name") {
   });
   dataset.read();
   CHECK(messages.empty());
-  fs::remove_all(dataset.path / "masks" / "human");
+  const fs::path folder = dataset.path / "masks" / "human";
+  fs::remove(folder / "0001.png");
+  fs::remove(folder / "0003.png");
   dataset.read();
-  const std::string folder = (dataset.path / "masks" / "human").string();
-  CHECK(messages ==
-        std::vector<std::string>{"warning " + folder + ": there is no such folder; all its masks are empty"});
+  CHECK(messages == std::vector<std::string>{"warning " + folder.string() +
+                                             ": has no mask for 2 of 4 frames; these count as empty"});
+  fs::remove_all(folder);
+  CHECK(message_of([&] { dataset.read(); }) == folder.string() + ": there is no such folder of masks");
+}
+
+TEST_CASE("every frame can be checked at once") {
+  const CopiedDataset dataset;
+  const DataSettings data = dataset_inputs(dataset.path);
+  const Clip clip = read_clip(data);
+  CHECK(message_of([&] { check_frames(data, clip); }) == "no error");
+  for (const char* name : {"frames/0003.png", "frames/0002.png"}) std::ofstream(dataset.path / name) << "text";
+  CHECK_THAT(message_of([&] { check_frames(data, clip); }), Contains((dataset.path / "frames/0002.png").string()));
+}
+
+TEST_CASE("frames whose names sort otherwise than their numbers are refused") {
+  const CopiedDataset dataset;
+  fs::rename(dataset.path / "frames/0003.png", dataset.path / "frames/10.png");
+  CHECK(message_of([&] { dataset.read(); }) ==
+        (dataset.path / "frames").string() +
+            ": \"0000.png\" and \"10.png\" have different numbers of digits; frames are taken in the order of their "
+            "names, so fill up with zeros");
 }
 
 TEST_CASE("inputs that are missing or damaged are told by name") {
@@ -187,7 +208,7 @@ TEST_CASE("inputs that are missing or damaged are told by name") {
     none.opacity_logits.clear();
     none.sh.clear();
     write_ply(data.objects[0].second.gaussians.string(), none);
-    CHECK(message() == data.objects[0].second.gaussians.string() + ": holds no Gaussians");
+    CHECK(message() == data.objects[0].second.gaussians.string() + ": holds no Gaussians that can be used");
   }
   SECTION("an avatar of another skeleton") {
     Avatar avatar = read_avatar(data.avatar.string());

@@ -247,10 +247,19 @@ TEST_CASE("a run that fails in the middle goes on once the cause is gone", "[run
   const RunConfig config = load_run_config(data / "config.json", {}, descriptions_of(loss_terms()));
   carry_out_tiny(config, "whole");
   const std::string frame = (data / "frames" / "0002.png").string(), bytes = file_text(frame);
-  std::ofstream(frame) << "no image";
-  CHECK_THROWS_AS(carry_out_tiny(config, "run"), DataError);
+  const auto damage = [&] {  // after it was found to be sound
+    std::ofstream(frame) << "no image";
+    return false;
+  };
+  CHECK_THROWS_AS(carry_out_tiny(config, "run", 1, false, damage), DataError);
+  const std::string message = json_of("run/status.json")["message"];
   CHECK(state_of("run") == "failed");
-  CHECK_THAT(json_of("run/status.json")["message"].get<std::string>(), Contains(frame));
+  CHECK_THAT(message, Contains(frame));
+  CHECK_THAT(file_text("run/log.txt"), Contains("failed: " + message + "\n"));
+  for (const char* name : {"summary.json", "motion.npz", "objects.npz", "cameras.json", "report.html"}) {
+    INFO(name);
+    CHECK_FALSE(fs::exists(fs::path("run") / name));
+  }
   CHECK(metrics_of("run").size() == kPerFrame);
   std::ofstream(frame, std::ios::binary) << bytes;
   carry_out_tiny(config, "run", 1, true);
@@ -286,6 +295,12 @@ TEST_CASE("a demo that was killed and resumed has the bits of one that never was
   INFO(resumed.err);
   CHECK(resumed.status == 0);
   CHECK(differences("before/run", "whole/run") == kNone);
+
+  std::vector<std::string> other = with_resume(arguments("whole"));
+  other.insert(other.end(), {"--set", "synthetic.seed=3"});
+  CHECK(run_hsi4d(other).err ==
+        "whole/dataset/synthetic.json: the dataset was made with other settings than these; "
+        "make a new one in another folder\n");
 
   const ProgramResult nowhere = run_hsi4d({"demo", "--quick", "--resume"});
   CHECK(nowhere.status == 2);

@@ -1,5 +1,6 @@
 #include "pipelines/run_state.h"
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 
@@ -53,7 +54,7 @@ RunProgress random_progress(const Clip& clip) {
   for (auto& stage : progress.after_stage) stage.push_back(random_state(random));
   progress.after_stage[1][1].body.axis_angle[7] = -0.0;
   progress.after_stage[1][1].body.axis_angle[8] = 5e-324;
-  progress.totals = {{30, 1, 0.1}, {150, 0, 1.0 / 3}};
+  progress.totals = {{30, 1, 9, 2065, 67984, 0.1}, {150, 0, 10, 3000, 80000, 1.0 / 3}};
   progress.image_errors.push_back({{"psnr_db", 30.123456789012345}, {"psnr_foreground_db", 20.5}, {"ssim", 0.9}});
   progress.covered(0, 3, 4) = 1;
   progress.seconds = 12.345;
@@ -131,6 +132,9 @@ TEST_CASE("progress survives its checkpoint bit for bit") {
     }
     CHECK(read.totals[s].iterations == saved.totals[s].iterations);
     CHECK(read.totals[s].rollbacks == saved.totals[s].rollbacks);
+    CHECK(read.totals[s].tiles == saved.totals[s].tiles);
+    CHECK(read.totals[s].pairs == saved.totals[s].pairs);
+    CHECK(read.totals[s].fragments == saved.totals[s].fragments);
     CHECK(same_bits(read.totals[s].seconds, saved.totals[s].seconds));
   }
   CHECK(read.image_errors == saved.image_errors);  // in the same order, which summary.json shows
@@ -190,8 +194,10 @@ TEST_CASE("a checkpoint with entries that cannot be is refused, whatever they ar
   CHECK_THAT(error_with("frames", Integers{3}), Contains("\"states\" holds 768 numbers, this clip needs 1152"));
   CHECK_THAT(error_with("frames", Integers{}), Contains("\"frames\" holds 0 numbers, this clip needs 1"));
   CHECK_THAT(error_with("frames", Doubles{2}), Contains("frames"));
-  CHECK_THAT(error_with("counts", Integers{1}), Contains("\"counts\" holds 1 numbers, this clip needs 4"));
+  CHECK_THAT(error_with("counts", Integers{1}), Contains("\"counts\" holds 1 numbers, this clip needs 10"));
   CHECK_THAT(error_with("seconds", Doubles{}), Contains("\"seconds\" holds 0 numbers, this clip needs 3"));
+  CHECK(error_with("states", Doubles(768, std::nan(""))) ==
+        "progress.npz: \"states\" holds a number that is not finite");
   CHECK_THAT(error_with("size_px", Integers{24}), Contains("\"size_px\" holds 1 numbers, this clip needs 2"));
   CHECK_THAT(error_with("covered", std::vector<float>(481)),
              Contains("\"covered\" holds 481 numbers, this clip needs 480"));
