@@ -148,7 +148,20 @@ class Reconstruction {
     }
   }
 
+  /// Removes what a killed writer left half done beside the files that are whole.
+  void remove_temporaries() const {
+    for (const std::string& folder : {folder_.paths().frames(), folder_.paths().checkpoint()}) {
+      std::error_code error;
+      std::vector<std::filesystem::path> left;
+      for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+        if (entry.path().extension() == ".tmp") left.push_back(entry.path());
+      }
+      for (const std::filesystem::path& file : left) std::filesystem::remove(file, error);
+    }
+  }
+
   void resume() {
+    remove_temporaries();
     if (folder_.resumed_from() && std::filesystem::exists(checkpoint_file())) {
       progress_ = checkpointed();
     } else {

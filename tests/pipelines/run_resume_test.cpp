@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "pipelines/cli/interrupt.h"
 #include "tests/pipelines/tiny_run.h"
 #include "tests/support/program.h"
 
@@ -187,9 +188,33 @@ TEST_CASE("lines that a kill cut short are written again", "[run]") {
   fs::resize_file("run/metrics.jsonl", fs::file_size("run/metrics.jsonl") - 7);
   std::ofstream("run/frames/0002_render.png") << "half a file";
   std::ofstream("run/status.json") << "{\"state\": \"runn";
+  for (const char* left :
+       {"frames/0002_render.png.77-3.tmp", "checkpoint/progress.npz.77-4.tmp", "summary.json.77-5.tmp"})
+    here.write(std::string("run/") + left, "half a file");
   carry_out_tiny(config, "run", 1, true);
   CHECK(differences("whole", "run") == kNone);
   CHECK(state_of("run") == "done");
+  CHECK(temporaries_in("run") == kNone);
+}
+
+TEST_CASE("a signal is noted once, and not at all where it is ignored", "[run]") {
+  const auto before = ::signal(SIGINT, SIG_IGN);
+  {
+    const cli::InterruptWatch watch;
+    ::raise(SIGINT);
+    CHECK_FALSE(cli::InterruptWatch::requested());
+    ::raise(SIGTERM);
+    CHECK(cli::InterruptWatch::requested());
+    CHECK(::signal(SIGTERM, SIG_DFL) == SIG_DFL);  // the second one ends the program
+  }
+  CHECK(::signal(SIGINT, SIG_DFL) == SIG_IGN);
+  {
+    const cli::InterruptWatch watch;
+    CHECK_FALSE(cli::InterruptWatch::requested());  // forgotten
+    ::raise(SIGINT);
+    CHECK(cli::InterruptWatch::requested());
+  }
+  CHECK(::signal(SIGINT, before) == SIG_DFL);
 }
 
 TEST_CASE("SIGINT ends a run in good order", "[run]") {

@@ -257,7 +257,7 @@ TEST_CASE("the camera is found with increments in any frame", "[run]") {
   CHECK(found.size() == 3);
 }
 
-TEST_CASE("--dry-run and --print-config write nothing, --seed and --threads are noted", "[run]") {
+TEST_CASE("a dry run and a printed config write nothing, seed and threads are noted", "[run]") {
   const TemporaryFolder here;
   const std::string config = tiny_config_file();
   const ProgramResult plan = run_hsi4d({"run", config, "--dry-run", "--out", "out"});
