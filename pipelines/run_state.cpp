@@ -140,7 +140,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
       progress.after_stage[s].push_back(state_from(states.data() + (s * done + t) * per_state, clip));
     }
     const std::int64_t* count = counts.data() + kCounts * s;
-    progress.totals[s] = {count[0], count[1], count[2], count[3], count[4], seconds[s]};
+    progress.totals[s] = {count[0], count[1], seconds[s], count[2], count[3], count[4]};
   }
   progress.seconds = seconds.back();
   const std::vector<float>& covered = checkpoint.floats("covered");

@@ -15,8 +15,8 @@ namespace hsi4d {
 struct StageTotals {
   Index iterations = 0;
   Index rollbacks = 0;
-  Index tiles = 0, pairs = 0, fragments = 0;  ///< rendered, over all iterations
   double seconds = 0;
+  Index tiles = 0, pairs = 0, fragments = 0;  ///< rendered, over all iterations
 };
 
 /// Everything that the next frame depends on, or that the end of the run tells.

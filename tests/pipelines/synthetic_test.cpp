@@ -56,6 +56,7 @@ const std::vector<std::string>& dataset_files() {
       "masks/watering_can/0002.png",
       "objects/watering_can.ply",
       "scene.ply",
+      "synthetic.json",
       "truth/cameras.json",
       "truth/motion.npz",
       "truth/objects.npz",
