@@ -54,7 +54,7 @@ RunProgress random_progress(const Clip& clip) {
   for (auto& stage : progress.after_stage) stage.push_back(random_state(random));
   progress.after_stage[1][1].body.axis_angle[7] = -0.0;
   progress.after_stage[1][1].body.axis_angle[8] = 5e-324;
-  progress.totals = {{30, 1, 9, 2065, 67984, 0.1}, {150, 0, 10, 3000, 80000, 1.0 / 3}};
+  progress.totals = {{30, 1, 0.1, 9, 2065, 67984}, {150, 0, 1.0 / 3, 10, 3000, 80000}};
   progress.image_errors.push_back({{"psnr_db", 30.123456789012345}, {"psnr_foreground_db", 20.5}, {"ssim", 0.9}});
   progress.covered(0, 3, 4) = 1;
   progress.seconds = 12.345;
