@@ -124,6 +124,7 @@ std::string gradients_command(const GradientsOptions& options) {
   check_ending(options.out, "hsi4d gradients: --out", {".npz"});
   check_ending(options.target, "hsi4d gradients: --target", target_endings());
   const SceneView view = view_of(options.shared, "hsi4d gradients");
+  check_writable(options.out);
   const std::vector<double> target = read_target(options.target, view.camera.height, view.camera.width);
   const PlyScene scene = read_scene(options.shared.scene);
   SceneGradients gradients = scene_gradients(scene.gaussians, view, target);

@@ -497,6 +497,33 @@ TEST_CASE("what is wrong with the options is told to the letter") {
         "hsi4d gradients: --target: t.jpg does not end as it must; allowed: .exr, .png, .npz");
 }
 
+TEST_CASE("a file that cannot be written is told before the work is done, and nothing is left behind") {
+  const Files files;
+  std::filesystem::create_directory("folder.npz");
+  for (const std::string out : {"missing/a.npz", "folder.npz"}) {
+    INFO(out);
+    NpzWriter npz;
+    npz.add<double>("image", {1, 1, 3}, {0, 0, 0});
+    const std::string message = fault([&] { npz.write(out); });
+    CHECK_THAT(message, StartsWith(out + ": cannot be written: "));
+    cli::RenderOptions render = render_options(out);
+    cli::GradientsOptions gradients = gradients_options(out);
+    CHECK(fault([&] { cli::render_command(render); }) == message);
+    CHECK(fault([&] { cli::gradients_command(gradients); }) == message);
+    render.shared.scene = gradients.shared.scene = "missing.ply";  // which is read later
+    CHECK(fault([&] { cli::render_command(render); }) == message);
+    CHECK(fault([&] { cli::gradients_command(gradients); }) == message);
+  }
+  const auto files_here = [] {
+    return std::distance(std::filesystem::directory_iterator("."), std::filesystem::directory_iterator());
+  };
+  const auto before = files_here();
+  cli::RenderOptions render = render_options("a.npz");
+  render.shared.scene = "missing.ply";
+  CHECK_THAT(fault([&] { cli::render_command(render); }), StartsWith("missing.ply: "));
+  CHECK(files_here() == before);
+}
+
 TEST_CASE("rows that are left out are told") {
   const Files files;
   std::string told;
