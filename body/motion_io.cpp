@@ -25,6 +25,15 @@ constexpr Part kParts[] = {
     {"pose_hand", "hand_pose", 25, 30, false},
 };
 
+/// Halves of a part, as SMPL-X names its parameters. Read where the whole part is not there.
+struct Half {
+  const char* name;
+  std::size_t joint, joints;
+};
+
+constexpr Half kHalves[] = {
+    {"leye_pose", 23, 1}, {"reye_pose", 24, 1}, {"left_hand_pose", 25, 15}, {"right_hand_pose", 40, 15}};
+
 /// What the numbers of a row of `poses` are: runs of joints, one after the other.
 struct RowLayout {
   const char* name;
@@ -94,15 +103,29 @@ void read_whole_poses(const NpyArray& array, Motion& motion) {
   throw DataError(array.source() + ": has shape " + shape_text(shape) + "; allowed: " + allowed);
 }
 
+void read_joints(const NpyArray& array, std::size_t first, std::size_t joints, Motion& motion) {
+  const Rows rows = rows_of(array, static_cast<int64_t>(motion.poses.size()), static_cast<int64_t>(3 * joints));
+  put_joints(rows, 0, first, joints, motion);
+}
+
+/// Reads those halves of a part that there are.
+void read_halves(const Npz& file, const Part& part, Motion& motion) {
+  for (const Half& half : kHalves) {
+    const bool is_of_part = half.joint >= part.joint && half.joint < part.joint + part.joints;
+    if (is_of_part && file.has(half.name)) read_joints(file.array(half.name), half.joint, half.joints, motion);
+  }
+}
+
 void read_parts(const Npz& file, Motion& motion) {
   for (const Part& part : kParts) {
     const NpyArray* array = find(file, {part.name, part.also});
-    if (array == nullptr && !part.needed) continue;
-    if (array == nullptr) {
+    if (array != nullptr) {
+      read_joints(*array, part.joint, part.joints, motion);
+    } else if (part.needed) {
       throw DataError(file.source() + ": there is neither 'poses' nor '" + part.name + "'");
+    } else {
+      read_halves(file, part, motion);
     }
-    const int64_t width = static_cast<int64_t>(3 * part.joints);
-    put_joints(rows_of(*array, static_cast<int64_t>(motion.poses.size()), width), 0, part.joint, part.joints, motion);
   }
 }
 

@@ -20,9 +20,12 @@ struct Motion {
 ///
 /// The rotations are `poses` [T,D]: D = 165 SMPL-X; 156 SMPL-H (body and hands; no jaw, no eyes); 72 SMPL (24 joints,
 /// of which the two hand joints are left out: they have no place in the other layouts). Or they are parts of
-/// `root_orient` [T,3] (or `global_orient`), `pose_body` [T,63] (or `body_pose`), `pose_jaw` [T,3], `pose_eye` [T,6],
-/// `pose_hand` [T,90]; parts that are not there are zero, but root_orient and pose_body must be there. `poses` wins
-/// where both are. The frame rate is `mocap_frame_rate` (or `mocap_framerate`); 10 where neither is there.
+/// `root_orient` [T,3] (or `global_orient`), `pose_body` [T,63] (or `body_pose`), `pose_jaw` [T,3] (or `jaw_pose`),
+/// `pose_eye` [T,6] (or `leye_pose` and `reye_pose` [T,3]), `pose_hand` [T,90] (or `left_hand_pose` and
+/// `right_hand_pose` [T,45]); parts that are not there are zero, either half of the eyes and the hands too, but
+/// root_orient and pose_body must be there. Where a file says a thing twice, `poses` wins over its parts, and
+/// `pose_eye` and `pose_hand` win over their halves. The frame rate is `mocap_frame_rate` (or `mocap_framerate`); 10
+/// where neither is there.
 ///
 /// Throws UserError when the file cannot be read; DataError naming file and array: an array missing, a shape that does
 /// not fit, no frame, a number that is not finite, a frame rate that is not positive.

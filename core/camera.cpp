@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include <Eigen/LU>
+
 #include "core/check.h"
 
 namespace hsi4d {
@@ -102,7 +104,7 @@ Matrix4<double> matrix_from_rigid(const Rigid<double>& transform) {
 }
 
 Vector3<double> camera_center_world(const Camera& camera) {
-  return -(camera.camera_from_world.rotation.transpose() * camera.camera_from_world.translation);
+  return -(camera.camera_from_world.rotation.inverse() * camera.camera_from_world.translation);
 }
 
 Rigid<double> look_at(const Vector3<double>& eye_world, const Vector3<double>& target_world,

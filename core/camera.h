@@ -40,7 +40,8 @@ Rigid<double> rigid_from_matrix(const Matrix4<double>& matrix, std::string_view 
 /// [R t; 0 0 0 1].
 Matrix4<double> matrix_from_rigid(const Rigid<double>& transform);
 
-/// Position of the camera in the world, c = −Rᵀ t, metres.
+/// Position of the camera in the world, c = −R⁻¹ t, metres: the point that camera_from_world takes to 0, also where R
+/// is orthonormal only to kRotationTolerance. Not finite where R has no inverse, which check_camera refuses.
 Vector3<double> camera_center_world(const Camera& camera);
 
 /// Pose that looks from `eye_world` to `target_world`, the image's top towards `up_world` (row C13).

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <memory>
 
+#include <Eigen/LU>
+
 #include "core/check.h"
 #include "core/config.h"
 #include "core/config_parse.h"
@@ -255,8 +257,11 @@ Camera camera_of(const NerfCamera& read, const std::string& pointer) {
   const std::string place = child_pointer(pointer, "transform_matrix");
   const Rigid<double> world_from_gl = rigid_from_matrix(matrix_of(read.transform_matrix), place);
   Camera camera = read.camera;
-  const Rigid<double> cv_from_gl = {Vector3<double>(1, -1, -1).asDiagonal(), Vector3<double>::Zero()};
-  camera.camera_from_world = compose(cv_from_gl, inverse(world_from_gl));
+  camera.camera_from_world = world_from_gl;
+  check_camera(camera, place);  // as the file has it, before it is inverted
+  const Matrix3<double> cv_from_gl = Vector3<double>(1, -1, -1).asDiagonal();
+  const Matrix3<double> rotation = cv_from_gl * world_from_gl.rotation.inverse();
+  camera.camera_from_world = {rotation, -(rotation * world_from_gl.translation)};
   check_camera(camera, place);
   return camera;
 }

@@ -105,6 +105,8 @@ template <class S>
 FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
                           const FrameGraphSettings& settings)
     : tape_(tape), settings_(settings), view_{clip.camera, clip.scene.origin_world, settings.render} {
+  // Objects and the body are recorded in the world, and one render has one origin: the scene's must be zero until they
+  // are recorded relative to it.
   HSI4D_CHECK(clip.scene.origin_world.isZero(0), "what moves is placed in the world, not relative to an origin");
   view_.camera.camera_from_world = camera_from_world;
   xi_from_update_ = camera_from_increment(settings.increment, view_.camera, clip.scene);

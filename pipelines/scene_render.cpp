@@ -51,8 +51,8 @@ struct TapedScene {
   TapedScene(const PosedGaussians& posed, const SceneView& scene_view, bool wants_depth) {
     const Gaussians& g = posed.gaussians;
     const Index n = g.count();
-    const SplatView view{scene_view.camera, g.origin_world, scene_view.settings};
-    means = leaf("means", shape_of(n, 3), posed_means(posed));
+    const SplatView view{scene_view.camera, origin_of(posed, scene_view.camera), scene_view.settings};
+    means = leaf("means", shape_of(n, 3), posed_means(posed, view.origin_world));
     quats = leaf("quats", shape_of(n, 4), cast<S>(g.quats));
     log_scales = leaf("log_scales", shape_of(n, 3), cast<S>(g.log_scales));
     logits = leaf("opacity_logits", shape_of(n, 1), cast<S>(g.opacity_logits));
@@ -78,16 +78,23 @@ struct TapedScene {
     return var;
   }
 
-  /// A m + a in double, rounded once.
-  static std::vector<S> posed_means(const PosedGaussians& posed) {
+  /// What the tape's means are relative to: transforms may put them anywhere in the world, so that the camera is the
+  /// one place from which what is seen is near (row A10).
+  static Vector3<double> origin_of(const PosedGaussians& posed, const Camera& camera) {
+    return posed.transforms.empty() ? posed.gaussians.origin_world : camera_center_world(camera);
+  }
+
+  /// A (m + o) + a − origin in double, rounded once; o is what m is relative to.
+  static std::vector<S> posed_means(const PosedGaussians& posed, const Vector3<double>& origin) {
     const Gaussians& g = posed.gaussians;
     std::vector<S> result = cast<S>(g.means);
     for (std::size_t n = 0; 12 * n < posed.transforms.size(); ++n) {
-      for (std::size_t r = 0; r < 3; ++r) {
-        const double* row = posed.transforms.data() + 12 * n + 4 * r;
-        double moved = row[3];
-        for (std::size_t c = 0; c < 3; ++c) moved += row[c] * static_cast<double>(g.means[3 * n + c]);
-        result[3 * n + r] = static_cast<S>(moved);
+      const double* rows = posed.transforms.data() + 12 * n;
+      const Vector3<double> mean = Vector3<float>(g.means.data() + 3 * n).cast<double>() + g.origin_world;
+      for (Index r = 0; r < 3; ++r) {
+        const double* row = rows + 4 * r;
+        const double moved = row[0] * mean[0] + row[1] * mean[1] + row[2] * mean[2] + (row[3] - origin[r]);
+        result[3 * n + static_cast<std::size_t>(r)] = static_cast<S>(moved);
       }
     }
     return result;

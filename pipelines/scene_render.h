@@ -20,7 +20,9 @@ inline constexpr std::array<ConfigChoice<Precision>, 3> kPrecisions = {
 /// Gaussians, and how each was moved from where its numbers put it.
 struct PosedGaussians {
   Gaussians gaussians;
-  std::vector<double> transforms;  ///< empty, or [N,12]: rows [3,4], applied to means and axes; not to SH directions
+  /// Empty, or [N,12]: rows [3,4], applied to axes and to means in the world (origin_world added); not to SH
+  /// directions.
+  std::vector<double> transforms;
 };
 
 /// From where, onto what, and how.

@@ -113,6 +113,7 @@ class Collector {
     resize(kept);
     scene_.report.rejected = scene_.report.rows - kept;
     scene_.report.rejections = rejections_.list();
+    repairs_.counts = {std::ssize(scene_.report.held_log_scales), std::ssize(scene_.report.held_opacity_logits)};
     scene_.report.repairs = repairs_.list();
     return std::move(scene_);
   }
@@ -136,20 +137,24 @@ class Collector {
     return -1;
   }
 
-  float held(float value, double limit, std::size_t repair) {
+  /// The number put at a place of an array; where it is beyond its limit it is held there, which `places` records.
+  static void put_held(float value, double limit, std::vector<float>& array, Index place, std::vector<Index>& places) {
     const float bound = static_cast<float>(limit);
     const float inside = std::clamp(value, -bound, bound);
-    if (inside != value) ++repairs_.counts[repair];
-    return inside;
+    if (inside != value) places.push_back(place);
+    array[static_cast<std::size_t>(place)] = inside;
   }
 
   void store(Index n) {
     Gaussians& g = scene_.gaussians;
     std::copy_n(row_.begin() + kMean, 3, g.means.begin() + 3 * n);
     std::copy_n(row_.begin() + kQuat, 4, g.quats.begin() + 4 * n);
-    for (std::size_t c = 0; c < 3; ++c)
-      g.log_scales[static_cast<std::size_t>(3 * n) + c] = held(row_[kScale + c], kLogScaleLimit, 0);
-    g.opacity_logits[static_cast<std::size_t>(n)] = held(row_[kOpacity], kOpacityLogitLimit, 1);
+    PlyReport& report = scene_.report;
+    for (Index c = 0; c < 3; ++c) {
+      const float value = row_[kScale + static_cast<std::size_t>(c)];
+      put_held(value, kLogScaleLimit, g.log_scales, 3 * n + c, report.held_log_scales);
+    }
+    put_held(row_[kOpacity], kOpacityLogitLimit, g.opacity_logits, n, report.held_opacity_logits);
     const auto k_count = static_cast<std::size_t>(coefficients_);
     float* sh = g.sh.data() + 3 * coefficients_ * n;
     for (std::size_t c = 0; c < 3; ++c) {

@@ -25,6 +25,8 @@ struct PlyReport {
   std::vector<std::pair<std::string, Index>> rejections;  ///< reason, rows; a row counts under its first reason
   std::vector<std::pair<std::string, Index>> repairs;     ///< what was put right, numbers
   std::vector<Index> row_of;                              ///< the file's row of every kept Gaussian, ascending
+  std::vector<Index> held_log_scales;      ///< places in log_scales [N,3] of numbers held at a limit, ascending
+  std::vector<Index> held_opacity_logits;  ///< places in opacity_logits [N] of such numbers, ascending
 };
 
 /// "12 of 340 Gaussians are left out (a mean that is not finite: 2, ...); held: ...", or nothing without cause.

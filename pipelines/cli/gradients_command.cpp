@@ -69,6 +69,12 @@ std::vector<double> at_file_rows(const std::vector<double>& kept, const PlyRepor
   return all;
 }
 
+/// A number that the reader held at a limit does not move what is drawn (row A5).
+void zero_held(SceneGradients& g, const PlyReport& report) {
+  for (const Index i : report.held_log_scales) g.log_scales[static_cast<std::size_t>(i)] = 0;
+  for (const Index i : report.held_opacity_logits) g.opacity_logits[static_cast<std::size_t>(i)] = 0;
+}
+
 void write_gradients(const std::string& path, const SceneGradients& g, const PlyScene& scene, Precision precision) {
   const Index n = scene.report.rows, k = scene.gaussians.sh_coefficients();
   const Index height = g.rendered.height, width = g.rendered.width;
@@ -118,9 +124,11 @@ std::string gradients_command(const GradientsOptions& options) {
   check_ending(options.out, "hsi4d gradients: --out", {".npz"});
   check_ending(options.target, "hsi4d gradients: --target", target_endings());
   const SceneView view = view_of(options.shared, "hsi4d gradients");
+  check_writable(options.out);
   const std::vector<double> target = read_target(options.target, view.camera.height, view.camera.width);
   const PlyScene scene = read_scene(options.shared.scene);
-  const SceneGradients gradients = scene_gradients(scene.gaussians, view, target);
+  SceneGradients gradients = scene_gradients(scene.gaussians, view, target);
+  zero_held(gradients, scene.report);
   write_gradients(options.out, gradients, scene, view.precision);
   return options.out + ": loss " + number_text(gradients.loss) + ", gradients of " +
          std::to_string(scene.gaussians.count()) + " Gaussians and the camera\n";

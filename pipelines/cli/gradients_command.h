@@ -20,8 +20,8 @@ struct GradientsOptions {
 ///   sh [N,K,3]   camera [6]
 ///
 /// where all but the first three are derivatives of the loss. Rows are those of the scene's file; rows that its reader
-/// rejects have gradient 0. The loss is float64; the arrays are float32 for --precision float, else float64. The
-/// derivative by a number that the reader held is that at the number held. Returns what the command prints.
+/// rejects have gradient 0, and so have log-scales and opacity logits that it held at a limit. The loss is float64; the
+/// arrays are float32 for --precision float, else float64. Returns what the command prints.
 ///
 /// Throws UserError or DataError with one message for whatever is wrong with options and files.
 std::string gradients_command(const GradientsOptions& options);

@@ -57,6 +57,7 @@ void write_npz(const std::string& path, const SceneImage& rendered, Precision pr
 std::string render_command(const RenderOptions& options) {
   check_options(options);
   const SceneView view = view_of(options.shared, "hsi4d render");
+  check_writable(options.out);
   const PosedGaussians scene = read_all(options);
   const SceneImage rendered = render_scene(scene, view);
   if (check_ending(options.out, "hsi4d render: --out", {".png", ".exr", ".npz"}) == ".npz") {

@@ -7,6 +7,7 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/config_file.h"
+#include "core/file.h"
 #include "core/log.h"
 #include "core/suggest.h"
 #include "pipelines/cli/text.h"
@@ -91,5 +92,7 @@ std::string check_ending(const std::string& path, const std::string& where, cons
   if (std::find(allowed.begin(), allowed.end(), ending) != allowed.end()) return ending;
   throw UserError(where + ": " + path + " does not end as it must; allowed: " + joined(allowed));
 }
+
+void check_writable(const std::string& path) { const AtomicFile trial(path); }
 
 }  // namespace hsi4d::cli

@@ -44,4 +44,8 @@ void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, c
 /// Throws UserError unless the path ends in one of `allowed`. Returns the ending.
 std::string check_ending(const std::string& path, const std::string& where, const std::vector<std::string>& allowed);
 
+/// Throws UserError, as writing does, unless a file can be written there; tried before the work is done. What is there
+/// stays as it is.
+void check_writable(const std::string& path);
+
 }  // namespace hsi4d::cli

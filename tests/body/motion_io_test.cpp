@@ -174,3 +174,55 @@ TEST_CASE("faults of motion files are named") {
   CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{0, {rest_pose(55)}}), InternalError);
   CHECK(folder.count() == 0);
 }
+
+TEST_CASE("eyes and hands are also read as the halves that SMPL-X names") {
+  const auto with = [](const std::function<void(NpzWriter&)>& add_more) {
+    return [add_more](NpzWriter& f) {
+      f.add<double>("transl", {2, 3}, counted(2, 3));
+      f.add<double>("global_orient", {2, 3}, counted(2, 3));
+      f.add<double>("body_pose", {2, 63}, counted(2, 63));
+      add_more(f);
+    };
+  };
+  const auto halves = [](NpzWriter& f) {
+    f.add<double>("leye_pose", {2, 3}, {1, 2, 3, 4, 5, 6});
+    f.add<double>("reye_pose", {2, 3}, {7, 8, 9, 10, 11, 12});
+    f.add<double>("left_hand_pose", {2, 45}, counted(2, 45));
+    Numbers right = counted(2, 45);
+    for (double& x : right) x += 1000;
+    f.add<double>("right_hand_pose", {2, 45}, right);
+  };
+  const Motion motion = decoded(with(halves));
+  for (std::size_t t = 0; t < 2; ++t) {
+    const Numbers& pose = motion.poses[t].axis_angle;
+    for (std::size_t i = 0; i < 3; ++i) {
+      CHECK(pose[66 + i] == 0);  // the jaw
+      CHECK(pose[69 + i] == static_cast<double>(3 * t + i + 1));
+      CHECK(pose[72 + i] == static_cast<double>(3 * t + i + 7));
+    }
+    for (std::size_t i = 0; i < 45; ++i) {
+      CHECK(pose[75 + i] == static_cast<double>(45 * t + i + 1));
+      CHECK(pose[120 + i] == static_cast<double>(45 * t + i + 1001));
+    }
+  }
+  SECTION("one half is enough; the other is zero") {
+    const Motion left = decoded(with([](NpzWriter& f) { f.add<double>("left_hand_pose", {2, 45}, counted(2, 45)); }));
+    CHECK(left.poses[1].axis_angle[75] == 46);
+    CHECK(left.poses[1].axis_angle[120] == 0);
+    CHECK(left.poses[1].axis_angle[69] == 0);
+  }
+  SECTION("a whole part wins") {
+    const Motion both = decoded(with([halves](NpzWriter& f) {
+      halves(f);
+      f.add<double>("pose_hand", {2, 90}, Numbers(180, -1));
+      f.add<double>("pose_eye", {2, 6}, Numbers(12, -2));
+    }));
+    for (std::size_t i = 69; i < 165; ++i) CHECK(both.poses[0].axis_angle[i] == (i < 75 ? -2 : -1));
+  }
+  SECTION("a half of another shape is refused") {
+    const auto narrow = with([](NpzWriter& f) { f.add<double>("right_hand_pose", {2, 6}, counted(2, 6)); });
+    CHECK(message_for(narrow) == "m.npz: array 'right_hand_pose': has shape [2,6]; [2,45] is needed");
+    const auto infinite = with([](NpzWriter& f) { f.add<double>("reye_pose", {2, 3}, {0, 0, 0, 0, INFINITY, 0}); });
+    CHECK(message_for(infinite) == "m.npz: array 'reye_pose': frame 1, number 1 is not finite");
+  }
+}

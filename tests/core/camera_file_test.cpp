@@ -1,9 +1,13 @@
 #include "core/camera_file.h"
 
+#include <array>
+#include <charconv>
+
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
 #include "core/file.h"
+#include "core/rotation.h"
 #include "tests/temporary_folder.h"
 
 using namespace hsi4d;
@@ -35,6 +39,12 @@ std::string with_matrix(const std::string& matrix, const std::string& more = "")
          more + "}";
 }
 const std::string kIdentity = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]";
+
+/// In as many digits as give the same number back.
+std::string precise(double value) {
+  std::array<char, 32> buffer;
+  return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
+}
 
 std::string fault(const std::string& text) {
   try {
@@ -143,6 +153,29 @@ TEST_CASE("nerfstudio's transforms are turned from OpenGL to OpenCV axes") {
   CHECK(transform_point(cameras[1].camera_from_world, Vector3<double>(0, 0, 7)) == Vector3<double>(0, 0, 2));
 }
 
+TEST_CASE("a pose whose matrix is off by what is allowed is inverted, not transposed") {
+  // Far away, so that 5e-5 of the rotation are 5 cm of the place.
+  const Vector3<double> center(600, -800, 20);
+  Matrix3<double> rotation = so3_exp(Vector3<double>(0.3, -1.1, 0.4));
+  rotation(0, 0) += 5e-5;
+  rotation(1, 2) -= 3e-5;
+  std::string rows;
+  for (int r = 0; r < 3; ++r) {
+    rows += "[";
+    for (int c = 0; c < 3; ++c) rows += precise(rotation(r, c)) + ", ";
+    rows += precise(center[r]) + "], ";
+  }
+  const Camera camera =
+      decode_cameras(R"({"w": 8, "h": 6, "fl_x": 7, "fl_y": 7, "cx": 4, "cy": 3, "frames": [{"transform_matrix": [)" +
+                         rows + "[0, 0, 0, 1]]}]}",
+                     "c.json")[0];
+  CHECK((camera_center_world(camera) - center).norm() < 1e-10);
+  CHECK(transform_point(camera.camera_from_world, center).norm() < 1e-10);
+  // A point of OpenGL's camera goes to the world by the file's matrix, and back to where OpenCV's axes have it.
+  const Vector3<double> world = rotation * Vector3<double>(1, 2, -300) + center;
+  CHECK((transform_point(camera.camera_from_world, world) - Vector3<double>(1, -2, 300)).norm() < 1e-9);
+}
+
 TEST_CASE("transforms that cannot be used are refused") {
   const auto transforms = [](const std::string& top, const std::string& frame) {
     return "{" + top + "\"h\": 6, \"fl_x\": 7, \"fl_y\": 7, \"cx\": 4, \"cy\": 3, \"frames\": [\n{" + frame +
@@ -163,6 +196,10 @@ TEST_CASE("transforms that cannot be used are refused") {
         "2 problems in c.json:\nc.json:1: /frames/0: the key \"transform_matrix\" is missing; allowed: 4 rows of 4 "
         "numbers\n"
         "c.json:1: /frames/1: 3 is a number, not an object");
+  CHECK(fault(R"({"w": 1, "h": 1, "fl_x": 1, "fl_y": 1, "cx": 0, "cy": 0, "frames": [{"transform_matrix":
+        [[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]})") ==
+        "c.json:1: /frames/0/transform_matrix: the rotation R is not orthonormal: |R R^T - I| is 1; allowed: at most "
+        "1e-04");
   CHECK(fault(R"({"w": "8", "frames": {}})") ==
         "2 problems in c.json:\nc.json:1: /w: \"8\" is a string, not a whole number; allowed: 1 to 65536\n"
         "c.json:1: /frames: {} is an object, not an array");

@@ -71,6 +71,20 @@ TEST_CASE("a 4x4 matrix gives the transform; its last row is checked") {
   CHECK_THROWS_WITH(rigid_from_matrix(matrix), "world_to_camera: matrix[0][3] is inf; allowed: a finite number");
 }
 
+TEST_CASE("the camera's centre is the point that its pose takes to zero, whatever the rotation is off by") {
+  Camera camera = test_camera();
+  camera.camera_from_world = look_at({600, -800, 20}, {0, 1, 2});
+  camera.camera_from_world.rotation(0, 1) += 5e-5;
+  camera.camera_from_world.rotation(2, 2) -= 2e-5;
+  check_camera(camera);
+  const Vector3<double> center = camera_center_world(camera);
+  CHECK(transform_point(camera.camera_from_world, center).norm() < 1e-10);
+  CHECK((center - Vector3<double>(600, -800, 20)).norm() > 1e-3);
+  const Vector3<double> world(1, 2, 3);
+  CHECK((point_in_view(view_of<double>(camera), world) - transform_point(camera.camera_from_world, world)).norm() <
+        1e-10);
+}
+
 TEST_CASE("look_at: z forward, x right, y down in a z-up world") {
   const Rigid<double> pose = look_at({1, 2, 3}, {1, 12, 3});
   CHECK((transform_point(pose, Vector3<double>(1, 12, 3)) - Vector3<double>(0, 0, 10)).norm() < 1e-14);

@@ -1,5 +1,6 @@
 #include "pipelines/posed_avatar.h"
 
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -137,4 +138,99 @@ TEST_CASE("render draws a body of a motion, in every precision") {
                                            "motion.npz", "--avatar", "avatar.npz", "--frame", "2", "--out", "a.png"});
   CHECK(outside.status == 2);
   CHECK(outside.err == "hsi4d render: --frame: motion.npz has no frame 2; allowed: 0 to 1\n");
+}
+
+namespace {
+
+/// The largest difference of two images' numbers.
+double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  REQUIRE(a.size() == b.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::fabs(a[i] - b[i]));
+  return largest;
+}
+
+Camera camera_at(const Vector3<double>& place) {
+  Camera camera;
+  camera.width = 40;
+  camera.height = 60;
+  camera.fx = camera.fy = 60;
+  camera.cx = 20;
+  camera.cy = 30;
+  camera.camera_from_world = look_at(place, place + Vector3<double>(0.1, 3, 0.2));
+  return camera;
+}
+
+}  // namespace
+
+TEST_CASE("a body looks the same wherever in the world it is, in float too (row A10)") {
+  const TemporaryFolder folder;
+  write_avatar("avatar.npz", surface_avatar(procedural_body(), {.gaussians = 400}));
+  cli::RenderOptions options;
+  options.shared.scene = "ball.ply";
+  options.shared.camera = "camera.json";
+  options.shared.settings = {"render.quality=reference"};  // no cuts, which the last bit of a number may decide
+  options.motion = "motion.npz";
+  options.avatar = "avatar.npz";
+  options.out = "a.npz";
+  const auto rendered = [&](double distance, const char* precision) {
+    const Vector3<double> shift(distance, -distance, 0.5 * distance);
+    Motion motion;
+    motion.poses = {rest_pose(55)};
+    motion.poses[0].set_rotation(0, {std::acos(-1.0) / 2, 0, 0});
+    motion.poses[0].set_rotation(16, {0, 0, -0.9});
+    motion.poses[0].transl = shift + Vector3<double>(0.1, 0, 0);
+    write_motion("motion.npz", motion);
+    write_camera("camera.json", camera_at(shift + Vector3<double>(0, -3, 0)));
+    Gaussians ball;
+    for (int i = 0; i < 3; ++i) {
+      const double place = std::array{0.5, -0.5, 0.25}[static_cast<std::size_t>(i)] + shift[i];
+      ball.means.push_back(static_cast<float>(place));
+      REQUIRE(static_cast<double>(ball.means.back()) == place);  // a file has floats: these are exact
+    }
+    ball.quats = {1, 0, 0, 0};
+    ball.log_scales = {-2, -2, -2};
+    ball.opacity_logits = {3};
+    ball.sh_degree = 1;
+    ball.sh.assign(12, 0.5F);
+    write_ply("ball.ply", ball);
+    options.shared.precision = precision;
+    cli::render_command(options);
+    return Npz::read("a.npz").array("image").as<double>();
+  };
+  const std::vector<double> reference = rendered(0, "reference");
+  CHECK(std::accumulate(reference.begin(), reference.end(), 0.0) / static_cast<double>(reference.size()) > 0.03);
+  for (const double distance : {0.0, 1e2, 1e4, 1e6}) {
+    INFO(distance);
+    CHECK(largest_difference(rendered(distance, "float"), reference) <= 1e-4);
+    CHECK(largest_difference(rendered(distance, "double"), reference) <= 1e-7);
+    CHECK(largest_difference(rendered(distance, "reference"), reference) <= 1e-7);
+  }
+}
+
+TEST_CASE("transforms act in the world, whatever the means are relative to") {
+  PosedGaussians posed = posed_avatar(two_bones(), [] {
+    BodyPose pose = rest_pose(2);
+    pose.set_rotation(0, {0.2, -0.4, 0.3});
+    pose.set_rotation(1, {0, 0, 1.1});
+    return pose;
+  }());
+  SceneView view{camera_at({0.7, -3, 0.2}), {0.1, 0.2, 0.3}, cli::render_settings({"render.quality=reference"}), {}};
+  const auto rendered = [&](Precision precision) {
+    view.precision = precision;
+    return render_scene(posed, view).image;
+  };
+  const std::vector<double> at_zero = rendered(Precision::kReference);
+  posed.gaussians.origin_world = {64, -256, 32};
+  for (std::size_t i = 0; i < posed.gaussians.means.size(); ++i)
+    posed.gaussians.means[i] -= static_cast<float>(posed.gaussians.origin_world[static_cast<Index>(i % 3)]);
+  CHECK(largest_difference(at_zero, std::vector<double>(at_zero.size())) > 0.3);
+  CHECK(largest_difference(rendered(Precision::kReference), at_zero) < 1e-9);
+  CHECK(largest_difference(rendered(Precision::kDouble), at_zero) < 1e-9);
+  CHECK(largest_difference(rendered(Precision::kFloat), at_zero) < 1e-5);
+  posed.transforms.clear();
+  posed.gaussians.means[7] += 0.125F;  // at rest two are equally deep, and rounding would order them
+  const std::vector<double> still = rendered(Precision::kReference);
+  CHECK(largest_difference(rendered(Precision::kDouble), still) < 1e-9);
+  CHECK(largest_difference(rendered(Precision::kFloat), still) < 1e-4);
 }

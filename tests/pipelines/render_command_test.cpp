@@ -268,6 +268,40 @@ TEST_CASE("gradients come at the file's rows, zero for rejected ones") {
   }
 }
 
+TEST_CASE("numbers that were held at a limit have gradient zero, at the file's rows") {
+  const Files files;
+  Gaussians g = test_gaussians();
+  g.means[3 * kRejected] = NAN;
+  g.log_scales[3 * 2 + 1] = -25;
+  g.log_scales[3 * 6 + 2] = -20;  // at the limit, and as it is in the file
+  g.opacity_logits[5] = INFINITY;
+  g.opacity_logits[7] = 20;
+  write_ply("scene.ply", g);
+  Gaussians inside = g;  // what the reader makes of it
+  inside.log_scales[3 * 2 + 1] = -20;
+  inside.opacity_logits[5] = 20;
+  write_ply("inside.ply", inside);
+  for (const char* word : kWords) {
+    INFO(word);
+    cli::GradientsOptions options = gradients_options("g.npz", word);
+    cli::gradients_command(options);
+    options.shared.scene = "inside.ply";
+    options.out = "inside.npz";
+    cli::gradients_command(options);
+    const std::vector<double> scales = numbers("g.npz", "log_scales"),
+                              inside_scales = numbers("inside.npz", "log_scales");
+    const std::vector<double> logits = numbers("g.npz", "opacity_logits"),
+                              inside_logits = numbers("inside.npz", "opacity_logits");
+    for (std::size_t i = 0; i < scales.size(); ++i) CHECK(scales[i] == (i == 3 * 2 + 1 ? 0 : inside_scales[i]));
+    for (std::size_t i = 0; i < logits.size(); ++i) CHECK(logits[i] == (i == 5 ? 0 : inside_logits[i]));
+    CHECK(inside_scales[3 * 2 + 1] != 0);
+    CHECK(inside_logits[5] != 0);
+    CHECK(logits[7] != 0);
+    for (const char* name : {"loss", "means", "quats", "sh", "camera"})
+      CHECK(numbers("g.npz", name) == numbers("inside.npz", name));
+  }
+}
+
 TEST_CASE("gradients' loss is the mean squared difference of the image that render writes") {
   const Files files;
   for (const char* word : kWords) {
@@ -461,6 +495,33 @@ TEST_CASE("what is wrong with the options is told to the letter") {
   options.target = "t.jpg";
   CHECK(fault([&] { cli::gradients_command(options); }) ==
         "hsi4d gradients: --target: t.jpg does not end as it must; allowed: .exr, .png, .npz");
+}
+
+TEST_CASE("a file that cannot be written is told before the work is done, and nothing is left behind") {
+  const Files files;
+  std::filesystem::create_directory("folder.npz");
+  for (const std::string out : {"missing/a.npz", "folder.npz"}) {
+    INFO(out);
+    NpzWriter npz;
+    npz.add<double>("image", {1, 1, 3}, {0, 0, 0});
+    const std::string message = fault([&] { npz.write(out); });
+    CHECK_THAT(message, StartsWith(out + ": cannot be written: "));
+    cli::RenderOptions render = render_options(out);
+    cli::GradientsOptions gradients = gradients_options(out);
+    CHECK(fault([&] { cli::render_command(render); }) == message);
+    CHECK(fault([&] { cli::gradients_command(gradients); }) == message);
+    render.shared.scene = gradients.shared.scene = "missing.ply";  // which is read later
+    CHECK(fault([&] { cli::render_command(render); }) == message);
+    CHECK(fault([&] { cli::gradients_command(gradients); }) == message);
+  }
+  const auto files_here = [] {
+    return std::distance(std::filesystem::directory_iterator("."), std::filesystem::directory_iterator());
+  };
+  const auto before = files_here();
+  cli::RenderOptions render = render_options("a.npz");
+  render.shared.scene = "missing.ply";
+  CHECK_THAT(fault([&] { cli::render_command(render); }), StartsWith("missing.ply: "));
+  CHECK(files_here() == before);
 }
 
 TEST_CASE("rows that are left out are told") {

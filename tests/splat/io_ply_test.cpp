@@ -233,6 +233,10 @@ TEST_CASE("exponents that would overflow are held and counted") {
   CHECK(scene.gaussians.log_scales[1] == -20);
   CHECK(scene.gaussians.log_scales[2] == 20);
   CHECK(summary_text(scene.report) == "log-scales held within ±20: 2, opacity logits held within ±20: 4");
+  CHECK(scene.report.held_log_scales == std::vector<Index>{0, 2});
+  CHECK(scene.report.held_opacity_logits == std::vector<Index>{0, 1, 3, 4});
+  g.means[3] = kInf;  // the second row is left out: places are those of what is kept
+  CHECK(decode_ply(encode_ply(g), "a.ply").report.held_opacity_logits == std::vector<Index>{0, 2, 3});
 }
 
 TEST_CASE("what is wrong with a PLY file is told to the letter") {
