@@ -12,6 +12,7 @@
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
 #include "splat/covariance.h"
+#include "splat/opacity.h"
 #include "splat/sh.h"
 
 namespace hsi4d {
@@ -164,7 +165,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Clip& clip) {
   const Var<S> scales = leaf("scene_log_scales", "scene log_scales", n, 3, g.log_scales.data());
   const Var<S> logits = leaf("scene_opacity_logits", "scene opacity_logits", n, 1, g.opacity_logits.data());
   const Var<S> sh = leaf("scene_sh", "scene sh", n, 3 * g.sh_coefficients(), g.sh.data());
-  return {{means, gaussian_axes(quats, scales), sigmoid(logits), sh_colors(sh, means, xi_, view_)}, n};
+  return {{means, gaussian_axes(quats, scales), gaussian_opacities(logits), sh_colors(sh, means, xi_, view_)}, n};
 }
 
 template <class S>
@@ -185,7 +186,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
   const Var<S> transform = rigid_rows(rotation, transl);
   const Var<S> means = matmul(centred, transpose(reshape(rotation, 3, 3))) + transl;
   const Var<S> axes = transform_axes(transform, gaussian_axes(quats, scales));
-  return {{means, axes, sigmoid(logits), sh_colors(sh, means, xi_, view_, transform)}, n};
+  return {{means, axes, gaussian_opacities(logits), sh_colors(sh, means, xi_, view_, transform)}, n};
 }
 
 template <class S>
@@ -207,7 +208,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
   const PosedSkeleton<S> skeleton = kinematic_chain(rotations, transl_, avatar.parents, avatar.joints);
   const Var<S> blended = blend_transforms(SkinWeights<S>(avatar.weights), skeleton.transforms);
   const Var<S> means = transform_points(blended, rest);
-  return {{means, transform_axes(blended, gaussian_axes(quats, scales)), sigmoid(logits), colors}, n};
+  return {{means, transform_axes(blended, gaussian_axes(quats, scales)), gaussian_opacities(logits), colors}, n};
 }
 
 template <class S>

@@ -6,6 +6,7 @@
 #include "core/check.h"
 #include "core/parallel.h"
 #include "splat/covariance.h"
+#include "splat/opacity.h"
 #include "splat/reference.h"
 #include "splat/render.h"
 #include "splat/sh.h"
@@ -66,7 +67,7 @@ struct TapedScene {
       tape.set(transforms, std::vector<S>(posed.transforms.begin(), posed.transforms.end()));
       axes = transform_axes(transforms, axes);
     }
-    const SplatInputs<S> inputs{means, axes, sigmoid(logits), sh_colors(sh, means, xi, view)};
+    const SplatInputs<S> inputs{means, axes, gaussian_opacities(logits), sh_colors(sh, means, xi, view)};
     RenderRequest request;
     request.depth = wants_depth;
     rendered = render(inputs, xi, background, view, request);

@@ -7,7 +7,7 @@
 namespace hsi4d {
 
 /// Alpha is held at or below this. 1 − 2⁻¹² leaks less than a sixteenth of an 8-bit step through an opaque Gaussian,
-/// and leaves room for a backward pass that divides T by 1 − α (stability B2, B16).
+/// (stability B16).
 inline constexpr double kAlphaCap = 1.0 - 1.0 / 4096;
 /// No cap: for a backward pass that does not divide, as ours.
 inline constexpr double kNoAlphaCap = 1.0;
@@ -21,6 +21,10 @@ inline constexpr double kAlphaMinAccurate = 1e-5;
 inline constexpr double kTransmittanceStop = 1e-4;
 inline constexpr double kTransmittanceStopFast = 1e-3;
 inline constexpr double kTransmittanceStopAccurate = 1e-7;
+
+/// No gradient flows through a normalised depth where Σ w is at or below this: 1/Σ w, on its way back through the
+/// compositor, has to stay far from float's largest number (stability B14).
+inline constexpr double kLeastDepthWeight = 1e-8;
 
 /// Variance of the low-pass filter added to every projected covariance, pixels².
 inline constexpr double kBlur = 0.3;

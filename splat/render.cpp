@@ -6,6 +6,7 @@
 #include "autodiff/matrix.h"
 #include "core/parallel.h"
 #include "core/simd.h"
+#include "splat/limits.h"
 
 namespace hsi4d {
 
@@ -76,11 +77,13 @@ struct AddBackground {
   }
 };
 
-/// E = D/A, 0 where A = 0; D and A are planes of the channels.
+/// E = D/A, 0 where A = 0; D and A are planes of the channels. No gradient where A is too small for 1/A (row B14).
 template <class S>
 struct NormalizedDepth {
   static constexpr const char* kName = "normalized_depth";
   Index sum_plane, weight_plane;
+
+  static bool has_gradient(S weight) { return weight > S(kLeastDepthWeight); }
 
   void forward(NodeIo<S>& io) {
     const ConstArray<S> channels = io.in(0);
@@ -104,7 +107,7 @@ struct NormalizedDepth {
       for (Index r = begin; r < end; ++r) {
         for (Index x = 0; x < depth.shape.cols; ++x) {
           const S weight = channels(weight_plane, r, x);
-          if (!(weight > S(0))) continue;
+          if (!has_gradient(weight)) continue;
           const S d_sum = g(r, x) / weight;
           d_channels(sum_plane, r, x) += d_sum;
           d_channels(weight_plane, r, x) -= d_sum * depth(r, x);
@@ -116,7 +119,10 @@ struct NormalizedDepth {
   void add_signature(Signature& signature, NodeIo<S>& io) {
     const ConstArray<S> channels = io.in(0);
     for (Index r = 0; r < channels.shape.rows; ++r) {
-      for (Index x = 0; x < channels.shape.cols; ++x) signature.add(channels(weight_plane, r, x) > S(0) ? 1 : 2);
+      for (Index x = 0; x < channels.shape.cols; ++x) {
+        const S weight = channels(weight_plane, r, x);
+        signature.add(has_gradient(weight) ? 1 : weight > S(0) ? 2 : 3);
+      }
     }
   }
 };

@@ -37,8 +37,8 @@ struct Rendered {
 ///
 /// @param xi          [1,6] (translation, rotation) in the camera's frame, see splat/view.h
 /// @param background  [1,3] colour behind everything
-/// Adjoint: all inputs; see project and composite for where it stops. The depth is not differentiable where Σ w = 0,
-/// and has no gradient there (row B14). Throws InternalError when the shapes do not fit or a group is out of range.
+/// Adjoint: all inputs; see project and composite for where it stops. The depth has no gradient where Σ w ≤
+/// kLeastDepthWeight (row B14). Throws InternalError when the shapes do not fit or a group is out of range.
 template <class S>
 Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, const SplatView& view,
                    const RenderRequest& request = {}, Source where = Source::current());

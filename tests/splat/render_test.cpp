@@ -1,6 +1,7 @@
 #include "splat/render.h"
 
 #include <cmath>
+#include <limits>
 
 #include "autodiff/elementwise.h"
 #include "core/parallel.h"
@@ -202,6 +203,71 @@ TEST_CASE("depth is the weighted mean, whatever the weight [B14]") {
   }
 }
 
+TEST_CASE("depth has finite gradients at any opacity and distance [B14]") {
+  for (const double opacity : {0., 1e-30, 1e-8, 1e-4, 0.5, 1.}) {
+    for (const double z : {2.5, 30., 1e3}) {
+      SplatScene scene;
+      scene.camera = plain_camera({17, 17});
+      apply_quality(scene.settings, Quality::kReference);
+      const double logit = opacity <= 0   ? -std::numeric_limits<double>::infinity()
+                           : opacity >= 1 ? std::numeric_limits<double>::infinity()
+                                          : std::log(opacity / (1 - opacity));
+      scene.add({0, 0, z}, 0.08 * z, logit, {0.5, 0.5, 0.5});
+      scene.add({0.05 * z, 0, 1.1 * z}, 0.1 * z, logit, {0.2, 0.7, 0.4});
+      RenderRequest request;
+      request.depth = true;
+      INFO("opacity " << opacity << ", z " << z);
+      const auto check = [&]<class S>(S) {
+        TapedSplats<S> taped(scene, cotangent_of(scene.camera, 0, true), request);
+        taped.run();
+        for (const double depth : taped.value(taped.rendered.depth)) {
+          CHECK((depth == 0 || (depth >= z * (1 - 1e-5) && depth <= 1.1 * z * (1 + 1e-5))));
+        }
+        for (const NamedNumbers& g : taped.gradients()) {
+          INFO("gradient of " << g.name);
+          CHECK(std::all_of(g.numbers.begin(), g.numbers.end(), [](double x) { return std::isfinite(x); }));
+        }
+      };
+      check(float());
+      check(double());
+    }
+  }
+}
+
+TEST_CASE("a weight too small to divide by passes no gradient of the depth, one above it does [B14]") {
+  for (const double factor : {0.9, 1.1}) {
+    SplatScene scene;
+    scene.camera = plain_camera({1, 1});
+    apply_quality(scene.settings, Quality::kReference);
+    scene.add({0, 0, 2.5}, 1, std::log(factor * kLeastDepthWeight), {0.5, 0.5, 0.5});
+    RenderRequest request;
+    request.depth = true;
+    SplatCotangent depth_alone;
+    depth_alone.depth = {1};
+    depth_alone.image = {0, 0, 0};
+    TapedSplats<double> taped(scene, depth_alone, request);
+    taped.run();
+    CHECK(taped.value(taped.rendered.depth)[0] == Approx(2.5));
+    CHECK(taped.gradient(taped.means)[2] == Approx(factor < 1 ? 0.0 : 1.0));
+  }
+}
+
+TEST_CASE("opacities pass the operator checks, and a logit that is NaN has gradient 0 [B15]") {
+  check_operator("gaussian_opacities", {{"logits", shape_of(37, 1), -9, 9}},
+                 [](const auto& in) { return gaussian_opacities(in[0]); });
+  Tape<float> tape;
+  const Var<float> logits = tape.parameter("logits", shape_of(4, 1));
+  const float inf = std::numeric_limits<float>::infinity();
+  tape.set(logits, std::vector<float>{std::nanf(""), inf, -inf, 20});
+  const Var<float> opacities = gaussian_opacities(logits);
+  tape.forward(opacities);
+  tape.backward(opacities, std::vector<float>(4, 1));
+  const ConstArray<float> o = tape.value(opacities), d = tape.gradient(logits);
+  CHECK((std::isnan(o(0, 0)) && o(1, 0) == 1 && o(2, 0) == 0));
+  CHECK((d(0, 0) == 0 && d(1, 0) == 0 && d(2, 0) == 0));
+  CHECK(d(3, 0) == Approx(std::exp(-20.)));
+}
+
 TEST_CASE("broken numbers leave no trace in float: finite image, finite gradients [A4, A5]") {
   for (const SettingsVariant& variant : settings_variants()) {
     SplatScene scene = broken_numbers(13, {48, 32});
@@ -212,8 +278,8 @@ TEST_CASE("broken numbers leave no trace in float: finite image, finite gradient
     for (const double x : taped.value(taped.rendered.image)) CHECK(std::isfinite(x));
     for (const NamedNumbers& g : taped.gradients()) {
       for (std::size_t i = 0; i < g.numbers.size(); ++i) {
-        if (g.name == "opacity_logits" && std::isnan(scene.opacity_logits[i])) continue;  // the sigmoid's own
         CHECK(std::isfinite(g.numbers[i]));
+        if (g.name == "opacity_logits" && std::isnan(scene.opacity_logits[i])) CHECK(g.numbers[i] == 0);
       }
     }
   }

@@ -11,6 +11,7 @@
 #include "autodiff/reduce.h"
 #include "body/skinning.h"
 #include "splat/covariance.h"
+#include "splat/opacity.h"
 #include "splat/render.h"
 #include "splat/sh.h"
 #include "tests/support/splat_scenes.h"
@@ -164,7 +165,7 @@ class TapedSplats {
       placed = transform_points(transforms, means);
       axes = transform_axes(transforms, axes);
     }
-    rendered = render<S>({placed, axes, sigmoid(opacity_logits), sh_colors(sh, placed, xi, view)}, xi, background, view,
+    rendered = render<S>({placed, axes, gaussian_opacities(opacity_logits), sh_colors(sh, placed, xi, view)}, xi, background, view,
                          request);
     add_term(rendered.image, cotangent.image);
     add_term(rendered.transmittance, cotangent.transmittance);
