@@ -76,6 +76,7 @@ struct Composite {
   Buffer<Index> checkpoint_begin = {};
   Buffer<S> checkpoints = {};
   Buffer<Index> fragments = {};
+  Buffer<Index> tile_end = {};  ///< list position after the last Gaussian composited in any pixel
 
   TileGrid grid() const {
     return detail::tile_grid(view.camera.width, view.camera.height, static_cast<Index>(view.settings.tile));
@@ -165,7 +166,23 @@ struct Composite {
         extents[rank] = all_extents[n];
       }
     });
-    lists.build(extents.span(), tiles, counts);
+    lists.count(extents.span(), tiles, counts);
+    const Index pairs = lists.slot_begin[drawn];
+    detail::check_pair_memory(pairs, bytes_of_pairs(io, pairs), detail::pair_memory_limit());
+    lists.fill(extents.span(), tiles, counts);
+  }
+
+  /// Numbers in the slot of a pair.
+  Index stride_of(const NodeIo<S>& io) const {
+    return (wants_shape(io) ? kMoments : 0) + (io.wants(kFeatures) ? io.in(kFeatures).shape.cols : 0);
+  }
+
+  /// Memory for the pairs of a forward and a backward run: entries, checkpoints, slots.
+  double bytes_of_pairs(const NodeIo<S>& io, Index pairs) const {
+    const double pixels = static_cast<double>(view.settings.tile) * view.settings.tile, number = sizeof(S);
+    const double checkpoint = wants_gradient(io) ? pixels * number / static_cast<double>(kSegment) : 0;
+    const double slot = static_cast<double>(stride_of(io)) * number;
+    return static_cast<double>(pairs) * (static_cast<double>(sizeof(TileEntry)) + checkpoint + slot);
   }
 
   CompositeScene<S> scene_of(const NodeIo<S>& io) const {
@@ -210,6 +227,7 @@ struct Composite {
     const CompositeScene<S> scene = scene_of(io);
     last.resize(tiles.count() * pixels);
     fragments.resize(tiles.count());
+    tile_end.resize(tiles.count());
     place_checkpoints(tiles, wants_gradient(io));
     Workspaces workspaces(tiles.count());
     const Index size = (channels + 1) * pixels;
@@ -221,6 +239,7 @@ struct Composite {
       job.transmittance = memory.data() + held.number() * size;
       job.channels = job.transmittance + pixels;
       fragments[tile] = detail::composite_tile(tiles.tile, scene, job);
+      tile_end[tile] = static_cast<Index>(*std::max_element(job.last, job.last + pixels));
       for (Index r = 0; r < job.height; ++r) {
         copy_row(job.transmittance + r * tiles.tile, job.width, &transmittance(job.top + r, job.left));
         for (Index k = 0; k < channels; ++k) {
@@ -240,6 +259,7 @@ struct Composite {
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       counters->tiles += lists.tile_begin[tile + 1] > lists.tile_begin[tile] ? 1 : 0;
       counters->fragments += fragments[tile];
+      counters->reached += tile_end[tile];
     }
   }
 
@@ -253,7 +273,7 @@ struct Composite {
     TileAdjoint<S> shared{};
     shared.wants_shape = wants_shape(io);
     shared.wants_features = io.wants(kFeatures);
-    shared.stride = (shared.wants_shape ? kMoments : 0) + (shared.wants_features ? channels : 0);
+    shared.stride = stride_of(io);
     shared.sums = io.scratch(shared.stride * lists.pairs()).data();
     const ConstArray<S> d_image = io.d_out(kChannels), d_transmittance = io.d_out(kTransmittance);
     Workspaces workspaces(tiles.count());
@@ -282,32 +302,40 @@ struct Composite {
     });
     parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, shared, rank);
+        for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, tiles, shared, rank);
       });
     });
   }
 
+  /// True if the Gaussian comes before a tile's end. Lists are in the order of ranks.
+  bool reached(Index tile, Index rank) const {
+    const Index end = tile_end[tile];
+    return end > 0 && rank <= static_cast<Index>(lists.entries[lists.tile_begin[tile] + end - 1].rank);
+  }
+
   /// Sums the pairs of a Gaussian in the order of its slots, in double, and adds what they mean to the inputs'
-  /// gradients.
-  void gather_gaussian(NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index rank) const {
-    const Index n = records[rank].index, begin = lists.slot_begin[rank], end = lists.slot_begin[rank + 1];
-    if (begin == end) return;
-    const S* sums = adjoint.sums + begin * adjoint.stride;
-    if (adjoint.wants_shape) {
-      double moments[kMoments] = {};
-      for (Index slot = begin; slot < end; ++slot) {
-        for (Index i = 0; i < kMoments; ++i)
-          moments[i] += static_cast<double>(sums[(slot - begin) * adjoint.stride + i]);
+  /// gradients. Pairs past the end of their tile have no adjoint, and their slots were not written (row B12).
+  void gather_gaussian(NodeIo<S>& io, const TileGrid& tiles, const TileAdjoint<S>& adjoint, Index rank) const {
+    constexpr Index kTogether = 16;  // numbers of a slot; with up to ten features it is read once
+    static_assert(kMoments <= kTogether);
+    const Index n = records[rank].index, first_feature = adjoint.wants_shape ? kMoments : 0;
+    for (Index k = 0; k < adjoint.stride; k += kTogether) {
+      const Index count = std::min(kTogether, adjoint.stride - k);
+      double totals[kTogether] = {};
+      bool any = false;
+      const S* sums = adjoint.sums + lists.slot_begin[rank] * adjoint.stride + k;
+      detail::for_each_tile(extents[rank], tiles, [&](Index tile) {
+        if (reached(tile, rank)) {
+          any = true;
+          for (Index i = 0; i < count; ++i) totals[i] += static_cast<double>(sums[i]);
+        }
+        sums += adjoint.stride;
+      });
+      if (!any) return;
+      if (adjoint.wants_shape && k == 0) add_shape_gradient(io, records[rank], n, totals);
+      for (Index i = std::max<Index>(first_feature - k, 0); i < count; ++i) {
+        io.d_in(kFeatures).row(n)[k + i - first_feature] += static_cast<S>(totals[i]);
       }
-      add_shape_gradient(io, records[rank], n, moments);
-      sums += kMoments;
-    }
-    if (!adjoint.wants_features) return;
-    const Array<S> d_features = io.d_in(kFeatures);
-    for (Index k = 0; k < d_features.shape.cols; ++k) {
-      double sum = 0;
-      for (Index i = 0; i < end - begin; ++i) sum += static_cast<double>(sums[i * adjoint.stride + k]);
-      d_features.row(n)[k] += static_cast<S>(sum);
     }
   }
 
@@ -380,7 +408,7 @@ struct Composite {
            counts.capacity_bytes() + records.capacity_bytes() + extents.capacity_bytes() +
            lists.tile_begin.capacity_bytes() + lists.slot_begin.capacity_bytes() + lists.entries.capacity_bytes() +
            last.capacity_bytes() + checkpoint_begin.capacity_bytes() + checkpoints.capacity_bytes() +
-           fragments.capacity_bytes();
+           fragments.capacity_bytes() + tile_end.capacity_bytes();
   }
 };
 

@@ -24,6 +24,7 @@ struct RenderCounters {
   Index pairs = 0;      ///< (tile, Gaussian)
   Index fragments = 0;  ///< (pixel, Gaussian) that were composited
   Index tiles = 0;      ///< tiles that a Gaussian reaches
+  Index reached = 0;    ///< pairs up to the last one of each tile that is composited: those that have an adjoint
 };
 
 template <class S>
@@ -43,7 +44,8 @@ struct Composited {
 /// Adjoint: projected.means_px and means_rest (of whose sum it is), projected.factors, opacities, features; each
 /// computed only when wanted. None where o G > alpha_cap (unless cap_gradient is pass), none through the order, the
 /// choice of pixels and the stop. A Gaussian that is not drawn has gradient 0. Throws InternalError when the shapes do
-/// not fit; UserError when there are more than kMostPairs (tile, Gaussian) pairs.
+/// not fit; UserError when there are more than kMostPairs (tile, Gaussian) pairs, or
+/// when they would take more than kPairMemoryShare of the memory.
 template <class S>
 Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> features, const SplatView& view,
                         Source where = Source::current());

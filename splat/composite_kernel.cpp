@@ -349,9 +349,6 @@ void composite_adjoint(const CompositeScene<S>& scene, const TileJob<S>& job, co
   };
   Index end = 0;
   for (int p = 0; p < kPixels; ++p) end = std::max(end, static_cast<Index>(job.last[p]));
-  for (Index at = end; at < static_cast<Index>(job.entries.size()); ++at) {
-    std::fill_n(slot_of(at), adjoint.stride, S(0));
-  }
   while (end > 0) {
     const Index begin = (end - 1) / kSegment * kSegment;
     replay<W>(scene, job, begin, end, adjoint.segment);

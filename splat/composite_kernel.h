@@ -80,7 +80,8 @@ struct TileAdjoint {
 template <class S>
 Index composite_tile(Index side, const CompositeScene<S>& scene, const TileJob<S>& job);
 
-/// Adjoint of composite_tile: the sums of every pair of the tile's list, of those after the stop too (zeros).
+/// Adjoint of composite_tile: the sums of every pair of the tile's list up to the last one composited in any pixel;
+/// the slots of those after it are left alone.
 template <class S>
 void composite_tile_adjoint(Index side, const CompositeScene<S>& scene, const TileJob<S>& job,
                             const TileAdjoint<S>& adjoint);

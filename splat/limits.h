@@ -48,7 +48,10 @@ inline constexpr int kTile = 16;
 /// Log-scales are held within ± this, so that a scale is a finite number of metres (stability A5).
 inline constexpr double kLogScaleLimit = 20;
 
-/// Most (tile, Gaussian) pairs of an image; more are refused before memory is taken for them (stability B10).
-inline constexpr std::int64_t kMostPairs = std::int64_t(1) << 31;
+/// Most (tile, Gaussian) pairs of an image, so that list positions fit 32 bits with a sign; more are refused before
+/// memory is taken for them (stability B10).
+inline constexpr std::int64_t kMostPairs = (std::int64_t(1) << 31) - 1;
+/// Share of the machine's memory that the pairs of an image may take; more is refused likewise.
+inline constexpr double kPairMemoryShare = 0.75;
 
 }  // namespace hsi4d

@@ -10,9 +10,7 @@ namespace hsi4d::reference {
 namespace {
 
 constexpr double kLogScaleLimit = 20;
-/// INRIA's square support: side of its tiles, its least half-difference of variances (squared), its standard
-/// deviations.
-constexpr int kInriaTile = 16;
+/// INRIA's square support: its least half-difference of variances (squared), its standard deviations.
 constexpr double kInriaLeastSpread = 0.1;
 constexpr double kInriaSigmas = 3;
 

@@ -4,10 +4,14 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 #include <string>
+#include <unistd.h>
+#include <utility>
 
 #include "core/check.h"
 #include "core/parallel.h"
+#include "splat/limits.h"
 
 namespace hsi4d::detail {
 
@@ -168,18 +172,36 @@ Index total_pairs(std::span<const Index> pairs) {
   return total;
 }
 
-void TileLists::build(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts) {
-  constexpr Index kGrain = 1024, kMostChunks = 32;
-  const Index ranks = static_cast<Index>(extents.size()), tiles = grid.count();
-  const Partition part{ranks, std::max(kGrain, (ranks + kMostChunks - 1) / kMostChunks)};
-  const auto visit = [&](Index rank, auto&& add) {
-    const Extent& f = extents[static_cast<std::size_t>(rank)];
-    if (f.row_begin >= f.row_end) return;
-    for (Index r = f.row_begin / grid.tile; r <= (f.row_end - 1) / grid.tile; ++r) {
-      const TileSpan span = tile_columns(f, grid, r);
-      for (Index c = span.begin; c < span.end; ++c) add(r * grid.cols + c);
-    }
+Index pair_memory_limit() {
+  const double bytes = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  return static_cast<Index>(kPairMemoryShare * bytes);
+}
+
+void check_pair_memory(Index pairs, double bytes, Index limit) {
+  if (bytes <= static_cast<double>(limit)) return;
+  const auto gigabytes = [](double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1f", x / 1e9);
+    return std::string(text);
   };
+  throw UserError("one image would take " + gigabytes(bytes) + " GB for " + std::to_string(pairs) +
+                  " (tile, Gaussian) pairs, allowed are " + gigabytes(static_cast<double>(limit)) +
+                  " GB: use fewer or smaller Gaussians, a smaller image, or an alpha_min above 0");
+}
+
+namespace {
+
+/// Chunks of the Gaussians, each of which counts its tiles by itself.
+Partition list_partition(Index ranks) {
+  constexpr Index kGrain = 1024, kMostChunks = 32;
+  return {ranks, std::max(kGrain, (ranks + kMostChunks - 1) / kMostChunks)};
+}
+
+}  // namespace
+
+void TileLists::count(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts) {
+  const Index ranks = static_cast<Index>(extents.size()), tiles = grid.count();
+  const Partition part = list_partition(ranks);
   counts.resize(part.chunks() * tiles);
   slot_begin.resize(ranks + 1);
   tile_begin.resize(tiles + 1);
@@ -188,29 +210,33 @@ void TileLists::build(std::span<const Extent> extents, const TileGrid& grid, Buf
     std::fill_n(of_tile, tiles, Index(0));
     for (Index rank = begin; rank < end; ++rank) {
       Index pairs = 0;
-      visit(rank, [&](Index tile) {
+      for_each_tile(extents[static_cast<std::size_t>(rank)], grid, [&](Index tile) {
         ++of_tile[tile];
         ++pairs;
       });
       slot_begin[rank] = pairs;
     }
   });
-  const Index total = total_pairs({slot_begin.data(), static_cast<std::size_t>(ranks)});
+  total_pairs({slot_begin.data(), static_cast<std::size_t>(ranks)});
   Index slot = 0;
   for (Index rank = 0; rank < ranks; ++rank) slot += std::exchange(slot_begin[rank], slot);
   slot_begin[ranks] = slot;
-  entries.resize(total);
   Index place = 0;
   for (Index tile = 0; tile < tiles; ++tile) {
     tile_begin[tile] = place;
     for (Index chunk = 0; chunk < part.chunks(); ++chunk) place += std::exchange(counts[chunk * tiles + tile], place);
   }
   tile_begin[tiles] = place;
-  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+}
+
+void TileLists::fill(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts) {
+  const Index tiles = grid.count();
+  entries.resize(tile_begin[tiles]);
+  parallel_chunks(list_partition(static_cast<Index>(extents.size())), [&](Index chunk, Index begin, Index end) {
     Index* const of_tile = counts.data() + chunk * tiles;
     for (Index rank = begin; rank < end; ++rank) {
       Index next = slot_begin[rank];
-      visit(rank, [&](Index tile) {
+      for_each_tile(extents[static_cast<std::size_t>(rank)], grid, [&](Index tile) {
         entries[of_tile[tile]++] = {static_cast<std::int32_t>(rank), static_cast<std::uint32_t>(next++)};
       });
     }

@@ -74,6 +74,24 @@ struct TileEntry {
 /// The sum of the numbers of pairs. Throws UserError if it is above kMostPairs (row B10).
 Index total_pairs(std::span<const Index> pairs);
 
+/// Most bytes that the pairs of an image may take: kPairMemoryShare of the machine's memory.
+Index pair_memory_limit();
+
+/// Throws UserError if `bytes` is above `limit` (row B10).
+///
+/// @param pairs  that ask for the bytes
+void check_pair_memory(Index pairs, double bytes, Index limit);
+
+/// Calls visit(tile) for every tile that an extent reaches, row by row: the order of its slots.
+template <class F>
+void for_each_tile(const Extent& extent, const TileGrid& grid, const F& visit) {
+  if (extent.row_begin >= extent.row_end) return;
+  for (Index r = extent.row_begin / grid.tile; r <= (extent.row_end - 1) / grid.tile; ++r) {
+    const TileSpan span = tile_columns(extent, grid, r);
+    for (Index c = span.begin; c < span.end; ++c) visit(r * grid.cols + c);
+  }
+}
+
 /// The Gaussians of every tile.
 struct TileLists {
   Buffer<Index> tile_begin;  ///< [tiles + 1] into entries
@@ -81,10 +99,13 @@ struct TileLists {
   Buffer<TileEntry> entries;
 
   Index pairs() const { return entries.size(); }
-  /// Fills the lists for extents in depth order. Parallel; the result depends on the arguments alone.
+  /// Counts the pairs for extents in depth order and places them: slot_begin and tile_begin. Takes no memory for pairs.
+  /// Parallel; the result depends on the arguments alone. Throws as total_pairs.
   ///
-  /// @param counts  workspace, kept between calls
-  void build(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts);
+  /// @param counts  workspace, handed on to fill
+  void count(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts);
+  /// Fills the lists, after count with the same arguments.
+  void fill(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts);
 };
 
 }  // namespace hsi4d::detail

@@ -1,6 +1,7 @@
 // Memory that the chunks of a parallel loop share: as many pieces as chunks can run at the same time.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 

@@ -133,7 +133,7 @@ TEST_CASE("the renderer gives the same bits on any number of threads", "[paralle
           taped.run();
         });
         std::vector<std::vector<double>> all = {
-            taped.value(taped.rendered.image), taped.value(taped.rendered.transmittance),
+            taped.value(taped.loss), taped.value(taped.rendered.image), taped.value(taped.rendered.transmittance),
             taped.value(taped.rendered.depth), taped.value(taped.rendered.group_opacity)};
         for (const NamedNumbers& g : taped.gradients()) all.push_back(g.numbers);
         if (threads == 1) first = all;

@@ -34,6 +34,7 @@ TEST_CASE("the renderer passes the operator checks, all outputs at once", "[para
   const SplatScene scene = smooth_scene(12, {19, 17});
   const Index n = scene.count();
   SplatView view{scene.camera, Vector3<double>::Zero(), scene.settings};
+  view.settings.blur = 30;  // wide enough that the depth has a gradient in every pixel
   RenderRequest request;
   request.depth = true;
   request.groups = {{0, 5}, {3, 12}, {4, 4}};

@@ -235,18 +235,20 @@ TEST_CASE("depth keys are in the order of the depths [B9]") {
 
 TEST_CASE("the sort by depth is stable [B8]") {
   RandomSequence random(5, 2);
-  for (const int kinds : {1, 3, 1000, 1 << 30}) {
-    std::vector<DepthKeyed> keys, room(20000);
-    for (std::int32_t i = 0; i < 20000; ++i) {
-      const double z = kinds == 1 ? 2.5 : std::floor(random.uniform(0, kinds)) / 7 - 3;
-      keys.push_back({i % 2 == 0 ? depth_bits(z) : depth_bits(z), i});
+  for (const bool floats : {false, true}) {
+    for (const int kinds : {1, 3, 1000, 1 << 30}) {
+      std::vector<DepthKeyed> keys, room(20000);
+      for (std::int32_t i = 0; i < 20000; ++i) {
+        const double z = kinds == 1 ? 2.5 : std::floor(random.uniform(0, kinds)) / 7 - 3;
+        keys.push_back({floats ? depth_bits(static_cast<float>(z)) : depth_bits(z), i});
+      }
+      std::vector<DepthKeyed> expected = keys;
+      std::stable_sort(expected.begin(), expected.end(),
+                       [](const DepthKeyed& a, const DepthKeyed& b) { return a.key < b.key; });
+      const auto sorted = sort_by_depth(keys, room);
+      CHECK(std::equal(sorted.begin(), sorted.end(), expected.begin(), expected.end(),
+                       [](const DepthKeyed& a, const DepthKeyed& b) { return a.key == b.key && a.index == b.index; }));
     }
-    std::vector<DepthKeyed> expected = keys;
-    std::stable_sort(expected.begin(), expected.end(),
-                     [](const DepthKeyed& a, const DepthKeyed& b) { return a.key < b.key; });
-    const auto sorted = sort_by_depth(keys, room);
-    CHECK(std::equal(sorted.begin(), sorted.end(), expected.begin(), expected.end(),
-                     [](const DepthKeyed& a, const DepthKeyed& b) { return a.key == b.key && a.index == b.index; }));
   }
   std::vector<DepthKeyed> none;
   CHECK(sort_by_depth(none, none).empty());
@@ -254,9 +256,14 @@ TEST_CASE("the sort by depth is stable [B8]") {
 
 TEST_CASE("more pairs than fit are refused before memory is taken [B10]") {
   const std::vector<Index> pairs = {1'000'000'000, 1'000'000'000, 1'000'000'000};
-  CHECK_THROWS_WITH(total_pairs(pairs), Catch::Contains("more than 2147483648 (tile, Gaussian) pairs"));
+  CHECK_THROWS_WITH(total_pairs(pairs), Catch::Contains("more than 2147483647 (tile, Gaussian) pairs"));
   CHECK_THROWS_AS(total_pairs(pairs), UserError);
   CHECK(total_pairs(std::span(pairs).first(2)) == 2'000'000'000);
+  CHECK_THROWS_WITH(check_pair_memory(2'000'000'000, 96e9, 12'000'000'000),
+                    Catch::Contains("96.0 GB for 2000000000 (tile, Gaussian) pairs, allowed are 12.0 GB"));
+  CHECK_THROWS_AS(check_pair_memory(1, 1001, 1000), UserError);
+  CHECK_NOTHROW(check_pair_memory(1, 1000, 1000));
+  CHECK(pair_memory_limit() > 100'000'000);
 }
 
 TEST_CASE("tile lists hold every pair once, in depth order, on any number of threads", "[parallel]") {
@@ -284,7 +291,10 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
   for (const int threads : {1, 2, 8}) {
     TileLists lists;
     Buffer<Index> counts;
-    with_threads(threads, [&] { lists.build(extents, grid, counts); });
+    with_threads(threads, [&] {
+      lists.count(extents, grid, counts);
+      lists.fill(extents, grid, counts);
+    });
     CHECK(lists.pairs() == pairs);
     std::vector<bool> used(static_cast<std::size_t>(pairs), false);
     for (Index tile = 0; tile < grid.count(); ++tile) {

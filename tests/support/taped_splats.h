@@ -165,8 +165,8 @@ class TapedSplats {
       placed = transform_points(transforms, means);
       axes = transform_axes(transforms, axes);
     }
-    rendered = render<S>({placed, axes, gaussian_opacities(opacity_logits), sh_colors(sh, placed, xi, view)}, xi, background, view,
-                         request);
+    rendered = render<S>({placed, axes, gaussian_opacities(opacity_logits), sh_colors(sh, placed, xi, view)}, xi,
+                         background, view, request);
     add_term(rendered.image, cotangent.image);
     add_term(rendered.transmittance, cotangent.transmittance);
     if (request.depth) add_term(rendered.depth, cotangent.depth);
@@ -219,10 +219,12 @@ struct ReferenceResult {
   std::vector<NamedNumbers> gradients;
 };
 
+/// @tparam T      what the brute-force renderer computes in: double or long double
 /// @param groups  rows of each group, as in RenderRequest; they must not overlap
-inline ReferenceResult reference_result(const SplatScene& scene, const SplatCotangent& cotangent,
-                                        const RenderRequest& request = {}, const std::vector<float>& moved_by = {}) {
-  reference::Scene<double> input = reference_scene<double>(scene);
+template <class T = double>
+ReferenceResult reference_result(const SplatScene& scene, const SplatCotangent& cotangent,
+                                 const RenderRequest& request = {}, const std::vector<float>& moved_by = {}) {
+  reference::Scene<T> input = reference_scene<T>(scene);
   input.transforms.assign(moved_by.begin(), moved_by.end());
   if (!request.groups.empty()) {
     input.groups.assign(static_cast<std::size_t>(scene.count()), -1);
@@ -232,42 +234,49 @@ inline ReferenceResult reference_result(const SplatScene& scene, const SplatCota
       }
     }
   }
-  const reference::Pinhole<double> camera = reference_pinhole<double>(scene.camera);
-  const std::array<double, 3> background = reference_background<double>(scene);
-  const reference::Image<double> image = reference::render(input, camera, background, scene.settings);
+  const reference::Pinhole<T> camera = reference_pinhole<T>(scene.camera);
+  const std::array<T, 3> background = reference_background<T>(scene);
+  const reference::Image<T> image = reference::render(input, camera, background, scene.settings);
   const std::size_t pixels = image.transmittance.size();
   ReferenceResult result;
-  result.transmittance = image.transmittance;
-  result.groups = image.group_opacity;
+  const auto narrow = [](const auto& x) {
+    std::vector<double> y;
+    for (const T v : x) y.push_back(static_cast<double>(v));
+    return y;
+  };
+  result.transmittance = narrow(image.transmittance);
+  result.groups = narrow(image.group_opacity);
   result.image.resize(3 * pixels);
   result.depth.resize(pixels);
-  reference::Image<double> d;
-  d.transmittance = cotangent.transmittance.empty() ? std::vector<double>(pixels, 0.0) : cotangent.transmittance;
+  reference::Image<T> d;
+  d.transmittance.assign(cotangent.transmittance.begin(), cotangent.transmittance.end());
+  d.transmittance.resize(pixels);
   d.depth_sum.assign(pixels, 0);
   d.color.assign(3 * pixels, 0);
-  d.group_opacity = cotangent.groups;
+  d.group_opacity.assign(cotangent.groups.begin(), cotangent.groups.end());
   for (std::size_t p = 0; p < pixels; ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
-      result.image[c * pixels + p] = image.color[3 * p + c];
+      result.image[c * pixels + p] = static_cast<double>(image.color[3 * p + c]);
       if (!cotangent.image.empty()) d.color[3 * p + c] = cotangent.image[c * pixels + p];
     }
     // E = D/A, A = 1 − T
-    const double opacity = 1 - image.transmittance[p];
+    const T opacity = 1 - image.transmittance[p];
     if (!(opacity > 0)) continue;
-    result.depth[p] = image.depth_sum[p] / opacity;
+    const T depth = image.depth_sum[p] / opacity;
+    result.depth[p] = static_cast<double>(depth);
     if (!request.depth || cotangent.depth.empty() || opacity < kOpaqueEnough) continue;
     d.depth_sum[p] = cotangent.depth[p] / opacity;
-    d.transmittance[p] += cotangent.depth[p] * result.depth[p] / opacity;
+    d.transmittance[p] += cotangent.depth[p] * depth / opacity;
   }
   const auto g = reference::gradients(input, camera, background, scene.settings, d);
-  result.gradients = {{"means", g.means},
-                      {"quats", g.quats},
-                      {"log_scales", g.log_scales},
-                      {"opacity_logits", g.opacity_logits},
-                      {"sh", g.sh},
-                      {"camera", {g.camera.begin(), g.camera.end()}},
-                      {"background", {g.background.begin(), g.background.end()}}};
-  if (!g.transforms.empty()) result.gradients.push_back({"transforms", g.transforms});
+  result.gradients = {{"means", narrow(g.means)},
+                      {"quats", narrow(g.quats)},
+                      {"log_scales", narrow(g.log_scales)},
+                      {"opacity_logits", narrow(g.opacity_logits)},
+                      {"sh", narrow(g.sh)},
+                      {"camera", narrow(g.camera)},
+                      {"background", narrow(g.background)}};
+  if (!g.transforms.empty()) result.gradients.push_back({"transforms", narrow(g.transforms)});
   return result;
 }
 
