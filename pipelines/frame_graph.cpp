@@ -31,7 +31,7 @@ constexpr std::array<JointGroup, 7> kJointGroups = {{{"global_orient", 0, 1},
                                                      {"reye_pose", 24, 1},
                                                      {"left_hand_pose", 25, 15},
                                                      {"right_hand_pose", 40, 15}}};
-constexpr Index kJoints = 55;
+constexpr Index kJoints = kSmplxJoints;
 constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_scales", "opacity_logits", "sh"};
 
 template <class S>

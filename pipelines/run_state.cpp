@@ -11,7 +11,7 @@ namespace hsi4d {
 
 namespace {
 
-constexpr Index kPoseNumbers = 165;
+constexpr Index kPoseNumbers = 3 * kSmplxJoints;
 constexpr Index kRigidNumbers = 12;
 constexpr std::size_t kCounts = 5;  // whole numbers of a stage's totals
 constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "psnr_foreground_db",

@@ -96,7 +96,7 @@ struct ErrorTable {
 /// Baselines first, then stages. It refers to `summary`, which must outlive it.
 ErrorTable make_error_table(const RunSummary& summary);
 
-/// The table of errors as plain text for a terminal, the best value of each column marked with *.
+/// The table of errors as plain text for a terminal, the best value of each row marked with *.
 std::string error_table(const RunSummary& summary);
 
 /// `value` with a fixed number of decimals, whatever the locale; "-0.00" is "0.00". "not finite" for NaN and infinity.

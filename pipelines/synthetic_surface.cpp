@@ -9,6 +9,7 @@
 #include "core/quaternion.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "splat/sh.h"
 
 namespace hsi4d {
 namespace {
@@ -27,7 +28,7 @@ constexpr double kOpacityLogit = 5;
 const Vector3<double> kHighlight = Vector3<double>(-0.35, -0.55, 0.76).normalized();
 
 /// Value of the first spherical harmonics, as the renderer has them.
-constexpr double kShBand0 = 0.28209479177387814, kShBand1 = 0.4886025119029199;
+constexpr double kShBand0 = kShC0, kShBand1 = 0.4886025119029199;
 
 /// Lengths of a sheet along u and v, metres: means of a few lines across it.
 Vector2<double> lengths_of(const Sheet& sheet) {

@@ -9,8 +9,8 @@
 
 namespace hsi4d::cli {
 
-/// Makes the dataset that the config's sections `synthetic` and `render` describe, and tells progress on stderr.
-/// Returns what the command prints.
+/// Makes the dataset that the config's section `synthetic` describes, and tells progress on stderr. The other sections
+/// go along in its config.json. Returns what the command prints.
 ///
 /// @param out  a new or empty folder; it appears when everything in it is complete
 /// Throws UserError with all problems of the config, or when the folder is not empty or cannot be written.
