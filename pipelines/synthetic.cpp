@@ -14,9 +14,9 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/image_io.h"
-#include "core/npz.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "pipelines/state.h"
 #include "pipelines/synthetic_motion.h"
 #include "pipelines/synthetic_render.h"
 #include "pipelines/synthetic_scene.h"
@@ -124,17 +124,11 @@ ConfigValue data_section(const std::string& name) {
 }
 
 void write_objects(const std::string& path, const std::string& name, const std::vector<Rigid<double>>& poses) {
-  std::vector<double> rotations, translations;
-  for (const Rigid<double>& pose : poses) {
-    const Vector3<double> w = so3_log(pose.rotation);
-    rotations.insert(rotations.end(), {w[0], w[1], w[2]});
-    translations.insert(translations.end(), {pose.translation[0], pose.translation[1], pose.translation[2]});
+  std::vector<SceneState> frames(poses.size());
+  for (std::size_t t = 0; t < poses.size(); ++t) {
+    frames[t].objects = {{so3_log(poses[t].rotation), poses[t].translation}};
   }
-  const std::int64_t frames = static_cast<std::int64_t>(poses.size());
-  NpzWriter file;
-  file.add(name + "/rotation", {frames, 3}, rotations);
-  file.add(name + "/translation", {frames, 3}, translations);
-  file.write(path);
+  write_object_tracks(path, {name}, frames);
 }
 
 /// Three independent standard normals.
