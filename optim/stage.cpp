@@ -6,6 +6,7 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/inspect.h"
 #include "core/suggest.h"
+#include "core/text.h"
 
 namespace hsi4d {
 
@@ -14,12 +15,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text.empty() ? "none" : text;
-}
 
 std::string message_of(const std::string& stage, const std::string& text) { return "stage '" + stage + "': " + text; }
 
@@ -199,20 +194,13 @@ class StageRun {
   }
 
   [[noreturn]] void throw_diverged(const std::string& when) const {
-    std::string values;
-    for (const LossValue& term : loss_.values)
-      values += (values.empty() ? "" : ", ") + term.name + " " + number_text(term.value);
+    std::vector<std::string> values;
+    for (const LossValue& term : loss_.values) values.push_back(term.name + " " + rounded(term.value, 6));
     throw StageDivergedError(message_of(options_.name, "given up in " + when + " after " +
                                                            std::to_string(adam_.rollbacks()) +
                                                            " steps that had to be taken back (max_rollbacks is " +
                                                            std::to_string(settings_.optimizer.max_rollbacks) +
-                                                           "): " + offender_ + "; terms: " + values));
-  }
-
-  static std::string number_text(double value) {
-    std::ostringstream text;
-    text << value;
-    return text.str();
+                                                           "): " + offender_ + "; terms: " + joined(values)));
   }
 
   /// Runs the tape once more, looking at every number: "; first: nan in forward of 'log' …". Empty where all is finite
@@ -238,7 +226,7 @@ class StageRun {
     tape_.forward(loss_.total);
     read_terms();
     if (std::isfinite(evaluated_loss())) return;
-    offender_ = "the loss is " + number_text(evaluated_loss()) + first_bad_node();
+    offender_ = "the loss is " + rounded(evaluated_loss(), 6) + first_bad_node();
     if (adam_.undo()) {
       ++undone_at_end_;
       tape_.forward(loss_.total);

@@ -11,6 +11,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/rotation.h"
+#include "core/text.h"
 #include "optim/metrics.h"
 #include "optim/stage.h"
 #include "pipelines/evaluate.h"
@@ -111,7 +112,7 @@ void add_problem(std::string& problems, const std::string& text) { problems += (
 class Reconstruction {
  public:
   Reconstruction(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
-                 const RunObserver& observer)
+                 const Observer& observer)
       : config_(config),
         losses_(losses),
         folder_(folder),
@@ -154,6 +155,8 @@ class Reconstruction {
     } else {
       add_covered(read_frame(config_.data, clip_, 0), config_.data, progress_.covered);
     }
+    if (folder_.resumed_from())
+      folder_.note("resumed, " + std::to_string(progress_.frames_done()) + " frames are in the checkpoint");
     folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
     bar_.step(total_steps() / (clip_.frames() - 1) * (progress_.frames_done() - 1));
   }
@@ -201,21 +204,43 @@ class Reconstruction {
     graph.set_state(state);
     const Image weight = complement(progress_.covered);
     graph.set_targets(targets_of(frame, stage, weight));
-    const StageResult result =
-        run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(),
-                     [&](const IterationReport& report) { note(index, s, report, *graph.rendered().counters); },
-                     {.name = name + ", frame " + std::to_string(index)});
+    std::string begin;  // of the loss, for the log
+    const auto note_iteration = [&](const IterationReport& report) {
+      if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
+      note(index, s, report, *graph.rendered().counters);
+    };
+    const StageResult result = run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(), note_iteration,
+                                            {.name = name + ", frame " + std::to_string(index)});
     graph.read_state(stage.optimize, state);
     StageTotals& totals = progress_.totals[s];
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
-    if (index == 1) tell_terms_off(name, result.off);
+    if (index == 1) tell_terms_off(name, stage, result.off);
+    folder_.note(stage_line(index, name, result, begin));
   }
 
-  static void tell_terms_off(const std::string& stage, const std::vector<std::string>& off) {
+  static std::string loss_text(double loss, std::span<const LossValue> terms) {
+    std::vector<std::string> parts;
+    for (const LossValue& term : terms) parts.push_back(term.name + " " + rounded(term.value, 4));
+    return rounded(loss, 4) + " (" + joined(parts) + ")";
+  }
+
+  /// What a stage did with a frame, for the log.
+  static std::string stage_line(Index frame, const std::string& stage, const StageResult& result,
+                                const std::string& begin) {
+    std::string text = "frame " + std::to_string(frame) + ", stage " + stage + ": " +
+                       std::to_string(result.iterations) + " iterations in " + rounded(result.seconds, 3) +
+                       " s, loss " + begin + " -> " + loss_text(result.loss, result.terms);
+    if (result.rollbacks > 0) text += ", " + std::to_string(result.rollbacks) + " steps not taken";
+    return text;
+  }
+
+  static void tell_terms_off(const std::string& name, const StageSettings& stage, const std::vector<std::string>& off) {
     for (const std::string& term : off) {
-      log_warning("stage " + stage + ": the loss \"" + term + "\" is off: its weight is 0, or an input is not given");
+      const LossSettings* const settings = find_entry(stage.losses, term);
+      log_warning("stage " + name + ": the loss \"" + term + "\" is off: " +
+                  (settings != nullptr && settings->weight == 0 ? "its weight is 0" : "it lacks an input"));
     }
   }
 
@@ -255,7 +280,7 @@ class Reconstruction {
                        {"fragments", static_cast<double>(counters.fragments)}};
     folder_.append_metrics(record);
     bar_.step_with("loss", report.loss);
-    if (observer_.stop_requested && observer_.stop_requested()) {
+    if (observer_.wants_stop()) {
       throw Interrupted("interrupted in frame " + std::to_string(frame) + "; " +
                         std::to_string(progress_.frames_done()) + " frames are in the checkpoint");
     }
@@ -358,7 +383,7 @@ class Reconstruction {
   const RunConfig& config_;
   const std::vector<LossTerm>& losses_;
   RunFolder& folder_;
-  const RunObserver& observer_;
+  const Observer& observer_;
   std::string resolved_;
   const Clip& clip_;
   RunProgress progress_;
@@ -402,7 +427,7 @@ void check_run(const RunConfig& config) {
 }
 
 RunSummary reconstruct(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses,
-                       RunFolder& folder, const RunObserver& observer) {
+                       RunFolder& folder, const Observer& observer) {
   return Reconstruction(config, clip, losses, folder, observer).run();
 }
 

@@ -14,6 +14,7 @@
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
+#include "core/text.h"
 #include "core/version.h"
 #include "pipelines/json_text.h"
 
@@ -187,9 +188,7 @@ std::string_view run_state_name(RunState state) {
 }
 
 std::string RunPaths::frame_image(int frame, std::string_view kind) const {
-  std::string digits = std::to_string(frame);
-  if (digits.size() < 4) digits.insert(0, 4 - digits.size(), '0');
-  return (folder / "frames" / (digits + "_" + std::string(kind) + ".png")).string();
+  return (folder / "frames" / (four_digits(frame) + "_" + std::string(kind) + ".png")).string();
 }
 
 /// The lock on a run folder: released by the system too when the process ends, however it ends.

@@ -90,6 +90,9 @@ class RunFolder {
   /// @param message  why it failed, for people; may be empty
   void set_state(RunState state, std::string_view message = "");
 
+  /// Writes a message into log.txt alone; what the library logs while this lives goes there too.
+  void note(std::string_view message, LogLevel level = LogLevel::kInfo) const { log_->write(level, message); }
+
   /// Appends a line to metrics.jsonl; it is with the system when this returns.
   /// Throws InternalError naming the member for a number that is not finite, unless the step was rolled back.
   void append_metrics(const IterationRecord& record);

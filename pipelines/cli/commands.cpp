@@ -5,6 +5,7 @@
 
 #include "core/check.h"
 #include "core/suggest.h"
+#include "core/text.h"
 #include "pipelines/reconstruct.h"
 #include "pipelines/run_config.h"
 
@@ -17,9 +18,9 @@ std::string count_of(std::size_t count, const std::string& one) {
 
 template <class T>
 std::string names_of(const ConfigMap<T>& map) {
-  std::string names;
-  for (const auto& [name, value] : map) names += (names.empty() ? "" : ", ") + name;
-  return names.empty() ? "" : " (" + names + ")";
+  std::vector<std::string> names;
+  for (const auto& [name, value] : map) names.push_back(name);
+  return names.empty() ? "" : " (" + joined(names) + ")";
 }
 
 std::string stage_summary(const std::string& name, const StageSettings& stage) {
@@ -90,9 +91,7 @@ std::vector<std::string> list_topics() { return {"losses", "settings"}; }
 std::string list_command(const std::string& topic, const std::vector<LossDescription>& losses) {
   if (topic == "losses") return list_losses(losses);
   if (topic == "settings") return list_all_settings(losses);
-  std::string known;
-  for (const std::string& name : list_topics()) known += (known.empty() ? "" : ", ") + name;
-  throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + known +
+  throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + joined(list_topics()) +
                   did_you_mean(topic, list_topics()));
 }
 

@@ -90,6 +90,39 @@ TEST_CASE("the summary of check tells what will run") {
                     "  stage camera: 1 iteration, 1 parameter group (camera), 2 losses (photo, centre)\n"));
 }
 
+TEST_CASE("check refuses stages whose groups are not known, do not exist in what is drawn, or never move") {
+  const TemporaryFolder folder;
+  folder.write("a.json", R"({"stages": {
+    "camera": {"iterations": 5, "draw": "scene", "optimize": {"camera": {"lr": 1}, "transl": {"lr": 1}},
+               "losses": {"masked_l2": {}}},
+    "body": {"iterations": 5, "optimize": {"bodypose": {"lr": 1}, "transl": {"lr": 1, "from": 5},
+                                           "scene_sh": {"lr": 1}},
+             "losses": {"photometric": {}}},
+    "none": {"iterations": 5, "optimize": {}}}})");
+  const std::string groups =
+      "camera, object_orient, object_transl, transl, global_orient, body_pose, jaw_pose, leye_pose, reye_pose, "
+      "left_hand_pose, right_hand_pose";
+  const ProgramResult result = run_hsi4d({"check", "a.json"});
+  CHECK(result.status == 2);
+  CHECK(result.out.empty());
+  CHECK(result.err ==
+        "/stages/camera/optimize: there is no parameter group \"transl\" (known: camera)\n"
+        "/stages/body/optimize: there is no parameter group \"bodypose\"; did you mean \"body_pose\"? (known: " +
+            groups + ")\n/stages/body/optimize: there is no parameter group \"scene_sh\" (known: " + groups +
+            ")\n/stages/body/optimize/transl/from: 5 is beyond the stage's 5 iterations; the group would never move\n"
+            "/stages/none/optimize: no parameter group is named (known: " +
+            groups + ")\n/stages/none/losses: a stage needs a loss\n");
+  folder.write("b.json", R"({"stages": {"body": {"iterations": 5,
+    "optimize": {"transl": {"lr": 1, "from": 3, "until": 3}}, "losses": {"photometric": {}}}}})");
+  CHECK_THAT(run_hsi4d({"check", "b.json"}).err, Contains("3 is not after from, which is 3; the group would never move"));
+  // Those of them that would be right.
+  folder.write("c.json", R"({"stages": {
+    "camera": {"iterations": 5, "draw": "scene", "optimize": {"camera": {"lr": 1}}, "losses": {"masked_l2": {}}},
+    "body": {"iterations": 5, "optimize": {"body_pose": {"lr": 1}, "transl": {"lr": 1, "from": 4}},
+             "losses": {"photometric": {}}}}})");
+  CHECK(run_hsi4d({"check", "c.json"}).status == 0);
+}
+
 TEST_CASE("schema prints JSON that refuses unknown keys") {
   const TemporaryFolder folder;
   const ProgramResult result = run_hsi4d({"schema"});
