@@ -25,7 +25,8 @@ double checked_sum(const double* weights, Index count, std::string_view source, 
     sum += weights[k];
   }
   if (!(std::abs(sum - 1) <= kWeightSumTolerance)) {
-    fail(source, vertex, "the weights sum to " + number_text(sum) + "; allowed: 1 within " + number_text(kWeightSumTolerance));
+    fail(source, vertex,
+         "the weights sum to " + number_text(sum) + "; allowed: 1 within " + number_text(kWeightSumTolerance));
   }
   return sum;
 }

@@ -160,10 +160,24 @@ class StageRun {
     const double loss = evaluated_loss();
     const StepReport step = adam_.step(i, settings_.iterations, loss);
     if (step.rolled_back) note_rollback(*step.bad, i);
-    if (!step.rolled_back) offender_.clear();
+    if (!step.rolled_back) {
+      offender_.clear();
+      wrap_rotations(step);
+    }
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
               seconds_since(start)});
+  }
+
+  /// Row D9: beyond a whole turn the derivative of an axis-angle vanishes, so none gets that far. What Adam knew of the
+  /// row belongs to the numbers that it had.
+  void wrap_rotations(const StepReport& step) {
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      if (!groups_[g].parameters.are_axis_angles || !step.groups[g].moved) continue;
+      for (const Var<S> block : groups_[g].parameters.blocks) {
+        for (const Index row : wrap_axis_angles(block)) adam_.clear_moments(block, row);
+      }
+    }
   }
 
   double evaluated_loss() const { return static_cast<double>(tape_.value(loss_.total).scalar()); }

@@ -23,14 +23,15 @@ namespace {
 struct JointGroup {
   const char* name;
   Index first, count;
+  const char* summary;
 };
-constexpr std::array<JointGroup, 7> kJointGroups = {{{"global_orient", 0, 1},
-                                                     {"body_pose", 1, 21},
-                                                     {"jaw_pose", 22, 1},
-                                                     {"leye_pose", 23, 1},
-                                                     {"reye_pose", 24, 1},
-                                                     {"left_hand_pose", 25, 15},
-                                                     {"right_hand_pose", 40, 15}}};
+constexpr std::array<JointGroup, 7> kJointGroups = {{{"global_orient", 0, 1, "Heading of the body"},
+                                                     {"body_pose", 1, 21, "21 joints of the body"},
+                                                     {"jaw_pose", 22, 1, "The jaw"},
+                                                     {"leye_pose", 23, 1, "The left eye"},
+                                                     {"reye_pose", 24, 1, "The right eye"},
+                                                     {"left_hand_pose", 25, 15, "15 joints of the left hand"},
+                                                     {"right_hand_pose", 40, 15, "15 joints of the right hand"}}};
 constexpr Index kJoints = kSmplxJoints;
 constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_scales", "opacity_logits", "sh"};
 
@@ -86,6 +87,17 @@ std::vector<std::string> state_group_names(Draw draw) {
   names.insert(names.end(), {"object_orient", "object_transl", "transl"});
   for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
   return names;
+}
+
+std::string state_group_summary(const std::string& name) {
+  if (name == "camera") return "Six numbers of the camera, translation and rotation";
+  if (name == "object_orient") return "Rotations of the objects";
+  if (name == "object_transl") return "Places of the objects";
+  if (name == "transl") return "Place of the body";
+  for (const JointGroup& joints : kJointGroups) {
+    if (name == joints.name) return joints.summary;
+  }
+  throw InternalError("there is no group of the state called '" + name + "'");
 }
 
 std::vector<std::string> parameter_group_names(Draw draw) {
@@ -149,11 +161,20 @@ Var<S> FrameGraph<S>::leaf(const std::string& group, const std::string& name, In
 }
 
 template <class S>
-void FrameGraph<S>::add_to_group(const std::string& group, Var<S> leaf) {
-  for (ParameterGroup<S>& known : groups_) {
-    if (known.name == group) return known.blocks.push_back(leaf);
-  }
-  groups_.push_back({group, {leaf}});
+ParameterGroup<S>& FrameGraph<S>::add_to_group(const std::string& group, Var<S> leaf) {
+  auto place = std::find_if(groups_.begin(), groups_.end(), [&](const auto& known) { return known.name == group; });
+  if (place == groups_.end()) place = groups_.insert(place, ParameterGroup<S>{group, {}});
+  place->blocks.push_back(leaf);
+  return *place;
+}
+
+/// A leaf of one rotation a row, in the numbers that the settings choose.
+template <class S>
+Var<S> FrameGraph<S>::rotation_leaf(const std::string& group, const std::string& name, Index rows) {
+  const bool is_axis_angle = settings_.rotations == RotationParameters::kAxisAngle;
+  const Var<S> var = tape_.parameter(name, shape_of(rows, is_axis_angle ? 3 : 6));
+  add_to_group(group, var).are_axis_angles = is_axis_angle;
+  return var;
 }
 
 template <class S>
@@ -177,8 +198,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
   const Var<S> scales = leaf("object_log_scales", object.name + " log_scales", n, 3, g.log_scales.data());
   const Var<S> logits = leaf("object_opacity_logits", object.name + " opacity_logits", n, 1, g.opacity_logits.data());
   const Var<S> sh = leaf("object_sh", object.name + " sh", n, 3 * g.sh_coefficients(), g.sh.data());
-  const Index numbers = settings_.rotations == RotationParameters::kSixD ? 6 : 3;
-  const Var<S> orient = leaf("object_orient", object.name + " orient", 1, numbers, nullptr);
+  const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
   const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
   objects_.push_back({orient, transl});
 
@@ -198,9 +218,8 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
   const Var<S> scales = leaf("human_log_scales", "human log_scales", n, 3, avatar.log_scales.data());
   const Var<S> logits = leaf("human_opacity_logits", "human opacity_logits", n, 1, avatar.opacity_logits.data());
   const Var<S> colors = leaf("human_colors", "human colors", n, 3, avatar.colors.data());
-  const Index numbers = settings_.rotations == RotationParameters::kSixD ? 6 : 3;
   for (const JointGroup& joints : kJointGroups) {
-    joint_rotations_.push_back(leaf(joints.name, joints.name, joints.count, numbers, nullptr));
+    joint_rotations_.push_back(rotation_leaf(joints.name, joints.name, joints.count));
   }
   transl_ = leaf("transl", "transl", 1, 3, nullptr);
 
@@ -256,7 +275,9 @@ template <class S>
 void FrameGraph<S>::write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle) {
   S* numbers = tape_.write(leaf).row(row);
   if (settings_.rotations == RotationParameters::kAxisAngle) {
-    for (Index i = 0; i < 3; ++i) numbers[i] = static_cast<S>(axis_angle[i]);
+    Vector3<double> wrapped = axis_angle;  // a file's may be any number of turns (row D9)
+    wrap_axis_angle(wrapped);
+    for (Index i = 0; i < 3; ++i) numbers[i] = static_cast<S>(wrapped[i]);
     return;
   }
   const Matrix3<double> rotation = so3_exp(axis_angle);

@@ -16,6 +16,7 @@
 #include "optim/stage.h"
 #include "pipelines/evaluate.h"
 #include "pipelines/frame_graph.h"
+#include "pipelines/input_hashes.h"
 #include "pipelines/run_state.h"
 
 namespace hsi4d {
@@ -117,7 +118,7 @@ class Reconstruction {
         losses_(losses),
         folder_(folder),
         observer_(observer),
-        resolved_(resolved_config(config, descriptions_of(losses))),
+        identity_(to_json(sections_beside_data(config, descriptions_of(losses)))),
         clip_(clip),
         progress_(first_progress(clip_, config.stages.size())),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
@@ -142,11 +143,19 @@ class Reconstruction {
   std::string checkpoint_file() const { return folder_.paths().checkpoint() + "/progress.npz"; }
 
   RunProgress checkpointed() const {
+    RunProgress progress;
     try {
-      return load_progress(checkpoint_file(), resolved_, clip_, config_.stages.size());
+      progress = load_progress(checkpoint_file(), identity_, clip_, config_.stages.size());
     } catch (const DataError& damage) {
       throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
     }
+    std::vector<ClipFile> files = clip_.files;
+    for (Index t = 0; t < progress.frames_done(); ++t) {
+      const std::vector<ClipFile> of_frame = frame_files(config_.data, clip_, t);
+      files.insert(files.end(), of_frame.begin(), of_frame.end());
+    }
+    check_unchanged(progress.inputs, files, checkpoint_file());
+    return progress;
   }
 
   void resume() {
@@ -154,7 +163,9 @@ class Reconstruction {
       progress_ = checkpointed();
     } else {
       add_covered(read_frame(config_.data, clip_, 0), config_.data, progress_.covered);
+      progress_.inputs = input_hashes(clip_.files) + input_hashes(frame_files(config_.data, clip_, 0));
     }
+    folder_.take_over_config();
     if (folder_.resumed_from())
       folder_.note("resumed, " + std::to_string(progress_.frames_done()) + " frames are in the checkpoint");
     folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
@@ -184,11 +195,11 @@ class Reconstruction {
       }
       after.push_back(state);
     }
-    const MetricValues errors = write_images(index, frame, state);
+    write_images(index, frame, state);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
-    progress_.image_errors.push_back(errors);
+    progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
     progress_.seconds += seconds_since(begin);
-    save_progress(checkpoint_file(), resolved_, progress_);
+    save_progress(checkpoint_file(), identity_, progress_);
   }
 
   FrameGraphSettings graph_settings(Draw draw) const {
@@ -298,16 +309,18 @@ class Reconstruction {
     return config_.precision == RunPrecision::kFloat ? render_state<float>(state) : render_state<double>(state);
   }
 
-  MetricValues write_images(Index index, const ClipFrame& frame, const SceneState& state) const {
+  /// Writes the images of a frame and notes how far the start's and the result's are from the video's.
+  void write_images(Index index, const ClipFrame& frame, const SceneState& state) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
-    const Image image = rendered_image(state);
+    const Image image = rendered_image(state), start = rendered_image(baseline_start(index));
     write_image(paths.frame_image(number, "target"), frame.target);
     write_image(paths.frame_image(number, "render"), image);
     write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
-    write_image(paths.frame_image(number, "start"), rendered_image(baseline_start(index)));
+    write_image(paths.frame_image(number, "start"), start);
     const Image foreground = foreground_of(frame);
-    return image_errors(image, frame.target, &foreground);
+    progress_.image_errors.push_back(image_errors(image, frame.target, &foreground));
+    progress_.start_errors.push_back(image_errors(start, frame.target, &foreground));
   }
 
   /// What the run is given for a frame before it does anything.
@@ -332,20 +345,25 @@ class Reconstruction {
     summary.frames = static_cast<int>(clip_.frames());
     summary.seconds = progress_.seconds;
     for (std::size_t s = 0; s < config_.stages.size(); ++s) summary.metrics.push_back(summarize_stage(s));
-    std::vector<FrameMetrics> images;
-    for (std::size_t t = 1; t < progress_.image_errors.size(); ++t) {
-      images.push_back({static_cast<int>(t), progress_.image_errors[t]});
-    }
+    summary.baselines = {{"start", {}, {}}};
     if (clip_.truth) add_errors(summary);
+    add_image_errors(progress_.image_errors, summary.metrics.back().values, summary.per_frame);
+    add_image_errors(progress_.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
+    return summary;
+  }
+
+  /// Adds errors of images, which need no truth, to means and frames.
+  static void add_image_errors(const std::vector<MetricValues>& errors, MetricValues& means,
+                               std::vector<FrameMetrics>& per_frame) {
+    std::vector<FrameMetrics> images;
+    for (std::size_t t = 1; t < errors.size(); ++t) images.push_back({static_cast<int>(t), errors[t]});
     for (std::size_t t = 0; t < images.size(); ++t) {
-      if (summary.per_frame.size() <= t) summary.per_frame.push_back({images[t].frame, {}});
-      MetricValues& values = summary.per_frame[t].values;
+      if (per_frame.size() <= t) per_frame.push_back({images[t].frame, {}});
+      MetricValues& values = per_frame[t].values;
       values.insert(values.end(), images[t].values.begin(), images[t].values.end());
     }
-    MetricValues& final_values = summary.metrics.back().values;
-    const MetricValues means = mean_errors(images);
-    final_values.insert(final_values.end(), means.begin(), means.end());
-    return summary;
+    const MetricValues added = mean_errors(images);
+    means.insert(means.end(), added.begin(), added.end());
   }
 
   StageSummary summarize_stage(std::size_t s) const {
@@ -373,6 +391,7 @@ class Reconstruction {
       start.push_back(baseline_start(t));
       copy.push_back(clip_.first);
     }
+    summary.baselines.clear();
     for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{"copy_frame_0", &copy}}) {
       summary.baselines.push_back(
           {name, errors_of(*states, Draw::kAll), sequence_errors(placed(clip_, *states, Draw::kAll), truth)});
@@ -384,7 +403,7 @@ class Reconstruction {
   const std::vector<LossTerm>& losses_;
   RunFolder& folder_;
   const Observer& observer_;
-  std::string resolved_;
+  std::string identity_;  // the text that a checkpoint of this run belongs to
   const Clip& clip_;
   RunProgress progress_;
   Progress bar_;

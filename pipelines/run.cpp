@@ -38,8 +38,8 @@ class EarlyMessages {
 
 /// First line of a run's log.
 std::string opening(const RunConfig& config, const Clip& clip, const RunIdentity& identity) {
-  return "hsi4d " + std::string(version()) + " (" + git_commit() + "), run '" + config.name + "': " +
-         std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
+  return "hsi4d " + std::string(version()) + " (" + git_commit() + "), run '" + config.name +
+         "': " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
          std::to_string(clip.camera.height) + " pixels, " + std::to_string(config.stages.size()) + " stages, " +
          std::to_string(identity.threads) + (identity.threads == 1 ? " thread, " : " threads, ") + identity.precision;
 }

@@ -47,8 +47,8 @@ void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, 
   const InterruptWatch watch;
   const int threads = arguments.threads > 0 ? arguments.threads : config.threads;
   with_threads(threads > 0 ? threads : thread_count(), [&] {
-    write_dataset(config.synthetic, video_render_settings(), dataset,
-observer_on_terminal(arguments.quiet), sections_beside_data(config, descriptions_of(losses)));
+    write_dataset(config.synthetic, video_render_settings(), dataset, observer_on_terminal(arguments.quiet),
+                  sections_beside_data(config, descriptions_of(losses)));
   });
 }
 

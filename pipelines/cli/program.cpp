@@ -139,8 +139,8 @@ struct CommandLine {
   }
 
   void add_list() {
-    CLI::App* list = app.add_subcommand("list", "List what configs can name: losses, settings");
-    list->add_option("TOPIC", topic, "losses or settings")->required();
+    CLI::App* list = app.add_subcommand("list", "List what configs can name");
+    list->add_option("TOPIC", topic, joined(list_topics()))->required();
     list->callback([this] { run = [this] { return list_command(topic, losses); }; });
   }
 
@@ -170,6 +170,12 @@ struct CommandLine {
         ->type_name("F.{exr,png,npz}")
         ->required();
     command.add_option("--out", gradients.out, "Where loss and gradients go")->type_name("F.npz")->required();
+    command.footer(
+        "Gradients are by the file's own numbers, its rows in order. They are 0 for what does not move the image: "
+        "rows\n"
+        "that the reader leaves out (a number that is not finite, a zero quaternion); log-scales and opacity logits\n"
+        "that it holds at -20 or 20; coefficients above render.sh_degree; opacities where alpha is held at\n"
+        "render.alpha_cap (not with render.compatibility=inria); and what the camera does not see.");
     command.callback([this] { run = [this] { return gradients_command(gradients); }; });
   }
 

@@ -16,7 +16,6 @@ namespace hsi4d::cli {
 /// Throws UserError with all problems of the config, or when the folder is not empty or cannot be written;
 /// Interrupted after Ctrl-C.
 std::string synth_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
-                          const std::filesystem::path& out, bool quiet,
-                          const std::vector<LossDescription>& losses);
+                          const std::filesystem::path& out, bool quiet, const std::vector<LossDescription>& losses);
 
 }  // namespace hsi4d::cli

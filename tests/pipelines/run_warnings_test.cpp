@@ -37,7 +37,8 @@ std::vector<std::string> log_lines(const fs::path& run) {
   std::vector<std::string> lines;
   std::istringstream text(file_text(run / "log.txt"));
   for (std::string line; std::getline(text, line);) {
-    REQUIRE(std::regex_search(line, std::regex("^\\d{4}-\\d\\d-\\d\\dT\\d\\d:\\d\\d:\\d\\d\\.\\d{3}[+-]\\d\\d:\\d\\d ")));
+    REQUIRE(
+        std::regex_search(line, std::regex("^\\d{4}-\\d\\d-\\d\\dT\\d\\d:\\d\\d:\\d\\d\\.\\d{3}[+-]\\d\\d:\\d\\d ")));
     lines.push_back(line.substr(line.find(' ') + 1));
   }
   return lines;
@@ -86,8 +87,8 @@ RunSummary run_into_trap(const std::string& folder, int from, int count, const s
   RunOptions options;
   options.folder = folder;
   options.threads = 1;
-  const RunConfig read = load_run_config(file, {"stages.interaction.optimizer.max_rollbacks=" + max_rollbacks},
-                                         descriptions_of(terms));
+  const RunConfig read =
+      load_run_config(file, {"stages.interaction.optimizer.max_rollbacks=" + max_rollbacks}, descriptions_of(terms));
   return carry_out(read, terms, options);
 }
 
@@ -164,9 +165,10 @@ TEST_CASE("more steps that were not taken than allowed end a run, and it goes on
   } catch (const StageDivergedError& error) {
     message = error.what();
   }
-  CHECK_THAT(message, Contains("stage 'interaction, frame 1': given up in iteration 2 after 3 steps that had to be taken "
-                               "back (max_rollbacks is 2): the loss is nan; first: ") &&
-                          Contains("'trap'"));
+  CHECK_THAT(message,
+             Contains("stage 'interaction, frame 1': given up in iteration 2 after 3 steps that had to be taken "
+                      "back (max_rollbacks is 2): the loss is nan; first: ") &&
+                 Contains("'trap'"));
   CHECK(warnings.holding("frame 1, stage interaction, iteration ") == 2);
   CHECK(json_of("run/status.json")["state"] == "failed");
   CHECK(json_of("run/status.json")["message"] == message);
@@ -187,17 +189,16 @@ TEST_CASE("the log of a run tells every stage of every frame, and the terminal d
   std::size_t at = 1;
   for (int frame = 1; frame < kTinyFrames; ++frame) {
     const std::string start = "info frame " + std::to_string(frame) + ", stage ";
-    CHECK_THAT(lines[at++], Catch::Matchers::Matches(start + "camera: 8 iterations in " + number + " s, loss " + number +
-                                                     " \\(masked_l2 " + number + "\\) -> " + number + " \\(masked_l2 " +
-                                                     number + "\\)"));
-    const std::string terms =
-        number + " \\(photometric " + number + ", center " + number + ", depth " + number + "\\)";
+    CHECK_THAT(lines[at++], Catch::Matchers::Matches(start + "camera: 8 iterations in " + number + " s, loss " +
+                                                     number + " \\(masked_l2 " + number + "\\) -> " + number +
+                                                     " \\(masked_l2 " + number + "\\)"));
+    const std::string terms = number + " \\(photometric " + number + ", center " + number + ", depth " + number + "\\)";
     CHECK_THAT(lines[at++], Catch::Matchers::Matches(start + "interaction: 10 iterations in " + number + " s, loss " +
                                                      terms + " -> " + terms));
   }
-  CHECK_THAT(lines.back(), Catch::Matchers::Matches("info done: 4 frames in .*, psnr_db " + number + ", ssim " + number +
-                                                    ", mpjpe_mm " + number + ", object_translation_cm " + number +
-                                                    ", camera_translation_cm " + number));
+  CHECK_THAT(lines.back(), Catch::Matchers::Matches("info done: 4 frames in .*, psnr_db " + number + ", ssim " +
+                                                    number + ", mpjpe_mm " + number + ", object_translation_cm " +
+                                                    number + ", camera_translation_cm " + number));
 }
 
 TEST_CASE("warnings from before there was a folder, and a resumed run, are in the log", "[run]") {

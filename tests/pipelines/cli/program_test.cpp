@@ -114,7 +114,8 @@ TEST_CASE("check refuses stages whose groups are not known, do not exist in what
             groups + ")\n/stages/none/losses: a stage needs a loss\n");
   folder.write("b.json", R"({"stages": {"body": {"iterations": 5,
     "optimize": {"transl": {"lr": 1, "from": 3, "until": 3}}, "losses": {"photometric": {}}}}})");
-  CHECK_THAT(run_hsi4d({"check", "b.json"}).err, Contains("3 is not after from, which is 3; the group would never move"));
+  CHECK_THAT(run_hsi4d({"check", "b.json"}).err,
+             Contains("3 is not after from, which is 3; the group would never move"));
   // Those of them that would be right.
   folder.write("c.json", R"({"stages": {
     "camera": {"iterations": 5, "draw": "scene", "optimize": {"camera": {"lr": 1}}, "losses": {"masked_l2": {}}},
@@ -140,8 +141,14 @@ TEST_CASE("list tells losses and settings") {
              Contains("/render/blur") && Contains("/stages/NAME/losses/photo/ssim_share"));
   CHECK_THROWS_MATCHES(
       cli::list_command("loses", test_losses()), UserError,
-      Catch::Matchers::Message("hsi4d list: there is nothing called \"loses\" to list; known: losses, settings; "
-                               "did you mean \"losses\"?"));
+      Catch::Matchers::Message("hsi4d list: there is nothing called \"loses\" to list; known: losses, stages, scenes, "
+                               "settings; did you mean \"losses\"?"));
+  const std::string stages = cli::list_command("stages", test_losses());
+  CHECK_THAT(stages, Contains("\nscene  camera           Six numbers of the camera") &&
+                         Contains("\nall    body_pose        21 joints of the body\n"));
+  CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 1 + 11);
+  CHECK_THAT(cli::list_command("scenes", test_losses()),
+             Contains("\nwatering_can      A person in a room lifts a watering can") && Contains("\nbox  "));
   const TemporaryFolder folder;
   const ProgramResult result = run_hsi4d({"list", "losses"});
   CHECK(result.status == 0);
@@ -163,6 +170,12 @@ TEST_CASE("the program and every subcommand answer --version and --help") {
     CHECK(own.err.empty());
     CHECK_THAT(own.out, Contains(std::string("hsi4d ") + command));
   }
+}
+
+TEST_CASE("the help of gradients tells which of them are zero") {
+  const TemporaryFolder folder;
+  CHECK_THAT(run_hsi4d({"gradients", "--help"}).out,
+             Contains("log-scales and opacity logits\nthat it holds at -20 or 20"));
 }
 
 TEST_CASE("mistakes on the command line end with 2 and one message") {
