@@ -46,12 +46,7 @@ void describe(ConfigFields& f, InitialSettings& s) {
 InitialSettings read_initial(const fs::path& file) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, {}, problems);
-  InitialSettings settings;
-  ConfigFields fields;
-  describe(fields, settings);
-  read_config(tree, fields, problems);
-  problems.throw_if_any();
-  return settings;
+  return read_settings<InitialSettings>(tree, problems);
 }
 
 /// Refuses 8.png, 9.png, 10.png: in the order of their names 10 comes first.

@@ -22,8 +22,9 @@ namespace fs = std::filesystem;
 RunConfig demo_config(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
   ConfigProblems problems;
   const std::string name = arguments.quick ? "demo_quick.json" : "demo.json";
-  const ConfigValue tree = load_config_text(std::string(demo_config_text(arguments.quick)), name, fs::current_path(),
-                                            arguments.overrides, problems);
+  const ConfigValue tree =
+      load_config_text(std::string(demo_config_text(arguments.quick)), name, fs::current_path(), arguments.overrides,
+                       problems, {{"demo.json", std::string(demo_config_text(false))}});
   return read_run_config(tree, descriptions_of(losses), problems);
 }
 
