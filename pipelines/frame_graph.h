@@ -14,6 +14,7 @@
 #include "optim/loss_term.h"
 #include "optim/parameters.h"
 #include "pipelines/clip.h"
+#include "pipelines/posed_splats.h"
 #include "pipelines/run_config.h"
 #include "pipelines/state.h"
 #include "splat/render.h"
@@ -80,6 +81,7 @@ class FrameGraph {
   Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
   ParameterGroup<S>& add_to_group(const std::string& group, Var<S> leaf);
   Var<S> rotation_leaf(const std::string& group, const std::string& name, Index rows);
+  GaussianVars<S> gaussian_leaves(const std::string& part, const std::string& name, const Gaussians& g);
   Part record_scene(const Clip& clip);
   Part record_object(const ClipObject& object);
   Part record_human(const Avatar& avatar);

@@ -174,8 +174,9 @@ struct CommandLine {
         "Gradients are by the file's own numbers, its rows in order. They are 0 for what does not move the image: "
         "rows\n"
         "that the reader leaves out (a number that is not finite, a zero quaternion); log-scales and opacity logits\n"
-        "that it holds at -20 or 20; coefficients above render.sh_degree; opacities where alpha is held at\n"
-        "render.alpha_cap (not with render.compatibility=inria); and what the camera does not see.");
+        "that it holds at -20 or 20; coefficients above render.sh_degree; what the camera does not see.\n"
+        "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
+        "render.compatibility is inria.");
     command.callback([this] { run = [this] { return gradients_command(gradients); }; });
   }
 
