@@ -18,8 +18,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kPerFrame = 18;  // iterations of kTinyStages
-
 RunConfig config_of(const fs::path& data, const std::vector<std::string>& overrides = {}) {
   return load_run_config(data / "config.json", overrides, descriptions_of(loss_terms()));
 }

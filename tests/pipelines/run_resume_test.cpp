@@ -15,8 +15,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kPerFrame = 18;  // iterations of kTinyStages
-
 /// True when metrics.jsonl has a line of this frame.
 bool has_reached(const std::string& run, int frame) {
   return file_text(run + "/metrics.jsonl").find("{\"frame\": " + std::to_string(frame) + ",") != std::string::npos;

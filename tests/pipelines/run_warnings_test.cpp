@@ -75,7 +75,8 @@ std::vector<LossTerm> with_trap() {
 
 /// A run whose second stage has the trap for its only loss; from the first evaluation in `from` on, `count` of them
 /// are NaN. The optimiser looks twice at a bad evaluation, to name the operator.
-RunSummary run_into_trap(const std::string& folder, int from, int count, const std::string& max_rollbacks) {
+RunSummary run_into_trap(const std::string& folder, int from, int count, const std::string& max_rollbacks,
+                         bool resume = false) {
   Trap::evaluations = 0;
   Trap::from = from;
   Trap::count = count;
@@ -87,6 +88,7 @@ RunSummary run_into_trap(const std::string& folder, int from, int count, const s
   RunOptions options;
   options.folder = folder;
   options.threads = 1;
+  options.resume = resume;
   const RunConfig read =
       load_run_config(file, {"stages.interaction.optimizer.max_rollbacks=" + max_rollbacks}, descriptions_of(terms));
   return carry_out(read, terms, options);
@@ -132,8 +134,8 @@ TEST_CASE("steps that were not taken are told, counted and lived with", "[run]")
   const TemporaryFolder here;
   const Warnings warnings;
   const RunSummary summary = run_into_trap("run", 4, 1, "10");  // the fifth evaluation; looked at again it is finite
-  CHECK(warnings.all() ==
-        std::vector<std::string>{"frame 1, stage interaction, iteration 4: no step, the loss is nan"});
+  REQUIRE(warnings.all() ==
+          std::vector<std::string>{"frame 1, stage interaction, iteration 4: no step, the loss is nan"});
   const std::vector<nlohmann::json> lines = metrics_of("run");
   Index rolled_back = 0;
   for (const nlohmann::json& line : lines) {
@@ -146,7 +148,7 @@ TEST_CASE("steps that were not taken are told, counted and lived with", "[run]")
     CHECK(line["losses"]["trap"].is_null());
   }
   CHECK(rolled_back == 1);
-  CHECK(lines.size() == 3 * 18);  // the others are done as ever
+  CHECK(lines.size() == 3 * kPerFrame);  // the others are done as ever
   CHECK(number_in(summary.metrics[0].values, "rollbacks") == 0);
   CHECK(number_in(summary.metrics[1].values, "rollbacks") == 1);
   CHECK(json_of("run/summary.json")["metrics"][1]["rollbacks"] == 1);
@@ -174,6 +176,11 @@ TEST_CASE("more steps that were not taken than allowed end a run, and it goes on
   CHECK(json_of("run/status.json")["message"] == message);
   CHECK_THAT(file_text("run/log.txt"), Contains(" error failed: " + message + "\n"));
   CHECK_FALSE(fs::exists("run/summary.json"));
+  run_into_trap("run", 0, 0, "2", true);
+  CHECK(json_of("run/status.json")["state"] == "done");
+  CHECK(warnings.all().size() == 2);
+  run_into_trap("whole", 0, 0, "2");
+  CHECK(differences("whole", "run").empty());
 }
 
 TEST_CASE("the log of a run tells every stage of every frame, and the terminal does not", "[run]") {
