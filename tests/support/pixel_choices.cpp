@@ -89,19 +89,24 @@ std::vector<Candidate<S>> candidates(const Tape<S>& tape, const Projected<S>& pr
 /// The choices at one pixel of a tile, given what reaches the tile in depth order.
 template <class S>
 std::uint64_t choices_at(const std::vector<const SplatRecord<S>*>& list, const CompositeRules<S>& rules,
-                         const TileJob<S>& job, Index row, Index col, Index& fragments) {
+                         const TileJob<S>& job, Index row, Index col, PixelChoices& count) {
   Hash hash;
   S transmittance = 1;
   for (const SplatRecord<S>* record : list) {
     if (job.top + row < record->row_begin || job.top + row >= record->row_end) continue;
     const auto pixel = hsi4d::detail::pixel_alpha(*record, rules, job, row, col);
-    if (!pixel.drawn) continue;
+    if (!pixel.drawn) {
+      ++count.skipped;
+      continue;
+    }
     const S next = transmittance * (S(1) - pixel.alpha);
     const bool past = next < rules.stop_below;
     const auto name = 4 * static_cast<std::uint64_t>(record->index);
     hash.add(name + (past ? 2 : 0) + (pixel.capped ? 1 : 0));
+    count.stopped += past ? 1 : 0;
     if (past && rules.exclusive) break;
-    fragments += pixel.alpha >= std::numeric_limits<S>::min() ? 1 : 0;  // below, the compositor's threads have 0
+    count.fragments += pixel.alpha >= std::numeric_limits<S>::min() ? 1 : 0;  // below, the compositor's threads have 0
+    count.capped += pixel.capped ? 1 : 0;
     if (past) break;
     transmittance = next;
   }
@@ -133,7 +138,7 @@ PixelChoices pixel_choices(const Tape<S>& tape, const Projected<S>& projected, V
     for (Index row = 0; row < job.height; ++row) {
       for (Index col = 0; col < job.width; ++col) {
         const Index pixel = (job.top + row) * tiles.width + job.left + col;
-        result.hashes[static_cast<std::size_t>(pixel)] = choices_at(list, rules, job, row, col, result.fragments);
+        result.hashes[static_cast<std::size_t>(pixel)] = choices_at(list, rules, job, row, col, result);
       }
     }
   }

@@ -17,6 +17,9 @@ struct PixelChoices {
   /// one at which the pixel stops.
   std::vector<std::uint64_t> hashes;
   Index fragments = 0;  ///< as RenderCounters has them
+  Index skipped = 0;    ///< (pixel, Gaussian), in tiles that it reaches, where α is below alpha_min
+  Index capped = 0;     ///< fragments that the cap holds
+  Index stopped = 0;    ///< pixels that stop before their last Gaussian or at it
 };
 
 /// The choices of composite(projected, opacities, …, view) for the values that the tape holds now. Features that are
