@@ -206,7 +206,7 @@ TEST_CASE("whether a transmittance equal to the threshold stops is a setting") {
   }
 }
 
-TEST_CASE("layers below alpha_min are missing as computed; without it nothing is [B5]") {
+TEST_CASE("layers below alpha_min are missing as computed, without it nothing is [B5]") {
   FlatSplats splats;
   const double alpha = 0.0039;  // just below 1/255
   for (int i = 0; i < 1000; ++i) splats.add(0.5, 0.5, 1 + i, 3, static_cast<float>(alpha), {1});

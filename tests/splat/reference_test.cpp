@@ -86,7 +86,7 @@ TEST_CASE("reference: one Gaussian in front of the camera") {
     }
 }
 
-TEST_CASE("reference: Gaussians over each other, in depth order whatever their rows; opacity of groups") {
+TEST_CASE("reference: Gaussians over each other, in depth order whatever their rows, opacity of groups") {
   SplatScene scene = small();
   scene.add({0, 0, 3}, 0.5, logit(0.5), {0, 1, 0});
   scene.add({0, 0, 2}, 0.5, logit(0.25), {1, 0, 0});
