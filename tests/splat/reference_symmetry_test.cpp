@@ -1,4 +1,4 @@
-// Images of the brute-force renderer against themselves: mirrored, cropped, split, scaled, moved, in long double.
+// Images of the brute-force renderer against themselves (mirrored, cropped, split, moved) and against long double.
 #include <cmath>
 
 #include <catch2/catch.hpp>
