@@ -17,14 +17,12 @@
 #include "pipelines/evaluate.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/input_hashes.h"
+#include "pipelines/report_data.h"
 #include "pipelines/run_state.h"
 
 namespace hsi4d {
 
 namespace {
-
-/// The difference image shows differences this many times as large as they are.
-constexpr float kDifferenceGain = 4;
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -72,7 +70,8 @@ Image difference_image(const Image& a, const Image& b) {
   Image result(a.channels(), a.height(), a.width());
   for (int c = 0; c < a.channels(); ++c) {
     for (int y = 0; y < a.height(); ++y) {
-      for (int x = 0; x < a.width(); ++x) result(c, y, x) = kDifferenceGain * std::fabs(a(c, y, x) - b(c, y, x));
+      for (int x = 0; x < a.width(); ++x)
+        result(c, y, x) = static_cast<float>(kDifferenceGain) * std::fabs(a(c, y, x) - b(c, y, x));
     }
   }
   return result;

@@ -17,6 +17,9 @@ namespace hsi4d {
 /// The images of a frame, frames/NNNN_KIND.png; `start` is the frame as the run was given it.
 inline constexpr std::array<std::string_view, 4> kFrameKinds = {"target", "render", "difference", "start"};
 
+/// The difference image shows differences this many times as large as they are.
+inline constexpr int kDifferenceGain = 4;
+
 struct FrameImages {
   int frame = 0;
   std::array<Bytes, kFrameKinds.size()> files;  ///< PNG files in the order of kFrameKinds; empty: there is none

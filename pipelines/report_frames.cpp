@@ -68,22 +68,40 @@ bool has_start(const ReportData& data) {
                      [](const FrameImages& frame) { return !frame.files[kStart].empty(); });
 }
 
+/// What a kind of image is called; a difference tells how much it is enlarged.
+std::string kind_label(std::string_view kind) {
+  return std::string(kind) + (kind == "difference" ? " ×" + std::to_string(kDifferenceGain) : "");
+}
+
 std::string image_choice(const std::string& id, const std::string& label, std::string_view chosen, bool with_start) {
   std::string text = "<label>" + label + " <select id=\"" + id + "\">";
   for (size_t k = 0; k < kFrameKinds.size(); ++k) {
     if (k == kStart && !with_start) continue;
     const std::string kind(kFrameKinds[k]);
-    text +=
-        "<option value=\"" + kind + "\"" + (kind == chosen ? " selected=\"selected\"" : "") + ">" + kind + "</option>";
+    text += "<option value=\"" + kind + "\"" + (kind == chosen ? " selected=\"selected\"" : "") + ">" +
+            kind_label(kind) + "</option>";
   }
   return text + "</select></label>\n";
+}
+
+/// Two images of a frame, one over the other up to where the reader puts their edge.
+std::string compare_figure(bool with_start) {
+  return "<figure><div class=\"compare\" id=\"compare\"><img id=\"under\" alt=\"left image\"/>"
+         "<img class=\"over\" id=\"over\" alt=\"right image\"/><div class=\"edge\" id=\"edge\"></div></div>\n"
+         "<div class=\"absent\" id=\"compare-absent\" hidden=\"hidden\">This frame lacks one of the two images.</div>\n"
+         "<figcaption class=\"controls\">" +
+         image_choice("left", "left", with_start ? "start" : "target", with_start) +
+         "<input type=\"range\" id=\"split\" aria-label=\"where the two images meet\" min=\"0\" max=\"100\" "
+         "step=\"0.5\" value=\"50\"/>\n" +
+         image_choice("right", "right", "render", with_start) + "</figcaption></figure>\n";
 }
 
 }  // namespace
 
 std::string frames_section(const ReportData& data) {
   if (data.frames.empty()) return "";
-  const bool with_start = has_start(data);
+  // The middle frame stands for a run better than the last, which is the farthest from what was given.
+  const size_t first = data.frames.size() / 2;
   std::string text =
       "<section id=\"frames\">\n<h2>Frames</h2>\n<noscript><p class=\"nothing\">The images need "
       "JavaScript.</p></noscript>\n"
@@ -91,24 +109,15 @@ std::string frames_section(const ReportData& data) {
       "<button id=\"play\">play</button><button id=\"next\" aria-label=\"next frame\">›</button>"
       "<span class=\"frame-name\" id=\"frame-name\"></span>"
       "<input type=\"range\" id=\"slider\" aria-label=\"frame\" min=\"0\" max=\"" +
-      std::to_string(data.frames.size() - 1) + "\" value=\"" + std::to_string(data.frames.size() - 1) +
-      "\"/></div>\n<div class=\"images\">\n";
+      std::to_string(data.frames.size() - 1) + "\" value=\"" + std::to_string(first) +
+      "\"/></div>\n<p class=\"frame-errors\" id=\"frame-errors\"></p>\n<div class=\"images\">\n";
   for (size_t k = 0; k < kStart; ++k) {
     const std::string kind(kFrameKinds[k]);
     text += "<figure><img id=\"image-" + kind + "\" alt=\"" + kind +
             "\" hidden=\"hidden\"/><div class=\"absent\" id=\"image-" + kind + "-absent\">no image</div><figcaption>" +
-            kind + "</figcaption></figure>\n";
+            kind_label(kind) + "</figcaption></figure>\n";
   }
-  text +=
-      "</div>\n<p class=\"frame-errors\" id=\"frame-errors\"></p>\n</div>\n<div class=\"card compare-card\">\n<h3>" +
-      std::string(with_start ? "Before and after" : "Side by side") + "</h3>\n<div class=\"controls\">" +
-      image_choice("left", "left", with_start ? "start" : "target", with_start) +
-      image_choice("right", "right", "render", with_start) +
-      "</div>\n<div class=\"compare\" id=\"compare\"><img id=\"under\" alt=\"left image\"/>"
-      "<img class=\"over\" id=\"over\" alt=\"right image\"/><div class=\"edge\" id=\"edge\"></div></div>\n"
-      "<p class=\"nothing\" id=\"compare-absent\" hidden=\"hidden\">This frame lacks one of the two images.</p>\n"
-      "<input type=\"range\" id=\"split\" aria-label=\"where the two images meet\" min=\"0\" max=\"100\" step=\"0.5\" "
-      "value=\"50\"/>\n</div>\n</section>\n<script>\n";
+  text += compare_figure(has_start(data)) + "</div>\n</div>\n</section>\n<script>\n";
   return text + frames_script(data) + std::string(report_script()) + "</script>\n";
 }
 

@@ -41,6 +41,14 @@ std::string head_section(const ReportData& data) {
   return text + "</dl>\n";
 }
 
+constexpr double kMostPercent = 999;  // beyond this a share tells nothing more
+
+/// Whether a result is worse than the start, in the digits that are shown.
+bool is_worse(const MetricFacts& facts, double value, double start) {
+  return (value - start) * facts.better < 0 &&
+         fixed_number(value, facts.decimals) != fixed_number(start, facts.decimals);
+}
+
 /// "from 64.0, −72 %": how a result stands to the start.
 std::string change_text(const MetricFacts& facts, double value, double start) {
   std::string text = "from " + fixed_number(start, facts.decimals);
@@ -51,9 +59,22 @@ std::string change_text(const MetricFacts& facts, double value, double start) {
   const int decimals = is_ratio ? 0 : facts.decimals;
   const std::string digits = fixed_number(std::fabs(change), decimals);
   if (digits == fixed_number(0, decimals)) return text + ", unchanged";
-  const bool is_better = change * facts.better > 0;
-  return text + " <span class=\"" + (is_better ? "better" : "worse") + "\">" + (change < 0 ? "−" : "+") + digits +
-         (is_ratio ? " %" : "") + "</span>";
+  const bool is_beyond = is_ratio && std::fabs(change) > kMostPercent;
+  return text + " <span class=\"" + (is_worse(facts, value, start) ? "worse" : "better") + "\">" +
+         (is_beyond ? "&gt; " : "") + (change < 0 ? "−" : "+") + (is_beyond ? fixed_number(kMostPercent, 0) : digits) +
+         (is_ratio ? "\u00A0%" : "") + "</span>";
+}
+
+/// What the last stage left worse than the start: the run did harm there, and its reader is told first.
+std::string worse_message(const RunSummary& summary, const MetricValues& start) {
+  std::string worse;
+  for (const MetricFacts& facts : metric_facts()) {
+    const double* const value = find_metric(summary.metrics.back().values, facts.name);
+    const double* const before = find_metric(start, facts.name);
+    if (value != nullptr && before != nullptr && is_worse(facts, *value, *before))
+      worse += (worse.empty() ? "" : "; ") + std::string(facts.label);
+  }
+  return worse.empty() ? "" : "<p class=\"message\">Worse than the start: " + text_of(worse) + ".</p>\n";
 }
 
 /// The few numbers that a reader wants first: of the last stage, against the start.
@@ -67,45 +88,49 @@ std::string figures_section(const RunSummary& summary) {
     const double* const value = find_metric(summary.metrics.back().values, name);
     if (value == nullptr) continue;
     const double* const before = start == nullptr ? nullptr : find_metric(*start, name);
-    cards += "<div class=\"card figure\" title=\"" + text_of(facts.summary) + "\"><div class=\"label\">" +
-             text_of(facts.label) + "</div><div class=\"value\">" + fixed_number(*value, facts.decimals) + " <small>" +
-             text_of(facts.unit) + "</small></div><div class=\"before\">" +
+    const bool worse = before != nullptr && is_worse(facts, *value, *before);
+    cards += std::string("<div class=\"card figure") + (worse ? " harmed" : "") + "\" title=\"" +
+             text_of(facts.summary) + "\"><div class=\"label\">" + text_of(facts.label) +
+             "</div><div class=\"value\">" + fixed_number(*value, facts.decimals) + " <small>" + text_of(facts.unit) +
+             "</small></div><div class=\"before\">" +
              (before == nullptr || facts.better == 0 ? "" : change_text(facts, *value, *before)) + "</div></div>\n";
   }
-  return cards.empty() ? "" : "<div class=\"figures\">\n" + cards + "</div>\n";
+  if (cards.empty()) return "";
+  return (start == nullptr ? "" : worse_message(summary, *start)) + "<div class=\"figures\">\n" + cards + "</div>\n";
 }
 
 // ---- Errors ----
 
+/// A row a metric and a column a result, as on the terminal: results are few, and pages are narrow.
 std::string errors_section(const ReportData& data) {
   std::string text = "<section id=\"errors\">\n<h2>Errors</h2>\n";
   const ErrorTable table = data.summary ? make_error_table(*data.summary) : ErrorTable();
   if (table.columns.empty()) return text + "<p class=\"nothing\">No errors were measured.</p>\n</section>\n";
-  text += "<div class=\"card wide\"><table>\n<thead><tr><th>result</th>";
-  for (const MetricFacts* const facts : table.columns)
-    text += "<th title=\"" + text_of(facts->summary) + "\">" + text_of(facts->label) + "<span class=\"unit\">" +
-            text_of(facts->unit) +
-            (facts->better > 0   ? " ↑"
-             : facts->better < 0 ? " ↓"
-                                 : "") +
-            "</span></th>";
+  const auto column = [](const ErrorTable::Row& row) {
+    return std::string(row.is_baseline ? " class=\"baseline\"" : "");
+  };
+  text += "<div class=\"card wide\"><table class=\"errors\">\n<thead><tr><th>error</th>";
+  for (const ErrorTable::Row& row : table.rows) text += "<th" + column(row) + ">" + row_label(row.name) + "</th>";
   text += "</tr></thead>\n<tbody>\n";
-  for (size_t r = 0; r < table.rows.size(); ++r) {
-    const ErrorTable::Row& row = table.rows[r];
-    text += std::string("<tr") + (row.is_baseline ? " class=\"baseline\"" : "") + "><th scope=\"row\">" +
-            row_label(row.name) + "</th>";
-    for (size_t m = 0; m < table.columns.size(); ++m) {
-      const double* const value = row.values[m];
+  for (size_t m = 0; m < table.columns.size(); ++m) {
+    const MetricFacts& facts = *table.columns[m];
+    text += "<tr><th scope=\"row\" title=\"" + text_of(facts.summary) + "\">" + text_of(facts.label) +
+            " <span class=\"unit\">" + text_of(facts.unit) +
+            (facts.better > 0   ? " ↑"
+             : facts.better < 0 ? " ↓"
+                                : "") +
+            "</span></th>";
+    for (size_t r = 0; r < table.rows.size(); ++r) {
+      const double* const value = table.rows[r].values[m];
       text += value == nullptr ? "<td class=\"none\">–</td>"
-                               : std::string(table.is_best(r, m) ? "<td class=\"best\">" : "<td>") +
-                                     fixed_number(*value, table.columns[m]->decimals) + "</td>";
+                               : (table.is_best(r, m) ? "<td class=\"best\">" : "<td" + column(table.rows[r]) + ">") +
+                                     fixed_number(*value, facts.decimals) + "</td>";
     }
     text += "</tr>\n";
   }
   return text +
-         "</tbody></table></div>\n<p class=\"caption\">Means over the frames that were optimised; rows in grey are "
-         "what "
-         "no optimisation gives, the others the end of each stage. The best of each column is "
+         "</tbody></table></div>\n<p class=\"caption\">Means over the frames that were optimised; columns in grey are "
+         "what no optimisation gives, the others the end of each stage. The best of each row is "
          "marked.</p>\n</section>\n";
 }
 

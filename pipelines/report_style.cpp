@@ -31,16 +31,19 @@ dl.facts dd { margin: 0; overflow-wrap: anywhere; }
 .figure .value { font-size: 25px; font-weight: 650; line-height: 1.25; font-variant-numeric: tabular-nums; }
 .figure .value small { font-size: 14px; font-weight: 500; color: var(--soft); }
 .figure .label, .figure .before { font-size: 13px; color: var(--soft); }
-.better { color: var(--good); font-weight: 600; } .worse { color: var(--bad); font-weight: 600; }
+.better { color: var(--good); font-weight: 600; white-space: nowrap; }
+.worse { color: var(--bad); font-weight: 600; white-space: nowrap; }
+.figure.harmed { border-color: var(--bad); }
 .wide { overflow-x: auto; padding: 0; }
 table { border-collapse: collapse; width: 100%; font-size: 13.5px; font-variant-numeric: tabular-nums; }
 th, td { padding: 7px 12px; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { font-weight: 600; vertical-align: bottom; } thead th { font-size: 12.5px; white-space: normal; min-width: 74px; }
 th:first-child, td:first-child { text-align: left; }
 tbody tr:last-child th, tbody tr:last-child td { border-bottom: 0; }
-tr.baseline th, tr.baseline td { color: var(--soft); }
-th .unit { display: block; font-weight: 400; color: var(--soft); }
-td.best, tr.baseline td.best { background: var(--best); color: var(--best-text); font-weight: 650; }
+th.baseline, td.baseline { color: var(--soft); }
+th .unit { font-weight: 400; color: var(--soft); }
+table.errors td, table.errors th { padding-top: 4px; padding-bottom: 4px; }
+td.best { background: var(--best); color: var(--best-text); font-weight: 650; }
 td.none { opacity: 0.5; }
 .plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(330px, 1fr)); gap: 14px; }
 #losses .plots { grid-template-columns: repeat(auto-fit, minmax(400px, 1fr)); }
@@ -60,18 +63,20 @@ svg.bar { width: 100%; height: 26px; border-radius: 6px; display: block; margin-
 button, select { font: inherit; font-size: 14px; padding: 3px 12px; border-radius: 7px; border: 1px solid var(--line);
   background: var(--page); color: var(--text); cursor: pointer; }
 .frame-name { min-width: 90px; font-weight: 600; font-variant-numeric: tabular-nums; }
-.images { display: grid; grid-template-columns: repeat(auto-fit, minmax(200px, 1fr)); gap: 12px; }
+.images { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 512px), 1fr)); gap: 16px; }
 figure { margin: 0; } figcaption { font-size: 13px; color: var(--soft); margin-top: 4px; text-align: center; }
-figure img, .compare img { width: 100%; display: block; border-radius: 6px; background: #8883; }
+figcaption.controls { margin: 8px auto 0; max-width: 512px; flex-wrap: nowrap; }
+figcaption.controls input[type=range] { flex: 1 1 60px; min-width: 60px; }
+figcaption label { white-space: nowrap; }
+.images img { width: 100%; display: block; margin: 0 auto; border-radius: 6px; background: #8883; }
+.images img.whole { image-rendering: pixelated; }
 .absent { aspect-ratio: 1; display: grid; place-items: center; border: 1px dashed var(--line); border-radius: 6px;
   color: var(--soft); }
-.frame-errors { font-size: 13px; color: var(--soft); margin: 10px 0 0; min-height: 1.5em; }
-.compare { position: relative; max-width: 560px; margin: 0 auto; }
+.frame-errors { font-size: 13px; color: var(--soft); margin: 0 0 12px; min-height: 1.5em; }
+.compare { position: relative; margin: 0 auto; }
 .compare .over { position: absolute; inset: 0; }
 .compare .edge { position: absolute; top: 0; bottom: 0; width: 2px; margin-left: -1px; background: #fff;
   box-shadow: 0 0 4px #000a; pointer-events: none; }
-.compare-card { margin-top: 14px; } .compare-card input[type=range] { width: 100%; max-width: 560px; display: block;
-  margin: 8px auto 0; accent-color: var(--accent); }
 ul.notes { margin: 0; padding-left: 22px; } ul.notes li { overflow-wrap: anywhere; }
 details summary { cursor: pointer; color: var(--soft); } pre { overflow-x: auto; font-size: 12.5px; margin: 10px 0 0; }
 .nothing { color: var(--soft); margin: 0; }
@@ -89,6 +94,16 @@ std::string_view report_script() {
     get(id).hidden = !url;
     get(id + "-absent").hidden = !!url;
     if (url) get(id).src = url;
+  };
+  // Pixels are shown whole: small images are enlarged by 2, 3, ...; images wider than their place are shrunk.
+  const fit = () => {
+    for (const image of document.querySelectorAll(".images img")) {
+      const size = image.naturalWidth, box = image.closest("figure");
+      const times = size && size <= box.clientWidth ? Math.max(1, Math.floor(Math.min(box.clientWidth, 600) / size)) : 0;
+      const width = times ? size * times + "px" : "";
+      image.classList.toggle("whole", times > 0);
+      (image.id === "under" || image.id === "over" ? get("compare") : image).style.width = width;
+    }
   };
   const showEdge = () => {
     const share = get("split").value;
@@ -123,6 +138,8 @@ std::string_view report_script() {
     get("split").value = 100 * (event.clientX - box.left) / box.width;
     showEdge();
   });
+  for (const image of document.querySelectorAll(".images img")) image.addEventListener("load", fit);
+  window.addEventListener("resize", fit);
   showEdge();
   show();
 })();

@@ -75,8 +75,9 @@ RunSummary summary_named(const std::string& name) {
   summary.name = name;
   summary.frames = 2;
   summary.seconds = 20;
-  summary.metrics = {{"camera", 2, 60, {{"camera_translation_cm", 0.25}}},
-                     {"interaction", 12, 600, {{"mpjpe_mm", 20}, {"psnr_db", 31}, {"fragments", 1234567}}}};
+  summary.metrics = {
+      {"camera", 2, 60, {{"camera_translation_cm", 0.25}}},
+      {"interaction", 12, 600, {{"mpjpe_mm", 20}, {"psnr_db", 31}, {"jitter", 9.5}, {"fragments", 1234567}}}};
   summary.baselines = {
       {"start", {{"mpjpe_mm", 60}, {"psnr_db", 20}}, {{1, {{"mpjpe_mm", 50}}}, {2, {{"mpjpe_mm", 70}}}}},
       {"copy_frame_0", {{"mpjpe_mm", 45}}, {}}};
@@ -132,10 +133,15 @@ TEST_CASE("a report has every section, well formed, and asks for nothing from ou
                        Contains("<dt>precision</dt><dd>float</dd>") && Contains("<dt>version</dt>") &&
                        Contains("<dt>time</dt><dd>20 s</dd>"));
   // The table: the best is marked, what was not measured is a dash.
-  CHECK_THAT(page, Contains("<th scope=\"row\">copy frame 0</th><td>45.0</td>"));
-  CHECK_THAT(page, Contains("<th scope=\"row\">interaction</th><td class=\"best\">20.0</td><td class=\"none\">–</td>"
-                            "<td class=\"best\">31.00</td>"));
-  CHECK_THAT(page, Contains("from 60.0 <span class=\"better\">−67 %</span>"));
+  CHECK_THAT(page, Contains("<th class=\"baseline\">start</th><th class=\"baseline\">copy frame 0</th><th>camera</th>"
+                            "<th>interaction</th></tr></thead>"));
+  CHECK_THAT(page,
+             Contains("MPJPE <span class=\"unit\">mm ↓</span></th><td class=\"baseline\">60.0</td>"
+                      "<td class=\"baseline\">45.0</td><td class=\"none\">–</td><td class=\"best\">20.0</td></tr>"));
+  CHECK_THAT(page, Contains("jitter <span class=\"unit\">m/s³ ↓</span></th><td class=\"none\">–</td>"
+                            "<td class=\"none\">–</td><td class=\"none\">–</td><td>9.5</td></tr>"));
+  CHECK_THAT(page, Contains("from 60.0 <span class=\"better\">−67\u00A0%</span>"));
+  CHECK(page.find("Worse than the start") == std::string::npos);
   // Errors by frame, with tooltips; the baseline without frames is a dashed mean.
   CHECK_THAT(page, Contains("<title>result, frame 2: 27.7 mm</title>"));
   CHECK_THAT(page, Contains("<title>start, frame 1: 50.0 mm</title>"));
@@ -153,6 +159,30 @@ TEST_CASE("a report has every section, well formed, and asks for nothing from ou
   CHECK_THAT(page, Contains("{frame: 2, errors: \"MPJPE 27.7 mm · PSNR 32.00 dB\""));
   for (const char* kind : {"target", "render", "difference"})
     CHECK_THAT(page, Contains(std::string("id=\"image-") + kind));
+  CHECK_THAT(page, Contains("<figcaption>difference ×4</figcaption>"));
+}
+
+TEST_CASE("a report opens on the middle frame") {
+  const TemporaryFolder here;
+  make_run("a", "a walk");
+  for (const char* name : {"0003", "0004", "0005"})
+    fs::copy("a/frames/0001_render.png", std::string("a/frames/") + name + "_render.png");
+  CHECK_THAT(report_html("a"), Contains("min=\"0\" max=\"4\" value=\"2\""));
+}
+
+TEST_CASE("a report tells first what became worse than the start, in few digits") {
+  const TemporaryFolder here;
+  make_run("a", "a walk");
+  RunSummary summary = summary_named("a walk");
+  summary.metrics[1].values = {{"mpjpe_mm", 483000}, {"world_mpjpe_mm", 12}, {"psnr_db", 19.5}};
+  summary.baselines[0].values.emplace_back("world_mpjpe_mm", 12.001);  // the same in the digits that are shown
+  here.write("a/summary.json", summary_json(summary));
+  const std::string page = report_html("a");
+  CHECK(tag_fault(page) == "");
+  CHECK_THAT(page, Contains("<p class=\"message\">Worse than the start: MPJPE; PSNR.</p>"));
+  CHECK_THAT(page, Contains("from 60.0 <span class=\"worse\">&gt; +999\u00A0%</span>"));
+  CHECK_THAT(page, Contains("from 12.0, unchanged"));
+  CHECK(count_of(page, "class=\"card figure harmed\"") == 1);  // PSNR has no card
 }
 
 TEST_CASE("the same run gives the same bytes, and reporting twice changes nothing") {
