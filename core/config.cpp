@@ -2,6 +2,7 @@
 // is in config_walk.cpp.
 #include "core/config.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -383,8 +384,13 @@ void ConfigFields::then(std::function<void()> step) {
   add_field(ConfigField::Kind::kStep, "", "").step = std::move(step);
 }
 
-void ConfigFields::rule(std::string_view name, std::function<std::string()> rule) {
-  add_field(ConfigField::Kind::kRule, name, "").rule = std::move(rule);
+void ConfigFields::rule(std::vector<std::string> names, std::function<std::string()> rule) {
+  for (const std::string& name : names)
+    HSI4D_CHECK(std::any_of(fields_.begin(), fields_.end(), [&name](const ConfigField& f) { return f.name == name; }),
+                "a rule is about a setting that is not described before it: " + name);
+  ConfigField& field = add_field(ConfigField::Kind::kRule, names.at(0), "");
+  field.rule = std::move(rule);
+  field.rule_fields = std::move(names);
 }
 
 std::vector<std::string> ConfigFields::names() const {

@@ -118,6 +118,7 @@ struct ConfigField {
   std::function<void()> clear;                                                 ///< kList
   std::function<void()> step;                                                  ///< kStep
   std::function<std::string()> rule;                                           ///< kRule: what is wrong, or nothing
+  std::vector<std::string> rule_fields;                                        ///< kRule: the fields that it is about
 
   /// The field must be written; without this an absent field keeps its default.
   ConfigField& required() {
@@ -270,9 +271,9 @@ class ConfigFields {
   /// here and keys written explicitly win.
   void then(std::function<void()> step);
 
-  /// A condition between fields, checked when all fields of the struct were read without problems. `rule` returns what
-  /// is wrong, or an empty string; the message is placed at `name`.
-  void rule(std::string_view name, std::function<std::string()> rule);
+  /// A condition between fields, checked when all of them were read without problems. `rule` returns what is wrong, or
+  /// an empty string; the message is placed at the first of `names`.
+  void rule(std::vector<std::string> names, std::function<std::string()> rule);
 
   const std::vector<ConfigField>& fields() const { return fields_; }
   /// The names of the fields.

@@ -154,10 +154,16 @@ class Loader {
   bool broken_ = false;
 };
 
-std::vector<std::string> split_dots(const std::string& key) {
+/// The keys of a dotted path, or of a JSON pointer (RFC 6901), as messages write settings.
+std::vector<std::string> split_path(const std::string& path) {
+  const bool is_pointer = path.starts_with('/');
   std::vector<std::string> parts(1);
-  for (const char c : key) {
-    if (c == '.') {
+  for (size_t i = is_pointer ? 1 : 0; i < path.size(); ++i) {
+    const char c = path[i], next = i + 1 < path.size() ? path[i + 1] : '\0';
+    if (is_pointer && c == '~' && (next == '0' || next == '1')) {
+      parts.back() += next == '0' ? '~' : '/';
+      ++i;
+    } else if (c == (is_pointer ? '/' : '.')) {
       parts.emplace_back();
     } else {
       parts.back() += c;
@@ -215,10 +221,12 @@ void apply_override(ConfigValue& tree, const std::string& text, int order, Confi
   const SourcePtr source = make_source("--set " + text, fs::path(), order, true);
   const ConfigOrigin origin{source, 0, 0, 0};
   const std::size_t equals = text.find('=');
-  const std::vector<std::string> parts = split_dots(text.substr(0, equals));
+  const std::vector<std::string> parts = split_path(text.substr(0, equals));
   const bool has_empty = std::any_of(parts.begin(), parts.end(), [](const std::string& part) { return part.empty(); });
   if (equals == std::string::npos || has_empty || parts.size() > kDeepestConfig) {
-    problems.add(origin, "", "write --set KEY=VALUE with dots between nested keys, for example --set render.blur=0.1");
+    problems.add(origin, "",
+                 "write --set KEY=VALUE with dots between nested keys, for example --set render.blur=0.1 or --set "
+                 "/render/blur=0.1");
     return;
   }
   std::optional<ConfigValue> value = override_value(text.substr(equals + 1), source);

@@ -18,8 +18,9 @@ inline constexpr std::uintmax_t kLargestConfig = 8U << 20U;
 /// order.
 ///
 /// "extends" is relative to the file that holds it. Objects merge key by key; arrays, null and all other values
-/// replace. An override is KEY=VALUE with KEY a dotted path ("stages.camera.iterations") and VALUE JSON, or else a
-/// string. A "$schema" string at the top of a file is for editors and is dropped.
+/// replace. An override is KEY=VALUE with KEY a dotted path ("stages.camera.iterations") or a JSON pointer
+/// ("/stages/camera/iterations"), and VALUE JSON, or else a string. A "$schema" string at the top of a file is for
+/// editors and is dropped.
 /// @param problems  receives what is wrong: a missing or cyclic base, syntax errors, duplicate keys, unusable overrides
 /// @return the tree; every value knows where it was written
 /// Throws UserError when `file` itself cannot be read, or when some text could not be parsed to its end (with all

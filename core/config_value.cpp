@@ -272,7 +272,13 @@ void ConfigProblems::add(const ConfigOrigin& origin, std::string_view pointer, s
     text += escaped.substr(1, escaped.size() - 2) + ": ";
   }
   text += message;
-  problems_.push_back({origin, std::move(text)});
+  problems_.push_back({origin, std::string(pointer), std::move(text)});
+}
+
+std::vector<std::string> ConfigProblems::pointers() const {
+  std::vector<std::string> all;
+  for (const Problem& problem : problems_) all.push_back(problem.pointer);
+  return all;
 }
 
 void ConfigProblems::throw_if_any() const {

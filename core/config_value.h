@@ -97,13 +97,15 @@ class ConfigProblems {
   void add(const ConfigOrigin& origin, std::string_view pointer, std::string_view message);
   std::size_t size() const { return count_; }
   bool empty() const { return count_ == 0; }
+  /// Where the problems are; of very many problems not all.
+  std::vector<std::string> pointers() const;
   /// Throws one UserError with every problem, a line each, in the order of the sources; nothing without problems.
   void throw_if_any() const;
 
  private:
   struct Problem {
     ConfigOrigin origin;
-    std::string text;
+    std::string pointer, text;
   };
   std::vector<Problem> problems_;
   std::size_t count_ = 0;

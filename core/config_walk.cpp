@@ -33,16 +33,20 @@ class Reader {
 
   void read_object(const ConfigValue& value, const ConfigFields& fields, const std::string& pointer) {
     if (!expect_object(value, pointer)) return;
-    const std::size_t before = problems_.size();
+    std::vector<std::string> wrong;  // fields with problems
     for (const ConfigMember& member : value.members) {
       if (!fields.find(member.key)) report_unknown(member, fields.names(), pointer);
     }
     for (const ConfigField& field : fields.fields()) {
       if (field.kind == FieldKind::kStep) field.step();
       if (field.kind == FieldKind::kStep || field.kind == FieldKind::kRule) continue;
+      const std::size_t before = problems_.size();
       read_field(value, field, pointer);
+      const ConfigValue* const read = find_member(value, field.name);
+      if (problems_.size() != before || (read != nullptr && read->kind == Kind::kUnreadable))
+        wrong.push_back(field.name);
     }
-    if (problems_.size() == before) check_rules(value, fields, pointer);
+    check_rules(value, fields, wrong, pointer);
   }
 
  private:
@@ -145,9 +149,12 @@ class Reader {
                   "no such entry in the config, and --set adds none" + (hint.empty() ? listed(present) : hint));
   }
 
-  void check_rules(const ConfigValue& value, const ConfigFields& fields, const std::string& pointer) {
+  void check_rules(const ConfigValue& value, const ConfigFields& fields, const std::vector<std::string>& wrong,
+                   const std::string& pointer) {
     for (const ConfigField& field : fields.fields()) {
       if (field.kind != FieldKind::kRule) continue;
+      const auto& about = field.rule_fields;
+      if (std::find_first_of(about.begin(), about.end(), wrong.begin(), wrong.end()) != about.end()) continue;
       const std::string message = field.rule();
       if (message.empty()) continue;
       const ConfigValue* at = find_member(value, field.name);

@@ -45,6 +45,12 @@ Progress::~Progress() {
   }
 }
 
+void Progress::skip(std::int64_t steps) {
+  done_ += steps;
+  skipped_ += steps;
+  last_done_ += steps;
+}
+
 void Progress::step(std::int64_t steps) {
   done_ += steps;
   if (!sink_ || is_finished_) return;
@@ -80,7 +86,7 @@ void Progress::report(double now, bool is_finished) {
   state.total = total_;
   state.seconds = now - begin_;
   state.steps_per_second = rate_;
-  if (is_finished && state.seconds > 0) state.steps_per_second = static_cast<double>(done_) / state.seconds;
+  if (is_finished && state.seconds > 0) state.steps_per_second = static_cast<double>(done_ - skipped_) / state.seconds;
   if (total_ > 0 && rate_ > 0)
     state.seconds_left = static_cast<double>(std::max<std::int64_t>(total_ - done_, 0)) / rate_;
   state.value_name = value_name_;

@@ -43,6 +43,8 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
+  /// `steps` were done by an earlier process: they count as done, but tell nothing of how fast this one is.
+  void skip(std::int64_t steps);
   /// `steps` more are done.
   void step(std::int64_t steps = 1);
   /// As step(), with a number worth watching; `name` must outlive the task (a literal).
@@ -55,7 +57,7 @@ class Progress {
 
   std::array<char, 64> task_{};
   std::size_t task_size_ = 0;
-  std::int64_t total_, done_ = 0;
+  std::int64_t total_, done_ = 0, skipped_ = 0;
   ProgressSink sink_;
   double interval_;
   ProgressClock clock_;

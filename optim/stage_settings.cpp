@@ -34,7 +34,7 @@ void describe(ConfigFields& f, ParameterGroupSettings& s) {
                   "First iteration in which it no longer moves; null: the end of the stage");
   });
   f.integer("every", s.every, {.min = 1, .max = kMostIterations}, "It moves in every this many-th iteration");
-  f.rule("until", [&s]() -> std::string {
+  f.rule({"until", "from"}, [&s]() -> std::string {
     if (!s.until || *s.until > s.from) return "";
     return std::to_string(*s.until) + " is not after from, which is " + std::to_string(s.from) +
            "; the group would never move";

@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "pipelines/run_problems.h"
 #include "splat/io_ply.h"
 
 namespace hsi4d {
@@ -17,9 +18,6 @@ namespace hsi4d {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Folder of the human's masks; the others are named by their objects.
-constexpr const char* kHumanMasks = "human";
 
 /// initial.json: the state of frame 0, and estimated poses of all frames.
 struct InitialPose {
@@ -176,26 +174,6 @@ bool shows_something(const Image& mask, double threshold) {
 }
 
 }  // namespace
-
-void check_inputs(const DataSettings& data) {
-  std::string problems;
-  const auto complain = [&problems](const std::string& text) { problems += (problems.empty() ? "" : "\n") + text; };
-  const auto expect = [&complain](const fs::path& path, const std::string& key, const std::string& what) {
-    if (path.empty()) complain("/data/" + key + ": not given; a run needs " + what);
-  };
-  expect(data.scene, "scene", "a scene");
-  expect(data.avatar, "avatar", "an avatar");
-  expect(data.frames, "frames", "the frames of a video");
-  expect(data.masks, "masks", "masks of the human and the objects");
-  expect(data.camera, "camera", "the camera of frame 0");
-  expect(data.initial, "initial", "the state of frame 0");
-  for (const auto& [name, object] : data.objects) {
-    if (name.empty()) complain("/data/objects: an object's name is empty; it names the folder of its masks");
-    if (name == kHumanMasks)
-      complain("/data/objects/human: \"human\" is the folder of the human's masks; use another name");
-  }
-  if (!problems.empty()) throw UserError(problems);
-}
 
 Clip read_clip(const DataSettings& data) {
   check_inputs(data);

@@ -51,9 +51,8 @@ struct ClipFrame {
   std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
 };
 
-/// Checks that every input that a run needs is named, and that no object's masks would be taken for another's. Throws
-/// one UserError with every problem.
-void check_inputs(const DataSettings& data);
+/// The folder of the human's masks, in data.masks beside those of the objects.
+inline constexpr const char* kHumanMasks = "human";
 
 /// Reads everything but the frames. Throws UserError or DataError naming the file: missing, damaged, sizes that do not
 /// fit each other.

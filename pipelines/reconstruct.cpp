@@ -107,7 +107,38 @@ std::vector<FrameState> placed(const Clip& clip, const std::vector<SceneState>& 
   return frames;
 }
 
-void add_problem(std::string& problems, const std::string& text) { problems += (problems.empty() ? "" : "\n") + text; }
+std::string checkpoint_file(const RunPaths& paths) { return paths.checkpoint() + "/progress.npz"; }
+
+/// The text that the checkpoints of a run belong to.
+std::string checkpoint_identity(const RunConfig& config, const std::vector<LossTerm>& losses) {
+  return to_json(sections_beside_data(config, descriptions_of(losses)));
+}
+
+/// What is in a checkpoint, if its inputs are still the same.
+RunProgress read_checkpoint(const std::string& file, const std::string& identity, const RunConfig& config,
+                            const Clip& clip) {
+  RunProgress progress;
+  try {
+    progress = load_progress(file, identity, clip, config.stages.size());
+  } catch (const DataError& damage) {
+    throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
+  }
+  std::vector<ClipFile> files = clip.files;
+  for (Index t = 0; t < progress.frames_done(); ++t) {
+    const std::vector<ClipFile> of_frame = frame_files(config.data, clip, t);
+    files.insert(files.end(), of_frame.begin(), of_frame.end());
+  }
+  check_unchanged(progress.inputs, files, file);
+  return progress;
+}
+
+/// What is told of a run that was stopped in frame `frame`: those before it are kept, frame 0 being given.
+std::string stop_message(Index frame) {
+  const std::string text = "interrupted in frame " + std::to_string(frame) + "; ";
+  if (frame == 1) return text + "no frame was finished";
+  return text + (frame == 2 ? "frame 1 is" : "frames 1 to " + std::to_string(frame - 1) + " are") +
+         " finished and kept";
+}
 
 class Reconstruction {
  public:
@@ -117,7 +148,7 @@ class Reconstruction {
         losses_(losses),
         folder_(folder),
         observer_(observer),
-        identity_(to_json(sections_beside_data(config, descriptions_of(losses)))),
+        identity_(checkpoint_identity(config, losses)),
         clip_(clip),
         progress_(first_progress(clip_, config.stages.size())),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
@@ -139,36 +170,20 @@ class Reconstruction {
     return steps * (clip_.frames() - 1);
   }
 
-  std::string checkpoint_file() const { return folder_.paths().checkpoint() + "/progress.npz"; }
-
-  RunProgress checkpointed() const {
-    RunProgress progress;
-    try {
-      progress = load_progress(checkpoint_file(), identity_, clip_, config_.stages.size());
-    } catch (const DataError& damage) {
-      throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
-    }
-    std::vector<ClipFile> files = clip_.files;
-    for (Index t = 0; t < progress.frames_done(); ++t) {
-      const std::vector<ClipFile> of_frame = frame_files(config_.data, clip_, t);
-      files.insert(files.end(), of_frame.begin(), of_frame.end());
-    }
-    check_unchanged(progress.inputs, files, checkpoint_file());
-    return progress;
-  }
-
   void resume() {
-    if (folder_.resumed_from() && std::filesystem::exists(checkpoint_file())) {
-      progress_ = checkpointed();
+    const std::string file = checkpoint_file(folder_.paths());
+    if (folder_.resumed_from() && std::filesystem::exists(file)) {
+      progress_ = read_checkpoint(file, identity_, config_, clip_);
     } else {
       add_covered(read_frame(config_.data, clip_, 0), config_.data, progress_.covered);
       progress_.inputs = input_hashes(clip_.files) + input_hashes(frame_files(config_.data, clip_, 0));
     }
     folder_.take_over_config();
     if (folder_.resumed_from())
-      folder_.note("resumed, " + std::to_string(progress_.frames_done()) + " frames are in the checkpoint");
+      folder_.note("resumed with frame " + std::to_string(progress_.frames_done()) + " of " +
+                   std::to_string(clip_.frames() - 1));
     folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
-    bar_.step(total_steps() / (clip_.frames() - 1) * (progress_.frames_done() - 1));
+    bar_.skip(total_steps() / (clip_.frames() - 1) * (progress_.frames_done() - 1));
   }
 
   /// The state that frame `index` starts from: the one before, with the estimated pose of the limbs.
@@ -198,7 +213,7 @@ class Reconstruction {
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
     progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
     progress_.seconds += seconds_since(begin);
-    save_progress(checkpoint_file(), identity_, progress_);
+    save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
   }
 
   FrameGraphSettings graph_settings(Draw draw) const {
@@ -290,10 +305,7 @@ class Reconstruction {
                        {"fragments", static_cast<double>(counters.fragments)}};
     folder_.append_metrics(record);
     bar_.step_with("loss", report.loss);
-    if (observer_.wants_stop()) {
-      throw Interrupted("interrupted in frame " + std::to_string(frame) + "; " +
-                        std::to_string(progress_.frames_done()) + " frames are in the checkpoint");
-    }
+    if (observer_.wants_stop()) throw Interrupted(stop_message(frame));
   }
 
   template <class S>
@@ -410,38 +422,11 @@ class Reconstruction {
 
 }  // namespace
 
-void check_stages(const RunConfig& config) {
-  std::string problems;
-  for (const auto& [name, stage] : config.stages) {
-    const std::string where = "/stages/" + name;
-    try {
-      check_groups(stage, state_group_names(stage.draw), where + "/optimize");
-    } catch (const UserError& mistake) {
-      add_problem(problems, mistake.what());
-    }
-    if (stage.losses.empty()) add_problem(problems, where + "/losses: a stage needs a loss");
-    for (const auto& [group, settings] : stage.optimize) {
-      if (settings.from < stage.iterations) continue;
-      add_problem(problems, where + "/optimize/" + group + "/from: " + std::to_string(settings.from) +
-                                " is beyond the stage's " + std::to_string(stage.iterations) +
-                                " iterations; the group would never move");
-    }
-  }
-  if (!problems.empty()) throw UserError(problems);
-}
-
-void check_run(const RunConfig& config) {
-  std::string problems;
-  if (config.stages.empty()) add_problem(problems, "/stages: a run needs at least one stage");
-  for (const auto& check : {std::function<void()>([&] { check_stages(config); }),
-                            std::function<void()>([&] { check_inputs(config.data); })}) {
-    try {
-      check();
-    } catch (const UserError& mistake) {
-      add_problem(problems, mistake.what());
-    }
-  }
-  if (!problems.empty()) throw UserError(problems);
+Index finished_frames(const std::string& folder, const RunConfig& config, const Clip& clip,
+                      const std::vector<LossTerm>& losses) {
+  const std::string file = checkpoint_file(RunPaths{folder});
+  if (!std::filesystem::exists(file)) return 0;
+  return read_checkpoint(file, checkpoint_identity(config, losses), config, clip).frames_done() - 1;
 }
 
 RunSummary reconstruct(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses,

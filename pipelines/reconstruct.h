@@ -13,12 +13,10 @@
 
 namespace hsi4d {
 
-/// Checks the stages beyond what reading the config does: the groups of parameters exist for what a stage draws and
-/// move at some time, and there is a loss. Throws one UserError with every problem.
-void check_stages(const RunConfig& config);
-
-/// check_stages, and that there is a stage and every input is named. Throws one UserError with every problem.
-void check_run(const RunConfig& config);
+/// How many frames a run in `folder` has finished, the given frame 0 not counted, according to its checkpoint; 0
+/// without one. Errors as reconstruct, for a checkpoint that cannot be gone on with.
+Index finished_frames(const std::string& folder, const RunConfig& config, const Clip& clip,
+                      const std::vector<LossTerm>& losses);
 
 /// Runs the stages of `config` on its clip and fills the run folder: metrics.jsonl, frames/, motion.npz, objects.npz,
 /// cameras.json, summary.json, checkpoint/. Results do not depend on the number of threads, nor on having been

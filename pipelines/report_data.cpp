@@ -78,6 +78,8 @@ void read_config_file(const RunPaths& paths, ReportData& data) {
   }
   data.config = read_text_file(paths.config());
   const ConfigValue tree = read_object(paths.config(), data.config);
+  const std::string name = string_member(tree, "name");
+  if (!name.empty()) data.name = name;
   for (const char* const key : {"seed", "threads", "precision"}) add_fact(data, tree, key, key);
   if (const ConfigValue* const render = find_member(tree, "render")) {
     add_fact(data, *render, "quality", "quality");
@@ -259,10 +261,17 @@ void read_frames(const RunPaths& paths, ReportData& data) {
   }
 }
 
-std::string folder_name(const fs::path& folder) {
+fs::path whole_path(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder).lexically_normal();
-  const fs::path last = whole.has_filename() ? whole.filename() : whole.parent_path().filename();
-  return last.string();
+  return whole.has_filename() ? whole : whole.parent_path();
+}
+
+std::string folder_name(const fs::path& folder) { return whole_path(folder).filename().string(); }
+
+/// Folder and what it is in, "first/run": a demo's run says little by itself.
+std::string folder_text(const fs::path& folder) {
+  const fs::path whole = whole_path(folder);
+  return (whole.parent_path().filename() / whole.filename()).generic_string();
 }
 
 }  // namespace
@@ -279,6 +288,7 @@ ReportData read_report_data(const std::string& run_folder) {
                     "or metrics.jsonl in it");
   ReportData data;
   data.name = folder_name(run_folder);
+  data.facts.emplace_back("folder", folder_text(run_folder));
   read_status(paths, data);
   read_config_file(paths, data);
   read_summary_file(paths, data);

@@ -10,6 +10,7 @@
 #include "core/text.h"
 #include "core/version.h"
 #include "pipelines/report.h"
+#include "pipelines/run_problems.h"
 
 namespace hsi4d {
 

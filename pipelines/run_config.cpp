@@ -1,6 +1,7 @@
 #include "pipelines/run_config.h"
 
 #include "core/config_file.h"
+#include "pipelines/run_problems.h"
 
 namespace hsi4d {
 namespace {
@@ -36,21 +37,22 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
         [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });
 }
 
-RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescription>& losses,
-                          ConfigProblems& problems) {
+RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescription>& losses, ConfigProblems& problems,
+                          ConfigUse use) {
   RunConfig config;
   ConfigFields fields;
   describe(fields, config, losses);
   read_config(tree, fields, problems);
+  add_run_problems(tree, config, use, problems);
   problems.throw_if_any();
   return config;
 }
 
 RunConfig load_run_config(const std::filesystem::path& file, const std::vector<std::string>& overrides,
-                          const std::vector<LossDescription>& losses) {
+                          const std::vector<LossDescription>& losses, ConfigUse use) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, overrides, problems);
-  return read_run_config(tree, losses, problems);
+  return read_run_config(tree, losses, problems, use);
 }
 
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses) {

@@ -53,18 +53,25 @@ struct RunConfig {
 
 void describe(ConfigFields& fields, CameraSettings& settings);
 
+/// What a config is read for: the more is asked of it, the more can be wrong.
+enum class ConfigUse {
+  kSettings,  ///< each setting is right in itself
+  kStages,    ///< and its stages can be run, once there are inputs
+  kRun,       ///< and so can the config, as it is
+};
+
 /// Describes the config of a run. `losses` are the terms that a stage may name.
 void describe(ConfigFields& fields, RunConfig& config, const std::vector<LossDescription>& losses);
 
 /// Reads and checks a config file. Throws one UserError that tells every problem of the file, of the files that it
 /// extends, and of the overrides (KEY=VALUE), a line each.
 RunConfig load_run_config(const std::filesystem::path& file, const std::vector<std::string>& overrides,
-                          const std::vector<LossDescription>& losses);
+                          const std::vector<LossDescription>& losses, ConfigUse use = ConfigUse::kSettings);
 
 /// Reads and checks a tree that load_config or config_from_overrides made, telling its problems beside those found
 /// before.
-RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescription>& losses,
-                          ConfigProblems& problems);
+RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescription>& losses, ConfigProblems& problems,
+                          ConfigUse use = ConfigUse::kSettings);
 
 /// The text of config.resolved.json: every setting, defaults included. Reading it back gives the same config and text.
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses);

@@ -44,6 +44,10 @@ std::string host_name() {
 
 std::string system_message(int error) { return std::generic_category().message(error); }
 
+std::string busy_message(const std::string& folder) {
+  return folder + ": another process is writing this run; wait for it, or choose another folder";
+}
+
 // ---- What is in a folder ----
 
 /// What a run leaves behind that was killed before it wrote its config: of no worth, and no reason to refuse a folder.
@@ -205,7 +209,7 @@ struct RunFolder::Lock {
     const int error = errno;
     if (error == EWOULDBLOCK) {
       ::close(descriptor);
-      throw UserError(folder + ": another process is writing this run; wait for it, or choose another folder");
+      throw UserError(busy_message(folder));
     }
     log_warning(folder + ": this file system has no locks (" + system_message(error) +
                 "): two runs that write this folder would not notice each other");
@@ -293,6 +297,14 @@ void remove_temporaries(const fs::path& folder) {
 }
 
 }  // namespace
+
+std::optional<RunState> look_at_run_folder(const std::string& path, const std::string& config, bool resume) {
+  const RunPaths paths{fs::path(path)};
+  const Found found = look_at_folder(paths);
+  check_resumable(paths, found, config, resume);
+  if (is_run_locked(path)) throw UserError(busy_message(path));
+  return found.is_run ? std::optional(found_state(found.status)) : std::nullopt;
+}
 
 RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
     : paths_{fs::path(path)}, identity_(std::move(identity)) {

@@ -65,6 +65,10 @@ struct RunPaths {
   std::string member(const char* name) const { return (folder / name).string(); }
 };
 
+/// What RunFolder would find at a path: throws UserError as its constructor would, and writes nothing.
+/// @return  how the run stands that it would go on with; null where it would begin one
+std::optional<RunState> look_at_run_folder(const std::string& path, const std::string& config, bool resume);
+
 /// A run folder that this process writes, and no other: a lock is held as long as this lives.
 ///
 /// Opening one makes the folder and its frames/ and checkpoint/, writes config.resolved.json and status.json (state

@@ -48,7 +48,7 @@ void describe(ConfigFields& f, RenderSettings& s) {
   f.choice("quality", s.quality, kQualities, "Preset of alpha_cap, alpha_min, transmittance_stop and depth_key");
   f.choice("compatibility", s.compatibility, kCompatibilities,
            "Preset that makes the numbers of another renderer; quality then stays default");
-  f.rule("quality", [&s]() -> std::string {
+  f.rule({"quality", "compatibility"}, [&s]() -> std::string {
     const bool both = s.quality != Quality::kDefault && s.compatibility != Compatibility::kNone;
     return both ? "quality and compatibility set the same keys; write one of the two" : "";
   });
@@ -80,7 +80,7 @@ void describe(ConfigFields& f, RenderSettings& s) {
     inner.choice("depth_key", key, kDepthKeys, "Type in which depths are compared; null: that of the render");
   });
   f.integer("tile", s.tile, {.min = 8, .max = 16, .multiple_of = 8}, "Side of a tile, pixels");
-  f.rule("alpha_min", [&s]() -> std::string {
+  f.rule({"alpha_min", "alpha_cap", "quality", "compatibility"}, [&s]() -> std::string {
     return s.alpha_min < s.alpha_cap ? "" : "alpha_min must be below alpha_cap, or nothing is drawn";
   });
 }

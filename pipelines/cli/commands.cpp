@@ -7,7 +7,6 @@
 #include "core/suggest.h"
 #include "core/text.h"
 #include "pipelines/frame_graph.h"
-#include "pipelines/reconstruct.h"
 #include "pipelines/run_config.h"
 
 namespace hsi4d::cli {
@@ -21,6 +20,13 @@ template <class T>
 std::string names_of(const ConfigMap<T>& map) {
   std::vector<std::string> names;
   for (const auto& [name, value] : map) names.push_back(name);
+  return names.empty() ? "" : " (" + joined(names) + ")";
+}
+
+/// Loss terms by name, with what is off.
+std::string names_of(const ConfigMap<LossSettings>& losses) {
+  std::vector<std::string> names;
+  for (const auto& [name, loss] : losses) names.push_back(name + (loss.weight == 0 ? " off by weight 0" : ""));
   return names.empty() ? "" : " (" + joined(names) + ")";
 }
 
@@ -100,8 +106,7 @@ std::string list_scenes() {
 
 std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           bool print_config, const std::vector<LossDescription>& losses) {
-  const RunConfig run = load_run_config(config, overrides, losses);
-  check_stages(run);
+  const RunConfig run = load_run_config(config, overrides, losses, ConfigUse::kStages);
   return print_config ? resolved_config(run, losses) : summary(config, run);
 }
 

@@ -10,7 +10,7 @@
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/terminal.h"
-#include "pipelines/reconstruct.h"
+#include "pipelines/run_problems.h"
 #include "pipelines/synthetic.h"
 
 namespace hsi4d::cli {
@@ -25,16 +25,7 @@ RunConfig demo_config(const DemoArguments& arguments, const std::vector<LossTerm
   const ConfigValue tree =
       load_config_text(std::string(demo_config_text(arguments.quick)), name, fs::current_path(), arguments.overrides,
                        problems, {{"demo.json", std::string(demo_config_text(false))}});
-  return read_run_config(tree, descriptions_of(losses), problems);
-}
-
-/// OUT, or the first of runs/NAME, runs/NAME-2, … that is not there.
-fs::path demo_folder(const DemoArguments& arguments, const std::string& name) {
-  if (!arguments.out.empty()) return arguments.out;
-  const fs::path first = fs::path("runs") / name;
-  fs::path folder = first;
-  for (int i = 2; fs::exists(folder); ++i) folder = first.string() + "-" + std::to_string(i);
-  return folder;
+  return read_run_config(tree, descriptions_of(losses), problems, ConfigUse::kStages);
 }
 
 void make_folder(const fs::path& folder) {
@@ -46,7 +37,7 @@ void make_folder(const fs::path& folder) {
 void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, const DemoArguments& arguments,
                   const fs::path& dataset) {
   const InterruptWatch watch;
-  const int threads = arguments.threads > 0 ? arguments.threads : config.threads;
+  const int asked = run_threads(arguments.threads), threads = asked > 0 ? asked : config.threads;
   with_threads(threads > 0 ? threads : thread_count(), [&] {
     write_dataset(config.synthetic, video_render_settings(), dataset, observer_on_terminal(arguments.quiet),
                   sections_beside_data(config, descriptions_of(losses)));
@@ -73,7 +64,7 @@ void name_inputs(const fs::path& dataset, DataSettings& data) {
 std::string demo_command(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
   if (arguments.resume && arguments.out.empty()) throw UserError("hsi4d demo: --resume needs --out, to know with what");
   RunConfig config = demo_config(arguments, losses);
-  const fs::path folder = demo_folder(arguments, config.name);
+  const fs::path folder = arguments.out.empty() ? free_run_folder(config.name) : arguments.out;
   const fs::path dataset = folder / "dataset";
   name_inputs(dataset, config.data);
   check_run(config);  // before a dataset is made for nothing
@@ -88,9 +79,12 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
     check_dataset(config, dataset);
   }
   name_inputs(dataset, config.data);  // now that its objects and truth are there
-  const std::string run = (folder / "run").string();
-  const RunSummary summary = run_on_terminal(config, losses, run, arguments.resume, arguments.threads, arguments.quiet);
-  return result_text(summary, run);
+  RunOptions options;
+  options.folder = (folder / "run").string();
+  options.resume = arguments.resume;
+  options.threads = run_threads(arguments.threads);
+  options.observer = observer_on_terminal(arguments.quiet);
+  return result_text(run_on_terminal(config, losses, options, folder.string()), options.folder);
 }
 
 }  // namespace hsi4d::cli

@@ -1,6 +1,7 @@
 // `hsi4d demo`: the method on a generated scene with ground truth.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,7 @@ struct DemoArguments {
   std::vector<std::string> overrides;
   bool quiet = false;
   bool resume = false;
-  int threads = 0;  ///< 0: what the config says
+  std::optional<int> threads;  ///< 0: one a core; none: what the config says
 };
 
 /// Makes the dataset in OUT/dataset and reconstructs it into OUT/run. Returns the table of errors and where the report

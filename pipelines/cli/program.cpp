@@ -2,13 +2,17 @@
 #include "pipelines/cli/program.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <functional>
+#include <limits>
 #include <new>
+#include <optional>
 
 #include <CLI/CLI.hpp>
 
 #include "core/check.h"
+#include "core/config_value.h"
 #include "core/log.h"
 #include "core/suggest.h"
 #include "core/text.h"
@@ -37,6 +41,22 @@ int complain(const Failure& failure) {
   std::fprintf(stderr, "%s\n", failure.message.c_str());
   return failure.status;
 }
+
+/// Refuses what is no whole number from 0 on, in words.
+class WholeNumber : public CLI::Validator {
+ public:
+  explicit WholeNumber(std::int64_t most = std::numeric_limits<std::int64_t>::max()) : CLI::Validator("") {
+    func_ = [most](const std::string& text) {
+      std::int64_t number = -1;
+      const auto end = std::from_chars(text.data(), text.data() + text.size(), number);
+      if (end.ec == std::errc() && end.ptr == text.data() + text.size() && number >= 0 && number <= most)
+        return std::string();
+      const bool is_open = most == std::numeric_limits<std::int64_t>::max();
+      return json_string(text) + " is out of range, or not a whole number; allowed: 0 " +
+             (is_open ? "or more" : "to " + std::to_string(most));
+    };
+  }
+};
 
 /// The subcommands with their arguments; `run` is what the chosen one does.
 struct CommandLine {
@@ -81,10 +101,11 @@ struct CommandLine {
     CLI::App* command = app.add_subcommand("run", "Reconstruct a clip as a config says, into a run folder");
     command->add_option("CONFIG", a.config, "The config file")->required();
     add_overrides(*command, a.overrides);
-    command->add_option("--out", a.out, "The run folder; default: runs/NAME, with the config's name");
+    command->add_option("--out", a.out,
+                        "The run folder; default: the first free runs/NAME, runs/NAME-2, ... with the config's name");
     command->add_flag("--resume", a.resume, "Go on with the run in the folder; the result has the same bits");
-    command->add_option("--threads", a.threads, "Threads; results do not depend on it")->check(CLI::Range(1, 1024));
-    command->add_option("--seed", a.seed, "Seed, instead of the config's");
+    add_threads(*command, a.threads);
+    command->add_option("--seed", a.seed, "Seed, instead of the config's")->check(WholeNumber())->type_name("N");
     command->add_flag("--dry-run", a.dry_run, "Check config and inputs, tell what would be done, write nothing");
     command->add_flag("--print-config", a.print_config, "Print the config with every default filled in, and stop");
     command->callback([this, &terms] { run = [this, &terms] { return run_command(run_arguments, terms); }; });
@@ -99,7 +120,7 @@ struct CommandLine {
     add_overrides(*command, a.overrides);
     command->add_flag("--quiet", a.quiet, "No progress on stderr");
     command->add_flag("--resume", a.resume, "Go on with the demo in --out; the result has the same bits");
-    command->add_option("--threads", a.threads, "Threads; results do not depend on it")->check(CLI::Range(1, 1024));
+    add_threads(*command, a.threads);
     command->callback([this, &terms] { run = [this, &terms] { return demo_command(demo_arguments, terms); }; });
   }
 
@@ -144,6 +165,12 @@ struct CommandLine {
     list->callback([this] { run = [this] { return list_command(topic, losses); }; });
   }
 
+  static void add_threads(CLI::App& command, std::optional<int>& threads) {
+    command.add_option("--threads", threads, "Threads, 0: one a core; results do not depend on it")
+        ->check(WholeNumber(1024))
+        ->type_name("N");
+  }
+
   static void add_overrides(CLI::App& command, std::vector<std::string>& overrides) {
     add_several(command, "--set", overrides, "Change one setting: render.blur=0.1. The value is JSON, or else text")
         ->type_name("KEY=VALUE");
@@ -155,7 +182,7 @@ struct CommandLine {
     add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
         ->type_name("F.ply");
     command.add_option("--motion", render.motion, "Motion of a body that is drawn too")->type_name("M.npz");
-    command.add_option("--frame", render.frame, "Frame of the motion, from 0")->type_name("I");
+    command.add_option("--frame", render.frame, "Frame of the motion, from 0")->check(WholeNumber())->type_name("I");
     command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.npz");
     command.add_option("--out", render.out, "Where to: 8-bit PNG, OpenEXR, or arrays image, alpha, depth")
         ->type_name("F.{png,exr,npz}")
@@ -186,6 +213,7 @@ struct CommandLine {
         ->type_name("C.json")
         ->required();
     command.add_option("--camera-frame", options.camera_frame, "Which camera of a file with several, from 0")
+        ->check(WholeNumber())
         ->type_name("I");
     command.add_option("--background", options.background, "Colour behind everything; black without")
         ->type_name("r,g,b");
@@ -218,9 +246,26 @@ void check_command_word(int argc, const char* const* argv, CommandLine& line) {
                   "\"; known: " + joined(known) + did_you_mean(word, known));
 }
 
+/// Refuses an option that the command does not have, with the nearest one; CLI11 would first ask for what is missing.
+void check_options(int argc, const char* const* argv, CommandLine& line) {
+  const CLI::App& command = *line.app.get_subcommand(argv[1]);
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  for (int i = 2; i < argc; ++i) {
+    const std::string word = std::string(argv[i]).substr(0, std::string(argv[i]).find('='));
+    if (word == "--") return;
+    if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;
+    throw UserError("hsi4d " + command.get_name() + ": there is no option \"" + word + "\"; known: " + joined(known) +
+                    did_you_mean(word, known));
+  }
+}
+
 void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
   CommandLine line(losses);
   check_command_word(argc, argv, line);
+  if (*argv[1] != '-') check_options(argc, argv, line);
   try {
     line.app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

@@ -1,27 +1,48 @@
 #include "pipelines/cli/run_command.h"
 
+#include "core/check.h"
+#include "core/parallel.h"
 #include "core/progress.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/clip.h"
-#include "pipelines/run.h"
 
 namespace hsi4d::cli {
 
 namespace {
 
-std::string folder_of(const RunArguments& arguments, const RunConfig& config) {
-  if (!arguments.out.empty()) return arguments.out;
-  return (std::filesystem::path("runs") / (config.name.empty() ? arguments.config.stem().string() : config.name))
-      .string();
+namespace fs = std::filesystem;
+
+fs::path run_folder(const std::string& name, int number) {
+  return fs::path("runs") / (number == 1 ? name : name + "-" + std::to_string(number));
 }
 
-/// What a run would do; reads its inputs, so that what is wrong with them shows.
-std::string plan(const RunConfig& config, const std::string& folder) {
-  check_run(config);
+std::string folder_of(const RunArguments& arguments, const RunConfig& config) {
+  if (!arguments.out.empty()) return arguments.out;
+  const std::string name = config.name.empty() ? arguments.config.stem().string() : config.name;
+  if (!arguments.resume) return free_run_folder(name);
+  if (fs::exists(run_folder(name, 2)))
+    throw UserError("hsi4d run: --resume needs --out: there are several runs called " + name + ", from " +
+                    run_folder(name, 1).string() + " on");
+  return run_folder(name, 1).string();
+}
+
+/// What becomes of a run folder, "would write runs/demo".
+std::string folder_plan(const RunConfig& config, const std::vector<LossTerm>& losses, const Clip& clip,
+                        const std::string& folder, bool resume) {
+  const auto state = look_at_run_folder(folder, resolved_config(config, descriptions_of(losses)), resume);
+  if (!state) return "would write " + folder + "\n";
+  const Index finished = finished_frames(folder, config, clip, losses), all = clip.frames() - 1;
+  return "would go on with " + folder + " (" + std::string(run_state_name(*state)) + "): " + std::to_string(finished) +
+         " of " + std::to_string(all) + " frames are finished, " + std::to_string(all - finished) +
+         (all - finished == 1 ? " is" : " are") + " left\n";
+}
+
+/// What a run would do; reads its inputs and its folder, so that what is wrong with them shows.
+std::string plan(const RunConfig& config, const std::vector<LossTerm>& losses, const std::string& folder, bool resume) {
   const Clip clip = read_clip(config.data);
   check_frames(config.data, clip);
-  std::string text = "would write " + folder + "\n";
+  std::string text = folder_plan(config, losses, clip, folder, resume);
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
           std::to_string(clip.camera.height) + ", scene of " + std::to_string(clip.scene.count()) +
           " Gaussians, human of " + std::to_string(clip.avatar.count()) + "\n";
@@ -36,15 +57,22 @@ std::string plan(const RunConfig& config, const std::string& folder) {
 
 }  // namespace
 
-RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>& losses, const std::string& folder,
-                           bool resume, int threads, bool quiet) {
+int run_threads(std::optional<int> asked) { return !asked ? 0 : *asked == 0 ? thread_count() : *asked; }
+
+std::string free_run_folder(const std::string& name) {
+  int number = 1;
+  while (fs::exists(run_folder(name, number))) ++number;
+  return run_folder(name, number).string();
+}
+
+RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options,
+                           const std::string& out) {
   const InterruptWatch watch;
-  RunOptions options;
-  options.folder = folder;
-  options.resume = resume;
-  options.threads = threads;
-  options.observer = observer_on_terminal(quiet);
-  return carry_out(config, losses, options);
+  try {
+    return carry_out(config, losses, options);
+  } catch (const Interrupted& stop) {
+    throw Interrupted(std::string(stop.what()) + "; the same command with --out " + out + " --resume goes on");
+  }
 }
 
 std::string result_text(const RunSummary& summary, const std::string& folder) {
@@ -55,12 +83,16 @@ std::string result_text(const RunSummary& summary, const std::string& folder) {
 std::string run_command(const RunArguments& arguments, const std::vector<LossTerm>& losses) {
   std::vector<std::string> overrides = arguments.overrides;
   if (arguments.seed) overrides.push_back("seed=" + std::to_string(*arguments.seed));
-  const RunConfig config = load_run_config(arguments.config, overrides, descriptions_of(losses));
+  const ConfigUse use = arguments.print_config ? ConfigUse::kSettings : ConfigUse::kRun;
+  const RunConfig config = load_run_config(arguments.config, overrides, descriptions_of(losses), use);
   if (arguments.print_config) return resolved_config(config, descriptions_of(losses));
-  const std::string folder = folder_of(arguments, config);
-  if (arguments.dry_run) return plan(config, folder);
-  const RunSummary summary = run_on_terminal(config, losses, folder, arguments.resume, arguments.threads);
-  return result_text(summary, folder);
+  RunOptions options;
+  options.folder = folder_of(arguments, config);
+  options.resume = arguments.resume;
+  options.threads = run_threads(arguments.threads);
+  options.observer = observer_on_terminal(false);
+  if (arguments.dry_run) return plan(config, losses, options.folder, arguments.resume);
+  return result_text(run_on_terminal(config, losses, options, options.folder), options.folder);
 }
 
 }  // namespace hsi4d::cli

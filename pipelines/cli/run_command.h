@@ -8,17 +8,16 @@
 #include <vector>
 
 #include "optim/loss_term.h"
-#include "pipelines/run_config.h"
-#include "pipelines/run_summary.h"
+#include "pipelines/run.h"
 
 namespace hsi4d::cli {
 
 struct RunArguments {
   std::filesystem::path config;
   std::vector<std::string> overrides;
-  std::string out;  ///< empty: runs/NAME
+  std::string out;  ///< empty: the first of runs/NAME, runs/NAME-2, … that is free
   bool resume = false;
-  int threads = 0;  ///< 0: what the config says
+  std::optional<int> threads;  ///< 0: one a core; none: what the config says
   std::optional<std::int64_t> seed;
   bool dry_run = false;
   bool print_config = false;
@@ -28,9 +27,16 @@ struct RunArguments {
 /// with print_config, the plan with dry_run (then nothing is written).
 std::string run_command(const RunArguments& arguments, const std::vector<LossTerm>& losses);
 
-/// A run with progress on stderr that ends in good order on Ctrl-C.
-RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>& losses, const std::string& folder,
-                           bool resume, int threads, bool quiet = false);
+/// A run that ends in good order on Ctrl-C, and then tells how to go on.
+/// @param out  what --out must be to go on with it later
+RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options,
+                           const std::string& out);
+
+/// Threads as RunOptions has them, of a command line's.
+int run_threads(std::optional<int> asked);
+
+/// runs/NAME, or the first of runs/NAME-2, … that is not there.
+std::string free_run_folder(const std::string& name);
 
 /// The table of errors, the time and where the report is.
 std::string result_text(const RunSummary& summary, const std::string& folder);

@@ -224,11 +224,12 @@ TEST_CASE("steps run between fields, so that a preset loses against explicit key
 }
 
 TEST_CASE("rules are checked when the fields themselves are right") {
-  double low = 0, high = 1;
+  double low = 0, high = 1, other = 0;
   ConfigFields fields;
   fields.number("low", low, {}, "");
   fields.number("high", high, {}, "");
-  fields.rule("high", [&]() -> std::string { return low < high ? "" : "high must be above low"; });
+  fields.number("other", other, {}, "");
+  fields.rule({"high", "low"}, [&]() -> std::string { return low < high ? "" : "high must be above low"; });
   const auto check = [&](const std::string& text) {
     ConfigProblems problems;
     read_config(load_config_text(text, "a.json", "", {}, problems), fields, problems);
@@ -238,6 +239,11 @@ TEST_CASE("rules are checked when the fields themselves are right") {
   CHECK_THROWS_WITH(check("{\"low\": 3,\n\"high\": 2}"), "a.json:2: /high: high must be above low");
   CHECK_THROWS_WITH(check("{\"low\": \"3\",\n\"high\": 2}"),
                     "a.json:1: /low: \"3\" is a string, not a number; allowed: any finite number");
+  // Other fields that are wrong do not hide it.
+  CHECK_THROWS_WITH(
+      check("{\"low\": 3, \"high\": 2,\n\"other\": \"x\", \"more\": 1}"),
+      Catch::Matchers::Contains("3 problems in a.json") && Catch::Matchers::Contains("/high: high must be above low"));
+  CHECK_THROWS_AS(fields.rule({"none"}, [] { return ""; }), InternalError);
 }
 
 TEST_CASE("describing one name twice is our bug") {

@@ -1,0 +1,182 @@
+#include "pipelines/run_problems.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include "core/check.h"
+#include "core/suggest.h"
+#include "core/text.h"
+#include "pipelines/clip.h"
+#include "pipelines/frame_graph.h"
+
+namespace hsi4d {
+namespace {
+
+// ---- Stages ----
+
+void add_group_problems(const StageSettings& stage, const std::string& in, std::vector<RunProblem>& found) {
+  const std::string where = in + "/optimize";
+  const std::vector<std::string> known = state_group_names(stage.draw);
+  if (stage.optimize.empty())
+    found.push_back({where, "no parameter group is named; known here: " + joined(known), {where}, true});
+  for (const auto& [name, group] : stage.optimize) {
+    const std::string place = child_pointer(where, name);
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      found.push_back(
+          {place,
+           "there is no such parameter group" + did_you_mean(name, known) + " (known: " + joined(known) + ")",
+           {in + "/draw"}});
+    if (stage.iterations > 0 && group.from >= stage.iterations)
+      found.push_back({child_pointer(place, "from"),
+                       std::to_string(group.from) + " is beyond the stage's " + std::to_string(stage.iterations) +
+                           " iterations; the group would never move",
+                       {in + "/iterations"}});
+  }
+}
+
+void add_loss_problems(const StageSettings& stage, const std::string& in, std::vector<RunProblem>& found) {
+  const std::string where = in + "/losses";
+  if (stage.losses.empty()) {
+    found.push_back({where, "a stage needs a loss", {where}, true});
+    return;
+  }
+  std::vector<std::string> names;
+  for (const auto& [name, loss] : stage.losses) {
+    if (loss.weight != 0) return;
+    names.push_back(name);
+  }
+  found.push_back({where,
+                   joined(names) + (names.size() == 1 ? " has" : " have") +
+                       " weight 0, which switches a loss off; a stage needs one that is on",
+                   {where}});
+}
+
+// ---- Inputs ----
+
+void add_name_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+  for (const auto& [name, object] : data.objects) {
+    if (name.empty())
+      found.push_back({"/data/objects", "an object's name is empty; it names the folder of its masks", {}});
+    if (name == kHumanMasks)
+      found.push_back({child_pointer("/data/objects", name),
+                       json_string(name) + " is the folder of the human's masks; use another name",
+                       {}});
+  }
+}
+
+void add_input_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+  struct Input {
+    const std::filesystem::path& path;
+    const char* key;
+    const char* what;
+  };
+  const std::array inputs = {Input{data.scene, "scene", "a scene"},
+                             Input{data.avatar, "avatar", "an avatar"},
+                             Input{data.frames, "frames", "the frames of a video"},
+                             Input{data.masks, "masks", "masks of the human and the objects"},
+                             Input{data.camera, "camera", "the camera of frame 0"},
+                             Input{data.initial, "initial", "the state of frame 0"}};
+  const auto is_missing = [](const Input& input) { return input.path.empty(); };
+  if (std::all_of(inputs.begin(), inputs.end(), is_missing)) {
+    std::vector<std::string> keys;
+    for (const Input& input : inputs) keys.emplace_back(input.key);
+    found.push_back({"/data",
+                     "no inputs are given; a run needs " + joined(keys) +
+                         ". `hsi4d synth` makes a dataset with a config beside it to run; `hsi4d demo` makes one and "
+                         "runs it",
+                     {"/data"},
+                     true});
+    return;
+  }
+  for (const Input& input : inputs) {
+    const std::string place = std::string("/data/") + input.key;
+    if (is_missing(input)) found.push_back({place, std::string("not given; a run needs ") + input.what, {place}, true});
+  }
+}
+
+// ---- Where they were written ----
+
+const ConfigValue* find_item(const ConfigValue& array, const std::string& key) {
+  std::size_t index = 0;
+  const auto end = std::from_chars(key.data(), key.data() + key.size(), index);
+  return end.ec == std::errc() && index < array.items.size() ? &array.items[index] : nullptr;
+}
+
+/// Where the setting was written; where it was not, the object that it would be in.
+const ConfigOrigin& origin_of(const ConfigValue& tree, const std::string& pointer) {
+  const ConfigValue* node = &tree;
+  const ConfigOrigin* origin = &tree.origin;
+  for (std::size_t begin = 1; begin < pointer.size();) {
+    const std::size_t end = std::min(pointer.find('/', begin), pointer.size());
+    const std::string key = pointer.substr(begin, end - begin);  // names of stages and objects need no escapes
+    begin = end + 1;
+    if (node->kind == ConfigValue::Kind::kArray) {
+      node = find_item(*node, key);
+      if (node == nullptr) return *origin;
+      origin = &node->origin;
+      continue;
+    }
+    const auto member = std::find_if(node->members.begin(), node->members.end(),
+                                     [&key](const ConfigMember& candidate) { return candidate.key == key; });
+    if (member == node->members.end()) return *origin;
+    node = &member->value;
+    origin = &node->origin;
+  }
+  return *origin;
+}
+
+/// Whether `problem` may be one only because of another, at the pointer `other`.
+bool may_follow(const RunProblem& problem, const std::string& other) {
+  for (const std::string& need : problem.needs) {
+    if (other == need || other.starts_with(need + "/")) return true;
+  }
+  const std::size_t slash = problem.pointer.rfind('/') + 1;
+  return problem.is_absence && other.starts_with(problem.pointer.substr(0, slash)) &&
+         !nearest_name(other.substr(slash), {problem.pointer.substr(slash)}).empty();
+}
+
+void throw_if_any(const std::vector<RunProblem>& found) {
+  if (found.empty()) return;
+  std::string text;
+  for (const RunProblem& problem : found) text += (text.empty() ? "" : "\n") + problem.pointer + ": " + problem.text;
+  throw UserError(text);
+}
+
+}  // namespace
+
+std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
+  std::vector<RunProblem> found;
+  if (use == ConfigUse::kSettings) return found;
+  if (use == ConfigUse::kRun && config.stages.empty())
+    found.push_back({"/stages", "a run needs at least one stage", {"/stages"}, true});
+  for (const auto& [name, stage] : config.stages) {
+    const std::string where = child_pointer("/stages", name);
+    add_group_problems(stage, where, found);
+    add_loss_problems(stage, where, found);
+  }
+  add_name_problems(config.data, found);
+  if (use == ConfigUse::kRun) add_input_problems(config.data, found);
+  return found;
+}
+
+void add_run_problems(const ConfigValue& tree, const RunConfig& config, ConfigUse use, ConfigProblems& problems) {
+  std::vector<RunProblem> found = run_problems(config, use);
+  const std::vector<std::string> before = problems.pointers();
+  std::erase_if(found, [&before](const RunProblem& problem) {
+    return std::any_of(before.begin(), before.end(),
+                       [&problem](const std::string& other) { return may_follow(problem, other); });
+  });
+  for (const RunProblem& problem : found) problems.add(origin_of(tree, problem.pointer), problem.pointer, problem.text);
+}
+
+void check_run(const RunConfig& config) { throw_if_any(run_problems(config, ConfigUse::kRun)); }
+
+void check_inputs(const DataSettings& data) {
+  std::vector<RunProblem> found;
+  add_name_problems(data, found);
+  add_input_problems(data, found);
+  throw_if_any(found);
+}
+
+}  // namespace hsi4d
