@@ -11,7 +11,7 @@
 #include "core/suggest.h"
 #include "pipelines/cli/text.h"
 #include "splat/info.h"
-#include "splat/io_ply.h"
+#include "splat/splat_file.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -22,7 +22,7 @@ std::string distribution_text(const Distribution& d) {
 }
 
 std::string ply_info(const std::string& path) {
-  const PlyScene scene = read_ply(path);
+  const SplatFile scene = read_splats(path);
   const GaussianStatistics s = statistics_of(scene.gaussians);
   std::string text = path + ": " + std::to_string(s.count) + " Gaussians, spherical harmonics of degree " +
                      std::to_string(s.sh_degree) + "\n";

@@ -52,7 +52,7 @@ end_header
 0 1 -2e-3 0 0 inf -3 -30 -3 1 0 0 +1 0.1 0.2 nan
 )";
 
-void check_scene(const PlyScene& scene) {
+void check_scene(const SplatFile& scene) {
   const Gaussians& g = scene.gaussians;
   check_sizes(g);
   HSI4D_CHECK_EQ(static_cast<Index>(scene.report.row_of.size()), g.count());
