@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 namespace hsi4d::cli {
 
@@ -11,6 +12,13 @@ std::string short_number(double value);
 
 /// The ending of a path in lower case with its dot, ".ply"; "" without one.
 std::string file_ending(const std::string& path);
+
+/// As many finite numbers as asked for, apart by commas: "1,2.5,-3".
+/// @param where  starts the message: "hsi4d convert: --translate"
+/// @param names  what they are: "x,y,z"
+/// Throws UserError that names the text and what is allowed.
+std::vector<double> parse_numbers(const std::string& text, std::size_t count, const std::string& where,
+                                  const std::string& names);
 
 /// "a, b, c".
 std::string joined(std::span<const std::string> words);

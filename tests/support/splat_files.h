@@ -96,24 +96,6 @@ inline std::vector<float> dc_of(const Gaussians& g) {
   return dc;
 }
 
-/// Rows of Gaussians in another order.
-inline Gaussians reordered(const Gaussians& g, const std::vector<Index>& order) {
-  Gaussians out;
-  out.sh_degree = g.sh_degree;
-  out.origin_world = g.origin_world;
-  for (const Index n : order) {
-    const auto copy = [n](const std::vector<float>& from, std::vector<float>& to, Index width) {
-      to.insert(to.end(), from.begin() + n * width, from.begin() + (n + 1) * width);
-    };
-    copy(g.means, out.means, 3);
-    copy(g.quats, out.quats, 4);
-    copy(g.log_scales, out.log_scales, 3);
-    copy(g.opacity_logits, out.opacity_logits, 1);
-    copy(g.sh, out.sh, 3 * Index{g.sh_coefficients()});
-  }
-  return out;
-}
-
 inline bool same_numbers(const Gaussians& a, const Gaussians& b) {
   const auto same = [](const std::vector<float>& x, const std::vector<float>& y) {
     return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(float)) == 0);
