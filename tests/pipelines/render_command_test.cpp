@@ -13,6 +13,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "pipelines/cli/gradients_command.h"
+#include "splat/io_ply.h"
 #include "tests/support/program.h"
 
 using namespace hsi4d;
