@@ -112,7 +112,7 @@ struct Composite {
     if (!(static_cast<double>(depth) + static_cast<double>(rest) > view.settings.near)) return false;
     double factor[6];
     read_factor(io, n, factor);
-    if (std::all_of(factor, factor + 6, [](double v) { return v == 0; })) return false;
+    if (!is_drawn(factor)) return false;
     Conic conic;
     if (!detail::conic_of(factor, view.settings.blur, conic)) return false;
     const double scaled =

@@ -7,59 +7,16 @@
 #include <numbers>
 
 #include "core/check.h"
-#include "core/compression.h"
 #include "splat/splat_rows.h"
+#include "splat/spz_container.h"
 
 namespace hsi4d {
 namespace {
 
-constexpr std::array<std::uint8_t, 4> kMagic = {'N', 'G', 'S', 'P'};
-constexpr std::size_t kHeaderBytes = 16, kHeaderBytes4 = 32, kTableRowBytes = 16;
-constexpr int kNewestVersion = 4;
-constexpr int kHighestDegreeOfFile = 4;
-constexpr int kMostFractionalBits = 24;  // of files that are read
-constexpr int kMostChosenBits = 20;      // a micrometre
-constexpr unsigned kAntialiased = 1, kHasExtensions = 2;
+constexpr int kMostChosenBits = 20;                            // a micrometre
 constexpr std::uint32_t kAxesExtension = 0xADBE0003U;          // SPZ_ADOBE_coordinate_system
 constexpr std::uint32_t kQuantisationExtension = 0xADBE0001U;  // SPZ_ADOBE_sh_quantization
-constexpr std::uint64_t kMostExtensionBytes = std::uint64_t{1} << 20;
-constexpr std::uint64_t kLeastCredible = std::uint64_t{64} << 20;  // bytes that any file may unpack to
-constexpr std::uint64_t kDensestCredible = 2048;                   // bytes that a byte of a larger file may
 constexpr double kColorScale = 0.15;
-constexpr std::array<const char*, 6> kAttributes = {"positions",  "opacities", "colours",
-                                                    "log-scales", "rotations", "harmonics"};
-enum Attribute : std::size_t { kPositions, kOpacities, kColors, kScales, kRotations, kHarmonics };
-
-struct Header {
-  int version = 0;
-  std::uint64_t count = 0;
-  int degree = 0;
-  int fractional_bits = 0;
-  unsigned flags = 0;
-
-  int rest_count() const { return (degree + 1) * (degree + 1) - 1; }  // K − 1
-  /// Bytes of an attribute of one Gaussian.
-  std::uint64_t row_bytes(std::size_t attribute) const {
-    switch (attribute) {
-      case kPositions:
-        return version == 1 ? 6 : 9;
-      case kOpacities:
-        return 1;
-      case kRotations:
-        return version < 3 ? 3 : 4;
-      case kHarmonics:
-        return 3 * static_cast<std::uint64_t>(rest_count());
-      default:
-        return 3;
-    }
-  }
-  std::uint64_t bytes(std::size_t attribute) const { return count * row_bytes(attribute); }  // below 2^40
-  std::uint64_t all_bytes() const {
-    std::uint64_t sum = 0;
-    for (std::size_t a = 0; a < kAttributes.size(); ++a) sum += bytes(a);
-    return sum;
-  }
-};
 
 /// Signs that take the file's axes to ours.
 struct Axes {
@@ -77,166 +34,6 @@ std::array<float, 16> harmonic_signs(const Axes& a) {
 
 // Reading -------------------------------------------------------------------------------------------------------------
 
-/// The fields that all versions have at the same places.
-Header read_header(std::span<const std::uint8_t> bytes, const std::string& name) {
-  if (!std::equal(kMagic.begin(), kMagic.end(), bytes.begin()))
-    throw DataError(name + ": this is no .spz file: its content does not begin with \"NGSP\"");
-  const std::uint64_t version = load_uint(&bytes[4], 4);
-  if (version < 1 || version > kNewestVersion)
-    throw DataError(name + ": version " + std::to_string(version) + " of .spz is not known; allowed: 1 to 4");
-  Header header;
-  header.version = static_cast<int>(version);
-  header.count = load_uint(&bytes[8], 4);
-  header.degree = bytes[12];
-  header.fractional_bits = bytes[13];
-  header.flags = bytes[14];
-  if (header.degree > kHighestDegreeOfFile)
-    throw DataError(name + ": spherical harmonics of degree " + std::to_string(header.degree) + "; allowed: 0 to 4");
-  if (header.fractional_bits > kMostFractionalBits)
-    throw DataError(name + ": " + std::to_string(header.fractional_bits) +
-                    " fractional bits of positions; allowed: 0 to 24");
-  return header;
-}
-
-/// Before memory is taken: what the header asks for is credible for a file of this size.
-void check_size(const Header& header, std::size_t file_size, std::uint64_t most, const std::string& name) {
-  if (header.all_bytes() <= most) return;
-  throw DataError(name + ": the header names " + std::to_string(header.count) + " Gaussians, which are " +
-                  std::to_string(header.all_bytes()) + " bytes; a file of " + std::to_string(file_size) +
-                  " bytes cannot hold them");
-}
-
-/// A file's attributes, unpacked.
-struct Content {
-  Header header;
-  Bytes memory;  // what the spans look at
-  std::array<std::span<const std::uint8_t>, 6> attributes;
-  Bytes extensions;
-};
-
-/// The attributes lie in `memory` one after the other.
-void split(Content& content) {
-  std::size_t at = 0;
-  for (std::size_t a = 0; a < kAttributes.size(); ++a) {
-    const auto size = static_cast<std::size_t>(content.header.bytes(a));
-    content.attributes[a] = std::span(content.memory).subspan(at, size);
-    at += size;
-  }
-}
-
-void refuse_version_4_inside(const Header& header, const std::string& name) {
-  if (header.version == kNewestVersion)
-    throw DataError(name + ": the gzip stream holds a .spz of version 4, which is not packed that way");
-}
-
-/// Versions 1 to 3 in a gzip stream.
-Content unpack_gzip(std::span<const std::uint8_t> file, const std::string& name) {
-  GzipReader reader(file, name);
-  Content content;
-  std::array<std::uint8_t, kHeaderBytes> head;
-  reader.read(head);
-  content.header = read_header(head, name);
-  refuse_version_4_inside(content.header, name);
-  check_size(content.header, file.size(), file.size() * kDensestDeflate, name);
-  content.memory.resize(static_cast<std::size_t>(content.header.all_bytes()));
-  reader.read(content.memory);
-  if ((content.header.flags & kHasExtensions) != 0) {
-    content.extensions.resize(kMostExtensionBytes);
-    content.extensions.resize(reader.read_some(content.extensions));
-  }
-  reader.expect_end();
-  split(content);
-  return content;
-}
-
-/// Versions 1 to 3 as they are before gzip.
-Content unpack_plain(std::span<const std::uint8_t> file, const Header& header, const std::string& name) {
-  Content content;
-  content.header = header;
-  const std::size_t there = file.size() - kHeaderBytes;
-  const std::uint64_t needed = header.all_bytes();
-  const bool longer = (header.flags & kHasExtensions) != 0;
-  if (there < needed || (there > needed && !longer))
-    throw DataError(name + ": the header names " + std::to_string(header.count) + " Gaussians, which are " +
-                    std::to_string(needed) + " bytes; the file has " + std::to_string(there) +
-                    " for them: it was cut short, or its header is wrong");
-  const auto begin = file.begin() + kHeaderBytes;
-  content.memory.assign(begin, begin + static_cast<std::ptrdiff_t>(needed));
-  content.extensions.assign(begin + static_cast<std::ptrdiff_t>(needed), file.end());
-  split(content);
-  return content;
-}
-
-/// A frame of version 4.
-struct Frame {
-  std::size_t attribute;
-  std::span<const std::uint8_t> packed;
-};
-
-/// The table of lengths, checked against the header and the file.
-std::vector<Frame> read_table(std::span<const std::uint8_t> file, const Header& header, std::size_t table,
-                              const std::string& name) {
-  std::vector<Frame> frames;
-  for (std::size_t a = 0; a < kAttributes.size(); ++a) {
-    if (header.bytes(a) > 0) frames.push_back({a, {}});
-  }
-  if (file[15] != frames.size())
-    throw DataError(name + ": the header names " + std::to_string(file[15]) + " frames; " +
-                    std::to_string(header.count) + " Gaussians of degree " + std::to_string(header.degree) + " have " +
-                    std::to_string(frames.size()));
-  if (table < kHeaderBytes4 || table + kTableRowBytes * frames.size() > file.size())
-    throw DataError(name + ": the table of lengths is said to be at byte " + std::to_string(table) + " of a file of " +
-                    std::to_string(file.size()));
-  std::size_t row = table, at = table + kTableRowBytes * frames.size();
-  for (Frame& frame : frames) {
-    const std::uint64_t packed = load_uint(&file[row], 8), unpacked = load_uint(&file[row + 8], 8);
-    const std::string what = name + ": " + kAttributes[frame.attribute];
-    if (unpacked != header.bytes(frame.attribute))
-      throw DataError(what + ": the table names " + std::to_string(unpacked) + " bytes; " +
-                      std::to_string(header.count) + " Gaussians have " +
-                      std::to_string(header.bytes(frame.attribute)));
-    if (packed > file.size() - at)
-      throw DataError(what + ": the frame at byte " + std::to_string(at) + " is said to have " +
-                      std::to_string(packed) + " bytes; the file ends after " + std::to_string(file.size() - at));
-    frame.packed = file.subspan(at, static_cast<std::size_t>(packed));
-    row += kTableRowBytes;
-    at += static_cast<std::size_t>(packed);
-  }
-  if (at != file.size())
-    throw DataError(name + ": " + std::to_string(file.size() - at) + " bytes are left over after the last frame");
-  return frames;
-}
-
-/// Version 4.
-Content unpack_frames(std::span<const std::uint8_t> file, const Header& header, const std::string& name) {
-  if (file.size() < kHeaderBytes4)
-    throw DataError(name + ": the header of version 4 has 32 bytes; the file has " + std::to_string(file.size()));
-  check_size(header, file.size(), std::max(kLeastCredible, file.size() * kDensestCredible), name);
-  const auto table = static_cast<std::size_t>(load_uint(&file[16], 4));
-  const std::vector<Frame> frames = read_table(file, header, table, name);
-  Content content;
-  content.header = header;
-  content.extensions.assign(file.begin() + kHeaderBytes4, file.begin() + static_cast<std::ptrdiff_t>(table));
-  content.memory.resize(static_cast<std::size_t>(header.all_bytes()));
-  split(content);
-  std::size_t at = 0;
-  for (const Frame& frame : frames) {
-    const auto out = std::span(content.memory).subspan(at, static_cast<std::size_t>(header.bytes(frame.attribute)));
-    decompress_zstd(frame.packed, out, name + ": " + kAttributes[frame.attribute]);
-    at += out.size();
-  }
-  return content;
-}
-
-Content unpack(std::span<const std::uint8_t> file, const std::string& name) {
-  if (file.size() >= 2 && file[0] == 0x1f && file[1] == 0x8b) return unpack_gzip(file, name);
-  if (file.size() < kHeaderBytes)
-    throw DataError(name + ": this is no .spz file: it has " + std::to_string(file.size()) +
-                    " bytes, its header alone has 16");
-  const Header header = read_header(file, name);
-  return header.version == kNewestVersion ? unpack_frames(file, header, name) : unpack_plain(file, header, name);
-}
-
 /// Signs of a named set of axes. The names count letter by letter: left or right, down or up, back or forward.
 Axes axes_named(std::uint64_t number, const std::string& name) {
   if (number == 0) return {};  // not said
@@ -248,10 +45,10 @@ Axes axes_named(std::uint64_t number, const std::string& name) {
 }
 
 /// Walks over the records of extensions. Returns the axes that the file has.
-Axes read_extensions(const Content& content, SplatRows& rows, const std::string& name) {
+Axes read_extensions(const SpzContent& content, SplatRows& rows, const std::string& name) {
   Axes axes;
   const Bytes& bytes = content.extensions;
-  if ((content.header.flags & kHasExtensions) == 0) {
+  if ((content.header.flags & kSpzHasExtensions) == 0) {
     if (!bytes.empty())
       throw DataError(name + ": " + std::to_string(bytes.size()) +
                       " bytes lie before the table of lengths, but the header names no extensions");
@@ -324,26 +121,26 @@ std::array<double, 4> smallest_three(std::uint64_t bits) {
 
 class Decoder {
  public:
-  Decoder(const Content& content, const Axes& axes)
+  Decoder(const SpzContent& content, const Axes& axes)
       : content_(content), axes_{axes.x, axes.y, axes.z}, signs_(harmonic_signs(axes)) {
     kept_rest_ = std::min(content.header.rest_count(), (kHighestShDegree + 1) * (kHighestShDegree + 1) - 1);
   }
 
   SplatRow row(std::size_t n) const {
     SplatRow row;
-    const std::uint8_t* position = at(kPositions, n);
+    const std::uint8_t* position = at(kSpzPositions, n);
     for (std::size_t c = 0; c < 3; ++c) {
       const double value = content_.header.version == 1
                                ? half(load_uint(position + 2 * c, 2))
                                : std::ldexp(fixed_point(position + 3 * c), -content_.header.fractional_bits);
       row.mean[c] = static_cast<float>(value * axes_[c]);
-      row.log_scale[c] = static_cast<float>(at(kScales, n)[c] / 16.0 - 10);
-      row.sh[c] = static_cast<float>((at(kColors, n)[c] / 255.0 - 0.5) / kColorScale);
+      row.log_scale[c] = static_cast<float>(at(kSpzScales, n)[c] / 16.0 - 10);
+      row.sh[c] = static_cast<float>((at(kSpzColors, n)[c] / 255.0 - 0.5) / kColorScale);
     }
-    row.opacity_logit = opacity_logit(*at(kOpacities, n));
+    row.opacity_logit = opacity_logit(*at(kSpzOpacities, n));
     row.quat = quat(n);
     for (std::size_t i = 0; i < static_cast<std::size_t>(3 * kept_rest_); ++i)
-      row.sh[3 + i] = signs_[i / 3 + 1] * static_cast<float>((at(kHarmonics, n)[i] - 128) / 128.0);
+      row.sh[3 + i] = signs_[i / 3 + 1] * static_cast<float>((at(kSpzHarmonics, n)[i] - 128) / 128.0);
     return row;
   }
 
@@ -354,13 +151,13 @@ class Decoder {
 
   /// wxyz. Axes that change sign take a rotation along: its axis is a pseudovector.
   std::array<float, 4> quat(std::size_t n) const {
-    const std::uint8_t* bytes = at(kRotations, n);
+    const std::uint8_t* bytes = at(kSpzRotations, n);
     const auto q = content_.header.version < 3 ? first_three(bytes) : smallest_three(load_uint(bytes, 4));
     return {static_cast<float>(q[3]), static_cast<float>(axes_[1] * axes_[2] * q[0]),
             static_cast<float>(axes_[0] * axes_[2] * q[1]), static_cast<float>(axes_[0] * axes_[1] * q[2])};
   }
 
-  const Content& content_;
+  const SpzContent& content_;
   std::array<double, 3> axes_;
   std::array<float, 16> signs_;
   int kept_rest_ = 0;
@@ -374,7 +171,7 @@ void check_options(const SpzOptions& o) {
     throw UserError(".spz: " + what + " is " + std::to_string(value) + "; allowed: " + std::to_string(least) + " to " +
                     std::to_string(most));
   };
-  check(o.version, 2, kNewestVersion, "the version to write");
+  check(o.version, 2, kSpzVersionInFrames, "the version to write");
   check(o.sh1_bits, 1, 8, "the number of bits of harmonics of degree 1");
   check(o.sh_rest_bits, 1, 8, "the number of bits of harmonics above degree 1");
   if (o.fractional_bits != -1) check(o.fractional_bits, 0, 23, "the number of fractional bits of positions");
@@ -430,8 +227,9 @@ void append_quat(Bytes& out, const Vector4<double>& unit, int version) {
 }
 
 /// The six attributes, unpacked.
-std::array<Bytes, 6> attributes_of(const Gaussians& g, const SpzOptions& options, int bits, Counts& losses) {
-  std::array<Bytes, 6> all;
+std::array<Bytes, kSpzAttributes> attributes_of(const Gaussians& g, const SpzOptions& options, int bits,
+                                                Counts& losses) {
+  std::array<Bytes, kSpzAttributes> all;
   HeldNumbers scales(-10, 5.9375), colors(-0.5 / kColorScale, 0.5 / kColorScale), harmonics(-1, 127.0 / 128);
   const std::array<float, 16> signs = harmonic_signs({});
   const int k_count = g.sh_coefficients();
@@ -439,21 +237,21 @@ std::array<Bytes, 6> attributes_of(const Gaussians& g, const SpzOptions& options
     const Vector3<double> mean = mean_world(g, n);
     for (int c = 0; c < 3; ++c) {
       const double fixed = std::round(std::ldexp(c == 0 ? mean[c] : -mean[c], bits));
-      append_uint(all[kPositions], static_cast<std::uint32_t>(static_cast<std::int32_t>(fixed)), 3);
+      append_uint(all[kSpzPositions], static_cast<std::uint32_t>(static_cast<std::int32_t>(fixed)), 3);
     }
     const auto row = static_cast<std::size_t>(n);
-    all[kOpacities].push_back(opacity_level(g.opacity_logits[row]));
+    all[kSpzOpacities].push_back(opacity_level(g.opacity_logits[row]));
     const float* sh = g.sh.data() + 3 * k_count * n;
     for (std::size_t c = 0; c < 3; ++c) {
-      all[kColors].push_back(level(255 * (kColorScale * colors.hold(sh[c]) + 0.5)));
-      all[kScales].push_back(level(16 * (scales.hold(g.log_scales[3 * row + c]) + 10)));
+      all[kSpzColors].push_back(level(255 * (kColorScale * colors.hold(sh[c]) + 0.5)));
+      all[kSpzScales].push_back(level(16 * (scales.hold(g.log_scales[3 * row + c]) + 10)));
     }
-    append_quat(all[kRotations], unit_quat(g, n), options.version);
+    append_quat(all[kSpzRotations], unit_quat(g, n), options.version);
     for (int k = 1; k < k_count; ++k) {
       const int sh_bits = k < 4 ? options.sh1_bits : options.sh_rest_bits;
       for (int c = 0; c < 3; ++c) {
         const float value = sh[3 * k + c] * signs[static_cast<std::size_t>(k)];
-        all[kHarmonics].push_back(harmonic_level(harmonics.hold(value), sh_bits));
+        all[kSpzHarmonics].push_back(harmonic_level(harmonics.hold(value), sh_bits));
       }
     }
   }
@@ -463,50 +261,15 @@ std::array<Bytes, 6> attributes_of(const Gaussians& g, const SpzOptions& options
   return all;
 }
 
-Bytes header_bytes(const Gaussians& g, int version, int bits) {
-  Bytes out(kMagic.begin(), kMagic.end());
-  append_uint(out, static_cast<std::uint64_t>(version), 4);
-  append_uint(out, static_cast<std::uint64_t>(g.count()), 4);
-  append_uint(out, static_cast<std::uint64_t>(g.sh_degree), 1);
-  append_uint(out, static_cast<std::uint64_t>(bits), 1);
-  return out;
-}
-
-Bytes packed_gzip(Bytes head, const std::array<Bytes, 6>& attributes) {
-  head.resize(kHeaderBytes);
-  for (const Bytes& attribute : attributes) head.insert(head.end(), attribute.begin(), attribute.end());
-  return compress_gzip(head);
-}
-
-Bytes packed_frames(Bytes head, const std::array<Bytes, 6>& attributes) {
-  std::uint8_t count = 0;
-  Bytes table, frames;
-  for (const Bytes& attribute : attributes) {
-    if (attribute.empty()) continue;
-    const Bytes frame = compress_zstd(attribute);
-    append_uint(table, frame.size(), 8);
-    append_uint(table, attribute.size(), 8);
-    frames.insert(frames.end(), frame.begin(), frame.end());
-    ++count;
-  }
-  append_uint(head, 0, 1);  // flags
-  append_uint(head, count, 1);
-  append_uint(head, kHeaderBytes4, 4);
-  head.resize(kHeaderBytes4);
-  head.insert(head.end(), table.begin(), table.end());
-  head.insert(head.end(), frames.begin(), frames.end());
-  return head;
-}
-
 }  // namespace
 
 SplatFile decode_spz(std::span<const std::uint8_t> file, const std::string& name) {
-  const Content content = unpack(file, name);
-  const Header& header = content.header;
+  const SpzContent content = unpack_spz(file, name);
+  const SpzHeader& header = content.header;
   SplatRows rows(static_cast<Index>(header.count), std::min(header.degree, kHighestShDegree),
                  ".spz version " + std::to_string(header.version));
-  if ((header.flags & kAntialiased) != 0) rows.add_note("trained with antialiasing");
-  if ((header.flags & ~(kAntialiased | kHasExtensions)) != 0)
+  if ((header.flags & kSpzAntialiased) != 0) rows.add_note("trained with antialiasing");
+  if ((header.flags & ~(kSpzAntialiased | kSpzHasExtensions)) != 0)
     rows.add_note("the header's flags are " + std::to_string(header.flags) + "; those above 3 are not known");
   if (header.degree > kHighestShDegree)
     rows.add_repair("Gaussians without their harmonics of degree 4", static_cast<Index>(header.count));
@@ -521,10 +284,13 @@ EncodedSplats encode_spz(const Gaussians& gaussians, const SpzOptions& options) 
   if (gaussians.count() > 0xffffffffLL) throw UserError(".spz: more Gaussians than the format can count (2^32)");
   const int bits = fractional_bits(gaussians, options.fractional_bits);
   EncodedSplats encoded;
-  const std::array<Bytes, 6> attributes = attributes_of(gaussians, options, bits, encoded.losses);
-  Bytes head = header_bytes(gaussians, options.version, bits);
-  encoded.bytes = options.version == kNewestVersion ? packed_frames(std::move(head), attributes)
-                                                    : packed_gzip(std::move(head), attributes);
+  const std::array<Bytes, kSpzAttributes> attributes = attributes_of(gaussians, options, bits, encoded.losses);
+  SpzHeader header;
+  header.version = options.version;
+  header.count = static_cast<std::uint64_t>(gaussians.count());
+  header.degree = gaussians.sh_degree;
+  header.fractional_bits = bits;
+  encoded.bytes = pack_spz(header, attributes);
   return encoded;
 }
 

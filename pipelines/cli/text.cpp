@@ -1,6 +1,5 @@
 #include "pipelines/cli/text.h"
 
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -9,12 +8,7 @@
 
 namespace hsi4d::cli {
 
-std::string short_number(double value) {
-  std::array<char, 32> buffer;
-  const auto end =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value + 0.0, std::chars_format::general, 4).ptr;
-  return {buffer.data(), end};
-}
+std::string short_number(double value) { return rounded(value, 4); }
 
 std::string file_ending(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
@@ -41,12 +35,6 @@ std::vector<double> parse_numbers(const std::string& text, std::size_t count, co
   if (at == end && numbers.size() == count) return numbers;
   throw UserError(where + ": \"" + text + "\" is not understood; allowed: " + std::to_string(count) +
                   " finite numbers " + names);
-}
-
-std::string joined(std::span<const std::string> words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 }  // namespace hsi4d::cli

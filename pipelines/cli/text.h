@@ -1,9 +1,10 @@
 // Small pieces of text that the commands share.
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
+
+#include "core/text.h"
 
 namespace hsi4d::cli {
 
@@ -19,8 +20,5 @@ std::string file_ending(const std::string& path);
 /// Throws UserError that names the text and what is allowed.
 std::vector<double> parse_numbers(const std::string& text, std::size_t count, const std::string& where,
                                   const std::string& names);
-
-/// "a, b, c".
-std::string joined(std::span<const std::string> words);
 
 }  // namespace hsi4d::cli

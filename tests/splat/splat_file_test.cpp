@@ -133,6 +133,25 @@ TEST_CASE("fixtures of other tools are read") {
   CHECK_THROWS_WITH(read("minimal.ksplat"), Contains(".ksplat files are not read"));
 }
 
+TEST_CASE("fixtures of other tools that were cut are refused at every length") {
+  if (!has_shared()) return;
+  for (const char* name : {"3pts.ply", "3pts.splat", "3pts.spz", "minimal-v2.spz", "minimal-v3.spz", "minimal-v4.spz",
+                           "minimal-raw.spz", "minimal.splat"}) {
+    INFO(name);
+    const Bytes whole = read_file(kShared + "formats/" + name);
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      INFO(size);
+      const Bytes part(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
+      const bool shorter_splat = std::string(name).ends_with(".splat") && size % 32 == 0;  // which has no header
+      if (shorter_splat) {
+        CHECK(decode_splats(part, name).gaussians.count() == static_cast<Index>(size / 32));
+      } else {
+        CHECK_THROWS_AS(decode_splats(part, name), DataError);
+      }
+    }
+  }
+}
+
 TEST_CASE("real scenes go through every format within its rounding") {
   if (!has_shared()) return;
   for (const char* name : {"playbot_scene_ground.ply", "playbot_object_robot.ply", "garden_sfm_init.ply"}) {
@@ -158,7 +177,7 @@ TEST_CASE("real scenes go through every format within its rounding") {
       CHECK(largest_opacity_difference(spz.gaussians, g) <= 1 / 510.0 + 1e-6);
       CHECK(largest_difference(dc_of(spz.gaussians), held(dc_of(g), -10 / 3.0, 10 / 3.0)) <= 1 / 76.5 + 1e-6);
       CHECK(largest_difference(rest_of(spz.gaussians), held(rest_of(g), -1, 1)) <= 1 / 128.0 + 1e-6);
-      CHECK(largest_angle(spz.gaussians, g) < (version == 2 ? 0.3 : 0.0049));
+      CHECK(largest_angle(spz.gaussians, g) < (version == 2 ? 0.25 : 0.0049));
     }
 
     const SplatFile splat = decode_splat(encode_splat(g).bytes, "a.splat");

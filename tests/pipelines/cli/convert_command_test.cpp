@@ -66,7 +66,7 @@ TEST_CASE("convert writes every format and says what is lost") {
             .starts_with("back.compressed.ply: 12 Gaussians, spherical harmonics of degree 1, compressed PLY\n"));
 }
 
-TEST_CASE("convert scales, then turns, then moves; a matrix says the same") {
+TEST_CASE("convert scales, then turns, then moves, a matrix says the same") {
   const TemporaryFolder folder;
   const Gaussians g = plain_gaussians(12, 3);
   write_ply("in.ply", g);
@@ -107,7 +107,7 @@ TEST_CASE("convert leaves out what it is told to") {
   CHECK(converted({.crop = "50,50,50,60,60,60"}).count() == 0);
 }
 
-TEST_CASE("what is wrong with convert's options is told; nothing is written") {
+TEST_CASE("what is wrong with convert's options is told, nothing is written") {
   const TemporaryFolder folder;
   write_ply("in.ply", plain_gaussians(2, 0));
   CHECK(fault({.rotate = "1,2"}) ==
