@@ -197,7 +197,12 @@ TEST_CASE("chunks along the curve are smaller than chunks in any order") {
   const Gaussians g = plain_gaussians(8192, 0);
   const Gaussians back = decode_ply(encode_compressed_ply(g).bytes, "a").gaussians;
   const Gaussians expected = selected(g, compressed_ply_order(g));
-  CHECK(largest_difference(back.means, expected.means) < 2.2 / 1023 / 2);  // half the scene's 4 m, and a little
+  double sum = 0;
+  for (std::size_t i = 0; i < g.means.size(); ++i)
+    sum += std::fabs(static_cast<double>(back.means[i]) - static_cast<double>(expected.means[i]));
+  // A chunk that fills the whole cube of 4 m errs by a quarter of a level in the mean.
+  const double anywhere = (2 * 4.0 / 2047 + 4.0 / 1023) / 3 / 4;
+  CHECK(sum / static_cast<double>(g.means.size()) < 0.6 * anywhere);
   std::vector<Index> order = compressed_ply_order(g);
   std::sort(order.begin(), order.end());
   for (Index n = 0; n < g.count(); ++n) REQUIRE(order[static_cast<std::size_t>(n)] == n);
