@@ -21,12 +21,11 @@ void add_group_problems(const StageSettings& stage, const std::string& in, std::
   if (stage.optimize.empty())
     found.push_back({where, "no parameter group is named; known here: " + joined(known), {where}, true});
   for (const auto& [name, group] : stage.optimize) {
-    const std::string place = child_pointer(where, name);
+    const std::string place = child_pointer(where, name), hint = did_you_mean(name, known);
     if (std::find(known.begin(), known.end(), name) == known.end())
-      found.push_back(
-          {place,
-           "there is no such parameter group" + did_you_mean(name, known) + " (known: " + joined(known) + ")",
-           {in + "/draw"}});
+      found.push_back({place,
+                       "there is no such parameter group" + (hint.empty() ? "; known here: " + joined(known) : hint),
+                       {in + "/draw"}});
     if (stage.iterations > 0 && group.from >= stage.iterations)
       found.push_back({child_pointer(place, "from"),
                        std::to_string(group.from) + " is beyond the stage's " + std::to_string(stage.iterations) +

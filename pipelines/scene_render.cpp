@@ -135,8 +135,10 @@ SceneImage image_of(const TapedScene<S>& scene, const Camera& camera) {
                     camera.height,
                     interleaved(scene.tape.value(rendered.image)),
                     interleaved(scene.tape.value(rendered.transmittance)),
+                    {},
                     {}};
   for (double& alpha : result.alpha) alpha = static_cast<double>(static_cast<S>(1 - alpha));
+  result.drawn = rendered.counters->visible;
   if (rendered.depth.tape) result.depth = interleaved(scene.tape.value(rendered.depth));
   return result;
 }
@@ -201,7 +203,7 @@ reference::Pinhole<double> reference_camera(const Camera& camera) {
 }
 
 SceneImage image_of(const reference::Image<double>& rendered, const Camera& camera) {
-  SceneImage result{camera.width, camera.height, rendered.color, rendered.transmittance, {}};
+  SceneImage result{camera.width, camera.height, rendered.color, rendered.transmittance, {}, {}};
   for (double& alpha : result.alpha) alpha = 1 - alpha;
   result.depth.resize(pixels_of(camera));
   for (std::size_t i = 0; i < rendered.group_opacity.size(); ++i) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,10 +36,11 @@ struct SceneView {
 
 /// An image, interleaved; numbers are floats where the precision is float.
 struct SceneImage {
-  int width = 0, height = 0;  ///< pixels
-  std::vector<double> image;  ///< [H,W,3] Σ w c + T background, not clamped
-  std::vector<double> alpha;  ///< [H,W] 1 − T
-  std::vector<double> depth;  ///< [H,W] Σ w z / Σ w, metres; 0 where Σ w = 0
+  int width = 0, height = 0;        ///< pixels
+  std::vector<double> image;        ///< [H,W,3] Σ w c + T background, not clamped
+  std::vector<double> alpha;        ///< [H,W] 1 − T
+  std::vector<double> depth;        ///< [H,W] Σ w z / Σ w, metres; 0 where Σ w = 0
+  std::optional<Index> drawn = {};  ///< Gaussians that reach the image; brute force does not count them
 };
 
 /// A loss and its derivatives, shaped like the numbers of the Gaussians.

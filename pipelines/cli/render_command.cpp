@@ -1,11 +1,16 @@
 #include "pipelines/cli/render_command.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "body/motion_io.h"
 #include "core/check.h"
 #include "core/image_io.h"
+#include "core/log.h"
+#include "core/rotation.h"
 #include "pipelines/posed_avatar.h"
+#include "pipelines/state.h"
+#include "splat/transform.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -16,29 +21,72 @@ void check_options(const RenderOptions& options) {
     throw UserError(std::string("hsi4d render: ") + (options.motion.empty() ? "--avatar" : "--motion") +
                     " is given without " + (options.motion.empty() ? "--motion" : "--avatar") +
                     "; a body needs both, and --frame");
-  if (options.motion.empty() && options.frame != 0)
-    throw UserError("hsi4d render: --frame is given without --motion and --avatar");
+  if (!options.object_poses.empty() && options.objects.empty())
+    throw UserError("hsi4d render: --objects is given without --object; it has poses of objects, not their Gaussians");
+  if (options.motion.empty() && options.object_poses.empty() && options.frame != 0)
+    throw UserError("hsi4d render: --frame is given without --motion and --avatar, or --objects");
+}
+
+/// The element of a sequence that --frame asks for.
+template <class T>
+const T& at_frame(const std::vector<T>& sequence, int frame, const std::string& file) {
+  if (frame < 0 || frame >= static_cast<int>(sequence.size()))
+    throw UserError("hsi4d render: --frame: " + file + " has no frame " + std::to_string(frame) + "; allowed: 0 to " +
+                    std::to_string(sequence.size() - 1));
+  return sequence[static_cast<std::size_t>(frame)];
 }
 
 PosedGaussians read_body(const RenderOptions& options) {
   const Motion motion = read_motion(options.motion);
-  const auto frames = static_cast<int>(motion.poses.size());
-  if (options.frame < 0 || options.frame >= frames)
-    throw UserError("hsi4d render: --frame: " + options.motion + " has no frame " + std::to_string(options.frame) +
-                    "; allowed: 0 to " + std::to_string(frames - 1));
   const Avatar avatar = read_avatar(options.avatar);
-  const BodyPose& pose = motion.poses[static_cast<std::size_t>(options.frame)];
+  const BodyPose& pose = at_frame(motion.poses, options.frame, options.motion);
   if (pose.joints() != avatar.joint_count())
     throw DataError(options.avatar + ": the avatar has " + std::to_string(avatar.joint_count()) +
                     " joints; the poses of " + options.motion + " have " + std::to_string(pose.joints()));
   return posed_avatar(avatar, pose);
 }
 
+Vector3<double> centroid_world(const Gaussians& gaussians) {
+  Vector3<double> sum = Vector3<double>::Zero();
+  for (Index i = 0; i < gaussians.count(); ++i) sum += Vector3<float>(gaussians.means.data() + 3 * i).cast<double>();
+  return gaussians.origin_world + sum / static_cast<double>(gaussians.count());
+}
+
+/// Where a pose of a run puts an object, which is relative to the centroid of its means.
+PosedGaussians placed(const Gaussians& object, const ObjectPose& pose) {
+  if (object.count() == 0) return {object, {}};
+  Similarity move;
+  move.rotation = so3_exp(pose.rotation);
+  move.translation = pose.translation - move.rotation * centroid_world(object);
+  PosedGaussians posed{transformed(object, move), {}};
+  // Parts of one image share an origin, so that the way from it to the object is a transform of the Gaussians.
+  const Vector3<double> way = posed.gaussians.origin_world - object.origin_world;
+  posed.gaussians.origin_world = object.origin_world;
+  for (Index n = 0; n < object.count(); ++n)
+    posed.transforms.insert(posed.transforms.end(), {1, 0, 0, way[0], 0, 1, 0, way[1], 0, 0, 1, way[2]});
+  return posed;
+}
+
+void add_objects(const RenderOptions& options, std::vector<PosedGaussians>& parts) {
+  std::vector<std::string> names;
+  for (const std::string& object : options.objects) {
+    parts.push_back({read_scene(object).gaussians, {}});
+    names.push_back(std::filesystem::path(object).stem().string());
+  }
+  if (options.object_poses.empty()) return;
+  const auto frames = read_object_tracks(options.object_poses, names);
+  const std::vector<ObjectPose>& poses = at_frame(frames, options.frame, options.object_poses);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    PosedGaussians& part = parts[parts.size() - poses.size() + i];
+    part = placed(part.gaussians, poses[i]);
+  }
+}
+
 /// Scene, objects and body, one after the other.
 PosedGaussians read_all(const RenderOptions& options) {
   std::vector<PosedGaussians> parts;
   parts.push_back({read_scene(options.shared.scene).gaussians, {}});
-  for (const std::string& object : options.objects) parts.push_back({read_scene(object).gaussians, {}});
+  add_objects(options, parts);
   if (!options.motion.empty()) parts.push_back(read_body(options));
   return parts.size() == 1 ? std::move(parts.front()) : concatenated(parts);
 }
@@ -50,6 +98,15 @@ void write_npz(const std::string& path, const SceneImage& rendered, Precision pr
   add_numbers(npz, precision, "alpha", {height, width}, rendered.alpha);
   add_numbers(npz, precision, "depth", {height, width}, rendered.depth);
   npz.write(path);
+}
+
+/// An empty image is what a camera sees that looks away, most often because its axes are of another convention.
+void warn_if_empty(const SceneImage& rendered, Index count) {
+  const bool shows_something =
+      std::any_of(rendered.alpha.begin(), rendered.alpha.end(), [](double alpha) { return alpha > 0; });
+  if (count == 0 || shows_something) return;
+  log_warning("no Gaussian is drawn: the camera sees none of " + std::to_string(count) +
+              ". Its pose must be camera_from_world in OpenCV's axes (x right, y down, z forward), in metres");
 }
 
 }  // namespace
@@ -66,8 +123,11 @@ std::string render_command(const RenderOptions& options) {
     const std::vector<float> values(rendered.image.begin(), rendered.image.end());
     write_image(options.out, from_interleaved(values, rendered.height, rendered.width, 3));
   }
+  const Index count = scene.gaussians.count();
+  warn_if_empty(rendered, count);
   return options.out + ": " + std::to_string(rendered.width) + " x " + std::to_string(rendered.height) + " pixels of " +
-         std::to_string(scene.gaussians.count()) + " Gaussians\n";
+         std::to_string(count) + " Gaussians" +
+         (rendered.drawn ? ", " + std::to_string(*rendered.drawn) + " of them drawn" : "") + "\n";
 }
 
 }  // namespace hsi4d::cli

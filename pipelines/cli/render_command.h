@@ -10,9 +10,10 @@ namespace hsi4d::cli {
 
 struct RenderOptions {
   SceneOptions shared;
-  std::vector<std::string> objects;  ///< --object F.ply, drawn as they lie in their files
+  std::vector<std::string> objects;  ///< --object F.ply, drawn as they lie in their files, or where
+  std::string object_poses;          ///< --objects O.npz puts them in that frame, by the names of their files
   std::string motion;                ///< --motion M.npz, with
-  int frame = 0;                     ///< --frame I and
+  int frame = 0;                     ///< --frame I, of poses and motion, and
   std::string avatar;                ///< --avatar F.npz: a body drawn in that frame's pose
   std::string out;                   ///< --out F.png, .exr or .npz
 };

@@ -49,6 +49,25 @@ TEST_CASE("progress reports first, then at the interval, then the end") {
   CHECK(shown.back().line == "camera 50/100, 50%, 10 steps/s, loss 0.02, took 5 s");
 }
 
+TEST_CASE("steps of an earlier process count as done, and not as speed") {
+  now = 0;
+  std::vector<Shown> shown;
+  {
+    Progress progress("x", 1000, keep_in(shown), 1.0, fake_clock);
+    now += 0.001;
+    progress.skip(900);
+    CHECK(shown.empty());
+    for (int i = 0; i < 50; ++i) now += 0.1, progress.step();
+  }
+  REQUIRE(shown.size() > 2);
+  CHECK(shown.front().done == 901);
+  CHECK(shown.front().rate < 11);
+  CHECK(shown[1].rate == Approx(10).epsilon(0.02));
+  CHECK(shown[1].left == Approx((1000 - static_cast<double>(shown[1].done)) / 10).epsilon(0.02));
+  CHECK(shown.back().done == 950);
+  CHECK(shown.back().rate == Approx(10).epsilon(0.01));
+}
+
 TEST_CASE("the rate follows a change of speed") {
   now = 0;
   std::vector<Shown> shown;

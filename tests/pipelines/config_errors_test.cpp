@@ -151,6 +151,20 @@ TEST_CASE("overrides name the command line") {
   CHECK(fault(good, {"render.blur=1", "stages.camera.losses={\"centre\": {}}"}) == "no fault");
 }
 
+TEST_CASE("overrides may be JSON pointers") {
+  const std::string good = stage(R"("iterations": 30, "losses": {"photo": {}})");
+  CHECK(fault(good, {"/render/blur=0.1", "/stages/camera/losses/photo/weight=2"}) == "no fault");
+  CHECK_THAT(fault(good, {"/render/blur=wide"}),
+             Equals("--set /render/blur=wide: /render/blur: wide is not a number; allowed: 0 to 100"));
+  CHECK_THAT(fault(good, {"/a~1b~0=1"}), Equals("--set /a~1b~0=1: /a~1b~0: unknown key; known here: " + kSections));
+  for (const char* bad : {"/=1", "=1", "/render//blur=1", "render..blur=1", "render.blur"}) {
+    CHECK_THAT(fault(good, {bad}),
+               Equals(std::string("--set ") + bad +
+                      ": write --set KEY=VALUE with dots between nested keys, for example --set render.blur=0.1 or "
+                      "--set /render/blur=0.1"));
+  }
+}
+
 TEST_CASE("every problem of a file, of what it extends and of the overrides is told at once") {
   const TemporaryFolder folder;
   folder.write("base.json", R"({"render": {"near": -1}, "stages": {"camera": {"iterations": 30}}})");
@@ -174,6 +188,38 @@ TEST_CASE("every problem of a file, of what it extends and of the overrides is t
                     "a.json:8:4: not valid JSON: the comma before '}' is one too many\n"
                     "base.json:1: /render/near: -1 is out of range; allowed: above 0 and at most 1000\n"
                     "--set threads=many: /threads: many is not a whole number; allowed: 0 to 1024"));
+}
+
+TEST_CASE("rules and stages are told with everything else, and not where they only follow from it") {
+  const TemporaryFolder folder;
+  folder.write("a.json", R"({
+  "render": {"quality": "fast", "compatibility": "inria", "blurr": 1},
+  "stages": {
+    "camera": {"iterations": 3, "draw": "scene", "optimise": {"camera": {"lr": 1}}, "losses": {"masked_l2": {"weight": 0}}},
+    "body": {"optimize": {"transl": {"lr": 1, "from": 9}, "bodypose": {}}}
+  }
+})");
+  const ProgramResult result = run_hsi4d({"run", "a.json"});
+  CHECK(result.status == 2);
+  CHECK_THAT(
+      result.err,
+      Catch::Matchers::StartsWith(
+          "9 problems in a.json:\n"
+          "a.json:1: /data: no inputs are given; a run needs scene, avatar, frames, masks, camera, initial. `hsi4d "
+          "synth` "
+          "makes a dataset with a config beside it to run; `hsi4d demo` makes one and runs it\n"
+          "a.json:2: /render/quality: quality and compatibility set the same keys; write one of the two\n"
+          "a.json:2: /render/blurr: unknown key; did you mean \"blur\"?\n"
+          "a.json:4: /stages/camera/optimise: unknown key; did you mean \"optimize\"?\n"
+          "a.json:4: /stages/camera/losses: masked_l2 has weight 0, which switches a loss off; a stage needs one that "
+          "is "
+          "on\n"
+          "a.json:5: /stages/body: the key \"iterations\" is missing; allowed: 1 to 1000000\n"
+          "a.json:5: /stages/body/losses: a stage needs a loss\n"
+          "a.json:5: /stages/body/optimize/bodypose: the key \"lr\" is missing; allowed: 0 to 1000\n"
+          "a.json:5: /stages/body/optimize/bodypose: there is no such parameter group; did you mean \"body_pose\"?"));
+  const std::string in_stages = run_hsi4d({"check", "a.json"}).err;  // which asks for no inputs
+  CHECK_THAT(in_stages, Catch::Matchers::StartsWith("8 problems in a.json:\na.json:2: "));
 }
 
 TEST_CASE("the program prints the same text and exits with 2") {

@@ -9,6 +9,7 @@
 #include "core/camera_file.h"
 #include "core/image_io.h"
 #include "core/parallel.h"
+#include "pipelines/cli/run_command.h"
 #include "pipelines/state.h"
 #include "tests/pipelines/tiny_run.h"
 #include "tests/support/program.h"
@@ -16,6 +17,7 @@
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
 namespace fs = std::filesystem;
 
 namespace {
@@ -293,11 +295,39 @@ TEST_CASE("a dry run and a printed config write nothing, seed and threads are no
   CHECK(status["threads"] == 2);
   CHECK(json_of("runs/tiny/config.resolved.json")["seed"] == 5);
   CHECK(json_of("runs/tiny/config.resolved.json")["threads"] == 0);
-  for (const char* bad : {"0", "1025", "many"}) {
+  for (const char* bad : {"-1", "1025", "many"}) {
     const ProgramResult refused = run_hsi4d({"run", config, "--threads", bad});
     CHECK(refused.status == 2);
-    CHECK_THAT(refused.err, Contains("hsi4d run: --threads: "));
+    CHECK_THAT(refused.err, Contains("hsi4d run: --threads: \"" + std::string(bad) +
+                                     "\" is out of range, or not a whole number; allowed: 0 to 1024"));
   }
+  CHECK(cli::run_threads(std::nullopt) == 0);  // what the config says
+  CHECK(cli::run_threads(0) == thread_count());
+  CHECK(cli::run_threads(3) == 3);
+}
+
+TEST_CASE("a dry run looks at the folder as the run would", "[run]") {
+  const TemporaryFolder here;
+  const std::string config = tiny_config_file();
+  int count = 0;
+  CHECK_THROWS_AS(carry_out_tiny(tiny_config(), "runs/tiny", 1, false, [&] { return ++count == 25; }), Interrupted);
+  // Without --out the next folder that is free.
+  CHECK_THAT(run_hsi4d({"run", config, "--dry-run"}).out, StartsWith("would write runs/tiny-2\n"));
+  const auto before = file_text("runs/tiny/status.json");
+  const ProgramResult taken = run_hsi4d({"run", config, "--dry-run", "--out", "runs/tiny"});
+  CHECK(taken.status == 2);
+  CHECK_THAT(taken.err, StartsWith("runs/tiny: holds a run that is not finished (interrupted)"));
+  CHECK_THAT(
+      run_hsi4d({"run", config, "--dry-run", "--resume"}).out,
+      StartsWith("would go on with runs/tiny (interrupted): 1 of 3 frames are finished, 2 are left\n  4 frames"));
+  CHECK_THAT(run_hsi4d({"run", config, "--dry-run", "--resume", "--seed", "9"}).err,
+             Contains("the run cannot be resumed, its config is another one:\n  /seed: 0 in the folder, 9 now"));
+  CHECK_THAT(run_hsi4d({"run", config, "--dry-run", "--out", TinyDataset::folder().string()}).err,
+             Contains("is not empty and holds no run"));
+  CHECK(file_text("runs/tiny/status.json") == before);
+  here.write("runs/tiny-2/any.txt", "");
+  CHECK(run_hsi4d({"run", config, "--resume"}).err ==
+        "hsi4d run: --resume needs --out: there are several runs called tiny, from runs/tiny on\n");
 }
 
 TEST_CASE("every shipped schedule runs", "[run]") {

@@ -218,5 +218,5 @@ TEST_CASE("warnings from before there was a folder, and a resumed run, are in th
   const std::string warning = "/human: has no mask for 1 of 4 frames; these count as empty";
   CHECK_THAT(file_text("run/log.txt"), Contains(warning) && Contains(" info interrupted: interrupted in frame 2"));
   carry_out_tiny(config, "run", 1, true);
-  CHECK_THAT(file_text("run/log.txt"), Contains("info resumed, 2 frames are in the checkpoint\n"));
+  CHECK_THAT(file_text("run/log.txt"), Contains("info resumed with frame 2 of 3\n"));
 }

@@ -106,16 +106,29 @@ TEST_CASE("check refuses stages whose groups are not known, do not exist in what
   CHECK(result.status == 2);
   CHECK(result.out.empty());
   CHECK(result.err ==
-        "/stages/camera/optimize: there is no parameter group \"transl\" (known: camera)\n"
-        "/stages/body/optimize: there is no parameter group \"bodypose\"; did you mean \"body_pose\"? (known: " +
-            groups + ")\n/stages/body/optimize: there is no parameter group \"scene_sh\" (known: " + groups +
-            ")\n/stages/body/optimize/transl/from: 5 is beyond the stage's 5 iterations; the group would never move\n"
-            "/stages/none/optimize: no parameter group is named (known: " +
-            groups + ")\n/stages/none/losses: a stage needs a loss\n");
+        "6 problems in a.json:\n"
+        "a.json:2: /stages/camera/optimize/transl: there is no such parameter group; known here: camera\n"
+        "a.json:4: /stages/body/optimize/bodypose: there is no such parameter group; did you mean \"body_pose\"?\n"
+        "a.json:4: /stages/body/optimize/transl/from: 5 is beyond the stage's 5 iterations; the group would never "
+        "move\n"
+        "a.json:5: /stages/body/optimize/scene_sh: there is no such parameter group; known here: " +
+            groups +
+            "\na.json:7: /stages/none/losses: a stage needs a loss\n"
+            "a.json:7: /stages/none/optimize: no parameter group is named; known here: " +
+            groups + "\n");
   folder.write("b.json", R"({"stages": {"body": {"iterations": 5,
     "optimize": {"transl": {"lr": 1, "from": 3, "until": 3}}, "losses": {"photometric": {}}}}})");
   CHECK_THAT(run_hsi4d({"check", "b.json"}).err,
              Contains("3 is not after from, which is 3; the group would never move"));
+  folder.write("off.json", R"({"stages": {
+    "a": {"iterations": 5, "optimize": {"transl": {"lr": 1}}, "losses": {"photometric": {"weight": 0}}},
+    "b": {"iterations": 5, "optimize": {"transl": {"lr": 1}},
+          "losses": {"photometric": {}, "depth": {"weight": 0}}}}})");
+  CHECK(run_hsi4d({"check", "off.json"}).err ==
+        "off.json:2: /stages/a/losses: photometric has weight 0, which switches a loss off; a stage needs one that is "
+        "on\n");
+  CHECK_THAT(run_hsi4d({"check", "off.json", "--set", "stages.a.losses.photometric.weight=1"}).out,
+             Contains("2 losses (photometric, depth off by weight 0)\n"));
   // Those of them that would be right.
   folder.write("c.json", R"({"stages": {
     "camera": {"iterations": 5, "draw": "scene", "optimize": {"camera": {"lr": 1}}, "losses": {"masked_l2": {}}},
@@ -163,7 +176,7 @@ TEST_CASE("the program and every subcommand answer --version and --help") {
   const ProgramResult help = run_hsi4d({"--help"});
   CHECK(help.status == 0);
   for (const char* command :
-       {"run", "demo", "synth", "report", "render", "gradients", "info", "check", "schema", "list"}) {
+       {"run", "demo", "synth", "report", "render", "gradients", "convert", "info", "check", "schema", "list"}) {
     CHECK_THAT(help.out, Contains(command));
     const ProgramResult own = run_hsi4d({command, "--help"});
     CHECK(own.status == 0);
@@ -186,14 +199,21 @@ TEST_CASE("mistakes on the command line end with 2 and one message") {
     CHECK(result.out.empty());
     return result.err;
   };
-  const std::string commands = "run, demo, synth, report, render, gradients, info, check, schema, list";
+  const std::string commands = "run, demo, synth, report, render, gradients, convert, info, check, schema, list";
   CHECK(mistake({"chek"}) == "hsi4d: there is no command \"chek\"; known: " + commands + "; did you mean \"check\"?\n");
   CHECK(mistake({"frobnicate"}) == "hsi4d: there is no command \"frobnicate\"; known: " + commands + "\n");
   CHECK(mistake({}) == "hsi4d: give a command: " + commands + "; `hsi4d --help` explains them\n");
   CHECK(mistake({"check"}) == "hsi4d check: CONFIG is required; `hsi4d check --help` explains its arguments\n");
   CHECK(mistake({"check", "a.json", "--sett", "x=1"}) ==
-        "hsi4d check: The following arguments were not expected: x=1 --sett; `hsi4d check --help` explains its "
-        "arguments\n");
+        "hsi4d check: there is no option \"--sett\"; known: --help, --set, --print-config; did you mean \"--set\"?\n");
+  CHECK(
+      mistake({"demo", "--quik"}) ==
+      "hsi4d demo: there is no option \"--quik\"; known: --help, --quick, --out, --set, --quiet, --resume, --threads; "
+      "did you mean \"--quick\"?\n");
+  CHECK(mistake({"render", "--sceen=a.ply"}).find("did you mean \"--scene\"?") != std::string::npos);
+  CHECK(mistake({"run", "a.json", "--seed", "x"}) ==
+        "hsi4d run: --seed: \"x\" is out of range, or not a whole number; allowed: 0 or more; `hsi4d run --help` "
+        "explains its arguments\n");
   CHECK(mistake({"check", "a.json", "--set"}) ==
         "hsi4d check: --set: 1 required KEY=VALUE missing; `hsi4d check --help` explains its arguments\n");
   CHECK(mistake({"--vresion"}) ==

@@ -44,7 +44,7 @@ TEST_CASE("what is wrong with the options is told to the letter") {
   CHECK(render_fault([](Options& o) { o.avatar = "a.npz"; }) ==
         "hsi4d render: --avatar is given without --motion; a body needs both, and --frame");
   CHECK(render_fault([](Options& o) { o.frame = 2; }) ==
-        "hsi4d render: --frame is given without --motion and --avatar");
+        "hsi4d render: --frame is given without --motion and --avatar, or --objects");
   CHECK_THAT(render_fault([](Options& o) { o.shared.scene = "missing.ply"; }), StartsWith("missing.ply: "));
   CHECK_THAT(render_fault([](Options& o) { o.objects = {"missing.ply"}; }), StartsWith("missing.ply: "));
   CHECK_THAT(render_fault([](Options& o) { o.shared.camera = "missing.json"; }), StartsWith("missing.json: "));
