@@ -111,7 +111,9 @@ TEST_CASE("overrides are JSON, or else a string") {
 TEST_CASE("unusable overrides are told") {
   const TemporaryFolder folder;
   folder.write("a.json", R"({"a": {"b": 1, "list": [1]}})");
-  const std::string form = ": write --set KEY=VALUE with dots between nested keys, for example --set render.blur=0.1";
+  const std::string form =
+      ": write --set KEY=VALUE with dots between nested keys, for example --set render.blur=0.1 or --set "
+      "/render/blur=0.1";
   CHECK_THAT(loaded("a.json", {"a.b"}), Equals("--set a.b" + form));
   CHECK_THAT(loaded("a.json", {"=1"}), Equals("--set =1" + form));
   CHECK_THAT(loaded("a.json", {"a..b=1"}), Equals("--set a..b=1" + form));

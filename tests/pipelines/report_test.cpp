@@ -299,6 +299,18 @@ TEST_CASE("a run that was killed is told from one that runs") {
   CHECK_THAT(report_html("a"), Contains("<p class=\"message\">no mask for frame 2</p>"));
 }
 
+TEST_CASE("a report is headed by the config's name and tells its folder, however the run stands") {
+  const TemporaryFolder here;
+  {
+    const RunFolder folder("first/run", {"{\"name\": \"a walk\"}\n", 0, 1, "float"}, false);
+    CHECK_THAT(report_html("first/run"), Contains("<h1>a walk</h1><span class=\"badge running\">") &&
+                                             Contains("<dt>folder</dt><dd>first/run</dd>"));
+  }
+  CHECK_THAT(report_html("first/run/"), Contains("<h1>a walk</h1>") && Contains("<dd>first/run</dd>"));
+  const RunFolder nameless("second/run", {"{}\n", 0, 1, "float"}, false);
+  CHECK_THAT(report_html("second/run"), Contains("<h1>run</h1>") && Contains("<dd>second/run</dd>"));
+}
+
 TEST_CASE("damaged files are told with file and line") {
   const TemporaryFolder here;
   const auto message_of = [&here](const std::string& file, const std::string& text) {
