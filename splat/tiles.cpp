@@ -11,6 +11,7 @@
 
 #include "core/check.h"
 #include "core/parallel.h"
+#include "core/simd.h"
 #include "splat/limits.h"
 
 namespace hsi4d::detail {
@@ -89,35 +90,37 @@ Extent extent_of(const Conic& conic, double x, double y, double opacity, const T
   result.top_x = conic.xy / width;
   result.inverse_l22 = height;
   const double half_height = result.reach * height, half_width = result.reach * width;
+  result.box_half_width = half_width;
   if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return result;
   result.row_begin = first_from(y - half_height - 0.5, grid.height);
   result.row_end = last_to(y + half_height - 0.5, grid.height);
   return result;
 }
 
-TileSpan tile_columns(const Extent& f, const TileGrid& grid, Index tile_row) {
-  if (f.kind == Extent::Kind::kAll) return {0, grid.cols};
-  if (f.kind == Extent::Kind::kRectangle) return f.cols;
-  const Index top = std::max(f.row_begin, tile_row * grid.tile);
-  const Index bottom = std::min(f.row_end, (tile_row + 1) * grid.tile);
+TileSpan block_columns(const Extent& f, const TileGrid& grid, Index band) {
+  const Index across = grid.tile / kBlockSide;
+  const Index top = std::max(f.row_begin, band * kBlockSide);
+  const Index bottom = std::min(f.row_end, (band + 1) * kBlockSide);
   if (top >= bottom) return {};
+  if (f.kind == Extent::Kind::kAll) return {0, grid.cols * across};
+  if (f.kind == Extent::Kind::kRectangle) return {f.cols.begin * across, f.cols.end * across};
   // The border's x as a function of dy is slope·dy ± half_width sqrt(reach² − dy²/yy); the band's rightmost point is
   // the ellipse's if that lies in the band, else at the band's nearer end.
   const double half_height = f.reach * f.inverse_l22;
   const double low = std::max(static_cast<double>(top) + 0.5 - f.y, -half_height);
-  const double high = std::min(static_cast<double>(bottom) - 0.5 - f.y, half_height);
+  const double high = std::max(std::min(static_cast<double>(bottom) - 0.5 - f.y, half_height), low);
   const auto half_width_at = [&](double dy) {
     const double w = dy / f.inverse_l22;
     return f.half_width * std::sqrt(std::max(0.0, f.reach * f.reach - w * w));
   };
-  const double right_dy = std::clamp(f.reach * f.top_x, low, std::max(low, high));
-  const double left_dy = std::clamp(-f.reach * f.top_x, low, std::max(low, high));
+  const double right_dy = std::clamp(f.reach * f.top_x, low, high);
+  const double left_dy = std::clamp(-f.reach * f.top_x, low, high);
   const double right = f.slope * right_dy + half_width_at(right_dy), left = f.slope * left_dy - half_width_at(left_dy);
   const double room = 1e-9 * (1 + std::abs(f.x) + std::abs(right) + std::abs(left));
   const Index begin = first_from(f.x + left - room - 0.5, grid.width);
   const Index end = last_to(f.x + right + room - 0.5, grid.width);
   if (begin >= end) return {};
-  return {begin / grid.tile, (end - 1) / grid.tile + 1};
+  return {begin / kBlockSide, (end - 1) / kBlockSide + 1};
 }
 
 // --- order -----------------------------------------------------------------------------------------------------------
@@ -191,56 +194,97 @@ void check_pair_memory(Index pairs, double bytes, Index limit) {
 
 namespace {
 
+constexpr Index kMostChunks = 32;
+
 /// Chunks of the Gaussians, each of which counts its tiles by itself.
 Partition list_partition(Index ranks) {
-  constexpr Index kGrain = 1024, kMostChunks = 32;
+  constexpr Index kGrain = 1024;
   return {ranks, std::max(kGrain, (ranks + kMostChunks - 1) / kMostChunks)};
 }
 
 }  // namespace
 
-void TileLists::count(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts) {
-  const Index ranks = static_cast<Index>(extents.size()), tiles = grid.count();
-  const Partition part = list_partition(ranks);
-  counts.resize(part.chunks() * tiles);
-  slot_begin.resize(ranks + 1);
-  tile_begin.resize(tiles + 1);
+Index TileLists::find(std::span<const DepthKeyed> order, std::span<const Extent> extents, const TileGrid& grid,
+                      Index most) {
+  const Index tiles = grid.count();
+  const Partition part = list_partition(static_cast<Index>(order.size()));
+  if (static_cast<Index>(found_.size()) < part.chunks()) found_.resize(static_cast<std::size_t>(part.chunks()));
+  counts_.resize(part.chunks() * tiles);
+  groups_.resize(part.chunks() * tiles);
+  slots.resize(static_cast<Index>(extents.size()));
+  std::fill_n(slots.data(), slots.size(), Slots{0, 0});
+  std::array<Index, kMostChunks> pairs{};
   parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-    Index* const of_tile = counts.data() + chunk * tiles;
-    std::fill_n(of_tile, tiles, Index(0));
-    for (Index rank = begin; rank < end; ++rank) {
-      Index pairs = 0;
-      for_each_tile(extents[static_cast<std::size_t>(rank)], grid, [&](Index tile) {
-        ++of_tile[tile];
-        ++pairs;
-      });
-      slot_begin[rank] = pairs;
-    }
+    std::uint32_t *const of_tile = counts_.data() + chunk * tiles, *const groups = groups_.data() + chunk * tiles;
+    std::fill_n(of_tile, tiles, 0u);
+    std::fill_n(groups, tiles, 0u);
+    std::vector<FoundPair>& found = found_[static_cast<std::size_t>(chunk)];
+    found.clear();
+    Index count = 0;
+    on_best_isa([&] {
+      for (Index rank = begin; rank < end; ++rank) {
+        const Index n = order[static_cast<std::size_t>(rank)].index;
+        const Index first = count;
+        for_each_tile(extents[static_cast<std::size_t>(n)], grid, [&](Index tile, std::uint32_t blocks) {
+          if (count++ < most) found.push_back({static_cast<std::uint32_t>(tile), blocks});
+          ++of_tile[tile];
+          groups[tile] += static_cast<std::uint32_t>(std::popcount(blocks));
+        });
+        slots[n] = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count)};
+      }
+    });
+    pairs[static_cast<std::size_t>(chunk)] = count;
   });
-  total_pairs({slot_begin.data(), static_cast<std::size_t>(ranks)});
-  Index slot = 0;
-  for (Index rank = 0; rank < ranks; ++rank) slot += std::exchange(slot_begin[rank], slot);
-  slot_begin[ranks] = slot;
+  const Index total = total_pairs(pairs);
+  tile_begin.resize(tiles + 1);
+  tile_groups.resize(tiles);
   Index place = 0;
   for (Index tile = 0; tile < tiles; ++tile) {
     tile_begin[tile] = place;
-    for (Index chunk = 0; chunk < part.chunks(); ++chunk) place += std::exchange(counts[chunk * tiles + tile], place);
+    tile_groups[tile] = 0;
+    for (Index chunk = 0; chunk < part.chunks(); ++chunk) {
+      const Index count = counts_[chunk * tiles + tile];
+      counts_[chunk * tiles + tile] = static_cast<std::uint32_t>(place);
+      place += count;
+      tile_groups[tile] += groups_[chunk * tiles + tile];
+    }
   }
   tile_begin[tiles] = place;
+  return total;
 }
 
-void TileLists::fill(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts) {
+void TileLists::fill(std::span<const DepthKeyed> order, const TileGrid& grid) {
   const Index tiles = grid.count();
+  const Partition part = list_partition(static_cast<Index>(order.size()));
   entries.resize(tile_begin[tiles]);
-  parallel_chunks(list_partition(static_cast<Index>(extents.size())), [&](Index chunk, Index begin, Index end) {
-    Index* const of_tile = counts.data() + chunk * tiles;
+  tile_of.resize(tile_begin[tiles]);
+  std::array<std::uint32_t, kMostChunks> first{};
+  for (Index chunk = 1; chunk < part.chunks(); ++chunk) {
+    const auto c = static_cast<std::size_t>(chunk);
+    first[c] = first[c - 1] + static_cast<std::uint32_t>(found_[c - 1].size());
+  }
+  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+    std::uint32_t* const of_tile = counts_.data() + chunk * tiles;
+    const FoundPair* pair = found_[static_cast<std::size_t>(chunk)].data();
+    std::uint32_t slot = first[static_cast<std::size_t>(chunk)];
     for (Index rank = begin; rank < end; ++rank) {
-      Index next = slot_begin[rank];
-      for_each_tile(extents[static_cast<std::size_t>(rank)], grid, [&](Index tile) {
-        entries[of_tile[tile]++] = {static_cast<std::int32_t>(rank), static_cast<std::uint32_t>(next++)};
-      });
+      const std::int32_t n = order[static_cast<std::size_t>(rank)].index;
+      const std::uint32_t size = slots[n].end - slots[n].begin;
+      slots[n] = {slot, slot + size};
+      for (const std::uint32_t after = slot + size; slot < after; ++slot, ++pair) {
+        entries[of_tile[pair->tile]++] = {n, slot, pair->blocks};
+        tile_of[slot] = pair->tile;
+      }
     }
   });
+}
+
+Index TileLists::capacity_bytes() const {
+  Index bytes = tile_begin.capacity_bytes() + tile_groups.capacity_bytes() + slots.capacity_bytes() +
+                tile_of.capacity_bytes() + entries.capacity_bytes() + counts_.capacity_bytes() +
+                groups_.capacity_bytes();
+  for (const auto& found : found_) bytes += static_cast<Index>(found.capacity() * sizeof(FoundPair));
+  return bytes;
 }
 
 }  // namespace hsi4d::detail

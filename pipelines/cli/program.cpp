@@ -12,6 +12,7 @@
 #include "core/log.h"
 #include "core/suggest.h"
 #include "core/version.h"
+#include "pipelines/cli/bench_command.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/demo_command.h"
 #include "pipelines/cli/gradients_command.h"
@@ -48,6 +49,7 @@ struct CommandLine {
   std::vector<LossDescription> losses;
   RenderOptions render;
   GradientsOptions gradients;
+  BenchOptions bench;
   std::function<std::string()> run;
 
   explicit CommandLine(const std::vector<LossTerm>& terms) : losses(descriptions_of(terms)) {
@@ -62,6 +64,7 @@ struct CommandLine {
     add_render();
     add_gradients();
     add_info();
+    add_bench();
     add_check();
     add_schema();
     add_list();
@@ -121,6 +124,17 @@ struct CommandLine {
     CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
     info->add_option("FILE", file, "A .ply, .npz, .npy, .json, .png, .jpg, .jpeg or .exr file")->required();
     info->callback([this] { run = [this] { return info_command(file); }; });
+  }
+
+  void add_bench() {
+    CLI::App* command = app.add_subcommand("bench", "Measure speed: a table, and one JSON object a measurement");
+    command->add_option("TOPIC", topic, "What: rasterize")->required()->check(CLI::IsMember({"rasterize"}));
+    command->add_option("--workload", bench.workloads, "Only these; default: all");
+    command->add_option("--threads", bench.threads, "Threads")->check(CLI::Range(1, 1024));
+    command->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told")
+        ->check(CLI::Range(1, 1000));
+    command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
+    command->callback([this] { run = [this] { return bench_rasterize_command(bench); }; });
   }
 
   void add_check() {
