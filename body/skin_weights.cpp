@@ -1,20 +1,15 @@
 // Weights as files have them: checked, pruned and normalised in double.
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numeric>
 #include <string>
 
 #include "body/skinning.h"
+#include "core/text.h"
 
 namespace hsi4d {
 
 namespace {
-
-std::string text_of(double value) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
 
 [[noreturn]] void fail(std::string_view source, Index vertex, const std::string& what) {
   throw DataError(std::string(source) + ": vertex " + std::to_string(vertex) + ": " + what);
@@ -25,12 +20,13 @@ double checked_sum(const double* weights, Index count, std::string_view source, 
   double sum = 0;
   for (Index k = 0; k < count; ++k) {
     if (!std::isfinite(weights[k]) || weights[k] < 0) {
-      fail(source, vertex, "weight " + std::to_string(k) + " is " + text_of(weights[k]) + "; allowed: 0 to 1");
+      fail(source, vertex, "weight " + std::to_string(k) + " is " + number_text(weights[k]) + "; allowed: 0 to 1");
     }
     sum += weights[k];
   }
   if (!(std::abs(sum - 1) <= kWeightSumTolerance)) {
-    fail(source, vertex, "the weights sum to " + text_of(sum) + "; allowed: 1 within " + text_of(kWeightSumTolerance));
+    fail(source, vertex,
+         "the weights sum to " + number_text(sum) + "; allowed: 1 within " + number_text(kWeightSumTolerance));
   }
   return sum;
 }

@@ -9,6 +9,7 @@
 
 #include "core/check.h"
 #include "core/config.h"
+#include "core/config_file.h"
 #include "core/config_parse.h"
 #include "core/file.h"
 #include "core/image.h"
@@ -131,11 +132,7 @@ Camera camera_of(const CameraText& text, const std::string& pointer) {
 
 std::vector<Camera> read_single(ConfigValue& tree, ConfigProblems& problems) {
   flatten_matrix(tree, "world_to_camera", "", problems);
-  CameraText text;
-  ConfigFields fields;
-  describe(fields, text);
-  read_config(tree, fields, problems);
-  problems.throw_if_any();
+  const auto text = read_settings<CameraText>(tree, problems);
   std::vector<Camera> cameras;
   add_failure(*find_member(tree, "world_to_camera"), problems, [&] { cameras.push_back(camera_of(text, "")); });
   return cameras;
@@ -181,11 +178,7 @@ std::vector<Camera> read_list(ConfigValue& tree, ConfigProblems& problems) {
   ConfigValue* items = member_of(tree, "cameras");
   for (std::size_t i = 0; items && i < items->items.size(); ++i)
     flatten_matrix(items->items[i], "world_to_camera", "/cameras/" + std::to_string(i), problems);
-  ListText text;
-  ConfigFields fields;
-  describe(fields, text);
-  read_config(tree, fields, problems);
-  problems.throw_if_any();
+  const auto text = read_settings<ListText>(tree, problems);
   std::vector<Camera> cameras;
   for (std::size_t i = 0; i < text.cameras.size(); ++i) {
     const std::string pointer = "/cameras/" + std::to_string(i);

@@ -73,7 +73,8 @@ std::optional<ConfigMember> take_member(ConfigValue& tree, const std::string& ke
 /// Reads a chain of files.
 class Loader {
  public:
-  explicit Loader(ConfigProblems& problems) : problems_(problems) {}
+  Loader(ConfigProblems& problems, const std::map<std::string, std::string>& beside)
+      : problems_(problems), beside_(beside) {}
 
   ConfigValue load(const std::string& text, const SourcePtr& source) {
     ConfigValue tree;
@@ -122,6 +123,15 @@ class Loader {
       fail(extends, "the files extend each other in a circle: " + names + file.generic_string());
       return nothing;
     }
+    if (const auto text = beside_.find(extends.text); text != beside_.end()) {
+      if (std::find(chain_.begin(), chain_.end(), fs::path(text->first)) != chain_.end()) {
+        fail(extends, shown(extends) + " extends itself");
+        return nothing;
+      }
+      chain_.emplace_back(text->first);
+      const int order = static_cast<int>(chain_.size());
+      return load(text->second, make_source(text->first, source.folder, order, false));
+    }
     FileText content = read_file(file);
     if (!content.problem.empty()) {
       fail(extends, shown(extends) + ": " + content.problem + " (looked for " + file.generic_string() + ")");
@@ -139,6 +149,7 @@ class Loader {
   }
 
   ConfigProblems& problems_;
+  const std::map<std::string, std::string>& beside_;
   std::vector<fs::path> chain_;
   bool broken_ = false;
 };
@@ -238,7 +249,8 @@ ConfigValue with_overrides(ConfigValue tree, const std::vector<std::string>& ove
 ConfigValue load_config(const fs::path& file, const std::vector<std::string>& overrides, ConfigProblems& problems) {
   FileText content = read_file(file);
   if (!content.problem.empty()) throw UserError(file.generic_string() + ": " + content.problem);
-  Loader loader(problems);
+  const std::map<std::string, std::string> no_texts;
+  Loader loader(problems, no_texts);
   loader.enter(file);
   ConfigValue tree = loader.load(content.text, make_source(file.generic_string(), file.parent_path(), 0, false));
   if (loader.broken()) problems.throw_if_any();
@@ -250,8 +262,9 @@ ConfigValue config_from_overrides(const std::vector<std::string>& overrides, Con
 }
 
 ConfigValue load_config_text(const std::string& text, const std::string& name, const fs::path& folder,
-                             const std::vector<std::string>& overrides, ConfigProblems& problems) {
-  Loader loader(problems);
+                             const std::vector<std::string>& overrides, ConfigProblems& problems,
+                             const std::map<std::string, std::string>& beside) {
+  Loader loader(problems, beside);
   ConfigValue tree = loader.load(text, make_source(name, folder, 0, false));
   if (loader.broken()) problems.throw_if_any();
   return with_overrides(std::move(tree), overrides, problems);

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "core/config.h"
 #include "core/config_value.h"
 
 namespace hsi4d {
@@ -29,7 +31,21 @@ ConfigValue load_config(const std::filesystem::path& file, const std::vector<std
 ConfigValue config_from_overrides(const std::vector<std::string>& overrides, ConfigProblems& problems);
 
 /// As load_config for text that is in no file, with `name` in messages; "extends" is relative to `folder`.
+/// @param beside  more such texts by name, which "extends" may name instead of files
 ConfigValue load_config_text(const std::string& text, const std::string& name, const std::filesystem::path& folder,
-                             const std::vector<std::string>& overrides, ConfigProblems& problems);
+                             const std::vector<std::string>& overrides, ConfigProblems& problems,
+                             const std::map<std::string, std::string>& beside = {});
+
+/// A struct read from a tree, where describe(ConfigFields&, T&) tells its fields. Throws UserError with all problems,
+/// those found before included.
+template <class T>
+T read_settings(const ConfigValue& tree, ConfigProblems& problems) {
+  T settings;
+  ConfigFields fields;
+  describe(fields, settings);
+  read_config(tree, fields, problems);
+  problems.throw_if_any();
+  return settings;
+}
 
 }  // namespace hsi4d

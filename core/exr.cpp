@@ -18,6 +18,7 @@
 #include <half.h>
 
 #include "core/check.h"
+#include "core/text.h"
 
 namespace hsi4d {
 namespace {
@@ -228,9 +229,7 @@ Image Layers::select(std::span<const std::string> wanted) const {
   for (size_t i = 0; i < wanted.size(); ++i) {
     const int c = find(wanted[i]);
     if (c < 0) {
-      std::string present;
-      for (const std::string& name : names) present += (present.empty() ? "" : ", ") + name;
-      fail(source, "has no channel '" + wanted[i] + "'; there are: " + present);
+      fail(source, "has no channel '" + wanted[i] + "'; there are: " + joined(names));
     }
     const auto plane = planes.data().subspan(c * planes.plane_stride(), planes.plane_stride());
     std::ranges::copy(plane, result.row(static_cast<int>(i), 0));

@@ -77,19 +77,21 @@ class Distributor : public spdlog::sinks::base_sink<std::mutex> {
     for (const spdlog::sink_ptr& target : sinks_) least = std::min(least, target->level());
     return least;
   }
+  /// Hands a message to one sink, if it wants it; counts a failure.
+  void hand(spdlog::sinks::sink& target, const spdlog::details::log_msg& message) {
+    if (!target.should_log(message.level)) return;
+    try {
+      target.log(message);
+      target.flush();
+    } catch (...) {
+      failures_.fetch_add(1);
+    }
+  }
   std::int64_t failures() const { return failures_.load(); }
 
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
-    for (const spdlog::sink_ptr& target : sinks_) {
-      if (!target->should_log(message.level)) continue;
-      try {
-        target->log(message);
-        target->flush();
-      } catch (...) {
-        failures_.fetch_add(1);
-      }
-    }
+    for (const spdlog::sink_ptr& target : sinks_) hand(*target, message);
   }
   void flush_() override {}
 
@@ -143,6 +145,12 @@ LogSink::LogSink(std::shared_ptr<State> state) : state_(std::move(state)) {}
 LogSink::~LogSink() = default;
 LogSink::LogSink(LogSink&&) noexcept = default;
 LogSink& LogSink::operator=(LogSink&&) noexcept = default;
+
+void LogSink::write(LogLevel level, std::string_view message) const {
+  const spdlog::details::log_msg entry("hsi4d", spdlog_level(level),
+                                       spdlog::string_view_t(message.data(), message.size()));
+  the_log().sinks->hand(*state_->sink, entry);
+}
 
 namespace {
 

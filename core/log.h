@@ -25,6 +25,10 @@ class LogSink {
   LogSink(const LogSink&) = delete;
   LogSink& operator=(const LogSink&) = delete;
 
+  /// Sends a message to this sink alone, if it wants this level: what belongs into a file and would disturb on a
+  /// terminal. Any thread; a sink that fails is counted by log_failures.
+  void write(LogLevel level, std::string_view message) const;
+
  private:
   std::shared_ptr<State> state_;
 };

@@ -7,6 +7,7 @@
 #include <zip.h>
 
 #include "core/check.h"
+#include "core/text.h"
 
 namespace hsi4d {
 namespace {
@@ -85,12 +86,6 @@ Bytes read_member(zip_t* archive, const zip_stat_t& stat, const std::string& lab
   return content;
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
-}
-
 }  // namespace
 
 Npz Npz::read(const std::string& path, int64_t max_bytes) { return decode(read_file(path), path, max_bytes); }
@@ -140,7 +135,7 @@ const NpyArray& Npz::array(std::string_view name) const {
   if (found != arrays_.end()) return found->second;
   const auto skip = std::ranges::find(skipped_, name, &Skipped::name);
   if (skip != skipped_.end()) fail(source_, "array '" + std::string(name) + "': " + skip->reason);
-  fail(source_, "has no array '" + std::string(name) + "'; there are: " + joined(names_));
+  fail(source_, "has no array '" + std::string(name) + "'; there are: " + (names_.empty() ? "none" : joined(names_)));
 }
 
 // Writing -------------------------------------------------------------------------------------------------------------

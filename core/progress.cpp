@@ -1,11 +1,12 @@
 #include "core/progress.h"
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <utility>
+
+#include "core/text.h"
 
 namespace hsi4d {
 namespace {
@@ -15,14 +16,6 @@ constexpr int kLeastBar = 10, kMostBar = 40;
 
 double steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-std::string rounded(double value, int digits) {
-  if (!std::isfinite(value)) return std::isnan(value) ? "nan" : value < 0 ? "-inf" : "inf";
-  std::array<char, 64> buffer;
-  const auto end =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::general, digits);
-  return {buffer.data(), end.ptr};
 }
 
 void append_two_digits(std::string& text, std::int64_t value) {

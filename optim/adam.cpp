@@ -286,7 +286,6 @@ void Adam<S>::clear_moments(Var<S> var, Index row) {
       HSI4D_CHECK(row >= 0 && row < shape.planes * shape.rows, "row " + std::to_string(row));
       std::fill_n(block.mean.begin() + row * shape.cols, shape.cols, 0.0);
       std::fill_n(block.square.begin() + row * shape.cols, shape.cols, 0.0);
-      can_undo_ = false;
       return;
     }
   }

@@ -120,7 +120,8 @@ class Adam {
   /// Goes on from moments that were read before; undo has nothing to take back then. Throws InternalError for an
   /// unknown name, DataError naming the group when the sizes are of other parameters.
   void set_moments(std::string_view group, const GroupMoments& moments);
-  /// Forgets the moments of one row of a block, whose numbers were given another meaning.
+  /// Forgets the moments of one row of a block, whose numbers were given another meaning since the last step. That step
+  /// can still be taken back, to the numbers and moments from before it.
   void clear_moments(Var<S> block, Index row);
 
  private:

@@ -14,6 +14,7 @@ template <class S>
 struct ParameterGroup {
   std::string name;
   std::vector<Var<S>> blocks;
+  bool are_axis_angles = false;  ///< each row is a rotation: a stage keeps it within half a turn (wrap_axis_angles)
 };
 
 /// The groups' names, in their order.

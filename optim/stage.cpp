@@ -6,6 +6,7 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/inspect.h"
 #include "core/suggest.h"
+#include "core/text.h"
 
 namespace hsi4d {
 
@@ -14,12 +15,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text.empty() ? "none" : text;
-}
 
 std::string message_of(const std::string& stage, const std::string& text) { return "stage '" + stage + "': " + text; }
 
@@ -165,10 +160,24 @@ class StageRun {
     const double loss = evaluated_loss();
     const StepReport step = adam_.step(i, settings_.iterations, loss);
     if (step.rolled_back) note_rollback(*step.bad, i);
-    if (!step.rolled_back) offender_.clear();
+    if (!step.rolled_back) {
+      offender_.clear();
+      wrap_rotations(step);
+    }
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
               seconds_since(start)});
+  }
+
+  /// Row D9: beyond a whole turn the derivative of an axis-angle vanishes, so none gets that far. What Adam knew of the
+  /// row belongs to the numbers that it had.
+  void wrap_rotations(const StepReport& step) {
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      if (!groups_[g].parameters.are_axis_angles || !step.groups[g].moved) continue;
+      for (const Var<S> block : groups_[g].parameters.blocks) {
+        for (const Index row : wrap_axis_angles(block)) adam_.clear_moments(block, row);
+      }
+    }
   }
 
   double evaluated_loss() const { return static_cast<double>(tape_.value(loss_.total).scalar()); }
@@ -199,20 +208,13 @@ class StageRun {
   }
 
   [[noreturn]] void throw_diverged(const std::string& when) const {
-    std::string values;
-    for (const LossValue& term : loss_.values)
-      values += (values.empty() ? "" : ", ") + term.name + " " + number_text(term.value);
+    std::vector<std::string> values;
+    for (const LossValue& term : loss_.values) values.push_back(term.name + " " + rounded(term.value, 6));
     throw StageDivergedError(message_of(options_.name, "given up in " + when + " after " +
                                                            std::to_string(adam_.rollbacks()) +
                                                            " steps that had to be taken back (max_rollbacks is " +
                                                            std::to_string(settings_.optimizer.max_rollbacks) +
-                                                           "): " + offender_ + "; terms: " + values));
-  }
-
-  static std::string number_text(double value) {
-    std::ostringstream text;
-    text << value;
-    return text.str();
+                                                           "): " + offender_ + "; terms: " + joined(values)));
   }
 
   /// Runs the tape once more, looking at every number: "; first: nan in forward of 'log' …". Empty where all is finite
@@ -238,7 +240,7 @@ class StageRun {
     tape_.forward(loss_.total);
     read_terms();
     if (std::isfinite(evaluated_loss())) return;
-    offender_ = "the loss is " + number_text(evaluated_loss()) + first_bad_node();
+    offender_ = "the loss is " + rounded(evaluated_loss(), 6) + first_bad_node();
     if (adam_.undo()) {
       ++undone_at_end_;
       tape_.forward(loss_.total);

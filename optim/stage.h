@@ -70,9 +70,9 @@ void check_groups(const StageSettings& settings, const std::vector<std::string>&
 ///
 /// Records Σ weight · term at the end of the tape, and in each iteration: lets gradients flow to the groups that are on
 /// in it and to no other of `available` (what is frozen costs nothing), runs the tape forward and backward, and takes
-/// an Adam step (optim/adam.h). A last forward run evaluates the parameters that are left; should they give a loss that
-/// is not finite, the last step is taken back. At the end (also by an exception) what was recorded is forgotten, and
-/// `available` is frozen or not as before.
+/// an Adam step (optim/adam.h). Rows of groups that are axis-angles are wrapped after each step. A last forward run
+/// evaluates the parameters that are left; should they give a loss that is not finite, the last step is taken back. At
+/// the end (also by an exception) what was recorded is forgotten, and `available` is frozen or not as before.
 ///
 /// @param tape       holds the inputs and the parameters
 /// @param settings   what moves and which terms count; a term without settings of its own takes its defaults

@@ -68,6 +68,7 @@ Measurement measured(const Workload& w, const RenderCounters& counters, const Ra
   m.gaussians = w.count;
   m.fragments = counters.fragments;
   m.pairs = counters.pairs;
+  m.groups = counters.groups;
   m.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
   return m;
 }

@@ -15,7 +15,7 @@ struct Measurement {
   int threads = 1;
   double median_ms = 0, min_ms = 0;
   int repeats = 0;
-  Index gaussians = 0, fragments = 0, pairs = 0, pixels = 0;
+  Index gaussians = 0, fragments = 0, groups = 0, pairs = 0, pixels = 0;
 };
 
 struct RasterizeBench {

@@ -9,6 +9,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/text.h"
 #include "splat/io_ply.h"
 
 namespace hsi4d {
@@ -45,12 +46,7 @@ void describe(ConfigFields& f, InitialSettings& s) {
 InitialSettings read_initial(const fs::path& file) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, {}, problems);
-  InitialSettings settings;
-  ConfigFields fields;
-  describe(fields, settings);
-  read_config(tree, fields, problems);
-  problems.throw_if_any();
-  return settings;
+  return read_settings<InitialSettings>(tree, problems);
 }
 
 /// Refuses 8.png, 9.png, 10.png: in the order of their names 10 comes first.
@@ -170,6 +166,15 @@ void check_masks(const fs::path& folder, const std::vector<std::string>& frames)
               std::to_string(frames.size()) + " frames; these count as empty");
 }
 
+/// False for a mask that nowhere reaches the threshold.
+bool shows_something(const Image& mask, double threshold) {
+  for (int y = 0; y < mask.height(); ++y) {
+    const float* row = mask.row(0, y);
+    if (std::any_of(row, row + mask.width(), [&](float m) { return static_cast<double>(m) >= threshold; })) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 void check_inputs(const DataSettings& data) {
@@ -219,13 +224,57 @@ Clip read_clip(const DataSettings& data) {
   clip.first.body = motion.poses.front();
   clip.frame_rate = motion.frame_rate;
   if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.frames());
+  clip.files = {{"/data/scene", data.scene},
+                {"/data/avatar", data.avatar},
+                {"/data/camera", data.camera},
+                {"/data/initial", data.initial},
+                {"/data/initial: /motion", initial.motion}};
+  for (const auto& [name, object] : data.objects)
+    clip.files.push_back({"/data/objects/" + name + "/gaussians", object.gaussians});
   return clip;
 }
 
 void check_frames(const DataSettings& data, const Clip& clip) {
+  std::vector<std::vector<bool>> is_seen(static_cast<std::size_t>(clip.frames()));  // [frame][object]
   parallel_for(clip.frames(), 1, [&](Index begin, Index end) {
-    for (Index index = begin; index < end; ++index) read_frame(data, clip, index);
+    for (Index index = begin; index < end; ++index) {
+      for (const Image& mask : read_frame(data, clip, index).object_masks) {
+        is_seen[static_cast<std::size_t>(index)].push_back(shows_something(mask, data.mask_threshold));
+      }
+    }
   });
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    std::vector<Index> hidden;
+    for (std::size_t t = 0; t < is_seen.size(); ++t) {
+      if (!is_seen[t][o]) hidden.push_back(static_cast<Index>(t));
+    }
+    if (hidden.empty()) continue;
+    log_warning((data.masks / clip.objects[o].name).string() + ": the object is hidden in " +
+                (hidden.size() == 1 ? "frame " : "frames ") + frame_ranges(hidden) +
+                ": no pixel reaches data.mask_threshold; the loss \"center\" is off for it there");
+  }
+}
+
+std::string frame_ranges(const std::vector<Index>& frames) {
+  std::vector<std::string> ranges;
+  for (std::size_t begin = 0; begin < frames.size();) {
+    std::size_t last = begin;
+    while (last + 1 < frames.size() && frames[last + 1] == frames[last] + 1) ++last;
+    ranges.push_back(std::to_string(frames[begin]) + (last == begin ? "" : "-" + std::to_string(frames[last])));
+    begin = last + 1;
+  }
+  return joined(ranges);
+}
+
+std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, Index index) {
+  const std::string& name = clip.frame_files.at(static_cast<std::size_t>(index));
+  std::vector<ClipFile> files = {{"frames/" + name, data.frames / name}};
+  const auto add_mask = [&](const std::string& folder) {
+    files.push_back({"masks/" + folder + "/" + name, data.masks / folder / name});
+  };
+  add_mask(kHumanMasks);
+  for (const ClipObject& object : clip.objects) add_mask(object.name);
+  return files;
 }
 
 ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index) {

@@ -22,6 +22,12 @@ struct ClipObject {
   Gaussians gaussians;  ///< relative to the centroid of their means
 };
 
+/// A file that a run reads.
+struct ClipFile {
+  std::string name;  ///< what it is, wherever it lies: "/data/scene", "frames/0001.png"
+  std::filesystem::path path;
+};
+
 /// All that stays the same over the clip. Frames are read one by one (read_frame).
 struct Clip {
   Gaussians scene;
@@ -33,6 +39,7 @@ struct Clip {
   double frame_rate = 10;                ///< frames a second
   std::vector<std::string> frame_files;  ///< in order
   std::optional<std::vector<SceneState>> truth;
+  std::vector<ClipFile> files;  ///< read for it, but for the truth, which no result depends on
 
   Index frames() const { return static_cast<Index>(frame_files.size()); }
 };
@@ -52,11 +59,18 @@ void check_inputs(const DataSettings& data);
 /// fit each other.
 Clip read_clip(const DataSettings& data);
 
-/// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on. Throws
-/// as read_frame.
+/// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on.
+/// Objects that some masks show nothing of are told in the log, each with its frames. Throws as read_frame.
 void check_frames(const DataSettings& data, const Clip& clip);
 
 /// Reads frame `index` and its masks. A mask that has no file counts as empty. Throws as read_clip.
 ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index);
+
+/// The files of a frame: the image, and the masks of human and objects, which may be missing.
+std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, Index index);
+
+/// Frames in words: "3", "2-4, 9".
+/// @param frames  ascending
+std::string frame_ranges(const std::vector<Index>& frames);
 
 }  // namespace hsi4d

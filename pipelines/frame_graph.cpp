@@ -7,13 +7,9 @@
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
-#include "body/kinematics.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
-#include "splat/covariance.h"
-#include "splat/opacity.h"
-#include "splat/sh.h"
 
 namespace hsi4d {
 
@@ -23,14 +19,15 @@ namespace {
 struct JointGroup {
   const char* name;
   Index first, count;
+  const char* summary;
 };
-constexpr std::array<JointGroup, 7> kJointGroups = {{{"global_orient", 0, 1},
-                                                     {"body_pose", 1, 21},
-                                                     {"jaw_pose", 22, 1},
-                                                     {"leye_pose", 23, 1},
-                                                     {"reye_pose", 24, 1},
-                                                     {"left_hand_pose", 25, 15},
-                                                     {"right_hand_pose", 40, 15}}};
+constexpr std::array<JointGroup, 7> kJointGroups = {{{"global_orient", 0, 1, "Heading of the body"},
+                                                     {"body_pose", 1, 21, "21 joints of the body"},
+                                                     {"jaw_pose", 22, 1, "The jaw"},
+                                                     {"leye_pose", 23, 1, "The left eye"},
+                                                     {"reye_pose", 24, 1, "The right eye"},
+                                                     {"left_hand_pose", 25, 15, "15 joints of the left hand"},
+                                                     {"right_hand_pose", 40, 15, "15 joints of the right hand"}}};
 constexpr Index kJoints = kSmplxJoints;
 constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_scales", "opacity_logits", "sh"};
 
@@ -59,25 +56,6 @@ Vector3<double> read_vector(Tape<S>& tape, Var<S> leaf) {
   return {static_cast<double>(array(0, 0)), static_cast<double>(array(0, 1)), static_cast<double>(array(0, 2))};
 }
 
-/// [1,12], the rows of [R | t].
-template <class S>
-Var<S> rigid_rows(Var<S> rotation, Var<S> translation) {
-  std::array<Var<S>, 6> parts;
-  for (Index r = 0; r < 3; ++r) {
-    parts[static_cast<std::size_t>(2 * r)] = slice_cols(rotation, 3 * r, 3);
-    parts[static_cast<std::size_t>(2 * r + 1)] = slice_cols(translation, r, 1);
-  }
-  return concat_cols<S>(parts);
-}
-
-template <class S, class Member>
-Var<S> stacked(const std::vector<SplatInputs<S>>& parts, Member member) {
-  if (parts.size() == 1) return parts.front().*member;
-  std::vector<Var<S>> rows;
-  for (const SplatInputs<S>& part : parts) rows.push_back(part.*member);
-  return concat_rows<S>(rows);
-}
-
 }  // namespace
 
 std::vector<std::string> state_group_names(Draw draw) {
@@ -86,6 +64,17 @@ std::vector<std::string> state_group_names(Draw draw) {
   names.insert(names.end(), {"object_orient", "object_transl", "transl"});
   for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
   return names;
+}
+
+std::string state_group_summary(const std::string& name) {
+  if (name == "camera") return "Six numbers of the camera, translation and rotation";
+  if (name == "object_orient") return "Rotations of the objects";
+  if (name == "object_transl") return "Places of the objects";
+  if (name == "transl") return "Place of the body";
+  for (const JointGroup& joints : kJointGroups) {
+    if (name == joints.name) return joints.summary;
+  }
+  throw InternalError("there is no group of the state called '" + name + "'");
 }
 
 std::vector<std::string> parameter_group_names(Draw draw) {
@@ -149,66 +138,65 @@ Var<S> FrameGraph<S>::leaf(const std::string& group, const std::string& name, In
 }
 
 template <class S>
-void FrameGraph<S>::add_to_group(const std::string& group, Var<S> leaf) {
-  for (ParameterGroup<S>& known : groups_) {
-    if (known.name == group) return known.blocks.push_back(leaf);
-  }
-  groups_.push_back({group, {leaf}});
+ParameterGroup<S>& FrameGraph<S>::add_to_group(const std::string& group, Var<S> leaf) {
+  auto place = std::find_if(groups_.begin(), groups_.end(), [&](const auto& known) { return known.name == group; });
+  if (place == groups_.end()) place = groups_.insert(place, ParameterGroup<S>{group, {}});
+  place->blocks.push_back(leaf);
+  return *place;
+}
+
+/// A leaf of one rotation a row, in the numbers that the settings choose.
+template <class S>
+Var<S> FrameGraph<S>::rotation_leaf(const std::string& group, const std::string& name, Index rows) {
+  const bool is_axis_angle = settings_.rotations == RotationParameters::kAxisAngle;
+  const Var<S> var = tape_.parameter(name, shape_of(rows, is_axis_angle ? 3 : 6));
+  add_to_group(group, var).are_axis_angles = is_axis_angle;
+  return var;
+}
+
+/// Leaves of a part's Gaussians: groups PART_means and so on; messages call them by `name`.
+template <class S>
+GaussianVars<S> FrameGraph<S>::gaussian_leaves(const std::string& part, const std::string& name, const Gaussians& g) {
+  const Index n = g.count();
+  GaussianVars<S> vars;
+  vars.means = leaf(part + "_means", name + " means", n, 3, g.means.data());
+  vars.quats = leaf(part + "_quats", name + " quats", n, 4, g.quats.data());
+  vars.log_scales = leaf(part + "_log_scales", name + " log_scales", n, 3, g.log_scales.data());
+  vars.opacity_logits = leaf(part + "_opacity_logits", name + " opacity_logits", n, 1, g.opacity_logits.data());
+  vars.colors = leaf(part + "_sh", name + " sh", n, 3 * g.sh_coefficients(), g.sh.data());
+  return vars;
 }
 
 template <class S>
 typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Clip& clip) {
-  const Gaussians& g = clip.scene;
-  const Index n = g.count();
-  const Var<S> means = leaf("scene_means", "scene means", n, 3, g.means.data());
-  const Var<S> quats = leaf("scene_quats", "scene quats", n, 4, g.quats.data());
-  const Var<S> scales = leaf("scene_log_scales", "scene log_scales", n, 3, g.log_scales.data());
-  const Var<S> logits = leaf("scene_opacity_logits", "scene opacity_logits", n, 1, g.opacity_logits.data());
-  const Var<S> sh = leaf("scene_sh", "scene sh", n, 3 * g.sh_coefficients(), g.sh.data());
-  return {{means, gaussian_axes(quats, scales), gaussian_opacities(logits), sh_colors(sh, means, xi_, view_)}, n};
+  const GaussianVars<S> vars = gaussian_leaves("scene", "scene", clip.scene);
+  return {standing_splats(vars, xi_, view_), clip.scene.count()};
 }
 
 template <class S>
 typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& object) {
-  const Gaussians& g = object.gaussians;
-  const Index n = g.count();
-  const Var<S> centred = leaf("object_means", object.name + " means", n, 3, g.means.data());
-  const Var<S> quats = leaf("object_quats", object.name + " quats", n, 4, g.quats.data());
-  const Var<S> scales = leaf("object_log_scales", object.name + " log_scales", n, 3, g.log_scales.data());
-  const Var<S> logits = leaf("object_opacity_logits", object.name + " opacity_logits", n, 1, g.opacity_logits.data());
-  const Var<S> sh = leaf("object_sh", object.name + " sh", n, 3 * g.sh_coefficients(), g.sh.data());
-  const Index numbers = settings_.rotations == RotationParameters::kSixD ? 6 : 3;
-  const Var<S> orient = leaf("object_orient", object.name + " orient", 1, numbers, nullptr);
+  const GaussianVars<S> vars = gaussian_leaves("object", object.name, object.gaussians);
+  const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
   const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
   objects_.push_back({orient, transl});
-
-  const Var<S> rotation = record_rotations(orient);
-  const Var<S> transform = rigid_rows(rotation, transl);
-  const Var<S> means = matmul(centred, transpose(reshape(rotation, 3, 3))) + transl;
-  const Var<S> axes = transform_axes(transform, gaussian_axes(quats, scales));
-  return {{means, axes, gaussian_opacities(logits), sh_colors(sh, means, xi_, view_, transform)}, n};
+  return {rigid_splats(vars, record_rotations(orient), transl, xi_, view_), object.gaussians.count()};
 }
 
 template <class S>
 typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
   const auto n = static_cast<Index>(avatar.opacity_logits.size());
   HSI4D_CHECK_EQ(static_cast<Index>(avatar.parents.size()), kJoints);
-  const Var<S> rest = leaf("human_means", "human means", n, 3, avatar.means.data());
-  const Var<S> quats = leaf("human_quats", "human quats", n, 4, avatar.quats.data());
-  const Var<S> scales = leaf("human_log_scales", "human log_scales", n, 3, avatar.log_scales.data());
-  const Var<S> logits = leaf("human_opacity_logits", "human opacity_logits", n, 1, avatar.opacity_logits.data());
-  const Var<S> colors = leaf("human_colors", "human colors", n, 3, avatar.colors.data());
-  const Index numbers = settings_.rotations == RotationParameters::kSixD ? 6 : 3;
+  GaussianVars<S> vars;
+  vars.means = leaf("human_means", "human means", n, 3, avatar.means.data());
+  vars.quats = leaf("human_quats", "human quats", n, 4, avatar.quats.data());
+  vars.log_scales = leaf("human_log_scales", "human log_scales", n, 3, avatar.log_scales.data());
+  vars.opacity_logits = leaf("human_opacity_logits", "human opacity_logits", n, 1, avatar.opacity_logits.data());
+  vars.colors = leaf("human_colors", "human colors", n, 3, avatar.colors.data());
   for (const JointGroup& joints : kJointGroups) {
-    joint_rotations_.push_back(leaf(joints.name, joints.name, joints.count, numbers, nullptr));
+    joint_rotations_.push_back(rotation_leaf(joints.name, joints.name, joints.count));
   }
   transl_ = leaf("transl", "transl", 1, 3, nullptr);
-
-  const Var<S> rotations = record_rotations(concat_rows<S>(joint_rotations_));
-  const PosedSkeleton<S> skeleton = kinematic_chain(rotations, transl_, avatar.parents, avatar.joints);
-  const Var<S> blended = blend_transforms(SkinWeights<S>(avatar.weights), skeleton.transforms);
-  const Var<S> means = transform_points(blended, rest);
-  return {{means, transform_axes(blended, gaussian_axes(quats, scales)), gaussian_opacities(logits), colors}, n};
+  return {skinned_splats(vars, record_rotations(concat_rows<S>(joint_rotations_)), transl_, avatar), n};
 }
 
 template <class S>
@@ -228,9 +216,7 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
     if (is_object) request.groups.emplace_back(row, row + parts[p].count);
     row += parts[p].count;
   }
-  const SplatInputs<S> all = {stacked(splats, &SplatInputs<S>::means), stacked(splats, &SplatInputs<S>::axes),
-                              stacked(splats, &SplatInputs<S>::opacities), stacked(splats, &SplatInputs<S>::colors)};
-  rendered_ = render(all, xi_, background_, view_, request);
+  rendered_ = render(stacked_splats(splats), xi_, background_, view_, request);
   inputs_.rendered = rendered_.image;
   inputs_.target = tape_.constant("target", rendered_.image.shape());
   inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
@@ -256,7 +242,9 @@ template <class S>
 void FrameGraph<S>::write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle) {
   S* numbers = tape_.write(leaf).row(row);
   if (settings_.rotations == RotationParameters::kAxisAngle) {
-    for (Index i = 0; i < 3; ++i) numbers[i] = static_cast<S>(axis_angle[i]);
+    Vector3<double> wrapped = axis_angle;  // a file's may be any number of turns (row D9)
+    wrap_axis_angle(wrapped);
+    for (Index i = 0; i < 3; ++i) numbers[i] = static_cast<S>(wrapped[i]);
     return;
   }
   const Matrix3<double> rotation = so3_exp(axis_angle);

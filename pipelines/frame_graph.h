@@ -14,6 +14,7 @@
 #include "optim/loss_term.h"
 #include "optim/parameters.h"
 #include "pipelines/clip.h"
+#include "pipelines/posed_splats.h"
 #include "pipelines/run_config.h"
 #include "pipelines/state.h"
 #include "splat/render.h"
@@ -43,6 +44,8 @@ std::vector<std::string> parameter_group_names(Draw draw);
 /// Those of them that a stage may move: what read_state brings back. The Gaussians' own numbers and the background are
 /// groups for gradient checks.
 std::vector<std::string> state_group_names(Draw draw);
+/// One of them in words: "Place of the body". Throws InternalError for another name.
+std::string state_group_summary(const std::string& name);
 
 /// The frame graph. The tape and the clip must outlive it.
 template <class S>
@@ -76,7 +79,9 @@ class FrameGraph {
   };
 
   Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
-  void add_to_group(const std::string& group, Var<S> leaf);
+  ParameterGroup<S>& add_to_group(const std::string& group, Var<S> leaf);
+  Var<S> rotation_leaf(const std::string& group, const std::string& name, Index rows);
+  GaussianVars<S> gaussian_leaves(const std::string& part, const std::string& name, const Gaussians& g);
   Part record_scene(const Clip& clip);
   Part record_object(const ClipObject& object);
   Part record_human(const Avatar& avatar);

@@ -11,10 +11,12 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/rotation.h"
+#include "core/text.h"
 #include "optim/metrics.h"
 #include "optim/stage.h"
 #include "pipelines/evaluate.h"
 #include "pipelines/frame_graph.h"
+#include "pipelines/input_hashes.h"
 #include "pipelines/run_state.h"
 
 namespace hsi4d {
@@ -111,12 +113,12 @@ void add_problem(std::string& problems, const std::string& text) { problems += (
 class Reconstruction {
  public:
   Reconstruction(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
-                 const RunObserver& observer)
+                 const Observer& observer)
       : config_(config),
         losses_(losses),
         folder_(folder),
         observer_(observer),
-        resolved_(resolved_config(config, descriptions_of(losses))),
+        identity_(to_json(sections_beside_data(config, descriptions_of(losses)))),
         clip_(clip),
         progress_(first_progress(clip_, config.stages.size())),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
@@ -141,11 +143,19 @@ class Reconstruction {
   std::string checkpoint_file() const { return folder_.paths().checkpoint() + "/progress.npz"; }
 
   RunProgress checkpointed() const {
+    RunProgress progress;
     try {
-      return load_progress(checkpoint_file(), resolved_, clip_, config_.stages.size());
+      progress = load_progress(checkpoint_file(), identity_, clip_, config_.stages.size());
     } catch (const DataError& damage) {
       throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
     }
+    std::vector<ClipFile> files = clip_.files;
+    for (Index t = 0; t < progress.frames_done(); ++t) {
+      const std::vector<ClipFile> of_frame = frame_files(config_.data, clip_, t);
+      files.insert(files.end(), of_frame.begin(), of_frame.end());
+    }
+    check_unchanged(progress.inputs, files, checkpoint_file());
+    return progress;
   }
 
   void resume() {
@@ -153,7 +163,11 @@ class Reconstruction {
       progress_ = checkpointed();
     } else {
       add_covered(read_frame(config_.data, clip_, 0), config_.data, progress_.covered);
+      progress_.inputs = input_hashes(clip_.files) + input_hashes(frame_files(config_.data, clip_, 0));
     }
+    folder_.take_over_config();
+    if (folder_.resumed_from())
+      folder_.note("resumed, " + std::to_string(progress_.frames_done()) + " frames are in the checkpoint");
     folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
     bar_.step(total_steps() / (clip_.frames() - 1) * (progress_.frames_done() - 1));
   }
@@ -181,11 +195,11 @@ class Reconstruction {
       }
       after.push_back(state);
     }
-    const MetricValues errors = write_images(index, frame, state);
+    write_images(index, frame, state);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
-    progress_.image_errors.push_back(errors);
+    progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
     progress_.seconds += seconds_since(begin);
-    save_progress(checkpoint_file(), resolved_, progress_);
+    save_progress(checkpoint_file(), identity_, progress_);
   }
 
   FrameGraphSettings graph_settings(Draw draw) const {
@@ -201,21 +215,43 @@ class Reconstruction {
     graph.set_state(state);
     const Image weight = complement(progress_.covered);
     graph.set_targets(targets_of(frame, stage, weight));
-    const StageResult result =
-        run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(),
-                     [&](const IterationReport& report) { note(index, s, report, *graph.rendered().counters); },
-                     {.name = name + ", frame " + std::to_string(index)});
+    std::string begin;  // of the loss, for the log
+    const auto note_iteration = [&](const IterationReport& report) {
+      if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
+      note(index, s, report, *graph.rendered().counters);
+    };
+    const StageResult result = run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(), note_iteration,
+                                            {.name = name + ", frame " + std::to_string(index)});
     graph.read_state(stage.optimize, state);
     StageTotals& totals = progress_.totals[s];
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
-    if (index == 1) tell_terms_off(name, result.off);
+    if (index == 1) tell_terms_off(name, stage, result.off);
+    folder_.note(stage_line(index, name, result, begin));
   }
 
-  static void tell_terms_off(const std::string& stage, const std::vector<std::string>& off) {
+  static std::string loss_text(double loss, std::span<const LossValue> terms) {
+    std::vector<std::string> parts;
+    for (const LossValue& term : terms) parts.push_back(term.name + " " + rounded(term.value, 4));
+    return rounded(loss, 4) + " (" + joined(parts) + ")";
+  }
+
+  /// What a stage did with a frame, for the log.
+  static std::string stage_line(Index frame, const std::string& stage, const StageResult& result,
+                                const std::string& begin) {
+    std::string text = "frame " + std::to_string(frame) + ", stage " + stage + ": " +
+                       std::to_string(result.iterations) + " iterations in " + rounded(result.seconds, 3) +
+                       " s, loss " + begin + " -> " + loss_text(result.loss, result.terms);
+    if (result.rollbacks > 0) text += ", " + std::to_string(result.rollbacks) + " steps not taken";
+    return text;
+  }
+
+  static void tell_terms_off(const std::string& name, const StageSettings& stage, const std::vector<std::string>& off) {
     for (const std::string& term : off) {
-      log_warning("stage " + stage + ": the loss \"" + term + "\" is off: its weight is 0, or an input is not given");
+      const LossSettings* const settings = find_entry(stage.losses, term);
+      log_warning("stage " + name + ": the loss \"" + term + "\" is off: " +
+                  (settings != nullptr && settings->weight == 0 ? "its weight is 0" : "it lacks an input"));
     }
   }
 
@@ -255,7 +291,7 @@ class Reconstruction {
                        {"fragments", static_cast<double>(counters.fragments)}};
     folder_.append_metrics(record);
     bar_.step_with("loss", report.loss);
-    if (observer_.stop_requested && observer_.stop_requested()) {
+    if (observer_.wants_stop()) {
       throw Interrupted("interrupted in frame " + std::to_string(frame) + "; " +
                         std::to_string(progress_.frames_done()) + " frames are in the checkpoint");
     }
@@ -273,16 +309,18 @@ class Reconstruction {
     return config_.precision == RunPrecision::kFloat ? render_state<float>(state) : render_state<double>(state);
   }
 
-  MetricValues write_images(Index index, const ClipFrame& frame, const SceneState& state) const {
+  /// Writes the images of a frame and notes how far the start's and the result's are from the video's.
+  void write_images(Index index, const ClipFrame& frame, const SceneState& state) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
-    const Image image = rendered_image(state);
+    const Image image = rendered_image(state), start = rendered_image(baseline_start(index));
     write_image(paths.frame_image(number, "target"), frame.target);
     write_image(paths.frame_image(number, "render"), image);
     write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
-    write_image(paths.frame_image(number, "start"), rendered_image(baseline_start(index)));
+    write_image(paths.frame_image(number, "start"), start);
     const Image foreground = foreground_of(frame);
-    return image_errors(image, frame.target, &foreground);
+    progress_.image_errors.push_back(image_errors(image, frame.target, &foreground));
+    progress_.start_errors.push_back(image_errors(start, frame.target, &foreground));
   }
 
   /// What the run is given for a frame before it does anything.
@@ -307,20 +345,25 @@ class Reconstruction {
     summary.frames = static_cast<int>(clip_.frames());
     summary.seconds = progress_.seconds;
     for (std::size_t s = 0; s < config_.stages.size(); ++s) summary.metrics.push_back(summarize_stage(s));
-    std::vector<FrameMetrics> images;
-    for (std::size_t t = 1; t < progress_.image_errors.size(); ++t) {
-      images.push_back({static_cast<int>(t), progress_.image_errors[t]});
-    }
+    summary.baselines = {{"start", {}, {}}};
     if (clip_.truth) add_errors(summary);
+    add_image_errors(progress_.image_errors, summary.metrics.back().values, summary.per_frame);
+    add_image_errors(progress_.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
+    return summary;
+  }
+
+  /// Adds errors of images, which need no truth, to means and frames.
+  static void add_image_errors(const std::vector<MetricValues>& errors, MetricValues& means,
+                               std::vector<FrameMetrics>& per_frame) {
+    std::vector<FrameMetrics> images;
+    for (std::size_t t = 1; t < errors.size(); ++t) images.push_back({static_cast<int>(t), errors[t]});
     for (std::size_t t = 0; t < images.size(); ++t) {
-      if (summary.per_frame.size() <= t) summary.per_frame.push_back({images[t].frame, {}});
-      MetricValues& values = summary.per_frame[t].values;
+      if (per_frame.size() <= t) per_frame.push_back({images[t].frame, {}});
+      MetricValues& values = per_frame[t].values;
       values.insert(values.end(), images[t].values.begin(), images[t].values.end());
     }
-    MetricValues& final_values = summary.metrics.back().values;
-    const MetricValues means = mean_errors(images);
-    final_values.insert(final_values.end(), means.begin(), means.end());
-    return summary;
+    const MetricValues added = mean_errors(images);
+    means.insert(means.end(), added.begin(), added.end());
   }
 
   StageSummary summarize_stage(std::size_t s) const {
@@ -348,6 +391,7 @@ class Reconstruction {
       start.push_back(baseline_start(t));
       copy.push_back(clip_.first);
     }
+    summary.baselines.clear();
     for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{"copy_frame_0", &copy}}) {
       summary.baselines.push_back(
           {name, errors_of(*states, Draw::kAll), sequence_errors(placed(clip_, *states, Draw::kAll), truth)});
@@ -358,8 +402,8 @@ class Reconstruction {
   const RunConfig& config_;
   const std::vector<LossTerm>& losses_;
   RunFolder& folder_;
-  const RunObserver& observer_;
-  std::string resolved_;
+  const Observer& observer_;
+  std::string identity_;  // the text that a checkpoint of this run belongs to
   const Clip& clip_;
   RunProgress progress_;
   Progress bar_;
@@ -402,7 +446,7 @@ void check_run(const RunConfig& config) {
 }
 
 RunSummary reconstruct(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses,
-                       RunFolder& folder, const RunObserver& observer) {
+                       RunFolder& folder, const Observer& observer) {
   return Reconstruction(config, clip, losses, folder, observer).run();
 }
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
+#include "core/text.h"
 #include "pipelines/run_summary.h"
 
 namespace hsi4d {
@@ -33,11 +33,7 @@ size_t utf8_length(const std::string& text, size_t i) {
 std::string coordinate(double value) { return fixed_number(value, 1); }
 
 /// A tick's number: as few digits as tell ticks apart.
-std::string tick_text(double value) {
-  std::array<char, 64> buffer;
-  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::general, 6);
-  return {buffer.data(), end.ptr};
-}
+std::string tick_text(double value) { return rounded(value, 6); }
 
 /// False for what has no place on the axes: not above 0 on a logarithmic scale, or so large that differences overflow.
 bool has_place(const Plot& plot, double y) { return std::fabs(y) <= 1e300 && (!plot.is_log || y > 0); }

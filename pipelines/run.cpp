@@ -1,9 +1,14 @@
 #include "pipelines/run.h"
 
 #include <exception>
+#include <optional>
+#include <utility>
 
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/progress.h"
+#include "core/text.h"
+#include "core/version.h"
 #include "pipelines/report.h"
 
 namespace hsi4d {
@@ -17,15 +22,48 @@ void on_threads(int threads, F&& body) {
   body();
 }
 
+/// What is logged before a run has its folder; it belongs into that folder's log too.
+class EarlyMessages {
+ public:
+  void move_to(const RunFolder& folder) {
+    sink_.reset();
+    for (const auto& [level, message] : messages_) folder.note(message, level);
+  }
+
+ private:
+  std::vector<std::pair<LogLevel, std::string>> messages_;
+  std::optional<LogSink> sink_ =
+      log_to([this](LogLevel level, std::string_view message) { messages_.emplace_back(level, message); });
+};
+
+/// First line of a run's log.
+std::string opening(const RunConfig& config, const Clip& clip, const RunIdentity& identity) {
+  return "hsi4d " + std::string(version()) + " (" + git_commit() + "), run '" + config.name +
+         "': " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
+         std::to_string(clip.camera.height) + " pixels, " + std::to_string(config.stages.size()) + " stages, " +
+         std::to_string(identity.threads) + (identity.threads == 1 ? " thread, " : " threads, ") + identity.precision;
+}
+
 /// Notes how the run ended. Where that cannot be written either (a full disk), what ended it is still what is thrown.
 void note_end(RunFolder& folder, RunState state, const std::string& message) noexcept {
   try {
-    folder.set_state(state, message);
     // In the run's log alone: whoever called gets the exception, and would read the message twice.
-    const LogSink to_log = log_to_file(folder.paths().log(), LogLevel::kDebug);
-    log_debug(std::string(run_state_name(state)) + ": " + message);
+    folder.note(std::string(run_state_name(state)) + ": " + message,
+                state == RunState::kFailed ? LogLevel::kError : LogLevel::kInfo);
+    folder.set_state(state, message);
   } catch (const std::exception&) {
   }
+}
+
+/// Last line of the log of a run that is done.
+std::string closing(const RunSummary& summary) {
+  std::string text = "done: " + std::to_string(summary.frames) + " frames in " + duration_text(summary.seconds);
+  if (summary.metrics.empty()) return text;
+  for (const char* name : {"psnr_db", "ssim", "mpjpe_mm", "object_translation_cm", "camera_translation_cm"}) {
+    const double* const value = find_metric(summary.metrics.back().values, name);
+    if (value != nullptr) text += ", " + std::string(name) + " " + rounded(*value, 4);
+  }
+  return text;
 }
 
 RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Clip& clip,
@@ -36,6 +74,7 @@ RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Cl
                [&] { summary = reconstruct(config, clip, losses, folder, options.observer); });
     folder.set_state(RunState::kDone);  // the report tells it
     write_report(options.folder);
+    folder.note(closing(summary));
     return summary;
   } catch (const Interrupted& stop) {
     note_end(folder, RunState::kInterrupted, stop.what());
@@ -50,6 +89,7 @@ RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Cl
 
 RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
   check_run(config);
+  EarlyMessages early;
   const Clip clip = read_clip(config.data);  // before anything is written
   check_frames(config.data, clip);
   RunIdentity identity;
@@ -59,6 +99,8 @@ RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losse
   identity.threads = threads > 0 ? threads : thread_count();
   identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
   RunFolder folder(options.folder, identity, options.resume);
+  folder.note(opening(config, clip, identity));
+  early.move_to(folder);
   return reconstruct_into(folder, config, clip, losses, options);
 }
 

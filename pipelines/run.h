@@ -13,7 +13,7 @@ struct RunOptions {
   std::string folder;   ///< UTF-8
   bool resume = false;  ///< go on with the run that is in the folder; starts anew where there is none
   int threads = 0;      ///< 0: what the config says
-  RunObserver observer;
+  Observer observer;
 };
 
 /// Carries out a run and leaves its folder complete, report.html included. status.json then says "done"; "interrupted"

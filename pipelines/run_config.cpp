@@ -60,11 +60,7 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
   return to_json(write_config(fields));
 }
 
-ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses) {
-  RunConfig copy = config;
-  ConfigFields fields;
-  describe(fields, copy, losses);
-  ConfigValue tree = write_config(fields);
+ConfigValue without_data(ConfigValue tree) {
   std::erase_if(tree.members,
                 [](const ConfigMember& member) { return member.key == "synthetic" || member.key == "threads"; });
   for (ConfigMember& member : tree.members) {
@@ -72,6 +68,13 @@ ConfigValue sections_beside_data(const RunConfig& config, const std::vector<Loss
     std::erase_if(member.value.members, [](const ConfigMember& own) { return !own.key.starts_with("mask_"); });
   }
   return tree;
+}
+
+ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses) {
+  RunConfig copy = config;
+  ConfigFields fields;
+  describe(fields, copy, losses);
+  return without_data(write_config(fields));
 }
 
 std::string run_config_schema(const std::vector<LossDescription>& losses) {

@@ -69,7 +69,11 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
 /// The text of config.resolved.json: every setting, defaults included. Reading it back gives the same config and text.
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses);
 
-/// The config as a tree, without what another dataset or machine would change: the files of data, synthetic, threads.
+/// A tree of a config without what another dataset or machine would change: the files of data, synthetic, threads. Two
+/// runs of the same data with equal trees have the same result.
+ConfigValue without_data(ConfigValue tree);
+
+/// The config as such a tree.
 ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses);
 
 /// The JSON Schema (draft 2020-12) of run configs.

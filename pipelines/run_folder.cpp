@@ -14,8 +14,10 @@
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
+#include "core/text.h"
 #include "core/version.h"
 #include "pipelines/json_text.h"
+#include "pipelines/run_config.h"
 
 namespace hsi4d {
 namespace {
@@ -103,11 +105,15 @@ void find_differences(const ConfigValue& before, const ConfigValue& now, const s
   }
 }
 
+/// What differs, a line each and each with a line break before it; empty where a run can be resumed.
 std::string describe_differences(const std::string& before, const std::string& now) {
   std::vector<std::string> differences;
   try {
-    find_differences(parse_json_text(before, "config.resolved.json"), parse_json_text(now, "config"), "", differences);
+    find_differences(without_data(parse_json_text(before, "config.resolved.json")),
+                     without_data(parse_json_text(now, "config")), "", differences);
+    if (differences.empty()) return "";
   } catch (const DataError&) {  // by hand, perhaps; there is nothing to compare setting by setting
+    if (before == now) return "";
   }
   std::string text;
   for (size_t i = 0; i < std::min(differences.size(), kMostDifferences); ++i) text += "\n  " + differences[i];
@@ -187,9 +193,7 @@ std::string_view run_state_name(RunState state) {
 }
 
 std::string RunPaths::frame_image(int frame, std::string_view kind) const {
-  std::string digits = std::to_string(frame);
-  if (digits.size() < 4) digits.insert(0, 4 - digits.size(), '0');
-  return (folder / "frames" / (digits + "_" + std::string(kind) + ".png")).string();
+  return (folder / "frames" / (four_digits(frame) + "_" + std::string(kind) + ".png")).string();
 }
 
 /// The lock on a run folder: released by the system too when the process ends, however it ends.
@@ -269,9 +273,9 @@ void check_resumable(const RunPaths& paths, const Found& found, const std::strin
     throw UserError(name + ": holds a run that is " + way +
                     "; choose another folder, remove this one, or go on with it by --resume");
   }
-  if (found.config != config)
-    throw UserError(paths.config() + ": the run cannot be resumed, its config is another one:" +
-                    describe_differences(found.config, config));
+  const std::string differences = describe_differences(found.config, config);
+  if (!differences.empty())
+    throw UserError(paths.config() + ": the run cannot be resumed, its config is another one:" + differences);
 }
 
 void make_folder(const fs::path& folder) {
@@ -322,6 +326,10 @@ void RunFolder::set_state(RunState state, std::string_view message) {
   state_ = state;
   message_ = message;
   write_status();
+}
+
+void RunFolder::take_over_config() {
+  if (read_text_file(paths_.config()) != identity_.config) write_text_file(paths_.config(), identity_.config);
 }
 
 void RunFolder::write_status() {

@@ -24,7 +24,7 @@ std::string_view run_state_name(RunState state);
 
 /// What a run folder notes of its run.
 struct RunIdentity {
-  std::string config;  ///< the text of config.resolved.json; a run is resumed only with the same
+  std::string config;  ///< the text of config.resolved.json; a run is resumed only where without_data has the same
   std::int64_t seed = 0;
   int threads = 0;
   std::string precision = "float";
@@ -75,7 +75,8 @@ class RunFolder {
   /// @param path    UTF-8; made with its parents
   /// @param resume  go on with the run that is there. Where there is none (no folder, or an empty one) it starts anew.
   /// Throws UserError naming the folder: another process writes to it; it holds a run and `resume` is false; it holds
-  /// something else; the config of the run in it differs (the settings that do are told); it cannot be written.
+  /// something else; the config of the run in it differs in more than threads and places of files (the settings that do
+  /// are told); it cannot be written.
   RunFolder(const std::string& path, RunIdentity identity, bool resume);
   ~RunFolder();
   RunFolder(const RunFolder&) = delete;
@@ -83,12 +84,18 @@ class RunFolder {
 
   const RunPaths& paths() const { return paths_; }
 
+  /// Replaces the config.resolved.json of a run that is resumed by that of now: its data may have been moved since.
+  void take_over_config();
+
   /// How the run stood that was found and is resumed; nothing for a new one.
   std::optional<RunState> resumed_from() const { return resumed_from_; }
 
   /// Writes status.json.
   /// @param message  why it failed, for people; may be empty
   void set_state(RunState state, std::string_view message = "");
+
+  /// Writes a message into log.txt alone; what the library logs while this lives goes there too.
+  void note(std::string_view message, LogLevel level = LogLevel::kInfo) const { log_->write(level, message); }
 
   /// Appends a line to metrics.jsonl; it is with the system when this returns.
   /// Throws InternalError naming the member for a number that is not finite, unless the step was rolled back.

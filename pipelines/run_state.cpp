@@ -17,8 +17,31 @@ constexpr std::size_t kCounts = 5;  // whole numbers of a stage's totals
 constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "psnr_foreground_db",
                                                      "ssim"};  // as image_errors orders
 
-std::string image_error_name(std::size_t frame, const std::string& name) {
-  return "image_errors/" + std::to_string(frame) + "/" + name;
+/// Errors of images, frame by frame: as "KIND/FRAME/NAME".
+std::string error_name(const char* kind, std::size_t frame, const std::string& name) {
+  return std::string(kind) + "/" + std::to_string(frame) + "/" + name;
+}
+
+void store_errors(const char* kind, const std::vector<MetricValues>& errors, Checkpoint& checkpoint) {
+  for (std::size_t t = 1; t < errors.size(); ++t) {
+    for (const auto& [name, value] : errors[t]) checkpoint.set(error_name(kind, t, name), std::vector<double>{value});
+  }
+}
+
+std::vector<MetricValues> stored_errors(const char* kind, std::size_t frames, const Checkpoint& checkpoint) {
+  std::vector<MetricValues> errors(frames);
+  for (std::size_t t = 1; t < frames; ++t) {
+    for (const char* name : kImageErrors) {
+      const std::string entry = error_name(kind, t, name);
+      if (!checkpoint.has(entry)) continue;
+      const std::vector<double>& error = checkpoint.doubles(entry);
+      if (error.size() != 1)
+        throw DataError(checkpoint.source() + ": \"" + entry + "\" holds " + std::to_string(error.size()) +
+                        " numbers, 1 is needed");
+      errors[t].emplace_back(name, error[0]);
+    }
+  }
+  return errors;
 }
 
 /// One state as numbers: camera [R | t] (12), then 6 an object, then the body's transl (3) and axis-angles (165).
@@ -73,6 +96,7 @@ RunProgress first_progress(const Clip& clip, std::size_t stages) {
   progress.after_stage.assign(stages, {clip.first});
   progress.totals.resize(stages);
   progress.image_errors.resize(1);
+  progress.start_errors.resize(1);
   progress.covered = Image(1, clip.camera.height, clip.camera.width);
   return progress;
 }
@@ -95,11 +119,9 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("seconds", std::move(seconds));
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
   checkpoint.set("covered", pixels_of(progress.covered));
-  for (std::size_t t = 1; t < progress.image_errors.size(); ++t) {
-    for (const auto& [name, value] : progress.image_errors[t]) {
-      checkpoint.set(image_error_name(t, name), std::vector<double>{value});
-    }
-  }
+  checkpoint.set("inputs", progress.inputs);
+  store_errors("image_errors", progress.image_errors, checkpoint);
+  store_errors("start_errors", progress.start_errors, checkpoint);
   checkpoint.save(file, text_hash(config));
 }
 
@@ -146,16 +168,9 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   const std::vector<float>& covered = checkpoint.floats("covered");
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);
-  progress.image_errors.resize(done);
-  for (std::size_t t = 1; t < done; ++t) {
-    for (const char* name : kImageErrors) {
-      const std::string entry = image_error_name(t, name);
-      if (!checkpoint.has(entry)) continue;
-      const std::vector<double>& error = checkpoint.doubles(entry);
-      expect(entry, error.size(), 1);
-      progress.image_errors[t].emplace_back(name, error[0]);
-    }
-  }
+  progress.inputs = checkpoint.text("inputs");
+  progress.image_errors = stored_errors("image_errors", done, checkpoint);
+  progress.start_errors = stored_errors("start_errors", done, checkpoint);
   return progress;
 }
 

@@ -24,6 +24,8 @@ struct RunProgress {
   std::vector<std::vector<SceneState>> after_stage;  ///< [stage][frame]; frame 0 is the given one
   std::vector<StageTotals> totals;                   ///< by stage
   std::vector<MetricValues> image_errors;            ///< [frame]; none of frame 0
+  std::vector<MetricValues> start_errors;            ///< the same of what each frame's image was given
+  std::string inputs;                                ///< what was read so far, in the form of input_hashes
   Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
   double seconds = 0;                                ///< of the frames done
 
@@ -35,7 +37,7 @@ struct RunProgress {
 RunProgress first_progress(const Clip& clip, std::size_t stages);
 
 /// Writes the checkpoint of a run, in one step.
-/// @param config  the text of the resolved config, to which the checkpoint belongs
+/// @param config  the text to which the checkpoint belongs: the config, without what no result depends on
 void save_progress(const std::string& file, const std::string& config, const RunProgress& progress);
 
 /// Reads it back, bit for bit. Throws DataError naming the file when it is damaged, of another config, or of another

@@ -16,6 +16,7 @@
 #include "core/image_io.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "core/text.h"
 #include "pipelines/state.h"
 #include "pipelines/synthetic_motion.h"
 #include "pipelines/synthetic_render.h"
@@ -79,12 +80,6 @@ class FolderInMaking {
 
   fs::path folder_, temporary_;
 };
-
-std::string frame_name(std::size_t frame) {
-  std::string digits = std::to_string(frame);
-  if (digits.size() < 4) digits.insert(0, 4 - digits.size(), '0');
-  return digits + ".png";
-}
 
 ConfigValue numbers(const Vector3<double>& v) {
   return ConfigValue::make_array(
@@ -167,8 +162,11 @@ RenderSettings video_render_settings() {
 }
 
 void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const fs::path& folder,
-                   const ProgressSink& progress, const ConfigValue& more_sections) {
+                   const Observer& observer, const ConfigValue& more_sections) {
   FolderInMaking out(folder);
+  const auto stop_if_asked = [&] {
+    if (observer.wants_stop()) throw Interrupted("interrupted while a dataset was made; nothing is left of it");
+  };
   const std::uint64_t seed = static_cast<std::uint64_t>(settings.seed);
   const BodyModel body = procedural_body();
   AvatarSettings avatar_settings;
@@ -180,6 +178,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
       synthetic_clip(body, object, {settings.frames, settings.frame_rate, settings.size_px, settings.camera_drift});
   const Gaussians room = synthetic_room(settings.scene_gaussians, clip.room, seed);
 
+  stop_if_asked();
   write_ply(out.file("scene.ply"), room);
   write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
   write_avatar(out.file("avatar.npz"), avatar);
@@ -194,14 +193,16 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
                   to_json(merged(object_of("data", data_section(object.name)), more_sections)));
 
   const SyntheticRenderer renderer(room, object.gaussians, avatar, render);
-  Progress shown("frames", settings.frames, progress);
+  Progress shown("frames", settings.frames, observer.progress, observer.progress_interval);
   for (std::size_t t = 0; t < clip.cameras.size(); ++t) {
+    const std::string name = four_digits(static_cast<std::int64_t>(t)) + ".png";
     const SyntheticFrame frame =
         renderer.frame(clip.motion.poses[t], clip.object[t], clip.cameras[t], settings.supersample);
-    write_image(out.file(fs::path("frames") / frame_name(t)), frame.color);
-    write_image(out.file(fs::path("masks") / "human" / frame_name(t)), frame.human_mask);
-    write_image(out.file(fs::path("masks") / object.name / frame_name(t)), frame.object_mask);
+    write_image(out.file(fs::path("frames") / name), frame.color);
+    write_image(out.file(fs::path("masks") / "human" / name), frame.human_mask);
+    write_image(out.file(fs::path("masks") / object.name / name), frame.object_mask);
     shown.step();
+    stop_if_asked();
   }
   shown.finish();
   out.commit();

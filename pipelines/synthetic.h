@@ -15,7 +15,7 @@
 
 #include "body/motion_io.h"
 #include "core/config_value.h"
-#include "core/progress.h"
+#include "pipelines/observer.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
 
@@ -35,8 +35,9 @@ Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings);
 ///
 /// @param folder         new or empty; its parents are made. It appears when everything in it is complete
 /// @param more_sections  an object: sections of config.json beside `data`, for example stages; null: none
-/// Throws UserError when the folder is there and not empty, or cannot be written.
+/// Throws UserError when the folder is there and not empty, or cannot be written; Interrupted when asked to stop: then
+/// nothing is left.
 void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const std::filesystem::path& folder,
-                   const ProgressSink& progress = {}, const ConfigValue& more_sections = ConfigValue::make_object());
+                   const Observer& observer = {}, const ConfigValue& more_sections = ConfigValue::make_object());
 
 }  // namespace hsi4d

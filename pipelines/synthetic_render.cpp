@@ -1,22 +1,15 @@
 #include "pipelines/synthetic_render.h"
 
 #include <algorithm>
-#include <array>
-#include <string>
+#include <span>
+#include <string_view>
+#include <vector>
 
-#include "autodiff/elementwise.h"
-#include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
-#include "body/kinematics.h"
-#include "body/skinning.h"
-#include "splat/covariance.h"
-#include "splat/render.h"
-#include "splat/sh.h"
+#include "pipelines/posed_splats.h"
 
 namespace hsi4d {
 namespace {
-
-using Vars = SplatInputs<float>;
 
 Var<float> constant(Tape<float>& tape, std::string_view name, const std::vector<float>& values, Index columns) {
   const Var<float> var = tape.constant(name, shape_of(static_cast<Index>(values.size()) / columns, columns));
@@ -24,68 +17,30 @@ Var<float> constant(Tape<float>& tape, std::string_view name, const std::vector<
   return var;
 }
 
-std::vector<float> as_floats(std::span<const double> values) {
-  std::vector<float> result;
-  result.reserve(values.size());
-  for (const double x : values) result.push_back(static_cast<float>(x));
-  return result;
+Var<float> constant(Tape<float>& tape, std::string_view name, std::span<const double> values, Index columns) {
+  return constant(tape, name, std::vector<float>(values.begin(), values.end()), columns);
 }
 
-Var<float> transform_var(Tape<float>& tape, const Rigid<double>& rigid) {
-  std::vector<float> rows;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) rows.push_back(static_cast<float>(rigid.rotation(i, j)));
-    rows.push_back(static_cast<float>(rigid.translation[i]));
-  }
-  return constant(tape, "world_from_object", rows, 12);
+GaussianVars<float> constants(Tape<float>& tape, const Gaussians& g) {
+  return {constant(tape, "means", g.means, 3), constant(tape, "quats", g.quats, 4),
+          constant(tape, "log_scales", g.log_scales, 3), constant(tape, "opacity_logits", g.opacity_logits, 1),
+          constant(tape, "sh", g.sh, 3 * g.sh_coefficients())};
 }
 
-Vars room_vars(Tape<float>& tape, const Gaussians& g, Var<float> xi, const SplatView& view) {
-  Vars vars;
-  vars.means = constant(tape, "room means", g.means, 3);
-  vars.axes =
-      gaussian_axes(constant(tape, "room quats", g.quats, 4), constant(tape, "room log_scales", g.log_scales, 3));
-  vars.opacities = sigmoid(constant(tape, "room opacity_logits", g.opacity_logits, 1));
-  vars.colors = sh_colors(constant(tape, "room sh", g.sh, 3 * g.sh_coefficients()), vars.means, xi, view);
-  return vars;
+SplatInputs<float> object_splats(Tape<float>& tape, const Gaussians& object, const Rigid<double>& pose, Var<float> xi,
+                                 const SplatView& view) {
+  const Matrix3<double> columns = pose.rotation.transpose();  // column-major, so its memory is the rows
+  return rigid_splats(constants(tape, object), constant(tape, "rotation", std::span(columns.data(), 9), 9),
+                      constant(tape, "translation", std::span(pose.translation.data(), 3), 3), xi, view);
 }
 
-Vars object_vars(Tape<float>& tape, const Gaussians& g, const Rigid<double>& pose, Var<float> xi,
-                 const SplatView& view) {
-  SparseWeights one_bone{g.count(), 1, 1, std::vector<std::int32_t>(static_cast<std::size_t>(g.count()), 0),
-                         std::vector<double>(static_cast<std::size_t>(g.count()), 1.0)};
-  const Var<float> transform = transform_var(tape, pose);
-  Vars vars;
-  vars.means = skin_points(SkinWeights<float>(one_bone), transform, constant(tape, "object means", g.means, 3));
-  vars.axes = transform_axes(transform, gaussian_axes(constant(tape, "object quats", g.quats, 4),
-                                                      constant(tape, "object log_scales", g.log_scales, 3)));
-  vars.opacities = sigmoid(constant(tape, "object opacity_logits", g.opacity_logits, 1));
-  vars.colors = sh_colors(constant(tape, "object sh", g.sh, 3 * g.sh_coefficients()), vars.means, xi, view, transform);
-  return vars;
-}
-
-Vars avatar_vars(Tape<float>& tape, const Avatar& avatar, const BodyPose& pose) {
-  const Var<float> rotations = rotations_from_axis_angle(constant(tape, "pose", as_floats(pose.axis_angle), 3));
-  const std::array<double, 3> transl = {pose.transl[0], pose.transl[1], pose.transl[2]};
-  const PosedSkeleton<float> skeleton =
-      kinematic_chain(rotations, constant(tape, "transl", as_floats(transl), 3), avatar.parents, avatar.joints);
-  const Var<float> blended = blend_transforms(SkinWeights<float>(avatar.weights), skeleton.transforms);
-  Vars vars;
-  vars.means = transform_points(blended, constant(tape, "avatar means", avatar.means, 3));
-  vars.axes = transform_axes(blended, gaussian_axes(constant(tape, "avatar quats", avatar.quats, 4),
-                                                    constant(tape, "avatar log_scales", avatar.log_scales, 3)));
-  vars.opacities = sigmoid(constant(tape, "avatar opacity_logits", avatar.opacity_logits, 1));
-  vars.colors = constant(tape, "avatar colors", avatar.colors, 3);
-  return vars;
-}
-
-Vars joined(std::span<const Vars> parts) {
-  const auto rows = [parts](Var<float> Vars::*member) {
-    std::vector<Var<float>> vars;
-    for (const Vars& part : parts) vars.push_back(part.*member);
-    return concat_rows(std::span<const Var<float>>(vars));
-  };
-  return {rows(&Vars::means), rows(&Vars::axes), rows(&Vars::opacities), rows(&Vars::colors)};
+SplatInputs<float> avatar_splats(Tape<float>& tape, const Avatar& avatar, const BodyPose& pose) {
+  const GaussianVars<float> vars = {constant(tape, "means", avatar.means, 3), constant(tape, "quats", avatar.quats, 4),
+                                    constant(tape, "log_scales", avatar.log_scales, 3),
+                                    constant(tape, "opacity_logits", avatar.opacity_logits, 1),
+                                    constant(tape, "colors", avatar.colors, 3)};
+  const Var<float> rotations = rotations_from_axis_angle(constant(tape, "pose", std::span(pose.axis_angle), 3));
+  return skinned_splats(vars, rotations, constant(tape, "transl", std::span(pose.transl.data(), 3), 3), avatar);
 }
 
 /// Planes [first, first + count) of an image on the tape, held in [0, 1].
@@ -105,14 +60,14 @@ SyntheticFrame SyntheticRenderer::frame(const BodyPose& pose, const Rigid<double
                        settings_};
   Tape<float> tape;
   const Var<float> xi = tape.constant("xi", shape_of(1, 6));
-  const std::array<Vars, 3> parts = {room_vars(tape, room_, xi, view),
-                                     object_vars(tape, object_, world_from_object, xi, view),
-                                     avatar_vars(tape, avatar_, pose)};
+  const std::vector<SplatInputs<float>> parts = {standing_splats(constants(tape, room_), xi, view),
+                                                 object_splats(tape, object_, world_from_object, xi, view),
+                                                 avatar_splats(tape, avatar_, pose)};
   const Index first = room_.count(), second = first + object_.count(), end = second + avatar_.count();
   RenderRequest request;
   request.groups = {{second, end}, {first, second}};
   const Rendered<float> rendered =
-      render(joined(parts), xi, tape.constant("background", shape_of(1, 3)), view, request);
+      render(stacked_splats(parts), xi, tape.constant("background", shape_of(1, 3)), view, request);
   tape.forward(rendered.image);
   tape.forward(rendered.group_opacity);
   const auto reduced = [&](Var<float> var, int plane, int count) {

@@ -89,15 +89,6 @@ inline bool wants_exact(const CompositeRules<float>& rules) {
 /// log₂ of the least α that is composited; what is below 2⁻¹²⁶ never is.
 inline float least_log2(float alpha_min) { return alpha_min > 0x1p-126f ? std::log2(alpha_min) : -126.0f; }
 
-inline PackedSplat packed_splat(const SplatRecord<float>& r, double center_x, double center_y) {
-  const auto scaled = [](float l) { return static_cast<float>(static_cast<double>(l) * kLog2Scale); };
-  PackedSplat p{scaled(r.l11), scaled(r.l21), scaled(r.l22), r.log2_opacity, 0, 0, r.opacity, 0};
-  const double dx = center_x - r.x, dy = center_y - r.y;
-  p.u0 = static_cast<float>(static_cast<double>(p.l11) * dx + static_cast<double>(p.l21) * dy);
-  p.w0 = static_cast<float>(static_cast<double>(p.l22) * dy);
-  return p;
-}
-
 }  // namespace hsi4d::detail
 #endif
 
@@ -198,7 +189,8 @@ HWY_INLINE V log2_alpha(const PackedSplat& g, const float* origin, V x, V y) {
 HWY_INLINE V exact_alpha(const PackedSplat& g, const float* origin, V x, V y) {
   const D d;
   const auto [u, w] = uw_at(g, origin, x, y);
-  return hn::Mul(hn::Set(d, g.opacity), exp2_of<true>(hn::NegMulAdd(u, u, hn::Neg(hn::Mul(w, w)))));
+  const V p = hn::Max(hn::NegMulAdd(u, u, hn::Neg(hn::Mul(w, w))), hn::Set(d, -150.0f));
+  return hn::Mul(hn::Set(d, g.opacity), exp2_of<true>(p));
 }
 
 // --- blocks ----------------------------------------------------------------------------------------------------------
@@ -278,6 +270,21 @@ struct Chunk {
   Form form = Form::kPlain;
 };
 
+/// Not inlined: g++ 12 may carry on with the double where a float was rounded, in one caller and not in another, and
+/// both passes need the same bits (row B13).
+HWY_NOINLINE void pack_splat(const SplatRecord<float>& r, double center_x, double center_y, PackedSplat& p) {
+  const double l11 = r.l11 * kLog2Scale, l21 = r.l21 * kLog2Scale, l22 = r.l22 * kLog2Scale;
+  const double dx = center_x - r.x, dy = center_y - r.y;
+  p.l11 = static_cast<float>(l11);
+  p.l21 = static_cast<float>(l21);
+  p.l22 = static_cast<float>(l22);
+  p.log2_opacity = r.log2_opacity;
+  p.u0 = static_cast<float>(static_cast<double>(p.l11) * dx + static_cast<double>(p.l21) * dy);
+  p.w0 = static_cast<float>(static_cast<double>(p.l22) * dy);
+  p.opacity = r.opacity;
+  p.unused = 0;
+}
+
 /// Packs the Gaussians of a chunk and their features.
 Chunk pack_chunk(Index side, const CompositeScene<float>& scene, const BlockJob& job, Index number,
                  const BlockWorkspace& space) {
@@ -288,16 +295,18 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& scene, const BlockJob&
   const float near_cap = std::log2(scene.rules.alpha_cap) - 1e-5f;
   const size_t size = chunk.entries.size();
   bool general = scene.rules.exclusive;
-  constexpr size_t kAhead = 8;
+  constexpr size_t kAhead = 12;
   for (size_t at = 0; at < size; ++at) {
     if (at + kAhead < size) {
       const auto next = chunk.entries[at + kAhead].index;
-      hwy::Prefetch(&scene.records[static_cast<size_t>(next)]);
+      const auto* const record = reinterpret_cast<const char*>(&scene.records[static_cast<size_t>(next)]);
+      hwy::Prefetch(record);
+      hwy::Prefetch(record + sizeof(SplatRecord<float>) - 1);
       hwy::Prefetch(scene.features + next * scene.channels);
     }
     const std::int32_t index = chunk.entries[at].index;
     const SplatRecord<float>& r = scene.records[static_cast<size_t>(index)];
-    space.packed[at] = packed_splat(r, x, y);
+    pack_splat(r, x, y, space.packed[at]);
     space.blocks[at] = static_cast<std::int32_t>(chunk.entries[at].blocks);
     general |= r.log2_opacity > near_cap;
     const float* const feature = scene.features + index * scene.channels;
@@ -336,7 +345,8 @@ void make_centers(Index side, const CompositeScene<float>& scene, const BlockJob
   const double y = static_cast<double>(job.top + block / across * kBlockSide + kBlockSide / 2);
   for (Index i = 0; i < n; ++i) {
     const auto at = static_cast<size_t>(space.list[i]);
-    const PackedSplat p = packed_splat(scene.records[static_cast<size_t>(chunk.entries[at].index)], x, y);
+    PackedSplat p;
+    pack_splat(scene.records[static_cast<size_t>(chunk.entries[at].index)], x, y, p);
     space.centers[2 * i] = p.u0;
     space.centers[2 * i + 1] = p.w0;
   }
@@ -827,7 +837,6 @@ void adjoint_of_list(Index side, const CompositeScene<float>& scene, const Block
 template <int kChannels>
 void backward(Index side, const CompositeScene<float>& scene, const BlockJob& job, const BlockAdjoint& adjoint) {
   const D d;
-  const D4 d4;
   const Index channels = scene.channels, blocks = (side / kBlockSide) * (side / kBlockSide), pixels = side * side;
   const BlockWorkspace space(job.workspace, channels);
   const Index stride = block_slot(channels), state_size = (1 + channels) * kBlockPixels;
@@ -856,10 +865,15 @@ void backward(Index side, const CompositeScene<float>& scene, const BlockJob& jo
       run(side, scene, job, space, block, b, runs[b], number == 0, adjoint, gradient);
       for (int j = 0; j < kParts; ++j) hn::Store(gradient.behind[j], d, behind + j * kLanes);
     }
+    constexpr Index kAhead = 8;  // slots lie far apart
     for (Index at = 0; at < chunk_end; ++at) {
+      if (at + kAhead < chunk_end) {
+        const auto slot = static_cast<Index>(chunk.entries[static_cast<size_t>(at + kAhead)].slot);
+        __builtin_prefetch(adjoint.sums + slot * adjoint.stride, 1);
+      }
       const float* const from = space.sums + at * stride;
       float* const to = adjoint.sums + static_cast<Index>(chunk.entries[static_cast<size_t>(at)].slot) * adjoint.stride;
-      for (Index k = 0; k < adjoint.stride; k += 4) hn::Store(hn::Load(d4, from + k), d4, to + k);
+      for (Index k = 0; k < adjoint.stride; k += 4) std::memcpy(to + k, from + k, 4 * sizeof(float));
     }
   }
 }
@@ -878,16 +892,22 @@ PixelAlpha<float> pixel_of_block(Index side, const SplatRecord<float>& record, c
   const bool exact = wants_exact(rules);
   const Index cell = exact ? kBlockSide : side;  // whose centre u and w are taken from
   const double half = static_cast<double>(cell) / 2;
-  const PackedSplat g = packed_splat(record, static_cast<double>(left + col / cell * cell) + half,
-                                     static_cast<double>(top + row / cell * cell) + half);
+  PackedSplat g;
+  pack_splat(record, static_cast<double>(left + col / cell * cell) + half,
+             static_cast<double>(top + row / cell * cell) + half, g);
   const float middle = static_cast<float>(half);
   const V x = hn::Set(d, static_cast<float>(col % cell) + 0.5f - middle);
   const V y = hn::Set(d, static_cast<float>(row % cell) + 0.5f - middle);
   const V p = log2_alpha(g, &g.u0, x, y);
   const float full = hn::GetLane(exact ? exact_alpha(g, &g.u0, x, y) : exp2_of<false>(p));
-  const bool drawn =
-      exact ? full >= std::max(rules.alpha_min, 0x1p-126f) : hn::GetLane(p) >= least_log2(rules.alpha_min);
+  const bool drawn = exact ? full >= rules.alpha_min : hn::GetLane(p) >= least_log2(rules.alpha_min);
   return {drawn ? std::min(full, rules.alpha_cap) : 0.0f, drawn, drawn && full > rules.alpha_cap};
+}
+
+float behind_pixel(float transmittance, float alpha) {
+  const D d;
+  const V t = hn::Set(d, transmittance), a = hn::Set(d, alpha);
+  return hn::GetLane(dimmed(hn::Eq(t, t), t, a));
 }
 
 }  // namespace hsi4d::detail::HWY_NAMESPACE
@@ -898,6 +918,7 @@ namespace hsi4d::detail {
 HWY_EXPORT(forward_blocks);
 HWY_EXPORT(backward_blocks);
 HWY_EXPORT(pixel_of_block);
+HWY_EXPORT(behind_pixel);
 
 Index block_workspace(Index channels) { return BlockWorkspace::numbers(channels); }
 
@@ -911,6 +932,9 @@ void composite_blocks_adjoint(Index side, const CompositeScene<float>& scene, co
 PixelAlpha<float> block_pixel_alpha(Index side, const SplatRecord<float>& record, const CompositeRules<float>& rules,
                                     Index left, Index top, Index row, Index col) {
   return HWY_DYNAMIC_DISPATCH(pixel_of_block)(side, record, rules, left, top, row, col);
+}
+float block_transmittance(float transmittance, float alpha) {
+  return HWY_DYNAMIC_DISPATCH(behind_pixel)(transmittance, alpha);
 }
 }  // namespace hsi4d::detail
 #endif

@@ -94,4 +94,7 @@ void composite_blocks_adjoint(Index side, const CompositeScene<float>& scene, co
 PixelAlpha<float> block_pixel_alpha(Index side, const SplatRecord<float>& record, const CompositeRules<float>& rules,
                                     Index left, Index top, Index row, Index col);
 
+/// T behind a Gaussian, by the same function.
+float block_transmittance(float transmittance, float alpha);
+
 }  // namespace hsi4d::detail

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <ctime>
 #include <limits>
 #include <type_traits>
@@ -57,7 +58,11 @@ bool all_finite(const S* x, Index n) {
 /// Copies a row of a tile; nearly all are 16 pixels, and known lengths copy faster.
 template <class S>
 void copy_row(const S* from, Index n, S* to) {
-  n == 16 ? std::copy_n(from, 16, to) : std::copy_n(from, n, to);
+  if (n == 16) {
+    std::memcpy(to, from, 16 * sizeof(S));
+  } else {
+    std::copy_n(from, n, to);
+  }
 }
 
 /// Of a tile: fragments, and the list position after the last Gaussian composited in any pixel.
@@ -144,7 +149,7 @@ struct Composite {
     if (!(static_cast<double>(depth) + static_cast<double>(rest) > view.settings.near)) return false;
     double factor[6];
     read_factor(io, n, factor);
-    if (std::all_of(factor, factor + 6, [](double v) { return v == 0; })) return false;
+    if (!is_drawn(factor)) return false;
     Conic conic;
     if (!detail::conic_of(factor, view.settings.blur, conic)) return false;
     const double scaled =
@@ -431,10 +436,24 @@ struct Composite {
     counters->times.backward_s = watch.lap();
     parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) gather_gaussian(io, shared, n);
+        for (Index n = begin; n < end; ++n) {
+          if (n + kAhead < end) fetch_slots(lists.slots[n + kAhead], shared);
+          gather_gaussian(io, shared, n);
+        }
       });
     });
     counters->times.reduce_s = watch.lap();
+  }
+
+  static constexpr Index kAhead = 10;
+
+  /// Slots are in depth order, and those of Gaussians that follow each other here lie far apart.
+  void fetch_slots(TileLists::Slots slots, const TileAdjoint<S>& adjoint) const {
+    constexpr Index kLine = 64 / static_cast<Index>(sizeof(S)), kMostLines = 6;
+    __builtin_prefetch(&lists.tile_of[slots.begin]);
+    const S* const begin = adjoint.sums + slots.begin * adjoint.stride;
+    const Index size = std::min((slots.end - slots.begin) * adjoint.stride, kMostLines * kLine);
+    for (Index i = 0; i < size; i += kLine) __builtin_prefetch(begin + i);
   }
 
   /// True if the Gaussian does not come after the last one of a tile that is composited.

@@ -21,6 +21,7 @@
 #include <hwy/highway.h>
 
 #include "core/check.h"
+#include "core/vector_exp.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace hsi4d::detail::HWY_NAMESPACE {
@@ -31,37 +32,24 @@ namespace hn = hwy::HWY_NAMESPACE;
 template <class S, int W>
 using Tag = hn::CappedTag<S, static_cast<size_t>(W)>;
 
-/// eˣ for x ≤ 0 by the method of core/vector_exp.h, within 2 ulp; 0 where the result would not be a normal number, and
-/// for NaN.
+/// eˣ for x ≤ 0 by the method and numbers of core/vector_exp.h, within 2 ulp; 0 where the result would not be a normal
+/// number, and for NaN.
 template <class D, class V>
 HWY_INLINE V exp_of_negative(D d, V x) {
   using S = hn::TFromD<D>;
-  constexpr bool kIsFloat = sizeof(S) == 4;
-  using Bits = std::conditional_t<kIsFloat, std::int32_t, std::int64_t>;
-  constexpr int kMantissa = kIsFloat ? 23 : 52;
-  constexpr Bits kBias = kIsFloat ? 127 : 1023;
+  using N = ExpNumbers<S>;
   const hn::RebindToSigned<D> di;
-  const V lowest = hn::Set(d, kIsFloat ? S(-87.25) : S(-708));
-  const V round = hn::Set(d, kIsFloat ? S(12582912) : S(6755399441055744.0));  // 1.5 · 2^mantissa
+  const V lowest = hn::Set(d, N::kIsFloat ? S(-87.25) : S(-708)), round = hn::Set(d, N::kRound);
   const V held = hn::Max(x, lowest);
-  const V shifted = hn::MulAdd(held, hn::Set(d, S(1.44269504088896340736)), round);
+  const V shifted = hn::MulAdd(held, hn::Set(d, N::kLog2E), round);
   const V n = hn::Sub(shifted, round);
-  V r = hn::NegMulAdd(n, hn::Set(d, kIsFloat ? S(0.693359375) : S(6.93145751953125e-1)), held);
-  r = hn::NegMulAdd(n, hn::Set(d, kIsFloat ? S(-2.12194440e-4) : S(1.42860682030941723212e-6)), r);
-  V y;
-  if constexpr (kIsFloat) {
-    y = hn::Set(d, S(1.0 / 5040));
-  } else {
-    y = hn::Set(d, S(1.0 / 6227020800.0));
-    for (const double c : {1.0 / 479001600, 1.0 / 39916800, 1.0 / 3628800, 1.0 / 362880, 1.0 / 40320, 1.0 / 5040}) {
-      y = hn::MulAdd(y, r, hn::Set(d, S(c)));
-    }
-  }
-  for (const double c : {1.0 / 720, 1.0 / 120, 1.0 / 24, 1.0 / 6, 1.0 / 2, 1.0, 1.0}) {
-    y = hn::MulAdd(y, r, hn::Set(d, S(c)));
-  }
+  V r = hn::NegMulAdd(n, hn::Set(d, N::kLn2High), held);
+  r = hn::NegMulAdd(n, hn::Set(d, N::kLn2Low), r);
+  V y = hn::Set(d, N::kTaylor[0]);
+  for (std::size_t k = 1; k < N::kTaylor.size(); ++k) y = hn::MulAdd(y, r, hn::Set(d, N::kTaylor[k]));
+  for (int k = 0; k < 2; ++k) y = hn::MulAdd(y, r, hn::Set(d, S(1)));
   const auto power = hn::Sub(hn::BitCast(di, shifted), hn::BitCast(di, round));
-  const V scale = hn::BitCast(d, hn::ShiftLeft<kMantissa>(hn::Add(power, hn::Set(di, kBias))));
+  const V scale = hn::BitCast(d, hn::ShiftLeft<N::kMantissa>(hn::Add(power, hn::Set(di, N::kBias))));
   return hn::IfThenElseZero(hn::Ge(x, lowest), hn::Mul(y, scale));
 }
 

@@ -99,8 +99,7 @@ bool project_gaussian(const Lens& lens, const Vector3<double>& p, const S* axes,
       factor[c] = static_cast<S>(lens.fx * g.inverse_z * (g.axes[0][c] - g.ratio_x.value * g.axes[2][c]));
       factor[3 + c] = static_cast<S>(lens.fy * g.inverse_z * (g.axes[1][c] - g.ratio_y.value * g.axes[2][c]));
     }
-    const bool no_axes = std::all_of(factor, factor + 6, [](S v) { return v == S(0); });
-    if (all_finite(mean_px, 2) && all_finite(factor, 6) && !no_axes) return true;
+    if (all_finite(mean_px, 2) && all_finite(factor, 6) && is_drawn(factor)) return true;
   }
   std::fill_n(mean_px, 2, S(0));
   std::fill_n(mean_rest, 2, S(0));
@@ -181,7 +180,7 @@ struct Project {
       Vector6<double> d_delta = Vector6<double>::Zero();
       on_best_isa([&] {
         for (Index n = begin; n < end; ++n) {
-          if (std::all_of(factors.row(n), factors.row(n) + 6, [](S v) { return v == S(0); })) continue;
+          if (!is_drawn(factors.row(n))) continue;
           double d_mean_px[2] = {}, d_factor[6] = {};
           for (int i = 0; i < 2 && d_means_px; ++i) d_mean_px[i] = static_cast<double>(d_means_px.row(n)[i]);
           for (int i = 0; i < 6 && d_factors; ++i) d_factor[i] = static_cast<double>(d_factors.row(n)[i]);

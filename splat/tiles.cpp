@@ -38,32 +38,41 @@ Index last_to(double x, Index end) {
   return x < static_cast<double>(end) ? static_cast<Index>(x) + 1 : end;
 }
 
-/// Tiles of 16 pixels that INRIA's square of half-width `radius` touches along one axis, as rows or columns of pixels.
-/// Its pixel centres are whole numbers.
-TileSpan square_pixels(double mean, double radius, Index size) {
-  constexpr double kBlock = 16;
+/// A range of pixels.
+struct Pixels {
+  Index begin = 0, end = 0;
+};
+
+/// Those of the tiles of 16 pixels that INRIA's square of half-width `radius` touches along one axis. Its pixel centres
+/// are whole numbers.
+Pixels square_pixels(double mean, double radius, Index size) {
+  constexpr double kTileOfInria = 16;
   const double p = mean - 0.5;
-  const double blocks = static_cast<double>(size) / kBlock + 1;
-  const double begin = std::floor((p - radius) / kBlock), end = std::floor((p + radius + (kBlock - 1)) / kBlock);
+  const double tiles = static_cast<double>(size) / kTileOfInria + 1;
+  const double begin = std::floor((p - radius) / kTileOfInria);
+  const double end = std::floor((p + radius + (kTileOfInria - 1)) / kTileOfInria);
   if (!(begin < end)) return {};
-  const auto pixel = [&](double block) {
-    const double held = block > 0 ? (block < blocks ? block : blocks) : 0;
-    return std::min(static_cast<Index>(held * kBlock), size);
+  const auto pixel = [&](double tile) {
+    const double held = tile > 0 ? (tile < tiles ? tile : tiles) : 0;
+    return std::min(static_cast<Index>(held * kTileOfInria), size);
   };
   return {pixel(begin), pixel(end)};
+}
+
+Extent rectangle(Pixels rows, Pixels cols) {
+  Extent result;
+  if (rows.begin >= rows.end || cols.begin >= cols.end) return result;
+  result.row_begin = static_cast<std::int32_t>(rows.begin);
+  result.row_end = static_cast<std::int32_t>(rows.end);
+  result.col_begin = static_cast<std::int32_t>(cols.begin / kBlockSide);
+  result.col_end = static_cast<std::int32_t>((cols.end + kBlockSide - 1) / kBlockSide);
+  return result;
 }
 
 Extent square_extent(const Conic& conic, double x, double y, const TileGrid& grid) {
   const double mid = 0.5 * (conic.xx + conic.yy);
   const double radius = std::ceil(3 * std::sqrt(mid + std::sqrt(std::max(0.1, mid * mid - conic.determinant))));
-  const TileSpan cols = square_pixels(x, radius, grid.width), rows = square_pixels(y, radius, grid.height);
-  Extent result;
-  result.kind = Extent::Kind::kRectangle;
-  if (cols.begin >= cols.end) return result;
-  result.row_begin = rows.begin;
-  result.row_end = rows.end;
-  result.cols = {cols.begin / grid.tile, (cols.end + grid.tile - 1) / grid.tile};
-  return result;
+  return rectangle(square_pixels(y, radius, grid.height), square_pixels(x, radius, grid.width));
 }
 
 }  // namespace
@@ -71,56 +80,34 @@ Extent square_extent(const Conic& conic, double x, double y, const TileGrid& gri
 Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
                  const RenderSettings& settings, double epsilon) {
   if (settings.footprint == hsi4d::Footprint::kSquare3Sigma) return square_extent(conic, x, y, grid);
-  Extent result;
-  if (settings.alpha_min <= 0) {
-    result.row_end = grid.height;
-    return result;
-  }
-  result.kind = Extent::Kind::kEllipse;
-  if (!(opacity >= settings.alpha_min * (1 - 4 * epsilon))) return result;
+  if (settings.alpha_min <= 0) return rectangle({0, grid.height}, {0, grid.width});
+  if (!(opacity >= settings.alpha_min * (1 - 4 * epsilon))) return {};
   // α ≥ alpha_min where u² + w² ≤ 2 ln(o/alpha_min). Rounding: of the exponential and the opacity, and of u, whose two
   // terms are as large as the ellipse is.
   const double exact = std::sqrt(std::max(0.0, 2 * std::log(opacity / settings.alpha_min)) + 32 * epsilon);
   const double width = std::sqrt(conic.xx), height = std::sqrt(conic.yy);
-  result.reach = exact * (1 + 8 * epsilon * (1 + conic.l11 * width + std::abs(conic.l21) * height));
-  result.x = x;
-  result.y = y;
-  result.slope = conic.xy / conic.yy;
-  result.half_width = 1 / conic.l11;
-  result.top_x = conic.xy / width;
-  result.inverse_l22 = height;
-  const double half_height = result.reach * height, half_width = result.reach * width;
-  result.box_half_width = half_width;
-  if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return result;
-  result.row_begin = first_from(y - half_height - 0.5, grid.height);
-  result.row_end = last_to(y + half_height - 0.5, grid.height);
+  const double reach = exact * (1 + 8 * epsilon * (1 + conic.l11 * width + std::abs(conic.l21) * height));
+  const double half_height = reach * height, half_width = reach * width;
+  if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return {};
+  const Pixels rows = {first_from(y - half_height - 0.5, grid.height), last_to(y + half_height - 0.5, grid.height)};
+  const Pixels cols = {first_from(x - half_width - 0.5, grid.width), last_to(x + half_width - 0.5, grid.width)};
+  Extent result = rectangle(rows, cols);
+  constexpr double kFar = 1e6;  // pixels: beyond, float is not enough
+  if (!(std::abs(x) < kFar && std::abs(y) < kFar && half_width < kFar && half_height < kFar)) return result;
+  result.kind = Extent::Kind::kEllipse;
+  constexpr double kRoom = 1e-6;  // relative, some units in the last place of float
+  const double first_row = static_cast<double>(result.row_begin / grid.tile * grid.tile);
+  result.first_dy = static_cast<float>(first_row + 0.5 - y);
+  result.lowest_dy = static_cast<float>(std::max(result.row_begin + 0.5 - y, -half_height));
+  result.highest_dy = static_cast<float>(std::min(result.row_end - 0.5 - y, half_height));
+  result.right_dy = static_cast<float>(reach * conic.xy / width);
+  result.x = static_cast<float>(x - 0.5);
+  result.slope = static_cast<float>(conic.xy / conic.yy);
+  result.half_width = static_cast<float>(1 / conic.l11);
+  result.reach_squared = static_cast<float>(reach * reach * (1 + 2 * kRoom));
+  result.flatness = static_cast<float>(1 / conic.yy);
+  result.room = static_cast<float>(1e-4 + kRoom * (std::abs(x) + half_width));
   return result;
-}
-
-TileSpan block_columns(const Extent& f, const TileGrid& grid, Index band) {
-  const Index across = grid.tile / kBlockSide;
-  const Index top = std::max(f.row_begin, band * kBlockSide);
-  const Index bottom = std::min(f.row_end, (band + 1) * kBlockSide);
-  if (top >= bottom) return {};
-  if (f.kind == Extent::Kind::kAll) return {0, grid.cols * across};
-  if (f.kind == Extent::Kind::kRectangle) return {f.cols.begin * across, f.cols.end * across};
-  // The border's x as a function of dy is slope·dy ± half_width sqrt(reach² − dy²/yy); the band's rightmost point is
-  // the ellipse's if that lies in the band, else at the band's nearer end.
-  const double half_height = f.reach * f.inverse_l22;
-  const double low = std::max(static_cast<double>(top) + 0.5 - f.y, -half_height);
-  const double high = std::max(std::min(static_cast<double>(bottom) - 0.5 - f.y, half_height), low);
-  const auto half_width_at = [&](double dy) {
-    const double w = dy / f.inverse_l22;
-    return f.half_width * std::sqrt(std::max(0.0, f.reach * f.reach - w * w));
-  };
-  const double right_dy = std::clamp(f.reach * f.top_x, low, high);
-  const double left_dy = std::clamp(-f.reach * f.top_x, low, high);
-  const double right = f.slope * right_dy + half_width_at(right_dy), left = f.slope * left_dy - half_width_at(left_dy);
-  const double room = 1e-9 * (1 + std::abs(f.x) + std::abs(right) + std::abs(left));
-  const Index begin = first_from(f.x + left - room - 0.5, grid.width);
-  const Index end = last_to(f.x + right + room - 0.5, grid.width);
-  if (begin >= end) return {};
-  return {begin / kBlockSide, (end - 1) / kBlockSide + 1};
 }
 
 // --- order -----------------------------------------------------------------------------------------------------------
@@ -196,6 +183,16 @@ namespace {
 
 constexpr Index kMostChunks = 32;
 
+/// Gaussians are visited in depth order and lie far apart: one is fetched so many before its turn.
+constexpr Index kAhead = 12;
+
+template <class T>
+void fetch(const T* object) {
+  constexpr std::size_t kLine = 64;
+  const char* const bytes = reinterpret_cast<const char*>(object);
+  for (std::size_t i = 0; i < sizeof(T); i += kLine) __builtin_prefetch(bytes + i);
+}
+
 /// Chunks of the Gaussians, each of which counts its tiles by itself.
 Partition list_partition(Index ranks) {
   constexpr Index kGrain = 1024;
@@ -224,6 +221,8 @@ Index TileLists::find(std::span<const DepthKeyed> order, std::span<const Extent>
     on_best_isa([&] {
       for (Index rank = begin; rank < end; ++rank) {
         const Index n = order[static_cast<std::size_t>(rank)].index;
+        if (rank + kAhead < end)
+          fetch(&extents[static_cast<std::size_t>(order[static_cast<std::size_t>(rank + kAhead)].index)]);
         const Index first = count;
         for_each_tile(extents[static_cast<std::size_t>(n)], grid, [&](Index tile, std::uint32_t blocks) {
           if (count++ < most) found.push_back({static_cast<std::uint32_t>(tile), blocks});
@@ -236,21 +235,35 @@ Index TileLists::find(std::span<const DepthKeyed> order, std::span<const Extent>
     pairs[static_cast<std::size_t>(chunk)] = count;
   });
   const Index total = total_pairs(pairs);
+  place_tiles(tiles, part.chunks());
+  return total;
+}
+
+/// tile_begin, tile_groups; counts_ become where each chunk's entries of a tile begin. Row by row: a column of counts_ lies
+/// in as many cache lines as there are chunks.
+void TileLists::place_tiles(Index tiles, Index chunks) {
   tile_begin.resize(tiles + 1);
   tile_groups.resize(tiles);
-  Index place = 0;
-  for (Index tile = 0; tile < tiles; ++tile) {
-    tile_begin[tile] = place;
-    tile_groups[tile] = 0;
-    for (Index chunk = 0; chunk < part.chunks(); ++chunk) {
-      const Index count = counts_[chunk * tiles + tile];
-      counts_[chunk * tiles + tile] = static_cast<std::uint32_t>(place);
-      place += count;
+  std::fill_n(tile_begin.data(), tiles + 1, Index(0));
+  std::fill_n(tile_groups.data(), tiles, Index(0));
+  for (Index chunk = 0; chunk < chunks; ++chunk) {
+    for (Index tile = 0; tile < tiles; ++tile) {
+      tile_begin[tile + 1] += counts_[chunk * tiles + tile];
       tile_groups[tile] += groups_[chunk * tiles + tile];
     }
   }
-  tile_begin[tiles] = place;
-  return total;
+  for (Index tile = 0; tile < tiles; ++tile) tile_begin[tile + 1] += tile_begin[tile];
+  // The groups are added up, and their first row serves as the running place.
+  std::uint32_t* const next = groups_.data();
+  for (Index tile = 0; tile < tiles && chunks > 0; ++tile) next[tile] = static_cast<std::uint32_t>(tile_begin[tile]);
+  for (Index chunk = 0; chunk < chunks; ++chunk) {
+    std::uint32_t* const counts = counts_.data() + chunk * tiles;
+    for (Index tile = 0; tile < tiles; ++tile) {
+      const std::uint32_t count = counts[tile];
+      counts[tile] = next[tile];
+      next[tile] += count;
+    }
+  }
 }
 
 void TileLists::fill(std::span<const DepthKeyed> order, const TileGrid& grid) {

@@ -27,21 +27,23 @@ struct TileGrid {
 
 TileGrid tile_grid(Index width, Index height, Index tile);
 
-struct TileSpan {
-  Index begin = 0, end = 0;
-};
+/// Side of a block, pixels: a tile is cut into blocks, and its entries tell which of them a Gaussian may touch. A band
+/// is a row of blocks.
+inline constexpr Index kBlockSide = 4;
 
-/// The pixels that a Gaussian may touch: all; or a rectangle of tiles; or those whose centre lies in an ellipse.
-struct Extent {
-  enum class Kind : std::uint8_t { kAll, kRectangle, kEllipse } kind = Kind::kAll;
-  Index row_begin = 0, row_end = 0;   ///< rows of pixels; empty: nothing is drawn
-  TileSpan cols;                      ///< of kRectangle, columns of tiles
-  double x = 0, y = 0;                ///< mean, pixels
-  double reach = 0;                   ///< sqrt(u² + w²) at the border
-  double slope = 0;                   ///< xy/yy: how far the middle of a row moves with dy
-  double half_width = 0;              ///< sqrt(det/yy): half a row's width at the centre is reach times this
-  double top_x = 0, inverse_l22 = 0;  ///< dy of the rightmost point, sqrt(yy): both for reach 1
-  double box_half_width = 0;          ///< pixels
+/// The pixels that a Gaussian may touch: of some rows, all in a range of blocks, or those whose centre lies in an
+/// ellipse dx = slope dy ± half_width sqrt(reach² − flatness dy²). In float: every number has room for its rounding.
+struct alignas(64) Extent {
+  enum class Kind : std::int32_t { kRectangle, kEllipse } kind = Kind::kRectangle;
+  std::int32_t row_begin = 0, row_end = 0;  ///< of pixels; empty: nothing is drawn
+  std::int32_t col_begin = 0, col_end = 0;  ///< of kRectangle, columns of blocks
+  // Of kEllipse; dy from the mean, pixels.
+  float first_dy = 0;                   ///< of the first row of the row of tiles that row_begin lies in
+  float lowest_dy = 0, highest_dy = 0;  ///< of the rows
+  float right_dy = 0;                   ///< of the rightmost point; that of the leftmost is its negative
+  float x = 0;                          ///< mean, in pixels whose centres are whole numbers
+  float slope = 0, half_width = 0, reach_squared = 0, flatness = 0;
+  float room = 0;  ///< pixels
 };
 
 /// The extent that settings ask for. It never leaves out a pixel where min(cap, o G) ≥ alpha_min, with room for the
@@ -51,12 +53,6 @@ struct Extent {
 /// @param epsilon  of the precision that α is computed in
 Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
                  const RenderSettings& settings, double epsilon);
-
-/// Side of a block, pixels: a tile is cut into blocks, and its entries tell which of them a Gaussian may touch.
-inline constexpr Index kBlockSide = 4;
-
-/// Columns of blocks that an extent reaches in one band of blocks (rows kBlockSide · band and on).
-TileSpan block_columns(const Extent& extent, const TileGrid& grid, Index band);
 
 // --- order -----------------------------------------------------------------------------------------------------------
 
@@ -91,89 +87,82 @@ Index pair_memory_limit();
 /// @param pairs  that ask for the bytes
 void check_pair_memory(Index pairs, double bytes, Index limit);
 
-/// Bands of blocks that are looked at together.
-inline constexpr Index kBands = 16;
+/// Bands that are looked at together.
+inline constexpr std::int32_t kBands = 8;
 
-/// Columns of blocks that an extent reaches in kBands bands.
+/// Columns of blocks that an extent reaches in kBands bands; begin > end: none.
 struct BandSpans {
   std::int32_t begin[kBands], end[kBands];
 };
 
-/// The spans of bands first, first + 1, … of an ellipse: those of block_columns or slightly more, in float.
-inline void ellipse_spans(const Extent& f, const TileGrid& grid, Index first, BandSpans& spans) {
-  // Of the border of the ellipse around its mean; widened by what rounding may lose.
-  const float half_height = static_cast<float>(f.reach * f.inverse_l22);
-  const float lowest = std::max(static_cast<float>(static_cast<double>(f.row_begin) + 0.5 - f.y), -half_height);
-  const float highest = std::min(static_cast<float>(static_cast<double>(f.row_end) - 0.5 - f.y), half_height);
-  const float start = static_cast<float>(static_cast<double>(first * kBlockSide) + 0.5 - f.y);
-  const float top_dy = static_cast<float>(f.reach * f.top_x), slope = static_cast<float>(f.slope);
-  const float reach_squared = static_cast<float>(f.reach * f.reach * (1 + 2e-6));
-  const float flatness = static_cast<float>(1 / (f.inverse_l22 * f.inverse_l22));
-  const float half_width = static_cast<float>(f.half_width), x = static_cast<float>(f.x - 0.5);
-  const float room = static_cast<float>(1e-4 + 1e-6 * (std::abs(f.x) + f.box_half_width));
-  const float width = static_cast<float>(grid.width);
-  constexpr std::int32_t kSide = kBlockSide;
-  constexpr float kSlack = 0.25f;  // rows are a pixel apart, and their places rounded
-  for (Index i = 0; i < kBands; ++i) {
-    const float top = start + static_cast<float>(i * kBlockSide);
-    const float low = std::max(top, lowest), high = std::max(std::min(top + (kBlockSide - 1), highest), low);
-    const float right_dy = std::min(std::max(top_dy, low), high), left_dy = std::min(std::max(-top_dy, low), high);
-    const float right =
-        slope * right_dy + half_width * std::sqrt(std::max(reach_squared - right_dy * right_dy * flatness, 0.0f));
-    const float left =
-        slope * left_dy - half_width * std::sqrt(std::max(reach_squared - left_dy * left_dy * flatness, 0.0f));
-    const float begin = std::min(std::max(std::ceil(x + left - room), 0.0f), width);
-    const float end = std::min(std::max(std::floor(x + right + room) + 1, 0.0f), width);
-    const bool some = begin < end && top <= highest + kSlack && top + (kBlockSide - 1) >= lowest - kSlack;
-    const std::int32_t first_pixel = static_cast<std::int32_t>(begin), after = static_cast<std::int32_t>(end);
-    spans.begin[i] = some ? first_pixel / kSide : std::numeric_limits<std::int32_t>::max();
-    spans.end[i] = some ? (after + kSide - 1) / kSide : 0;
+/// The spans of the bands from `first` on, counted from the first one of the row of tiles that extent.row_begin lies
+/// in. Loops without branches: vectors.
+inline void band_spans(const Extent& f, const TileGrid& grid, std::int32_t first, BandSpans& spans) {
+  constexpr std::int32_t kSide = kBlockSide, kNone = std::numeric_limits<std::int32_t>::max();
+  const float width = static_cast<float>(grid.width), start = f.first_dy + static_cast<float>(first * kSide);
+  for (std::int32_t i = 0; i < kBands; ++i) {
+    const float top = start + static_cast<float>(i * kSide), bottom = top + static_cast<float>(kSide - 1);
+    const float low = std::max(top, f.lowest_dy), high = std::max(std::min(bottom, f.highest_dy), low);
+    const float right_dy = std::min(std::max(f.right_dy, low), high);
+    const float left_dy = std::min(std::max(-f.right_dy, low), high);
+    const float right_half = std::sqrt(std::max(f.reach_squared - right_dy * right_dy * f.flatness, 0.0f));
+    const float left_half = std::sqrt(std::max(f.reach_squared - left_dy * left_dy * f.flatness, 0.0f));
+    const float right = f.slope * right_dy + f.half_width * right_half;
+    const float left = f.slope * left_dy - f.half_width * left_half;
+    const float begin = std::min(std::max(std::ceil(f.x + left - f.room), 0.0f), width);
+    const float end = std::min(std::max(std::floor(f.x + right + f.room) + 1, 0.0f), width);
+    constexpr float kSlack = 0.25f;  // rows are a pixel apart, and their places rounded
+    const bool some = (begin < end) & (top <= f.highest_dy + kSlack) & (bottom >= f.lowest_dy - kSlack);
+    const std::int32_t from = static_cast<std::int32_t>(begin) / kSide;
+    const std::int32_t to = (static_cast<std::int32_t>(end) + kSide - 1) / kSide;
+    spans.begin[i] = some ? from : kNone;
+    spans.end[i] = some ? to : 0;
+  }
+  if (f.kind == Extent::Kind::kEllipse) return;
+  const std::int32_t tile = static_cast<std::int32_t>(grid.tile), row = f.row_begin / tile * tile + first * kSide;
+  for (std::int32_t i = 0; i < kBands; ++i) {
+    const bool some = row + (i + 1) * kSide > f.row_begin && row + i * kSide < f.row_end;
+    spans.begin[i] = some ? f.col_begin : kNone;
+    spans.end[i] = some ? f.col_end : 0;
   }
 }
 
-/// The spans of kBands bands.
-inline void band_spans(const Extent& f, const TileGrid& grid, Index first, BandSpans& spans) {
-  constexpr double kFar = 1e6;  // pixels: beyond, float is not enough
-  if (f.kind == Extent::Kind::kEllipse && std::abs(f.x) < kFar && std::abs(f.y) < kFar && f.box_half_width < kFar &&
-      f.reach * f.inverse_l22 < kFar) {
-    return ellipse_spans(f, grid, first, spans);
-  }
-  for (Index i = 0; i < kBands; ++i) {
-    const TileSpan span = block_columns(f, grid, first + i);
-    const bool some = span.begin < span.end;
-    spans.begin[i] = some ? static_cast<std::int32_t>(span.begin) : std::numeric_limits<std::int32_t>::max();
-    spans.end[i] = some ? static_cast<std::int32_t>(span.end) : 0;
+/// Calls visit(tile, blocks) for every tile that an extent reaches: the order of its slots.
+///
+/// @param kAcross  blocks across a tile
+template <std::int32_t kAcross, class F>
+inline void for_each_tile(const Extent& extent, const TileGrid& grid, const F& visit) {
+  const std::int32_t first_row = extent.row_begin / static_cast<std::int32_t>(grid.tile);
+  const std::int32_t last_row = (extent.row_end - 1) / static_cast<std::int32_t>(grid.tile);
+  constexpr std::int32_t kRows = kBands / kAcross;
+  for (std::int32_t row = first_row; row <= last_row; row += kRows) {
+    BandSpans spans;
+    band_spans(extent, grid, (row - first_row) * kAcross, spans);
+    std::int32_t first = spans.begin[0], after = spans.end[0];
+    for (std::int32_t i = 1; i < kBands; ++i) {
+      first = std::min(first, spans.begin[i]);
+      after = std::max(after, spans.end[i]);
+    }
+    for (std::int32_t block = first / kAcross * kAcross; block < after; block += kAcross) {
+      std::uint32_t bits[kBands];
+      for (std::int32_t i = 0; i < kBands; ++i) {
+        const std::int32_t from = std::min(std::max(spans.begin[i] - block, 0), kAcross);
+        const std::int32_t to = std::min(std::max(spans.end[i] - block, from), kAcross);
+        bits[i] = ((1u << to) - (1u << from)) << (i % kAcross * kAcross);
+      }
+      for (std::int32_t r = 0; r < kRows; ++r) {
+        std::uint32_t blocks = 0;
+        for (std::int32_t i = 0; i < kAcross; ++i) blocks |= bits[r * kAcross + i];
+        if (blocks != 0) visit(static_cast<Index>(row + r) * grid.cols + block / kAcross, blocks);
+      }
+    }
   }
 }
 
-/// Calls visit(tile, blocks) for every tile that an extent reaches, row by row: the order of its slots.
 template <class F>
 inline void for_each_tile(const Extent& extent, const TileGrid& grid, const F& visit) {
   if (extent.row_begin >= extent.row_end) return;
-  const std::int32_t across = static_cast<std::int32_t>(grid.tile / kBlockSide);
-  const Index last_row = (extent.row_end - 1) / grid.tile;
-  BandSpans spans;
-  Index known = -1;  // the first row of tiles after those in `spans`
-  for (Index r = extent.row_begin / grid.tile; r <= last_row; ++r) {
-    const Index rows_together = kBands / across;
-    if (r >= known) {
-      band_spans(extent, grid, r * across, spans);
-      known = r + rows_together;
-    }
-    const std::int32_t* const begin = spans.begin + (r + rows_together - known) * across;
-    const std::int32_t* const end = spans.end + (r + rows_together - known) * across;
-    std::int32_t first = begin[0], after = end[0];
-    for (std::int32_t i = 1; i < across; ++i) first = std::min(first, begin[i]), after = std::max(after, end[i]);
-    for (std::int32_t c = first / across; c * across < after; ++c) {
-      std::uint32_t blocks = 0;
-      for (std::int32_t i = 0; i < across; ++i) {
-        const std::int32_t from = std::min(std::max(begin[i] - c * across, 0), across);
-        const std::int32_t to = std::max(std::min(end[i] - c * across, across), from);
-        blocks |= ((1u << to) - (1u << from)) << (i * across);
-      }
-      if (blocks != 0) visit(r * grid.cols + c, blocks);
-    }
-  }
+  grid.tile == 16 ? for_each_tile<4>(extent, grid, visit) : for_each_tile<2>(extent, grid, visit);
 }
 
 /// A pair as it is found.
@@ -207,6 +196,8 @@ class TileLists {
   Index capacity_bytes() const;
 
  private:
+  void place_tiles(Index tiles, Index chunks);
+
   std::vector<std::vector<FoundPair>> found_;  // of each chunk of the order
   Buffer<std::uint32_t> counts_;               // [chunks][tiles]
   Buffer<std::uint32_t> groups_;               // [chunks][tiles]

@@ -2,6 +2,9 @@
 add_test(NAME layering
   COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/layering
                            -P ${CMAKE_CURRENT_SOURCE_DIR}/layering_test.cmake)
+add_test(NAME test_names
+  COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/test_names
+                           -P ${CMAKE_CURRENT_SOURCE_DIR}/test_names_test.cmake)
 
 set(sanitizer_flags "")
 if(HSI4D_SANITIZE)
@@ -12,4 +15,4 @@ add_test(NAME install
                            -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/install -DGENERATOR=${CMAKE_GENERATOR}
                            -DCOMPILER=${CMAKE_CXX_COMPILER} -DFLAGS=${sanitizer_flags} -DVERSION=${PROJECT_VERSION}
                            -P ${CMAKE_CURRENT_SOURCE_DIR}/install_test.cmake)
-set_tests_properties(layering install PROPERTIES LABELS quick TIMEOUT 300)
+set_tests_properties(layering test_names install PROPERTIES LABELS quick TIMEOUT 300)

@@ -18,7 +18,7 @@ std::string json_line(const Measurement& m) {
   const nlohmann::ordered_json line = {
       {"name", m.name},     {"threads", m.threads}, {"isa", isa_name(best_isa())}, {"median_ms", m.median_ms},
       {"min_ms", m.min_ms}, {"repeats", m.repeats}, {"gaussians", m.gaussians},    {"fragments", m.fragments},
-      {"pairs", m.pairs},   {"pixels", m.pixels},   {"mfragments_per_s", rate(m)}};
+      {"groups", m.groups}, {"pairs", m.pairs},     {"pixels", m.pixels},          {"mfragments_per_s", rate(m)}};
   return line.dump() + "\n";
 }
 

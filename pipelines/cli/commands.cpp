@@ -5,6 +5,8 @@
 
 #include "core/check.h"
 #include "core/suggest.h"
+#include "core/text.h"
+#include "pipelines/frame_graph.h"
 #include "pipelines/reconstruct.h"
 #include "pipelines/run_config.h"
 
@@ -17,9 +19,9 @@ std::string count_of(std::size_t count, const std::string& one) {
 
 template <class T>
 std::string names_of(const ConfigMap<T>& map) {
-  std::string names;
-  for (const auto& [name, value] : map) names += (names.empty() ? "" : ", ") + name;
-  return names.empty() ? "" : " (" + names + ")";
+  std::vector<std::string> names;
+  for (const auto& [name, value] : map) names.push_back(name);
+  return names.empty() ? "" : " (" + joined(names) + ")";
 }
 
 std::string stage_summary(const std::string& name, const StageSettings& stage) {
@@ -74,6 +76,26 @@ std::string list_all_settings(const std::vector<LossDescription>& losses) {
   return table(rows);
 }
 
+/// What a stage may move, by what it draws.
+std::string list_stages() {
+  std::vector<std::vector<std::string>> rows = {{"DRAW", "GROUP", "MOVES"}};
+  for (const ConfigChoice<Draw>& draw : kDraws) {
+    for (const std::string& group : state_group_names(draw.value))
+      rows.push_back({draw.name, group, state_group_summary(group)});
+  }
+  return table(rows);
+}
+
+/// What synthetic.object can be: the scenes that synth and demo make.
+std::string list_scenes() {
+  std::vector<std::vector<std::string>> rows = {{"SYNTHETIC.OBJECT", "SCENE"}};
+  for (const ConfigChoice<SyntheticObjectKind>& kind : kSyntheticObjectKinds)
+    rows.push_back({kind.name, std::string("A person in a room lifts ") +
+                                   (kind.value == SyntheticObjectKind::kBox ? "a box" : "a watering can") +
+                                   " from a table, turns and pours; the camera drifts"});
+  return table(rows);
+}
+
 }  // namespace
 
 std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
@@ -85,14 +107,14 @@ std::string check_command(const std::filesystem::path& config, const std::vector
 
 std::string schema_command(const std::vector<LossDescription>& losses) { return run_config_schema(losses); }
 
-std::vector<std::string> list_topics() { return {"losses", "settings"}; }
+std::vector<std::string> list_topics() { return {"losses", "stages", "scenes", "settings"}; }
 
 std::string list_command(const std::string& topic, const std::vector<LossDescription>& losses) {
   if (topic == "losses") return list_losses(losses);
+  if (topic == "stages") return list_stages();
+  if (topic == "scenes") return list_scenes();
   if (topic == "settings") return list_all_settings(losses);
-  std::string known;
-  for (const std::string& name : list_topics()) known += (known.empty() ? "" : ", ") + name;
-  throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + known +
+  throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + joined(list_topics()) +
                   did_you_mean(topic, list_topics()));
 }
 

@@ -22,8 +22,9 @@ namespace fs = std::filesystem;
 RunConfig demo_config(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
   ConfigProblems problems;
   const std::string name = arguments.quick ? "demo_quick.json" : "demo.json";
-  const ConfigValue tree = load_config_text(std::string(demo_config_text(arguments.quick)), name, fs::current_path(),
-                                            arguments.overrides, problems);
+  const ConfigValue tree =
+      load_config_text(std::string(demo_config_text(arguments.quick)), name, fs::current_path(), arguments.overrides,
+                       problems, {{"demo.json", std::string(demo_config_text(false))}});
   return read_run_config(tree, descriptions_of(losses), problems);
 }
 
@@ -47,8 +48,7 @@ void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, 
   const InterruptWatch watch;
   const int threads = arguments.threads > 0 ? arguments.threads : config.threads;
   with_threads(threads > 0 ? threads : thread_count(), [&] {
-    write_dataset(config.synthetic, video_render_settings(), dataset,
-                  stopping_progress(arguments.quiet ? ProgressSink{} : progress_on_stderr()),
+    write_dataset(config.synthetic, video_render_settings(), dataset, observer_on_terminal(arguments.quiet),
                   sections_beside_data(config, descriptions_of(losses)));
   });
 }

@@ -1,13 +1,12 @@
 #include "pipelines/cli/gradients_command.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 
 #include "core/check.h"
 #include "core/exr.h"
 #include "core/image_io.h"
+#include "core/text.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -52,12 +51,6 @@ void check_finite(const std::string& path, const std::vector<double>& values, in
   const auto place = static_cast<std::int64_t>(bad - values.begin()) / 3;
   throw DataError(path + ": row " + std::to_string(place / width) + ", column " + std::to_string(place % width) +
                   " of the image is not finite");
-}
-
-/// The loss in as many digits as give the same number back.
-std::string number_text(double value) {
-  std::array<char, 32> buffer;
-  return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
 }
 
 /// Rows of `width` numbers put at the file's rows, zeros elsewhere.

@@ -2,8 +2,6 @@
 
 #include <csignal>
 
-#include "pipelines/reconstruct.h"
-
 namespace hsi4d::cli {
 
 namespace {
@@ -38,14 +36,5 @@ InterruptWatch::~InterruptWatch() {
 }
 
 bool InterruptWatch::requested() { return interrupt_requested != 0; }
-
-ProgressSink stopping_progress(ProgressSink show) {
-  return [show](const ProgressState& state) {
-    if (show) show(state);
-    if (InterruptWatch::requested() && !state.is_finished) {
-      throw Interrupted("interrupted while " + std::string(state.task) + " were made; nothing is left of them");
-    }
-  };
-}
 
 }  // namespace hsi4d::cli

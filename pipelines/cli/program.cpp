@@ -11,6 +11,7 @@
 #include "core/check.h"
 #include "core/log.h"
 #include "core/suggest.h"
+#include "core/text.h"
 #include "core/version.h"
 #include "pipelines/cli/bench_command.h"
 #include "pipelines/cli/commands.h"
@@ -43,7 +44,7 @@ struct CommandLine {
   CLI::App app{"4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d"};
   std::string config, topic, file, out;
   std::vector<std::string> overrides, runs;
-  bool print_config = false;
+  bool print_config = false, quiet = false;
   RunArguments run_arguments;
   DemoArguments demo_arguments;
   std::vector<LossDescription> losses;
@@ -111,7 +112,8 @@ struct CommandLine {
         ->required();
     synth->add_option("--out", out, "Where to: a new or empty folder")->type_name("DIR")->required();
     add_overrides(*synth, overrides);
-    synth->callback([this] { run = [this] { return synth_command(config, overrides, out, losses); }; });
+    synth->add_flag("--quiet", quiet, "No progress on stderr");
+    synth->callback([this] { run = [this] { return synth_command(config, overrides, out, quiet, losses); }; });
   }
 
   void add_report() {
@@ -151,8 +153,8 @@ struct CommandLine {
   }
 
   void add_list() {
-    CLI::App* list = app.add_subcommand("list", "List what configs can name: losses, settings");
-    list->add_option("TOPIC", topic, "losses or settings")->required();
+    CLI::App* list = app.add_subcommand("list", "List what configs can name");
+    list->add_option("TOPIC", topic, joined(list_topics()))->required();
     list->callback([this] { run = [this] { return list_command(topic, losses); }; });
   }
 
@@ -182,6 +184,13 @@ struct CommandLine {
         ->type_name("F.{exr,png,npz}")
         ->required();
     command.add_option("--out", gradients.out, "Where loss and gradients go")->type_name("F.npz")->required();
+    command.footer(
+        "Gradients are by the file's own numbers, its rows in order. They are 0 for what does not move the image: "
+        "rows\n"
+        "that the reader leaves out (a number that is not finite, a zero quaternion); log-scales and opacity logits\n"
+        "that it holds at -20 or 20; coefficients above render.sh_degree; what the camera does not see.\n"
+        "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
+        "render.compatibility is inria.");
     command.callback([this] { run = [this] { return gradients_command(gradients); }; });
   }
 
@@ -210,23 +219,17 @@ struct CommandLine {
   }
 };
 
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 /// Refuses a first word that is no command or option, with the nearest one: CLI11 would only call it unexpected.
 void check_command_word(int argc, const char* const* argv, CommandLine& line) {
   const std::vector<std::string> names = line.command_names();
-  if (argc < 2) throw UserError("hsi4d: give a command: " + join(names) + "; `hsi4d --help` explains them");
+  if (argc < 2) throw UserError("hsi4d: give a command: " + joined(names) + "; `hsi4d --help` explains them");
   const std::string word = argv[1];
   const std::vector<std::string> options = {"-h", "--help", "--version"};
   const bool is_option = word.starts_with("-");
   const std::vector<std::string>& known = is_option ? options : names;
   if (std::find(known.begin(), known.end(), word) != known.end()) return;
   throw UserError("hsi4d: there is no " + std::string(is_option ? "option" : "command") + " \"" + word +
-                  "\"; known: " + join(known) + did_you_mean(word, known));
+                  "\"; known: " + joined(known) + did_you_mean(word, known));
 }
 
 void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {

@@ -43,9 +43,7 @@ RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>&
   options.folder = folder;
   options.resume = resume;
   options.threads = threads;
-  if (!quiet) options.observer.progress = progress_on_stderr();
-  options.observer.progress_interval = progress_interval();
-  options.observer.stop_requested = [] { return InterruptWatch::requested(); };
+  options.observer = observer_on_terminal(quiet);
   return carry_out(config, losses, options);
 }
 

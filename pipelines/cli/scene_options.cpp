@@ -36,12 +36,7 @@ Precision parse_precision(const std::string& word, const std::string& where) {
 RenderSettings render_settings(const std::vector<std::string>& overrides) {
   ConfigProblems problems;
   const ConfigValue tree = config_from_overrides(overrides, problems);
-  RenderSection section;
-  ConfigFields fields;
-  describe(fields, section);
-  read_config(tree, fields, problems);
-  problems.throw_if_any();
-  return section.render;
+  return read_settings<RenderSection>(tree, problems).render;
 }
 
 std::array<double, 3> parse_color(const std::string& text, const std::string& where) {

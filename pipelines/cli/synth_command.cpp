@@ -9,11 +9,11 @@
 namespace hsi4d::cli {
 
 std::string synth_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
-                          const std::filesystem::path& out, const std::vector<LossDescription>& losses) {
+                          const std::filesystem::path& out, bool quiet, const std::vector<LossDescription>& losses) {
   const RunConfig run = load_run_config(config, overrides, losses);
   const InterruptWatch watch;
   with_threads(run.threads > 0 ? run.threads : thread_count(), [&] {
-    write_dataset(run.synthetic, video_render_settings(), out, stopping_progress(progress_on_stderr()),
+    write_dataset(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet),
                   sections_beside_data(run, losses));
   });
   const std::string frames = std::to_string(run.synthetic.frames) + (run.synthetic.frames == 1 ? " frame" : " frames");

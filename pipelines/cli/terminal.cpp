@@ -6,6 +6,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "pipelines/cli/interrupt.h"
+
 namespace hsi4d::cli {
 namespace {
 
@@ -34,8 +36,13 @@ bool stderr_is_terminal() {
   return isatty(STDERR_FILENO) != 0 && term != nullptr && std::string(term) != "dumb" && *term != '\0';
 }
 
-ProgressSink progress_on_stderr() { return stderr_is_terminal() ? show_bar : show_line; }
-
-double progress_interval() { return stderr_is_terminal() ? kTerminalInterval : kPlainInterval; }
+Observer observer_on_terminal(bool quiet) {
+  Observer observer;
+  const bool is_terminal = stderr_is_terminal();
+  if (!quiet) observer.progress = is_terminal ? show_bar : show_line;
+  observer.progress_interval = is_terminal ? kTerminalInterval : kPlainInterval;
+  observer.stop_requested = [] { return InterruptWatch::requested(); };
+  return observer;
+}
 
 }  // namespace hsi4d::cli

@@ -1,17 +1,16 @@
 // Progress on stderr: a bar that is redrawn on a terminal, plain lines elsewhere.
 #pragma once
 
-#include "core/progress.h"
+#include "pipelines/observer.h"
 
 namespace hsi4d::cli {
 
 /// True when stderr is a terminal that understands being rewritten (TERM is set and not "dumb").
 bool stderr_is_terminal();
 
-/// Shows progress on stderr. A terminal gets a bar that is redrawn, anything else a line now and then.
-ProgressSink progress_on_stderr();
-
-/// Seconds between two reports that suit stderr: 0.1 on a terminal, 10 elsewhere.
-double progress_interval();
+/// Shows progress on stderr (not when `quiet`) and asks to stop after a signal that an InterruptWatch noted. A terminal
+/// gets a bar that is redrawn ten times a second; anything else a line at the first step, every ten seconds, and at the
+/// end.
+Observer observer_on_terminal(bool quiet);
 
 }  // namespace hsi4d::cli

@@ -223,7 +223,7 @@ TEST_CASE("nothing runs backward behind a frozen array, and no NaN leaks from th
   CHECK_FALSE(c.tape.has_gradient(x));
 }
 
-TEST_CASE("an operator may have several outputs; an unused one has no adjoint") {
+TEST_CASE("an operator may have several outputs, an unused one has no adjoint") {
   Tape<double> tape;
   bool first = false, second = false;
   const auto x = tape.parameter("x", kScalarShape);
@@ -247,7 +247,7 @@ TEST_CASE("an operator may have several outputs; an unused one has no adjoint") 
   CHECK_THROWS_AS(tape.output(x, 0), InternalError);
 }
 
-TEST_CASE("mark and rewind forget a suffix; old handles are refused") {
+TEST_CASE("mark and rewind forget a suffix, old handles are refused") {
   Tape<double> tape;
   const auto x = tape.parameter("x", shape_of(100, 3));
   const auto mark = tape.mark();

@@ -121,7 +121,7 @@ TEST_CASE("poses of SMPL-X, SMPL-H and SMPL are mapped") {
   CHECK(angle(smpl, 1, "jaw", 1) == 0);
 }
 
-TEST_CASE("poses in parts are read; missing parts are zero") {
+TEST_CASE("poses in parts are read, missing parts are zero") {
   const Motion motion = decoded([](NpzWriter& f) {
     f.add<float>("transl", {1, 3}, {1, 2, 3});
     f.add<float>("global_orient", {1, 3}, {4, 5, 6});

@@ -58,7 +58,7 @@ TEST_CASE("a camera that makes no sense is refused by name, value and what is al
   CHECK(message([](Camera& c) { c.camera_from_world.rotation *= 1.00006; }) != "accepted");
 }
 
-TEST_CASE("a 4x4 matrix gives the transform; its last row is checked") {
+TEST_CASE("a 4x4 matrix gives the transform, its last row is checked") {
   const Rigid<double> pose = test_camera().camera_from_world;
   Matrix4<double> matrix = matrix_from_rigid(pose);
   const Rigid<double> back = rigid_from_matrix(matrix);

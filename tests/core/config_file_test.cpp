@@ -27,6 +27,23 @@ std::string loaded(const std::string& file, const std::vector<std::string>& over
 
 }  // namespace
 
+TEST_CASE("a text may extend another one that is in no file either") {
+  const TemporaryFolder folder;
+  folder.write("file.json", R"({"c": 3})");
+  const std::map<std::string, std::string> beside = {
+      {"base.json", R"({"extends": "file.json", "a": 1, "b": {"x": 2}})"}};
+  ConfigProblems problems;
+  const ConfigValue tree =
+      load_config_text(R"({"extends": "base.json", "b": {"y": 4}})", "top.json", ".", {"a=5"}, problems, beside);
+  CHECK_NOTHROW(problems.throw_if_any());
+  CHECK(to_json_line(tree) == R"({"c": 3, "a": 5, "b": {"x": 2, "y": 4}})");
+  ConfigProblems more;
+  CHECK_THROWS_WITH(load_config_text(R"({"extends": "basis.json"})", "top.json", ".", {}, more, beside),
+                    Catch::Matchers::Contains("\"basis.json\""));
+  CHECK_THROWS_WITH(load_config_text(R"({"extends": "a"})", "top.json", ".", {}, more, {{"a", R"({"extends": "a"})"}}),
+                    Catch::Matchers::Contains("\"a\" extends itself"));
+}
+
 TEST_CASE("a config is laid over what it extends, through several files and folders") {
   const TemporaryFolder folder;
   folder.write("base/root.json", R"({"a": {"x": 1, "y": 1}, "list": [1, 2, 3], "z": 0})");

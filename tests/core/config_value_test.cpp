@@ -88,7 +88,7 @@ TEST_CASE("a million random floats and doubles survive writing and reading, bit 
   CHECK(failures == 0);
 }
 
-TEST_CASE("merging goes key by key; arrays and null replace") {
+TEST_CASE("merging goes key by key, arrays and null replace") {
   const auto parse = [](const std::string& text) {
     ConfigProblems problems;
     ConfigValue value;

@@ -106,7 +106,7 @@ TEST_CASE("JPEG comes back close, and closer with more quality") {
   CHECK(decode_image(encode_image("a.jpeg", take_channels(image, 0, 1)), "a.jpeg").channels() == 1);
 }
 
-TEST_CASE("OpenEXR images keep every float; half is rounded") {
+TEST_CASE("OpenEXR images keep every float, half is rounded") {
   for (int channels = 1; channels <= 4; ++channels) {
     Image image = steps(channels, 5, 21, 1000);
     image(0, 1, 1) = -3e30f;

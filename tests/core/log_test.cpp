@@ -50,6 +50,24 @@ TEST_CASE("a file receives lines with time and level, each at once") {
                  "\\d{4}-\\d\\d-\\d\\dT\\d\\d:\\d\\d:\\d\\d\\.\\d{3}[+-]\\d\\d:\\d\\d debug one\n.* error two\n"));
 }
 
+TEST_CASE("a message to one sink reaches no other") {
+  const TemporaryFolder folder;
+  int seen = 0;
+  const LogSink other = log_to([&](LogLevel, std::string_view) { ++seen; }, LogLevel::kTrace);
+  const LogSink file = log_to_file("log.txt", LogLevel::kInfo);
+  file.write(LogLevel::kInfo, "for the {} file");
+  file.write(LogLevel::kDebug, "too fine");
+  log_warning("for both");
+  CHECK(seen == 1);
+  CHECK_THAT(file_text("log.txt"), Catch::Matchers::Matches("\\d{4}-\\d\\d-\\d\\dT\\d\\d:\\d\\d:\\d\\d\\.\\d{3}"
+                                                            "[+-]\\d\\d:\\d\\d info for the \\{\\} file\n"
+                                                            ".* warning for both\n"));
+  const LogSink bad = log_to([](LogLevel, std::string_view) { throw std::runtime_error("full"); });
+  const std::int64_t before = log_failures();
+  CHECK_NOTHROW(bad.write(LogLevel::kInfo, "x"));
+  CHECK(log_failures() == before + 1);
+}
+
 TEST_CASE("a log file that cannot be opened is the user's mistake") {
   const TemporaryFolder folder;
   folder.write("plain", "");

@@ -58,7 +58,7 @@ TEST_CASE("seed, stream and index enter the block as the header says") {
   CHECK(Random(0, 0).bits(0) == 0xe169c58d6627e8d5u);
 }
 
-TEST_CASE("the same seed, stream and index give the same number in any order; a sequence follows the indices") {
+TEST_CASE("the same seed, stream and index give the same number in any order, a sequence follows the indices") {
   const Random random(7, random_stream("noise"));
   const double third = random.uniform(3);
   CHECK(random.uniform(100) != third);

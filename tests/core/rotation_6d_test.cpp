@@ -76,7 +76,7 @@ TEMPLATE_TEST_CASE("C9: 6D gives a rotation at every angle between the columns a
   }
 }
 
-TEMPLATE_TEST_CASE("C9: zero, tiny, huge and non-finite columns give a rotation; the replaced ones have no gradient",
+TEMPLATE_TEST_CASE("C9: zero, tiny, huge and non-finite columns give a rotation, the replaced ones have no gradient",
                    "", float, double) {
   using S = TestType;
   const S nan = std::numeric_limits<S>::quiet_NaN(), infinity = std::numeric_limits<S>::infinity();

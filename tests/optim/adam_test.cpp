@@ -362,6 +362,9 @@ TEST_CASE("moments of other parameters are refused, and rows of moments can be c
     CHECK(cleared.blocks[0].mean[k] == (k / 3 == 2 ? 0 : moments.blocks[0].mean[k]));
     CHECK(cleared.blocks[0].square[k] == (k / 3 == 2 ? 0 : moments.blocks[0].square[k]));
   }
+  REQUIRE(adam.undo());  // takes the step back with what was forgotten since
+  CHECK(problem.tape.value(problem.x)(2, 0) == 0);
+  CHECK(adam.moments("all").blocks[0].mean == std::vector<double>(12, 0));
   moments.blocks[0].mean.pop_back();
   CHECK_THROWS_AS(adam.set_moments("all", moments), DataError);
   CHECK_THROWS_AS(adam.moments("none"), InternalError);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <catch2/catch.hpp>
 
@@ -101,6 +102,45 @@ std::vector<LossTerm> cliff_terms() {
 }
 
 }  // namespace
+
+TEST_CASE("a stage keeps axis-angles within half a turn, and forgets what it knew of the old numbers") {
+  // Pulled along one axis, past half a turn: the loss is linear in the angle that was added up, so it goes on falling
+  // while the row jumps from pi to -pi.
+  struct Result {
+    double w = 0;
+    GroupMoments moments;
+  };
+  const auto turn = [](bool are_axis_angles, int iterations) {
+    Tape<double> tape;
+    const Var<double> w = tape.parameter("w", shape_of(2, 3));
+    tape.set(w, {3.0, 0, 0, 0.5, 0, 0});
+    const Var<double> pull = tape.constant("pull", shape_of(2, 3));
+    tape.set(pull, {-1, 0, 0, -1, 0, 0});
+    LossInputs<double> inputs;
+    inputs.rendered = w * pull;
+    const std::vector<LossTerm> terms = {
+        make_loss_term("pull", "Turns", [](const auto& in) { return sum(in.rendered); })};
+    StageSettings settings;
+    settings.iterations = iterations;
+    settings.optimize = {{"w", moving(0.05)}};
+    settings.losses = {{"pull", weighted(1)}};
+    AdamState kept = {{"w", {}}};
+    std::vector<ParameterGroup<double>> groups = {{"w", {w}, are_axis_angles}};
+    run_stage<double>(tape, settings, terms, inputs, groups, {}, {.kept = &kept});
+    CHECK(tape.value(w)(1, 0) == Approx(0.5 + 0.05 * iterations));  // the other row goes its way
+    return Result{tape.value(w)(0, 0), kept.at("w")};
+  };
+  // 3.0 + 3 * 0.05 = 3.15 is beyond pi by 0.0084.
+  CHECK(turn(false, 3).w == Approx(3.15));
+  const Result wrapped = turn(true, 3);
+  CHECK(wrapped.w == Approx(3.15 - 2 * std::numbers::pi));
+  CHECK(wrapped.moments.blocks[0].mean[0] == 0);
+  CHECK(wrapped.moments.blocks[0].square[0] == 0);
+  CHECK(wrapped.moments.blocks[0].mean[3] != 0);
+  CHECK(turn(false, 3).moments.blocks[0].mean[0] != 0);
+  CHECK(turn(true, 5).w > wrapped.w);  // and on from there
+  CHECK(turn(true, 5).w < 0);
+}
 
 TEMPLATE_TEST_CASE("a stage makes its loss small and leaves the tape as it was", "", float, double) {
   Picture<TestType> picture;

@@ -1,5 +1,7 @@
 #include "pipelines/frame_graph.h"
 
+#include <numbers>
+
 #include <catch2/catch.hpp>
 
 #include "autodiff/elementwise.h"
@@ -83,6 +85,36 @@ TEST_CASE("the gradient of the whole chain is right for every parameter", "[fram
     CHECK(report.worst_error <= 1e-6);
     for (const Var<double> block : group.blocks) tape.freeze(block);
   }
+}
+
+TEST_CASE("axis-angles are taken within half a turn, whatever the state says", "[frame_graph]") {
+  const Clip clip = small_clip(16, 14, 100);
+  const double turn = 2 * std::numbers::pi;
+  SceneState wound = clip.first, plain = clip.first;
+  plain.objects[0].rotation = {0, 0, -1e-3};
+  wound.objects[0].rotation = {0, 0, turn - 1e-3};
+  plain.body.set_rotation(4, Vector3<double>(0.3, 0, 0));
+  wound.body.set_rotation(4, Vector3<double>(0.3 - 2 * turn, 0, 0));
+  const auto read = [&](const SceneState& state) {
+    Tape<double> tape;
+    FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(RotationParameters::kAxisAngle));
+    graph.set_state(state);
+    std::vector<double> numbers;
+    for (const ParameterGroup<double>& group : graph.groups()) {
+      const bool is_rotation =
+          group.name.ends_with("_orient") || (group.name.ends_with("_pose") && group.name != "transl");
+      CHECK(group.are_axis_angles == is_rotation);
+      if (!is_rotation) continue;
+      for (const Var<double> block : group.blocks) {
+        const auto values = tape.value(block);
+        for (Index i = 0; i < values.shape.count(); ++i) numbers.push_back(values.data[i]);
+      }
+    }
+    return numbers;
+  };
+  const std::vector<double> a = read(plain), b = read(wound);
+  REQUIRE(a.size() == b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) CHECK(a[i] == Approx(b[i]).margin(1e-12));
 }
 
 TEST_CASE("the camera's gradient is right away from the camera that the graph was recorded with", "[frame_graph]") {

@@ -163,8 +163,11 @@ TEST_CASE("a config that differs is told setting by setting") {
         "a/config.resolved.json: the run cannot be resumed, its config is another one:\n"
         "  /seed: 7 in the folder, 8 now\n"
         "  /stages/camera/lr: absent in the folder, 0.1 now");
-  other.config = "{\"seed\": 7, \"stages\": {\"camera\": {\"iterations\": 30}}}";
-  CHECK_THAT(opening_message("a", other, true), Contains("(in its text only)"));
+  // The same in another form, for another number of threads, beside another dataset to be made.
+  other.config =
+      "{\"seed\": 7, \"threads\": 3, \"synthetic\": {\"seed\": 4}, \"stages\": {\"camera\": {\"iterations\": 30}}}";
+  CHECK(opening_message("a", other, true) == "opened");
+  CHECK(file_text("a/config.resolved.json") == kConfig);  // until somebody takes the other over
   here.write("a/config.resolved.json", "{\"seed\":");
   CHECK_THAT(opening_message("a", identity(), true), Contains("(in its text only)"));
 }

@@ -56,6 +56,8 @@ RunProgress random_progress(const Clip& clip) {
   progress.after_stage[1][1].body.axis_angle[8] = 5e-324;
   progress.totals = {{30, 1, 0.1, 9, 2065, 67984}, {150, 0, 1.0 / 3, 10, 3000, 80000}};
   progress.image_errors.push_back({{"psnr_db", 30.123456789012345}, {"psnr_foreground_db", 20.5}, {"ssim", 0.9}});
+  progress.start_errors.push_back({{"psnr_db", 18.5}, {"ssim", 0.25}});
+  progress.inputs = "cbf29ce484222325 /data/scene\n- masks/human/0001.png\n";
   progress.covered(0, 3, 4) = 1;
   progress.seconds = 12.345;
   return progress;
@@ -137,6 +139,8 @@ TEST_CASE("progress survives its checkpoint bit for bit") {
     CHECK(read.totals[s].fragments == saved.totals[s].fragments);
     CHECK(same_bits(read.totals[s].seconds, saved.totals[s].seconds));
   }
+  CHECK(read.start_errors == saved.start_errors);
+  CHECK(read.inputs == saved.inputs);
   CHECK(read.image_errors == saved.image_errors);  // in the same order, which summary.json shows
   CHECK(same_bits(read.seconds, saved.seconds));
   for (int y = 0; y < 20; ++y) {

@@ -117,6 +117,12 @@ TEST_CASE("a run leaves a whole run folder, and a result better than its baselin
     }
   }
   CHECK(number_at(last, "psnr_db") > 30);
+  for (const char* name : {"psnr_db", "psnr_foreground_db", "ssim"}) {
+    INFO(name);
+    CHECK(number_at(last, name) > number_at(written["baselines"]["start"], name));
+    CHECK(number_at(written["per_frame"][2], name) > number_at(written["baselines_per_frame"]["start"][2], name));
+    CHECK_FALSE(written["baselines"]["copy_frame_0"].contains(name));
+  }
 
   const Motion motion = read_motion("run/motion.npz");
   CHECK(motion.frame_rate == 10);
@@ -158,7 +164,11 @@ TEST_CASE("a run without truth has no errors against it, but images", "[run]") {
   RunConfig config = tiny_config();
   config.data.truth.clear();
   const RunSummary summary = carry_out_tiny(config, "run");
-  CHECK(summary.baselines.empty());
+  REQUIRE(summary.baselines.size() == 1);  // the image that the run was given
+  CHECK(summary.baselines[0].name == "start");
+  CHECK(summary.baselines[0].values.size() == 3);
+  REQUIRE(summary.baselines[0].per_frame.size() == kTinyFrames - 1);
+  CHECK(number_in(summary.baselines[0].per_frame[2].values, "psnr_db") > 10);
   for (const StageSummary& stage : summary.metrics) {
     for (const char* name : {"mpjpe_mm", "object_translation_cm", "camera_translation_cm", "jitter"}) {
       INFO(stage.stage << " " << name);

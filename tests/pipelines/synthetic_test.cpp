@@ -114,7 +114,8 @@ std::string message_of(const std::function<void()>& action) {
 TEST_CASE("a synthetic dataset is complete, readable and true to itself") {
   const TemporaryFolder folder;
   std::int64_t last_done = 0;
-  write_dataset(small_settings(), {}, "data", [&](const ProgressState& state) { last_done = state.done; });
+  write_dataset(small_settings(), {}, "data",
+                {.progress = [&](const ProgressState& state) { last_done = state.done; }});
   CHECK(last_done == 3);
   CHECK(names_in(content_of("data")) == dataset_files());
   CHECK(std::distance(fs::directory_iterator("."), fs::directory_iterator()) == 1);  // no temporary is left
@@ -252,7 +253,7 @@ TEST_CASE("a dataset never lands in a folder that holds something") {
 
   struct Stop {};
   const auto stop = [](const ProgressState&) { throw Stop(); };
-  CHECK_THROWS_AS(write_dataset(settings, {}, "stopped", stop), Stop);
+  CHECK_THROWS_AS(write_dataset(settings, {}, "stopped", {.progress = stop}), Stop);
   CHECK_FALSE(fs::exists("stopped"));
   for (const auto& entry : fs::directory_iterator(".")) CHECK(entry.path().extension() != ".tmp");
 }

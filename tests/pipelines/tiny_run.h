@@ -42,6 +42,7 @@ inline const char* const kTinyStages = R"({
   }
 })";
 
+inline constexpr int kPerFrame = 18;  // iterations of kTinyStages
 inline constexpr int kTinyFrames = 4;
 inline constexpr int kTinyPixels = 48;
 inline const std::string kTinyObject = "watering_can";

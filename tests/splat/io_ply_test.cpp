@@ -193,7 +193,7 @@ TEST_CASE("both byte orders are read, every number type") {
   }
 }
 
-TEST_CASE("rows that cannot be used are left out and counted; the others know their row") {
+TEST_CASE("rows that cannot be used are left out and counted, the others know their row") {
   Gaussians g = random_gaussians(12, 1);
   g.means[3 * 1] = kNan;
   g.means[3 * 2 + 2] = -kInf;

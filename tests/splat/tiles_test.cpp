@@ -222,12 +222,17 @@ TEST_CASE("extents of wild numbers stay inside of the image [A6]") {
             if (!conic_of(v.data(), 0.3, conic)) continue;
             const Extent e = extent_of(conic, at, at, opacity, grid, settings, 1e-7);
             CHECK((e.row_begin >= 0 && e.row_end <= grid.height));
-            for (Index r = 0; r < grid.rows; ++r) {
-              for (Index band = 2 * r; band < 2 * r + 2; ++band) {
-                const TileSpan span = block_columns(e, grid, band);
-                CHECK((span.begin >= 0 && span.end <= 2 * grid.cols));
+            if (e.row_begin >= e.row_end) continue;
+            for (std::int32_t first = 0; first < 16; first += kBands) {
+              BandSpans spans;
+              band_spans(e, grid, first, spans);
+              for (Index i = 0; i < kBands; ++i) {
+                if (spans.begin[i] < spans.end[i]) CHECK((spans.begin[i] >= 0 && spans.end[i] <= 2 * grid.cols));
               }
             }
+            for_each_tile(e, grid, [&](Index tile, std::uint32_t blocks) {
+              CHECK((tile >= 0 && tile < grid.count() && blocks > 0 && blocks < 16));
+            });
           }
         }
       }

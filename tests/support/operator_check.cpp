@@ -237,6 +237,7 @@ void check_recorded(Recorded<double>& r, const std::vector<double>& cotangent, c
   GradcheckOptions gradcheck_options;
   gradcheck_options.tolerance = options.tolerance;
   gradcheck_options.kink_share = options.kink_share;
+  gradcheck_options.step = options.step;
   gradcheck_options.entries = options.entries;
   gradcheck_options.seed = seed;
   const GradcheckReport report = gradcheck(r.tape, r.out, gradcheck_options);

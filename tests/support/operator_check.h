@@ -37,6 +37,8 @@ struct OperatorCheck {
   double freeze_tolerance = 0;
   /// Share of entries that may lie at kinks.
   double kink_share = 0.1;
+  /// Relative step of the differences (see GradcheckOptions); smaller where kinks lie close.
+  double step = GradcheckOptions{}.step;
   /// Entries of each input that are tried (see GradcheckOptions); fewer for an operator that is slow.
   Index entries = 64;
 };

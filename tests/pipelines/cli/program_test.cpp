@@ -90,6 +90,40 @@ TEST_CASE("the summary of check tells what will run") {
                     "  stage camera: 1 iteration, 1 parameter group (camera), 2 losses (photo, centre)\n"));
 }
 
+TEST_CASE("check refuses stages whose groups are not known, do not exist in what is drawn, or never move") {
+  const TemporaryFolder folder;
+  folder.write("a.json", R"({"stages": {
+    "camera": {"iterations": 5, "draw": "scene", "optimize": {"camera": {"lr": 1}, "transl": {"lr": 1}},
+               "losses": {"masked_l2": {}}},
+    "body": {"iterations": 5, "optimize": {"bodypose": {"lr": 1}, "transl": {"lr": 1, "from": 5},
+                                           "scene_sh": {"lr": 1}},
+             "losses": {"photometric": {}}},
+    "none": {"iterations": 5, "optimize": {}}}})");
+  const std::string groups =
+      "camera, object_orient, object_transl, transl, global_orient, body_pose, jaw_pose, leye_pose, reye_pose, "
+      "left_hand_pose, right_hand_pose";
+  const ProgramResult result = run_hsi4d({"check", "a.json"});
+  CHECK(result.status == 2);
+  CHECK(result.out.empty());
+  CHECK(result.err ==
+        "/stages/camera/optimize: there is no parameter group \"transl\" (known: camera)\n"
+        "/stages/body/optimize: there is no parameter group \"bodypose\"; did you mean \"body_pose\"? (known: " +
+            groups + ")\n/stages/body/optimize: there is no parameter group \"scene_sh\" (known: " + groups +
+            ")\n/stages/body/optimize/transl/from: 5 is beyond the stage's 5 iterations; the group would never move\n"
+            "/stages/none/optimize: no parameter group is named (known: " +
+            groups + ")\n/stages/none/losses: a stage needs a loss\n");
+  folder.write("b.json", R"({"stages": {"body": {"iterations": 5,
+    "optimize": {"transl": {"lr": 1, "from": 3, "until": 3}}, "losses": {"photometric": {}}}}})");
+  CHECK_THAT(run_hsi4d({"check", "b.json"}).err,
+             Contains("3 is not after from, which is 3; the group would never move"));
+  // Those of them that would be right.
+  folder.write("c.json", R"({"stages": {
+    "camera": {"iterations": 5, "draw": "scene", "optimize": {"camera": {"lr": 1}}, "losses": {"masked_l2": {}}},
+    "body": {"iterations": 5, "optimize": {"body_pose": {"lr": 1}, "transl": {"lr": 1, "from": 4}},
+             "losses": {"photometric": {}}}}})");
+  CHECK(run_hsi4d({"check", "c.json"}).status == 0);
+}
+
 TEST_CASE("schema prints JSON that refuses unknown keys") {
   const TemporaryFolder folder;
   const ProgramResult result = run_hsi4d({"schema"});
@@ -107,8 +141,14 @@ TEST_CASE("list tells losses and settings") {
              Contains("/render/blur") && Contains("/stages/NAME/losses/photo/ssim_share"));
   CHECK_THROWS_MATCHES(
       cli::list_command("loses", test_losses()), UserError,
-      Catch::Matchers::Message("hsi4d list: there is nothing called \"loses\" to list; known: losses, settings; "
-                               "did you mean \"losses\"?"));
+      Catch::Matchers::Message("hsi4d list: there is nothing called \"loses\" to list; known: losses, stages, scenes, "
+                               "settings; did you mean \"losses\"?"));
+  const std::string stages = cli::list_command("stages", test_losses());
+  CHECK_THAT(stages, Contains("\nscene  camera           Six numbers of the camera") &&
+                         Contains("\nall    body_pose        21 joints of the body\n"));
+  CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 1 + 11);
+  CHECK_THAT(cli::list_command("scenes", test_losses()),
+             Contains("\nwatering_can      A person in a room lifts a watering can") && Contains("\nbox  "));
   const TemporaryFolder folder;
   const ProgramResult result = run_hsi4d({"list", "losses"});
   CHECK(result.status == 0);
@@ -130,6 +170,12 @@ TEST_CASE("the program and every subcommand answer --version and --help") {
     CHECK(own.err.empty());
     CHECK_THAT(own.out, Contains(std::string("hsi4d ") + command));
   }
+}
+
+TEST_CASE("the help of gradients tells which of them are zero") {
+  const TemporaryFolder folder;
+  CHECK_THAT(run_hsi4d({"gradients", "--help"}).out,
+             Contains("log-scales and opacity logits\nthat it holds at -20 or 20"));
 }
 
 TEST_CASE("mistakes on the command line end with 2 and one message") {

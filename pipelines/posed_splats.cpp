@@ -1,0 +1,76 @@
+#include "pipelines/posed_splats.h"
+
+#include <array>
+
+#include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
+#include "body/kinematics.h"
+#include "splat/covariance.h"
+#include "splat/opacity.h"
+#include "splat/sh.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// [1,12], the rows of [R | t].
+template <class S>
+Var<S> rigid_rows(Var<S> rotation, Var<S> translation) {
+  std::array<Var<S>, 6> parts;
+  for (Index r = 0; r < 3; ++r) {
+    parts[static_cast<std::size_t>(2 * r)] = slice_cols(rotation, 3 * r, 3);
+    parts[static_cast<std::size_t>(2 * r + 1)] = slice_cols(translation, r, 1);
+  }
+  return concat_cols<S>(parts);
+}
+
+template <class S, class Member>
+Var<S> stacked(const std::vector<SplatInputs<S>>& parts, Member member) {
+  if (parts.size() == 1) return parts.front().*member;
+  std::vector<Var<S>> rows;
+  for (const SplatInputs<S>& part : parts) rows.push_back(part.*member);
+  return concat_rows<S>(rows);
+}
+
+}  // namespace
+
+template <class S>
+SplatInputs<S> standing_splats(const GaussianVars<S>& scene, Var<S> xi, const SplatView& view) {
+  return {scene.means, gaussian_axes(scene.quats, scene.log_scales), gaussian_opacities(scene.opacity_logits),
+          sh_colors(scene.colors, scene.means, xi, view)};
+}
+
+template <class S>
+SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<S> transl, Var<S> xi,
+                            const SplatView& view) {
+  const Var<S> transform = rigid_rows(rotation, transl);
+  const Var<S> means = matmul(object.means, transpose(reshape(rotation, 3, 3))) + transl;
+  return {means, transform_axes(transform, gaussian_axes(object.quats, object.log_scales)),
+          gaussian_opacities(object.opacity_logits), sh_colors(object.colors, means, xi, view, transform)};
+}
+
+template <class S>
+SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar) {
+  const PosedSkeleton<S> skeleton = kinematic_chain(rotations, transl, avatar.parents, avatar.joints);
+  const Var<S> blended = blend_transforms(SkinWeights<S>(avatar.weights), skeleton.transforms);
+  const Var<S> means = transform_points(blended, human.means);
+  return {means, transform_axes(blended, gaussian_axes(human.quats, human.log_scales)),
+          gaussian_opacities(human.opacity_logits), human.colors};
+}
+
+template <class S>
+SplatInputs<S> stacked_splats(const std::vector<SplatInputs<S>>& parts) {
+  return {stacked(parts, &SplatInputs<S>::means), stacked(parts, &SplatInputs<S>::axes),
+          stacked(parts, &SplatInputs<S>::opacities), stacked(parts, &SplatInputs<S>::colors)};
+}
+
+#define HSI4D_INSTANTIATE(S)                                                                              \
+  template SplatInputs<S> standing_splats(const GaussianVars<S>&, Var<S>, const SplatView&);              \
+  template SplatInputs<S> rigid_splats(const GaussianVars<S>&, Var<S>, Var<S>, Var<S>, const SplatView&); \
+  template SplatInputs<S> skinned_splats(const GaussianVars<S>&, Var<S>, Var<S>, const Avatar&);          \
+  template SplatInputs<S> stacked_splats(const std::vector<SplatInputs<S>>&);
+HSI4D_INSTANTIATE(float)
+HSI4D_INSTANTIATE(double)
+#undef HSI4D_INSTANTIATE
+
+}  // namespace hsi4d

@@ -1,0 +1,47 @@
+// Gaussians on a tape, put where they are seen: those of the scene, of a rigid object, of a human.
+#pragma once
+
+#include <vector>
+
+#include "body/avatar.h"
+#include "splat/render.h"
+
+namespace hsi4d {
+
+/// The numbers of N Gaussians on a tape, as files hold them.
+template <class S>
+struct GaussianVars {
+  Var<S> means;           ///< [N,3] metres
+  Var<S> quats;           ///< [N,4] wxyz, raw
+  Var<S> log_scales;      ///< [N,3]
+  Var<S> opacity_logits;  ///< [N,1]
+  Var<S> colors;          ///< [N,3K] harmonics; of a human [N,3] colours
+};
+
+/// The scene: it stays where it is.
+/// @param xi  [1,6] update of the view's camera, from which the harmonics are seen
+/// Adjoint: all numbers, xi.
+template <class S>
+SplatInputs<S> standing_splats(const GaussianVars<S>& scene, Var<S> xi, const SplatView& view);
+
+/// A rigid object: x_world = R x + t; its harmonics turn along.
+/// @param rotation  [1,9] rows of R
+/// @param transl    [1,3] metres, world
+/// Adjoint: all numbers, rotation, transl, xi.
+template <class S>
+SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<S> transl, Var<S> xi,
+                            const SplatView& view);
+
+/// A human in a pose: linear blend skinning of rest-pose Gaussians, axes by the blended linear map (row D2).
+/// @param human      the avatar's numbers
+/// @param rotations  [J,9] of the joints
+/// @param transl     [1,3] metres, world
+/// Adjoint: all numbers, rotations, transl.
+template <class S>
+SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar);
+
+/// All rows of several parts, one after the other.
+template <class S>
+SplatInputs<S> stacked_splats(const std::vector<SplatInputs<S>>& parts);
+
+}  // namespace hsi4d

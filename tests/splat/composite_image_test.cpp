@@ -1,0 +1,177 @@
+// Whole composited images: nothing to draw, very much to draw, and what has to leave an image as it is.
+#include <algorithm>
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "core/random.h"
+#include "splat/composite.h"
+#include "tests/support/flat_splats.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+
+TEST_CASE("nothing to draw, and images of every edge: exact zeros [B11]") {
+  for (const int width : {1, 8, 15, 16, 17}) {
+    for (const int height : {1, 16, 17}) {
+      for (const int tile : {8, 16}) {
+        SplatView view = view_of_size(width, height, RenderSettings());
+        view.settings.tile = tile;
+        INFO(width << " x " << height << ", tiles of " << tile);
+        FlatSplats none, behind, drawn;
+        none.channels = 3;
+        behind.add(3, 3, -1, 1, 0.9, {1, 1, 1});            // behind the camera
+        behind.add(3, 3, 2, 0, 0.9, {1, 1, 1});             // six zeros
+        behind.add(-1000, 3, 2, 1, 0.9, {1, 1, 1});         // beside the image
+        behind.add(3, 3, 2, 1, 0.9 / 255, {1, 1, 1});       // too faint
+        behind.add(std::nan(""), 3, 2, 1, 0.9, {1, 1, 1});  // broken
+        behind.add(3, 3, 2, 1, 0.9, {1, std::nan(""), 1});  // broken
+        for (const FlatSplats* splats : {&none, &behind}) {
+          Flat<float> flat(*splats, view);
+          flat.backward_ones();
+          for (const double x : flat.value(flat.out.channels)) CHECK(x == 0);
+          for (const double t : flat.value(flat.out.transmittance)) CHECK(t == 1);
+          for (const auto& d :
+               {flat.d(flat.means), flat.d(flat.factors), flat.d(flat.opacities), flat.d(flat.features)}) {
+            CHECK(std::all_of(d.begin(), d.end(), [](double x) { return x == 0; }));
+          }
+          const RenderCounters& counters = *flat.out.counters;
+          CHECK((counters.visible == 0 && counters.pairs == 0 && counters.fragments == 0 && counters.tiles == 0));
+        }
+        drawn.add(width / 2.0, height / 2.0, 2, 30, 0.9, {1, 2, 3});
+        Flat<double> flat(drawn, view);
+        flat.backward_ones();
+        CHECK(flat.out.counters->fragments == width * height);
+        CHECK(flat.d(flat.features)[0] == Approx(flat.d(flat.features)[1]));
+      }
+    }
+  }
+}
+
+TEST_CASE("a million Gaussians on one pixel keep their order and stay finite [B12]") {
+  FlatSplats splats;
+  for (int i = 0; i < 1000000; ++i) splats.add(8.5, 8.5, 2, 0.2, 0.3, {i < 8 ? 1.0 : 0.0, 1});
+  SplatView view = view_of_size(17, 17, RenderSettings());
+  Flat<float> flat(splats, view);
+  flat.backward_ones();
+  const auto channels = flat.value(flat.out.channels), t = flat.value(flat.out.transmittance);
+  for (std::size_t p = 0; p < t.size(); ++p) {
+    CHECK((t[p] >= 0 && t[p] <= 1));
+    CHECK(channels[t.size() + p] + t[p] == Approx(1).margin(1e-6));
+  }
+  // Equal depths are composited by index: the first eight are in front.
+  const double g = 0.3;
+  CHECK(channels[8 * 17 + 8] == Approx(1 - std::pow(1 - g, 8)).margin(1e-6));
+  const auto d = flat.d(flat.opacities);
+  CHECK(std::all_of(d.begin(), d.end(), [](double x) { return std::isfinite(x); }));
+  CHECK(d[0] != 0);
+  CHECK(d[999999] == 0);
+  CHECK(flat.out.counters->visible == 1000000);
+  // The backward pass ends where the last pixel does: of 4 tiles, where 0.3 G is hardly above alpha_min.
+  CHECK(flat.out.counters->pairs >= 1000000);
+  CHECK(flat.out.counters->reached < 20000);
+}
+
+TEST_CASE("an opaque wall leaks what the cap lets through [B16]") {
+  FlatSplats splats;
+  splats.add(8, 8, 1, 1e5, 1, {0});
+  splats.add(8, 8, 2, 1e5, 1, {1});
+  for (const double cap : {0.99, kAlphaCap}) {
+    SplatView view = view_of_size(16, 16, smooth_settings());
+    view.settings.alpha_cap = cap;
+    Flat<double> flat(splats, view);
+    for (const double x : flat.value(flat.out.channels)) CHECK(x == Approx((1 - cap) * cap).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("a mirrored scene makes a mirrored image, and a padded image the same pixels [B20]") {
+  const int width = 37, height = 23;
+  const FlatSplats splats = random_flat(40, width, height, 3, 6);
+  FlatSplats mirrored = splats, shifted = splats;
+  for (std::size_t n = 0; n < splats.depths.size(); ++n) {
+    mirrored.means[2 * n] = width - splats.means[2 * n];
+    for (std::size_t k = 0; k < 3; ++k) mirrored.factors[6 * n + k] *= -1;
+    shifted.means[2 * n] += 32;
+    shifted.means[2 * n + 1] += 16;
+  }
+  const SplatView view = view_of_size(width, height, RenderSettings());
+  Flat<double> plain(splats, view), mirror(mirrored, view);
+  Flat<double> padded(shifted, view_of_size(width + 50, height + 40, RenderSettings()));
+  const auto a = plain.tape.value(plain.out.channels), b = mirror.tape.value(mirror.out.channels);
+  const auto c = padded.tape.value(padded.out.channels);
+  double mirror_error = 0, padding_error = 0;
+  for (Index k = 0; k < 3; ++k) {
+    for (Index r = 0; r < height; ++r) {
+      for (Index x = 0; x < width; ++x) {
+        mirror_error = std::max(mirror_error, std::abs(a(k, r, x) - b(k, r, width - 1 - x)));
+        padding_error = std::max(padding_error, std::abs(a(k, r, x) - c(k, r + 16, x + 32)));
+      }
+    }
+  }
+  CHECK(mirror_error <= 1e-12);
+  CHECK(padding_error <= 1e-12);
+}
+
+TEST_CASE("the size of tiles changes nothing but rounding [B7]") {
+  const FlatSplats splats = random_flat(200, 61, 45, 3, 8);
+  SplatView view = view_of_size(61, 45, RenderSettings());
+  Flat<float> large(splats, view);
+  view.settings.tile = 8;
+  Flat<float> small(splats, view);
+  CHECK(largest_difference(large.value(large.out.channels), small.value(small.out.channels)) <= 1e-6);
+  CHECK(large.out.counters->fragments == small.out.counters->fragments);
+  large.backward_ones();
+  small.backward_ones();
+  CHECK(relative_l2(small.d(small.factors), large.d(large.factors)) <= 1e-5);
+}
+
+TEST_CASE("the order of the rows does not matter where depths differ [B8]") {
+  const FlatSplats splats = random_flat(60, 33, 20, 2, 10);
+  FlatSplats turned;
+  const Index n = splats.count();
+  for (Index i = n - 1; i >= 0; --i) {
+    const auto at = [&](const std::vector<double>& from, std::vector<double>& to, Index size) {
+      to.insert(to.end(), from.begin() + i * size, from.begin() + (i + 1) * size);
+    };
+    at(splats.means, turned.means, 2);
+    at(splats.factors, turned.factors, 6);
+    at(splats.depths, turned.depths, 1);
+    at(splats.opacities, turned.opacities, 1);
+    at(splats.features, turned.features, 2);
+  }
+  turned.channels = 2;
+  const SplatView view = view_of_size(33, 20, RenderSettings());
+  Flat<float> a(splats, view), b(turned, view);
+  CHECK(a.value(a.out.channels) == b.value(b.out.channels));
+}
+
+TEST_CASE("long lists are composited over many segments as over one") {
+  FlatSplats splats;
+  RandomSequence random(11, 1);
+  for (int i = 0; i < 700; ++i) {
+    splats.add(random.uniform(0, 16), random.uniform(0, 16), 1 + i, 4, random.uniform(0.001, 0.02),
+               {random.uniform(0, 1)});
+  }
+  const SplatView view = view_of_size(16, 16, smooth_settings());
+  Flat<double> flat(splats, view);
+  flat.backward_ones();
+  // v_i by its definition, at every pixel, for a few Gaussians.
+  const auto d = flat.d(flat.opacities);
+  for (const std::size_t i : {std::size_t(0), std::size_t(63), std::size_t(64), std::size_t(500), std::size_t(699)}) {
+    double expected = 0;
+    for (int p = 0; p < 256; ++p) {
+      double through = 1, behind = 0, before_i = 0, g_i = 0;
+      std::vector<double> alphas;
+      for (std::size_t k = 0; k < 700; ++k) {
+        const double dx = p % 16 + 0.5 - splats.means[2 * k], dy = p / 16 + 0.5 - splats.means[2 * k + 1];
+        const double g = std::exp(-0.5 * (dx * dx + dy * dy) / (16 + kBlur));
+        if (k == i) before_i = through, g_i = g;
+        alphas.push_back(splats.opacities[k] * g);
+        through *= 1 - alphas.back();
+      }
+      for (std::size_t k = 699; k > i; --k) behind = alphas[k] * splats.features[k] + (1 - alphas[k]) * behind;
+      expected += before_i * g_i * (splats.features[i] - behind);
+    }
+    CHECK(d[i] == Approx(expected).epsilon(1e-11));
+  }
+}
