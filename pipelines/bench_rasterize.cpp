@@ -6,6 +6,7 @@
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/suggest.h"
+#include "core/text.h"
 #include "pipelines/bench_workloads.h"
 #include "splat/covariance.h"
 #include "splat/render.h"
@@ -112,7 +113,8 @@ void bench_rasterize(const RasterizeBench& options, const std::function<void(con
   const std::vector<std::string> all = rasterize_workloads();
   for (const std::string& name : options.workloads) {
     if (std::find(all.begin(), all.end(), name) == all.end())
-      throw UserError("hsi4d bench rasterize: no workload \"" + name + "\"" + did_you_mean(name, all));
+      throw UserError("hsi4d bench rasterize: no workload \"" + name + "\"; known: " + joined(all) +
+                      did_you_mean(name, all));
   }
   for (const NamedWorkload& named : kWorkloads) {
     const auto& wanted = options.workloads;
