@@ -148,13 +148,9 @@ class StageRun {
     for (Index i = 0; i < settings_.iterations; ++i) iterate(i, callback);
     evaluate_the_end();
     keep_moments();
-    return {settings_.iterations,
-            evaluated_loss(),
-            loss_.values,
-            std::move(loss_.off),
-            adam_.rollbacks() + undone_at_end_,
-            seconds_since(start),
-            left_out_objects()};
+    return {
+        settings_.iterations, evaluated_loss(),  loss_.values, std::move(loss_.off), adam_.rollbacks() + undone_at_end_,
+        seconds_since(start), left_out_objects()};
   }
 
  private:
@@ -206,8 +202,7 @@ class StageRun {
     for (std::size_t k = 0; k < left_out_.size(); ++k) {
       for (std::size_t o = 0; o < left_out_[k].size(); ++o) {
         if (left_out_[k][o] == 0) continue;
-        objects.push_back(
-            {loss_.left_out[k].term, loss_.left_out[k].reason, static_cast<Index>(o), left_out_[k][o]});
+        objects.push_back({loss_.left_out[k].term, loss_.left_out[k].reason, static_cast<Index>(o), left_out_[k][o]});
       }
     }
     return objects;
@@ -290,7 +285,7 @@ class StageRun {
   Adam<S> adam_;
   Index undone_at_end_ = 0;
   std::vector<std::vector<Index>> left_out_;  // evaluations, by loss_.left_out and object
-  std::string offender_;  // of the last evaluation, if it was bad
+  std::string offender_;                      // of the last evaluation, if it was bad
 };
 
 }  // namespace

