@@ -68,7 +68,8 @@ std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip
     words.get();
     std::getline(words, entry.term, '\t');
     std::getline(words, entry.reason);
-    if (!words || entry.stage >= stages || entry.object < 0 || entry.object >= std::ssize(clip.objects)) {
+    if (!words || entry.stage >= stages || entry.object < 0 || entry.object >= std::ssize(clip.objects) ||
+        entry.frame < 1 || entry.frame >= clip.frames()) {
       throw DataError(checkpoint.source() + ": \"" + kLeftOut + "\" holds \"" + line +
                       "\", which is no stage, frame, object, term and reason of this clip");
     }
