@@ -10,7 +10,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
-#include "splat/io_ply.h"
+#include "splat/splat_file.h"
 
 namespace hsi4d {
 
@@ -92,7 +92,7 @@ std::vector<std::string> png_names(const fs::path& folder) {
 
 /// The Gaussians of a file; what its reader rejected or held is told in the log.
 Gaussians read_gaussians(const fs::path& file) {
-  PlyScene read = read_ply(file.string());
+  SplatFile read = read_splats(file.string());
   const std::string remarks = summary_text(read.report);
   if (!remarks.empty()) log_warning(file.string() + ": " + remarks);
   if (read.gaussians.count() == 0) throw DataError(file.string() + ": holds no Gaussians that can be used");

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "splat/splat_file.h"
+
 namespace hsi4d {
 
 DataSettings dataset_inputs(const std::filesystem::path& folder) {
@@ -17,7 +19,7 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
   if (fs::exists(base / "truth")) data.truth = base / "truth";
   std::error_code error;  // no such folder: no objects
   for (const fs::directory_entry& entry : fs::directory_iterator(base / "objects", error)) {
-    if (entry.path().extension() == ".ply") data.objects.push_back({entry.path().stem().string(), {entry.path()}});
+    if (has_splat_ending(entry.path().string())) data.objects.push_back({entry.path().stem().string(), {entry.path()}});
   }
   std::sort(data.objects.begin(), data.objects.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   return data;
@@ -25,12 +27,12 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
 
 void describe(ConfigFields& f, ObjectSettings& s) {
   f.path("gaussians", s.gaussians, {.must_exist = true},
-         "Its Gaussians (.ply), relative to the centroid of their means")
+         "Its Gaussians (.ply, .splat or .spz), relative to the centroid of their means")
       .required();
 }
 
 void describe(ConfigFields& f, DataSettings& s) {
-  f.path("scene", s.scene, {.must_exist = true}, "The static scene (.ply), metres, z up");
+  f.path("scene", s.scene, {.must_exist = true}, "The static scene (.ply, .splat or .spz), metres, z up");
   f.map("objects", s.objects, "Rigid objects that move, by name");
   f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.npz)");
   f.path("frames", s.frames, {.must_exist = true},

@@ -51,4 +51,36 @@ Gaussians concatenated(std::span<const Gaussians* const> parts) {
   return all;
 }
 
+Gaussians selected(const Gaussians& gaussians, std::span<const Index> rows) {
+  check_sizes(gaussians);
+  Gaussians out;
+  out.sh_degree = gaussians.sh_degree;
+  out.origin_world = gaussians.origin_world;
+  const Index sh_width = 3 * Index{gaussians.sh_coefficients()};
+  for (const Index n : rows) {
+    HSI4D_CHECK(n >= 0 && n < gaussians.count(), "there is no Gaussian " + std::to_string(n));
+    const auto copy = [n](const std::vector<float>& from, std::vector<float>& to, Index width) {
+      to.insert(to.end(), from.begin() + n * width, from.begin() + (n + 1) * width);
+    };
+    copy(gaussians.means, out.means, 3);
+    copy(gaussians.quats, out.quats, 4);
+    copy(gaussians.log_scales, out.log_scales, 3);
+    copy(gaussians.opacity_logits, out.opacity_logits, 1);
+    copy(gaussians.sh, out.sh, sh_width);
+  }
+  return out;
+}
+
+Gaussians with_sh_degree(const Gaussians& gaussians, int degree) {
+  check_sizes(gaussians);
+  Gaussians out = gaussians;
+  out.sh_degree = degree;
+  const Index from = 3 * Index{gaussians.sh_coefficients()}, to = 3 * Index{out.sh_coefficients()};
+  out.sh.assign(static_cast<std::size_t>(gaussians.count() * to), 0.0F);
+  for (Index n = 0; n < gaussians.count(); ++n)
+    std::copy_n(gaussians.sh.begin() + n * from, std::min(from, to), out.sh.begin() + n * to);
+  check_sizes(out);
+  return out;
+}
+
 }  // namespace hsi4d

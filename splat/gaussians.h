@@ -34,4 +34,12 @@ void check_sizes(const Gaussians& gaussians);
 /// Throws InternalError when the parts' origins differ, or as check_sizes. No parts give no Gaussians.
 Gaussians concatenated(std::span<const Gaussians* const> parts);
 
+/// The rows of `gaussians` that are named, in this order. Throws InternalError as check_sizes, or for a row that is not
+/// there.
+Gaussians selected(const Gaussians& gaussians, std::span<const Index> rows);
+
+/// The same Gaussians with harmonics of another degree, 0 to kHighestShDegree: those above it left out, or zeros added.
+/// Throws InternalError as check_sizes, or for another degree.
+Gaussians with_sh_degree(const Gaussians& gaussians, int degree);
+
 }  // namespace hsi4d

@@ -11,47 +11,28 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "splat/gaussians.h"
+#include "splat/splat_report.h"
 
 namespace hsi4d {
 
-/// What a reader did to the rows of a file.
-struct PlyReport {
-  Index rows = 0;                                         ///< of the file
-  Index rejected = 0;                                     ///< rows that are left out
-  std::vector<std::pair<std::string, Index>> rejections;  ///< reason, rows; a row counts under its first reason
-  std::vector<std::pair<std::string, Index>> repairs;     ///< what was put right, numbers
-  std::vector<Index> row_of;                              ///< the file's row of every kept Gaussian, ascending
-  std::vector<Index> held_log_scales;      ///< places in log_scales [N,3] of numbers held at a limit, ascending
-  std::vector<Index> held_opacity_logits;  ///< places in opacity_logits [N] of such numbers, ascending
-};
-
-/// "12 of 340 Gaussians are left out (a mean that is not finite: 2, ...); held: ...", or nothing without cause.
-std::string summary_text(const PlyReport& report);
-
-struct PlyScene {
-  Gaussians gaussians;
-  PlyReport report;
-};
-
-/// The Gaussians of a PLY file, kept rows in the file's order, origin at 0.
+/// The Gaussians of a PLY file.
 ///
 /// Binary of both byte orders, and ascii. Other elements and properties are passed over. A row is left out, and
 /// counted, when a number of it is not finite (an opacity of ±inf is) or its quaternion is zero; opacity logits and
-/// log-scales beyond ±kOpacityLogitLimit and ±kLogScaleLimit are held there, and counted.
+/// log-scales beyond ±kOpacityLogitLimit and ±kLogScaleLimit are held there, and counted. A compressed PLY
+/// (splat/io_compressed_ply.h) is known by its properties and read too.
 ///
 /// @param path  UTF-8
 /// Throws UserError when the file cannot be read; DataError naming the path, and the header's line or the sizes: no PLY
 /// file, a header that is not PLY's, a property missing, twice or a list, f_rest_ properties that are not 0, 9, 24 or
 /// 45 in number, fewer or more bytes than the header's counts need.
-PlyScene read_ply(const std::string& path);
+SplatFile read_ply(const std::string& path);
 
 /// As read_ply, of a file in memory.
 /// @param name  what error messages call it
-PlyScene decode_ply(std::span<const std::uint8_t> file, const std::string& name);
+SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name);
 
 /// Writes Gaussians as binary little-endian floats, INRIA's properties in INRIA's order, normals zero; in one step (see
 /// AtomicFile). An origin is added to the means.

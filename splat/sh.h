@@ -3,12 +3,10 @@
 //   colour = max(0, ½ + Σ_k Y_k(r) sh_k),   r = (m − c)/|m − c|, world axes, from the camera to the Gaussian
 #pragma once
 
+#include "splat/sh_basis.h"
 #include "splat/view.h"
 
 namespace hsi4d {
-
-/// Y_0, the constant basis function.
-inline constexpr double kShC0 = 0.28209479177387814;
 
 /// Colours as the camera Exp(ξ) · view.camera sees them.
 ///

@@ -54,7 +54,7 @@ void check_finite(const std::string& path, const std::vector<double>& values, in
 }
 
 /// Rows of `width` numbers put at the file's rows, zeros elsewhere.
-std::vector<double> at_file_rows(const std::vector<double>& kept, const PlyReport& report, std::size_t width) {
+std::vector<double> at_file_rows(const std::vector<double>& kept, const SplatReport& report, std::size_t width) {
   std::vector<double> all(static_cast<std::size_t>(report.rows) * width, 0.0);
   for (std::size_t n = 0; n < report.row_of.size(); ++n)
     std::copy_n(kept.begin() + static_cast<std::ptrdiff_t>(n * width), width,
@@ -63,12 +63,12 @@ std::vector<double> at_file_rows(const std::vector<double>& kept, const PlyRepor
 }
 
 /// A number that the reader held at a limit does not move what is drawn (row A5).
-void zero_held(SceneGradients& g, const PlyReport& report) {
+void zero_held(SceneGradients& g, const SplatReport& report) {
   for (const Index i : report.held_log_scales) g.log_scales[static_cast<std::size_t>(i)] = 0;
   for (const Index i : report.held_opacity_logits) g.opacity_logits[static_cast<std::size_t>(i)] = 0;
 }
 
-void write_gradients(const std::string& path, const SceneGradients& g, const PlyScene& scene, Precision precision) {
+void write_gradients(const std::string& path, const SceneGradients& g, const SplatFile& scene, Precision precision) {
   const Index n = scene.report.rows, k = scene.gaussians.sh_coefficients();
   const Index height = g.rendered.height, width = g.rendered.width;
   NpzWriter npz;
@@ -119,7 +119,7 @@ std::string gradients_command(const GradientsOptions& options) {
   const SceneView view = view_of(options.shared, "hsi4d gradients");
   check_writable(options.out);
   const std::vector<double> target = read_target(options.target, view.camera.height, view.camera.width);
-  const PlyScene scene = read_scene(options.shared.scene);
+  const SplatFile scene = read_scene(options.shared.scene);
   SceneGradients gradients = scene_gradients(scene.gaussians, view, target);
   zero_held(gradients, scene.report);
   write_gradients(options.out, gradients, scene, view.precision);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/exr.h"
@@ -11,7 +13,7 @@
 #include "core/suggest.h"
 #include "pipelines/cli/text.h"
 #include "splat/info.h"
-#include "splat/io_ply.h"
+#include "splat/splat_file.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -21,14 +23,53 @@ std::string distribution_text(const Distribution& d) {
          short_number(d.percentile_95) + ", " + short_number(d.largest);
 }
 
-std::string ply_info(const std::string& path) {
-  const PlyScene scene = read_ply(path);
-  const GaussianStatistics s = statistics_of(scene.gaussians);
+/// "12.3 %", or "0" for none.
+std::string share_text(Index count, Index all) {
+  return count == 0 ? "0" : short_number(100 * static_cast<double>(count) / static_cast<double>(all)) + " %";
+}
+
+std::string histogram_text(const std::string& name, const Histogram& h) {
+  constexpr Index kWidest = 40;
+  Index all = 0, most = 1;
+  for (const Index count : h.counts) all += count, most = std::max(most, count);
+  std::string text;
+  for (std::size_t i = 0; i < h.counts.size(); ++i) {
+    std::string range = short_number(h.edges[i]) + " to " + short_number(h.edges[i + 1]);
+    range.resize(std::max<std::size_t>(range.size(), 18), ' ');
+    std::string share = share_text(h.counts[i], all);
+    share.resize(std::max<std::size_t>(share.size() + 1, 11), ' ');
+    const Index width = (h.counts[i] * kWidest + most - 1) / most;  // at least one where there is one
+    std::string line = (i == 0 ? name : std::string(name.size(), ' ')) + range + " " + share +
+                       std::string(static_cast<std::size_t>(width), '#');
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += "  " + line + "\n";
+  }
+  return text;
+}
+
+Counts suspicion_counts(const Suspicions& s) {
+  Counts found;
+  const auto add = [&found](const char* what, Index count) {
+    if (count > 0) found.emplace_back(what, count);
+  };
+  add("at the place of an earlier one", s.duplicates);
+  add("fainter than 1/255", s.transparent);
+  add("larger than the scene", s.huge);
+  add("needles (100 : 1)", s.needles);
+  return found;
+}
+
+std::string splat_info(const std::string& path) {
+  const SplatFile file = read_splats(path);
+  const GaussianStatistics s = statistics_of(file.gaussians);
   std::string text = path + ": " + std::to_string(s.count) + " Gaussians, spherical harmonics of degree " +
-                     std::to_string(s.sh_degree) + "\n";
-  const std::string left_out = summary_text(scene.report);
-  if (!left_out.empty()) text += "  " + left_out + "\n";
+                     std::to_string(s.sh_degree) + ", " + file.report.format + "\n";
+  const std::string faults = summary_text(file.report);
+  text += "  faults   " + (faults.empty() ? "none" : faults) + "\n";
+  for (const std::string& note : file.report.notes) text += "  note     " + note + "\n";
   if (s.count == 0) return text;
+  const Counts suspicious = suspicion_counts(s.suspicions);
+  if (!suspicious.empty()) text += "  notice   " + counts_text(suspicious) + "\n";
   text += "  bounds   ";
   for (int c = 0; c < 3; ++c)
     text += std::string(c > 0 ? ", " : "") + "xyz"[c] + " " + short_number(s.lower_world[c]) + " to " +
@@ -36,7 +77,46 @@ std::string ply_info(const std::string& path) {
   text += " m\n";
   text += "  opacity  " + distribution_text(s.opacity) + "\n";
   text += "  scale    " + distribution_text(s.scale) + " m\n";
-  return text + "  (smallest, 5 %, median, 95 %, largest; scale: standard deviations along all axes)\n";
+  text += "  (smallest, 5 %, median, 95 %, largest; scale: standard deviations along all axes)\n";
+  text += histogram_text("opacity  ", s.opacity_histogram);
+  return text + histogram_text("scale    ", s.scale_histogram);
+}
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Distribution& d, const Histogram& h) {
+  return {{"smallest", d.smallest}, {"percentile_5", d.percentile_5},
+          {"median", d.median},     {"percentile_95", d.percentile_95},
+          {"largest", d.largest},   {"histogram", {{"edges", h.edges}, {"counts", h.counts}}}};
+}
+
+Json json_of(const Counts& counts) {
+  Json object = Json::object();
+  for (const auto& [reason, count] : counts) object[reason] = count;
+  return object;
+}
+
+/// As splat_info, for programs.
+std::string splat_json(const std::string& path) {
+  const SplatFile file = read_splats(path);
+  const SplatReport& report = file.report;
+  const GaussianStatistics s = statistics_of(file.gaussians);
+  Json json = {
+      {"file", path}, {"format", report.format}, {"rows", report.rows}, {"count", s.count}, {"sh_degree", s.sh_degree}};
+  json["faults"] = {
+      {"rejected", report.rejected}, {"rejections", json_of(report.rejections)}, {"repairs", json_of(report.repairs)}};
+  json["notes"] = report.notes;
+  json["suspicious"] = {{"duplicates", s.suspicions.duplicates},
+                        {"transparent", s.suspicions.transparent},
+                        {"huge", s.suspicions.huge},
+                        {"needles", s.suspicions.needles}};
+  if (s.count > 0) {
+    json["bounds"] = {{"lower", {s.lower_world[0], s.lower_world[1], s.lower_world[2]}},
+                      {"upper", {s.upper_world[0], s.upper_world[1], s.upper_world[2]}}};
+    json["opacity"] = json_of(s.opacity, s.opacity_histogram);
+    json["scale"] = json_of(s.scale, s.scale_histogram);
+  }
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string array_line(const std::string& name, const NpyArray& array) {
@@ -92,12 +172,17 @@ struct Kind {
   const char* ending;
   std::string (*info)(const std::string&);
 };
-constexpr Kind kKinds[] = {{".ply", ply_info},   {".npz", npz_info},   {".npy", npy_info},    {".json", camera_info},
-                           {".png", image_info}, {".jpg", image_info}, {".jpeg", image_info}, {".exr", exr_info}};
+constexpr Kind kKinds[] = {{".ply", splat_info},  {".splat", splat_info}, {".spz", splat_info}, {".npz", npz_info},
+                           {".npy", npy_info},    {".json", camera_info}, {".png", image_info}, {".jpg", image_info},
+                           {".jpeg", image_info}, {".exr", exr_info}};
 
 }  // namespace
 
-std::string info_command(const std::string& path) {
+std::string info_command(const std::string& path, bool json) {
+  if (json) {
+    if (has_splat_ending(path)) return splat_json(path);
+    throw UserError("hsi4d info: --json tells of Gaussians; allowed: .ply, .splat, .spz");
+  }
   const std::string ending = file_ending(path);
   std::vector<std::string> known;
   for (const Kind& kind : kKinds) {

@@ -5,10 +5,13 @@
 
 namespace hsi4d::cli {
 
-/// What a file holds, by its ending: Gaussians (.ply), arrays (.npz, .npy), cameras (.json), images (.png, .jpg, .jpeg,
-/// .exr). Returns what the command prints.
+/// What a file holds, by its ending: Gaussians (.ply, .splat, .spz), arrays (.npz, .npy), cameras (.json), images
+/// (.png, .jpg, .jpeg, .exr). Returns what the command prints.
 ///
+/// @param json  one JSON object instead of text: file, format, rows, count, sh_degree, faults, notes, suspicious,
+/// bounds,
+///              opacity and scale with their histograms. Gaussians only.
 /// Throws UserError for another ending, and what the file's reader throws.
-std::string info_command(const std::string& path);
+std::string info_command(const std::string& path, bool json = false);
 
 }  // namespace hsi4d::cli

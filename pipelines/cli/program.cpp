@@ -14,6 +14,7 @@
 #include "core/text.h"
 #include "core/version.h"
 #include "pipelines/cli/commands.h"
+#include "pipelines/cli/convert_command.h"
 #include "pipelines/cli/demo_command.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
@@ -43,7 +44,8 @@ struct CommandLine {
   CLI::App app{"4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d"};
   std::string config, topic, file, out;
   std::vector<std::string> overrides, runs;
-  bool print_config = false, quiet = false;
+  bool print_config = false, quiet = false, json = false;
+  ConvertOptions convert;
   RunArguments run_arguments;
   DemoArguments demo_arguments;
   std::vector<LossDescription> losses;
@@ -62,6 +64,7 @@ struct CommandLine {
     add_report();
     add_render();
     add_gradients();
+    add_convert();
     add_info();
     add_check();
     add_schema();
@@ -121,8 +124,34 @@ struct CommandLine {
 
   void add_info() {
     CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
-    info->add_option("FILE", file, "A .ply, .npz, .npy, .json, .png, .jpg, .jpeg or .exr file")->required();
-    info->callback([this] { run = [this] { return info_command(file); }; });
+    info->add_option("FILE", file, "A .ply, .splat, .spz, .npz, .npy, .json, .png, .jpg, .jpeg or .exr file")
+        ->required();
+    info->add_flag("--json", json, "Print one JSON object; for Gaussians");
+    info->callback([this] { run = [this] { return info_command(file, json); }; });
+  }
+
+  void add_convert() {
+    ConvertOptions& o = convert;
+    CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: .ply, .splat, .spz");
+    command.add_option("IN", o.in, "Gaussians: .ply (INRIA's or compressed), .splat or .spz")->required();
+    command.add_option("OUT", o.out, "Where to; the ending says how: .ply, .compressed.ply, .splat or .spz")
+        ->required();
+    command.add_option("--scale", o.scale, "Multiply lengths, about the origin, first")->type_name("S");
+    command.add_option("--rotate", o.rotate, "Turn about the origin, harmonics too: axis times angle in degrees")
+        ->type_name("x,y,z");
+    command.add_option("--translate", o.translate, "Move, last; metres")->type_name("x,y,z");
+    command
+        .add_option("--matrix", o.matrix, "Instead of the three: a 4x4 matrix row by row, 16 numbers apart by commas")
+        ->type_name("M");
+    command.add_option("--crop", o.crop, "Keep the Gaussians whose means are in this box of IN's coordinates")
+        ->type_name("x0,y0,z0,x1,y1,z1");
+    command.add_option("--min-opacity", o.min_opacity, "Leave out fainter Gaussians")->type_name("O");
+    command.add_option("--sh-degree", o.sh_degree, "Degree of the harmonics, 0 to 3")->type_name("N");
+    command.add_option("--spz-version", o.spz_version, "Version of .spz to write: 2, 3 or 4; 3 without")
+        ->type_name("N");
+    command.add_option("--spz-sh-bits", o.spz_sh_bits, "Bits of harmonics in .spz, degree 1 and above; 8,8 without")
+        ->type_name("A,B");
+    command.callback([this] { run = [this] { return convert_command(convert); }; });
   }
 
   void add_check() {
@@ -153,7 +182,7 @@ struct CommandLine {
     CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image");
     add_scene(command, render.shared);
     add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
-        ->type_name("F.ply");
+        ->type_name("F.{ply,splat,spz}");
     command.add_option("--motion", render.motion, "Motion of a body that is drawn too")->type_name("M.npz");
     command.add_option("--frame", render.frame, "Frame of the motion, from 0")->type_name("I");
     command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.npz");
@@ -181,7 +210,7 @@ struct CommandLine {
   }
 
   void add_scene(CLI::App& command, SceneOptions& options) {
-    command.add_option("--scene", options.scene, "Gaussians")->type_name("F.ply")->required();
+    command.add_option("--scene", options.scene, "Gaussians")->type_name("F.{ply,splat,spz}")->required();
     command.add_option("--camera", options.camera, "A camera, or nerfstudio's transforms.json")
         ->type_name("C.json")
         ->required();

@@ -65,8 +65,8 @@ SceneView view_of(const SceneOptions& options, const std::string& command) {
   return view;
 }
 
-PlyScene read_scene(const std::string& path) {
-  PlyScene scene = read_ply(path);
+SplatFile read_scene(const std::string& path) {
+  SplatFile scene = read_splats(path);
   const std::string text = summary_text(scene.report);
   if (!text.empty()) log_warning(path + ": " + text);
   return scene;

@@ -7,7 +7,7 @@
 
 #include "core/npz.h"
 #include "pipelines/scene_render.h"
-#include "splat/io_ply.h"
+#include "splat/splat_file.h"
 
 namespace hsi4d::cli {
 
@@ -35,7 +35,7 @@ RenderSettings render_settings(const std::vector<std::string>& overrides);
 std::array<double, 3> parse_color(const std::string& text, const std::string& where);
 
 /// Gaussians of a file; what the reader left out or put right goes to the log as a warning.
-PlyScene read_scene(const std::string& path);
+SplatFile read_scene(const std::string& path);
 
 /// Adds an array of numbers, float32 where the precision is float, else float64.
 void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,

@@ -1,6 +1,10 @@
 #include "pipelines/cli/text.h"
 
+#include <charconv>
+#include <cmath>
 #include <filesystem>
+
+#include "core/check.h"
 
 namespace hsi4d::cli {
 
@@ -12,6 +16,25 @@ std::string file_ending(const std::string& path) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
   return ending;
+}
+
+std::vector<double> parse_numbers(const std::string& text, std::size_t count, const std::string& where,
+                                  const std::string& names) {
+  std::vector<double> numbers;
+  const char* at = text.data();
+  const char* end = text.data() + text.size();
+  while (true) {
+    double number = 0;
+    const auto done = std::from_chars(at, end, number);
+    if (done.ec != std::errc() || !std::isfinite(number)) break;
+    numbers.push_back(number);
+    at = done.ptr;
+    if (at == end || *at != ',') break;
+    ++at;
+  }
+  if (at == end && numbers.size() == count) return numbers;
+  throw UserError(where + ": \"" + text + "\" is not understood; allowed: " + std::to_string(count) +
+                  " finite numbers " + names);
 }
 
 }  // namespace hsi4d::cli

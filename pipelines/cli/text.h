@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/text.h"
 
@@ -12,5 +13,12 @@ std::string short_number(double value);
 
 /// The ending of a path in lower case with its dot, ".ply"; "" without one.
 std::string file_ending(const std::string& path);
+
+/// As many finite numbers as asked for, apart by commas: "1,2.5,-3".
+/// @param where  starts the message: "hsi4d convert: --translate"
+/// @param names  what they are: "x,y,z"
+/// Throws UserError that names the text and what is allowed.
+std::vector<double> parse_numbers(const std::string& text, std::size_t count, const std::string& where,
+                                  const std::string& names);
 
 }  // namespace hsi4d::cli

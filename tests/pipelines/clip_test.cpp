@@ -9,6 +9,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "splat/io_ply.h"
+#include "splat/splat_file.h"
 #include "tests/pipelines/tiny_run.h"
 
 using namespace hsi4d;
@@ -56,14 +57,16 @@ TEST_CASE("a dataset's folder tells its inputs") {
   REQUIRE(data.objects.size() == 1);
   CHECK(data.objects[0].first == kTinyObject);
   CHECK(data.objects[0].second.gaussians == base / "objects" / "watering_can.ply");
-  for (const char* name : {"objects/b.ply", "objects/a.ply", "objects/notes.txt"})
+  for (const char* name : {"objects/b.ply", "objects/a.ply", "objects/c.spz", "objects/d.splat", "objects/notes.txt"})
     here.write(std::string("d/") + name, "");
-  const DataSettings other = dataset_inputs("d");  // relative, nothing there but two objects
+  const DataSettings other = dataset_inputs("d");  // relative, nothing there but objects
   CHECK(other.scene == here.path() / "d" / "scene.ply");
   CHECK(other.truth.empty());
-  REQUIRE(other.objects.size() == 2);
+  REQUIRE(other.objects.size() == 4);
   CHECK(other.objects[0].first == "a");
   CHECK(other.objects[1].first == "b");
+  CHECK(other.objects[2].first == "c");
+  CHECK(other.objects[3].first == "d");
   CHECK(dataset_inputs("nowhere").objects.empty());
 }
 
@@ -95,6 +98,25 @@ TEST_CASE("a clip has what the dataset's files have") {
   for (int y = 0; y < kTinyPixels; ++y) {
     for (int x = 0; x < kTinyPixels; ++x) REQUIRE(frame.human_mask(0, y, x) == human(0, y, x));
   }
+}
+
+TEST_CASE("scene and objects may be in any format of Gaussians") {
+  const CopiedDataset dataset;
+  DataSettings data = dataset_inputs(dataset.path);
+  const Clip plain = read_clip(data);
+  const auto convert = [](fs::path& file, const std::string& ending) {
+    const Gaussians g = read_splats(file.string()).gaussians;
+    file.replace_extension(ending);
+    write_splats(file.string(), g);
+  };
+  convert(data.scene, ".spz");
+  convert(data.objects[0].second.gaussians, ".splat");
+  const Clip packed = read_clip(data);
+  REQUIRE(packed.scene.count() == plain.scene.count());
+  for (std::size_t i = 0; i < plain.scene.means.size(); ++i)
+    REQUIRE(static_cast<double>(packed.scene.means[i]) ==
+            Approx(static_cast<double>(plain.scene.means[i])).margin(1e-5));
+  CHECK(packed.objects[0].gaussians.means == plain.objects[0].gaussians.means);
 }
 
 TEST_CASE("objects are about the centroid of their means, wherever their file has them") {

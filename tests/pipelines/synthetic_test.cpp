@@ -123,7 +123,7 @@ TEST_CASE("a synthetic dataset is complete, readable and true to itself") {
   const Gaussians room = read_ply("data/scene.ply").gaussians;
   CHECK(room.count() <= 1500);
   CHECK(room.count() > 1000);
-  const PlyScene object = read_ply("data/objects/watering_can.ply");
+  const SplatFile object = read_ply("data/objects/watering_can.ply");
   CHECK(object.report.rejected == 0);
   Vector3<double> sum = Vector3<double>::Zero();
   for (std::size_t i = 0; i < object.gaussians.means.size(); ++i)

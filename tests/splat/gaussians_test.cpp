@@ -72,3 +72,25 @@ TEST_CASE("Gaussians with different origins are not put together") {
   const std::array<const Gaussians*, 2> parts = {&a, &b};
   CHECK_THROWS_AS(concatenated(parts), InternalError);
 }
+
+TEST_CASE("rows of Gaussians are picked, harmonics cut and padded") {
+  Gaussians g = counted(5, 2, 0);
+  g.origin_world = {1, 2, 3};
+  const std::array<Index, 3> rows = {4, 0, 4};
+  const Gaussians picked = selected(g, rows);
+  check_sizes(picked);
+  CHECK(picked.origin_world == g.origin_world);
+  CHECK(picked.means[0] == g.means[12]);
+  CHECK(picked.means[3] == g.means[0]);
+  CHECK(picked.quats[11] == g.quats[19]);
+  CHECK(picked.sh[27 * 2 + 26] == g.sh[27 * 4 + 26]);
+  const std::array<Index, 1> none = {5};
+  CHECK_THROWS_AS(selected(g, none), InternalError);
+  const Gaussians less = with_sh_degree(g, 1), more = with_sh_degree(g, 3);
+  for (std::size_t n = 0; n < 5; ++n) {
+    for (std::size_t i = 0; i < 12; ++i) CHECK(less.sh[12 * n + i] == g.sh[27 * n + i]);
+    for (std::size_t i = 0; i < 48; ++i) CHECK(more.sh[48 * n + i] == (i < 27 ? g.sh[27 * n + i] : 0));
+  }
+  CHECK(with_sh_degree(g, 2).sh == g.sh);
+  CHECK_THROWS_AS(with_sh_degree(g, 4), InternalError);
+}

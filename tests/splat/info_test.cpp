@@ -42,3 +42,24 @@ TEST_CASE("statistics of Gaussians are of activated numbers in the world") {
   CHECK(s.scale.largest == Approx(2));
   CHECK(statistics_of(Gaussians{}).count == 0);
 }
+
+TEST_CASE("histograms count every number once") {
+  const std::vector<float> values = {-5, 0, 0.5F, 1, 1.5F, 2, 7};
+  const Histogram h = histogram_of(values, {0, 1, 2});
+  CHECK(h.counts == std::vector<Index>{3, 4});  // an edge belongs to the bin above it, the last one to the last
+  Gaussians g;
+  g.means.resize(6);
+  g.quats.resize(8);
+  g.log_scales = {0, 0, 0, std::log(0.02F), 0, std::log(30.0F)};
+  g.opacity_logits = {-20, 20};
+  g.sh.resize(6);
+  const GaussianStatistics s = statistics_of(g);
+  CHECK(s.opacity_histogram.counts == std::vector<Index>{1, 0, 0, 0, 0, 0, 0, 0, 0, 1});
+  CHECK(s.scale_histogram.edges.size() == 5);
+  CHECK(s.scale_histogram.edges.front() == Approx(0.01));
+  CHECK(s.scale_histogram.edges.back() == Approx(100));
+  CHECK(s.scale_histogram.counts == std::vector<Index>{1, 0, 4, 1});
+  CHECK(s.suspicions.duplicates == 1);
+  CHECK(s.suspicions.transparent == 1);
+  CHECK(s.suspicions.huge == 0);  // all at one place: there is no scene to be larger than
+}

@@ -70,7 +70,7 @@ std::vector<std::string> floats(std::vector<std::string> names) {
   return names;
 }
 
-PlyScene decode(const std::string& text) {
+SplatFile decode(const std::string& text) {
   return decode_ply({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, "a.ply");
 }
 
@@ -95,7 +95,7 @@ TEST_CASE("Gaussians are written to PLY and read back bitwise") {
     g.means[1] = 1e-42F;  // a denormal
     g.sh[0] = 3e38F;
     write_ply(folder / "g.ply", g);
-    const PlyScene scene = read_ply(folder / "g.ply");
+    const SplatFile scene = read_ply(folder / "g.ply");
     check_same(scene.gaussians, g);
     CHECK(scene.gaussians.origin_world == Vector3<double>::Zero());
     CHECK(scene.report.rows == 17);
@@ -205,7 +205,7 @@ TEST_CASE("rows that cannot be used are left out and counted, the others know th
   g.sh[12 * 8 + 11] = kNan;
   g.sh[12 * 9] = kInf;
   g.means[3 * 9] = kInf;  // counts once, under its first reason
-  const PlyScene scene = decode_ply(encode_ply(g), "a.ply");
+  const SplatFile scene = decode_ply(encode_ply(g), "a.ply");
   CHECK(scene.report.rows == 12);
   CHECK(scene.report.rejected == 9);
   CHECK(scene.report.row_of == std::vector<Index>{0, 10, 11});
@@ -226,7 +226,7 @@ TEST_CASE("exponents that would overflow are held and counted") {
   g.log_scales[0] = -37;
   g.log_scales[1] = -20;
   g.log_scales[2] = 88;
-  const PlyScene scene = decode_ply(encode_ply(g), "a.ply");
+  const SplatFile scene = decode_ply(encode_ply(g), "a.ply");
   CHECK(scene.gaussians.count() == 5);
   CHECK(scene.gaussians.opacity_logits == std::vector<float>{20, -20, 20, 20, -20});
   CHECK(scene.gaussians.log_scales[0] == -20);
@@ -305,7 +305,7 @@ TEST_CASE("every byte of a small file flipped gives an error or a checked scene"
       std::vector<std::uint8_t> damaged = whole;
       damaged[at] = static_cast<std::uint8_t>(damaged[at] ^ mask);
       try {
-        const PlyScene scene = decode_ply(damaged, "a.ply");
+        const SplatFile scene = decode_ply(damaged, "a.ply");
         check_sizes(scene.gaussians);
         REQUIRE(scene.gaussians.count() + scene.report.rejected == 10);
         ++taken;
@@ -348,7 +348,7 @@ TEST_CASE("real scenes are read whole") {
   for (const Known& known : {Known{"playbot_scene_ground.ply", 104575, 2}, Known{"playbot_object_robot.ply", 20425, 3},
                              Known{"garden_sfm_init.ply", 138766, 0}, Known{"formats/3pts.ply", 3, 3}}) {
     INFO(known.file);
-    const PlyScene scene = read_ply(folder + "/" + known.file);
+    const SplatFile scene = read_ply(folder + "/" + known.file);
     check_sizes(scene.gaussians);
     CHECK(scene.report.rows == known.count);
     CHECK(scene.gaussians.count() == known.count);

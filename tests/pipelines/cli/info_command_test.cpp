@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
 #include "core/camera_file.h"
 #include "core/check.h"
@@ -27,14 +28,34 @@ TEST_CASE("info tells what is in a file") {
   g.sh.resize(36);
   write_ply("g.ply", g);
   CHECK(cli::info_command("g.ply") ==
-        "g.ply: 2 Gaussians, spherical harmonics of degree 1\n"
-        "  1 of 3 Gaussians are left out (a mean that is not finite: 1); log-scales held within ±20: 1\n"
+        "g.ply: 2 Gaussians, spherical harmonics of degree 1, INRIA PLY\n"
+        "  faults   1 of 3 Gaussians are left out (a mean that is not finite: 1); log-scales held within ±20: 1\n"
         "  bounds   x -1 to 1, y 2 to 5, z 0 to 3 m\n"
         "  opacity  0.5, 0.5, 0.5, 0.5, 0.5\n"
         "  scale    2.061e-09, 2.061e-09, 1, 1, 1 m\n"
-        "  (smallest, 5 %, median, 95 %, largest; scale: standard deviations along all axes)\n");
+        "  (smallest, 5 %, median, 95 %, largest; scale: standard deviations along all axes)\n"
+        "  opacity  0 to 0.1           0\n"
+        "           0.1 to 0.2         0\n"
+        "           0.2 to 0.3         0\n"
+        "           0.3 to 0.4         0\n"
+        "           0.4 to 0.5         0\n"
+        "           0.5 to 0.6         100 %      ########################################\n"
+        "           0.6 to 0.7         0\n"
+        "           0.7 to 0.8         0\n"
+        "           0.8 to 0.9         0\n"
+        "           0.9 to 1           0\n"
+        "  scale    1e-09 to 1e-08     16.67 %    ########\n"
+        "           1e-08 to 1e-07     0\n"
+        "           1e-07 to 1e-06     0\n"
+        "           1e-06 to 1e-05     0\n"
+        "           1e-05 to 0.0001    0\n"
+        "           0.0001 to 0.001    0\n"
+        "           0.001 to 0.01      0\n"
+        "           0.01 to 0.1        0\n"
+        "           0.1 to 1           83.33 %    ########################################\n");
   write_ply("none.PLY", Gaussians{});
-  CHECK(cli::info_command("none.PLY") == "none.PLY: 0 Gaussians, spherical harmonics of degree 0\n");
+  CHECK(cli::info_command("none.PLY") ==
+        "none.PLY: 0 Gaussians, spherical harmonics of degree 0, INRIA PLY\n  faults   none\n");
 
   NpzWriter npz;
   npz.add<float>("weights", {2, 3}, std::vector<float>(6));
@@ -62,7 +83,7 @@ TEST_CASE("info tells what is in a file") {
 
   CHECK_THROWS_MATCHES(cli::info_command("a.plly"), UserError,
                        Message("hsi4d info: a.plly: nothing is known of files that end in \".plly\"; allowed: .ply, "
-                               ".npz, .npy, .json, .png, .jpg, .jpeg, .exr; did you mean \".ply\"?"));
+                               ".splat, .spz, .npz, .npy, .json, .png, .jpg, .jpeg, .exr; did you mean \".ply\"?"));
   const ProgramResult missing = run_hsi4d({"info", "missing.ply"});
   CHECK(missing.status == 2);
   CHECK(missing.out.empty());
@@ -70,4 +91,60 @@ TEST_CASE("info tells what is in a file") {
   const ProgramResult done = run_hsi4d({"info", "a.npz"});
   CHECK(done.status == 0);
   CHECK(done.out == cli::info_command("a.npz"));
+}
+
+TEST_CASE("info names what is allowed and seldom meant") {
+  const TemporaryFolder folder;
+  Gaussians g;
+  for (int i = 0; i < 20; ++i) {
+    g.means.insert(g.means.end(), {static_cast<float>(i), 0, 0});
+    g.quats.insert(g.quats.end(), {1, 0, 0, 0});
+    g.log_scales.insert(g.log_scales.end(), {-3, -3, -3});
+    g.opacity_logits.push_back(0);
+    g.sh.insert(g.sh.end(), {0, 0, 0});
+  }
+  write_ply("g.ply", g);
+  CHECK(cli::info_command("g.ply").find("notice") == std::string::npos);
+  g.means[3] = 0;            // where the first one is
+  g.opacity_logits[2] = -6;  // 0.0025
+  g.log_scales[9] = 4;       // 54 m in a scene of 18; and a needle
+  g.log_scales[12] = 1.7F;   // a needle
+  write_ply("g.ply", g);
+  CHECK_THAT(
+      cli::info_command("g.ply"),
+      Catch::Matchers::Contains("  notice   at the place of an earlier one: 1, fainter than 1/255: 1, larger than "
+                                "the scene: 1, needles (100 : 1): 2\n"));
+}
+
+TEST_CASE("info gives Gaussians as JSON") {
+  const TemporaryFolder folder;
+  Gaussians g;
+  g.means = {1, 2, 3, -1, 5, 0, 0, 0, NAN};
+  g.quats = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+  g.log_scales = {0, 0, -30, 0, 0, 0, 0, 0, 0};
+  g.opacity_logits = {0, 0, 0};
+  g.sh.resize(9);
+  write_ply("g.ply", g);
+  const ProgramResult done = run_hsi4d({"info", "--json", "g.ply"});
+  CHECK(done.status == 0);
+  const auto json = nlohmann::json::parse(done.out);
+  CHECK(json["file"] == "g.ply");
+  CHECK(json["format"] == "INRIA PLY");
+  CHECK(json["rows"] == 3);
+  CHECK(json["count"] == 2);
+  CHECK(json["sh_degree"] == 0);
+  CHECK(json["faults"]["rejected"] == 1);
+  CHECK(json["faults"]["rejections"] == nlohmann::json({{"a mean that is not finite", 1}}));
+  CHECK(json["faults"]["repairs"] == nlohmann::json({{"log-scales held within ±20", 1}}));
+  CHECK(json["bounds"]["lower"] == nlohmann::json({-1, 2, 0}));
+  CHECK(json["bounds"]["upper"] == nlohmann::json({1, 5, 3}));
+  CHECK(json["opacity"]["median"] == 0.5);
+  CHECK(json["opacity"]["histogram"]["counts"] == nlohmann::json({0, 0, 0, 0, 0, 2, 0, 0, 0, 0}));
+  CHECK(json["scale"]["histogram"]["edges"].size() == json["scale"]["histogram"]["counts"].size() + 1);
+  CHECK(json["suspicious"]["duplicates"] == 0);
+  CHECK(json["notes"].empty());
+  write_ply("none.ply", Gaussians{});
+  CHECK(nlohmann::json::parse(cli::info_command("none.ply", true))["count"] == 0);
+  CHECK_THROWS_WITH(cli::info_command("a.npz", true),
+                    "hsi4d info: --json tells of Gaussians; allowed: .ply, .splat, .spz");
 }
