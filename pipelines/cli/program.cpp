@@ -219,7 +219,7 @@ struct CommandLine {
         "that the reader leaves out (a number that is not finite, a zero quaternion); log-scales and opacity logits\n"
         "that it holds at -20 or 20; coefficients above render.sh_degree; what the camera does not see.\n"
         "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
-        "render.compatibility is inria.");
+        "render.cap_gradient is pass (render.compatibility=inria makes it so).");
     command.callback([this] { run = [this] { return gradients_command(gradients); }; });
   }
 

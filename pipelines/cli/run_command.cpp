@@ -20,7 +20,7 @@ std::string folder_of(const RunArguments& arguments, const RunConfig& config) {
 std::string plan(const RunConfig& config, const std::string& folder) {
   check_run(config);
   const Clip clip = read_clip(config.data);
-  check_frames(config.data, clip);
+  check_frames(config.data, clip, has_loss(config, "center"));
   std::string text = "would write " + folder + "\n";
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
           std::to_string(clip.camera.height) + ", scene of " + std::to_string(clip.scene.count()) +

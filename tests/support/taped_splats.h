@@ -176,6 +176,13 @@ class TapedSplats {
     if (!request.groups.empty()) add_term(rendered.group_opacity, cotangent.groups);
   }
 
+  /// All that may be written, but for the weights of the loss.
+  std::vector<Var<S>> leaves() const {
+    std::vector<Var<S>> all = {means, quats, log_scales, opacity_logits, sh, xi, background};
+    if (transforms.tape != nullptr) all.push_back(transforms);
+    return all;
+  }
+
   void run() {
     tape.forward(loss);
     tape.backward(loss);
