@@ -436,24 +436,10 @@ struct Composite {
     counters->times.backward_s = watch.lap();
     parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) {
-          if (n + kAhead < end) fetch_slots(lists.slots[n + kAhead], shared);
-          gather_gaussian(io, shared, n);
-        }
+        for (Index n = begin; n < end; ++n) gather_gaussian(io, shared, n);
       });
     });
     counters->times.reduce_s = watch.lap();
-  }
-
-  static constexpr Index kAhead = 10;
-
-  /// Slots are in depth order, and those of Gaussians that follow each other here lie far apart.
-  void fetch_slots(TileLists::Slots slots, const TileAdjoint<S>& adjoint) const {
-    constexpr Index kLine = 64 / static_cast<Index>(sizeof(S)), kMostLines = 6;
-    __builtin_prefetch(&lists.tile_of[slots.begin]);
-    const S* const begin = adjoint.sums + slots.begin * adjoint.stride;
-    const Index size = std::min((slots.end - slots.begin) * adjoint.stride, kMostLines * kLine);
-    for (Index i = 0; i < size; i += kLine) __builtin_prefetch(begin + i);
   }
 
   /// True if the Gaussian does not come after the last one of a tile that is composited.

@@ -239,8 +239,8 @@ Index TileLists::find(std::span<const DepthKeyed> order, std::span<const Extent>
   return total;
 }
 
-/// tile_begin, tile_groups; counts_ become where each chunk's entries of a tile begin. Row by row: a column of counts_ lies
-/// in as many cache lines as there are chunks.
+/// tile_begin, tile_groups; counts_ become where each chunk's entries of a tile begin. Row by row: a column of counts_
+/// lies in as many cache lines as there are chunks.
 void TileLists::place_tiles(Index tiles, Index chunks) {
   tile_begin.resize(tiles + 1);
   tile_groups.resize(tiles);
@@ -271,22 +271,24 @@ void TileLists::fill(std::span<const DepthKeyed> order, const TileGrid& grid) {
   const Partition part = list_partition(static_cast<Index>(order.size()));
   entries.resize(tile_begin[tiles]);
   tile_of.resize(tile_begin[tiles]);
-  std::array<std::uint32_t, kMostChunks> first{};
-  for (Index chunk = 1; chunk < part.chunks(); ++chunk) {
-    const auto c = static_cast<std::size_t>(chunk);
-    first[c] = first[c - 1] + static_cast<std::uint32_t>(found_[c - 1].size());
+  // Slots in the order of the inputs: those of Gaussians that follow each other are then read one after the other.
+  std::uint32_t slot = 0;
+  for (Slots& s : slots.span()) {
+    const std::uint32_t size = s.end - s.begin;
+    s = {slot, slot + size};
+    slot += size;
   }
   parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
     std::uint32_t* const of_tile = counts_.data() + chunk * tiles;
     const FoundPair* pair = found_[static_cast<std::size_t>(chunk)].data();
-    std::uint32_t slot = first[static_cast<std::size_t>(chunk)];
+    const auto index_at = [&](Index rank) { return order[static_cast<std::size_t>(rank)].index; };
     for (Index rank = begin; rank < end; ++rank) {
-      const std::int32_t n = order[static_cast<std::size_t>(rank)].index;
-      const std::uint32_t size = slots[n].end - slots[n].begin;
-      slots[n] = {slot, slot + size};
-      for (const std::uint32_t after = slot + size; slot < after; ++slot, ++pair) {
-        entries[of_tile[pair->tile]++] = {n, slot, pair->blocks};
-        tile_of[slot] = pair->tile;
+      if (rank + 2 * kAhead < end) fetch(&slots[index_at(rank + 2 * kAhead)]);
+      if (rank + kAhead < end) fetch(&tile_of[slots[index_at(rank + kAhead)].begin]);
+      const std::int32_t n = index_at(rank);
+      for (std::uint32_t at = slots[n].begin; at < slots[n].end; ++at, ++pair) {
+        entries[of_tile[pair->tile]++] = {n, at, pair->blocks};
+        tile_of[at] = pair->tile;
       }
     }
   });

@@ -178,7 +178,7 @@ class TileLists {
   };
   Buffer<Index> tile_begin;       ///< [tiles + 1] into entries
   Buffer<Index> tile_groups;      ///< [tiles] (block, Gaussian) pairs
-  Buffer<Slots> slots;            ///< [N] of each Gaussian; none of those that are not in the order
+  Buffer<Slots> slots;            ///< [N] of each Gaussian, in the order of the rows; none of those not in `order`
   Buffer<std::uint32_t> tile_of;  ///< [pairs] tile of a slot
   Buffer<TileEntry> entries;
 

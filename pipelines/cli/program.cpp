@@ -10,6 +10,7 @@
 
 #include "core/check.h"
 #include "core/log.h"
+#include "core/simd.h"
 #include "core/suggest.h"
 #include "core/text.h"
 #include "core/version.h"
@@ -307,6 +308,7 @@ int run_program(int argc, const char* const* argv, const std::vector<LossTerm>& 
                        static_cast<int>(message.size()), message.data());
         },
         LogLevel::kInfo);
+    best_isa();  // before any kernel runs
     run_commands(argc, argv, losses);
     return kDone;
   } catch (...) {

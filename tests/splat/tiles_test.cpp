@@ -303,10 +303,16 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
   }
   std::vector<std::vector<TileEntry>> expected(static_cast<std::size_t>(grid.count()));
   std::vector<Index> groups(static_cast<std::size_t>(grid.count()), 0);
-  std::uint32_t slot = 0;
+  std::vector<std::uint32_t> next_slot(extents.size() + 1, 0);  // slots are in the order of rows
+  for (std::size_t n = 0; n < extents.size(); ++n) {
+    next_slot[n + 1] = next_slot[n];
+    if (n % 7 != 0) for_each_tile(extents[n], grid, [&](Index, std::uint32_t) { ++next_slot[n + 1]; });
+  }
+  const std::uint32_t slot = next_slot.back();
   for (const DepthKeyed& d : order) {
     for_each_tile(extents[static_cast<std::size_t>(d.index)], grid, [&](Index tile, std::uint32_t blocks) {
-      expected[static_cast<std::size_t>(tile)].push_back({d.index, slot++, blocks});
+      expected[static_cast<std::size_t>(tile)].push_back(
+          {d.index, next_slot[static_cast<std::size_t>(d.index)]++, blocks});
       groups[static_cast<std::size_t>(tile)] += std::popcount(blocks);
     });
   }
