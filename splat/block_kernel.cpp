@@ -841,13 +841,16 @@ void backward(Index side, const CompositeScene<float>& scene, const BlockJob& jo
   const BlockWorkspace space(job.workspace, channels);
   const Index stride = block_slot(channels), state_size = (1 + channels) * kBlockPixels;
   for (Index b = 0; b < blocks; ++b) from_rows(adjoint.d_transmittance, side, b, space.state + b * state_size);
+  bool reached = false;  // some chunk behind this one was composited: every slot of this one is then read
   for (Index number = block_chunks(static_cast<Index>(job.entries.size())) - 1; number >= 0; --number) {
     const BlockRun* const runs = job.runs + number * blocks;
-    if (std::all_of(runs, runs + blocks, [](const BlockRun& run) { return run.end == 0; })) continue;
+    const bool used = std::any_of(runs, runs + blocks, [](const BlockRun& run) { return run.end > 0; });
+    if (!used && !reached) continue;
     const Chunk chunk = pack_chunk(side, scene, job, number, space);
     const Index size = static_cast<Index>(chunk.entries.size());
     std::memset(space.sums, 0, static_cast<size_t>((size + 1) * stride) * sizeof(float));
-    Index chunk_end = 0;
+    Index chunk_end = reached ? size : 0;
+    reached = true;
     for (Index b = 0; b < blocks; ++b) {
       if (runs[b].end == 0) continue;
       const Index n = make_list(chunk, b, space);
