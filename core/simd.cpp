@@ -6,6 +6,9 @@
 #include <string>
 #include <string_view>
 
+#include <hwy/highway.h>
+#include <hwy/targets.h>
+
 #include "core/check.h"
 
 namespace hsi4d {
@@ -25,11 +28,20 @@ Isa supported_isa() {
   return Isa::kBaseline;
 }
 
+/// Highway's kernels too take no more than `isa`.
+void hold_highway(Isa isa) {
+  // Better targets are lower bits.
+  if (isa == Isa::kAvx2) hwy::SetSupportedTargetsForTest(~(static_cast<std::int64_t>(HWY_AVX2) - 1));
+  if (isa == Isa::kBaseline) hwy::SetSupportedTargetsForTest(HWY_STATIC_TARGET);
+}
+
 Isa choose_isa() {
   const char* wish = std::getenv("HSI4D_ISA");
   if (wish == nullptr || *wish == '\0') return supported_isa();
   for (const Isa isa : kAll) {
-    if (std::string_view(wish) == isa_name(isa)) return std::min(isa, supported_isa());
+    if (std::string_view(wish) != isa_name(isa)) continue;
+    hold_highway(isa);
+    return std::min(isa, supported_isa());
   }
   throw UserError("environment variable HSI4D_ISA: '" + std::string(wish) +
                   "' is unknown; allowed: baseline, avx2, avx512");

@@ -11,7 +11,8 @@ namespace hsi4d {
 
 enum class Isa { kBaseline, kAvx2, kAvx512 };
 
-/// The best instruction set of this processor, or the lower one that HSI4D_ISA=baseline|avx2|avx512 asks for.
+/// The best instruction set of this processor, or the lower one that HSI4D_ISA=baseline|avx2|avx512 asks for; Highway's
+/// kernels are held to it as well, if this is called before the first of them runs.
 Isa best_isa();
 
 /// "baseline", "avx2" or "avx512".

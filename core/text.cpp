@@ -1,5 +1,6 @@
 #include "core/text.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -29,6 +30,58 @@ std::string four_digits(std::int64_t number) {
   std::string digits = std::to_string(number);
   if (digits.size() < 4) digits.insert(0, 4 - digits.size(), '0');
   return digits;
+}
+
+std::size_t utf8_length(std::string_view text) {
+  if (text.empty()) return 0;
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(text[i])); };
+  const unsigned lead = byte(0);
+  if (lead < 0x80) return 1;
+  const std::size_t length = lead >> 5U == 6 ? 2 : lead >> 4U == 14 ? 3 : lead >> 3U == 30 ? 4 : 0;
+  if (length == 0 || length > text.size()) return 0;
+  unsigned code = lead & (0x7fU >> length);
+  for (std::size_t i = 1; i < length; ++i) {
+    if (byte(i) >> 6U != 2) return 0;
+    code = code << 6U | (byte(i) & 0x3fU);
+  }
+  constexpr std::array<unsigned, 5> kFirst = {0, 0, 0x80, 0x800, 0x10000};  // that needs so many bytes
+  const bool is_half = code >= 0xd800 && code < 0xe000;
+  return code >= kFirst[length] && code < 0x110000 && !is_half ? length : 0;
+}
+
+namespace {
+
+/// As utf8_length, and 0 for control characters.
+std::size_t plain_length(std::string_view text) {
+  const std::size_t length = utf8_length(text);
+  return length == 1 && (static_cast<unsigned char>(text[0]) < 0x20 || text[0] == 0x7f) ? 0 : length;
+}
+
+}  // namespace
+
+bool is_plain_text(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t length = plain_length(text);
+    if (length == 0) return false;
+    text.remove_prefix(length);
+  }
+  return true;
+}
+
+std::string with_escapes(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string escaped;
+  while (!text.empty()) {
+    const std::size_t length = plain_length(text);
+    if (length == 0) {
+      const auto byte = static_cast<unsigned char>(text[0]);
+      escaped += {'\\', 'x', kDigits[byte >> 4U], kDigits[byte & 15U]};
+    } else {
+      escaped += text.substr(0, length);
+    }
+    text.remove_prefix(std::max<std::size_t>(length, 1));
+  }
+  return escaped;
 }
 
 }  // namespace hsi4d

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace hsi4d {
 
@@ -18,5 +19,15 @@ std::string number_text(double value);
 
 /// A number of frame, row or file, with zeros before it to have at least four digits: "0007".
 std::string four_digits(std::int64_t number);
+
+/// Bytes of the character that text begins with, 1 to 4; 0 where it begins with none: empty, or not UTF-8 (overlong and
+/// cut sequences and halves of surrogate pairs are not).
+std::size_t utf8_length(std::string_view text);
+
+/// Whether it is UTF-8 without control characters: something that every terminal, file and JSON text can hold.
+bool is_plain_text(std::string_view text);
+
+/// The text with every byte that is not of a plain character as \xNN.
+std::string with_escapes(std::string_view text);
 
 }  // namespace hsi4d

@@ -1,12 +1,21 @@
 // Loss terms: what they may read, and how they are listed. docs/adding_a_loss.md shows how to write one.
 #pragma once
 
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "autodiff/tape.h"
 #include "optim/loss_description.h"
 
 namespace hsi4d {
+
+/// Objects that a term may leave out of its sum, though its inputs are given.
+struct LeftOut {
+  std::string term, reason;
+  Index objects = 0;
+  std::function<bool(Index object)> is_left_out;  ///< in the tape's last forward run
+};
 
 /// What a loss term may read, by name. A Var without a tape stands for what the stage does not have; `given` asks.
 /// Every input may carry a gradient. O counts the moving objects.
@@ -21,6 +30,8 @@ struct LossInputs {
                                 ///< 1, or 0 where the frame shows none of it
   Var<S> object_depth;          ///< [O,1] mean camera z of each object's Gaussian centres, metres
   Var<S> object_depth_target;   ///< [O,1] what it was in the clip's first frame, metres
+
+  std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
 
   static bool given(Var<S> input) { return input.tape != nullptr; }
 };

@@ -25,6 +25,7 @@ struct RecordedLoss {
   std::vector<Var<S>> terms;
   std::vector<LossValue> values;  // of `terms`
   std::vector<std::string> off;
+  std::vector<LeftOut> left_out;
 };
 
 const LossTerm& term_named(const std::string& name, std::span<const LossTerm> terms, const std::string& stage) {
@@ -41,12 +42,14 @@ template <class S>
 RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossTerm> terms, const LossInputs<S>& inputs,
                             const std::string& stage) {
   RecordedLoss<S> loss;
+  LossInputs<S> asking = inputs;
+  asking.left_out = &loss.left_out;
   std::vector<std::string> reasons;
   for (const auto& [name, chosen] : settings.losses) {
     const LossTerm& term = term_named(name, terms, stage);
     const Var<S> value = chosen.weight == 0
                              ? Var<S>{}
-                             : term.record(inputs, chosen.own.has_value() ? chosen.own : term.description.defaults);
+                             : term.record(asking, chosen.own.has_value() ? chosen.own : term.description.defaults);
     if (value.tape == nullptr) {
       loss.off.push_back(name);
       reasons.push_back(name + (chosen.weight == 0 ? " has weight 0" : " lacks an input"));
@@ -131,6 +134,7 @@ class StageRun {
         loss_(record_loss(settings, terms, inputs, options.name)),
         adam_(tape, groups_, settings.optimizer) {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
+    for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
     if (options.kept == nullptr) return;
     for (const AdamGroup<S>& group : groups_) {
       const auto kept = options.kept->find(group.parameters.name);
@@ -145,8 +149,8 @@ class StageRun {
     evaluate_the_end();
     keep_moments();
     return {
-        settings_.iterations, evaluated_loss(), loss_.values, std::move(loss_.off), adam_.rollbacks() + undone_at_end_,
-        seconds_since(start)};
+        settings_.iterations, evaluated_loss(),  loss_.values, std::move(loss_.off), adam_.rollbacks() + undone_at_end_,
+        seconds_since(start), left_out_objects()};
   }
 
  private:
@@ -186,6 +190,22 @@ class StageRun {
     for (std::size_t k = 0; k < loss_.terms.size(); ++k) {
       loss_.values[k].value = static_cast<double>(tape_.value(loss_.terms[k]).scalar());
     }
+    for (std::size_t k = 0; k < loss_.left_out.size(); ++k) {
+      for (Index o = 0; o < loss_.left_out[k].objects; ++o) {
+        if (loss_.left_out[k].is_left_out(o)) ++left_out_[k][static_cast<std::size_t>(o)];
+      }
+    }
+  }
+
+  std::vector<LeftOutObject> left_out_objects() const {
+    std::vector<LeftOutObject> objects;
+    for (std::size_t k = 0; k < left_out_.size(); ++k) {
+      for (std::size_t o = 0; o < left_out_[k].size(); ++o) {
+        if (left_out_[k][o] == 0) continue;
+        objects.push_back({loss_.left_out[k].term, loss_.left_out[k].reason, static_cast<Index>(o), left_out_[k][o]});
+      }
+    }
+    return objects;
   }
 
   /// A group that is on and that no term depends on would silently stay.
@@ -264,7 +284,8 @@ class StageRun {
   RecordedLoss<S> loss_;
   Adam<S> adam_;
   Index undone_at_end_ = 0;
-  std::string offender_;  // of the last evaluation, if it was bad
+  std::vector<std::vector<Index>> left_out_;  // evaluations, by loss_.left_out and object
+  std::string offender_;                      // of the last evaluation, if it was bad
 };
 
 }  // namespace

@@ -37,6 +37,13 @@ struct IterationReport {
 /// Called after every iteration. May throw to end the stage: the parameters then stay as they are.
 using StageCallback = std::function<void(const IterationReport&)>;
 
+/// An object that a term left out in some evaluations of a stage.
+struct LeftOutObject {
+  std::string term, reason;
+  Index object = 0;
+  Index evaluations = 0;  ///< of iterations + 1
+};
+
 /// What a stage has done.
 struct StageResult {
   Index iterations = 0;
@@ -45,6 +52,7 @@ struct StageResult {
   std::vector<std::string> off;  ///< terms of the settings that lacked an input, or have weight 0
   Index rollbacks = 0;
   double seconds = 0;
+  std::vector<LeftOutObject> left_out;  ///< by term and object, in order
 };
 
 /// What the settings do not say.

@@ -62,6 +62,15 @@ void check_numbering(const std::vector<std::string>& names, const fs::path& fold
   }
 }
 
+/// Logs, checkpoints and reports hold the names.
+void check_characters(const std::vector<std::string>& names, const fs::path& folder) {
+  for (const std::string& name : names) {
+    if (is_plain_text(name)) continue;
+    throw UserError(folder.string() + ": the name \"" + with_escapes(name) +
+                    "\" is not UTF-8 text without control characters; rename the frame, and its masks with it");
+  }
+}
+
 std::vector<std::string> png_names(const fs::path& folder) {
   std::vector<std::string> names;
   std::error_code error;
@@ -70,6 +79,7 @@ std::vector<std::string> png_names(const fs::path& folder) {
   }
   if (error) throw UserError(folder.string() + ": cannot be listed as a folder of frames: " + error.message());
   std::sort(names.begin(), names.end());
+  check_characters(names, folder);
   check_numbering(names, folder);
   if (names.size() < 2) {
     throw UserError(folder.string() + ": holds " + std::to_string(names.size()) +
@@ -212,7 +222,7 @@ Clip read_clip(const DataSettings& data) {
   return clip;
 }
 
-void check_frames(const DataSettings& data, const Clip& clip) {
+void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
   std::vector<std::vector<bool>> is_seen(static_cast<std::size_t>(clip.frames()));  // [frame][object]
   parallel_for(clip.frames(), 1, [&](Index begin, Index end) {
     for (Index index = begin; index < end; ++index) {
@@ -223,13 +233,14 @@ void check_frames(const DataSettings& data, const Clip& clip) {
   });
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
     std::vector<Index> hidden;
-    for (std::size_t t = 0; t < is_seen.size(); ++t) {
+    for (std::size_t t = 1; t < is_seen.size(); ++t) {  // frame 0 is given
       if (!is_seen[t][o]) hidden.push_back(static_cast<Index>(t));
     }
     if (hidden.empty()) continue;
     log_warning((data.masks / clip.objects[o].name).string() + ": the object is hidden in " +
                 (hidden.size() == 1 ? "frame " : "frames ") + frame_ranges(hidden) +
-                ": no pixel reaches data.mask_threshold; the loss \"center\" is off for it there");
+                ": no pixel reaches data.mask_threshold" +
+                (has_center ? "; the loss \"center\" is off for it there" : ""));
   }
 }
 

@@ -59,8 +59,10 @@ inline constexpr const char* kHumanMasks = "human";
 Clip read_clip(const DataSettings& data);
 
 /// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on.
-/// Objects that some masks show nothing of are told in the log, each with its frames. Throws as read_frame.
-void check_frames(const DataSettings& data, const Clip& clip);
+/// Objects that some masks after frame 0 show nothing of are told in the log, each with its frames. Throws as
+/// read_frame.
+/// @param has_center  the run has the loss `center`, which such masks switch off
+void check_frames(const DataSettings& data, const Clip& clip, bool has_center);
 
 /// Reads frame `index` and its masks. A mask that has no file counts as empty. Throws as read_clip.
 ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <map>
 
 #include "body/kinematics.h"
 #include "body/motion_io.h"
@@ -157,6 +158,7 @@ class Reconstruction {
     resume();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
     bar_.finish();
+    tell_left_out();
     write_results();
     const RunSummary summary = summarize();
     folder_.write_summary(summary);
@@ -242,7 +244,10 @@ class Reconstruction {
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
     if (index == 1) tell_terms_off(name, stage, result.off);
-    folder_.note(stage_line(index, name, result, begin));
+    for (const LeftOutObject& object : result.left_out) {
+      progress_.left_out.push_back({s, index, object.object, object.term, object.reason});
+    }
+    folder_.note(stage_line(index, name, result, begin) + left_out_text(result));
   }
 
   static std::string loss_text(double loss, std::span<const LossValue> terms) {
@@ -259,6 +264,33 @@ class Reconstruction {
                        " s, loss " + begin + " -> " + loss_text(result.loss, result.terms);
     if (result.rollbacks > 0) text += ", " + std::to_string(result.rollbacks) + " steps not taken";
     return text;
+  }
+
+  std::string left_out_text(const StageResult& result) const {
+    std::string text;
+    for (const LeftOutObject& object : result.left_out) {
+      text += ", " + object.term + " without " + clip_.objects[static_cast<std::size_t>(object.object)].name + " in " +
+              std::to_string(object.evaluations) + " of " + std::to_string(result.iterations + 1) + " evaluations";
+    }
+    return text;
+  }
+
+  /// Every object that a term of a stage left out: one warning, with its frames.
+  void tell_left_out() const {
+    std::map<std::string, std::vector<Index>> frames;  // by message
+    std::vector<std::string> messages;                 // in the order in which it first happened
+    for (const LeftOutInFrame& entry : progress_.left_out) {
+      const std::string begin = "stage " + config_.stages[entry.stage].first + ": the loss \"" + entry.term +
+                                "\" was off for the object \"" +
+                                clip_.objects[static_cast<std::size_t>(entry.object)].name + "\" (" + entry.reason +
+                                "), in some iterations at least, in ";
+      if (frames[begin].empty()) messages.push_back(begin);
+      if (frames[begin].empty() || frames[begin].back() != entry.frame) frames[begin].push_back(entry.frame);
+    }
+    for (const std::string& begin : messages) {
+      const std::vector<Index>& of_object = frames[begin];
+      log_warning(begin + (of_object.size() == 1 ? "frame " : "frames ") + frame_ranges(of_object));
+    }
   }
 
   static void tell_terms_off(const std::string& name, const StageSettings& stage, const std::vector<std::string>& off) {

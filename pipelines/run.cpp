@@ -92,7 +92,7 @@ RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losse
   check_run(config);
   EarlyMessages early;
   const Clip clip = read_clip(config.data);  // before anything is written
-  check_frames(config.data, clip);
+  check_frames(config.data, clip, has_loss(config, "center"));
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));
   identity.seed = config.seed;

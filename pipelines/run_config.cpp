@@ -1,5 +1,7 @@
 #include "pipelines/run_config.h"
 
+#include <algorithm>
+
 #include "core/config_file.h"
 #include "pipelines/run_problems.h"
 
@@ -60,6 +62,14 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
   ConfigFields fields;
   describe(fields, copy, losses);
   return to_json(write_config(fields));
+}
+
+bool has_loss(const RunConfig& config, const std::string& name) {
+  return std::any_of(config.stages.begin(), config.stages.end(), [&](const auto& entry) {
+    const StageSettings& stage = entry.second;
+    const LossSettings* const loss = find_entry(stage.losses, name);
+    return stage.draw == Draw::kAll && loss != nullptr && loss->weight != 0;
+  });
 }
 
 ConfigValue without_data(ConfigValue tree) {

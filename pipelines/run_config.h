@@ -76,6 +76,9 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
 /// The text of config.resolved.json: every setting, defaults included. Reading it back gives the same config and text.
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses);
 
+/// Whether a stage that draws the objects has the loss, with a weight that is not 0.
+bool has_loss(const RunConfig& config, const std::string& name);
+
 /// A tree of a config without what another dataset or machine would change: the files of data, synthetic, threads. Two
 /// runs of the same data with equal trees have the same result.
 ConfigValue without_data(ConfigValue tree);

@@ -87,6 +87,25 @@ std::string text_if_there(const std::string& path) { return fs::exists(path) ? r
 
 // ---- Configs that differ ----
 
+std::string keys_of(const ConfigValue& object) {
+  std::vector<std::string> keys;
+  for (const ConfigMember& member : object.members) keys.push_back(member.key);
+  return joined(keys);
+}
+
+/// Whether the keys that both have come in one order in both. That of stages is the order in which they run, that of
+/// losses and groups the one in which sums are taken.
+bool have_one_order(const ConfigValue& a, const ConfigValue& b) {
+  const auto common = [](const ConfigValue& object, const ConfigValue& other) {
+    std::vector<std::string_view> keys;
+    for (const ConfigMember& member : object.members) {
+      if (find_member(other, member.key) != nullptr) keys.push_back(member.key);
+    }
+    return keys;
+  };
+  return common(a, b) == common(b, a);
+}
+
 /// Appends "POINTER: A in the folder, B now" for everything that differs.
 void find_differences(const ConfigValue& before, const ConfigValue& now, const std::string& pointer,
                       std::vector<std::string>& out) {
@@ -103,6 +122,9 @@ void find_differences(const ConfigValue& before, const ConfigValue& now, const s
     for (const ConfigMember& member : now.members) {
       if (find_member(before, member.key) == nullptr)
         out.push_back(child_pointer(pointer, member.key) + ": absent in the folder, " + shown(member.value) + " now");
+    }
+    if (!pointer.empty() && !have_one_order(before, now)) {
+      out.push_back(pointer + ": in the order " + keys_of(before) + " in the folder, " + keys_of(now) + " now");
     }
   } else if (to_json_line(before) != to_json_line(now)) {
     out.push_back((pointer.empty() ? "/" : pointer) + ": " + shown(before) + " in the folder, " + shown(now) + " now");

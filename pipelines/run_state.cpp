@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <sstream>
 
 #include "core/check.h"
 #include "optim/checkpoint.h"
@@ -42,6 +43,39 @@ std::vector<MetricValues> stored_errors(const char* kind, std::size_t frames, co
     }
   }
   return errors;
+}
+
+constexpr const char* kLeftOut = "left_out";
+
+/// A line each: "STAGE FRAME OBJECT TERM<tab>REASON".
+std::string left_out_text(const std::vector<LeftOutInFrame>& left_out) {
+  std::string text;
+  for (const LeftOutInFrame& entry : left_out) {
+    text += std::to_string(entry.stage) + " " + std::to_string(entry.frame) + " " + std::to_string(entry.object) + " " +
+            entry.term + "\t" + entry.reason + "\n";
+  }
+  return text;
+}
+
+std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages) {
+  std::vector<LeftOutInFrame> left_out;
+  if (!checkpoint.has(kLeftOut)) return left_out;
+  std::istringstream lines(checkpoint.text(kLeftOut));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    LeftOutInFrame entry;
+    words >> entry.stage >> entry.frame >> entry.object;
+    words.get();
+    std::getline(words, entry.term, '\t');
+    std::getline(words, entry.reason);
+    if (!words || entry.stage >= stages || entry.object < 0 || entry.object >= std::ssize(clip.objects) ||
+        entry.frame < 1 || entry.frame >= clip.frames()) {
+      throw DataError(checkpoint.source() + ": \"" + kLeftOut + "\" holds \"" + line +
+                      "\", which is no stage, frame, object, term and reason of this clip");
+    }
+    left_out.push_back(entry);
+  }
+  return left_out;
 }
 
 /// One state as numbers: camera [R | t] (12), then 6 an object, then the body's transl (3) and axis-angles (165).
@@ -120,6 +154,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
+  if (!progress.left_out.empty()) checkpoint.set(kLeftOut, left_out_text(progress.left_out));
   store_errors("image_errors", progress.image_errors, checkpoint);
   store_errors("start_errors", progress.start_errors, checkpoint);
   checkpoint.save(file, text_hash(config));
@@ -169,6 +204,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);
   progress.inputs = checkpoint.text("inputs");
+  progress.left_out = left_out_of(checkpoint, clip, stages);
   progress.image_errors = stored_errors("image_errors", done, checkpoint);
   progress.start_errors = stored_errors("start_errors", done, checkpoint);
   return progress;

@@ -19,6 +19,13 @@ struct StageTotals {
   Index tiles = 0, pairs = 0, fragments = 0;  ///< rendered, over all iterations
 };
 
+/// An object that a loss term left out, in some iterations at least.
+struct LeftOutInFrame {
+  std::size_t stage = 0;
+  Index frame = 0, object = 0;
+  std::string term, reason;
+};
+
 /// Everything that the next frame depends on, or that the end of the run tells.
 struct RunProgress {
   std::vector<std::vector<SceneState>> after_stage;  ///< [stage][frame]; frame 0 is the given one
@@ -27,6 +34,7 @@ struct RunProgress {
   std::vector<MetricValues> start_errors;            ///< the same of what each frame's image was given
   std::string inputs;                                ///< what was read so far, in the form of input_hashes
   Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
+  std::vector<LeftOutInFrame> left_out;              ///< in the order in which it happened
   double seconds = 0;                                ///< of the frames done
 
   /// Frames done, frame 0 included.

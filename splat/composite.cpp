@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <ctime>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include "core/parallel.h"
 #include "core/simd.h"
+#include "splat/block_kernel.h"
 #include "splat/composite_kernel.h"
 #include "splat/tiles.h"
 #include "splat/workspaces.h"
@@ -38,8 +42,12 @@ CompositeRules<S> rules_of(const RenderSettings& settings) {
   if (stop > S(0) && settings.stop_when == StopWhen::kAtOrBelow) {
     stop = std::nextafter(stop, std::numeric_limits<S>::infinity());
   }
-  return {static_cast<S>(settings.alpha_cap), static_cast<S>(settings.alpha_min), stop,
-          settings.stop_rule == StopRule::kExclusive, settings.cap_gradient == CapGradient::kPass};
+  return {static_cast<S>(settings.alpha_cap),
+          static_cast<S>(settings.alpha_min),
+          stop,
+          settings.stop_rule == StopRule::kExclusive,
+          settings.cap_gradient == CapGradient::kPass,
+          static_cast<S>(settings.blur)};
 }
 
 template <class S>
@@ -50,33 +58,61 @@ bool all_finite(const S* x, Index n) {
 /// Copies a row of a tile; nearly all are 16 pixels, and known lengths copy faster.
 template <class S>
 void copy_row(const S* from, Index n, S* to) {
-  n == 16 ? std::copy_n(from, 16, to) : std::copy_n(from, n, to);
+  if (n == 16) {
+    std::memcpy(to, from, 16 * sizeof(S));
+  } else {
+    std::copy_n(from, n, to);
+  }
 }
+
+/// Of a tile: fragments, and the list position after the last Gaussian composited in any pixel.
+struct TileCounts {
+  Index fragments, end;
+};
+
+/// Seconds since it was made or last asked; on one thread those that the processor gave, so that other programs of the
+/// machine do not count.
+class Stopwatch {
+ public:
+  double lap() {
+    const double now = seconds();
+    return now - std::exchange(last_, now);
+  }
+
+ private:
+  static double seconds() {
+    timespec time{};
+    clock_gettime(thread_count() == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+  double last_ = seconds();
+};
 
 template <class S>
 struct Composite {
   static constexpr const char* kName = "composite";
+  static constexpr bool kPersistentOutputs = true;  // tiles that stay empty are not written again
   SplatView view;
   std::shared_ptr<RenderCounters> counters;
 
   enum Input { kMeans, kFactors, kDepths, kRest, kMeansRest, kOpacities, kFeatures };
   enum Output { kChannels, kTransmittance };
 
-  // In the order of the inputs, kept for their memory alone.
-  Buffer<SplatRecord<S>> all_records = {};
-  Buffer<Extent> all_extents = {};
-  Buffer<DepthKeyed> keys = {}, room = {};
-  Buffer<Index> counts = {};
-  // In depth order.
+  // In the order of the inputs.
   Buffer<SplatRecord<S>> records = {};
   Buffer<Extent> extents = {};
+  Buffer<DepthKeyed> keys = {}, room = {};
   TileLists lists = {};
   // What the backward pass needs of every tile.
-  Buffer<detail::ListPosition<S>> last = {};
-  Buffer<Index> checkpoint_begin = {};
+  Buffer<DepthKeyed> tile_last = {};    ///< the last Gaussian composited in any pixel; index −1: none
+  Buffer<Index> checkpoint_begin = {};  ///< pieces of a tile's, or a block's, pixels
   Buffer<S> checkpoints = {};
-  Buffer<Index> fragments = {};
-  Buffer<Index> tile_end = {};  ///< list position after the last Gaussian composited in any pixel
+  Buffer<detail::ListPosition<S>> last = {};  ///< plain kernel
+  Buffer<Index> run_begin = {};               ///< block kernel
+  Buffer<detail::BlockRun> runs = {};         ///< block kernel
+  Buffer<TileCounts> tile_counts = {};
+  Buffer<std::uint8_t> blank = {};  ///< of each tile: the outputs hold what an empty one has
+  const S* written = nullptr;       ///< the output that `blank` tells of
 
   TileGrid grid() const {
     return detail::tile_grid(view.camera.width, view.camera.height, static_cast<Index>(view.settings.tile));
@@ -93,7 +129,8 @@ struct Composite {
     for (int i = 0; i < 6; ++i) factor[i] = static_cast<double>(v[i]);
   }
 
-  std::uint64_t depth_key(S depth, S rest) const {
+  std::uint64_t depth_key(const NodeIo<S>& io, Index n) const {
+    const S depth = io.in(kDepths).data[n], rest = io.in(kRest).data[n];
     constexpr DepthKey kOwn = std::is_same_v<S, float> ? DepthKey::kFloat : DepthKey::kDouble;
     if (view.settings.depth_key.value_or(kOwn) == DepthKey::kFloat)
       return detail::depth_bits(static_cast<float>(depth));
@@ -128,26 +165,28 @@ struct Composite {
               static_cast<S>(conic.l21),
               static_cast<S>(conic.l22),
               static_cast<S>(scaled),
+              static_cast<S>(std::log2(std::max(scaled, detail::kLeastOpacity))),
               static_cast<std::int32_t>(extent.row_begin),
               static_cast<std::int32_t>(extent.row_end),
               static_cast<std::int32_t>(n)};
-    return all_finite(&record.l11, 4);
+    return all_finite(&record.l11, 5);
   }
 
-  /// Records and extents of what is drawn, in depth order, and the tiles' lists.
+  /// Records and extents of what is drawn, and the tiles' lists.
   void prepare(const NodeIo<S>& io) {
+    Stopwatch watch;
     const TileGrid tiles = grid();
     const Index rows = io.in(kMeans).shape.rows;
-    all_records.resize(rows);
-    all_extents.resize(rows);
+    records.resize(rows);
+    extents.resize(rows);
     keys.resize(rows);
     room.resize(rows);
     parallel_for(rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
         for (Index n = begin; n < end; ++n) {
-          const bool drawn = prepare_gaussian(io, tiles, n, all_records[n], all_extents[n]);
+          const bool drawn = prepare_gaussian(io, tiles, n, records[n], extents[n]);
           keys[n].index = drawn ? static_cast<std::int32_t>(n) : -1;
-          if (drawn) keys[n].key = depth_key(io.in(kDepths).data[n], io.in(kRest).data[n]);
+          if (drawn) keys[n].key = depth_key(io, n);
         }
       });
     });
@@ -155,25 +194,22 @@ struct Composite {
     for (Index n = 0; n < rows; ++n) {
       if (keys[n].index >= 0) keys[drawn++] = keys[n];
     }
+    counters->times.records_s = watch.lap();
     const auto count = static_cast<std::size_t>(drawn);
     const std::span<const DepthKeyed> order = detail::sort_by_depth(keys.span().first(count), room.span().first(count));
-    records.resize(drawn);
-    extents.resize(drawn);
-    parallel_for(drawn, kGrain, [&](Index begin, Index end) {
-      for (Index rank = begin; rank < end; ++rank) {
-        const Index n = order[static_cast<std::size_t>(rank)].index;
-        records[rank] = all_records[n];
-        extents[rank] = all_extents[n];
-      }
-    });
-    lists.count(extents.span(), tiles, counts);
-    const Index pairs = lists.slot_begin[drawn];
-    detail::check_pair_memory(pairs, bytes_of_pairs(io, pairs), detail::pair_memory_limit());
-    lists.fill(extents.span(), tiles, counts);
+    counters->times.sort_s = watch.lap();
+    const Index limit = detail::pair_memory_limit();
+    const Index most = static_cast<Index>(static_cast<double>(limit) / bytes_of_pairs(io, 1));
+    const Index pairs = lists.find(order, extents.span(), tiles, most);
+    detail::check_pair_memory(pairs, bytes_of_pairs(io, pairs), limit);
+    lists.fill(order, tiles);
+    counters->times.bin_s = watch.lap();
   }
 
   /// Numbers in the slot of a pair.
   Index stride_of(const NodeIo<S>& io) const {
+    if (in_blocks(io))
+      return wants_gradient(io) ? detail::block_slot(io.wants(kFeatures) ? io.in(kFeatures).shape.cols : 0) : 0;
     return (wants_shape(io) ? kMoments : 0) + (io.wants(kFeatures) ? io.in(kFeatures).shape.cols : 0);
   }
 
@@ -182,7 +218,8 @@ struct Composite {
     const double pixels = static_cast<double>(view.settings.tile) * view.settings.tile, number = sizeof(S);
     const double checkpoint = wants_gradient(io) ? pixels * number / static_cast<double>(kSegment) : 0;
     const double slot = static_cast<double>(stride_of(io)) * number;
-    return static_cast<double>(pairs) * (static_cast<double>(sizeof(TileEntry)) + checkpoint + slot);
+    constexpr std::size_t kListBytes = sizeof(TileEntry) + sizeof(detail::FoundPair) + sizeof(std::uint32_t);
+    return static_cast<double>(pairs) * (static_cast<double>(kListBytes) + checkpoint + slot);
   }
 
   CompositeScene<S> scene_of(const NodeIo<S>& io) const {
@@ -192,84 +229,183 @@ struct Composite {
 
   // --- tiles ---------------------------------------------------------------------------------------------------------
 
+  /// True: the block kernel; else the plain one.
+  static bool in_blocks(const NodeIo<S>& io) {
+    return std::is_same_v<S, float> && io.in(kFeatures).shape.cols <= detail::kMostBlockChannels;
+  }
+
+  template <class Job>
+  void place_job(const TileGrid& tiles, Index tile, Job& job) const {
+    const Index begin = lists.tile_begin[tile], size = lists.tile_begin[tile + 1] - begin;
+    job.entries = {lists.entries.data() + begin, static_cast<std::size_t>(size)};
+    job.left = tile % tiles.cols * tiles.tile;
+    job.top = tile / tiles.cols * tiles.tile;
+    job.width = std::min(tiles.tile, tiles.width - job.left);
+    job.height = std::min(tiles.tile, tiles.height - job.top);
+  }
+
   /// The job of a tile, without `transmittance` and `channels`.
   TileJob<S> job_of(const TileGrid& tiles, Index tile) {
-    const Index begin = lists.tile_begin[tile], size = lists.tile_begin[tile + 1] - begin;
-    const Index left = tile % tiles.cols * tiles.tile, top = tile / tiles.cols * tiles.tile;
     const Index pixels = tiles.tile * tiles.tile;
     TileJob<S> job{};
-    job.entries = {lists.entries.data() + begin, static_cast<std::size_t>(size)};
-    job.left = left;
-    job.top = top;
-    job.width = std::min(tiles.tile, tiles.width - left);
-    job.height = std::min(tiles.tile, tiles.height - top);
+    place_job(tiles, tile, job);
     job.last = last.data() + tile * pixels;
     job.checkpoints = checkpoints.size() > 0 ? checkpoints.data() + checkpoint_begin[tile] * pixels : nullptr;
     return job;
   }
 
-  void place_checkpoints(const TileGrid& tiles, bool wanted) {
+  /// The same for the block kernel, without `workspace` too.
+  detail::BlockJob block_job_of(const TileGrid& tiles, Index tile) requires(std::is_same_v<S, float>) {
+    detail::BlockJob job{};
+    place_job(tiles, tile, job);
+    if (runs.size() == 0) return job;
+    job.runs = runs.data() + run_begin[tile];
+    job.checkpoints = checkpoints.data() + checkpoint_begin[tile] * detail::kBlockPixels;
+    return job;
+  }
+
+  /// Room for what the forward pass keeps for the backward pass.
+  void place_kept(const NodeIo<S>& io, const TileGrid& tiles) {
+    const bool blocks = in_blocks(io), wanted = wants_gradient(io);
+    const Index side = tiles.tile, across = side / detail::kBlockSide;
     checkpoint_begin.resize(tiles.count() + 1);
-    Index place = 0;
+    run_begin.resize(tiles.count() + 1);
+    Index place = 0, run = 0;
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       checkpoint_begin[tile] = place;
+      run_begin[tile] = run;
       const Index size = lists.tile_begin[tile + 1] - lists.tile_begin[tile];
-      if (wanted && size > 0) place += (size - 1) / kSegment;
+      if (!wanted || size == 0) continue;
+      place += blocks ? detail::checkpoints_of(side, size, lists.tile_groups[tile]) : (size - 1) / kSegment;
+      run += detail::block_chunks(size) * across * across;
     }
     checkpoint_begin[tiles.count()] = place;
-    checkpoints.resize(place * tiles.tile * tiles.tile);
+    run_begin[tiles.count()] = run;
+    checkpoints.resize(place * (blocks ? detail::kBlockPixels : side * side));
+    runs.resize(blocks ? run : 0);
+    last.resize(blocks ? 0 : tiles.count() * side * side);
+  }
+
+  /// Composites a tile; `memory` is T, channels and workspace.
+  TileCounts composite_tile(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* memory) {
+    const Index pixels = tiles.tile * tiles.tile;
+    const CompositeScene<S> scene = scene_of(io);
+    if constexpr (std::is_same_v<S, float>) {
+      if (in_blocks(io)) {
+        detail::BlockJob job = block_job_of(tiles, tile);
+        job.transmittance = memory;
+        job.channels = memory + pixels;
+        job.workspace = job.channels + scene.channels * pixels;
+        const detail::BlockCounts counts = detail::composite_blocks(tiles.tile, scene, job);
+        return {counts.fragments, counts.end};
+      }
+    }
+    TileJob<S> job = job_of(tiles, tile);
+    job.transmittance = memory;
+    job.channels = memory + pixels;
+    const Index fragments = detail::composite_tile(tiles.tile, scene, job);
+    return {fragments, static_cast<Index>(*std::max_element(job.last, job.last + pixels))};
+  }
+
+  Index forward_memory(const NodeIo<S>& io, Index pixels) const {
+    const Index channels = io.in(kFeatures).shape.cols;
+    return (channels + 1) * pixels + (in_blocks(io) ? detail::block_workspace(channels) : 0);
   }
 
   void forward(NodeIo<S>& io) {
     prepare(io);
+    Stopwatch watch;
     const TileGrid tiles = grid();
     const Index pixels = tiles.tile * tiles.tile, channels = io.in(kFeatures).shape.cols;
-    const CompositeScene<S> scene = scene_of(io);
-    last.resize(tiles.count() * pixels);
-    fragments.resize(tiles.count());
-    tile_end.resize(tiles.count());
-    place_checkpoints(tiles, wants_gradient(io));
+    place_kept(io, tiles);
+    tile_counts.resize(tiles.count());
+    tile_last.resize(tiles.count());
     Workspaces workspaces(tiles.count());
-    const Index size = (channels + 1) * pixels;
+    const Index size = forward_memory(io, pixels);
     const std::span<S> memory = io.scratch(size * workspaces.count());
     const Array<S> image = io.out(kChannels), transmittance = io.out(kTransmittance);
+    if (written != image.data || blank.size() != tiles.count()) {
+      blank.resize(tiles.count());
+      std::fill_n(blank.data(), tiles.count(), std::uint8_t(0));
+      written = image.data;
+    }
     run_chunks(tiles.count(), [&](Index tile) {
+      const bool empty = lists.tile_begin[tile] == lists.tile_begin[tile + 1];
+      tile_counts[tile] = {0, 0};
+      tile_last[tile] = {0, -1};
+      if (empty && blank[tile] != 0) return;
+      blank[tile] = empty ? 1 : 0;
       const Workspaces::Held held(workspaces);
-      TileJob<S> job = job_of(tiles, tile);
-      job.transmittance = memory.data() + held.number() * size;
-      job.channels = job.transmittance + pixels;
-      fragments[tile] = detail::composite_tile(tiles.tile, scene, job);
-      tile_end[tile] = static_cast<Index>(*std::max_element(job.last, job.last + pixels));
-      for (Index r = 0; r < job.height; ++r) {
-        copy_row(job.transmittance + r * tiles.tile, job.width, &transmittance(job.top + r, job.left));
+      S* const t = memory.data() + held.number() * size;
+      tile_counts[tile] = composite_tile(io, tiles, tile, t);
+      const Index end = tile_counts[tile].end;
+      tile_last[tile] = {0, end > 0 ? lists.entries[lists.tile_begin[tile] + end - 1].index : -1};
+      if (end > 0) tile_last[tile].key = depth_key(io, tile_last[tile].index);
+      TileJob<S> place{};
+      place_job(tiles, tile, place);
+      for (Index r = 0; r < place.height; ++r) {
+        copy_row(t + r * tiles.tile, place.width, &transmittance(place.top + r, place.left));
         for (Index k = 0; k < channels; ++k) {
-          copy_row(job.channels + k * pixels + r * tiles.tile, job.width, &image(k, job.top + r, job.left));
+          copy_row(t + (k + 1) * pixels + r * tiles.tile, place.width, &image(k, place.top + r, place.left));
         }
       }
     });
+    counters->times.forward_s = watch.lap();
     count(tiles);
   }
 
   void count(const TileGrid& tiles) {
+    const RenderTimes times = counters->times;
     *counters = {};
+    counters->times = times;
     counters->pairs = lists.pairs();
-    for (Index rank = 0; rank < records.size(); ++rank) {
-      counters->visible += lists.slot_begin[rank + 1] > lists.slot_begin[rank] ? 1 : 0;
-    }
+    for (const TileLists::Slots& s : lists.slots.span()) counters->visible += s.end > s.begin ? 1 : 0;
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       counters->tiles += lists.tile_begin[tile + 1] > lists.tile_begin[tile] ? 1 : 0;
-      counters->fragments += fragments[tile];
-      counters->reached += tile_end[tile];
+      counters->groups += lists.tile_groups[tile];
+      counters->fragments += tile_counts[tile].fragments;
+      counters->reached += tile_counts[tile].end;
     }
   }
 
   // --- backward ------------------------------------------------------------------------------------------------------
 
+  /// Sums of a tile's pairs; `d_channels` is [1 + C][W][W], channels first, and `workspace` follows it.
+  void tile_adjoint(const NodeIo<S>& io, const TileGrid& tiles, Index tile, const TileAdjoint<S>& shared,
+                    S* d_channels) {
+    const Index pixels = tiles.tile * tiles.tile;
+    const CompositeScene<S> scene = scene_of(io);
+    S* const d_transmittance = d_channels + scene.channels * pixels;
+    if constexpr (std::is_same_v<S, float>) {
+      if (in_blocks(io)) {
+        detail::BlockJob job = block_job_of(tiles, tile);
+        job.workspace = d_transmittance + pixels;
+        detail::composite_blocks_adjoint(
+            tiles.tile, scene, job,
+            {d_channels, d_transmittance, shared.sums, shared.stride, shared.wants_shape, shared.wants_features});
+        return;
+      }
+    }
+    TileAdjoint<S> adjoint = shared;
+    adjoint.d_channels = d_channels;
+    adjoint.behind = d_transmittance;
+    adjoint.segment = d_transmittance + pixels;
+    adjoint.feature_sums = adjoint.segment + 2 * kSegment * pixels;
+    detail::composite_tile_adjoint(tiles.tile, scene, job_of(tiles, tile), adjoint);
+  }
+
+  Index backward_memory(const NodeIo<S>& io, const TileGrid& tiles) const {
+    const Index pixels = tiles.tile * tiles.tile, channels = io.in(kFeatures).shape.cols;
+    const Index work =
+        in_blocks(io) ? detail::block_workspace(channels) : 2 * kSegment * pixels + channels * tiles.tile;
+    return (channels + 1) * pixels + work;
+  }
+
   void backward(NodeIo<S>& io) {
     if (!wants_gradient(io)) return;
+    Stopwatch watch;
     const TileGrid tiles = grid();
     const Index pixels = tiles.tile * tiles.tile, channels = io.in(kFeatures).shape.cols;
-    const CompositeScene<S> scene = scene_of(io);
     TileAdjoint<S> shared{};
     shared.wants_shape = wants_shape(io);
     shared.wants_features = io.wants(kFeatures);
@@ -277,66 +413,79 @@ struct Composite {
     shared.sums = io.scratch(shared.stride * lists.pairs()).data();
     const ConstArray<S> d_image = io.d_out(kChannels), d_transmittance = io.d_out(kTransmittance);
     Workspaces workspaces(tiles.count());
-    const Index size = (channels + 1 + 2 * kSegment) * pixels + channels * tiles.tile;
+    const Index size = backward_memory(io, tiles);
     const std::span<S> memory = io.scratch(size * workspaces.count());
     run_chunks(tiles.count(), [&](Index tile) {
-      const TileJob<S> job = job_of(tiles, tile);
-      if (job.entries.empty()) return;
+      if (tile_counts[tile].end == 0) return;
       const Workspaces::Held held(workspaces);
       S* const d_channels = memory.data() + held.number() * size;
-      TileAdjoint<S> adjoint = shared;
-      adjoint.d_channels = d_channels;
-      adjoint.behind = d_channels + channels * pixels;
-      adjoint.segment = adjoint.behind + pixels;
+      TileJob<S> place{};
+      place_job(tiles, tile, place);
       std::fill_n(d_channels, (channels + 1) * pixels, S(0));
-      for (Index r = 0; r < job.height; ++r) {
+      for (Index r = 0; r < place.height; ++r) {
         for (Index k = 0; d_image && k < channels; ++k) {
-          copy_row(&d_image(k, job.top + r, job.left), job.width, d_channels + k * pixels + r * tiles.tile);
+          copy_row(&d_image(k, place.top + r, place.left), place.width, d_channels + k * pixels + r * tiles.tile);
         }
         if (d_transmittance) {
-          copy_row(&d_transmittance(job.top + r, job.left), job.width, adjoint.behind + r * tiles.tile);
+          copy_row(&d_transmittance(place.top + r, place.left), place.width,
+                   d_channels + channels * pixels + r * tiles.tile);
         }
       }
-      adjoint.feature_sums = adjoint.segment + 2 * kSegment * pixels;
-      detail::composite_tile_adjoint(tiles.tile, scene, job, adjoint);
+      tile_adjoint(io, tiles, tile, shared, d_channels);
     });
+    counters->times.backward_s = watch.lap();
     parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index rank = begin; rank < end; ++rank) gather_gaussian(io, tiles, shared, rank);
+        for (Index n = begin; n < end; ++n) gather_gaussian(io, shared, n);
       });
     });
+    counters->times.reduce_s = watch.lap();
   }
 
-  /// True if the Gaussian comes before a tile's end. Lists are in the order of ranks.
-  bool reached(Index tile, Index rank) const {
-    const Index end = tile_end[tile];
-    return end > 0 && rank <= static_cast<Index>(lists.entries[lists.tile_begin[tile] + end - 1].rank);
+  /// True if the Gaussian does not come after the last one of a tile that is composited.
+  bool reached(Index tile, std::uint64_t key, Index n) const {
+    const DepthKeyed& end = tile_last[tile];
+    return end.index >= 0 && (key < end.key || (key == end.key && n <= end.index));
   }
 
   /// Sums the pairs of a Gaussian in the order of its slots, in double, and adds what they mean to the inputs'
   /// gradients. Pairs past the end of their tile have no adjoint, and their slots were not written (row B12).
-  void gather_gaussian(NodeIo<S>& io, const TileGrid& tiles, const TileAdjoint<S>& adjoint, Index rank) const {
+  void gather_gaussian(NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index n) const {
     constexpr Index kTogether = 16;  // numbers of a slot; with up to ten features it is read once
     static_assert(kMoments <= kTogether);
-    const Index n = records[rank].index, first_feature = adjoint.wants_shape ? kMoments : 0;
+    const TileLists::Slots slots = lists.slots[n];
+    if (slots.begin == slots.end) return;
+    const std::uint64_t key = depth_key(io, n);
+    const Index first_feature = adjoint.wants_shape || in_blocks(io) ? kMoments : 0;
+    const Index features = adjoint.wants_features ? io.in(kFeatures).shape.cols : 0;
     for (Index k = 0; k < adjoint.stride; k += kTogether) {
       const Index count = std::min(kTogether, adjoint.stride - k);
       double totals[kTogether] = {};
       bool any = false;
-      const S* sums = adjoint.sums + lists.slot_begin[rank] * adjoint.stride + k;
-      detail::for_each_tile(extents[rank], tiles, [&](Index tile) {
-        if (reached(tile, rank)) {
-          any = true;
-          for (Index i = 0; i < count; ++i) totals[i] += static_cast<double>(sums[i]);
-        }
-        sums += adjoint.stride;
-      });
+      for (Index slot = slots.begin; slot < static_cast<Index>(slots.end); ++slot) {
+        if (!reached(lists.tile_of[slot], key, n)) continue;
+        any = true;
+        const S* const sums = adjoint.sums + slot * adjoint.stride + k;
+        for (Index i = 0; i < count; ++i) totals[i] += static_cast<double>(sums[i]);
+      }
       if (!any) return;
-      if (adjoint.wants_shape && k == 0) add_shape_gradient(io, records[rank], n, totals);
-      for (Index i = std::max<Index>(first_feature - k, 0); i < count; ++i) {
+      if (adjoint.wants_shape && k == 0) {
+        if (in_blocks(io)) scale_block_moments(records[n], totals);
+        add_shape_gradient(io, records[n], n, totals);
+      }
+      for (Index i = std::max<Index>(first_feature - k, 0); i < std::min(count, first_feature + features - k); ++i) {
         io.d_in(kFeatures).row(n)[k + i - first_feature] += static_cast<S>(totals[i]);
       }
     }
+  }
+
+  /// From sums of ∂/∂ log α with scaled u and w to those of kMoments.
+  static void scale_block_moments(const SplatRecord<S>& record, double* moments) {
+    const double o = std::max(static_cast<double>(record.opacity), detail::kLeastOpacity);
+    const double first = 1 / (o * detail::kLog2Scale), second = first / detail::kLog2Scale;
+    moments[0] /= o;
+    for (int i = 1; i < 3; ++i) moments[i] *= first;
+    for (int i = 3; i < 6; ++i) moments[i] *= second;
   }
 
   /// With L = [l11 l21; 0 l22] and M the moments (Σ g u², …) as a symmetric matrix, from ds = −(L d)ᵀ L d_mean and
@@ -381,34 +530,48 @@ struct Composite {
 
   // --- the rest ------------------------------------------------------------------------------------------------------
 
-  /// Order, lists, stops, and for each (pixel, Gaussian) pair whether it is cut, composited or held by the cap.
-  void add_signature(Signature& signature, NodeIo<S>&) {
+  /// α of a Gaussian at a pixel of a tile, by the kernel in use.
+  detail::PixelAlpha<S> pixel_alpha(const NodeIo<S>& io, const TileJob<S>& place, const SplatRecord<S>& record, Index r,
+                                    Index c) const {
+    const CompositeRules<S> rules = rules_of<S>(view.settings);
+    if constexpr (std::is_same_v<S, float>) {
+      if (in_blocks(io))
+        return detail::block_pixel_alpha(view.settings.tile, record, rules, place.left, place.top, r, c);
+    }
+    return detail::pixel_alpha(record, rules, place, r, c);
+  }
+
+  /// Order, lists, and for each (pixel, Gaussian) pair whether it is composited, stops with it, or is held by the cap.
+  void add_signature(Signature& signature, NodeIo<S>& io) {
     const TileGrid tiles = grid();
     const CompositeRules<S> rules = rules_of<S>(view.settings);
-    for (const SplatRecord<S>& record : records.span()) signature.add(static_cast<std::uint64_t>(record.index));
     for (Index tile = 0; tile < tiles.count(); ++tile) {
-      const TileJob<S> job = job_of(tiles, tile);
-      signature.add(job.entries.size());
-      for (std::size_t at = 0; at < job.entries.size(); ++at) {
-        const SplatRecord<S>& record = records[job.entries[at].rank];
-        for (Index p = 0; p < job.width * job.height; ++p) {
-          const Index r = p / job.width, c = p % job.width;
-          if (job.top + r < record.row_begin || job.top + r >= record.row_end) continue;
-          const auto pixel = detail::pixel_alpha(record, rules, job, r, c);
-          const bool before_stop = static_cast<Index>(at) < static_cast<Index>(job.last[r * tiles.tile + c]);
-          if (before_stop && pixel.drawn) signature.add(at * 2 + (pixel.capped ? 1 : 0));
+      TileJob<S> place{};
+      place_job(tiles, tile, place);
+      signature.add(place.entries.size());
+      for (const TileEntry& entry : place.entries) signature.add(static_cast<std::uint64_t>(entry.index));
+      for (Index p = 0; p < place.width * place.height; ++p) {
+        const Index r = p / place.width, c = p % place.width;
+        S t = 1;
+        for (std::size_t at = 0; at < place.entries.size() && t >= rules.stop_below; ++at) {
+          const SplatRecord<S>& record = records[place.entries[at].index];
+          if (place.top + r < record.row_begin || place.top + r >= record.row_end) continue;
+          const auto pixel = pixel_alpha(io, place, record, r, c);
+          if (!pixel.drawn) continue;
+          const S next = t * (1 - pixel.alpha);
+          if (rules.exclusive && next < rules.stop_below) break;
+          t = next;
+          signature.add(at * 2 + (pixel.capped ? 1 : 0));
         }
-        signature.add(at);
       }
     }
   }
 
   Index saved_bytes() const {
-    return all_records.capacity_bytes() + all_extents.capacity_bytes() + keys.capacity_bytes() + room.capacity_bytes() +
-           counts.capacity_bytes() + records.capacity_bytes() + extents.capacity_bytes() +
-           lists.tile_begin.capacity_bytes() + lists.slot_begin.capacity_bytes() + lists.entries.capacity_bytes() +
-           last.capacity_bytes() + checkpoint_begin.capacity_bytes() + checkpoints.capacity_bytes() +
-           fragments.capacity_bytes() + tile_end.capacity_bytes();
+    return records.capacity_bytes() + extents.capacity_bytes() + keys.capacity_bytes() + room.capacity_bytes() +
+           lists.capacity_bytes() + tile_last.capacity_bytes() + checkpoint_begin.capacity_bytes() +
+           checkpoints.capacity_bytes() + last.capacity_bytes() + run_begin.capacity_bytes() + runs.capacity_bytes() +
+           tile_counts.capacity_bytes();
   }
 };
 

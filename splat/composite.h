@@ -18,13 +18,20 @@
 
 namespace hsi4d {
 
-/// What a forward run did.
+/// Seconds of the steps of the last forward and backward runs.
+struct RenderTimes {
+  double records_s = 0, sort_s = 0, bin_s = 0, forward_s = 0, backward_s = 0, reduce_s = 0;
+};
+
+/// What the last runs did.
 struct RenderCounters {
   Index visible = 0;    ///< Gaussians that reach a tile
   Index pairs = 0;      ///< (tile, Gaussian)
+  Index groups = 0;     ///< (block of 4×4 pixels, Gaussian) that may touch
   Index fragments = 0;  ///< (pixel, Gaussian) that were composited
   Index tiles = 0;      ///< tiles that a Gaussian reaches
   Index reached = 0;    ///< pairs up to the last one of each tile that is composited: those that have an adjoint
+  RenderTimes times;
 };
 
 template <class S>

@@ -125,7 +125,7 @@ struct RowRange {
 
 template <class S>
 HWY_INLINE const SplatRecord<S>& record_at(const CompositeScene<S>& scene, const TileJob<S>& job, Index at) {
-  return scene.records[static_cast<size_t>(job.entries[static_cast<size_t>(at)].rank)];
+  return scene.records[static_cast<size_t>(job.entries[static_cast<size_t>(at)].index)];
 }
 
 /// Fetches the record that will be looked at a few list positions later: they lie far apart.

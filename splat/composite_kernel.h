@@ -16,9 +16,13 @@ struct SplatRecord {
   double x, y;      ///< mean, pixels; the loops use its place in the tile, which S holds to far more digits
   S l11, l21, l22;  ///< see Conic
   S opacity;        ///< with the antialias factor
+  S log2_opacity;   ///< of an opacity held at or above kLeastOpacity
   std::int32_t row_begin, row_end;  ///< pixels
   std::int32_t index;               ///< row of the inputs
 };
+
+/// Opacities are held at this in the logarithm.
+inline constexpr double kLeastOpacity = 1e-30;
 
 /// Settings as the pixel loops use them.
 template <class S>
@@ -27,12 +31,13 @@ struct CompositeRules {
   S stop_below;    ///< a pixel is finished when T is below this; 0: never
   bool exclusive;  ///< the Gaussian that would finish the pixel is left out
   bool pass_cap;   ///< the gradient passes where the cap holds
+  S blur = 0;      ///< pixels², already in the conics
 };
 
 /// Gaussians, features and lists of an image.
 template <class S>
 struct CompositeScene {
-  std::span<const SplatRecord<S>> records;  ///< in depth order
+  std::span<const SplatRecord<S>> records;  ///< in the order of the inputs
   const S* features;                        ///< [N,channels]
   Index channels;
   CompositeRules<S> rules;

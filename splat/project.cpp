@@ -84,6 +84,12 @@ bool all_finite(const S* x, int n) {
   return finite;
 }
 
+/// Whether a Gaussian has a depth, drawn or not: a smooth function of mean and camera, before `near` too.
+template <class S>
+bool has_depth(const Vector3<double>& p) {
+  return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(static_cast<S>(p[2]));
+}
+
 /// Mean and factor in the image. False, and all zeros, for a Gaussian that is not to be drawn.
 template <class S>
 bool project_gaussian(const Lens& lens, const Vector3<double>& p, const S* axes, S* mean_px, S* mean_rest, S* factor) {
@@ -158,7 +164,7 @@ struct Project {
           const Vector3<double> p = point_in_camera(lens, means.row(n));
           project_gaussian(lens, p, axes.row(n), means_px.row(n), means_rest.row(n), factors.row(n));
           const S depth = static_cast<S>(p[2]);
-          const bool usable = std::isfinite(depth);
+          const bool usable = has_depth<S>(p);
           depths.data[n] = usable ? depth : S(0);
           rest.data[n] = usable ? static_cast<S>(p[2] - static_cast<double>(depth)) : S(0);
         }
@@ -180,13 +186,19 @@ struct Project {
       Vector6<double> d_delta = Vector6<double>::Zero();
       on_best_isa([&] {
         for (Index n = begin; n < end; ++n) {
-          if (!is_drawn(factors.row(n))) continue;
+          const bool drawn = is_drawn(factors.row(n));
+          const double d_depth = d_depths ? static_cast<double>(d_depths.data[n]) : 0;
+          if (!drawn && d_depth == 0) continue;
+          const Vector3<double> p = point_in_camera(lens, means.row(n));
+          if (!drawn) {
+            if (has_depth<S>(p)) add_depth_alone(transposed, p, d_depth, d_means ? d_means.row(n) : nullptr, d_delta);
+            continue;
+          }
           double d_mean_px[2] = {}, d_factor[6] = {};
           for (int i = 0; i < 2 && d_means_px; ++i) d_mean_px[i] = static_cast<double>(d_means_px.row(n)[i]);
           for (int i = 0; i < 6 && d_factors; ++i) d_factor[i] = static_cast<double>(d_factors.row(n)[i]);
-          const double d_depth = d_depths ? static_cast<double>(d_depths.data[n]) : 0;
           InCamera g;
-          take_into_camera(lens, point_in_camera(lens, means.row(n)), axes.row(n), g);
+          take_into_camera(lens, p, axes.row(n), g);
           InCameraGradient d;
           d.d_p[2] = d_depth;
           project_adjoint(lens, g, d_mean_px, d_factor, d);
@@ -220,6 +232,15 @@ struct Project {
                     Vector3<double>(d.d_axes[0][c], d.d_axes[1][c], d.d_axes[2][c]));
     }
     d_delta.tail<3>() += turn;
+  }
+
+  /// Of a Gaussian that is not drawn: z = the third of p = W (m − c).
+  static void add_depth_alone(const Matrix3<double>& transposed, const Vector3<double>& p, double d_depth, S* d_mean,
+                              Vector6<double>& d_delta) {
+    const Vector3<double> d_p(0, 0, d_depth), d_m = transposed * d_p;
+    for (int i = 0; i < 3 && d_mean != nullptr; ++i) d_mean[i] += static_cast<S>(d_m[i]);
+    d_delta.head<3>() += d_p;
+    d_delta.tail<3>() += cross(p, d_p);
   }
 
   /// What is drawn, and which ratios are held.

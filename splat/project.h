@@ -21,7 +21,7 @@ template <class S>
 struct Projected {
   Var<S> means_px;    ///< [N,2] (u, v); the centre of row i, column j is (j + 0.5, i + 0.5)
   Var<S> factors;     ///< [N,6] V, 2×3 by rows, pixels
-  Var<S> depths;      ///< [N,1] camera z, metres; 0 where it is not finite
+  Var<S> depths;      ///< [N,1] camera z, metres, drawn or not; 0 where the point is not finite
   Var<S> depth_rest;  ///< [N,1] what rounding took from the depths in float, zeros in double; has no adjoint
   Var<S> means_rest;  ///< [N,2] what rounding took from the means, likewise
 };
@@ -35,7 +35,8 @@ bool is_drawn(const S* factor) {
 /// Projects Gaussians with the camera Exp(ξ) · view.camera.
 ///
 /// Gaussians at z ≤ near, and those with numbers that are not finite (of the input or the result), get means_px = 0 and
-/// factors = 0, and no gradient.
+/// factors = 0, and no gradient through these. Their depth is that of any other, with its gradient to mean and ξ, as
+/// long as the point in the camera's frame is finite.
 ///
 /// @param means  [N,3] metres, relative to view.origin_world
 /// @param axes   [N,9] metres, 3×3 by rows, world (see gaussian_axes)

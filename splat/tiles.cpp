@@ -11,6 +11,7 @@
 
 #include "core/check.h"
 #include "core/parallel.h"
+#include "core/simd.h"
 #include "splat/limits.h"
 
 namespace hsi4d::detail {
@@ -37,32 +38,41 @@ Index last_to(double x, Index end) {
   return x < static_cast<double>(end) ? static_cast<Index>(x) + 1 : end;
 }
 
-/// Tiles of 16 pixels that INRIA's square of half-width `radius` touches along one axis, as rows or columns of pixels.
-/// Its pixel centres are whole numbers.
-TileSpan square_pixels(double mean, double radius, Index size) {
-  constexpr double kBlock = 16;
+/// A range of pixels.
+struct Pixels {
+  Index begin = 0, end = 0;
+};
+
+/// Those of the tiles of 16 pixels that INRIA's square of half-width `radius` touches along one axis. Its pixel centres
+/// are whole numbers.
+Pixels square_pixels(double mean, double radius, Index size) {
+  constexpr double kTileOfInria = 16;
   const double p = mean - 0.5;
-  const double blocks = static_cast<double>(size) / kBlock + 1;
-  const double begin = std::floor((p - radius) / kBlock), end = std::floor((p + radius + (kBlock - 1)) / kBlock);
+  const double tiles = static_cast<double>(size) / kTileOfInria + 1;
+  const double begin = std::floor((p - radius) / kTileOfInria);
+  const double end = std::floor((p + radius + (kTileOfInria - 1)) / kTileOfInria);
   if (!(begin < end)) return {};
-  const auto pixel = [&](double block) {
-    const double held = block > 0 ? (block < blocks ? block : blocks) : 0;
-    return std::min(static_cast<Index>(held * kBlock), size);
+  const auto pixel = [&](double tile) {
+    const double held = tile > 0 ? (tile < tiles ? tile : tiles) : 0;
+    return std::min(static_cast<Index>(held * kTileOfInria), size);
   };
   return {pixel(begin), pixel(end)};
+}
+
+Extent rectangle(Pixels rows, Pixels cols) {
+  Extent result;
+  if (rows.begin >= rows.end || cols.begin >= cols.end) return result;
+  result.row_begin = static_cast<std::int32_t>(rows.begin);
+  result.row_end = static_cast<std::int32_t>(rows.end);
+  result.col_begin = static_cast<std::int32_t>(cols.begin / kBlockSide);
+  result.col_end = static_cast<std::int32_t>((cols.end + kBlockSide - 1) / kBlockSide);
+  return result;
 }
 
 Extent square_extent(const Conic& conic, double x, double y, const TileGrid& grid) {
   const double mid = 0.5 * (conic.xx + conic.yy);
   const double radius = std::ceil(3 * std::sqrt(mid + std::sqrt(std::max(0.1, mid * mid - conic.determinant))));
-  const TileSpan cols = square_pixels(x, radius, grid.width), rows = square_pixels(y, radius, grid.height);
-  Extent result;
-  result.kind = Extent::Kind::kRectangle;
-  if (cols.begin >= cols.end) return result;
-  result.row_begin = rows.begin;
-  result.row_end = rows.end;
-  result.cols = {cols.begin / grid.tile, (cols.end + grid.tile - 1) / grid.tile};
-  return result;
+  return rectangle(square_pixels(y, radius, grid.height), square_pixels(x, radius, grid.width));
 }
 
 }  // namespace
@@ -70,54 +80,34 @@ Extent square_extent(const Conic& conic, double x, double y, const TileGrid& gri
 Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
                  const RenderSettings& settings, double epsilon) {
   if (settings.footprint == hsi4d::Footprint::kSquare3Sigma) return square_extent(conic, x, y, grid);
-  Extent result;
-  if (settings.alpha_min <= 0) {
-    result.row_end = grid.height;
-    return result;
-  }
-  result.kind = Extent::Kind::kEllipse;
-  if (!(opacity >= settings.alpha_min * (1 - 4 * epsilon))) return result;
+  if (settings.alpha_min <= 0) return rectangle({0, grid.height}, {0, grid.width});
+  if (!(opacity >= settings.alpha_min * (1 - 4 * epsilon))) return {};
   // α ≥ alpha_min where u² + w² ≤ 2 ln(o/alpha_min). Rounding: of the exponential and the opacity, and of u, whose two
   // terms are as large as the ellipse is.
   const double exact = std::sqrt(std::max(0.0, 2 * std::log(opacity / settings.alpha_min)) + 32 * epsilon);
   const double width = std::sqrt(conic.xx), height = std::sqrt(conic.yy);
-  result.reach = exact * (1 + 8 * epsilon * (1 + conic.l11 * width + std::abs(conic.l21) * height));
-  result.x = x;
-  result.y = y;
-  result.slope = conic.xy / conic.yy;
-  result.half_width = 1 / conic.l11;
-  result.top_x = conic.xy / width;
-  result.inverse_l22 = height;
-  const double half_height = result.reach * height, half_width = result.reach * width;
-  if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return result;
-  result.row_begin = first_from(y - half_height - 0.5, grid.height);
-  result.row_end = last_to(y + half_height - 0.5, grid.height);
+  const double reach = exact * (1 + 8 * epsilon * (1 + conic.l11 * width + std::abs(conic.l21) * height));
+  const double half_height = reach * height, half_width = reach * width;
+  if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return {};
+  const Pixels rows = {first_from(y - half_height - 0.5, grid.height), last_to(y + half_height - 0.5, grid.height)};
+  const Pixels cols = {first_from(x - half_width - 0.5, grid.width), last_to(x + half_width - 0.5, grid.width)};
+  Extent result = rectangle(rows, cols);
+  constexpr double kFar = 1e6;  // pixels: beyond, float is not enough
+  if (!(std::abs(x) < kFar && std::abs(y) < kFar && half_width < kFar && half_height < kFar)) return result;
+  result.kind = Extent::Kind::kEllipse;
+  constexpr double kRoom = 1e-6;  // relative, some units in the last place of float
+  const double first_row = static_cast<double>(result.row_begin / grid.tile * grid.tile);
+  result.first_dy = static_cast<float>(first_row + 0.5 - y);
+  result.lowest_dy = static_cast<float>(std::max(result.row_begin + 0.5 - y, -half_height));
+  result.highest_dy = static_cast<float>(std::min(result.row_end - 0.5 - y, half_height));
+  result.right_dy = static_cast<float>(reach * conic.xy / width);
+  result.x = static_cast<float>(x - 0.5);
+  result.slope = static_cast<float>(conic.xy / conic.yy);
+  result.half_width = static_cast<float>(1 / conic.l11);
+  result.reach_squared = static_cast<float>(reach * reach * (1 + 2 * kRoom));
+  result.flatness = static_cast<float>(1 / conic.yy);
+  result.room = static_cast<float>(1e-4 + kRoom * (std::abs(x) + half_width));
   return result;
-}
-
-TileSpan tile_columns(const Extent& f, const TileGrid& grid, Index tile_row) {
-  if (f.kind == Extent::Kind::kAll) return {0, grid.cols};
-  if (f.kind == Extent::Kind::kRectangle) return f.cols;
-  const Index top = std::max(f.row_begin, tile_row * grid.tile);
-  const Index bottom = std::min(f.row_end, (tile_row + 1) * grid.tile);
-  if (top >= bottom) return {};
-  // The border's x as a function of dy is slope·dy ± half_width sqrt(reach² − dy²/yy); the band's rightmost point is
-  // the ellipse's if that lies in the band, else at the band's nearer end.
-  const double half_height = f.reach * f.inverse_l22;
-  const double low = std::max(static_cast<double>(top) + 0.5 - f.y, -half_height);
-  const double high = std::min(static_cast<double>(bottom) - 0.5 - f.y, half_height);
-  const auto half_width_at = [&](double dy) {
-    const double w = dy / f.inverse_l22;
-    return f.half_width * std::sqrt(std::max(0.0, f.reach * f.reach - w * w));
-  };
-  const double right_dy = std::clamp(f.reach * f.top_x, low, std::max(low, high));
-  const double left_dy = std::clamp(-f.reach * f.top_x, low, std::max(low, high));
-  const double right = f.slope * right_dy + half_width_at(right_dy), left = f.slope * left_dy - half_width_at(left_dy);
-  const double room = 1e-9 * (1 + std::abs(f.x) + std::abs(right) + std::abs(left));
-  const Index begin = first_from(f.x + left - room - 0.5, grid.width);
-  const Index end = last_to(f.x + right + room - 0.5, grid.width);
-  if (begin >= end) return {};
-  return {begin / grid.tile, (end - 1) / grid.tile + 1};
 }
 
 // --- order -----------------------------------------------------------------------------------------------------------
@@ -191,56 +181,125 @@ void check_pair_memory(Index pairs, double bytes, Index limit) {
 
 namespace {
 
+constexpr Index kMostChunks = 32;
+
+/// Gaussians are visited in depth order and lie far apart: one is fetched so many before its turn.
+constexpr Index kAhead = 12;
+
+template <class T>
+void fetch(const T* object) {
+  constexpr std::size_t kLine = 64;
+  const char* const bytes = reinterpret_cast<const char*>(object);
+  for (std::size_t i = 0; i < sizeof(T); i += kLine) __builtin_prefetch(bytes + i);
+}
+
 /// Chunks of the Gaussians, each of which counts its tiles by itself.
 Partition list_partition(Index ranks) {
-  constexpr Index kGrain = 1024, kMostChunks = 32;
+  constexpr Index kGrain = 1024;
   return {ranks, std::max(kGrain, (ranks + kMostChunks - 1) / kMostChunks)};
 }
 
 }  // namespace
 
-void TileLists::count(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts) {
-  const Index ranks = static_cast<Index>(extents.size()), tiles = grid.count();
-  const Partition part = list_partition(ranks);
-  counts.resize(part.chunks() * tiles);
-  slot_begin.resize(ranks + 1);
-  tile_begin.resize(tiles + 1);
+Index TileLists::find(std::span<const DepthKeyed> order, std::span<const Extent> extents, const TileGrid& grid,
+                      Index most) {
+  const Index tiles = grid.count();
+  const Partition part = list_partition(static_cast<Index>(order.size()));
+  if (static_cast<Index>(found_.size()) < part.chunks()) found_.resize(static_cast<std::size_t>(part.chunks()));
+  counts_.resize(part.chunks() * tiles);
+  groups_.resize(part.chunks() * tiles);
+  slots.resize(static_cast<Index>(extents.size()));
+  std::fill_n(slots.data(), slots.size(), Slots{0, 0});
+  std::array<Index, kMostChunks> pairs{};
   parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-    Index* const of_tile = counts.data() + chunk * tiles;
-    std::fill_n(of_tile, tiles, Index(0));
-    for (Index rank = begin; rank < end; ++rank) {
-      Index pairs = 0;
-      for_each_tile(extents[static_cast<std::size_t>(rank)], grid, [&](Index tile) {
-        ++of_tile[tile];
-        ++pairs;
-      });
-      slot_begin[rank] = pairs;
-    }
+    std::uint32_t *const of_tile = counts_.data() + chunk * tiles, *const groups = groups_.data() + chunk * tiles;
+    std::fill_n(of_tile, tiles, 0u);
+    std::fill_n(groups, tiles, 0u);
+    std::vector<FoundPair>& found = found_[static_cast<std::size_t>(chunk)];
+    found.clear();
+    Index count = 0;
+    on_best_isa([&] {
+      for (Index rank = begin; rank < end; ++rank) {
+        const Index n = order[static_cast<std::size_t>(rank)].index;
+        if (rank + kAhead < end)
+          fetch(&extents[static_cast<std::size_t>(order[static_cast<std::size_t>(rank + kAhead)].index)]);
+        const Index first = count;
+        for_each_tile(extents[static_cast<std::size_t>(n)], grid, [&](Index tile, std::uint32_t blocks) {
+          if (count++ < most) found.push_back({static_cast<std::uint32_t>(tile), blocks});
+          ++of_tile[tile];
+          groups[tile] += static_cast<std::uint32_t>(std::popcount(blocks));
+        });
+        slots[n] = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count)};
+      }
+    });
+    pairs[static_cast<std::size_t>(chunk)] = count;
   });
-  total_pairs({slot_begin.data(), static_cast<std::size_t>(ranks)});
-  Index slot = 0;
-  for (Index rank = 0; rank < ranks; ++rank) slot += std::exchange(slot_begin[rank], slot);
-  slot_begin[ranks] = slot;
-  Index place = 0;
-  for (Index tile = 0; tile < tiles; ++tile) {
-    tile_begin[tile] = place;
-    for (Index chunk = 0; chunk < part.chunks(); ++chunk) place += std::exchange(counts[chunk * tiles + tile], place);
-  }
-  tile_begin[tiles] = place;
+  const Index total = total_pairs(pairs);
+  place_tiles(tiles, part.chunks());
+  return total;
 }
 
-void TileLists::fill(std::span<const Extent> extents, const TileGrid& grid, Buffer<Index>& counts) {
+/// tile_begin, tile_groups; counts_ become where each chunk's entries of a tile begin. Row by row: a column of counts_
+/// lies in as many cache lines as there are chunks.
+void TileLists::place_tiles(Index tiles, Index chunks) {
+  tile_begin.resize(tiles + 1);
+  tile_groups.resize(tiles);
+  std::fill_n(tile_begin.data(), tiles + 1, Index(0));
+  std::fill_n(tile_groups.data(), tiles, Index(0));
+  for (Index chunk = 0; chunk < chunks; ++chunk) {
+    for (Index tile = 0; tile < tiles; ++tile) {
+      tile_begin[tile + 1] += counts_[chunk * tiles + tile];
+      tile_groups[tile] += groups_[chunk * tiles + tile];
+    }
+  }
+  for (Index tile = 0; tile < tiles; ++tile) tile_begin[tile + 1] += tile_begin[tile];
+  // The groups are added up, and their first row serves as the running place.
+  std::uint32_t* const next = groups_.data();
+  for (Index tile = 0; tile < tiles && chunks > 0; ++tile) next[tile] = static_cast<std::uint32_t>(tile_begin[tile]);
+  for (Index chunk = 0; chunk < chunks; ++chunk) {
+    std::uint32_t* const counts = counts_.data() + chunk * tiles;
+    for (Index tile = 0; tile < tiles; ++tile) {
+      const std::uint32_t count = counts[tile];
+      counts[tile] = next[tile];
+      next[tile] += count;
+    }
+  }
+}
+
+void TileLists::fill(std::span<const DepthKeyed> order, const TileGrid& grid) {
   const Index tiles = grid.count();
+  const Partition part = list_partition(static_cast<Index>(order.size()));
   entries.resize(tile_begin[tiles]);
-  parallel_chunks(list_partition(static_cast<Index>(extents.size())), [&](Index chunk, Index begin, Index end) {
-    Index* const of_tile = counts.data() + chunk * tiles;
+  tile_of.resize(tile_begin[tiles]);
+  // Slots in the order of the inputs: those of Gaussians that follow each other are then read one after the other.
+  std::uint32_t slot = 0;
+  for (Slots& s : slots.span()) {
+    const std::uint32_t size = s.end - s.begin;
+    s = {slot, slot + size};
+    slot += size;
+  }
+  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+    std::uint32_t* const of_tile = counts_.data() + chunk * tiles;
+    const FoundPair* pair = found_[static_cast<std::size_t>(chunk)].data();
+    const auto index_at = [&](Index rank) { return order[static_cast<std::size_t>(rank)].index; };
     for (Index rank = begin; rank < end; ++rank) {
-      Index next = slot_begin[rank];
-      for_each_tile(extents[static_cast<std::size_t>(rank)], grid, [&](Index tile) {
-        entries[of_tile[tile]++] = {static_cast<std::int32_t>(rank), static_cast<std::uint32_t>(next++)};
-      });
+      if (rank + 2 * kAhead < end) fetch(&slots[index_at(rank + 2 * kAhead)]);
+      if (rank + kAhead < end) fetch(&tile_of[slots[index_at(rank + kAhead)].begin]);
+      const std::int32_t n = index_at(rank);
+      for (std::uint32_t at = slots[n].begin; at < slots[n].end; ++at, ++pair) {
+        entries[of_tile[pair->tile]++] = {n, at, pair->blocks};
+        tile_of[at] = pair->tile;
+      }
     }
   });
+}
+
+Index TileLists::capacity_bytes() const {
+  Index bytes = tile_begin.capacity_bytes() + tile_groups.capacity_bytes() + slots.capacity_bytes() +
+                tile_of.capacity_bytes() + entries.capacity_bytes() + counts_.capacity_bytes() +
+                groups_.capacity_bytes();
+  for (const auto& found : found_) bytes += static_cast<Index>(found.capacity() * sizeof(FoundPair));
+  return bytes;
 }
 
 }  // namespace hsi4d::detail

@@ -30,18 +30,35 @@ void describe(ConfigFields& fields, CenterSettings& settings) {
                 "An object whose opacity sums to less than this many pixels counts as hidden: the term is off for it");
 }
 
+/// Whether the term is on for an object.
+template <class M, class V>
+bool is_on(M mass, V visible, double min_opacity) {
+  return mass >= static_cast<M>(min_opacity) && visible >= V(0.5);
+}
+
 /// Columns x, y, mass of the centres beside x, y, visible of the targets; each object's distance², 0 where it is off.
 template <class S>
 Var<S> mean_squared_distance(Var<S> centres, Var<S> targets, const CenterSettings& settings, double unit_px) {
   const auto column = [](Var<S> x, Index c) { return slice_cols(x, c, 1); };
-  const S least = static_cast<S>(settings.min_opacity);
+  const double least = settings.min_opacity;
   const Var<S> total = sum_over({column(centres, 0), column(centres, 1), column(centres, 2), column(targets, 0),
                                  column(targets, 1), column(targets, 2)},
                                 [least](auto x, auto y, auto mass, auto target_x, auto target_y, auto visible) {
-                                  const bool on = value_of(mass) >= least && value_of(visible) >= S(0.5);
+                                  const bool on = is_on(value_of(mass), value_of(visible), least);
                                   return select(on, square(x - target_x) + square(y - target_y), S(0));
                                 });
   return total * (1 / (static_cast<double>(centres.shape().rows) * unit_px * unit_px));
+}
+
+/// Objects that the frame shows and the render hides.
+template <class S>
+LeftOut hidden_objects(Var<S> centres, Var<S> targets, double min_opacity) {
+  return {"center", "the opacity rendered of it sums to less than min_opacity", centres.shape().rows,
+          [=](Index object) {
+            const S mass = centres.owner().value(centres)(object, 2);
+            const S visible = targets.owner().value(targets)(object, 2);
+            return visible >= S(0.5) && !is_on(mass, visible, min_opacity);
+          }};
 }
 
 }  // namespace
@@ -55,7 +72,11 @@ LossTerm center_loss() {
         const Shape image = in.object_opacity.shape();
         if (image.planes == 0) return Value{};
         const double unit_px = settings.unit == CenterUnit::kPixels ? 1 : static_cast<double>(image.cols);
-        return mean_squared_distance(centroids(in.object_opacity), in.object_center_target, settings, unit_px);
+        const auto centres = centroids(in.object_opacity);
+        if (in.left_out != nullptr) {
+          in.left_out->push_back(hidden_objects(centres, in.object_center_target, settings.min_opacity));
+        }
+        return mean_squared_distance(centres, in.object_center_target, settings, unit_px);
       });
 }
 

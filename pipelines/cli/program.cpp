@@ -14,9 +14,11 @@
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/log.h"
+#include "core/simd.h"
 #include "core/suggest.h"
 #include "core/text.h"
 #include "core/version.h"
+#include "pipelines/cli/bench_command.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/convert_command.h"
 #include "pipelines/cli/demo_command.h"
@@ -71,6 +73,7 @@ struct CommandLine {
   std::vector<LossDescription> losses;
   RenderOptions render;
   GradientsOptions gradients;
+  BenchOptions bench;
   std::function<std::string()> run;
 
   explicit CommandLine(const std::vector<LossTerm>& terms) : losses(descriptions_of(terms)) {
@@ -86,6 +89,7 @@ struct CommandLine {
     add_gradients();
     add_convert();
     add_info();
+    add_bench();
     add_check();
     add_schema();
     add_list();
@@ -175,6 +179,17 @@ struct CommandLine {
     command.callback([this] { run = [this] { return convert_command(convert); }; });
   }
 
+  void add_bench() {
+    CLI::App* command = app.add_subcommand("bench", "Measure speed: a table, and one JSON object a measurement");
+    command->add_option("TOPIC", topic, "What: rasterize")->required()->check(CLI::IsMember({"rasterize"}));
+    command->add_option("--workload", bench.workloads, "Only these; default: all");
+    command->add_option("--threads", bench.threads, "Threads")->check(CLI::Range(1, 1024));
+    command->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told")
+        ->check(CLI::Range(1, 1000));
+    command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
+    command->callback([this] { run = [this] { return bench_rasterize_command(bench); }; });
+  }
+
   void add_check() {
     CLI::App* check = app.add_subcommand("check", "Check a config and everything that it extends; tells all problems");
     check->add_option("CONFIG", config, "The config file")->required();
@@ -238,7 +253,7 @@ struct CommandLine {
         "that the reader leaves out (a number that is not finite, a zero quaternion); log-scales and opacity logits\n"
         "that it holds at -20 or 20; coefficients above render.sh_degree; what the camera does not see.\n"
         "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
-        "render.compatibility is inria.");
+        "render.cap_gradient is pass (render.compatibility=inria makes it so).");
     command.callback([this] { run = [this] { return gradients_command(gradients); }; });
   }
 
@@ -344,6 +359,7 @@ int run_program(int argc, const char* const* argv, const std::vector<LossTerm>& 
                        static_cast<int>(message.size()), message.data());
         },
         LogLevel::kInfo);
+    best_isa();  // before any kernel runs
     run_commands(argc, argv, losses);
     return kDone;
   } catch (...) {

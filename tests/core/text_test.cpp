@@ -1,6 +1,8 @@
 #include "core/text.h"
 
 #include <limits>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -23,4 +25,30 @@ TEST_CASE("numbers are written in few digits, or in all that they need") {
   CHECK(std::stod(number_text(1.0 / 3)) == 1.0 / 3);
   CHECK(four_digits(7) == "0007");
   CHECK(four_digits(12345) == "12345");
+}
+
+TEST_CASE("text that is UTF-8 without control characters is told from what is not") {
+  const std::vector<std::string> plain = {"", "0001.png", " ", "\xc3\xa4", "\xe2\x82\xac", "\xf0\x9f\x98\x80", "~"};
+  for (const std::string& text : plain) {
+    INFO(text);
+    CHECK(is_plain_text(text));
+    CHECK(with_escapes(text) == text);
+  }
+  for (const auto& [text, escaped] : std::vector<std::pair<std::string, std::string>>{
+           {"a\xffz", "a\\xffz"},
+           {"\x80", "\\x80"},                             // begins no character
+           {"\xc3", "\\xc3"},                             // cut
+           {"\xc3(", "\\xc3("},                           // the second byte is none
+           {"\xc0\xaf", "\\xc0\\xaf"},                    // overlong
+           {"\xe0\x80\xaf", "\\xe0\\x80\\xaf"},           // overlong
+           {"\xed\xa0\x80", "\\xed\\xa0\\x80"},           // half of a pair
+           {"\xf4\x90\x80\x80", "\\xf4\\x90\\x80\\x80"},  // beyond the last
+           {"\xc3\xa4\xe4", "\xc3\xa4\\xe4"},
+           {"a\nb\x7f", "a\\x0ab\\x7f"}}) {
+    INFO(escaped);
+    CHECK_FALSE(is_plain_text(text));
+    CHECK(with_escapes(text) == escaped);
+  }
+  CHECK(utf8_length("") == 0);
+  CHECK(utf8_length("\xe2\x82\xac.") == 3);
 }

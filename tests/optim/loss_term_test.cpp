@@ -168,6 +168,29 @@ TEST_CASE("center is off for an object that is hidden or not in the frame's mask
   CHECK(objects.largest_slope(1) == 0);
 }
 
+TEST_CASE("center tells which objects the render hides, not those that the frame does not show") {
+  Objects objects;
+  std::vector<LeftOut> left_out;
+  objects.inputs.left_out = &left_out;
+  const auto hidden = [&](const std::string& settings = "{}") {
+    left_out.clear();
+    objects.value(settings);
+    REQUIRE(left_out.size() == 1);
+    CHECK(left_out[0].term == "center");
+    CHECK_FALSE(left_out[0].reason.empty());
+    REQUIRE(left_out[0].objects == 2);
+    return std::vector<bool>{left_out[0].is_left_out(0), left_out[0].is_left_out(1)};
+  };
+  CHECK(hidden() == std::vector<bool>{false, false});
+  CHECK(hidden(R"({"min_opacity": 2.5})") == std::vector<bool>{false, true});  // the second has 2 px, the first 2.7
+  CHECK(hidden(R"({"min_opacity": 3})") == std::vector<bool>{true, true});
+  objects.tape.set(objects.inputs.object_center_target, {8.5, 6.5, 0, 10.5, 6, 1});
+  CHECK(hidden(R"({"min_opacity": 3})") == std::vector<bool>{false, true});
+  objects.tape.write(objects.inputs.object_opacity)(1, 7, 10) = 0;  // what it says is of the last forward run
+  objects.tape.write(objects.inputs.object_opacity)(1, 8, 10) = 0;
+  CHECK(hidden() == std::vector<bool>{false, true});
+}
+
 TEST_CASE("depth is the mean squared difference of the objects' depths") {
   Tape<double> tape;
   LossInputs<double> inputs;

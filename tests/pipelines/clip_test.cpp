@@ -190,9 +190,25 @@ TEST_CASE("every frame can be checked at once") {
   const CopiedDataset dataset;
   const DataSettings data = dataset_inputs(dataset.path);
   const Clip clip = read_clip(data);
-  CHECK(message_of([&] { check_frames(data, clip); }) == "no error");
+  CHECK(message_of([&] { check_frames(data, clip, true); }) == "no error");
   for (const char* name : {"frames/0003.png", "frames/0002.png"}) std::ofstream(dataset.path / name) << "text";
-  CHECK_THAT(message_of([&] { check_frames(data, clip); }), Contains((dataset.path / "frames/0002.png").string()));
+  CHECK_THAT(message_of([&] { check_frames(data, clip, true); }),
+             Contains((dataset.path / "frames/0002.png").string()));
+}
+
+TEST_CASE("frames whose names are not text are refused when the folder is read") {
+  for (const auto& [name, shown] : {std::pair{"0003\xff.png", "0003\\xff.png"}, {"00\n03.png", "00\\x0a03.png"}}) {
+    const CopiedDataset dataset;
+    fs::rename(dataset.path / "frames/0003.png", dataset.path / "frames" / name);
+    CHECK_THROWS_AS(dataset.read(), UserError);
+    CHECK(message_of([&] { dataset.read(); }) ==
+          (dataset.path / "frames").string() + ": the name \"" + shown +
+              "\" is not UTF-8 text without control characters; rename the frame, and its masks with it");
+  }
+  const CopiedDataset dataset;
+  for (const char* folder : {"frames", "masks/human"})
+    fs::rename(dataset.path / folder / "0003.png", dataset.path / folder / "0003\xc3\xa4.png");
+  CHECK(message_of([&] { dataset.read(); }) == "no error");
 }
 
 TEST_CASE("frames whose names sort otherwise than their numbers are refused") {

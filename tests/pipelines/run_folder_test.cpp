@@ -172,6 +172,22 @@ TEST_CASE("a config that differs is told setting by setting") {
   CHECK_THAT(opening_message("a", identity(), true), Contains("(in its text only)"));
 }
 
+TEST_CASE("a config with its stages in another order is another one") {
+  const TemporaryFolder here;
+  const auto config = [](const std::string& stages) { return "{\"seed\": 7, \"stages\": {" + stages + "}}"; };
+  const std::string first = "\"first\": {\"iterations\": 1}", second = "\"second\": {\"iterations\": 2}";
+  RunIdentity before = identity(), now = identity();
+  before.config = config(first + ", " + second);
+  now.config = config(second + ", " + first);
+  CHECK(opening_message("a", before, false) == "opened");
+  CHECK(opening_message("a", now, true) ==
+        "a/config.resolved.json: the run cannot be resumed, its config is another one:\n"
+        "  /stages: in the order first, second in the folder, second, first now");
+  CHECK(opening_message("a", before, true) == "opened");
+  now.config = "{\"stages\": {" + first + ", " + second + "}, \"seed\": 7}";  // sections have no order
+  CHECK(opening_message("a", now, true) == "opened");
+}
+
 TEST_CASE("after truncation the metrics are as if the run had never gone further") {
   const TemporaryFolder here;
   leave_run("whole", RunState::kDone);

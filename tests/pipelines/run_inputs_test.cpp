@@ -57,7 +57,7 @@ std::vector<std::string> warnings_of(const RunConfig& config) {
   std::vector<std::string> warnings;
   const LogSink sink =
       log_to([&](LogLevel, std::string_view text) { warnings.emplace_back(text); }, LogLevel::kWarning);
-  check_frames(config.data, read_clip(config.data));
+  check_frames(config.data, read_clip(config.data), has_loss(config, "center"));
   return warnings;
 }
 
@@ -158,8 +158,15 @@ TEST_CASE("frames in which an object is not seen are told once, as ranges", "[ru
   CHECK(warnings_of(config).empty());
   const fs::path masks = config.data.masks / kTinyObject;
   const std::string rest = ": no pixel reaches data.mask_threshold; the loss \"center\" is off for it there";
+  write_image((masks / "0000.png").string(), Image(1, kTinyPixels, kTinyPixels));
+  CHECK(warnings_of(config).empty());  // frame 0 is given, not optimised
   write_image((masks / "0002.png").string(), Image(1, kTinyPixels, kTinyPixels));
   CHECK(warnings_of(config) == std::vector<std::string>{masks.string() + ": the object is hidden in frame 2" + rest});
+  RunConfig without = config;
+  std::erase_if(without.stages.back().second.losses, [](const auto& loss) { return loss.first == "center"; });
+  CHECK(warnings_of(without) ==
+        std::vector<std::string>{masks.string() + ": the object is hidden in frame 2: no pixel reaches "
+                                                  "data.mask_threshold"});
   write_image((masks / "0003.png").string(), Image(1, kTinyPixels, kTinyPixels));
   carry_out_tiny(config, "run");
   CHECK_THAT(file_text("run/log.txt"),

@@ -207,3 +207,26 @@ TEST_CASE("a checkpoint with entries that cannot be is refused, whatever they ar
              Contains("\"covered\" holds 481 numbers, this clip needs 480"));
   CHECK_THAT(error_with("image_errors/1/ssim", Doubles{}), Contains("\"image_errors/1/ssim\" holds 0 numbers"));
 }
+
+TEST_CASE("what losses left out is in a checkpoint, and nothing that is not of the clip") {
+  const TemporaryFolder here;
+  const Clip clip = three_frames();
+  RunProgress progress = random_progress(clip);
+  progress.left_out = {{0, 1, 1, "center", "it is hidden"}, {1, 1, 0, "a term of mine", "100 % off"}};
+  save_progress(kFile, kConfig, progress);
+  const std::vector<LeftOutInFrame> read = load_progress(kFile, kConfig, clip, kStages).left_out;
+  REQUIRE(read.size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    CHECK(read[i].stage == progress.left_out[i].stage);
+    CHECK(read[i].frame == progress.left_out[i].frame);
+    CHECK(read[i].object == progress.left_out[i].object);
+    CHECK(read[i].term == progress.left_out[i].term);
+    CHECK(read[i].reason == progress.left_out[i].reason);
+  }
+  for (const std::string line : {"2 1 0 a\tb", "0 3 0 a\tb", "0 0 0 a\tb", "0 1 2 a\tb", "0 1 -1 a\tb", "x", "0 1 0"}) {
+    INFO(line);
+    save_with(clip, "left_out", line + "\n");
+    CHECK(loading_error(clip) == kFile + ": \"left_out\" holds \"" + line +
+                                     "\", which is no stage, frame, object, term and reason of this clip");
+  }
+}

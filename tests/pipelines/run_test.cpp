@@ -1,7 +1,9 @@
 #include "pipelines/run.h"
 
 #include <cmath>
+#include <map>
 #include <set>
+#include <sstream>
 
 #include <catch2/catch.hpp>
 
@@ -330,21 +332,79 @@ TEST_CASE("a dry run looks at the folder as the run would", "[run]") {
         "hsi4d run: --resume needs --out: there are several runs called tiny, from runs/tiny on\n");
 }
 
-TEST_CASE("every shipped schedule runs", "[run]") {
+TEST_CASE("every shipped config runs", "[run]") {
   const TemporaryFolder here;
   const DataSettings data = dataset_inputs(TinyDataset::folder());
-  for (const char* name : {"demo_quick", "demo", "paper"}) {
+  std::set<std::string> with_stages, without;
+  for (const std::string& name : names_in(fs::path(HSI4D_SOURCE_DIR) / "configs")) {
     INFO(name);
-    const fs::path file = fs::path(HSI4D_SOURCE_DIR) / "configs" / (std::string(name) + ".json");
-    RunConfig config = load_run_config(file, {"stages.camera.iterations=2", "stages.interaction.iterations=2"},
-                                       descriptions_of(loss_terms()));
+    RunConfig config =
+        load_run_config(fs::path(HSI4D_SOURCE_DIR) / "configs" / name, {}, descriptions_of(loss_terms()));
+    const std::string folder = fs::path(name).stem().string();
+    (config.stages.empty() ? without : with_stages).insert(folder);
+    // A config without stages is a base for others, or settings of a render or dataset: its run has those of a tiny
+    // one.
+    if (config.stages.empty()) config.stages = tiny_config().stages;
     for (auto& [stage, settings] : config.stages) {
+      settings.iterations = 2;
       for (auto& [group, moved] : settings.optimize) moved.from = 0;  // as later iterations would be
     }
     config.data = data;
-    const RunSummary summary = carry_out_tiny(config, name);
+    const RunSummary summary = carry_out_tiny(config, folder);
     CHECK(summary.metrics.size() == 2);
     CHECK(number_in(summary.metrics.back().values, "psnr_db") > 10);
-    CHECK(json_of(std::string(name) + "/status.json")["state"] == "done");
+    CHECK(json_of(folder + "/status.json")["state"] == "done");
+    INFO("its dataset");  // but for its size
+    config.synthetic.frames = 2;
+    config.synthetic.size_px = 32;
+    config.synthetic.scene_gaussians = kFewestRoomGaussians;
+    config.synthetic.avatar_gaussians = 300;
+    config.synthetic.object_gaussians = kFewestObjectGaussians;
+    write_dataset(config.synthetic, video_render_settings(), folder + "-dataset");
+    CHECK(fs::exists(folder + "-dataset/truth/motion.npz"));
+  }
+  CHECK(with_stages == std::set<std::string>{"demo", "demo_quick", "paper"});
+  CHECK(without == std::set<std::string>{"accurate", "compare_gsplat", "default", "synthetic"});
+}
+
+TEST_CASE("the demo halves the errors of what it is given, and tells them", "[full][demo]") {
+  const TemporaryFolder here;
+  const ProgramResult demo = run_hsi4d({"demo", "--quick", "--quiet", "--out", "demo"});
+  INFO(demo.err);
+  INFO(demo.out);
+  REQUIRE(demo.status == 0);
+  CHECK(demo.err.empty());
+  const nlohmann::json config = json_of("demo/run/config.resolved.json"), summary = json_of("demo/run/summary.json");
+  CHECK(config["synthetic"]["size_px"] == 256);
+  CHECK(config["synthetic"]["frames"] == 8);
+  CHECK(summary["frames"] == 8);
+  const nlohmann::json& last = summary["metrics"].back();
+  for (const char* name :
+       {"mpjpe_mm", "object_translation_cm", "object_rotation_deg", "camera_translation_cm", "camera_rotation_deg"}) {
+    for (const char* baseline : {"start", "copy_frame_0"}) {
+      INFO(name << " against " << baseline);
+      CHECK(number_at(last, name) <= 0.5 * number_at(summary["baselines"][baseline], name));
+    }
+  }
+  for (const char* name : {"world_mpjpe_mm", "world_mpjpe_image_mm", "world_mpjpe_depth_mm"}) {
+    CHECK(number_at(last, name) > 0);
+  }
+  // What it prints is that summary: every row has its numbers under its columns.
+  CHECK_THAT(demo.out, Contains(error_table(parse_summary(file_text("demo/run/summary.json"), "summary.json"))));
+  std::map<std::string, std::vector<double>> rows;  // by label
+  std::istringstream lines(demo.out);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t unit_end = line.find(']');
+    if (unit_end == std::string::npos) continue;
+    std::istringstream words(line.substr(unit_end + 1));
+    for (std::string word; words >> word;)
+      rows[line.substr(0, unit_end + 1)].push_back(word == "-" ? 0 : std::stod(word));
+  }
+  for (const char* label : {"MPJPE [mm]", "world MPJPE [mm]", "object position [cm]", "camera position [cm]"}) {
+    INFO(label);
+    REQUIRE(rows[label].size() == 4);  // start, copy_frame_0, camera, interaction
+    CHECK(rows[label][3] > 0);
+    CHECK(rows[label][3] < rows[label][0]);
+    CHECK(rows[label][3] < rows[label][1]);
   }
 }

@@ -123,6 +123,33 @@ TEST_CASE("a loss that is off is told once, with the reason", "[run]") {
   }
 }
 
+TEST_CASE("an object that center leaves out is told once, with its frames, also by a run that was resumed", "[run]") {
+  const TemporaryFolder here;
+  const RunConfig config = tiny_config({"stages.interaction.losses.center.min_opacity=100000"});
+  const std::string told =
+      "stage interaction: the loss \"center\" was off for the object \"watering_can\" (the opacity rendered of it sums "
+      "to less than min_opacity), in some iterations at least, in frames 1-3";
+  {
+    const Warnings warnings;
+    carry_out_tiny(config, "run");
+    CHECK(warnings.all() == std::vector<std::string>{told});
+  }
+  const std::string log = file_text("run/log.txt");
+  CHECK_THAT(log, Contains(" warning " + told + "\n"));
+  CHECK_THAT(log, Contains("frame 2, stage interaction: 10 iterations in ") &&
+                      Contains(", center without watering_can in 11 of 11 evaluations\n"));
+  for (const nlohmann::json& line : metrics_of("run")) {
+    if (line["stage"] == "interaction") CHECK(line["losses"]["center"] == 0);
+  }
+  const Warnings warnings;
+  int count = 0;
+  CHECK_THROWS_AS(carry_out_tiny(config, "halves", 1, false, [&] { return ++count == 20; }), Interrupted);
+  CHECK(warnings.all().empty());  // its frames are not known yet
+  carry_out_tiny(config, "halves", 1, true);
+  CHECK(warnings.all() == std::vector<std::string>{told});
+  CHECK(differences("run", "halves").empty());
+}
+
 TEST_CASE("a run in which every loss is on warns of nothing", "[run]") {
   const TemporaryFolder here;
   const Warnings warnings;

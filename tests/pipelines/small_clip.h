@@ -1,6 +1,9 @@
 // A clip of a few Gaussians, made in memory: a wall and a floor, one object, a body.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "body/procedural_body.h"
 #include "core/random.h"
 #include "pipelines/clip.h"
@@ -35,9 +38,9 @@ inline BodyPose bent_pose(std::uint64_t seed) {
 }
 
 /// The clip: a camera at (0.2, -3, 1.2) that looks at a body at the origin, `gaussians` Gaussians on it.
-inline Clip small_clip(int width, int height, Index gaussians) {
+inline Clip small_clip(int width, int height, Index gaussians, Index of_scene = 30) {
   Clip clip;
-  clip.scene = random_gaussians(30, {0, 1, 0.9}, 1.2, -1.2, 11);
+  clip.scene = random_gaussians(of_scene, {0, 1, 0.9}, 1.2, -1.2, 11);
   clip.objects.push_back({"box", random_gaussians(8, {0, 0, 0}, 0.12, -2.2, 12)});
   clip.objects.push_back({"ball", random_gaussians(6, {0, 0, 0}, 0.1, -2.0, 13)});
   AvatarSettings avatar;
@@ -50,6 +53,41 @@ inline Clip small_clip(int width, int height, Index gaussians) {
   clip.first.body = bent_pose(14);
   clip.frame_files = {"0000.png", "0001.png"};
   return clip;
+}
+
+/// The avatar with the `per_joint` Gaussians alone that each joint moves most, so that few of them show every joint;
+/// larger, so that they cover as much.
+inline Avatar avatar_of_every_joint(const Avatar& dense, Index per_joint) {
+  std::vector<Index> kept;
+  for (Index joint = 0; joint < dense.joint_count(); ++joint) {
+    std::vector<std::pair<double, Index>> moved;  // minus by how much, which
+    for (std::size_t at = 0; at < dense.weights.weights.size(); ++at) {
+      if (dense.weights.indices[at] != joint || dense.weights.weights[at] == 0) continue;
+      moved.emplace_back(-dense.weights.weights[at], static_cast<Index>(at) / dense.weights.per_vertex);
+    }
+    std::sort(moved.begin(), moved.end());
+    moved.resize(std::min(moved.size(), static_cast<std::size_t>(per_joint)));
+    for (const auto& [amount, gaussian] : moved) kept.push_back(gaussian);
+  }
+  std::sort(kept.begin(), kept.end());
+  kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
+  Avatar few = dense;
+  const auto take = [&kept](auto& numbers, Index width) {
+    auto taken = numbers;
+    taken.clear();
+    for (const Index i : kept) {
+      const auto row = numbers.begin() + static_cast<std::ptrdiff_t>(i * width);
+      taken.insert(taken.end(), row, row + static_cast<std::ptrdiff_t>(width));
+    }
+    numbers = taken;
+  };
+  take(few.means, 3), take(few.quats, 4), take(few.log_scales, 3), take(few.opacity_logits, 1), take(few.colors, 3);
+  take(few.weights.indices, dense.weights.per_vertex), take(few.weights.weights, dense.weights.per_vertex);
+  few.weights.vertices = few.count();
+  const double larger = std::sqrt(static_cast<double>(dense.count()) / static_cast<double>(few.count()));
+  for (float& log_scale : few.log_scales) log_scale += static_cast<float>(std::log(larger));
+  check_sizes(few);
+  return few;
 }
 
 }  // namespace hsi4d::test

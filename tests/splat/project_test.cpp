@@ -170,16 +170,35 @@ TEST_CASE("Gaussians that are not drawn are zeros without a gradient") {
     CHECK(run.value(run.projected.means_px) == std::vector<double>(2, 0.0));
     CHECK(run.value(run.projected.factors) == std::vector<double>(6, 0.0));
     if (std::isfinite(c.mean[0]) && std::isfinite(c.mean[1])) CHECK(run.value(run.projected.depths)[0] == c.depth);
-    for (const auto& d : {run.d(run.means), run.d(run.axes), run.d(run.xi)}) {
-      CHECK(std::all_of(d.begin(), d.end(), [](double x) { return x == 0; }));
-    }
+    // Of the cotangents, all 1, that of the depth alone reaches anything, and that only where the point is finite:
+    // ∂z/∂m is the camera's third row, ∂z/∂ξ = (0, 0, 1, y, −x, 0).
+    const bool has_depth = std::isfinite(c.mean[0]) && std::isfinite(c.mean[1]) && std::isfinite(c.mean[2]);
+    const std::vector<double> zeros(6, 0.0);
+    CHECK(run.d(run.axes) == std::vector<double>(9, 0.0));
+    CHECK(run.d(run.means) == (has_depth ? std::vector<double>{0, 0, 1} : std::vector<double>(3, 0.0)));
+    CHECK(run.d(run.xi) == (has_depth ? std::vector<double>{0, 0, 1, c.mean[1], -c.mean[0], 0} : zeros));
   }
   std::vector<double> axes = kAxes;
   axes[4] = nan;
   Run<double> run(view_of_camera(camera), {0, 0, 2}, axes, kNoUpdate);
   run.backward();
   CHECK(run.value(run.projected.factors) == std::vector<double>(6, 0.0));
-  CHECK(run.d(run.means) == std::vector<double>(3, 0.0));
+  CHECK(run.d(run.means) == std::vector<double>{0, 0, 1});  // of the depth
+  CHECK(run.d(run.axes) == std::vector<double>(9, 0.0));
+}
+
+TEST_CASE("depths have their gradient on both sides of near") {
+  const Camera camera = tilted_camera({40, 30});
+  const Vector3<double> center = inverse(camera.camera_from_world).translation;
+  std::vector<double> means;
+  for (const double z : {-3.0, -0.2, 0.005, 2.0}) {
+    const Vector3<double> m = center + camera.camera_from_world.rotation.transpose() * Vector3<double>(0.3 * z, 0.1, z);
+    means.insert(means.end(), m.data(), m.data() + 3);
+  }
+  check_operator(
+      "depths of what is drawn and what is not",
+      {{"means", shape_of(4, 3), 0, 0, means}, {"axes", shape_of(4, 9), -0.2, 0.2}, {"xi", shape_of(1, 6), -0.1, 0.1}},
+      [&](const auto& in) { return project(in[0], in[1], in[2], view_of_camera(camera)).depths; });
 }
 
 TEST_CASE("any scale at any depth stays finite in float [A4]") {

@@ -1,6 +1,7 @@
 #include "splat/tiles.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -9,7 +10,7 @@
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "splat/composite_kernel.h"
+#include "splat/block_kernel.h"
 
 using namespace hsi4d;
 using namespace hsi4d::detail;
@@ -64,16 +65,20 @@ SplatRecord<S> record_of(const Conic& conic, double x, double y, double opacity)
   r.x = x, r.y = y;
   r.l11 = static_cast<S>(conic.l11), r.l21 = static_cast<S>(conic.l21), r.l22 = static_cast<S>(conic.l22);
   r.opacity = static_cast<S>(opacity);
+  r.log2_opacity = static_cast<S>(std::log2(std::max(opacity, kLeastOpacity)));
   return r;
 }
 
 /// What α is at a pixel of the image, in the tile that it lies in.
 template <class S>
 PixelAlpha<S> alpha_at(const SplatRecord<S>& record, const RenderSettings& settings, Index row, Index col) {
-  const CompositeRules<S> rules{static_cast<S>(settings.alpha_cap), static_cast<S>(settings.alpha_min), 0, false,
-                                false};
+  const CompositeRules<S> rules{static_cast<S>(settings.alpha_cap), static_cast<S>(settings.alpha_min), 0, false, false,
+                                static_cast<S>(settings.blur)};
   TileJob<S> job{};
   job.left = col / 16 * 16, job.top = row / 16 * 16;
+  if constexpr (std::is_same_v<S, float>) {
+    return block_pixel_alpha(16, record, rules, job.left, job.top, row - job.top, col - job.left);
+  }
   return pixel_alpha(record, rules, job, row - job.top, col - job.left);
 }
 
@@ -174,22 +179,28 @@ TEST_CASE("a factor that is left out of a tile has no pixel there that it would 
     Conic conic;
     REQUIRE(conic_of(v.data(), 0.3, conic));
     const Extent extent = extent_of(conic, x, y, opacity, grid, settings, std::numeric_limits<float>::epsilon());
+    std::vector<std::uint32_t> listed(static_cast<std::size_t>(grid.count()), 0);
+    for_each_tile(extent, grid, [&](Index tile, std::uint32_t blocks) {
+      REQUIRE(listed[static_cast<std::size_t>(tile)] == 0);
+      listed[static_cast<std::size_t>(tile)] = blocks;
+    });
     for (Index tile = 0; tile < grid.count(); ++tile) {
       const Index tile_row = tile / grid.cols, tile_col = tile % grid.cols;
-      const TileSpan span = tile_columns(extent, grid, tile_row);
-      bool drawn = false, drawn_in_rows = false;
-      for (Index p = 0; p < 256; ++p) {
-        const Index row = tile_row * 16 + p / 16, col = tile_col * 16 + p % 16;
-        if (row >= grid.height || col >= grid.width) continue;
-        const bool here = alpha_at(record_of<float>(conic, x, y, opacity), settings, row, col).drawn ||
-                          alpha_at(record_of<double>(conic, x, y, opacity), settings, row, col).drawn;
-        drawn = drawn || here;
-        drawn_in_rows = drawn_in_rows || (here && row >= extent.row_begin && row < extent.row_end);
+      for (Index block = 0; block < 16; ++block) {
+        bool drawn = false, drawn_in_rows = false;
+        for (Index p = 0; p < 16; ++p) {
+          const Index row = tile_row * 16 + block / 4 * 4 + p / 4, col = tile_col * 16 + block % 4 * 4 + p % 4;
+          if (row >= grid.height || col >= grid.width) continue;
+          const bool here = alpha_at(record_of<float>(conic, x, y, opacity), settings, row, col).drawn ||
+                            alpha_at(record_of<double>(conic, x, y, opacity), settings, row, col).drawn;
+          drawn = drawn || here;
+          drawn_in_rows = drawn_in_rows || (here && row >= extent.row_begin && row < extent.row_end);
+        }
+        const bool is_listed = (listed[static_cast<std::size_t>(tile)] >> block & 1) != 0;
+        REQUIRE(drawn == drawn_in_rows);
+        if (drawn) REQUIRE(is_listed);
+        is_listed ? (drawn ? ++kept : ++empty) : ++left_out;
       }
-      const bool listed = tile_col >= span.begin && tile_col < span.end;
-      REQUIRE(drawn == drawn_in_rows);
-      if (drawn) REQUIRE(listed);
-      listed ? (drawn ? ++kept : ++empty) : ++left_out;
     }
   }
   CHECK(left_out > 50000);
@@ -211,10 +222,17 @@ TEST_CASE("extents of wild numbers stay inside of the image [A6]") {
             if (!conic_of(v.data(), 0.3, conic)) continue;
             const Extent e = extent_of(conic, at, at, opacity, grid, settings, 1e-7);
             CHECK((e.row_begin >= 0 && e.row_end <= grid.height));
-            for (Index r = 0; r < grid.rows; ++r) {
-              const TileSpan span = tile_columns(e, grid, r);
-              CHECK((span.begin >= 0 && span.end <= grid.cols));
+            if (e.row_begin >= e.row_end) continue;
+            for (std::int32_t first = 0; first < 16; first += kBands) {
+              BandSpans spans;
+              band_spans(e, grid, first, spans);
+              for (Index i = 0; i < kBands; ++i) {
+                if (spans.begin[i] < spans.end[i]) CHECK((spans.begin[i] >= 0 && spans.end[i] <= 2 * grid.cols));
+              }
             }
+            for_each_tile(e, grid, [&](Index tile, std::uint32_t blocks) {
+              CHECK((tile >= 0 && tile < grid.count() && blocks > 0 && blocks < 16));
+            });
           }
         }
       }
@@ -278,36 +296,48 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
     extents.push_back(extent_of(conic, random.uniform(-10, 160), random.uniform(-10, 100), random.uniform(0, 1), grid,
                                 settings, 1e-7));
   }
-  std::vector<std::vector<std::int32_t>> expected(static_cast<std::size_t>(grid.count()));
-  Index pairs = 0;
-  for (std::size_t rank = 0; rank < extents.size(); ++rank) {
-    for (Index tile = 0; tile < grid.count(); ++tile) {
-      const TileSpan span = tile_columns(extents[rank], grid, tile / grid.cols);
-      if (tile % grid.cols < span.begin || tile % grid.cols >= span.end) continue;
-      expected[static_cast<std::size_t>(tile)].push_back(static_cast<std::int32_t>(rank));
-      ++pairs;
-    }
+  // In depth order: every row but each seventh, backwards.
+  std::vector<DepthKeyed> order;
+  for (std::int32_t n = 4999; n >= 0; --n) {
+    if (n % 7 != 0) order.push_back({0, n});
+  }
+  std::vector<std::vector<TileEntry>> expected(static_cast<std::size_t>(grid.count()));
+  std::vector<Index> groups(static_cast<std::size_t>(grid.count()), 0);
+  std::vector<std::uint32_t> next_slot(extents.size() + 1, 0);  // slots are in the order of rows
+  for (std::size_t n = 0; n < extents.size(); ++n) {
+    next_slot[n + 1] = next_slot[n];
+    if (n % 7 != 0) for_each_tile(extents[n], grid, [&](Index, std::uint32_t) { ++next_slot[n + 1]; });
+  }
+  const std::uint32_t slot = next_slot.back();
+  for (const DepthKeyed& d : order) {
+    for_each_tile(extents[static_cast<std::size_t>(d.index)], grid, [&](Index tile, std::uint32_t blocks) {
+      expected[static_cast<std::size_t>(tile)].push_back(
+          {d.index, next_slot[static_cast<std::size_t>(d.index)]++, blocks});
+      groups[static_cast<std::size_t>(tile)] += std::popcount(blocks);
+    });
   }
   for (const int threads : {1, 2, 8}) {
     TileLists lists;
-    Buffer<Index> counts;
     with_threads(threads, [&] {
-      lists.count(extents, grid, counts);
-      lists.fill(extents, grid, counts);
+      CHECK(lists.find(order, extents, grid, 1 << 30) == slot);
+      lists.fill(order, grid);
     });
-    CHECK(lists.pairs() == pairs);
-    std::vector<bool> used(static_cast<std::size_t>(pairs), false);
+    REQUIRE(lists.pairs() == slot);
     for (Index tile = 0; tile < grid.count(); ++tile) {
-      std::vector<std::int32_t> ranks;
-      for (Index e = lists.tile_begin[tile]; e < lists.tile_begin[tile + 1]; ++e) {
-        const TileEntry entry = lists.entries[e];
-        ranks.push_back(entry.rank);
-        CHECK(entry.slot >= lists.slot_begin[entry.rank]);
-        CHECK(entry.slot < lists.slot_begin[entry.rank + 1]);
-        CHECK_FALSE(used[entry.slot]);
-        used[entry.slot] = true;
+      const auto& of_tile = expected[static_cast<std::size_t>(tile)];
+      REQUIRE(lists.tile_begin[tile + 1] - lists.tile_begin[tile] == static_cast<Index>(of_tile.size()));
+      CHECK(lists.tile_groups[tile] == groups[static_cast<std::size_t>(tile)]);
+      for (std::size_t i = 0; i < of_tile.size(); ++i) {
+        const TileEntry entry = lists.entries[lists.tile_begin[tile] + static_cast<Index>(i)];
+        CHECK(entry.index == of_tile[i].index);
+        CHECK(entry.slot == of_tile[i].slot);
+        CHECK(entry.blocks == of_tile[i].blocks);
+        CHECK(lists.tile_of[entry.slot] == static_cast<std::uint32_t>(tile));
+        CHECK((entry.slot >= lists.slots[entry.index].begin && entry.slot < lists.slots[entry.index].end));
       }
-      CHECK(ranks == expected[static_cast<std::size_t>(tile)]);
     }
+    for (Index n = 0; n < 5000; n += 7) CHECK(lists.slots[n].begin == lists.slots[n].end);
   }
+  TileLists lists;
+  CHECK(lists.find(order, extents, grid, 10) == slot);  // counted, though not kept
 }

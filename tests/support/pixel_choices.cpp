@@ -5,7 +5,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "splat/composite_kernel.h"
+#include "splat/block_kernel.h"
 #include "splat/conic.h"
 #include "splat/tiles.h"
 
@@ -40,7 +40,28 @@ CompositeRules<S> rules_of(const RenderSettings& settings) {
   const bool at_too = stop > S(0) && settings.stop_when == StopWhen::kAtOrBelow;
   return {static_cast<S>(settings.alpha_cap), static_cast<S>(settings.alpha_min),
           at_too ? std::nextafter(stop, std::numeric_limits<S>::infinity()) : stop,
-          settings.stop_rule == StopRule::kExclusive, settings.cap_gradient == CapGradient::kPass};
+          settings.stop_rule == StopRule::kExclusive, settings.cap_gradient == CapGradient::kPass,
+          static_cast<S>(settings.blur)};
+}
+
+/// α and the transmittance behind it, by the kernel that composites up to kMostBlockChannels features.
+template <class S>
+hsi4d::detail::PixelAlpha<S> alpha_at(Index side, const SplatRecord<S>& record, const CompositeRules<S>& rules,
+                                      const TileJob<S>& job, Index row, Index col) {
+  if constexpr (std::is_same_v<S, float>) {
+    return hsi4d::detail::block_pixel_alpha(side, record, rules, job.left, job.top, row, col);
+  } else {
+    return hsi4d::detail::pixel_alpha(record, rules, job, row, col);
+  }
+}
+
+template <class S>
+S behind(S transmittance, S alpha) {
+  if constexpr (std::is_same_v<S, float>) {
+    return hsi4d::detail::block_transmittance(transmittance, alpha);
+  } else {
+    return transmittance * (S(1) - alpha);
+  }
 }
 
 template <class S>
@@ -77,6 +98,7 @@ std::vector<Candidate<S>> candidates(const Tape<S>& tape, const Projected<S>& pr
                 static_cast<S>(conic.l21),
                 static_cast<S>(conic.l22),
                 static_cast<S>(o),
+                static_cast<S>(std::log2(std::max(o, hsi4d::detail::kLeastOpacity))),
                 static_cast<std::int32_t>(c.extent.row_begin),
                 static_cast<std::int32_t>(c.extent.row_end),
                 static_cast<std::int32_t>(n)};
@@ -88,18 +110,18 @@ std::vector<Candidate<S>> candidates(const Tape<S>& tape, const Projected<S>& pr
 
 /// The choices at one pixel of a tile, given what reaches the tile in depth order.
 template <class S>
-std::uint64_t choices_at(const std::vector<const SplatRecord<S>*>& list, const CompositeRules<S>& rules,
+std::uint64_t choices_at(Index side, const std::vector<const SplatRecord<S>*>& list, const CompositeRules<S>& rules,
                          const TileJob<S>& job, Index row, Index col, PixelChoices& count) {
   Hash hash;
   S transmittance = 1;
   for (const SplatRecord<S>* record : list) {
     if (job.top + row < record->row_begin || job.top + row >= record->row_end) continue;
-    const auto pixel = hsi4d::detail::pixel_alpha(*record, rules, job, row, col);
+    const auto pixel = alpha_at(side, *record, rules, job, row, col);
     if (!pixel.drawn) {
       ++count.skipped;
       continue;
     }
-    const S next = transmittance * (S(1) - pixel.alpha);
+    const S next = behind(transmittance, pixel.alpha);
     const bool past = next < rules.stop_below;
     const auto name = 4 * static_cast<std::uint64_t>(record->index);
     hash.add(name + (past ? 2 : 0) + (pixel.capped ? 1 : 0));
@@ -123,7 +145,7 @@ PixelChoices pixel_choices(const Tape<S>& tape, const Projected<S>& projected, V
   std::vector<std::vector<const SplatRecord<S>*>> lists(static_cast<std::size_t>(tiles.count()));
   for (const Candidate<S>& c : all) {
     hsi4d::detail::for_each_tile(c.extent, tiles,
-                                 [&](Index tile) { lists[static_cast<std::size_t>(tile)].push_back(&c.record); });
+                                 [&](Index tile, std::uint32_t) { lists[static_cast<std::size_t>(tile)].push_back(&c.record); });
   }
   const CompositeRules<S> rules = rules_of<S>(view.settings);
   PixelChoices result;
@@ -138,7 +160,7 @@ PixelChoices pixel_choices(const Tape<S>& tape, const Projected<S>& projected, V
     for (Index row = 0; row < job.height; ++row) {
       for (Index col = 0; col < job.width; ++col) {
         const Index pixel = (job.top + row) * tiles.width + job.left + col;
-        result.hashes[static_cast<std::size_t>(pixel)] = choices_at(list, rules, job, row, col, result);
+        result.hashes[static_cast<std::size_t>(pixel)] = choices_at(tiles.tile, list, rules, job, row, col, result);
       }
     }
   }

@@ -188,7 +188,8 @@ TEST_CASE("the program and every subcommand answer --version and --help") {
 TEST_CASE("the help of gradients tells which of them are zero") {
   const TemporaryFolder folder;
   CHECK_THAT(run_hsi4d({"gradients", "--help"}).out,
-             Contains("log-scales and opacity logits\nthat it holds at -20 or 20"));
+             Contains("log-scales and opacity logits\nthat it holds at -20 or 20") &&
+                 Contains("unless\nrender.cap_gradient is pass (render.compatibility=inria makes it so)."));
 }
 
 TEST_CASE("mistakes on the command line end with 2 and one message") {
@@ -199,7 +200,7 @@ TEST_CASE("mistakes on the command line end with 2 and one message") {
     CHECK(result.out.empty());
     return result.err;
   };
-  const std::string commands = "run, demo, synth, report, render, gradients, convert, info, check, schema, list";
+  const std::string commands = "run, demo, synth, report, render, gradients, convert, info, bench, check, schema, list";
   CHECK(mistake({"chek"}) == "hsi4d: there is no command \"chek\"; known: " + commands + "; did you mean \"check\"?\n");
   CHECK(mistake({"frobnicate"}) == "hsi4d: there is no command \"frobnicate\"; known: " + commands + "\n");
   CHECK(mistake({}) == "hsi4d: give a command: " + commands + "; `hsi4d --help` explains them\n");

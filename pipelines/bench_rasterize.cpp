@@ -1,0 +1,127 @@
+#include "pipelines/bench_rasterize.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/check.h"
+#include "core/parallel.h"
+#include "core/suggest.h"
+#include "core/text.h"
+#include "pipelines/bench_workloads.h"
+#include "splat/covariance.h"
+#include "splat/render.h"
+
+namespace hsi4d {
+
+namespace {
+
+struct NamedWorkload {
+  const char* name;
+  Workload (*make)();
+};
+constexpr std::array<NamedWorkload, 4> kWorkloads = {{{"avatar", avatar_workload},
+                                                      {"scene", scene_workload},
+                                                      {"avatar_in_scene", avatar_in_scene_workload},
+                                                      {"small", small_workload}}};
+
+/// A workload on a tape, projected once: what is measured starts at the image plane.
+struct Recorded {
+  Tape<float> tape;
+  Projected<float> projected;
+  Var<float> opacities, colors;
+  Composited<float> composited;
+  std::vector<float> cotangent;
+
+  Recorded(const Workload& w, bool with_colors) {
+    const auto parameter = [&](const char* name, Index cols, const std::vector<float>& values, bool frozen) {
+      const Var<float> var =
+          frozen ? tape.constant(name, shape_of(w.count, cols)) : tape.parameter(name, shape_of(w.count, cols));
+      std::copy(values.begin(), values.end(), tape.write(var).data);
+      return var;
+    };
+    const Var<float> means = parameter("means", 3, w.means, false), quats = parameter("quats", 4, w.quats, false);
+    const Var<float> scales = parameter("log_scales", 3, w.log_scales, false);
+    opacities = parameter("opacities", 1, w.opacities, false);
+    colors = parameter("colors", 3, w.colors, !with_colors);
+    const Var<float> xi = tape.constant("xi", shape_of(1, 6));
+    projected = project(means, gaussian_axes(quats, scales), xi, w.view);
+    composited = composite(projected, opacities, colors, w.view);
+    const auto pixels = static_cast<std::size_t>(w.view.camera.width) * static_cast<std::size_t>(w.view.camera.height);
+    cotangent.resize(3 * pixels);
+    for (std::size_t i = 0; i < cotangent.size(); ++i) cotangent[i] = 1 + 0.001f * static_cast<float>(i % 977);
+  }
+  void run(bool backward) {
+    tape.write(opacities);
+    tape.forward(composited.channels);
+    if (backward) tape.backward(composited.channels, cotangent);
+  }
+};
+
+Measurement measured(const Workload& w, const RenderCounters& counters, const RasterizeBench& options,
+                     const std::string& step, std::vector<double> seconds) {
+  std::sort(seconds.begin(), seconds.end());
+  Measurement m;
+  m.name = "rasterize/" + w.name + "/" + step;
+  m.threads = options.threads;
+  m.median_ms = 1e3 * seconds[seconds.size() / 2];
+  m.min_ms = 1e3 * seconds.front();
+  m.repeats = static_cast<int>(seconds.size());
+  m.gaussians = w.count;
+  m.fragments = counters.fragments;
+  m.pairs = counters.pairs;
+  m.groups = counters.groups;
+  m.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
+  return m;
+}
+
+void bench_workload(const Workload& w, const RasterizeBench& options,
+                    const std::function<void(const Measurement&)>& report) {
+  for (const bool with_colors : {false, true}) {
+    Recorded recorded(w, with_colors);
+    const RenderCounters& counters = *recorded.composited.counters;
+    std::vector<RenderTimes> times;
+    recorded.run(true);  // memory
+    for (int i = 0; i < options.repeats; ++i) {
+      recorded.run(true);
+      times.push_back(counters.times);
+    }
+    const auto say = [&](const char* step, double RenderTimes::*time) {
+      std::vector<double> seconds;
+      for (const RenderTimes& t : times) seconds.push_back(t.*time);
+      report(measured(w, counters, options, step, std::move(seconds)));
+    };
+    if (!with_colors) {
+      say("records", &RenderTimes::records_s);
+      say("sort", &RenderTimes::sort_s);
+      say("bin", &RenderTimes::bin_s);
+      say("forward", &RenderTimes::forward_s);
+    }
+    say(with_colors ? "backward_with_colors" : "backward", &RenderTimes::backward_s);
+    say(with_colors ? "reduce_with_colors" : "reduce", &RenderTimes::reduce_s);
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> rasterize_workloads() {
+  std::vector<std::string> names;
+  for (const NamedWorkload& w : kWorkloads) names.emplace_back(w.name);
+  return names;
+}
+
+void bench_rasterize(const RasterizeBench& options, const std::function<void(const Measurement&)>& report) {
+  const std::vector<std::string> all = rasterize_workloads();
+  for (const std::string& name : options.workloads) {
+    if (std::find(all.begin(), all.end(), name) == all.end())
+      throw UserError("hsi4d bench rasterize: no workload \"" + name + "\"; known: " + joined(all) +
+                      did_you_mean(name, all));
+  }
+  for (const NamedWorkload& named : kWorkloads) {
+    const auto& wanted = options.workloads;
+    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), named.name) == wanted.end()) continue;
+    const Workload workload = named.make();
+    with_threads(options.threads, [&] { bench_workload(workload, options, report); });
+  }
+}
+
+}  // namespace hsi4d

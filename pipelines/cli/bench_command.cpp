@@ -1,0 +1,42 @@
+#include "pipelines/cli/bench_command.h"
+
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/simd.h"
+#include "pipelines/bench_rasterize.h"
+
+namespace hsi4d::cli {
+
+namespace {
+
+double rate(const Measurement& m) { return m.median_ms > 0 ? static_cast<double>(m.fragments) / m.median_ms / 1e3 : 0; }
+
+std::string json_line(const Measurement& m) {
+  const nlohmann::ordered_json line = {
+      {"name", m.name},     {"threads", m.threads}, {"isa", isa_name(best_isa())}, {"median_ms", m.median_ms},
+      {"min_ms", m.min_ms}, {"repeats", m.repeats}, {"gaussians", m.gaussians},    {"fragments", m.fragments},
+      {"groups", m.groups}, {"pairs", m.pairs},     {"pixels", m.pixels},          {"mfragments_per_s", rate(m)}};
+  return line.dump() + "\n";
+}
+
+}  // namespace
+
+std::string bench_rasterize_command(const BenchOptions& options) {
+  std::string json, table;
+  char line[160];
+  std::snprintf(line, sizeof line, "%-44s %10s %10s %12s %12s\n", "", "median ms", "least ms", "fragments", "M/s");
+  table += line;
+  bench_rasterize({options.workloads, options.threads, options.repeats}, [&](const Measurement& m) {
+    std::snprintf(line, sizeof line, "%-44s %10.3f %10.3f %12lld %12.0f\n", m.name.c_str(), m.median_ms, m.min_ms,
+                  static_cast<long long>(m.fragments), rate(m));
+    table += line;
+    json += json_line(m);
+  });
+  if (!options.json.empty()) write_text_file(options.json, json);
+  return table;
+}
+
+}  // namespace hsi4d::cli

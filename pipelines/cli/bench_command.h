@@ -1,0 +1,19 @@
+// `hsi4d bench TOPIC`: measurements.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace hsi4d::cli {
+
+struct BenchOptions {
+  std::vector<std::string> workloads;  ///< empty: all
+  int threads = 1;
+  int repeats = 9;
+  std::string json;  ///< path to write one JSON object a measurement to; empty: none
+};
+
+/// `hsi4d bench rasterize`: returns a table.
+std::string bench_rasterize_command(const BenchOptions& options);
+
+}  // namespace hsi4d::cli

@@ -1,0 +1,100 @@
+// The pixel loops of composite.h in float, in blocks of 4×4 pixels; forward and backward. Not part of the public
+// interface.
+//
+// With L of the conic scaled by sqrt(½ log₂ e) and K = log₂ o,
+//
+//   u = l11 x + l21 y + u0,   w = l22 y + w0,   p = K − u² − w²,   α = 2ᵖ
+//
+// x, y from the tile's centre; u0 and w0, the mean's part, are made in double. p ≥ log₂ alpha_min decides what is cut.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "splat/composite_kernel.h"
+
+namespace hsi4d::detail {
+
+/// Features that the block kernel composites at most.
+inline constexpr Index kMostBlockChannels = 16;
+
+/// List positions that are taken into a tile's workspace at a time.
+inline constexpr Index kBlockChunk = 1024;
+/// Positions of a block's list between two kept transmittances.
+inline constexpr Index kBlockSegment = 64;
+
+inline constexpr Index kBlockPixels = 16;
+
+/// sqrt(½ log₂ e): what L is scaled by.
+inline constexpr double kLog2Scale = 0.84932180028801904272;
+
+/// Settings below these take the more exact of the block kernel's forms.
+inline constexpr float kExactBelowAlpha = 1.0f / 1024, kExactBelowStop = 1e-5f, kExactBelowBlur = 0.1f;
+
+/// What a block did with a chunk of the tile's list, for the backward pass.
+struct BlockRun {
+  std::int32_t end;         ///< positions of the block's list up to the last one composited in any pixel
+  std::int32_t checkpoint;  ///< number of its first kept transmittance in the tile's
+};
+
+/// One tile; see TileJob. The transmittance of pixels past the border is left as −1.
+struct BlockJob {
+  std::span<const TileEntry> entries;
+  Index left, top, width, height;
+  float* transmittance;  ///< [W][W]; only forward
+  float* channels;       ///< [C][W][W]; only forward
+  BlockRun* runs;        ///< [chunks][blocks]; may be null in forward: nothing is kept
+  float* checkpoints;    ///< [·][16], room for checkpoints_of(…)
+  float* workspace;      ///< block_workspace(…) numbers, aligned
+};
+
+/// What the backward pass of a tile reads and writes beside the job.
+struct BlockAdjoint {
+  const float* d_channels;       ///< [C][W][W], zero past the border
+  const float* d_transmittance;  ///< [W][W], zero past the border
+  float* sums;                   ///< of slot s at s · stride: moments, then features, then padding; aligned
+  Index stride;                  ///< block_slot(C), or block_slot(0) without features
+  bool wants_shape, wants_features;
+};
+
+/// What forward tells.
+struct BlockCounts {
+  Index fragments;
+  Index end;  ///< list position after the last one composited in any pixel
+};
+
+inline Index block_chunks(Index entries) { return (entries + kBlockChunk - 1) / kBlockChunk; }
+
+/// Room for kept transmittances of a tile, in blocks of kBlockPixels numbers.
+///
+/// @param groups  (block, Gaussian) pairs of the tile
+inline Index checkpoints_of(Index side, Index entries, Index groups) {
+  const Index blocks = (side / kBlockSide) * (side / kBlockSide);
+  return groups / kBlockSegment + (entries > kBlockChunk ? (block_chunks(entries) - 1) * blocks : 0);
+}
+
+/// Numbers in the slot of a pair: moments and features, in fours.
+inline Index block_slot(Index channels) { return (kMoments + channels + 3) / 4 * 4; }
+
+/// Numbers of workspace that a tile takes.
+Index block_workspace(Index channels);
+
+/// Composites a tile.
+///
+/// @param side  W, 8 or 16
+BlockCounts composite_blocks(Index side, const CompositeScene<float>& scene, const BlockJob& job);
+
+/// Adjoint of composite_blocks: the sums of the pairs at list positions before the largest end. Moments are those of
+/// v = ∂/∂ log α: Σ v, Σ v u, Σ v w, Σ v u², Σ v u w, Σ v w², with u and w as scaled above.
+void composite_blocks_adjoint(Index side, const CompositeScene<float>& scene, const BlockJob& job,
+                              const BlockAdjoint& adjoint);
+
+/// α of a Gaussian at a pixel of the tile whose corner is (left, top) by the same functions, and whether it is
+/// composited there, stop aside.
+PixelAlpha<float> block_pixel_alpha(Index side, const SplatRecord<float>& record, const CompositeRules<float>& rules,
+                                    Index left, Index top, Index row, Index col);
+
+/// T behind a Gaussian, by the same function.
+float block_transmittance(float transmittance, float alpha);
+
+}  // namespace hsi4d::detail
