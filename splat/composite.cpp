@@ -165,9 +165,9 @@ struct Composite {
     counters->times.sort_s = watch.lap();
     const Index limit = detail::pair_memory_limit();
     const Index most = static_cast<Index>(static_cast<double>(limit) / bytes_of_pairs(io, 1));
-    const Index pairs = lists.find(order, extents.span(), tiles, most);
+    const Index pairs = lists.find(extents.span(), tiles, most);
     detail::check_pair_memory(pairs, bytes_of_pairs(io, pairs), limit);
-    lists.fill(order, tiles);
+    lists.deal(order, tiles);
     counters->times.bin_s = watch.lap();
   }
 
@@ -183,7 +183,7 @@ struct Composite {
     const double pixels = static_cast<double>(view.settings.tile) * view.settings.tile, number = sizeof(S);
     const double checkpoint = wants_gradient(io) ? pixels * number / static_cast<double>(kSegment) : 0;
     const double slot = static_cast<double>(stride_of(io)) * number;
-    constexpr std::size_t kListBytes = sizeof(TileEntry) + sizeof(detail::FoundPair) + sizeof(std::uint32_t);
+    constexpr std::size_t kListBytes = sizeof(TileEntry) + 2 * sizeof(detail::FoundPair);
     return static_cast<double>(pairs) * (static_cast<double>(kListBytes) + checkpoint + slot);
   }
 
@@ -433,7 +433,7 @@ struct Composite {
       double totals[kTogether] = {};
       bool any = false;
       for (Index slot = slots.begin; slot < static_cast<Index>(slots.end); ++slot) {
-        if (!reached(lists.tile_of[slot], key, n)) continue;
+        if (!reached(lists.tile_of(slot), key, n)) continue;
         any = true;
         const S* const sums = adjoint.sums + slot * adjoint.stride + k;
         for (Index i = 0; i < count; ++i) totals[i] += static_cast<double>(sums[i]);

@@ -81,11 +81,12 @@ std::uint64_t depth_key(const SplatArrays<S>& splats, const RenderSettings& sett
   return depth_bits(depth_of(splats, n));
 }
 
-/// Record and extent of row n; false if it is not drawn. Culls numbers that are not finite, then near, then the
-/// footprint, each before its numbers are used (rows A4-A6).
+/// Record and extent of row n; false, and an empty extent, if it is not drawn. Culls numbers that are not finite, then
+/// near, then the footprint, each before its numbers are used (rows A4-A6).
 template <class S>
 bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, const TileGrid& grid, Index n,
                  SplatRecord<S>& record, Extent& extent) {
+  extent = {};
   const S *mean = splats.means.row(n), *mean_rest = splats.means_rest.row(n);
   const S depth = splats.depths.data[n], rest = splats.depth_rest.data[n], opacity = splats.opacities.data[n];
   if (!all_finite(mean, 2) || !all_finite(mean_rest, 2) || !std::isfinite(depth) || !std::isfinite(rest) ||
@@ -101,8 +102,7 @@ bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, c
   const double x = static_cast<double>(mean[0]) + static_cast<double>(mean_rest[0]);
   const double y = static_cast<double>(mean[1]) + static_cast<double>(mean_rest[1]);
   extent = extent_of(conic, x, y, scaled, grid, settings, static_cast<double>(std::numeric_limits<S>::epsilon()));
-  if (extent.row_begin >= extent.row_end || !all_finite(splats.features.row(n), splats.features.shape.cols))
-    return false;
+  if (extent.row_begin >= extent.row_end) return false;
   record = {x,
             y,
             static_cast<S>(conic.l11),
@@ -112,7 +112,9 @@ bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, c
             static_cast<S>(std::log2(std::max(scaled, kLeastOpacity))),
             extent.row_begin,
             extent.row_end};
-  return all_finite(&record.l11, 5);
+  if (all_finite(&record.l11, 5) && all_finite(splats.features.row(n), splats.features.shape.cols)) return true;
+  extent = {};
+  return false;
 }
 
 /// Where the gradients of one row go: its numbers, or null where none is wanted.

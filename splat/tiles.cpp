@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <string>
 #include <unistd.h>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "core/parallel.h"
 #include "core/simd.h"
 #include "splat/limits.h"
+#include "splat/tile_finder.h"
 
 namespace hsi4d::detail {
 
@@ -122,25 +124,65 @@ std::uint64_t depth_bits(double depth) {
   return bits ^ (bits >> 63 != 0 ? ~std::uint64_t(0) : std::uint64_t(1) << 63);
 }
 
+namespace {
+
+/// Numbers of a radix's digits, turned into the places of the first of each.
+template <class Count>
+void places_of(Count& counts) {
+  std::uint32_t sum = 0;
+  for (std::uint32_t& c : counts) sum += std::exchange(c, sum);
+}
+
+/// Sorts by the difference from the least key, of 32 bits: packed with the index into one word, two or three digits.
+void sort_near_keys(std::span<DepthKeyed> keys, std::span<DepthKeyed> room, std::uint64_t least, std::uint64_t most) {
+  constexpr int kDigit = 12;
+  constexpr std::size_t kValues = std::size_t(1) << kDigit;
+  const int bits = static_cast<int>(std::bit_width(most - least)), digits = (bits + kDigit - 1) / kDigit;
+  std::array<std::array<std::uint32_t, kValues>, 3> place;
+  for (int i = 0; i < digits; ++i) place[static_cast<std::size_t>(i)].fill(0);
+  static_assert(sizeof(DepthKeyed) == 2 * sizeof(std::uint64_t));
+  std::uint64_t *from = reinterpret_cast<std::uint64_t*>(room.data()), *to = from + keys.size();
+  const auto digit = [](std::uint64_t word, int i) {
+    return static_cast<std::size_t>(word >> (32 + i * kDigit)) % kValues;
+  };
+  for (std::size_t n = 0; n < keys.size(); ++n) {
+    const std::uint64_t word = (keys[n].key - least) << 32 | static_cast<std::uint32_t>(keys[n].index);
+    from[n] = word;
+    for (int i = 0; i < digits; ++i) ++place[static_cast<std::size_t>(i)][digit(word, i)];
+  }
+  for (int i = 0; i < digits; ++i) {
+    auto& next = place[static_cast<std::size_t>(i)];
+    places_of(next);
+    for (std::size_t n = 0; n < keys.size(); ++n) to[next[digit(from[n], i)]++] = from[n];
+    std::swap(from, to);
+  }
+  for (std::size_t n = 0; n < keys.size(); ++n) {
+    keys[n] = {least + (from[n] >> 32), static_cast<std::int32_t>(from[n] & 0xFFFFFFFF)};
+  }
+}
+
+}  // namespace
+
 std::span<DepthKeyed> sort_by_depth(std::span<DepthKeyed> keys, std::span<DepthKeyed> room) {
   constexpr int kDigit = 11;
   constexpr std::size_t kValues = std::size_t(1) << kDigit;
   const auto digit = [](std::uint64_t key, int shift) { return static_cast<std::size_t>(key >> shift) % kValues; };
-  std::uint64_t all = ~std::uint64_t(0), any = 0;
+  std::uint64_t least = ~std::uint64_t(0), most = 0;
   for (const DepthKeyed& k : keys) {
-    all &= k.key;
-    any |= k.key;
+    least = std::min(least, k.key);
+    most = std::max(most, k.key);
   }
-  for (int shift = 0; shift < 64; shift += kDigit) {
-    if (digit(all, shift) == digit(any, shift)) continue;  // the same in every key
+  if (keys.empty() || least == most) return keys;
+  if (most - least <= 0xFFFFFFFF) {
+    sort_near_keys(keys, room, least, most);
+    return keys;
+  }
+  // Digits that are the same in every key lie above the first in which least and most differ.
+  const int bits = static_cast<int>(std::bit_width(least ^ most));
+  for (int shift = 0; shift < bits; shift += kDigit) {
     std::array<std::uint32_t, kValues> place{};
     for (const DepthKeyed& k : keys) ++place[digit(k.key, shift)];
-    std::uint32_t sum = 0;
-    for (std::uint32_t& p : place) {
-      const std::uint32_t count = p;
-      p = sum;
-      sum += count;
-    }
+    places_of(place);
     for (const DepthKeyed& k : keys) room[place[digit(k.key, shift)]++] = k;
     std::swap(keys, room);
   }
@@ -181,124 +223,114 @@ void check_pair_memory(Index pairs, double bytes, Index limit) {
 
 namespace {
 
-constexpr Index kMostChunks = 32;
+/// Most parts that work is cut into.
+constexpr Index kMostParts = 32;
 
-/// Gaussians are visited in depth order and lie far apart: one is fetched so many before its turn.
-constexpr Index kAhead = 12;
-
-template <class T>
-void fetch(const T* object) {
-  constexpr std::size_t kLine = 64;
-  const char* const bytes = reinterpret_cast<const char*>(object);
-  for (std::size_t i = 0; i < sizeof(T); i += kLine) __builtin_prefetch(bytes + i);
-}
-
-/// Chunks of the Gaussians, each of which counts its tiles by itself.
-Partition list_partition(Index ranks) {
+/// Cut for the threads at hand: where the lists do not depend on it.
+Partition cut(Index n) {
   constexpr Index kGrain = 1024;
-  return {ranks, std::max(kGrain, (ranks + kMostChunks - 1) / kMostChunks)};
+  const Index threads = thread_count(), parts = threads == 1 ? 1 : std::min(2 * threads, kMostParts);
+  return {n, std::max(kGrain, (n + parts - 1) / parts)};
 }
 
 }  // namespace
 
-Index TileLists::find(std::span<const DepthKeyed> order, std::span<const Extent> extents, const TileGrid& grid,
-                      Index most) {
+Index TileLists::find(std::span<const Extent> extents, const TileGrid& grid, Index most) {
   const Index tiles = grid.count();
-  const Partition part = list_partition(static_cast<Index>(order.size()));
-  if (static_cast<Index>(found_.size()) < part.chunks()) found_.resize(static_cast<std::size_t>(part.chunks()));
-  counts_.resize(part.chunks() * tiles);
-  groups_.resize(part.chunks() * tiles);
+  const Partition part = cut(static_cast<Index>(extents.size()));
+  const Index room = count_room(grid);
+  totals_.resize(std::max<Index>(part.chunks(), 1) * room);
+  std::fill_n(totals_.data(), totals_.size(), std::uint64_t(0));
   slots.resize(static_cast<Index>(extents.size()));
-  std::fill_n(slots.data(), slots.size(), Slots{0, 0});
-  std::array<Index, kMostChunks> pairs{};
+  if (static_cast<Index>(of_part_.size()) < part.chunks()) of_part_.resize(static_cast<std::size_t>(part.chunks()));
+  std::array<Index, kMostParts> sizes{};
   parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-    std::uint32_t *const of_tile = counts_.data() + chunk * tiles, *const groups = groups_.data() + chunk * tiles;
-    std::fill_n(of_tile, tiles, 0u);
-    std::fill_n(groups, tiles, 0u);
-    std::vector<FoundPair>& found = found_[static_cast<std::size_t>(chunk)];
-    found.clear();
-    Index count = 0;
-    on_best_isa([&] {
-      for (Index rank = begin; rank < end; ++rank) {
-        const Index n = order[static_cast<std::size_t>(rank)].index;
-        if (rank + kAhead < end)
-          fetch(&extents[static_cast<std::size_t>(order[static_cast<std::size_t>(rank + kAhead)].index)]);
-        const Index first = count;
-        for_each_tile(extents[static_cast<std::size_t>(n)], grid, [&](Index tile, std::uint32_t blocks) {
-          if (count++ < most) found.push_back({static_cast<std::uint32_t>(tile), blocks});
-          ++of_tile[tile];
-          groups[tile] += static_cast<std::uint32_t>(std::popcount(blocks));
-        });
-        slots[n] = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count)};
-      }
-    });
-    pairs[static_cast<std::size_t>(chunk)] = count;
+    const auto number = static_cast<std::size_t>(chunk);
+    const auto rows = extents.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin));
+    sizes[number] = find_pairs(
+        rows, grid, most,
+        {part.chunks() == 1 ? found_ : of_part_[number], totals_.data() + chunk * room, slots.data() + begin});
   });
-  const Index total = total_pairs(pairs);
-  place_tiles(tiles, part.chunks());
-  return total;
-}
-
-/// tile_begin, tile_groups; counts_ become where each chunk's entries of a tile begin. Row by row: a column of counts_
-/// lies in as many cache lines as there are chunks.
-void TileLists::place_tiles(Index tiles, Index chunks) {
+  pairs_ = total_pairs(sizes);
   tile_begin.resize(tiles + 1);
   tile_groups.resize(tiles);
-  std::fill_n(tile_begin.data(), tiles + 1, Index(0));
-  std::fill_n(tile_groups.data(), tiles, Index(0));
-  for (Index chunk = 0; chunk < chunks; ++chunk) {
-    for (Index tile = 0; tile < tiles; ++tile) {
-      tile_begin[tile + 1] += counts_[chunk * tiles + tile];
-      tile_groups[tile] += groups_[chunk * tiles + tile];
-    }
+  tile_begin[0] = 0;
+  for (Index tile = 0; tile < tiles; ++tile) {
+    std::uint64_t total = totals_[tile];
+    for (Index chunk = 1; chunk < part.chunks(); ++chunk) total += totals_[chunk * room + tile];
+    tile_begin[tile + 1] = tile_begin[tile] + static_cast<Index>(total & 0xFFFFFFFF);
+    tile_groups[tile] = static_cast<Index>(total >> 32);
   }
-  for (Index tile = 0; tile < tiles; ++tile) tile_begin[tile + 1] += tile_begin[tile];
-  // The groups are added up, and their first row serves as the running place.
-  std::uint32_t* const next = groups_.data();
-  for (Index tile = 0; tile < tiles && chunks > 0; ++tile) next[tile] = static_cast<std::uint32_t>(tile_begin[tile]);
-  for (Index chunk = 0; chunk < chunks; ++chunk) {
-    std::uint32_t* const counts = counts_.data() + chunk * tiles;
-    for (Index tile = 0; tile < tiles; ++tile) {
-      const std::uint32_t count = counts[tile];
-      counts[tile] = next[tile];
-      next[tile] += count;
-    }
-  }
+  if (part.chunks() > 1 && pairs_ <= most) join(part, sizes);
+  return pairs_;
 }
 
-void TileLists::fill(std::span<const DepthKeyed> order, const TileGrid& grid) {
+/// Pairs of all parts into one array; slots of a part are then counted from its first.
+void TileLists::join(const Partition& part, std::span<const Index> sizes) {
+  if (static_cast<Index>(found_.size()) < pairs_) found_.resize(static_cast<std::size_t>(pairs_ + pairs_ / 2));
+  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+    const auto number = static_cast<std::size_t>(chunk);
+    const Index place = std::accumulate(sizes.begin(), sizes.begin() + chunk, Index(0));
+    std::copy_n(of_part_[number].begin(), sizes[number], found_.begin() + place);
+    const auto shift = static_cast<std::uint32_t>(place);
+    for (Index n = begin; n < end; ++n) slots[n] = {slots[n].begin + shift, slots[n].end + shift};
+  });
+}
+
+void TileLists::deal(std::span<const DepthKeyed> order, const TileGrid& grid) {
   const Index tiles = grid.count();
-  const Partition part = list_partition(static_cast<Index>(order.size()));
-  entries.resize(tile_begin[tiles]);
-  tile_of.resize(tile_begin[tiles]);
-  // Slots in the order of the inputs: those of Gaussians that follow each other are then read one after the other.
-  std::uint32_t slot = 0;
-  for (Slots& s : slots.span()) {
-    const std::uint32_t size = s.end - s.begin;
-    s = {slot, slot + size};
-    slot += size;
+  const Partition part = cut(static_cast<Index>(order.size()));
+  entries.resize(pairs_);
+  next_.resize(std::max<Index>(part.chunks(), 1) * tiles);
+  // Rows in depth order lie far apart: slots, and pairs, are fetched before their turn.
+  constexpr Index kAhead = 12;
+  const Slots* const of_row = slots.data();
+  const FoundPair* const found = found_.data();
+  const auto visit = [&](Index begin, Index end, const auto& visit_pair) {
+    const DepthKeyed* const rows = order.data();
+    for (Index rank = begin; rank < end; ++rank) {
+      if (rank + 2 * kAhead < end) __builtin_prefetch(of_row + rows[rank + 2 * kAhead].index);
+      if (rank + kAhead < end) __builtin_prefetch(found + of_row[rows[rank + kAhead].index].begin);
+      const std::int32_t n = rows[rank].index;
+      const Slots s = of_row[n];
+      for (std::uint32_t slot = s.begin; slot < s.end; ++slot) visit_pair(n, slot, found[slot]);
+    }
+  };
+  if (part.chunks() > 1) {
+    parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+      std::uint32_t* const count = next_.data() + chunk * tiles;
+      std::fill_n(count, tiles, 0u);
+      visit(begin, end, [count](std::int32_t, std::uint32_t, FoundPair pair) { ++count[pair.tile]; });
+    });
+  } else {
+    std::fill_n(next_.data(), tiles, 0u);
+  }
+  // Numbers of entries become places; part by part, as a tile's lie far apart.
+  totals_.resize(tiles);
+  std::uint64_t* const place = totals_.data();
+  for (Index tile = 0; tile < tiles; ++tile) place[tile] = static_cast<std::uint64_t>(tile_begin[tile]);
+  for (Index chunk = 0; chunk < std::max<Index>(part.chunks(), 1); ++chunk) {
+    std::uint32_t* const next = next_.data() + chunk * tiles;
+    for (Index tile = 0; tile < tiles; ++tile) {
+      const std::uint32_t count = next[tile];
+      next[tile] = static_cast<std::uint32_t>(place[tile]);
+      place[tile] += count;
+    }
   }
   parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-    std::uint32_t* const of_tile = counts_.data() + chunk * tiles;
-    const FoundPair* pair = found_[static_cast<std::size_t>(chunk)].data();
-    const auto index_at = [&](Index rank) { return order[static_cast<std::size_t>(rank)].index; };
-    for (Index rank = begin; rank < end; ++rank) {
-      if (rank + 2 * kAhead < end) fetch(&slots[index_at(rank + 2 * kAhead)]);
-      if (rank + kAhead < end) fetch(&tile_of[slots[index_at(rank + kAhead)].begin]);
-      const std::int32_t n = index_at(rank);
-      for (std::uint32_t at = slots[n].begin; at < slots[n].end; ++at, ++pair) {
-        entries[of_tile[pair->tile]++] = {n, at, pair->blocks};
-        tile_of[at] = pair->tile;
-      }
-    }
+    std::uint32_t* const next = next_.data() + chunk * tiles;
+    TileEntry* const to = entries.data();
+    visit(begin, end, [next, to](std::int32_t n, std::uint32_t slot, FoundPair pair) {
+      to[next[pair.tile]++] = {n, slot, pair.blocks};
+    });
   });
 }
 
 Index TileLists::capacity_bytes() const {
   Index bytes = tile_begin.capacity_bytes() + tile_groups.capacity_bytes() + slots.capacity_bytes() +
-                tile_of.capacity_bytes() + entries.capacity_bytes() + counts_.capacity_bytes() +
-                groups_.capacity_bytes();
-  for (const auto& found : found_) bytes += static_cast<Index>(found.capacity() * sizeof(FoundPair));
+                entries.capacity_bytes() + totals_.capacity_bytes() + next_.capacity_bytes();
+  bytes += static_cast<Index>(found_.capacity() * sizeof(FoundPair));
+  for (const auto& part : of_part_) bytes += static_cast<Index>(part.capacity() * sizeof(FoundPair));
   return bytes;
 }
 

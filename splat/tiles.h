@@ -3,13 +3,16 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <span>
 #include <vector>
 
 #include "core/buffer.h"
+#include "core/parallel.h"
 #include "core/types.h"
 #include "splat/conic.h"
 #include "splat/render_settings.h"
@@ -36,7 +39,7 @@ inline constexpr Index kBlockSide = 4;
 struct alignas(64) Extent {
   enum class Kind : std::int32_t { kRectangle, kEllipse } kind = Kind::kRectangle;
   std::int32_t row_begin = 0, row_end = 0;  ///< of pixels; empty: nothing is drawn
-  std::int32_t col_begin = 0, col_end = 0;  ///< of kRectangle, columns of blocks
+  std::int32_t col_begin = 0, col_end = 0;  ///< of blocks
   // Of kEllipse; dy from the mean, pixels.
   float first_dy = 0;                   ///< of the first row of the row of tiles that row_begin lies in
   float lowest_dy = 0, highest_dy = 0;  ///< of the rows
@@ -130,36 +133,62 @@ inline void band_spans(const Extent& f, const TileGrid& grid, std::int32_t first
   }
 }
 
-/// Calls visit(tile, blocks) for every tile that an extent reaches: the order of its slots.
+/// Columns of blocks that are looked at together.
+inline constexpr std::int32_t kWindow = 16;
+
+/// Calls visit(tile, columns, words) for windows of tiles that cover an extent, rows of windows first: `words` are the
+/// kBands × kWindow blocks of kBands / kAcross rows of tiles from `tile` on, for blocks_of_tile; those of tiles from
+/// column `columns` on are none.
 ///
 /// @param kAcross  blocks across a tile
 template <std::int32_t kAcross, class F>
-inline void for_each_tile(const Extent& extent, const TileGrid& grid, const F& visit) {
-  const std::int32_t first_row = extent.row_begin / static_cast<std::int32_t>(grid.tile);
-  const std::int32_t last_row = (extent.row_end - 1) / static_cast<std::int32_t>(grid.tile);
-  constexpr std::int32_t kRows = kBands / kAcross;
-  for (std::int32_t row = first_row; row <= last_row; row += kRows) {
+inline void for_each_window(const Extent& extent, const TileGrid& grid, const F& visit) {
+  constexpr std::int32_t kRows = kBands / kAcross, kTile = kAcross * kBlockSide;
+  const std::int32_t first_row = extent.row_begin / kTile, after_row = (extent.row_end + kTile - 1) / kTile;
+  const std::int32_t first_col = extent.col_begin / kAcross, after_col = (extent.col_end + kAcross - 1) / kAcross;
+  for (std::int32_t row = first_row; row < after_row; row += kRows) {
     BandSpans spans;
     band_spans(extent, grid, (row - first_row) * kAcross, spans);
-    std::int32_t first = spans.begin[0], after = spans.end[0];
-    for (std::int32_t i = 1; i < kBands; ++i) {
-      first = std::min(first, spans.begin[i]);
-      after = std::max(after, spans.end[i]);
-    }
-    for (std::int32_t block = first / kAcross * kAcross; block < after; block += kAcross) {
-      std::uint32_t bits[kBands];
+    for (std::int32_t col = first_col; col < after_col; col += kWindow / kAcross) {
+      const std::int32_t width = std::min(kWindow, (after_col - col) * kAcross);
+      std::uint16_t bands[kBands];
       for (std::int32_t i = 0; i < kBands; ++i) {
-        const std::int32_t from = std::min(std::max(spans.begin[i] - block, 0), kAcross);
-        const std::int32_t to = std::min(std::max(spans.end[i] - block, from), kAcross);
-        bits[i] = ((1u << to) - (1u << from)) << (i % kAcross * kAcross);
+        const std::int32_t from = std::min(std::max(spans.begin[i] - col * kAcross, 0), width);
+        const std::int32_t to = std::max(std::min(spans.end[i] - col * kAcross, width), from);
+        bands[i] = static_cast<std::uint16_t>((1u << to) - (1u << from));
       }
-      for (std::int32_t r = 0; r < kRows; ++r) {
-        std::uint32_t blocks = 0;
-        for (std::int32_t i = 0; i < kAcross; ++i) blocks |= bits[r * kAcross + i];
-        if (blocks != 0) visit(static_cast<Index>(row + r) * grid.cols + block / kAcross, blocks);
-      }
+      std::array<std::uint64_t, 2> words;
+      std::memcpy(words.data(), bands, sizeof bands);
+      visit(static_cast<Index>(row) * grid.cols + col, width / kAcross, words);
     }
   }
+}
+
+/// The blocks of the tile in row r and column c of a window.
+template <std::int32_t kAcross>
+inline std::uint32_t blocks_of_tile(const std::array<std::uint64_t, 2>& words, std::int32_t r, std::int32_t c) {
+  if constexpr (kAcross == 4) {
+    std::uint64_t bits = words[static_cast<std::size_t>(r)] >> (4 * c) & 0x000F000F000F000F;
+    bits |= bits >> 12;
+    return static_cast<std::uint32_t>((bits | bits >> 24) & 0xFFFF);
+  } else {
+    const std::uint64_t bits = words[static_cast<std::size_t>(r / 2)] >> (32 * (r % 2) + 2 * c) & 0x00030003;
+    return static_cast<std::uint32_t>((bits | bits >> 14) & 0xF);
+  }
+}
+
+/// Calls visit(tile, blocks) for every tile that an extent reaches: the order of its slots.
+template <std::int32_t kAcross, class F>
+inline void for_each_tile(const Extent& extent, const TileGrid& grid, const F& visit) {
+  for_each_window<kAcross>(extent, grid,
+                           [&](Index tile, std::int32_t columns, const std::array<std::uint64_t, 2>& words) {
+                             for (std::int32_t c = 0; c < columns; ++c) {
+                               for (std::int32_t r = 0; r < kBands / kAcross; ++r) {
+                                 const std::uint32_t blocks = blocks_of_tile<kAcross>(words, r, c);
+                                 if (blocks != 0) visit(tile + r * grid.cols + c, blocks);
+                               }
+                             }
+                           });
 }
 
 template <class F>
@@ -179,31 +208,36 @@ class TileLists {
   struct Slots {
     std::uint32_t begin, end;
   };
-  Buffer<Index> tile_begin;       ///< [tiles + 1] into entries
-  Buffer<Index> tile_groups;      ///< [tiles] (block, Gaussian) pairs
-  Buffer<Slots> slots;            ///< [N] of each Gaussian, in the order of the rows; none of those not in `order`
-  Buffer<std::uint32_t> tile_of;  ///< [pairs] tile of a slot
-  Buffer<TileEntry> entries;
+  Buffer<Index> tile_begin;   ///< [tiles + 1] into entries
+  Buffer<Index> tile_groups;  ///< [tiles] (block, Gaussian) pairs
+  Buffer<Slots> slots;        ///< [N] of each Gaussian, in the order of the rows
+  Buffer<TileEntry> entries;  ///< by tile, then in depth order
 
-  Index pairs() const { return entries.size(); }
+  Index pairs() const { return pairs_; }
+  /// Tile of a slot.
+  Index tile_of(Index slot) const { return pair_at(slot).tile; }
 
-  /// Finds the pairs of Gaussians in depth order, and places them: slots, tile_begin, tile_groups. Parallel; the result
-  /// depends on the arguments alone. Keeps `most` pairs or somewhat more; a caller who is told of more must not go on.
-  /// Returns the number of pairs. Throws as total_pairs.
+  /// Finds the pairs of all Gaussians: slots, tile_begin, tile_groups. Parallel; the result depends on the arguments
+  /// alone. Keeps `most` pairs or somewhat more; a caller who is told of more must not go on. Returns the number of
+  /// pairs. Throws as total_pairs.
   ///
-  /// @param order    rows of `extents`
-  /// @param extents  [N]
-  Index find(std::span<const DepthKeyed> order, std::span<const Extent> extents, const TileGrid& grid, Index most);
-  /// Fills entries and tile_of, after find with the same arguments.
-  void fill(std::span<const DepthKeyed> order, const TileGrid& grid);
+  /// @param extents  [N] in the order of the rows; empty ones of rows that are not drawn
+  Index find(std::span<const Extent> extents, const TileGrid& grid, Index most);
+  /// Fills entries, after find.
+  ///
+  /// @param order  every row whose extent is not empty, in depth order
+  void deal(std::span<const DepthKeyed> order, const TileGrid& grid);
   Index capacity_bytes() const;
 
  private:
-  void place_tiles(Index tiles, Index chunks);
+  const FoundPair& pair_at(Index slot) const { return found_[static_cast<std::size_t>(slot)]; }
+  void join(const Partition& part, std::span<const Index> sizes);
 
-  std::vector<std::vector<FoundPair>> found_;  // of each chunk of the order
-  Buffer<std::uint32_t> counts_;               // [chunks][tiles]
-  Buffer<std::uint32_t> groups_;               // [chunks][tiles]
+  Index pairs_ = 0;
+  std::vector<FoundPair> found_;                 // [≥ pairs] of each slot
+  std::vector<std::vector<FoundPair>> of_part_;  // of parts of the rows, when there are several
+  Buffer<std::uint64_t> totals_;                 // [parts][tiles] pairs, and in the upper half groups
+  Buffer<std::uint32_t> next_;                   // [parts of the order][tiles] where the next entry goes
 };
 
 }  // namespace hsi4d::detail
