@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <span>
 
@@ -198,11 +199,35 @@ struct Chunk {
   Form form = Form::kPlain;
 };
 
+#if HWY_CAP_GE256
+/// The numbers of a Gaussian in one vector, in double where the mean takes part. Vectors are rounded to float where it
+/// is written, so that both passes have the same bits (row B13).
+HWY_INLINE void pack_splat(const SplatRecord<float>& r, const double* center, PackedSplat& p) {
+  static_assert(offsetof(SplatRecord<float>, y) == offsetof(SplatRecord<float>, x) + sizeof(double) &&
+                offsetof(SplatRecord<float>, l22) == offsetof(SplatRecord<float>, l11) + 2 * sizeof(float) &&
+                offsetof(SplatRecord<float>, opacity) == offsetof(SplatRecord<float>, l22) + sizeof(float));
+  const D4 d4;
+  const hn::CappedTag<double, 4> dd;
+  const hn::CappedTag<double, 2> dd2;
+  const auto conic = hn::Mul(hn::PromoteTo(dd, hn::LoadU(d4, &r.l11)), hn::Set(dd, kLog2Scale));
+  const auto rounded = hn::DemoteTo(d4, conic);  // l11, l21, l22, –
+  const auto offset = hn::Sub(hn::LoadU(dd2, center), hn::LoadU(dd2, &r.x));
+  const auto parts =
+      hn::Mul(hn::PromoteTo(dd, rounded), hn::Combine(dd, hn::InterleaveUpper(dd2, offset, offset), offset));
+  const auto u = hn::LowerHalf(parts), w = hn::UpperHalf(dd2, parts);  // l11 dx, l21 dy; l22 dy, –
+  const auto uw = hn::DemoteTo(hn::CappedTag<float, 2>(), hn::InterleaveLower(dd2, hn::Add(u, hn::Reverse(dd2, u)), w));
+  hn::StoreU(rounded, d4, &p.l11);
+  p.log2_opacity = r.log2_opacity;
+  hn::StoreU(uw, hn::CappedTag<float, 2>(), &p.u0);
+  p.opacity = r.opacity;
+  p.padding = 0;
+}
+#else
 /// Not inlined: g++ 12 may carry on with the double where a float was rounded, in one caller and not in another, and
 /// both passes need the same bits (row B13).
-HWY_NOINLINE void pack_splat(const SplatRecord<float>& r, double center_x, double center_y, PackedSplat& p) {
+HWY_NOINLINE void pack_splat(const SplatRecord<float>& r, const double* center, PackedSplat& p) {
   const double l11 = r.l11 * kLog2Scale, l21 = r.l21 * kLog2Scale, l22 = r.l22 * kLog2Scale;
-  const double dx = center_x - r.x, dy = center_y - r.y;
+  const double dx = center[0] - r.x, dy = center[1] - r.y;
   p.l11 = static_cast<float>(l11);
   p.l21 = static_cast<float>(l21);
   p.l22 = static_cast<float>(l22);
@@ -212,14 +237,17 @@ HWY_NOINLINE void pack_splat(const SplatRecord<float>& r, double center_x, doubl
   p.opacity = r.opacity;
   p.padding = 0;
 }
+#endif
 
 /// Packs the Gaussians of a chunk and their features.
+template <int kChannels>
 Chunk pack_chunk(Index side, const CompositeScene<float>& scene, const BlockJob& job, Index number,
                  const BlockWorkspace& space) {
+  const Index channels = kChannels > 0 ? kChannels : scene.channels;
   const auto begin = static_cast<size_t>(number * kBlockChunk);
   Chunk chunk{job.entries.subspan(begin, std::min(job.entries.size() - begin, static_cast<size_t>(kBlockChunk)))};
-  const double x = static_cast<double>(job.left) + static_cast<double>(side) / 2;
-  const double y = static_cast<double>(job.top) + static_cast<double>(side) / 2;
+  const double center[2] = {static_cast<double>(job.left) + static_cast<double>(side) / 2,
+                            static_cast<double>(job.top) + static_cast<double>(side) / 2};
   const float near_cap = std::log2(scene.rules.alpha_cap) - 1e-5f;
   const size_t size = chunk.entries.size();
   bool general = scene.rules.exclusive;
@@ -234,16 +262,16 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& scene, const BlockJob&
     }
     const std::int32_t index = chunk.entries[at].index;
     const SplatRecord<float>& r = scene.records[static_cast<size_t>(index)];
-    pack_splat(r, x, y, space.packed[at]);
+    pack_splat(r, center, space.packed[at]);
     space.blocks[at] = static_cast<std::int32_t>(chunk.entries[at].blocks);
     general |= r.log2_opacity > near_cap;
     const float* const feature = scene.feature(index);
-    float* const to = space.features + static_cast<Index>(at) * scene.channels;
-    for (Index k = 0; k < scene.channels; ++k) to[k] = feature[k];
+    float* const to = space.features + static_cast<Index>(at) * channels;
+    for (Index k = 0; k < channels; ++k) to[k] = feature[k];
   }
   std::fill_n(space.blocks + size, 16, 0);
   space.packed[size] = {0, 0, 0, -1e4f, 0, 0, 0, 0};
-  std::fill_n(space.features + static_cast<Index>(size) * scene.channels, scene.channels, 0.0f);
+  std::fill_n(space.features + static_cast<Index>(size) * channels, channels, 0.0f);
   chunk.form = wants_exact(scene.rules) ? Form::kExact : general ? Form::kCapped : Form::kPlain;
   return chunk;
 }
@@ -269,12 +297,12 @@ Index make_list(const Chunk& chunk, Index block, const BlockWorkspace& space) {
 void make_centers(Index side, const CompositeScene<float>& scene, const BlockJob& job, const Chunk& chunk, Index block,
                   Index n, const BlockWorkspace& space) {
   const Index across = side / kBlockSide;
-  const double x = static_cast<double>(job.left + block % across * kBlockSide + kBlockSide / 2);
-  const double y = static_cast<double>(job.top + block / across * kBlockSide + kBlockSide / 2);
+  const double center[2] = {static_cast<double>(job.left + block % across * kBlockSide + kBlockSide / 2),
+                            static_cast<double>(job.top + block / across * kBlockSide + kBlockSide / 2)};
   for (Index i = 0; i < n; ++i) {
     const auto at = static_cast<size_t>(space.list[i]);
     PackedSplat p;
-    pack_splat(scene.records[static_cast<size_t>(chunk.entries[at].index)], x, y, p);
+    pack_splat(scene.records[static_cast<size_t>(chunk.entries[at].index)], center, p);
     space.centers[2 * i] = p.u0;
     space.centers[2 * i + 1] = p.w0;
   }

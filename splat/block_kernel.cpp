@@ -86,6 +86,11 @@ Index last_drawn(const std::uint16_t* words, Index n) {
 
 Index count_bits(const std::uint16_t* words, Index n) {
   Index count = 0;
+  for (; n >= 4; n -= 4, words += 4) {
+    std::uint64_t four;
+    std::memcpy(&four, words, sizeof four);
+    count += std::popcount(four);
+  }
   for (Index i = 0; i < n; ++i) count += std::popcount(words[i]);
   return count;
 }
@@ -110,7 +115,7 @@ BlockCounts forward(Index side, const CompositeScene<float>& scene, const BlockJ
   std::int32_t kept = 0;
   for (Index number = 0; number < chunks; ++number) {
     if (std::none_of(alive, alive + blocks, [](bool a) { return a; })) break;
-    const Chunk chunk = pack_chunk(side, scene, job, number, space);
+    const Chunk chunk = pack_chunk<kChannels>(side, scene, job, number, space);
     for (Index b = 0; b < blocks; ++b) {
       if (!alive[b]) continue;
       const Index n = make_list(chunk, b, space);
@@ -312,7 +317,11 @@ HWY_INLINE void adjoint_of_batch(const CompositeScene<float>& scene, const Block
     splats[i] = &space.packed[list[i]].l11;
     places[i] = space.sums + list[i] * stride;
   }
-  Sixteen of[kMoments + kMostBlockChannels + 3];
+  const Index used = kMoments + (adjoint.wants_features ? channels : 0);
+  Sixteen of[(kMoments + kMostBlockChannels + 3) / 4 * 4];
+  for (Index i = used; i < (used + 3) / 4 * 4; ++i) {
+    for (V& part : of[i].v) part = hn::Zero(d);
+  }
   if (adjoint.wants_shape) {
     Sixteen moments[kMoments];
     for (int m = 0; m < kMoments; ++m) moments[m] = sum_over_rows(sums.moments[m]);
@@ -323,14 +332,15 @@ HWY_INLINE void adjoint_of_batch(const CompositeScene<float>& scene, const Block
       for (V& part : of[m].v) part = hn::Zero(d);
     }
   }
-  Index used = kMoments;
-  if (adjoint.wants_features) {
-    for (Index k = 0; k < channels; ++k) of[used++] = sum_over_rows(sums.features[k]);
+  for (Index k = kMoments; k < used; ++k) of[k] = sum_over_rows(sums.features[k - kMoments]);
+  Index first = adjoint.wants_shape ? 0 : 4;
+#if HWY_CAP_GE256
+  if (first == 0) {
+    add_eights(of, places);
+    first = 8;
   }
-  for (Index i = used; i < (used + 3) / 4 * 4; ++i) {
-    for (V& part : of[i].v) part = hn::Zero(d);
-  }
-  for (Index first = adjoint.wants_shape ? 0 : 4; first < used; first += 4) {
+#endif
+  for (; first < used; first += 4) {
     float* to[16];
     for (int i = 0; i < 16; ++i) to[i] = places[i] + first;
     add_fours(of[first], of[first + 1], of[first + 2], of[first + 3], to);
@@ -362,12 +372,19 @@ void adjoint_of_list(Index side, const CompositeScene<float>& scene, const Block
   }
 }
 
+/// Fetches the slots of a share of a chunk's entries.
+void fetch_slots(const Chunk& chunk, Index part, Index parts, const BlockAdjoint& adjoint) {
+  const Index size = static_cast<Index>(chunk.entries.size());
+  for (const TileEntry& entry :
+       chunk.entries.subspan(static_cast<size_t>(size * part / parts),
+                             static_cast<size_t>(size * (part + 1) / parts - size * part / parts))) {
+    if (entry.slot != kNoSlot) __builtin_prefetch(adjoint.sums + static_cast<Index>(entry.slot) * adjoint.stride, 1);
+  }
+}
+
 /// Sums of list positions to their slots, which lie far apart.
 void scatter_sums(std::span<const TileEntry> entries, const BlockAdjoint& adjoint, const float* sums, Index stride) {
-  constexpr size_t kAhead = 8;
   for (size_t at = 0; at < entries.size(); ++at) {
-    if (at + kAhead < entries.size() && entries[at + kAhead].slot != kNoSlot)
-      __builtin_prefetch(adjoint.sums + static_cast<Index>(entries[at + kAhead].slot) * adjoint.stride, 1);
     if (entries[at].slot == kNoSlot) continue;
     const float* const from = sums + static_cast<Index>(at) * stride;
     float* const to = adjoint.sums + static_cast<Index>(entries[at].slot) * adjoint.stride;
@@ -387,12 +404,13 @@ void backward(Index side, const CompositeScene<float>& scene, const BlockJob& jo
     const BlockRun* const runs = job.runs + number * blocks;
     const bool used = std::any_of(runs, runs + blocks, [](const BlockRun& run) { return run.end > 0; });
     if (!used && !reached) continue;
-    const Chunk chunk = pack_chunk(side, scene, job, number, space);
+    const Chunk chunk = pack_chunk<kChannels>(side, scene, job, number, space);
     const Index size = static_cast<Index>(chunk.entries.size());
     std::memset(space.sums, 0, static_cast<size_t>((size + 1) * stride) * sizeof(float));
     Index chunk_end = reached ? size : 0;
     reached = true;
     for (Index b = 0; b < blocks; ++b) {
+      fetch_slots(chunk, b, blocks, adjoint);  // one after the other beside the work: they lie far apart
       if (runs[b].end == 0) continue;
       const Index n = make_list(chunk, b, space);
       if (chunk.form == Form::kExact) make_centers(side, scene, job, chunk, b, n, space);
@@ -428,8 +446,9 @@ PixelAlpha<float> pixel_of_block(Index side, const SplatRecord<float>& record, c
   const Index cell = exact ? kBlockSide : side;  // whose centre u and w are taken from
   const double half = static_cast<double>(cell) / 2;
   PackedSplat g;
-  pack_splat(record, static_cast<double>(left + col / cell * cell) + half,
-             static_cast<double>(top + row / cell * cell) + half, g);
+  const double center[2] = {static_cast<double>(left + col / cell * cell) + half,
+                            static_cast<double>(top + row / cell * cell) + half};
+  pack_splat(record, center, g);
   const float middle = static_cast<float>(half);
   const V x = hn::Set(d, static_cast<float>(col % cell) + 0.5f - middle);
   const V y = hn::Set(d, static_cast<float>(row % cell) + 0.5f - middle);

@@ -219,6 +219,30 @@ HWY_INLINE void add_fours(const Sixteen& a, const Sixteen& b, const Sixteen& c, 
     }
   }
 }
+
+#if HWY_CAP_GE256
+/// Adds eight numbers to each of 16 places.
+HWY_INLINE void add_eights(const Sixteen* of, float* const (&places)[16]) {
+  const D d;
+  const hn::CappedTag<float, 8> d8;
+  for (int j = 0; j < kParts; ++j) {
+    V low[4] = {of[0].v[j], of[1].v[j], of[2].v[j], of[3].v[j]},
+      high[4] = {of[4].v[j], of[5].v[j], of[6].v[j], of[7].v[j]};
+    transpose4(low[0], low[1], low[2], low[3]);
+    transpose4(high[0], high[1], high[2], high[3]);
+    // Blocks of 128 bits are of places i, i + 4, …: next to those of `low` come those of `high`.
+    HWY_ALIGN float rows[4][2][kLanes];
+    for (int i = 0; i < 4; ++i) {
+      hn::Store(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(high[i]), low[i]), d, rows[i][0]);
+      hn::Store(hn::OddEvenBlocks(high[i], hn::SwapAdjacentBlocks(low[i])), d, rows[i][1]);
+    }
+    for (int g = 0; g < kLanes; ++g) {
+      float* const to = places[j * kLanes + g];
+      hn::StoreU(hn::Add(hn::LoadU(d8, to), hn::Load(d8, rows[g % 4][g / 4 % 2] + g / 8 * 8)), d8, to);
+    }
+  }
+}
+#endif
 #endif
 
 }  // namespace hsi4d::detail::HWY_NAMESPACE
