@@ -45,30 +45,29 @@ void copy_row(const S* from, Index n, S* to) {
   }
 }
 
-/// Writes the blocks that a job composited.
+/// Writes the blocks that a job composited, row by row of the image: a row of a tile is a cache line.
 void store_blocks(Index side, const detail::BlockJob& job, const Array<float>& channels,
                   const Array<float>& transmittance) {
   constexpr Index kSide = detail::kBlockSide;
-  const Index across = side / kSide, planes = channels.shape.planes;
-  const auto store = [&](const float* from, Index x, Index y, Index plane, const Array<float>& image) {
-    const Index width = std::min(kSide, job.width - x), height = std::min(kSide, job.height - y);
-    for (Index r = 0; r < height; ++r) {
-      float* const to = &image(plane, job.top + y + r, job.left + x);
-      if (width == kSide) {
-        std::memcpy(to, from + r * kSide, kSide * sizeof(float));
-      } else {
-        std::copy_n(from + r * kSide, width, to);
+  const Index across = side / kSide, planes = channels.shape.planes, size = (1 + planes) * detail::kBlockPixels;
+  for (Index y = 0; y < job.height; ++y) {
+    const std::uint32_t blocks = job.blocks >> (y / kSide * across) & ((1u << across) - 1);
+    const float* const state = job.state + y / kSide * across * size + y % kSide * kSide;
+    for (Index plane = 0; plane <= planes; ++plane) {
+      float* const to =
+          plane == 0 ? &transmittance(0, job.top + y, job.left) : &channels(plane - 1, job.top + y, job.left);
+      for (Index b = 0; b < across; ++b) {
+        if ((blocks >> b & 1u) == 0 || b * kSide >= job.width) continue;
+        float four[kSide];
+        std::memcpy(four, state + b * size + plane * detail::kBlockPixels, sizeof four);
+        for (float& t : four) t = plane == 0 ? std::abs(t) : t;
+        if ((b + 1) * kSide <= job.width) {
+          std::memcpy(to + b * kSide, four, sizeof four);
+        } else {
+          std::copy_n(four, job.width - b * kSide, to + b * kSide);
+        }
       }
     }
-  };
-  for (Index b = 0; b < across * across; ++b) {
-    const Index x = b % across * kSide, y = b / across * kSide;
-    if ((job.blocks >> b & 1u) == 0 || x >= job.width || y >= job.height) continue;
-    const float* const state = job.state + b * (1 + planes) * detail::kBlockPixels;
-    float t[detail::kBlockPixels];
-    for (Index i = 0; i < detail::kBlockPixels; ++i) t[i] = std::abs(state[i]);
-    store(t, x, y, 0, transmittance);
-    for (Index k = 0; k < planes; ++k) store(state + (k + 1) * detail::kBlockPixels, x, y, k, channels);
   }
 }
 
@@ -148,10 +147,11 @@ struct Composite {
     room.resize(rows);
     parallel_for(rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
+        detail::make_records(splats, view.settings, tiles, begin, end, &records[begin], &extents[begin]);
         for (Index n = begin; n < end; ++n) {
-          const bool drawn = detail::make_record(splats, view.settings, tiles, n, records[n], extents[n]);
-          keys[n].index = drawn ? static_cast<std::int32_t>(n) : -1;
-          if (drawn) keys[n].key = detail::depth_key(splats, view.settings, n);
+          const bool drawn = extents[n].row_begin < extents[n].row_end;
+          keys[n] = {drawn ? detail::depth_key(splats, view.settings, n) : 0,
+                     drawn ? static_cast<std::int32_t>(n) : -1};
         }
       });
     });
@@ -452,8 +452,9 @@ struct Composite {
   /// From sums of ∂/∂ log α with scaled u and w to those of kMoments.
   static void scale_block_moments(const SplatRecord<S>& record, double* moments) {
     const double o = std::max(static_cast<double>(record.opacity), kLeastOpacity);
-    const double first = 1 / (o * detail::kLog2Scale), second = first / detail::kLog2Scale;
-    moments[0] /= o;
+    constexpr double kInverse = 1 / detail::kLog2Scale;
+    const double inverse = 1 / o, first = inverse * kInverse, second = first * kInverse;
+    moments[0] *= inverse;
     for (int i = 1; i < 3; ++i) moments[i] *= first;
     for (int i = 3; i < 6; ++i) moments[i] *= second;
   }

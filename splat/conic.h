@@ -55,7 +55,7 @@ inline bool conic_of(const double* v, double blur, Conic& conic) {
 /// which it is made of here, (v0 − xy/yy v1)_c = (Σ_k v1_k m_ck + b v0_c)/yy, it does not.
 inline std::array<double, 6> whitened_factor(const double* v, double blur, const Conic& conic) {
   const auto m = minors(v);
-  const double scale = conic.l11 / conic.yy;
+  const double scale = conic.l11 * conic.l22 * conic.l22;  // l11/yy
   return {scale * (v[4] * m[0] + v[5] * m[1] + blur * v[0]),
           scale * (v[5] * m[2] - v[3] * m[0] + blur * v[1]),
           scale * (-v[3] * m[1] - v[4] * m[2] + blur * v[2]),

@@ -81,40 +81,86 @@ std::uint64_t depth_key(const SplatArrays<S>& splats, const RenderSettings& sett
   return depth_bits(depth_of(splats, n));
 }
 
-/// Record and extent of row n; false, and an empty extent, if it is not drawn. Culls numbers that are not finite, then
-/// near, then the footprint, each before its numbers are used (rows A4-A6).
+/// What extents and records are made of.
+struct SplatOutline {
+  Conic conic;
+  double x, y;          ///< mean, pixels
+  double opacity;       ///< with the antialias factor
+  double log2_opacity;  ///< of an opacity held at or above kLeastOpacity
+  bool drawn;
+};
+
+/// Outline of row n, without log2_opacity. Culls numbers that are not finite, then near, each before its numbers are
+/// used (rows A4-A6).
 template <class S>
-bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, const TileGrid& grid, Index n,
-                 SplatRecord<S>& record, Extent& extent) {
-  extent = {};
+void outline_of(const SplatArrays<S>& splats, const RenderSettings& settings, Index n, SplatOutline& outline) {
   const S *mean = splats.means.row(n), *mean_rest = splats.means_rest.row(n);
   const S depth = splats.depths.data[n], rest = splats.depth_rest.data[n], opacity = splats.opacities.data[n];
+  outline.opacity = 0;
+  outline.drawn = false;
   if (!all_finite(mean, 2) || !all_finite(mean_rest, 2) || !std::isfinite(depth) || !std::isfinite(rest) ||
       !std::isfinite(opacity))
-    return false;
-  if (!(depth_of(splats, n) > settings.near)) return false;
+    return;
+  if (!(depth_of(splats, n) > settings.near)) return;
   double factor[6];
   read_factor(splats, n, factor);
-  if (!is_drawn(factor)) return false;
-  Conic conic;
-  if (!conic_of(factor, settings.blur, conic)) return false;
-  const double scaled = static_cast<double>(opacity) * (settings.antialias ? blur_compensation(conic) : 1.0);
-  const double x = static_cast<double>(mean[0]) + static_cast<double>(mean_rest[0]);
-  const double y = static_cast<double>(mean[1]) + static_cast<double>(mean_rest[1]);
-  extent = extent_of(conic, x, y, scaled, grid, settings, static_cast<double>(std::numeric_limits<S>::epsilon()));
-  if (extent.row_begin >= extent.row_end) return false;
-  record = {x,
-            y,
+  if (!is_drawn(factor) || !conic_of(factor, settings.blur, outline.conic)) return;
+  outline.opacity = static_cast<double>(opacity) * (settings.antialias ? blur_compensation(outline.conic) : 1.0);
+  outline.x = static_cast<double>(mean[0]) + static_cast<double>(mean_rest[0]);
+  outline.y = static_cast<double>(mean[1]) + static_cast<double>(mean_rest[1]);
+  outline.drawn = true;
+}
+
+/// Record and extent of row n from its outline; an empty extent if it is not drawn.
+template <class S>
+void finish_record(const SplatArrays<S>& splats, const TileGrid& grid, const ExtentRules& rules, Index n,
+                   const SplatOutline& outline, SplatRecord<S>& record, Extent& extent) {
+  extent = {};
+  if (!outline.drawn || !all_finite(splats.features.row(n), splats.features.shape.cols)) return;
+  const Conic& conic = outline.conic;
+  record = {outline.x,
+            outline.y,
             static_cast<S>(conic.l11),
             static_cast<S>(conic.l21),
             static_cast<S>(conic.l22),
-            static_cast<S>(scaled),
-            static_cast<S>(std::log2(std::max(scaled, kLeastOpacity))),
-            extent.row_begin,
-            extent.row_end};
-  if (all_finite(&record.l11, 5) && all_finite(splats.features.row(n), splats.features.shape.cols)) return true;
-  extent = {};
-  return false;
+            static_cast<S>(outline.opacity),
+            static_cast<S>(outline.log2_opacity),
+            0,
+            0};
+  if (!all_finite(&record.l11, 5)) return;
+  extent = extent_of(conic, outline.x, outline.y, outline.opacity, outline.log2_opacity, grid, rules);
+  record.row_begin = extent.row_begin;
+  record.row_end = extent.row_end;
+}
+
+/// Records and extents of rows [begin, end); the extents of those that are not drawn are empty. In steps over some
+/// rows at a time: a row's numbers follow from each other, and the processor looks ahead only so far.
+///
+/// @param records, extents  of row `begin`, and so on
+template <class S>
+void make_records(const SplatArrays<S>& splats, const RenderSettings& settings, const TileGrid& grid, Index begin,
+                  Index end, SplatRecord<S>* records, Extent* extents) {
+  constexpr Index kTogether = 32;
+  const ExtentRules rules = extent_rules(settings, static_cast<double>(std::numeric_limits<S>::epsilon()));
+  SplatOutline outlines[kTogether];
+  for (; begin < end; begin += kTogether, records += kTogether, extents += kTogether) {
+    const Index count = std::min(kTogether, end - begin);
+    for (Index i = 0; i < count; ++i) outline_of(splats, settings, begin + i, outlines[i]);
+    for (Index i = 0; i < count; ++i) {
+      outlines[i].log2_opacity = std::log2(std::max(outlines[i].opacity, kLeastOpacity));
+    }
+    for (Index i = 0; i < count; ++i) {
+      finish_record(splats, grid, rules, begin + i, outlines[i], records[i], extents[i]);
+    }
+  }
+}
+
+/// The same of row n. False if it is not drawn.
+template <class S>
+bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, const TileGrid& grid, Index n,
+                 SplatRecord<S>& record, Extent& extent) {
+  make_records(splats, settings, grid, n, n + 1, &record, &extent);
+  return extent.row_begin < extent.row_end;
 }
 
 /// Where the gradients of one row go: its numbers, or null where none is wanted.
@@ -130,7 +176,7 @@ struct SplatGradient {
 //
 // d_cov is that of the full symmetric matrix: its off-diagonal number counts twice (row B21).
 
-/// Adjoint of make_record: adds what the moments of row n over all its pixels mean.
+/// Adjoint of make_records: adds what the moments of row n over all its pixels mean.
 ///
 /// @param moments  kMoments numbers, see composite_kernel.h
 template <class S>

@@ -94,66 +94,101 @@ HWY_INLINE std::array<std::uint64_t, 2> window_words(const Spans& spans, std::in
   return words;
 }
 
-/// Writes the pairs of an extent, and one after them that is none; adds them to the totals. Returns the end.
+/// Tiles that may be reached.
+struct Tiles {
+  std::int32_t first_row, after_row, first_col, after_col;
+  Index count() const { return static_cast<Index>(after_row - first_row) * (after_col - first_col); }
+};
+
 template <std::int32_t kAcross>
-HWY_INLINE FoundPair* pairs_of(const Extent& extent, const TileGrid& grid, VF width, FoundPair* to,
-                               std::uint64_t* totals) {
-  constexpr std::int32_t kRows = kBands / kAcross, kTile = kAcross * kBlockSide;
+HWY_INLINE Tiles tiles_of(const Extent& extent) {
+  constexpr std::int32_t kTile = kAcross * kBlockSide;
+  return {extent.row_begin / kTile, (extent.row_end + kTile - 1) / kTile, extent.col_begin / kAcross,
+          (extent.col_end + kAcross - 1) / kAcross};
+}
+
+/// Where pairs go.
+struct Place {
+  FoundPair* to;
+  std::uint64_t* totals;
+};
+
+/// Writes the pairs of a window, and one after them that is none; adds them to the totals.
+///
+/// @param corner   the tile of its first row and column
+/// @param columns  of tiles
+template <std::int32_t kAcross>
+HWY_INLINE void add_window(const std::array<std::uint64_t, 2>& words, Index corner, std::int32_t columns, Index cols,
+                           Place& place) {
   constexpr std::int32_t kColumns = 2;  // looked at without asking whether they are reached
-  const std::int32_t first_row = extent.row_begin / kTile, after_row = (extent.row_end + kTile - 1) / kTile;
-  const std::int32_t first_col = extent.col_begin / kAcross, after_col = (extent.col_end + kAcross - 1) / kAcross;
-  for (std::int32_t row = first_row; row < after_row; row += kRows) {
-    const std::int32_t band = (row - first_row) * kAcross;
-    const Spans spans = extent.kind == Extent::Kind::kEllipse ? ellipse_spans(extent, width, band)
-                                                              : rectangle_spans(extent, grid, band);
-    for (std::int32_t col = first_col; col < after_col; col += kWindow / kAcross) {
-      const std::int32_t columns = std::min(kWindow / kAcross, after_col - col);
-      const std::array<std::uint64_t, 2> words = window_words(spans, col * kAcross, columns * kAcross);
-      const Index corner = static_cast<Index>(row) * grid.cols + col;
-      for (std::int32_t c = 0; c < columns; c += kColumns) {
-        for (std::int32_t i = c; i < c + kColumns; ++i) {
-          for (std::int32_t r = 0; r < kRows; ++r) {
-            const std::uint32_t blocks = blocks_of_tile<kAcross>(words, r, i);
-            const Index tile = corner + r * grid.cols + i;
-            const std::uint64_t some = blocks != 0 ? 1 : 0;
-            *to = {static_cast<std::uint32_t>(tile), blocks};
-            to += some;
-            totals[tile] += (static_cast<std::uint64_t>(std::popcount(blocks)) << 32) + some;
-          }
-        }
+  for (std::int32_t c = 0; c < columns; c += kColumns) {
+    for (std::int32_t i = c; i < c + kColumns; ++i) {
+      for (std::int32_t r = 0; r < kBands / kAcross; ++r) {
+        const std::uint32_t blocks = blocks_of_tile<kAcross>(words, r, i);
+        const Index tile = corner + r * cols + i;
+        const std::uint64_t some = blocks != 0 ? 1 : 0;
+        *place.to = {static_cast<std::uint32_t>(tile), blocks};
+        place.to += some;
+        place.totals[tile] += (static_cast<std::uint64_t>(std::popcount(blocks)) << 32) + some;
       }
     }
   }
-  return to;
 }
 
-/// Tiles that an extent may reach.
+/// All windows of an extent.
 template <std::int32_t kAcross>
-HWY_INLINE Index most_tiles(const Extent& extent) {
-  constexpr std::int32_t kTile = kAcross * kBlockSide;
-  const Index rows = (extent.row_end + kTile - 1) / kTile - extent.row_begin / kTile;
-  const Index cols = (extent.col_end + kAcross - 1) / kAcross - extent.col_begin / kAcross;
-  return rows * cols;
+void add_extent(const Extent& extent, const Tiles& tiles, const TileGrid& grid, VF width, Place& place) {
+  for (std::int32_t row = tiles.first_row; row < tiles.after_row; row += kBands / kAcross) {
+    const std::int32_t band = (row - tiles.first_row) * kAcross;
+    const Spans spans = extent.kind == Extent::Kind::kEllipse ? ellipse_spans(extent, width, band)
+                                                              : rectangle_spans(extent, grid, band);
+    for (std::int32_t col = tiles.first_col; col < tiles.after_col; col += kWindow / kAcross) {
+      const std::int32_t columns = std::min(kWindow / kAcross, tiles.after_col - col);
+      const auto words = window_words(spans, col * kAcross, columns * kAcross);
+      add_window<kAcross>(words, static_cast<Index>(row) * grid.cols + col, columns, grid.cols, place);
+    }
+  }
 }
 
+/// In two steps over some rows at a time: words of ellipses of one window, without a branch that the processor could
+/// guess wrong, then the pairs.
 template <std::int32_t kAcross>
 Index find(std::span<const Extent> extents, const TileGrid& grid, Index most, const PairSink& sink) {
+  constexpr size_t kTogether = 32;
   const VF width = hn::Set(DF(), static_cast<float>(grid.width));
   TileLists::Slots* slots = sink.slots;
   Index count = 0, room = static_cast<Index>(sink.found.size());
-  for (const Extent& extent : extents) {
-    const Index first = count;
-    if (extent.row_begin < extent.row_end) {
-      const Index at = count < most ? count : 0;
-      const Index needed = at + most_tiles<kAcross>(extent) + 1;
-      if (room < needed) {
-        room = std::max(needed, room + room / 2);
-        sink.found.resize(static_cast<std::size_t>(room));
-      }
-      FoundPair* const begin = sink.found.data() + at;
-      count += pairs_of<kAcross>(extent, grid, width, begin, sink.totals) - begin;
+  std::array<std::uint64_t, 2> words[kTogether];
+  for (; !extents.empty(); extents = extents.subspan(std::min(kTogether, extents.size()))) {
+    const auto some = extents.first(std::min(kTogether, extents.size()));
+    for (size_t i = 0; i < some.size(); ++i) {
+      const Tiles tiles = tiles_of<kAcross>(some[i]);
+      words[i] = window_words(ellipse_spans(some[i], width, 0), tiles.first_col * kAcross,
+                              std::min(kWindow, (tiles.after_col - tiles.first_col) * kAcross));
     }
-    *slots++ = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count)};
+    for (size_t i = 0; i < some.size(); ++i) {
+      const Extent& extent = some[i];
+      const Index first = count;
+      if (extent.row_begin < extent.row_end) {
+        const Tiles tiles = tiles_of<kAcross>(extent);
+        const Index at = count < most ? count : 0, needed = at + tiles.count() + 1;
+        if (room < needed) {
+          room = std::max(needed, room + room / 2);
+          sink.found.resize(static_cast<size_t>(room));
+        }
+        FoundPair* const begin = sink.found.data() + at;
+        Place place{begin, sink.totals};
+        const std::int32_t rows = tiles.after_row - tiles.first_row, cols = tiles.after_col - tiles.first_col;
+        if (extent.kind == Extent::Kind::kEllipse && rows <= kBands / kAcross && cols <= kWindow / kAcross) {
+          const Index corner = static_cast<Index>(tiles.first_row) * grid.cols + tiles.first_col;
+          add_window<kAcross>(words[i], corner, cols, grid.cols, place);
+        } else {
+          add_extent<kAcross>(extent, tiles, grid, width, place);
+        }
+        count += place.to - begin;
+      }
+      *slots++ = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count)};
+    }
   }
   return count;
 }

@@ -26,25 +26,6 @@ TileGrid tile_grid(Index width, Index height, Index tile) {
 
 namespace {
 
-/// First whole number ≥ x, held in [0, end]; `end` for NaN.
-Index first_from(double x, Index end) {
-  if (!(x < static_cast<double>(end))) return end;
-  if (!(x > 0)) return 0;
-  const Index whole = static_cast<Index>(x);
-  return whole + (static_cast<double>(whole) < x ? 1 : 0);
-}
-
-/// One past the last whole number ≤ x, held in [0, end]; 0 for NaN.
-Index last_to(double x, Index end) {
-  if (!(x >= 0)) return 0;
-  return x < static_cast<double>(end) ? static_cast<Index>(x) + 1 : end;
-}
-
-/// A range of pixels.
-struct Pixels {
-  Index begin = 0, end = 0;
-};
-
 /// Those of the tiles of 16 pixels that INRIA's square of half-width `radius` touches along one axis. Its pixel centres
 /// are whole numbers.
 Pixels square_pixels(double mean, double radius, Index size) {
@@ -61,55 +42,16 @@ Pixels square_pixels(double mean, double radius, Index size) {
   return {pixel(begin), pixel(end)};
 }
 
-Extent rectangle(Pixels rows, Pixels cols) {
-  Extent result;
-  if (rows.begin >= rows.end || cols.begin >= cols.end) return result;
-  result.row_begin = static_cast<std::int32_t>(rows.begin);
-  result.row_end = static_cast<std::int32_t>(rows.end);
-  result.col_begin = static_cast<std::int32_t>(cols.begin / kBlockSide);
-  result.col_end = static_cast<std::int32_t>((cols.end + kBlockSide - 1) / kBlockSide);
-  return result;
+}  // namespace
+
+ExtentRules extent_rules(const RenderSettings& settings, double epsilon) {
+  return {settings.footprint, settings.alpha_min, settings.alpha_min > 0 ? std::log2(settings.alpha_min) : 0, epsilon};
 }
 
 Extent square_extent(const Conic& conic, double x, double y, const TileGrid& grid) {
   const double mid = 0.5 * (conic.xx + conic.yy);
   const double radius = std::ceil(3 * std::sqrt(mid + std::sqrt(std::max(0.1, mid * mid - conic.determinant))));
-  return rectangle(square_pixels(y, radius, grid.height), square_pixels(x, radius, grid.width));
-}
-
-}  // namespace
-
-Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
-                 const RenderSettings& settings, double epsilon) {
-  if (settings.footprint == hsi4d::Footprint::kSquare3Sigma) return square_extent(conic, x, y, grid);
-  if (settings.alpha_min <= 0) return rectangle({0, grid.height}, {0, grid.width});
-  if (!(opacity >= settings.alpha_min * (1 - 4 * epsilon))) return {};
-  // α ≥ alpha_min where u² + w² ≤ 2 ln(o/alpha_min). Rounding: of the exponential and the opacity, and of u, whose two
-  // terms are as large as the ellipse is.
-  const double exact = std::sqrt(std::max(0.0, 2 * std::log(opacity / settings.alpha_min)) + 32 * epsilon);
-  const double width = std::sqrt(conic.xx), height = std::sqrt(conic.yy);
-  const double reach = exact * (1 + 8 * epsilon * (1 + conic.l11 * width + std::abs(conic.l21) * height));
-  const double half_height = reach * height, half_width = reach * width;
-  if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return {};
-  const Pixels rows = {first_from(y - half_height - 0.5, grid.height), last_to(y + half_height - 0.5, grid.height)};
-  const Pixels cols = {first_from(x - half_width - 0.5, grid.width), last_to(x + half_width - 0.5, grid.width)};
-  Extent result = rectangle(rows, cols);
-  constexpr double kFar = 1e6;  // pixels: beyond, float is not enough
-  if (!(std::abs(x) < kFar && std::abs(y) < kFar && half_width < kFar && half_height < kFar)) return result;
-  result.kind = Extent::Kind::kEllipse;
-  constexpr double kRoom = 1e-6;  // relative, some units in the last place of float
-  const double first_row = static_cast<double>(result.row_begin / grid.tile * grid.tile);
-  result.first_dy = static_cast<float>(first_row + 0.5 - y);
-  result.lowest_dy = static_cast<float>(std::max(result.row_begin + 0.5 - y, -half_height));
-  result.highest_dy = static_cast<float>(std::min(result.row_end - 0.5 - y, half_height));
-  result.right_dy = static_cast<float>(reach * conic.xy / width);
-  result.x = static_cast<float>(x - 0.5);
-  result.slope = static_cast<float>(conic.xy / conic.yy);
-  result.half_width = static_cast<float>(1 / conic.l11);
-  result.reach_squared = static_cast<float>(reach * reach * (1 + 2 * kRoom));
-  result.flatness = static_cast<float>(1 / conic.yy);
-  result.room = static_cast<float>(1e-4 + kRoom * (std::abs(x) + half_width));
-  return result;
+  return rectangle_extent(square_pixels(y, radius, grid.height), square_pixels(x, radius, grid.width));
 }
 
 // --- order -----------------------------------------------------------------------------------------------------------

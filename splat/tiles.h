@@ -21,7 +21,7 @@ namespace hsi4d::detail {
 
 // --- its tiles -------------------------------------------------------------------------------------------------------
 
-/// The image in square tiles.
+/// The image in square tiles, of a side that is a power of two.
 struct TileGrid {
   Index width, height, tile;  ///< pixels
   Index cols, rows;           ///< tiles
@@ -49,13 +49,80 @@ struct alignas(64) Extent {
   float room = 0;  ///< pixels
 };
 
-/// The extent that settings ask for. It never leaves out a pixel where min(cap, o G) ≥ alpha_min, with room for the
-/// rounding of arithmetic in which 1 + `epsilon` is the next number after 1 (row B7).
+/// Settings as extents use them.
+struct ExtentRules {
+  Footprint footprint;
+  double alpha_min, log2_alpha_min;
+  double epsilon;  ///< of the precision that α is computed in: 1 + epsilon is the next number after 1
+};
+
+ExtentRules extent_rules(const RenderSettings& settings, double epsilon);
+
+/// A range of pixels.
+struct Pixels {
+  Index begin = 0, end = 0;
+};
+
+inline Extent rectangle_extent(Pixels rows, Pixels cols) {
+  Extent result;
+  if (rows.begin >= rows.end || cols.begin >= cols.end) return result;
+  result.row_begin = static_cast<std::int32_t>(rows.begin);
+  result.row_end = static_cast<std::int32_t>(rows.end);
+  result.col_begin = static_cast<std::int32_t>(cols.begin / kBlockSide);
+  result.col_end = static_cast<std::int32_t>((cols.end + kBlockSide - 1) / kBlockSide);
+  return result;
+}
+
+/// Those of INRIA's square of three standard deviations.
+Extent square_extent(const Conic& conic, double x, double y, const TileGrid& grid);
+
+/// Pixels whose centres lie in [low, high], held in [0, size]; none for NaN.
+inline Pixels pixels_within(double low, double high, Index size) {
+  const double end = static_cast<double>(size), first = low - 0.5, last = high - 0.5;
+  const double from = first < end ? std::ceil(first > 0 ? first : 0.0) : end;
+  const double to = last >= 0 ? (last < end ? std::floor(last) + 1 : end) : 0.0;
+  return {static_cast<Index>(from), static_cast<Index>(to)};
+}
+
+/// The extent that rules ask for. It never leaves out a pixel where min(cap, o G) ≥ alpha_min, with room for the
+/// rounding of the arithmetic (row B7).
 ///
-/// @param opacity  o, with the antialias factor
-/// @param epsilon  of the precision that α is computed in
-Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
-                 const RenderSettings& settings, double epsilon);
+/// @param opacity       o, with the antialias factor
+/// @param log2_opacity  of an opacity held at or above kLeastOpacity
+inline Extent extent_of(const Conic& conic, double x, double y, double opacity, double log2_opacity,
+                        const TileGrid& grid, const ExtentRules& rules) {
+  if (rules.footprint == Footprint::kSquare3Sigma) return square_extent(conic, x, y, grid);
+  if (rules.alpha_min <= 0) return rectangle_extent({0, grid.height}, {0, grid.width});
+  const double epsilon = rules.epsilon;
+  if (!(opacity >= rules.alpha_min * (1 - 4 * epsilon))) return {};
+  // α ≥ alpha_min where u² + w² ≤ 2 ln(o/alpha_min). Rounding: of the exponential, the opacity and the logarithms, and
+  // of u, whose two terms are as large as the ellipse is.
+  constexpr double kTwiceLn2 = 1.3862943611198906188;
+  const double exact = std::sqrt(std::max(0.0, kTwiceLn2 * (log2_opacity - rules.log2_alpha_min)) + 64 * epsilon);
+  const double inverse_yy = conic.l22 * conic.l22;
+  const double width = std::sqrt(conic.xx), height = conic.yy * conic.l22;
+  const double reach = exact * (1 + 16 * epsilon * (1 + conic.l11 * width + std::abs(conic.l21) * height));
+  const double half_height = reach * height, half_width = reach * width;
+  if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return {};
+  Extent result = rectangle_extent(pixels_within(y - half_height, y + half_height, grid.height),
+                                   pixels_within(x - half_width, x + half_width, grid.width));
+  constexpr double kFar = 1e6;  // pixels: beyond, float is not enough
+  if (!(std::abs(x) < kFar && std::abs(y) < kFar && half_width < kFar && half_height < kFar)) return result;
+  result.kind = Extent::Kind::kEllipse;
+  constexpr double kRoom = 1e-6;  // relative, some units in the last place of float
+  const std::int32_t first_row = result.row_begin & -static_cast<std::int32_t>(grid.tile);
+  result.first_dy = static_cast<float>(first_row + 0.5 - y);
+  result.lowest_dy = static_cast<float>(std::max(result.row_begin + 0.5 - y, -half_height));
+  result.highest_dy = static_cast<float>(std::min(result.row_end - 0.5 - y, half_height));
+  result.right_dy = static_cast<float>(reach * conic.xy / width);
+  result.x = static_cast<float>(x - 0.5);
+  result.slope = static_cast<float>(conic.xy * inverse_yy);
+  result.half_width = static_cast<float>(conic.l11 * conic.determinant * inverse_yy);  // 1/l11
+  result.reach_squared = static_cast<float>(reach * reach * (1 + 2 * kRoom));
+  result.flatness = static_cast<float>(inverse_yy);
+  result.room = static_cast<float>(1e-4 + kRoom * (std::abs(x) + half_width));
+  return result;
+}
 
 // --- order -----------------------------------------------------------------------------------------------------------
 

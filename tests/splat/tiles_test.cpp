@@ -69,6 +69,12 @@ SplatRecord<S> record_of(const Conic& conic, double x, double y, double opacity)
   return r;
 }
 
+Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
+                 const RenderSettings& settings, double epsilon) {
+  const double log2_opacity = std::log2(std::max(opacity, kLeastOpacity));
+  return detail::extent_of(conic, x, y, opacity, log2_opacity, grid, extent_rules(settings, epsilon));
+}
+
 /// What α is at a pixel of the image, in the tile that it lies in.
 template <class S>
 PixelAlpha<S> alpha_at(const SplatRecord<S>& record, const RenderSettings& settings, Index row, Index col) {
