@@ -266,7 +266,7 @@ void TileLists::place_tiles(Index tiles, Index chunks) {
   }
 }
 
-void TileLists::fill(std::span<const DepthKeyed> order, const TileGrid& grid) {
+void TileLists::fill(std::span<const DepthKeyed> order, const TileGrid& grid, std::int32_t first) {
   const Index tiles = grid.count();
   const Partition part = list_partition(static_cast<Index>(order.size()));
   entries.resize(tile_begin[tiles]);
@@ -287,7 +287,7 @@ void TileLists::fill(std::span<const DepthKeyed> order, const TileGrid& grid) {
       if (rank + kAhead < end) fetch(&tile_of[slots[index_at(rank + kAhead)].begin]);
       const std::int32_t n = index_at(rank);
       for (std::uint32_t at = slots[n].begin; at < slots[n].end; ++at, ++pair) {
-        entries[of_tile[pair->tile]++] = {n, at, pair->blocks};
+        entries[of_tile[pair->tile]++] = {first + n, at, pair->blocks};
         tile_of[at] = pair->tile;
       }
     }

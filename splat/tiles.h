@@ -195,7 +195,9 @@ class TileLists {
   /// @param extents  [N]
   Index find(std::span<const DepthKeyed> order, std::span<const Extent> extents, const TileGrid& grid, Index most);
   /// Fills entries and tile_of, after find with the same arguments.
-  void fill(std::span<const DepthKeyed> order, const TileGrid& grid);
+  ///
+  /// @param first  what entries call row 0
+  void fill(std::span<const DepthKeyed> order, const TileGrid& grid, std::int32_t first);
   Index capacity_bytes() const;
 
  private:

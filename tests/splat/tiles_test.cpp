@@ -320,7 +320,7 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
     TileLists lists;
     with_threads(threads, [&] {
       CHECK(lists.find(order, extents, grid, 1 << 30) == slot);
-      lists.fill(order, grid);
+      lists.fill(order, grid, 0);
     });
     REQUIRE(lists.pairs() == slot);
     for (Index tile = 0; tile < grid.count(); ++tile) {
