@@ -28,32 +28,42 @@ inline constexpr Index kBlockPixels = 16;
 /// sqrt(½ log₂ e): what L is scaled by.
 inline constexpr double kLog2Scale = 0.84932180028801904272;
 
-/// Settings below these take the more exact of the block kernel's forms.
-inline constexpr float kExactBelowAlpha = 1.0f / 1024, kExactBelowStop = 1e-5f, kExactBelowBlur = 0.1f;
-
 /// What a block did with a chunk of the tile's list, for the backward pass.
 struct BlockRun {
   std::int32_t end;         ///< positions of the block's list up to the last one composited in any pixel
   std::int32_t checkpoint;  ///< number of its first kept transmittance in the tile's
 };
 
-/// One tile; see TileJob. The transmittance of pixels past the border is left as −1.
+/// One tile and a list; see TileJob. What is known of a block's pixels is its state, [1 + C][16]: T, negative for
+/// pixels that are finished or lie past the image's border, and channels.
 struct BlockJob {
   std::span<const TileEntry> entries;
   Index left, top, width, height;
-  float* transmittance;  ///< [W][W]; only forward
-  float* channels;       ///< [C][W][W]; only forward
+  std::uint32_t blocks;  ///< bit b: composite block b
+  float* state;          ///< [blocks][1 + C][16], in and out; only forward
+  const float* start;    ///< state in front of the list; null: that of begin_blocks; only backward
   BlockRun* runs;        ///< [chunks][blocks]; may be null in forward: nothing is kept
   float* checkpoints;    ///< [·][16], room for checkpoints_of(…)
   float* workspace;      ///< block_workspace(…) numbers, aligned
 };
 
+inline constexpr std::uint32_t all_blocks(Index side) {
+  const Index count = (side / kBlockSide) * (side / kBlockSide);
+  return (std::uint32_t(1) << count) - 1;
+}
+
+/// Numbers of a tile's state.
+inline Index block_state(Index side, Index channels) { return (1 + channels) * side * side; }
+
+/// The state in front of all Gaussians: T = 1 in the image, −1 past its border; channels 0.
+void begin_blocks(Index side, Index width, Index height, Index channels, float* state);
+
 /// What the backward pass of a tile reads and writes beside the job.
 struct BlockAdjoint {
-  const float* d_channels;       ///< [C][W][W], zero past the border
-  const float* d_transmittance;  ///< [W][W], zero past the border
-  float* sums;                   ///< of slot s at s · stride: moments, then features, then padding; aligned
-  Index stride;                  ///< block_slot(C), or block_slot(0) without features
+  const float* d_channels;  ///< [C][W][W], zero past the border
+  const float* behind;      ///< [W][W] S behind the list: d_T where nothing follows; zero past the border
+  float* sums;              ///< of slot s at s · stride: moments, then features, then padding; aligned
+  Index stride;             ///< block_slot(C), or block_slot(0) without features
   bool wants_shape, wants_features;
 };
 
@@ -79,13 +89,14 @@ inline Index block_slot(Index channels) { return (kMoments + channels + 3) / 4 *
 /// Numbers of workspace that a tile takes.
 Index block_workspace(Index channels);
 
-/// Composites a tile.
+/// Composites a list over the state of a tile's blocks.
 ///
 /// @param side  W, 8 or 16
 BlockCounts composite_blocks(Index side, const CompositeScene<float>& scene, const BlockJob& job);
 
-/// Adjoint of composite_blocks: the sums of the pairs at list positions before the largest end. Moments are those of
-/// v = ∂/∂ log α: Σ v, Σ v u, Σ v w, Σ v u², Σ v u w, Σ v w², with u and w as scaled above.
+/// Adjoint of composite_blocks: the sums of the pairs at list positions before the largest end, but for those whose
+/// slot is kNoSlot. Moments are those of v = ∂/∂ log α: Σ v, Σ v u, Σ v w, Σ v u², Σ v u w, Σ v w², with u and w as
+/// scaled above.
 void composite_blocks_adjoint(Index side, const CompositeScene<float>& scene, const BlockJob& job,
                               const BlockAdjoint& adjoint);
 

@@ -12,7 +12,7 @@
 #include "core/simd.h"
 #include "splat/block_kernel.h"
 #include "splat/composite_kernel.h"
-#include "splat/tiles.h"
+#include "splat/splat_records.h"
 #include "splat/workspaces.h"
 
 namespace hsi4d {
@@ -21,7 +21,6 @@ namespace {
 
 using detail::CompositeRules;
 using detail::CompositeScene;
-using detail::Conic;
 using detail::DepthKeyed;
 using detail::Extent;
 using detail::kMoments;
@@ -36,25 +35,6 @@ using detail::Workspaces;
 
 constexpr Index kGrain = 512;
 
-template <class S>
-CompositeRules<S> rules_of(const RenderSettings& settings) {
-  S stop = static_cast<S>(settings.transmittance_stop);
-  if (stop > S(0) && settings.stop_when == StopWhen::kAtOrBelow) {
-    stop = std::nextafter(stop, std::numeric_limits<S>::infinity());
-  }
-  return {static_cast<S>(settings.alpha_cap),
-          static_cast<S>(settings.alpha_min),
-          stop,
-          settings.stop_rule == StopRule::kExclusive,
-          settings.cap_gradient == CapGradient::kPass,
-          static_cast<S>(settings.blur)};
-}
-
-template <class S>
-bool all_finite(const S* x, Index n) {
-  return std::all_of(x, x + n, [](S v) { return std::isfinite(v); });
-}
-
 /// Copies a row of a tile; nearly all are 16 pixels, and known lengths copy faster.
 template <class S>
 void copy_row(const S* from, Index n, S* to) {
@@ -62,6 +42,33 @@ void copy_row(const S* from, Index n, S* to) {
     std::memcpy(to, from, 16 * sizeof(S));
   } else {
     std::copy_n(from, n, to);
+  }
+}
+
+/// Writes the blocks that a job composited.
+void store_blocks(Index side, const detail::BlockJob& job, const Array<float>& channels,
+                  const Array<float>& transmittance) {
+  constexpr Index kSide = detail::kBlockSide;
+  const Index across = side / kSide, planes = channels.shape.planes;
+  const auto store = [&](const float* from, Index x, Index y, Index plane, const Array<float>& image) {
+    const Index width = std::min(kSide, job.width - x), height = std::min(kSide, job.height - y);
+    for (Index r = 0; r < height; ++r) {
+      float* const to = &image(plane, job.top + y + r, job.left + x);
+      if (width == kSide) {
+        std::memcpy(to, from + r * kSide, kSide * sizeof(float));
+      } else {
+        std::copy_n(from + r * kSide, width, to);
+      }
+    }
+  };
+  for (Index b = 0; b < across * across; ++b) {
+    const Index x = b % across * kSide, y = b / across * kSide;
+    if ((job.blocks >> b & 1u) == 0 || x >= job.width || y >= job.height) continue;
+    const float* const state = job.state + b * (1 + planes) * detail::kBlockPixels;
+    float t[detail::kBlockPixels];
+    for (Index i = 0; i < detail::kBlockPixels; ++i) t[i] = std::abs(state[i]);
+    store(t, x, y, 0, transmittance);
+    for (Index k = 0; k < planes; ++k) store(state + (k + 1) * detail::kBlockPixels, x, y, k, channels);
   }
 }
 
@@ -124,59 +131,17 @@ struct Composite {
 
   // --- Gaussians -----------------------------------------------------------------------------------------------------
 
-  static void read_factor(const NodeIo<S>& io, Index n, double* factor) {
-    const S* v = io.in(kFactors).row(n);
-    for (int i = 0; i < 6; ++i) factor[i] = static_cast<double>(v[i]);
-  }
-
-  std::uint64_t depth_key(const NodeIo<S>& io, Index n) const {
-    const S depth = io.in(kDepths).data[n], rest = io.in(kRest).data[n];
-    constexpr DepthKey kOwn = std::is_same_v<S, float> ? DepthKey::kFloat : DepthKey::kDouble;
-    if (view.settings.depth_key.value_or(kOwn) == DepthKey::kFloat)
-      return detail::depth_bits(static_cast<float>(depth));
-    return detail::depth_bits(static_cast<double>(depth) + static_cast<double>(rest));
-  }
-
-  /// Culls: numbers that are not finite, then near, then the footprint, each before its numbers are used (rows A4-A6).
-  bool prepare_gaussian(const NodeIo<S>& io, const TileGrid& tiles, Index n, SplatRecord<S>& record,
-                        Extent& extent) const {
-    const S *mean = io.in(kMeans).row(n), *mean_rest = io.in(kMeansRest).row(n);
-    const S depth = io.in(kDepths).data[n], rest = io.in(kRest).data[n], opacity = io.in(kOpacities).data[n];
-    const ConstArray<S> features = io.in(kFeatures);
-    if (!all_finite(mean, 2) || !all_finite(mean_rest, 2) || !std::isfinite(depth) || !std::isfinite(rest) ||
-        !std::isfinite(opacity))
-      return false;
-    if (!(static_cast<double>(depth) + static_cast<double>(rest) > view.settings.near)) return false;
-    double factor[6];
-    read_factor(io, n, factor);
-    if (!is_drawn(factor)) return false;
-    Conic conic;
-    if (!detail::conic_of(factor, view.settings.blur, conic)) return false;
-    const double scaled =
-        static_cast<double>(opacity) * (view.settings.antialias ? detail::blur_compensation(conic) : 1.0);
-    const double x = static_cast<double>(mean[0]) + static_cast<double>(mean_rest[0]);
-    const double y = static_cast<double>(mean[1]) + static_cast<double>(mean_rest[1]);
-    extent = detail::extent_of(conic, x, y, scaled, tiles, view.settings,
-                               static_cast<double>(std::numeric_limits<S>::epsilon()));
-    if (extent.row_begin >= extent.row_end || !all_finite(features.row(n), features.shape.cols)) return false;
-    record = {x,
-              y,
-              static_cast<S>(conic.l11),
-              static_cast<S>(conic.l21),
-              static_cast<S>(conic.l22),
-              static_cast<S>(scaled),
-              static_cast<S>(std::log2(std::max(scaled, detail::kLeastOpacity))),
-              static_cast<std::int32_t>(extent.row_begin),
-              static_cast<std::int32_t>(extent.row_end),
-              static_cast<std::int32_t>(n)};
-    return all_finite(&record.l11, 5);
+  static detail::SplatArrays<S> splats_of(const NodeIo<S>& io) {
+    return {io.in(kMeans),     io.in(kFactors),   io.in(kDepths),  io.in(kRest),
+            io.in(kMeansRest), io.in(kOpacities), io.in(kFeatures)};
   }
 
   /// Records and extents of what is drawn, and the tiles' lists.
   void prepare(const NodeIo<S>& io) {
     Stopwatch watch;
     const TileGrid tiles = grid();
-    const Index rows = io.in(kMeans).shape.rows;
+    const detail::SplatArrays<S> splats = splats_of(io);
+    const Index rows = splats.rows();
     records.resize(rows);
     extents.resize(rows);
     keys.resize(rows);
@@ -184,9 +149,9 @@ struct Composite {
     parallel_for(rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
         for (Index n = begin; n < end; ++n) {
-          const bool drawn = prepare_gaussian(io, tiles, n, records[n], extents[n]);
+          const bool drawn = detail::make_record(splats, view.settings, tiles, n, records[n], extents[n]);
           keys[n].index = drawn ? static_cast<std::int32_t>(n) : -1;
-          if (drawn) keys[n].key = depth_key(io, n);
+          if (drawn) keys[n].key = detail::depth_key(splats, view.settings, n);
         }
       });
     });
@@ -224,7 +189,11 @@ struct Composite {
 
   CompositeScene<S> scene_of(const NodeIo<S>& io) const {
     const ConstArray<S> features = io.in(kFeatures);
-    return {records.span(), features.data, features.shape.cols, rules_of<S>(view.settings)};
+    return {records.span(),
+            {features.data, nullptr},
+            records.size(),
+            features.shape.cols,
+            detail::composite_rules<S>(view.settings)};
   }
 
   // --- tiles ---------------------------------------------------------------------------------------------------------
@@ -286,44 +255,53 @@ struct Composite {
     last.resize(blocks ? 0 : tiles.count() * side * side);
   }
 
-  /// Composites a tile; `memory` is T, channels and workspace.
+  /// Composites a tile into the image; `memory` is its pixels and workspace.
   TileCounts composite_tile(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* memory) {
-    const Index pixels = tiles.tile * tiles.tile;
     const CompositeScene<S> scene = scene_of(io);
+    const Array<S> image = io.out(kChannels), transmittance = io.out(kTransmittance);
     if constexpr (std::is_same_v<S, float>) {
       if (in_blocks(io)) {
         detail::BlockJob job = block_job_of(tiles, tile);
-        job.transmittance = memory;
-        job.channels = memory + pixels;
-        job.workspace = job.channels + scene.channels * pixels;
+        job.blocks = detail::all_blocks(tiles.tile);
+        job.state = memory;
+        job.workspace = memory + detail::block_state(tiles.tile, scene.channels);
+        detail::begin_blocks(tiles.tile, job.width, job.height, scene.channels, job.state);
         const detail::BlockCounts counts = detail::composite_blocks(tiles.tile, scene, job);
+        store_blocks(tiles.tile, job, image, transmittance);
         return {counts.fragments, counts.end};
       }
     }
+    const Index pixels = tiles.tile * tiles.tile;
     TileJob<S> job = job_of(tiles, tile);
     job.transmittance = memory;
     job.channels = memory + pixels;
     const Index fragments = detail::composite_tile(tiles.tile, scene, job);
+    for (Index r = 0; r < job.height; ++r) {
+      copy_row(job.transmittance + r * tiles.tile, job.width, &transmittance(job.top + r, job.left));
+      for (Index k = 0; k < scene.channels; ++k) {
+        copy_row(job.channels + k * pixels + r * tiles.tile, job.width, &image(k, job.top + r, job.left));
+      }
+    }
     return {fragments, static_cast<Index>(*std::max_element(job.last, job.last + pixels))};
   }
 
-  Index forward_memory(const NodeIo<S>& io, Index pixels) const {
+  Index forward_memory(const NodeIo<S>& io, Index side) const {
     const Index channels = io.in(kFeatures).shape.cols;
-    return (channels + 1) * pixels + (in_blocks(io) ? detail::block_workspace(channels) : 0);
+    return detail::block_state(side, channels) + (in_blocks(io) ? detail::block_workspace(channels) : 0);
   }
 
   void forward(NodeIo<S>& io) {
     prepare(io);
     Stopwatch watch;
     const TileGrid tiles = grid();
-    const Index pixels = tiles.tile * tiles.tile, channels = io.in(kFeatures).shape.cols;
+    const detail::SplatArrays<S> splats = splats_of(io);
     place_kept(io, tiles);
     tile_counts.resize(tiles.count());
     tile_last.resize(tiles.count());
     Workspaces workspaces(tiles.count());
-    const Index size = forward_memory(io, pixels);
+    const Index size = forward_memory(io, tiles.tile);
     const std::span<S> memory = io.scratch(size * workspaces.count());
-    const Array<S> image = io.out(kChannels), transmittance = io.out(kTransmittance);
+    const Array<S> image = io.out(kChannels);
     if (written != image.data || blank.size() != tiles.count()) {
       blank.resize(tiles.count());
       std::fill_n(blank.data(), tiles.count(), std::uint8_t(0));
@@ -336,19 +314,10 @@ struct Composite {
       if (empty && blank[tile] != 0) return;
       blank[tile] = empty ? 1 : 0;
       const Workspaces::Held held(workspaces);
-      S* const t = memory.data() + held.number() * size;
-      tile_counts[tile] = composite_tile(io, tiles, tile, t);
+      tile_counts[tile] = composite_tile(io, tiles, tile, memory.data() + held.number() * size);
       const Index end = tile_counts[tile].end;
       tile_last[tile] = {0, end > 0 ? lists.entries[lists.tile_begin[tile] + end - 1].index : -1};
-      if (end > 0) tile_last[tile].key = depth_key(io, tile_last[tile].index);
-      TileJob<S> place{};
-      place_job(tiles, tile, place);
-      for (Index r = 0; r < place.height; ++r) {
-        copy_row(t + r * tiles.tile, place.width, &transmittance(place.top + r, place.left));
-        for (Index k = 0; k < channels; ++k) {
-          copy_row(t + (k + 1) * pixels + r * tiles.tile, place.width, &image(k, place.top + r, place.left));
-        }
-      }
+      if (end > 0) tile_last[tile].key = detail::depth_key(splats, view.settings, tile_last[tile].index);
     });
     counters->times.forward_s = watch.lap();
     count(tiles);
@@ -455,7 +424,8 @@ struct Composite {
     static_assert(kMoments <= kTogether);
     const TileLists::Slots slots = lists.slots[n];
     if (slots.begin == slots.end) return;
-    const std::uint64_t key = depth_key(io, n);
+    const detail::SplatArrays<S> splats = splats_of(io);
+    const std::uint64_t key = detail::depth_key(splats, view.settings, n);
     const Index first_feature = adjoint.wants_shape || in_blocks(io) ? kMoments : 0;
     const Index features = adjoint.wants_features ? io.in(kFeatures).shape.cols : 0;
     for (Index k = 0; k < adjoint.stride; k += kTogether) {
@@ -471,7 +441,7 @@ struct Composite {
       if (!any) return;
       if (adjoint.wants_shape && k == 0) {
         if (in_blocks(io)) scale_block_moments(records[n], totals);
-        add_shape_gradient(io, records[n], n, totals);
+        detail::add_record_gradient(splats, view.settings, n, records[n], totals, gradient_of(io, n));
       }
       for (Index i = std::max<Index>(first_feature - k, 0); i < std::min(count, first_feature + features - k); ++i) {
         io.d_in(kFeatures).row(n)[k + i - first_feature] += static_cast<S>(totals[i]);
@@ -481,51 +451,16 @@ struct Composite {
 
   /// From sums of ∂/∂ log α with scaled u and w to those of kMoments.
   static void scale_block_moments(const SplatRecord<S>& record, double* moments) {
-    const double o = std::max(static_cast<double>(record.opacity), detail::kLeastOpacity);
+    const double o = std::max(static_cast<double>(record.opacity), kLeastOpacity);
     const double first = 1 / (o * detail::kLog2Scale), second = first / detail::kLog2Scale;
     moments[0] /= o;
     for (int i = 1; i < 3; ++i) moments[i] *= first;
     for (int i = 3; i < 6; ++i) moments[i] *= second;
   }
 
-  /// With L = [l11 l21; 0 l22] and M the moments (Σ g u², …) as a symmetric matrix, from ds = −(L d)ᵀ L d_mean and
-  /// ds = −½ (Lᵀ L d)ᵀ d_cov (Lᵀ L d):
-  ///
-  ///   d_o = Σ g,   d_mean = o Lᵀ (Σ g u, Σ g w),   d_cov = ½ o Lᵀ M L,   d_V = 2 d_cov V = o Lᵀ M (L V)
-  ///
-  /// d_cov is that of the full symmetric matrix: its off-diagonal number counts twice (row B21).
-  void add_shape_gradient(NodeIo<S>& io, const SplatRecord<S>& record, Index n, const double* moments) const {
-    double v[6];
-    read_factor(io, n, v);
-    Conic conic;
-    if (!detail::conic_of(v, view.settings.blur, conic)) return;
-    const bool antialias = view.settings.antialias;
-    const double o = static_cast<double>(record.opacity);
-    if (io.wants(kOpacities)) {
-      io.d_in(kOpacities).data[n] +=
-          static_cast<S>(antialias ? moments[0] * detail::blur_compensation(conic) : moments[0]);
-    }
-    for (const int input : {kMeans, kMeansRest}) {
-      if (!io.wants(input)) continue;
-      S* d_mean = io.d_in(input).row(n);
-      d_mean[0] += static_cast<S>(o * (conic.l11 * moments[1]));
-      d_mean[1] += static_cast<S>(o * (conic.l21 * moments[1] + conic.l22 * moments[2]));
-    }
-    if (!io.wants(kFactors)) return;
-    double d_v[6];
-    const auto lv = detail::whitened_factor(v, view.settings.blur, conic);
-    for (int c = 0; c < 3; ++c) {
-      const double lu = lv[static_cast<std::size_t>(c)], lw = lv[static_cast<std::size_t>(3 + c)];
-      const double mu = moments[3] * lu + moments[4] * lw, mw = moments[4] * lu + moments[5] * lw;
-      d_v[c] = o * (conic.l11 * mu);
-      d_v[3 + c] = o * (conic.l21 * mu + conic.l22 * mw);
-    }
-    if (antialias) {
-      const double opacity = static_cast<double>(io.in(kOpacities).data[n]);
-      detail::blur_compensation_adjoint(v, view.settings.blur, conic, moments[0] * opacity, d_v);
-    }
-    S* d_factor = io.d_in(kFactors).row(n);
-    for (int i = 0; i < 6; ++i) d_factor[i] += static_cast<S>(d_v[i]);
+  static detail::SplatGradient<S> gradient_of(const NodeIo<S>& io, Index n) {
+    const auto row = [&](int input) { return io.wants(input) ? io.d_in(input).row(n) : nullptr; };
+    return {row(kMeans), row(kMeansRest), row(kFactors), row(kOpacities)};
   }
 
   // --- the rest ------------------------------------------------------------------------------------------------------
@@ -533,7 +468,7 @@ struct Composite {
   /// α of a Gaussian at a pixel of a tile, by the kernel in use.
   detail::PixelAlpha<S> pixel_alpha(const NodeIo<S>& io, const TileJob<S>& place, const SplatRecord<S>& record, Index r,
                                     Index c) const {
-    const CompositeRules<S> rules = rules_of<S>(view.settings);
+    const CompositeRules<S> rules = detail::composite_rules<S>(view.settings);
     if constexpr (std::is_same_v<S, float>) {
       if (in_blocks(io))
         return detail::block_pixel_alpha(view.settings.tile, record, rules, place.left, place.top, r, c);
@@ -541,10 +476,18 @@ struct Composite {
     return detail::pixel_alpha(record, rules, place, r, c);
   }
 
+  /// T behind a Gaussian, by the kernel in use.
+  static S behind(const NodeIo<S>& io, S transmittance, S alpha) {
+    if constexpr (std::is_same_v<S, float>) {
+      if (in_blocks(io)) return detail::block_transmittance(transmittance, alpha);
+    }
+    return transmittance * (1 - alpha);
+  }
+
   /// Order, lists, and for each (pixel, Gaussian) pair whether it is composited, stops with it, or is held by the cap.
   void add_signature(Signature& signature, NodeIo<S>& io) {
     const TileGrid tiles = grid();
-    const CompositeRules<S> rules = rules_of<S>(view.settings);
+    const CompositeRules<S> rules = detail::composite_rules<S>(view.settings);
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       TileJob<S> place{};
       place_job(tiles, tile, place);
@@ -558,7 +501,7 @@ struct Composite {
           if (place.top + r < record.row_begin || place.top + r >= record.row_end) continue;
           const auto pixel = pixel_alpha(io, place, record, r, c);
           if (!pixel.drawn) continue;
-          const S next = t * (1 - pixel.alpha);
+          const S next = behind(io, t, pixel.alpha);
           if (rules.exclusive && next < rules.stop_below) break;
           t = next;
           signature.add(at * 2 + (pixel.capped ? 1 : 0));

@@ -176,7 +176,7 @@ Index composite(const CompositeScene<S>& scene, const TileJob<S>& job) {
     fetch_ahead(scene, job, at);
     const SplatRecord<S>& record = record_at(scene, job, at);
     const Splat<Tag<S, W>> splat(d, job, record);
-    const S* const feature = scene.features + record.index * scene.channels;
+    const S* const feature = scene.feature(job.entries[static_cast<size_t>(at)].index);
     const auto position = hn::Set(di, static_cast<ListPosition<S>>(at + 1));
     const RowRange rows(record, job);
     for (Index r = rows.begin; r < rows.end; ++r) {
@@ -258,16 +258,19 @@ void replay(const CompositeScene<S>& scene, const TileJob<S>& job, Index begin, 
   }
 }
 
-/// Gradients of one (tile, Gaussian) pair into its slot, and `behind` moved to in front of the Gaussian.
+/// Gradients of one (tile, Gaussian) pair into its slot, if it has one, and `behind` moved to in front of the Gaussian.
 template <int W, int kChannels, class S>
 void adjoint_of_entry(const CompositeScene<S>& scene, const TileJob<S>& job, const TileAdjoint<S>& adjoint,
-                      const SplatRecord<S>& record, const S* of_entry, S* slot) {
+                      const TileEntry& entry, const S* of_entry) {
   const Tag<S, W> d;
   using V = hn::Vec<Tag<S, W>>;
   constexpr int kPixels = W * W;
   const Index lanes = static_cast<Index>(hn::Lanes(d));
   const Index channels = kChannels > 0 ? kChannels : scene.channels;
-  const S* const feature = scene.features + record.index * scene.channels;
+  const SplatRecord<S>& record = scene.records[static_cast<size_t>(entry.index)];
+  const S* const feature = scene.feature(entry.index);
+  const bool has_slot = entry.slot != kNoSlot;
+  const bool wants_shape = adjoint.wants_shape && has_slot, wants_features = adjoint.wants_features && has_slot;
   const Splat<Tag<S, W>> splat(d, job, record);
   const V cap = hn::Set(d, scene.rules.alpha_cap), one = hn::Set(d, S(1)), zero = hn::Zero(d);
   const V held_gradient = hn::Set(d, scene.rules.pass_cap ? S(1) : S(0));
@@ -289,7 +292,7 @@ void adjoint_of_entry(const CompositeScene<S>& scene, const TileJob<S>& job, con
       const V through = hn::Load(d, of_entry + p), behind = hn::Load(d, adjoint.behind + p);
       const V raw = hn::Mul(splat.opacity, gaussian), alpha = alpha_of(d, splat, gaussian, cap);
       hn::Store(hn::MulAdd(alpha, shown, hn::Mul(hn::Sub(one, alpha), behind)), d, adjoint.behind + p);
-      if (adjoint.wants_shape) {
+      if (wants_shape) {
         const V gate = hn::IfThenElse(hn::Gt(raw, cap), held_gradient, one);
         const SplatRow<Tag<S, W>> row(d, splat, center_y<S>(r));
         const V u = u_of(d, splat, row, center_x);
@@ -302,7 +305,7 @@ void adjoint_of_entry(const CompositeScene<S>& scene, const TileJob<S>& job, con
         m4 = hn::MulAdd(vgu, row.w, m4);
         m5 = hn::MulAdd(vgw, row.w, m5);
       }
-      if (!adjoint.wants_features) continue;
+      if (!wants_features) continue;
       const V weight = hn::Mul(through, alpha);
       if constexpr (kChannels == 3) {
         f0 = hn::MulAdd(weight, hn::Load(d, d_row), f0);
@@ -316,10 +319,11 @@ void adjoint_of_entry(const CompositeScene<S>& scene, const TileJob<S>& job, con
       }
     }
   }
-  if (adjoint.wants_shape) {
+  S* slot = adjoint.sums + static_cast<Index>(has_slot ? entry.slot : 0) * adjoint.stride;
+  if (wants_shape) {
     for (const V m : {m0, m1, m2, m3, m4, m5}) *slot++ = hn::GetLane(hn::SumOfLanes(d, m));
   }
-  if (!adjoint.wants_features) return;
+  if (!wants_features) return;
   if constexpr (kChannels == 3) {
     for (const V f : {f0, f1, f2}) *slot++ = hn::GetLane(hn::SumOfLanes(d, f));
   } else {
@@ -332,17 +336,14 @@ void adjoint_of_entry(const CompositeScene<S>& scene, const TileJob<S>& job, con
 template <int W, int kChannels, class S>
 void composite_adjoint(const CompositeScene<S>& scene, const TileJob<S>& job, const TileAdjoint<S>& adjoint) {
   constexpr int kPixels = W * W;
-  const auto slot_of = [&](Index at) {
-    return adjoint.sums + static_cast<Index>(job.entries[static_cast<size_t>(at)].slot) * adjoint.stride;
-  };
   Index end = 0;
   for (int p = 0; p < kPixels; ++p) end = std::max(end, static_cast<Index>(job.last[p]));
   while (end > 0) {
     const Index begin = (end - 1) / kSegment * kSegment;
     replay<W>(scene, job, begin, end, adjoint.segment);
     for (Index at = end - 1; at >= begin; --at) {
-      adjoint_of_entry<W, kChannels>(scene, job, adjoint, record_at(scene, job, at),
-                                     adjoint.segment + (at - begin) * 2 * kPixels, slot_of(at));
+      adjoint_of_entry<W, kChannels>(scene, job, adjoint, job.entries[static_cast<size_t>(at)],
+                                     adjoint.segment + (at - begin) * 2 * kPixels);
     }
     end = begin;
   }

@@ -6,41 +6,21 @@
 #include <type_traits>
 
 #include "core/types.h"
-#include "splat/tiles.h"
+#include "splat/splat_records.h"
 
 namespace hsi4d::detail {
-
-/// What the pixel loops need of a Gaussian.
-template <class S>
-struct SplatRecord {
-  double x, y;      ///< mean, pixels; the loops use its place in the tile, which S holds to far more digits
-  S l11, l21, l22;  ///< see Conic
-  S opacity;        ///< with the antialias factor
-  S log2_opacity;   ///< of an opacity held at or above kLeastOpacity
-  std::int32_t row_begin, row_end;  ///< pixels
-  std::int32_t index;               ///< row of the inputs
-};
-
-/// Opacities are held at this in the logarithm.
-inline constexpr double kLeastOpacity = 1e-30;
-
-/// Settings as the pixel loops use them.
-template <class S>
-struct CompositeRules {
-  S alpha_cap, alpha_min;
-  S stop_below;    ///< a pixel is finished when T is below this; 0: never
-  bool exclusive;  ///< the Gaussian that would finish the pixel is left out
-  bool pass_cap;   ///< the gradient passes where the cap holds
-  S blur = 0;      ///< pixels², already in the conics
-};
 
 /// Gaussians, features and lists of an image.
 template <class S>
 struct CompositeScene {
   std::span<const SplatRecord<S>> records;  ///< in the order of the inputs
-  const S* features;                        ///< [N,channels]
+  const S* features[2];                     ///< [·,channels] of rows before `second`, and from there
+  Index second;
   Index channels;
   CompositeRules<S> rules;
+  const S* feature(Index n) const {
+    return n < second ? features[0] + n * channels : features[1] + (n - second) * channels;
+  }
 };
 
 /// A list position, as wide as S so that vectors of both have equally many lanes.

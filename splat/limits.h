@@ -42,6 +42,17 @@ inline constexpr double kOpacityLogitLimit = 20;
 /// Highest degree of the spherical harmonics.
 inline constexpr int kHighestShDegree = 3;
 
+/// Opacities are held at this in logarithms.
+inline constexpr double kLeastOpacity = 1e-30;
+/// No alpha below float's least normal number is composited in float, whatever alpha_min is (stability B5).
+inline constexpr float kLeastAlpha = 0x1p-126f;
+
+/// In float, settings below these take the more exact form of the pixel loops: u and w from the block's centre, and an
+/// exponential to half a unit in the last place.
+inline constexpr float kExactBelowAlpha = 1.0f / 1024;
+inline constexpr float kExactBelowStop = 1e-5f;
+inline constexpr float kExactBelowBlur = 0.1f;
+
 /// Side of a square tile, pixels.
 inline constexpr int kTile = 16;
 

@@ -70,6 +70,9 @@ std::span<DepthKeyed> sort_by_depth(std::span<DepthKeyed> keys, std::span<DepthK
 
 // --- lists -----------------------------------------------------------------------------------------------------------
 
+/// Of pairs without an adjoint.
+inline constexpr std::uint32_t kNoSlot = 0xFFFFFFFF;
+
 struct TileEntry {
   std::int32_t index;    ///< row of the inputs
   std::uint32_t slot;    ///< of this (tile, Gaussian) pair; those of a Gaussian follow each other

@@ -28,8 +28,9 @@ void on_every_target(const F& f) {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-/// One pixel: with features that name Gaussians, eight at a time, its channels are their weights, and so are the gradients of the
-/// features where the cotangent is 1. A Gaussian that only one of both composites has weight 0 in the other.
+/// One pixel: with features that name Gaussians, eight at a time, its channels are their weights, and so are the
+/// gradients of the features where the cotangent is 1. A Gaussian that only one of both composites has weight 0 in the
+/// other.
 template <class S>
 void check_weights_of(const FlatSplats& splats, const FlatSplats& colored, const SplatView& view) {
   constexpr Index kTogether = 8;

@@ -30,19 +30,10 @@ struct Hash {
 template <class S>
 struct Candidate {
   std::uint64_t key;
+  Index row;  ///< of the inputs
   SplatRecord<S> record;
   Extent extent;
 };
-
-template <class S>
-CompositeRules<S> rules_of(const RenderSettings& settings) {
-  const S stop = static_cast<S>(settings.transmittance_stop);
-  const bool at_too = stop > S(0) && settings.stop_when == StopWhen::kAtOrBelow;
-  return {static_cast<S>(settings.alpha_cap), static_cast<S>(settings.alpha_min),
-          at_too ? std::nextafter(stop, std::numeric_limits<S>::infinity()) : stop,
-          settings.stop_rule == StopRule::kExclusive, settings.cap_gradient == CapGradient::kPass,
-          static_cast<S>(settings.blur)};
-}
 
 /// α and the transmittance behind it, by the kernel that composites up to kMostBlockChannels features.
 template <class S>
@@ -67,41 +58,16 @@ S behind(S transmittance, S alpha) {
 template <class S>
 std::vector<Candidate<S>> candidates(const Tape<S>& tape, const Projected<S>& projected, Var<S> opacities,
                                      const SplatView& view, const TileGrid& tiles) {
-  const ConstArray<S> means = tape.value(projected.means_px), rest = tape.value(projected.means_rest);
-  const ConstArray<S> factors = tape.value(projected.factors), depths = tape.value(projected.depths);
-  const ConstArray<S> depth_rest = tape.value(projected.depth_rest), opacity = tape.value(opacities);
-  const RenderSettings& settings = view.settings;
-  const DepthKey own = std::is_same_v<S, float> ? DepthKey::kFloat : DepthKey::kDouble;
-  const bool float_keys = settings.depth_key.value_or(own) == DepthKey::kFloat;
+  const hsi4d::detail::SplatArrays<S> splats = {tape.value(projected.means_px),   tape.value(projected.factors),
+                                                tape.value(projected.depths),     tape.value(projected.depth_rest),
+                                                tape.value(projected.means_rest), tape.value(opacities),
+                                                tape.value(projected.depths)};
   std::vector<Candidate<S>> all;
-  for (Index n = 0; n < means.shape.rows; ++n) {
-    const double depth = static_cast<double>(depths.data[n]) + static_cast<double>(depth_rest.data[n]);
-    double factor[6];
-    for (int i = 0; i < 6; ++i) factor[i] = static_cast<double>(factors.row(n)[i]);
-    Conic conic;
-    if (!(depth > settings.near) || !is_drawn(factor) || !std::isfinite(opacity.data[n]) ||
-        !hsi4d::detail::conic_of(factor, settings.blur, conic))
-      continue;
-    const double scale = settings.antialias ? hsi4d::detail::blur_compensation(conic) : 1;
-    const double o = static_cast<double>(opacity.data[n]) * scale;
-    const double x = static_cast<double>(means.row(n)[0]) + static_cast<double>(rest.row(n)[0]);
-    const double y = static_cast<double>(means.row(n)[1]) + static_cast<double>(rest.row(n)[1]);
+  for (Index n = 0; n < splats.rows(); ++n) {
     Candidate<S> c{};
-    c.extent = hsi4d::detail::extent_of(conic, x, y, o, tiles, settings,
-                                        static_cast<double>(std::numeric_limits<S>::epsilon()));
-    if (c.extent.row_begin >= c.extent.row_end) continue;
-    c.key =
-        float_keys ? hsi4d::detail::depth_bits(static_cast<float>(depths.data[n])) : hsi4d::detail::depth_bits(depth);
-    c.record = {x,
-                y,
-                static_cast<S>(conic.l11),
-                static_cast<S>(conic.l21),
-                static_cast<S>(conic.l22),
-                static_cast<S>(o),
-                static_cast<S>(std::log2(std::max(o, hsi4d::detail::kLeastOpacity))),
-                static_cast<std::int32_t>(c.extent.row_begin),
-                static_cast<std::int32_t>(c.extent.row_end),
-                static_cast<std::int32_t>(n)};
+    if (!hsi4d::detail::make_record(splats, view.settings, tiles, n, c.record, c.extent)) continue;
+    c.key = hsi4d::detail::depth_key(splats, view.settings, n);
+    c.row = n;
     all.push_back(c);
   }
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
@@ -110,20 +76,21 @@ std::vector<Candidate<S>> candidates(const Tape<S>& tape, const Projected<S>& pr
 
 /// The choices at one pixel of a tile, given what reaches the tile in depth order.
 template <class S>
-std::uint64_t choices_at(Index side, const std::vector<const SplatRecord<S>*>& list, const CompositeRules<S>& rules,
+std::uint64_t choices_at(Index side, const std::vector<const Candidate<S>*>& list, const CompositeRules<S>& rules,
                          const TileJob<S>& job, Index row, Index col, PixelChoices& count) {
   Hash hash;
   S transmittance = 1;
-  for (const SplatRecord<S>* record : list) {
-    if (job.top + row < record->row_begin || job.top + row >= record->row_end) continue;
-    const auto pixel = alpha_at(side, *record, rules, job, row, col);
+  for (const Candidate<S>* splat : list) {
+    const SplatRecord<S>& record = splat->record;
+    if (job.top + row < record.row_begin || job.top + row >= record.row_end) continue;
+    const auto pixel = alpha_at(side, record, rules, job, row, col);
     if (!pixel.drawn) {
       ++count.skipped;
       continue;
     }
     const S next = behind(transmittance, pixel.alpha);
     const bool past = next < rules.stop_below;
-    const auto name = 4 * static_cast<std::uint64_t>(record->index);
+    const auto name = 4 * static_cast<std::uint64_t>(splat->row);
     hash.add(name + (past ? 2 : 0) + (pixel.capped ? 1 : 0));
     count.stopped += past ? 1 : 0;
     if (past && rules.exclusive) break;
@@ -142,12 +109,12 @@ PixelChoices pixel_choices(const Tape<S>& tape, const Projected<S>& projected, V
                            const SplatView& view) {
   const TileGrid tiles = hsi4d::detail::tile_grid(view.camera.width, view.camera.height, view.settings.tile);
   const std::vector<Candidate<S>> all = candidates(tape, projected, opacities, view, tiles);
-  std::vector<std::vector<const SplatRecord<S>*>> lists(static_cast<std::size_t>(tiles.count()));
+  std::vector<std::vector<const Candidate<S>*>> lists(static_cast<std::size_t>(tiles.count()));
   for (const Candidate<S>& c : all) {
-    hsi4d::detail::for_each_tile(c.extent, tiles,
-                                 [&](Index tile, std::uint32_t) { lists[static_cast<std::size_t>(tile)].push_back(&c.record); });
+    hsi4d::detail::for_each_tile(
+        c.extent, tiles, [&](Index tile, std::uint32_t) { lists[static_cast<std::size_t>(tile)].push_back(&c); });
   }
-  const CompositeRules<S> rules = rules_of<S>(view.settings);
+  const CompositeRules<S> rules = hsi4d::detail::composite_rules<S>(view.settings);
   PixelChoices result;
   result.hashes.resize(static_cast<std::size_t>(tiles.width * tiles.height));
   for (Index tile = 0; tile < tiles.count(); ++tile) {

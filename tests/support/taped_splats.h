@@ -50,8 +50,8 @@ inline double relative_l2(const std::vector<double>& a, const std::vector<double
 }
 
 /// Relative L2 errors of gradients, by class. That of quaternions is zero but for rounding where Gaussians are round:
-/// if it is below 1e-6 of the log-scales', it is measured against that. The camera's is a sum over all Gaussians that may
-/// cancel (20-fold in one of the real views): it is measured against the means' where that is larger.
+/// if it is below 1e-6 of the log-scales', it is measured against that. The camera's is a sum over all Gaussians that
+/// may cancel (20-fold in one of the real views): it is measured against the means' where that is larger.
 inline std::vector<NamedNumbers> gradient_errors(const std::vector<NamedNumbers>& computed,
                                                  const std::vector<NamedNumbers>& expected) {
   const auto norm = [&](const std::string& name) {

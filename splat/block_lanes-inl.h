@@ -1,0 +1,227 @@
+// Vectors of the block kernel: instructions that Highway has no name for, 2ᵖ, and transposes between lanes of pixels
+// and lanes of Gaussians. Compiled once for each instruction set.
+#if defined(HSI4D_SPLAT_BLOCK_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef HSI4D_SPLAT_BLOCK_LANES_INL_H
+#undef HSI4D_SPLAT_BLOCK_LANES_INL_H
+#else
+#define HSI4D_SPLAT_BLOCK_LANES_INL_H
+#endif
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace hsi4d::detail::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<float, 16>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(D()));
+constexpr int kParts = 16 / kLanes;  ///< vectors of a block
+using D4 = hn::CappedTag<float, 4>;
+
+// --- a few instructions that Highway has no name for -----------------------------------------------------------------
+
+#if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
+HWY_INLINE M both_at_least(V a, V b, V c, V d) {
+  return M{_mm512_mask_cmp_ps_mask(_mm512_cmp_ps_mask(a.raw, b.raw, _CMP_GE_OQ), c.raw, d.raw, _CMP_GE_OQ)};
+}
+HWY_INLINE V product_or_zero(M m, V a, V b) { return V{_mm512_maskz_mul_ps(m.raw, a.raw, b.raw)}; }
+/// t − t a where m, else t.
+HWY_INLINE V dimmed(M m, V t, V a) { return V{_mm512_mask_fnmadd_ps(t.raw, m.raw, a.raw, t.raw)}; }
+HWY_INLINE V fraction(V p) { return V{_mm512_reduce_ps(p.raw, 0x09)}; }
+HWY_INLINE V rest_of_rounding(V p) { return V{_mm512_reduce_ps(p.raw, 0x08)}; }
+HWY_INLINE V times_power_of_floor(V y, V p) { return V{_mm512_scalef_ps(y.raw, p.raw)}; }
+HWY_INLINE void keep_bits(M m, int, std::uint16_t* to) { _store_mask16(to, m.raw); }
+#else
+#if HWY_TARGET == HWY_SCALAR
+/// y 2^⌊p⌋ for y in [1, 2) and p ≥ −126; for smaller p some number.
+HWY_INLINE V times_power_of_floor(V y, V p) {
+  const float floor = std::floor(std::max(hn::GetLane(p), -126.0f));
+  return hn::Set(D(), std::bit_cast<float>(std::bit_cast<std::int32_t>(hn::GetLane(y)) +
+                                           static_cast<std::int32_t>(floor) * (1 << 23)));
+}
+#else
+/// The same.
+HWY_INLINE V times_power_of_floor(V y, V p) {
+  const hn::RebindToSigned<D> di;
+  const auto n = hn::ConvertTo(di, hn::Floor(hn::Max(p, hn::Set(D(), -126.0f))));
+  return hn::BitCast(D(), hn::Add(hn::BitCast(di, y), hn::ShiftLeft<23>(n)));
+}
+#endif
+HWY_INLINE M both_at_least(V a, V b, V c, V d) { return hn::And(hn::Ge(a, b), hn::Ge(c, d)); }
+HWY_INLINE V product_or_zero(M m, V a, V b) { return hn::IfThenElseZero(m, hn::Mul(a, b)); }
+HWY_INLINE V dimmed(M m, V t, V a) { return hn::NegMulAdd(t, hn::IfThenElseZero(m, a), t); }
+HWY_INLINE V fraction(V p) { return hn::Sub(p, hn::Floor(p)); }
+HWY_INLINE V rest_of_rounding(V p) { return hn::Sub(p, hn::Round(p)); }
+HWY_INLINE void keep_bits(M m, int part, std::uint16_t* to) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(D(), m, bits);
+  *to = static_cast<std::uint16_t>((part == 0 ? 0 : *to) | bits[0] << (part * kLanes));
+}
+#endif
+
+/// 2ᵖ for p ≥ −126, 1 at 0, by a minimax polynomial of degree 5 of p − ⌊p⌋, 8e-8, and rounding, 1e-7. If `exact`, of
+/// degree 6, 2e-9, of what is left of p by rounding it: near p = 0, where 1 − 2ᵖ matters, within half an ulp.
+template <bool kExact>
+HWY_INLINE V exp2_of(V p) {
+  const D d;
+  if constexpr (kExact) {
+    const V f = rest_of_rounding(p);
+    V y = hn::Set(d, 0.00015353365227943616f);
+    for (const float c : {0.0013398874529485412f, 0.009618437347880177f, 0.055503324707932414f, 0.24022647913679607f,
+                          0.693147202855229f, 1.0f}) {
+      y = hn::MulAdd(y, f, hn::Set(d, c));
+    }
+    return times_power_of_floor(y, hn::Sub(p, f));
+  } else {
+    const V f = fraction(p);
+    V y = hn::Set(d, 0.0018671309482703458f);
+    for (const float c :
+         {0.009017028235494745f, 0.05579991480382185f, 0.24016444961251981f, 0.6931513118582556f, 1.0f}) {
+      y = hn::MulAdd(y, f, hn::Set(d, c));
+    }
+    return times_power_of_floor(y, p);
+  }
+}
+
+// --- lanes of pixels to lanes of Gaussians ---------------------------------------------------------------------------
+
+/// Sixteen numbers, one of each Gaussian of a batch.
+struct Sixteen {
+  V v[kParts];
+};
+
+#if HWY_TARGET == HWY_SCALAR
+/// From v[Gaussian] with lanes [row][column] to v[column] with lanes [row][Gaussian].
+void transpose4(V (&v)[4][kParts]) {
+  for (int row = 0; row < 4; ++row) {
+    for (int g = 0; g < 4; ++g) {
+      for (int x = 0; x < g; ++x) std::swap(v[g][4 * row + x], v[x][4 * row + g]);
+    }
+  }
+}
+
+/// Vectors with lanes [row][Gaussian] for the four quads of a batch, summed over rows.
+Sixteen sum_over_rows(const V (&quads)[4][kParts]) {
+  Sixteen r;
+  for (int i = 0; i < 16; ++i) {
+    const V* const of = quads[i / 4] + i % 4;
+    r.v[i] = hn::Add(hn::Add(of[0], of[4]), hn::Add(of[8], of[12]));
+  }
+  return r;
+}
+
+/// Four numbers from each of 16 places, as lanes of places.
+void load_fours(const float* const (&places)[16], Sixteen (&out)[4]) {
+  for (int i = 0; i < 16; ++i) {
+    for (int k = 0; k < 4; ++k) out[k].v[i] = hn::Set(D(), places[i][k]);
+  }
+}
+
+/// Adds four numbers to each of 16 places.
+void add_fours(const Sixteen& a, const Sixteen& b, const Sixteen& c, const Sixteen& e, float* const (&places)[16]) {
+  for (int i = 0; i < 16; ++i) {
+    const V* const of[4] = {&a.v[i], &b.v[i], &c.v[i], &e.v[i]};
+    for (int k = 0; k < 4; ++k) places[i][k] += hn::GetLane(*of[k]);
+  }
+}
+#else
+/// Transposes the 4×4 numbers of every 128 bits of four vectors.
+HWY_INLINE void transpose4(V& a, V& b, V& c, V& e) {
+  const D d;
+  const hn::Repartition<double, D> dd;
+  const auto wide = [&](V v) HWY_ATTR { return hn::BitCast(dd, v); };
+  const V ab_low = hn::InterleaveLower(d, a, b), ab_high = hn::InterleaveUpper(d, a, b);
+  const V ce_low = hn::InterleaveLower(d, c, e), ce_high = hn::InterleaveUpper(d, c, e);
+  a = hn::BitCast(d, hn::InterleaveLower(dd, wide(ab_low), wide(ce_low)));
+  b = hn::BitCast(d, hn::InterleaveUpper(dd, wide(ab_low), wide(ce_low)));
+  c = hn::BitCast(d, hn::InterleaveLower(dd, wide(ab_high), wide(ce_high)));
+  e = hn::BitCast(d, hn::InterleaveUpper(dd, wide(ab_high), wide(ce_high)));
+}
+
+/// From v[Gaussian] with lanes [row][column] to v[column] with lanes [row][Gaussian].
+HWY_INLINE void transpose4(V (&v)[4][kParts]) {
+  for (int j = 0; j < kParts; ++j) transpose4(v[0][j], v[1][j], v[2][j], v[3][j]);
+}
+
+#if HWY_CAP_GE256
+/// The sum of a's halves, then that of b's.
+HWY_INLINE V sums_of_halves(V a, V b) {
+  const D d;
+  return hn::Add(hn::ConcatLowerLower(d, b, a), hn::ConcatUpperUpper(d, b, a));
+}
+#endif
+
+/// Vectors with lanes [row][Gaussian] for the four quads of a batch, summed over rows.
+HWY_INLINE Sixteen sum_over_rows(const V (&quads)[4][kParts]) {
+  Sixteen r;
+#if HWY_CAP_GE512
+  const V even = sums_of_halves(quads[0][0], quads[2][0]), odd = sums_of_halves(quads[1][0], quads[3][0]);
+  // blocks of 128 bits: quads 0 0 2 2, and 1 1 3 3
+  r.v[0] = hn::Add(hn::OddEvenBlocks(hn::SwapAdjacentBlocks(odd), even),
+                   hn::OddEvenBlocks(odd, hn::SwapAdjacentBlocks(even)));
+#elif HWY_CAP_GE256
+  for (int q = 0; q < 4; q += 2) {
+    r.v[q / 2] = sums_of_halves(hn::Add(quads[q][0], quads[q][1]), hn::Add(quads[q + 1][0], quads[q + 1][1]));
+  }
+#else
+  for (int q = 0; q < 4; ++q) {
+    r.v[q] = hn::Add(hn::Add(quads[q][0], quads[q][1]), hn::Add(quads[q][2], quads[q][3]));
+  }
+#endif
+  return r;
+}
+
+/// Four numbers from places 0, 4, … of `from`, as 128 bits each.
+HWY_INLINE V blocks_from(const float* const* from) {
+  const D4 d4;
+#if HWY_CAP_GE256
+  const hn::CappedTag<float, 8> d8;
+  const auto low = hn::Combine(d8, hn::LoadU(d4, from[4]), hn::LoadU(d4, from[0]));
+#if HWY_CAP_GE512
+  return hn::Combine(D(), hn::Combine(d8, hn::LoadU(d4, from[12]), hn::LoadU(d4, from[8])), low);
+#else
+  return low;
+#endif
+#else
+  return hn::LoadU(d4, from[0]);
+#endif
+}
+
+/// Four numbers from each of 16 places, as lanes of places.
+HWY_INLINE void load_fours(const float* const (&places)[16], Sixteen (&out)[4]) {
+  for (int j = 0; j < kParts; ++j) {
+    for (int i = 0; i < 4; ++i) out[i].v[j] = blocks_from(places + j * kLanes + i);
+    transpose4(out[0].v[j], out[1].v[j], out[2].v[j], out[3].v[j]);
+  }
+}
+
+/// Adds four numbers to each of 16 places.
+HWY_INLINE void add_fours(const Sixteen& a, const Sixteen& b, const Sixteen& c, const Sixteen& e,
+                          float* const (&places)[16]) {
+  const D d;
+  const D4 d4;
+  for (int j = 0; j < kParts; ++j) {
+    V v[4] = {a.v[j], b.v[j], c.v[j], e.v[j]};
+    transpose4(v[0], v[1], v[2], v[3]);
+    HWY_ALIGN float rows[4][kLanes];
+    for (int i = 0; i < 4; ++i) hn::Store(v[i], d, rows[i]);
+    for (int g = 0; g < kLanes; ++g) {
+      float* const to = places[j * kLanes + g];
+      hn::Store(hn::Add(hn::Load(d4, to), hn::Load(d4, rows[g % 4] + g / 4 * 4)), d4, to);
+    }
+  }
+}
+#endif
+
+}  // namespace hsi4d::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // HSI4D_SPLAT_BLOCK_LANES_INL_H

@@ -1,0 +1,166 @@
+// What the pixel loops need of a projected Gaussian, made from the inputs of composite.h, and its adjoint. Not part of
+// the public interface.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+#include "autodiff/array.h"
+#include "splat/limits.h"
+#include "splat/project.h"
+#include "splat/tiles.h"
+
+namespace hsi4d::detail {
+
+/// The inputs of composite, N rows each; see there.
+template <class S>
+struct SplatArrays {
+  ConstArray<S> means, factors, depths, depth_rest, means_rest, opacities, features;
+  Index rows() const { return means.shape.rows; }
+};
+
+template <class S>
+struct SplatRecord {
+  double x, y;      ///< mean, pixels; the loops use its place in the tile, which S holds to far more digits
+  S l11, l21, l22;  ///< see Conic
+  S opacity;        ///< with the antialias factor
+  S log2_opacity;   ///< of an opacity held at or above kLeastOpacity
+  std::int32_t row_begin, row_end;  ///< pixels
+};
+
+/// Settings as the pixel loops use them.
+template <class S>
+struct CompositeRules {
+  S alpha_cap, alpha_min;
+  S stop_below;    ///< a pixel is finished when T is below this; 0: never
+  bool exclusive;  ///< the Gaussian that would finish the pixel is left out
+  bool pass_cap;   ///< the gradient passes where the cap holds
+  S blur = 0;      ///< pixels², already in the conics
+};
+
+template <class S>
+CompositeRules<S> composite_rules(const RenderSettings& settings) {
+  S stop = static_cast<S>(settings.transmittance_stop);
+  if (stop > S(0) && settings.stop_when == StopWhen::kAtOrBelow) {
+    stop = std::nextafter(stop, std::numeric_limits<S>::infinity());
+  }
+  return {static_cast<S>(settings.alpha_cap),
+          static_cast<S>(settings.alpha_min),
+          stop,
+          settings.stop_rule == StopRule::kExclusive,
+          settings.cap_gradient == CapGradient::kPass,
+          static_cast<S>(settings.blur)};
+}
+
+template <class S>
+bool all_finite(const S* x, Index n) {
+  return std::all_of(x, x + n, [](S v) { return std::isfinite(v); });
+}
+
+template <class S>
+void read_factor(const SplatArrays<S>& splats, Index n, double* factor) {
+  const S* v = splats.factors.row(n);
+  for (int i = 0; i < 6; ++i) factor[i] = static_cast<double>(v[i]);
+}
+
+/// Camera z of row n in double, metres.
+template <class S>
+double depth_of(const SplatArrays<S>& splats, Index n) {
+  return static_cast<double>(splats.depths.data[n]) + static_cast<double>(splats.depth_rest.data[n]);
+}
+
+/// What row n is sorted by.
+template <class S>
+std::uint64_t depth_key(const SplatArrays<S>& splats, const RenderSettings& settings, Index n) {
+  constexpr DepthKey kOwn = std::is_same_v<S, float> ? DepthKey::kFloat : DepthKey::kDouble;
+  if (settings.depth_key.value_or(kOwn) == DepthKey::kFloat)
+    return depth_bits(static_cast<float>(splats.depths.data[n]));
+  return depth_bits(depth_of(splats, n));
+}
+
+/// Record and extent of row n; false if it is not drawn. Culls numbers that are not finite, then near, then the
+/// footprint, each before its numbers are used (rows A4-A6).
+template <class S>
+bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, const TileGrid& grid, Index n,
+                 SplatRecord<S>& record, Extent& extent) {
+  const S *mean = splats.means.row(n), *mean_rest = splats.means_rest.row(n);
+  const S depth = splats.depths.data[n], rest = splats.depth_rest.data[n], opacity = splats.opacities.data[n];
+  if (!all_finite(mean, 2) || !all_finite(mean_rest, 2) || !std::isfinite(depth) || !std::isfinite(rest) ||
+      !std::isfinite(opacity))
+    return false;
+  if (!(depth_of(splats, n) > settings.near)) return false;
+  double factor[6];
+  read_factor(splats, n, factor);
+  if (!is_drawn(factor)) return false;
+  Conic conic;
+  if (!conic_of(factor, settings.blur, conic)) return false;
+  const double scaled = static_cast<double>(opacity) * (settings.antialias ? blur_compensation(conic) : 1.0);
+  const double x = static_cast<double>(mean[0]) + static_cast<double>(mean_rest[0]);
+  const double y = static_cast<double>(mean[1]) + static_cast<double>(mean_rest[1]);
+  extent = extent_of(conic, x, y, scaled, grid, settings, static_cast<double>(std::numeric_limits<S>::epsilon()));
+  if (extent.row_begin >= extent.row_end || !all_finite(splats.features.row(n), splats.features.shape.cols))
+    return false;
+  record = {x,
+            y,
+            static_cast<S>(conic.l11),
+            static_cast<S>(conic.l21),
+            static_cast<S>(conic.l22),
+            static_cast<S>(scaled),
+            static_cast<S>(std::log2(std::max(scaled, kLeastOpacity))),
+            extent.row_begin,
+            extent.row_end};
+  return all_finite(&record.l11, 5);
+}
+
+/// Where the gradients of one row go: its numbers, or null where none is wanted.
+template <class S>
+struct SplatGradient {
+  S *mean = nullptr, *mean_rest = nullptr, *factor = nullptr, *opacity = nullptr;
+};
+
+// With L = [l11 l21; 0 l22] and M the moments (Σ g u², …) as a symmetric matrix, from ds = −(L d)ᵀ L d_mean and
+// ds = −½ (Lᵀ L d)ᵀ d_cov (Lᵀ L d):
+//
+//   d_o = Σ g,   d_mean = o Lᵀ (Σ g u, Σ g w),   d_cov = ½ o Lᵀ M L,   d_V = 2 d_cov V = o Lᵀ M (L V)
+//
+// d_cov is that of the full symmetric matrix: its off-diagonal number counts twice (row B21).
+
+/// Adjoint of make_record: adds what the moments of row n over all its pixels mean.
+///
+/// @param moments  kMoments numbers, see composite_kernel.h
+template <class S>
+void add_record_gradient(const SplatArrays<S>& splats, const RenderSettings& settings, Index n,
+                         const SplatRecord<S>& record, const double* moments, const SplatGradient<S>& d) {
+  double v[6];
+  read_factor(splats, n, v);
+  Conic conic;
+  if (!conic_of(v, settings.blur, conic)) return;
+  const double o = static_cast<double>(record.opacity);
+  if (d.opacity != nullptr) {
+    *d.opacity += static_cast<S>(settings.antialias ? moments[0] * blur_compensation(conic) : moments[0]);
+  }
+  for (S* const d_mean : {d.mean, d.mean_rest}) {
+    if (d_mean == nullptr) continue;
+    d_mean[0] += static_cast<S>(o * (conic.l11 * moments[1]));
+    d_mean[1] += static_cast<S>(o * (conic.l21 * moments[1] + conic.l22 * moments[2]));
+  }
+  if (d.factor == nullptr) return;
+  double d_v[6];
+  const auto lv = whitened_factor(v, settings.blur, conic);
+  for (int c = 0; c < 3; ++c) {
+    const double lu = lv[static_cast<std::size_t>(c)], lw = lv[static_cast<std::size_t>(3 + c)];
+    const double mu = moments[3] * lu + moments[4] * lw, mw = moments[4] * lu + moments[5] * lw;
+    d_v[c] = o * (conic.l11 * mu);
+    d_v[3 + c] = o * (conic.l21 * mu + conic.l22 * mw);
+  }
+  if (settings.antialias) {
+    const double opacity = static_cast<double>(splats.opacities.data[n]);
+    blur_compensation_adjoint(v, settings.blur, conic, moments[0] * opacity, d_v);
+  }
+  for (int i = 0; i < 6; ++i) d.factor[i] += static_cast<S>(d_v[i]);
+}
+
+}  // namespace hsi4d::detail
