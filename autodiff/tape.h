@@ -96,6 +96,8 @@ class NodeIo {
   /// True when input i needs a gradient; only then may d_in(i) be asked for. Fixed between forward and its backward, so
   /// forward may save only what backward will need.
   bool wants(int i) const { return tape_->arrays_[input_ids_[i]].needs_gradient; }
+  /// Changes whenever input i was written or computed again; never a number it had before.
+  std::uint64_t version(int i) const { return tape_->arrays_[input_ids_[i]].version; }
   /// Adjoint of input i, to be added to, never overwritten (but see must_assign).
   Array<S> d_in(int i) const { return tape_->adjoint_view(input_ids_[i]); }
   /// True when nothing has been added to d_in(i) yet and its numbers are undefined: the operator then assigns what it

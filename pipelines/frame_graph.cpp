@@ -94,7 +94,9 @@ std::vector<std::string> parameter_group_names(Draw draw) {
 template <class S>
 FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
                           const FrameGraphSettings& settings)
-    : tape_(tape), settings_(settings), view_{clip.camera, clip.scene.origin_world, settings.render} {
+    : tape_(tape),
+      settings_(settings),
+      view_{clip.camera, clip.scene.origin_world, settings.render, settings.skip, settings.approx} {
   // Objects and the body are recorded in the world, and one render has one origin: the scene's must be zero until they
   // are recorded relative to it.
   HSI4D_CHECK(clip.scene.origin_world.isZero(0), "what moves is placed in the world, not relative to an origin");
@@ -207,28 +209,35 @@ Var<S> FrameGraph<S>::record_rotations(Var<S> parameters) const {
 
 template <class S>
 void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t first_object) {
-  std::vector<SplatInputs<S>> splats;
   RenderRequest request;
   Index row = 0;
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    splats.push_back(parts[p].splats);
     const bool is_object = p >= first_object && p < first_object + objects_.size();
     if (is_object) request.groups.emplace_back(row, row + parts[p].count);
     row += parts[p].count;
   }
-  rendered_ = render(stacked_splats(splats), xi_, background_, view_, request);
+  rendered_ = render_parts(parts, request);
   inputs_.rendered = rendered_.image;
   inputs_.target = tape_.constant("target", rendered_.image.shape());
   inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
   if (!request.groups.empty()) record_object_inputs(parts, first_object);
 }
 
+/// The scene is the first part; it stands still while the camera does.
+template <class S>
+Rendered<S> FrameGraph<S>::render_parts(const std::vector<Part>& parts, const RenderRequest& request) const {
+  if (parts.size() == 1) return render(parts.front().splats, xi_, background_, view_, request);
+  std::vector<SplatInputs<S>> moving;
+  for (std::size_t p = 1; p < parts.size(); ++p) moving.push_back(parts[p].splats);
+  return render(parts.front().splats, stacked_splats(moving), xi_, background_, view_, request);
+}
+
 template <class S>
 void FrameGraph<S>::record_object_inputs(const std::vector<Part>& parts, std::size_t first_object) {
   const auto count = static_cast<Index>(objects_.size());
   std::vector<Var<S>> depths;
-  Index row = 0;
-  for (std::size_t p = 0; p < first_object + objects_.size(); ++p) {
+  Index row = 0;  // of what moves
+  for (std::size_t p = 1; p < first_object + objects_.size(); ++p) {
     if (p >= first_object) depths.push_back(mean(slice_rows(rendered_.projected.depths, row, parts[p].count)));
     row += parts[p].count;
   }

@@ -24,6 +24,8 @@ namespace hsi4d {
 /// What a frame graph draws and how.
 struct FrameGraphSettings {
   RenderSettings render;
+  RenderSkips skip = {};
+  RenderApproximations approx = {};
   RotationParameters rotations = RotationParameters::kSixD;
   CameraIncrement increment = CameraIncrement::kCamera;
   Draw draw = Draw::kAll;
@@ -87,6 +89,7 @@ class FrameGraph {
   Part record_human(const Avatar& avatar);
   Var<S> record_rotations(Var<S> parameters) const;
   void record_render(const std::vector<Part>& parts, std::size_t first_object);
+  Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
   void record_object_inputs(const std::vector<Part>& parts, std::size_t first_object);
   void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
   Vector3<double> read_rotation(Var<S> leaf, Index row) const;

@@ -219,7 +219,12 @@ class Reconstruction {
   }
 
   FrameGraphSettings graph_settings(Draw draw) const {
-    return {config_.render, config_.rotations, config_.camera.increment, draw,
+    return {config_.render,
+            config_.skip,
+            config_.approx,
+            config_.rotations,
+            config_.camera.increment,
+            draw,
             Vector3<double>(config_.background.data())};
   }
 

@@ -35,6 +35,8 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("data", s.data, "The files that the run reads");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
   f.object("render", s.render, "How Gaussians become pixels");
+  f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");
+  f.object("approx", s.approx, "What may be computed nearly, and faster");
   f.map("stages", s.stages, "The stages of the run by name, in the order in which they run",
         [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });
 }

@@ -48,6 +48,8 @@ struct RunConfig {
   DataSettings data;
   SyntheticSettings synthetic;
   RenderSettings render;
+  RenderSkips skip;
+  RenderApproximations approx;
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 

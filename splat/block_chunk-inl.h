@@ -255,9 +255,7 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& scene, const BlockJob&
   for (size_t at = 0; at < size; ++at) {
     if (at + kAhead < size) {
       const auto next = chunk.entries[at + kAhead].index;
-      const auto* const record = reinterpret_cast<const char*>(&scene.records[static_cast<size_t>(next)]);
-      hwy::Prefetch(record);
-      hwy::Prefetch(record + sizeof(SplatRecord<float>) - 1);
+      hwy::Prefetch(&scene.records[static_cast<size_t>(next)]);  // one cache line
       hwy::Prefetch(scene.feature(next));
     }
     const std::int32_t index = chunk.entries[at].index;

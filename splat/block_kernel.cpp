@@ -189,25 +189,50 @@ struct BatchSums {
   V features[kMostBlockChannels][4][kParts];
 };
 
-/// Moments of v over the pixels of each row: 1, x, x², and with y.
-HWY_INLINE void quad_moments(const Block& b, V (&v)[4][kParts], int q, BatchSums& sums) {
+/// Moments of pixels −1.5, −0.5, 0.5, 1.5 from the centre: 1, x, x².
+struct LineMoments {
+  V one, x, xx;
+};
+HWY_INLINE LineMoments line_moments(V a, V b, V c, V e) {
   const D d;
+  const V outer = hn::Add(a, e), inner = hn::Add(b, c);
+  const V outer_difference = hn::Sub(e, a), inner_difference = hn::Sub(c, b);
+  return {hn::Add(outer, inner),
+          hn::MulAdd(hn::Set(d, 1.5f), outer_difference, hn::Mul(hn::Set(d, 0.5f), inner_difference)),
+          hn::MulAdd(hn::Set(d, 2.25f), outer, hn::Mul(hn::Set(d, 0.25f), inner))};
+}
+
+/// Moments of v over the pixels of each row, 1, x, x²: numbers 0, 1 and 3 of `sums`.
+HWY_INLINE void quad_moments(V (&v)[4][kParts], int q, BatchSums& sums) {
   transpose4(v);
   for (int j = 0; j < kParts; ++j) {
-    const V y = b.row[j];
-    const V outer = hn::Add(v[0][j], v[3][j]), inner = hn::Add(v[1][j], v[2][j]);
-    const V outer_difference = hn::Sub(v[3][j], v[0][j]), inner_difference = hn::Sub(v[2][j], v[1][j]);
-    const V one = hn::Add(outer, inner);
-    const V x = hn::MulAdd(hn::Set(d, 1.5f), outer_difference, hn::Mul(hn::Set(d, 0.5f), inner_difference));
-    const V xx = hn::MulAdd(hn::Set(d, 2.25f), outer, hn::Mul(hn::Set(d, 0.25f), inner));
-    const V of_y = hn::Mul(one, y);
-    sums.moments[0][q][j] = one;
-    sums.moments[1][q][j] = x;
-    sums.moments[2][q][j] = of_y;
-    sums.moments[3][q][j] = xx;
-    sums.moments[4][q][j] = hn::Mul(x, y);
-    sums.moments[5][q][j] = hn::Mul(of_y, y);
+    const LineMoments m = line_moments(v[0][j], v[1][j], v[2][j], v[3][j]);
+    sums.moments[0][q][j] = m.one;
+    sums.moments[1][q][j] = m.x;
+    sums.moments[3][q][j] = m.xx;
   }
+}
+
+/// Moments of a batch from those of its rows: 1, x, y, x², x y, y².
+HWY_INLINE void block_moments([[maybe_unused]] const Block& b, BatchSums& sums, Sixteen (&moments)[kMoments]) {
+#if HWY_CAP_GE512 && HWY_ARCH_X86
+  V(&one)[4][kParts] = sums.moments[0], (&x)[4][kParts] = sums.moments[1];
+  transpose_blocks(one[0][0], one[1][0], one[2][0], one[3][0]);
+  transpose_blocks(x[0][0], x[1][0], x[2][0], x[3][0]);
+  const LineMoments of_one = line_moments(one[0][0], one[1][0], one[2][0], one[3][0]);
+  const LineMoments of_x = line_moments(x[0][0], x[1][0], x[2][0], x[3][0]);
+  const V of[kMoments] = {of_one.one, of_x.one, of_one.x, sum_over_rows(sums.moments[3]).v[0], of_x.x, of_one.xx};
+  for (int m = 0; m < kMoments; ++m) moments[m].v[0] = of[m];
+#else
+  for (int q = 0; q < 4; ++q) {
+    for (int j = 0; j < kParts; ++j) {
+      sums.moments[2][q][j] = hn::Mul(sums.moments[0][q][j], b.row[j]);
+      sums.moments[4][q][j] = hn::Mul(sums.moments[1][q][j], b.row[j]);
+      sums.moments[5][q][j] = hn::Mul(sums.moments[2][q][j], b.row[j]);
+    }
+  }
+  for (int m = 0; m < kMoments; ++m) moments[m] = sum_over_rows(sums.moments[m]);
+#endif
 }
 
 /// Moments in u and w, formed in each pixel: for Gaussians so thin that those in x and y cancel.
@@ -295,7 +320,7 @@ HWY_INLINE void adjoint_of_batch(const CompositeScene<float>& scene, const Block
       if constexpr (kForm == Form::kExact) {
         quad_moments_exact(space, b, begin + place + 4 * q, v, q, sums);
       } else {
-        quad_moments(b, v, q, sums);
+        quad_moments(v, q, sums);
       }
     }
     if (!adjoint.wants_features) continue;
@@ -324,8 +349,12 @@ HWY_INLINE void adjoint_of_batch(const CompositeScene<float>& scene, const Block
   }
   if (adjoint.wants_shape) {
     Sixteen moments[kMoments];
-    for (int m = 0; m < kMoments; ++m) moments[m] = sum_over_rows(sums.moments[m]);
-    if constexpr (kForm != Form::kExact) to_uw(splats, b, moments);
+    if constexpr (kForm == Form::kExact) {
+      for (int m = 0; m < kMoments; ++m) moments[m] = sum_over_rows(sums.moments[m]);
+    } else {
+      block_moments(b, sums, moments);
+      to_uw(splats, b, moments);
+    }
     for (int m = 0; m < kMoments; ++m) of[m] = moments[m];
   } else {
     for (int m = 0; m < kMoments; ++m) {

@@ -159,6 +159,18 @@ HWY_INLINE V sums_of_halves(V a, V b) {
 }
 #endif
 
+#if HWY_CAP_GE512 && HWY_ARCH_X86
+/// Transposes the 4×4 blocks of 128 bits of four vectors.
+HWY_INLINE void transpose_blocks(V& a, V& b, V& c, V& e) {
+  const V ab_low{_mm512_shuffle_f32x4(a.raw, b.raw, 0x44)}, ab_high{_mm512_shuffle_f32x4(a.raw, b.raw, 0xEE)};
+  const V ce_low{_mm512_shuffle_f32x4(c.raw, e.raw, 0x44)}, ce_high{_mm512_shuffle_f32x4(c.raw, e.raw, 0xEE)};
+  a = V{_mm512_shuffle_f32x4(ab_low.raw, ce_low.raw, 0x88)};
+  b = V{_mm512_shuffle_f32x4(ab_low.raw, ce_low.raw, 0xDD)};
+  c = V{_mm512_shuffle_f32x4(ab_high.raw, ce_high.raw, 0x88)};
+  e = V{_mm512_shuffle_f32x4(ab_high.raw, ce_high.raw, 0xDD)};
+}
+#endif
+
 /// Vectors with lanes [row][Gaussian] for the four quads of a batch, summed over rows.
 HWY_INLINE Sixteen sum_over_rows(const V (&quads)[4][kParts]) {
   Sixteen r;

@@ -1,18 +1,23 @@
 #include "splat/composite.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
-#include <ctime>
+#include <initializer_list>
 #include <limits>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "core/parallel.h"
 #include "core/simd.h"
+#include "core/stopwatch.h"
 #include "splat/block_kernel.h"
 #include "splat/composite_kernel.h"
-#include "splat/splat_records.h"
+#include "splat/splat_lists.h"
+#include "splat/static_layer.h"
 #include "splat/workspaces.h"
 
 namespace hsi4d {
@@ -45,28 +50,70 @@ void copy_row(const S* from, Index n, S* to) {
   }
 }
 
-/// Writes the blocks that a job composited, row by row of the image: a row of a tile is a cache line.
+/// Fetches the rows of the image that store_blocks will write.
+void fetch_blocks(const detail::BlockJob& job, const Array<float>& channels, const Array<float>& transmittance) {
+  for (Index y = job.top; y < job.top + job.height; ++y) {
+    __builtin_prefetch(&transmittance(0, y, job.left), 1);
+    for (Index k = 0; k < channels.shape.planes; ++k) __builtin_prefetch(&channels(k, y, job.left), 1);
+  }
+}
+
+/// Writes a row of neighbouring blocks whole.
+///
+/// @param kAcross  blocks
+/// @param state    of the first
+/// @param top      of them in the image
+template <Index kAcross>
+void store_band(const float* state, Index left, Index top, const Array<float>& channels,
+                const Array<float>& transmittance) {
+  constexpr Index kSide = detail::kBlockSide;
+  const Index planes = channels.shape.planes, size = (1 + planes) * detail::kBlockPixels;
+  for (Index r = 0; r < kSide; ++r) {
+    float* const to = &transmittance(0, top + r, left);
+    for (Index b = 0; b < kAcross; ++b) {
+      for (Index i = 0; i < kSide; ++i) to[b * kSide + i] = std::abs(state[b * size + r * kSide + i]);
+    }
+  }
+  for (Index k = 0; k < planes; ++k) {
+    const float* const from = state + (k + 1) * detail::kBlockPixels;
+    for (Index r = 0; r < kSide; ++r) {
+      float* const to = &channels(k, top + r, left);
+      for (Index b = 0; b < kAcross; ++b) {
+        std::memcpy(to + b * kSide, from + b * size + r * kSide, kSide * sizeof(float));
+      }
+    }
+  }
+}
+
+/// Writes the pixels of a block that lie in the image.
+void store_block(const float* state, Index left, Index top, Index width, Index height, const Array<float>& channels,
+                 const Array<float>& transmittance) {
+  constexpr Index kSide = detail::kBlockSide;
+  for (Index r = 0; r < height; ++r) {
+    for (Index i = 0; i < width; ++i) transmittance(0, top + r, left + i) = std::abs(state[r * kSide + i]);
+    for (Index k = 0; k < channels.shape.planes; ++k) {
+      std::copy_n(state + (k + 1) * detail::kBlockPixels + r * kSide, width, &channels(k, top + r, left));
+    }
+  }
+}
+
+/// Writes the blocks that a job composited.
 void store_blocks(Index side, const detail::BlockJob& job, const Array<float>& channels,
                   const Array<float>& transmittance) {
   constexpr Index kSide = detail::kBlockSide;
-  const Index across = side / kSide, planes = channels.shape.planes, size = (1 + planes) * detail::kBlockPixels;
-  for (Index y = 0; y < job.height; ++y) {
-    const std::uint32_t blocks = job.blocks >> (y / kSide * across) & ((1u << across) - 1);
-    const float* const state = job.state + y / kSide * across * size + y % kSide * kSide;
-    for (Index plane = 0; plane <= planes; ++plane) {
-      float* const to =
-          plane == 0 ? &transmittance(0, job.top + y, job.left) : &channels(plane - 1, job.top + y, job.left);
-      for (Index b = 0; b < across; ++b) {
-        if ((blocks >> b & 1u) == 0 || b * kSide >= job.width) continue;
-        float four[kSide];
-        std::memcpy(four, state + b * size + plane * detail::kBlockPixels, sizeof four);
-        for (float& t : four) t = plane == 0 ? std::abs(t) : t;
-        if ((b + 1) * kSide <= job.width) {
-          std::memcpy(to + b * kSide, four, sizeof four);
-        } else {
-          std::copy_n(four, job.width - b * kSide, to + b * kSide);
-        }
-      }
+  const Index across = side / kSide, size = (1 + channels.shape.planes) * detail::kBlockPixels;
+  const std::uint32_t whole = (1u << across) - 1;
+  for (Index y = 0; y < job.height; y += kSide) {
+    const std::uint32_t blocks = job.blocks >> (y / kSide * across) & whole;
+    const float* const state = job.state + y / kSide * across * size;
+    if (blocks == whole && across == 4 && job.width == side && y + kSide <= job.height) {
+      store_band<4>(state, job.left, job.top + y, channels, transmittance);
+      continue;
+    }
+    for (Index x = 0; x < job.width; x += kSide) {
+      if ((blocks >> (x / kSide) & 1u) == 0) continue;
+      store_block(state + x / kSide * size, job.left + x, job.top + y, std::min(kSide, job.width - x),
+                  std::min(kSide, job.height - y), channels, transmittance);
     }
   }
 }
@@ -76,22 +123,13 @@ struct TileCounts {
   Index fragments, end;
 };
 
-/// Seconds since it was made or last asked; on one thread those that the processor gave, so that other programs of the
-/// machine do not count.
-class Stopwatch {
- public:
-  double lap() {
-    const double now = seconds();
-    return now - std::exchange(last_, now);
-  }
-
- private:
-  static double seconds() {
-    timespec time{};
-    clock_gettime(thread_count() == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC, &time);
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-  }
-  double last_ = seconds();
+/// What a tile composites in this run.
+struct TilePlan {
+  std::span<const TileEntry> entries;  ///< that have an adjoint, or stand still among these
+  std::span<const TileEntry> behind;   ///< that stand still behind all of them
+  Index merged = 0;                    ///< place of `entries` among the merged ones; −1: they are nowhere else
+  Index groups = 0;                    ///< (block, Gaussian) pairs of `entries`, at most
+  std::uint32_t blocks = 0;            ///< that `entries` touch
 };
 
 template <class S>
@@ -101,14 +139,15 @@ struct Composite {
   SplatView view;
   std::shared_ptr<RenderCounters> counters;
 
-  enum Input { kMeans, kFactors, kDepths, kRest, kMeansRest, kOpacities, kFeatures };
+  /// Of what moves; those of what stands still follow, if there is any.
+  enum Input { kMeans, kFactors, kDepths, kRest, kMeansRest, kOpacities, kFeatures, kStill };
   enum Output { kChannels, kTransmittance };
 
-  // In the order of the inputs.
-  Buffer<SplatRecord<S>> records = {};
-  Buffer<Extent> extents = {};
-  Buffer<DepthKeyed> keys = {}, room = {};
-  TileLists lists = {};
+  Buffer<SplatRecord<S>> records = {};  ///< of all rows, those that stand still first
+  detail::SplatLists still = {}, moving = {};
+  Buffer<TileEntry> merged = {};
+  Buffer<TilePlan> plans = {};
+  std::vector<detail::TileLayer> layers = {};  ///< of each tile
   // What the backward pass needs of every tile.
   Buffer<DepthKeyed> tile_last = {};    ///< the last Gaussian composited in any pixel; index −1: none
   Buffer<Index> checkpoint_begin = {};  ///< pieces of a tile's, or a block's, pixels
@@ -117,83 +156,159 @@ struct Composite {
   Buffer<Index> run_begin = {};               ///< block kernel
   Buffer<detail::BlockRun> runs = {};         ///< block kernel
   Buffer<TileCounts> tile_counts = {};
-  Buffer<std::uint8_t> blank = {};  ///< of each tile: the outputs hold what an empty one has
-  const S* written = nullptr;       ///< the output that `blank` tells of
+  Buffer<std::uint32_t> settled = {};  ///< of each tile: blocks whose outputs hold what stands still, and nothing else
+  const S* written = nullptr;          ///< the output that `settled` tells of
+  double still_s = 0;                  ///< seconds of the state built for the next forward run
 
   TileGrid grid() const {
     return detail::tile_grid(view.camera.width, view.camera.height, static_cast<Index>(view.settings.tile));
   }
-  bool wants_shape(const NodeIo<S>& io) const {
-    return io.wants(kMeans) || io.wants(kMeansRest) || io.wants(kFactors) || io.wants(kOpacities);
+  static bool wants_any(const NodeIo<S>& io, std::initializer_list<int> inputs) {
+    return std::any_of(inputs.begin(), inputs.end(),
+                       [&](int i) { return io.wants(i) || (has_still(io) && io.wants(kStill + i)); });
   }
-  bool wants_gradient(const NodeIo<S>& io) const { return wants_shape(io) || io.wants(kFeatures); }
+  static bool wants_shape(const NodeIo<S>& io) { return wants_any(io, {kMeans, kMeansRest, kFactors, kOpacities}); }
+  static bool wants_features(const NodeIo<S>& io) { return wants_any(io, {kFeatures}); }
+  static bool wants_gradient(const NodeIo<S>& io) { return wants_shape(io) || wants_features(io); }
 
   // --- Gaussians -----------------------------------------------------------------------------------------------------
 
-  static detail::SplatArrays<S> splats_of(const NodeIo<S>& io) {
-    return {io.in(kMeans),     io.in(kFactors),   io.in(kDepths),  io.in(kRest),
-            io.in(kMeansRest), io.in(kOpacities), io.in(kFeatures)};
+  static bool has_still(const NodeIo<S>& io) { return io.inputs() > kStill; }
+  /// True: those that stand still are listed by themselves, once.
+  bool in_layers(const NodeIo<S>& io) const {
+    if (!has_still(io) || !view.skip.static_tiles) return false;
+    for (int i = kStill; i < io.inputs(); ++i) {
+      if (io.wants(i)) return false;
+    }
+    return true;
+  }
+  static Index still_rows(const NodeIo<S>& io) { return has_still(io) ? io.in(kStill + kMeans).shape.rows : 0; }
+
+  static detail::SplatArrays<S> splats_of(const NodeIo<S>& io, int first) {
+    return {io.in(first + kMeans),     io.in(first + kFactors),   io.in(first + kDepths),  io.in(first + kRest),
+            io.in(first + kMeansRest), io.in(first + kOpacities), io.in(first + kFeatures)};
+  }
+  static detail::SplatRows<S> rows_of(const NodeIo<S>& io) {
+    return {has_still(io) ? splats_of(io, kStill) : detail::SplatArrays<S>{}, splats_of(io, 0), still_rows(io)};
   }
 
-  /// Records and extents of what is drawn, and the tiles' lists.
-  void prepare(const NodeIo<S>& io) {
-    Stopwatch watch;
+  /// The state is what is made of Gaussians that stand still.
+  std::uint64_t state_key(NodeIo<S>& io) const {
+    if (!in_layers(io)) return 0;
+    Signature key;
+    for (int i = kStill; i < io.inputs(); ++i) key.add(io.version(i));
+    return key.value();
+  }
+  void build_state(NodeIo<S>& io) {
     const TileGrid tiles = grid();
-    const detail::SplatArrays<S> splats = splats_of(io);
-    const Index rows = splats.rows();
-    records.resize(rows);
-    extents.resize(rows);
-    keys.resize(rows);
-    room.resize(rows);
-    parallel_for(rows, kGrain, [&](Index begin, Index end) {
-      on_best_isa([&] {
-        detail::make_records(splats, view.settings, tiles, begin, end, &records[begin], &extents[begin]);
-        for (Index n = begin; n < end; ++n) {
-          const bool drawn = extents[n].row_begin < extents[n].row_end;
-          keys[n] = {drawn ? detail::depth_key(splats, view.settings, n) : 0,
-                     drawn ? static_cast<std::int32_t>(n) : -1};
-        }
-      });
-    });
-    Index drawn = 0;
-    for (Index n = 0; n < rows; ++n) {
-      if (keys[n].index >= 0) keys[drawn++] = keys[n];
-    }
-    counters->times.records_s = watch.lap();
-    const auto count = static_cast<std::size_t>(drawn);
-    const std::span<const DepthKeyed> order = detail::sort_by_depth(keys.span().first(count), room.span().first(count));
-    counters->times.sort_s = watch.lap();
-    const Index limit = detail::pair_memory_limit();
-    const Index most = static_cast<Index>(static_cast<double>(limit) / bytes_of_pairs(io, 1));
-    const Index pairs = lists.find(extents.span(), tiles, most);
-    detail::check_pair_memory(pairs, bytes_of_pairs(io, pairs), limit);
-    lists.deal(order, tiles);
-    counters->times.bin_s = watch.lap();
+    Stopwatch watch;
+    records.resize(rows_of(io).count());
+    settled.resize(tiles.count());
+    std::fill_n(settled.data(), tiles.count(), 0u);
+    layers.resize(static_cast<std::size_t>(tiles.count()));
+    for (detail::TileLayer& layer : layers) layer.made = false;
+    RenderTimes times;
+    still.count = 0;
+    if (in_layers(io)) list(io, 0, still_rows(io), still, times);
+    still_s = watch.lap();
+  }
+
+  void list(const NodeIo<S>& io, Index first, Index count, detail::SplatLists& lists, RenderTimes& times) {
+    detail::list_splats(rows_of(io), first, count, view.settings, grid(), records.span(), bytes_per_pair(io), lists,
+                        times);
   }
 
   /// Numbers in the slot of a pair.
-  Index stride_of(const NodeIo<S>& io) const {
-    if (in_blocks(io))
-      return wants_gradient(io) ? detail::block_slot(io.wants(kFeatures) ? io.in(kFeatures).shape.cols : 0) : 0;
-    return (wants_shape(io) ? kMoments : 0) + (io.wants(kFeatures) ? io.in(kFeatures).shape.cols : 0);
+  static Index stride_of(const NodeIo<S>& io) {
+    const Index features = wants_features(io) ? io.in(kFeatures).shape.cols : 0;
+    if (in_blocks(io)) return wants_gradient(io) ? detail::block_slot(features) : 0;
+    return (wants_shape(io) ? kMoments : 0) + features;
   }
 
-  /// Memory for the pairs of a forward and a backward run: entries, checkpoints, slots.
-  double bytes_of_pairs(const NodeIo<S>& io, Index pairs) const {
+  /// Memory for a pair of a forward and a backward run: entries, checkpoints, slots.
+  double bytes_per_pair(const NodeIo<S>& io) const {
     const double pixels = static_cast<double>(view.settings.tile) * view.settings.tile, number = sizeof(S);
     const double checkpoint = wants_gradient(io) ? pixels * number / static_cast<double>(kSegment) : 0;
     const double slot = static_cast<double>(stride_of(io)) * number;
     constexpr std::size_t kListBytes = sizeof(TileEntry) + 2 * sizeof(detail::FoundPair);
-    return static_cast<double>(pairs) * (static_cast<double>(kListBytes) + checkpoint + slot);
+    return static_cast<double>(kListBytes) + checkpoint + slot;
   }
 
   CompositeScene<S> scene_of(const NodeIo<S>& io) const {
-    const ConstArray<S> features = io.in(kFeatures);
+    const detail::SplatRows<S> rows = rows_of(io);
     return {records.span(),
-            {features.data, nullptr},
-            records.size(),
-            features.shape.cols,
+            {rows.still.features.data, rows.moving.features.data},
+            rows.second,
+            rows.moving.features.shape.cols,
             detail::composite_rules<S>(view.settings)};
+  }
+
+  // --- plans ---------------------------------------------------------------------------------------------------------
+
+  /// What every tile composites, and the tiles' layers placed.
+  void make_plans(const NodeIo<S>& io, const TileGrid& tiles) {
+    constexpr Index kTogether = 64;
+    plans.resize(tiles.count());
+    parallel_for(tiles.count(), kTogether, [&](Index begin, Index end) {
+      for (Index tile = begin; tile < end; ++tile) plans[tile] = plan_of(io, tile);
+    });
+    Index place = 0;
+    for (TilePlan& plan : plans.span()) {
+      if (plan.merged < 0) continue;
+      plan.merged = place;
+      place += static_cast<Index>(plan.entries.size());
+    }
+    merged.resize(place);
+  }
+
+  /// `entries` of a plan that is to be merged tells only how many they are.
+  TilePlan plan_of(const NodeIo<S>& io, Index tile) {
+    TilePlan plan;
+    plan.merged = -1;
+    const std::span<const TileEntry> moved = moving.of_tile(tile);
+    if (moved.empty()) return plan;
+    for (const TileEntry& e : moved) plan.blocks |= e.blocks;
+    if (!in_blocks(io)) plan.blocks = detail::all_blocks(view.settings.tile);
+    plan.groups = moving.lists.tile_groups[tile];
+    plan.entries = moved;
+    const std::span<const TileEntry> kept = still.of_tile(tile);
+    if (kept.empty()) return plan;
+    std::span<const TileEntry> among = kept;
+    if constexpr (std::is_same_v<S, float>) {
+      if (uses_layer(io)) {
+        detail::TileLayer& layer = layers[static_cast<std::size_t>(tile)];
+        const detail::DepthRange range = detail::depth_range(rows_of(io), view.settings, moved);
+        if (!layer.made || layer.range != range) {
+          layer.made = false;
+          layer.range = range;
+          detail::place_range(rows_of(io), view.settings, kept, layer);
+        }
+        among = among_of(kept, layer);
+        plan.behind = kept.subspan(static_cast<std::size_t>(layer.after));
+      }
+    }
+    if (among.empty()) return plan;
+    for (const TileEntry& e : among) plan.groups += std::popcount(e.blocks);
+    plan.merged = 0;
+    plan.entries = {moved.data(), moved.size() + among.size()};
+    return plan;
+  }
+  bool uses_layer(const NodeIo<S>& io) const { return in_blocks(io) && view.skip.static_layer; }
+  static std::span<const TileEntry> among_of(std::span<const TileEntry> kept, const detail::TileLayer& layer) {
+    return kept.subspan(static_cast<std::size_t>(layer.first), static_cast<std::size_t>(layer.after - layer.first));
+  }
+
+  /// Merges the entries of a plan, once its place is known.
+  void merge(const NodeIo<S>& io, Index tile) {
+    TilePlan& plan = plans[tile];
+    if (plan.merged < 0) return;
+    TileEntry* const to = merged.data() + plan.merged;
+    const std::span<const TileEntry> kept = still.of_tile(tile);
+    const bool layered = uses_layer(io);
+    detail::merge_entries(rows_of(io), view.settings,
+                          layered ? among_of(kept, layers[static_cast<std::size_t>(tile)]) : kept, moving.of_tile(tile),
+                          to);
+    plan.entries = {to, plan.entries.size()};
   }
 
   // --- tiles ---------------------------------------------------------------------------------------------------------
@@ -204,9 +319,7 @@ struct Composite {
   }
 
   template <class Job>
-  void place_job(const TileGrid& tiles, Index tile, Job& job) const {
-    const Index begin = lists.tile_begin[tile], size = lists.tile_begin[tile + 1] - begin;
-    job.entries = {lists.entries.data() + begin, static_cast<std::size_t>(size)};
+  static void place_job(const TileGrid& tiles, Index tile, Job& job) {
     job.left = tile % tiles.cols * tiles.tile;
     job.top = tile / tiles.cols * tiles.tile;
     job.width = std::min(tiles.tile, tiles.width - job.left);
@@ -218,15 +331,20 @@ struct Composite {
     const Index pixels = tiles.tile * tiles.tile;
     TileJob<S> job{};
     place_job(tiles, tile, job);
+    job.entries = plans[tile].entries;
     job.last = last.data() + tile * pixels;
     job.checkpoints = checkpoints.size() > 0 ? checkpoints.data() + checkpoint_begin[tile] * pixels : nullptr;
     return job;
   }
 
-  /// The same for the block kernel, without `workspace` too.
+  /// The same for the block kernel, without `state` and `workspace`.
   detail::BlockJob block_job_of(const TileGrid& tiles, Index tile) requires(std::is_same_v<S, float>) {
     detail::BlockJob job{};
     place_job(tiles, tile, job);
+    job.entries = plans[tile].entries;
+    job.blocks = plans[tile].blocks;
+    const detail::TileLayer& layer = layers[static_cast<std::size_t>(tile)];
+    job.start = layer.made && layer.first > 0 ? layer.front.data() : nullptr;
     if (runs.size() == 0) return job;
     job.runs = runs.data() + run_begin[tile];
     job.checkpoints = checkpoints.data() + checkpoint_begin[tile] * detail::kBlockPixels;
@@ -243,9 +361,9 @@ struct Composite {
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       checkpoint_begin[tile] = place;
       run_begin[tile] = run;
-      const Index size = lists.tile_begin[tile + 1] - lists.tile_begin[tile];
+      const auto size = static_cast<Index>(plans[tile].entries.size());
       if (!wanted || size == 0) continue;
-      place += blocks ? detail::checkpoints_of(side, size, lists.tile_groups[tile]) : (size - 1) / kSegment;
+      place += blocks ? detail::checkpoints_of(side, size, plans[tile].groups) : (size - 1) / kSegment;
       run += detail::block_chunks(size) * across * across;
     }
     checkpoint_begin[tiles.count()] = place;
@@ -255,24 +373,96 @@ struct Composite {
     last.resize(blocks ? 0 : tiles.count() * side * side);
   }
 
-  /// Composites a tile into the image; `memory` is its pixels and workspace.
+  /// Memory of a worker: pixels of a tile twice, workspace.
+  static Index forward_memory(const NodeIo<S>& io, Index side) {
+    const Index channels = io.in(kFeatures).shape.cols;
+    return 2 * detail::block_state(side, channels) + (in_blocks(io) ? detail::block_workspace(channels) : 0);
+  }
+
+  /// Blocks that show what moved there before, or nothing yet, and have to show what stands still.
+  std::uint32_t unsettled(const TileGrid& tiles, Index tile) const {
+    return detail::all_blocks(tiles.tile) & ~plans[tile].blocks & ~settled[tile];
+  }
+
+  /// Brings the outputs of a tile up to date.
   TileCounts composite_tile(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* memory) {
-    const CompositeScene<S> scene = scene_of(io);
-    const Array<S> image = io.out(kChannels), transmittance = io.out(kTransmittance);
+    const std::uint32_t all = detail::all_blocks(tiles.tile);
+    const TilePlan& plan = plans[tile];
     if constexpr (std::is_same_v<S, float>) {
       if (in_blocks(io)) {
-        detail::BlockJob job = block_job_of(tiles, tile);
-        job.blocks = detail::all_blocks(tiles.tile);
-        job.state = memory;
-        job.workspace = memory + detail::block_state(tiles.tile, scene.channels);
-        detail::begin_blocks(tiles.tile, job.width, job.height, scene.channels, job.state);
-        const detail::BlockCounts counts = detail::composite_blocks(tiles.tile, scene, job);
-        store_blocks(tiles.tile, job, image, transmittance);
-        return {counts.fragments, counts.end};
+        TileCounts counts{0, 0};
+        const std::uint32_t left = unsettled(tiles, tile);
+        if (left != 0) counts.fragments += composite_still(io, tiles, tile, left, memory);
+        if (plan.blocks != 0) {
+          const TileCounts moved = composite_moving(io, tiles, tile, memory);
+          counts = {counts.fragments + moved.fragments, moved.end};
+        }
+        settled[tile] = all & ~plan.blocks;
+        return counts;
       }
     }
+    settled[tile] = plan.entries.empty() ? all : 0;
+    return composite_plain(io, tiles, tile, memory);
+  }
+
+  /// Composites what stands still, in some blocks.
+  Index composite_still(const NodeIo<S>& io, const TileGrid& tiles, Index tile, std::uint32_t blocks,
+                        float* memory) requires(std::is_same_v<S, float>) {
+    const CompositeScene<float> scene = scene_of(io);
+    detail::BlockJob job{};
+    place_job(tiles, tile, job);
+    job.entries = still.of_tile(tile);
+    job.blocks = blocks;
+    job.state = memory;
+    job.workspace = memory + 2 * detail::block_state(tiles.tile, scene.channels);
+    detail::begin_blocks(tiles.tile, job.width, job.height, scene.channels, job.state);
+    const Index fragments = detail::composite_blocks(tiles.tile, scene, job).fragments;
+    store_blocks(tiles.tile, job, io.out(kChannels), io.out(kTransmittance));
+    return fragments;
+  }
+
+  /// Composites what moves, over what stands still in front of it, and what stands still behind.
+  TileCounts composite_moving(const NodeIo<S>& io, const TileGrid& tiles, Index tile,
+                              float* memory) requires(std::is_same_v<S, float>) {
+    const CompositeScene<float> scene = scene_of(io);
+    const Index numbers = detail::block_state(tiles.tile, scene.channels);
+    const TilePlan& plan = plans[tile];
+    detail::TileLayer& layer = layers[static_cast<std::size_t>(tile)];
+    const std::span<const TileEntry> kept = still.of_tile(tile);
+    const bool layered = uses_layer(io) && !kept.empty(), collapse = view.approx.collapse_suffix;
+    detail::BlockJob job = block_job_of(tiles, tile);
+    job.state = memory;
+    job.workspace = memory + 2 * numbers;
+    Index fragments = 0;
+    if (layered && !layer.made) {
+      fragments += detail::make_layer(tiles.tile, scene, job, kept, collapse, layer);
+      job.start = layer.first > 0 ? layer.front.data() : nullptr;
+    }
+    if (job.start != nullptr) {
+      std::copy_n(job.start, numbers, job.state);
+    } else {
+      detail::begin_blocks(tiles.tile, job.width, job.height, scene.channels, job.state);
+    }
+    fetch_blocks(job, io.out(kChannels), io.out(kTransmittance));
+    const detail::BlockCounts counts = detail::composite_blocks(tiles.tile, scene, job);
+    fragments += counts.fragments;
+    if (!plan.behind.empty()) {
+      fragments += detail::composite_behind(tiles.tile, scene, job, plan.behind, collapse, memory + numbers, layer);
+    }
+    store_blocks(tiles.tile, job, io.out(kChannels), io.out(kTransmittance));
+    return {fragments, counts.end};
+  }
+
+  TileCounts composite_plain(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* memory) {
+    const CompositeScene<S> scene = scene_of(io);
+    const Array<S> image = io.out(kChannels), transmittance = io.out(kTransmittance);
     const Index pixels = tiles.tile * tiles.tile;
     TileJob<S> job = job_of(tiles, tile);
+    const bool moves = !job.entries.empty();
+    if (!moves) {
+      job.entries = still.of_tile(tile);
+      job.checkpoints = nullptr;
+    }
     job.transmittance = memory;
     job.channels = memory + pixels;
     const Index fragments = detail::composite_tile(tiles.tile, scene, job);
@@ -282,59 +472,67 @@ struct Composite {
         copy_row(job.channels + k * pixels + r * tiles.tile, job.width, &image(k, job.top + r, job.left));
       }
     }
-    return {fragments, static_cast<Index>(*std::max_element(job.last, job.last + pixels))};
-  }
-
-  Index forward_memory(const NodeIo<S>& io, Index side) const {
-    const Index channels = io.in(kFeatures).shape.cols;
-    return detail::block_state(side, channels) + (in_blocks(io) ? detail::block_workspace(channels) : 0);
+    return {fragments, moves ? static_cast<Index>(*std::max_element(job.last, job.last + pixels)) : 0};
   }
 
   void forward(NodeIo<S>& io) {
-    prepare(io);
-    Stopwatch watch;
     const TileGrid tiles = grid();
-    const detail::SplatArrays<S> splats = splats_of(io);
+    const Index second = in_layers(io) ? still_rows(io) : 0, rows = rows_of(io).count();
+    list(io, second, rows - second, moving, counters->times);
+    Stopwatch watch;
+    make_plans(io, tiles);
     place_kept(io, tiles);
     tile_counts.resize(tiles.count());
     tile_last.resize(tiles.count());
+    if (written != io.out(kChannels).data) {
+      std::fill_n(settled.data(), tiles.count(), 0u);
+      written = io.out(kChannels).data;
+    }
+    *counters = counters_before(tiles, uses_layer(io));
+    counters->times.still_s = std::exchange(still_s, 0.0);
     Workspaces workspaces(tiles.count());
     const Index size = forward_memory(io, tiles.tile);
     const std::span<S> memory = io.scratch(size * workspaces.count());
-    const Array<S> image = io.out(kChannels);
-    if (written != image.data || blank.size() != tiles.count()) {
-      blank.resize(tiles.count());
-      std::fill_n(blank.data(), tiles.count(), std::uint8_t(0));
-      written = image.data;
-    }
     run_chunks(tiles.count(), [&](Index tile) {
-      const bool empty = lists.tile_begin[tile] == lists.tile_begin[tile + 1];
       tile_counts[tile] = {0, 0};
       tile_last[tile] = {0, -1};
-      if (empty && blank[tile] != 0) return;
-      blank[tile] = empty ? 1 : 0;
+      if (plans[tile].entries.empty() && settled[tile] == detail::all_blocks(tiles.tile)) return;
       const Workspaces::Held held(workspaces);
+      merge(io, tile);
       tile_counts[tile] = composite_tile(io, tiles, tile, memory.data() + held.number() * size);
       const Index end = tile_counts[tile].end;
-      tile_last[tile] = {0, end > 0 ? lists.entries[lists.tile_begin[tile] + end - 1].index : -1};
-      if (end > 0) tile_last[tile].key = detail::depth_key(splats, view.settings, tile_last[tile].index);
+      if (end == 0) return;
+      const std::int32_t index = plans[tile].entries[static_cast<std::size_t>(end - 1)].index;
+      tile_last[tile] = {rows_of(io).key(view.settings, index), index};
     });
     counters->times.forward_s = watch.lap();
-    count(tiles);
+    for (const TileCounts& counts : tile_counts.span()) {
+      counters->fragments += counts.fragments;
+      counters->reached += counts.end;
+    }
   }
 
-  void count(const TileGrid& tiles) {
-    const RenderTimes times = counters->times;
-    *counters = {};
-    counters->times = times;
-    counters->pairs = lists.pairs();
-    for (const TileLists::Slots& s : lists.slots.span()) counters->visible += s.end > s.begin ? 1 : 0;
-    for (Index tile = 0; tile < tiles.count(); ++tile) {
-      counters->tiles += lists.tile_begin[tile + 1] > lists.tile_begin[tile] ? 1 : 0;
-      counters->groups += lists.tile_groups[tile];
-      counters->fragments += tile_counts[tile].fragments;
-      counters->reached += tile_counts[tile].end;
+  /// What is known before the tiles are composited.
+  RenderCounters counters_before(const TileGrid& tiles, bool layered) const {
+    RenderCounters result;
+    result.times = counters->times;
+    for (const detail::SplatLists* part : {&still, &moving}) {
+      for (Index i = 0; i < part->count; ++i) {
+        const TileLists::Slots slots = part->lists.slots[i];
+        result.visible += slots.end > slots.begin ? 1 : 0;
+      }
     }
+    for (Index tile = 0; tile < tiles.count(); ++tile) {
+      const TilePlan& plan = plans[tile];
+      const auto kept = static_cast<Index>(still.of_tile(tile).size());
+      const bool moves = !plan.entries.empty(), restored = kept > 0 && unsettled(tiles, tile) != 0;
+      result.tiles += moves || kept > 0 ? 1 : 0;
+      result.rendered += moves || restored ? 1 : 0;
+      result.groups += plan.groups;
+      result.pairs += static_cast<Index>(plan.entries.size() + plan.behind.size()) + (restored ? kept : 0);
+      result.layers += layered && moves && kept > 0 && !layers[static_cast<std::size_t>(tile)].made ? 1 : 0;
+    }
+    return result;
   }
 
   // --- backward ------------------------------------------------------------------------------------------------------
@@ -349,6 +547,10 @@ struct Composite {
       if (in_blocks(io)) {
         detail::BlockJob job = block_job_of(tiles, tile);
         job.workspace = d_transmittance + pixels;
+        if (!plans[tile].behind.empty()) {
+          detail::see_behind(tiles.tile, scene.channels, job.blocks, layers[static_cast<std::size_t>(tile)], d_channels,
+                             d_transmittance);
+        }
         detail::composite_blocks_adjoint(
             tiles.tile, scene, job,
             {d_channels, d_transmittance, shared.sums, shared.stride, shared.wants_shape, shared.wants_features});
@@ -377,9 +579,9 @@ struct Composite {
     const Index pixels = tiles.tile * tiles.tile, channels = io.in(kFeatures).shape.cols;
     TileAdjoint<S> shared{};
     shared.wants_shape = wants_shape(io);
-    shared.wants_features = io.wants(kFeatures);
+    shared.wants_features = wants_features(io);
     shared.stride = stride_of(io);
-    shared.sums = io.scratch(shared.stride * lists.pairs()).data();
+    shared.sums = io.scratch(shared.stride * moving.lists.pairs()).data();
     const ConstArray<S> d_image = io.d_out(kChannels), d_transmittance = io.d_out(kTransmittance);
     Workspaces workspaces(tiles.count());
     const Index size = backward_memory(io, tiles);
@@ -403,9 +605,10 @@ struct Composite {
       tile_adjoint(io, tiles, tile, shared, d_channels);
     });
     counters->times.backward_s = watch.lap();
-    parallel_for(records.size(), kGrain, [&](Index begin, Index end) {
+    parallel_for(moving.count, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) gather_gaussian(io, shared, n);
+        const detail::SplatRows<S> rows = rows_of(io);
+        for (Index i = begin; i < end; ++i) gather_gaussian(io, rows, shared, i);
       });
     });
     counters->times.reduce_s = watch.lap();
@@ -417,34 +620,37 @@ struct Composite {
     return end.index >= 0 && (key < end.key || (key == end.key && n <= end.index));
   }
 
-  /// Sums the pairs of a Gaussian in the order of its slots, in double, and adds what they mean to the inputs'
-  /// gradients. Pairs past the end of their tile have no adjoint, and their slots were not written (row B12).
-  void gather_gaussian(NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index n) const {
+  /// Sums the pairs of a Gaussian, number i of the lists, in the order of its slots, in double, and adds what they mean
+  /// to the inputs' gradients. Pairs past the end of their tile have no adjoint, and their slots were not written (row
+  /// B12).
+  void gather_gaussian(NodeIo<S>& io, const detail::SplatRows<S>& rows, const TileAdjoint<S>& adjoint, Index i) const {
     constexpr Index kTogether = 16;  // numbers of a slot; with up to ten features it is read once
     static_assert(kMoments <= kTogether);
-    const TileLists::Slots slots = lists.slots[n];
+    const TileLists::Slots slots = moving.lists.slots[i];
     if (slots.begin == slots.end) return;
-    const detail::SplatArrays<S> splats = splats_of(io);
-    const std::uint64_t key = detail::depth_key(splats, view.settings, n);
+    const Index n = moving.first + i, row = rows.in_set(n);
+    const int inputs = n < rows.second ? static_cast<int>(kStill) : 0;
+    const std::uint64_t key = rows.key(view.settings, n);
     const Index first_feature = adjoint.wants_shape || in_blocks(io) ? kMoments : 0;
-    const Index features = adjoint.wants_features ? io.in(kFeatures).shape.cols : 0;
+    const Index features = io.wants(inputs + kFeatures) ? io.in(kFeatures).shape.cols : 0;
     for (Index k = 0; k < adjoint.stride; k += kTogether) {
       const Index count = std::min(kTogether, adjoint.stride - k);
       double totals[kTogether] = {};
       bool any = false;
       for (Index slot = slots.begin; slot < static_cast<Index>(slots.end); ++slot) {
-        if (!reached(lists.tile_of(slot), key, n)) continue;
+        if (!reached(moving.lists.tile_of(slot), key, n)) continue;
         any = true;
         const S* const sums = adjoint.sums + slot * adjoint.stride + k;
-        for (Index i = 0; i < count; ++i) totals[i] += static_cast<double>(sums[i]);
+        for (Index j = 0; j < count; ++j) totals[j] += static_cast<double>(sums[j]);
       }
       if (!any) return;
       if (adjoint.wants_shape && k == 0) {
         if (in_blocks(io)) scale_block_moments(records[n], totals);
-        detail::add_record_gradient(splats, view.settings, n, records[n], totals, gradient_of(io, n));
+        detail::add_record_gradient(rows.set_of(n), view.settings, row, records[n], totals,
+                                    gradient_of(io, inputs, row));
       }
-      for (Index i = std::max<Index>(first_feature - k, 0); i < std::min(count, first_feature + features - k); ++i) {
-        io.d_in(kFeatures).row(n)[k + i - first_feature] += static_cast<S>(totals[i]);
+      for (Index j = std::max<Index>(first_feature - k, 0); j < std::min(count, first_feature + features - k); ++j) {
+        io.d_in(inputs + kFeatures).row(row)[k + j - first_feature] += static_cast<S>(totals[j]);
       }
     }
   }
@@ -459,8 +665,9 @@ struct Composite {
     for (int i = 3; i < 6; ++i) moments[i] *= second;
   }
 
-  static detail::SplatGradient<S> gradient_of(const NodeIo<S>& io, Index n) {
-    const auto row = [&](int input) { return io.wants(input) ? io.d_in(input).row(n) : nullptr; };
+  /// @param inputs  number of the first input of the row's set
+  static detail::SplatGradient<S> gradient_of(const NodeIo<S>& io, int inputs, Index n) {
+    const auto row = [&](int input) { return io.wants(inputs + input) ? io.d_in(inputs + input).row(n) : nullptr; };
     return {row(kMeans), row(kMeansRest), row(kFactors), row(kOpacities)};
   }
 
@@ -489,16 +696,20 @@ struct Composite {
   void add_signature(Signature& signature, NodeIo<S>& io) {
     const TileGrid tiles = grid();
     const CompositeRules<S> rules = detail::composite_rules<S>(view.settings);
+    std::vector<TileEntry> entries;
     for (Index tile = 0; tile < tiles.count(); ++tile) {
+      const std::span<const TileEntry> kept = still.of_tile(tile), moved = moving.of_tile(tile);
+      entries.resize(kept.size() + moved.size());
+      detail::merge_entries(rows_of(io), view.settings, kept, moved, entries.data());
       TileJob<S> place{};
       place_job(tiles, tile, place);
-      signature.add(place.entries.size());
-      for (const TileEntry& entry : place.entries) signature.add(static_cast<std::uint64_t>(entry.index));
+      signature.add(entries.size());
+      for (const TileEntry& entry : entries) signature.add(static_cast<std::uint64_t>(entry.index));
       for (Index p = 0; p < place.width * place.height; ++p) {
         const Index r = p / place.width, c = p % place.width;
         S t = 1;
-        for (std::size_t at = 0; at < place.entries.size() && t >= rules.stop_below; ++at) {
-          const SplatRecord<S>& record = records[place.entries[at].index];
+        for (std::size_t at = 0; at < entries.size() && t >= rules.stop_below; ++at) {
+          const SplatRecord<S>& record = records[entries[at].index];
           if (place.top + r < record.row_begin || place.top + r >= record.row_end) continue;
           const auto pixel = pixel_alpha(io, place, record, r, c);
           if (!pixel.drawn) continue;
@@ -512,43 +723,74 @@ struct Composite {
   }
 
   Index saved_bytes() const {
-    return records.capacity_bytes() + extents.capacity_bytes() + keys.capacity_bytes() + room.capacity_bytes() +
-           lists.capacity_bytes() + tile_last.capacity_bytes() + checkpoint_begin.capacity_bytes() +
-           checkpoints.capacity_bytes() + last.capacity_bytes() + run_begin.capacity_bytes() + runs.capacity_bytes() +
-           tile_counts.capacity_bytes();
+    Index bytes = records.capacity_bytes() + still.capacity_bytes() + moving.capacity_bytes() +
+                  merged.capacity_bytes() + plans.capacity_bytes() + tile_last.capacity_bytes() +
+                  checkpoint_begin.capacity_bytes() + checkpoints.capacity_bytes() + last.capacity_bytes() +
+                  run_begin.capacity_bytes() + runs.capacity_bytes() + tile_counts.capacity_bytes() +
+                  settled.capacity_bytes();
+    for (const detail::TileLayer& layer : layers) bytes += layer.capacity_bytes();
+    return bytes;
   }
 };
+
+/// Rows of a set whose shapes fit.
+template <class S>
+Index check_set(const SplatSet<S>& set, Index channels) {
+  const Index rows = set.opacities.shape().rows;
+  HSI4D_CHECK_EQ(set.projected.means_px.shape(), shape_of(rows, 2));
+  HSI4D_CHECK_EQ(set.projected.factors.shape(), shape_of(rows, 6));
+  HSI4D_CHECK_EQ(set.projected.depths.shape(), shape_of(rows, 1));
+  HSI4D_CHECK_EQ(set.projected.depth_rest.shape(), shape_of(rows, 1));
+  HSI4D_CHECK_EQ(set.projected.means_rest.shape(), shape_of(rows, 2));
+  HSI4D_CHECK_EQ(set.opacities.shape(), shape_of(rows, 1));
+  HSI4D_CHECK_EQ(set.features.shape(), shape_of(rows, channels));
+  return rows;
+}
+
+/// @param sets  what moves, then what stands still, if there is any
+template <class S>
+Composited<S> record_composite(std::initializer_list<SplatSet<S>> sets, const SplatView& view, Source where) {
+  check_camera(view.camera);
+  const Index channels = sets.begin()->features.shape().cols;
+  HSI4D_CHECK(channels >= 1, "no features");
+  const int tile = view.settings.tile;
+  HSI4D_CHECK(tile == 8 || tile == 16, "tile = " + std::to_string(tile) + "; allowed: 8, 16");
+  std::vector<Var<S>> inputs;
+  Index rows = 0;
+  for (const SplatSet<S>& set : sets) {
+    rows += check_set(set, channels);
+    const Projected<S>& p = set.projected;
+    inputs.insert(inputs.end(),
+                  {p.means_px, p.factors, p.depths, p.depth_rest, p.means_rest, set.opacities, set.features});
+  }
+  HSI4D_CHECK(rows <= std::numeric_limits<std::int32_t>::max(), std::to_string(rows) + " Gaussians");
+  const Index width = view.camera.width, height = view.camera.height;
+  const std::array outputs = {image_shape<S>(channels, height, width), image_shape<S>(1, height, width)};
+  auto counters = std::make_shared<RenderCounters>();
+  Tape<S>& tape = inputs.front().owner();
+  const Var<S> first = tape.record(Composite<S>{view, counters}, std::span<const Var<S>>(inputs),
+                                   std::span<const Shape>(outputs), where);
+  return {first, tape.output(first, 1), counters};
+}
 
 }  // namespace
 
 template <class S>
 Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> features, const SplatView& view,
                         Source where) {
-  check_camera(view.camera);
-  const Index rows = opacities.shape().rows, channels = features.shape().cols;
-  HSI4D_CHECK(rows <= std::numeric_limits<std::int32_t>::max(), std::to_string(rows) + " Gaussians");
-  HSI4D_CHECK(channels >= 1, "no features");
-  HSI4D_CHECK_EQ(projected.means_px.shape(), shape_of(rows, 2));
-  HSI4D_CHECK_EQ(projected.factors.shape(), shape_of(rows, 6));
-  HSI4D_CHECK_EQ(projected.depths.shape(), shape_of(rows, 1));
-  HSI4D_CHECK_EQ(projected.depth_rest.shape(), shape_of(rows, 1));
-  HSI4D_CHECK_EQ(projected.means_rest.shape(), shape_of(rows, 2));
-  HSI4D_CHECK_EQ(opacities.shape(), shape_of(rows, 1));
-  HSI4D_CHECK_EQ(features.shape(), shape_of(rows, channels));
-  const int tile = view.settings.tile;
-  HSI4D_CHECK(tile == 8 || tile == 16, "tile = " + std::to_string(tile) + "; allowed: 8, 16");
-  const std::array inputs = {projected.means_px,   projected.factors, projected.depths, projected.depth_rest,
-                             projected.means_rest, opacities,         features};
-  const Index width = view.camera.width, height = view.camera.height;
-  const std::array outputs = {image_shape<S>(channels, height, width), image_shape<S>(1, height, width)};
-  auto counters = std::make_shared<RenderCounters>();
-  Tape<S>& tape = opacities.owner();
-  const Var<S> first = tape.record(Composite<S>{view, counters}, std::span<const Var<S>>(inputs),
-                                   std::span<const Shape>(outputs), where);
-  return {first, tape.output(first, 1), counters};
+  return record_composite<S>({{projected, opacities, features}}, view, where);
 }
 
-template Composited<float> composite(const Projected<float>&, Var<float>, Var<float>, const SplatView&, Source);
-template Composited<double> composite(const Projected<double>&, Var<double>, Var<double>, const SplatView&, Source);
+template <class S>
+Composited<S> composite(const SplatSet<S>& still, const SplatSet<S>& moving, const SplatView& view, Source where) {
+  return record_composite<S>({moving, still}, view, where);
+}
+
+#define HSI4D_INSTANTIATE(S)                                                                       \
+  template Composited<S> composite(const Projected<S>&, Var<S>, Var<S>, const SplatView&, Source); \
+  template Composited<S> composite(const SplatSet<S>&, const SplatSet<S>&, const SplatView&, Source);
+HSI4D_INSTANTIATE(float)
+HSI4D_INSTANTIATE(double)
+#undef HSI4D_INSTANTIATE
 
 }  // namespace hsi4d

@@ -15,24 +15,9 @@
 #include <memory>
 
 #include "splat/project.h"
+#include "splat/render_counters.h"
 
 namespace hsi4d {
-
-/// Seconds of the steps of the last forward and backward runs.
-struct RenderTimes {
-  double records_s = 0, sort_s = 0, bin_s = 0, forward_s = 0, backward_s = 0, reduce_s = 0;
-};
-
-/// What the last runs did.
-struct RenderCounters {
-  Index visible = 0;    ///< Gaussians that reach a tile
-  Index pairs = 0;      ///< (tile, Gaussian)
-  Index groups = 0;     ///< (block of 4×4 pixels, Gaussian) that may touch
-  Index fragments = 0;  ///< (pixel, Gaussian) that were composited
-  Index tiles = 0;      ///< tiles that a Gaussian reaches
-  Index reached = 0;    ///< pairs up to the last one of each tile that is composited: those that have an adjoint
-  RenderTimes times;
-};
 
 template <class S>
 struct Composited {
@@ -55,6 +40,24 @@ struct Composited {
 /// when they would take more than kPairMemoryShare of the memory.
 template <class S>
 Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> features, const SplatView& view,
+                        Source where = Source::current());
+
+/// Gaussians in the image and what is composited of them.
+template <class S>
+struct SplatSet {
+  Projected<S> projected;
+  Var<S> opacities;  ///< [N,1]
+  Var<S> features;   ///< [N,C]
+};
+
+/// The same for the rows of two sets, `still` in front in the order of rows. While no gradient is wanted in `still`,
+/// its records, order and lists are kept until one of its inputs changes, and only what `moving` touches is composited
+/// anew: see RenderSkips, which says what that changes, and splat/static_layer.h. With a gradient, or without
+/// static_tiles, the result is that of one set.
+///
+/// Adjoint: as above, of both sets.
+template <class S>
+Composited<S> composite(const SplatSet<S>& still, const SplatSet<S>& moving, const SplatView& view,
                         Source where = Source::current());
 
 }  // namespace hsi4d

@@ -150,8 +150,10 @@ struct SlicePlanes {
 };
 
 /// [N,1+G]: ones, and for each group 1 in its rows; without the ones when there is no depth.
+///
+/// @param first_row  what groups call row 0
 template <class S>
-Var<S> indicators(Tape<S>& tape, Index rows, const RenderRequest& request, Source where) {
+Var<S> indicators(Tape<S>& tape, Index first_row, Index rows, const RenderRequest& request, Source where) {
   const Index first = request.depth ? 1 : 0, groups = static_cast<Index>(request.groups.size());
   const Var<S> result = tape.constant("indicators", shape_of(rows, first + groups), where);
   const Array<S> a = tape.write(result);
@@ -159,8 +161,62 @@ Var<S> indicators(Tape<S>& tape, Index rows, const RenderRequest& request, Sourc
     if (request.depth) a(n, 0) = S(1);
     for (Index k = 0; k < groups; ++k) {
       const auto& [begin, end] = request.groups[static_cast<std::size_t>(k)];
-      a(n, first + k) = n >= begin && n < end ? S(1) : S(0);
+      a(n, first + k) = first_row + n >= begin && first_row + n < end ? S(1) : S(0);
     }
+  }
+  return result;
+}
+
+/// Projects Gaussians, and puts together what is composited of them: colours; depth and 1 if asked for; groups.
+template <class S>
+SplatSet<S> project_set(const SplatInputs<S>& inputs, Index first_row, Var<S> xi, const SplatView& view,
+                        const RenderRequest& request, Source where) {
+  const Index rows = inputs.means.shape().rows;
+  HSI4D_CHECK_EQ(inputs.colors.shape(), shape_of(rows, kColors));
+  const Projected<S> projected = project(inputs.means, inputs.axes, xi, view, where);
+  std::vector<Var<S>> features = {inputs.colors};
+  if (request.depth) features.push_back(projected.depths);
+  if (request.depth || !request.groups.empty()) {
+    features.push_back(indicators(inputs.means.owner(), first_row, rows, request, where));
+  }
+  const Var<S> all = features.size() == 1 ? inputs.colors : concat_cols(std::span<const Var<S>>(features), where);
+  return {projected, inputs.opacities, all};
+}
+
+/// @param still  null: there is none
+template <class S>
+Rendered<S> render_sets(const SplatInputs<S>* still, const SplatInputs<S>& moving, Var<S> xi, Var<S> background,
+                        const SplatView& view, const RenderRequest& request, Source where) {
+  Tape<S>& tape = moving.means.owner();
+  const Index first = still != nullptr ? still->means.shape().rows : 0, rows = first + moving.means.shape().rows;
+  const auto groups = static_cast<Index>(request.groups.size());
+  HSI4D_CHECK_EQ(background.shape(), shape_of(1, kColors));
+  for (const auto& [begin, end] : request.groups) {
+    HSI4D_CHECK(
+        begin >= 0 && begin <= end && end <= rows,
+        "group [" + std::to_string(begin) + ", " + std::to_string(end) + ") of " + std::to_string(rows) + " Gaussians");
+  }
+  const SplatSet<S> moved = project_set(moving, first, xi, view, request, where);
+  const Composited<S> composited = still != nullptr
+                                       ? composite(project_set(*still, 0, xi, view, request, where), moved, view, where)
+                                       : composite(moved.projected, moved.opacities, moved.features, view, where);
+
+  const Shape one = image_shape<S>(1, view.camera.height, view.camera.width);
+  Shape image = one, group_image = one;
+  image.planes = kColors;
+  group_image.planes = groups;
+  Rendered<S> result;
+  result.projected = moved.projected;
+  result.counters = composited.counters;
+  result.transmittance = composited.transmittance;
+  result.image =
+      tape.record(AddBackground<S>{}, {composited.channels, composited.transmittance, background}, image, where);
+  if (request.depth) {
+    result.depth = tape.record(NormalizedDepth<S>{kColors, kColors + 1}, {composited.channels}, one, where);
+  }
+  if (groups > 0) {
+    const Index plane = kColors + (request.depth ? 2 : 0);
+    result.group_opacity = tape.record(SlicePlanes<S>{plane}, {composited.channels}, group_image, where);
   }
   return result;
 }
@@ -170,46 +226,21 @@ Var<S> indicators(Tape<S>& tape, Index rows, const RenderRequest& request, Sourc
 template <class S>
 Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, const SplatView& view,
                    const RenderRequest& request, Source where) {
-  Tape<S>& tape = inputs.means.owner();
-  const Index rows = inputs.means.shape().rows, groups = static_cast<Index>(request.groups.size());
-  HSI4D_CHECK_EQ(inputs.colors.shape(), shape_of(rows, kColors));
-  HSI4D_CHECK_EQ(background.shape(), shape_of(1, kColors));
-  for (const auto& [begin, end] : request.groups) {
-    HSI4D_CHECK(
-        begin >= 0 && begin <= end && end <= rows,
-        "group [" + std::to_string(begin) + ", " + std::to_string(end) + ") of " + std::to_string(rows) + " Gaussians");
-  }
-  const Projected<S> projected = project(inputs.means, inputs.axes, xi, view, where);
-  // Channels: colours; depth and 1 if asked for; groups.
-  std::vector<Var<S>> features = {inputs.colors};
-  if (request.depth) features.push_back(projected.depths);
-  if (request.depth || groups > 0) features.push_back(indicators(tape, rows, request, where));
-  const Var<S> all = features.size() == 1 ? inputs.colors : concat_cols(std::span<const Var<S>>(features), where);
-  const Composited<S> composited = composite(projected, inputs.opacities, all, view, where);
-
-  const Shape one = image_shape<S>(1, view.camera.height, view.camera.width);
-  Shape image = one, group_image = one;
-  image.planes = kColors;
-  group_image.planes = groups;
-  Rendered<S> result;
-  result.projected = projected;
-  result.counters = composited.counters;
-  result.transmittance = composited.transmittance;
-  result.image =
-      tape.record(AddBackground<S>{}, {composited.channels, composited.transmittance, background}, image, where);
-  if (request.depth) {
-    result.depth = tape.record(NormalizedDepth<S>{kColors, kColors + 1}, {composited.channels}, one, where);
-  }
-  if (groups > 0) {
-    const Index first = kColors + (request.depth ? 2 : 0);
-    result.group_opacity = tape.record(SlicePlanes<S>{first}, {composited.channels}, group_image, where);
-  }
-  return result;
+  return render_sets<S>(nullptr, inputs, xi, background, view, request, where);
 }
 
-template Rendered<float> render(const SplatInputs<float>&, Var<float>, Var<float>, const SplatView&,
-                                const RenderRequest&, Source);
-template Rendered<double> render(const SplatInputs<double>&, Var<double>, Var<double>, const SplatView&,
-                                 const RenderRequest&, Source);
+template <class S>
+Rendered<S> render(const SplatInputs<S>& still, const SplatInputs<S>& moving, Var<S> xi, Var<S> background,
+                   const SplatView& view, const RenderRequest& request, Source where) {
+  return render_sets(&still, moving, xi, background, view, request, where);
+}
+
+#define HSI4D_INSTANTIATE(S)                                                                                          \
+  template Rendered<S> render(const SplatInputs<S>&, Var<S>, Var<S>, const SplatView&, const RenderRequest&, Source); \
+  template Rendered<S> render(const SplatInputs<S>&, const SplatInputs<S>&, Var<S>, Var<S>, const SplatView&,         \
+                              const RenderRequest&, Source);
+HSI4D_INSTANTIATE(float)
+HSI4D_INSTANTIATE(double)
+#undef HSI4D_INSTANTIATE
 
 }  // namespace hsi4d

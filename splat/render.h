@@ -43,4 +43,10 @@ template <class S>
 Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, const SplatView& view,
                    const RenderRequest& request = {}, Source where = Source::current());
 
+/// The same for two sets, of which `still` stands still while ξ does: see composite for what is then computed once.
+/// Rows of groups are counted through both, those of `still` first. Rendered::projected is that of `moving`.
+template <class S>
+Rendered<S> render(const SplatInputs<S>& still, const SplatInputs<S>& moving, Var<S> xi, Var<S> background,
+                   const SplatView& view, const RenderRequest& request = {}, Source where = Source::current());
+
 }  // namespace hsi4d

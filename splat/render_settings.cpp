@@ -44,6 +44,19 @@ void apply_compatibility(RenderSettings& settings, Compatibility compatibility) 
   settings.frustum_clamp = kFrustumClamp;
 }
 
+void describe(ConfigFields& f, RenderSkips& s) {
+  f.boolean("static_tiles", s.static_tiles,
+            "Prepare what stands still once, and render only blocks that something touches which moves");
+  f.boolean("static_layer", s.static_layer,
+            "Composite what stands in front of all that moves once, and leave it and what stands behind out of the "
+            "backward pass");
+}
+
+void describe(ConfigFields& f, RenderApproximations& s) {
+  f.boolean("collapse_suffix", s.collapse_suffix,
+            "Composite what stands still behind all that moves into one layer, once");
+}
+
 void describe(ConfigFields& f, RenderSettings& s) {
   f.choice("quality", s.quality, kQualities, "Preset of alpha_cap, alpha_min, transmittance_stop and depth_key");
   f.choice("compatibility", s.compatibility, kCompatibilities,

@@ -68,6 +68,24 @@ struct RenderSettings {
   int tile = kTile;                   ///< pixels
 };
 
+/// What is not computed because the result does not need it: config section `skip`. The image is the same within 1e-6,
+/// the gradients within 1e-5.
+struct RenderSkips {
+  /// Gaussians that stand still are prepared once, and blocks of pixels that nothing touches which moves are not
+  /// composited again. The same bits.
+  bool static_tiles = true;
+  /// Of Gaussians that stand still, those in front of all that moves in a tile are composited once, and the adjoint
+  /// visits neither these nor those behind. Needs static_tiles.
+  bool static_layer = true;
+};
+
+/// What changes the result a little: config section `approx`.
+struct RenderApproximations {
+  /// What stands still behind all that moves in a tile is composited once into one layer, as if nothing were in front
+  /// of it. Off by at most transmittance_stop in each pixel. Needs static_layer.
+  bool collapse_suffix = false;
+};
+
 /// Sets what the quality names: `fast` stops earlier; `accurate` has no cap, alpha_min 1e-5 and stop 1e-7; `reference`
 /// has no cap, no cut, no stop and sorts in double.
 void apply_quality(RenderSettings& settings, Quality quality);
@@ -76,6 +94,9 @@ void apply_quality(RenderSettings& settings, Quality quality);
 /// 1e-4, blur 0.3, near 0.01, clamp 1.3, zero gradient where the cap holds. `inria`: the same with near 0.2, stop at <
 /// 1e-4, its square support of 3σ, and the gradient passed through the cap.
 void apply_compatibility(RenderSettings& settings, Compatibility compatibility);
+
+void describe(ConfigFields& fields, RenderSkips& skip);
+void describe(ConfigFields& fields, RenderApproximations& approx);
 
 /// Describes every setting. A preset is applied before the other keys are read, so an explicitly written key wins.
 void describe(ConfigFields& fields, RenderSettings& settings);

@@ -23,7 +23,7 @@ struct SplatArrays {
 };
 
 template <class S>
-struct SplatRecord {
+struct alignas(64) SplatRecord {  // a cache line
   double x, y;      ///< mean, pixels; the loops use its place in the tile, which S holds to far more digits
   S l11, l21, l22;  ///< see Conic
   S opacity;        ///< with the antialias factor

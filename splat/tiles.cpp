@@ -219,7 +219,7 @@ void TileLists::join(const Partition& part, std::span<const Index> sizes) {
   });
 }
 
-void TileLists::deal(std::span<const DepthKeyed> order, const TileGrid& grid) {
+void TileLists::deal(std::span<const DepthKeyed> order, const TileGrid& grid, std::int32_t first) {
   const Index tiles = grid.count();
   const Partition part = cut(static_cast<Index>(order.size()));
   entries.resize(pairs_);
@@ -262,8 +262,8 @@ void TileLists::deal(std::span<const DepthKeyed> order, const TileGrid& grid) {
   parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
     std::uint32_t* const next = next_.data() + chunk * tiles;
     TileEntry* const to = entries.data();
-    visit(begin, end, [next, to](std::int32_t n, std::uint32_t slot, FoundPair pair) {
-      to[next[pair.tile]++] = {n, slot, pair.blocks};
+    visit(begin, end, [next, to, first](std::int32_t n, std::uint32_t slot, FoundPair pair) {
+      to[next[pair.tile]++] = {first + n, slot, pair.blocks};
     });
   });
 }

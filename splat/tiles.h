@@ -293,7 +293,8 @@ class TileLists {
   /// Fills entries, after find.
   ///
   /// @param order  every row whose extent is not empty, in depth order
-  void deal(std::span<const DepthKeyed> order, const TileGrid& grid);
+  /// @param first  what entries call row 0
+  void deal(std::span<const DepthKeyed> order, const TileGrid& grid, std::int32_t first);
   Index capacity_bytes() const;
 
  private:

@@ -19,6 +19,8 @@ struct SplatView {
   Camera camera;
   Vector3<double> origin_world = Vector3<double>::Zero();
   RenderSettings settings;
+  RenderSkips skip = {};
+  RenderApproximations approx = {};
 };
 
 namespace detail {

@@ -6,6 +6,7 @@
 
 #include "core/file.h"
 #include "core/simd.h"
+#include "pipelines/bench_pixel_filter.h"
 #include "pipelines/bench_rasterize.h"
 
 namespace hsi4d::cli {
@@ -22,6 +23,22 @@ std::string json_line(const Measurement& m) {
   return line.dump() + "\n";
 }
 
+std::string json_line(const FilterMeasurement& m) {
+  const nlohmann::ordered_json line = {{"name", m.name},
+                                       {"gaussians", m.gaussians},
+                                       {"height_px", m.height_px},
+                                       {"distance_m", m.distance_m},
+                                       {"sigma_px", m.sigma_px},
+                                       {"blur", m.blur},
+                                       {"antialias", m.antialias},
+                                       {"width_px", m.error.width_px},
+                                       {"half_width_px", m.error.half_width_px},
+                                       {"brightness", m.error.brightness},
+                                       {"rms", m.error.rms},
+                                       {"distance_error", m.distance_error}};
+  return line.dump() + "\n";
+}
+
 }  // namespace
 
 std::string bench_rasterize_command(const BenchOptions& options) {
@@ -32,6 +49,28 @@ std::string bench_rasterize_command(const BenchOptions& options) {
   bench_rasterize({options.workloads, options.threads, options.repeats}, [&](const Measurement& m) {
     std::snprintf(line, sizeof line, "%-44s %10.3f %10.3f %12lld %12.0f\n", m.name.c_str(), m.median_ms, m.min_ms,
                   static_cast<long long>(m.fragments), rate(m));
+    table += line;
+    json += json_line(m);
+  });
+  if (!options.json.empty()) write_text_file(options.json, json);
+  return table;
+}
+
+std::string bench_pixel_filter_command(const BenchOptions& options) {
+  std::string json, table;
+  char line[200];
+  std::snprintf(line, sizeof line, "%-50s %9s %9s %9s %9s %9s %8s %8s %10s\n", "", "sigma px", "blur px2", "width px",
+                "half px", "size px", "light %", "rms", "distance %");
+  table += line;
+  PixelFilterBench bench;
+  bench.figures = options.workloads;
+  bench.threads = options.threads;
+  if (!options.heights_px.empty()) bench.heights_px = options.heights_px;
+  bench_pixel_filter(bench, [&](const FilterMeasurement& m) {
+    const SilhouetteError& e = m.error;
+    std::snprintf(line, sizeof line, "%-50s %9.2f %9.4f %+9.3f %+9.3f %+9.3f %+8.2f %8.4f %+10.2f\n", m.name.c_str(),
+                  m.sigma_px, m.blur, e.width_px, e.half_width_px, m.distance_error * m.height_px, 100 * e.brightness,
+                  e.rms, 100 * m.distance_error);
     table += line;
     json += json_line(m);
   });

@@ -180,14 +180,23 @@ struct CommandLine {
   }
 
   void add_bench() {
-    CLI::App* command = app.add_subcommand("bench", "Measure speed: a table, and one JSON object a measurement");
-    command->add_option("TOPIC", topic, "What: rasterize")->required()->check(CLI::IsMember({"rasterize"}));
+    CLI::App* command = app.add_subcommand(
+        "bench", "Measure the renderer's speed or its pixel filter: a table, and one JSON object a measurement");
+    command->add_option("TOPIC", topic, "What: rasterize, pixel_filter")
+        ->required()
+        ->check(CLI::IsMember({"rasterize", "pixel_filter"}));
     command->add_option("--workload", bench.workloads, "Only these; default: all");
     command->add_option("--threads", bench.threads, "Threads")->check(CLI::Range(1, 1024));
-    command->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told")
+    command->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of rasterize")
         ->check(CLI::Range(1, 1000));
+    command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
+        ->check(CLI::Range(8.0, 2048.0));
     command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
-    command->callback([this] { run = [this] { return bench_rasterize_command(bench); }; });
+    command->callback([this] {
+      run = [this] {
+        return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);
+      };
+    });
   }
 
   void add_check() {

@@ -327,7 +327,7 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
     TileLists lists;
     with_threads(threads, [&] {
       CHECK(lists.find(extents, grid, 1 << 30) == slot);
-      lists.deal(order, grid);
+      lists.deal(order, grid, 0);
     });
     REQUIRE(lists.pairs() == slot);
     for (Index tile = 0; tile < grid.count(); ++tile) {

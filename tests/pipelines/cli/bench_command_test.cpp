@@ -1,5 +1,6 @@
 #include "pipelines/cli/bench_command.h"
 
+#include <map>
 #include <sstream>
 
 #include <catch2/catch.hpp>
@@ -46,4 +47,50 @@ TEST_CASE("bench tells which workloads there are") {
       cli::bench_rasterize_command(options),
       "hsi4d bench rasterize: no workload \"smal\"; known: avatar, scene, avatar_in_scene, small; did you "
       "mean \"small\"?");
+}
+
+TEST_CASE("bench pixel_filter judges every filter at a height and writes one object a measurement", "[full]") {
+  const TemporaryFolder folder;
+  cli::BenchOptions options;
+  options.workloads = {"avatar_5000"};
+  options.heights_px = {16};
+  options.json = folder / "m.json";
+  const std::string table = cli::bench_pixel_filter_command(options);
+  std::istringstream lines(read_text_file(options.json));
+  std::map<std::string, nlohmann::json> found;
+  for (std::string line; std::getline(lines, line);) {
+    const auto m = nlohmann::json::parse(line);
+    const std::string name = m.at("name"), prefix = "pixel_filter/avatar_5000/16/";
+    CHECK(table.find(name) != std::string::npos);
+    REQUIRE(name.substr(0, prefix.size()) == prefix);
+    CHECK(m.at("gaussians") == 5000);
+    CHECK(m.at("height_px") == 16);
+    CHECK(m.at("sigma_px").get<double>() == Approx(0.1).epsilon(0.1));
+    found[name.substr(prefix.size())] = m;
+  }
+  CHECK(found.size() == 8 * 3 + 2);
+  const auto number = [&](const char* name, const char* key) { return found.at(name).at(key).get<double>(); };
+  for (const std::string truth : {"box", "soft", "clip"}) {
+    CHECK(number((truth + "/plain").c_str(), "blur") == 0.3);
+    CHECK(number((truth + "/antialias_box").c_str(), "blur") == Approx(1.0 / 12));
+    CHECK(number((truth + "/plain_matched").c_str(), "rms") <= number((truth + "/plain").c_str(), "rms"));
+    CHECK(number((truth + "/antialias_matched").c_str(), "rms") <=
+          1.001 * number((truth + "/antialias_box").c_str(), "rms"));
+  }
+  CHECK(number("box/antialias_within", "width_px") <= 0.05);
+  CHECK(number("box/plain", "width_px") > number("box/antialias", "width_px"));
+  CHECK(number("box/plain", "distance_error") > 0.05);
+  CHECK(std::abs(number("box/truth_4x", "width_px")) < 0.05);
+}
+
+TEST_CASE("bench pixel_filter tells which figures and heights there are") {
+  cli::BenchOptions options;
+  options.workloads = {"avatar"};
+  CHECK_THROWS_WITH(cli::bench_pixel_filter_command(options),
+                    "hsi4d bench pixel_filter: no workload \"avatar\"; known: avatar_5000, avatar_40000; did you mean "
+                    "\"avatar_5000\"?");
+  options.workloads = {};
+  options.heights_px = {4};
+  CHECK_THROWS_WITH(cli::bench_pixel_filter_command(options),
+                    "hsi4d bench pixel_filter: a height of 4 px; allowed: 8 to 2048");
 }

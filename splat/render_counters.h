@@ -1,0 +1,27 @@
+// What a render did: counts and times.
+#pragma once
+
+#include "core/types.h"
+
+namespace hsi4d {
+
+/// Seconds of the steps of the last forward and backward runs; records to bin of what is not kept from an earlier run.
+struct RenderTimes {
+  double still_s = 0;  ///< records, order and lists of the Gaussians that stand still; 0 when they were kept
+  double records_s = 0, sort_s = 0, bin_s = 0, forward_s = 0, backward_s = 0, reduce_s = 0;
+};
+
+/// What the last runs did.
+struct RenderCounters {
+  Index visible = 0;    ///< Gaussians that reach a tile
+  Index pairs = 0;      ///< (tile, Gaussian) that were looked at
+  Index groups = 0;     ///< (block of 4×4 pixels, Gaussian) that may touch, of those with an adjoint or among them
+  Index fragments = 0;  ///< (pixel, Gaussian) that were composited
+  Index tiles = 0;      ///< tiles that a Gaussian reaches
+  Index reached = 0;    ///< pairs up to the last one of each tile that is composited: those that have an adjoint
+  Index rendered = 0;   ///< tiles of which something was rendered
+  Index layers = 0;     ///< tiles whose static layer was made anew
+  RenderTimes times;
+};
+
+}  // namespace hsi4d

@@ -1,0 +1,138 @@
+#include "splat/static_layer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace hsi4d::detail {
+
+namespace {
+
+constexpr DepthRange kAllDepths = {std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()};
+
+double depth_of_step(std::int32_t step) { return std::exp2(static_cast<double>(step) / kDepthSteps); }
+
+/// The key of a depth, as depth_key of a Gaussian that has it.
+std::uint64_t key_of(const RenderSettings& settings, double depth) {
+  return settings.depth_key.value_or(DepthKey::kFloat) == DepthKey::kFloat ? depth_bits(static_cast<float>(depth))
+                                                                           : depth_bits(depth);
+}
+
+Index state_of_block(Index channels) { return (1 + channels) * kBlockPixels; }
+
+}  // namespace
+
+DepthRange depth_range(const SplatRows<float>& rows, const RenderSettings& settings,
+                       std::span<const TileEntry> moving) {
+  const auto depth = [&](const TileEntry& e) { return depth_of(rows.set_of(e.index), rows.in_set(e.index)); };
+  const double nearest = depth(moving.front()), farthest = depth(moving.back());
+  if (!(nearest > 0) || !(farthest > 0)) return kAllDepths;
+  DepthRange range = {static_cast<std::int32_t>(std::floor(kDepthSteps * std::log2(nearest))),
+                      static_cast<std::int32_t>(std::ceil(kDepthSteps * std::log2(farthest)))};
+  // Logarithm and keys are rounded.
+  while (key_of(settings, depth_of_step(range.near)) > rows.key(settings, moving.front().index)) --range.near;
+  while (key_of(settings, depth_of_step(range.far)) < rows.key(settings, moving.back().index)) ++range.far;
+  return range;
+}
+
+void place_range(const SplatRows<float>& rows, const RenderSettings& settings, std::span<const TileEntry> still,
+                 TileLayer& layer) {
+  layer.first = 0;
+  layer.after = static_cast<Index>(still.size());
+  if (layer.range == kAllDepths) return;
+  const std::uint64_t near = key_of(settings, depth_of_step(layer.range.near));
+  const std::uint64_t far = key_of(settings, depth_of_step(layer.range.far));
+  const auto key = [&](const TileEntry& e) { return rows.key(settings, e.index); };
+  const auto first = std::partition_point(still.begin(), still.end(), [&](const auto& e) { return key(e) < near; });
+  const auto after = std::partition_point(first, still.end(), [&](const auto& e) { return key(e) <= far; });
+  layer.first = first - still.begin();
+  if (settings.alpha_cap < 1) layer.after = after - still.begin();  // else T can be 0, and nothing is relative to it
+}
+
+template <class S>
+void merge_entries(const SplatRows<S>& rows, const RenderSettings& settings, std::span<const TileEntry> still,
+                   std::span<const TileEntry> moving, TileEntry* merged) {
+  std::size_t s = 0;
+  for (const TileEntry& m : moving) {
+    const std::uint64_t key = rows.key(settings, m.index);
+    for (; s < still.size() && rows.key(settings, still[s].index) <= key; ++s) {
+      *merged++ = {still[s].index, kNoSlot, still[s].blocks};
+    }
+    *merged++ = m;
+  }
+  for (; s < still.size(); ++s) *merged++ = {still[s].index, kNoSlot, still[s].blocks};
+}
+
+template void merge_entries(const SplatRows<float>&, const RenderSettings&, std::span<const TileEntry>,
+                            std::span<const TileEntry>, TileEntry*);
+template void merge_entries(const SplatRows<double>&, const RenderSettings&, std::span<const TileEntry>,
+                            std::span<const TileEntry>, TileEntry*);
+
+Index make_layer(Index side, const CompositeScene<float>& scene, BlockJob job, std::span<const TileEntry> still,
+                 bool collapse, TileLayer& layer) {
+  const auto composite = [&](std::span<const TileEntry> entries, Buffer<float>& state) {
+    state.resize(block_state(side, scene.channels));
+    job.entries = entries;
+    job.blocks = all_blocks(side);
+    job.state = state.data();
+    job.runs = nullptr;
+    begin_blocks(side, job.width, job.height, scene.channels, job.state);
+    return composite_blocks(side, scene, job).fragments;
+  };
+  Index fragments = 0;
+  if (layer.first > 0) fragments += composite(still.first(static_cast<std::size_t>(layer.first)), layer.front);
+  if (collapse) fragments += composite(still.subspan(static_cast<std::size_t>(layer.after)), layer.collapsed);
+  layer.seen.resize(block_state(side, scene.channels));
+  layer.made = true;
+  return fragments;
+}
+
+Index composite_behind(Index side, const CompositeScene<float>& scene, const BlockJob& job,
+                       std::span<const TileEntry> behind, bool collapse, float* memory, TileLayer& layer) {
+  const Index size = state_of_block(scene.channels), numbers = block_state(side, scene.channels);
+  const float* own = layer.collapsed.data();  // T and channels of what is behind
+  Index fragments = 0;
+  if (!collapse) {
+    BlockJob rest = job;
+    rest.entries = behind;
+    rest.state = memory;
+    rest.runs = nullptr;
+    for (Index i = 0; i < numbers; ++i) memory[i] = i % size < kBlockPixels ? job.state[i] : 0.0f;
+    fragments = composite_blocks(side, scene, rest).fragments;
+    own = memory;
+  }
+  for (Index i = 0; i < numbers; i += size) {
+    if ((job.blocks >> (i / size) & 1u) == 0) continue;
+    for (Index p = i; p < i + kBlockPixels; ++p) {
+      const float front = job.state[p];  // T behind what moves
+      const bool alive = front >= scene.rules.stop_below && front > 0;
+      // What is seen behind is own/front, or own itself when it was composited as if nothing were in front of it.
+      const float relative = collapse ? 1.0f : 1 / front, absolute = collapse ? front : 1.0f;
+      layer.seen[p] = alive ? std::abs(own[p]) * relative : 1.0f;
+      if (alive) job.state[p] = own[p] * absolute;
+      for (Index k = 1; k <= scene.channels; ++k) {
+        const Index at = p + k * kBlockPixels;
+        layer.seen[at] = alive ? own[at] * relative : 0.0f;
+        if (alive) job.state[at] += own[at] * absolute;
+      }
+    }
+  }
+  return fragments;
+}
+
+void see_behind(Index side, Index channels, std::uint32_t blocks, const TileLayer& layer, const float* d_channels,
+                float* behind) {
+  const Index across = side / kBlockSide;
+  for (Index b = 0; b < across * across; ++b) {
+    if ((blocks >> b & 1u) == 0) continue;
+    const float* const seen = layer.seen.data() + b * state_of_block(channels);
+    for (Index i = 0; i < kBlockPixels; ++i) {
+      const Index p = (b / across * kBlockSide + i / kBlockSide) * side + b % across * kBlockSide + i % kBlockSide;
+      float sum = behind[p] * seen[i];
+      for (Index k = 0; k < channels; ++k) sum += d_channels[k * side * side + p] * seen[(k + 1) * kBlockPixels + i];
+      behind[p] = sum;
+    }
+  }
+}
+
+}  // namespace hsi4d::detail
