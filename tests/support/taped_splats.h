@@ -144,7 +144,7 @@ class TapedSplats {
   Tape<S> tape;
   Var<S> means, quats, log_scales, opacity_logits, sh, xi, background, transforms;
   SplatView view;
-  Var<S> opacities;
+  Var<S> opacities, colors;
   Rendered<S> rendered;
   Var<S> loss;
 
@@ -169,7 +169,8 @@ class TapedSplats {
       axes = transform_axes(transforms, axes);
     }
     opacities = gaussian_opacities(opacity_logits);
-    rendered = render<S>({placed, axes, opacities, sh_colors(sh, placed, xi, view)}, xi, background, view, request);
+    colors = sh_colors(sh, placed, xi, view);
+    rendered = render<S>({placed, axes, opacities, colors}, xi, background, view, request);
     add_term(rendered.image, cotangent.image);
     add_term(rendered.transmittance, cotangent.transmittance);
     if (request.depth) add_term(rendered.depth, cotangent.depth);
