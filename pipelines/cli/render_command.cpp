@@ -1,12 +1,10 @@
 #include "pipelines/cli/render_command.h"
 
-#include <algorithm>
 #include <filesystem>
 
 #include "body/motion_io.h"
 #include "core/check.h"
 #include "core/image_io.h"
-#include "core/log.h"
 #include "core/rotation.h"
 #include "pipelines/cli/pixel_table.h"
 #include "pipelines/posed_avatar.h"
@@ -117,15 +115,6 @@ void write_npz(const std::string& path, const SceneImage& rendered, Precision pr
   npz.write(path);
 }
 
-/// An empty image is what a camera sees that looks away, most often because its axes are of another convention.
-void warn_if_empty(const SceneImage& rendered, Index count) {
-  const bool shows_something =
-      std::any_of(rendered.alpha.begin(), rendered.alpha.end(), [](double alpha) { return alpha > 0; });
-  if (count == 0 || shows_something) return;
-  log_warning("no Gaussian is drawn: the camera sees none of " + std::to_string(count) +
-              ". Its pose must be camera_from_world in OpenCV's axes (x right, y down, z forward), in metres");
-}
-
 }  // namespace
 
 std::string render_command(const RenderOptions& options) {
@@ -146,7 +135,7 @@ std::string render_command(const RenderOptions& options) {
     write_image(options.out, from_interleaved(values, rendered.height, rendered.width, 3));
   }
   const Index count = scene.gaussians.count();
-  warn_if_empty(rendered, count);
+  warn_if_nothing_drawn(rendered, count);
   std::string text;
   for (const PixelTrace& trace : rendered.traces) text += pixel_table(trace, rendered, view, parts.rows) + "\n";
   return text + options.out + ": " + std::to_string(rendered.width) + " x " + std::to_string(rendered.height) +
