@@ -37,7 +37,7 @@ std::string after(const std::vector<std::string>& lines, const std::string& star
 
 }  // namespace
 
-TEST_CASE("--debug-pixel prints the Gaussians of a pixel, whose sums are the image") {
+TEST_CASE("debug-pixel prints the Gaussians of a pixel, whose sums are the image") {
   const Files files;
   for (const char* word : kWords) {
     INFO(word);
@@ -85,7 +85,7 @@ TEST_CASE("--debug-pixel prints the Gaussians of a pixel, whose sums are the ima
   }
 }
 
-TEST_CASE("--debug-pixel names files, caps, stops and what was nearly drawn") {
+TEST_CASE("debug-pixel names files, caps, stops and what was nearly drawn") {
   const Files files;
   // An opaque wall in front of all else, through the ray of the pixel, and before it a small one six pixels beside.
   const Camera camera = test_camera();
@@ -133,7 +133,7 @@ TEST_CASE("--debug-pixel names files, caps, stops and what was nearly drawn") {
   }
 }
 
-TEST_CASE("--debug-pixel outside the image, or no pixel") {
+TEST_CASE("a debug-pixel outside the image, or no pixel, is refused") {
   const Files files;
   cli::RenderOptions options = render_options("a.npz", "float");
   for (const std::string outside : {"37,0", "0,23", "-1,0", "0,-1"}) {
