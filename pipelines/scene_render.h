@@ -37,12 +37,12 @@ struct SceneView {
 
 /// An image, interleaved; numbers are floats where the precision is float.
 struct SceneImage {
-  int width = 0, height = 0;        ///< pixels
-  std::vector<double> image;        ///< [H,W,3] Σ w c + T background, not clamped
-  std::vector<double> alpha;        ///< [H,W] 1 − T
-  std::vector<double> depth;        ///< [H,W] Σ w z / Σ w, metres; 0 where Σ w = 0
-  std::optional<Index> drawn = {};  ///< Gaussians that reach the image; brute force does not count them
-  std::vector<PixelTrace> traces;   ///< of the pixels asked for
+  int width = 0, height = 0;            ///< pixels
+  std::vector<double> image;            ///< [H,W,3] Σ w c + T background, not clamped
+  std::vector<double> alpha;            ///< [H,W] 1 − T
+  std::vector<double> depth;            ///< [H,W] Σ w z / Σ w, metres; 0 where Σ w = 0
+  std::optional<Index> drawn = {};      ///< Gaussians that reach the image; brute force does not count them
+  std::vector<PixelTrace> traces = {};  ///< of the pixels asked for
 };
 
 /// A loss and its derivatives, shaped like the numbers of the Gaussians.
