@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "core/suggest.h"
 #include "core/text.h"
+#include "pipelines/bench_iteration.h"
 #include "pipelines/bench_workloads.h"
 #include "splat/covariance.h"
 #include "splat/render.h"
@@ -70,6 +71,7 @@ Measurement measured(const Workload& w, const RenderCounters& counters, const Ra
   m.fragments = counters.fragments;
   m.pairs = counters.pairs;
   m.groups = counters.groups;
+  m.tiles = counters.rendered;
   m.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
   return m;
 }
@@ -120,7 +122,12 @@ void bench_rasterize(const RasterizeBench& options, const std::function<void(con
     const auto& wanted = options.workloads;
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), named.name) == wanted.end()) continue;
     const Workload workload = named.make();
-    with_threads(options.threads, [&] { bench_workload(workload, options, report); });
+    with_threads(options.threads, [&] {
+      bench_workload(workload, options, report);
+      if (workload.moving_begin > 0 && workload.moving_begin < workload.count) {
+        bench_iteration(workload, options, report);
+      }
+    });
   }
 }
 

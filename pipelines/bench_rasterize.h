@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,9 @@ struct Measurement {
   double median_ms = 0, min_ms = 0;
   int repeats = 0;
   Index gaussians = 0, fragments = 0, groups = 0, pairs = 0, pixels = 0;
+  Index tiles = 0;  ///< of which something was rendered
+  /// Of an iteration with skips, against the same without: largest difference of the image, relative L2 of gradients.
+  std::optional<double> image_error = {}, gradient_error = {};
 };
 
 struct RasterizeBench {

@@ -52,7 +52,7 @@ struct TapedScene {
   TapedScene(const PosedGaussians& posed, const SceneView& scene_view, bool wants_depth) {
     const Gaussians& g = posed.gaussians;
     const Index n = g.count();
-    const SplatView view{scene_view.camera, origin_of(posed, scene_view.camera), scene_view.settings};
+    view = {scene_view.camera, origin_of(posed, scene_view.camera), scene_view.settings};
     means = leaf("means", shape_of(n, 3), posed_means(posed, view.origin_world));
     quats = leaf("quats", shape_of(n, 4), cast<S>(g.quats));
     log_scales = leaf("log_scales", shape_of(n, 3), cast<S>(g.log_scales));
@@ -67,7 +67,7 @@ struct TapedScene {
       tape.set(transforms, std::vector<S>(posed.transforms.begin(), posed.transforms.end()));
       axes = transform_axes(transforms, axes);
     }
-    const SplatInputs<S> inputs{means, axes, gaussian_opacities(logits), sh_colors(sh, means, xi, view)};
+    inputs = {means, axes, gaussian_opacities(logits), sh_colors(sh, means, xi, view)};
     RenderRequest request;
     request.depth = wants_depth;
     rendered = render(inputs, xi, background, view, request);
@@ -109,8 +109,14 @@ struct TapedScene {
     return result;
   }
 
+  PixelTrace trace(PixelPlace place) const {
+    return trace_pixel(tape, rendered.projected, inputs.opacities, inputs.colors, view, place);
+  }
+
   Tape<S> tape;
+  SplatView view;
   Var<S> means, quats, log_scales, logits, sh, xi;
+  SplatInputs<S> inputs;
   Rendered<S> rendered;
 };
 
@@ -136,6 +142,7 @@ SceneImage image_of(const TapedScene<S>& scene, const Camera& camera) {
                     interleaved(scene.tape.value(rendered.image)),
                     interleaved(scene.tape.value(rendered.transmittance)),
                     {},
+                    {},
                     {}};
   for (double& alpha : result.alpha) alpha = static_cast<double>(static_cast<S>(1 - alpha));
   result.drawn = rendered.counters->visible;
@@ -144,14 +151,16 @@ SceneImage image_of(const TapedScene<S>& scene, const Camera& camera) {
 }
 
 template <class S>
-SceneImage render_taped(const PosedGaussians& posed, const SceneView& view) {
+SceneImage render_taped(const PosedGaussians& posed, const SceneView& view, std::span<const PixelPlace> traced) {
   TapedScene<S> scene(posed, view, true);
   for (const Var<S> var : {scene.means, scene.quats, scene.log_scales, scene.logits, scene.sh, scene.xi})
     scene.tape.freeze(var);
   scene.tape.forward(scene.rendered.depth);
   scene.tape.forward(scene.rendered.image);
   scene.tape.forward(scene.rendered.transmittance);
-  return image_of(scene, view.camera);
+  SceneImage result = image_of(scene, view.camera);
+  for (const PixelPlace place : traced) result.traces.push_back(scene.trace(place));
+  return result;
 }
 
 template <class S>
@@ -203,7 +212,7 @@ reference::Pinhole<double> reference_camera(const Camera& camera) {
 }
 
 SceneImage image_of(const reference::Image<double>& rendered, const Camera& camera) {
-  SceneImage result{camera.width, camera.height, rendered.color, rendered.transmittance, {}, {}};
+  SceneImage result{camera.width, camera.height, rendered.color, rendered.transmittance, {}, {}, {}};
   for (double& alpha : result.alpha) alpha = 1 - alpha;
   result.depth.resize(pixels_of(camera));
   for (std::size_t i = 0; i < rendered.group_opacity.size(); ++i) {
@@ -213,10 +222,31 @@ SceneImage image_of(const reference::Image<double>& rendered, const Camera& came
   return result;
 }
 
-SceneImage render_reference(const PosedGaussians& posed, const SceneView& view) {
-  return image_of(
-      reference::render(reference_scene(posed), reference_camera(view.camera), view.background, view.settings),
-      view.camera);
+PixelSplat traced_splat(const reference::Fragment<double>& f, double cap) {
+  return {f.gaussian, f.depth, f.uncapped, f.alpha, f.uncapped > cap, f.transmittance, f.color, {}};
+}
+
+PixelTrace trace_of(const reference::PixelFragments<double>& pixel, PixelPlace place, double cap) {
+  PixelTrace trace;
+  trace.place = place;
+  for (const auto& fragment : pixel.composited) trace.add(traced_splat(fragment, cap));
+  for (const auto& fragment : pixel.skipped) trace.skip(traced_splat(fragment, cap));
+  for (const auto& fragment : pixel.refused) trace.refused = traced_splat(fragment, cap);
+  trace.stopped = pixel.stopped;
+  trace.behind_stop = pixel.behind_stop;
+  trace.transmittance = pixel.transmittance;
+  return trace;
+}
+
+SceneImage render_reference(const PosedGaussians& posed, const SceneView& view, std::span<const PixelPlace> traced) {
+  const reference::Scene<double> scene = reference_scene(posed);
+  const reference::Pinhole<double> camera = reference_camera(view.camera);
+  SceneImage result = image_of(reference::render(scene, camera, view.background, view.settings), view.camera);
+  for (const PixelPlace place : traced) {
+    const auto pixel = reference::fragments(scene, camera, view.settings, place.row, place.column);
+    result.traces.push_back(trace_of(pixel, place, view.settings.alpha_cap));
+  }
+  return result;
 }
 
 SceneGradients gradients_reference(const Gaussians& gaussians, const SceneView& view, std::span<const double> target) {
@@ -238,17 +268,17 @@ SceneGradients gradients_reference(const Gaussians& gaussians, const SceneView& 
 
 }  // namespace
 
-SceneImage render_scene(const PosedGaussians& scene, const SceneView& view) {
+SceneImage render_scene(const PosedGaussians& scene, const SceneView& view, std::span<const PixelPlace> traced) {
   check_scene(scene);
   switch (view.precision) {
     case Precision::kFloat:
-      return render_taped<float>(scene, view);
+      return render_taped<float>(scene, view, traced);
     case Precision::kDouble:
-      return render_taped<double>(scene, view);
+      return render_taped<double>(scene, view, traced);
     case Precision::kReference:
       break;
   }
-  return render_reference(scene, view);
+  return render_reference(scene, view, traced);
 }
 
 SceneGradients scene_gradients(const Gaussians& scene, const SceneView& view, std::span<const double> target) {

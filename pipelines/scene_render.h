@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/camera.h"
+#include "splat/debug_pixel.h"
 #include "splat/gaussians.h"
 #include "splat/render_settings.h"
 
@@ -36,11 +37,12 @@ struct SceneView {
 
 /// An image, interleaved; numbers are floats where the precision is float.
 struct SceneImage {
-  int width = 0, height = 0;        ///< pixels
-  std::vector<double> image;        ///< [H,W,3] Σ w c + T background, not clamped
-  std::vector<double> alpha;        ///< [H,W] 1 − T
-  std::vector<double> depth;        ///< [H,W] Σ w z / Σ w, metres; 0 where Σ w = 0
-  std::optional<Index> drawn = {};  ///< Gaussians that reach the image; brute force does not count them
+  int width = 0, height = 0;            ///< pixels
+  std::vector<double> image;            ///< [H,W,3] Σ w c + T background, not clamped
+  std::vector<double> alpha;            ///< [H,W] 1 − T
+  std::vector<double> depth;            ///< [H,W] Σ w z / Σ w, metres; 0 where Σ w = 0
+  std::optional<Index> drawn = {};      ///< Gaussians that reach the image; brute force does not count them
+  std::vector<PixelTrace> traces = {};  ///< of the pixels asked for
 };
 
 /// A loss and its derivatives, shaped like the numbers of the Gaussians.
@@ -55,8 +57,9 @@ struct SceneGradients {
   std::array<double, 6> camera{};  ///< at ξ = 0 of T ← Exp(ξ) T, ξ = (translation, rotation), T = camera_from_world
 };
 
-/// Renders. Throws InternalError as check_sizes, or for transforms of another count.
-SceneImage render_scene(const PosedGaussians& scene, const SceneView& view);
+/// Renders, and tells what made the pixels `traced`. Throws InternalError as check_sizes, for transforms of another
+/// count, or for a pixel that is not in the image.
+SceneImage render_scene(const PosedGaussians& scene, const SceneView& view, std::span<const PixelPlace> traced = {});
 
 /// Renders and differentiates.
 /// @param target  [H,W,3]. Throws InternalError for another count of numbers.

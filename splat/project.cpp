@@ -31,8 +31,7 @@ struct Lens {
   double low_x, high_x, low_y, high_y;  // of x/z and y/z in the Jacobian
 };
 
-Lens lens_of(const SplatView& view, const Vector6<double>& xi) {
-  const Camera& c = view.camera;
+Lens lens_of(const SplatView& view, const Camera& c, const Vector6<double>& xi) {
   const double margin_x = (view.settings.frustum_clamp - 1) * c.width / (2 * c.fx);
   const double margin_y = (view.settings.frustum_clamp - 1) * c.height / (2 * c.fy);
   return {detail::moved_camera(view, xi),
@@ -146,18 +145,55 @@ void project_adjoint(const Lens& lens, const InCamera& g, const double d_mean_px
   }
 }
 
+/// Gradients of the four intrinsics through one drawn Gaussian. V_0 and u − cx are proportional to fx; at a limit
+/// h = (±(clamp − 1) W/2 + {0, W} − cx)/fx, so that d_fx −= d_h h/fx and d_cx −= d_h/fx.
+void intrinsics_adjoint(const Lens& lens, const InCamera& g, const double d_mean_px[2], const double d_factor[6],
+                        Vector4<double>& d_intrinsics) {
+  const double focal[2] = {lens.fx, lens.fy};
+  const Held* const ratio[2] = {&g.ratio_x, &g.ratio_y};
+  const double place[2] = {g.x, g.y};
+  for (int i = 0; i < 2; ++i) {
+    const double h = ratio[i]->value;
+    double d_focal = d_mean_px[i] * place[i], d_ratio = 0;  // both with a factor 1/z still to come
+    for (int c = 0; c < 3; ++c) {
+      d_focal += d_factor[3 * i + c] * (g.axes[i][c] - h * g.axes[2][c]);
+      d_ratio -= d_factor[3 * i + c] * focal[i] * g.axes[2][c];
+    }
+    d_intrinsics[i] += d_focal * g.inverse_z;
+    d_intrinsics[2 + i] += d_mean_px[i];
+    if (!ratio[i]->held) continue;
+    d_intrinsics[i] -= d_ratio * g.inverse_z * h / focal[i];
+    d_intrinsics[2 + i] -= d_ratio * g.inverse_z / focal[i];
+  }
+}
+
 template <class S>
 struct Project {
   static constexpr const char* kName = "project";
   SplatView view;
+  bool own_intrinsics = true;  ///< those of the view, not an input
 
+  enum Input { kMeansIn, kAxesIn, kXi, kIntrinsics };
   enum Output { kMeans, kFactors, kDepths, kRest, kMeansRest };
+
+  Lens lens(const NodeIo<S>& io) const {
+    Camera camera = view.camera;
+    if (!own_intrinsics) {
+      const S* numbers = io.in(kIntrinsics).data;
+      camera.fx = static_cast<double>(numbers[0]);
+      camera.fy = static_cast<double>(numbers[1]);
+      camera.cx = static_cast<double>(numbers[2]);
+      camera.cy = static_cast<double>(numbers[3]);
+      check_camera(camera, "intrinsics of project");
+    }
+    return lens_of(view, camera, detail::camera_update(io.in(kXi)));
+  }
 
   void forward(NodeIo<S>& io) {
     const ConstArray<S> means = io.in(0), axes = io.in(1);
     const Array<S> means_px = io.out(kMeans), factors = io.out(kFactors);
     const Array<S> depths = io.out(kDepths), rest = io.out(kRest), means_rest = io.out(kMeansRest);
-    const Lens lens = lens_of(view, detail::camera_update(io.in(2)));
+    const Lens lens = this->lens(io);
     parallel_for(means.shape.rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
         for (Index n = begin; n < end; ++n) {
@@ -177,13 +213,15 @@ struct Project {
     const ConstArray<S> d_means_px = io.d_out(kMeans), d_factors = io.d_out(kFactors), d_depths = io.d_out(kDepths);
     const Array<S> d_means = io.wants(0) ? io.d_in(0) : Array<S>{};
     const Array<S> d_axes = io.wants(1) ? io.d_in(1) : Array<S>{};
-    const bool wants_camera = io.wants(2);
-    const Lens lens = lens_of(view, detail::camera_update(xi));
+    const bool wants_camera = io.wants(kXi), wants_intrinsics = !own_intrinsics && io.wants(kIntrinsics);
+    const Lens lens = this->lens(io);
     const Matrix3<double> transposed = lens.camera.rotation.transpose();
     const Partition part = reduction_partition(means.shape.rows, kGrain);
     const std::span<double> partials = io.template scratch<double>(6 * part.chunks());
+    const std::span<double> lens_partials = io.template scratch<double>(wants_intrinsics ? 4 * part.chunks() : 0);
     parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
       Vector6<double> d_delta = Vector6<double>::Zero();
+      Vector4<double> d_intrinsics = Vector4<double>::Zero();
       on_best_isa([&] {
         for (Index n = begin; n < end; ++n) {
           const bool drawn = is_drawn(factors.row(n));
@@ -216,10 +254,16 @@ struct Project {
             }
           }
           if (wants_camera) add_camera(g, d, d_delta);
+          if (wants_intrinsics) intrinsics_adjoint(lens, g, d_mean_px, d_factor, d_intrinsics);
         }
       });
       for (Index i = 0; i < 6; ++i) partials[static_cast<std::size_t>(6 * chunk + i)] = d_delta[i];
+      for (Index i = 0; wants_intrinsics && i < 4; ++i)
+        lens_partials[static_cast<std::size_t>(i * part.chunks() + chunk)] = d_intrinsics[i];
     });
+    for (Index i = 0; wants_intrinsics && i < 4; ++i)
+      io.d_in(kIntrinsics).data[i] +=
+          static_cast<S>(pairwise_sum(lens_partials.data() + i * part.chunks(), part.chunks()));
     if (wants_camera) detail::add_camera_gradient(xi, partials, part.chunks(), io.d_in(2));
   }
 
@@ -246,7 +290,7 @@ struct Project {
   /// What is drawn, and which ratios are held.
   void add_signature(Signature& signature, NodeIo<S>& io) {
     const ConstArray<S> means = io.in(0), axes = io.in(1);
-    const Lens lens = lens_of(view, detail::camera_update(io.in(2)));
+    const Lens lens = this->lens(io);
     for (Index n = 0; n < means.shape.rows; ++n) {
       const Vector3<double> p = point_in_camera(lens, means.row(n));
       S mean_px[2], mean_rest[2], factor[6];
@@ -264,22 +308,24 @@ struct Project {
 }  // namespace
 
 template <class S>
-Projected<S> project(Var<S> means, Var<S> axes, Var<S> xi, const SplatView& view, Source where) {
+Projected<S> project(Var<S> means, Var<S> axes, Var<S> xi, const SplatView& view, Var<S> intrinsics, Source where) {
   check_camera(view.camera);
   const Index rows = means.shape().rows;
   HSI4D_CHECK_EQ(means.shape(), shape_of(rows, 3));
   HSI4D_CHECK_EQ(axes.shape(), shape_of(rows, 9));
   HSI4D_CHECK_EQ(xi.shape(), shape_of(1, 6));
-  const std::array inputs = {means, axes, xi};
+  const bool own = intrinsics.tape == nullptr;
+  if (!own) HSI4D_CHECK_EQ(intrinsics.shape(), shape_of(1, 4));
+  const std::array inputs = {means, axes, xi, intrinsics};
   const std::array outputs = {shape_of(rows, 2), shape_of(rows, 6), shape_of(rows, 1), shape_of(rows, 1),
                               shape_of(rows, 2)};
   Tape<S>& tape = means.owner();
-  const Var<S> first =
-      tape.record(Project<S>{view}, std::span<const Var<S>>(inputs), std::span<const Shape>(outputs), where);
+  const Var<S> first = tape.record(Project<S>{view, own}, std::span<const Var<S>>(inputs).first(own ? 3 : 4),
+                                   std::span<const Shape>(outputs), where);
   return {first, tape.output(first, 1), tape.output(first, 2), tape.output(first, 3), tape.output(first, 4)};
 }
 
-template Projected<float> project(Var<float>, Var<float>, Var<float>, const SplatView&, Source);
-template Projected<double> project(Var<double>, Var<double>, Var<double>, const SplatView&, Source);
+template Projected<float> project(Var<float>, Var<float>, Var<float>, const SplatView&, Var<float>, Source);
+template Projected<double> project(Var<double>, Var<double>, Var<double>, const SplatView&, Var<double>, Source);
 
 }  // namespace hsi4d

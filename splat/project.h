@@ -6,7 +6,7 @@
 //
 // with M the Gaussian's axes and h_x = x/z held in [−cx/fx − m, (W−cx)/fx + m], m = (frustum_clamp − 1) W/(2 fx), h_y
 // likewise with fy, cy, H (rows A2, A3). The mean itself is not held. Everything is computed in double and rounded
-// once.
+// once. fx, fy, cx, cy are the camera's, or four numbers on the tape.
 #pragma once
 
 #include <algorithm>
@@ -41,9 +41,13 @@ bool is_drawn(const S* factor) {
 /// @param means  [N,3] metres, relative to view.origin_world
 /// @param axes   [N,9] metres, 3×3 by rows, world (see gaussian_axes)
 /// @param xi     [1,6] (translation, rotation), metres and radians, in the camera's frame
-/// Adjoint: means, axes, xi (exact for any ξ). None through a held x/z or y/z (z still moves h/z).
-/// Throws InternalError when the shapes do not fit, UserError for a camera that makes no sense.
+/// @param intrinsics  [1,4] fx, fy, cx, cy in pixels, instead of the view's; none: the view's, at no cost
+/// Adjoint: means, axes, xi (exact for any ξ), intrinsics (exact: means, the Jacobian, and the limits at which x/z and
+/// y/z are held, which move with them). None through a held x/z or y/z to mean and ξ (z still moves h/z).
+/// Throws InternalError when the shapes do not fit, UserError for a camera that makes no sense, which intrinsics are
+/// looked at for in every run.
 template <class S>
-Projected<S> project(Var<S> means, Var<S> axes, Var<S> xi, const SplatView& view, Source where = Source::current());
+Projected<S> project(Var<S> means, Var<S> axes, Var<S> xi, const SplatView& view, Var<S> intrinsics = {},
+                     Source where = Source::current());
 
 }  // namespace hsi4d

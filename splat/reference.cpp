@@ -76,14 +76,23 @@ bool past_threshold(T transmittance, const RenderSettings& settings) {
   return settings.stop_when == StopWhen::kAtOrBelow ? transmittance <= stop : transmittance < stop;
 }
 
+/// Where a pixel's compositing ended.
+struct End {
+  std::size_t place;  // in the depth order: after the last one looked at
+  bool stopped, refused;
+};
+
 /// Step 6: the Gaussians composited in a pixel, front to back. Returns T behind them. Those with α = 0 change nothing
 /// and are left out.
+///
+/// @param misses  may be null: those that are left out for their α, and the one that the exclusive stop leaves out
 template <class T>
 T composite_pixel(const std::vector<Drawn<T>>& order, const RenderSettings& settings, int row, int column,
-                  std::vector<Hit<T>>& hits) {
+                  std::vector<Hit<T>>& hits, std::vector<Hit<T>>* misses = nullptr, End* end = nullptr) {
   hits.clear();
   T transmittance = 1;
   const std::array<int, 2> tile = {column / kInriaTile, row / kInriaTile};
+  if (end != nullptr) *end = {order.size(), false, false};
   for (std::size_t place = 0; place < order.size(); ++place) {
     const Drawn<T>& drawn = order[place];
     if (tile[0] < drawn.tile_begin[0] || tile[0] >= drawn.tile_end[0] || tile[1] < drawn.tile_begin[1] ||
@@ -96,11 +105,16 @@ T composite_pixel(const std::vector<Drawn<T>>& order, const RenderSettings& sett
     const T uncapped = drawn.opacity * hit.gaussian, cap = settings.alpha_cap;
     hit.alpha = std::min(cap, uncapped);
     hit.d_alpha = uncapped > cap && settings.cap_gradient == CapGradient::kZero ? 0 : 1;
-    if (hit.alpha < T(settings.alpha_min) || hit.alpha == 0) continue;
     hit.transmittance = transmittance;
+    if (hit.alpha < T(settings.alpha_min) || hit.alpha == 0) {
+      if (misses != nullptr) misses->push_back(hit);
+      continue;
+    }
     const T behind = transmittance * (1 - hit.alpha);
-    const bool stops = past_threshold(behind, settings);
-    if (stops && settings.stop_rule == StopRule::kExclusive) break;
+    const bool stops = past_threshold(behind, settings), refused = stops && settings.stop_rule == StopRule::kExclusive;
+    if (stops && end != nullptr) *end = {place + 1, true, refused};
+    if (refused && misses != nullptr) misses->push_back(hit);
+    if (refused) break;
     hits.push_back(hit);
     transmittance = behind;
     if (stops) break;
@@ -236,17 +250,28 @@ Gradients<T> gradients(const Scene<T>& scene, const Pinhole<T>& camera, const st
 }
 
 template <class T>
-std::vector<Fragment<T>> fragments(const Scene<T>& scene, const Pinhole<T>& camera, const RenderSettings& settings,
-                                   int row, int column) {
+PixelFragments<T> fragments(const Scene<T>& scene, const Pinhole<T>& camera, const RenderSettings& settings, int row,
+                            int column) {
   check_scene(scene);
   const View<T> view = view_of(camera, settings);
   HSI4D_CHECK(row >= 0 && row < camera.height && column >= 0 && column < camera.width, "the pixel is not in the image");
   const std::vector<Drawn<T>> order = draw_all(scene, view, settings);
-  std::vector<Hit<T>> hits;
-  composite_pixel(order, settings, row, column, hits);
-  std::vector<Fragment<T>> result;
-  result.reserve(hits.size());
-  for (const Hit<T>& hit : hits) result.push_back({order[hit.place].index, hit.alpha, hit.transmittance});
+  std::vector<Hit<T>> hits, misses;
+  End end{};
+  PixelFragments<T> result;
+  result.transmittance = composite_pixel(order, settings, row, column, hits, &misses, &end);
+  result.stopped = end.stopped;
+  result.behind_stop = static_cast<Index>(order.size() - end.place);
+  const auto add_to = [&](std::vector<Fragment<T>>& list, const Hit<T>& hit) {
+    const Drawn<T>& drawn = order[hit.place];
+    list.push_back({drawn.index, hit.alpha, hit.transmittance, drawn.opacity * hit.gaussian, drawn.depth, drawn.color});
+  };
+  for (const Hit<T>& hit : hits) add_to(result.composited, hit);
+  if (end.refused) {
+    add_to(result.refused, misses.back());
+    misses.pop_back();
+  }
+  for (const Hit<T>& hit : misses) add_to(result.skipped, hit);
   return result;
 }
 
@@ -254,7 +279,7 @@ std::vector<Fragment<T>> fragments(const Scene<T>& scene, const Pinhole<T>& came
   template Image<T> render(const Scene<T>&, const Pinhole<T>&, const std::array<T, 3>&, const RenderSettings&);       \
   template Gradients<T> gradients(const Scene<T>&, const Pinhole<T>&, const std::array<T, 3>&, const RenderSettings&, \
                                   const Image<T>&);                                                                   \
-  template std::vector<Fragment<T>> fragments(const Scene<T>&, const Pinhole<T>&, const RenderSettings&, int, int);
+  template PixelFragments<T> fragments(const Scene<T>&, const Pinhole<T>&, const RenderSettings&, int, int);
 HSI4D_REFERENCE(double)
 HSI4D_REFERENCE(long double)
 #undef HSI4D_REFERENCE

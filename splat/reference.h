@@ -89,12 +89,26 @@ struct Gradients {
   std::array<T, 3> background{};
 };
 
-/// A Gaussian composited in a pixel.
+/// A Gaussian at a pixel.
 template <class T>
 struct Fragment {
   Index gaussian = 0;
   T alpha = 0;
   T transmittance = 0;  ///< in front of it
+  T uncapped = 0;       ///< o G
+  T depth = 0;          ///< p_z, metres
+  std::array<T, 3> color{};
+};
+
+/// What a pixel is made of.
+template <class T>
+struct PixelFragments {
+  std::vector<Fragment<T>> composited;  ///< front to back; those with α = 0 are left out
+  std::vector<Fragment<T>> skipped;     ///< in front of the stop, for an α below alpha_min or 0
+  std::vector<Fragment<T>> refused;     ///< the one that the exclusive stop leaves out, if it stops
+  bool stopped = false;
+  Index behind_stop = 0;  ///< not looked at
+  T transmittance = 1;    ///< behind the last
 };
 
 /// Image of the scene as described at the top of this file. T is double or long double; single-threaded.
@@ -116,11 +130,11 @@ template <class T>
 Gradients<T> gradients(const Scene<T>& scene, const Pinhole<T>& camera, const std::array<T, 3>& background,
                        const RenderSettings& settings, const Image<T>& cotangent);
 
-/// The Gaussians composited in a pixel, front to back; those with α = 0 are left out.
+/// The Gaussians of a pixel.
 ///
 /// Throws as render, and if the pixel is not in the image.
 template <class T>
-std::vector<Fragment<T>> fragments(const Scene<T>& scene, const Pinhole<T>& camera, const RenderSettings& settings,
-                                   int row, int column);
+PixelFragments<T> fragments(const Scene<T>& scene, const Pinhole<T>& camera, const RenderSettings& settings, int row,
+                            int column);
 
 }  // namespace hsi4d::reference

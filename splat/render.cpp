@@ -170,10 +170,10 @@ Var<S> indicators(Tape<S>& tape, Index first_row, Index rows, const RenderReques
 /// Projects Gaussians, and puts together what is composited of them: colours; depth and 1 if asked for; groups.
 template <class S>
 SplatSet<S> project_set(const SplatInputs<S>& inputs, Index first_row, Var<S> xi, const SplatView& view,
-                        const RenderRequest& request, Source where) {
+                        const RenderRequest& request, Var<S> intrinsics, Source where) {
   const Index rows = inputs.means.shape().rows;
   HSI4D_CHECK_EQ(inputs.colors.shape(), shape_of(rows, kColors));
-  const Projected<S> projected = project(inputs.means, inputs.axes, xi, view, where);
+  const Projected<S> projected = project(inputs.means, inputs.axes, xi, view, intrinsics, where);
   std::vector<Var<S>> features = {inputs.colors};
   if (request.depth) features.push_back(projected.depths);
   if (request.depth || !request.groups.empty()) {
@@ -186,7 +186,7 @@ SplatSet<S> project_set(const SplatInputs<S>& inputs, Index first_row, Var<S> xi
 /// @param still  null: there is none
 template <class S>
 Rendered<S> render_sets(const SplatInputs<S>* still, const SplatInputs<S>& moving, Var<S> xi, Var<S> background,
-                        const SplatView& view, const RenderRequest& request, Source where) {
+                        const SplatView& view, const RenderRequest& request, Var<S> intrinsics, Source where) {
   Tape<S>& tape = moving.means.owner();
   const Index first = still != nullptr ? still->means.shape().rows : 0, rows = first + moving.means.shape().rows;
   const auto groups = static_cast<Index>(request.groups.size());
@@ -196,10 +196,10 @@ Rendered<S> render_sets(const SplatInputs<S>* still, const SplatInputs<S>& movin
         begin >= 0 && begin <= end && end <= rows,
         "group [" + std::to_string(begin) + ", " + std::to_string(end) + ") of " + std::to_string(rows) + " Gaussians");
   }
-  const SplatSet<S> moved = project_set(moving, first, xi, view, request, where);
-  const Composited<S> composited = still != nullptr
-                                       ? composite(project_set(*still, 0, xi, view, request, where), moved, view, where)
-                                       : composite(moved.projected, moved.opacities, moved.features, view, where);
+  const SplatSet<S> moved = project_set(moving, first, xi, view, request, intrinsics, where);
+  const Composited<S> composited =
+      still != nullptr ? composite(project_set(*still, 0, xi, view, request, intrinsics, where), moved, view, where)
+                       : composite(moved.projected, moved.opacities, moved.features, view, where);
 
   const Shape one = image_shape<S>(1, view.camera.height, view.camera.width);
   Shape image = one, group_image = one;
@@ -225,20 +225,21 @@ Rendered<S> render_sets(const SplatInputs<S>* still, const SplatInputs<S>& movin
 
 template <class S>
 Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, const SplatView& view,
-                   const RenderRequest& request, Source where) {
-  return render_sets<S>(nullptr, inputs, xi, background, view, request, where);
+                   const RenderRequest& request, Var<S> intrinsics, Source where) {
+  return render_sets<S>(nullptr, inputs, xi, background, view, request, intrinsics, where);
 }
 
 template <class S>
 Rendered<S> render(const SplatInputs<S>& still, const SplatInputs<S>& moving, Var<S> xi, Var<S> background,
-                   const SplatView& view, const RenderRequest& request, Source where) {
-  return render_sets(&still, moving, xi, background, view, request, where);
+                   const SplatView& view, const RenderRequest& request, Var<S> intrinsics, Source where) {
+  return render_sets(&still, moving, xi, background, view, request, intrinsics, where);
 }
 
-#define HSI4D_INSTANTIATE(S)                                                                                          \
-  template Rendered<S> render(const SplatInputs<S>&, Var<S>, Var<S>, const SplatView&, const RenderRequest&, Source); \
-  template Rendered<S> render(const SplatInputs<S>&, const SplatInputs<S>&, Var<S>, Var<S>, const SplatView&,         \
-                              const RenderRequest&, Source);
+#define HSI4D_INSTANTIATE(S)                                                                                         \
+  template Rendered<S> render(const SplatInputs<S>&, Var<S>, Var<S>, const SplatView&, const RenderRequest&, Var<S>, \
+                              Source);                                                                               \
+  template Rendered<S> render(const SplatInputs<S>&, const SplatInputs<S>&, Var<S>, Var<S>, const SplatView&,        \
+                              const RenderRequest&, Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)
 #undef HSI4D_INSTANTIATE

@@ -37,16 +37,18 @@ struct Rendered {
 ///
 /// @param xi          [1,6] (translation, rotation) in the camera's frame, see splat/view.h
 /// @param background  [1,3] colour behind everything
+/// @param intrinsics  none, or [1,4] fx, fy, cx, cy in pixels instead of the view's, see project
 /// Adjoint: all inputs; see project and composite for where it stops. The depth has no gradient where Σ w ≤
 /// kLeastDepthWeight (row B14). Throws InternalError when the shapes do not fit or a group is out of range.
 template <class S>
 Rendered<S> render(const SplatInputs<S>& inputs, Var<S> xi, Var<S> background, const SplatView& view,
-                   const RenderRequest& request = {}, Source where = Source::current());
+                   const RenderRequest& request = {}, Var<S> intrinsics = {}, Source where = Source::current());
 
 /// The same for two sets, of which `still` stands still while ξ does: see composite for what is then computed once.
 /// Rows of groups are counted through both, those of `still` first. Rendered::projected is that of `moving`.
 template <class S>
 Rendered<S> render(const SplatInputs<S>& still, const SplatInputs<S>& moving, Var<S> xi, Var<S> background,
-                   const SplatView& view, const RenderRequest& request = {}, Source where = Source::current());
+                   const SplatView& view, const RenderRequest& request = {}, Var<S> intrinsics = {},
+                   Source where = Source::current());
 
 }  // namespace hsi4d

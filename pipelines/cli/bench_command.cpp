@@ -16,10 +16,21 @@ namespace {
 double rate(const Measurement& m) { return m.median_ms > 0 ? static_cast<double>(m.fragments) / m.median_ms / 1e3 : 0; }
 
 std::string json_line(const Measurement& m) {
-  const nlohmann::ordered_json line = {
-      {"name", m.name},     {"threads", m.threads}, {"isa", isa_name(best_isa())}, {"median_ms", m.median_ms},
-      {"min_ms", m.min_ms}, {"repeats", m.repeats}, {"gaussians", m.gaussians},    {"fragments", m.fragments},
-      {"groups", m.groups}, {"pairs", m.pairs},     {"pixels", m.pixels},          {"mfragments_per_s", rate(m)}};
+  nlohmann::ordered_json line = {{"name", m.name},
+                                 {"threads", m.threads},
+                                 {"isa", isa_name(best_isa())},
+                                 {"median_ms", m.median_ms},
+                                 {"min_ms", m.min_ms},
+                                 {"repeats", m.repeats},
+                                 {"gaussians", m.gaussians},
+                                 {"fragments", m.fragments},
+                                 {"groups", m.groups},
+                                 {"pairs", m.pairs},
+                                 {"tiles", m.tiles},
+                                 {"pixels", m.pixels},
+                                 {"mfragments_per_s", rate(m)}};
+  if (m.image_error) line["image_error"] = *m.image_error;
+  if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
   return line.dump() + "\n";
 }
 
@@ -44,12 +55,19 @@ std::string json_line(const FilterMeasurement& m) {
 std::string bench_rasterize_command(const BenchOptions& options) {
   std::string json, table;
   char line[160];
-  std::snprintf(line, sizeof line, "%-44s %10s %10s %12s %12s\n", "", "median ms", "least ms", "fragments", "M/s");
+  std::snprintf(line, sizeof line, "%-44s %10s %10s %7s %10s %12s %8s\n", "", "median ms", "least ms", "tiles", "pairs",
+                "fragments", "M/s");
   table += line;
   bench_rasterize({options.workloads, options.threads, options.repeats}, [&](const Measurement& m) {
-    std::snprintf(line, sizeof line, "%-44s %10.3f %10.3f %12lld %12.0f\n", m.name.c_str(), m.median_ms, m.min_ms,
+    std::snprintf(line, sizeof line, "%-44s %10.3f %10.3f %7lld %10lld %12lld %8.0f\n", m.name.c_str(), m.median_ms,
+                  m.min_ms, static_cast<long long>(m.tiles), static_cast<long long>(m.pairs),
                   static_cast<long long>(m.fragments), rate(m));
     table += line;
+    if (m.image_error && m.gradient_error) {
+      std::snprintf(line, sizeof line, "%-44s image within %.2g, gradients within %.2g (relative L2) of all rendered\n",
+                    "", *m.image_error, *m.gradient_error);
+      table += line;
+    }
     json += json_line(m);
   });
   if (!options.json.empty()) write_text_file(options.json, json);

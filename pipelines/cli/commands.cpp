@@ -5,7 +5,7 @@
 
 #include "core/check.h"
 #include "core/suggest.h"
-#include "core/text.h"
+#include "pipelines/cli/text.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/run_config.h"
 
@@ -48,24 +48,6 @@ std::string summary(const std::filesystem::path& file, const RunConfig& config) 
   text += "\n";
   for (const auto& [name, stage] : config.stages) text += stage_summary(name, stage);
   if (config.stages.empty()) text += "  no stages\n";
-  return text;
-}
-
-/// Columns of equal width, two blanks apart.
-std::string table(const std::vector<std::vector<std::string>>& rows) {
-  std::vector<std::size_t> widths;
-  for (const auto& row : rows) {
-    widths.resize(std::max(widths.size(), row.size()));
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  }
-  std::string text;
-  for (const auto& row : rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      text += row[i];
-      if (i + 1 < row.size()) text.append(widths[i] - row[i].size() + 2, ' ');
-    }
-    text += "\n";
-  }
   return text;
 }
 

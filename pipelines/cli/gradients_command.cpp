@@ -123,6 +123,7 @@ std::string gradients_command(const GradientsOptions& options) {
   SceneGradients gradients = scene_gradients(scene.gaussians, view, target);
   zero_held(gradients, scene.report);
   write_gradients(options.out, gradients, scene, view.precision);
+  warn_if_nothing_drawn(gradients.rendered, scene.gaussians.count());
   return options.out + ": loss " + number_text(gradients.loss) + ", gradients of " +
          std::to_string(scene.gaussians.count()) + " Gaussians and the camera\n";
 }

@@ -243,6 +243,10 @@ struct CommandLine {
         ->check(WholeNumber())
         ->type_name("I");
     command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.npz");
+    add_several(command, "--debug-pixel", render.pixels,
+                "Print the Gaussians that make the pixel of column X and row Y, front to back, what was skipped, where "
+                "it stopped, and the sums")
+        ->type_name("X,Y");
     command.add_option("--out", render.out, "Where to: 8-bit PNG, OpenEXR, or arrays image, alpha, depth")
         ->type_name("F.{png,exr,npz}")
         ->required();

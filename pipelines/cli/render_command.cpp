@@ -1,13 +1,12 @@
 #include "pipelines/cli/render_command.h"
 
-#include <algorithm>
 #include <filesystem>
 
 #include "body/motion_io.h"
 #include "core/check.h"
 #include "core/image_io.h"
-#include "core/log.h"
 #include "core/rotation.h"
+#include "pipelines/cli/pixel_table.h"
 #include "pipelines/posed_avatar.h"
 #include "pipelines/state.h"
 #include "splat/transform.h"
@@ -67,28 +66,44 @@ PosedGaussians placed(const Gaussians& object, const ObjectPose& pose) {
   return posed;
 }
 
-void add_objects(const RenderOptions& options, std::vector<PosedGaussians>& parts) {
+/// What is drawn: parts, one after the other, and the rows of each.
+struct Parts {
+  std::vector<PosedGaussians> gaussians;
+  std::vector<FileRows> rows;
+
+  void add(const std::string& file, PosedGaussians part, std::vector<Index> row_of = {}) {
+    const Index begin = rows.empty() ? 0 : rows.back().end;
+    rows.push_back({file, begin, begin + part.gaussians.count(), std::move(row_of)});
+    gaussians.push_back(std::move(part));
+  }
+  void add_file(const std::string& path) {
+    SplatFile file = read_scene(path);
+    add(path, {std::move(file.gaussians), {}}, std::move(file.report.row_of));
+  }
+};
+
+void add_objects(const RenderOptions& options, Parts& parts) {
   std::vector<std::string> names;
   for (const std::string& object : options.objects) {
-    parts.push_back({read_scene(object).gaussians, {}});
+    parts.add_file(object);
     names.push_back(std::filesystem::path(object).stem().string());
   }
   if (options.object_poses.empty()) return;
   const auto frames = read_object_tracks(options.object_poses, names);
   const std::vector<ObjectPose>& poses = at_frame(frames, options.frame, options.object_poses);
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    PosedGaussians& part = parts[parts.size() - poses.size() + i];
+    PosedGaussians& part = parts.gaussians[parts.gaussians.size() - poses.size() + i];
     part = placed(part.gaussians, poses[i]);
   }
 }
 
-/// Scene, objects and body, one after the other.
-PosedGaussians read_all(const RenderOptions& options) {
-  std::vector<PosedGaussians> parts;
-  parts.push_back({read_scene(options.shared.scene).gaussians, {}});
+/// Scene, objects and body.
+Parts read_all(const RenderOptions& options) {
+  Parts parts;
+  parts.add_file(options.shared.scene);
   add_objects(options, parts);
-  if (!options.motion.empty()) parts.push_back(read_body(options));
-  return parts.size() == 1 ? std::move(parts.front()) : concatenated(parts);
+  if (!options.motion.empty()) parts.add(options.avatar, read_body(options));
+  return parts;
 }
 
 void write_npz(const std::string& path, const SceneImage& rendered, Precision precision) {
@@ -100,23 +115,19 @@ void write_npz(const std::string& path, const SceneImage& rendered, Precision pr
   npz.write(path);
 }
 
-/// An empty image is what a camera sees that looks away, most often because its axes are of another convention.
-void warn_if_empty(const SceneImage& rendered, Index count) {
-  const bool shows_something =
-      std::any_of(rendered.alpha.begin(), rendered.alpha.end(), [](double alpha) { return alpha > 0; });
-  if (count == 0 || shows_something) return;
-  log_warning("no Gaussian is drawn: the camera sees none of " + std::to_string(count) +
-              ". Its pose must be camera_from_world in OpenCV's axes (x right, y down, z forward), in metres");
-}
-
 }  // namespace
 
 std::string render_command(const RenderOptions& options) {
   check_options(options);
   const SceneView view = view_of(options.shared, "hsi4d render");
+  std::vector<PixelPlace> pixels;
+  for (const std::string& pixel : options.pixels)
+    pixels.push_back(parse_pixel(pixel, view.camera, "hsi4d render: --debug-pixel"));
   check_writable(options.out);
-  const PosedGaussians scene = read_all(options);
-  const SceneImage rendered = render_scene(scene, view);
+  Parts parts = read_all(options);
+  const PosedGaussians scene =
+      parts.gaussians.size() == 1 ? std::move(parts.gaussians.front()) : concatenated(parts.gaussians);
+  const SceneImage rendered = render_scene(scene, view, pixels);
   if (check_ending(options.out, "hsi4d render: --out", {".png", ".exr", ".npz"}) == ".npz") {
     write_npz(options.out, rendered, view.precision);
   } else {
@@ -124,9 +135,11 @@ std::string render_command(const RenderOptions& options) {
     write_image(options.out, from_interleaved(values, rendered.height, rendered.width, 3));
   }
   const Index count = scene.gaussians.count();
-  warn_if_empty(rendered, count);
-  return options.out + ": " + std::to_string(rendered.width) + " x " + std::to_string(rendered.height) + " pixels of " +
-         std::to_string(count) + " Gaussians" +
+  warn_if_nothing_drawn(rendered, count);
+  std::string text;
+  for (const PixelTrace& trace : rendered.traces) text += pixel_table(trace, rendered, view, parts.rows) + "\n";
+  return text + options.out + ": " + std::to_string(rendered.width) + " x " + std::to_string(rendered.height) +
+         " pixels of " + std::to_string(count) + " Gaussians" +
          (rendered.drawn ? ", " + std::to_string(*rendered.drawn) + " of them drawn" : "") + "\n";
 }
 

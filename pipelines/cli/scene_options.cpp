@@ -88,6 +88,14 @@ std::string check_ending(const std::string& path, const std::string& where, cons
   throw UserError(where + ": " + path + " does not end as it must; allowed: " + joined(allowed));
 }
 
+void warn_if_nothing_drawn(const SceneImage& rendered, Index count) {
+  const bool shows_something =
+      std::any_of(rendered.alpha.begin(), rendered.alpha.end(), [](double alpha) { return alpha > 0; });
+  if (count == 0 || shows_something) return;
+  log_warning("no Gaussian is drawn: the camera sees none of " + std::to_string(count) +
+              ". Its pose must be camera_from_world in OpenCV's axes (x right, y down, z forward), in metres");
+}
+
 void check_writable(const std::string& path) { const AtomicFile trial(path); }
 
 }  // namespace hsi4d::cli

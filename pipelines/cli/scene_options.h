@@ -37,6 +37,12 @@ std::array<double, 3> parse_color(const std::string& text, const std::string& wh
 /// Gaussians of a file; what the reader left out or put right goes to the log as a warning.
 SplatFile read_scene(const std::string& path);
 
+/// Warns of an image in which no Gaussian is drawn: what a camera sees that looks away, most often because its axes are
+/// of another convention, which the warning names.
+///
+/// @param count  of the Gaussians; without any there is no warning
+void warn_if_nothing_drawn(const SceneImage& rendered, Index count);
+
 /// Adds an array of numbers, float32 where the precision is float, else float64.
 void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,
                  const std::vector<double>& values);

@@ -14,6 +14,9 @@ std::string short_number(double value);
 /// The ending of a path in lower case with its dot, ".ply"; "" without one.
 std::string file_ending(const std::string& path);
 
+/// Rows of words in columns of equal width, two blanks apart; a line each.
+std::string table(const std::vector<std::vector<std::string>>& rows);
+
 /// As many finite numbers as asked for, apart by commas: "1,2.5,-3".
 /// @param where  starts the message: "hsi4d convert: --translate"
 /// @param names  what they are: "x,y,z"

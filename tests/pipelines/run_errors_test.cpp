@@ -40,9 +40,7 @@ class SpoiltDataset {
   /// Changes config.json.
   template <class F>
   void edit_config(F&& change) const {
-    nlohmann::ordered_json config = nlohmann::ordered_json::parse(file_text(file("config.json")));
-    change(config);
-    std::ofstream(file("config.json")) << config.dump(2);
+    write_changed(file("config.json"), file("config.json"), change);
   }
 
  private:
@@ -226,8 +224,7 @@ TEST_CASE("a damaged checkpoint is told, and how to go on without it", "[run]") 
                                 ": cannot be read as a zip archive: Not a zip archive; without this file the run "
                                 "begins anew";
     CHECK_THAT(result.err, Catch::Matchers::EndsWith(message + "\n"));
-    CHECK(json_of("run/status.json")["state"] == "failed");
-    CHECK(json_of("run/status.json")["message"] == message);
+    check_has_failed("run", message);
   }
   SECTION("a bit flipped") {
     std::string bytes = file_text(file);
@@ -256,7 +253,6 @@ TEST_CASE("a checkpoint of other inputs is refused", "[run]") {
   const std::string message =
       "run/checkpoint/progress.npz: 4 frames done, the clip has 3; without this file the run begins anew";
   CHECK_THAT(result.err, Catch::Matchers::EndsWith(message + "\n"));
-  CHECK(json_of("run/status.json")["state"] == "failed");
-  CHECK(json_of("run/status.json")["message"] == message);
+  check_has_failed("run", message);
   CHECK_THAT(file_text("run/log.txt"), Contains("failed: " + message + "\n"));
 }

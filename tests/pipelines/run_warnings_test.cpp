@@ -81,10 +81,10 @@ RunSummary run_into_trap(const std::string& folder, int from, int count, const s
   Trap::from = from;
   Trap::count = count;
   const std::vector<LossTerm> terms = with_trap();
-  nlohmann::ordered_json config = nlohmann::ordered_json::parse(file_text(tiny_config_file()));
-  config["stages"]["interaction"]["losses"] = {{"trap", nlohmann::ordered_json::object()}};
   const fs::path file = TinyDataset::folder() / "trap.json";
-  std::ofstream(file) << config.dump();
+  write_changed(tiny_config_file(), file, [](nlohmann::ordered_json& config) {
+    config["stages"]["interaction"]["losses"] = {{"trap", nlohmann::ordered_json::object()}};
+  });
   RunOptions options;
   options.folder = folder;
   options.threads = 1;
@@ -199,8 +199,7 @@ TEST_CASE("more steps that were not taken than allowed end a run, and it goes on
                       "back (max_rollbacks is 2): the loss is nan; first: ") &&
                  Contains("'trap'"));
   CHECK(warnings.holding("frame 1, stage interaction, iteration ") == 2);
-  CHECK(json_of("run/status.json")["state"] == "failed");
-  CHECK(json_of("run/status.json")["message"] == message);
+  check_has_failed("run", message);
   CHECK_THAT(file_text("run/log.txt"), Contains(" error failed: " + message + "\n"));
   CHECK_FALSE(fs::exists("run/summary.json"));
   run_into_trap("run", 0, 0, "2", true);

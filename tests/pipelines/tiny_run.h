@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
@@ -99,6 +100,21 @@ inline RunSummary carry_out_tiny(const RunConfig& config, const std::string& fol
 }
 
 inline nlohmann::json json_of(const std::filesystem::path& file) { return nlohmann::json::parse(file_text(file)); }
+
+/// Writes a JSON file with the content of another one, or the same, changed.
+template <class F>
+void write_changed(const std::filesystem::path& from, const std::filesystem::path& to, F&& change) {
+  nlohmann::ordered_json content = nlohmann::ordered_json::parse(file_text(from));
+  change(content);
+  std::ofstream(to) << content.dump(2);
+}
+
+/// The run's state is "failed", with this message.
+inline void check_has_failed(const std::filesystem::path& run, const std::string& message) {
+  const nlohmann::json status = json_of(run / "status.json");
+  CHECK(status["state"] == "failed");
+  CHECK(status["message"] == message);
+}
 
 /// The complete lines of a metrics.jsonl.
 inline std::vector<nlohmann::json> metrics_of(const std::filesystem::path& run) {

@@ -217,3 +217,56 @@ TEST_CASE("any scale at any depth stays finite in float [A4]") {
     }
   }
 }
+
+TEST_CASE("intrinsics on the tape pass the operator checks", "[parallel]") {
+  const Camera camera = tilted_camera({40, 30});
+  check_operator(
+      "project with intrinsics",
+      {{"means", shape_of(600, 3), -0.8, 0.8},
+       {"axes", shape_of(600, 9), -0.2, 0.2},
+       {"xi", shape_of(1, 6), -0.2, 0.2},
+       {"intrinsics", shape_of(1, 4), 0, 0, {47, 53, 23, 12}}},
+      [&](const auto& in) { return side_by_side(project(in[0], in[1], in[2], view_of_camera(camera), in[3])); });
+}
+
+TEST_CASE("intrinsics move the limits of held ratios, with their gradient [A2]") {
+  const Camera camera = plain_camera({40, 30});
+  std::vector<double> means, axes;  // all beyond a limit: left, right, above, below, and at corners
+  for (const double x : {-3., 0.1, 3.}) {
+    for (const double y : {-3., -0.2, 3.}) {
+      if (x == 0.1 && y == -0.2) continue;
+      means.insert(means.end(), {static_cast<float>(2 * x), static_cast<float>(2 * y), 2});
+      for (const double a : kAxes) axes.push_back(static_cast<float>(a));
+    }
+  }
+  const Index n = static_cast<Index>(means.size() / 3);
+  check_operator("factors of what is held, by intrinsics",
+                 {{"means", shape_of(n, 3), 0, 0, means},
+                  {"axes", shape_of(n, 9), 0, 0, axes},
+                  {"xi", shape_of(1, 6), 0, 0, std::vector<double>(6, 0.0)},
+                  {"intrinsics", shape_of(1, 4), 0, 0, {40, 50, 27, 9}}},
+                 [&](const auto& in) { return project(in[0], in[1], in[2], view_of_camera(camera), in[3]).factors; },
+                 {.tolerance = 1e-9, .kink_share = 0});
+}
+
+TEST_CASE("intrinsics on the tape are those of a camera, and are checked in every run") {
+  const Camera camera = tilted_camera({40, 30});
+  Camera other = camera;
+  other.fx = 61, other.fy = 43, other.cx = 11, other.cy = 22;
+  Tape<double> tape;
+  const auto leaf = [&](const char* name, Index cols, const std::vector<double>& numbers) {
+    const Var<double> var = tape.parameter(name, shape_of(1, cols));
+    tape.set(var, numbers);
+    return var;
+  };
+  const std::vector<double> mean = {0.2, 0.3, -0.1};
+  const Var<double> means = leaf("means", 3, mean), axes = leaf("axes", 9, kAxes), xi = leaf("xi", 6, kNoUpdate);
+  const Var<double> intrinsics = leaf("intrinsics", 4, {61, 43, 11, 22});
+  const Var<double> all = side_by_side(project(means, axes, xi, view_of_camera(camera), intrinsics));
+  tape.forward(all);
+  Run<double> expected(view_of_camera(other), mean, kAxes, kNoUpdate);
+  CHECK(wide_numbers<double>(tape.value(all)) == expected.value(expected.all));
+  tape.set(intrinsics, std::vector<double>{61, 0, 11, 22});
+  CHECK_THROWS_AS(tape.forward(all), UserError);
+  CHECK_THROWS_AS(project(means, axes, xi, view_of_camera(camera), xi), InternalError);
+}

@@ -157,7 +157,8 @@ TEST_CASE("reference: alpha agrees with the textbook's formulas") {
           std::vector<long double> alpha(static_cast<std::size_t>(scene.count()), 0);
           for (const auto& fragment :
                reference::fragments(reference_scene<long double>(scene), reference_pinhole<long double>(scene.camera),
-                                    scene.settings, row, column))
+                                    scene.settings, row, column)
+                   .composited)
             alpha[static_cast<std::size_t>(fragment.gaussian)] = fragment.alpha;
           for (std::size_t n = 0; n < alpha.size(); ++n) {
             const long double expected = std::max(0.0L, textbook_alpha(scene, n, row, column));
@@ -260,7 +261,7 @@ TEST_CASE("reference: ties go by row, and the type of the depth key decides what
   const auto first = [&](std::optional<DepthKey> key) {
     RenderSettings settings = uncut();
     settings.depth_key = key;
-    return reference::fragments(gaussians, camera, settings, 2, 2)[0].gaussian;
+    return reference::fragments(gaussians, camera, settings, 2, 2).composited[0].gaussian;
   };
   CHECK(first(DepthKey::kDouble) == 0);
   gaussians.means[5] = 2 - 1e-12;
@@ -284,7 +285,8 @@ TEST_CASE("reference: INRIA's square support, by its tiles") {
     std::set<int> columns, rows;
     for (int row = 0; row < 40; ++row)
       for (int column = 0; column < 40; ++column)
-        if (!reference::fragments(gaussians, reference_pinhole<double>(scene.camera), settings, row, column).empty()) {
+        if (!reference::fragments(gaussians, reference_pinhole<double>(scene.camera), settings, row, column)
+                 .composited.empty()) {
           columns.insert(column);
           rows.insert(row);
         }

@@ -86,6 +86,32 @@ TEST_CASE("colours with a camera update pass the operator checks through the ren
       options);
 }
 
+TEST_CASE("intrinsics and any linear map pass the operator checks through the renderer") {
+  SplatScene scene = smooth_scene(12, {19, 17});
+  scene.settings.frustum_clamp = 0.6;  // some ratios are held
+  const Index n = scene.count();
+  const SplatView view{scene.camera, Vector3<double>::Zero(), scene.settings};
+  const Camera& c = scene.camera;
+  OperatorCheck options;
+  options.entries = 12;
+  options.kink_share = 0.2;
+  check_operator(
+      "render by intrinsics and transforms",
+      {{"means", shape_of(n, 3), 0, 1, wide(scene.means)},
+       {"axes", shape_of(n, 9), -0.3, 0.3},
+       {"transforms", shape_of(n, 12), -1, 1},
+       {"opacities", shape_of(n, 1), 0.2, 0.9},
+       {"colors", shape_of(n, 3), 0, 1},
+       {"xi", shape_of(1, 6), -0.05, 0.05},
+       {"background", shape_of(1, 3), 0, 1},
+       {"intrinsics", shape_of(1, 4), 0, 0, {1.1 * c.fx, 0.9 * c.fy, c.cx + 1.5, c.cy - 0.5}}},
+      [&](const auto& in) {
+        const auto out = render({in[0], transform_axes(in[2], in[1]), in[3], in[4]}, in[5], in[6], view, {}, in[7]);
+        return out.image * 0.7 + out.transmittance * 0.3;
+      },
+      options);
+}
+
 TEST_CASE("an image without Gaussians is the background, exactly [B11]") {
   for (const int width : {1, 15, 16, 17}) {
     for (const int height : {1, 15, 16, 17}) {

@@ -176,13 +176,7 @@ TEST_CASE("similarities compose and have inverses") {
 
 TEST_CASE("what a camera that goes along sees does not change") {
   const SplatScene scene = random_splats(60, 3, {24, 18});
-  Gaussians g;
-  g.sh_degree = scene.sh_degree;
-  g.means = scene.means;
-  g.quats = scene.quats;
-  g.log_scales = scene.log_scales;
-  g.opacity_logits = scene.opacity_logits;
-  g.sh = scene.sh;
+  const Gaussians g = scene.gaussians();
   const auto image = [&](const Gaussians& of, const Rigid<double>& camera_from_world) {
     reference::Scene<double> s;
     s.n = of.count();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <utility>
 
 #include "splat/io_ply.h"
 
@@ -78,18 +79,16 @@ bool real_scene(const RealView& view, SplatScene& scene) {
   scene.sh_degree = all.sh_degree;
   scene.camera = camera_of(view, all);
   scene.background = {0.1f, 0.2f, 0.3f};
-  const auto width = static_cast<std::ptrdiff_t>(3 * all.sh_coefficients());
+  std::vector<Index> in_view;
   for (Index n = 0; n < all.count(); ++n) {
-    if (!is_in_view(scene.camera, view.margin, mean_of(all, n))) continue;
-    const auto copy = [n](const std::vector<float>& from, std::vector<float>& to, std::ptrdiff_t size) {
-      to.insert(to.end(), from.begin() + n * size, from.begin() + (n + 1) * size);
-    };
-    copy(all.means, scene.means, 3);
-    copy(all.quats, scene.quats, 4);
-    copy(all.log_scales, scene.log_scales, 3);
-    copy(all.opacity_logits, scene.opacity_logits, 1);
-    copy(all.sh, scene.sh, width);
+    if (is_in_view(scene.camera, view.margin, mean_of(all, n))) in_view.push_back(n);
   }
+  Gaussians part = selected(all, in_view);
+  scene.means = std::move(part.means);
+  scene.quats = std::move(part.quats);
+  scene.log_scales = std::move(part.log_scales);
+  scene.opacity_logits = std::move(part.opacity_logits);
+  scene.sh = std::move(part.sh);
   return true;
 }
 

@@ -27,7 +27,8 @@ reference::Image<T> render(const SplatScene& scene, const RenderSettings& settin
 inline std::vector<reference::Fragment<double>> fragments(const SplatScene& scene, const RenderSettings& settings,
                                                           int row, int column) {
   return reference::fragments(reference_scene<double>(scene), reference_pinhole<double>(scene.camera), settings, row,
-                              column);
+                              column)
+      .composited;
 }
 
 template <class A, class B>

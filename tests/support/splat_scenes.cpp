@@ -63,6 +63,17 @@ class Painter {
 
 }  // namespace
 
+Gaussians SplatScene::gaussians() const {
+  Gaussians g;
+  g.sh_degree = sh_degree;
+  g.means = means;
+  g.quats = quats;
+  g.log_scales = log_scales;
+  g.opacity_logits = opacity_logits;
+  g.sh = sh;
+  return g;
+}
+
 void SplatScene::add(const std::array<double, 3>& mean, double scale, double opacity_logit,
                      const std::array<double, 3>& color) {
   for (const double x : mean) means.push_back(static_cast<float>(x));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/camera.h"
+#include "splat/gaussians.h"
 #include "splat/reference.h"
 #include "splat/render_settings.h"
 
@@ -28,6 +29,7 @@ struct SplatScene {
 
   Index count() const { return static_cast<Index>(opacity_logits.size()); }
   int sh_coefficients() const { return (sh_degree + 1) * (sh_degree + 1); }
+  Gaussians gaussians() const;
   /// Adds a Gaussian whose other numbers are as given and whose colour is the same from everywhere.
   void add(const std::array<double, 3>& mean, double scale, double opacity_logit, const std::array<double, 3>& color);
 };

@@ -50,8 +50,7 @@ inline double relative_l2(const std::vector<double>& a, const std::vector<double
 }
 
 /// Relative L2 errors of gradients, by class. That of quaternions is zero but for rounding where Gaussians are round:
-/// if it is below 1e-6 of the log-scales', it is measured against that. The camera's is a sum over all Gaussians that
-/// may cancel (20-fold in one of the real views): it is measured against the means' where that is larger.
+/// if it is below 1e-6 of the log-scales', it is measured against that.
 inline std::vector<NamedNumbers> gradient_errors(const std::vector<NamedNumbers>& computed,
                                                  const std::vector<NamedNumbers>& expected) {
   const auto norm = [&](const std::string& name) {
@@ -66,7 +65,6 @@ inline std::vector<NamedNumbers> gradient_errors(const std::vector<NamedNumbers>
     const double own = norm(name);
     double size = own;
     if (name == "quats" && own < 1e-6 * norm("log_scales")) size = norm("log_scales");
-    if (name == "camera") size = std::max(own, norm("means"));
     const double error = relative_l2(computed[i].numbers, expected[i].numbers);
     errors.push_back({name, {own > 0 ? error * own / size : error}});
   }
@@ -144,7 +142,7 @@ class TapedSplats {
   Tape<S> tape;
   Var<S> means, quats, log_scales, opacity_logits, sh, xi, background, transforms;
   SplatView view;
-  Var<S> opacities;
+  Var<S> opacities, colors;
   Rendered<S> rendered;
   Var<S> loss;
 
@@ -169,7 +167,8 @@ class TapedSplats {
       axes = transform_axes(transforms, axes);
     }
     opacities = gaussian_opacities(opacity_logits);
-    rendered = render<S>({placed, axes, opacities, sh_colors(sh, placed, xi, view)}, xi, background, view, request);
+    colors = sh_colors(sh, placed, xi, view);
+    rendered = render<S>({placed, axes, opacities, colors}, xi, background, view, request);
     add_term(rendered.image, cotangent.image);
     add_term(rendered.transmittance, cotangent.transmittance);
     if (request.depth) add_term(rendered.depth, cotangent.depth);

@@ -162,13 +162,7 @@ TEST_CASE("what convert leaves out of a damaged file is told") {
 TEST_CASE("render and gradients take any format, and draw what convert makes of it") {
   const TemporaryFolder folder;
   const SplatScene scene = random_splats(40, 5, {20, 15});
-  Gaussians g;
-  g.sh_degree = scene.sh_degree;
-  g.means = scene.means;
-  g.quats = scene.quats;
-  g.log_scales = scene.log_scales;
-  g.opacity_logits = scene.opacity_logits;
-  g.sh = scene.sh;
+  const Gaussians g = scene.gaussians();
   write_ply("in.ply", g);
   write_camera("camera.json", scene.camera);
   for (const char* name : {"a.compressed.ply", "a.splat", "a.spz"}) {

@@ -1,6 +1,8 @@
 // `hsi4d render`: its files.
 #include "pipelines/cli/render_command.h"
 
+#include <utility>
+
 #include "core/exr.h"
 #include "core/image_io.h"
 #include "core/log.h"
@@ -165,6 +167,16 @@ TEST_CASE("a camera that sees nothing is warned of, with the convention") {
         Catch::Matchers::EndsWith(
             "no Gaussian is drawn: the camera sees none of 8. Its pose must be camera_from_world in OpenCV's axes (x "
             "right, y down, z forward), in metres"));
+    const std::string of_render = std::exchange(told, "");
+    cli::gradients_command(gradients_options("g.npz", word));
+    CHECK(told == of_render);
+    CHECK(numbers("g.npz", "camera") == std::vector<double>(6));
+    write_camera("seeing.json", test_camera());
+    told.clear();
+    cli::GradientsOptions seeing = gradients_options("g.npz", word);
+    seeing.shared.camera = "seeing.json";
+    cli::gradients_command(seeing);
+    CHECK(told.find("no Gaussian is drawn") == std::string::npos);
   }
 }
 

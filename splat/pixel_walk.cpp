@@ -1,0 +1,84 @@
+#include "splat/pixel_walk.h"
+
+#include <algorithm>
+#include <type_traits>
+
+#include "splat/block_kernel.h"
+#include "splat/composite_kernel.h"
+
+namespace hsi4d::detail {
+
+namespace {
+
+/// What is drawn, with what it may touch; to be sorted by key.
+template <class S>
+struct Candidate {
+  std::uint64_t key;
+  RecordOfRow<S> splat;
+  Extent extent;
+};
+
+/// Nearest first; equal depths in the order of the inputs.
+template <class S>
+std::vector<Candidate<S>> candidates(const SplatArrays<S>& splats, const RenderSettings& settings,
+                                     const TileGrid& grid) {
+  std::vector<Candidate<S>> all;
+  for (Index n = 0; n < splats.rows(); ++n) {
+    Candidate<S> c{};
+    if (!make_record(splats, settings, grid, n, c.splat.record, c.extent)) continue;
+    c.key = depth_key(splats, settings, n);
+    c.splat.row = n;
+    all.push_back(c);
+  }
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
+  return all;
+}
+
+}  // namespace
+
+template <class S>
+PixelWalk<S>::PixelWalk(const SplatArrays<S>& splats, const SplatView& view, std::optional<Index> tile)
+    : grid_(tile_grid(view.camera.width, view.camera.height, view.settings.tile)),
+      rules_(composite_rules<S>(view.settings)),
+      in_blocks_(std::is_same_v<S, float> && splats.features.shape.cols <= kMostBlockChannels) {
+  const std::vector<Candidate<S>> all = candidates(splats, view.settings, grid_);
+  records_.reserve(all.size());  // the lists point into it
+  lists_.resize(static_cast<std::size_t>(grid_.count()));
+  for (const Candidate<S>& c : all) {
+    const RecordOfRow<S>* kept = nullptr;
+    for_each_tile(c.extent, grid_, [&](Index reached, std::uint32_t) {
+      if (tile.value_or(reached) != reached) return;
+      if (kept == nullptr) kept = &records_.emplace_back(c.splat);
+      lists_[static_cast<std::size_t>(reached)].push_back(kept);
+    });
+  }
+}
+
+template <class S>
+PixelStep<S> PixelWalk<S>::step_at(const RecordOfRow<S>& splat, Index row, Index col, S transmittance) const {
+  const Index left = col / grid_.tile * grid_.tile, top = row / grid_.tile * grid_.tile;
+  PixelAlpha<S> pixel{};
+  S behind = 0;
+  if constexpr (std::is_same_v<S, float>) {
+    if (in_blocks_) {
+      pixel = block_pixel_alpha(grid_.tile, splat.record, rules_, left, top, row - top, col - left);
+      behind = block_transmittance(transmittance, pixel.alpha);
+    }
+  }
+  if (!in_blocks_) {
+    TileJob<S> job{};
+    job.left = left;
+    job.top = top;
+    pixel = pixel_alpha(splat.record, rules_, job, row - top, col - left);
+    behind = transmittance * (S(1) - pixel.alpha);
+  }
+  const bool stops = pixel.drawn && behind < rules_.stop_below;
+  return {&splat.record, splat.row,     pixel.alpha,
+          pixel.drawn,   pixel.capped,  pixel.drawn && !(stops && rules_.exclusive),
+          stops,         transmittance, behind};
+}
+
+template class PixelWalk<float>;
+template class PixelWalk<double>;
+
+}  // namespace hsi4d::detail
