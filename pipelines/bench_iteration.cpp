@@ -19,10 +19,10 @@ struct Mode {
   RenderSkips skip;
   RenderApproximations approx;
 };
-constexpr std::array<Mode, 4> kModes = {{{"iteration", {false, false}, {false}},
-                                         {"iteration_static_tiles", {true, false}, {false}},
-                                         {"iteration_static_layer", {true, true}, {false}},
-                                         {"iteration_collapsed", {true, true}, {true}}}};
+constexpr std::array<Mode, 4> kModes = {{{"iteration", {false, false, false}, {false}},
+                                         {"iteration_static_tiles", {true, false, true}, {false}},
+                                         {"iteration_static_layer", {true, true, true}, {false}},
+                                         {"iteration_collapsed", {true, true, true}, {true}}}};
 
 /// A workload on a tape as two sets, from means and axes to the image.
 struct Iterated {
@@ -125,7 +125,7 @@ void bench_iteration(const Workload& w, const RasterizeBench& options,
     result.fragments = counters.fragments;
     result.groups = counters.groups;
     result.pairs = counters.pairs;
-    result.tiles = counters.rendered;
+    result.tiles = counters.tiles;
     result.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
     if (m > 0) {
       result.image_error = image_error(*all[m], *all.front());

@@ -71,7 +71,7 @@ Measurement measured(const Workload& w, const RenderCounters& counters, const Ra
   m.fragments = counters.fragments;
   m.pairs = counters.pairs;
   m.groups = counters.groups;
-  m.tiles = counters.rendered;
+  m.tiles = counters.tiles;
   m.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
   return m;
 }

@@ -239,10 +239,10 @@ HWY_NOINLINE void pack_splat(const SplatRecord<float>& r, const double* center, 
 }
 #endif
 
-/// Packs the Gaussians of a chunk and their features.
+/// Packs the Gaussians of a chunk and their features; only those that may touch one of the blocks asked for.
 template <int kChannels>
 Chunk pack_chunk(Index side, const CompositeScene<float>& scene, const BlockJob& job, Index number,
-                 const BlockWorkspace& space) {
+                 std::uint32_t blocks, const BlockWorkspace& space) {
   const Index channels = kChannels > 0 ? kChannels : scene.channels;
   const auto begin = static_cast<size_t>(number * kBlockChunk);
   Chunk chunk{job.entries.subspan(begin, std::min(job.entries.size() - begin, static_cast<size_t>(kBlockChunk)))};
@@ -253,15 +253,16 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& scene, const BlockJob&
   bool general = scene.rules.exclusive;
   constexpr size_t kAhead = 12;
   for (size_t at = 0; at < size; ++at) {
-    if (at + kAhead < size) {
+    if (at + kAhead < size && (chunk.entries[at + kAhead].blocks & blocks) != 0) {
       const auto next = chunk.entries[at + kAhead].index;
       hwy::Prefetch(&scene.records[static_cast<size_t>(next)]);  // one cache line
       hwy::Prefetch(scene.feature(next));
     }
+    space.blocks[at] = static_cast<std::int32_t>(chunk.entries[at].blocks & blocks);
+    if (space.blocks[at] == 0) continue;
     const std::int32_t index = chunk.entries[at].index;
     const SplatRecord<float>& r = scene.records[static_cast<size_t>(index)];
     pack_splat(r, center, space.packed[at]);
-    space.blocks[at] = static_cast<std::int32_t>(chunk.entries[at].blocks);
     general |= r.log2_opacity > near_cap;
     const float* const feature = scene.feature(index);
     float* const to = space.features + static_cast<Index>(at) * channels;

@@ -105,19 +105,18 @@ BlockCounts forward(Index side, const CompositeScene<float>& scene, const BlockJ
   const Index channels = scene.channels, blocks = (side / kBlockSide) * (side / kBlockSide);
   const BlockWorkspace space(job.workspace, channels);
   const Index state_size = (1 + channels) * kBlockPixels, chunks = block_chunks(static_cast<Index>(job.entries.size()));
-  bool alive[BlockWorkspace::kMostBlocks];
+  std::uint32_t alive = 0;  // bits of blocks
   for (Index b = 0; b < blocks; ++b) {
-    const float* const t = job.state + b * state_size;
-    alive[b] = (job.blocks >> b & 1u) != 0 && any_alive(scene.rules, t);
+    if ((job.blocks >> b & 1u) != 0 && any_alive(scene.rules, job.state + b * state_size)) alive |= 1u << b;
   }
   if (job.runs != nullptr) std::fill_n(job.runs, chunks * blocks, BlockRun{0, 0});
   BlockCounts counts{0, 0};
   std::int32_t kept = 0;
   for (Index number = 0; number < chunks; ++number) {
-    if (std::none_of(alive, alive + blocks, [](bool a) { return a; })) break;
-    const Chunk chunk = pack_chunk<kChannels>(side, scene, job, number, space);
+    if (alive == 0) break;
+    const Chunk chunk = pack_chunk<kChannels>(side, scene, job, number, alive, space);
     for (Index b = 0; b < blocks; ++b) {
-      if (!alive[b]) continue;
+      if ((alive >> b & 1u) == 0) continue;
       const Index n = make_list(chunk, b, space);
       if (n == 0) continue;
       if (chunk.form == Form::kExact) make_centers(side, scene, job, chunk, b, n, space);
@@ -135,7 +134,7 @@ BlockCounts forward(Index side, const CompositeScene<float>& scene, const BlockJ
       }
       if (end > 0) counts.end = std::max<Index>(counts.end, number * kBlockChunk + space.list[end - 1] + 1);
       counts.fragments += count_bits(space.drawn, end);
-      alive[b] = any_alive(scene.rules, state);
+      if (!any_alive(scene.rules, state)) alive &= ~(1u << b);
     }
   }
   return counts;
@@ -431,9 +430,10 @@ void backward(Index side, const CompositeScene<float>& scene, const BlockJob& jo
   bool reached = false;  // some chunk behind this one was composited: every slot of this one is then read
   for (Index number = block_chunks(static_cast<Index>(job.entries.size())) - 1; number >= 0; --number) {
     const BlockRun* const runs = job.runs + number * blocks;
-    const bool used = std::any_of(runs, runs + blocks, [](const BlockRun& run) { return run.end > 0; });
-    if (!used && !reached) continue;
-    const Chunk chunk = pack_chunk<kChannels>(side, scene, job, number, space);
+    std::uint32_t used = 0;  // bits of blocks
+    for (Index b = 0; b < blocks; ++b) used |= (runs[b].end > 0 ? 1u : 0u) << b;
+    if (used == 0 && !reached) continue;
+    const Chunk chunk = pack_chunk<kChannels>(side, scene, job, number, used, space);
     const Index size = static_cast<Index>(chunk.entries.size());
     std::memset(space.sums, 0, static_cast<size_t>((size + 1) * stride) * sizeof(float));
     Index chunk_end = reached ? size : 0;

@@ -16,8 +16,8 @@
 #include "core/stopwatch.h"
 #include "splat/block_kernel.h"
 #include "splat/composite_kernel.h"
-#include "splat/splat_lists.h"
-#include "splat/static_layer.h"
+#include "splat/tile_image.h"
+#include "splat/tile_plans.h"
 #include "splat/workspaces.h"
 
 namespace hsi4d {
@@ -40,96 +40,9 @@ using detail::Workspaces;
 
 constexpr Index kGrain = 512;
 
-/// Copies a row of a tile; nearly all are 16 pixels, and known lengths copy faster.
-template <class S>
-void copy_row(const S* from, Index n, S* to) {
-  if (n == 16) {
-    std::memcpy(to, from, 16 * sizeof(S));
-  } else {
-    std::copy_n(from, n, to);
-  }
-}
-
-/// Fetches the rows of the image that store_blocks will write.
-void fetch_blocks(const detail::BlockJob& job, const Array<float>& channels, const Array<float>& transmittance) {
-  for (Index y = job.top; y < job.top + job.height; ++y) {
-    __builtin_prefetch(&transmittance(0, y, job.left), 1);
-    for (Index k = 0; k < channels.shape.planes; ++k) __builtin_prefetch(&channels(k, y, job.left), 1);
-  }
-}
-
-/// Writes a row of neighbouring blocks whole.
-///
-/// @param kAcross  blocks
-/// @param state    of the first
-/// @param top      of them in the image
-template <Index kAcross>
-void store_band(const float* state, Index left, Index top, const Array<float>& channels,
-                const Array<float>& transmittance) {
-  constexpr Index kSide = detail::kBlockSide;
-  const Index planes = channels.shape.planes, size = (1 + planes) * detail::kBlockPixels;
-  for (Index r = 0; r < kSide; ++r) {
-    float* const to = &transmittance(0, top + r, left);
-    for (Index b = 0; b < kAcross; ++b) {
-      for (Index i = 0; i < kSide; ++i) to[b * kSide + i] = std::abs(state[b * size + r * kSide + i]);
-    }
-  }
-  for (Index k = 0; k < planes; ++k) {
-    const float* const from = state + (k + 1) * detail::kBlockPixels;
-    for (Index r = 0; r < kSide; ++r) {
-      float* const to = &channels(k, top + r, left);
-      for (Index b = 0; b < kAcross; ++b) {
-        std::memcpy(to + b * kSide, from + b * size + r * kSide, kSide * sizeof(float));
-      }
-    }
-  }
-}
-
-/// Writes the pixels of a block that lie in the image.
-void store_block(const float* state, Index left, Index top, Index width, Index height, const Array<float>& channels,
-                 const Array<float>& transmittance) {
-  constexpr Index kSide = detail::kBlockSide;
-  for (Index r = 0; r < height; ++r) {
-    for (Index i = 0; i < width; ++i) transmittance(0, top + r, left + i) = std::abs(state[r * kSide + i]);
-    for (Index k = 0; k < channels.shape.planes; ++k) {
-      std::copy_n(state + (k + 1) * detail::kBlockPixels + r * kSide, width, &channels(k, top + r, left));
-    }
-  }
-}
-
-/// Writes the blocks that a job composited.
-void store_blocks(Index side, const detail::BlockJob& job, const Array<float>& channels,
-                  const Array<float>& transmittance) {
-  constexpr Index kSide = detail::kBlockSide;
-  const Index across = side / kSide, size = (1 + channels.shape.planes) * detail::kBlockPixels;
-  const std::uint32_t whole = (1u << across) - 1;
-  for (Index y = 0; y < job.height; y += kSide) {
-    const std::uint32_t blocks = job.blocks >> (y / kSide * across) & whole;
-    const float* const state = job.state + y / kSide * across * size;
-    if (blocks == whole && across == 4 && job.width == side && y + kSide <= job.height) {
-      store_band<4>(state, job.left, job.top + y, channels, transmittance);
-      continue;
-    }
-    for (Index x = 0; x < job.width; x += kSide) {
-      if ((blocks >> (x / kSide) & 1u) == 0) continue;
-      store_block(state + x / kSide * size, job.left + x, job.top + y, std::min(kSide, job.width - x),
-                  std::min(kSide, job.height - y), channels, transmittance);
-    }
-  }
-}
-
 /// Of a tile: fragments, and the list position after the last Gaussian composited in any pixel.
 struct TileCounts {
   Index fragments, end;
-};
-
-/// What a tile composites in this run.
-struct TilePlan {
-  std::span<const TileEntry> entries;  ///< that have an adjoint, or stand still among these
-  std::span<const TileEntry> behind;   ///< that stand still behind all of them
-  Index merged = 0;                    ///< place of `entries` among the merged ones; −1: they are nowhere else
-  Index groups = 0;                    ///< (block, Gaussian) pairs of `entries`, at most
-  std::uint32_t blocks = 0;            ///< that `entries` touch
 };
 
 template <class S>
@@ -144,13 +57,11 @@ struct Composite {
   enum Output { kChannels, kTransmittance };
 
   Buffer<SplatRecord<S>> records = {};  ///< of all rows, those that stand still first
-  detail::SplatLists still = {}, moving = {};
-  Buffer<TileEntry> merged = {};
-  Buffer<TilePlan> plans = {};
-  std::vector<detail::TileLayer> layers = {};  ///< of each tile
+  detail::TilePlans planned = {};
   // What the backward pass needs of every tile.
-  Buffer<DepthKeyed> tile_last = {};    ///< the last Gaussian composited in any pixel; index −1: none
-  Buffer<Index> checkpoint_begin = {};  ///< pieces of a tile's, or a block's, pixels
+  Buffer<DepthKeyed> tile_last = {};     ///< the last Gaussian composited in any pixel; index −1: none
+  Buffer<DepthKeyed> adjoint_last = {};  ///< the same, of tiles with an adjoint; of the last backward run
+  Buffer<Index> checkpoint_begin = {};   ///< pieces of a tile's, or a block's, pixels
   Buffer<S> checkpoints = {};
   Buffer<detail::ListPosition<S>> last = {};  ///< plain kernel
   Buffer<Index> run_begin = {};               ///< block kernel
@@ -174,8 +85,8 @@ struct Composite {
   // --- Gaussians -----------------------------------------------------------------------------------------------------
 
   static bool has_still(const NodeIo<S>& io) { return io.inputs() > kStill; }
-  /// True: those that stand still are listed by themselves, once.
-  bool in_layers(const NodeIo<S>& io) const {
+  /// True: those that stand still are listed by themselves, and kept.
+  bool keeps_still(const NodeIo<S>& io) const {
     if (!has_still(io) || !view.skip.static_tiles) return false;
     for (int i = kStill; i < io.inputs(); ++i) {
       if (io.wants(i)) return false;
@@ -194,7 +105,7 @@ struct Composite {
 
   /// The state is what is made of Gaussians that stand still.
   std::uint64_t state_key(NodeIo<S>& io) const {
-    if (!in_layers(io)) return 0;
+    if (!keeps_still(io)) return 0;
     Signature key;
     for (int i = kStill; i < io.inputs(); ++i) key.add(io.version(i));
     return key.value();
@@ -205,11 +116,9 @@ struct Composite {
     records.resize(rows_of(io).count());
     settled.resize(tiles.count());
     std::fill_n(settled.data(), tiles.count(), 0u);
-    layers.resize(static_cast<std::size_t>(tiles.count()));
-    for (detail::TileLayer& layer : layers) layer.made = false;
+    planned.reset(tiles.count());
     RenderTimes times;
-    still.count = 0;
-    if (in_layers(io)) list(io, 0, still_rows(io), still, times);
+    if (keeps_still(io)) list(io, 0, still_rows(io), planned.still, times);
     still_s = watch.lap();
   }
 
@@ -243,76 +152,11 @@ struct Composite {
             detail::composite_rules<S>(view.settings)};
   }
 
-  // --- plans ---------------------------------------------------------------------------------------------------------
-
-  /// What every tile composites, and the tiles' layers placed.
-  void make_plans(const NodeIo<S>& io, const TileGrid& tiles) {
-    constexpr Index kTogether = 64;
-    plans.resize(tiles.count());
-    parallel_for(tiles.count(), kTogether, [&](Index begin, Index end) {
-      for (Index tile = begin; tile < end; ++tile) plans[tile] = plan_of(io, tile);
-    });
-    Index place = 0;
-    for (TilePlan& plan : plans.span()) {
-      if (plan.merged < 0) continue;
-      plan.merged = place;
-      place += static_cast<Index>(plan.entries.size());
-    }
-    merged.resize(place);
-  }
-
-  /// `entries` of a plan that is to be merged tells only how many they are.
-  TilePlan plan_of(const NodeIo<S>& io, Index tile) {
-    TilePlan plan;
-    plan.merged = -1;
-    const std::span<const TileEntry> moved = moving.of_tile(tile);
-    if (moved.empty()) return plan;
-    for (const TileEntry& e : moved) plan.blocks |= e.blocks;
-    if (!in_blocks(io)) plan.blocks = detail::all_blocks(view.settings.tile);
-    plan.groups = moving.lists.tile_groups[tile];
-    plan.entries = moved;
-    const std::span<const TileEntry> kept = still.of_tile(tile);
-    if (kept.empty()) return plan;
-    std::span<const TileEntry> among = kept;
-    if constexpr (std::is_same_v<S, float>) {
-      if (uses_layer(io)) {
-        detail::TileLayer& layer = layers[static_cast<std::size_t>(tile)];
-        const detail::DepthRange range = detail::depth_range(rows_of(io), view.settings, moved);
-        if (!layer.made || layer.range != range) {
-          layer.made = false;
-          layer.range = range;
-          detail::place_range(rows_of(io), view.settings, kept, layer);
-        }
-        among = among_of(kept, layer);
-        plan.behind = kept.subspan(static_cast<std::size_t>(layer.after));
-      }
-    }
-    if (among.empty()) return plan;
-    for (const TileEntry& e : among) plan.groups += std::popcount(e.blocks);
-    plan.merged = 0;
-    plan.entries = {moved.data(), moved.size() + among.size()};
-    return plan;
-  }
-  bool uses_layer(const NodeIo<S>& io) const { return in_blocks(io) && view.skip.static_layer; }
-  static std::span<const TileEntry> among_of(std::span<const TileEntry> kept, const detail::TileLayer& layer) {
-    return kept.subspan(static_cast<std::size_t>(layer.first), static_cast<std::size_t>(layer.after - layer.first));
-  }
-
-  /// Merges the entries of a plan, once its place is known.
-  void merge(const NodeIo<S>& io, Index tile) {
-    TilePlan& plan = plans[tile];
-    if (plan.merged < 0) return;
-    TileEntry* const to = merged.data() + plan.merged;
-    const std::span<const TileEntry> kept = still.of_tile(tile);
-    const bool layered = uses_layer(io);
-    detail::merge_entries(rows_of(io), view.settings,
-                          layered ? among_of(kept, layers[static_cast<std::size_t>(tile)]) : kept, moving.of_tile(tile),
-                          to);
-    plan.entries = {to, plan.entries.size()};
-  }
-
   // --- tiles ---------------------------------------------------------------------------------------------------------
 
+  detail::PlanRules plan_rules(const NodeIo<S>& io) const {
+    return {in_blocks(io), in_blocks(io) && view.skip.static_layer};
+  }
   /// True: the block kernel; else the plain one.
   static bool in_blocks(const NodeIo<S>& io) {
     return std::is_same_v<S, float> && io.in(kFeatures).shape.cols <= detail::kMostBlockChannels;
@@ -331,7 +175,7 @@ struct Composite {
     const Index pixels = tiles.tile * tiles.tile;
     TileJob<S> job{};
     place_job(tiles, tile, job);
-    job.entries = plans[tile].entries;
+    job.entries = planned.plans[tile].entries;
     job.last = last.data() + tile * pixels;
     job.checkpoints = checkpoints.size() > 0 ? checkpoints.data() + checkpoint_begin[tile] * pixels : nullptr;
     return job;
@@ -341,9 +185,9 @@ struct Composite {
   detail::BlockJob block_job_of(const TileGrid& tiles, Index tile) requires(std::is_same_v<S, float>) {
     detail::BlockJob job{};
     place_job(tiles, tile, job);
-    job.entries = plans[tile].entries;
-    job.blocks = plans[tile].blocks;
-    const detail::TileLayer& layer = layers[static_cast<std::size_t>(tile)];
+    job.entries = planned.plans[tile].entries;
+    job.blocks = planned.plans[tile].blocks;
+    const detail::TileLayer& layer = planned.layer(tile);
     job.start = layer.made && layer.first > 0 ? layer.front.data() : nullptr;
     if (runs.size() == 0) return job;
     job.runs = runs.data() + run_begin[tile];
@@ -361,9 +205,9 @@ struct Composite {
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       checkpoint_begin[tile] = place;
       run_begin[tile] = run;
-      const auto size = static_cast<Index>(plans[tile].entries.size());
+      const auto size = static_cast<Index>(planned.plans[tile].entries.size());
       if (!wanted || size == 0) continue;
-      place += blocks ? detail::checkpoints_of(side, size, plans[tile].groups) : (size - 1) / kSegment;
+      place += blocks ? detail::checkpoints_of(side, size, planned.plans[tile].groups) : (size - 1) / kSegment;
       run += detail::block_chunks(size) * across * across;
     }
     checkpoint_begin[tiles.count()] = place;
@@ -381,13 +225,13 @@ struct Composite {
 
   /// Blocks that show what moved there before, or nothing yet, and have to show what stands still.
   std::uint32_t unsettled(const TileGrid& tiles, Index tile) const {
-    return detail::all_blocks(tiles.tile) & ~plans[tile].blocks & ~settled[tile];
+    return detail::all_blocks(tiles.tile) & ~planned.plans[tile].blocks & ~settled[tile];
   }
 
   /// Brings the outputs of a tile up to date.
   TileCounts composite_tile(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* memory) {
     const std::uint32_t all = detail::all_blocks(tiles.tile);
-    const TilePlan& plan = plans[tile];
+    const detail::TilePlan& plan = planned.plans[tile];
     if constexpr (std::is_same_v<S, float>) {
       if (in_blocks(io)) {
         TileCounts counts{0, 0};
@@ -411,13 +255,13 @@ struct Composite {
     const CompositeScene<float> scene = scene_of(io);
     detail::BlockJob job{};
     place_job(tiles, tile, job);
-    job.entries = still.of_tile(tile);
+    job.entries = planned.still.of_tile(tile);
     job.blocks = blocks;
     job.state = memory;
     job.workspace = memory + 2 * detail::block_state(tiles.tile, scene.channels);
     detail::begin_blocks(tiles.tile, job.width, job.height, scene.channels, job.state);
     const Index fragments = detail::composite_blocks(tiles.tile, scene, job).fragments;
-    store_blocks(tiles.tile, job, io.out(kChannels), io.out(kTransmittance));
+    detail::store_blocks(tiles.tile, job, io.out(kChannels), io.out(kTransmittance));
     return fragments;
   }
 
@@ -426,10 +270,10 @@ struct Composite {
                               float* memory) requires(std::is_same_v<S, float>) {
     const CompositeScene<float> scene = scene_of(io);
     const Index numbers = detail::block_state(tiles.tile, scene.channels);
-    const TilePlan& plan = plans[tile];
-    detail::TileLayer& layer = layers[static_cast<std::size_t>(tile)];
-    const std::span<const TileEntry> kept = still.of_tile(tile);
-    const bool layered = uses_layer(io) && !kept.empty(), collapse = view.approx.collapse_suffix;
+    const detail::TilePlan& plan = planned.plans[tile];
+    detail::TileLayer& layer = planned.layer(tile);
+    const std::span<const TileEntry> kept = planned.still.of_tile(tile);
+    const bool layered = plan_rules(io).in_layers && !kept.empty(), collapse = view.approx.collapse_suffix;
     detail::BlockJob job = block_job_of(tiles, tile);
     job.state = memory;
     job.workspace = memory + 2 * numbers;
@@ -449,7 +293,7 @@ struct Composite {
     if (!plan.behind.empty()) {
       fragments += detail::composite_behind(tiles.tile, scene, job, plan.behind, collapse, memory + numbers, layer);
     }
-    store_blocks(tiles.tile, job, io.out(kChannels), io.out(kTransmittance));
+    detail::store_blocks(tiles.tile, job, io.out(kChannels), io.out(kTransmittance));
     return {fragments, counts.end};
   }
 
@@ -460,16 +304,16 @@ struct Composite {
     TileJob<S> job = job_of(tiles, tile);
     const bool moves = !job.entries.empty();
     if (!moves) {
-      job.entries = still.of_tile(tile);
+      job.entries = planned.still.of_tile(tile);
       job.checkpoints = nullptr;
     }
     job.transmittance = memory;
     job.channels = memory + pixels;
     const Index fragments = detail::composite_tile(tiles.tile, scene, job);
     for (Index r = 0; r < job.height; ++r) {
-      copy_row(job.transmittance + r * tiles.tile, job.width, &transmittance(job.top + r, job.left));
+      detail::copy_row(job.transmittance + r * tiles.tile, job.width, &transmittance(job.top + r, job.left));
       for (Index k = 0; k < scene.channels; ++k) {
-        copy_row(job.channels + k * pixels + r * tiles.tile, job.width, &image(k, job.top + r, job.left));
+        detail::copy_row(job.channels + k * pixels + r * tiles.tile, job.width, &image(k, job.top + r, job.left));
       }
     }
     return {fragments, moves ? static_cast<Index>(*std::max_element(job.last, job.last + pixels)) : 0};
@@ -477,10 +321,10 @@ struct Composite {
 
   void forward(NodeIo<S>& io) {
     const TileGrid tiles = grid();
-    const Index second = in_layers(io) ? still_rows(io) : 0, rows = rows_of(io).count();
-    list(io, second, rows - second, moving, counters->times);
+    const Index second = keeps_still(io) ? still_rows(io) : 0, rows = rows_of(io).count();
+    list(io, second, rows - second, planned.moving, counters->times);
     Stopwatch watch;
-    make_plans(io, tiles);
+    planned.plan(rows_of(io), view.settings, tiles, plan_rules(io));
     place_kept(io, tiles);
     tile_counts.resize(tiles.count());
     tile_last.resize(tiles.count());
@@ -488,7 +332,7 @@ struct Composite {
       std::fill_n(settled.data(), tiles.count(), 0u);
       written = io.out(kChannels).data;
     }
-    *counters = counters_before(tiles, uses_layer(io));
+    *counters = counters_before(tiles, plan_rules(io).in_layers);
     counters->times.still_s = std::exchange(still_s, 0.0);
     Workspaces workspaces(tiles.count());
     const Index size = forward_memory(io, tiles.tile);
@@ -496,13 +340,13 @@ struct Composite {
     run_chunks(tiles.count(), [&](Index tile) {
       tile_counts[tile] = {0, 0};
       tile_last[tile] = {0, -1};
-      if (plans[tile].entries.empty() && settled[tile] == detail::all_blocks(tiles.tile)) return;
+      if (planned.plans[tile].entries.empty() && settled[tile] == detail::all_blocks(tiles.tile)) return;
       const Workspaces::Held held(workspaces);
-      merge(io, tile);
+      planned.merge(rows_of(io), view.settings, plan_rules(io), tile);
       tile_counts[tile] = composite_tile(io, tiles, tile, memory.data() + held.number() * size);
       const Index end = tile_counts[tile].end;
       if (end == 0) return;
-      const std::int32_t index = plans[tile].entries[static_cast<std::size_t>(end - 1)].index;
+      const std::int32_t index = planned.plans[tile].entries[static_cast<std::size_t>(end - 1)].index;
       tile_last[tile] = {rows_of(io).key(view.settings, index), index};
     });
     counters->times.forward_s = watch.lap();
@@ -516,21 +360,23 @@ struct Composite {
   RenderCounters counters_before(const TileGrid& tiles, bool layered) const {
     RenderCounters result;
     result.times = counters->times;
-    for (const detail::SplatLists* part : {&still, &moving}) {
+    result.kept_bytes = checkpoints.size() * static_cast<Index>(sizeof(S)) +
+                        runs.size() * static_cast<Index>(sizeof(detail::BlockRun)) +
+                        last.size() * static_cast<Index>(sizeof(detail::ListPosition<S>));
+    for (const detail::SplatLists* part : {&planned.still, &planned.moving}) {
       for (Index i = 0; i < part->count; ++i) {
         const TileLists::Slots slots = part->lists.slots[i];
         result.visible += slots.end > slots.begin ? 1 : 0;
       }
     }
     for (Index tile = 0; tile < tiles.count(); ++tile) {
-      const TilePlan& plan = plans[tile];
-      const auto kept = static_cast<Index>(still.of_tile(tile).size());
+      const detail::TilePlan& plan = planned.plans[tile];
+      const auto kept = static_cast<Index>(planned.still.of_tile(tile).size());
       const bool moves = !plan.entries.empty(), restored = kept > 0 && unsettled(tiles, tile) != 0;
-      result.tiles += moves || kept > 0 ? 1 : 0;
-      result.rendered += moves || restored ? 1 : 0;
+      result.tiles += moves || restored ? 1 : 0;
       result.groups += plan.groups;
       result.pairs += static_cast<Index>(plan.entries.size() + plan.behind.size()) + (restored ? kept : 0);
-      result.layers += layered && moves && kept > 0 && !layers[static_cast<std::size_t>(tile)].made ? 1 : 0;
+      result.layers += layered && moves && kept > 0 && !planned.layer(tile).made ? 1 : 0;
     }
     return result;
   }
@@ -547,9 +393,8 @@ struct Composite {
       if (in_blocks(io)) {
         detail::BlockJob job = block_job_of(tiles, tile);
         job.workspace = d_transmittance + pixels;
-        if (!plans[tile].behind.empty()) {
-          detail::see_behind(tiles.tile, scene.channels, job.blocks, layers[static_cast<std::size_t>(tile)], d_channels,
-                             d_transmittance);
+        if (!planned.plans[tile].behind.empty()) {
+          detail::see_behind(tiles.tile, scene.channels, job.blocks, planned.layer(tile), d_channels, d_transmittance);
         }
         detail::composite_blocks_adjoint(
             tiles.tile, scene, job,
@@ -572,6 +417,23 @@ struct Composite {
     return (channels + 1) * pixels + work;
   }
 
+  /// d_channels and d_T of a tile's pixels, zero past the image's border.
+  static void load_cotangent(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* d_channels) {
+    const ConstArray<S> d_image = io.d_out(kChannels), d_transmittance = io.d_out(kTransmittance);
+    const Index pixels = tiles.tile * tiles.tile, channels = io.in(kFeatures).shape.cols;
+    TileJob<S> place{};
+    place_job(tiles, tile, place);
+    std::fill_n(d_channels, (channels + 1) * pixels, S(0));
+    for (Index r = 0; r < place.height; ++r) {
+      S* const to = d_channels + r * tiles.tile;
+      for (Index k = 0; d_image && k < channels; ++k) {
+        detail::copy_row(&d_image(k, place.top + r, place.left), place.width, to + k * pixels);
+      }
+      if (!d_transmittance) continue;
+      detail::copy_row(&d_transmittance(place.top + r, place.left), place.width, to + channels * pixels);
+    }
+  }
+
   void backward(NodeIo<S>& io) {
     if (!wants_gradient(io)) return;
     Stopwatch watch;
@@ -581,31 +443,26 @@ struct Composite {
     shared.wants_shape = wants_shape(io);
     shared.wants_features = wants_features(io);
     shared.stride = stride_of(io);
-    shared.sums = io.scratch(shared.stride * moving.lists.pairs()).data();
-    const ConstArray<S> d_image = io.d_out(kChannels), d_transmittance = io.d_out(kTransmittance);
+    shared.sums = io.scratch(shared.stride * planned.moving.lists.pairs()).data();
     Workspaces workspaces(tiles.count());
     const Index size = backward_memory(io, tiles);
     const std::span<S> memory = io.scratch(size * workspaces.count());
+    adjoint_last.resize(tiles.count());
     run_chunks(tiles.count(), [&](Index tile) {
+      adjoint_last[tile] = {0, -1};
       if (tile_counts[tile].end == 0) return;
       const Workspaces::Held held(workspaces);
       S* const d_channels = memory.data() + held.number() * size;
-      TileJob<S> place{};
-      place_job(tiles, tile, place);
-      std::fill_n(d_channels, (channels + 1) * pixels, S(0));
-      for (Index r = 0; r < place.height; ++r) {
-        for (Index k = 0; d_image && k < channels; ++k) {
-          copy_row(&d_image(k, place.top + r, place.left), place.width, d_channels + k * pixels + r * tiles.tile);
-        }
-        if (d_transmittance) {
-          copy_row(&d_transmittance(place.top + r, place.left), place.width,
-                   d_channels + channels * pixels + r * tiles.tile);
-        }
-      }
+      load_cotangent(io, tiles, tile, d_channels);
+      const auto is_zero = [](S x) { return x == S(0); };
+      if (view.skip.zero_cotangent && std::all_of(d_channels, d_channels + (channels + 1) * pixels, is_zero)) return;
+      adjoint_last[tile] = tile_last[tile];
       tile_adjoint(io, tiles, tile, shared, d_channels);
     });
     counters->times.backward_s = watch.lap();
-    parallel_for(moving.count, kGrain, [&](Index begin, Index end) {
+    counters->adjoint_tiles = std::count_if(adjoint_last.data(), adjoint_last.data() + tiles.count(),
+                                            [](const DepthKeyed& end) { return end.index >= 0; });
+    parallel_for(planned.moving.count, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
         const detail::SplatRows<S> rows = rows_of(io);
         for (Index i = begin; i < end; ++i) gather_gaussian(io, rows, shared, i);
@@ -614,9 +471,10 @@ struct Composite {
     counters->times.reduce_s = watch.lap();
   }
 
-  /// True if the Gaussian does not come after the last one of a tile that is composited.
+  /// True if a Gaussian's pair with a tile has an adjoint: it does not come after the last one that is composited
+  /// there.
   bool reached(Index tile, std::uint64_t key, Index n) const {
-    const DepthKeyed& end = tile_last[tile];
+    const DepthKeyed& end = adjoint_last[tile];
     return end.index >= 0 && (key < end.key || (key == end.key && n <= end.index));
   }
 
@@ -626,9 +484,9 @@ struct Composite {
   void gather_gaussian(NodeIo<S>& io, const detail::SplatRows<S>& rows, const TileAdjoint<S>& adjoint, Index i) const {
     constexpr Index kTogether = 16;  // numbers of a slot; with up to ten features it is read once
     static_assert(kMoments <= kTogether);
-    const TileLists::Slots slots = moving.lists.slots[i];
+    const TileLists::Slots slots = planned.moving.lists.slots[i];
     if (slots.begin == slots.end) return;
-    const Index n = moving.first + i, row = rows.in_set(n);
+    const Index n = planned.moving.first + i, row = rows.in_set(n);
     const int inputs = n < rows.second ? static_cast<int>(kStill) : 0;
     const std::uint64_t key = rows.key(view.settings, n);
     const Index first_feature = adjoint.wants_shape || in_blocks(io) ? kMoments : 0;
@@ -638,7 +496,7 @@ struct Composite {
       double totals[kTogether] = {};
       bool any = false;
       for (Index slot = slots.begin; slot < static_cast<Index>(slots.end); ++slot) {
-        if (!reached(moving.lists.tile_of(slot), key, n)) continue;
+        if (!reached(planned.moving.lists.tile_of(slot), key, n)) continue;
         any = true;
         const S* const sums = adjoint.sums + slot * adjoint.stride + k;
         for (Index j = 0; j < count; ++j) totals[j] += static_cast<double>(sums[j]);
@@ -698,7 +556,7 @@ struct Composite {
     const CompositeRules<S> rules = detail::composite_rules<S>(view.settings);
     std::vector<TileEntry> entries;
     for (Index tile = 0; tile < tiles.count(); ++tile) {
-      const std::span<const TileEntry> kept = still.of_tile(tile), moved = moving.of_tile(tile);
+      const std::span<const TileEntry> kept = planned.still.of_tile(tile), moved = planned.moving.of_tile(tile);
       entries.resize(kept.size() + moved.size());
       detail::merge_entries(rows_of(io), view.settings, kept, moved, entries.data());
       TileJob<S> place{};
@@ -723,13 +581,10 @@ struct Composite {
   }
 
   Index saved_bytes() const {
-    Index bytes = records.capacity_bytes() + still.capacity_bytes() + moving.capacity_bytes() +
-                  merged.capacity_bytes() + plans.capacity_bytes() + tile_last.capacity_bytes() +
-                  checkpoint_begin.capacity_bytes() + checkpoints.capacity_bytes() + last.capacity_bytes() +
-                  run_begin.capacity_bytes() + runs.capacity_bytes() + tile_counts.capacity_bytes() +
-                  settled.capacity_bytes();
-    for (const detail::TileLayer& layer : layers) bytes += layer.capacity_bytes();
-    return bytes;
+    return records.capacity_bytes() + planned.capacity_bytes() + tile_last.capacity_bytes() +
+           adjoint_last.capacity_bytes() + checkpoint_begin.capacity_bytes() + checkpoints.capacity_bytes() +
+           last.capacity_bytes() + run_begin.capacity_bytes() + runs.capacity_bytes() + tile_counts.capacity_bytes() +
+           settled.capacity_bytes();
   }
 };
 

@@ -13,14 +13,15 @@ struct RenderTimes {
 
 /// What the last runs did.
 struct RenderCounters {
-  Index visible = 0;    ///< Gaussians that reach a tile
-  Index pairs = 0;      ///< (tile, Gaussian) that were looked at
-  Index groups = 0;     ///< (block of 4×4 pixels, Gaussian) that may touch, of those with an adjoint or among them
-  Index fragments = 0;  ///< (pixel, Gaussian) that were composited
-  Index tiles = 0;      ///< tiles that a Gaussian reaches
-  Index reached = 0;    ///< pairs up to the last one of each tile that is composited: those that have an adjoint
-  Index rendered = 0;   ///< tiles of which something was rendered
-  Index layers = 0;     ///< tiles whose static layer was made anew
+  Index visible = 0;        ///< Gaussians that reach a tile
+  Index pairs = 0;          ///< (tile, Gaussian) that were looked at
+  Index groups = 0;         ///< (block of 4×4 pixels, Gaussian) that may touch, of those with an adjoint or among them
+  Index fragments = 0;      ///< (pixel, Gaussian) that were composited
+  Index tiles = 0;          ///< tiles of which something was composited
+  Index reached = 0;        ///< pairs up to the last one of each tile that is composited: those that have an adjoint
+  Index layers = 0;         ///< tiles whose static layer was made anew
+  Index adjoint_tiles = 0;  ///< tiles that the backward run visited
+  Index kept_bytes = 0;     ///< of the pixels, from forward to backward, beside the outputs
   RenderTimes times;
 };
 

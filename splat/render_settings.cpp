@@ -50,6 +50,7 @@ void describe(ConfigFields& f, RenderSkips& s) {
   f.boolean("static_layer", s.static_layer,
             "Composite what stands in front of all that moves once, and leave it and what stands behind out of the "
             "backward pass");
+  f.boolean("zero_cotangent", s.zero_cotangent, "Leave tiles out of the backward pass where the loss sees nothing");
 }
 
 void describe(ConfigFields& f, RenderApproximations& s) {

@@ -77,6 +77,8 @@ struct RenderSkips {
   /// Of Gaussians that stand still, those in front of all that moves in a tile are composited once, and the adjoint
   /// visits neither these nor those behind. Needs static_tiles.
   bool static_layer = true;
+  /// The adjoint leaves out tiles whose cotangent is zero, as where a mask makes a loss blind.
+  bool zero_cotangent = true;
 };
 
 /// What changes the result a little: config section `approx`.

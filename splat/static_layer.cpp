@@ -20,8 +20,7 @@ std::uint64_t key_of(const RenderSettings& settings, double depth) {
 
 Index state_of_block(Index channels) { return (1 + channels) * kBlockPixels; }
 
-}  // namespace
-
+/// The range that holds what moves.
 DepthRange depth_range(const SplatRows<float>& rows, const RenderSettings& settings,
                        std::span<const TileEntry> moving) {
   const auto depth = [&](const TileEntry& e) { return depth_of(rows.set_of(e.index), rows.in_set(e.index)); };
@@ -35,6 +34,7 @@ DepthRange depth_range(const SplatRows<float>& rows, const RenderSettings& setti
   return range;
 }
 
+/// Positions of those that lie in the range.
 void place_range(const SplatRows<float>& rows, const RenderSettings& settings, std::span<const TileEntry> still,
                  TileLayer& layer) {
   layer.first = 0;
@@ -47,6 +47,17 @@ void place_range(const SplatRows<float>& rows, const RenderSettings& settings, s
   const auto after = std::partition_point(first, still.end(), [&](const auto& e) { return key(e) <= far; });
   layer.first = first - still.begin();
   if (settings.alpha_cap < 1) layer.after = after - still.begin();  // else T can be 0, and nothing is relative to it
+}
+
+}  // namespace
+
+void place_layer(const SplatRows<float>& rows, const RenderSettings& settings, std::span<const TileEntry> still,
+                 std::span<const TileEntry> moving, TileLayer& layer) {
+  const DepthRange range = depth_range(rows, settings, moving);
+  if (layer.made && layer.range == range) return;
+  layer.made = false;
+  layer.range = range;
+  place_range(rows, settings, still, layer);
 }
 
 template <class S>

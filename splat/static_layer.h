@@ -29,11 +29,6 @@ struct DepthRange {
   bool operator==(const DepthRange&) const = default;
 };
 
-/// The range that holds what moves in a tile.
-///
-/// @param moving  in depth order, not empty
-DepthRange depth_range(const SplatRows<float>& rows, const RenderSettings& settings, std::span<const TileEntry> moving);
-
 /// What is kept of a tile.
 struct TileLayer {
   DepthRange range;
@@ -46,9 +41,11 @@ struct TileLayer {
   Index capacity_bytes() const { return front.capacity_bytes() + collapsed.capacity_bytes() + seen.capacity_bytes(); }
 };
 
-/// Positions in a tile's list of those that lie in a range: `first` and `after` of the layer.
-void place_range(const SplatRows<float>& rows, const RenderSettings& settings, std::span<const TileEntry> still,
-                 TileLayer& layer);
+/// Finds the range of what moves in a tile and, when it is not the layer's, the cut; the layer has to be made then.
+///
+/// @param still, moving  of the tile, in depth order; not empty
+void place_layer(const SplatRows<float>& rows, const RenderSettings& settings, std::span<const TileEntry> still,
+                 std::span<const TileEntry> moving, TileLayer& layer);
 
 /// Merges two lists that are in depth order; those of `still` get no slot.
 template <class S>

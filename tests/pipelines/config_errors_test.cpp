@@ -28,7 +28,8 @@ std::string fault(const std::string& text, const std::vector<std::string>& overr
 }
 
 const std::string kSections =
-    "name, seed, threads, precision, rotations, background, camera, data, synthetic, render, stages";
+    "name, seed, threads, precision, rotations, background, camera, data, synthetic, render, skip, "
+    "approx, stages";
 
 // A config with one stage, `inside` its braces.
 std::string stage(const std::string& inside) { return "{\"stages\": {\"camera\": {\n" + inside + "}}}"; }

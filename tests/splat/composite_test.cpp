@@ -232,3 +232,27 @@ TEST_CASE("shapes that do not fit are refused") {
   CHECK_THROWS_AS(composite<float>({v(3, 2), v(3, 6), v(3, 1), v(3, 1), v(3, 2)}, v(3, 1), v(3, 3), odd),
                   InternalError);
 }
+
+TEST_CASE("tiles without a cotangent are left out of the adjoint, which keeps its bits") {
+  const FlatSplats splats = random_flat(600, 100, 60, 3, 21);
+  SplatView all = view_of_size(100, 60, {}), some = all;
+  all.skip.zero_cotangent = false;
+  Flat<float> full(splats, all), skipped(splats, some);
+  std::vector<float> cotangent(3 * 100 * 60, 0.0f);
+  for (std::size_t i = 0; i < cotangent.size(); ++i) {
+    if (i % 100 < 40) cotangent[i] = std::sin(static_cast<float>(i));
+  }
+  for (int i = 0; i < 2; ++i) {  // the second time with what is left of the first
+    full.backward(cotangent);
+    skipped.backward(cotangent);
+    for (const auto var : {0, 1, 2, 3}) {
+      const auto of = [var](Flat<float>& f) {
+        return f.d(std::array{f.means, f.factors, f.opacities, f.features}[var]);
+      };
+      CHECK(of(skipped) == of(full));
+    }
+    CHECK(full.out.counters->adjoint_tiles == 7 * 4);
+    CHECK(skipped.out.counters->adjoint_tiles == 3 * 4);
+    std::fill(cotangent.begin(), cotangent.begin() + 100 * 60, 0.0f);
+  }
+}
