@@ -241,26 +241,31 @@ HWY_NOINLINE void pack_splat(const SplatRecord<float>& r, const double* center, 
 
 /// Packs the Gaussians of a chunk and their features; only those that may touch one of the blocks asked for.
 template <int kChannels>
-Chunk pack_chunk(Index side, const CompositeScene<float>& scene, const BlockJob& job, Index number,
-                 std::uint32_t blocks, const BlockWorkspace& space) {
+Chunk pack_chunk(Index side, const CompositeScene<float>& all, const BlockJob& job, Index number, std::uint32_t blocks,
+                 const BlockWorkspace& workspace) {
+  // Copies, whose pointers need not be read again after each number that is written.
+  const CompositeScene<float> scene = all;
+  const BlockWorkspace space = workspace;
   const Index channels = kChannels > 0 ? kChannels : scene.channels;
   const auto begin = static_cast<size_t>(number * kBlockChunk);
   Chunk chunk{job.entries.subspan(begin, std::min(job.entries.size() - begin, static_cast<size_t>(kBlockChunk)))};
   const double center[2] = {static_cast<double>(job.left) + static_cast<double>(side) / 2,
                             static_cast<double>(job.top) + static_cast<double>(side) / 2};
   const float near_cap = std::log2(scene.rules.alpha_cap) - 1e-5f;
-  const size_t size = chunk.entries.size();
+  const std::span<const TileEntry> entries = chunk.entries;
+  const size_t size = entries.size();
   bool general = scene.rules.exclusive;
   constexpr size_t kAhead = 12;
   for (size_t at = 0; at < size; ++at) {
-    if (at + kAhead < size && (chunk.entries[at + kAhead].blocks & blocks) != 0) {
-      const auto next = chunk.entries[at + kAhead].index;
+    if (at + kAhead < size && (entries[at + kAhead].blocks & blocks) != 0) {
+      const auto next = entries[at + kAhead].index;
       hwy::Prefetch(&scene.records[static_cast<size_t>(next)]);  // one cache line
       hwy::Prefetch(scene.feature(next));
     }
-    space.blocks[at] = static_cast<std::int32_t>(chunk.entries[at].blocks & blocks);
-    if (space.blocks[at] == 0) continue;
-    const std::int32_t index = chunk.entries[at].index;
+    const std::uint32_t touched = entries[at].blocks & blocks;
+    space.blocks[at] = static_cast<std::int32_t>(touched);
+    if (touched == 0) continue;
+    const std::int32_t index = entries[at].index;
     const SplatRecord<float>& r = scene.records[static_cast<size_t>(index)];
     pack_splat(r, center, space.packed[at]);
     general |= r.log2_opacity > near_cap;

@@ -56,16 +56,6 @@ Extent square_extent(const Conic& conic, double x, double y, const TileGrid& gri
 
 // --- order -----------------------------------------------------------------------------------------------------------
 
-std::uint64_t depth_bits(float depth) {
-  const std::uint32_t bits = std::bit_cast<std::uint32_t>(depth + 0.0f);  // −0 + 0 = 0
-  return bits ^ (bits >> 31 != 0 ? 0xFFFFFFFFu : 0x80000000u);
-}
-
-std::uint64_t depth_bits(double depth) {
-  const std::uint64_t bits = std::bit_cast<std::uint64_t>(depth + 0.0);
-  return bits ^ (bits >> 63 != 0 ? ~std::uint64_t(0) : std::uint64_t(1) << 63);
-}
-
 namespace {
 
 /// Numbers of a radix's digits, turned into the places of the first of each.
@@ -75,17 +65,19 @@ void places_of(Count& counts) {
   for (std::uint32_t& c : counts) sum += std::exchange(c, sum);
 }
 
-/// Sorts by the difference from the least key, of 32 bits: packed with the index into one word, two or three digits.
+/// Sorts by the difference from the least key, of 32 bits: packed with the index into one word, up to
+/// three digits.
 void sort_near_keys(std::span<DepthKeyed> keys, std::span<DepthKeyed> room, std::uint64_t least, std::uint64_t most) {
-  constexpr int kDigit = 12;
-  constexpr std::size_t kValues = std::size_t(1) << kDigit;
-  const int bits = static_cast<int>(std::bit_width(most - least)), digits = (bits + kDigit - 1) / kDigit;
-  std::array<std::array<std::uint32_t, kValues>, 3> place;
+  constexpr int kMostBits = 11;  // of a digit: few enough places that all of them stay in the first-level cache
+  const int bits = static_cast<int>(std::bit_width(most - least)), digits = (bits + kMostBits - 1) / kMostBits;
+  const int width = (bits + digits - 1) / digits;
+  const std::uint64_t mask = (std::uint64_t(1) << width) - 1;
+  std::array<std::array<std::uint32_t, std::size_t(1) << kMostBits>, 3> place;
   for (int i = 0; i < digits; ++i) place[static_cast<std::size_t>(i)].fill(0);
   static_assert(sizeof(DepthKeyed) == 2 * sizeof(std::uint64_t));
   std::uint64_t *from = reinterpret_cast<std::uint64_t*>(room.data()), *to = from + keys.size();
-  const auto digit = [](std::uint64_t word, int i) {
-    return static_cast<std::size_t>(word >> (32 + i * kDigit)) % kValues;
+  const auto digit = [&](std::uint64_t word, int i) {
+    return static_cast<std::size_t>(word >> (32 + i * width) & mask);
   };
   for (std::size_t n = 0; n < keys.size(); ++n) {
     const std::uint64_t word = (keys[n].key - least) << 32 | static_cast<std::uint32_t>(keys[n].index);

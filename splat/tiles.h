@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -127,8 +128,15 @@ inline Extent extent_of(const Conic& conic, double x, double y, double opacity, 
 // --- order -----------------------------------------------------------------------------------------------------------
 
 /// Bits whose order as whole numbers is that of the depths (row B9: all signs, −0 as 0).
-std::uint64_t depth_bits(float depth);
-std::uint64_t depth_bits(double depth);
+inline std::uint64_t depth_bits(float depth) {
+  const std::uint32_t bits = std::bit_cast<std::uint32_t>(depth + 0.0f);  // −0 + 0 = 0
+  return bits ^ (bits >> 31 != 0 ? 0xFFFFFFFFu : 0x80000000u);
+}
+
+inline std::uint64_t depth_bits(double depth) {
+  const std::uint64_t bits = std::bit_cast<std::uint64_t>(depth + 0.0);
+  return bits ^ (bits >> 63 != 0 ? ~std::uint64_t(0) : std::uint64_t(1) << 63);
+}
 
 struct DepthKeyed {
   std::uint64_t key;
