@@ -1,8 +1,11 @@
 #include "splat/static_layer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+
+#include "core/simd.h"
 
 namespace hsi4d::detail {
 
@@ -98,52 +101,84 @@ Index make_layer(Index side, const CompositeScene<float>& scene, BlockJob job, s
   return fragments;
 }
 
+namespace {
+
+/// Calls f(block) for the blocks of a set.
+template <class F>
+void for_each_block(std::uint32_t blocks, const F& f) {
+  for (; blocks != 0; blocks &= blocks - 1) f(static_cast<Index>(std::countr_zero(blocks)));
+}
+
+/// Adds what is behind a block to its state, and tells what of it is seen.
+///
+/// @param own    T and channels of what is behind: over the state's T, or with `collapse` over 1
+/// @param state  T and channels, in: behind what moves, out: behind everything
+void add_behind(const float* own, Index channels, float stop, bool collapse, float* state, float* seen) {
+  float relative[kBlockPixels], absolute[kBlockPixels];  // factors of `own`; 0 where a pixel is finished
+  for (Index p = 0; p < kBlockPixels; ++p) {
+    const float front = state[p];
+    const bool alive = front >= stop && front > 0;
+    relative[p] = alive ? (collapse ? 1.0f : 1 / front) : 0.0f;
+    absolute[p] = alive ? (collapse ? front : 1.0f) : 0.0f;
+    seen[p] = alive ? std::abs(own[p]) * relative[p] : 1.0f;
+    state[p] = alive ? own[p] * absolute[p] : front;
+  }
+  for (Index k = 1; k <= channels; ++k) {
+    for (Index p = 0; p < kBlockPixels; ++p) {
+      const Index at = k * kBlockPixels + p;
+      seen[at] = own[at] * relative[p];
+      state[at] += own[at] * absolute[p];
+    }
+  }
+}
+
+}  // namespace
+
 Index composite_behind(Index side, const CompositeScene<float>& scene, const BlockJob& job,
                        std::span<const TileEntry> behind, bool collapse, float* memory, TileLayer& layer) {
-  const Index size = state_of_block(scene.channels), numbers = block_state(side, scene.channels);
-  const float* own = layer.collapsed.data();  // T and channels of what is behind
+  const Index size = state_of_block(scene.channels);
+  const float* own = layer.collapsed.data();
   Index fragments = 0;
   if (!collapse) {
     BlockJob rest = job;
     rest.entries = behind;
     rest.state = memory;
     rest.runs = nullptr;
-    for (Index i = 0; i < numbers; ++i) memory[i] = i % size < kBlockPixels ? job.state[i] : 0.0f;
+    for_each_block(job.blocks, [&](Index b) {
+      std::copy_n(job.state + b * size, kBlockPixels, memory + b * size);
+      std::fill_n(memory + b * size + kBlockPixels, size - kBlockPixels, 0.0f);
+    });
     fragments = composite_blocks(side, scene, rest).fragments;
     own = memory;
   }
-  for (Index i = 0; i < numbers; i += size) {
-    if ((job.blocks >> (i / size) & 1u) == 0) continue;
-    for (Index p = i; p < i + kBlockPixels; ++p) {
-      const float front = job.state[p];  // T behind what moves
-      const bool alive = front >= scene.rules.stop_below && front > 0;
-      // What is seen behind is own/front, or own itself when it was composited as if nothing were in front of it.
-      const float relative = collapse ? 1.0f : 1 / front, absolute = collapse ? front : 1.0f;
-      layer.seen[p] = alive ? std::abs(own[p]) * relative : 1.0f;
-      if (alive) job.state[p] = own[p] * absolute;
-      for (Index k = 1; k <= scene.channels; ++k) {
-        const Index at = p + k * kBlockPixels;
-        layer.seen[at] = alive ? own[at] * relative : 0.0f;
-        if (alive) job.state[at] += own[at] * absolute;
-      }
-    }
-  }
+  on_best_isa([&] {
+    for_each_block(job.blocks, [&](Index b) {
+      add_behind(own + b * size, scene.channels, scene.rules.stop_below, collapse, job.state + b * size,
+                 layer.seen.data() + b * size);
+    });
+  });
   return fragments;
 }
 
 void see_behind(Index side, Index channels, std::uint32_t blocks, const TileLayer& layer, const float* d_channels,
                 float* behind) {
   const Index across = side / kBlockSide;
-  for (Index b = 0; b < across * across; ++b) {
-    if ((blocks >> b & 1u) == 0) continue;
-    const float* const seen = layer.seen.data() + b * state_of_block(channels);
-    for (Index i = 0; i < kBlockPixels; ++i) {
-      const Index p = (b / across * kBlockSide + i / kBlockSide) * side + b % across * kBlockSide + i % kBlockSide;
-      float sum = behind[p] * seen[i];
-      for (Index k = 0; k < channels; ++k) sum += d_channels[k * side * side + p] * seen[(k + 1) * kBlockPixels + i];
-      behind[p] = sum;
-    }
-  }
+  on_best_isa([&] {
+    for_each_block(blocks, [&](Index b) {
+      const float* const seen = layer.seen.data() + b * state_of_block(channels);
+      for (Index r = 0; r < kBlockSide; ++r) {
+        const Index p = (b / across * kBlockSide + r) * side + b % across * kBlockSide;
+        float sum[kBlockSide];
+        for (Index c = 0; c < kBlockSide; ++c) sum[c] = behind[p + c] * seen[r * kBlockSide + c];
+        for (Index k = 0; k < channels; ++k) {
+          const float* const d = d_channels + k * side * side + p;
+          const float* const of = seen + (k + 1) * kBlockPixels + r * kBlockSide;
+          for (Index c = 0; c < kBlockSide; ++c) sum[c] += d[c] * of[c];
+        }
+        std::copy_n(sum, kBlockSide, behind + p);
+      }
+    });
+  });
 }
 
 }  // namespace hsi4d::detail

@@ -103,7 +103,7 @@ TEST_CASE("a supersampled image in bands is the large image averaged") {
   CHECK_THROWS_AS(supersampled(figure, view, 0), InternalError);
 }
 
-TEST_CASE("with a small blur antialias keeps a figure's width to 0.05 px; with 0.3 it does not, and without it less") {
+TEST_CASE("with a small blur antialias keeps a figure's width to 0.05 px, with 0.3 it does not") {
   const Judge judge(1000, 128);
   const SilhouetteError small = judge.error(kSharpBlur, true), plain = judge.error(0.3, false),
                         wide = judge.error(0.3, true);
