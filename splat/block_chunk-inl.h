@@ -196,8 +196,18 @@ HWY_INLINE Blended composite_one(const BlockWorkspace& space, const PackedSplat&
 
 struct Chunk {
   std::span<const TileEntry> entries;
+  bool near_cap = false;  ///< some α may reach the cap
   Form form = Form::kPlain;
 };
+
+inline Form form_of(const CompositeRules<float>& rules, bool near_cap) {
+  return wants_exact(rules) ? Form::kExact : near_cap || rules.exclusive ? Form::kCapped : Form::kPlain;
+}
+
+std::span<const TileEntry> entries_of_chunk(const BlockJob& job, Index number) {
+  const auto begin = static_cast<size_t>(number * kBlockChunk);
+  return job.entries.subspan(begin, std::min(job.entries.size() - begin, static_cast<size_t>(kBlockChunk)));
+}
 
 #if HWY_CAP_GE256
 /// The numbers of a Gaussian in one vector, in double where the mean takes part. Vectors are rounded to float where it
@@ -247,14 +257,12 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& all, const BlockJob& j
   const CompositeScene<float> scene = all;
   const BlockWorkspace space = workspace;
   const Index channels = kChannels > 0 ? kChannels : scene.channels;
-  const auto begin = static_cast<size_t>(number * kBlockChunk);
-  Chunk chunk{job.entries.subspan(begin, std::min(job.entries.size() - begin, static_cast<size_t>(kBlockChunk)))};
+  Chunk chunk{entries_of_chunk(job, number)};
   const double center[2] = {static_cast<double>(job.left) + static_cast<double>(side) / 2,
                             static_cast<double>(job.top) + static_cast<double>(side) / 2};
-  const float near_cap = std::log2(scene.rules.alpha_cap) - 1e-5f;
+  const float cap = std::log2(scene.rules.alpha_cap) - 1e-5f;
   const std::span<const TileEntry> entries = chunk.entries;
   const size_t size = entries.size();
-  bool general = scene.rules.exclusive;
   constexpr size_t kAhead = 12;
   for (size_t at = 0; at < size; ++at) {
     if (at + kAhead < size && (entries[at + kAhead].blocks & blocks) != 0) {
@@ -268,7 +276,7 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& all, const BlockJob& j
     const std::int32_t index = entries[at].index;
     const SplatRecord<float>& r = scene.records[static_cast<size_t>(index)];
     pack_splat(r, center, space.packed[at]);
-    general |= r.log2_opacity > near_cap;
+    chunk.near_cap |= r.log2_opacity > cap;
     const float* const feature = scene.feature(index);
     float* const to = space.features + static_cast<Index>(at) * channels;
     for (Index k = 0; k < channels; ++k) to[k] = feature[k];
@@ -276,8 +284,18 @@ Chunk pack_chunk(Index side, const CompositeScene<float>& all, const BlockJob& j
   std::fill_n(space.blocks + size, 16, 0);
   space.packed[size] = {0, 0, 0, -1e4f, 0, 0, 0, 0};
   std::fill_n(space.features + static_cast<Index>(size) * channels, channels, 0.0f);
-  chunk.form = wants_exact(scene.rules) ? Form::kExact : general ? Form::kCapped : Form::kPlain;
+  chunk.form = form_of(scene.rules, chunk.near_cap);
   return chunk;
+}
+
+/// Points `space` at a chunk that was packed before.
+Chunk packed_chunk(const CompositeScene<float>& scene, const BlockJob& job, Index number, BlockWorkspace& space) {
+  const Index begin = PackedBlocks::begin(number);
+  // Forward only reads them.
+  space.packed = reinterpret_cast<PackedSplat*>(const_cast<float*>(job.packed->splats.data()) + begin * 8);
+  space.blocks = const_cast<std::int32_t*>(job.packed->blocks.data()) + begin;
+  space.features = const_cast<float*>(job.packed->features.data()) + begin * scene.channels;
+  return {entries_of_chunk(job, number), job.packed->near_cap, form_of(scene.rules, job.packed->near_cap)};
 }
 
 /// Positions in the chunk of the Gaussians that may touch a block, padded to fours by one that is never drawn. Returns

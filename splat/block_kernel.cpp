@@ -103,7 +103,7 @@ bool any_alive(const CompositeRules<float>& rules, const float* transmittance) {
 template <int kChannels>
 BlockCounts forward(Index side, const CompositeScene<float>& scene, const BlockJob& job) {
   const Index channels = scene.channels, blocks = (side / kBlockSide) * (side / kBlockSide);
-  const BlockWorkspace space(job.workspace, channels);
+  BlockWorkspace space(job.workspace, channels);
   const Index state_size = (1 + channels) * kBlockPixels, chunks = block_chunks(static_cast<Index>(job.entries.size()));
   std::uint32_t alive = 0;  // bits of blocks
   for (Index b = 0; b < blocks; ++b) {
@@ -114,7 +114,8 @@ BlockCounts forward(Index side, const CompositeScene<float>& scene, const BlockJ
   std::int32_t kept = 0;
   for (Index number = 0; number < chunks; ++number) {
     if (alive == 0) break;
-    const Chunk chunk = pack_chunk<kChannels>(side, scene, job, number, alive, space);
+    const Chunk chunk = job.packed != nullptr ? packed_chunk(scene, job, number, space)
+                                              : pack_chunk<kChannels>(side, scene, job, number, alive, space);
     for (Index b = 0; b < blocks; ++b) {
       if ((alive >> b & 1u) == 0) continue;
       const Index n = make_list(chunk, b, space);
@@ -468,6 +469,21 @@ BlockCounts forward_blocks(Index side, const CompositeScene<float>& scene, const
 void backward_blocks(Index side, const CompositeScene<float>& scene, const BlockJob& job, const BlockAdjoint& adjoint) {
   scene.channels == 3 ? backward<3>(side, scene, job, adjoint) : backward<0>(side, scene, job, adjoint);
 }
+void pack_list(Index side, const CompositeScene<float>& scene, const BlockJob& job, PackedBlocks& packed) {
+  const Index chunks = block_chunks(static_cast<Index>(job.entries.size()));
+  const Index room = static_cast<Index>(job.entries.size()) + chunks * PackedBlocks::kRoom;
+  packed.splats.resize(room * 8);
+  packed.features.resize(room * scene.channels);
+  packed.blocks.resize(room);
+  packed.near_cap = false;
+  BlockJob from = job;
+  from.packed = &packed;
+  BlockWorkspace space(job.workspace, scene.channels);
+  for (Index number = 0; number < chunks; ++number) {
+    packed_chunk(scene, from, number, space);
+    packed.near_cap |= pack_chunk<0>(side, scene, job, number, all_blocks(side), space).near_cap;
+  }
+}
 PixelAlpha<float> pixel_of_block(Index side, const SplatRecord<float>& record, const CompositeRules<float>& rules,
                                  Index left, Index top, Index row, Index col) {
   const D d;
@@ -500,6 +516,7 @@ HWY_AFTER_NAMESPACE();
 namespace hsi4d::detail {
 HWY_EXPORT(forward_blocks);
 HWY_EXPORT(backward_blocks);
+HWY_EXPORT(pack_list);
 HWY_EXPORT(pixel_of_block);
 HWY_EXPORT(behind_pixel);
 
@@ -515,6 +532,9 @@ Index block_workspace(Index channels) { return BlockWorkspace::numbers(channels)
 
 BlockCounts composite_blocks(Index side, const CompositeScene<float>& scene, const BlockJob& job) {
   return HWY_DYNAMIC_DISPATCH(forward_blocks)(side, scene, job);
+}
+void pack_blocks(Index side, const CompositeScene<float>& scene, const BlockJob& job, PackedBlocks& packed) {
+  HWY_DYNAMIC_DISPATCH(pack_list)(side, scene, job, packed);
 }
 void composite_blocks_adjoint(Index side, const CompositeScene<float>& scene, const BlockJob& job,
                               const BlockAdjoint& adjoint) {

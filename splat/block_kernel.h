@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/buffer.h"
 #include "splat/composite_kernel.h"
 
 namespace hsi4d::detail {
@@ -34,10 +35,23 @@ struct BlockRun {
   std::int32_t checkpoint;  ///< number of its first kept transmittance in the tile's
 };
 
+/// A list packed for the loops, to be composited many times; see pack_blocks. By chunks, each with room at its end.
+struct PackedBlocks {
+  static constexpr Index kRoom = 16;
+  Buffer<float> splats;         ///< [entries + kRoom chunks][8]
+  Buffer<float> features;       ///< [entries + kRoom chunks][C]
+  Buffer<std::int32_t> blocks;  ///< [entries + kRoom chunks]
+  bool near_cap = false;        ///< some α may reach the cap
+  /// Place of a chunk's first entry.
+  static Index begin(Index chunk) { return chunk * (kBlockChunk + kRoom); }
+  Index capacity_bytes() const { return splats.capacity_bytes() + features.capacity_bytes() + blocks.capacity_bytes(); }
+};
+
 /// One tile and a list; see TileJob. What is known of a block's pixels is its state, [1 + C][16]: T, negative for
 /// pixels that are finished or lie past the image's border, and channels.
 struct BlockJob {
   std::span<const TileEntry> entries;
+  const PackedBlocks* packed;  ///< of the entries; null: they are packed on the way; only forward
   Index left, top, width, height;
   std::uint32_t blocks;  ///< bit b: composite block b
   float* state;          ///< [blocks][1 + C][16], in and out; only forward
@@ -88,6 +102,9 @@ inline Index block_slot(Index channels) { return (kMoments + channels + 3) / 4 *
 
 /// Numbers of workspace that a tile takes.
 Index block_workspace(Index channels);
+
+/// Packs the entries of a job.
+void pack_blocks(Index side, const CompositeScene<float>& scene, const BlockJob& job, PackedBlocks& packed);
 
 /// Composites a list over the state of a tile's blocks.
 ///

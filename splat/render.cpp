@@ -19,6 +19,7 @@ constexpr Index kColors = 3;
 template <class S>
 struct AddBackground {
   static constexpr const char* kName = "add_background";
+  static constexpr bool kAssigns = true;
   enum Input { kChannels, kTransmittance, kBackground };
 
   void forward(NodeIo<S>& io) {
@@ -40,39 +41,44 @@ struct AddBackground {
 
   // d_channels_k = g_k,  d_T = Σ_k background_k g_k,  d_background_k = Σ T g_k
   void backward(NodeIo<S>& io) {
-    const ConstArray<S> t = io.in(kTransmittance), g = io.d_out();
+    const ConstArray<S> g = io.d_out();
     const S* background = io.in(kBackground).data;
-    const Array<S> d_channels = io.wants(kChannels) ? io.d_in(kChannels) : Array<S>{};
-    const Array<S> d_t = io.wants(kTransmittance) ? io.d_in(kTransmittance) : Array<S>{};
-    const bool wants_background = io.wants(kBackground);
-    const Partition part = reduction_partition(g.shape.rows, kRows);
-    const std::span<double> partials = io.template scratch<double>(kColors * part.chunks());
-    parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-      std::array<double, kColors> sums{};
+    parallel_for(g.shape.rows, kRows, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index k = 0; k < kColors; ++k) {
+        for (Index k = 0; io.wants(kChannels) && k < io.d_in(kChannels).shape.planes; ++k) {
           for (Index r = begin; r < end; ++r) {
-            const S *d = &g(k, r, 0), *through = t.row(r);
-            if (d_channels) {
-              S* d_c = &d_channels(k, r, 0);
-              for (Index x = 0; x < g.shape.cols; ++x) d_c[x] += d[x];
-            }
-            if (d_t) {
-              S* d_through = d_t.row(r);
-              for (Index x = 0; x < g.shape.cols; ++x) d_through[x] += background[k] * d[x];
-            }
-            for (Index x = 0; wants_background && x < g.shape.cols; ++x) {
-              sums[static_cast<std::size_t>(k)] += static_cast<double>(through[x]) * static_cast<double>(d[x]);
-            }
+            S* const d_c = &io.d_in(kChannels)(k, r, 0);
+            if (io.must_assign(kChannels)) std::fill_n(d_c, g.shape.cols, S(0));
+            if (k < kColors) add_scaled(&g(k, r, 0), S(1), g.shape.cols, d_c);
           }
         }
+        for (Index r = begin; io.wants(kTransmittance) && r < end; ++r) {
+          S* const d_t = io.d_in(kTransmittance).row(r);
+          if (io.must_assign(kTransmittance)) std::fill_n(d_t, g.shape.cols, S(0));
+          for (Index k = 0; k < kColors; ++k) add_scaled(&g(k, r, 0), background[k], g.shape.cols, d_t);
+        }
       });
-      for (Index k = 0; k < kColors; ++k) {
-        partials[static_cast<std::size_t>(k * part.chunks() + chunk)] = sums[static_cast<std::size_t>(k)];
-      }
     });
-    for (Index k = 0; wants_background && k < kColors; ++k) {
-      io.d_in(kBackground).data[k] += static_cast<S>(pairwise_sum(partials.data() + k * part.chunks(), part.chunks()));
+    if (io.wants(kBackground)) add_background_gradient(io);
+  }
+
+  static void add_scaled(const S* x, S factor, Index n, S* sum) {
+    for (Index i = 0; i < n; ++i) sum[i] += factor * x[i];
+  }
+
+  static void add_background_gradient(NodeIo<S>& io) {
+    const ConstArray<S> t = io.in(kTransmittance), g = io.d_out();
+    S* const d_background = io.d_in(kBackground).data;
+    if (io.must_assign(kBackground)) std::fill_n(d_background, kColors, S(0));
+    for (Index k = 0; k < kColors; ++k) {
+      d_background[k] += static_cast<S>(parallel_sum(g.shape.rows, kRows, [&](Index begin, Index end) {
+        double sum = 0;
+        for (Index r = begin; r < end; ++r) {
+          const S *d = &g(k, r, 0), *through = t.row(r);
+          for (Index x = 0; x < g.shape.cols; ++x) sum += static_cast<double>(through[x]) * static_cast<double>(d[x]);
+        }
+        return sum;
+      }));
     }
   }
 };

@@ -95,7 +95,13 @@ Index make_layer(Index side, const CompositeScene<float>& scene, BlockJob job, s
   };
   Index fragments = 0;
   if (layer.first > 0) fragments += composite(still.first(static_cast<std::size_t>(layer.first)), layer.front);
-  if (collapse) fragments += composite(still.subspan(static_cast<std::size_t>(layer.after)), layer.collapsed);
+  const std::span<const TileEntry> behind = still.subspan(static_cast<std::size_t>(layer.after));
+  if (collapse) {
+    fragments += composite(behind, layer.collapsed);
+  } else if (!behind.empty()) {
+    job.entries = behind;
+    pack_blocks(side, scene, job, layer.behind);
+  }
   layer.seen.resize(block_state(side, scene.channels));
   layer.made = true;
   return fragments;
@@ -142,6 +148,7 @@ Index composite_behind(Index side, const CompositeScene<float>& scene, const Blo
   if (!collapse) {
     BlockJob rest = job;
     rest.entries = behind;
+    rest.packed = &layer.behind;
     rest.state = memory;
     rest.runs = nullptr;
     for_each_block(job.blocks, [&](Index b) {

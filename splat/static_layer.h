@@ -36,9 +36,12 @@ struct TileLayer {
   Index first = 0, after = 0;  ///< list positions of those among what moves
   Buffer<float> front;         ///< state behind those in front
   Buffer<float> collapsed;     ///< state of those behind alone; only when they are collapsed
+  PackedBlocks behind;         ///< those behind; only when they are not collapsed
   Buffer<float> seen;          ///< of the last forward run: what is seen behind, relative to T there
 
-  Index capacity_bytes() const { return front.capacity_bytes() + collapsed.capacity_bytes() + seen.capacity_bytes(); }
+  Index capacity_bytes() const {
+    return front.capacity_bytes() + collapsed.capacity_bytes() + behind.capacity_bytes() + seen.capacity_bytes();
+  }
 };
 
 /// Finds the range of what moves in a tile and, when it is not the layer's, the cut; the layer has to be made then.
@@ -52,8 +55,8 @@ template <class S>
 void merge_entries(const SplatRows<S>& rows, const RenderSettings& settings, std::span<const TileEntry> still,
                    std::span<const TileEntry> moving, TileEntry* merged);
 
-/// Composites what stands still in front of a range, into layer.front, and with `collapse` also what is behind. Returns
-/// the fragments.
+/// Composites what stands still in front of a range, into layer.front; packs what is behind, or with `collapse`
+/// composites it. Returns the fragments.
 ///
 /// @param job  of the tile; its entries, blocks and state are not read
 Index make_layer(Index side, const CompositeScene<float>& scene, BlockJob job, std::span<const TileEntry> still,
