@@ -503,8 +503,8 @@ struct Composite {
       }
       if (!any) return;
       if (adjoint.wants_shape && k == 0) {
-        if (in_blocks(io)) scale_block_moments(records[n], totals);
-        detail::add_record_gradient(rows.set_of(n), view.settings, row, records[n], totals,
+        const double d_opacity = record_moments(in_blocks(io), records[n], totals);
+        detail::add_record_gradient(rows.set_of(n), view.settings, row, records[n], d_opacity, totals,
                                     gradient_of(io, inputs, row));
       }
       for (Index j = std::max<Index>(first_feature - k, 0); j < std::min(count, first_feature + features - k); ++j) {
@@ -513,14 +513,18 @@ struct Composite {
     }
   }
 
-  /// From sums of ∂/∂ log α with scaled u and w to those of kMoments.
-  static void scale_block_moments(const SplatRecord<S>& record, double* moments) {
-    const double o = std::max(static_cast<double>(record.opacity), kLeastOpacity);
-    constexpr double kInverse = 1 / detail::kLog2Scale;
-    const double inverse = 1 / o, first = inverse * kInverse, second = first * kInverse;
-    moments[0] *= inverse;
-    for (int i = 1; i < 3; ++i) moments[i] *= first;
-    for (int i = 3; i < 6; ++i) moments[i] *= second;
+  /// From a slot's sums to those of add_record_gradient; returns Σ ∂/∂o.
+  static double record_moments(bool blocks, const SplatRecord<S>& record, double* moments) {
+    const double o = static_cast<double>(record.opacity);
+    if (blocks) {  // u and w are scaled
+      constexpr double kInverse = 1 / detail::kLog2Scale;
+      for (int i = 1; i < 3; ++i) moments[i] *= kInverse;
+      for (int i = 3; i < 6; ++i) moments[i] *= kInverse * kInverse;
+      return moments[0] / std::max(o, kLeastOpacity);
+    }
+    const double d_opacity = moments[0];  // kMoments: of g = v/o
+    for (int i = 0; i < kMoments; ++i) moments[i] *= o;
+    return d_opacity;
   }
 
   /// @param inputs  number of the first input of the row's set

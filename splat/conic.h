@@ -53,15 +53,15 @@ inline bool conic_of(const double* v, double blur, Conic& conic) {
 
 /// L V with L = [l11 l21; 0 l22], 2×3 by rows. Its first row, l11 (v0 − xy/yy v1), cancels for needles; by the minors,
 /// which it is made of here, (v0 − xy/yy v1)_c = (Σ_k v1_k m_ck + b v0_c)/yy, it does not.
-inline std::array<double, 6> whitened_factor(const double* v, double blur, const Conic& conic) {
+inline std::array<double, 6> whitened_factor(const double* v, double blur, double l11, double l22) {
   const auto m = minors(v);
-  const double scale = conic.l11 * conic.l22 * conic.l22;  // l11/yy
+  const double scale = l11 * (l22 * l22);  // l11/yy
   return {scale * (v[4] * m[0] + v[5] * m[1] + blur * v[0]),
           scale * (v[5] * m[2] - v[3] * m[0] + blur * v[1]),
           scale * (-v[3] * m[1] - v[4] * m[2] + blur * v[2]),
-          conic.l22 * v[3],
-          conic.l22 * v[4],
-          conic.l22 * v[5]};
+          l22 * v[3],
+          l22 * v[4],
+          l22 * v[5]};
 }
 
 /// sqrt(det V Vᵀ / det cov): what the opacity is multiplied with under antialias (row A7).

@@ -169,46 +169,47 @@ struct SplatGradient {
   S *mean = nullptr, *mean_rest = nullptr, *factor = nullptr, *opacity = nullptr;
 };
 
-// With L = [l11 l21; 0 l22] and M the moments (Σ g u², …) as a symmetric matrix, from ds = −(L d)ᵀ L d_mean and
-// ds = −½ (Lᵀ L d)ᵀ d_cov (Lᵀ L d):
+// With L = [l11 l21; 0 l22], v = ∂/∂ log α at a pixel and M the moments (Σ v u², …) as a symmetric matrix, from
+// ds = −(L d)ᵀ L d_mean and ds = −½ (Lᵀ L d)ᵀ d_cov (Lᵀ L d):
 //
-//   d_o = Σ g,   d_mean = o Lᵀ (Σ g u, Σ g w),   d_cov = ½ o Lᵀ M L,   d_V = 2 d_cov V = o Lᵀ M (L V)
+//   d_mean = Lᵀ (Σ v u, Σ v w),   d_cov = ½ Lᵀ M L,   d_V = 2 d_cov V = Lᵀ M (L V)
 //
-// d_cov is that of the full symmetric matrix: its off-diagonal number counts twice (row B21).
+// d_cov is that of the full symmetric matrix: its off-diagonal number counts twice (row B21). L is that of the record,
+// with which u and w were made.
 
-/// Adjoint of make_records: adds what the moments of row n over all its pixels mean.
+/// Adjoint of make_records: adds what the sums of row n over all its pixels mean.
 ///
-/// @param moments  kMoments numbers, see composite_kernel.h
+/// @param d_opacity  Σ ∂/∂o, o with the antialias factor
+/// @param moments    Σ v, Σ v u, Σ v w, Σ v u², Σ v u w, Σ v w²
 template <class S>
 void add_record_gradient(const SplatArrays<S>& splats, const RenderSettings& settings, Index n,
-                         const SplatRecord<S>& record, const double* moments, const SplatGradient<S>& d) {
-  double v[6];
-  read_factor(splats, n, v);
-  Conic conic;
-  if (!conic_of(v, settings.blur, conic)) return;
-  const double o = static_cast<double>(record.opacity);
-  if (d.opacity != nullptr) {
-    *d.opacity += static_cast<S>(settings.antialias ? moments[0] * blur_compensation(conic) : moments[0]);
-  }
+                         const SplatRecord<S>& record, double d_opacity, const double* moments,
+                         const SplatGradient<S>& d) {
+  const double l11 = static_cast<double>(record.l11), l21 = static_cast<double>(record.l21);
+  const double l22 = static_cast<double>(record.l22);
   for (S* const d_mean : {d.mean, d.mean_rest}) {
     if (d_mean == nullptr) continue;
-    d_mean[0] += static_cast<S>(o * (conic.l11 * moments[1]));
-    d_mean[1] += static_cast<S>(o * (conic.l21 * moments[1] + conic.l22 * moments[2]));
+    d_mean[0] += static_cast<S>(l11 * moments[1]);
+    d_mean[1] += static_cast<S>(l21 * moments[1] + l22 * moments[2]);
   }
-  if (d.factor == nullptr) return;
-  double d_v[6];
-  const auto lv = whitened_factor(v, settings.blur, conic);
+  double v[6], d_v[6];
+  read_factor(splats, n, v);
+  const auto lv = whitened_factor(v, settings.blur, l11, l22);
   for (int c = 0; c < 3; ++c) {
     const double lu = lv[static_cast<std::size_t>(c)], lw = lv[static_cast<std::size_t>(3 + c)];
     const double mu = moments[3] * lu + moments[4] * lw, mw = moments[4] * lu + moments[5] * lw;
-    d_v[c] = o * (conic.l11 * mu);
-    d_v[3 + c] = o * (conic.l21 * mu + conic.l22 * mw);
+    d_v[c] = l11 * mu;
+    d_v[3 + c] = l21 * mu + l22 * mw;
   }
   if (settings.antialias) {
+    Conic conic;
+    conic_of(v, settings.blur, conic);
     const double opacity = static_cast<double>(splats.opacities.data[n]);
-    blur_compensation_adjoint(v, settings.blur, conic, moments[0] * opacity, d_v);
+    blur_compensation_adjoint(v, settings.blur, conic, d_opacity * opacity, d_v);
+    d_opacity *= blur_compensation(conic);
   }
-  for (int i = 0; i < 6; ++i) d.factor[i] += static_cast<S>(d_v[i]);
+  if (d.opacity != nullptr) *d.opacity += static_cast<S>(d_opacity);
+  for (int i = 0; i < 6 && d.factor != nullptr; ++i) d.factor[i] += static_cast<S>(d_v[i]);
 }
 
 }  // namespace hsi4d::detail
