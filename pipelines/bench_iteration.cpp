@@ -126,6 +126,7 @@ void bench_iteration(const Workload& w, const RasterizeBench& options,
     result.groups = counters.groups;
     result.pairs = counters.pairs;
     result.tiles = counters.tiles;
+    result.kept_bytes = counters.kept_bytes;
     result.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
     if (m > 0) {
       result.image_error = image_error(*all[m], *all.front());

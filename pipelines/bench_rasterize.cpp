@@ -72,6 +72,7 @@ Measurement measured(const Workload& w, const RenderCounters& counters, const Ra
   m.pairs = counters.pairs;
   m.groups = counters.groups;
   m.tiles = counters.tiles;
+  m.kept_bytes = counters.kept_bytes;
   m.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
   return m;
 }

@@ -28,6 +28,7 @@ std::string json_line(const Measurement& m) {
                                  {"pairs", m.pairs},
                                  {"tiles", m.tiles},
                                  {"pixels", m.pixels},
+                                 {"kept_bytes", m.kept_bytes},
                                  {"mfragments_per_s", rate(m)}};
   if (m.image_error) line["image_error"] = *m.image_error;
   if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
