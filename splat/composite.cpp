@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
@@ -27,7 +26,6 @@ namespace {
 using detail::CompositeRules;
 using detail::CompositeScene;
 using detail::DepthKeyed;
-using detail::Extent;
 using detail::kMoments;
 using detail::kSegment;
 using detail::SplatRecord;
@@ -48,7 +46,7 @@ struct TileCounts {
 template <class S>
 struct Composite {
   static constexpr const char* kName = "composite";
-  static constexpr bool kPersistentOutputs = true;  // tiles that stay empty are not written again
+  static constexpr bool kPersistentOutputs = true;  // blocks that nothing touches which moves are not written again
   SplatView view;
   std::shared_ptr<RenderCounters> counters;
 

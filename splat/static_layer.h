@@ -64,7 +64,7 @@ Index make_layer(Index side, const CompositeScene<float>& scene, BlockJob job, s
 
 /// Composites what stands still behind over job.state, for job.blocks, and keeps layer.seen. Returns the fragments.
 ///
-/// @param behind  entries; none when they are collapsed
+/// @param behind  entries; not read when they are collapsed
 /// @param memory  block_state numbers
 Index composite_behind(Index side, const CompositeScene<float>& scene, const BlockJob& job,
                        std::span<const TileEntry> behind, bool collapse, float* memory, TileLayer& layer);
