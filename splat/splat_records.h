@@ -72,13 +72,20 @@ double depth_of(const SplatArrays<S>& splats, Index n) {
   return static_cast<double>(splats.depths.data[n]) + static_cast<double>(splats.depth_rest.data[n]);
 }
 
+/// What a Gaussian at a depth is sorted by in a render of type S.
+///
+/// @param rounded  the depth as S holds it
+template <class S>
+std::uint64_t key_of_depth(const RenderSettings& settings, S rounded, double depth) {
+  constexpr DepthKey kOwn = std::is_same_v<S, float> ? DepthKey::kFloat : DepthKey::kDouble;
+  const bool in_float = settings.depth_key.value_or(kOwn) == DepthKey::kFloat;
+  return in_float ? depth_bits(static_cast<float>(rounded)) : depth_bits(depth);
+}
+
 /// What row n is sorted by.
 template <class S>
 std::uint64_t depth_key(const SplatArrays<S>& splats, const RenderSettings& settings, Index n) {
-  constexpr DepthKey kOwn = std::is_same_v<S, float> ? DepthKey::kFloat : DepthKey::kDouble;
-  if (settings.depth_key.value_or(kOwn) == DepthKey::kFloat)
-    return depth_bits(static_cast<float>(splats.depths.data[n]));
-  return depth_bits(depth_of(splats, n));
+  return key_of_depth(settings, splats.depths.data[n], depth_of(splats, n));
 }
 
 /// What extents and records are made of.

@@ -15,10 +15,9 @@ constexpr DepthRange kAllDepths = {std::numeric_limits<std::int32_t>::min(), std
 
 double depth_of_step(std::int32_t step) { return std::exp2(static_cast<double>(step) / kDepthSteps); }
 
-/// The key of a depth, as depth_key of a Gaussian that has it.
+/// The key of a depth in a render in float.
 std::uint64_t key_of(const RenderSettings& settings, double depth) {
-  return settings.depth_key.value_or(DepthKey::kFloat) == DepthKey::kFloat ? depth_bits(static_cast<float>(depth))
-                                                                           : depth_bits(depth);
+  return key_of_depth(settings, static_cast<float>(depth), depth);
 }
 
 Index state_of_block(Index channels) { return (1 + channels) * kBlockPixels; }
