@@ -489,6 +489,8 @@ struct Composite {
     const std::uint64_t key = rows.key(view.settings, n);
     const Index first_feature = adjoint.wants_shape || in_blocks(io) ? kMoments : 0;
     const Index features = io.wants(inputs + kFeatures) ? io.in(kFeatures).shape.cols : 0;
+    const detail::SplatGradient<S> gradient = gradient_of(io, inputs, row);
+    if (features == 0 && !gradient.wanted()) return;  // a set may be frozen
     for (Index k = 0; k < adjoint.stride; k += kTogether) {
       const Index count = std::min(kTogether, adjoint.stride - k);
       double totals[kTogether] = {};
@@ -500,10 +502,9 @@ struct Composite {
         for (Index j = 0; j < count; ++j) totals[j] += static_cast<double>(sums[j]);
       }
       if (!any) return;
-      if (adjoint.wants_shape && k == 0) {
+      if (gradient.wanted() && k == 0) {
         const double d_opacity = record_moments(in_blocks(io), records[n], totals);
-        detail::add_record_gradient(rows.set_of(n), view.settings, row, records[n], d_opacity, totals,
-                                    gradient_of(io, inputs, row));
+        detail::add_record_gradient(rows.set_of(n), view.settings, row, records[n], d_opacity, totals, gradient);
       }
       for (Index j = std::max<Index>(first_feature - k, 0); j < std::min(count, first_feature + features - k); ++j) {
         io.d_in(inputs + kFeatures).row(row)[k + j - first_feature] += static_cast<S>(totals[j]);

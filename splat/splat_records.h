@@ -174,6 +174,7 @@ bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, c
 template <class S>
 struct SplatGradient {
   S *mean = nullptr, *mean_rest = nullptr, *factor = nullptr, *opacity = nullptr;
+  bool wanted() const { return mean != nullptr || mean_rest != nullptr || factor != nullptr || opacity != nullptr; }
 };
 
 // With L = [l11 l21; 0 l22], v = ∂/∂ log α at a pixel and M the moments (Σ v u², …) as a symmetric matrix, from
