@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <type_traits>
 
@@ -35,6 +36,8 @@ struct LaneVector<double> {
 /// Eight numbers.
 template <class S>
 using Lanes = typename detail::LaneVector<S>::Type;
+
+using WideLanes = Lanes<double>;
 
 /// What comparing two T gives: a bool, or one for each lane.
 template <class T>
@@ -149,7 +152,9 @@ T rounded_to(const T& x) {
 template <class S>
 Lanes<S> load_lanes(const S* x, Index stride, Index count) {
   Lanes<S> result{};
-  if (count >= kLanes) {
+  if (count >= kLanes && stride == 1) {
+    std::memcpy(&result, x, sizeof result);
+  } else if (count >= kLanes) {
     for (Index i = 0; i < kLanes; ++i) result[i] = x[i * stride];
   } else {
     for (Index i = 0; i < kLanes; ++i) result[i] = x[std::min(i, count - 1) * stride];

@@ -15,6 +15,7 @@
 #include "core/stopwatch.h"
 #include "splat/block_kernel.h"
 #include "splat/composite_kernel.h"
+#include "splat/slot_sums.h"
 #include "splat/tile_image.h"
 #include "splat/tile_plans.h"
 #include "splat/workspaces.h"
@@ -489,7 +490,7 @@ struct Composite {
     shared.wants_shape = wants_shape(io);
     shared.wants_features = wants_features(io);
     shared.stride = stride_of(io);
-    shared.sums = io.scratch(shared.stride * planned.moving.lists.pairs()).data();
+    shared.sums = io.scratch(shared.stride * planned.moving.lists.pairs() + detail::kSlotNumbers).data();
     Workspaces workspaces(tiles.count());
     const Index size = backward_memory(io, tiles);
     const std::span<S> memory = io.scratch(size * workspaces.count());
@@ -508,76 +509,32 @@ struct Composite {
     counters->times.backward_s = watch.lap();
     counters->adjoint_tiles = std::count_if(adjoint_last.data(), adjoint_last.data() + tiles.count(),
                                             [](const DepthKeyed& end) { return end.index >= 0; });
-    parallel_for(planned.moving.count, kGrain, [&](Index begin, Index end) {
-      on_best_isa([&] {
-        const detail::SplatRows<S> rows = rows_of(io);
-        for (Index i = begin; i < end; ++i) gather_gaussian(io, rows, shared, i);
-      });
-    });
+    parallel_for(planned.moving.count, kGrain,
+                 [&](Index begin, Index end) { on_best_isa([&] { reduce(io, shared, begin, end); }); });
     counters->times.reduce_s = watch.lap();
   }
 
-  /// True if a Gaussian's pair with a tile has an adjoint: it does not come after the last one that is composited
-  /// there.
-  bool reached(Index tile, std::uint64_t key, Index n) const {
-    const DepthKeyed& end = adjoint_last[tile];
-    return end.index >= 0 && (key < end.key || (key == end.key && n <= end.index));
+  /// @param inputs  number of the first input of a set
+  static detail::SplatGradients<S> gradients_of(const NodeIo<S>& io, int inputs) {
+    const auto d = [&](int input) { return io.wants(inputs + input) ? io.d_in(inputs + input) : Array<S>{}; };
+    return {d(kMeans), d(kMeansRest), d(kFactors), d(kOpacities), d(kFeatures)};
   }
 
-  /// Sums the pairs of a Gaussian, number i of the lists, in the order of its slots, in double, and adds what they mean
-  /// to the inputs' gradients. Pairs past the end of their tile have no adjoint, and their slots were not written (row
-  /// B12).
-  void gather_gaussian(NodeIo<S>& io, const detail::SplatRows<S>& rows, const TileAdjoint<S>& adjoint, Index i) const {
-    constexpr Index kTogether = 16;  // numbers of a slot; with up to ten features it is read once
-    static_assert(kMoments <= kTogether);
-    const TileLists::Slots slots = planned.moving.lists.slots[i];
-    if (slots.begin == slots.end) return;
-    const Index n = planned.moving.first + i, row = rows.in_set(n);
-    const int inputs = n < rows.second ? static_cast<int>(kStill) : 0;
-    const std::uint64_t key = rows.key(view.settings, n);
-    const Index first_feature = adjoint.wants_shape || in_blocks(io) ? kMoments : 0;
-    const Index features = io.wants(inputs + kFeatures) ? io.in(kFeatures).shape.cols : 0;
-    const detail::SplatGradient<S> gradient = gradient_of(io, inputs, row);
-    if (features == 0 && !gradient.wanted()) return;  // a set may be frozen
-    for (Index k = 0; k < adjoint.stride; k += kTogether) {
-      const Index count = std::min(kTogether, adjoint.stride - k);
-      double totals[kTogether] = {};
-      bool any = false;
-      for (Index slot = slots.begin; slot < static_cast<Index>(slots.end); ++slot) {
-        if (!reached(planned.moving.lists.tile_of(slot), key, n)) continue;
-        any = true;
-        const S* const sums = adjoint.sums + slot * adjoint.stride + k;
-        for (Index j = 0; j < count; ++j) totals[j] += static_cast<double>(sums[j]);
-      }
-      if (!any) return;
-      if (gradient.wanted() && k == 0) {
-        const double d_opacity = record_moments(in_blocks(io), records[n], totals);
-        detail::add_record_gradient(rows.set_of(n), view.settings, row, records[n], d_opacity, totals, gradient);
-      }
-      for (Index j = std::max<Index>(first_feature - k, 0); j < std::min(count, first_feature + features - k); ++j) {
-        io.d_in(inputs + kFeatures).row(row)[k + j - first_feature] += static_cast<S>(totals[j]);
-      }
+  /// Adds what the sums of rows [begin, end) of the lists mean to the gradients of both sets.
+  void reduce(const NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index begin, Index end) const {
+    const detail::SplatRows<S> rows = rows_of(io);
+    const Index first = planned.moving.first + begin, after = planned.moving.first + end;
+    const Index middle = std::clamp(rows.second, first, after);
+    const detail::SlotSums<S> sums{
+        adjoint.sums,  adjoint.stride,       adjoint.wants_shape || in_blocks(io) ? kMoments : 0,
+        in_blocks(io), planned.moving.lists, {adjoint_last.data(), static_cast<std::size_t>(adjoint_last.size())}};
+    if (first < middle) {
+      detail::reduce_slots(sums, rows.still, view.settings, {first, first, begin}, middle - first,
+                           records.data() + first, gradients_of(io, kStill));
     }
-  }
-
-  /// From a slot's sums to those of add_record_gradient; returns Σ ∂/∂o.
-  static double record_moments(bool blocks, const SplatRecord<S>& record, double* moments) {
-    const double o = static_cast<double>(record.opacity);
-    if (blocks) {  // u and w are scaled
-      constexpr double kInverse = 1 / detail::kLog2Scale;
-      for (int i = 1; i < 3; ++i) moments[i] *= kInverse;
-      for (int i = 3; i < 6; ++i) moments[i] *= kInverse * kInverse;
-      return moments[0] / std::max(o, kLeastOpacity);
-    }
-    const double d_opacity = moments[0];  // kMoments: of g = v/o
-    for (int i = 0; i < kMoments; ++i) moments[i] *= o;
-    return d_opacity;
-  }
-
-  /// @param inputs  number of the first input of the row's set
-  static detail::SplatGradient<S> gradient_of(const NodeIo<S>& io, int inputs, Index n) {
-    const auto row = [&](int input) { return io.wants(inputs + input) ? io.d_in(inputs + input).row(n) : nullptr; };
-    return {row(kMeans), row(kMeansRest), row(kFactors), row(kOpacities)};
+    detail::reduce_slots(sums, rows.moving, view.settings,
+                         {middle - rows.second, middle, middle - planned.moving.first}, after - middle,
+                         records.data() + middle, gradients_of(io, 0));
   }
 
   // --- the rest ------------------------------------------------------------------------------------------------------

@@ -169,8 +169,6 @@ void intrinsics_adjoint(const Lens& lens, const InCamera<T>& g, const T* d_mean_
   }
 }
 
-using Wide = Lanes<double>;
-
 template <class S>
 struct Project {
   static constexpr const char* kName = "project";
@@ -194,9 +192,9 @@ struct Project {
   }
 
   /// Some Gaussians in the camera's frame.
-  static InCamera<Wide> taken(const Lens& lens, const S* mean, const S* axes, Index count) {
-    InCamera<Wide> g;
-    Wide m[3], a[9];
+  static InCamera<WideLanes> taken(const Lens& lens, const S* mean, const S* axes, Index count) {
+    InCamera<WideLanes> g;
+    WideLanes m[3], a[9];
     for (Index i = 0; i < 3; ++i) m[i] = load_wide(mean + i, 3, count);
     for (Index i = 0; i < 9; ++i) a[i] = load_wide(axes + i, 9, count);
     point_in_camera(lens, m, g.p);
@@ -213,9 +211,9 @@ struct Project {
       on_best_isa([&] {
         for (Index n = begin; n < end; n += kLanes) {
           const Index count = end - n;
-          const Wide zero{};
-          const InCamera<Wide> g = taken(lens, means.row(n), axes.row(n), count);
-          const InImage<Wide> image = project_gaussian<S>(lens, g);
+          const WideLanes zero{};
+          const InCamera<WideLanes> g = taken(lens, means.row(n), axes.row(n), count);
+          const InImage<WideLanes> image = project_gaussian<S>(lens, g);
           for (Index i = 0; i < 2; ++i) {
             store_lanes<S>(image.drawn ? image.mean[i] : zero, means_px.row(n) + i, 2, count);
             store_lanes<S>(image.drawn ? image.mean_rest[i] : zero, means_rest.row(n) + i, 2, count);
@@ -223,7 +221,7 @@ struct Project {
           for (Index i = 0; i < 6; ++i) {
             store_lanes<S>(image.drawn ? image.factor[i] : zero, factors.row(n) + i, 6, count);
           }
-          const Wide depth = has_depth<S>(g.p) ? g.p[2] : zero, rounded = rounded_to<S>(depth);
+          const WideLanes depth = has_depth<S>(g.p) ? g.p[2] : zero, rounded = rounded_to<S>(depth);
           store_lanes<S>(rounded, depths.row(n), 1, count);
           store_lanes<S>(depth - rounded, rest.row(n), 1, count);
         }
@@ -257,7 +255,7 @@ struct Project {
     const std::span<double> lens_partials = io.template scratch<double>(a.wants_intrinsics ? 4 * part.chunks() : 0);
     parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
       on_best_isa([&] {
-        Wide d_delta[6] = {}, d_intrinsics[4] = {};
+        WideLanes d_delta[6] = {}, d_intrinsics[4] = {};
         for (Index n = begin; n < end; n += kLanes) adjoint_of_rows(lens, a, n, end - n, d_delta, d_intrinsics);
         for (Index i = 0; i < 6; ++i)
           partials[static_cast<std::size_t>(6 * chunk + i)] = sum_of_lanes<double>(d_delta[i]);
@@ -273,21 +271,21 @@ struct Project {
   }
 
   /// Rows [n, n + count), up to eight. Of a Gaussian that is not drawn the depth alone has a gradient.
-  static void adjoint_of_rows(const Lens& lens, const Adjoint& a, Index n, Index count, Wide* d_delta,
-                              Wide* d_intrinsics) {
-    const Wide zero{};
-    LaneMask<Wide> drawn = zero != zero;
+  static void adjoint_of_rows(const Lens& lens, const Adjoint& a, Index n, Index count, WideLanes* d_delta,
+                              WideLanes* d_intrinsics) {
+    const WideLanes zero{};
+    LaneMask<WideLanes> drawn = zero != zero;
     for (Index i = 0; i < 6; ++i) drawn = drawn | (load_wide(a.factors.row(n) + i, 6, count) != zero);
-    const Wide d_depth = a.d_depths ? load_wide(a.d_depths.row(n), 1, count) : zero;
+    const WideLanes d_depth = a.d_depths ? load_wide(a.d_depths.row(n), 1, count) : zero;
     if (!any_lane(drawn | (d_depth != zero))) return;
-    const InCamera<Wide> g = taken(lens, a.means.row(n), a.axes.row(n), count);
-    Wide d_mean_px[2] = {}, d_factor[6] = {};
+    const InCamera<WideLanes> g = taken(lens, a.means.row(n), a.axes.row(n), count);
+    WideLanes d_mean_px[2] = {}, d_factor[6] = {};
     for (Index i = 0; i < 2 && a.d_means_px; ++i) d_mean_px[i] = load_wide(a.d_means_px.row(n) + i, 2, count);
     for (Index i = 0; i < 6 && a.d_factors; ++i) d_factor[i] = load_wide(a.d_factors.row(n) + i, 6, count);
-    InCameraGradient<Wide> d = project_adjoint(lens, g, d_mean_px, d_factor, d_depth);
-    const LaneMask<Wide> with_depth = has_depth<S>(g.p);
+    InCameraGradient<WideLanes> d = project_adjoint(lens, g, d_mean_px, d_factor, d_depth);
+    const LaneMask<WideLanes> with_depth = has_depth<S>(g.p);
     for (int i = 0; i < 3; ++i) {
-      const Wide of_depth = i == 2 ? (with_depth ? d_depth : zero) : zero;
+      const WideLanes of_depth = i == 2 ? (with_depth ? d_depth : zero) : zero;
       d.p[i] = drawn ? d.p[i] : of_depth;
     }
     const Matrix3<double>& w = lens.camera.rotation;
@@ -296,13 +294,13 @@ struct Project {
     }
     for (int i = 0; i < 9 && a.d_axes; ++i) {
       const int r = i / 3, c = i % 3;
-      const Wide turned = w(0, r) * d.axes[0][c] + w(1, r) * d.axes[1][c] + w(2, r) * d.axes[2][c];
+      const WideLanes turned = w(0, r) * d.axes[0][c] + w(1, r) * d.axes[1][c] + w(2, r) * d.axes[2][c];
       add_lanes<S>(drawn ? turned : zero, a.d_axes.row(n) + i, 9, count);
     }
-    const LaneMask<Wide> rows = first_lanes<double>(count);
+    const LaneMask<WideLanes> rows = first_lanes<double>(count);
     if (a.wants_camera) add_camera(g, d, drawn, rows & (drawn | with_depth), d_delta);
     if (!a.wants_intrinsics) return;
-    Wide d_lens[4];
+    WideLanes d_lens[4];
     intrinsics_adjoint(lens, g, d_mean_px, d_factor, d_lens);
     for (int i = 0; i < 4; ++i) d_intrinsics[i] = d_intrinsics[i] + (rows & drawn ? d_lens[i] : zero);
   }
@@ -311,16 +309,16 @@ struct Project {
   ///
   /// @param drawn  those whose axes count
   /// @param rows   those that count
-  static void add_camera(const InCamera<Wide>& g, const InCameraGradient<Wide>& d, const LaneMask<Wide>& drawn,
-                         const LaneMask<Wide>& rows, Wide* d_delta) {
-    const Wide zero{};
+  static void add_camera(const InCamera<WideLanes>& g, const InCameraGradient<WideLanes>& d,
+                         const LaneMask<WideLanes>& drawn, const LaneMask<WideLanes>& rows, WideLanes* d_delta) {
+    const WideLanes zero{};
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, k = (i + 2) % 3;
-      Wide of_axes = zero;
+      WideLanes of_axes = zero;
       for (int c = 0; c < 3; ++c) {
         of_axes = of_axes + (g.axes[j][c] * d.axes[k][c] - g.axes[k][c] * d.axes[j][c]);
       }
-      const Wide turn = g.p[j] * d.p[k] - g.p[k] * d.p[j] + (drawn ? of_axes : zero);
+      const WideLanes turn = g.p[j] * d.p[k] - g.p[k] * d.p[j] + (drawn ? of_axes : zero);
       d_delta[i] = d_delta[i] + (rows ? d.p[i] : zero);
       d_delta[3 + i] = d_delta[3 + i] + (rows ? turn : zero);
     }
@@ -331,7 +329,7 @@ struct Project {
     const ConstArray<S> means = io.in(kMeansIn), axes = io.in(kAxesIn);
     const Lens lens = this->lens(io);
     for (Index n = 0; n < means.shape.rows; ++n) {
-      const InCamera<Wide> g = taken(lens, means.row(n), axes.row(n), 1);
+      const InCamera<WideLanes> g = taken(lens, means.row(n), axes.row(n), 1);
       const std::uint64_t drawn = project_gaussian<S>(lens, g).drawn[0] != 0;
       const std::uint64_t held_x = g.ratio[0].held[0] != 0, held_y = g.ratio[1].held[0] != 0;
       signature.add(drawn ? 2 + held_x + 2 * held_y : 1);

@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "autodiff/array.h"
+#include "core/lanes.h"
 #include "splat/limits.h"
 #include "splat/project.h"
 #include "splat/tiles.h"
@@ -60,12 +61,6 @@ bool all_finite(const S* x, Index n) {
   return std::all_of(x, x + n, [](S v) { return std::isfinite(v); });
 }
 
-template <class S>
-void read_factor(const SplatArrays<S>& splats, Index n, double* factor) {
-  const S* v = splats.factors.row(n);
-  for (int i = 0; i < 6; ++i) factor[i] = static_cast<double>(v[i]);
-}
-
 /// Camera z of row n in double, metres.
 template <class S>
 double depth_of(const SplatArrays<S>& splats, Index n) {
@@ -88,76 +83,82 @@ std::uint64_t depth_key(const SplatArrays<S>& splats, const RenderSettings& sett
   return key_of_depth(settings, splats.depths.data[n], depth_of(splats, n));
 }
 
-/// What extents and records are made of.
-struct SplatOutline {
-  Conic conic;
-  double x, y;          ///< mean, pixels
-  double opacity;       ///< with the antialias factor
-  double log2_opacity;  ///< of an opacity held at or above kLeastOpacity
-  bool drawn;
+/// What extents and records of eight rows are made of.
+struct SplatOutlines {
+  ConicOf<WideLanes> conic;
+  WideLanes x, y;          ///< mean, pixels
+  WideLanes opacity;       ///< with the antialias factor
+  WideLanes log2_opacity;  ///< of an opacity held at or above kLeastOpacity
+  ReachOf<WideLanes> reach;
+  LaneMask<WideLanes> drawn;
 };
 
-/// Outline of row n, without log2_opacity. Culls numbers that are not finite, then near, each before its numbers are
-/// used (rows A4-A6).
+/// Outlines of rows [n, n + count), eight at most. Not drawn are rows with numbers that are not finite, also once they
+/// are rounded to S, and those that are too near (rows A4-A6); their other numbers mean nothing.
 template <class S>
-void outline_of(const SplatArrays<S>& splats, const RenderSettings& settings, Index n, SplatOutline& outline) {
-  const S *mean = splats.means.row(n), *mean_rest = splats.means_rest.row(n);
-  const S depth = splats.depths.data[n], rest = splats.depth_rest.data[n], opacity = splats.opacities.data[n];
-  outline.opacity = 0;
-  outline.drawn = false;
-  if (!all_finite(mean, 2) || !all_finite(mean_rest, 2) || !std::isfinite(depth) || !std::isfinite(rest) ||
-      !std::isfinite(opacity))
-    return;
-  if (!(depth_of(splats, n) > settings.near)) return;
-  double factor[6];
-  read_factor(splats, n, factor);
-  if (!is_drawn(factor) || !conic_of(factor, settings.blur, outline.conic)) return;
-  outline.opacity = static_cast<double>(opacity) * (settings.antialias ? blur_compensation(outline.conic) : 1.0);
-  outline.x = static_cast<double>(mean[0]) + static_cast<double>(mean_rest[0]);
-  outline.y = static_cast<double>(mean[1]) + static_cast<double>(mean_rest[1]);
-  outline.drawn = true;
+void outlines_of(const SplatArrays<S>& splats, const RenderSettings& settings, const ExtentRules& rules, Index n,
+                 Index count, SplatOutlines& o) {
+  const auto load = [count](const ConstArray<S>& from, Index row, Index col) {
+    return load_wide(from.row(row) + col, from.shape.cols, count);
+  };
+  o.x = load(splats.means, n, 0) + load(splats.means_rest, n, 0);
+  o.y = load(splats.means, n, 1) + load(splats.means_rest, n, 1);
+  const WideLanes depth = load(splats.depths, n, 0) + load(splats.depth_rest, n, 0);
+  WideLanes factor[6];
+  for (Index i = 0; i < 6; ++i) factor[i] = load(splats.factors, n, i);
+  o.drawn = conic_of(factor, settings.blur, o.conic) & (depth > settings.near) & lane_finite(depth) & lane_finite(o.x) &
+            lane_finite(o.y);
+  LaneMask<WideLanes> some = factor[0] != 0.0;
+  for (const WideLanes& v : factor) some = some | (v != 0.0);
+  o.opacity = load(splats.opacities, n, 0);
+  o.drawn = o.drawn & some & lane_finite(o.opacity);
+  if (settings.antialias) o.opacity = o.opacity * blur_compensation(o.conic);
+  o.log2_opacity = lane_max(o.opacity, lane_constant<WideLanes>(0) + kLeastOpacity);
+  for (Index i = 0; i < kLanes; ++i) o.log2_opacity[i] = std::log2(o.log2_opacity[i]);
+  for (const WideLanes& number : {o.conic.l11, o.conic.l21, o.conic.l22, o.opacity, o.log2_opacity}) {
+    o.drawn = o.drawn & lane_finite(rounded_to<S>(number));
+  }
+  o.reach = reach_of(o.conic, o.x, o.log2_opacity, rules);
 }
 
-/// Record and extent of row n from its outline; an empty extent if it is not drawn.
+/// Record and extent of row n, which is lane i of the outlines; an empty extent if it is not drawn.
 template <class S>
 void finish_record(const SplatArrays<S>& splats, const TileGrid& grid, const ExtentRules& rules, Index n,
-                   const SplatOutline& outline, SplatRecord<S>& record, Extent& extent) {
+                   const SplatOutlines& o, Index i, SplatRecord<S>& record, Extent& extent) {
   extent = {};
-  if (!outline.drawn || !all_finite(splats.features.row(n), splats.features.shape.cols)) return;
-  const Conic& conic = outline.conic;
-  record = {outline.x,
-            outline.y,
+  if (!o.drawn[i] || !all_finite(splats.features.row(n), splats.features.shape.cols)) return;
+  const ConicOf<WideLanes>& c = o.conic;
+  const ReachOf<WideLanes>& r = o.reach;
+  const Conic conic = {c.l11[i],        c.l21[i], c.l22[i], c.xx[i], c.xy[i], c.yy[i], c.sharp_determinant[i],
+                       c.determinant[i]};
+  const ReachOf<double> reach = {r.half_width[i],       r.half_height[i], r.right_dy[i], r.slope[i],
+                                 r.inner_half_width[i], r.squared[i],     r.flatness[i], r.room[i]};
+  extent = extent_of(conic, o.x[i], o.y[i], o.opacity[i], reach, grid, rules);
+  record = {o.x[i],
+            o.y[i],
             static_cast<S>(conic.l11),
             static_cast<S>(conic.l21),
             static_cast<S>(conic.l22),
-            static_cast<S>(outline.opacity),
-            static_cast<S>(outline.log2_opacity),
-            0,
-            0};
-  if (!all_finite(&record.l11, 5)) return;
-  extent = extent_of(conic, outline.x, outline.y, outline.opacity, outline.log2_opacity, grid, rules);
-  record.row_begin = extent.row_begin;
-  record.row_end = extent.row_end;
+            static_cast<S>(o.opacity[i]),
+            static_cast<S>(o.log2_opacity[i]),
+            extent.row_begin,
+            extent.row_end};
 }
 
-/// Records and extents of rows [begin, end); the extents of those that are not drawn are empty. In steps over some
-/// rows at a time: a row's numbers follow from each other, and the processor looks ahead only so far.
+/// Records and extents of rows [begin, end); the extents of those that are not drawn are empty. Call it in
+/// on_best_isa.
 ///
 /// @param records, extents  of row `begin`, and so on
 template <class S>
 void make_records(const SplatArrays<S>& splats, const RenderSettings& settings, const TileGrid& grid, Index begin,
                   Index end, SplatRecord<S>* records, Extent* extents) {
-  constexpr Index kTogether = 32;
   const ExtentRules rules = extent_rules(settings, static_cast<double>(std::numeric_limits<S>::epsilon()));
-  SplatOutline outlines[kTogether];
-  for (; begin < end; begin += kTogether, records += kTogether, extents += kTogether) {
-    const Index count = std::min(kTogether, end - begin);
-    for (Index i = 0; i < count; ++i) outline_of(splats, settings, begin + i, outlines[i]);
+  SplatOutlines outlines;
+  for (; begin < end; begin += kLanes, records += kLanes, extents += kLanes) {
+    const Index count = std::min(kLanes, end - begin);
+    outlines_of(splats, settings, rules, begin, count, outlines);
     for (Index i = 0; i < count; ++i) {
-      outlines[i].log2_opacity = std::log2(std::max(outlines[i].opacity, kLeastOpacity));
-    }
-    for (Index i = 0; i < count; ++i) {
-      finish_record(splats, grid, rules, begin + i, outlines[i], records[i], extents[i]);
+      finish_record(splats, grid, rules, begin + i, outlines, i, records[i], extents[i]);
     }
   }
 }
@@ -170,11 +171,11 @@ bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, c
   return extent.row_begin < extent.row_end;
 }
 
-/// Where the gradients of one row go: its numbers, or null where none is wanted.
+/// Where the gradients of a set go; empty where none is wanted.
 template <class S>
-struct SplatGradient {
-  S *mean = nullptr, *mean_rest = nullptr, *factor = nullptr, *opacity = nullptr;
-  bool wanted() const { return mean != nullptr || mean_rest != nullptr || factor != nullptr || opacity != nullptr; }
+struct SplatGradients {
+  Array<S> means, means_rest, factors, opacities, features;
+  bool of_shape() const { return means || means_rest || factors || opacities; }
 };
 
 // With L = [l11 l21; 0 l22], v = ∂/∂ log α at a pixel and M the moments (Σ v u², …) as a symmetric matrix, from
@@ -185,39 +186,48 @@ struct SplatGradient {
 // d_cov is that of the full symmetric matrix: its off-diagonal number counts twice (row B21). L is that of the record,
 // with which u and w were made.
 
-/// Adjoint of make_records: adds what the sums of row n over all its pixels mean.
+/// Adjoint of make_records: adds what the sums of rows [n, n + count), eight at most, over all their pixels mean.
 ///
+/// @param records    of row n, and so on
+/// @param rows       those that have sums
 /// @param d_opacity  Σ ∂/∂o, o with the antialias factor
 /// @param moments    Σ v, Σ v u, Σ v w, Σ v u², Σ v u w, Σ v w²
 template <class S>
-void add_record_gradient(const SplatArrays<S>& splats, const RenderSettings& settings, Index n,
-                         const SplatRecord<S>& record, double d_opacity, const double* moments,
-                         const SplatGradient<S>& d) {
-  const double l11 = static_cast<double>(record.l11), l21 = static_cast<double>(record.l21);
-  const double l22 = static_cast<double>(record.l22);
-  for (S* const d_mean : {d.mean, d.mean_rest}) {
-    if (d_mean == nullptr) continue;
-    d_mean[0] += static_cast<S>(l11 * moments[1]);
-    d_mean[1] += static_cast<S>(l21 * moments[1] + l22 * moments[2]);
+void add_record_gradients(const SplatArrays<S>& splats, const RenderSettings& settings, Index n, Index count,
+                          const SplatRecord<S>* records, const LaneMask<WideLanes>& rows, WideLanes d_opacity,
+                          const WideLanes* moments, const SplatGradients<S>& d) {
+  WideLanes l11{}, l21{}, l22{};
+  const WideLanes zero{};
+  for (Index i = 0; i < std::min(count, kLanes); ++i) {
+    l11[i] = static_cast<double>(records[i].l11);
+    l21[i] = static_cast<double>(records[i].l21);
+    l22[i] = static_cast<double>(records[i].l22);
   }
-  double v[6], d_v[6];
-  read_factor(splats, n, v);
+  const auto add = [&](const Array<S>& to, Index col, const WideLanes& x) {
+    if (to) add_lanes<S>(rows ? x : zero, to.row(n) + col, to.shape.cols, count);
+  };
+  const WideLanes d_x = l11 * moments[1], d_y = l21 * moments[1] + l22 * moments[2];
+  for (const Array<S>& to : {d.means, d.means_rest}) {
+    add(to, 0, d_x);
+    add(to, 1, d_y);
+  }
+  WideLanes v[6], d_v[6];
+  for (Index i = 0; i < 6; ++i) v[i] = load_wide(splats.factors.row(n) + i, 6, count);
   const auto lv = whitened_factor(v, settings.blur, l11, l22);
-  for (int c = 0; c < 3; ++c) {
-    const double lu = lv[static_cast<std::size_t>(c)], lw = lv[static_cast<std::size_t>(3 + c)];
-    const double mu = moments[3] * lu + moments[4] * lw, mw = moments[4] * lu + moments[5] * lw;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const WideLanes mu = moments[3] * lv[c] + moments[4] * lv[3 + c], mw = moments[4] * lv[c] + moments[5] * lv[3 + c];
     d_v[c] = l11 * mu;
     d_v[3 + c] = l21 * mu + l22 * mw;
   }
   if (settings.antialias) {
-    Conic conic;
+    ConicOf<WideLanes> conic;
     conic_of(v, settings.blur, conic);
-    const double opacity = static_cast<double>(splats.opacities.data[n]);
+    const WideLanes opacity = load_wide(splats.opacities.row(n), 1, count);
     blur_compensation_adjoint(v, settings.blur, conic, d_opacity * opacity, d_v);
-    d_opacity *= blur_compensation(conic);
+    d_opacity = d_opacity * blur_compensation(conic);
   }
-  if (d.opacity != nullptr) *d.opacity += static_cast<S>(d_opacity);
-  for (int i = 0; i < 6 && d.factor != nullptr; ++i) d.factor[i] += static_cast<S>(d_v[i]);
+  add(d.opacities, 0, d_opacity);
+  for (Index i = 0; i < 6; ++i) add(d.factors, i, d_v[i]);
 }
 
 }  // namespace hsi4d::detail

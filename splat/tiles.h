@@ -85,44 +85,69 @@ inline Pixels pixels_within(double low, double high, Index size) {
   return {static_cast<Index>(from), static_cast<Index>(to)};
 }
 
+/// What an ellipse of pixels where α may reach alpha_min is made of. T: double, or Lanes of them.
+template <class T>
+struct ReachOf {
+  T half_width, half_height;                                     ///< of the box around it
+  T right_dy, slope, inner_half_width, squared, flatness, room;  ///< as in Extent
+};
+
+/// α ≥ alpha_min where u² + w² ≤ 2 ln(o/alpha_min). With room for the rounding of the exponential, the opacity and the
+/// logarithms, and of u, whose two terms are as large as the ellipse is (row B7).
+///
+/// @param log2_opacity  of an opacity held at or above kLeastOpacity
+template <class T>
+ReachOf<T> reach_of(const ConicOf<T>& conic, const T& x, const T& log2_opacity, const ExtentRules& rules) {
+  constexpr double kTwiceLn2 = 1.3862943611198906188;
+  constexpr double kRoom = 1e-6;  // relative, some units in the last place of float
+  const double epsilon = rules.epsilon;
+  const T exact = lane_sqrt(T(lane_max(T(kTwiceLn2 * (log2_opacity - rules.log2_alpha_min)), T{}) + 64 * epsilon));
+  const T inverse_yy = conic.l22 * conic.l22;
+  const T width = lane_sqrt(conic.xx), height = conic.yy * conic.l22;
+  const T reach = exact * (1.0 + 16 * epsilon * (1.0 + conic.l11 * width + lane_abs(conic.l21) * height));
+  return {reach * width,
+          reach * height,
+          reach * conic.xy / width,
+          conic.xy * inverse_yy,
+          conic.l11 * conic.determinant * inverse_yy,  // 1/l11
+          reach * reach * (1 + 2 * kRoom),
+          inverse_yy,
+          1e-4 + kRoom * (lane_abs(x) + reach * width)};
+}
+
+/// The extent of an ellipse around (x, y).
+inline Extent extent_within(const ReachOf<double>& reach, double x, double y, const TileGrid& grid) {
+  if (!(x + reach.half_width >= 0.5 && x - reach.half_width <= static_cast<double>(grid.width) - 0.5)) return {};
+  Extent result = rectangle_extent(pixels_within(y - reach.half_height, y + reach.half_height, grid.height),
+                                   pixels_within(x - reach.half_width, x + reach.half_width, grid.width));
+  constexpr double kFar = 1e6;  // pixels: beyond, float is not enough
+  if (!(std::abs(x) < kFar && std::abs(y) < kFar && reach.half_width < kFar && reach.half_height < kFar)) return result;
+  result.kind = Extent::Kind::kEllipse;
+  const std::int32_t first_row = result.row_begin & -static_cast<std::int32_t>(grid.tile);
+  result.first_dy = static_cast<float>(first_row + 0.5 - y);
+  result.lowest_dy = static_cast<float>(std::max(result.row_begin + 0.5 - y, -reach.half_height));
+  result.highest_dy = static_cast<float>(std::min(result.row_end - 0.5 - y, reach.half_height));
+  result.right_dy = static_cast<float>(reach.right_dy);
+  result.x = static_cast<float>(x - 0.5);
+  result.slope = static_cast<float>(reach.slope);
+  result.half_width = static_cast<float>(reach.inner_half_width);
+  result.reach_squared = static_cast<float>(reach.squared);
+  result.flatness = static_cast<float>(reach.flatness);
+  result.room = static_cast<float>(reach.room);
+  return result;
+}
+
 /// The extent that rules ask for. It never leaves out a pixel where min(cap, o G) ≥ alpha_min, with room for the
 /// rounding of the arithmetic (row B7).
 ///
-/// @param opacity       o, with the antialias factor
-/// @param log2_opacity  of an opacity held at or above kLeastOpacity
-inline Extent extent_of(const Conic& conic, double x, double y, double opacity, double log2_opacity,
+/// @param opacity  o, with the antialias factor
+/// @param reach    by reach_of, for a footprint that asks for it
+inline Extent extent_of(const Conic& conic, double x, double y, double opacity, const ReachOf<double>& reach,
                         const TileGrid& grid, const ExtentRules& rules) {
   if (rules.footprint == Footprint::kSquare3Sigma) return square_extent(conic, x, y, grid);
   if (rules.alpha_min <= 0) return rectangle_extent({0, grid.height}, {0, grid.width});
-  const double epsilon = rules.epsilon;
-  if (!(opacity >= rules.alpha_min * (1 - 4 * epsilon))) return {};
-  // α ≥ alpha_min where u² + w² ≤ 2 ln(o/alpha_min). Rounding: of the exponential, the opacity and the logarithms, and
-  // of u, whose two terms are as large as the ellipse is.
-  constexpr double kTwiceLn2 = 1.3862943611198906188;
-  const double exact = std::sqrt(std::max(0.0, kTwiceLn2 * (log2_opacity - rules.log2_alpha_min)) + 64 * epsilon);
-  const double inverse_yy = conic.l22 * conic.l22;
-  const double width = std::sqrt(conic.xx), height = conic.yy * conic.l22;
-  const double reach = exact * (1 + 16 * epsilon * (1 + conic.l11 * width + std::abs(conic.l21) * height));
-  const double half_height = reach * height, half_width = reach * width;
-  if (!(x + half_width >= 0.5 && x - half_width <= static_cast<double>(grid.width) - 0.5)) return {};
-  Extent result = rectangle_extent(pixels_within(y - half_height, y + half_height, grid.height),
-                                   pixels_within(x - half_width, x + half_width, grid.width));
-  constexpr double kFar = 1e6;  // pixels: beyond, float is not enough
-  if (!(std::abs(x) < kFar && std::abs(y) < kFar && half_width < kFar && half_height < kFar)) return result;
-  result.kind = Extent::Kind::kEllipse;
-  constexpr double kRoom = 1e-6;  // relative, some units in the last place of float
-  const std::int32_t first_row = result.row_begin & -static_cast<std::int32_t>(grid.tile);
-  result.first_dy = static_cast<float>(first_row + 0.5 - y);
-  result.lowest_dy = static_cast<float>(std::max(result.row_begin + 0.5 - y, -half_height));
-  result.highest_dy = static_cast<float>(std::min(result.row_end - 0.5 - y, half_height));
-  result.right_dy = static_cast<float>(reach * conic.xy / width);
-  result.x = static_cast<float>(x - 0.5);
-  result.slope = static_cast<float>(conic.xy * inverse_yy);
-  result.half_width = static_cast<float>(conic.l11 * conic.determinant * inverse_yy);  // 1/l11
-  result.reach_squared = static_cast<float>(reach * reach * (1 + 2 * kRoom));
-  result.flatness = static_cast<float>(inverse_yy);
-  result.room = static_cast<float>(1e-4 + kRoom * (std::abs(x) + half_width));
-  return result;
+  if (!(opacity >= rules.alpha_min * (1 - 4 * rules.epsilon))) return {};
+  return extent_within(reach, x, y, grid);
 }
 
 // --- order -----------------------------------------------------------------------------------------------------------

@@ -72,7 +72,8 @@ SplatRecord<S> record_of(const Conic& conic, double x, double y, double opacity)
 Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
                  const RenderSettings& settings, double epsilon) {
   const double log2_opacity = std::log2(std::max(opacity, kLeastOpacity));
-  return detail::extent_of(conic, x, y, opacity, log2_opacity, grid, extent_rules(settings, epsilon));
+  const ExtentRules rules = extent_rules(settings, epsilon);
+  return detail::extent_of(conic, x, y, opacity, reach_of(conic, x, log2_opacity, rules), grid, rules);
 }
 
 /// What α is at a pixel of the image, in the tile that it lies in.
