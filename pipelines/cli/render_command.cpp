@@ -7,6 +7,7 @@
 #include "core/image_io.h"
 #include "core/rotation.h"
 #include "pipelines/cli/pixel_table.h"
+#include "pipelines/cli/text.h"
 #include "pipelines/posed_avatar.h"
 #include "pipelines/state.h"
 #include "splat/transform.h"
@@ -123,6 +124,10 @@ std::string render_command(const RenderOptions& options) {
   std::vector<PixelPlace> pixels;
   for (const std::string& pixel : options.pixels)
     pixels.push_back(parse_pixel(pixel, view.camera, "hsi4d render: --debug-pixel"));
+  std::vector<std::string> inputs = options.objects;
+  inputs.insert(inputs.end(),
+                {options.shared.scene, options.shared.camera, options.object_poses, options.motion, options.avatar});
+  check_no_input(options.out, "hsi4d render: --out", inputs);
   check_writable(options.out);
   Parts parts = read_all(options);
   const PosedGaussians scene =
@@ -139,7 +144,7 @@ std::string render_command(const RenderOptions& options) {
   std::string text;
   for (const PixelTrace& trace : rendered.traces) text += pixel_table(trace, rendered, view, parts.rows) + "\n";
   return text + options.out + ": " + std::to_string(rendered.width) + " x " + std::to_string(rendered.height) +
-         " pixels of " + std::to_string(count) + " Gaussians" +
+         " pixels of " + count_text(count, "Gaussian") +
          (rendered.drawn ? ", " + std::to_string(*rendered.drawn) + " of them drawn" : "") + "\n";
 }
 

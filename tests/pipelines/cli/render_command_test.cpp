@@ -185,13 +185,18 @@ TEST_CASE("a scene without Gaussians is its background") {
   write_ply("scene.ply", Gaussians{});
   for (const char* word : kWords) {
     INFO(word);
+    std::vector<std::string> told;
+    const LogSink sink = log_to([&told](LogLevel, std::string_view message) { told.emplace_back(message); });
     CHECK(cli::render_command(render_options("a.npz", word)) ==
           "a.npz: 37 x 23 pixels of 0 Gaussians" + drawn(word, 0) + "\n");
+    CHECK(told == std::vector<std::string>{"no Gaussian is drawn: the files hold none"});
     const std::vector<double> image = numbers("a.npz", "image"), alpha = numbers("a.npz", "alpha");
     for (std::size_t i = 0; i < image.size(); ++i)
       CHECK(image[i] == Approx(0.1 * static_cast<double>(i % 3 + 1)).epsilon(1e-7));
     for (const double value : alpha) CHECK(value == 0);
     cli::gradients_command(gradients_options("g.npz", word));
+    CHECK(told.size() == 2);
+    CHECK(told.back() == told.front());
     CHECK(Npz::read("g.npz").array("means").shape() == std::vector<std::int64_t>{0, 3});
     CHECK(numbers("g.npz", "camera") == std::vector<double>(6));
   }
