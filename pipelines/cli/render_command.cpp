@@ -116,6 +116,11 @@ void write_npz(const std::string& path, const SceneImage& rendered, Precision pr
   npz.write(path);
 }
 
+void write_picture(const std::string& path, const SceneImage& rendered) {
+  const std::vector<float> values(rendered.image.begin(), rendered.image.end());
+  write_image(path, from_interleaved(values, rendered.height, rendered.width, 3));
+}
+
 }  // namespace
 
 std::string render_command(const RenderOptions& options) {
@@ -132,20 +137,29 @@ std::string render_command(const RenderOptions& options) {
   Parts parts = read_all(options);
   const PosedGaussians scene =
       parts.gaussians.size() == 1 ? std::move(parts.gaussians.front()) : concatenated(parts.gaussians);
-  const SceneImage rendered = render_scene(scene, view, pixels);
-  if (check_ending(options.out, "hsi4d render: --out", {".png", ".exr", ".npz"}) == ".npz") {
-    write_npz(options.out, rendered, view.precision);
-  } else {
-    const std::vector<float> values(rendered.image.begin(), rendered.image.end());
-    write_image(options.out, from_interleaved(values, rendered.height, rendered.width, 3));
-  }
   const Index count = scene.gaussians.count();
-  warn_if_nothing_drawn(rendered, count);
+  const bool arrays = check_ending(options.out, "hsi4d render: --out", {".png", ".exr", ".npz"}) == ".npz";
   std::string text;
-  for (const PixelTrace& trace : rendered.traces) text += pixel_table(trace, rendered, view, parts.rows) + "\n";
-  return text + options.out + ": " + std::to_string(rendered.width) + " x " + std::to_string(rendered.height) +
+  std::optional<Index> drawn;
+  if (arrays || !pixels.empty()) {
+    const SceneImage rendered = render_scene(scene, view, pixels);
+    if (arrays) {
+      write_npz(options.out, rendered, view.precision);
+    } else {
+      write_picture(options.out, rendered);
+    }
+    warn_if_nothing_drawn(shows_something(rendered), count);
+    for (const PixelTrace& trace : rendered.traces) text += pixel_table(trace, rendered, view, parts.rows) + "\n";
+    drawn = rendered.drawn;
+  } else {
+    const ScenePicture picture = render_picture(scene, view);
+    write_image(options.out, picture.image);
+    warn_if_nothing_drawn(picture.shows_something, count);
+    drawn = picture.drawn;
+  }
+  return text + options.out + ": " + std::to_string(view.camera.width) + " x " + std::to_string(view.camera.height) +
          " pixels of " + count_text(count, "Gaussian") +
-         (rendered.drawn ? ", " + std::to_string(*rendered.drawn) + " of them drawn" : "") + "\n";
+         (drawn ? ", " + std::to_string(*drawn) + " of them drawn" : "") + "\n";
 }
 
 }  // namespace hsi4d::cli

@@ -89,9 +89,7 @@ std::string check_ending(const std::string& path, const std::string& where, cons
   throw UserError(where + ": " + path + " does not end as it must; allowed: " + joined(allowed));
 }
 
-void warn_if_nothing_drawn(const SceneImage& rendered, Index count) {
-  const bool shows_something =
-      std::any_of(rendered.alpha.begin(), rendered.alpha.end(), [](double alpha) { return alpha > 0; });
+void warn_if_nothing_drawn(bool shows_something, Index count) {
   if (shows_something) return;
   if (count == 0) return log_warning("no Gaussian is drawn: the files hold none");
   log_warning("no Gaussian is drawn: the camera sees none of " + std::to_string(count) +

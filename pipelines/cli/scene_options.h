@@ -40,8 +40,9 @@ SplatFile read_scene(const std::string& path);
 /// Warns of an image in which no Gaussian is drawn: because there is none, or because the camera looks away, most often
 /// since its axes are of another convention, which the warning names.
 ///
-/// @param count  of the Gaussians
-void warn_if_nothing_drawn(const SceneImage& rendered, Index count);
+/// @param shows_something  alpha is above 0 somewhere in the image
+/// @param count            of the Gaussians
+void warn_if_nothing_drawn(bool shows_something, Index count);
 
 /// Adds an array of numbers, float32 where the precision is float, else float64.
 void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,
