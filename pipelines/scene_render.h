@@ -72,8 +72,7 @@ bool shows_something(const SceneImage& rendered);
 /// count, or for a pixel that is not in the image.
 SceneImage render_scene(const PosedGaussians& scene, const SceneView& view, std::span<const PixelPlace> traced = {});
 
-/// Renders the image of render_scene, rounded to float, in less time and a third of the memory: depth is not
-/// composited.
+/// Renders the image of render_scene, rounded to float, in half the time and memory: depth is not composited.
 ScenePicture render_picture(const PosedGaussians& scene, const SceneView& view);
 
 /// Renders and differentiates.
