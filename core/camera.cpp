@@ -82,6 +82,11 @@ void check_camera(const Camera& camera, std::string_view name) {
     refuse(name, "the rotation R is not orthonormal: |R R^T - I| is " + text_of(error),
            "at most " + text_of(kRotationTolerance));
   }
+  if (r.determinant() < 0) {
+    refuse(name, "the rotation R mirrors: its determinant is -1",
+           "1. An odd number of axes is turned round: those of a camera are OpenCV's, x right, y down, z forward, and "
+           "from OpenGL's, y up, z backward, two differ; a world of left-handed axes must be made right-handed first");
+  }
 }
 
 Rigid<double> rigid_from_matrix(const Matrix4<double>& matrix, std::string_view name) {

@@ -23,8 +23,8 @@ struct Camera {
 /// Largest entry of |R Rᵀ − I| that a camera's rotation may have.
 inline constexpr double kRotationTolerance = 1e-4;
 
-/// Throws UserError unless width, height, fx and fy are positive, all numbers are finite, and |R Rᵀ − I| ≤
-/// kRotationTolerance in every entry. The rotation is otherwise used as given; a mirrored one (determinant −1) passes.
+/// Throws UserError unless width, height, fx and fy are positive, all numbers are finite, |R Rᵀ − I| ≤
+/// kRotationTolerance in every entry, and R does not mirror (determinant > 0). It is otherwise used as given.
 ///
 /// @param name  starts the message: a file, with a JSON pointer perhaps
 void check_camera(const Camera& camera, std::string_view name = "camera");

@@ -114,20 +114,7 @@ void bench_iteration(const Workload& w, const RasterizeBench& options,
   }
   for (std::size_t m = 0; m < all.size(); ++m) {
     const RenderCounters& counters = *all[m]->rendered.counters;
-    std::sort(seconds[m].begin(), seconds[m].end());
-    Measurement result;
-    result.name = "rasterize/" + w.name + "/" + kModes[m].name;
-    result.threads = options.threads;
-    result.median_ms = 1e3 * seconds[m][seconds[m].size() / 2];
-    result.min_ms = 1e3 * seconds[m].front();
-    result.repeats = options.repeats;
-    result.gaussians = w.count;
-    result.fragments = counters.fragments;
-    result.groups = counters.groups;
-    result.pairs = counters.pairs;
-    result.tiles = counters.tiles;
-    result.kept_bytes = counters.kept_bytes;
-    result.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
+    Measurement result = measured(w, counters, options.threads, kModes[m].name, seconds[m]);
     if (m > 0) {
       result.image_error = image_error(*all[m], *all.front());
       result.gradient_error = gradient_error(*all[m], *all.front());

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 
 #include "core/check.h"
+#include "core/fma_peak.h"
 #include "core/parallel.h"
 #include "core/suggest.h"
 #include "core/text.h"
@@ -58,27 +60,28 @@ struct Recorded {
   }
 };
 
-Measurement measured(const Workload& w, const RenderCounters& counters, const RasterizeBench& options,
-                     const std::string& step, std::vector<double> seconds) {
-  std::sort(seconds.begin(), seconds.end());
-  Measurement m;
-  m.name = "rasterize/" + w.name + "/" + step;
-  m.threads = options.threads;
-  m.median_ms = 1e3 * seconds[seconds.size() / 2];
-  m.min_ms = 1e3 * seconds.front();
-  m.repeats = static_cast<int>(seconds.size());
-  m.gaussians = w.count;
-  m.fragments = counters.fragments;
-  m.pairs = counters.pairs;
-  m.groups = counters.groups;
-  m.tiles = counters.tiles;
-  m.kept_bytes = counters.kept_bytes;
-  m.pixels = static_cast<Index>(w.view.camera.width) * w.view.camera.height;
-  return m;
-}
+/// A step of an iteration and what it does.
+struct Step {
+  const char* name;
+  double RenderTimes::*time;
+  WorkUnit unit;
+  double operations = 0;  ///< on the vector ports for a group of 16 lanes (docs/numerics.md); 0: not counted
+};
+constexpr double kLanes = 16;  // a block of 4×4 pixels
+constexpr double kForward = 20, kBackward = 17 + 6 + 8 + 7, kBackwardOfColors = 2 + 3 + 1;
+constexpr std::array<Step, 6> kSteps = {{{"records", &RenderTimes::records_s, WorkUnit::kGaussians},
+                                         {"sort", &RenderTimes::sort_s, WorkUnit::kGaussians},
+                                         {"bin", &RenderTimes::bin_s, WorkUnit::kPairs},
+                                         {"forward", &RenderTimes::forward_s, WorkUnit::kFragments, kForward},
+                                         {"backward", &RenderTimes::backward_s, WorkUnit::kFragments, kBackward},
+                                         {"reduce", &RenderTimes::reduce_s, WorkUnit::kGaussians}}};
+constexpr std::array<Step, 2> kStepsWithColors = {
+    {{"backward_with_colors", &RenderTimes::backward_s, WorkUnit::kFragments, kBackward + kBackwardOfColors},
+     {"reduce_with_colors", &RenderTimes::reduce_s, WorkUnit::kGaussians}}};
 
 void bench_workload(const Workload& w, const RasterizeBench& options,
                     const std::function<void(const Measurement&)>& report) {
+  const double peak = fma_peak_per_second();
   for (const bool with_colors : {false, true}) {
     Recorded recorded(w, with_colors);
     const RenderCounters& counters = *recorded.composited.counters;
@@ -88,19 +91,16 @@ void bench_workload(const Workload& w, const RasterizeBench& options,
       recorded.run(true);
       times.push_back(counters.times);
     }
-    const auto say = [&](const char* step, double RenderTimes::*time) {
+    const std::span<const Step> steps = with_colors ? std::span<const Step>(kStepsWithColors) : kSteps;
+    for (const Step& step : steps) {
       std::vector<double> seconds;
-      for (const RenderTimes& t : times) seconds.push_back(t.*time);
-      report(measured(w, counters, options, step, std::move(seconds)));
-    };
-    if (!with_colors) {
-      say("records", &RenderTimes::records_s);
-      say("sort", &RenderTimes::sort_s);
-      say("bin", &RenderTimes::bin_s);
-      say("forward", &RenderTimes::forward_s);
+      for (const RenderTimes& t : times) seconds.push_back(t.*step.time);
+      Measurement m = measured(w, counters, options.threads, step.name, std::move(seconds));
+      m.unit = step.unit;
+      m.operations = step.operations * kLanes * static_cast<double>(counters.groups);
+      m.fma_peak_per_s = peak;
+      report(m);
     }
-    say(with_colors ? "backward_with_colors" : "backward", &RenderTimes::backward_s);
-    say(with_colors ? "reduce_with_colors" : "reduce", &RenderTimes::reduce_s);
   }
 }
 

@@ -337,9 +337,14 @@ class Reconstruction {
     for (const LossValue& term : report.terms) record.losses.emplace_back(term.name, term.value);
     record.seconds = report.seconds;
     record.rolled_back = report.rolled_back;
-    record.counters = {{"tiles", static_cast<double>(counters.tiles)},
-                       {"pairs", static_cast<double>(counters.pairs)},
-                       {"fragments", static_cast<double>(counters.fragments)}};
+    for (const auto& [name, count] : {std::pair{"tiles", counters.tiles},
+                                      {"pairs", counters.pairs},
+                                      {"groups", counters.groups},
+                                      {"fragments", counters.fragments},
+                                      {"layers", counters.layers},
+                                      {"adjoint_tiles", counters.adjoint_tiles}}) {
+      record.counters.emplace_back(name, static_cast<double>(count));
+    }
     folder_.append_metrics(record);
     bar_.step_with("loss", report.loss);
     if (observer_.wants_stop()) throw Interrupted(stop_message(frame));

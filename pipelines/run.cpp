@@ -91,6 +91,7 @@ RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Cl
 RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
   check_run(config);
   EarlyMessages early;
+  for (const RunNote& note : run_notes(config)) log_message(note.level, note.text);
   const Clip clip = read_clip(config.data);  // before anything is written
   check_frames(config.data, clip, has_loss(config, "center"));
   RunIdentity identity;

@@ -39,7 +39,7 @@ struct IterationRecord {
   std::vector<std::pair<std::string, double>> losses;  ///< the terms
   double seconds = 0;
   bool rolled_back = false;    ///< the step was undone; numbers that are not finite are then written as null
-  MetricValues counters = {};  ///< work done: tiles, pairs, fragments
+  MetricValues counters = {};  ///< work done: tiles, pairs, groups, fragments, layers, adjoint_tiles
 };
 
 /// The paths of a run folder's members.

@@ -94,6 +94,15 @@ void add_input_problems(const DataSettings& data, std::vector<RunProblem>& found
   }
 }
 
+// ---- Skips and approximations ----
+
+/// The setting that keeps static layers from being made, "skip.static_layer=false"; none: empty.
+std::string without_static_layers(const RunConfig& config) {
+  if (!config.skip.static_tiles) return "skip.static_tiles=false";
+  if (!config.skip.static_layer) return "skip.static_layer=false";
+  return config.precision == RunPrecision::kDouble ? "precision=double" : "";
+}
+
 // ---- Where they were written ----
 
 const ConfigValue* find_item(const ConfigValue& array, const std::string& key) {
@@ -167,6 +176,22 @@ void add_run_problems(const ConfigValue& tree, const RunConfig& config, ConfigUs
                        [&problem](const std::string& other) { return may_follow(problem, other); });
   });
   for (const RunProblem& problem : found) problems.add(origin_of(tree, problem.pointer), problem.pointer, problem.text);
+}
+
+std::vector<RunNote> run_notes(const RunConfig& config) {
+  std::vector<RunNote> notes;
+  if (!config.skip.static_tiles && config.skip.static_layer)
+    notes.push_back({LogLevel::kInfo, "skip.static_tiles=false switches skip.static_layer off too"});
+  if (!config.approx.collapse_suffix) return notes;
+  const std::string off = without_static_layers(config);
+  if (off.empty()) {
+    notes.push_back({LogLevel::kInfo,
+                     "approx.collapse_suffix is on: images are near, each pixel within render.transmittance_stop, " +
+                         rounded(config.render.transmittance_stop, 4)});
+  } else {
+    notes.push_back({LogLevel::kWarning, "approx.collapse_suffix=true does nothing with " + off});
+  }
+  return notes;
 }
 
 void check_run(const RunConfig& config) { throw_if_any(run_problems(config, ConfigUse::kRun)); }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/config_value.h"
+#include "core/log.h"
 #include "pipelines/run_config.h"
 
 namespace hsi4d {
@@ -25,6 +26,15 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use);
 /// Adds them with the places where the settings were written in `tree`. Those that may only follow from problems that
 /// were found before are left out.
 void add_run_problems(const ConfigValue& tree, const RunConfig& config, ConfigUse use, ConfigProblems& problems);
+
+/// What is no mistake and yet is to be known of a config.
+struct RunNote {
+  LogLevel level;  ///< warning: a setting that does nothing
+  std::string text;
+};
+
+/// Approximations that are on, settings of `skip` and `approx` that switch others off or do nothing.
+std::vector<RunNote> run_notes(const RunConfig& config);
 
 /// Throws one UserError with every problem of a run, a line each.
 void check_run(const RunConfig& config);

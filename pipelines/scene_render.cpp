@@ -151,10 +151,33 @@ SceneImage image_of(const TapedScene<S>& scene, const Camera& camera) {
 }
 
 template <class S>
-SceneImage render_taped(const PosedGaussians& posed, const SceneView& view, std::span<const PixelPlace> traced) {
-  TapedScene<S> scene(posed, view, true);
+void freeze_all(TapedScene<S>& scene) {
   for (const Var<S> var : {scene.means, scene.quats, scene.log_scales, scene.logits, scene.sh, scene.xi})
     scene.tape.freeze(var);
+}
+
+template <class S>
+ScenePicture picture_taped(const PosedGaussians& posed, const SceneView& view) {
+  TapedScene<S> scene(posed, view, false);
+  freeze_all(scene);
+  scene.tape.forward(scene.rendered.image);
+  scene.tape.forward(scene.rendered.transmittance);
+  ScenePicture picture{Image(3, view.camera.height, view.camera.width), false, scene.rendered.counters->visible};
+  const ConstArray<S> image = scene.tape.value(scene.rendered.image),
+                      t = scene.tape.value(scene.rendered.transmittance);
+  for (int y = 0; y < view.camera.height; ++y) {
+    for (int c = 0; c < 3; ++c) {
+      for (int x = 0; x < view.camera.width; ++x) picture.image(c, y, x) = static_cast<float>(image(c, y, x));
+    }
+    picture.shows_something |= std::any_of(t.row(y), t.row(y) + view.camera.width, [](S at) { return 1 - at > 0; });
+  }
+  return picture;
+}
+
+template <class S>
+SceneImage render_taped(const PosedGaussians& posed, const SceneView& view, std::span<const PixelPlace> traced) {
+  TapedScene<S> scene(posed, view, true);
+  freeze_all(scene);
   scene.tape.forward(scene.rendered.depth);
   scene.tape.forward(scene.rendered.image);
   scene.tape.forward(scene.rendered.transmittance);
@@ -268,6 +291,10 @@ SceneGradients gradients_reference(const Gaussians& gaussians, const SceneView& 
 
 }  // namespace
 
+bool shows_something(const SceneImage& rendered) {
+  return std::any_of(rendered.alpha.begin(), rendered.alpha.end(), [](double alpha) { return alpha > 0; });
+}
+
 SceneImage render_scene(const PosedGaussians& scene, const SceneView& view, std::span<const PixelPlace> traced) {
   check_scene(scene);
   switch (view.precision) {
@@ -279,6 +306,21 @@ SceneImage render_scene(const PosedGaussians& scene, const SceneView& view, std:
       break;
   }
   return render_reference(scene, view, traced);
+}
+
+ScenePicture render_picture(const PosedGaussians& scene, const SceneView& view) {
+  check_scene(scene);
+  switch (view.precision) {
+    case Precision::kFloat:
+      return picture_taped<float>(scene, view);
+    case Precision::kDouble:
+      return picture_taped<double>(scene, view);
+    case Precision::kReference:
+      break;
+  }
+  const SceneImage rendered = render_reference(scene, view, {});
+  const std::vector<float> values(rendered.image.begin(), rendered.image.end());
+  return {from_interleaved(values, rendered.height, rendered.width, 3), shows_something(rendered), rendered.drawn};
 }
 
 SceneGradients scene_gradients(const Gaussians& scene, const SceneView& view, std::span<const double> target) {

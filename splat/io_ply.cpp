@@ -17,17 +17,25 @@ enum Column : std::size_t { kMean = 0, kScale = 3, kQuat = 6, kOpacity = 10, kDc
 
 std::string numbered(const char* name, int number) { return name + std::to_string(number); }
 
-std::vector<std::string> column_names(int rest_count) {
+/// @param rest_count  of the file's f_rest_, a third for each channel; of each channel the first `kept` are read
+std::vector<std::string> column_names(int rest_count, int kept) {
   std::vector<std::string> names = {"x",     "y",     "z",     "scale_0", "scale_1", "scale_2", "rot_0",
                                     "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",  "f_dc_1",  "f_dc_2"};
-  for (int i = 0; i < rest_count; ++i) names.push_back(numbered("f_rest_", i));
+  for (int c = 0; c < 3; ++c) {
+    for (int k = 0; k < kept; ++k) names.push_back(numbered("f_rest_", c * (rest_count / 3) + k));
+  }
   return names;
 }
 
+constexpr int kHighestDegreeOfFiles = 4;  // of which no more than kHighestShDegree is kept
+
+/// Harmonics of a channel above degree 0.
+int rest_of(int degree) { return (degree + 1) * (degree + 1) - 1; }
+
 /// Degree of the harmonics that so many f_rest_ properties are, or -1.
 int degree_of(int rest_count) {
-  for (int degree = 0; degree <= 3; ++degree) {
-    if (rest_count == 3 * ((degree + 1) * (degree + 1) - 1)) return degree;
+  for (int degree = 0; degree <= kHighestDegreeOfFiles; ++degree) {
+    if (rest_count == 3 * rest_of(degree)) return degree;
   }
   return -1;
 }
@@ -45,10 +53,10 @@ const PlyElement& vertex_of(const PlyHeader& header, const std::string& name) {
 }
 
 /// The places of the wanted properties. Throws DataError with all that are missing.
-std::vector<int> columns_of(const PlyElement& vertex, int rest_count, const std::string& name) {
+std::vector<int> columns_of(const PlyElement& vertex, int rest_count, int kept, const std::string& name) {
   std::vector<int> columns;
   std::string missing;
-  for (const std::string& wanted : column_names(rest_count)) {
+  for (const std::string& wanted : column_names(rest_count, kept)) {
     columns.push_back(vertex.find(wanted));
     if (columns.back() < 0) {
       missing += (missing.empty() ? "" : ", ") + wanted;
@@ -90,9 +98,11 @@ SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name
   if (degree < 0)
     throw DataError(name + ": there are " + std::to_string(rest_count) +
                     " properties f_rest_; allowed: 0, 9, 24 or 45 (spherical harmonics of degree 0 to 3)");
-  const std::vector<int> columns = columns_of(vertex, rest_count, name);
-  SplatRows rows(vertex.rows, degree, "INRIA PLY");
-  const int coefficients = (degree + 1) * (degree + 1);
+  const int kept_degree = std::min(degree, kHighestShDegree), kept = rest_of(kept_degree);
+  const std::vector<int> columns = columns_of(vertex, rest_count, kept, name);
+  SplatRows rows(vertex.rows, kept_degree, "INRIA PLY");
+  if (degree > kept_degree) rows.add_repair(kWithoutDegree4, vertex.rows);
+  const int coefficients = kept + 1;
   const auto take = [&](Index, std::span<const double> values) { rows.take(row_of(values, coefficients)); };
   read_ply_rows(file, header, name, header.find("vertex"), columns, take);
   return rows.finish();

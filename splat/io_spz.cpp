@@ -271,8 +271,7 @@ SplatFile decode_spz(std::span<const std::uint8_t> file, const std::string& name
   if ((header.flags & kSpzAntialiased) != 0) rows.add_note("trained with antialiasing");
   if ((header.flags & ~(kSpzAntialiased | kSpzHasExtensions)) != 0)
     rows.add_note("the header's flags are " + std::to_string(header.flags) + "; those above 3 are not known");
-  if (header.degree > kHighestShDegree)
-    rows.add_repair("Gaussians without their harmonics of degree 4", static_cast<Index>(header.count));
+  if (header.degree > kHighestShDegree) rows.add_repair(kWithoutDegree4, static_cast<Index>(header.count));
   const Decoder decoder(content, read_extensions(content, rows, name));
   for (std::size_t n = 0; n < header.count; ++n) rows.take(decoder.row(n));
   return rows.finish();

@@ -24,11 +24,27 @@ bool begins_with(std::span<const std::uint8_t> file, std::string_view text) {
                     [](char c, std::uint8_t byte) { return c == static_cast<char>(byte); });
 }
 
+/// Whether a file of any name begins as one of Gaussians does. Gzip may hold something else.
+bool begins_as_splats(std::span<const std::uint8_t> file) {
+  return begins_with(file, "ply\n") || begins_with(file, "ply\r") || begins_with(file, "NGSP");
+}
+
 }  // namespace
 
 bool has_splat_ending(const std::string& path) {
   return ends_in(path, ".ply") || ends_in(path, ".splat") || ends_in(path, ".spz");
 }
+
+bool is_splat_file(const std::string& path) {
+  if (has_splat_ending(path) || ends_in(path, ".ksplat")) return true;
+  try {
+    return begins_as_splats(read_file_start(path, 4));
+  } catch (const UserError&) {
+    return false;
+  }
+}
+
+int written_sh_degree(const std::string& path, int sh_degree) { return ends_in(path, ".splat") ? 0 : sh_degree; }
 
 SplatFile read_splats(const std::string& path) { return decode_splats(read_file(path), path); }
 

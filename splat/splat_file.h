@@ -16,6 +16,13 @@ inline constexpr const char* kSplatFormats = ".ply (INRIA's and compressed), .sp
 /// Whether a path ends in .ply, .splat or .spz, in any case.
 bool has_splat_ending(const std::string& path);
 
+/// Whether read_splats takes a file for one of Gaussians, by its content or its ending, or knows why it cannot be read
+/// (.ksplat). A file that cannot be opened has its ending alone.
+bool is_splat_file(const std::string& path);
+
+/// Degree of the harmonics that a file of the path's ending holds, of Gaussians of degree `sh_degree`.
+int written_sh_degree(const std::string& path, int sh_degree);
+
 /// The Gaussians of a file. PLY and .spz are known by their content, .splat by the path's ending.
 ///
 /// @param path  UTF-8

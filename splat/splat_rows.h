@@ -18,6 +18,9 @@ struct SplatRow {
   std::array<float, kMostSh> sh{};  ///< [K,3], the first K of the file's degree
 };
 
+/// The repair of a reader that leaves out harmonics above kHighestShDegree.
+inline constexpr const char* kWithoutDegree4 = "Gaussians without their harmonics of degree 4";
+
 /// Takes rows one by one into Gaussians that have room for all. A row is left out, and counted, when a number of it is
 /// not finite (an opacity of ±inf is) or its quaternion is zero; opacity logits and log-scales beyond
 /// ±kOpacityLogitLimit and ±kLogScaleLimit are held there, and counted.

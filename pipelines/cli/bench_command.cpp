@@ -1,5 +1,6 @@
 #include "pipelines/cli/bench_command.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include <nlohmann/json.hpp>
@@ -13,7 +14,9 @@ namespace hsi4d::cli {
 
 namespace {
 
-double rate(const Measurement& m) { return m.median_ms > 0 ? static_cast<double>(m.fragments) / m.median_ms / 1e3 : 0; }
+const char* unit_name(WorkUnit unit) {
+  return unit == WorkUnit::kGaussians ? "gaussians" : unit == WorkUnit::kPairs ? "pairs" : "fragments";
+}
 
 std::string json_line(const Measurement& m) {
   nlohmann::ordered_json line = {{"name", m.name},
@@ -29,10 +32,21 @@ std::string json_line(const Measurement& m) {
                                  {"tiles", m.tiles},
                                  {"pixels", m.pixels},
                                  {"kept_bytes", m.kept_bytes},
-                                 {"mfragments_per_s", rate(m)}};
+                                 {"unit", unit_name(m.unit)},
+                                 {"millions_per_s", m.millions_per_s()},
+                                 {"peak_memory_bytes", m.peak_memory_bytes}};
+  if (m.fma_peak_per_s > 0) line["fma_peak_per_s"] = m.fma_peak_per_s;
+  if (m.peak_share()) line["fma_peak_share"] = *m.peak_share();
   if (m.image_error) line["image_error"] = *m.image_error;
   if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
   return line.dump() + "\n";
+}
+
+/// " 34.5" of a hundred, or nothing.
+std::string share_text(const Measurement& m) {
+  char text[16] = "";
+  if (m.peak_share()) std::snprintf(text, sizeof text, " %6.1f", 100 * *m.peak_share());
+  return text;
 }
 
 std::string json_line(const FilterMeasurement& m) {
@@ -56,21 +70,28 @@ std::string json_line(const FilterMeasurement& m) {
 std::string bench_rasterize_command(const BenchOptions& options) {
   std::string json, table;
   char line[160];
-  std::snprintf(line, sizeof line, "%-44s %10s %10s %7s %10s %12s %8s\n", "", "median ms", "least ms", "tiles", "pairs",
-                "fragments", "M/s");
+  std::snprintf(line, sizeof line, "%-44s %10s %10s %7s %10s %12s %8s %-9s %6s\n", "", "median ms", "least ms", "tiles",
+                "pairs", "fragments", "M/s", "of", "peak %");
   table += line;
+  double peak = 0;
   bench_rasterize({options.workloads, options.threads, options.repeats}, [&](const Measurement& m) {
-    std::snprintf(line, sizeof line, "%-44s %10.3f %10.3f %7lld %10lld %12lld %8.0f\n", m.name.c_str(), m.median_ms,
+    std::snprintf(line, sizeof line, "%-44s %10.3f %10.3f %7lld %10lld %12lld %8.0f %-9s", m.name.c_str(), m.median_ms,
                   m.min_ms, static_cast<long long>(m.tiles), static_cast<long long>(m.pairs),
-                  static_cast<long long>(m.fragments), rate(m));
-    table += line;
+                  static_cast<long long>(m.fragments), m.millions_per_s(), unit_name(m.unit));
+    table += line + share_text(m) + "\n";
     if (m.image_error && m.gradient_error) {
       std::snprintf(line, sizeof line, "%-44s image within %.2g, gradients within %.2g (relative L2) of all rendered\n",
                     "", *m.image_error, *m.gradient_error);
       table += line;
     }
     json += json_line(m);
+    peak = std::max(peak, m.fma_peak_per_s);
   });
+  if (peak > 0) {
+    std::snprintf(line, sizeof line, "peak %%: of the %.1f G multiply-adds a second that were measured beside it\n",
+                  1e-9 * peak);
+    table += line;
+  }
   if (!options.json.empty()) write_text_file(options.json, json);
   return table;
 }

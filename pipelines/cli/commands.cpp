@@ -8,13 +8,10 @@
 #include "pipelines/cli/text.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/run_config.h"
+#include "pipelines/run_problems.h"
 
 namespace hsi4d::cli {
 namespace {
-
-std::string count_of(std::size_t count, const std::string& one) {
-  return std::to_string(count) + " " + one + (count == 1 ? "" : one.ends_with("s") ? "es" : "s");
-}
 
 template <class T>
 std::string names_of(const ConfigMap<T>& map) {
@@ -31,23 +28,23 @@ std::string names_of(const ConfigMap<LossSettings>& losses) {
 }
 
 std::string stage_summary(const std::string& name, const StageSettings& stage) {
-  return "  stage " + name + ": " + count_of(static_cast<std::size_t>(stage.iterations), "iteration") + ", " +
-         count_of(stage.optimize.size(), "parameter group") + names_of(stage.optimize) + ", " +
-         count_of(stage.losses.size(), "loss") + names_of(stage.losses) + "\n";
+  return "  stage " + name + ": " + count_text(stage.iterations, "iteration") + ", " +
+         count_text(std::ssize(stage.optimize), "parameter group") + names_of(stage.optimize) + ", " +
+         count_text(std::ssize(stage.losses), "loss") + names_of(stage.losses) + "\n";
 }
 
 std::string summary(const std::filesystem::path& file, const RunConfig& config) {
   const RenderSettings& render = config.render;
   std::string text = file.generic_string() + ": OK\n";
   text += "  seed " + std::to_string(config.seed) + ", ";
-  text +=
-      config.threads == 0 ? "one thread a core\n" : count_of(static_cast<std::size_t>(config.threads), "thread") + "\n";
+  text += config.threads == 0 ? "one thread a core\n" : count_text(config.threads, "thread") + "\n";
   text += "  render: quality " + std::string(choice_name<Quality>(kQualities, render.quality));
   if (render.compatibility != Compatibility::kNone)
     text += ", as " + std::string(choice_name<Compatibility>(kCompatibilities, render.compatibility));
   text += "\n";
   for (const auto& [name, stage] : config.stages) text += stage_summary(name, stage);
   if (config.stages.empty()) text += "  no stages\n";
+  for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
   return text;
 }
 

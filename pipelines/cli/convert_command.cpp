@@ -65,9 +65,13 @@ std::vector<Index> kept_rows(const Gaussians& g, const ConvertOptions& o) {
 
 SplatWriteOptions write_options(const ConvertOptions& o) {
   SplatWriteOptions options;
-  options.spz.version = o.spz_version;
-  if (o.spz_version < 2 || o.spz_version > 4)
-    throw UserError(kCommand + "--spz-version: " + std::to_string(o.spz_version) + " is not written; allowed: 2, 3, 4");
+  if (file_ending(o.out) != ".spz" && (o.spz_version || !o.spz_sh_bits.empty()))
+    throw UserError(kCommand + (o.spz_version ? "--spz-version" : "--spz-sh-bits") +
+                    " says how .spz files are written; " + o.out + " is none");
+  options.spz.version = o.spz_version.value_or(options.spz.version);
+  if (options.spz.version < 2 || options.spz.version > 4)
+    throw UserError(kCommand + "--spz-version: " + std::to_string(options.spz.version) +
+                    " is not written; allowed: 2, 3, 4");
   if (o.spz_sh_bits.empty()) return options;
   const std::vector<double> bits = parse_numbers(o.spz_sh_bits, 2, kCommand + "--spz-sh-bits", "A,B, from 1 to 8");
   for (const double count : bits) {
@@ -87,8 +91,9 @@ std::string convert_command(const ConvertOptions& o) {
     throw UserError(kCommand + "--sh-degree: " + std::to_string(o.sh_degree) + " is no degree; allowed: 0 to " +
                     std::to_string(kHighestShDegree));
   const Similarity similarity = similarity_of(o);
+  if (!has_splat_ending(o.out)) check_ending(o.out, kCommand + "OUT", {".ply", ".compressed.ply", ".splat", ".spz"});
   const SplatWriteOptions options = write_options(o);
-  if (!has_splat_ending(o.out)) check_ending(o.out, "hsi4d convert: OUT", {".ply", ".splat", ".spz"});
+  check_no_input(o.out, kCommand + "OUT", {o.in});
   check_writable(o.out);
   const SplatFile file = read_scene(o.in);
   const std::vector<Index> rows = kept_rows(file.gaussians, o);
@@ -97,10 +102,10 @@ std::string convert_command(const ConvertOptions& o) {
   if (o.sh_degree >= 0) g = with_sh_degree(g, o.sh_degree);
   const EncodedSplats encoded = encode_splats(o.out, g, options);
   write_file(o.out, encoded.bytes);
-  std::string text = o.out + ": " + std::to_string(g.count()) + " Gaussians";
+  std::string text = o.out + ": " + count_text(g.count(), "Gaussian");
   if (!all) text += " of " + std::to_string(file.gaussians.count());
-  text +=
-      ", harmonics of degree " + std::to_string(g.sh_degree) + ", " + std::to_string(encoded.bytes.size()) + " bytes\n";
+  text += ", harmonics of degree " + std::to_string(written_sh_degree(o.out, g.sh_degree)) + ", " +
+          std::to_string(encoded.bytes.size()) + " bytes\n";
   if (!encoded.losses.empty()) text += "  not held by the format: " + counts_text(encoded.losses) + "\n";
   return text;
 }

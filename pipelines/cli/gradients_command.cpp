@@ -7,6 +7,7 @@
 #include "core/exr.h"
 #include "core/image_io.h"
 #include "core/text.h"
+#include "pipelines/cli/text.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -117,15 +118,16 @@ std::string gradients_command(const GradientsOptions& options) {
   check_ending(options.out, "hsi4d gradients: --out", {".npz"});
   check_ending(options.target, "hsi4d gradients: --target", target_endings());
   const SceneView view = view_of(options.shared, "hsi4d gradients");
+  check_no_input(options.out, "hsi4d gradients: --out", {options.target, options.shared.scene, options.shared.camera});
   check_writable(options.out);
   const std::vector<double> target = read_target(options.target, view.camera.height, view.camera.width);
   const SplatFile scene = read_scene(options.shared.scene);
   SceneGradients gradients = scene_gradients(scene.gaussians, view, target);
   zero_held(gradients, scene.report);
   write_gradients(options.out, gradients, scene, view.precision);
-  warn_if_nothing_drawn(gradients.rendered, scene.gaussians.count());
+  warn_if_nothing_drawn(shows_something(gradients.rendered), scene.gaussians.count());
   return options.out + ": loss " + number_text(gradients.loss) + ", gradients of " +
-         std::to_string(scene.gaussians.count()) + " Gaussians and the camera\n";
+         count_text(scene.gaussians.count(), "Gaussian") + " and the camera\n";
 }
 
 }  // namespace hsi4d::cli

@@ -62,12 +62,14 @@ Counts suspicion_counts(const Suspicions& s) {
 std::string splat_info(const std::string& path) {
   const SplatFile file = read_splats(path);
   const GaussianStatistics s = statistics_of(file.gaussians);
-  std::string text = path + ": " + std::to_string(s.count) + " Gaussians, spherical harmonics of degree " +
+  std::string text = path + ": " + count_text(s.count, "Gaussian") + ", spherical harmonics of degree " +
                      std::to_string(s.sh_degree) + ", " + file.report.format + "\n";
   const std::string faults = summary_text(file.report);
   text += "  faults   " + (faults.empty() ? "none" : faults) + "\n";
   for (const std::string& note : file.report.notes) text += "  note     " + note + "\n";
-  if (s.count == 0) return text;
+  if (s.count == 0)
+    return text + "  notice   " + (file.report.rows == 0 ? "the file holds no Gaussians" : "no Gaussian is left") +
+           "\n";
   const Counts suspicious = suspicion_counts(s.suspicions);
   if (!suspicious.empty()) text += "  notice   " + counts_text(suspicious) + "\n";
   text += "  bounds   ";
@@ -180,9 +182,10 @@ constexpr Kind kKinds[] = {{".ply", splat_info},  {".splat", splat_info}, {".spz
 
 std::string info_command(const std::string& path, bool json) {
   if (json) {
-    if (has_splat_ending(path)) return splat_json(path);
+    if (is_splat_file(path)) return splat_json(path);
     throw UserError("hsi4d info: --json tells of Gaussians; allowed: .ply, .splat, .spz");
   }
+  if (is_splat_file(path)) return splat_info(path);
   const std::string ending = file_ending(path);
   std::vector<std::string> known;
   for (const Kind& kind : kKinds) {

@@ -35,7 +35,7 @@ std::string name_of(const PixelSplat& splat, std::span<const FileRows> files) {
 
 std::string composited_table(const PixelTrace& trace, std::span<const FileRows> files) {
   std::vector<std::vector<std::string>> rows = {{"#", "file", "row", "depth", "alpha uncapped", "alpha", "T before",
-                                                 "weight", "color", "sum of weight x color", ""}};
+                                                 "weight", "colour", "sum of weight x colour", ""}};
   for (std::size_t i = 0; i < trace.composited.size(); ++i) {
     const PixelSplat& s = trace.composited[i];
     const FileRow from = file_row(s.index, files);
@@ -111,8 +111,8 @@ PixelPlace parse_pixel(const std::string& text, const Camera& camera, const std:
 std::string pixel_table(const PixelTrace& trace, const SceneImage& rendered, const SceneView& view,
                         std::span<const FileRows> files) {
   return "pixel column " + std::to_string(trace.place.column) + ", row " + std::to_string(trace.place.row) + ": " +
-         std::to_string(trace.composited.size()) + (trace.composited.size() == 1 ? " Gaussian" : " Gaussians") +
-         " composited, front to back\n" + composited_table(trace, files) + skipped_text(trace, view.settings, files) +
+         count_text(std::ssize(trace.composited), "Gaussian") + " composited, front to back\n" +
+         composited_table(trace, files) + skipped_text(trace, view.settings, files) +
          stop_text(trace, view.settings, files) + sums_text(trace, rendered, view);
 }
 

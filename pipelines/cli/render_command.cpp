@@ -7,6 +7,7 @@
 #include "core/image_io.h"
 #include "core/rotation.h"
 #include "pipelines/cli/pixel_table.h"
+#include "pipelines/cli/text.h"
 #include "pipelines/posed_avatar.h"
 #include "pipelines/state.h"
 #include "splat/transform.h"
@@ -115,6 +116,11 @@ void write_npz(const std::string& path, const SceneImage& rendered, Precision pr
   npz.write(path);
 }
 
+void write_picture(const std::string& path, const SceneImage& rendered) {
+  const std::vector<float> values(rendered.image.begin(), rendered.image.end());
+  write_image(path, from_interleaved(values, rendered.height, rendered.width, 3));
+}
+
 }  // namespace
 
 std::string render_command(const RenderOptions& options) {
@@ -123,24 +129,37 @@ std::string render_command(const RenderOptions& options) {
   std::vector<PixelPlace> pixels;
   for (const std::string& pixel : options.pixels)
     pixels.push_back(parse_pixel(pixel, view.camera, "hsi4d render: --debug-pixel"));
+  std::vector<std::string> inputs = options.objects;
+  inputs.insert(inputs.end(),
+                {options.shared.scene, options.shared.camera, options.object_poses, options.motion, options.avatar});
+  check_no_input(options.out, "hsi4d render: --out", inputs);
   check_writable(options.out);
   Parts parts = read_all(options);
   const PosedGaussians scene =
       parts.gaussians.size() == 1 ? std::move(parts.gaussians.front()) : concatenated(parts.gaussians);
-  const SceneImage rendered = render_scene(scene, view, pixels);
-  if (check_ending(options.out, "hsi4d render: --out", {".png", ".exr", ".npz"}) == ".npz") {
-    write_npz(options.out, rendered, view.precision);
-  } else {
-    const std::vector<float> values(rendered.image.begin(), rendered.image.end());
-    write_image(options.out, from_interleaved(values, rendered.height, rendered.width, 3));
-  }
   const Index count = scene.gaussians.count();
-  warn_if_nothing_drawn(rendered, count);
+  const bool arrays = check_ending(options.out, "hsi4d render: --out", {".png", ".exr", ".npz"}) == ".npz";
   std::string text;
-  for (const PixelTrace& trace : rendered.traces) text += pixel_table(trace, rendered, view, parts.rows) + "\n";
-  return text + options.out + ": " + std::to_string(rendered.width) + " x " + std::to_string(rendered.height) +
-         " pixels of " + std::to_string(count) + " Gaussians" +
-         (rendered.drawn ? ", " + std::to_string(*rendered.drawn) + " of them drawn" : "") + "\n";
+  std::optional<Index> drawn;
+  if (arrays || !pixels.empty()) {
+    const SceneImage rendered = render_scene(scene, view, pixels);
+    if (arrays) {
+      write_npz(options.out, rendered, view.precision);
+    } else {
+      write_picture(options.out, rendered);
+    }
+    warn_if_nothing_drawn(shows_something(rendered), count);
+    for (const PixelTrace& trace : rendered.traces) text += pixel_table(trace, rendered, view, parts.rows) + "\n";
+    drawn = rendered.drawn;
+  } else {
+    const ScenePicture picture = render_picture(scene, view);
+    write_image(options.out, picture.image);
+    warn_if_nothing_drawn(picture.shows_something, count);
+    drawn = picture.drawn;
+  }
+  return text + options.out + ": " + std::to_string(view.camera.width) + " x " + std::to_string(view.camera.height) +
+         " pixels of " + count_text(count, "Gaussian") +
+         (drawn ? ", " + std::to_string(*drawn) + " of them drawn" : "") + "\n";
 }
 
 }  // namespace hsi4d::cli

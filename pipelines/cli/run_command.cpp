@@ -5,7 +5,9 @@
 #include "core/progress.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/terminal.h"
+#include "pipelines/cli/text.h"
 #include "pipelines/clip.h"
+#include "pipelines/run_problems.h"
 
 namespace hsi4d::cli {
 
@@ -44,14 +46,15 @@ std::string plan(const RunConfig& config, const std::vector<LossTerm>& losses, c
   check_frames(config.data, clip, has_loss(config, "center"));
   std::string text = folder_plan(config, losses, clip, folder, resume);
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
-          std::to_string(clip.camera.height) + ", scene of " + std::to_string(clip.scene.count()) +
-          " Gaussians, human of " + std::to_string(clip.avatar.count()) + "\n";
+          std::to_string(clip.camera.height) + ", scene of " + count_text(clip.scene.count(), "Gaussian") +
+          ", human of " + std::to_string(clip.avatar.count()) + "\n";
   for (const ClipObject& object : clip.objects) {
-    text += "  object " + object.name + " of " + std::to_string(object.gaussians.count()) + " Gaussians\n";
+    text += "  object " + object.name + " of " + count_text(object.gaussians.count(), "Gaussian") + "\n";
   }
   for (const auto& [name, stage] : config.stages) {
-    text += "  stage " + name + ": " + std::to_string(stage.iterations) + " iterations a frame\n";
+    text += "  stage " + name + ": " + count_text(stage.iterations, "iteration") + " a frame\n";
   }
+  for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
   return text;
 }
 

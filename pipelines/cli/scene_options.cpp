@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 
 #include "core/camera_file.h"
 #include "core/check.h"
@@ -88,12 +89,20 @@ std::string check_ending(const std::string& path, const std::string& where, cons
   throw UserError(where + ": " + path + " does not end as it must; allowed: " + joined(allowed));
 }
 
-void warn_if_nothing_drawn(const SceneImage& rendered, Index count) {
-  const bool shows_something =
-      std::any_of(rendered.alpha.begin(), rendered.alpha.end(), [](double alpha) { return alpha > 0; });
-  if (count == 0 || shows_something) return;
+void warn_if_nothing_drawn(bool shows_something, Index count) {
+  if (shows_something) return;
+  if (count == 0) return log_warning("no Gaussian is drawn: the files hold none");
   log_warning("no Gaussian is drawn: the camera sees none of " + std::to_string(count) +
               ". Its pose must be camera_from_world in OpenCV's axes (x right, y down, z forward), in metres");
+}
+
+void check_no_input(const std::string& out, const std::string& where, const std::vector<std::string>& in) {
+  for (const std::string& name : in) {
+    std::error_code missing;  // what cannot be looked at is told by who reads or writes it
+    if (!std::filesystem::equivalent(name, out, missing) || missing) continue;
+    throw UserError(where + ": " + out + " is the file that is read, " + name +
+                    ", which would be replaced; give another name");
+  }
 }
 
 void check_writable(const std::string& path) { const AtomicFile trial(path); }

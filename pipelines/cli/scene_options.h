@@ -37,11 +37,12 @@ std::array<double, 3> parse_color(const std::string& text, const std::string& wh
 /// Gaussians of a file; what the reader left out or put right goes to the log as a warning.
 SplatFile read_scene(const std::string& path);
 
-/// Warns of an image in which no Gaussian is drawn: what a camera sees that looks away, most often because its axes are
-/// of another convention, which the warning names.
+/// Warns of an image in which no Gaussian is drawn: because there is none, or because the camera looks away, most often
+/// since its axes are of another convention, which the warning names.
 ///
-/// @param count  of the Gaussians; without any there is no warning
-void warn_if_nothing_drawn(const SceneImage& rendered, Index count);
+/// @param shows_something  alpha is above 0 somewhere in the image
+/// @param count            of the Gaussians
+void warn_if_nothing_drawn(bool shows_something, Index count);
 
 /// Adds an array of numbers, float32 where the precision is float, else float64.
 void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,
@@ -49,6 +50,10 @@ void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, c
 
 /// Throws UserError unless the path ends in one of `allowed`. Returns the ending.
 std::string check_ending(const std::string& path, const std::string& where, const std::vector<std::string>& allowed);
+
+/// Throws UserError that names both when `out` is one of the files `in`, by another spelling or a link too: writing
+/// would replace it. Empty names in `in` are passed over.
+void check_no_input(const std::string& out, const std::string& where, const std::vector<std::string>& in);
 
 /// Throws UserError, as writing does, unless a file can be written there; tried before the work is done. What is there
 /// stays as it is.

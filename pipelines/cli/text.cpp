@@ -11,6 +11,10 @@ namespace hsi4d::cli {
 
 std::string short_number(double value) { return rounded(value, 4); }
 
+std::string count_text(std::int64_t count, const std::string& one) {
+  return std::to_string(count) + " " + one + (count == 1 ? "" : one.ends_with("s") ? "es" : "s");
+}
+
 std::string file_ending(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
   for (char& c : ending) {

@@ -1,6 +1,7 @@
 // Small pieces of text that the commands share.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,9 @@ namespace hsi4d::cli {
 
 /// A number in 4 significant digits, without locale; 0 for −0.
 std::string short_number(double value);
+
+/// "1 Gaussian", "2 Gaussians", "2 losses".
+std::string count_text(std::int64_t count, const std::string& one);
 
 /// The ending of a path in lower case with its dot, ".ply"; "" without one.
 std::string file_ending(const std::string& path);

@@ -116,6 +116,8 @@ TEST_CASE("what is wrong with a camera file is told to the letter") {
   CHECK(fault(with_matrix("[[1.001, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")) ==
         "c.json:2: /world_to_camera: the rotation R is not orthonormal: |R R^T - I| is 0.0020009999999996975; "
         "allowed: at most 1e-04");
+  CHECK_THAT(fault(with_matrix("[[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")),
+             Catch::Matchers::StartsWith("c.json:2: /world_to_camera: the rotation R mirrors: its determinant is -1;"));
   CHECK(fault(R"({"width": 0, "height": 2.5, "fx": -1, "fy": 1, "cx": 0, "cy": 0, "world_to_camera": )" + kIdentity +
               "}") ==
         "3 problems in c.json:\nc.json:1: /width: 0 is out of range; allowed: 1 to 65536\n"
@@ -200,6 +202,10 @@ TEST_CASE("transforms that cannot be used are refused") {
         [[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]})") ==
         "c.json:1: /frames/0/transform_matrix: the rotation R is not orthonormal: |R R^T - I| is 1; allowed: at most "
         "1e-04");
+  CHECK_THAT(fault(R"({"w": 1, "h": 1, "fl_x": 1, "fl_y": 1, "cx": 0, "cy": 0, "frames": [{"transform_matrix":
+        [[1, 0, 0, 0], [0, 0, 1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]}]})"),
+             Catch::Matchers::StartsWith("c.json:1: /frames/0/transform_matrix: the rotation R mirrors: its "
+                                         "determinant is -1;"));
   CHECK(fault(R"({"w": "8", "frames": {}})") ==
         "2 problems in c.json:\nc.json:1: /w: \"8\" is a string, not a whole number; allowed: 1 to 65536\n"
         "c.json:1: /frames: {} is an object, not an array");

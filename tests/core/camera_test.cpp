@@ -54,6 +54,11 @@ TEST_CASE("a camera that makes no sense is refused by name, value and what is al
         "cam.json: translation[2] is -inf; allowed: a finite number");
   CHECK(message([](Camera& c) { c.camera_from_world.rotation = 2 * Matrix3<double>::Identity(); }) ==
         "cam.json: the rotation R is not orthonormal: |R R^T - I| is 3; allowed: at most 1e-04");
+  CHECK(message([](Camera& c) { c.camera_from_world.rotation.row(1) *= -1; }) ==
+        "cam.json: the rotation R mirrors: its determinant is -1; allowed: 1. An odd number of axes is turned round: "
+        "those of a camera are OpenCV's, x right, y down, z forward, and from OpenGL's, y up, z backward, two differ; "
+        "a world of left-handed axes must be made right-handed first");
+  CHECK(message([](Camera& c) { c.camera_from_world.rotation.bottomRows<2>() *= -1; }) == "accepted");
   CHECK(message([](Camera& c) { c.camera_from_world.rotation *= 1.00004; }) == "accepted");
   CHECK(message([](Camera& c) { c.camera_from_world.rotation *= 1.00006; }) != "accepted");
 }

@@ -66,6 +66,10 @@ void check_metrics_lines(const fs::path& run, int camera_iterations, int interac
         REQUIRE(line["tiles"].get<double>() > 0);
         REQUIRE(line["pairs"].get<double>() > 0);
         REQUIRE(line["fragments"].get<double>() >= line["tiles"].get<double>());
+        REQUIRE(line["groups"].get<double>() > 0);
+        REQUIRE(line["groups"].get<double>() <= line["fragments"].get<double>());
+        REQUIRE(line["layers"].get<double>() <= line["tiles"].get<double>());
+        REQUIRE(line["adjoint_tiles"].get<double>() > 0);
       }
     }
   }

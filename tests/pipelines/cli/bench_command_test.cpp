@@ -8,6 +8,7 @@
 
 #include "core/check.h"
 #include "core/file.h"
+#include "core/simd.h"
 #include "tests/temporary_folder.h"
 
 using namespace hsi4d;
@@ -21,6 +22,7 @@ TEST_CASE("bench rasterize measures every step and writes one object a measureme
   const std::string table = cli::bench_rasterize_command(options);
   std::istringstream lines(read_text_file(options.json));
   std::vector<std::string> names;
+  std::vector<double> shares;
   for (std::string line; std::getline(lines, line);) {
     const auto m = nlohmann::json::parse(line);
     names.push_back(m.at("name"));
@@ -31,9 +33,27 @@ TEST_CASE("bench rasterize measures every step and writes one object a measureme
     CHECK(m.at("groups") > m.at("pairs"));
     CHECK(m.at("pairs") > m.at("gaussians"));
     CHECK(m.at("median_ms") >= m.at("min_ms"));
-    const double rate = m.at("fragments").get<double>() / m.at("median_ms").get<double>() / 1e3;
-    CHECK(m.at("mfragments_per_s").get<double>() == Approx(rate));
+    const std::string step = names.back().substr(std::string("rasterize/small/").size());
+    const bool composites = step.starts_with("forward") || step.starts_with("backward");
+    CHECK(m.at("unit") == (composites ? "fragments" : step == "bin" ? "pairs" : "gaussians"));
+    const double rate = m.at(m.at("unit").get<std::string>()).get<double>() / m.at("median_ms").get<double>() / 1e3;
+    CHECK(m.at("millions_per_s").get<double>() == Approx(rate));
+    CHECK(m.at("peak_memory_bytes") > m.at("pixels").get<double>() * 4 * 4);
+    CHECK(m.contains("fma_peak_share") == (composites && m.contains("fma_peak_per_s")));
+    if (!m.contains("fma_peak_share")) continue;
+    const double operations = 16 * m.at("groups").get<double>() *
+                              (step == "forward"    ? 20
+                               : step == "backward" ? 38
+                                                    : 44);
+    const double share = operations / (1e-3 * m.at("min_ms").get<double>()) / m.at("fma_peak_per_s").get<double>();
+    CHECK(m.at("fma_peak_share").get<double>() == Approx(share));
+    CHECK(share > 0.001);
+    CHECK(share < 1);
+    shares.push_back(share);
   }
+  CHECK(shares.size() == (best_isa() == Isa::kBaseline ? 0 : 3));
+  CHECK((table.find(" peak %") != std::string::npos && table.find("G multiply-adds a second") != std::string::npos) ==
+        !shares.empty());
   CHECK(names == std::vector<std::string>{"rasterize/small/records", "rasterize/small/sort", "rasterize/small/bin",
                                           "rasterize/small/forward", "rasterize/small/backward",
                                           "rasterize/small/reduce", "rasterize/small/backward_with_colors",

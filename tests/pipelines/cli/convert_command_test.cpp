@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 
 #include <catch2/catch.hpp>
 
@@ -54,7 +55,7 @@ TEST_CASE("convert writes every format and says what is lost") {
             " bytes\n");
   CHECK(file_text("out.ply") == file_text("in.ply"));
   CHECK(cli::convert_command({.in = "in.ply", .out = "out.splat"}) ==
-        "out.splat: 12 Gaussians, harmonics of degree 1, 384 bytes\n  not held by the format: Gaussians without their "
+        "out.splat: 12 Gaussians, harmonics of degree 0, 384 bytes\n  not held by the format: Gaussians without their "
         "harmonics of degree 1 and more: 12\n");
   const ProgramResult done = run_hsi4d({"convert", "in.ply", "out.spz", "--spz-version", "4", "--spz-sh-bits", "5,4"});
   CHECK(done.status == 0);
@@ -125,18 +126,75 @@ TEST_CASE("what is wrong with convert's options is told, nothing is written") {
         "hsi4d convert: --crop: \"1,0,0,0,1,1\" ends before it begins; allowed: the least x, y, z, then the greatest");
   CHECK(fault({.min_opacity = 1.5}) == "hsi4d convert: --min-opacity: 1.5 is no opacity; allowed: 0 to 1");
   CHECK(fault({.sh_degree = 4}) == "hsi4d convert: --sh-degree: 4 is no degree; allowed: 0 to 3");
-  CHECK(fault({.spz_version = 1}) == "hsi4d convert: --spz-version: 1 is not written; allowed: 2, 3, 4");
-  CHECK(fault({.spz_sh_bits = "5,9"}) ==
+  CHECK(fault({.out = "out.spz", .spz_version = 1}) ==
+        "hsi4d convert: --spz-version: 1 is not written; allowed: 2, 3, 4");
+  CHECK(fault({.out = "out.spz", .spz_version = -1}) ==
+        "hsi4d convert: --spz-version: -1 is not written; allowed: 2, 3, 4");
+  CHECK(fault({.spz_version = 4}) == "hsi4d convert: --spz-version says how .spz files are written; out.ply is none");
+  CHECK(fault({.out = "out.splat", .spz_sh_bits = "5,4"}) ==
+        "hsi4d convert: --spz-sh-bits says how .spz files are written; out.splat is none");
+  CHECK(fault({.out = "out.spz", .spz_sh_bits = "5,9"}) ==
         "hsi4d convert: --spz-sh-bits: \"5,9\" are no numbers of bits; allowed: two whole numbers from 1 to 8, for "
         "example 5,4");
   CHECK(fault({.out = "out.ksplat"}) ==
-        "hsi4d convert: OUT: out.ksplat does not end as it must; allowed: .ply, .splat, .spz");
+        "hsi4d convert: OUT: out.ksplat does not end as it must; allowed: .ply, .compressed.ply, .splat, .spz");
   CHECK_THAT(fault({.out = "none/out.ply"}), Contains("none/out.ply"));
   CHECK_FALSE(std::filesystem::exists("out.ply"));
   CHECK(run_hsi4d({"convert", "in.ply"}).status == 2);
   const ProgramResult missing = run_hsi4d({"convert", "none.spz", "out.ply"});
   CHECK(missing.status == 2);
   CHECK_THAT(missing.err, StartsWith("none.spz: "));
+}
+
+TEST_CASE("convert does not replace the file that it reads, whatever it is called") {
+  const TemporaryFolder folder;
+  write_ply("in.ply", plain_gaussians(2, 0));
+  std::filesystem::create_directory("sub");
+  std::filesystem::create_symlink("in.ply", "link.ply");
+  std::filesystem::create_hard_link("in.ply", "hard.ply");
+  const std::string before = file_text("in.ply");
+  for (const std::string out : {"in.ply", "./in.ply", "sub/../in.ply", "link.ply", "hard.ply"}) {
+    INFO(out);
+    CHECK(fault({.out = out, .scale = 2}) == "hsi4d convert: OUT: " + out +
+                                                 " is the file that is read, in.ply, which would be replaced; give "
+                                                 "another name");
+    CHECK(file_text("in.ply") == before);
+  }
+  const ProgramResult result = run_hsi4d({"convert", "link.ply", "in.ply"});
+  CHECK(result.status == 2);
+  CHECK_THAT(result.err, Contains("in.ply is the file that is read, link.ply, which would be replaced"));
+  CHECK(fault({.out = "copy.ply"}) == "no fault");
+  CHECK(fault({.out = "copy.ply"}) == "no fault");  // another file of before is replaced, as ever
+}
+
+TEST_CASE("harmonics of degree 4 in a PLY are left out and counted") {
+  const TemporaryFolder folder;
+  std::string header = "ply\nformat ascii 1.0\nelement vertex 1\n", row;
+  for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"}) {
+    header += std::string("property float ") + name + "\n";
+    row += "0.5 ";
+  }
+  for (int i = 0; i < 72; ++i) {  // 24 of a channel
+    header += "property float f_rest_" + std::to_string(i) + "\n";
+    row += std::to_string(i) + " ";
+  }
+  for (const char* name : {"opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"}) {
+    header += std::string("property float ") + name + "\n";
+    row += "1 ";
+  }
+  std::ofstream("in.ply") << header << "end_header\n" << row << "\n";
+  const ProgramResult done = run_hsi4d({"convert", "in.ply", "out.ply"});
+  CHECK(done.status == 0);
+  CHECK(done.err == "hsi4d: warning: in.ply: Gaussians without their harmonics of degree 4: 1\n");
+  CHECK_THAT(done.out, StartsWith("out.ply: 1 Gaussian, harmonics of degree 3, "));
+  const Gaussians g = read_splats("out.ply").gaussians;
+  REQUIRE(g.sh_degree == 3);
+  REQUIRE(g.sh.size() == 48);
+  CHECK(g.sh[0] == 0.5F);
+  for (std::size_t k = 1; k < 16; ++k) {
+    for (std::size_t c = 0; c < 3; ++c) CHECK(g.sh[3 * k + c] == static_cast<float>(24 * c + k - 1));
+  }
+  CHECK(g.opacity_logits[0] == 1);
 }
 
 TEST_CASE("what convert leaves out of a damaged file is told") {

@@ -46,6 +46,7 @@ TEST_CASE("debug-pixel prints the Gaussians of a pixel, whose sums are the image
     const std::vector<std::string> lines = lines_of(cli::render_command(options));
     CHECK(lines.front() == "pixel column 18, row 12: 4 Gaussians composited, front to back");
     CHECK(words_of(lines[1])[1] == "row");
+    CHECK_THAT(lines[1], Catch::Matchers::Contains(" colour ") && Catch::Matchers::EndsWith("sum of weight x colour"));
     std::array<double, 3> sum{};
     double transmittance = 1, depth_before = 0;
     std::set<std::string> rows;

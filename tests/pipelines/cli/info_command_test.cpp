@@ -1,6 +1,7 @@
 #include "pipelines/cli/info_command.h"
 
 #include <cmath>
+#include <filesystem>
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
@@ -8,6 +9,7 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/exr.h"
+#include "core/file.h"
 #include "core/image_io.h"
 #include "core/npz.h"
 #include "splat/io_ply.h"
@@ -55,7 +57,10 @@ TEST_CASE("info tells what is in a file") {
         "           0.1 to 1           83.33 %    ########################################\n");
   write_ply("none.PLY", Gaussians{});
   CHECK(cli::info_command("none.PLY") ==
-        "none.PLY: 0 Gaussians, spherical harmonics of degree 0, INRIA PLY\n  faults   none\n");
+        "none.PLY: 0 Gaussians, spherical harmonics of degree 0, INRIA PLY\n  faults   none\n"
+        "  notice   the file holds no Gaussians\n");
+  write_text_file("empty.splat", "");
+  CHECK_THAT(cli::info_command("empty.splat"), Catch::Matchers::Contains("  notice   the file holds no Gaussians\n"));
 
   NpzWriter npz;
   npz.add<float>("weights", {2, 3}, std::vector<float>(6));
@@ -91,6 +96,33 @@ TEST_CASE("info tells what is in a file") {
   const ProgramResult done = run_hsi4d({"info", "a.npz"});
   CHECK(done.status == 0);
   CHECK(done.out == cli::info_command("a.npz"));
+}
+
+TEST_CASE("info knows Gaussians by what is in the file, as render does, and says which are not read") {
+  const TemporaryFolder folder;
+  Gaussians g;
+  g.means = {1, 2, 3};
+  g.quats = {1, 0, 0, 0};
+  g.log_scales = {0, 0, 0};
+  g.opacity_logits = {0};
+  g.sh.resize(3);
+  write_ply("g.ply", g);
+  const std::string told = cli::info_command("g.ply");
+  CHECK_THAT(told, Catch::Matchers::StartsWith("g.ply: 1 Gaussian, spherical harmonics of degree 0, INRIA PLY\n"));
+  for (const std::string name : {"g.gaussians", "g", "g.npz"}) {
+    std::filesystem::copy_file("g.ply", name);
+    CHECK(cli::info_command(name) == name + told.substr(5));
+    CHECK(nlohmann::json::parse(cli::info_command(name, true))["count"] == 1);
+  }
+  write_text_file("g.ksplat", "any bytes");
+  for (const bool json : {false, true})
+    CHECK_THROWS_MATCHES(cli::info_command("g.ksplat", json), UserError,
+                         Message("g.ksplat: .ksplat files are not read; Gaussians are read from .ply (INRIA's and "
+                                 "compressed), .splat, .spz, into which the tool that wrote it can convert it"));
+  g.means = {NAN, 2, 3};
+  write_ply("g.ply", g);
+  CHECK_THAT(cli::info_command("g.ply"), Catch::Matchers::StartsWith("g.ply: 0 Gaussians, ") &&
+                                             Catch::Matchers::EndsWith("\n  notice   no Gaussian is left\n"));
 }
 
 TEST_CASE("info names what is allowed and seldom meant") {

@@ -73,6 +73,11 @@ TEST_CASE("render writes the same image to EXR and PNG") {
   cli::render_command(options);
   options.out = "a.exr";
   CHECK(cli::render_command(options) == "a.exr: 37 x 23 pixels of 8 Gaussians, 8 of them drawn\n");
+  options.out = "traced.exr";  // with depth, which the others are without
+  options.pixels = {"3,4"};
+  cli::render_command(options);
+  CHECK(file_text("traced.exr") == file_text("a.exr"));
+  options.pixels.clear();
   options.out = "a.PNG";
   cli::render_command(options);
   const std::vector<double> image = numbers("a.npz", "image");
@@ -168,6 +173,9 @@ TEST_CASE("a camera that sees nothing is warned of, with the convention") {
             "no Gaussian is drawn: the camera sees none of 8. Its pose must be camera_from_world in OpenCV's axes (x "
             "right, y down, z forward), in metres"));
     const std::string of_render = std::exchange(told, "");
+    CHECK_THAT(cli::render_command(render_options("a.exr", word)),
+               Catch::Matchers::Contains("of 8 Gaussians" + drawn(word, 0)));
+    CHECK(std::exchange(told, "") == of_render);
     cli::gradients_command(gradients_options("g.npz", word));
     CHECK(told == of_render);
     CHECK(numbers("g.npz", "camera") == std::vector<double>(6));
@@ -185,13 +193,20 @@ TEST_CASE("a scene without Gaussians is its background") {
   write_ply("scene.ply", Gaussians{});
   for (const char* word : kWords) {
     INFO(word);
+    std::vector<std::string> told;
+    const LogSink sink = log_to([&told](LogLevel, std::string_view message) { told.emplace_back(message); });
     CHECK(cli::render_command(render_options("a.npz", word)) ==
           "a.npz: 37 x 23 pixels of 0 Gaussians" + drawn(word, 0) + "\n");
+    CHECK(told == std::vector<std::string>{"no Gaussian is drawn: the files hold none"});
+    cli::render_command(render_options("a.png", word));
+    CHECK(std::exchange(told, {told.back()}) == std::vector<std::string>(2, told.back()));
     const std::vector<double> image = numbers("a.npz", "image"), alpha = numbers("a.npz", "alpha");
     for (std::size_t i = 0; i < image.size(); ++i)
       CHECK(image[i] == Approx(0.1 * static_cast<double>(i % 3 + 1)).epsilon(1e-7));
     for (const double value : alpha) CHECK(value == 0);
     cli::gradients_command(gradients_options("g.npz", word));
+    CHECK(told.size() == 2);
+    CHECK(told.back() == told.front());
     CHECK(Npz::read("g.npz").array("means").shape() == std::vector<std::int64_t>{0, 3});
     CHECK(numbers("g.npz", "camera") == std::vector<double>(6));
   }

@@ -85,6 +85,26 @@ TEST_CASE("a file that cannot be written is told before the work is done, and no
   CHECK(files_here() == before);
 }
 
+TEST_CASE("no file that is read is replaced by the result") {
+  const Files files;
+  cli::RenderOptions render = render_options("poses.npz");
+  NpzWriter npz;
+  npz.add<double>("image", {1, 1, 3}, {0, 0, 0});
+  npz.write("poses.npz");
+  const std::string poses = file_text("poses.npz"), target = file_text("target.npz");
+  render.objects = {"clean.ply"};
+  render.object_poses = "./poses.npz";
+  CHECK(fault([&] { cli::render_command(render); }) ==
+        "hsi4d render: --out: poses.npz is the file that is read, ./poses.npz, which would be replaced; give another "
+        "name");
+  CHECK(file_text("poses.npz") == poses);
+  std::filesystem::create_symlink("target.npz", "g.npz");
+  CHECK(fault([&] { cli::gradients_command(gradients_options("g.npz")); }) ==
+        "hsi4d gradients: --out: g.npz is the file that is read, target.npz, which would be replaced; give another "
+        "name");
+  CHECK(file_text("target.npz") == target);
+}
+
 TEST_CASE("rows that are left out are told") {
   const Files files;
   std::string told;

@@ -1,0 +1,146 @@
+// The sections `skip` and `approx` of a config: what they change of a run's result, and what is told of them.
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "body/motion_io.h"
+#include "core/check.h"
+#include "pipelines/cli/commands.h"
+#include "pipelines/cli/run_command.h"
+#include "pipelines/run_problems.h"
+#include "pipelines/state.h"
+#include "tests/pipelines/tiny_run.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+const std::vector<std::string> kAllOff = {"skip.static_tiles=false", "skip.static_layer=false",
+                                          "skip.zero_cotangent=false"};
+const std::vector<std::string> kTilesOnly = {"skip.static_layer=false", "skip.zero_cotangent=false"};
+const std::vector<std::string> kAllButLayers = {"skip.static_layer=false"};
+const std::vector<std::string> kCollapsed = {"approx.collapse_suffix=true"};
+
+/// A run of the tiny clip in a folder; its result as bytes.
+struct SkipRun {
+  std::string folder, motion, objects;
+  SkipRun(const std::string& name, const std::vector<std::string>& overrides) : folder(name) {
+    carry_out_tiny(tiny_config(overrides), folder);
+    motion = file_text(folder + "/motion.npz");
+    objects = file_text(folder + "/objects.npz");
+  }
+  /// The sum of a counter over all lines of metrics.jsonl of the stage that draws what moves.
+  double counted(const char* counter) const {
+    double sum = 0;
+    for (const nlohmann::json& line : metrics_of(folder)) {
+      if (line["stage"] == "interaction") sum += line.at(counter).get<double>();
+    }
+    return sum;
+  }
+};
+
+/// Largest differences of two runs' results: places in metres and angles in radians.
+double largest_difference(const SkipRun& a, const SkipRun& b) {
+  double worst = 0;
+  const auto compare = [&worst](const double* x, const double* y, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) worst = std::max(worst, std::abs(x[i] - y[i]));
+  };
+  const Motion m = read_motion(a.folder + "/motion.npz"), n = read_motion(b.folder + "/motion.npz");
+  REQUIRE(m.poses.size() == n.poses.size());
+  for (std::size_t t = 0; t < m.poses.size(); ++t) {
+    compare(m.poses[t].transl.data(), n.poses[t].transl.data(), 3);
+    compare(m.poses[t].axis_angle.data(), n.poses[t].axis_angle.data(), m.poses[t].axis_angle.size());
+  }
+  const auto tracks = read_object_tracks(a.folder + "/objects.npz", {kTinyObject});
+  const auto others = read_object_tracks(b.folder + "/objects.npz", {kTinyObject});
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    compare(tracks[t][0].translation.data(), others[t][0].translation.data(), 3);
+    compare(tracks[t][0].rotation.data(), others[t][0].rotation.data(), 3);
+  }
+  return worst;
+}
+
+std::vector<std::string> notes_of(const std::vector<std::string>& overrides) {
+  std::vector<std::string> texts;
+  for (const RunNote& note : run_notes(tiny_config(overrides)))
+    texts.push_back(std::string(log_level_name(note.level)) + ": " + note.text);
+  return texts;
+}
+
+}  // namespace
+
+TEST_CASE("skips that are set in a config leave the result's bits, or nearly, and save what their counters say",
+          "[run]") {
+  const TemporaryFolder here;
+  const SkipRun off("off", kAllOff), tiles("tiles", kTilesOnly), cotangent("cotangent", kAllButLayers), on("on", {});
+  CHECK(tiles.motion == off.motion);
+  CHECK(tiles.objects == off.objects);
+  CHECK(cotangent.motion == off.motion);
+  CHECK(cotangent.objects == off.objects);
+  const double near = largest_difference(on, off);
+  INFO("with static layers " << near << " m or rad off");
+  CHECK(near <= 1e-5);  // 6e-7
+
+  CHECK(tiles.counted("tiles") < off.counted("tiles"));
+  CHECK(tiles.counted("fragments") < off.counted("fragments"));
+  CHECK(cotangent.counted("adjoint_tiles") <= tiles.counted("adjoint_tiles"));
+  CHECK(on.counted("groups") < tiles.counted("groups"));
+  for (const SkipRun* run : {&off, &tiles, &cotangent}) CHECK(run->counted("layers") == 0);
+  CHECK(on.counted("layers") > 0);
+  CHECK(on.counted("layers") < on.counted("tiles"));  // they are kept from one iteration to the next
+}
+
+TEST_CASE("an approximation that a config sets changes the result a little, and its log names it", "[run]") {
+  const TemporaryFolder here;
+  const SkipRun on("on", {}), collapsed("collapsed", kCollapsed);
+  const double near = largest_difference(collapsed, on);
+  INFO("collapsed " << near << " m or rad off");
+  CHECK(collapsed.motion != on.motion);
+  CHECK(near <= 0.02);  // 0.004: an angle that few pixels tell
+  const std::string told =
+      "approx.collapse_suffix is on: images are near, each pixel within render.transmittance_stop, 0.0001";
+  CHECK_THAT(file_text("collapsed/log.txt"), Contains(" info " + told + "\n"));
+  CHECK_THAT(file_text("on/log.txt"), !Contains("collapse_suffix"));
+}
+
+TEST_CASE("what settings of skip and approx do to each other is told", "[run]") {
+  using Notes = std::vector<std::string>;
+  const std::string on =
+      "info: approx.collapse_suffix is on: images are near, each pixel within "
+      "render.transmittance_stop, ";
+  const std::string nothing = "warning: approx.collapse_suffix=true does nothing with ";
+  const std::string off_too = "info: skip.static_tiles=false switches skip.static_layer off too";
+  CHECK(notes_of({}).empty());
+  CHECK(notes_of({"skip.zero_cotangent=false"}).empty());
+  CHECK(notes_of({"skip.static_layer=false"}).empty());
+  CHECK(notes_of(kCollapsed) == Notes{on + "0.0001"});
+  CHECK(notes_of({"approx.collapse_suffix=true", "render.quality=fast"}) == Notes{on + "0.001"});
+  CHECK(notes_of({"approx.collapse_suffix=true", "skip.static_layer=false"}) ==
+        Notes{nothing + "skip.static_layer=false"});
+  CHECK(notes_of({"approx.collapse_suffix=true", "skip.static_tiles=false"}) ==
+        Notes{off_too, nothing + "skip.static_tiles=false"});
+  CHECK(notes_of({"approx.collapse_suffix=true", "precision=double"}) == Notes{nothing + "precision=double"});
+  CHECK(notes_of({"skip.static_tiles=false"}) == Notes{off_too});
+  CHECK(notes_of(kAllOff).empty());
+}
+
+TEST_CASE("check, a dry run and a run's log have what is to be known of skip and approx", "[run]") {
+  const TemporaryFolder here;
+  const std::vector<std::string> overrides = {"approx.collapse_suffix=true", "skip.static_layer=false"};
+  const std::string text = "approx.collapse_suffix=true does nothing with skip.static_layer=false\n";
+  const auto check = [](const std::vector<std::string>& set) {
+    return cli::check_command(tiny_config_file(), set, false, descriptions_of(loss_terms()));
+  };
+  CHECK_THAT(check(overrides), Contains("  note: " + text));
+  CHECK_THAT(check({}), !Contains("note:"));
+  cli::RunArguments arguments;
+  arguments.config = tiny_config_file();
+  arguments.overrides = overrides;
+  arguments.out = "run";
+  arguments.dry_run = true;
+  CHECK_THAT(cli::run_command(arguments, loss_terms()), Contains("  note: " + text));
+  carry_out_tiny(tiny_config(overrides), "run");
+  CHECK_THAT(file_text("run/log.txt"), Contains(" warning " + text));
+}
