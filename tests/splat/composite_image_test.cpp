@@ -3,11 +3,13 @@
 #include <cmath>
 #include <limits>
 #include <type_traits>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
 #include "core/random.h"
 #include "splat/composite.h"
+#include "splat/debug_pixel.h"
 #include "tests/support/flat_splats.h"
 
 using namespace hsi4d;
@@ -50,9 +52,14 @@ TEST_CASE("nothing to draw, and images of every edge: exact zeros [B11]") {
   }
 }
 
-TEST_CASE("a million Gaussians on one pixel keep their order and stay finite [B12]") {
-  FlatSplats splats;
-  for (int i = 0; i < 1000000; ++i) splats.add(8.5, 8.5, 2, 0.2, 0.3, {i < 8 ? 1.0 : 0.0, 1});
+TEST_CASE(
+    "a million Gaussians on one pixel keep their order and stay finite, for the cost of those that are seen [B12]") {
+  const auto stack_of = [](int n) {
+    FlatSplats stack;
+    for (int i = 0; i < n; ++i) stack.add(8.5, 8.5, 2, 0.2, 0.3, {i < 8 ? 1.0 : 0.0, 1});
+    return stack;
+  };
+  const FlatSplats splats = stack_of(1000000);
   SplatView view = view_of_size(17, 17, RenderSettings());
   Flat<float> flat(splats, view);
   flat.backward_ones();
@@ -72,6 +79,15 @@ TEST_CASE("a million Gaussians on one pixel keep their order and stay finite [B1
   // The backward pass ends where the last pixel does: of 4 tiles, where 0.3 G is hardly above alpha_min.
   CHECK(flat.out.counters->pairs >= 1000000);
   CHECK(flat.out.counters->reached < 20000);
+  // log(transmittance_stop)/log(1 − alpha_min) layers finish any pixel that one of them is drawn in; 5×5 pixels are.
+  // What lies behind them costs nothing, however much it is.
+  CHECK(flat.out.counters->fragments < 25 * 2360);
+  Flat<float> fewer(stack_of(20000), view);
+  fewer.backward_ones();
+  CHECK(fewer.out.counters->fragments == flat.out.counters->fragments);
+  CHECK(fewer.out.counters->reached == flat.out.counters->reached);
+  CHECK(fewer.out.counters->adjoint_tiles == flat.out.counters->adjoint_tiles);
+  CHECK(fewer.out.counters->kept_bytes <= flat.out.counters->kept_bytes);
 }
 
 TEMPLATE_TEST_CASE("an opaque wall leaks what the cap lets through [B16]", "[isa]", float, double) {
@@ -153,6 +169,91 @@ TEST_CASE("the order of the rows does not matter where depths differ [B8]") {
   const SplatView view = view_of_size(33, 20, RenderSettings());
   Flat<float> a(splats, view), b(turned, view);
   CHECK(a.value(a.out.channels) == b.value(b.out.channels));
+}
+
+TEMPLATE_TEST_CASE("rows in another order, equal depths in the same, make the same bits [B8]", "", float, double) {
+  using S = TestType;
+  const Index n = 20000;
+  FlatSplats splats = random_flat(n, 64, 48, 2, 14), shuffled;
+  for (std::size_t i = 0; i < splats.depths.size(); ++i) splats.depths[i] = 2 + 0.5 * static_cast<double>(i * i % 4);
+  // The layers are interleaved anew at random; within each the rows keep their order.
+  std::vector<Index> layers[4], order;
+  for (Index i = n - 1; i >= 0; --i) layers[i * i % 4].push_back(i);
+  RandomSequence random(15, 1);
+  while (static_cast<Index>(order.size()) < n) {
+    auto& layer = layers[static_cast<std::size_t>(random.uniform(0, 4))];
+    if (layer.empty()) continue;
+    order.push_back(layer.back());
+    layer.pop_back();
+  }
+  for (const Index i : order) {
+    const auto at = [&](const std::vector<double>& from, std::vector<double>& to, Index size) {
+      to.insert(to.end(), from.begin() + i * size, from.begin() + (i + 1) * size);
+    };
+    at(splats.means, shuffled.means, 2);
+    at(splats.factors, shuffled.factors, 6);
+    at(splats.depths, shuffled.depths, 1);
+    at(splats.opacities, shuffled.opacities, 1);
+    at(splats.features, shuffled.features, 2);
+  }
+  shuffled.channels = 2;
+  CHECK(shuffled.depths != splats.depths);
+  const SplatView view = view_of_size(64, 48, RenderSettings());
+  Flat<S> a(splats, view), b(shuffled, view);
+  const bool same_image = a.value(a.out.channels) == b.value(b.out.channels);
+  CHECK(same_image);
+  a.backward_ones();
+  b.backward_ones();
+  const auto expected = a.d(a.opacities), d = b.d(b.opacities);
+  Index different = 0;
+  for (std::size_t k = 0; k < order.size(); ++k) different += d[k] != expected[static_cast<std::size_t>(order[k])];
+  CHECK(different == 0);
+}
+
+TEMPLATE_TEST_CASE("what is skipped changes a pixel by no more than its alphas' sum [B5]", "", float, double) {
+  using S = TestType;
+  const int width = 24, height = 16;
+  FlatSplats splats = random_flat(400, width, height, 3, 16);
+  for (double& x : splats.opacities) x *= 0.03;  // many layers around alpha_min
+  for (double& x : splats.features) x = 0.5 + 0.5 * x;
+  SplatView cut = view_of_size(width, height, RenderSettings()), whole = cut;
+  whole.settings.alpha_min = 0;
+  Flat<S> flat(splats, cut), exact(splats, whole);
+  const auto a = flat.value(flat.out.channels), b = exact.value(exact.out.channels);
+  const std::size_t pixels = a.size() / 3;
+  double largest_sum = 0, largest_error = 0;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    const PixelTrace trace = trace_pixel(exact.tape, exact.projected, exact.opacities, exact.features, whole,
+                                         {static_cast<int>(p) % width, static_cast<int>(p) / width});
+    double sum = 0;
+    for (const PixelSplat& splat : trace.composited) sum += splat.alpha < cut.settings.alpha_min ? splat.alpha : 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double error = std::abs(a[k * pixels + p] - b[k * pixels + p]);
+      CHECK(error <= sum + 2e-6);
+      largest_error = std::max(largest_error, error);
+    }
+    largest_sum = std::max(largest_sum, sum);
+  }
+  INFO("sum of skipped alphas up to " << largest_sum << ", error up to " << largest_error);
+  CHECK(largest_sum > 0.02);
+  CHECK(largest_error > 0.1 * largest_sum);  // and the bound is of the right size
+}
+
+TEST_CASE("what is kept from forward to backward is at most 12 bytes a pixel beside the outputs") {
+  // With T, one of the outputs, 16. The larger Gaussians make 70 fragments in each pixel.
+  const int side = 192;
+  for (const double radius : {1.0, 4.0}) {
+    FlatSplats splats = random_flat(8000, side, side, 3, 17);
+    for (double& x : splats.factors) x *= radius / 3;
+    const SplatView view = view_of_size(side, side, RenderSettings());
+    Flat<float> flat(splats, view);
+    const RenderCounters& counters = *flat.out.counters;
+    const double per_pixel = static_cast<double>(counters.kept_bytes) / (side * side);
+    INFO("radius " << radius << ": " << per_pixel << " bytes a pixel, "
+                   << static_cast<double>(counters.fragments) / (side * side) << " fragments");
+    CHECK(per_pixel > 0);
+    CHECK(per_pixel <= 12);
+  }
 }
 
 TEMPLATE_TEST_CASE("long lists are composited over many segments as over one", "[isa]", float, double) {

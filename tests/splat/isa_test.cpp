@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/simd.h"
+#include "tests/support/taped_splats.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
@@ -32,4 +33,29 @@ TEST_CASE("what is tried on every instruction set leaves the one that was asked 
   CHECK(vector_target() == before);
   CHECK_THROWS(on_every_target([] { throw 1; }));
   CHECK(vector_target() == before);
+}
+
+TEMPLATE_TEST_CASE("instruction sets agree to rounding [B13, F10]", "", float, double) {
+  using S = TestType;
+  constexpr bool kIsFloat = std::is_same_v<S, float>;
+  for (const SettingsVariant& variant : settings_variants()) {
+    SplatScene scene = random_splats(120, 33, {49, 37});
+    variant.apply(scene.settings);
+    INFO(variant.name);
+    std::vector<double> image;
+    std::vector<NamedNumbers> gradients;
+    on_every_target([&] {
+      TapedSplats<S> taped(scene, cotangent_of(scene.camera));
+      taped.run();
+      if (image.empty()) {
+        image = taped.value(taped.rendered.image);
+        gradients = taped.gradients();
+      }
+      CHECK(largest_difference(taped.value(taped.rendered.image), image) <= (kIsFloat ? 2e-6 : 1e-14));
+      for (const NamedNumbers& e : gradient_errors(taped.gradients(), gradients)) {
+        INFO(e.name);
+        CHECK(e.numbers[0] <= (kIsFloat ? 5e-6 : 1e-12));
+      }
+    });
+  }
 }
