@@ -5,28 +5,16 @@
 #include <limits>
 
 #include <catch2/catch.hpp>
-#include <hwy/highway.h>
 
 #include "core/random.h"
+#include "splat/block_kernel.h"
 #include "tests/support/flat_splats.h"
+#include "tests/support/isa.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
 
 namespace {
-
-/// Runs f with each set of vector instructions that this program has code for and the processor knows.
-template <class F>
-void on_every_target(const F& f) {
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    INFO("target " << hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    f();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
 
 /// One pixel: with features that name Gaussians, eight at a time, its channels are their weights, and so are the
 /// gradients of the features where the cotangent is 1. A Gaussian that only one of both composites has weight 0 in the
@@ -69,7 +57,7 @@ void check_same_weights(const FlatSplats& splats, const FlatSplats& colored, con
   check_weights_of<double>(splats, colored, view);
 }
 
-/// exp(−d²/2) as a pixel of the compositor gets it.
+/// exp(−d²/2) as a pixel of the row kernel gets it.
 template <class S>
 S pixel_gaussian(S d) {
   hsi4d::detail::SplatRecord<S> record{};
@@ -110,6 +98,75 @@ void check_exponential(double lowest, double step) {
   CHECK(pixel_gaussian(S(1e4)) == S(0));
 }
 
+constexpr float kLog2ScaleFloat = static_cast<float>(hsi4d::detail::kLog2Scale);
+
+/// α at a pixel of the block kernel of a Gaussian of opacity 1.
+float block_alpha(const hsi4d::detail::SplatRecord<float>& record, float alpha_min, bool exact) {
+  const hsi4d::detail::CompositeRules<float> rules{1, alpha_min, exact ? 0.0f : 1e-4f, false, false, 0.3f};
+  return hsi4d::detail::block_pixel_alpha(16, record, rules, 0, 0, 0, 0).alpha;
+}
+
+/// A number p and 2^p as the block kernel's pixels compute it.
+struct Power {
+  float p, value;
+};
+
+/// With L = 0 what is left of the exponent is log₂ o.
+Power plain_power(double wanted) {
+  hsi4d::detail::SplatRecord<float> record{};
+  record.opacity = 1;
+  record.log2_opacity = static_cast<float>(wanted);
+  return {record.log2_opacity, block_alpha(record, 1.0f / 1024, false)};
+}
+
+/// There log₂ o is not in the exponent, which is −w² here: of a mean so far away, and an l22 so small, that where in
+/// the tile the pixel lies is lost beside it.
+Power exact_power(double wanted) {
+  hsi4d::detail::SplatRecord<float> record{};
+  record.opacity = 1;
+  record.l22 = 0x1p-60f;
+  const double y = std::sqrt(-wanted) / static_cast<double>(kLog2ScaleFloat);
+  record.y = -0x1p60 * y;
+  const auto w = static_cast<float>(static_cast<double>(kLog2ScaleFloat) * y);
+  return {-(w * w), block_alpha(record, hsi4d::kLeastAlpha, true)};
+}
+
+/// Errors of 2^p for p from 0 down to `lowest`.
+struct PowerErrors {
+  double ulps = 0, relative = 0;
+  double near_one = 0;  ///< ulp where p > −1/64
+  bool monotone = true;
+};
+
+template <class F>
+PowerErrors errors_of_powers(const F& power_at, double lowest) {
+  PowerErrors worst;
+  Power last{1, 2};
+  const auto try_at = [&](double wanted) {
+    const Power now = power_at(wanted);
+    const long double exact = std::exp2(static_cast<long double>(now.p));
+    const auto near = static_cast<float>(exact);
+    const long double error = std::abs(static_cast<long double>(now.value) - exact);
+    const auto ulps = static_cast<double>(error / (near - std::nextafter(near, 0.0f)));
+    worst.ulps = std::max(worst.ulps, ulps);
+    worst.relative = std::max(worst.relative, static_cast<double>(error / exact));
+    if (now.p > -1.0f / 64) worst.near_one = std::max(worst.near_one, ulps);
+    worst.monotone = worst.monotone && (now.p > last.p || now.value <= last.value);
+    last = now;
+  };
+  for (double p = 0; p > lowest; p -= 1e-4) try_at(p);
+  for (double at = 0; at >= lowest + 1; at -= 0.125) {  // number by number, where p's whole part changes and elsewhere
+    last = {1, 2};
+    auto p = static_cast<float>(at + 20 * 0x1p-23 * std::max(1.0, -at));
+    for (int i = 0; i < 60; ++i, p = std::nextafter(p, -200.0f)) {
+      if (p <= 0) try_at(static_cast<double>(p));
+    }
+  }
+  CHECK(worst.monotone);
+  CHECK(power_at(0).value == 1.0f);
+  return worst;
+}
+
 }  // namespace
 
 TEST_CASE("forward and backward composite the same Gaussians with the same weights, to the last bit [B13]") {
@@ -136,9 +193,23 @@ TEST_CASE("forward and backward composite the same Gaussians with the same weigh
   });
 }
 
-TEST_CASE("the exponential of the pixel loops: within 2 ulp, monotone, exact at its ends [B17]") {
+TEST_CASE("the exponential of the row kernel: within 2 ulp, monotone, exact at its ends [B17]") {
   on_every_target([] {
     check_exponential<float>(87, 2e-3);
     check_exponential<double>(708, 2e-2);
+  });
+}
+
+TEST_CASE("the exponential of the block kernel, both forms: monotone, exact at 0, within 3 ulp and 1.2 ulp [B17]") {
+  on_every_target([] {
+    const PowerErrors plain = errors_of_powers(plain_power, -9.9), exact = errors_of_powers(exact_power, -125);
+    INFO("plain " << plain.ulps << " ulp, " << plain.relative << " of the value; exact " << exact.ulps << " ulp, "
+                  << exact.relative << ", near 1 " << exact.near_one << " ulp");
+    CHECK(plain.ulps <= 3);
+    CHECK(plain.relative <= 1.9e-7);
+    CHECK(exact.ulps <= 1.2);
+    CHECK(exact.relative <= 1e-7);
+    CHECK(exact.near_one <= 0.6);
+    CHECK(exact_power(-200).value <= 0x1p-125f);
   });
 }

@@ -13,6 +13,7 @@
 #include "core/parallel.h"
 #include "splat/conic.h"
 #include "tests/support/failed_images.h"
+#include "tests/support/isa.h"
 #include "tests/support/pixel_choices.h"
 #include "tests/support/real_splats.h"
 #include "tests/support/taped_splats.h"
@@ -196,7 +197,7 @@ SplatScene at_the_cut(Index faint) {
 
 }  // namespace
 
-TEST_CASE("float agrees with double at the same depth keys: every kind of scene and of settings") {
+TEST_CASE("float agrees with double at the same depth keys: every kind of scene and of settings", "[isa]") {
   const SceneSize size{96, 64};
   Summary summary;
   for (const SplatScene& scene :
@@ -207,7 +208,7 @@ TEST_CASE("float agrees with double at the same depth keys: every kind of scene 
   summary.check("all scenes, all settings");
 }
 
-TEST_CASE("float agrees with double at the same depth keys: where cuts flip, only there") {
+TEST_CASE("float agrees with double at the same depth keys: where cuts flip, only there", "[isa]") {
   Summary summary;
   const FloatErrors errors = check_float(at_the_cut(40), kGradientsElsewhere, summary);
   CHECK(errors.flips > 0);
@@ -215,7 +216,7 @@ TEST_CASE("float agrees with double at the same depth keys: where cuts flip, onl
   summary.print("alphas at the cut");
 }
 
-TEST_CASE("float agrees with double at the same depth keys: needles, to 1.2e-7 times their aspect") {
+TEST_CASE("float agrees with double at the same depth keys: needles, to 1.2e-7 times their aspect", "[isa]") {
   // V is kept in float. Rounded by half a unit in the last place, 6e-8, it turns a needle by as much; its ends move by
   // 6e-8 of its length. Measured in its width that is 6e-8 times the aspect (of the projected ellipse with the blur,
   // the root of the covariance's condition number): so large is the change of u, of G and of all gradients. Twice that
@@ -271,11 +272,12 @@ TEST_CASE("float agrees with double at the same depth keys: a whole real scene",
   summary.check("a whole scene");
 }
 
-TEST_CASE("the renderer gives the same bits on any number of threads", "[parallel]") {
+TEST_CASE("the renderer gives the same bits on any number of threads", "[parallel][isa]") {
   RenderRequest request;
   request.depth = true;
-  request.groups = {{0, 700}, {350, 1600}};
-  const SplatScene scene = random_splats(1600, 31, {97, 65});  // several chunks of the loops over Gaussians
+  const Index n = is_held_isa() ? 300 : 1600;  // several chunks of the loops over Gaussians
+  request.groups = {{0, n / 2}, {n / 4, n}};
+  const SplatScene scene = random_splats(n, 31, {97, 65});
   for (const SettingsVariant& variant : settings_variants()) {
     INFO(variant.name);
     SplatScene changed = scene;

@@ -112,7 +112,7 @@ struct LargeImage {
 
 }  // namespace
 
-TEST_CASE("an image of one pixel, of one row and of one column are those of brute force") {
+TEST_CASE("an image of one pixel, of one row and of one column are those of brute force", "[isa]") {
   for (const SceneSize& size : {SceneSize{1, 1}, SceneSize{33, 1}, SceneSize{1, 33}}) {
     INFO(size.width << " x " << size.height);
     SplatScene scene = random_splats(40, 3, size);
@@ -125,7 +125,7 @@ TEST_CASE("a large image with few Gaussians") { LargeImage(1500).check(1500); }
 
 TEST_CASE("an image of 8192 x 8192 pixels", "[full]") { LargeImage(8192).check(8192); }
 
-TEST_CASE("a camera inside of Gaussians sees what brute force sees") {
+TEST_CASE("a camera inside of Gaussians sees what brute force sees", "[isa]") {
   SplatScene scene;
   scene.camera = plain_camera({40, 30});
   scene.background = {0.1F, 0.2F, 0.3F};

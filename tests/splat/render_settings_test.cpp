@@ -46,10 +46,13 @@ TEST_CASE("quality presets hold their bounds") {
   CHECK(reference.alpha_min == 0);
   CHECK(reference.transmittance_stop == 0);
   CHECK(reference.depth_key == DepthKey::kDouble);
-  // The fast backward pass divides by 1 - alpha, so presets that may use it keep the cap and stop that it needs.
+  // Presets for speed take the quick form of the block kernel, and with a cap below 1 what stands still behind is
+  // composited once (static_layer.h). The backward pass divides by nothing and needs neither cap nor stop.
   for (const RenderSettings& s : {fast, RenderSettings{}}) {
     CHECK(s.alpha_cap <= 1.0 - 1.0 / 4096);
-    CHECK(s.transmittance_stop >= 1e-5);
+    CHECK(s.transmittance_stop >= static_cast<double>(kExactBelowStop));
+    CHECK(s.alpha_min >= static_cast<double>(kExactBelowAlpha));
+    CHECK(s.blur >= static_cast<double>(kExactBelowBlur));
     CHECK(s.stop_rule == StopRule::kInclusive);
   }
 }
