@@ -26,8 +26,8 @@ const SkinKernels<S>& kernels() {
 
 // --- tables ----------------------------------------------------------------------------------------------------------
 
-/// Rounds the `count` weights of a vertex to S. In float their sum is then off by 1e-7 at most: at a kilometre no more
-/// than the rounding of the result itself.
+/// Rounds the `count` weights of a vertex to S. In float their sum is then off by another 1e-7 at most: at a kilometre
+/// no more than the rounding of the result itself.
 template <class S>
 void round_weights(const double* weights, Index count, Index vertex, S* rounded) {
   double sum = 0;
@@ -35,7 +35,7 @@ void round_weights(const double* weights, Index count, Index vertex, S* rounded)
     rounded[k] = static_cast<S>(weights[k]);
     sum += weights[k];
   }
-  HSI4D_CHECK(std::abs(sum - 1) < 1e-9, "weights of vertex " + std::to_string(vertex) + " are not normalised");
+  HSI4D_CHECK(std::abs(sum - 1) <= kWeightRounding, "weights of vertex " + std::to_string(vertex) + " are not normalised");
 }
 
 /// Lists the entries of each block of vertices by joint, then by vertex; weights of 0 are left out.
