@@ -113,7 +113,8 @@ struct PoseCorrectives {
     S* d_points = io.d_in(1).data;
     const bool assign = io.must_assign(1);
     on_best_isa([&] {
-      for (Index i = 0; i < 3 * directions.vertices(); ++i) d_points[i] = assign ? d_result[i] : d_points[i] + d_result[i];
+      for (Index i = 0; i < 3 * directions.vertices(); ++i)
+        d_points[i] = assign ? d_result[i] : d_points[i] + d_result[i];
     });
   }
 
@@ -225,11 +226,11 @@ Var<S> rotation_offsets(Var<S> rotations, Source where) {
   return rotations.owner().record(RotationOffsets<S>{}, {rotations}, shape_of(joints, 9), where);
 }
 
-#define HSI4D_INSTANTIATE(S)                                                                         \
-  template Var<S> blend_shapes(std::span<const double>, std::span<const BlendTerm<S>>, Source);      \
-  template class PoseDirections<S>;                                                                  \
-  template Var<S> pose_correctives(const PoseDirections<S>&, Var<S>, Var<S>, Source);                \
-  template Var<S> rotation_offsets_from_axis_angle(Var<S>, Source);                                  \
+#define HSI4D_INSTANTIATE(S)                                                                    \
+  template Var<S> blend_shapes(std::span<const double>, std::span<const BlendTerm<S>>, Source); \
+  template class PoseDirections<S>;                                                             \
+  template Var<S> pose_correctives(const PoseDirections<S>&, Var<S>, Var<S>, Source);           \
+  template Var<S> rotation_offsets_from_axis_angle(Var<S>, Source);                             \
   template Var<S> rotation_offsets(Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

@@ -34,7 +34,8 @@ double largest_of(const DirectionSource& source, Index block, Index group) {
   const Index end = std::min((block + 1) * kTileRows, 3 * source.vertices);
   double largest = 0;
   for (Index row = block * kTileRows; row < end; ++row) {
-    const double* p = source.values.data() + row * source.row_stride + source.group_begin[static_cast<std::size_t>(group)];
+    const double* p =
+        source.values.data() + row * source.row_stride + source.group_begin[static_cast<std::size_t>(group)];
     for (Index c = 0; c < source.group_columns; ++c) largest = std::max(largest, std::abs(p[c]));
   }
   return largest;
@@ -62,7 +63,8 @@ template <class F>
 void for_numbers(const DirectionSource& source, Index block, Index group, F&& put) {
   const Index end = std::min((block + 1) * kTileRows, 3 * source.vertices);
   for (Index row = block * kTileRows; row < end; ++row) {
-    const double* p = source.values.data() + row * source.row_stride + source.group_begin[static_cast<std::size_t>(group)];
+    const double* p =
+        source.values.data() + row * source.row_stride + source.group_begin[static_cast<std::size_t>(group)];
     for (Index c = 0; c < source.group_columns; ++c) put(c, row - block * kTileRows, p[c]);
   }
 }
@@ -207,10 +209,10 @@ void gather_directions(const Directions<S>& directions, const S* d_result, S* sc
   });
 }
 
-#define HSI4D_INSTANTIATE(S)                                                      \
-  template class Directions<S>;                                                   \
-  template void add_directions(const Directions<S>&, const S*, const S*, S*);     \
-  template Index gather_scratch(const Directions<S>&);                            \
+#define HSI4D_INSTANTIATE(S)                                                  \
+  template class Directions<S>;                                               \
+  template void add_directions(const Directions<S>&, const S*, const S*, S*); \
+  template Index gather_scratch(const Directions<S>&);                        \
   template void gather_directions(const Directions<S>&, const S*, S*, double*);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

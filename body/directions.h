@@ -3,8 +3,8 @@
 //   y = x + P c        P [3V,C], c [C]            d_x = d_y,   d_c = Pᵀ d_y
 //
 // P of a body's pose correctives has 31,425 × 486 numbers, which no cache near the processor holds, so the time is that
-// of reading P, once forward and once backward. Hence P is cut into tiles, the rows of 32 vertices by the columns of one
-// group (one joint), which lie in the order in which both directions read them:
+// of reading P, once forward and once backward. Hence P is cut into tiles, the rows of 32 vertices by the columns of
+// one group (one joint), which lie in the order in which both directions read them:
 // - tiles of zeros are left out;
 // - in float, a tile may be packed into whole numbers of 16 bits with a scale of its own. A number is then off by at
 //   most scale/2, scale = largest/32767. Tiles are packed, those with the smallest numbers first, while the largest
@@ -74,7 +74,8 @@ void add_directions(const Directions<S>& directions, const S* coefficients, cons
 template <class S>
 Index gather_scratch(const Directions<S>& directions);
 
-/// sums[C] = Pᵀ d_result, float partial sums of 2,048 vertices added in double; the same bits for any number of threads.
+/// sums[C] = Pᵀ d_result, float partial sums of 2,048 vertices added in double; the same bits for any number of
+/// threads.
 ///
 /// @param d_result  [V,3]
 /// @param scratch   gather_scratch numbers

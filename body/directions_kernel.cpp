@@ -1,7 +1,7 @@
 // Vector kernels of directions_kernel.h: rows in the lanes, a tile's columns one after the other.
 //
-// One core cannot read a single stream of memory as fast as several: kStreams blocks are worked on side by side, tile by
-// tile, with their rows in the first-level cache.
+// One core cannot read a single stream of memory as fast as several: kStreams blocks are worked on side by side, tile
+// by tile, with their rows in the first-level cache.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "body/directions_kernel.cpp"
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
@@ -26,7 +26,7 @@ inline constexpr Index kLanes = static_cast<Index>(hn::MaxLanes(Tag<S>()));
 /// Vectors of rows that are worked on at once, in registers.
 inline constexpr int kHeld = 6;
 template <class S>
-inline constexpr Index kHeldRows = kHeld * kLanes<S>;
+inline constexpr Index kHeldRows = kHeld* kLanes<S>;
 static_assert(kTileRows % kHeldRows<float> == 0 && kTileRows % kHeldRows<double> == 0);
 
 template <class S>
@@ -94,8 +94,8 @@ template <class S, class F>
 HWY_INLINE void for_tiles(const DirectionTiles<S>& table, Index begin, Index end, F&& f) {
   Index most = 0;
   for (Index b = begin; b < end; ++b) {
-    most = std::max(most, table.block_begin[static_cast<std::size_t>(b + 1)] -
-                              table.block_begin[static_cast<std::size_t>(b)]);
+    most = std::max(
+        most, table.block_begin[static_cast<std::size_t>(b + 1)] - table.block_begin[static_cast<std::size_t>(b)]);
   }
   for (Index t = 0; t < most; ++t) {
     for (Index b = begin; b < end; ++b) {
@@ -118,7 +118,7 @@ void add(const DirectionTiles<S>& table, const S* coefficients, const S* points,
   alignas(64) S rows[kStreams * kTileRows];
   for (Index first = begin; first < end; first += kStreams) {
     const Index last = std::min(first + kStreams, end);
-    load_rows(points, table.vertices, first, last, rows);
+    std::fill(rows, rows + (last - first) * kTileRows, S(0));  // points come last: sums of displacements round less
     for_tiles(table, first, last, [&](Index block, const DirectionTile& tile) {
       S* to = rows + (block - first) * kTileRows;
       const S* by = coefficients + tile.column;
@@ -128,8 +128,8 @@ void add(const DirectionTiles<S>& table, const S* coefficients, const S* points,
         add_tile<S>(table.numbers.data() + tile.offset, by, tile.columns, S(1), to);
       }
     });
-    std::copy(rows, rows + std::min(last * kTileRows, 3 * table.vertices) - first * kTileRows,
-              result + first * kTileRows);
+    const Index row = first * kTileRows, count = std::min(last * kTileRows, 3 * table.vertices) - row;
+    for (Index i = 0; i < count; ++i) result[row + i] = points[row + i] + rows[i];
   }
 }
 

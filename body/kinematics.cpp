@@ -221,7 +221,7 @@ std::vector<double> pose_joints(const BodyModel& body, const BodyPose& pose) {
   return pose_joints(body.parents, body.joints, pose);
 }
 
-#define HSI4D_INSTANTIATE(S) \
+#define HSI4D_INSTANTIATE(S)                                                                                \
   template PosedSkeleton<S> kinematic_chain(Var<S>, Var<S>, std::vector<int>, std::vector<double>, Source); \
   template PosedSkeleton<S> kinematic_chain(Var<S>, Var<S>, std::vector<int>, Var<S>, Source);
 HSI4D_INSTANTIATE(float)

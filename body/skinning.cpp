@@ -35,7 +35,8 @@ void round_weights(const double* weights, Index count, Index vertex, S* rounded)
     rounded[k] = static_cast<S>(weights[k]);
     sum += weights[k];
   }
-  HSI4D_CHECK(std::abs(sum - 1) <= kWeightRounding, "weights of vertex " + std::to_string(vertex) + " are not normalised");
+  HSI4D_CHECK(std::abs(sum - 1) <= kWeightRounding,
+              "weights of vertex " + std::to_string(vertex) + " are not normalised");
 }
 
 /// Lists the entries of each block of vertices by joint, then by vertex; weights of 0 are left out.

@@ -78,8 +78,7 @@ Rotations<S> rotations_of(Tape<S>& tape, Var<S> parameters, Index joints, const 
 }
 
 template <class S>
-Rotations<S> hand_rotations(Tape<S>& tape, const SmplxBody<S>& body, Var<S> parameters, int side,
-                            const Source& where) {
+Rotations<S> hand_rotations(Tape<S>& tape, const SmplxBody<S>& body, Var<S> parameters, int side, const Source& where) {
   if (parameters.tape == nullptr) parameters = tape.constant("no rotation", shape_of(kHandJoints, 3), where);
   if (parameters.shape() == shape_of(kHandJoints, 6)) return rotations_of(tape, parameters, kHandJoints, where);
   return rotations_of(tape, hand_pose(body, parameters, side, where), kHandJoints, where);
@@ -146,7 +145,8 @@ Var<S> hand_pose(const SmplxBody<S>& body, Var<S> coefficients, int side, Source
   if (coefficients.shape() != shape_of(kHandJoints, 3)) {
     const Index count = coefficients.shape().cols, there = static_cast<Index>(all.size()) / (3 * kHandJoints);
     HSI4D_CHECK_EQ(coefficients.shape(), shape_of(1, count));
-    HSI4D_CHECK(count <= there, std::to_string(count) + " components of a hand; the model has " + std::to_string(there));
+    HSI4D_CHECK(count <= there,
+                std::to_string(count) + " components of a hand; the model has " + std::to_string(there));
     const Var<S> components =
         constant_of<S>(tape, "hand components", shape_of(count, 3 * kHandJoints),
                        std::span(all).first(static_cast<std::size_t>(count * 3 * kHandJoints)), where);
@@ -154,15 +154,15 @@ Var<S> hand_pose(const SmplxBody<S>& body, Var<S> coefficients, int side, Source
   }
   const std::vector<S>& mean = body.tables().hand_means[at];
   const bool is_flat = std::all_of(mean.begin(), mean.end(), [](S x) { return x == 0; });
-  return is_flat ? pose : pose + Operand<S>(constant_of<S>(tape, "hand mean", shape_of(kHandJoints, 3), mean, where), where);
+  return is_flat ? pose
+                 : pose + Operand<S>(constant_of<S>(tape, "hand mean", shape_of(kHandJoints, 3), mean, where), where);
 }
 
 template <class S>
 PosedSmplx<S> pose_smplx(Tape<S>& tape, const SmplxBody<S>& body, const SmplxParameters<S>& p, Source where) {
   const auto& t = body.tables();
   PosedSmplx<S> posed;
-  posed.rest_vertices =
-      blended(tape, "template", t.vertices, t.shape, p.betas, t.expression, p.expression, where);
+  posed.rest_vertices = blended(tape, "template", t.vertices, t.shape, p.betas, t.expression, p.expression, where);
   posed.rest_joints =
       blended(tape, "joints", t.joints, t.joint_shape, p.betas, t.joint_expression, p.expression, where);
   const Rotations<S> rotations = all_rotations(tape, body, p, where);
@@ -181,9 +181,9 @@ PosedSmplx<S> pose_smplx(Tape<S>& tape, const SmplxBody<S>& body, const SmplxPar
   return posed;
 }
 
-#define HSI4D_INSTANTIATE(S)                                                                        \
-  template class SmplxBody<S>;                                                                      \
-  template Var<S> hand_pose(const SmplxBody<S>&, Var<S>, int, Source);                              \
+#define HSI4D_INSTANTIATE(S)                                           \
+  template class SmplxBody<S>;                                         \
+  template Var<S> hand_pose(const SmplxBody<S>&, Var<S>, int, Source); \
   template PosedSmplx<S> pose_smplx(Tape<S>&, const SmplxBody<S>&, const SmplxParameters<S>&, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

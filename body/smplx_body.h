@@ -26,9 +26,9 @@ struct SmplxBodyOptions {
   /// Joints ≥ 1 whose pose correctives follow every change and have an adjoint, ascending; see PoseDirections. Of the
   /// others only the correctives have none: their rotations move the body, with a gradient, all the same.
   std::vector<int> moving_joints;
-  bool correctives = true;                  ///< false: none, even if the model has them
-  double packing = kCorrectivePacking;      ///< see PoseDirections
-  bool flat_hand_mean = false;              ///< true: hands are flat, not in the file's mean pose, where parameters are 0
+  bool correctives = true;              ///< false: none, even if the model has them
+  double packing = kCorrectivePacking;  ///< see PoseDirections
+  bool flat_hand_mean = false;          ///< true: hands are flat, not in the file's mean pose, where parameters are 0
 
   SmplxBodyOptions();  ///< every joint moves
 };
@@ -45,12 +45,12 @@ class SmplxBody {
 
   struct Tables {
     std::vector<int> parents;
-    std::vector<double> vertices, joints;                     // template
+    std::vector<double> vertices, joints;  // template
     Directions<S> shape, expression, joint_shape, joint_expression;
     PoseDirections<S> correctives;
     std::unique_ptr<SkinWeights<S>> weights;
-    std::array<std::vector<S>, 2> hand_means;                 // [45]; zeros where flat_hand_mean
-    std::array<std::vector<S>, 2> hand_components;            // [n,45]
+    std::array<std::vector<S>, 2> hand_means;       // [45]; zeros where flat_hand_mean
+    std::array<std::vector<S>, 2> hand_components;  // [n,45]
     Index betas = 0, expressions = 0;
   };
   const Tables& tables() const { return *tables_; }
@@ -71,15 +71,15 @@ class SmplxBody {
 /// file's first n components (PCA), too. A hand [15,6] is its whole rotation, without the mean.
 template <class S>
 struct SmplxParameters {
-  Var<S> betas;            ///< [1,B]
-  Var<S> expression;       ///< [1,E]
-  Var<S> global_orient;    ///< [1,3] or [1,6]; turns the body about its pelvis
-  Var<S> body_pose;        ///< [21,3] or [21,6]
-  Var<S> jaw_pose;         ///< [1,3] or [1,6], as the eyes
+  Var<S> betas;          ///< [1,B]
+  Var<S> expression;     ///< [1,E]
+  Var<S> global_orient;  ///< [1,3] or [1,6]; turns the body about its pelvis
+  Var<S> body_pose;      ///< [21,3] or [21,6]
+  Var<S> jaw_pose;       ///< [1,3] or [1,6], as the eyes
   Var<S> leye_pose, reye_pose;
-  Var<S> left_hand_pose;   ///< [15,3], [15,6] or [1,n]
+  Var<S> left_hand_pose;  ///< [15,3], [15,6] or [1,n]
   Var<S> right_hand_pose;
-  Var<S> transl;           ///< [1,3] metres
+  Var<S> transl;  ///< [1,3] metres
 };
 
 /// What a body is in a pose; each Var is computed only when a result depends on it.

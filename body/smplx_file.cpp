@@ -189,7 +189,8 @@ SmplxModel model_of(const Npz& file, const SmplxFileOptions& options) {
   if (options.correctives && has_readable(file, "posedirs")) {
     model.correctives = finite_numbers(file, "posedirs", {model.vertex_count(), 3, kCorrectiveColumns});
   }
-  model.hands = {read_hand(file, "hands_meanl", "hands_componentsl"), read_hand(file, "hands_meanr", "hands_componentsr")};
+  model.hands = {read_hand(file, "hands_meanl", "hands_componentsl"),
+                 read_hand(file, "hands_meanr", "hands_componentsr")};
   return model;
 }
 
