@@ -109,6 +109,14 @@ void skin_points(const SkinWeights<S>& weights, const S* transforms, const S* po
 template <class S>
 Var<S> skin_points(const SkinWeights<S>& weights, Var<S> transforms, Var<S> points, Source where = Source::current());
 
+/// y_v = Σ_j w_vj A_j (x_v, 1) + t: the translation last, whatever the weights sum to by their rounding.
+///
+/// @param transl  [1,3] metres
+/// Adjoint: transforms, points, transl; each computed only when wanted.
+template <class S>
+Var<S> skin_points(const SkinWeights<S>& weights, Var<S> transforms, Var<S> points, Var<S> transl,
+                   Source where = Source::current());
+
 /// B_v = Σ_j w_vj A_j, the blended transform of each vertex; its linear part is in general no rotation.
 ///
 /// @param transforms  [J,12], rows [3,4] of posed_from_rest

@@ -174,7 +174,7 @@ PosedSmplx<S> pose_smplx(Tape<S>& tape, const SmplxBody<S>& body, const SmplxPar
   const Var<S> corrected = t.correctives.joints() > 0
                                ? pose_correctives(t.correctives, rotations.offsets, posed.rest_vertices, where)
                                : posed.rest_vertices;
-  posed.vertices = skin_points(*t.weights, in_place.transforms, corrected, where) + Operand<S>(transl, where);
+  posed.vertices = skin_points(*t.weights, in_place.transforms, corrected, transl, where);
   const PosedSkeleton<S> moved = kinematic_chain(posed.rotations, transl, t.parents, posed.rest_joints, where);
   posed.joints = moved.joints;
   posed.transforms = moved.transforms;
