@@ -190,10 +190,9 @@ void gather_directions(const Directions<S>& directions, const S* d_result, S* sc
   const DirectionTiles<S>& table = directions.tiles();
   const Partition part{table.vertices, kDirectionGrain};
   const Index numbers = table.columns * kDirectionLanes, chunks = part.chunks();
-  run_chunks(chunks, [&](Index i) {
-    const Index chunk = chunks - 1 - i;  // from the last to the first, see DirectionKernels
-    kernels<S>().gather(table, d_result, scratch + chunk * numbers, part.begin(chunk) / kTileVertices,
-                        (part.end(chunk) + kTileVertices - 1) / kTileVertices);
+  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+    kernels<S>().gather(table, d_result, scratch + chunk * numbers, begin / kTileVertices,
+                        (end + kTileVertices - 1) / kTileVertices);
   });
   on_best_isa([&] {
     for (Index c = 0; c < table.columns; ++c) {

@@ -40,8 +40,7 @@ template <class S>
 struct DirectionKernels {
   using Tiles = const DirectionTiles<S>&;
   void (*add)(Tiles, const S* coefficients, const S* points, S* result, Index begin, Index end);
-  /// `partial` [C,kDirectionLanes] is overwritten with sums of the blocks, lane by lane. Blocks are read from the last
-  /// to the first: what the forward run read last is still in the caches.
+  /// `partial` [C,kDirectionLanes] is overwritten with sums of the blocks, lane by lane.
   void (*gather)(Tiles, const S* d_result, S* partial, Index begin, Index end);
 };
 
