@@ -59,8 +59,8 @@ TEST_CASE("unknown keys") {
 
 TEST_CASE("body models") {
   CHECK_THAT(fault(R"({"body": {"kind": "smpl"}})"),
-             Equals("a.json:1: /body/kind: \"smpl\" is not one of the allowed words: procedural, smplx; did you mean "
-                    "\"smplx\"?"));
+             Equals("a.json:1: /body/kind: \"smpl\" is not one of the choices; allowed: \"procedural\", \"smplx\"; did "
+                    "you mean \"smplx\"?"));
   CHECK_THAT(fault(R"({"body": {"kind": "smplx"}})"),
              Equals("a.json:1: /body/path: kind smplx needs the file of a body model"));
   CHECK_THAT(fault(R"({"body": {"kind": "smplx", "path": "nowhere.npz"}})"),
