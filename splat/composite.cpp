@@ -37,6 +37,7 @@ using detail::TileLists;
 using detail::Workspaces;
 
 constexpr Index kGrain = 512;
+constexpr Index kPixelRows = 16;  // a chunk
 
 /// Of a tile: fragments, and the list position after the last Gaussian composited in any pixel.
 struct TileCounts {
@@ -50,9 +51,9 @@ struct Composite {
   SplatView view;
   std::shared_ptr<RenderCounters> counters;
 
-  /// Of what moves; those of what stands still follow, if there is any.
+  /// Of what moves; those of what stands still follow, if there is any, then the background, if there is one.
   enum Input { kMeans, kFactors, kDepths, kRest, kMeansRest, kOpacities, kFeatures, kStill };
-  enum Output { kChannels, kTransmittance };
+  enum Output { kChannels, kTransmittance, kMoreChannels };
 
   Buffer<SplatRecord<S>> records = {};  ///< of all rows, those that stand still first
   detail::TilePlans planned = {};
@@ -67,6 +68,7 @@ struct Composite {
   Buffer<TileCounts> tile_counts = {};
   Buffer<std::uint32_t> settled = {};  ///< of each tile: blocks whose outputs hold what stands still, and nothing else
   const S* written = nullptr;          ///< the output that `settled` tells of
+  std::uint64_t written_over = 0;      ///< version of the background that it lies over
   double still_s = 0;                  ///< seconds of the state built for the next forward run
 
   TileGrid grid() const {
@@ -80,13 +82,29 @@ struct Composite {
   static bool wants_features(const NodeIo<S>& io) { return wants_any(io, {kFeatures}); }
   static bool wants_gradient(const NodeIo<S>& io) { return wants_shape(io) || wants_features(io); }
 
+  // --- outputs -------------------------------------------------------------------------------------------------------
+
+  static bool has_background(const NodeIo<S>& io) { return io.inputs() % kStill != 0; }
+  static int background_input(const NodeIo<S>& io) { return io.inputs() - 1; }
+  static Index channels_of(const NodeIo<S>& io) { return io.in(kFeatures).shape.cols; }
+  /// The output that holds channel k, and its plane there.
+  static std::pair<int, Index> place_of_channel(const NodeIo<S>& io, Index k) {
+    const Index over = io.out(kChannels).shape.planes;
+    return k < over ? std::pair<int, Index>(kChannels, k) : std::pair<int, Index>(kMoreChannels, k - over);
+  }
+  static detail::OutputImages<S> images_of(const NodeIo<S>& io) {
+    const Array<S> over = io.out(kChannels);
+    return {over, over.shape.planes < channels_of(io) ? io.out(kMoreChannels) : Array<S>{}, io.out(kTransmittance),
+            has_background(io) ? io.in(background_input(io)).data : nullptr};
+  }
+
   // --- Gaussians -----------------------------------------------------------------------------------------------------
 
-  static bool has_still(const NodeIo<S>& io) { return io.inputs() > kStill; }
+  static bool has_still(const NodeIo<S>& io) { return io.inputs() >= 2 * kStill; }
   /// True: those that stand still are listed by themselves, and kept.
   bool keeps_still(const NodeIo<S>& io) const {
     if (!has_still(io) || !view.skip.static_tiles) return false;
-    for (int i = kStill; i < io.inputs(); ++i) {
+    for (int i = kStill; i < 2 * kStill; ++i) {
       if (io.wants(i)) return false;
     }
     return true;
@@ -105,7 +123,7 @@ struct Composite {
   std::uint64_t state_key(NodeIo<S>& io) const {
     if (!keeps_still(io)) return 0;
     Signature key;
-    for (int i = kStill; i < io.inputs(); ++i) key.add(io.version(i));
+    for (int i = kStill; i < 2 * kStill; ++i) key.add(io.version(i));
     return key.value();
   }
   void build_state(NodeIo<S>& io) {
@@ -259,7 +277,7 @@ struct Composite {
     job.workspace = memory + 2 * detail::block_state(tiles.tile, scene.channels);
     detail::begin_blocks(tiles.tile, job.width, job.height, scene.channels, job.state);
     const Index fragments = detail::composite_blocks(tiles.tile, scene, job).fragments;
-    detail::store_blocks(tiles.tile, job, io.out(kChannels), io.out(kTransmittance));
+    detail::store_blocks(tiles.tile, job, images_of(io));
     return fragments;
   }
 
@@ -285,19 +303,19 @@ struct Composite {
     } else {
       detail::begin_blocks(tiles.tile, job.width, job.height, scene.channels, job.state);
     }
-    fetch_blocks(job, io.out(kChannels), io.out(kTransmittance));
+    fetch_blocks(job, images_of(io));
     const detail::BlockCounts counts = detail::composite_blocks(tiles.tile, scene, job);
     fragments += counts.fragments;
     if (!plan.behind.empty()) {
       fragments += detail::composite_behind(tiles.tile, scene, job, plan.behind, collapse, memory + numbers, layer);
     }
-    detail::store_blocks(tiles.tile, job, io.out(kChannels), io.out(kTransmittance));
+    detail::store_blocks(tiles.tile, job, images_of(io));
     return {fragments, counts.end};
   }
 
   TileCounts composite_plain(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* memory) {
     const CompositeScene<S> scene = scene_of(io);
-    const Array<S> image = io.out(kChannels), transmittance = io.out(kTransmittance);
+    const detail::OutputImages<S> images = images_of(io);
     const Index pixels = tiles.tile * tiles.tile;
     TileJob<S> job = job_of(tiles, tile);
     const bool moves = !job.entries.empty();
@@ -309,9 +327,11 @@ struct Composite {
     job.channels = memory + pixels;
     const Index fragments = detail::composite_tile(tiles.tile, scene, job);
     for (Index r = 0; r < job.height; ++r) {
-      detail::copy_row(job.transmittance + r * tiles.tile, job.width, &transmittance(job.top + r, job.left));
+      const S* const through = job.transmittance + r * tiles.tile;
+      detail::copy_row(through, job.width, &images.transmittance(job.top + r, job.left));
       for (Index k = 0; k < scene.channels; ++k) {
-        detail::copy_row(job.channels + k * pixels + r * tiles.tile, job.width, &image(k, job.top + r, job.left));
+        images.put(k, job.channels + k * pixels + r * tiles.tile, through, job.width,
+                   images.at(k, job.top + r, job.left));
       }
     }
     return {fragments, moves ? static_cast<Index>(*std::max_element(job.last, job.last + pixels)) : 0};
@@ -326,9 +346,11 @@ struct Composite {
     place_kept(io, tiles);
     tile_counts.resize(tiles.count());
     tile_last.resize(tiles.count());
-    if (written != io.out(kChannels).data) {
+    const std::uint64_t over = has_background(io) ? io.version(background_input(io)) : 0;
+    if (written != io.out(kChannels).data || written_over != over) {
       std::fill_n(settled.data(), tiles.count(), 0u);
       written = io.out(kChannels).data;
+      written_over = over;
     }
     *counters = counters_before(tiles, plan_rules(io).in_layers);
     counters->times.still_s = std::exchange(still_s, 0.0);
@@ -415,24 +437,50 @@ struct Composite {
     return (channels + 1) * pixels + work;
   }
 
-  /// d_channels and d_T of a tile's pixels, zero past the image's border.
+  /// d_channels and d_T of a tile's pixels, zero past the image's border. A channel over a background has
+  /// d_T += background d_channel.
   static void load_cotangent(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* d_channels) {
-    const ConstArray<S> d_image = io.d_out(kChannels), d_transmittance = io.d_out(kTransmittance);
-    const Index pixels = tiles.tile * tiles.tile, channels = io.in(kFeatures).shape.cols;
+    const ConstArray<S> d_transmittance = io.d_out(kTransmittance);
+    const detail::OutputImages<S> images = images_of(io);
+    const Index pixels = tiles.tile * tiles.tile, channels = images.channels();
     TileJob<S> place{};
     place_job(tiles, tile, place);
+    S* const d_through = d_channels + channels * pixels;
     std::fill_n(d_channels, (channels + 1) * pixels, S(0));
-    for (Index r = 0; r < place.height; ++r) {
-      S* const to = d_channels + r * tiles.tile;
-      for (Index k = 0; d_image && k < channels; ++k) {
-        detail::copy_row(&d_image(k, place.top + r, place.left), place.width, to + k * pixels);
+    for (Index r = 0; d_transmittance && r < place.height; ++r) {
+      detail::copy_row(&d_transmittance(place.top + r, place.left), place.width, d_through + r * tiles.tile);
+    }
+    for (Index k = 0; k < channels; ++k) {
+      const auto [output, plane] = place_of_channel(io, k);
+      const ConstArray<S> d_image = io.d_out(output);
+      const S behind = images.behind(k);
+      S* const to = d_channels + k * pixels;
+      for (Index r = 0; d_image && r < place.height; ++r) {
+        detail::copy_row(&d_image(plane, place.top + r, place.left), place.width, to + r * tiles.tile);
       }
-      if (!d_transmittance) continue;
-      detail::copy_row(&d_transmittance(place.top + r, place.left), place.width, to + channels * pixels);
+      for (Index i = 0; behind != S(0) && i < pixels; ++i) d_through[i] += behind * to[i];
+    }
+  }
+
+  /// d_background_k = Σ T d_channel_k
+  static void add_background_gradient(NodeIo<S>& io) {
+    const ConstArray<S> t = io.out(kTransmittance), g = io.d_out(kChannels);
+    if (!g) return;
+    for (Index k = 0; k < g.shape.planes; ++k) {
+      const double sum = parallel_sum(g.shape.rows, kPixelRows, [&](Index begin, Index end) {
+        double part = 0;
+        for (Index r = begin; r < end; ++r) {
+          const S *d = &g(k, r, 0), *through = t.row(r);
+          for (Index x = 0; x < g.shape.cols; ++x) part += static_cast<double>(through[x]) * static_cast<double>(d[x]);
+        }
+        return part;
+      });
+      io.d_in(background_input(io)).data[k] += static_cast<S>(sum);
     }
   }
 
   void backward(NodeIo<S>& io) {
+    if (has_background(io) && io.wants(background_input(io))) add_background_gradient(io);
     if (!wants_gradient(io)) return;
     Stopwatch watch;
     const TileGrid tiles = grid();
@@ -607,7 +655,8 @@ Index check_set(const SplatSet<S>& set, Index channels) {
 
 /// @param sets  what moves, then what stands still, if there is any
 template <class S>
-Composited<S> record_composite(std::initializer_list<SplatSet<S>> sets, const SplatView& view, Source where) {
+Composited<S> record_composite(std::initializer_list<SplatSet<S>> sets, Var<S> background, const SplatView& view,
+                               Source where) {
   check_camera(view.camera);
   const Index channels = sets.begin()->features.shape().cols;
   HSI4D_CHECK(channels >= 1, "no features");
@@ -623,30 +672,40 @@ Composited<S> record_composite(std::initializer_list<SplatSet<S>> sets, const Sp
   }
   HSI4D_CHECK(rows <= std::numeric_limits<std::int32_t>::max(), std::to_string(rows) + " Gaussians");
   const Index width = view.camera.width, height = view.camera.height;
-  const std::array outputs = {image_shape<S>(channels, height, width), image_shape<S>(1, height, width)};
+  Index over = channels;
+  if (background.tape != nullptr) {
+    over = background.shape().cols;
+    HSI4D_CHECK_EQ(background.shape(), shape_of(1, over));
+    HSI4D_CHECK(over >= 1 && over <= channels,
+                "a background of " + std::to_string(over) + " channels of " + std::to_string(channels));
+    inputs.push_back(background);
+  }
+  const std::array outputs = {image_shape<S>(over, height, width), image_shape<S>(1, height, width),
+                              image_shape<S>(channels - over, height, width)};
+  const bool split = over < channels;
   auto counters = std::make_shared<RenderCounters>();
   Tape<S>& tape = inputs.front().owner();
   const Var<S> first = tape.record(Composite<S>{view, counters}, std::span<const Var<S>>(inputs),
-                                   std::span<const Shape>(outputs), where);
-  return {first, tape.output(first, 1), counters};
+                                   std::span<const Shape>(outputs).first(split ? 3 : 2), where);
+  return {first, tape.output(first, 1), split ? tape.output(first, 2) : Var<S>{}, counters};
 }
 
 }  // namespace
 
 template <class S>
-Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> features, const SplatView& view,
-                        Source where) {
-  return record_composite<S>({{projected, opacities, features}}, view, where);
+Composited<S> composite(const SplatSet<S>& splats, const SplatView& view, Var<S> background, Source where) {
+  return record_composite<S>({splats}, background, view, where);
 }
 
 template <class S>
-Composited<S> composite(const SplatSet<S>& still, const SplatSet<S>& moving, const SplatView& view, Source where) {
-  return record_composite<S>({moving, still}, view, where);
+Composited<S> composite(const SplatSet<S>& still, const SplatSet<S>& moving, const SplatView& view, Var<S> background,
+                        Source where) {
+  return record_composite<S>({moving, still}, background, view, where);
 }
 
-#define HSI4D_INSTANTIATE(S)                                                                       \
-  template Composited<S> composite(const Projected<S>&, Var<S>, Var<S>, const SplatView&, Source); \
-  template Composited<S> composite(const SplatSet<S>&, const SplatSet<S>&, const SplatView&, Source);
+#define HSI4D_INSTANTIATE(S)                                                              \
+  template Composited<S> composite(const SplatSet<S>&, const SplatView&, Var<S>, Source); \
+  template Composited<S> composite(const SplatSet<S>&, const SplatSet<S>&, const SplatView&, Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)
 #undef HSI4D_INSTANTIATE

@@ -19,45 +19,45 @@
 
 namespace hsi4d {
 
+/// Gaussians in the image and what is composited of them.
+template <class S>
+struct SplatSet {
+  Projected<S> projected;  ///< see project
+  Var<S> opacities;        ///< [N,1] in [0, 1]
+  Var<S> features;         ///< [N,C] what is composited: colours, depths, …; C ≥ 1
+};
+
 template <class S>
 struct Composited {
-  Var<S> channels;                                 ///< [C,H,W] Σ w f, without background
-  Var<S> transmittance;                            ///< [1,H,W] T behind the last Gaussian
+  Var<S> channels;       ///< [C,H,W] Σ w f; with a background of B numbers [B,H,W] Σ w f + T background
+  Var<S> transmittance;  ///< [1,H,W] T behind the last Gaussian
+  Var<S>
+      more_channels;  ///< [C−B,H,W] Σ w f of the other features, with a background; else, and if there are none, empty
   std::shared_ptr<const RenderCounters> counters;  ///< of the last forward run
 };
 
 /// Composites Gaussians into an image of view.camera's size. Not drawn are: rows whose factors are six zeros, depths ≤
 /// near, rows with a number that is not finite, and, with blur 0, Gaussians without area (rows A4-A6).
 ///
-/// @param projected  see project
-/// @param opacities  [N,1] in [0, 1]
-/// @param features   [N,C] what is composited: colours, depths, …; C ≥ 1
-/// @return           image-shaped arrays
-/// Adjoint: projected.means_px and means_rest (of whose sum it is), projected.factors, opacities, features; each
-/// computed only when wanted. None where o G > alpha_cap (unless cap_gradient is pass), none through the order, the
-/// choice of pixels and the stop. A Gaussian that is not drawn has gradient 0. Throws InternalError when the shapes do
-/// not fit; UserError when there are more than kMostPairs (tile, Gaussian) pairs, or
-/// when they would take more than kPairMemoryShare of the memory.
+/// @param background  none, or [1,B], 1 ≤ B ≤ C: what lies behind everything in the first channels
+/// @return            image-shaped arrays
+/// Adjoint: projected.means_px and means_rest (of whose sum it is), projected.factors, opacities, features, background;
+/// each computed only when wanted. None where o G > alpha_cap (unless cap_gradient is pass), none through the order,
+/// the choice of pixels and the stop. A Gaussian that is not drawn has gradient 0. Throws InternalError when the shapes
+/// do not fit; UserError when there are more than kMostPairs (tile, Gaussian) pairs, or when they would take more than
+/// kPairMemoryShare of the memory.
 template <class S>
-Composited<S> composite(const Projected<S>& projected, Var<S> opacities, Var<S> features, const SplatView& view,
+Composited<S> composite(const SplatSet<S>& splats, const SplatView& view, Var<S> background = {},
                         Source where = Source::current());
-
-/// Gaussians in the image and what is composited of them.
-template <class S>
-struct SplatSet {
-  Projected<S> projected;
-  Var<S> opacities;  ///< [N,1]
-  Var<S> features;   ///< [N,C]
-};
 
 /// The same for the rows of two sets, `still` in front in the order of rows. While no gradient is wanted in `still`,
 /// its records, order and lists are kept until one of its inputs changes, and only what `moving` touches is composited
 /// anew: see RenderSkips, which says what that changes, and splat/static_layer.h. With a gradient, or without
-/// static_tiles, the result is that of one set.
+/// static_tiles, the result is that of one set. A background that changes is laid behind everything anew.
 ///
 /// Adjoint: as above, of both sets.
 template <class S>
 Composited<S> composite(const SplatSet<S>& still, const SplatSet<S>& moving, const SplatView& view,
-                        Source where = Source::current());
+                        Var<S> background = {}, Source where = Source::current());
 
 }  // namespace hsi4d

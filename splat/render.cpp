@@ -5,7 +5,6 @@
 
 #include "autodiff/matrix.h"
 #include "core/parallel.h"
-#include "core/simd.h"
 #include "splat/limits.h"
 
 namespace hsi4d {
@@ -14,74 +13,6 @@ namespace {
 
 constexpr Index kRows = 16;  // of pixels a chunk
 constexpr Index kColors = 3;
-
-/// image_k = channels_k + T background_k
-template <class S>
-struct AddBackground {
-  static constexpr const char* kName = "add_background";
-  static constexpr bool kAssigns = true;
-  enum Input { kChannels, kTransmittance, kBackground };
-
-  void forward(NodeIo<S>& io) {
-    const ConstArray<S> channels = io.in(kChannels), t = io.in(kTransmittance);
-    const S* background = io.in(kBackground).data;
-    const Array<S> image = io.out();
-    parallel_for(image.shape.rows, kRows, [&](Index begin, Index end) {
-      on_best_isa([&] {
-        for (Index k = 0; k < kColors; ++k) {
-          for (Index r = begin; r < end; ++r) {
-            const S *c = &channels(k, r, 0), *through = t.row(r);
-            S* sum = &image(k, r, 0);
-            for (Index x = 0; x < image.shape.cols; ++x) sum[x] = c[x] + through[x] * background[k];
-          }
-        }
-      });
-    });
-  }
-
-  // d_channels_k = g_k,  d_T = Σ_k background_k g_k,  d_background_k = Σ T g_k
-  void backward(NodeIo<S>& io) {
-    const ConstArray<S> g = io.d_out();
-    const S* background = io.in(kBackground).data;
-    parallel_for(g.shape.rows, kRows, [&](Index begin, Index end) {
-      on_best_isa([&] {
-        for (Index k = 0; io.wants(kChannels) && k < io.d_in(kChannels).shape.planes; ++k) {
-          for (Index r = begin; r < end; ++r) {
-            S* const d_c = &io.d_in(kChannels)(k, r, 0);
-            if (io.must_assign(kChannels)) std::fill_n(d_c, g.shape.cols, S(0));
-            if (k < kColors) add_scaled(&g(k, r, 0), S(1), g.shape.cols, d_c);
-          }
-        }
-        for (Index r = begin; io.wants(kTransmittance) && r < end; ++r) {
-          S* const d_t = io.d_in(kTransmittance).row(r);
-          if (io.must_assign(kTransmittance)) std::fill_n(d_t, g.shape.cols, S(0));
-          for (Index k = 0; k < kColors; ++k) add_scaled(&g(k, r, 0), background[k], g.shape.cols, d_t);
-        }
-      });
-    });
-    if (io.wants(kBackground)) add_background_gradient(io);
-  }
-
-  static void add_scaled(const S* x, S factor, Index n, S* sum) {
-    for (Index i = 0; i < n; ++i) sum[i] += factor * x[i];
-  }
-
-  static void add_background_gradient(NodeIo<S>& io) {
-    const ConstArray<S> t = io.in(kTransmittance), g = io.d_out();
-    S* const d_background = io.d_in(kBackground).data;
-    if (io.must_assign(kBackground)) std::fill_n(d_background, kColors, S(0));
-    for (Index k = 0; k < kColors; ++k) {
-      d_background[k] += static_cast<S>(parallel_sum(g.shape.rows, kRows, [&](Index begin, Index end) {
-        double sum = 0;
-        for (Index r = begin; r < end; ++r) {
-          const S *d = &g(k, r, 0), *through = t.row(r);
-          for (Index x = 0; x < g.shape.cols; ++x) sum += static_cast<double>(through[x]) * static_cast<double>(d[x]);
-        }
-        return sum;
-      }));
-    }
-  }
-};
 
 /// E = D/A, 0 where A = 0; D and A are planes of the channels. No gradient where A is too small for 1/A (row B14).
 template <class S>
@@ -204,25 +135,24 @@ Rendered<S> render_sets(const SplatInputs<S>* still, const SplatInputs<S>& movin
   }
   const SplatSet<S> moved = project_set(moving, first, xi, view, request, intrinsics, where);
   const Composited<S> composited =
-      still != nullptr ? composite(project_set(*still, 0, xi, view, request, intrinsics, where), moved, view, where)
-                       : composite(moved.projected, moved.opacities, moved.features, view, where);
+      still != nullptr
+          ? composite(project_set(*still, 0, xi, view, request, intrinsics, where), moved, view, background, where)
+          : composite(moved, view, background, where);
 
   const Shape one = image_shape<S>(1, view.camera.height, view.camera.width);
-  Shape image = one, group_image = one;
-  image.planes = kColors;
-  group_image.planes = groups;
   Rendered<S> result;
   result.projected = moved.projected;
   result.counters = composited.counters;
+  result.image = composited.channels;
   result.transmittance = composited.transmittance;
-  result.image =
-      tape.record(AddBackground<S>{}, {composited.channels, composited.transmittance, background}, image, where);
   if (request.depth) {
-    result.depth = tape.record(NormalizedDepth<S>{kColors, kColors + 1}, {composited.channels}, one, where);
-  }
-  if (groups > 0) {
-    const Index plane = kColors + (request.depth ? 2 : 0);
-    result.group_opacity = tape.record(SlicePlanes<S>{plane}, {composited.channels}, group_image, where);
+    result.depth = tape.record(NormalizedDepth<S>{0, 1}, {composited.more_channels}, one, where);
+    if (groups == 0) return result;
+    Shape group_image = one;
+    group_image.planes = groups;
+    result.group_opacity = tape.record(SlicePlanes<S>{2}, {composited.more_channels}, group_image, where);
+  } else if (groups > 0) {
+    result.group_opacity = composited.more_channels;
   }
   return result;
 }

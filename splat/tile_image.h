@@ -20,11 +20,37 @@ inline void copy_row(const S* from, Index n, S* to) {
   }
 }
 
+/// The outputs of composite: channels, the first of which may lie over a background, and T.
+template <class S>
+struct OutputImages {
+  Array<S> over;           ///< the first channels, to which T·background is added if there is one
+  Array<S> rest;           ///< the channels after them; may be empty
+  Array<S> transmittance;  ///< one plane
+  const S* background;     ///< a number for each plane of `over`; null: none
+
+  Index channels() const { return over.shape.planes + (rest ? rest.shape.planes : 0); }
+  /// Pixel (y, x) of channel k.
+  S* at(Index k, Index y, Index x) const {
+    return k < over.shape.planes ? &over(k, y, x) : &rest(k - over.shape.planes, y, x);
+  }
+  /// The background of channel k; 0 where there is none.
+  S behind(Index k) const { return background != nullptr && k < over.shape.planes ? background[k] : S(0); }
+
+  /// Writes a row of some pixels of a channel.
+  ///
+  /// @param through  T of these pixels
+  void put(Index k, const S* from, const S* through, Index n, S* to) const {
+    const S color = behind(k);
+    if (color == S(0)) return copy_row(from, n, to);
+    for (Index i = 0; i < n; ++i) to[i] = from[i] + through[i] * color;
+  }
+};
+
 /// Fetches the rows of the image that store_blocks will write.
-inline void fetch_blocks(const BlockJob& job, const Array<float>& channels, const Array<float>& transmittance) {
+inline void fetch_blocks(const BlockJob& job, const OutputImages<float>& images) {
   for (Index y = job.top; y < job.top + job.height; ++y) {
-    __builtin_prefetch(&transmittance(0, y, job.left), 1);
-    for (Index k = 0; k < channels.shape.planes; ++k) __builtin_prefetch(&channels(k, y, job.left), 1);
+    __builtin_prefetch(&images.transmittance(0, y, job.left), 1);
+    for (Index k = 0; k < images.channels(); ++k) __builtin_prefetch(images.at(k, y, job.left), 1);
   }
 }
 
@@ -34,56 +60,57 @@ inline void fetch_blocks(const BlockJob& job, const Array<float>& channels, cons
 /// @param state    of the first
 /// @param top      of them in the image
 template <Index kAcross>
-inline void store_band(const float* state, Index left, Index top, const Array<float>& channels,
-                       const Array<float>& transmittance) {
-  constexpr Index kSide = kBlockSide;
-  const Index planes = channels.shape.planes, size = (1 + planes) * kBlockPixels;
+inline void store_band(const float* state, Index left, Index top, const OutputImages<float>& images) {
+  constexpr Index kSide = kBlockSide, kWidth = kAcross * kSide;
+  const Index planes = images.channels(), size = (1 + planes) * kBlockPixels;
+  float through[kSide][kWidth], row[kWidth];
   for (Index r = 0; r < kSide; ++r) {
-    float* const to = &transmittance(0, top + r, left);
     for (Index b = 0; b < kAcross; ++b) {
-      for (Index i = 0; i < kSide; ++i) to[b * kSide + i] = std::abs(state[b * size + r * kSide + i]);
+      for (Index i = 0; i < kSide; ++i) through[r][b * kSide + i] = std::abs(state[b * size + r * kSide + i]);
     }
+    copy_row(through[r], kWidth, &images.transmittance(0, top + r, left));
   }
   for (Index k = 0; k < planes; ++k) {
     const float* const from = state + (k + 1) * kBlockPixels;
     for (Index r = 0; r < kSide; ++r) {
-      float* const to = &channels(k, top + r, left);
       for (Index b = 0; b < kAcross; ++b) {
-        std::memcpy(to + b * kSide, from + b * size + r * kSide, kSide * sizeof(float));
+        std::memcpy(row + b * kSide, from + b * size + r * kSide, kSide * sizeof(float));
       }
+      images.put(k, row, through[r], kWidth, images.at(k, top + r, left));
     }
   }
 }
 
 /// Writes the pixels of a block that lie in the image.
 inline void store_block(const float* state, Index left, Index top, Index width, Index height,
-                        const Array<float>& channels, const Array<float>& transmittance) {
+                        const OutputImages<float>& images) {
   constexpr Index kSide = kBlockSide;
+  float through[kSide];
   for (Index r = 0; r < height; ++r) {
-    for (Index i = 0; i < width; ++i) transmittance(0, top + r, left + i) = std::abs(state[r * kSide + i]);
-    for (Index k = 0; k < channels.shape.planes; ++k) {
-      std::copy_n(state + (k + 1) * kBlockPixels + r * kSide, width, &channels(k, top + r, left));
+    for (Index i = 0; i < width; ++i) through[i] = std::abs(state[r * kSide + i]);
+    std::copy_n(through, width, &images.transmittance(0, top + r, left));
+    for (Index k = 0; k < images.channels(); ++k) {
+      images.put(k, state + (k + 1) * kBlockPixels + r * kSide, through, width, images.at(k, top + r, left));
     }
   }
 }
 
 /// Writes the blocks that a job composited.
-inline void store_blocks(Index side, const BlockJob& job, const Array<float>& channels,
-                         const Array<float>& transmittance) {
+inline void store_blocks(Index side, const BlockJob& job, const OutputImages<float>& images) {
   constexpr Index kSide = kBlockSide;
-  const Index across = side / kSide, size = (1 + channels.shape.planes) * kBlockPixels;
+  const Index across = side / kSide, size = (1 + images.channels()) * kBlockPixels;
   const std::uint32_t whole = (1u << across) - 1;
   for (Index y = 0; y < job.height; y += kSide) {
     const std::uint32_t blocks = job.blocks >> (y / kSide * across) & whole;
     const float* const state = job.state + y / kSide * across * size;
     if (blocks == whole && across == 4 && job.width == side && y + kSide <= job.height) {
-      store_band<4>(state, job.left, job.top + y, channels, transmittance);
+      store_band<4>(state, job.left, job.top + y, images);
       continue;
     }
     for (Index x = 0; x < job.width; x += kSide) {
       if ((blocks >> (x / kSide) & 1u) == 0) continue;
       store_block(state + x / kSide * size, job.left + x, job.top + y, std::min(kSide, job.width - x),
-                  std::min(kSide, job.height - y), channels, transmittance);
+                  std::min(kSide, job.height - y), images);
     }
   }
 }

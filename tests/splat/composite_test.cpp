@@ -41,7 +41,7 @@ void check_composite(const std::string& name, const FlatSplats& splats, const Sp
     auto& tape = in[0].owner();
     const auto rest = tape.constant("rest", shape_of(n, 1));
     const auto means_rest = tape.constant("means rest", shape_of(n, 2));
-    const auto out = composite({in[0], in[1], in[2], rest, means_rest}, in[3], in[4], view);
+    const auto out = composite(SplatSet{Projected{in[0], in[1], in[2], rest, means_rest}, in[3], in[4]}, view);
     return out.channels + out.transmittance;  // the transmittance is added to every channel
   };
   check_operator(name,
@@ -223,14 +223,16 @@ TEST_CASE("shapes that do not fit are refused") {
   Tape<float> tape;
   const auto v = [&](Index rows, Index cols) { return tape.parameter("v", shape_of(rows, cols)); };
   const SplatView view = view_of_size(16, 16, RenderSettings());
-  CHECK_THROWS_AS(composite<float>({v(3, 2), v(3, 6), v(3, 1), v(3, 1), v(3, 2)}, v(2, 1), v(3, 3), view),
-                  InternalError);
-  CHECK_THROWS_AS(composite<float>({v(3, 2), v(3, 6), v(3, 1), v(3, 1), v(3, 2)}, v(3, 1), v(3, 0), view),
-                  InternalError);
+  const auto set = [&](Index opacities, Index features) {
+    return SplatSet<float>{{v(3, 2), v(3, 6), v(3, 1), v(3, 1), v(3, 2)}, v(opacities, 1), v(3, features)};
+  };
+  CHECK_THROWS_AS(composite(set(2, 3), view), InternalError);
+  CHECK_THROWS_AS(composite(set(3, 0), view), InternalError);
+  CHECK_THROWS_AS(composite(set(3, 3), view, v(1, 4)), InternalError);
+  CHECK_THROWS_AS(composite(set(3, 3), view, v(2, 3)), InternalError);
   SplatView odd = view;
   odd.settings.tile = 12;
-  CHECK_THROWS_AS(composite<float>({v(3, 2), v(3, 6), v(3, 1), v(3, 1), v(3, 2)}, v(3, 1), v(3, 3), odd),
-                  InternalError);
+  CHECK_THROWS_AS(composite(set(3, 3), odd), InternalError);
 }
 
 TEST_CASE("tiles without a cotangent are left out of the adjoint, which keeps its bits") {

@@ -59,6 +59,7 @@ template <class S>
 struct TwoSets {
   Tape<S> tape;
   std::vector<Var<S>> still, moving;  ///< means, factors, depths, opacities, features
+  Var<S> background;                  ///< of all channels; 0 until it is written
   Composited<S> out;
 
   TwoSets(const Sets& sets, const SplatView& view, bool moves_all = false) {
@@ -66,7 +67,8 @@ struct TwoSets {
     for (const Var<S>& var : still) {
       if (!moves_all) tape.freeze(var);
     }
-    out = composite(first, second, view);
+    background = tape.constant("background", shape_of(1, sets.still.channels));
+    out = composite(first, second, view, background);
   }
   void move(const FlatSplats& splats) { write(splats, moving); }
   void write(const FlatSplats& splats, const std::vector<Var<S>>& vars) {
@@ -244,6 +246,31 @@ TEST_CASE("what stands still is taken anew when it changes") {
     CHECK(changed.out.counters->times.still_s > 0);
     CHECK(changed.image() == fresh.image());
     CHECK(changed.gradients(changed.moving) == fresh.gradients(fresh.moving));
+  }
+}
+
+TEMPLATE_TEST_CASE("a background lies behind everything, and anew when it changes", "", float, double) {
+  using S = TestType;
+  const Sets sets = made_sets(60, 50, 30);
+  OneSet<S> without(sets, view_with({}, false, false));
+  TwoSets<S> all(sets, view_with({}, false, false)), skipping(sets, view_with({}, true, false));
+  const std::vector<double> colors = without.image(), t = without.transmittance();
+  const std::size_t pixels = t.size();
+  for (const std::vector<S>& background : {std::vector<S>{S(0.1), S(0.7), S(-3)}, std::vector<S>{S(2), S(0), S(0.3)}}) {
+    for (TwoSets<S>* sets_of : {&all, &skipping}) {
+      sets_of->tape.set(sets_of->background, background);
+      sets_of->run();
+    }
+    std::vector<double> expected;
+    for (std::size_t i = 0; i < colors.size(); ++i) {
+      const S color = static_cast<S>(colors[i]), through = static_cast<S>(t[i % pixels]);
+      expected.push_back(static_cast<double>(color + through * background[i / pixels]));
+    }
+    CHECK(all.image() == expected);
+    CHECK(skipping.image() == expected);
+    CHECK(skipping.transmittance() == t);
+    CHECK(skipping.gradients(skipping.moving) == all.gradients(all.moving));
+    CHECK(all.gradients(all.moving) != without.gradients(true));
   }
 }
 

@@ -57,7 +57,7 @@ struct Flat {
     features = leaf("features", shape_of(n, splats.channels), splats.features);
     const Var<S> rest = tape.constant("rest", shape_of(n, 1)), means_rest = tape.constant("rest", shape_of(n, 2));
     projected = {means, factors, depths, rest, means_rest};
-    out = composite<S>(projected, opacities, features, view);
+    out = composite(SplatSet{projected, opacities, features}, view);
     tape.forward(out.channels);
   }
   void backward(const std::vector<S>& cotangent) { tape.backward(out.channels, cotangent); }
