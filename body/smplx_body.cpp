@@ -84,7 +84,7 @@ Rotations<S> hand_rotations(Tape<S>& tape, const SmplxBody<S>& body, Var<S> para
   return rotations_of(tape, hand_pose(body, parameters, side, where), kHandJoints, where);
 }
 
-/// All joints, in the order of SMPL-X. Parts in axis-angle that follow each other are one array.
+/// All joints, in the order of SMPL-X.
 template <class S>
 Rotations<S> all_rotations(Tape<S>& tape, const SmplxBody<S>& body, const SmplxParameters<S>& p, const Source& where) {
   const std::array parts = {rotations_of(tape, p.global_orient, 1, where),
@@ -128,7 +128,7 @@ SmplxBody<S>::SmplxBody(const SmplxModel& model, const SmplxBodyOptions& options
   for (std::size_t side = 0; side < 2; ++side) {
     const SmplxHand& hand = model.hands[side];
     tables->hand_means[side] = as_type<S>(hand.mean);
-    if (options.flat_hand_mean) std::fill(tables->hand_means[side].begin(), tables->hand_means[side].end(), S(0));
+    if (options.flat_hand_mean || hand.mean.empty()) tables->hand_means[side].assign(3 * kHandJoints, S(0));
     tables->hand_components[side] = as_type<S>(hand.components);
   }
   tables->betas = model.betas;

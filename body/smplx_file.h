@@ -20,7 +20,7 @@ struct SmplxFileOptions {
 
 /// The pose space of a hand.
 struct SmplxHand {
-  std::vector<double> mean;        ///< [45] axis-angle of its 15 joints, radians
+  std::vector<double> mean;        ///< [45] axis-angle of its 15 joints, radians; empty: zeros
   std::vector<double> components;  ///< [n,45], the first explains most; empty: the file has none
   Index component_count() const { return static_cast<Index>(components.size()) / 45; }
 };

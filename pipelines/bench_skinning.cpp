@@ -39,7 +39,6 @@ SmplxModel made_up_model() {
   model.joints = body.joints;
   model.weights = {kVertices, kSmplxJoints, std::vector<double>(static_cast<std::size_t>(kVertices * kSmplxJoints))};
   model.correctives.resize(static_cast<std::size_t>(3 * kVertices * 9 * (kSmplxJoints - 1)));
-  for (SmplxHand& hand : model.hands) hand.mean.assign(45, 0.0);
   const Random random(0, random_stream("bench.skinning"));
   for (Index v = 0; v < kVertices; ++v) {
     const Index from = v * body.vertex_count() / kVertices;
