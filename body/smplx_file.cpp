@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/npz.h"
+#include "core/text.h"
 
 namespace hsi4d {
 
@@ -13,6 +14,8 @@ namespace {
 constexpr Index kJoints = kSmplxJoints;
 constexpr Index kCorrectiveColumns = 9 * (kJoints - 1);
 constexpr Index kHandNumbers = 45;
+/// Larger numbers are no metres, radians or weights of a body; with these, sums and products fit into floats.
+constexpr double kLargestNumber = 1e6;
 
 /// Columns of `shapedirs`: shape first, expression from `expression_begin` on.
 struct ShapeColumns {
@@ -36,13 +39,15 @@ std::string place_of(const NpyArray& array, Index number) {
   return "[" + text + "]";
 }
 
-/// The numbers of an array of this shape (−1: any length), all finite.
-std::vector<double> finite_numbers(const Npz& file, const char* name, std::initializer_list<int64_t> shape) {
+/// The numbers of an array of this shape (−1: any length), none beyond kLargestNumber.
+std::vector<double> checked_numbers(const Npz& file, const char* name, std::initializer_list<int64_t> shape) {
   const NpyArray& array = file.array(name);
   std::vector<double> numbers = array.require_shape(shape).as<double>();
-  const auto bad = std::find_if(numbers.begin(), numbers.end(), [](double x) { return !std::isfinite(x); });
+  const auto bad =
+      std::find_if(numbers.begin(), numbers.end(), [](double x) { return !(std::abs(x) <= kLargestNumber); });
   if (bad == numbers.end()) return numbers;
-  throw DataError(array.source() + ": number " + place_of(array, bad - numbers.begin()) + " is not finite");
+  throw DataError(array.source() + ": number " + place_of(array, bad - numbers.begin()) + " is " + number_text(*bad) +
+                  "; allowed: -1e6 to 1e6");
 }
 
 /// Columns [first, first + count) of rows of `width` numbers.
@@ -81,7 +86,7 @@ void read_shape(const Npz& file, const SmplxFileOptions& options, SmplxModel& mo
   model.betas_in_file = there.betas;
   model.expressions_in_file = there.expressions;
   if (columns == 0) return;
-  const std::vector<double> directions = finite_numbers(file, "shapedirs", {model.vertex_count(), 3, columns});
+  const std::vector<double> directions = checked_numbers(file, "shapedirs", {model.vertex_count(), 3, columns});
   model.shape = columns_of(directions, columns, 0, options.betas);
   model.expression = columns_of(directions, columns, there.expression_begin, options.expressions);
 }
@@ -115,15 +120,15 @@ std::vector<double> joint_columns(const std::vector<double>& rows, Index width, 
 
 void read_joints(const Npz& file, SmplxModel& model) {
   if (has_readable(file, "J_template") && has_readable(file, "J_shapedirs")) {
-    model.joints = finite_numbers(file, "J_template", {kJoints, 3});
+    model.joints = checked_numbers(file, "J_template", {kJoints, 3});
     const NpyArray& array = file.array("J_shapedirs");
     const Index width = array.require_shape({kJoints, 3, -1}).shape()[2];
-    const std::vector<double> rows = finite_numbers(file, "J_shapedirs", {kJoints, 3, width});
+    const std::vector<double> rows = checked_numbers(file, "J_shapedirs", {kJoints, 3, width});
     model.joint_shape = joint_columns(rows, width, 0, model.betas);
     model.joint_expression = joint_columns(rows, width, model.betas_in_file, model.expressions);
     return;
   }
-  const std::vector<double> regressor = finite_numbers(file, "J_regressor", {kJoints, model.vertex_count()});
+  const std::vector<double> regressor = checked_numbers(file, "J_regressor", {kJoints, model.vertex_count()});
   model.joints = regressed(regressor, model.vertex_count(), model.vertices, 1);
   model.joint_shape = regressed(regressor, model.vertex_count(), model.shape, model.betas);
   model.joint_expression = regressed(regressor, model.vertex_count(), model.expression, model.expressions);
@@ -170,8 +175,8 @@ void read_weights(const Npz& file, SmplxModel& model) {
 
 SmplxHand read_hand(const Npz& file, const char* mean, const char* components) {
   SmplxHand hand{std::vector<double>(static_cast<std::size_t>(kHandNumbers)), {}};
-  if (has_readable(file, mean)) hand.mean = finite_numbers(file, mean, {kHandNumbers});
-  if (has_readable(file, components)) hand.components = finite_numbers(file, components, {-1, kHandNumbers});
+  if (has_readable(file, mean)) hand.mean = checked_numbers(file, mean, {kHandNumbers});
+  if (has_readable(file, components)) hand.components = checked_numbers(file, components, {-1, kHandNumbers});
   return hand;
 }
 
@@ -179,7 +184,7 @@ SmplxModel model_of(const Npz& file, const SmplxFileOptions& options) {
   SmplxModel model;
   model.source = file.source();
   for (const Npz::Skipped& member : file.skipped()) model.unread.push_back(member.name);
-  model.vertices = finite_numbers(file, "v_template", {-1, 3});
+  model.vertices = checked_numbers(file, "v_template", {-1, 3});
   if (model.vertices.empty()) throw DataError(file.array("v_template").source() + ": holds no vertex");
   read_faces(file, model);
   read_tree(file, model);
@@ -187,7 +192,7 @@ SmplxModel model_of(const Npz& file, const SmplxFileOptions& options) {
   read_shape(file, options, model);
   read_joints(file, model);
   if (options.correctives && has_readable(file, "posedirs")) {
-    model.correctives = finite_numbers(file, "posedirs", {model.vertex_count(), 3, kCorrectiveColumns});
+    model.correctives = checked_numbers(file, "posedirs", {model.vertex_count(), 3, kCorrectiveColumns});
   }
   model.hands = {read_hand(file, "hands_meanl", "hands_componentsl"),
                  read_hand(file, "hands_meanr", "hands_componentsr")};
