@@ -5,6 +5,7 @@
 // the `degenerate` flag, for the caller to count (row C8).
 #pragma once
 
+#include "core/lanes.h"
 #include "core/linear.h"
 #include "core/stumpff.h"
 
@@ -103,26 +104,50 @@ void scaled_quaternion_log_adjoint(const Vector4<S>& q, const Vector3<S>& d_axis
   d_q[0] -= S(2) * length / squared * along;
 }
 
-/// The rotation matrix of a unit quaternion and the gradient of its formula.
+/// The rotation matrix r, by rows, of a unit quaternion. T: a number, or Lanes of them.
+template <class T>
+void unit_quaternion_to_matrix(const T* q, T* r) {
+  const T x2 = q[1] + q[1], y2 = q[2] + q[2], z2 = q[3] + q[3];
+  const T xx = q[1] * x2, yy = q[2] * y2, zz = q[3] * z2;
+  const T xy = q[1] * y2, xz = q[1] * z2, yz = q[2] * z2;
+  const T wx = q[0] * x2, wy = q[0] * y2, wz = q[0] * z2;
+  const T one = lane_constant<T>(1);
+  r[0] = one - (yy + zz), r[1] = xy - wz, r[2] = xz + wy;
+  r[3] = xy + wz, r[4] = one - (xx + zz), r[5] = yz - wx;
+  r[6] = xz - wy, r[7] = yz + wx, r[8] = one - (xx + yy);
+}
+
+/// Its gradient as a function of all four numbers: R = I + 2 w K(v) + 2 (v vᵀ − |v|² I).
+///
+/// @param d_r  of the matrix, by rows
+template <class T>
+void unit_quaternion_gradient(const T* q, const T* d_r, T* d_q) {
+  const T* const v = q + 1;
+  const T turn[3] = {d_r[7] - d_r[5], d_r[2] - d_r[6], d_r[3] - d_r[1]};
+  const T trace = d_r[0] + d_r[4] + d_r[8];
+  const T two = lane_constant<T>(2);
+  d_q[0] = (v[0] * turn[0] + v[1] * turn[1] + v[2] * turn[2]) * two;
+  for (int i = 0; i < 3; ++i) {
+    const T symmetric =
+        (d_r[3 * i] + d_r[i]) * v[0] + (d_r[3 * i + 1] + d_r[3 + i]) * v[1] + (d_r[3 * i + 2] + d_r[6 + i]) * v[2];
+    d_q[1 + i] = (turn[i] * q[0] + symmetric - v[i] * (trace + trace)) * two;
+  }
+}
+
+/// A matrix by rows.
 template <class S>
-Matrix3<S> unit_quaternion_to_matrix(const Vector4<S>& q) {
-  const S x2 = q[1] + q[1], y2 = q[2] + q[2], z2 = q[3] + q[3];
-  const S xx = q[1] * x2, yy = q[2] * y2, zz = q[3] * z2;
-  const S xy = q[1] * y2, xz = q[1] * z2, yz = q[2] * z2;
-  const S wx = q[0] * x2, wy = q[0] * y2, wz = q[0] * z2;
-  Matrix3<S> r;
-  r << S(1) - (yy + zz), xy - wz, xz + wy, xy + wz, S(1) - (xx + zz), yz - wx, xz - wy, yz + wx, S(1) - (xx + yy);
+Eigen::Matrix<S, 3, 3, Eigen::RowMajor> unit_quaternion_to_matrix(const Vector4<S>& q) {
+  Eigen::Matrix<S, 3, 3, Eigen::RowMajor> r;
+  unit_quaternion_to_matrix(q.data(), r.data());
   return r;
 }
 
 template <class S>
 Vector4<S> unit_quaternion_gradient(const Vector4<S>& q, const Matrix3<S>& d_r) {
-  // R = I + 2 w K(v) + 2 (v vᵀ − |v|² I)
-  const Vector3<S> v(q[1], q[2], q[3]);
-  const Vector3<S> turn = axial(d_r);
-  const S trace = d_r(0, 0) + d_r(1, 1) + d_r(2, 2);
-  const Vector3<S> d_v = turn * q[0] + (d_r + d_r.transpose()) * v - v * (trace + trace);
-  return Vector4<S>(dot(v, turn), d_v[0], d_v[1], d_v[2]) * S(2);
+  const Eigen::Matrix<S, 3, 3, Eigen::RowMajor> rows = d_r;
+  Vector4<S> d_q;
+  unit_quaternion_gradient(q.data(), rows.data(), d_q.data());
+  return d_q;
 }
 
 }  // namespace detail

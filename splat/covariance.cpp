@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/lanes.h"
 #include "core/parallel.h"
 #include "core/quaternion.h"
 #include "core/simd.h"
@@ -35,41 +36,75 @@ S held_scale(S log_scale) {
   return vector_exp(log_scale < -kLimit ? -kLimit : (log_scale > kLimit ? kLimit : log_scale));
 }
 
-/// Rotation and scales; false for a Gaussian that is not to be drawn.
+/// Direction, length and scales of some Gaussians.
 template <class S>
-bool read_gaussian(const S* q, const S* l, Matrix3<S>& rotation, Vector3<S>& scales) {
-  bool degenerate = false;
-  rotation = quaternion_to_matrix(Vector4<S>(q[0], q[1], q[2], q[3]), &degenerate);
-  for (int i = 0; i < 3; ++i) scales[i] = held_scale(l[i]);
-  return !degenerate && !std::isnan(l[0]) && !std::isnan(l[1]) && !std::isnan(l[2]);
+struct RotatedScales {
+  Lanes<S> unit[4], length;  ///< as direction_of; rows that are not drawn have any numbers
+  Lanes<S> rotation[9];
+  Lanes<S> scales[3];
+  LaneMask<Lanes<S>> drawn;
+};
+
+/// @param q, l    of the first of `count` rows
+template <class S>
+RotatedScales<S> read_gaussians(const S* q, const S* l, Index count) {
+  RotatedScales<S> g;
+  Lanes<S> largest{};
+  g.drawn = largest == largest;
+  S logs[3 * kLanes];
+  for (Index i = 0; i < 3; ++i) {
+    const Lanes<S> log_scale = load_lanes(l + i, 3, count);
+    g.drawn = g.drawn & (log_scale == log_scale);
+    store_lanes<S>(log_scale, logs + i * kLanes, 1, kLanes);
+  }
+  for (S& number : logs) number = held_scale(number);
+  for (Index i = 0; i < 3; ++i) g.scales[i] = load_lanes(logs + i * kLanes, 1, kLanes);
+  for (Index i = 0; i < 4; ++i) {
+    g.unit[i] = load_lanes(q + i, 4, count);
+    g.drawn = g.drawn & lane_finite(g.unit[i]);
+    largest = lane_max(largest, lane_abs(g.unit[i]));
+  }
+  g.drawn = g.drawn & (largest > lane_constant<Lanes<S>>(0));
+  for (Lanes<S>& number : g.unit) number = number / largest;
+  const Lanes<S>* const u = g.unit;
+  const Lanes<S> norm = lane_sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + u[3] * u[3]);
+  for (Lanes<S>& number : g.unit) number = number / norm;
+  g.length = norm * largest;
+  detail::unit_quaternion_to_matrix(g.unit, g.rotation);
+  return g;
 }
 
 template <class S>
-void axes_of(const S* q, const S* l, S* axes) {
-  Matrix3<S> rotation;
-  Vector3<S> scales;
-  const bool drawn = read_gaussian(q, l, rotation, scales);
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) axes[3 * r + c] = drawn ? rotation(r, c) * scales[c] : S(0);
+void axes_of(const S* q, const S* l, Index count, S* axes) {
+  const RotatedScales<S> g = read_gaussians(q, l, count);
+  for (int i = 0; i < 9; ++i) {
+    const Lanes<S> axis = g.rotation[i] * g.scales[i % 3];
+    store_lanes<S>(g.drawn ? axis : Lanes<S>{}, axes + i, 9, count);
   }
 }
 
 /// d_R = d_M diag(s),  d_l_c = s_c Σ_r R_rc d_M_rc. Either result may be null.
 template <class S>
-void axes_adjoint(const S* q, const S* l, const S* d_axes, S* d_q, S* d_l) {
-  Matrix3<S> rotation;
-  Vector3<S> scales;
-  if (!read_gaussian(q, l, rotation, scales)) return;
-  const ConstMatrixRow<S> d_m(d_axes);
-  if (d_q != nullptr) {
-    Vector4<S> d = Vector4<S>::Zero();
-    quaternion_to_matrix_adjoint(Vector4<S>(q[0], q[1], q[2], q[3]), Matrix3<S>(d_m * scales.asDiagonal()), d);
-    for (int i = 0; i < 4; ++i) d_q[i] += d[i];
+void axes_adjoint(const S* q, const S* l, const S* d_axes, Index count, S* d_q, S* d_l) {
+  const RotatedScales<S> g = read_gaussians(q, l, count);
+  Lanes<S> d_m[9];
+  for (int i = 0; i < 9; ++i) d_m[i] = load_lanes(d_axes + i, 9, count);
+  for (int c = 0; d_l != nullptr && c < 3; ++c) {
+    const Lanes<S> d =
+        g.scales[c] * (g.rotation[c] * d_m[c] + g.rotation[3 + c] * d_m[3 + c] + g.rotation[6 + c] * d_m[6 + c]);
+    const Lanes<S> log_scale = load_lanes(l + c, 3, count);
+    const auto free = g.drawn & (lane_abs(log_scale) <= S(kLogScaleLimit));
+    add_lanes<S>(free ? d : Lanes<S>{}, d_l + c, 3, count);
   }
-  if (d_l == nullptr) return;
-  for (int c = 0; c < 3; ++c) {
-    if (!scale_is_free(l[c])) continue;
-    d_l[c] += scales[c] * (rotation(0, c) * d_m(0, c) + rotation(1, c) * d_m(1, c) + rotation(2, c) * d_m(2, c));
+  if (d_q == nullptr) return;
+  for (int i = 0; i < 9; ++i) d_m[i] = d_m[i] * g.scales[i % 3];
+  Lanes<S> d_unit[4];
+  detail::unit_quaternion_gradient(g.unit, d_m, d_unit);
+  const Lanes<S> along = g.unit[0] * d_unit[0] + g.unit[1] * d_unit[1] + g.unit[2] * d_unit[2] + g.unit[3] * d_unit[3];
+  const auto long_enough = g.drawn & (g.length >= smallest_length<S>());
+  for (int i = 0; i < 4; ++i) {
+    const Lanes<S> d = (d_unit[i] - g.unit[i] * along) / g.length;
+    add_lanes<S>(long_enough ? d : Lanes<S>{}, d_q + i, 4, count);
   }
 }
 
@@ -82,7 +117,7 @@ struct GaussianAxes {
     const Array<S> axes = io.out();
     parallel_for(q.shape.rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) axes_of(q.row(n), l.row(n), axes.row(n));
+        for (Index n = begin; n < end; n += kLanes) axes_of(q.row(n), l.row(n), end - n, axes.row(n));
       });
     });
   }
@@ -93,8 +128,9 @@ struct GaussianAxes {
     const Array<S> d_l = io.wants(1) ? io.d_in(1) : Array<S>{};
     parallel_for(q.shape.rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) {
-          axes_adjoint(q.row(n), l.row(n), d_axes.row(n), d_q ? d_q.row(n) : nullptr, d_l ? d_l.row(n) : nullptr);
+        for (Index n = begin; n < end; n += kLanes) {
+          axes_adjoint(q.row(n), l.row(n), d_axes.row(n), end - n, d_q ? d_q.row(n) : nullptr,
+                       d_l ? d_l.row(n) : nullptr);
         }
       });
     });

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/lanes.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 
@@ -12,16 +13,17 @@ namespace {
 
 constexpr Index kGrain = 512;
 
-/// x held within [low, high].
+/// x held within [low, high]. T here: a number, or Lanes of them.
+template <class T>
 struct Held {
-  double value;
-  bool held;
+  T value;
+  LaneMask<T> held;
 };
 
-Held hold(double x, double low, double high) {
-  if (x < low) return {low, true};
-  if (x > high) return {high, true};
-  return {x, false};
+template <class T>
+Held<T> hold(const T& x, double low, double high) {
+  const LaneMask<T> below = x<low, above = x> high;
+  return {below ? low : (above ? high : x), below | above};
 }
 
 /// What all rows share.
@@ -46,126 +48,128 @@ Lens lens_of(const SplatView& view, const Camera& c, const Vector6<double>& xi) 
           (c.height - c.cy) / c.fy + margin_y};
 }
 
-// --- one Gaussian, in double -----------------------------------------------------------------------------------------
+// --- one Gaussian, or eight, in double -------------------------------------------------------------------------------
 
 /// Mean and axes in the camera's frame, and what both passes make of them.
+template <class T>
 struct InCamera {
-  double x, y, z, inverse_z;
-  double axes[3][3];  // W M
-  Held ratio_x, ratio_y;
+  T p[3], inverse_z;
+  T axes[3][3];  // W M
+  Held<T> ratio[2];
 };
 
-template <class S>
-Vector3<double> point_in_camera(const Lens& lens, const S* mean) {
-  const Vector3<double> m(static_cast<double>(mean[0]), static_cast<double>(mean[1]), static_cast<double>(mean[2]));
-  return lens.camera.rotation * (m - lens.camera.center);
+/// p = W (m − c)
+template <class T>
+void point_in_camera(const Lens& lens, const T* mean, T* p) {
+  const Matrix3<double>& w = lens.camera.rotation;
+  const Vector3<double>& c = lens.camera.center;
+  const T d[3] = {mean[0] - c[0], mean[1] - c[1], mean[2] - c[2]};
+  for (int r = 0; r < 3; ++r) p[r] = w(r, 0) * d[0] + w(r, 1) * d[1] + w(r, 2) * d[2];
 }
 
-template <class S>
-void take_into_camera(const Lens& lens, const Vector3<double>& p, const S* axes, InCamera& g) {
-  g.x = p[0], g.y = p[1], g.z = p[2];
-  g.inverse_z = 1 / g.z;
+template <class T>
+void take_into_camera(const Lens& lens, const T* axes, InCamera<T>& g) {
+  g.inverse_z = 1.0 / g.p[2];
   const Matrix3<double>& w = lens.camera.rotation;
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      g.axes[r][c] = w(r, 0) * static_cast<double>(axes[c]) + w(r, 1) * static_cast<double>(axes[3 + c]) +
-                     w(r, 2) * static_cast<double>(axes[6 + c]);
-    }
+    for (int c = 0; c < 3; ++c) g.axes[r][c] = w(r, 0) * axes[c] + w(r, 1) * axes[3 + c] + w(r, 2) * axes[6 + c];
   }
-  g.ratio_x = hold(g.x * g.inverse_z, lens.low_x, lens.high_x);
-  g.ratio_y = hold(g.y * g.inverse_z, lens.low_y, lens.high_y);
-}
-
-template <class S>
-bool all_finite(const S* x, int n) {
-  bool finite = true;
-  for (int i = 0; i < n; ++i) finite = finite && std::isfinite(x[i]);
-  return finite;
+  g.ratio[0] = hold<T>(g.p[0] * g.inverse_z, lens.low_x, lens.high_x);
+  g.ratio[1] = hold<T>(g.p[1] * g.inverse_z, lens.low_y, lens.high_y);
 }
 
 /// Whether a Gaussian has a depth, drawn or not: a smooth function of mean and camera, before `near` too.
-template <class S>
-bool has_depth(const Vector3<double>& p) {
-  return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(static_cast<S>(p[2]));
+template <class S, class T>
+LaneMask<T> has_depth(const T* p) {
+  return lane_finite(p[0]) & lane_finite(p[1]) & lane_finite(rounded_to<S>(p[2]));
 }
 
-/// Mean and factor in the image. False, and all zeros, for a Gaussian that is not to be drawn.
-template <class S>
-bool project_gaussian(const Lens& lens, const Vector3<double>& p, const S* axes, S* mean_px, S* mean_rest, S* factor) {
-  if (std::isfinite(p[0]) && std::isfinite(p[1]) && p[2] > lens.near && std::isfinite(p[2])) {
-    InCamera g;
-    take_into_camera(lens, p, axes, g);
-    const double mean[2] = {lens.fx * g.x * g.inverse_z + lens.cx, lens.fy * g.y * g.inverse_z + lens.cy};
-    for (int i = 0; i < 2; ++i) {
-      mean_px[i] = static_cast<S>(mean[i]);
-      mean_rest[i] = static_cast<S>(mean[i] - static_cast<double>(mean_px[i]));
-    }
+/// Mean and factor in the image. Numbers of Gaussians that are not drawn mean nothing.
+template <class T>
+struct InImage {
+  T mean[2], mean_rest[2], factor[6];
+  LaneMask<T> drawn;
+};
+
+/// @param S  what the results are rounded to
+template <class S, class T>
+InImage<T> project_gaussian(const Lens& lens, const InCamera<T>& g) {
+  InImage<T> image;
+  image.drawn = lane_finite(g.p[0]) & lane_finite(g.p[1]) & (g.p[2] > lens.near) & lane_finite(g.p[2]);
+  const double focal[2] = {lens.fx, lens.fy}, center[2] = {lens.cx, lens.cy};
+  LaneMask<T> some = g.p[2] != g.p[2];
+  for (int i = 0; i < 2; ++i) {
+    const T mean = focal[i] * g.p[i] * g.inverse_z + center[i];
+    image.mean[i] = rounded_to<S>(mean);
+    image.mean_rest[i] = mean - image.mean[i];
+    image.drawn = image.drawn & lane_finite(image.mean[i]);
     for (int c = 0; c < 3; ++c) {
-      factor[c] = static_cast<S>(lens.fx * g.inverse_z * (g.axes[0][c] - g.ratio_x.value * g.axes[2][c]));
-      factor[3 + c] = static_cast<S>(lens.fy * g.inverse_z * (g.axes[1][c] - g.ratio_y.value * g.axes[2][c]));
+      const T v = rounded_to<S>(focal[i] * g.inverse_z * (g.axes[i][c] - g.ratio[i].value * g.axes[2][c]));
+      image.factor[3 * i + c] = v;
+      image.drawn = image.drawn & lane_finite(v);
+      some = some | (v != 0.0);
     }
-    if (all_finite(mean_px, 2) && all_finite(factor, 6) && is_drawn(factor)) return true;
   }
-  std::fill_n(mean_px, 2, S(0));
-  std::fill_n(mean_rest, 2, S(0));
-  std::fill_n(factor, 6, S(0));
-  return false;
+  image.drawn = image.drawn & some;
+  return image;
 }
 
-/// Gradients of one drawn Gaussian in the camera's frame: of the point p, of the axes U = W M.
+/// Gradients of a drawn Gaussian in the camera's frame: of the point p, of the axes U = W M.
+template <class T>
 struct InCameraGradient {
-  Vector3<double> d_p = Vector3<double>::Zero();
-  double d_axes[3][3] = {};
+  T p[3], axes[3][3];
 };
 
 /// V_0 = fx/z (U_0 − h_x U_2), V_1 likewise, u = fx x/z + cx. With a = d_V_0 · U: d_h_x = −fx/z a_2 unless held, and
 /// since V ∝ 1/z, d_z −= (V·d_V)/z.
-void project_adjoint(const Lens& lens, const InCamera& g, const double d_mean_px[2], const double d_factor[6],
-                     InCameraGradient& d) {
-  const double focal[2] = {lens.fx * g.inverse_z, lens.fy * g.inverse_z};
-  const Held* const ratio[2] = {&g.ratio_x, &g.ratio_y};
-  const double place[2] = {g.x, g.y};
+///
+/// @param d_depth  of p_z itself
+template <class T>
+InCameraGradient<T> project_adjoint(const Lens& lens, const InCamera<T>& g, const T* d_mean_px, const T* d_factor,
+                                    const T& d_depth) {
+  const T zero{};
+  InCameraGradient<T> d{};
+  d.p[2] = d_depth;
+  const double lens_focal[2] = {lens.fx, lens.fy};
   for (int i = 0; i < 2; ++i) {
-    const double h = ratio[i]->value;
-    double along = 0, d_ratio = 0;  // V_i · d_V_i, and the gradient of h
+    const T h = g.ratio[i].value, focal = lens_focal[i] * g.inverse_z;
+    T along = zero, d_ratio = zero;  // V_i · d_V_i, and the gradient of h
     for (int c = 0; c < 3; ++c) {
-      const double d_v = d_factor[3 * i + c] * focal[i];
-      along += d_v * (g.axes[i][c] - h * g.axes[2][c]);
-      d_ratio -= d_v * g.axes[2][c];
-      d.d_axes[i][c] += d_v;
-      d.d_axes[2][c] -= h * d_v;
+      const T d_v = d_factor[3 * i + c] * focal;
+      along = along + d_v * (g.axes[i][c] - h * g.axes[2][c]);
+      d_ratio = d_ratio - d_v * g.axes[2][c];
+      d.axes[i][c] = d_v;
+      d.axes[2][c] = d.axes[2][c] - h * d_v;
     }
-    double d_place = focal[i] * d_mean_px[i];
-    d.d_p[2] -= along * g.inverse_z + d_place * (place[i] * g.inverse_z);
-    if (!ratio[i]->held) {
-      d_place += d_ratio * g.inverse_z;
-      d.d_p[2] -= d_ratio * h * g.inverse_z;
+    d_ratio = g.ratio[i].held ? zero : d_ratio;
+    const T d_place = focal * d_mean_px[i];
+    d.p[2] = d.p[2] - (along + d_place * g.p[i] + d_ratio * h) * g.inverse_z;
+    d.p[i] = d_place + d_ratio * g.inverse_z;
+  }
+  return d;
+}
+
+/// Gradients of the four intrinsics through a drawn Gaussian. V_0 and u − cx are proportional to fx; at a limit
+/// h = (±(clamp − 1) W/2 + {0, W} − cx)/fx, so that d_fx −= d_h h/fx and d_cx −= d_h/fx.
+template <class T>
+void intrinsics_adjoint(const Lens& lens, const InCamera<T>& g, const T* d_mean_px, const T* d_factor,
+                        T* d_intrinsics) {
+  const T zero{};
+  const double focal[2] = {lens.fx, lens.fy};
+  for (int i = 0; i < 2; ++i) {
+    const T h = g.ratio[i].value;
+    T d_focal = d_mean_px[i] * g.p[i], d_ratio = zero;  // both with a factor 1/z still to come
+    for (int c = 0; c < 3; ++c) {
+      d_focal = d_focal + d_factor[3 * i + c] * (g.axes[i][c] - h * g.axes[2][c]);
+      d_ratio = d_ratio - d_factor[3 * i + c] * focal[i] * g.axes[2][c];
     }
-    d.d_p[i] += d_place;
+    d_ratio = g.ratio[i].held ? d_ratio * g.inverse_z : zero;
+    d_intrinsics[i] = d_focal * g.inverse_z - d_ratio * h / focal[i];
+    d_intrinsics[2 + i] = d_mean_px[i] - d_ratio / focal[i];
   }
 }
 
-/// Gradients of the four intrinsics through one drawn Gaussian. V_0 and u − cx are proportional to fx; at a limit
-/// h = (±(clamp − 1) W/2 + {0, W} − cx)/fx, so that d_fx −= d_h h/fx and d_cx −= d_h/fx.
-void intrinsics_adjoint(const Lens& lens, const InCamera& g, const double d_mean_px[2], const double d_factor[6],
-                        Vector4<double>& d_intrinsics) {
-  const double focal[2] = {lens.fx, lens.fy};
-  const Held* const ratio[2] = {&g.ratio_x, &g.ratio_y};
-  const double place[2] = {g.x, g.y};
-  for (int i = 0; i < 2; ++i) {
-    const double h = ratio[i]->value;
-    double d_focal = d_mean_px[i] * place[i], d_ratio = 0;  // both with a factor 1/z still to come
-    for (int c = 0; c < 3; ++c) {
-      d_focal += d_factor[3 * i + c] * (g.axes[i][c] - h * g.axes[2][c]);
-      d_ratio -= d_factor[3 * i + c] * focal[i] * g.axes[2][c];
-    }
-    d_intrinsics[i] += d_focal * g.inverse_z;
-    d_intrinsics[2 + i] += d_mean_px[i];
-    if (!ratio[i]->held) continue;
-    d_intrinsics[i] -= d_ratio * g.inverse_z * h / focal[i];
-    d_intrinsics[2 + i] -= d_ratio * g.inverse_z / focal[i];
-  }
-}
+using Wide = Lanes<double>;
 
 template <class S>
 struct Project {
@@ -189,118 +193,148 @@ struct Project {
     return lens_of(view, camera, detail::camera_update(io.in(kXi)));
   }
 
+  /// Some Gaussians in the camera's frame.
+  static InCamera<Wide> taken(const Lens& lens, const S* mean, const S* axes, Index count) {
+    InCamera<Wide> g;
+    Wide m[3], a[9];
+    for (Index i = 0; i < 3; ++i) m[i] = load_wide(mean + i, 3, count);
+    for (Index i = 0; i < 9; ++i) a[i] = load_wide(axes + i, 9, count);
+    point_in_camera(lens, m, g.p);
+    take_into_camera(lens, a, g);
+    return g;
+  }
+
   void forward(NodeIo<S>& io) {
-    const ConstArray<S> means = io.in(0), axes = io.in(1);
+    const ConstArray<S> means = io.in(kMeansIn), axes = io.in(kAxesIn);
     const Array<S> means_px = io.out(kMeans), factors = io.out(kFactors);
     const Array<S> depths = io.out(kDepths), rest = io.out(kRest), means_rest = io.out(kMeansRest);
     const Lens lens = this->lens(io);
     parallel_for(means.shape.rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) {
-          const Vector3<double> p = point_in_camera(lens, means.row(n));
-          project_gaussian(lens, p, axes.row(n), means_px.row(n), means_rest.row(n), factors.row(n));
-          const S depth = static_cast<S>(p[2]);
-          const bool usable = has_depth<S>(p);
-          depths.data[n] = usable ? depth : S(0);
-          rest.data[n] = usable ? static_cast<S>(p[2] - static_cast<double>(depth)) : S(0);
+        for (Index n = begin; n < end; n += kLanes) {
+          const Index count = end - n;
+          const Wide zero{};
+          const InCamera<Wide> g = taken(lens, means.row(n), axes.row(n), count);
+          const InImage<Wide> image = project_gaussian<S>(lens, g);
+          for (Index i = 0; i < 2; ++i) {
+            store_lanes<S>(image.drawn ? image.mean[i] : zero, means_px.row(n) + i, 2, count);
+            store_lanes<S>(image.drawn ? image.mean_rest[i] : zero, means_rest.row(n) + i, 2, count);
+          }
+          for (Index i = 0; i < 6; ++i) {
+            store_lanes<S>(image.drawn ? image.factor[i] : zero, factors.row(n) + i, 6, count);
+          }
+          const Wide depth = has_depth<S>(g.p) ? g.p[2] : zero, rounded = rounded_to<S>(depth);
+          store_lanes<S>(rounded, depths.row(n), 1, count);
+          store_lanes<S>(depth - rounded, rest.row(n), 1, count);
         }
       });
     });
   }
 
+  /// What the adjoint reads and adds to; null where there is none.
+  struct Adjoint {
+    ConstArray<S> means, axes, factors, d_means_px, d_factors, d_depths;
+    Array<S> d_means, d_axes;
+    bool wants_camera, wants_intrinsics;
+  };
+
   void backward(NodeIo<S>& io) {
-    const ConstArray<S> means = io.in(0), axes = io.in(1), xi = io.in(2), factors = io.out(kFactors);
-    const ConstArray<S> d_means_px = io.d_out(kMeans), d_factors = io.d_out(kFactors), d_depths = io.d_out(kDepths);
-    const Array<S> d_means = io.wants(0) ? io.d_in(0) : Array<S>{};
-    const Array<S> d_axes = io.wants(1) ? io.d_in(1) : Array<S>{};
-    const bool wants_camera = io.wants(kXi), wants_intrinsics = !own_intrinsics && io.wants(kIntrinsics);
+    Adjoint a{io.in(kMeansIn),
+              io.in(kAxesIn),
+              io.out(kFactors),
+              io.d_out(kMeans),
+              io.d_out(kFactors),
+              io.d_out(kDepths),
+              {},
+              {},
+              io.wants(kXi),
+              !own_intrinsics && io.wants(kIntrinsics)};
+    if (io.wants(kMeansIn)) a.d_means = io.d_in(kMeansIn);
+    if (io.wants(kAxesIn)) a.d_axes = io.d_in(kAxesIn);
     const Lens lens = this->lens(io);
-    const Matrix3<double> transposed = lens.camera.rotation.transpose();
-    const Partition part = reduction_partition(means.shape.rows, kGrain);
+    const Partition part = reduction_partition(a.means.shape.rows, kGrain);
     const std::span<double> partials = io.template scratch<double>(6 * part.chunks());
-    const std::span<double> lens_partials = io.template scratch<double>(wants_intrinsics ? 4 * part.chunks() : 0);
+    const std::span<double> lens_partials = io.template scratch<double>(a.wants_intrinsics ? 4 * part.chunks() : 0);
     parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-      Vector6<double> d_delta = Vector6<double>::Zero();
-      Vector4<double> d_intrinsics = Vector4<double>::Zero();
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) {
-          const bool drawn = is_drawn(factors.row(n));
-          const double d_depth = d_depths ? static_cast<double>(d_depths.data[n]) : 0;
-          if (!drawn && d_depth == 0) continue;
-          const Vector3<double> p = point_in_camera(lens, means.row(n));
-          if (!drawn) {
-            if (has_depth<S>(p)) add_depth_alone(transposed, p, d_depth, d_means ? d_means.row(n) : nullptr, d_delta);
-            continue;
-          }
-          double d_mean_px[2] = {}, d_factor[6] = {};
-          for (int i = 0; i < 2 && d_means_px; ++i) d_mean_px[i] = static_cast<double>(d_means_px.row(n)[i]);
-          for (int i = 0; i < 6 && d_factors; ++i) d_factor[i] = static_cast<double>(d_factors.row(n)[i]);
-          InCamera g;
-          take_into_camera(lens, p, axes.row(n), g);
-          InCameraGradient d;
-          d.d_p[2] = d_depth;
-          project_adjoint(lens, g, d_mean_px, d_factor, d);
-          if (d_means) {
-            const Vector3<double> d_m = transposed * d.d_p;
-            for (int i = 0; i < 3; ++i) d_means.row(n)[i] += static_cast<S>(d_m[i]);
-          }
-          if (d_axes) {
-            for (int r = 0; r < 3; ++r) {
-              for (int c = 0; c < 3; ++c) {
-                d_axes.row(n)[3 * r + c] +=
-                    static_cast<S>(transposed(r, 0) * d.d_axes[0][c] + transposed(r, 1) * d.d_axes[1][c] +
-                                   transposed(r, 2) * d.d_axes[2][c]);
-              }
-            }
-          }
-          if (wants_camera) add_camera(g, d, d_delta);
-          if (wants_intrinsics) intrinsics_adjoint(lens, g, d_mean_px, d_factor, d_intrinsics);
+        Wide d_delta[6] = {}, d_intrinsics[4] = {};
+        for (Index n = begin; n < end; n += kLanes) adjoint_of_rows(lens, a, n, end - n, d_delta, d_intrinsics);
+        for (Index i = 0; i < 6; ++i)
+          partials[static_cast<std::size_t>(6 * chunk + i)] = sum_of_lanes<double>(d_delta[i]);
+        for (Index i = 0; a.wants_intrinsics && i < 4; ++i) {
+          lens_partials[static_cast<std::size_t>(i * part.chunks() + chunk)] = sum_of_lanes<double>(d_intrinsics[i]);
         }
       });
-      for (Index i = 0; i < 6; ++i) partials[static_cast<std::size_t>(6 * chunk + i)] = d_delta[i];
-      for (Index i = 0; wants_intrinsics && i < 4; ++i)
-        lens_partials[static_cast<std::size_t>(i * part.chunks() + chunk)] = d_intrinsics[i];
     });
-    for (Index i = 0; wants_intrinsics && i < 4; ++i)
+    for (Index i = 0; a.wants_intrinsics && i < 4; ++i)
       io.d_in(kIntrinsics).data[i] +=
           static_cast<S>(pairwise_sum(lens_partials.data() + i * part.chunks(), part.chunks()));
-    if (wants_camera) detail::add_camera_gradient(xi, partials, part.chunks(), io.d_in(2));
+    if (a.wants_camera) detail::add_camera_gradient(io.in(kXi), partials, part.chunks(), io.d_in(kXi));
+  }
+
+  /// Rows [n, n + count), up to eight. Of a Gaussian that is not drawn the depth alone has a gradient.
+  static void adjoint_of_rows(const Lens& lens, const Adjoint& a, Index n, Index count, Wide* d_delta,
+                              Wide* d_intrinsics) {
+    const Wide zero{};
+    LaneMask<Wide> drawn = zero != zero;
+    for (Index i = 0; i < 6; ++i) drawn = drawn | (load_wide(a.factors.row(n) + i, 6, count) != zero);
+    const Wide d_depth = a.d_depths ? load_wide(a.d_depths.row(n), 1, count) : zero;
+    if (!any_lane(drawn | (d_depth != zero))) return;
+    const InCamera<Wide> g = taken(lens, a.means.row(n), a.axes.row(n), count);
+    Wide d_mean_px[2] = {}, d_factor[6] = {};
+    for (Index i = 0; i < 2 && a.d_means_px; ++i) d_mean_px[i] = load_wide(a.d_means_px.row(n) + i, 2, count);
+    for (Index i = 0; i < 6 && a.d_factors; ++i) d_factor[i] = load_wide(a.d_factors.row(n) + i, 6, count);
+    InCameraGradient<Wide> d = project_adjoint(lens, g, d_mean_px, d_factor, d_depth);
+    const LaneMask<Wide> with_depth = has_depth<S>(g.p);
+    for (int i = 0; i < 3; ++i) {
+      const Wide of_depth = i == 2 ? (with_depth ? d_depth : zero) : zero;
+      d.p[i] = drawn ? d.p[i] : of_depth;
+    }
+    const Matrix3<double>& w = lens.camera.rotation;
+    for (int i = 0; i < 3 && a.d_means; ++i) {
+      add_lanes<S>(w(0, i) * d.p[0] + w(1, i) * d.p[1] + w(2, i) * d.p[2], a.d_means.row(n) + i, 3, count);
+    }
+    for (int i = 0; i < 9 && a.d_axes; ++i) {
+      const int r = i / 3, c = i % 3;
+      const Wide turned = w(0, r) * d.axes[0][c] + w(1, r) * d.axes[1][c] + w(2, r) * d.axes[2][c];
+      add_lanes<S>(drawn ? turned : zero, a.d_axes.row(n) + i, 9, count);
+    }
+    const LaneMask<Wide> rows = first_lanes<double>(count);
+    if (a.wants_camera) add_camera(g, d, drawn, rows & (drawn | with_depth), d_delta);
+    if (!a.wants_intrinsics) return;
+    Wide d_lens[4];
+    intrinsics_adjoint(lens, g, d_mean_px, d_factor, d_lens);
+    for (int i = 0; i < 4; ++i) d_intrinsics[i] = d_intrinsics[i] + (rows & drawn ? d_lens[i] : zero);
   }
 
   /// p' = p + ρ + φ × p, and the same without ρ for the columns of U.
-  static void add_camera(const InCamera& g, const InCameraGradient& d, Vector6<double>& d_delta) {
-    d_delta.head<3>() += d.d_p;
-    Vector3<double> turn = cross(Vector3<double>(g.x, g.y, g.z), d.d_p);
-    for (int c = 0; c < 3; ++c) {
-      turn += cross(Vector3<double>(g.axes[0][c], g.axes[1][c], g.axes[2][c]),
-                    Vector3<double>(d.d_axes[0][c], d.d_axes[1][c], d.d_axes[2][c]));
+  ///
+  /// @param drawn  those whose axes count
+  /// @param rows   those that count
+  static void add_camera(const InCamera<Wide>& g, const InCameraGradient<Wide>& d, const LaneMask<Wide>& drawn,
+                         const LaneMask<Wide>& rows, Wide* d_delta) {
+    const Wide zero{};
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, k = (i + 2) % 3;
+      Wide of_axes = zero;
+      for (int c = 0; c < 3; ++c) {
+        of_axes = of_axes + (g.axes[j][c] * d.axes[k][c] - g.axes[k][c] * d.axes[j][c]);
+      }
+      const Wide turn = g.p[j] * d.p[k] - g.p[k] * d.p[j] + (drawn ? of_axes : zero);
+      d_delta[i] = d_delta[i] + (rows ? d.p[i] : zero);
+      d_delta[3 + i] = d_delta[3 + i] + (rows ? turn : zero);
     }
-    d_delta.tail<3>() += turn;
-  }
-
-  /// Of a Gaussian that is not drawn: z = the third of p = W (m − c).
-  static void add_depth_alone(const Matrix3<double>& transposed, const Vector3<double>& p, double d_depth, S* d_mean,
-                              Vector6<double>& d_delta) {
-    const Vector3<double> d_p(0, 0, d_depth), d_m = transposed * d_p;
-    for (int i = 0; i < 3 && d_mean != nullptr; ++i) d_mean[i] += static_cast<S>(d_m[i]);
-    d_delta.head<3>() += d_p;
-    d_delta.tail<3>() += cross(p, d_p);
   }
 
   /// What is drawn, and which ratios are held.
   void add_signature(Signature& signature, NodeIo<S>& io) {
-    const ConstArray<S> means = io.in(0), axes = io.in(1);
+    const ConstArray<S> means = io.in(kMeansIn), axes = io.in(kAxesIn);
     const Lens lens = this->lens(io);
     for (Index n = 0; n < means.shape.rows; ++n) {
-      const Vector3<double> p = point_in_camera(lens, means.row(n));
-      S mean_px[2], mean_rest[2], factor[6];
-      if (!project_gaussian(lens, p, axes.row(n), mean_px, mean_rest, factor)) {
-        signature.add(1);
-        continue;
-      }
-      InCamera g;
-      take_into_camera(lens, p, axes.row(n), g);
-      signature.add(2 + static_cast<std::uint64_t>(g.ratio_x.held) + 2 * static_cast<std::uint64_t>(g.ratio_y.held));
+      const InCamera<Wide> g = taken(lens, means.row(n), axes.row(n), 1);
+      const std::uint64_t drawn = project_gaussian<S>(lens, g).drawn[0] != 0;
+      const std::uint64_t held_x = g.ratio[0].held[0] != 0, held_y = g.ratio[1].held[0] != 0;
+      signature.add(drawn ? 2 + held_x + 2 * held_y : 1);
     }
   }
 };
