@@ -62,8 +62,8 @@ struct SmplxModel {
 /// are divided by it and counted in `rescaled_weights`.
 ///
 /// Throws UserError when the file cannot be read; DataError naming file and array: no such archive, an array missing or
-/// of Python objects, a shape that does not fit, a number that is not finite or beyond 1e6, parents that are no tree, a face's vertex
-/// out of range, weights as in normalized_weights, more betas or expressions asked for than there are.
+/// of Python objects, a shape that does not fit, a number that is not finite or beyond 1e6, parents that are no tree, a
+/// face's vertex out of range, weights as in normalized_weights, more betas or expressions asked for than there are.
 SmplxModel read_smplx(const std::string& path, const SmplxFileOptions& options = {});
 /// As read_smplx, of a file in memory. @param name  what messages call it
 SmplxModel decode_smplx(std::span<const std::uint8_t> file, const std::string& name,
