@@ -1,5 +1,7 @@
 #include "body/kinematics.h"
 
+#include <algorithm>
+
 #include "core/rotation.h"
 
 namespace hsi4d {
@@ -63,14 +65,17 @@ template <class S>
 struct KinematicChain {
   static constexpr const char* kName = "kinematic_chain";
   std::vector<int> parents;
-  std::vector<double> rest;
-  Buffer<Pose> poses = {};  // R_j and p_j, which the adjoint needs
+  std::vector<double> rest;  // of the last forward, where it is input 2
+  Buffer<Pose> poses = {};   // R_j and p_j, which the adjoint needs
 
   Index joints() const { return static_cast<Index>(parents.size()); }
   Index saved_bytes() const { return poses.capacity_bytes(); }
 
   void forward(NodeIo<S>& io) {
     const Vector transl = vector_at(io.in(1).data);
+    if (io.inputs() == 3) {
+      for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = static_cast<double>(io.in(2).data[i]);
+    }
     poses.resize(joints());
     run_chain(parents, rest.data(), io.in(0).data, poses.data());
     for (Index j = 0; j < joints(); ++j) {
@@ -98,6 +103,24 @@ struct KinematicChain {
     }
   }
 
+  /// d_r_j += R_qᵀ d_p_j − R_jᵀ g_j and d_r_q −= R_qᵀ d_p_j, of whole cotangents d_p.
+  void rest_adjoint(NodeIo<S>& io, const Pose* d) const {
+    double* d_rest = io.template scratch<double>(3 * joints()).data();
+    std::fill(d_rest, d_rest + 3 * joints(), 0.0);
+    const auto at = [&](Index j) { return Eigen::Map<Vector>(d_rest + 3 * j); };
+    for (Index j = 0; j < joints(); ++j) {
+      const Index q = j == 0 ? 0 : parents[static_cast<std::size_t>(j)];
+      const Vector along = j == 0 ? Vector(d[0].position()) : Vector(poses[q].rotation().transpose() * d[j].position());
+      at(j) += along;
+      if (j > 0) at(q) -= along;
+      if (!io.d_out(0)) continue;
+      const S* g = io.d_out(0).row(j);
+      const Vector d_offset(static_cast<double>(g[3]), static_cast<double>(g[7]), static_cast<double>(g[11]));
+      at(j) -= poses[j].rotation().transpose() * d_offset;
+    }
+    for (Index i = 0; i < 3 * joints(); ++i) io.d_in(2).data[i] += static_cast<S>(d_rest[i]);
+  }
+
   void backward(NodeIo<S>& io) {
     Pose* d = io.template scratch<Pose>(joints()).data();
     seed(io, d);
@@ -106,20 +129,24 @@ struct KinematicChain {
       for (Index j = 0; j < joints(); ++j) d_transl += d[j].position();
       for (int i = 0; i < 3; ++i) io.d_in(1).data[i] += static_cast<S>(d_transl[i]);
     }
-    if (!io.wants(0)) return;
+    const bool wants_rest = io.inputs() == 3 && io.wants(2);
+    if (!io.wants(0) && !wants_rest) return;
     for (Index j = joints(); j-- > 0;) {  // children before parents
       const bool root = j == 0;
       const Index q = root ? 0 : parents[static_cast<std::size_t>(j)];
-      const Matrix d_local = root ? d[j].rotation() : Matrix(poses[q].rotation().transpose() * d[j].rotation());
-      S* d_rotation = io.d_in(0).row(j);
-      for (int r = 0; r < 3; ++r) {
-        for (int c = 0; c < 3; ++c) d_rotation[3 * r + c] += static_cast<S>(d_local(r, c));
+      if (io.wants(0)) {
+        const Matrix d_local = root ? d[j].rotation() : Matrix(poses[q].rotation().transpose() * d[j].rotation());
+        S* d_rotation = io.d_in(0).row(j);
+        for (int r = 0; r < 3; ++r) {
+          for (int c = 0; c < 3; ++c) d_rotation[3 * r + c] += static_cast<S>(d_local(r, c));
+        }
       }
       if (root) continue;
       const Vector bone = vector_at(rest.data() + 3 * j) - vector_at(rest.data() + 3 * q);
       d[q].rotation() += d[j].rotation() * matrix_at(io.in(0).row(j)).transpose() + d[j].position() * bone.transpose();
       d[q].position() += d[j].position();
     }
+    if (wants_rest) rest_adjoint(io, d);
   }
 };
 
@@ -141,6 +168,22 @@ PosedSkeleton<S> kinematic_chain(Var<S> rotations, Var<S> transl, std::vector<in
   Tape<S>& tape = rotations.owner();
   const Var<S> transforms =
       tape.record(KinematicChain<S>{std::move(parents), std::move(rest_joints)}, std::array{rotations, transl},
+                  std::array{shape_of(joints, 12), shape_of(joints, 3)}, where);
+  return {transforms, tape.output(transforms, 1)};
+}
+
+template <class S>
+PosedSkeleton<S> kinematic_chain(Var<S> rotations, Var<S> transl, std::vector<int> parents, Var<S> rest_joints,
+                                 Source where) {
+  const Index joints = static_cast<Index>(parents.size());
+  std::vector<double> rest(3 * parents.size());
+  check_skeleton(parents, rest);
+  HSI4D_CHECK_EQ(rotations.shape(), shape_of(joints, 9));
+  HSI4D_CHECK_EQ(transl.shape(), shape_of(1, 3));
+  HSI4D_CHECK_EQ(rest_joints.shape(), shape_of(joints, 3));
+  Tape<S>& tape = rotations.owner();
+  const Var<S> transforms =
+      tape.record(KinematicChain<S>{std::move(parents), std::move(rest)}, std::array{rotations, transl, rest_joints},
                   std::array{shape_of(joints, 12), shape_of(joints, 3)}, where);
   return {transforms, tape.output(transforms, 1)};
 }
@@ -178,8 +221,9 @@ std::vector<double> pose_joints(const BodyModel& body, const BodyPose& pose) {
   return pose_joints(body.parents, body.joints, pose);
 }
 
-#define HSI4D_INSTANTIATE(S) \
-  template PosedSkeleton<S> kinematic_chain(Var<S>, Var<S>, std::vector<int>, std::vector<double>, Source);
+#define HSI4D_INSTANTIATE(S)                                                                                \
+  template PosedSkeleton<S> kinematic_chain(Var<S>, Var<S>, std::vector<int>, std::vector<double>, Source); \
+  template PosedSkeleton<S> kinematic_chain(Var<S>, Var<S>, std::vector<int>, Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)
 #undef HSI4D_INSTANTIATE

@@ -8,7 +8,11 @@
 // rotation part, g_j of its translation and h_j of the joint,
 //
 //   d_R_j = G_j − g_j r_jᵀ,  d_p_j = g_j + h_j,  d_t = Σ_j d_p_j,  and then from the last joint to the first
-//   d_L_j += R_qᵀ d_R_j,  d_R_q += d_R_j L_jᵀ + d_p_j (r_j − r_q)ᵀ,  d_p_q += d_p_j.
+//   d_L_j += R_qᵀ d_R_j,  d_R_q += d_R_j L_jᵀ + d_p_j (r_j − r_q)ᵀ,  d_p_q += d_p_j
+//
+// and, with whole d_p,
+//
+//   d_r_j += R_qᵀ d_p_j − R_jᵀ g_j,  d_r_q −= R_qᵀ d_p_j;     d_r_0 += d_p_0 − R_0ᵀ g_0 for the root.
 //
 // Both directions run in double, for float too: a chain of 55 joints costs nothing beside the points that follow it,
 // and its rounding would be the same for all points of a limb.
@@ -41,6 +45,13 @@ struct PosedSkeleton {
 template <class S>
 PosedSkeleton<S> kinematic_chain(Var<S> rotations, Var<S> transl, std::vector<int> parents,
                                  std::vector<double> rest_joints, Source where = Source::current());
+
+/// As above, with the rest joints [J,3] on the tape too: they follow the body's shape.
+///
+/// Adjoint: rotations, transl, rest_joints.
+template <class S>
+PosedSkeleton<S> kinematic_chain(Var<S> rotations, Var<S> transl, std::vector<int> parents, Var<S> rest_joints,
+                                 Source where = Source::current());
 
 /// A skeleton in a pose, untaped.
 struct PosedJoints {

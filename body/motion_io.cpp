@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "body/body_model.h"
+#include "body/pose_layout.h"
 #include "core/npz.h"
 
 namespace hsi4d {
@@ -34,24 +35,13 @@ struct Half {
 constexpr Half kHalves[] = {
     {"leye_pose", 23, 1}, {"reye_pose", 24, 1}, {"left_hand_pose", 25, 15}, {"right_hand_pose", 40, 15}};
 
-/// What the numbers of a row of `poses` are: runs of joints, one after the other.
+/// A model whose rows of `poses` are read; smplx_runs says what the numbers are.
 struct RowLayout {
   const char* name;
   int64_t numbers;
-  struct Run {
-    std::size_t from, to, joints;
-  };
-  std::vector<Run> runs;
 };
 
-const std::vector<RowLayout>& row_layouts() {
-  static const std::vector<RowLayout> layouts = {
-      {"SMPL-X", 165, {{0, 0, 55}}},
-      {"SMPL-H", 156, {{0, 0, 22}, {22, 25, 30}}},
-      {"SMPL", 72, {{0, 0, 22}}},
-  };
-  return layouts;
-}
+constexpr RowLayout kRowLayouts[] = {{"SMPL-X", 165}, {"SMPL-H", 156}, {"SMPL", 72}};
 
 struct Rows {
   std::vector<double> numbers;
@@ -91,10 +81,13 @@ void read_whole_poses(const NpyArray& array, Motion& motion) {
   const int64_t frames = static_cast<int64_t>(motion.poses.size());
   const auto& shape = array.shape();
   std::string allowed;
-  for (const RowLayout& layout : row_layouts()) {
+  for (const RowLayout& layout : kRowLayouts) {
     if (shape.size() == 2 && shape[0] == frames && shape[1] == layout.numbers) {
       const Rows rows = rows_of(array, frames, layout.numbers);
-      for (const auto& run : layout.runs) put_joints(rows, run.from, run.to, run.joints, motion);
+      for (const PoseRun& run : smplx_runs(layout.numbers / 3)) {
+        put_joints(rows, static_cast<std::size_t>(run.from), static_cast<std::size_t>(run.to),
+                   static_cast<std::size_t>(run.joints), motion);
+      }
       return;
     }
     allowed += (allowed.empty() ? "" : ", ") + shape_text(std::vector<int64_t>{frames, layout.numbers}) + " (" +

@@ -78,6 +78,43 @@ DenseWeights normalized_weights(DenseWeights raw, std::string_view source) {
   return raw;
 }
 
+Index repair_weights(DenseWeights& weights, std::string_view source) {
+  HSI4D_CHECK_EQ(static_cast<Index>(weights.weights.size()), weights.vertices * weights.joints);
+  Index repaired = 0;
+  for (Index v = 0; v < weights.vertices; ++v) {
+    double* of_vertex = weights.weights.data() + v * weights.joints;
+    const double sum = checked_sum(of_vertex, weights.joints, source, v);
+    if (std::abs(sum - 1) <= kWeightRounding) continue;
+    normalize(of_vertex, weights.joints);
+    ++repaired;
+  }
+  return repaired;
+}
+
+std::optional<SparseWeights> sparse_weights(const DenseWeights& dense) {
+  HSI4D_CHECK_EQ(static_cast<Index>(dense.weights.size()), dense.vertices * dense.joints);
+  SparseWeights sparse{dense.vertices, dense.joints, 1, {}, {}};
+  for (Index v = 0; v < dense.vertices; ++v) {
+    const double* of_vertex = dense.weights.data() + v * dense.joints;
+    const Index used = dense.joints - std::count(of_vertex, of_vertex + dense.joints, 0.0);
+    sparse.per_vertex = std::max(sparse.per_vertex, used);
+  }
+  if (sparse.per_vertex > kMaxWeightsPerVertex) return std::nullopt;
+  for (Index v = 0; v < dense.vertices; ++v) {
+    const double* of_vertex = dense.weights.data() + v * dense.joints;
+    const auto largest = static_cast<std::int32_t>(std::max_element(of_vertex, of_vertex + dense.joints) - of_vertex);
+    const std::size_t end = sparse.weights.size() + static_cast<std::size_t>(sparse.per_vertex);
+    for (Index j = 0; j < dense.joints; ++j) {
+      if (of_vertex[j] == 0) continue;
+      sparse.indices.push_back(static_cast<std::int32_t>(j));
+      sparse.weights.push_back(of_vertex[j]);
+    }
+    sparse.indices.resize(end, largest);
+    sparse.weights.resize(end, 0.0);
+  }
+  return sparse;
+}
+
 SparseWeights largest_weights(const DenseWeights& dense, Index per_vertex, std::string_view source) {
   HSI4D_CHECK_EQ(static_cast<Index>(dense.weights.size()), dense.vertices * dense.joints);
   const Index kept = std::min(per_vertex, dense.joints);

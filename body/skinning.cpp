@@ -26,8 +26,8 @@ const SkinKernels<S>& kernels() {
 
 // --- tables ----------------------------------------------------------------------------------------------------------
 
-/// Rounds the `count` weights of a vertex to S. In float their sum is then off by 1e-7 at most: at a kilometre no more
-/// than the rounding of the result itself.
+/// Rounds the `count` weights of a vertex to S. In float their sum is then off by another 1e-7 at most: at a kilometre
+/// no more than the rounding of the result itself.
 template <class S>
 void round_weights(const double* weights, Index count, Index vertex, S* rounded) {
   double sum = 0;
@@ -35,7 +35,8 @@ void round_weights(const double* weights, Index count, Index vertex, S* rounded)
     rounded[k] = static_cast<S>(weights[k]);
     sum += weights[k];
   }
-  HSI4D_CHECK(std::abs(sum - 1) < 1e-9, "weights of vertex " + std::to_string(vertex) + " are not normalised");
+  HSI4D_CHECK(std::abs(sum - 1) <= kWeightRounding,
+              "weights of vertex " + std::to_string(vertex) + " are not normalised");
 }
 
 /// Lists the entries of each block of vertices by joint, then by vertex; weights of 0 are left out.
@@ -129,9 +130,40 @@ void fill(DenseTable<S>& table, const DenseWeights& from) {
 
 // --- untaped ---------------------------------------------------------------------------------------------------------
 
-/// `saved` receives the blended transforms of dense weights unless it is null.
+/// Three numbers again and again, as many as vectors of every width hold whole.
+inline constexpr Index kRun = 48;
+
+/// points += t
 template <class S>
-void skin(const SkinTables<S>& tables, const S* transforms, const S* points, S* result, S* saved) {
+void move_points(const S* t, S* points, Index begin, Index end) {
+  S run[kRun];
+  for (Index i = 0; i < kRun; ++i) run[i] = t[i % 3];
+  on_best_isa([&] {
+    Index at = 3 * begin;
+    for (; at + kRun <= 3 * end; at += kRun) {
+      for (Index i = 0; i < kRun; ++i) points[at + i] += run[i];
+    }
+    for (Index i = 0; at + i < 3 * end; ++i) points[at + i] += run[i];
+  });
+}
+
+/// sum[3] = Σ_v d_points_v of a chunk
+template <class S>
+void sum_points(const S* d_points, Index begin, Index end, double* sum) {
+  S run[kRun] = {};
+  on_best_isa([&] {
+    Index at = 3 * begin;
+    for (; at + kRun <= 3 * end; at += kRun) {
+      for (Index i = 0; i < kRun; ++i) run[i] += d_points[at + i];
+    }
+    for (Index i = 0; at + i < 3 * end; ++i) run[i] += d_points[at + i];
+  });
+  for (Index i = 0; i < kRun; ++i) sum[i % 3] += static_cast<double>(run[i]);
+}
+
+/// `saved` receives the blended transforms of dense weights unless it is null; no `transl`: none.
+template <class S>
+void skin(const SkinTables<S>& tables, const S* transforms, const S* points, S* result, S* saved, const S* transl) {
   const Index vertices = tables.is_dense ? tables.dense.vertices : tables.sparse.vertices;
   parallel_for(vertices, kSkinGrain, [&](Index begin, Index end) {
     if (tables.is_dense) {
@@ -139,6 +171,7 @@ void skin(const SkinTables<S>& tables, const S* transforms, const S* points, S* 
     } else {
       kernels<S>().sparse_points(tables.sparse, transforms, points, result, begin, end);
     }
+    if (transl != nullptr) move_points(transl, result, begin, end);
   });
 }
 
@@ -166,6 +199,7 @@ void gather_transforms(NodeIo<S>& io, const SkinTables<S>& tables, F&& chunk) {
 
 // --- operators -------------------------------------------------------------------------------------------------------
 
+/// Inputs: transforms, points, and a translation or none.
 template <class S>
 struct SkinPoints {
   static constexpr const char* kName = "skin_points";
@@ -176,7 +210,21 @@ struct SkinPoints {
     const auto& tables = weights.tables();
     const bool save = tables.is_dense && io.wants(1);
     if (save) blended.resize(round_up(tables.dense.vertices, detail::kPanel) * kTransformSize);
-    skin(tables, io.in(0).data, io.in(1).data, io.out().data, save ? blended.data() : nullptr);
+    const S* transl = io.inputs() == 3 ? io.in(2).data : nullptr;
+    skin(tables, io.in(0).data, io.in(1).data, io.out().data, save ? blended.data() : nullptr, transl);
+  }
+
+  void transl_adjoint(NodeIo<S>& io) const {
+    const Partition part{weights.vertices(), kSkinGrain};
+    double* sums = io.template scratch<double>(3 * part.chunks()).data();
+    std::fill(sums, sums + 3 * part.chunks(), 0.0);
+    parallel_chunks(part,
+                    [&](Index c, Index begin, Index end) { sum_points(io.d_out().data, begin, end, sums + 3 * c); });
+    for (Index i = 0; i < 3; ++i) {
+      double sum = 0;
+      for (Index c = 0; c < part.chunks(); ++c) sum += sums[3 * c + i];
+      io.d_in(2).data[i] += static_cast<S>(sum);
+    }
   }
 
   void backward(NodeIo<S>& io) {
@@ -193,6 +241,7 @@ struct SkinPoints {
         }
       });
     }
+    if (io.inputs() == 3 && io.wants(2)) transl_adjoint(io);
     if (!io.wants(1)) return;
     S* d_points = io.d_in(1).data;
     parallel_for(weights.vertices(), kSkinGrain, [&](Index begin, Index end) {
@@ -318,7 +367,7 @@ Index SkinWeights<S>::joints() const {
 
 template <class S>
 void skin_points(const SkinWeights<S>& weights, const S* transforms, const S* points, S* result) {
-  skin<S>(weights.tables(), transforms, points, result, nullptr);
+  skin<S>(weights.tables(), transforms, points, result, nullptr, nullptr);
 }
 
 template <class S>
@@ -326,6 +375,14 @@ Var<S> skin_points(const SkinWeights<S>& weights, Var<S> transforms, Var<S> poin
   HSI4D_CHECK_EQ(transforms.shape(), shape_of(weights.joints(), kTransformSize));
   HSI4D_CHECK_EQ(points.shape(), shape_of(weights.vertices(), 3));
   return transforms.owner().record(SkinPoints<S>{weights, {}}, {transforms, points}, points.shape(), where);
+}
+
+template <class S>
+Var<S> skin_points(const SkinWeights<S>& weights, Var<S> transforms, Var<S> points, Var<S> transl, Source where) {
+  HSI4D_CHECK_EQ(transforms.shape(), shape_of(weights.joints(), kTransformSize));
+  HSI4D_CHECK_EQ(points.shape(), shape_of(weights.vertices(), 3));
+  HSI4D_CHECK_EQ(transl.shape(), shape_of(1, 3));
+  return transforms.owner().record(SkinPoints<S>{weights, {}}, {transforms, points, transl}, points.shape(), where);
 }
 
 template <class S>
@@ -342,11 +399,12 @@ Var<S> transform_points(Var<S> transforms, Var<S> points, Source where) {
   return transforms.owner().record(TransformPoints<S>{}, {transforms, points}, points.shape(), where);
 }
 
-#define HSI4D_INSTANTIATE(S)                                                  \
-  template class SkinWeights<S>;                                              \
-  template void skin_points(const SkinWeights<S>&, const S*, const S*, S*);   \
-  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Source); \
-  template Var<S> blend_transforms(const SkinWeights<S>&, Var<S>, Source);    \
+#define HSI4D_INSTANTIATE(S)                                                          \
+  template class SkinWeights<S>;                                                      \
+  template void skin_points(const SkinWeights<S>&, const S*, const S*, S*);           \
+  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Source);         \
+  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Var<S>, Source); \
+  template Var<S> blend_transforms(const SkinWeights<S>&, Var<S>, Source);            \
   template Var<S> transform_points(Var<S>, Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -26,6 +27,9 @@ inline constexpr double kTinyWeight = 1e-6;
 
 /// How far from 1 the weights of a vertex may sum up in a file.
 inline constexpr double kWeightSumTolerance = 1e-2;
+
+/// How far from 1 they may sum up by the rounding of floats, which is left as it is.
+inline constexpr double kWeightRounding = 1e-6;
 
 /// K = per_vertex weights for each of V vertices; a joint may repeat, unused places have weight 0 and any valid joint.
 struct SparseWeights {
@@ -49,6 +53,16 @@ struct DenseWeights {
 SparseWeights normalized_weights(SparseWeights raw, std::string_view source);
 DenseWeights normalized_weights(DenseWeights raw, std::string_view source);
 
+/// Divides the weights of those vertices by their sum, as normalized_weights does, whose sum is farther than
+/// kWeightRounding from 1; all others stay bit for bit what a file says, down to the smallest. Returns how many.
+///
+/// Throws DataError naming the vertex as normalized_weights does.
+Index repair_weights(DenseWeights& weights, std::string_view source);
+
+/// The same weights with as few places a vertex as hold all that are not zero; nothing when that is more than
+/// kMaxWeightsPerVertex.
+std::optional<SparseWeights> sparse_weights(const DenseWeights& dense);
+
 /// The `per_vertex` largest weights of each vertex (ties: the lower joint), normalised. SMPL-X has few that are not
 /// zero.
 ///
@@ -65,7 +79,7 @@ struct SkinTables;
 template <class S>
 class SkinWeights {
  public:
-  /// Takes normalised weights. Throws InternalError when those of a vertex do not sum to 1.
+  /// Takes normalised weights. Throws InternalError when those of a vertex do not sum to 1 within kWeightRounding.
   explicit SkinWeights(const SparseWeights& weights);
   explicit SkinWeights(const DenseWeights& weights);
 
@@ -94,6 +108,14 @@ void skin_points(const SkinWeights<S>& weights, const S* transforms, const S* po
 /// Throws InternalError when a shape differs from the weights'.
 template <class S>
 Var<S> skin_points(const SkinWeights<S>& weights, Var<S> transforms, Var<S> points, Source where = Source::current());
+
+/// y_v = Σ_j w_vj A_j (x_v, 1) + t: the translation last, whatever the weights sum to by their rounding.
+///
+/// @param transl  [1,3] metres
+/// Adjoint: transforms, points, transl; each computed only when wanted.
+template <class S>
+Var<S> skin_points(const SkinWeights<S>& weights, Var<S> transforms, Var<S> points, Var<S> transl,
+                   Source where = Source::current());
 
 /// B_v = Σ_j w_vj A_j, the blended transform of each vertex; its linear part is in general no rotation.
 ///

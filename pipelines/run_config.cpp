@@ -33,6 +33,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
   f.object("camera", s.camera, "How cameras are optimised");
   f.object("data", s.data, "The files that the run reads");
+  f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
   f.object("render", s.render, "How Gaussians become pixels");
   f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");
@@ -75,8 +76,9 @@ bool has_loss(const RunConfig& config, const std::string& name) {
 }
 
 ConfigValue without_data(ConfigValue tree) {
-  std::erase_if(tree.members,
-                [](const ConfigMember& member) { return member.key == "synthetic" || member.key == "threads"; });
+  std::erase_if(tree.members, [](const ConfigMember& member) {
+    return member.key == "body" || member.key == "synthetic" || member.key == "threads";
+  });
   for (ConfigMember& member : tree.members) {
     if (member.key != "data") continue;
     std::erase_if(member.value.members, [](const ConfigMember& own) { return !own.key.starts_with("mask_"); });

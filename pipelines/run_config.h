@@ -9,6 +9,7 @@
 #include "core/config.h"
 #include "optim/loss_description.h"
 #include "optim/stage_settings.h"
+#include "pipelines/body_settings.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
@@ -46,6 +47,7 @@ struct RunConfig {
   std::array<double, 3> background{};  ///< colour behind everything
   CameraSettings camera;
   DataSettings data;
+  BodySettings body;
   SyntheticSettings synthetic;
   RenderSettings render;
   RenderSkips skip;
@@ -81,8 +83,8 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
 /// Whether a stage that draws the objects has the loss, with a weight that is not 0.
 bool has_loss(const RunConfig& config, const std::string& name);
 
-/// A tree of a config without what another dataset or machine would change: the files of data, synthetic, threads. Two
-/// runs of the same data with equal trees have the same result.
+/// A tree of a config without what another dataset or machine would change: the files of data, body, synthetic,
+/// threads. Two runs of the same data with equal trees have the same result.
 ConfigValue without_data(ConfigValue tree);
 
 /// The config as such a tree.

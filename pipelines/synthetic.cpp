@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "body/avatar.h"
-#include "body/procedural_body.h"
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/file.h"
@@ -162,13 +161,13 @@ RenderSettings video_render_settings() {
 }
 
 void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const fs::path& folder,
-                   const Observer& observer, const ConfigValue& more_sections) {
+                   const Observer& observer, const ConfigValue& more_sections, const BodySettings& body_settings) {
   FolderInMaking out(folder);
   const auto stop_if_asked = [&] {
     if (observer.wants_stop()) throw Interrupted("interrupted while a dataset was made; nothing is left of it");
   };
   const std::uint64_t seed = static_cast<std::uint64_t>(settings.seed);
-  const BodyModel body = procedural_body();
+  const BodyModel body = rest_body(body_settings);
   AvatarSettings avatar_settings;
   avatar_settings.gaussians = settings.avatar_gaussians;
   avatar_settings.seed = seed;
@@ -188,7 +187,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_motion(out.file("truth/motion.npz"), clip.motion);
   write_objects(out.file("truth/objects.npz"), object.name, clip.object);
   write_cameras(out.file("truth/cameras.json"), clip.cameras);
-  write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings));
+  write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
   write_text_file(out.file("config.json"),
                   to_json(merged(object_of("data", data_section(object.name)), more_sections)));
 

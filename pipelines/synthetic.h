@@ -35,9 +35,11 @@ Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings);
 ///
 /// @param folder         new or empty; its parents are made. It appears when everything in it is complete
 /// @param more_sections  an object: sections of config.json beside `data`, for example stages; null: none
-/// Throws UserError when the folder is there and not empty, or cannot be written; Interrupted when asked to stop: then
-/// nothing is left.
+/// @param body_settings  who is seen
+/// Throws as rest_body of the settings; UserError when the folder is there and not empty, or cannot be written;
+/// Interrupted when asked to stop: then nothing is left.
 void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const std::filesystem::path& folder,
-                   const Observer& observer = {}, const ConfigValue& more_sections = ConfigValue::make_object());
+                   const Observer& observer = {}, const ConfigValue& more_sections = ConfigValue::make_object(),
+                   const BodySettings& body_settings = {});
 
 }  // namespace hsi4d

@@ -30,10 +30,12 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
            "Standard deviation of each coordinate of the initial motion's root, metres");
 }
 
-std::string synthetic_settings_json(const SyntheticSettings& settings) {
+std::string synthetic_settings_json(const SyntheticSettings& settings, const BodySettings& body) {
   SyntheticSettings copy = settings;  // a description binds to something that it could change
+  BodySettings body_copy = body;
   ConfigFields fields;
   describe(fields, copy);
+  if (body.kind != BodyKind::kProcedural) fields.object("body", body_copy, "The body model");
   return to_json(write_config(fields));
 }
 

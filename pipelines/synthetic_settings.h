@@ -7,6 +7,7 @@
 
 #include "core/config.h"
 #include "core/types.h"
+#include "pipelines/body_settings.h"
 
 namespace hsi4d {
 
@@ -40,7 +41,7 @@ struct SyntheticSettings {
 
 void describe(ConfigFields& fields, SyntheticSettings& settings);
 
-/// The settings as JSON text: what a dataset's synthetic.json holds.
-std::string synthetic_settings_json(const SyntheticSettings& settings);
+/// The settings as JSON text: what a dataset's synthetic.json holds. The body is in it unless it is the default.
+std::string synthetic_settings_json(const SyntheticSettings& settings, const BodySettings& body = {});
 
 }  // namespace hsi4d

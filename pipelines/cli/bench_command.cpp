@@ -9,6 +9,7 @@
 #include "core/simd.h"
 #include "pipelines/bench_pixel_filter.h"
 #include "pipelines/bench_rasterize.h"
+#include "pipelines/bench_skinning.h"
 
 namespace hsi4d::cli {
 
@@ -65,6 +66,28 @@ std::string json_line(const FilterMeasurement& m) {
   return line.dump() + "\n";
 }
 
+/// Billions of bytes a second that the correctives are read at; 0 where there are none.
+double rate(const SkinningMeasurement& m) {
+  const double reads = m.name.ends_with("/both") ? 2 : 1;
+  return m.median_ms > 0 ? reads * static_cast<double>(m.table_bytes) / m.median_ms / 1e6 : 0;
+}
+
+std::string json_line(const SkinningMeasurement& m) {
+  const nlohmann::ordered_json line = {{"name", m.name},
+                                       {"threads", m.threads},
+                                       {"isa", isa_name(best_isa())},
+                                       {"median_ms", m.median_ms},
+                                       {"min_ms", m.min_ms},
+                                       {"repeats", m.repeats},
+                                       {"vertices", m.vertices},
+                                       {"joints", m.joints},
+                                       {"corrective_columns", m.corrective_columns},
+                                       {"table_bytes", m.table_bytes},
+                                       {"packing_error_m", m.packing_error_m},
+                                       {"gbytes_per_s", rate(m)}};
+  return line.dump() + "\n";
+}
+
 }  // namespace
 
 std::string bench_rasterize_command(const BenchOptions& options) {
@@ -92,6 +115,23 @@ std::string bench_rasterize_command(const BenchOptions& options) {
                   1e-9 * peak);
     table += line;
   }
+  if (!options.json.empty()) write_text_file(options.json, json);
+  return table;
+}
+
+std::string bench_skinning_command(const BenchOptions& options) {
+  std::string json, table;
+  char line[160];
+  std::snprintf(line, sizeof line, "%-40s %10s %10s %9s %8s %10s %7s\n", "", "median ms", "least ms", "vertices",
+                "columns", "MB read", "GB/s");
+  table += line;
+  bench_skinning({options.workloads, options.threads, options.repeats}, [&](const SkinningMeasurement& m) {
+    std::snprintf(line, sizeof line, "%-40s %10.3f %10.3f %9lld %8lld %10.1f %7.1f\n", m.name.c_str(), m.median_ms,
+                  m.min_ms, static_cast<long long>(m.vertices), static_cast<long long>(m.corrective_columns),
+                  (m.name.ends_with("/both") ? 2 : 1) * static_cast<double>(m.table_bytes) / 1e6, rate(m));
+    table += line;
+    json += json_line(m);
+  });
   if (!options.json.empty()) write_text_file(options.json, json);
   return table;
 }

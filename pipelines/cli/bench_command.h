@@ -9,13 +9,16 @@ namespace hsi4d::cli {
 struct BenchOptions {
   std::vector<std::string> workloads;  ///< empty: all
   int threads = 1;
-  int repeats = 9;                 ///< of rasterize
+  int repeats = 9;                 ///< of rasterize and skinning
   std::vector<double> heights_px;  ///< of the figures of pixel_filter; empty: all
   std::string json;                ///< path to write one JSON object a measurement to; empty: none
 };
 
 /// `hsi4d bench rasterize`: returns a table.
 std::string bench_rasterize_command(const BenchOptions& options);
+
+/// `hsi4d bench skinning`: returns a table.
+std::string bench_skinning_command(const BenchOptions& options);
 
 /// `hsi4d bench pixel_filter`: returns a table. The workloads are figures.
 std::string bench_pixel_filter_command(const BenchOptions& options);

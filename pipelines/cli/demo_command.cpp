@@ -40,14 +40,14 @@ void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, 
   const int asked = run_threads(arguments.threads), threads = asked > 0 ? asked : config.threads;
   with_threads(threads > 0 ? threads : thread_count(), [&] {
     write_dataset(config.synthetic, video_render_settings(), dataset, observer_on_terminal(arguments.quiet),
-                  sections_beside_data(config, descriptions_of(losses)));
+                  sections_beside_data(config, descriptions_of(losses)), config.body);
   });
 }
 
 /// The dataset that is gone on with must be the one that the config asks for.
 void check_dataset(const RunConfig& config, const fs::path& dataset) {
   const std::string file = (dataset / "synthetic.json").string();
-  if (read_text_file(file) == synthetic_settings_json(config.synthetic)) return;
+  if (read_text_file(file) == synthetic_settings_json(config.synthetic, config.body)) return;
   throw UserError(file + ": the dataset was made with other settings than these; make a new one in another folder");
 }
 

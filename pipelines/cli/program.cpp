@@ -180,20 +180,23 @@ struct CommandLine {
   }
 
   void add_bench() {
-    CLI::App* command = app.add_subcommand(
-        "bench", "Measure the renderer's speed or its pixel filter: a table, and one JSON object a measurement");
-    command->add_option("TOPIC", topic, "What: rasterize, pixel_filter")
+    CLI::App* command = app.add_subcommand("bench",
+                                           "Measure the speed of the renderer or the body, or the pixel filter: a "
+                                           "table, and one JSON object a measurement");
+    command->add_option("TOPIC", topic, "What: rasterize, skinning, pixel_filter")
         ->required()
-        ->check(CLI::IsMember({"rasterize", "pixel_filter"}));
+        ->check(CLI::IsMember({"rasterize", "skinning", "pixel_filter"}));
     command->add_option("--workload", bench.workloads, "Only these; default: all");
     command->add_option("--threads", bench.threads, "Threads")->check(CLI::Range(1, 1024));
-    command->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of rasterize")
+    command
+        ->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of rasterize and skinning")
         ->check(CLI::Range(1, 1000));
     command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
         ->check(CLI::Range(8.0, 2048.0));
     command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
     command->callback([this] {
       run = [this] {
+        if (topic == "skinning") return bench_skinning_command(bench);
         return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);
       };
     });

@@ -14,7 +14,7 @@ std::string synth_command(const std::filesystem::path& config, const std::vector
   const InterruptWatch watch;
   with_threads(run.threads > 0 ? run.threads : thread_count(), [&] {
     write_dataset(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet),
-                  sections_beside_data(run, losses));
+                  sections_beside_data(run, losses), run.body);
   });
   const std::string frames = std::to_string(run.synthetic.frames) + (run.synthetic.frames == 1 ? " frame" : " frames");
   const std::string size = std::to_string(run.synthetic.size_px);

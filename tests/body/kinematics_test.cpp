@@ -115,6 +115,18 @@ TEST_CASE("the kinematic chain passes the operator checks, for each output and b
       return transform_points(posed.transforms, posed.joints);
     });
   }
+  for (const bool chain : {false, true}) {
+    const Skeleton s = random_skeleton(7, chain, random);
+    const std::vector<OperatorInput> inputs = {
+        {"rotations", shape_of(7, 9)}, {"transl", shape_of(1, 3)}, {"rest_joints", shape_of(7, 3)}};
+    const auto posed = [&](const auto& in) { return kinematic_chain(in[0], in[1], s.parents, in[2]); };
+    check_operator("transforms, rest joints move", inputs, [&](const auto& in) { return posed(in).transforms; });
+    check_operator("joints, rest joints move", inputs, [&](const auto& in) { return posed(in).joints; });
+    check_operator("both, rest joints move", inputs, [&](const auto& in) {
+      const auto both = posed(in);
+      return transform_points(both.transforms, both.joints);
+    });
+  }
   const std::vector<OperatorInput> root = {{"rotations", shape_of(1, 9)}, {"transl", shape_of(1, 3)}};
   check_operator("a single joint", root, [](const auto& in) {
     return kinematic_chain(in[0], in[1], {-1}, {0.25, 0.5, -0.125}).transforms;

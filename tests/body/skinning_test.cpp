@@ -154,6 +154,8 @@ void check_operators(const std::string& name, const W& weights) {
   const OperatorInput points{"points", shape_of(weights.vertices, 3)};
   check_operator(name + ", points", {transforms, points},
                  [&](const auto& in) { return skin_points(both(in[0]), in[0], in[1]); });
+  check_operator(name + ", moved", {transforms, points, {"transl", shape_of(1, 3)}},
+                 [&](const auto& in) { return skin_points(both(in[0]), in[0], in[1], in[2]); });
   check_operator(name + ", blended", {transforms},
                  [&](const auto& in) { return blend_transforms(both(in[0]), in[0]); });
 }

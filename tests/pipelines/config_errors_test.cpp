@@ -9,7 +9,9 @@
 
 using namespace hsi4d;
 using namespace hsi4d::test;
+using Catch::Matchers::Contains;
 using Catch::Matchers::Equals;
+using Catch::Matchers::StartsWith;
 
 namespace {
 
@@ -28,7 +30,7 @@ std::string fault(const std::string& text, const std::vector<std::string>& overr
 }
 
 const std::string kSections =
-    "name, seed, threads, precision, rotations, background, camera, data, synthetic, render, skip, "
+    "name, seed, threads, precision, rotations, background, camera, data, body, synthetic, render, skip, "
     "approx, stages";
 
 // A config with one stage, `inside` its braces.
@@ -53,6 +55,25 @@ TEST_CASE("unknown keys") {
   CHECK_THAT(
       fault(stage(R"("iterations": 30, "losses": {"centre": {"masked": true}})")),
       Equals("a.json:2: /stages/camera/losses/centre/masked: unknown key; it belongs in /stages/NAME/losses/photo"));
+}
+
+TEST_CASE("body models") {
+  CHECK_THAT(fault(R"({"body": {"kind": "smpl"}})"),
+             Equals("a.json:1: /body/kind: \"smpl\" is not one of the choices; allowed: \"procedural\", \"smplx\"; did "
+                    "you mean \"smplx\"?"));
+  CHECK_THAT(fault(R"({"body": {"kind": "smplx"}})"),
+             Equals("a.json:1: /body/path: kind smplx needs the file of a body model"));
+  CHECK_THAT(fault(R"({"body": {"kind": "smplx", "path": "nowhere.npz"}})"),
+             StartsWith("a.json:1: /body/path: ") && Contains("nowhere.npz"));
+  CHECK_THAT(fault(R"({"body": {"path": "a.json"}})"),
+             Equals("a.json:1: /body/path: kind procedural reads no file; kind smplx does"));
+  CHECK_THAT(fault(R"({"body": {"beta": 3}})"), Equals("a.json:1: /body/beta: unknown key; did you mean \"betas\"?"));
+  CHECK_THAT(fault(R"({"body": {"betas": 301}})"),
+             Equals("a.json:1: /body/betas: 301 is out of range; allowed: 0 to 300"));
+  CHECK_THAT(fault(R"({"body": {"hands": "pca", "hand_components": 0}})"),
+             Equals("a.json:1: /body/hand_components: 0 is out of range; allowed: 1 to 45"));
+  CHECK(fault(R"({"body": {"kind": "smplx", "path": "a.json", "hands": "pca", "flat_hand_mean": true}})") ==
+        "no fault");
 }
 
 TEST_CASE("wrong types") {

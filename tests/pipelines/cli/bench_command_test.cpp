@@ -69,6 +69,40 @@ TEST_CASE("bench tells which workloads there are") {
       "mean \"small\"?");
 }
 
+TEST_CASE("bench skinning measures a body and writes one object a measurement") {
+  const TemporaryFolder folder;
+  cli::BenchOptions options;
+  options.workloads = {"fixed_hands", "no_correctives"};
+  options.repeats = 2;
+  options.json = folder / "m.json";
+  const std::string table = cli::bench_skinning_command(options);
+  std::istringstream lines(read_text_file(options.json));
+  std::vector<std::string> names;
+  for (std::string line; std::getline(lines, line);) {
+    const auto m = nlohmann::json::parse(line);
+    names.push_back(m.at("name"));
+    CHECK(table.find(names.back()) != std::string::npos);
+    CHECK(m.at("vertices") == 10475);
+    CHECK(m.at("joints") == 55);
+    CHECK(m.at("repeats") == 2);
+    CHECK(m.at("median_ms") >= m.at("min_ms"));
+    const bool has_correctives = names.back().find("fixed_hands") != std::string::npos;
+    CHECK(m.at("corrective_columns") == (has_correctives ? 24 * 9 : 0));
+    CHECK((m.at("table_bytes") > 0) == has_correctives);
+    CHECK(m.at("packing_error_m").get<double>() <= 5e-6);
+    const double reads = names.back().ends_with("/both") ? 2 : 1;
+    const double rate = reads * m.at("table_bytes").get<double>() / m.at("median_ms").get<double>() / 1e6;
+    CHECK(m.at("gbytes_per_s").get<double>() == Approx(rate));
+  }
+  CHECK(names == std::vector<std::string>{"skinning/fixed_hands/forward", "skinning/fixed_hands/backward",
+                                          "skinning/fixed_hands/both", "skinning/no_correctives/forward",
+                                          "skinning/no_correctives/backward", "skinning/no_correctives/both"});
+  options.workloads = {"fixed_hand"};
+  CHECK_THROWS_WITH(cli::bench_skinning_command(options),
+                    "hsi4d bench skinning: no workload \"fixed_hand\"; known: smplx, smplx_floats, fixed_hands, "
+                    "fixed_hands_floats, no_correctives; did you mean \"fixed_hands\"?");
+}
+
 TEST_CASE("bench pixel_filter judges every filter at a height and writes one object a measurement", "[full]") {
   const TemporaryFolder folder;
   cli::BenchOptions options;

@@ -1,0 +1,46 @@
+// Config section `body`: which body model is used, and how its files are read.
+#pragma once
+
+#include <array>
+#include <filesystem>
+
+#include "body/smplx_body.h"
+#include "core/config.h"
+
+namespace hsi4d {
+
+/// Where the body comes from.
+enum class BodyKind { kProcedural, kSmplx };
+
+/// The numbers by which hands are posed.
+enum class HandParameters { kFull, kPca };
+
+inline constexpr std::array<ConfigChoice<BodyKind>, 2> kBodyKinds = {
+    {{BodyKind::kProcedural, "procedural"}, {BodyKind::kSmplx, "smplx"}}};
+inline constexpr std::array<ConfigChoice<HandParameters>, 2> kHandParameters = {
+    {{HandParameters::kFull, "full"}, {HandParameters::kPca, "pca"}}};
+
+/// The body model.
+struct BodySettings {
+  BodyKind kind = BodyKind::kProcedural;
+  std::filesystem::path path;  ///< of kind smplx
+  Index betas = 10;
+  Index expressions = 10;
+  HandParameters hands = HandParameters::kFull;
+  Index hand_components = 12;  ///< of hands pca
+  bool flat_hand_mean = false;
+};
+
+void describe(ConfigFields& fields, BodySettings& settings);
+
+/// The SMPL-X model that the settings name. Throws as read_smplx; DataError naming the file when it has fewer hand
+/// components than are asked for; InternalError for another kind of body.
+SmplxModel read_smplx_body(const BodySettings& settings);
+
+/// What the settings say of how that model is prepared.
+SmplxBodyOptions smplx_body_options(const BodySettings& settings);
+
+/// The body in its rest pose and mean shape, whatever its kind. Throws as read_smplx_body.
+BodyModel rest_body(const BodySettings& settings);
+
+}  // namespace hsi4d

@@ -1,0 +1,112 @@
+#include "pipelines/body_settings.h"
+
+#include <catch2/catch.hpp>
+
+#include "body/avatar.h"
+#include "body/procedural_body.h"
+#include "core/file.h"
+#include "pipelines/synthetic.h"
+#include "tests/support/smplx_reference.h"
+#include "tests/support/temporary_folder.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+
+namespace {
+
+/// The procedural body in the layout of SMPL-X files.
+NpzWriter procedural_file() {
+  const BodyModel body = procedural_body();
+  SmplxArrays a;
+  a.vertices = body.vertex_count();
+  a.columns = 0;
+  a.v_template.assign(body.vertices.begin(), body.vertices.end());
+  a.f.assign(body.faces.begin(), body.faces.end());
+  a.parents.assign(body.parents.begin(), body.parents.end());
+  a.weights.resize(static_cast<std::size_t>(55 * a.vertices));
+  for (std::size_t i = 0; i < body.weights.indices.size(); ++i) {
+    a.weights[55 * (i / 4) + static_cast<std::size_t>(body.weights.indices[i])] += body.weights.weights[i];
+  }
+  NpzWriter file = smplx_writer(a);
+  file.add<double>("J_template", {55, 3}, body.joints);
+  file.add<double>("J_shapedirs", {55, 3, 0}, {});
+  return file;
+}
+
+}  // namespace
+
+TEST_CASE("the body of a config is the procedural one, or read from its file") {
+  const TemporaryFolder folder;
+  const std::string file = (folder.path() / "body.npz").string();
+  const SmplxArrays arrays = random_smplx({.vertices = 30, .correctives = false});
+  smplx_writer(arrays).write(file);
+  CHECK(rest_body(BodySettings{}).vertices == procedural_body().vertices);
+  CHECK_THROWS_AS(read_smplx_body(BodySettings{}), InternalError);
+  BodySettings settings;
+  settings.kind = BodyKind::kSmplx;
+  settings.path = file;
+  settings.betas = 3;
+  settings.expressions = 2;
+  const SmplxModel model = read_smplx_body(settings);
+  CHECK(model.betas == 3);
+  CHECK(model.expressions == 2);
+  CHECK(rest_body(settings).vertices == std::vector<float>(arrays.v_template.begin(), arrays.v_template.end()));
+  CHECK_FALSE(smplx_body_options(settings).flat_hand_mean);
+  settings.flat_hand_mean = true;
+  CHECK(smplx_body_options(settings).flat_hand_mean);
+  settings.betas = 11;
+  CHECK_THROWS_WITH(read_smplx_body(settings), Catch::Contains("which holds 10 betas; 11 were asked for"));
+}
+
+TEST_CASE("hand components that a file has not are refused") {
+  const TemporaryFolder folder;
+  const std::string file = (folder.path() / "body.npz").string();
+  SmplxArrays arrays = random_smplx({.vertices = 3, .correctives = false});
+  arrays.hand_components[1].resize(45 * 6);
+  smplx_writer(arrays).write(file);
+  BodySettings settings;
+  settings.kind = BodyKind::kSmplx;
+  settings.path = file;
+  settings.hand_components = 7;
+  CHECK_NOTHROW(read_smplx_body(settings));
+  settings.hands = HandParameters::kPca;
+  CHECK_THROWS_WITH(read_smplx_body(settings), settings.path.string() +
+                                                   ": has 6 components of a hand; 7 were asked "
+                                                   "for (body.hand_components)");
+  settings.hand_components = 6;
+  CHECK_NOTHROW(read_smplx_body(settings));
+}
+
+TEST_CASE("synth makes the avatar of the body that a config names") {
+  const TemporaryFolder folder;
+  const std::string file = (folder.path() / "body.npz").string();
+  procedural_file().write(file);
+  BodySettings body;
+  body.kind = BodyKind::kSmplx;
+  body.path = file;
+  body.betas = body.expressions = 0;
+  SyntheticSettings settings;
+  settings.frames = 1;
+  settings.size_px = 32;
+  settings.scene_gaussians = 700;
+  settings.avatar_gaussians = 500;
+  settings.object_gaussians = 60;
+  write_dataset(settings, video_render_settings(), folder.path() / "named", {}, ConfigValue::make_object(), body);
+  write_dataset(settings, video_render_settings(), folder.path() / "plain");
+  const auto avatar_of = [&](const char* name) { return read_avatar((folder.path() / name / "avatar.npz").string()); };
+  const Avatar named = avatar_of("named"), plain = avatar_of("plain");
+  CHECK(named.means == plain.means);
+  CHECK(named.weights.indices == plain.weights.indices);
+  for (std::size_t i = 0; i < named.joints.size(); ++i) CHECK(named.joints[i] == plain.joints[i]);
+  const auto text_of = [&](const char* name) {
+    return read_text_file((folder.path() / name / "synthetic.json").string());
+  };
+  CHECK(text_of("plain") == synthetic_settings_json(settings));
+  CHECK(text_of("named") == synthetic_settings_json(settings, body));
+  CHECK_THAT(text_of("named"), Catch::Contains("body.npz"));
+  body.betas = 1;
+  CHECK_THROWS_WITH(
+      write_dataset(settings, video_render_settings(), folder.path() / "wrong", {}, ConfigValue::make_object(), body),
+      Catch::Contains("which holds 0 betas; 1 were asked for"));
+  CHECK_FALSE(std::filesystem::exists(folder.path() / "wrong"));
+}
