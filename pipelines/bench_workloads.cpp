@@ -89,7 +89,11 @@ Made on_capsule(const Capsule& capsule, RandomSequence& random, double size) {
   return g;
 }
 
-void append_figure(Workload& w, Index count, const Vector3<double>& pelvis, double size) {
+constexpr double kFigureSize = 0.0046, kScenePixels = 2.4;  // chosen for 6.5 and 71 million fragments
+
+/// @param scale  of the figure and its distance, so that it looks the same
+void append_figure(Workload& w, Index count, double scale) {
+  const Vector3<double> pelvis(0, -0.05, 2.05);
   RandomSequence random(11);
   double area = 0;
   for (const Capsule& c : capsules()) area += c.radius * ((c.to - c.from).norm() + 2 * c.radius);
@@ -98,8 +102,9 @@ void append_figure(Workload& w, Index count, const Vector3<double>& pelvis, doub
   for (const Capsule& c : capsules()) {
     wanted += static_cast<double>(count) * c.radius * ((c.to - c.from).norm() + 2 * c.radius) / area;
     for (; made < static_cast<Index>(std::lround(wanted)); ++made) {
-      Made g = on_capsule(c, random, size);
-      g.mean += pelvis;
+      Made g = on_capsule(c, random, kFigureSize);
+      g.mean = (g.mean + pelvis) * scale;
+      g.scales *= scale;
       append(w, g);
     }
   }
@@ -124,13 +129,11 @@ void append_scene(Workload& w, Index count, double pixels) {
   }
 }
 
-constexpr double kFigureSize = 0.0046, kScenePixels = 2.4;  // chosen for 6.5 and 71 million fragments
-
 }  // namespace
 
 Workload avatar_workload() {
   Workload w{.name = "avatar", .view = square_view(1024)};
-  append_figure(w, 50000, {0, -0.05, 2.05}, kFigureSize);
+  append_figure(w, 50000, 1);
   w.moving_begin = 0;
   return w;
 }
@@ -145,7 +148,7 @@ Workload scene_workload() {
 Workload avatar_in_scene_workload() {
   Workload w = scene_workload();
   w.name = "avatar_in_scene";
-  append_figure(w, 50000, {0, -0.05, 2.05}, kFigureSize);
+  append_figure(w, 50000, 1.27);  // 2.6 m away: some of the scene is in front
   return w;
 }
 

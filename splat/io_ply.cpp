@@ -97,7 +97,7 @@ SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name
   const int degree = degree_of(rest_count);
   if (degree < 0)
     throw DataError(name + ": there are " + std::to_string(rest_count) +
-                    " properties f_rest_; allowed: 0, 9, 24 or 45 (spherical harmonics of degree 0 to 3)");
+                    " properties f_rest_; allowed: 0, 9, 24, 45 or 72 (spherical harmonics of degree 0 to 4)");
   const int kept_degree = std::min(degree, kHighestShDegree), kept = rest_of(kept_degree);
   const std::vector<int> columns = columns_of(vertex, rest_count, kept, name);
   SplatRows rows(vertex.rows, kept_degree, "INRIA PLY");

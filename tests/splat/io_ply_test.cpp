@@ -269,7 +269,7 @@ TEST_CASE("what is wrong with a PLY file is told to the letter") {
   std::vector<std::string> more = least;
   for (int i = 0; i < 12; ++i) more.push_back("float f_rest_" + std::to_string(i));
   CHECK(fault(ply_text("ascii", 0, more, "")) ==
-        "a.ply: there are 12 properties f_rest_; allowed: 0, 9, 24 or 45 (spherical harmonics of degree 0 to 3)");
+        "a.ply: there are 12 properties f_rest_; allowed: 0, 9, 24, 45 or 72 (spherical harmonics of degree 0 to 4)");
   more.resize(least.size());
   for (int i = 1; i < 10; ++i) more.push_back("float f_rest_" + std::to_string(i));
   CHECK_THAT(fault(ply_text("ascii", 0, more, "")), Contains("has no property f_rest_0;"));
