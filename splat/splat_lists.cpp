@@ -1,6 +1,7 @@
 #include "splat/splat_lists.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "core/parallel.h"
 #include "core/simd.h"
@@ -34,15 +35,19 @@ void list_splats(const SplatRows<S>& rows, Index first, Index count, const Rende
   result.keys.resize(count);
   result.room.resize(count);
   DepthKeyed* const keys = result.keys.data();
+  std::atomic<Index> bound = 0;  // of pairs
   parallel_for(count, kGrain, [&](Index begin, Index end) {
     on_best_isa([&] {
       make_records(rows, first + begin, first + end, settings, tiles, &records[static_cast<std::size_t>(first + begin)],
                    &result.extents[begin]);
+      Index around = 0;
       for (Index i = begin; i < end; ++i) {
+        around += tiles_around(result.extents[i], tiles);
         const bool drawn = result.extents[i].row_begin < result.extents[i].row_end;
         keys[i].index = drawn ? static_cast<std::int32_t>(i) : -1;
         if (drawn) keys[i].key = rows.key(settings, first + i);
       }
+      bound += around;
     });
   });
   std::size_t drawn = 0;
@@ -55,7 +60,7 @@ void list_splats(const SplatRows<S>& rows, Index first, Index count, const Rende
   times.sort_s = watch.lap();
   const Index limit = pair_memory_limit();
   const Index most = static_cast<Index>(static_cast<double>(limit) / bytes_per_pair);
-  const Index pairs = result.lists.find(result.extents.span(), tiles, most);
+  const Index pairs = result.lists.find(result.extents.span(), tiles, most, bound);
   check_pair_memory(pairs, bytes_per_pair * static_cast<double>(pairs), limit);
   result.lists.deal(order, tiles, static_cast<std::int32_t>(first));
   times.bin_s = watch.lap();

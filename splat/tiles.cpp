@@ -169,23 +169,28 @@ Partition cut(Index n) {
 
 }  // namespace
 
-Index TileLists::find(std::span<const Extent> extents, const TileGrid& grid, Index most) {
+Index TileLists::find(std::span<const Extent> extents, const TileGrid& grid, Index most, Index bound) {
   const Index tiles = grid.count();
   const Partition part = cut(static_cast<Index>(extents.size()));
   const Index room = count_room(grid);
   totals_.resize(std::max<Index>(part.chunks(), 1) * room);
-  std::fill_n(totals_.data(), totals_.size(), std::uint64_t(0));
   slots.resize(static_cast<Index>(extents.size()));
   if (static_cast<Index>(of_part_.size()) < part.chunks()) of_part_.resize(static_cast<std::size_t>(part.chunks()));
   std::array<Index, kMostParts> sizes{};
-  parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-    const auto number = static_cast<std::size_t>(chunk);
-    const auto rows = extents.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin));
-    sizes[number] = find_pairs(
-        rows, grid, most,
-        {part.chunks() == 1 ? found_ : of_part_[number], totals_.data() + chunk * room, slots.data() + begin});
-  });
-  pairs_ = total_pairs(sizes);
+  const auto run = [&](Index keep) {
+    std::fill_n(totals_.data(), totals_.size(), std::uint64_t(0));
+    parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
+      const auto number = static_cast<std::size_t>(chunk);
+      const auto rows = extents.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin));
+      sizes[number] = find_pairs(
+          rows, grid, keep,
+          {part.chunks() == 1 ? found_ : of_part_[number], totals_.data() + chunk * room, slots.data() + begin});
+    });
+    return total_pairs(sizes);
+  };
+  pairs_ = run(bound <= most ? most : 0);
+  if (pairs_ > most) return pairs_;
+  if (bound > most) run(most);
   tile_begin.resize(tiles + 1);
   tile_groups.resize(tiles);
   tile_begin[0] = 0;
@@ -195,7 +200,7 @@ Index TileLists::find(std::span<const Extent> extents, const TileGrid& grid, Ind
     tile_begin[tile + 1] = tile_begin[tile] + static_cast<Index>(total & 0xFFFFFFFF);
     tile_groups[tile] = static_cast<Index>(total >> 32);
   }
-  if (part.chunks() > 1 && pairs_ <= most) join(part, sizes);
+  if (part.chunks() > 1) join(part, sizes);
   return pairs_;
 }
 

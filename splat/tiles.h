@@ -150,6 +150,15 @@ inline Extent extent_of(const Conic& conic, double x, double y, double opacity, 
   return extent_within(reach, x, y, grid);
 }
 
+/// Tiles of the box around an extent.
+inline Index tiles_around(const Extent& extent, const TileGrid& grid) {
+  if (extent.row_begin >= extent.row_end) return 0;
+  const int shift = std::countr_zero(static_cast<std::uint32_t>(grid.tile));
+  const Index rows = ((extent.row_end - 1) >> shift) - (extent.row_begin >> shift) + 1;
+  const Index cols = ((extent.col_end * kBlockSide - 1) >> shift) - ((extent.col_begin * kBlockSide) >> shift) + 1;
+  return rows * cols;
+}
+
 // --- order -----------------------------------------------------------------------------------------------------------
 
 /// Bits whose order as whole numbers is that of the depths (row B9: all signs, −0 as 0).
@@ -318,11 +327,12 @@ class TileLists {
   Index tile_of(Index slot) const { return pair_at(slot).tile; }
 
   /// Finds the pairs of all Gaussians: slots, tile_begin, tile_groups. Parallel; the result depends on the arguments
-  /// alone. Keeps `most` pairs or somewhat more; a caller who is told of more must not go on. Returns the number of
-  /// pairs. Throws as total_pairs.
+  /// alone. Returns the number of pairs; if there are more than `most`, none is kept, no memory is taken for them (row
+  /// B10), and the caller must not go on. Throws as total_pairs.
   ///
   /// @param extents  [N] in the order of the rows; empty ones of rows that are not drawn
-  Index find(std::span<const Extent> extents, const TileGrid& grid, Index most);
+  /// @param bound    the sum of their tiles_around: where it is above `most`, pairs are counted before any is kept
+  Index find(std::span<const Extent> extents, const TileGrid& grid, Index most, Index bound);
   /// Fills entries, after find.
   ///
   /// @param order  every row whose extent is not empty, in depth order

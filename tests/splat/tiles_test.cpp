@@ -324,10 +324,14 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
       groups[static_cast<std::size_t>(tile)] += std::popcount(blocks);
     });
   }
-  for (const int threads : {1, 2, 8}) {
+  Index bound = 0;
+  for (const Extent& extent : extents) bound += tiles_around(extent, grid);
+  REQUIRE(bound > slot);
+  for (const auto& [threads, most] :
+       {std::pair(1, bound), {2, bound}, {8, bound}, {1, Index(slot)}, {8, Index(slot)}}) {
     TileLists lists;
     with_threads(threads, [&] {
-      CHECK(lists.find(extents, grid, 1 << 30) == slot);
+      CHECK(lists.find(extents, grid, most, bound) == slot);
       lists.deal(order, grid, 0);
     });
     REQUIRE(lists.pairs() == slot);
@@ -347,5 +351,9 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
     for (Index n = 0; n < 5000; n += 7) CHECK(lists.slots[n].begin == lists.slots[n].end);
   }
   TileLists lists;
-  CHECK(lists.find(extents, grid, 10) == slot);  // counted, though not kept
+  CHECK(lists.find(extents, grid, slot - 1, bound) == slot);  // counted, though not kept
+  TileLists none;
+  none.find({}, grid, 0, 0);
+  const Index pair_bytes = lists.capacity_bytes() - none.capacity_bytes() - std::ssize(extents) * 8;
+  CHECK(pair_bytes < 10000);  // no memory is taken for them [B10]
 }
