@@ -15,6 +15,7 @@
 #include "core/stopwatch.h"
 #include "splat/block_kernel.h"
 #include "splat/composite_kernel.h"
+#include "splat/pixel_step.h"
 #include "splat/slot_sums.h"
 #include "splat/tile_image.h"
 #include "splat/tile_plans.h"
@@ -175,9 +176,7 @@ struct Composite {
     return {in_blocks(io), in_blocks(io) && view.skip.static_layer};
   }
   /// True: the block kernel; else the plain one.
-  static bool in_blocks(const NodeIo<S>& io) {
-    return std::is_same_v<S, float> && io.in(kFeatures).shape.cols <= detail::kMostBlockChannels;
-  }
+  static bool in_blocks(const NodeIo<S>& io) { return detail::composites_in_blocks<S>(channels_of(io)); }
 
   template <class Job>
   static void place_job(const TileGrid& tiles, Index tile, Job& job) {
@@ -539,25 +538,6 @@ struct Composite {
 
   // --- the rest ------------------------------------------------------------------------------------------------------
 
-  /// α of a Gaussian at a pixel of a tile, by the kernel in use.
-  detail::PixelAlpha<S> pixel_alpha(const NodeIo<S>& io, const TileJob<S>& place, const SplatRecord<S>& record, Index r,
-                                    Index c) const {
-    const CompositeRules<S> rules = detail::composite_rules<S>(view.settings);
-    if constexpr (std::is_same_v<S, float>) {
-      if (in_blocks(io))
-        return detail::block_pixel_alpha(view.settings.tile, record, rules, place.left, place.top, r, c);
-    }
-    return detail::pixel_alpha(record, rules, place, r, c);
-  }
-
-  /// T behind a Gaussian, by the kernel in use.
-  static S behind(const NodeIo<S>& io, S transmittance, S alpha) {
-    if constexpr (std::is_same_v<S, float>) {
-      if (in_blocks(io)) return detail::block_transmittance(transmittance, alpha);
-    }
-    return transmittance * (1 - alpha);
-  }
-
   /// Order, lists, and for each (pixel, Gaussian) pair whether it is composited, stops with it, or is held by the cap.
   void add_signature(Signature& signature, NodeIo<S>& io) {
     const TileGrid tiles = grid();
@@ -577,9 +557,8 @@ struct Composite {
         for (std::size_t at = 0; at < entries.size() && t >= rules.stop_below; ++at) {
           const SplatRecord<S>& record = records[entries[at].index];
           if (place.top + r < record.row_begin || place.top + r >= record.row_end) continue;
-          const auto pixel = pixel_alpha(io, place, record, r, c);
+          const auto [pixel, next] = detail::pixel_of(in_blocks(io), tiles.tile, record, rules, place, r, c, t);
           if (!pixel.drawn) continue;
-          const S next = behind(io, t, pixel.alpha);
           if (rules.exclusive && next < rules.stop_below) break;
           t = next;
           signature.add(at * 2 + (pixel.capped ? 1 : 0));

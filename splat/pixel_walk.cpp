@@ -1,10 +1,8 @@
 #include "splat/pixel_walk.h"
 
 #include <algorithm>
-#include <type_traits>
 
-#include "splat/block_kernel.h"
-#include "splat/composite_kernel.h"
+#include "splat/pixel_step.h"
 
 namespace hsi4d::detail {
 
@@ -40,7 +38,7 @@ template <class S>
 PixelWalk<S>::PixelWalk(const SplatArrays<S>& splats, const SplatView& view, std::optional<Index> tile)
     : grid_(tile_grid(view.camera.width, view.camera.height, view.settings.tile)),
       rules_(composite_rules<S>(view.settings)),
-      in_blocks_(std::is_same_v<S, float> && splats.features.shape.cols <= kMostBlockChannels) {
+      in_blocks_(composites_in_blocks<S>(splats.features.shape.cols)) {
   const std::vector<Candidate<S>> all = candidates(splats, view.settings, grid_);
   records_.reserve(all.size());  // the lists point into it
   lists_.resize(static_cast<std::size_t>(grid_.count()));
@@ -57,21 +55,11 @@ PixelWalk<S>::PixelWalk(const SplatArrays<S>& splats, const SplatView& view, std
 template <class S>
 PixelStep<S> PixelWalk<S>::step_at(const RecordOfRow<S>& splat, Index row, Index col, S transmittance) const {
   const Index left = col / grid_.tile * grid_.tile, top = row / grid_.tile * grid_.tile;
-  PixelAlpha<S> pixel{};
-  S behind = 0;
-  if constexpr (std::is_same_v<S, float>) {
-    if (in_blocks_) {
-      pixel = block_pixel_alpha(grid_.tile, splat.record, rules_, left, top, row - top, col - left);
-      behind = block_transmittance(transmittance, pixel.alpha);
-    }
-  }
-  if (!in_blocks_) {
-    TileJob<S> job{};
-    job.left = left;
-    job.top = top;
-    pixel = pixel_alpha(splat.record, rules_, job, row - top, col - left);
-    behind = transmittance * (S(1) - pixel.alpha);
-  }
+  TileJob<S> place{};
+  place.left = left;
+  place.top = top;
+  const auto [pixel, behind] =
+      pixel_of(in_blocks_, grid_.tile, splat.record, rules_, place, row - top, col - left, transmittance);
   const bool stops = pixel.drawn && behind < rules_.stop_below;
   return {&splat.record, splat.row,     pixel.alpha,
           pixel.drawn,   pixel.capped,  pixel.drawn && !(stops && rules_.exclusive),
