@@ -13,13 +13,13 @@
 #include "core/parallel.h"
 #include "core/simd.h"
 #include "core/stopwatch.h"
+#include "core/workspaces.h"
 #include "splat/block_kernel.h"
 #include "splat/composite_kernel.h"
 #include "splat/pixel_step.h"
 #include "splat/slot_sums.h"
 #include "splat/tile_image.h"
 #include "splat/tile_plans.h"
-#include "splat/workspaces.h"
 
 namespace hsi4d {
 
