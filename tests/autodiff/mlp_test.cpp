@@ -297,7 +297,8 @@ TEST_CASE("frozen inputs of mlp are not worked for") {
   CHECK_FALSE(frozen.tape.has_gradient(frozen.in[0]));
   CHECK_FALSE(frozen.tape.has_gradient(frozen.in[4]));
   CHECK(frozen.gradient(2) == r.gradient(2));
-  // What they would take at least: an adjoint for the features, and half of the partial sums of weights in each chunk (the rest is rounding of memory).
+  // What they would take at least: an adjoint for the features, and half of the partial sums of weights in each chunk
+  // (the rest is rounding of memory).
   const Index features = 16 * net.rows * static_cast<Index>(sizeof(float));
   const Index sums = 3 * (19 * 32 + 32 * 32 + 32 * 3) * static_cast<Index>(sizeof(double));
   CHECK(frozen.tape.memory_bytes() <= with_all - features - sums);
