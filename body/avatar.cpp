@@ -123,11 +123,16 @@ void check_sizes(const Avatar& avatar) {
   HSI4D_CHECK_EQ(avatar.joint_names.size(), j);
   const std::string fault = tree_fault(avatar.parents);
   HSI4D_CHECK(fault.empty(), fault);
+  if (!avatar.color_net) return;
+  check_sizes(*avatar.color_net);
+  HSI4D_CHECK_EQ(avatar.color_net->rows, avatar.count());
 }
 
 Avatar avatar_of(const Safetensors& file) {
   file.require_format(kFormat, kAvatarVersion);
-  return avatar_in(file);
+  Avatar avatar = avatar_in(file);
+  avatar.color_net = color_net_of(file, avatar.count(), avatar.joint_count());
+  return avatar;
 }
 
 Avatar decode_avatar(std::span<const std::uint8_t> file, const std::string& name) {
@@ -154,6 +159,7 @@ SafetensorsWriter avatar_file(const Avatar& avatar) {
   file.add<std::int32_t>("parents", {j}, avatar.parents);
   file.add<double>("joints", {j, 3}, avatar.joints);
   file.set_texts("joint_names", avatar.joint_names);
+  if (avatar.color_net) add_color_net(*avatar.color_net, file);
   return file;
 }
 

@@ -186,6 +186,12 @@ void add_color_net(const ColorNet& net, SafetensorsWriter& file) {
                          std::vector<std::int32_t>(net.code_joints.begin(), net.code_joints.end()));
 }
 
+void write_color_net(const std::string& path, const ColorNet& net) {
+  SafetensorsWriter file("hsi4d color net", 1);
+  add_color_net(net, file);
+  file.write(path);
+}
+
 std::optional<ColorNet> color_net_of(const Safetensors& file, Index rows, Index joints) {
   const std::string features = kPrefix + std::string("features");
   if (!file.has(features)) return {};

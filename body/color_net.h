@@ -17,6 +17,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "autodiff/mlp.h"
@@ -106,6 +107,9 @@ Var<S> color_net(const ColorNetVars<S>& net, Var<S> colors, Var<S> code, Var<S> 
 /// Adds the arrays `color_net/features`, `color_net/weightsL`, `color_net/biasL` (F32) and `color_net/code_joints`
 /// (I32) of a network to a file.
 void add_color_net(const ColorNet& net, SafetensorsWriter& file);
+
+/// A file of a color net alone, format "hsi4d color net", in one step. Throws UserError when it cannot be written.
+void write_color_net(const std::string& path, const ColorNet& net);
 
 /// The network of a file, or nothing when it has none. Numbers come back as float32 has them.
 /// @param rows    Gaussians

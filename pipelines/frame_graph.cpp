@@ -10,6 +10,7 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
+#include "splat/camera_center.h"
 
 namespace hsi4d {
 
@@ -29,6 +30,8 @@ constexpr std::array<JointGroup, 7> kJointGroups = {{{"global_orient", 0, 1, "He
                                                      {"left_hand_pose", 25, 15, "15 joints of the left hand"},
                                                      {"right_hand_pose", 40, 15, "15 joints of the right hand"}}};
 constexpr Index kJoints = kSmplxJoints;
+constexpr const char* kColorNet = "color_net";
+constexpr const char* kFeatures = "avatar_features";
 constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_scales", "opacity_logits", "sh"};
 
 template <class S>
@@ -63,6 +66,7 @@ std::vector<std::string> state_group_names(Draw draw) {
   if (draw == Draw::kScene) return names;
   names.insert(names.end(), {"object_orient", "object_transl", "transl"});
   for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
+  names.insert(names.end(), {kColorNet, kFeatures});
   return names;
 }
 
@@ -71,6 +75,8 @@ std::string state_group_summary(const std::string& name) {
   if (name == "object_orient") return "Rotations of the objects";
   if (name == "object_transl") return "Places of the objects";
   if (name == "transl") return "Place of the body";
+  if (name == kColorNet) return "Weights of the network that colours the human, which all frames share";
+  if (name == kFeatures) return "That network's features of each Gaussian, which all frames share";
   for (const JointGroup& joints : kJointGroups) {
     if (name == joints.name) return joints.summary;
   }
@@ -198,7 +204,26 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
     joint_rotations_.push_back(rotation_leaf(joints.name, joints.name, joints.count));
   }
   transl_ = leaf("transl", "transl", 1, 3, nullptr);
-  return {skinned_splats(vars, record_rotations(concat_rows<S>(joint_rotations_)), transl_, avatar), n};
+  const Var<S> rotations = record_rotations(concat_rows<S>(joint_rotations_));
+  if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations, transl_, avatar), n};
+  HSI4D_CHECK_EQ(settings_.color_net->rows, n);
+  const HumanColors<S> colors = record_color_net(*settings_.color_net);
+  return {skinned_splats(vars, rotations, transl_, avatar, &colors), n};
+}
+
+template <class S>
+HumanColors<S> FrameGraph<S>::record_color_net(const ColorNet& net) {
+  color_net_ = color_net_leaves(tape_, net);
+  add_to_group(kFeatures, color_net_.features);
+  for (const MlpLayer<S>& layer : color_net_.layers) {
+    add_to_group(kColorNet, layer.weights);
+    add_to_group(kColorNet, layer.bias);
+  }
+  HumanColors<S> colors{color_net_, net.code_joints, {}, settings_.color_pose_gradient};
+  if (!net.view_direction) return colors;
+  const Var<S> center = camera_center(xi_, view_);
+  colors.camera_center = settings_.color_camera_gradient ? center : stop_gradient(center);
+  return colors;
 }
 
 template <class S>
@@ -311,6 +336,13 @@ void FrameGraph<S>::read_state(const ConfigMap<ParameterGroupSettings>& moved, S
       std::copy_n(axis_angle.data(), 3, state.body.axis_angle.data() + 3 * (kJointGroups[g].first + j));
     }
   }
+}
+
+template <class S>
+void FrameGraph<S>::read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const {
+  if (color_net_.layers.empty()) return;
+  if (find_entry(moved, kColorNet) != nullptr) read_layers(color_net_, net);
+  if (find_entry(moved, kFeatures) != nullptr) read_features(color_net_, net);
 }
 
 template <class S>

@@ -2,7 +2,7 @@
 //
 //   scene       means, quats, log_scales, opacity_logits, sh                                ─┐
 //   object o    the same, moved by [exp(orient) | transl]                                     ├─ render ─ image, masks
-//   human       rotations → kinematic chain → blended transforms → means, axes; colours     ─┘
+//   human       rotations → kinematic chain → blended transforms → means, axes; color net   ─┘
 //
 // Every number that the image depends on is a leaf, frozen unless a stage moves it, so that each can be optimised, and
 // checked, by its group's name.
@@ -30,6 +30,9 @@ struct FrameGraphSettings {
   CameraIncrement increment = CameraIncrement::kCamera;
   Draw draw = Draw::kAll;
   Vector3<double> background = Vector3<double>::Zero();
+  const ColorNet* color_net = nullptr;  ///< of the human's colours, read when the graph is recorded; null: the avatar's
+  bool color_pose_gradient = true;      ///< colours of the net have a gradient in the pose
+  bool color_camera_gradient = false;   ///< and, by the direction of view, in the camera
 };
 
 /// What a frame is compared with.
@@ -63,6 +66,8 @@ class FrameGraph {
   /// Reads the leaves of the groups named in `moved` back into `state`; the rest of it keeps its bits. Rotations come
   /// as axis-angle with angles up to π.
   void read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const;
+  /// Reads features and layers of the color net back, those of them that are named in `moved`.
+  void read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const;
   /// Writes the frame: target, the weight of pixels, centres of the objects' masks. See FrameTargets.
   void set_targets(const FrameTargets& targets);
 
@@ -87,6 +92,7 @@ class FrameGraph {
   Part record_scene(const Clip& clip);
   Part record_object(const ClipObject& object);
   Part record_human(const Avatar& avatar);
+  HumanColors<S> record_color_net(const ColorNet& net);
   Var<S> record_rotations(Var<S> parameters) const;
   void record_render(const std::vector<Part>& parts, std::size_t first_object);
   Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
@@ -104,6 +110,7 @@ class FrameGraph {
   std::vector<Object> objects_;
   Var<S> transl_;
   std::vector<Var<S>> joint_rotations_;  // by kJointGroups
+  ColorNetVars<S> color_net_;            // empty without a color net
   Rendered<S> rendered_;
   LossInputs<S> inputs_;
 };

@@ -4,6 +4,7 @@
 
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
+#include "body/canonical_directions.h"
 #include "body/kinematics.h"
 #include "splat/covariance.h"
 #include "splat/opacity.h"
@@ -22,6 +23,15 @@ Var<S> rigid_rows(Var<S> rotation, Var<S> translation) {
     parts[static_cast<std::size_t>(2 * r + 1)] = slice_cols(translation, r, 1);
   }
   return concat_cols<S>(parts);
+}
+
+template <class S>
+Var<S> net_colors(const HumanColors<S>& colors, Var<S> own, Var<S> rotations, Var<S> blended, Var<S> means) {
+  const auto passed = [&colors](Var<S> var) { return colors.pose_gradient ? var : stop_gradient(var); };
+  Var<S> directions;
+  if (colors.camera_center.tape != nullptr)
+    directions = canonical_directions(passed(blended), passed(means), colors.camera_center);
+  return color_net(colors.net, own, pose_code(passed(rotations), colors.code_joints), directions);
 }
 
 template <class S, class Member>
@@ -50,12 +60,14 @@ SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<
 }
 
 template <class S>
-SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar) {
+SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar,
+                              const HumanColors<S>* colors) {
   const PosedSkeleton<S> skeleton = kinematic_chain(rotations, transl, avatar.parents, avatar.joints);
   const Var<S> blended = blend_transforms(SkinWeights<S>(avatar.weights), skeleton.transforms);
   const Var<S> means = transform_points(blended, human.means);
   return {means, transform_axes(blended, gaussian_axes(human.quats, human.log_scales)),
-          gaussian_opacities(human.opacity_logits), human.colors};
+          gaussian_opacities(human.opacity_logits),
+          colors == nullptr ? human.colors : net_colors(*colors, human.colors, rotations, blended, means)};
 }
 
 template <class S>
@@ -67,7 +79,8 @@ SplatInputs<S> stacked_splats(const std::vector<SplatInputs<S>>& parts) {
 #define HSI4D_INSTANTIATE(S)                                                                              \
   template SplatInputs<S> standing_splats(const GaussianVars<S>&, Var<S>, const SplatView&);              \
   template SplatInputs<S> rigid_splats(const GaussianVars<S>&, Var<S>, Var<S>, Var<S>, const SplatView&); \
-  template SplatInputs<S> skinned_splats(const GaussianVars<S>&, Var<S>, Var<S>, const Avatar&);          \
+  template SplatInputs<S> skinned_splats(const GaussianVars<S>&, Var<S>, Var<S>, const Avatar&,           \
+                                         const HumanColors<S>*);                                          \
   template SplatInputs<S> stacked_splats(const std::vector<SplatInputs<S>>&);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

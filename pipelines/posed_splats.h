@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "body/avatar.h"
+#include "body/color_net.h"
 #include "splat/render.h"
 
 namespace hsi4d {
@@ -32,13 +33,25 @@ template <class S>
 SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<S> transl, Var<S> xi,
                             const SplatView& view);
 
+/// What a human's colours follow beside the avatar's own.
+template <class S>
+struct HumanColors {
+  ColorNetVars<S> net;
+  std::vector<int> code_joints;
+  Var<S> camera_center;       ///< [1,3] metres, world; empty for a network without direction of view
+  bool pose_gradient = true;  ///< colours have a gradient in the pose, and the direction of view in the body
+};
+
 /// A human in a pose: linear blend skinning of rest-pose Gaussians, axes by the blended linear map (row D2).
 /// @param human      the avatar's numbers
 /// @param rotations  [J,9] of the joints
 /// @param transl     [1,3] metres, world
-/// Adjoint: all numbers, rotations, transl.
+/// @param colors     null: the avatar's own
+/// Adjoint: all numbers, rotations, transl, the network's numbers, the camera's centre. Without pose_gradient none
+/// flows through the colours to rotations and transl.
 template <class S>
-SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar);
+SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar,
+                              const HumanColors<S>* colors = nullptr);
 
 /// All rows of several parts, one after the other.
 template <class S>

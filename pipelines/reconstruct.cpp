@@ -115,12 +115,16 @@ std::string checkpoint_identity(const RunConfig& config, const std::vector<LossT
   return to_json(sections_beside_data(config, descriptions_of(losses)));
 }
 
+std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
+  return first_color_net(config.color_net, clip.avatar, config.seed);
+}
+
 /// What is in a checkpoint, if its inputs are still the same.
 RunProgress read_checkpoint(const std::string& file, const std::string& identity, const RunConfig& config,
                             const Clip& clip) {
   RunProgress progress;
   try {
-    progress = load_progress(file, identity, clip, config.stages.size());
+    progress = load_progress(file, identity, clip, config.stages.size(), first_net(config, clip));
   } catch (const DataError& damage) {
     throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
   }
@@ -151,7 +155,8 @@ class Reconstruction {
         observer_(observer),
         identity_(checkpoint_identity(config, losses)),
         clip_(clip),
-        progress_(first_progress(clip_, config.stages.size())),
+        progress_(first_progress(clip_, config.stages.size(), first_net(config, clip))),
+        start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
 
   RunSummary run() {
@@ -202,15 +207,17 @@ class Reconstruction {
     const ClipFrame frame = read_frame(config_.data, clip_, index);
     add_covered(frame, config_.data, progress_.covered);
     SceneState state = start_of(index);
+    ColorState colors = progress_.colors;
     std::vector<SceneState> after;
     for (std::size_t s = 0; s < config_.stages.size(); ++s) {
       if (config_.precision == RunPrecision::kFloat) {
-        run_frame_stage<float>(index, s, frame, state);
+        run_frame_stage<float>(index, s, frame, state, colors);
       } else {
-        run_frame_stage<double>(index, s, frame, state);
+        run_frame_stage<double>(index, s, frame, state, colors);
       }
       after.push_back(state);
     }
+    progress_.colors = std::move(colors);
     write_images(index, frame, state);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
     progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
@@ -218,21 +225,24 @@ class Reconstruction {
     save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
   }
 
-  FrameGraphSettings graph_settings(Draw draw) const {
+  FrameGraphSettings graph_settings(Draw draw, const ColorState& colors) const {
     return {config_.render,
             config_.skip,
             config_.approx,
             config_.rotations,
             config_.camera.increment,
             draw,
-            Vector3<double>(config_.background.data())};
+            Vector3<double>(config_.background.data()),
+            colors.net ? &*colors.net : nullptr,
+            config_.color_net.pose_gradient,
+            config_.color_net.camera_gradient};
   }
 
   template <class S>
-  void run_frame_stage(Index index, std::size_t s, const ClipFrame& frame, SceneState& state) {
+  void run_frame_stage(Index index, std::size_t s, const ClipFrame& frame, SceneState& state, ColorState& colors) {
     const auto& [name, stage] = config_.stages[s];
     Tape<S> tape;
-    FrameGraph<S> graph(tape, clip_, state.camera_from_world, graph_settings(stage.draw));
+    FrameGraph<S> graph(tape, clip_, state.camera_from_world, graph_settings(stage.draw, colors));
     graph.set_state(state);
     const Image weight = complement(progress_.covered);
     graph.set_targets(targets_of(frame, stage, weight));
@@ -241,9 +251,11 @@ class Reconstruction {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
       note(index, s, report, *graph.rendered().counters);
     };
-    const StageResult result = run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(), note_iteration,
-                                            {.name = name + ", frame " + std::to_string(index)});
+    const StageResult result =
+        run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(), note_iteration,
+                     {.name = name + ", frame " + std::to_string(index), .kept = &colors.moments});
     graph.read_state(stage.optimize, state);
+    if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
     StageTotals& totals = progress_.totals[s];
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
@@ -351,22 +363,24 @@ class Reconstruction {
   }
 
   template <class S>
-  Image render_state(const SceneState& state) const {
+  Image render_state(const SceneState& state, const ColorState& colors) const {
     Tape<S> tape;
-    FrameGraph<S> graph(tape, clip_, state.camera_from_world, graph_settings(Draw::kAll));
+    FrameGraph<S> graph(tape, clip_, state.camera_from_world, graph_settings(Draw::kAll, colors));
     graph.set_state(state);
     tape.forward(graph.rendered().image);
     return to_image(tape.value(graph.rendered().image));
   }
-  Image rendered_image(const SceneState& state) const {
-    return config_.precision == RunPrecision::kFloat ? render_state<float>(state) : render_state<double>(state);
+  Image rendered_image(const SceneState& state, const ColorState& colors) const {
+    return config_.precision == RunPrecision::kFloat ? render_state<float>(state, colors)
+                                                     : render_state<double>(state, colors);
   }
 
   /// Writes the images of a frame and notes how far the start's and the result's are from the video's.
   void write_images(Index index, const ClipFrame& frame, const SceneState& state) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
-    const Image image = rendered_image(state), start = rendered_image(baseline_start(index));
+    const Image image = rendered_image(state, progress_.colors),
+                start = rendered_image(baseline_start(index), start_colors_);
     write_image(paths.frame_image(number, "target"), frame.target);
     write_image(paths.frame_image(number, "render"), image);
     write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
@@ -390,6 +404,14 @@ class Reconstruction {
     write_motion(folder_.paths().motion(), {clip_.frame_rate, bodies_of(result)});
     if (!names.empty()) write_object_tracks(folder_.paths().objects(), names, result);
     write_cameras(folder_.paths().cameras(), cameras_of(result, clip_.camera));
+    if (progress_.colors.net && moves_colors()) write_color_net(folder_.paths().color_net(), *progress_.colors.net);
+  }
+
+  bool moves_colors() const {
+    return std::any_of(config_.stages.begin(), config_.stages.end(), [](const auto& entry) {
+      const auto& moved = entry.second.optimize;
+      return find_entry(moved, "color_net") != nullptr || find_entry(moved, "avatar_features") != nullptr;
+    });
   }
 
   RunSummary summarize() const {
@@ -459,6 +481,7 @@ class Reconstruction {
   std::string identity_;  // the text that a checkpoint of this run belongs to
   const Clip& clip_;
   RunProgress progress_;
+  const ColorState start_colors_;
   Progress bar_;
 };
 

@@ -24,7 +24,7 @@ void describe(ConfigFields& f, CameraSettings& s) {
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {
   f.string("name", s.name, "What the run is called in its report");
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed},
-            "Seed of what is random in a run; nothing is so far (a dataset has synthetic.seed)");
+            "Seed of what is random in a run: a new color net (a dataset has synthetic.seed)");
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
             "Threads; 0: one a core. Results do not depend on it");
   f.choice("precision", s.precision, kRunPrecisions, "Type of the numbers that a run computes with");
@@ -34,6 +34,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("camera", s.camera, "How cameras are optimised");
   f.object("data", s.data, "The files that the run reads");
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
+  f.object("color_net", s.color_net, "How the human's colours follow its pose");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
   f.object("render", s.render, "How Gaussians become pixels");
   f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");

@@ -10,6 +10,7 @@
 #include "optim/loss_description.h"
 #include "optim/stage_settings.h"
 #include "pipelines/body_settings.h"
+#include "pipelines/color_net_settings.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
@@ -48,6 +49,7 @@ struct RunConfig {
   CameraSettings camera;
   DataSettings data;
   BodySettings body;
+  ColorNetSettings color_net;
   SyntheticSettings synthetic;
   RenderSettings render;
   RenderSkips skip;

@@ -54,6 +54,7 @@ struct RunPaths {
   std::string motion() const { return member("motion.npz"); }
   std::string objects() const { return member("objects.npz"); }
   std::string cameras() const { return member("cameras.json"); }
+  std::string color_net() const { return member("color_net.safetensors"); }
   std::string report() const { return member("report.html"); }
   std::string frames() const { return member("frames"); }
   std::string checkpoint() const { return member("checkpoint"); }

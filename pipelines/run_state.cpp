@@ -125,13 +125,14 @@ SceneState state_from(const double* numbers, const Clip& clip) {
 
 }  // namespace
 
-RunProgress first_progress(const Clip& clip, std::size_t stages) {
+RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net) {
   RunProgress progress;
   progress.after_stage.assign(stages, {clip.first});
   progress.totals.resize(stages);
   progress.image_errors.resize(1);
   progress.start_errors.resize(1);
   progress.covered = Image(1, clip.camera.height, clip.camera.width);
+  progress.colors = first_color_state(std::move(net));
   return progress;
 }
 
@@ -155,19 +156,21 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
   if (!progress.left_out.empty()) checkpoint.set(kLeftOut, left_out_text(progress.left_out));
+  store_color_state(progress.colors, checkpoint);
   store_errors("image_errors", progress.image_errors, checkpoint);
   store_errors("start_errors", progress.start_errors, checkpoint);
   checkpoint.save(file, text_hash(config));
 }
 
-RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages) {
+RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
+                          std::optional<ColorNet> net) {
   const Checkpoint checkpoint = load_checkpoint(file, text_hash(config));
   const auto expect = [&file](const std::string& name, std::size_t found, std::size_t wanted) {
     if (found == wanted) return;
     throw DataError(file + ": \"" + name + "\" holds " + std::to_string(found) + " numbers, this clip needs " +
                     std::to_string(wanted) + "; the inputs have changed since the run began");
   };
-  RunProgress progress = first_progress(clip, stages);
+  RunProgress progress = first_progress(clip, stages, std::move(net));
   const std::vector<std::int64_t>& frames = checkpoint.integers("frames");
   expect("frames", frames.size(), 1);
   if (frames[0] < 1 || frames[0] > clip.frames()) {
@@ -204,6 +207,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);
   progress.inputs = checkpoint.text("inputs");
+  progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
   progress.left_out = left_out_of(checkpoint, clip, stages);
   progress.image_errors = stored_errors("image_errors", done, checkpoint);
   progress.start_errors = stored_errors("start_errors", done, checkpoint);

@@ -6,6 +6,7 @@
 
 #include "core/image.h"
 #include "pipelines/clip.h"
+#include "pipelines/color_state.h"
 #include "pipelines/run_summary.h"
 #include "pipelines/state.h"
 
@@ -35,6 +36,7 @@ struct RunProgress {
   std::string inputs;                                ///< what was read so far, in the form of input_hashes
   Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
   std::vector<LeftOutInFrame> left_out;              ///< in the order in which it happened
+  ColorState colors;                                 ///< after the last frame done
   double seconds = 0;                                ///< of the frames done
 
   /// Frames done, frame 0 included.
@@ -42,7 +44,8 @@ struct RunProgress {
 };
 
 /// Nothing done but the given frame 0.
-RunProgress first_progress(const Clip& clip, std::size_t stages);
+/// @param net  with which the run begins, if it has one
+RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net = {});
 
 /// Writes the checkpoint of a run, in one step.
 /// @param config  the text to which the checkpoint belongs: the config, without what no result depends on
@@ -50,6 +53,8 @@ void save_progress(const std::string& file, const std::string& config, const Run
 
 /// Reads it back, bit for bit. Throws DataError naming the file when it is damaged, of another config, or of another
 /// clip.
-RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages);
+/// @param net  as of first_progress
+RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
+                          std::optional<ColorNet> net = {});
 
 }  // namespace hsi4d
