@@ -260,7 +260,8 @@ struct MlpOp {
     const Partition part = reduction_partition(io.out().shape.rows, kChunkRows);
     detail::Workspaces workspaces(part.chunks());
     const std::span<S> memory = io.scratch(at.size * workspaces.count());
-    const std::span<double> totals = io.template scratch<double>(sums.count * part.chunks());
+    const std::span<double> totals = io.template scratch<double>(sums.count * std::max<Index>(1, part.chunks()));
+    std::fill_n(totals.data(), sums.count, 0.0);  // without a row there is no chunk
     parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
       const detail::Workspaces::Held held(workspaces);
       S* work = memory.data() + at.size * held.number();
@@ -271,16 +272,20 @@ struct MlpOp {
           output_adjoint(io, net, at, sums, first, count, work);
           block_adjoint(io, net, at, sums, first, count, work);
         }
-        for (Index i = 0; i < sums.count; ++i) {
-          double sum = 0;
-          for (Index lane = 0; lane < net.kernels.lanes; ++lane) {
-            sum += static_cast<double>(work[at.partial + i * net.kernels.lanes + lane]);
-          }
-          totals[static_cast<std::size_t>(i * part.chunks() + chunk)] = sum;
-        }
+        net.kernels.add_lanes(work + at.partial, sums.count, totals.data() + chunk * sums.count);
       });
     });
-    add_sums(io, sums, [&](Index i) { return pairwise_sum(totals.data() + i * part.chunks(), part.chunks()); });
+    add_chunks(totals.data(), part.chunks(), sums.count);
+    add_sums(io, sums, totals.data());
+  }
+
+  /// Adds up the chunks' sums [chunks][count] into the first, pairwise.
+  static void add_chunks(double* sums, Index chunks, Index count) {
+    for (Index apart = 1; apart < chunks; apart *= 2) {
+      for (Index c = 0; c + apart < chunks; c += 2 * apart) {
+        for (Index i = 0; i < count; ++i) sums[c * count + i] += sums[(c + apart) * count + i];
+      }
+    }
   }
 
   /// The network's values for a block once more, and d_z of its output.
@@ -336,42 +341,36 @@ struct MlpOp {
   }
 
   /// Adds the sums over all rows to the gradients of code, weights and biases.
-  template <class F>
-  void add_sums(NodeIo<S>& io, const Sums& sums, const F& total) const {
+  void add_sums(NodeIo<S>& io, const Sums& sums, const double* total) const {
     const auto put = [&io](int input, Index i, double value) {
       S& number = io.d_in(input).data[i];
       number = io.must_assign(input) ? static_cast<S>(value) : number + static_cast<S>(value);
     };
     const Index outputs_1 = width(1), own = width(0) * outputs_1;
-    const std::span<double> g = io.template scratch<double>(outputs_1);
-    for (Index t = 0; t < outputs_1 && sums.bias[0] >= 0; ++t) {
-      g[static_cast<std::size_t>(t)] = total(sums.bias[0] + t);
-    }
+    const double* g = sums.bias[0] < 0 ? nullptr : total + sums.bias[0];
     if (wants(io, code)) {
       const S* w = io.in(weights(0)).data + own;
       for (Index p = 0; p < io.in(code).shape.cols; ++p) {
         double sum = 0;
-        for (Index t = 0; t < outputs_1; ++t)
-          sum += static_cast<double>(w[p * outputs_1 + t]) * g[static_cast<std::size_t>(t)];
+        for (Index t = 0; t < outputs_1; ++t) sum += static_cast<double>(w[p * outputs_1 + t]) * g[t];
         put(code, p, sum);
       }
     }
     for (int l = 0; l < layers; ++l) {
       const auto layer = static_cast<std::size_t>(l);
       if (wants(io, weights(l))) {
-        for (Index i = 0; i < width(l) * width(l + 1); ++i) put(weights(l), i, total(sums.weights[layer] + i));
+        for (Index i = 0; i < width(l) * width(l + 1); ++i) put(weights(l), i, total[sums.weights[layer] + i]);
       }
       if (l == 0 && code >= 0 && wants(io, weights(0))) {
         const ConstArray<S> numbers = io.in(code);
         for (Index p = 0; p < numbers.shape.cols; ++p) {
           for (Index t = 0; t < outputs_1; ++t) {
-            put(weights(0), own + p * outputs_1 + t,
-                static_cast<double>(numbers.data[p]) * g[static_cast<std::size_t>(t)]);
+            put(weights(0), own + p * outputs_1 + t, static_cast<double>(numbers.data[p]) * g[t]);
           }
         }
       }
       if (wants(io, bias(l))) {
-        for (Index t = 0; t < width(l + 1); ++t) put(bias(l), t, total(sums.bias[layer] + t));
+        for (Index t = 0; t < width(l + 1); ++t) put(bias(l), t, total[sums.bias[layer] + t]);
       }
     }
   }

@@ -38,6 +38,8 @@ struct MlpKernels {
   void (*to_weights)(const MlpStep<S>& step, const S* x, const S* d_z, S* partial);
   /// partial [outputs][lanes] += Σ_rows d_z_t, lane by lane.
   void (*to_bias)(const MlpStep<S>& step, const S* d_z, S* partial);
+  /// sums [count], each of the lanes of a number of partial [count][lanes], in double.
+  void (*add_lanes)(const S* partial, Index count, double* sums);
 };
 
 /// The kernels of the best instruction set.

@@ -7,6 +7,7 @@
 
 #include "core/file.h"
 #include "core/simd.h"
+#include "pipelines/bench_color_net.h"
 #include "pipelines/bench_pixel_filter.h"
 #include "pipelines/bench_rasterize.h"
 #include "pipelines/bench_skinning.h"
@@ -88,6 +89,25 @@ std::string json_line(const SkinningMeasurement& m) {
   return line.dump() + "\n";
 }
 
+std::string json_line(const ColorNetMeasurement& m) {
+  nlohmann::ordered_json line = {{"name", m.name},
+                                 {"threads", m.threads},
+                                 {"isa", isa_name(best_isa())},
+                                 {"median_ms", m.median_ms},
+                                 {"min_ms", m.min_ms},
+                                 {"repeats", m.repeats},
+                                 {"gaussians", m.gaussians},
+                                 {"features", m.features},
+                                 {"hidden_width", m.hidden_width},
+                                 {"hidden_layers", m.hidden_layers},
+                                 {"multiply_adds", m.multiply_adds}};
+  if (m.fma_peak_per_s > 0) {
+    line["fma_peak_per_s"] = m.fma_peak_per_s;
+    line["fma_peak_share"] = m.peak_share();
+  }
+  return line.dump() + "\n";
+}
+
 }  // namespace
 
 std::string bench_rasterize_command(const BenchOptions& options) {
@@ -132,6 +152,30 @@ std::string bench_skinning_command(const BenchOptions& options) {
     table += line;
     json += json_line(m);
   });
+  if (!options.json.empty()) write_text_file(options.json, json);
+  return table;
+}
+
+std::string bench_color_net_command(const BenchOptions& options) {
+  std::string json, table;
+  char line[160];
+  std::snprintf(line, sizeof line, "%-36s %10s %10s %9s %6s %6s %10s %7s\n", "", "median ms", "least ms", "gaussians",
+                "width", "layers", "M mul-add", "peak %");
+  table += line;
+  double peak = 0;
+  bench_color_net({options.workloads, options.threads, options.repeats}, [&](const ColorNetMeasurement& m) {
+    std::snprintf(line, sizeof line, "%-36s %10.3f %10.3f %9lld %6lld %6lld %10.1f %7.1f\n", m.name.c_str(),
+                  m.median_ms, m.min_ms, static_cast<long long>(m.gaussians), static_cast<long long>(m.hidden_width),
+                  static_cast<long long>(m.hidden_layers), 1e-6 * m.multiply_adds, 100 * m.peak_share());
+    table += line;
+    json += json_line(m);
+    peak = std::max(peak, m.fma_peak_per_s);
+  });
+  if (peak > 0) {
+    std::snprintf(line, sizeof line, "peak %%: of the %.1f G multiply-adds a second that were measured beside it\n",
+                  1e-9 * peak);
+    table += line;
+  }
   if (!options.json.empty()) write_text_file(options.json, json);
   return table;
 }

@@ -9,7 +9,7 @@ namespace hsi4d::cli {
 struct BenchOptions {
   std::vector<std::string> workloads;  ///< empty: all
   int threads = 1;
-  int repeats = 9;                 ///< of rasterize and skinning
+  int repeats = 9;                 ///< of all but pixel_filter
   std::vector<double> heights_px;  ///< of the figures of pixel_filter; empty: all
   std::string json;                ///< path to write one JSON object a measurement to; empty: none
 };
@@ -19,6 +19,9 @@ std::string bench_rasterize_command(const BenchOptions& options);
 
 /// `hsi4d bench skinning`: returns a table.
 std::string bench_skinning_command(const BenchOptions& options);
+
+/// `hsi4d bench color_net`: returns a table.
+std::string bench_color_net_command(const BenchOptions& options);
 
 /// `hsi4d bench pixel_filter`: returns a table. The workloads are figures.
 std::string bench_pixel_filter_command(const BenchOptions& options);

@@ -183,13 +183,13 @@ struct CommandLine {
     CLI::App* command = app.add_subcommand("bench",
                                            "Measure the speed of the renderer or the body, or the pixel filter: a "
                                            "table, and one JSON object a measurement");
-    command->add_option("TOPIC", topic, "What: rasterize, skinning, pixel_filter")
+    command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter")
         ->required()
-        ->check(CLI::IsMember({"rasterize", "skinning", "pixel_filter"}));
+        ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter"}));
     command->add_option("--workload", bench.workloads, "Only these; default: all");
     command->add_option("--threads", bench.threads, "Threads")->check(CLI::Range(1, 1024));
     command
-        ->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of rasterize and skinning")
+        ->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of all but pixel_filter")
         ->check(CLI::Range(1, 1000));
     command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
         ->check(CLI::Range(8.0, 2048.0));
@@ -197,6 +197,7 @@ struct CommandLine {
     command->callback([this] {
       run = [this] {
         if (topic == "skinning") return bench_skinning_command(bench);
+        if (topic == "color_net") return bench_color_net_command(bench);
         return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);
       };
     });

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <numbers>
 
 #include <catch2/catch.hpp>
@@ -18,6 +19,17 @@ using namespace hsi4d;
 using test::small_clip;
 
 namespace {
+
+/// A color net whose every number is something, with a direction of view.
+ColorNet some_color_net(const Avatar& avatar) {
+  ColorNet net = new_color_net(avatar.means, avatar.joint_count(), {4, 6, 2, true, 1});
+  RandomSequence random(21);
+  for (ColorNet::Layer& layer : net.layers) {
+    for (double& w : layer.weights) w = random.uniform(-0.5, 0.5);
+    for (double& b : layer.bias) b = random.uniform(-0.5, 0.5);
+  }
+  return net;
+}
 
 /// Settings without cuts, so that differences of the loss are smooth.
 FrameGraphSettings smooth_settings(RotationParameters rotations) {
@@ -85,8 +97,12 @@ TEST_CASE("the gradient of the whole chain is right for every parameter", "[fram
   clip.avatar = test::avatar_of_every_joint(clip.avatar, 2);
   CHECK(clip.avatar.count() > kSmplxJoints);
   CHECK(clip.avatar.count() <= 2 * kSmplxJoints);
+  const ColorNet net = some_color_net(clip.avatar);
+  FrameGraphSettings settings = smooth_settings(rotations);
+  settings.color_net = &net;
+  settings.color_camera_gradient = true;
   Tape<double> tape;
-  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(rotations));
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);
   graph.set_state(clip.first);
   const Image image = random_image(3, 14, 16, 3), weight = random_image(1, 14, 16, 4);
   graph.set_targets(targets_for(image, weight));
@@ -203,7 +219,10 @@ TEST_CASE("a state survives being written to the leaves and read back", "[frame_
 TEST_CASE("image, loss and every gradient have the same bits for any number of threads", "[frame_graph][parallel]") {
   const Clip clip = small_clip(72, 60, 1800, 1300);  // several chunks (512 rows) of scene, body and all together
   Tape<float> tape;
+  const ColorNet net = some_color_net(clip.avatar);
   FrameGraphSettings settings;
+  settings.color_net = &net;
+  settings.color_camera_gradient = true;
   FrameGraph<float> graph(tape, clip, clip.first.camera_from_world, settings);
   graph.set_state(clip.first);
   const Image image = random_image(3, 60, 72, 3), weight = random_image(1, 60, 72, 4);
@@ -240,6 +259,49 @@ TEST_CASE("image, loss and every gradient have the same bits for any number of t
     REQUIRE(numbers.size() == expected.size());
     CHECK(std::memcmp(expected.data(), numbers.data(), numbers.size() * sizeof(float)) == 0);
   }
+}
+
+TEST_CASE("gradients through the human's colours are stopped where the settings say so", "[frame_graph]") {
+  const Clip clip = small_clip(24, 20, 300);
+  const ColorNet net = some_color_net(clip.avatar);
+  const Image image = random_image(3, 20, 24, 3), weight = random_image(1, 20, 24, 4);
+  const auto gradients = [&](const ColorNet* of, bool pose, bool camera) {
+    FrameGraphSettings settings;
+    settings.color_net = of;
+    settings.color_pose_gradient = pose;
+    settings.color_camera_gradient = camera;
+    Tape<double> tape;
+    FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);
+    graph.set_state(clip.first);
+    graph.set_targets(targets_for(image, weight));
+    const Var<double> loss = loss_of(graph);
+    std::map<std::string, std::vector<double>> result;
+    for (const ParameterGroup<double>& group : graph.groups()) {
+      for (const Var<double> block : group.blocks) tape.unfreeze(block);
+    }
+    tape.forward(loss);
+    tape.backward(loss);
+    for (const ParameterGroup<double>& group : graph.groups()) {
+      for (const Var<double> block : group.blocks) {
+        const ConstArray<double> g = tape.gradient(block);
+        auto& numbers = result[group.name];
+        numbers.insert(numbers.end(), g.data, g.data + g.shape.count());
+      }
+    }
+    return result;
+  };
+  auto none = gradients(&net, false, false), pose = gradients(&net, true, false), camera = gradients(&net, false, true),
+       both = gradients(&net, true, true);
+  CHECK(none["camera"] == pose["camera"]);
+  CHECK(camera["camera"] == both["camera"]);
+  CHECK(none["camera"] != camera["camera"]);
+  CHECK(none["body_pose"] == camera["body_pose"]);
+  CHECK(pose["body_pose"] == both["body_pose"]);
+  CHECK(none["body_pose"] != pose["body_pose"]);
+  CHECK(none["transl"] != pose["transl"]);  // by the direction of view
+  for (const char* same : {"color_net", "avatar_features", "human_colors", "scene_sh"}) CHECK(none[same] == both[same]);
+  CHECK_FALSE(none["color_net"].empty());
+  CHECK(gradients(nullptr, true, true)["color_net"].empty());
 }
 
 TEST_CASE("increments of a camera act in the frame that they name", "[frame_graph]") {

@@ -55,6 +55,15 @@ class TinyDataset {
     static const TinyDataset dataset;
     return dataset.folder_;
   }
+  static SyntheticSettings settings() {
+    SyntheticSettings settings;
+    settings.frames = kTinyFrames;
+    settings.size_px = kTinyPixels;
+    settings.scene_gaussians = 1500;
+    settings.avatar_gaussians = 500;
+    settings.object_gaussians = 150;
+    return settings;
+  }
 
  private:
   TinyDataset() {
@@ -62,16 +71,10 @@ class TinyDataset {
     if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder can be made");
     base_ = pattern;
     folder_ = base_ / "data";
-    SyntheticSettings settings;
-    settings.frames = kTinyFrames;
-    settings.size_px = kTinyPixels;
-    settings.scene_gaussians = 1500;
-    settings.avatar_gaussians = 500;
-    settings.object_gaussians = 150;
     ConfigProblems problems;
     const ConfigValue stages = load_config_text(kTinyStages, "tiny.json", base_, {}, problems);
     problems.throw_if_any();
-    write_dataset(settings, video_render_settings(), folder_, {}, stages);
+    write_dataset(settings(), video_render_settings(), folder_, {}, stages);
   }
   ~TinyDataset() {
     std::error_code error;

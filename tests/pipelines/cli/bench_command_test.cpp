@@ -102,6 +102,45 @@ TEST_CASE("bench skinning measures a body and writes one object a measurement") 
                     "fixed_hands_floats, no_correctives; did you mean \"fixed_hands\"?");
 }
 
+TEST_CASE("bench color_net measures forward and backward and writes one object a measurement") {
+  const TemporaryFolder folder;
+  cli::BenchOptions options;
+  options.workloads = {"narrow", "view_direction"};
+  options.repeats = 2;
+  options.json = folder / "m.json";
+  const std::string table = cli::bench_color_net_command(options);
+  std::istringstream lines(read_text_file(options.json));
+  std::vector<std::string> names;
+  for (std::string line; std::getline(lines, line);) {
+    const auto m = nlohmann::json::parse(line);
+    names.push_back(m.at("name"));
+    INFO(names.back());
+    CHECK(table.find(names.back()) != std::string::npos);
+    CHECK(m.at("gaussians") == 50000);
+    CHECK(m.at("features") == 16);
+    CHECK(m.at("repeats") == 2);
+    CHECK(m.at("median_ms") >= m.at("min_ms"));
+    const bool narrow = names.back().find("narrow") != std::string::npos;
+    const double width = m.at("hidden_width"), inputs = narrow ? 16 : 19;
+    CHECK(width == (narrow ? 16 : 32));
+    const double once = 50000 * (inputs * width + width * width + 3 * width);
+    const double pose = 3 * once - 50000 * width * 16;  // nothing goes back to the features
+    const double expected = names.back().ends_with("forward") ? once : names.back().ends_with("both") ? 4 * once : pose;
+    CHECK(m.at("multiply_adds").get<double>() == expected);
+    if (!m.contains("fma_peak_share")) continue;
+    const double rate = expected / (1e-3 * m.at("min_ms").get<double>());
+    CHECK(m.at("fma_peak_share").get<double>() == Approx(rate / m.at("fma_peak_per_s").get<double>()));
+  }
+  CHECK(names == std::vector<std::string>{"color_net/view_direction/forward", "color_net/view_direction/both",
+                                          "color_net/view_direction/pose", "color_net/narrow/forward",
+                                          "color_net/narrow/both", "color_net/narrow/pose"});
+  options.workloads = {"wid"};
+  CHECK_THROWS_WITH(
+      cli::bench_color_net_command(options),
+      "hsi4d bench color_net: no workload \"wid\"; known: default, view_direction, narrow, wide, deep; did "
+      "you mean \"wide\"?");
+}
+
 TEST_CASE("bench pixel_filter judges every filter at a height and writes one object a measurement", "[full]") {
   const TemporaryFolder folder;
   cli::BenchOptions options;

@@ -101,7 +101,7 @@ TEST_CASE("check refuses stages whose groups are not known, do not exist in what
     "none": {"iterations": 5, "optimize": {}}}})");
   const std::string groups =
       "camera, object_orient, object_transl, transl, global_orient, body_pose, jaw_pose, leye_pose, reye_pose, "
-      "left_hand_pose, right_hand_pose";
+      "left_hand_pose, right_hand_pose, color_net, avatar_features";
   const ProgramResult result = run_hsi4d({"check", "a.json"});
   CHECK(result.status == 2);
   CHECK(result.out.empty());
