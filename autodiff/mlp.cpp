@@ -228,10 +228,10 @@ struct MlpOp {
 
   /// Where the parts of the adjoint's workspace lie.
   struct Layout {
-    Index x, z, d_z, d_y, partial, size;
+    Index x, z, d_z, d_y, sums, size;
     std::array<Index, kMostMlpLayers> y, slope;
   };
-  Layout layout(const Sums& sums, Index lanes) const {
+  Layout layout(const Sums& sums) const {
     Layout at{};
     const auto take = [&at](Index count) {
       const Index begin = at.size;
@@ -246,7 +246,7 @@ struct MlpOp {
     at.z = take(outputs() * kMlpBlock);
     at.d_z = take(widest() * kMlpBlock);
     at.d_y = take(widest() * kMlpBlock);
-    at.partial = take(sums.count * lanes);
+    at.sums = take(sums.count);
     return at;
   }
 
@@ -256,7 +256,7 @@ struct MlpOp {
   void backward(NodeIo<S>& io) {
     const Sums sums = wanted_sums(io);
     const Network net = network(io, io.scratch(width(1)));
-    const Layout at = layout(sums, net.kernels.lanes);
+    const Layout at = layout(sums);
     const Partition part = reduction_partition(io.out().shape.rows, kChunkRows);
     detail::Workspaces workspaces(part.chunks());
     const std::span<S> memory = io.scratch(at.size * workspaces.count());
@@ -266,13 +266,13 @@ struct MlpOp {
       const detail::Workspaces::Held held(workspaces);
       S* work = memory.data() + at.size * held.number();
       on_best_isa([&] {
-        std::fill_n(work + at.partial, sums.count * net.kernels.lanes, S(0));
+        std::fill_n(work + at.sums, sums.count, S(0));
         for (Index first = begin; first < end; first += kMlpBlock) {
           const Index count = std::min(kMlpBlock, end - first);
           output_adjoint(io, net, at, sums, first, count, work);
           block_adjoint(io, net, at, sums, first, count, work);
         }
-        net.kernels.add_lanes(work + at.partial, sums.count, totals.data() + chunk * sums.count);
+        std::copy_n(work + at.sums, sums.count, totals.data() + chunk * sums.count);
       });
     });
     add_chunks(totals.data(), part.chunks(), sums.count);
@@ -314,13 +314,13 @@ struct MlpOp {
   void block_adjoint(NodeIo<S>& io, const Network& net, const Layout& at, const Sums& sums, Index first, Index count,
                      S* work) const {
     const MlpKernels<S>& kernels = net.kernels;
-    S *d_z = work + at.d_z, *d_y = work + at.d_y, *partial = work + at.partial;
+    S *d_z = work + at.d_z, *d_y = work + at.d_y, *of_rows = work + at.sums;
     for (int l = layers - 1; l >= sums.first_layer; --l) {
       const auto layer = static_cast<std::size_t>(l);
       const MlpStep<S>& step = net.steps[layer];
       const S* x = l == 0 ? work + at.x : work + at.y[layer - 1];
-      if (sums.weights[layer] >= 0) kernels.to_weights(step, x, d_z, partial + sums.weights[layer] * kernels.lanes);
-      if (sums.bias[layer] >= 0) kernels.to_bias(step, d_z, partial + sums.bias[layer] * kernels.lanes);
+      if (sums.weights[layer] >= 0) kernels.to_weights(step, x, d_z, of_rows + sums.weights[layer]);
+      if (sums.bias[layer] >= 0) kernels.to_bias(step, d_z, of_rows + sums.bias[layer]);
       if (l == sums.first_layer) break;
       kernels.to_inputs(step, d_z, work + at.slope[layer - 1], d_y);
       std::swap(d_z, d_y);

@@ -10,8 +10,8 @@
 // exponential (docs/numerics.md says what that is worth).
 //
 // The code meets its rows of W_1 once per evaluation, not once a row. Hidden values are not kept from forward to
-// backward but made again, block by block, in the first- and second-level cache. Sums over rows are taken lane by lane
-// in S within a chunk of rows, whose results are added up in double, pairwise.
+// backward but made again, block by block, in the first- and second-level cache. Sums over rows are taken in S within a
+// chunk of them, lane by lane in a block of 192 and then block by block; the chunks' are added up in double, pairwise.
 #pragma once
 
 #include <span>

@@ -32,19 +32,19 @@ inline constexpr int kWide = 3;
 inline constexpr int kTall = HWY_TARGET <= HWY_AVX3 ? 8 : 4;  // lower targets are better
 static_assert(kMlpBlock % (kWide * kMlpLanes) == 0);
 
-/// 1/√s for s ≥ 1, within 2 ulp. In float a first guess from the bits [Lomont 2003, "Fast inverse square root"] and
-/// three steps of Newton's method: no division, no root, and none of the processor's own estimates, which differ from
-/// maker to maker.
+/// 1/√s for s ≥ 1. In float within 8e-7: a first guess from the bits and two steps of Newton's method whose constants
+/// balance the error [Walczyk, Moroz and Cieśliński 2021, "Improving the accuracy of the fast inverse square root by
+/// modifying Newton-Raphson corrections"]; no division, no root, and none of the processor's own estimates, which
+/// differ from maker to maker.
 template <class S>
 HWY_INLINE Vec<S> inverse_root(Vec<S> s) {
   const Tag<S> d;
   if constexpr (std::is_same_v<S, float>) {
     const hn::RebindToUnsigned<Tag<S>> bits;
-    const auto half = hn::Mul(s, hn::Set(d, 0.5F)), three_halves = hn::Set(d, 1.5F);
-    auto r = hn::BitCast(d, hn::Sub(hn::Set(bits, 0x5F3759DFu), hn::ShiftRight<1>(hn::BitCast(bits, s))));
-    r = hn::Mul(r, hn::NegMulAdd(hn::Mul(half, r), r, three_halves));
-    r = hn::Mul(r, hn::NegMulAdd(hn::Mul(half, r), r, three_halves));
-    return hn::Mul(r, hn::NegMulAdd(hn::Mul(half, r), r, three_halves));
+    const auto half = hn::Mul(s, hn::Set(d, 0.5F));
+    auto r = hn::BitCast(d, hn::Sub(hn::Set(bits, 0x5F376908u), hn::ShiftRight<1>(hn::BitCast(bits, s))));
+    r = hn::Mul(r, hn::NegMulAdd(hn::Mul(half, r), r, hn::Set(d, 1.50087896F)));
+    return hn::Mul(r, hn::NegMulAdd(hn::Mul(half, r), r, hn::Set(d, 1.50000057F)));
   } else {
     return hn::Div(hn::Set(d, S(1)), hn::Sqrt(s));
   }
@@ -166,17 +166,54 @@ void to_inputs(const MlpStep<S>& step, const S* d_z, const S* slope, S* d_x) {
   });
 }
 
+/// Sums of neighbouring lanes: those of a, then those of b.
+template <class S>
+HWY_INLINE Vec<S> sums_of_pairs(Vec<S> a, Vec<S> b) {
+#if HWY_TARGET == HWY_SCALAR
+  return hn::Add(a, b);  // one lane has no neighbours; never called
+#else
+  const Tag<S> d;
+  return hn::Add(hn::ConcatEven(d, b, a), hn::ConcatOdd(d, b, a));
+#endif
+}
+
+/// sums[t] += Σ of the lanes of x[t], for kT vectors together: half the vectors, or half the lanes, at each step.
+template <class S, int kT>
+HWY_INLINE void add_sums_of_lanes(Vec<S> (&x)[kT], S* sums) {
+  const Tag<S> d;
+  if constexpr (kLanes < S >> 1 && kT <= kLanes<S>) {
+#pragma GCC unroll 3
+    for (int left = kT / 2; left > 0; left /= 2) {
+#pragma GCC unroll 4
+      for (int t = 0; t < left; ++t) x[t] = sums_of_pairs<S>(x[2 * t], x[2 * t + 1]);
+    }
+#pragma GCC unroll 4
+    for (Index lanes = kLanes<S> / kT; lanes > 1; lanes /= 2) x[0] = sums_of_pairs<S>(x[0], x[0]);
+    const hn::CappedTag<S, kT> few;
+    using Few = hn::Vec<decltype(few)>;
+    S folded[kLanes<S>];
+    hn::StoreU(x[0], d, folded);
+    if constexpr (hn::MaxLanes(few) == kT) {
+      const Few all = hn::Add(hn::LoadU(few, sums), hn::LoadU(few, folded));
+      hn::StoreU(all, few, sums);
+    } else {
+      for (int t = 0; t < kT; ++t) sums[t] += folded[t];
+    }
+  } else {
+    for (int t = 0; t < kT; ++t) sums[t] += hn::GetLane(hn::SumOfLanes(d, x[t]));
+  }
+}
+
 /// Sums over the block's rows of kT outputs by kI inputs.
 template <class S, int kT, int kI>
 HWY_NOINLINE void weights_tile(const MlpStep<S>& step, Index output, Index input, const S* HWY_RESTRICT x,
-                               const S* HWY_RESTRICT d_z, S* HWY_RESTRICT partial) {
+                               const S* HWY_RESTRICT d_z, S* HWY_RESTRICT sums) {
   const Tag<S> d;
   Vec<S> sum[kI][kT];
 #pragma GCC unroll 3
   for (int i = 0; i < kI; ++i) {
 #pragma GCC unroll 8
-    for (int t = 0; t < kT; ++t)
-      sum[i][t] = hn::LoadU(d, partial + ((input + i) * step.outputs + output + t) * kLanes<S>);
+    for (int t = 0; t < kT; ++t) sum[i][t] = hn::Zero(d);
   }
   for (Index at = 0; at < kMlpBlock; at += kLanes<S>) {
     Vec<S> row[kI];
@@ -190,55 +227,38 @@ HWY_NOINLINE void weights_tile(const MlpStep<S>& step, Index output, Index input
     }
   }
 #pragma GCC unroll 3
-  for (int i = 0; i < kI; ++i) {
-#pragma GCC unroll 8
-    for (int t = 0; t < kT; ++t)
-      hn::StoreU(sum[i][t], d, partial + ((input + i) * step.outputs + output + t) * kLanes<S>);
-  }
+  for (int i = 0; i < kI; ++i) add_sums_of_lanes<S, kT>(sum[i], sums + (input + i) * step.outputs + output);
 }
 
 template <class S>
-void to_weights(const MlpStep<S>& step, const S* x, const S* d_z, S* partial) {
+void to_weights(const MlpStep<S>& step, const S* x, const S* d_z, S* sums) {
   for_tiles<kTall>(0, step.outputs, [&](auto tall, Index output) {
     constexpr int kT = decltype(tall)::value;
     Index input = 0;
-    for (; input + kWide <= step.inputs; input += kWide)
-      weights_tile<S, kT, kWide>(step, output, input, x, d_z, partial);
-    for (; input < step.inputs; ++input) weights_tile<S, kT, 1>(step, output, input, x, d_z, partial);
+    for (; input + kWide <= step.inputs; input += kWide) weights_tile<S, kT, kWide>(step, output, input, x, d_z, sums);
+    for (; input < step.inputs; ++input) weights_tile<S, kT, 1>(step, output, input, x, d_z, sums);
   });
 }
 
 template <class S>
-void to_bias(const MlpStep<S>& step, const S* d_z, S* partial) {
+void to_bias(const MlpStep<S>& step, const S* d_z, S* sums) {
   const Tag<S> d;
-  for (Index t = 0; t < step.outputs; ++t) {
-    Vec<S> even = hn::LoadU(d, partial + t * kLanes<S>), odd = hn::Zero(d);
-    const S* line = d_z + t * kMlpBlock;
-    for (Index at = 0; at < kMlpBlock; at += 2 * kLanes<S>) {
-      even = hn::Add(even, hn::LoadU(d, line + at));
-      odd = hn::Add(odd, hn::LoadU(d, line + at + kLanes<S>));
+  for_tiles<kTall>(0, step.outputs, [&](auto tall, Index output) {
+    constexpr int kT = decltype(tall)::value;
+    Vec<S> sum[kT];
+#pragma GCC unroll 8
+    for (int t = 0; t < kT; ++t) sum[t] = hn::Zero(d);
+    for (Index at = 0; at < kMlpBlock; at += kLanes<S>) {
+#pragma GCC unroll 8
+      for (int t = 0; t < kT; ++t) sum[t] = hn::Add(sum[t], hn::LoadU(d, d_z + (output + t) * kMlpBlock + at));
     }
-    hn::StoreU(hn::Add(even, odd), d, partial + t * kLanes<S>);
-  }
-}
-
-/// Halves onto each other: four independent sums at a time, where one after the other would wait for each addition.
-template <class S>
-void add_lanes(const S* partial, Index count, double* sums) {
-  for (Index i = 0; i < count; ++i) {
-    double lane[kLanes<S>];
-    for (Index l = 0; l < kLanes<S>; ++l) lane[l] = static_cast<double>(partial[i * kLanes<S> + l]);
-    for (Index half = kLanes<S> / 2; half > 0; half /= 2) {
-      for (Index l = 0; l < half; ++l) lane[l] += lane[l + half];
-    }
-    sums[i] = lane[0];
-  }
+    add_sums_of_lanes<S, kT>(sum, sums + output);
+  });
 }
 
 template <class S>
 void set(MlpKernels<S>& kernels) {
-  kernels = {kLanes<S>,    linear<S>,     hidden<S>,  hidden_with_slope<S>,
-             to_inputs<S>, to_weights<S>, to_bias<S>, add_lanes<S>};
+  kernels = {linear<S>, hidden<S>, hidden_with_slope<S>, to_inputs<S>, to_weights<S>, to_bias<S>};
 }
 
 }  // namespace

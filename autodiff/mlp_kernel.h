@@ -24,8 +24,6 @@ struct MlpStep {
 /// The kernels of one instruction set. x is [inputs][kMlpBlock]; y, z, slope and d_z are [outputs][kMlpBlock].
 template <class S>
 struct MlpKernels {
-  Index lanes;  ///< of the partial sums
-
   /// z of a layer.
   void (*linear)(const MlpStep<S>& step, const S* x, S* z);
   /// y = a(z), the activation of mlp.h.
@@ -34,12 +32,10 @@ struct MlpKernels {
   void (*hidden_with_slope)(const MlpStep<S>& step, const S* x, S* y, S* slope);
   /// d_x_k = slope_k Σ_t W_kt d_z_t; slope is that of x, null for 1.
   void (*to_inputs)(const MlpStep<S>& step, const S* d_z, const S* slope, S* d_x);
-  /// partial [inputs][outputs][lanes] += Σ_rows x_k d_z_t, lane by lane.
-  void (*to_weights)(const MlpStep<S>& step, const S* x, const S* d_z, S* partial);
-  /// partial [outputs][lanes] += Σ_rows d_z_t, lane by lane.
-  void (*to_bias)(const MlpStep<S>& step, const S* d_z, S* partial);
-  /// sums [count], each of the lanes of a number of partial [count][lanes], in double.
-  void (*add_lanes)(const S* partial, Index count, double* sums);
+  /// sums [inputs, outputs] += Σ_rows x_k d_z_t.
+  void (*to_weights)(const MlpStep<S>& step, const S* x, const S* d_z, S* sums);
+  /// sums [outputs] += Σ_rows d_z_t.
+  void (*to_bias)(const MlpStep<S>& step, const S* d_z, S* sums);
 };
 
 /// The kernels of the best instruction set.
