@@ -2,12 +2,45 @@
 
 #include <algorithm>
 
+#include "autodiff/rotations.h"
+#include "body/canonical_directions.h"
 #include "core/check.h"
 #include "splat/sh.h"
 
 namespace hsi4d {
 
-PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose) {
+namespace {
+
+template <class T>
+Var<double> constant(Tape<double>& tape, const char* name, const std::vector<T>& numbers, Index columns) {
+  const Var<double> var = tape.constant(name, shape_of(static_cast<Index>(numbers.size()) / columns, columns));
+  tape.set(var, std::vector<double>(numbers.begin(), numbers.end()));
+  return var;
+}
+
+/// The color net's colours.
+std::vector<float> net_colors(const Avatar& avatar, const BodyPose& pose, const std::vector<double>& transforms,
+                              const Vector3<double>* center_world) {
+  const ColorNet& net = *avatar.color_net;
+  Tape<double> tape;
+  const Var<double> rotations = rotations_from_axis_angle(constant(tape, "pose", pose.axis_angle, 3));
+  Var<double> directions;
+  if (net.view_direction) {
+    HSI4D_CHECK(center_world != nullptr, "the avatar's color net needs the camera's centre");
+    const Var<double> blended = constant(tape, "transforms", transforms, 12);
+    directions = canonical_directions(
+        blended, transform_points(blended, constant(tape, "means", avatar.means, 3)),
+        constant(tape, "center", std::vector<double>(center_world->data(), center_world->data() + 3), 3));
+  }
+  const Var<double> colors = color_net(color_net_leaves(tape, net), constant(tape, "colors", avatar.colors, 3),
+                                       pose_code(rotations, net.code_joints), directions);
+  tape.forward(colors);
+  return {tape.value(colors).data, tape.value(colors).data + 3 * avatar.count()};
+}
+
+}  // namespace
+
+PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose, const Vector3<double>* center_world) {
   check_sizes(avatar);
   const PosedJoints skeleton = pose_skeleton(avatar, pose);
   PosedGaussians posed;
@@ -16,9 +49,6 @@ PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose) {
   g.quats = avatar.quats;
   g.log_scales = avatar.log_scales;
   g.opacity_logits = avatar.opacity_logits;
-  g.sh.resize(avatar.colors.size());
-  std::transform(avatar.colors.begin(), avatar.colors.end(), g.sh.begin(),
-                 [](float color) { return static_cast<float>((static_cast<double>(color) - 0.5) / kShC0); });
   const SparseWeights& weights = avatar.weights;
   posed.transforms.assign(12 * static_cast<std::size_t>(g.count()), 0.0);
   for (Index i = 0; i < weights.vertices * weights.per_vertex; ++i) {
@@ -26,6 +56,11 @@ PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose) {
     double* blended = posed.transforms.data() + 12 * (i / weights.per_vertex);
     for (int e = 0; e < 12; ++e) blended[e] += weights.weights[static_cast<std::size_t>(i)] * joint[e];
   }
+  const std::vector<float> colors =
+      avatar.color_net ? net_colors(avatar, pose, posed.transforms, center_world) : avatar.colors;
+  g.sh.resize(colors.size());
+  std::transform(colors.begin(), colors.end(), g.sh.begin(),
+                 [](float color) { return static_cast<float>((static_cast<double>(color) - 0.5) / kShC0); });
   return posed;
 }
 

@@ -7,10 +7,11 @@
 namespace hsi4d {
 
 /// The avatar's Gaussians with the blended transform of each, Σ_j w_nj A_j, in double. Colours become harmonics of
-/// degree 0.
+/// degree 0: those of the avatar's color net in this pose, where it has one.
 ///
-/// Throws InternalError when pose and avatar differ in their joints.
-PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose);
+/// @param center_world  the camera's centre, metres, of which only a color net with a direction of view knows
+/// Throws InternalError when pose and avatar differ in their joints, or that centre is needed and null.
+PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose, const Vector3<double>* center_world = nullptr);
 
 /// All rows of `parts`, one part after the other; identity transforms where a part has none and another has some.
 /// Errors as those of concatenated in splat/gaussians.h.

@@ -36,14 +36,14 @@ const T& at_frame(const std::vector<T>& sequence, int frame, const std::string& 
   return sequence[static_cast<std::size_t>(frame)];
 }
 
-PosedGaussians read_body(const RenderOptions& options) {
+PosedGaussians read_body(const RenderOptions& options, const Vector3<double>& center_world) {
   const Motion motion = read_motion(options.motion);
   const Avatar avatar = read_avatar(options.avatar);
   const BodyPose& pose = at_frame(motion.poses, options.frame, options.motion);
   if (pose.joints() != avatar.joint_count())
     throw DataError(options.avatar + ": the avatar has " + std::to_string(avatar.joint_count()) +
                     " joints; the poses of " + options.motion + " have " + std::to_string(pose.joints()));
-  return posed_avatar(avatar, pose);
+  return posed_avatar(avatar, pose, &center_world);
 }
 
 Vector3<double> centroid_world(const Gaussians& gaussians) {
@@ -99,11 +99,11 @@ void add_objects(const RenderOptions& options, Parts& parts) {
 }
 
 /// Scene, objects and body.
-Parts read_all(const RenderOptions& options) {
+Parts read_all(const RenderOptions& options, const Camera& camera) {
   Parts parts;
   parts.add_file(options.shared.scene);
   add_objects(options, parts);
-  if (!options.motion.empty()) parts.add(options.avatar, read_body(options));
+  if (!options.motion.empty()) parts.add(options.avatar, read_body(options, camera_center_world(camera)));
   return parts;
 }
 
@@ -134,7 +134,7 @@ std::string render_command(const RenderOptions& options) {
                 {options.shared.scene, options.shared.camera, options.object_poses, options.motion, options.avatar});
   check_no_input(options.out, "hsi4d render: --out", inputs);
   check_writable(options.out);
-  Parts parts = read_all(options);
+  Parts parts = read_all(options, view.camera);
   const PosedGaussians scene =
       parts.gaussians.size() == 1 ? std::move(parts.gaussians.front()) : concatenated(parts.gaussians);
   const Index count = scene.gaussians.count();

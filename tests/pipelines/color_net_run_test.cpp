@@ -31,10 +31,11 @@ Avatar changed(Avatar avatar, Index t) {
   return avatar;
 }
 
-/// A copy of the tiny dataset whose human changes colour from frame to frame; the avatar's file has those of frame 0.
-void write_changing_dataset(const fs::path& folder) {
-  fs::copy(TinyDataset::folder(), folder, fs::copy_options::recursive);
-  const SyntheticSettings settings = TinyDataset::settings();
+/// A dataset whose human changes colour from frame to frame; the avatar's file has those of frame 0.
+void write_changing_dataset(const fs::path& folder, const SyntheticSettings& settings = TinyDataset::settings()) {
+  ConfigProblems problems;
+  write_dataset(settings, video_render_settings(), folder, {},
+                load_config_text(kTinyStages, "tiny.json", folder.parent_path(), {}, problems));
   const auto seed = static_cast<std::uint64_t>(settings.seed);
   const BodyModel body = rest_body(BodySettings{});
   const SyntheticObject object = synthetic_object(settings.object, settings.object_gaussians, seed);
@@ -93,6 +94,36 @@ TEST_CASE("where the human's appearance changes, a color net beats none", "[run]
                                  << joints_off << " mm without, " << joints_on << " mm with");
   CHECK(psnr_on > psnr_off + 1.5);
   CHECK(joints_on < 1.1 * joints_off);
+}
+
+TEST_CASE("the gain of a color net by learning rate and width", "[full][color_net]") {
+  const TemporaryFolder here;
+  SyntheticSettings settings = TinyDataset::settings();
+  settings.frames = 6;
+  settings.size_px = 128;
+  settings.scene_gaussians = 5000;
+  settings.avatar_gaussians = 3000;
+  settings.object_gaussians = 500;
+  write_changing_dataset("changing", settings);
+  const std::string iterations = "stages.interaction.iterations=300";
+  const RunSummary off = carry_out_tiny(config_of("changing", {iterations}), "off", 2);
+  const double without = last_number(off, "psnr_foreground_db");
+  WARN("without: " << without << " dB, " << last_number(off, "world_mpjpe_mm") << " mm");
+  int count = 0;
+  for (const double lr : {1e-5, 1e-4, 1e-3, 1e-2}) {
+    for (const int width : {16, 32, 64}) {
+      if (width != 32 && lr != 1e-2) continue;
+      RunConfig config = config_of("changing", {"color_net.use=on", iterations});
+      config.color_net.hidden_width = width;
+      move_group(config, "color_net", lr);
+      const RunSummary on = carry_out_tiny(config, "on" + std::to_string(++count), 2);
+      const double with = last_number(on, "psnr_foreground_db");
+      WARN("lr " << lr << ", width " << width << ": " << with << " dB, " << last_number(on, "world_mpjpe_mm") << " mm, "
+                 << on.metrics.back().seconds << " s");
+      CHECK(with > without - 0.05);
+      if (lr >= 1e-3) CHECK(with > without + 1.5);
+    }
+  }
 }
 
 TEST_CASE("a color net moves in the iterations that its group says, and persists from frame to frame",

@@ -47,6 +47,35 @@ Vector3<double> mean_of(const PosedGaussians& posed, std::size_t n) {
 
 }  // namespace
 
+TEST_CASE("a posed avatar has the colours of its color net") {
+  Avatar avatar = two_bones();
+  for (float& color : avatar.colors) color = 0.2F + 0.6F * color;
+  const auto colors_of = [](const PosedGaussians& posed) {
+    std::vector<double> rgb;
+    for (const float sh : posed.gaussians.sh) rgb.push_back(0.5 + static_cast<double>(sh) * 0.28209479177387814);
+    return rgb;
+  };
+  const auto distance = [](const std::vector<double>& a, const std::vector<double>& b) {
+    double most = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::fabs(a[i] - b[i]));
+    return most;
+  };
+  BodyPose bent = rest_pose(2);
+  bent.set_rotation(1, {0, 0, 1});
+  const std::vector<double> own = colors_of(posed_avatar(avatar, bent));
+  avatar.color_net = new_color_net(avatar.means, 2, {4, 8, 1, false, 1});
+  CHECK(distance(colors_of(posed_avatar(avatar, bent)), own) < 1e-6);  // a new one changes nothing
+  for (std::size_t i = 0; i < 24; ++i) avatar.color_net->layers[1].weights[i] = 0.1 * static_cast<double>(i) - 1;
+  const std::vector<double> rest = colors_of(posed_avatar(avatar, rest_pose(2)));
+  CHECK(distance(rest, own) > 0.05);
+  CHECK(distance(colors_of(posed_avatar(avatar, bent)), rest) > 0.01);  // they follow the pose
+  avatar.color_net = new_color_net(avatar.means, 2, {4, 8, 1, true, 1});
+  for (std::size_t i = 0; i < 24; ++i) avatar.color_net->layers[1].weights[i] = 0.1 * static_cast<double>(i) - 1;
+  const Vector3<double> front(0, -3, 0), behind(0, 3, 0);
+  CHECK(distance(colors_of(posed_avatar(avatar, bent, &front)), colors_of(posed_avatar(avatar, bent, &behind))) > 0.01);
+  CHECK_THROWS_AS(posed_avatar(avatar, bent), InternalError);
+}
+
 TEST_CASE("an avatar's Gaussians follow their joints") {
   const Avatar avatar = two_bones();
   BodyPose pose = rest_pose(2);
