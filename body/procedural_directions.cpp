@@ -138,11 +138,9 @@ std::array<double, 45> hand_pose_of(const HandBend& bend, int side) {
       put_turn(turn, side == 1, pose.data() + 9 * f + 3 * bone);
     }
   }
-  // The thumb's base swings below the palm, and its joints bend across it.
-  const auto& thumb = left_fingers()[4].points;
-  const Vector along = direction_of(Vector(thumb[3] - thumb[0])).unit, across(0.35, -0.35, -0.87);
-  const Vector bending = direction_of(Vector(cross(along, across))).unit;
-  const Vector turns[3] = {Vector(0.55, -0.10, -0.30), bending * 0.55, bending * 0.75};
+  // Found by a search: at 1 the thumb lies on the bent index and middle fingers, and goes through neither.
+  const Vector bending(0.505, 0.862, -0.047);
+  const Vector turns[3] = {Vector(0.30, 0.05, -0.30), bending * 0.85, bending * 0.85};
   for (std::size_t bone = 0; bone < 3; ++bone) {
     put_turn(turns[bone] * bend.thumb, side == 1, pose.data() + 36 + 3 * bone);
   }

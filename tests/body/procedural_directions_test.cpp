@@ -198,6 +198,10 @@ TEST_CASE("a closed hand is a fist, and the right hand mirrors the left") {
     CHECK(tip[1] < wrist[1] - 0.01);  // and below it
     CHECK(tip[1] > wrist[1] - 0.05);
   }
+  // The thumb's tip lies on the middle finger: their axes are two radii apart, there or thereabouts.
+  const Vector thumb = finger_tip(closed, 4, 0), middle = finger_tip(closed, 1, 0);
+  CHECK((thumb - middle).norm() < 0.05);
+  CHECK(thumb[1] < middle[1]);
   const auto right = detail::hand_pose_of(detail::kClosedHand, 1);
   for (int finger = 0; finger < 5; ++finger) {
     const Vector l = finger_tip(closed, finger, 0), r = finger_tip(right, finger, 1);
