@@ -26,11 +26,14 @@ Var<S> rigid_rows(Var<S> rotation, Var<S> translation) {
 }
 
 template <class S>
-Var<S> net_colors(const HumanColors<S>& colors, Var<S> own, Var<S> rotations, Var<S> blended, Var<S> means) {
+Var<S> net_colors(const HumanColors<S>& colors, Var<S> own, Var<S> rotations, const Avatar& avatar,
+                  Var<S> joint_transforms, Var<S> means) {
   const auto passed = [&colors](Var<S> var) { return colors.pose_gradient ? var : stop_gradient(var); };
   Var<S> directions;
-  if (colors.camera_center.tape != nullptr)
-    directions = canonical_directions(passed(blended), passed(means), colors.camera_center);
+  if (colors.camera_center.tape != nullptr) {
+    const Var<S> blended = blend_transforms(SkinWeights<S>(avatar.weights), passed(joint_transforms));
+    directions = canonical_directions(blended, passed(means), colors.camera_center);
+  }
   return color_net(colors.net, own, pose_code(passed(rotations), colors.code_joints), directions);
 }
 
@@ -67,7 +70,8 @@ SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Va
   const Var<S> means = transform_points(blended, human.means);
   return {means, transform_axes(blended, gaussian_axes(human.quats, human.log_scales)),
           gaussian_opacities(human.opacity_logits),
-          colors == nullptr ? human.colors : net_colors(*colors, human.colors, rotations, blended, means)};
+          colors == nullptr ? human.colors
+                            : net_colors(*colors, human.colors, rotations, avatar, skeleton.transforms, means)};
 }
 
 template <class S>
