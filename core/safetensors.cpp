@@ -125,14 +125,15 @@ Entry entry_of(const ConfigMember& member, const std::string& label) {
 
 /// The arrays in the order of their bytes, of which there is neither one twice nor one in none.
 void check_layout(std::vector<Entry>& entries, int64_t bytes, const std::string& source) {
-  std::stable_sort(entries.begin(), entries.end(),
-                   [](const Entry& a, const Entry& b) { return std::pair(a.begin, a.end) < std::pair(b.begin, b.end); });
+  std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+    return std::pair(a.begin, a.end) < std::pair(b.begin, b.end);
+  });
   int64_t at = 0;
   for (const Entry& entry : entries) {
     if (entry.begin != at)
-      fail(source + ": array " + named(entry.name),
-           "begins at byte " + std::to_string(entry.begin) + " of the data; it has to begin at " + std::to_string(at) +
-               ", where the array before it ends");
+      fail(source + ": array " + named(entry.name), "begins at byte " + std::to_string(entry.begin) +
+                                                        " of the data; it has to begin at " + std::to_string(at) +
+                                                        ", where the array before it ends");
     at = entry.end;
   }
   if (at != bytes)
@@ -243,9 +244,9 @@ std::vector<std::string> Safetensors::texts(std::string_view key) const {
 int Safetensors::require_format(std::string_view format, int newest) const {
   const auto found = metadata_.find("format");
   if (found == metadata_.end() || found->second != format)
-    fail(source_, (found == metadata_.end() ? "the metadata has no \"format\""
-                                            : "the format is " + named(found->second)) +
-                      "; allowed: " + named(format));
+    fail(source_,
+         (found == metadata_.end() ? "the metadata has no \"format\"" : "the format is " + named(found->second)) +
+             "; allowed: " + named(format));
   const std::string& words = text("version");
   int version = 0;
   const char* end = words.data() + words.size();

@@ -72,8 +72,7 @@ TEST_CASE("a safetensors file has the bytes of the format") {
   SafetensorsWriter writer;
   writer.add<uint16_t>("a", {2}, {1, 513});
   writer.set_text("k", "v");
-  std::string header =
-      R"({"__metadata__": {"k": "v"}, "a": {"dtype": "U16", "shape": [2], "data_offsets": [0, 4]}})";
+  std::string header = R"({"__metadata__": {"k": "v"}, "a": {"dtype": "U16", "shape": [2], "data_offsets": [0, 4]}})";
   header.resize(120, ' ');
   CHECK(writer.encode() == file_of(header, {1, 0, 1, 2}));
   // The numbers of every array lie at a multiple of their size.
@@ -128,10 +127,8 @@ TEST_CASE("faults of safetensors name file and array") {
   };
   CHECK(one("\"F32\"", "[2]", "[0,8]") == "none");
   CHECK(one("1", "[2]", "[0,8]") == "a: array 'x': the dtype is a number, not a string");
-  CHECK(one("\"F32\"", "[-2]", "[0,8]") ==
-        "a: array 'x': the shape is [-2]; allowed: at most 32 lengths from 0 on");
-  CHECK(one("\"F32\"", "[2.0]", "[0,8]") ==
-        "a: array 'x': the shape is [2.0]; allowed: at most 32 lengths from 0 on");
+  CHECK(one("\"F32\"", "[-2]", "[0,8]") == "a: array 'x': the shape is [-2]; allowed: at most 32 lengths from 0 on");
+  CHECK(one("\"F32\"", "[2.0]", "[0,8]") == "a: array 'x': the shape is [2.0]; allowed: at most 32 lengths from 0 on");
   CHECK(one("\"F32\"", "[2]", "[8,0]") ==
         "a: array 'x': the data_offsets are [8, 0]; allowed: two numbers, the second not the smaller");
   CHECK(one("\"F32\"", "[2]", "[0,99999999999999999999]") ==
@@ -149,9 +146,9 @@ TEST_CASE("faults of safetensors name file and array") {
   CHECK(error_of_header("{" + array("x", "\"U8\"", "[5]", "[0,5]") + "," + array("y", "\"U8\"", "[5]", "[3,8]") + "}",
                         8) ==
         "a: array 'y': begins at byte 3 of the data; it has to begin at 5, where the array before it ends");
-  CHECK(error_of_header("{" + array("x", "\"U8\"", "[4]", "[0,4]") + "," + array("x", "\"U8\"", "[4]", "[4,8]") + "}",
-                        8)
-            .starts_with("a:1"));
+  CHECK(
+      error_of_header("{" + array("x", "\"U8\"", "[4]", "[0,4]") + "," + array("x", "\"U8\"", "[4]", "[4,8]") + "}", 8)
+          .starts_with("a:1"));
 }
 
 TEST_CASE("what is absent in safetensors is named") {
@@ -163,9 +160,9 @@ TEST_CASE("what is absent in safetensors is named") {
   CHECK_THROWS_WITH(file.require_format("hsi4d other", 3), "a: the format is 'hsi4d example'; allowed: 'hsi4d other'");
   CHECK_THROWS_WITH(file.require_format("hsi4d example", 2),
                     "a: the format's version is '3'; allowed: 1 to 2 (the file is from a newer program)");
-  CHECK_THROWS_WITH(Safetensors::decode(SafetensorsWriter("hsi4d example", 0).encode(), "a")
-                        .require_format("hsi4d example", 2),
-                    "a: the format's version is '0'; allowed: 1 to 2");
+  CHECK_THROWS_WITH(
+      Safetensors::decode(SafetensorsWriter("hsi4d example", 0).encode(), "a").require_format("hsi4d example", 2),
+      "a: the format's version is '0'; allowed: 1 to 2");
   CHECK_THROWS_WITH(Safetensors::decode(file_of("{}"), "a").require_format("hsi4d other", 3),
                     "a: the metadata has no \"format\"; allowed: 'hsi4d other'");
 }
