@@ -10,7 +10,10 @@ namespace {
 
 constexpr const char* kFormat = "hsi4d avatar";
 
-std::vector<float> finite_numbers(const Npz& file, const char* name, std::initializer_list<int64_t> shape) {
+// Files are Safetensors or, of version 1, Npz.
+
+template <class File>
+std::vector<float> finite_numbers(const File& file, const char* name, std::initializer_list<int64_t> shape) {
   const NpyArray& array = file.array(name);
   std::vector<float> numbers = array.require_shape(shape).as<float>();
   const std::size_t width = shape.size() < 2 ? 1 : static_cast<std::size_t>(*(shape.begin() + 1));
@@ -22,16 +25,26 @@ std::vector<float> finite_numbers(const Npz& file, const char* name, std::initia
   return numbers;
 }
 
-void check_format(const Npz& file) {
+void check_first_format(const Npz& file) {
   if (!file.has("format")) throw DataError(file.source() + ": there is no array 'format'; this is no avatar");
   const std::string format = file.array("format").text();
-  if (format != kFormat) {
+  if (format != kFormat)
     throw DataError(file.source() + ": the format is '" + format + "'; allowed: '" + kFormat + "'");
-  }
   const auto version = file.array("version").scalar<int64_t>();
-  if (version >= 1 && version <= kAvatarVersion) return;
-  throw DataError(file.source() + ": the format's version is " + std::to_string(version) + "; allowed: 1 to " +
-                  std::to_string(kAvatarVersion) + (version > 1 ? " (the file is from a newer program)" : ""));
+  if (version == 1) return;
+  throw DataError(file.source() + ": the format's version is " + std::to_string(version) +
+                  "; allowed in a .npz file: 1");
+}
+
+std::vector<std::string> joint_names_of(const Safetensors& file, Index joints) {
+  std::vector<std::string> names = file.texts("joint_names");
+  if (static_cast<Index>(names.size()) == joints) return names;
+  throw DataError(file.source() + ": metadata 'joint_names' has " + std::to_string(names.size()) + " names; " +
+                  std::to_string(joints) + " are needed, one a joint");
+}
+
+std::vector<std::string> joint_names_of(const Npz& file, Index joints) {
+  return file.array("joint_names").require_shape({joints}).strings();
 }
 
 void check_quaternions(const NpyArray& array, const std::vector<float>& quats) {
@@ -41,7 +54,8 @@ void check_quaternions(const NpyArray& array, const std::vector<float>& quats) {
   }
 }
 
-void read_skeleton(const Npz& file, Avatar& avatar) {
+template <class File>
+void read_skeleton(const File& file, Avatar& avatar) {
   const NpyArray& parents = file.array("parents");
   avatar.parents = parents.require_shape({-1}).as<std::int32_t>();
   const std::string fault = tree_fault(avatar.parents);
@@ -53,10 +67,11 @@ void read_skeleton(const Npz& file, Avatar& avatar) {
     throw DataError(joints.source() + ": row " + std::to_string(i / 3) + ", number " + std::to_string(i % 3) +
                     " is not finite");
   }
-  avatar.joint_names = file.array("joint_names").require_shape({avatar.joint_count()}).strings();
+  avatar.joint_names = joint_names_of(file, avatar.joint_count());
 }
 
-void read_weights(const Npz& file, Index count, Avatar& avatar) {
+template <class File>
+void read_weights(const File& file, Index count, Avatar& avatar) {
   const NpyArray& indices = file.array("weight_indices");
   const int64_t per_gaussian = indices.require_shape({count, -1}).shape()[1];
   if (per_gaussian < 1 || per_gaussian > kMaxWeightsPerVertex) {
@@ -69,8 +84,8 @@ void read_weights(const Npz& file, Index count, Avatar& avatar) {
                                       weights.source());
 }
 
-Avatar avatar_of(const Npz& file) {
-  check_format(file);
+template <class File>
+Avatar avatar_in(const File& file) {
   Avatar avatar;
   avatar.means = finite_numbers(file, "means", {-1, 3});
   const int64_t count = file.array("means").shape()[0];
@@ -110,18 +125,25 @@ void check_sizes(const Avatar& avatar) {
   HSI4D_CHECK(fault.empty(), fault);
 }
 
-Avatar read_avatar(const std::string& path) { return avatar_of(Npz::read(path)); }
-
-Avatar decode_avatar(std::span<const std::uint8_t> file, const std::string& name) {
-  return avatar_of(Npz::decode(file, name));
+Avatar avatar_of(const Safetensors& file) {
+  file.require_format(kFormat, kAvatarVersion);
+  return avatar_in(file);
 }
 
-void write_avatar(const std::string& path, const Avatar& avatar) {
+Avatar decode_avatar(std::span<const std::uint8_t> file, const std::string& name) {
+  const bool is_archive = file.size() > 1 && file[0] == 'P' && file[1] == 'K' && !looks_like_safetensors(file);
+  if (!is_archive) return avatar_of(Safetensors::decode(file, name));
+  const Npz archive = Npz::decode(file, name);
+  check_first_format(archive);
+  return avatar_in(archive);
+}
+
+Avatar read_avatar(const std::string& path) { return decode_avatar(read_file(path), path); }
+
+SafetensorsWriter avatar_file(const Avatar& avatar) {
   check_sizes(avatar);
-  NpzWriter file;
+  SafetensorsWriter file(kFormat, kAvatarVersion);
   const int64_t n = avatar.count(), k = avatar.weights.per_vertex, j = avatar.joint_count();
-  file.add_text("format", kFormat);
-  file.add_scalar<std::int32_t>("version", kAvatarVersion);
   file.add<float>("means", {n, 3}, avatar.means);
   file.add<float>("quats", {n, 4}, avatar.quats);
   file.add<float>("log_scales", {n, 3}, avatar.log_scales);
@@ -131,8 +153,10 @@ void write_avatar(const std::string& path, const Avatar& avatar) {
   file.add<double>("weights", {n, k}, avatar.weights.weights);
   file.add<std::int32_t>("parents", {j}, avatar.parents);
   file.add<double>("joints", {j, 3}, avatar.joints);
-  file.add_texts("joint_names", avatar.joint_names);
-  file.write(path);
+  file.set_texts("joint_names", avatar.joint_names);
+  return file;
 }
+
+void write_avatar(const std::string& path, const Avatar& avatar) { avatar_file(avatar).write(path); }
 
 }  // namespace hsi4d

@@ -9,6 +9,7 @@
 #include "body/body_model.h"
 #include "body/kinematics.h"
 #include "body/skinning.h"
+#include "core/safetensors.h"
 
 namespace hsi4d {
 
@@ -55,11 +56,12 @@ std::vector<double> pose_joints(const Avatar& avatar, const BodyPose& pose);
 void check_sizes(const Avatar& avatar);
 
 /// Version of avatar files that is written; older ones are read, newer ones refused.
-inline constexpr int kAvatarVersion = 1;
+inline constexpr int kAvatarVersion = 2;
 
-/// An avatar's file: a .npz with `format` "hsi4d avatar", `version`, and float32 `means` [N,3], `quats` [N,4],
-/// `log_scales` [N,3], `opacity_logits` [N], `colors` [N,3]; int32 `weight_indices` [N,K] and float64 `weights` [N,K]
-/// (K of 1 to 8); int32 `parents` [J]; float64 `joints` [J,3]; `joint_names` [J].
+/// An avatar's file (docs/avatar.md): safetensors of format "hsi4d avatar", with F32 `means` [N,3], `quats` [N,4],
+/// `log_scales` [N,3], `opacity_logits` [N], `colors` [N,3]; I32 `weight_indices` [N,K] and F64 `weights` [N,K] (K of 1
+/// to 8); I32 `parents` [J]; F64 `joints` [J,3]; and the text `joint_names`. Files of version 1, which are .npz
+/// archives, are read too; the content says which it is, not the ending.
 ///
 /// Weights are normalised (normalized_weights), quaternions are not.
 /// Throws UserError when the file cannot be read; DataError naming file and array: another format or a newer version, a
@@ -71,5 +73,9 @@ Avatar decode_avatar(std::span<const std::uint8_t> file, const std::string& name
 
 /// Writes an avatar's file in one step. Throws UserError when it cannot, InternalError as check_sizes.
 void write_avatar(const std::string& path, const Avatar& avatar);
+
+/// The arrays and texts of an avatar, of a file that may hold more; errors as read_avatar and write_avatar.
+Avatar avatar_of(const Safetensors& file);
+SafetensorsWriter avatar_file(const Avatar& avatar);
 
 }  // namespace hsi4d

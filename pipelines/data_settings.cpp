@@ -11,7 +11,8 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
   const fs::path base = fs::absolute(folder).lexically_normal();
   DataSettings data;
   data.scene = base / "scene.ply";
-  data.avatar = base / "avatar.npz";
+  data.avatar = base / "avatar.safetensors";
+  if (!fs::exists(data.avatar) && fs::exists(base / "avatar.npz")) data.avatar = base / "avatar.npz";  // of version 1
   data.frames = base / "frames";
   data.masks = base / "masks";
   data.camera = base / "camera.json";
@@ -34,7 +35,7 @@ void describe(ConfigFields& f, ObjectSettings& s) {
 void describe(ConfigFields& f, DataSettings& s) {
   f.path("scene", s.scene, {.must_exist = true}, "The static scene (.ply, .splat or .spz), metres, z up");
   f.map("objects", s.objects, "Rigid objects that move, by name");
-  f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.npz)");
+  f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.safetensors)");
   f.path("frames", s.frames, {.must_exist = true},
          "Folder of the video's frames: .png files in the order of their names");
   f.path("masks", s.masks, {.must_exist = true},

@@ -26,8 +26,8 @@ struct DataSettings {
   int mask_margin_px = 1;
 };
 
-/// The inputs in a dataset's folder, as `hsi4d synth` lays them out: scene.ply, objects/NAME.ply, avatar.npz, frames/,
-/// masks/, camera.json, initial.json, truth/ (none where it is missing). Paths are absolute.
+/// The inputs in a dataset's folder, as `hsi4d synth` lays them out: scene.ply, objects/NAME.ply, avatar.safetensors,
+/// frames/, masks/, camera.json, initial.json, truth/ (none where it is missing). Paths are absolute.
 DataSettings dataset_inputs(const std::filesystem::path& folder);
 
 void describe(ConfigFields& fields, ObjectSettings& settings);

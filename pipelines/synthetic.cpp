@@ -108,7 +108,7 @@ ConfigValue data_section(const std::string& name) {
   };
   add("scene", "scene.ply");
   data.add("objects", object_of(name, object_of("gaussians", ConfigValue::make_string("objects/" + name + ".ply"))));
-  add("avatar", "avatar.npz");
+  add("avatar", "avatar.safetensors");
   add("frames", "frames");
   add("masks", "masks");
   add("camera", "camera.json");
@@ -180,7 +180,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   stop_if_asked();
   write_ply(out.file("scene.ply"), room);
   write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
-  write_avatar(out.file("avatar.npz"), avatar);
+  write_avatar(out.file("avatar.safetensors"), avatar);
   write_camera(out.file("camera.json"), clip.cameras.front());
   write_motion(out.file("initial_motion.npz"), disturbed_motion(clip.motion, settings));
   write_text_file(out.file("initial.json"), initial_json(object.name, clip.object.front()));

@@ -1,6 +1,6 @@
 // Datasets with exact ground truth, made by code: one room, one object, one motion, seen by a drifting camera.
 //
-//   scene.ply  objects/NAME.ply  avatar.npz                      Gaussians; the object's are relative to their mean
+//   scene.ply  objects/NAME.ply  avatar.safetensors              Gaussians; the object's are relative to their mean
 //   frames/0000.png ...                                          8 bit
 //   masks/human/0000.png ...  masks/NAME/0000.png ...            8 bit grey: the share of the pixel
 //   camera.json  initial.json  initial_motion.npz                frame 0 exact, later frames disturbed

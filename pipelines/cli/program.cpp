@@ -245,7 +245,7 @@ struct CommandLine {
     command.add_option("--frame", render.frame, "Frame of motion and objects, from 0")
         ->check(WholeNumber())
         ->type_name("I");
-    command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.npz");
+    command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.safetensors");
     add_several(command, "--debug-pixel", render.pixels,
                 "Print the Gaussians that make the pixel of column X and row Y, front to back, what was skipped, where "
                 "it stopped, and the sums")

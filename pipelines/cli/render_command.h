@@ -14,7 +14,7 @@ struct RenderOptions {
   std::string object_poses;          ///< --objects O.npz puts them in that frame, by the names of their files
   std::string motion;                ///< --motion M.npz, with
   int frame = 0;                     ///< --frame I, of poses and motion, and
-  std::string avatar;                ///< --avatar F.npz: a body drawn in that frame's pose
+  std::string avatar;                ///< --avatar F.safetensors: a body drawn in that frame's pose
   std::vector<std::string> pixels;   ///< --debug-pixel X,Y: column and row
   std::string out;                   ///< --out F.png, .exr or .npz
 };

@@ -67,56 +67,59 @@ bool equal(const Avatar& a, const Avatar& b) {
          a.parents == b.parents && a.joints == b.joints && a.joint_names == b.joint_names;
 }
 
-/// The file of small_avatar with one array replaced (or left out, when `add` adds nothing).
-std::string message_for(const std::string& changed, const std::function<void(NpzWriter&)>& add) {
-  const Avatar a = small_avatar();
-  NpzWriter file;
-  const std::map<std::string, std::function<void()>> members = {
-      {"format", [&] { file.add_text("format", "hsi4d avatar"); }},
-      {"version", [&] { file.add_scalar<std::int32_t>("version", 1); }},
-      {"means",
-       [&] {
-         file.add<float>("means", {2, 3}, a.means);
-       }},
-      {"quats",
-       [&] {
-         file.add<float>("quats", {2, 4}, a.quats);
-       }},
-      {"log_scales",
-       [&] {
-         file.add<float>("log_scales", {2, 3}, a.log_scales);
-       }},
-      {"opacity_logits", [&] { file.add<float>("opacity_logits", {2}, a.opacity_logits); }},
-      {"colors",
-       [&] {
-         file.add<float>("colors", {2, 3}, a.colors);
-       }},
-      {"weight_indices",
-       [&] {
-         file.add<std::int32_t>("weight_indices", {2, 2}, a.weights.indices);
-       }},
-      {"weights",
-       [&] {
-         file.add<double>("weights", {2, 2}, a.weights.weights);
-       }},
-      {"parents", [&] { file.add<std::int32_t>("parents", {3}, a.parents); }},
-      {"joints",
-       [&] {
-         file.add<double>("joints", {3, 3}, a.joints);
-       }},
-      {"joint_names", [&] { file.add_texts("joint_names", a.joint_names); }},
-  };
-  REQUIRE(members.contains(changed));
-  for (const auto& [name, write] : members) {
-    if (name != changed) write();
+using Members = std::map<std::string, std::function<void(SafetensorsWriter&)>>;
+
+/// The arrays of small_avatar's file, and its joint names.
+Members members() {
+  static const Avatar a = small_avatar();
+  Members m;
+  m["means"] = [](SafetensorsWriter& f) { f.add<float>("means", {2, 3}, a.means); };
+  m["quats"] = [](SafetensorsWriter& f) { f.add<float>("quats", {2, 4}, a.quats); };
+  m["log_scales"] = [](SafetensorsWriter& f) { f.add<float>("log_scales", {2, 3}, a.log_scales); };
+  m["opacity_logits"] = [](SafetensorsWriter& f) { f.add<float>("opacity_logits", {2}, a.opacity_logits); };
+  m["colors"] = [](SafetensorsWriter& f) { f.add<float>("colors", {2, 3}, a.colors); };
+  m["weight_indices"] = [](SafetensorsWriter& f) { f.add<std::int32_t>("weight_indices", {2, 2}, a.weights.indices); };
+  m["weights"] = [](SafetensorsWriter& f) { f.add<double>("weights", {2, 2}, a.weights.weights); };
+  m["parents"] = [](SafetensorsWriter& f) { f.add<std::int32_t>("parents", {3}, a.parents); };
+  m["joints"] = [](SafetensorsWriter& f) { f.add<double>("joints", {3, 3}, a.joints); };
+  m["joint_names"] = [](SafetensorsWriter& f) { f.set_texts("joint_names", a.joint_names); };
+  return m;
+}
+
+/// What is said of small_avatar's file with one member replaced (or left out, when `add` adds nothing).
+std::string message_for(const std::string& changed, const std::function<void(SafetensorsWriter&)>& add,
+                        SafetensorsWriter file = SafetensorsWriter("hsi4d avatar", kAvatarVersion)) {
+  const Members all = members();
+  REQUIRE(all.contains(changed));
+  for (const auto& [name, write] : all) {
+    if (name != changed) write(file);
   }
   add(file);
   try {
-    decode_avatar(file.encode(), "a.npz");
+    decode_avatar(file.encode(), "a");
   } catch (const DataError& error) {
     return error.what();
   }
   return "accepted";
+}
+
+/// small_avatar as version 1 had it, an archive.
+NpzWriter first_file(int version = 1) {
+  const Avatar a = small_avatar();
+  NpzWriter file;
+  file.add_text("format", "hsi4d avatar");
+  file.add_scalar<std::int32_t>("version", version);
+  file.add<float>("means", {2, 3}, a.means);
+  file.add<float>("quats", {2, 4}, a.quats);
+  file.add<float>("log_scales", {2, 3}, a.log_scales);
+  file.add<float>("opacity_logits", {2}, a.opacity_logits);
+  file.add<float>("colors", {2, 3}, a.colors);
+  file.add<std::int32_t>("weight_indices", {2, 2}, a.weights.indices);
+  file.add<double>("weights", {2, 2}, a.weights.weights);
+  file.add<std::int32_t>("parents", {3}, a.parents);
+  file.add<double>("joints", {3, 3}, a.joints);
+  file.add_texts("joint_names", a.joint_names);
+  return file;
 }
 
 }  // namespace
@@ -241,7 +244,7 @@ TEST_CASE("an avatar is a function of the settings, and its seed counts") {
 
 TEST_CASE("avatar files round-trip") {
   const TemporaryFolder folder;
-  const std::string path = folder / "a.npz";
+  const std::string path = folder / "a.safetensors";
   write_avatar(path, small_avatar());
   CHECK(equal(read_avatar(path), small_avatar()));
   write_avatar(path, avatar());
@@ -258,36 +261,58 @@ TEST_CASE("avatar files round-trip") {
   CHECK(read_avatar(path).count() == 2000);
 }
 
+TEST_CASE("an avatar's file may hold more than the avatar") {
+  SafetensorsWriter file = avatar_file(small_avatar());
+  file.add<float>("color_net.weights", {2}, {1, 2});
+  file.set_text("trained_on", "a clip");
+  CHECK(equal(decode_avatar(file.encode(), "a"), small_avatar()));
+}
+
+TEST_CASE("avatar files of version 1 are read, whatever their name") {
+  const TemporaryFolder folder;
+  CHECK(equal(decode_avatar(first_file().encode(), "a.npz"), small_avatar()));
+  first_file().write(folder / "a.safetensors");
+  CHECK(equal(read_avatar(folder / "a.safetensors"), small_avatar()));
+  CHECK_THROWS_WITH(decode_avatar(first_file(2).encode(), "a.npz"),
+                    "a.npz: the format's version is 2; allowed in a .npz file: 1");
+  CHECK_THROWS_WITH(decode_avatar(NpzWriter().encode(), "a.npz"),
+                    "a.npz: there is no array 'format'; this is no avatar");
+}
+
 TEST_CASE("faults of avatar files are named") {
-  const auto nothing = [](NpzWriter&) {};
-  CHECK(message_for("means", [](NpzWriter& f) { f.add<float>("means", {2, 3}, {0, 0, 0, 1, 2, 3}); }) == "accepted");
-  CHECK(message_for("format", nothing) == "a.npz: there is no array 'format'; this is no avatar");
-  CHECK(message_for("format", [](NpzWriter& f) { f.add_text("format", "x"); }) ==
-        "a.npz: the format is 'x'; allowed: 'hsi4d avatar'");
-  CHECK(message_for("version", [](NpzWriter& f) { f.add_scalar<std::int32_t>("version", 2); }) ==
-        "a.npz: the format's version is 2; allowed: 1 to 1 (the file is from a newer program)");
-  CHECK(message_for("quats", [](NpzWriter& f) {
+  const auto nothing = [](SafetensorsWriter&) {};
+  using File = SafetensorsWriter;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  CHECK(message_for("means", [](File& f) { f.add<float>("means", {2, 3}, {0, 0, 0, 1, 2, 3}); }) == "accepted");
+  CHECK(message_for("means", nothing).starts_with("a: has no array 'means'; there are: "));
+  CHECK(message_for("means", members().at("means"), File("x", 1)) == "a: the format is 'x'; allowed: 'hsi4d avatar'");
+  CHECK(message_for("means", members().at("means"), File("hsi4d avatar", 3)) ==
+        "a: the format's version is '3'; allowed: 1 to 2 (the file is from a newer program)");
+  CHECK(message_for("quats", [](File& f) {
           f.add<float>("quats", {1, 4}, {1, 0, 0, 0});
-        }) == "a.npz: array 'quats': has shape [1,4]; [2,4] is needed");
-  CHECK(message_for("quats", [](NpzWriter& f) {
+        }) == "a: array 'quats': has shape [1,4]; [2,4] is needed");
+  CHECK(message_for("quats", [](File& f) {
           f.add<float>("quats", {2, 4}, {1, 0, 0, 0, 0, 0, 0, 0});
-        }) == "a.npz: array 'quats': row 1 is zero, which is no rotation");
-  CHECK(message_for("means", [](NpzWriter& f) {
-          f.add<float>("means", {2, 3}, {0, 0, 0, 1, std::numeric_limits<float>::quiet_NaN(), 3});
-        }) == "a.npz: array 'means': row 1, number 1 is not finite");
-  CHECK(message_for("parents", [](NpzWriter& f) {
+        }) == "a: array 'quats': row 1 is zero, which is no rotation");
+  CHECK(message_for("means", [nan](File& f) {
+          f.add<float>("means", {2, 3}, {0, 0, 0, 1, nan, 3});
+        }) == "a: array 'means': row 1, number 1 is not finite");
+  CHECK(message_for("parents", [](File& f) {
           f.add<std::int32_t>("parents", {3}, {-1, 2, 1});
-        }) == "a.npz: array 'parents': the parent of joint 1 is 2; allowed: 0 to 0, a joint that comes before it");
-  CHECK(message_for("parents", [](NpzWriter& f) { f.add<std::int32_t>("parents", {0}, {}); }) ==
-        "a.npz: array 'parents': there are no joints");
-  CHECK(message_for("weights", [](NpzWriter& f) {
+        }) == "a: array 'parents': the parent of joint 1 is 2; allowed: 0 to 0, a joint that comes before it");
+  CHECK(message_for("parents", [](File& f) { f.add<std::int32_t>("parents", {0}, {}); }) ==
+        "a: array 'parents': there are no joints");
+  CHECK(message_for("joint_names", nothing) == "a: has no metadata 'joint_names'; there is: format, version");
+  CHECK(message_for("joint_names", [](File& f) { f.set_text("joint_names", "[\"root\"]"); }) ==
+        "a: metadata 'joint_names' has 1 names; 3 are needed, one a joint");
+  CHECK(message_for("weights", [](File& f) {
           f.add<double>("weights", {2, 2}, {0.5, 0.25, 1, 0});
-        }) == "a.npz: array 'weights': vertex 0: the weights sum to 0.75; allowed: 1 within 0.01");
-  CHECK(message_for("weight_indices", [](NpzWriter& f) {
+        }) == "a: array 'weights': vertex 0: the weights sum to 0.75; allowed: 1 within 0.01");
+  CHECK(message_for("weight_indices", [](File& f) {
           f.add<std::int32_t>("weight_indices", {2, 2}, {0, 3, 0, 0});
-        }) == "a.npz: array 'weights': vertex 0: joint 3 does not exist; allowed: 0 to 2");
-  CHECK(message_for("weight_indices", [](NpzWriter& f) {
+        }) == "a: array 'weights': vertex 0: joint 3 does not exist; allowed: 0 to 2");
+  CHECK(message_for("weight_indices", [](File& f) {
           f.add<std::int32_t>("weight_indices", {2, 9}, std::vector<std::int32_t>(18, 0));
-        }) == "a.npz: array 'weight_indices': has shape [2,9]; allowed: 1 to 8 weights a Gaussian");
-  CHECK_THROWS_AS(read_avatar("no_such_avatar.npz"), UserError);
+        }) == "a: array 'weight_indices': has shape [2,9]; allowed: 1 to 8 weights a Gaussian");
+  CHECK_THROWS_AS(read_avatar("no_such_avatar.safetensors"), UserError);
 }

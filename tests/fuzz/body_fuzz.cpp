@@ -11,6 +11,20 @@ namespace hsi4d::fuzz {
 namespace {
 
 Bytes small_avatar() {
+  Avatar a;
+  a.means = {0, 1, 2};
+  a.quats = {1, 0, 0, 0};
+  a.log_scales = {-4, -4, -5};
+  a.opacity_logits = {1};
+  a.colors = {0.5F, 0.5F, 0.5F};
+  a.weights = {1, 2, 2, {0, 1}, {0.75, 0.25}};
+  a.parents = {-1, 0};
+  a.joints = {0, 0, 0, 0, 1, 0};
+  a.joint_names = {"root", "tip"};
+  return avatar_file(a).encode();
+}
+
+Bytes first_avatar() {
   NpzWriter file;
   file.add_text("format", "hsi4d avatar");
   file.add_scalar<std::int32_t>("version", 1);
@@ -43,10 +57,10 @@ Bytes small_motion(bool whole) {
 
 }  // namespace
 
-std::vector<Bytes> corpus() { return {small_avatar(), small_motion(true), small_motion(false)}; }
+std::vector<Bytes> corpus() { return {small_avatar(), first_avatar(), small_motion(true), small_motion(false)}; }
 
 bool accepts(std::span<const uint8_t> file) {
-  const bool avatar = is_read([&] { check_sizes(decode_avatar(file, "fuzz.npz")); });
+  const bool avatar = is_read([&] { check_sizes(decode_avatar(file, "fuzz")); });
   const bool motion = is_read([&] { decode_motion(file, "fuzz.npz"); });
   return avatar || motion;
 }

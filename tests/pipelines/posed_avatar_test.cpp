@@ -79,7 +79,7 @@ TEST_CASE("parts without transforms stand still beside those that have some") {
 TEST_CASE("render draws a body of a motion, in every precision") {
   const TemporaryFolder folder;
   const Avatar avatar = surface_avatar(procedural_body(), {.gaussians = 400});
-  write_avatar("avatar.npz", avatar);
+  write_avatar("avatar.safetensors", avatar);
   Motion motion;
   for (int frame = 0; frame < 2; ++frame) {
     BodyPose pose = rest_pose(55);
@@ -110,7 +110,7 @@ TEST_CASE("render draws a body of a motion, in every precision") {
   options.shared.scene = "ball.ply";
   options.shared.camera = "camera.json";
   options.motion = "motion.npz";
-  options.avatar = "avatar.npz";
+  options.avatar = "avatar.safetensors";
   std::vector<std::vector<double>> images;
   for (const int frame : {0, 1}) {
     for (const char* precision : {"reference", "double", "float"}) {
@@ -135,7 +135,7 @@ TEST_CASE("render draws a body of a motion, in every precision") {
   CHECK(sum / static_cast<double>(images[0].size()) > 0.03);  // and was seen
 
   const ProgramResult outside = run_hsi4d({"render", "--scene", "ball.ply", "--camera", "camera.json", "--motion",
-                                           "motion.npz", "--avatar", "avatar.npz", "--frame", "2", "--out", "a.png"});
+                                           "motion.npz", "--avatar", "avatar.safetensors", "--frame", "2", "--out", "a.png"});
   CHECK(outside.status == 2);
   CHECK(outside.err == "hsi4d render: --frame: motion.npz has no frame 2; allowed: 0 to 1\n");
 }
@@ -165,13 +165,13 @@ Camera camera_at(const Vector3<double>& place) {
 
 TEST_CASE("a body looks the same wherever in the world it is, in float too (row A10)") {
   const TemporaryFolder folder;
-  write_avatar("avatar.npz", surface_avatar(procedural_body(), {.gaussians = 400}));
+  write_avatar("avatar.safetensors", surface_avatar(procedural_body(), {.gaussians = 400}));
   cli::RenderOptions options;
   options.shared.scene = "ball.ply";
   options.shared.camera = "camera.json";
   options.shared.settings = {"render.quality=reference"};  // no cuts, which the last bit of a number may decide
   options.motion = "motion.npz";
-  options.avatar = "avatar.npz";
+  options.avatar = "avatar.safetensors";
   options.out = "a.npz";
   const auto rendered = [&](double distance, const char* precision) {
     const Vector3<double> shift(distance, -distance, 0.5 * distance);

@@ -40,7 +40,7 @@ SyntheticSettings small_settings() {
 
 const std::vector<std::string>& dataset_files() {
   static const std::vector<std::string> files = {
-      "avatar.npz",
+      "avatar.safetensors",
       "camera.json",
       "config.json",
       "frames/0000.png",
@@ -129,7 +129,7 @@ TEST_CASE("a synthetic dataset is complete, readable and true to itself") {
   for (std::size_t i = 0; i < object.gaussians.means.size(); ++i)
     sum[Eigen::Index(i % 3)] += double(object.gaussians.means[i]);
   CHECK(sum.norm() / double(object.gaussians.count()) < 1e-7);
-  CHECK(read_avatar("data/avatar.npz").count() == 600);
+  CHECK(read_avatar("data/avatar.safetensors").count() == 600);
 
   const Motion truth = read_motion("data/truth/motion.npz"), initial = read_motion("data/initial_motion.npz");
   const std::vector<Camera> cameras = read_cameras("data/truth/cameras.json");
