@@ -22,6 +22,13 @@ void require_range(const char* name, double value, double low, double high) {
   throw UserError(text.str());
 }
 
+/// Distance of neighbours over the distance to what is midway between them: 1.6 in an even triangular lattice.
+constexpr double kReachShare = 1.6;
+
+/// Normal scale over how far the surface bends away, where it does: fingertips are rounder than their Gaussians are
+/// small.
+constexpr double kBendShare = 1.25;
+
 /// Gaussians per area over those of the trunk: parts with detail need more.
 double density_of(std::int32_t joint) {
   if (joint >= 25) return 6;                                               // fingers
@@ -108,10 +115,12 @@ Avatar surface_avatar(const BodyModel& body, const AvatarSettings& settings) {
     const SurfaceSample& sample = samples[i];
     const Vector point = sample.place.point, normal = normal_at(body, normals, sample.place);
     const Vector4<double> q = facing(normal);
-    const double tangent = settings.cover * sample.spacing;
+    // Where places lie unevenly, the ones beside a gap reach over it.
+    const double tangent = settings.cover * std::max(sample.spacing, kReachShare * sample.reach);
     append(avatar.means, {point[0], point[1], point[2]});
     append(avatar.quats, {q[0], q[1], q[2], q[3]});
-    append(avatar.log_scales, {std::log(tangent), std::log(tangent), std::log(tangent * settings.thickness)});
+    append(avatar.log_scales, {std::log(tangent), std::log(tangent),
+                               std::log(std::max(tangent * settings.thickness, kBendShare * sample.bend))});
     append(avatar.opacity_logits, {std::log(settings.opacity / (1 - settings.opacity))});
     append_weights(body, sample.place, avatar.weights);
     const int joint = avatar.weights.indices[avatar.weights.indices.size() - 4];

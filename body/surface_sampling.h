@@ -14,6 +14,7 @@ struct SurfaceSample {
   double wanted_spacing = 0;  ///< metres: the root of the area that a place has there by the density
   double spacing = 0;         ///< metres: the root of the area that is nearer to this one than to others
   double reach = 0;           ///< metres: to the farthest of what is nearest to this one
+  double bend = 0;            ///< metres: how far the surface there leaves the plane of this one's face
 };
 
 /// `count` places, everywhere as many per area as the density says, and as far from each other as that allows.
