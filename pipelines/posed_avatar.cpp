@@ -7,11 +7,9 @@
 
 namespace hsi4d {
 
-PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose) {
+Gaussians rest_gaussians(const Avatar& avatar) {
   check_sizes(avatar);
-  const PosedJoints skeleton = pose_skeleton(avatar, pose);
-  PosedGaussians posed;
-  Gaussians& g = posed.gaussians;
+  Gaussians g;
   g.means = avatar.means;
   g.quats = avatar.quats;
   g.log_scales = avatar.log_scales;
@@ -19,8 +17,14 @@ PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose) {
   g.sh.resize(avatar.colors.size());
   std::transform(avatar.colors.begin(), avatar.colors.end(), g.sh.begin(),
                  [](float color) { return static_cast<float>((static_cast<double>(color) - 0.5) / kShC0); });
+  return g;
+}
+
+PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose) {
+  PosedGaussians posed{rest_gaussians(avatar), {}};
+  const PosedJoints skeleton = pose_skeleton(avatar, pose);
   const SparseWeights& weights = avatar.weights;
-  posed.transforms.assign(12 * static_cast<std::size_t>(g.count()), 0.0);
+  posed.transforms.assign(12 * static_cast<std::size_t>(avatar.count()), 0.0);
   for (Index i = 0; i < weights.vertices * weights.per_vertex; ++i) {
     const double* joint = skeleton.transforms.data() + 12 * Index{weights.indices[static_cast<std::size_t>(i)]};
     double* blended = posed.transforms.data() + 12 * (i / weights.per_vertex);

@@ -6,8 +6,11 @@
 
 namespace hsi4d {
 
-/// The avatar's Gaussians with the blended transform of each, Σ_j w_nj A_j, in double. Colours become harmonics of
-/// degree 0.
+/// The avatar's Gaussians in the rest pose. Colours become harmonics of degree 0.
+/// Throws InternalError as check_sizes.
+Gaussians rest_gaussians(const Avatar& avatar);
+
+/// The avatar's Gaussians with the blended transform of each, Σ_j w_nj A_j, in double.
 ///
 /// Throws InternalError when pose and avatar differ in their joints.
 PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose);

@@ -18,6 +18,7 @@
 #include "core/suggest.h"
 #include "core/text.h"
 #include "core/version.h"
+#include "pipelines/cli/avatar_command.h"
 #include "pipelines/cli/bench_command.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/convert_command.h"
@@ -74,6 +75,7 @@ struct CommandLine {
   RenderOptions render;
   GradientsOptions gradients;
   BenchOptions bench;
+  AvatarOptions avatar;
   std::function<std::string()> run;
 
   explicit CommandLine(const std::vector<LossTerm>& terms) : losses(descriptions_of(terms)) {
@@ -89,6 +91,7 @@ struct CommandLine {
     add_gradients();
     add_convert();
     add_info();
+    add_avatar();
     add_bench();
     add_check();
     add_schema();
@@ -149,155 +152,189 @@ struct CommandLine {
 
   void add_info() {
     CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
-    info->add_option("FILE", file, "A .ply, .splat, .spz, .npz, .npy, .json, .png, .jpg, .jpeg or .exr file")
+    info->add_option("FILE", file,
+                     "A .ply, .splat, .spz, .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg or .exr file")
         ->required();
     info->add_flag("--json", json, "Print one JSON object; for Gaussians");
     info->callback([this] { run = [this] { return info_command(file, json); }; });
   }
 
-  void add_convert() {
-    ConvertOptions& o = convert;
-    CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: .ply, .splat, .spz");
-    command.add_option("IN", o.in, "Gaussians: .ply (INRIA's or compressed), .splat or .spz")->required();
-    command.add_option("OUT", o.out, "Where to; the ending says how: .ply, .compressed.ply, .splat or .spz")
+  void add_avatar() {
+    AvatarOptions& o = avatar;
+    CLI::App& command = *app.add_subcommand("avatar", "Make, import or describe the Gaussians of a body");
+    command.require_subcommand(1);
+    const auto add_body = [&o](CLI::App& sub) {
+      sub.add_option("--betas", o.betas, "Shape of the body model: the first betas; the mean shape without")
+          ->type_name("B,B,...");
+      sub.add_option("--out", o.out, "The avatar's file")->type_name("F.safetensors")->required();
+    };
+
+    CLI::App& make = *command.add_subcommand("make", "Dress a body in Gaussians, spread evenly over its surface");
+    make.add_option("--body-model", o.body_model, "A SMPL-X file; without, the body that comes with the program")
+        ->type_name("M.npz");
+    make.add_option("--gaussians", o.settings.gaussians, "How many; 20,000 to 300,000 are useful")->type_name("N");
+    make.add_option("--detail", o.settings.detail, "How much denser head, hands and feet are: 0 not at all, to 1")
+        ->type_name("X");
+    make.add_option("--cover", o.settings.cover, "Size along the surface over the distance of neighbours")
+        ->type_name("X");
+    make.add_option("--texture", o.settings.texture, "Contrast of the patterns, 0 to 1")->type_name("X");
+    make.add_option("--seed", o.settings.seed, "Seed of the places")->check(WholeNumber())->type_name("N");
+    add_body(make);
+    make.callback([this] { run = [this] { return avatar_make_command(avatar); }; });
+
+    CLI::App& import = *command.add_subcommand("import", "Bind the Gaussians of a file to a body model");
+    import.add_option("PLY", o.in, "Gaussians in the rest pose of the body model, in its frame: .ply, .splat or .spz")
         ->required();
-    command.add_option("--scale", o.scale, "Multiply lengths, about the origin, first")->type_name("S");
-    command.add_option("--rotate", o.rotate, "Turn about the origin, harmonics too: axis times angle in degrees")
-        ->type_name("x,y,z");
-    command.add_option("--translate", o.translate, "Move, last; metres")->type_name("x,y,z");
-    command
-        .add_option("--matrix", o.matrix, "Instead of the three: a 4x4 matrix row by row, 16 numbers apart by commas")
-        ->type_name("M");
-    command.add_option("--crop", o.crop, "Keep the Gaussians whose means are in this box of IN's coordinates")
-        ->type_name("x0,y0,z0,x1,y1,z1");
-    command.add_option("--min-opacity", o.min_opacity, "Leave out fainter Gaussians")->type_name("O");
-    command.add_option("--sh-degree", o.sh_degree, "Degree of the harmonics, 0 to 3")->type_name("N");
-    command.add_option("--spz-version", o.spz_version, "Version of .spz to write: 2, 3 or 4; 3 without")
-        ->type_name("N");
-    command.add_option("--spz-sh-bits", o.spz_sh_bits, "Bits of harmonics in .spz, degree 1 and above; 8,8 without")
-        ->type_name("A,B");
-    command.callback([this] { run = [this] { return convert_command(convert); }; });
-  }
+    import.add_option("--body-model", o.body_model, "A SMPL-X file; without, the body that comes with the program")
+        ->type_name("M.npz");
+    add_body(import);
+    import.callback([this] { run = [this] { return avatar_import_command(avatar);
+  }; });
 
-  void add_bench() {
-    CLI::App* command = app.add_subcommand("bench",
-                                           "Measure the speed of the renderer or the body, or the pixel filter: a "
-                                           "table, and one JSON object a measurement");
-    command->add_option("TOPIC", topic, "What: rasterize, skinning, pixel_filter")
-        ->required()
-        ->check(CLI::IsMember({"rasterize", "skinning", "pixel_filter"}));
-    command->add_option("--workload", bench.workloads, "Only these; default: all");
-    command->add_option("--threads", bench.threads, "Threads")->check(CLI::Range(1, 1024));
-    command
-        ->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of rasterize and skinning")
-        ->check(CLI::Range(1, 1000));
-    command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
-        ->check(CLI::Range(8.0, 2048.0));
-    command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
-    command->callback([this] {
-      run = [this] {
-        if (topic == "skinning") return bench_skinning_command(bench);
-        return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);
-      };
-    });
-  }
+CLI::App& info = *command.add_subcommand("info", "Tell what is in an avatar's file");
+info.add_option("FILE", file, "An avatar")->required();
+info.callback([this] { run = [this] { return avatar_info_command(file); }; });
+}  // namespace
 
-  void add_check() {
-    CLI::App* check = app.add_subcommand("check", "Check a config and everything that it extends; tells all problems");
-    check->add_option("CONFIG", config, "The config file")->required();
-    add_overrides(*check, overrides);
-    check->add_flag("--print-config", print_config, "Print the config with every default filled in");
-    check->callback([this] { run = [this] { return check_command(config, overrides, print_config, losses); }; });
-  }
+void add_convert() {
+  ConvertOptions& o = convert;
+  CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: .ply, .splat, .spz");
+  command.add_option("IN", o.in, "Gaussians: .ply (INRIA's or compressed), .splat or .spz")->required();
+  command.add_option("OUT", o.out, "Where to; the ending says how: .ply, .compressed.ply, .splat or .spz")->required();
+  command.add_option("--scale", o.scale, "Multiply lengths, about the origin, first")->type_name("S");
+  command.add_option("--rotate", o.rotate, "Turn about the origin, harmonics too: axis times angle in degrees")
+      ->type_name("x,y,z");
+  command.add_option("--translate", o.translate, "Move, last; metres")->type_name("x,y,z");
+  command.add_option("--matrix", o.matrix, "Instead of the three: a 4x4 matrix row by row, 16 numbers apart by commas")
+      ->type_name("M");
+  command.add_option("--crop", o.crop, "Keep the Gaussians whose means are in this box of IN's coordinates")
+      ->type_name("x0,y0,z0,x1,y1,z1");
+  command.add_option("--min-opacity", o.min_opacity, "Leave out fainter Gaussians")->type_name("O");
+  command.add_option("--sh-degree", o.sh_degree, "Degree of the harmonics, 0 to 3")->type_name("N");
+  command.add_option("--spz-version", o.spz_version, "Version of .spz to write: 2, 3 or 4; 3 without")->type_name("N");
+  command.add_option("--spz-sh-bits", o.spz_sh_bits, "Bits of harmonics in .spz, degree 1 and above; 8,8 without")
+      ->type_name("A,B");
+  command.callback([this] { run = [this] { return convert_command(convert); }; });
+}
 
-  void add_schema() {
-    CLI::App* schema = app.add_subcommand("schema", "Print the JSON Schema of configs, for editors");
-    schema->callback([this] { run = [this] { return schema_command(losses); }; });
-  }
+void add_bench() {
+  CLI::App* command = app.add_subcommand("bench",
+                                         "Measure the speed of the renderer or the body, or the pixel filter: a "
+                                         "table, and one JSON object a measurement");
+  command->add_option("TOPIC", topic, "What: rasterize, skinning, pixel_filter")
+      ->required()
+      ->check(CLI::IsMember({"rasterize", "skinning", "pixel_filter"}));
+  command->add_option("--workload", bench.workloads, "Only these; default: all");
+  command->add_option("--threads", bench.threads, "Threads")->check(CLI::Range(1, 1024));
+  command
+      ->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of rasterize and skinning")
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
+      ->check(CLI::Range(8.0, 2048.0));
+  command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
+  command->callback([this] {
+    run = [this] {
+      if (topic == "skinning") return bench_skinning_command(bench);
+      return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);
+    };
+  });
+}
 
-  void add_list() {
-    CLI::App* list = app.add_subcommand("list", "List what configs can name");
-    list->add_option("TOPIC", topic, joined(list_topics()))->required();
-    list->callback([this] { run = [this] { return list_command(topic, losses); }; });
-  }
+void add_check() {
+  CLI::App* check = app.add_subcommand("check", "Check a config and everything that it extends; tells all problems");
+  check->add_option("CONFIG", config, "The config file")->required();
+  add_overrides(*check, overrides);
+  check->add_flag("--print-config", print_config, "Print the config with every default filled in");
+  check->callback([this] { run = [this] { return check_command(config, overrides, print_config, losses); }; });
+}
 
-  static void add_threads(CLI::App& command, std::optional<int>& threads) {
-    command.add_option("--threads", threads, "Threads, 0: one a core; results do not depend on it")
-        ->check(WholeNumber(1024))
-        ->type_name("N");
-  }
+void add_schema() {
+  CLI::App* schema = app.add_subcommand("schema", "Print the JSON Schema of configs, for editors");
+  schema->callback([this] { run = [this] { return schema_command(losses); }; });
+}
 
-  static void add_overrides(CLI::App& command, std::vector<std::string>& overrides) {
-    add_several(command, "--set", overrides, "Change one setting: render.blur=0.1. The value is JSON, or else text")
-        ->type_name("KEY=VALUE");
-  }
+void add_list() {
+  CLI::App* list = app.add_subcommand("list", "List what configs can name");
+  list->add_option("TOPIC", topic, joined(list_topics()))->required();
+  list->callback([this] { run = [this] { return list_command(topic, losses); }; });
+}
 
-  void add_render() {
-    CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image");
-    add_scene(command, render.shared);
-    add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
-        ->type_name("F.{ply,splat,spz}");
-    command
-        .add_option("--objects", render.object_poses,
-                    "Poses of a run's objects: each --object NAME.ply is drawn where NAME is in --frame")
-        ->type_name("O.npz");
-    command.add_option("--motion", render.motion, "Motion of a body that is drawn too")->type_name("M.npz");
-    command.add_option("--frame", render.frame, "Frame of motion and objects, from 0")
-        ->check(WholeNumber())
-        ->type_name("I");
-    command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.safetensors");
-    add_several(command, "--debug-pixel", render.pixels,
-                "Print the Gaussians that make the pixel of column X and row Y, front to back, what was skipped, where "
-                "it stopped, and the sums")
-        ->type_name("X,Y");
-    command.add_option("--out", render.out, "Where to: 8-bit PNG, OpenEXR, or arrays image, alpha, depth")
-        ->type_name("F.{png,exr,npz}")
-        ->required();
-    command.callback([this] { run = [this] { return render_command(render); }; });
-  }
+static void add_threads(CLI::App& command, std::optional<int>& threads) {
+  command.add_option("--threads", threads, "Threads, 0: one a core; results do not depend on it")
+      ->check(WholeNumber(1024))
+      ->type_name("N");
+}
 
-  void add_gradients() {
-    CLI::App& command = *app.add_subcommand("gradients", "Differentiate the difference of a render from an image");
-    add_scene(command, gradients.shared);
-    command.add_option("--target", gradients.target, "The image to compare with")
-        ->type_name("F.{exr,png,npz}")
-        ->required();
-    command.add_option("--out", gradients.out, "Where loss and gradients go")->type_name("F.npz")->required();
-    command.footer(
-        "Gradients are by the file's own numbers, its rows in order. They are 0 for what does not move the image: "
-        "rows\n"
-        "that the reader leaves out (a number that is not finite, a zero quaternion); log-scales and opacity logits\n"
-        "that it holds at -20 or 20; coefficients above render.sh_degree; what the camera does not see.\n"
-        "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
-        "render.cap_gradient is pass (render.compatibility=inria makes it so).");
-    command.callback([this] { run = [this] { return gradients_command(gradients); }; });
-  }
+static void add_overrides(CLI::App& command, std::vector<std::string>& overrides) {
+  add_several(command, "--set", overrides, "Change one setting: render.blur=0.1. The value is JSON, or else text")
+      ->type_name("KEY=VALUE");
+}
 
-  void add_scene(CLI::App& command, SceneOptions& options) {
-    command.add_option("--scene", options.scene, "Gaussians")->type_name("F.{ply,splat,spz}")->required();
-    command.add_option("--camera", options.camera, "A camera, or nerfstudio's transforms.json")
-        ->type_name("C.json")
-        ->required();
-    command.add_option("--camera-frame", options.camera_frame, "Which camera of a file with several, from 0")
-        ->check(WholeNumber())
-        ->type_name("I");
-    command.add_option("--background", options.background, "Colour behind everything; black without")
-        ->type_name("r,g,b");
-    command.add_option("--precision", options.precision, "float, double, or reference: brute force in double")
-        ->type_name("WORD");
-    add_several(command, "--set", options.settings, "Change a setting of the renderer: render.blur=0.1")
-        ->type_name("render.KEY=VALUE");
-  }
+void add_render() {
+  CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image");
+  add_scene(command, render.shared);
+  add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
+      ->type_name("F.{ply,splat,spz}");
+  command
+      .add_option("--objects", render.object_poses,
+                  "Poses of a run's objects: each --object NAME.ply is drawn where NAME is in --frame")
+      ->type_name("O.npz");
+  command.add_option("--motion", render.motion, "Motion of a body that is drawn too")->type_name("M.npz");
+  command.add_option("--frame", render.frame, "Frame of motion and objects, from 0")
+      ->check(WholeNumber())
+      ->type_name("I");
+  command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.safetensors");
+  add_several(command, "--debug-pixel", render.pixels,
+              "Print the Gaussians that make the pixel of column X and row Y, front to back, what was skipped, where "
+              "it stopped, and the sums")
+      ->type_name("X,Y");
+  command.add_option("--out", render.out, "Where to: 8-bit PNG, OpenEXR, or arrays image, alpha, depth")
+      ->type_name("F.{png,exr,npz}")
+      ->required();
+  command.callback([this] { run = [this] { return render_command(render); }; });
+}
 
-  /// An option that may be given several times, with one value each time.
-  static CLI::Option* add_several(CLI::App& command, const std::string& name, std::vector<std::string>& values,
-                                  const std::string& description) {
-    return command.add_option(name, values, description)
-        ->expected(1)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-        ->allow_extra_args(false);
-  }
-};
+void add_gradients() {
+  CLI::App& command = *app.add_subcommand("gradients", "Differentiate the difference of a render from an image");
+  add_scene(command, gradients.shared);
+  command.add_option("--target", gradients.target, "The image to compare with")
+      ->type_name("F.{exr,png,npz}")
+      ->required();
+  command.add_option("--out", gradients.out, "Where loss and gradients go")->type_name("F.npz")->required();
+  command.footer(
+      "Gradients are by the file's own numbers, its rows in order. They are 0 for what does not move the image: "
+      "rows\n"
+      "that the reader leaves out (a number that is not finite, a zero quaternion); log-scales and opacity logits\n"
+      "that it holds at -20 or 20; coefficients above render.sh_degree; what the camera does not see.\n"
+      "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
+      "render.cap_gradient is pass (render.compatibility=inria makes it so).");
+  command.callback([this] { run = [this] { return gradients_command(gradients); }; });
+}
+
+void add_scene(CLI::App& command, SceneOptions& options) {
+  command.add_option("--scene", options.scene, "Gaussians")->type_name("F.{ply,splat,spz}")->required();
+  command.add_option("--camera", options.camera, "A camera, or nerfstudio's transforms.json")
+      ->type_name("C.json")
+      ->required();
+  command.add_option("--camera-frame", options.camera_frame, "Which camera of a file with several, from 0")
+      ->check(WholeNumber())
+      ->type_name("I");
+  command.add_option("--background", options.background, "Colour behind everything; black without")->type_name("r,g,b");
+  command.add_option("--precision", options.precision, "float, double, or reference: brute force in double")
+      ->type_name("WORD");
+  add_several(command, "--set", options.settings, "Change a setting of the renderer: render.blur=0.1")
+      ->type_name("render.KEY=VALUE");
+}
+
+/// An option that may be given several times, with one value each time.
+static CLI::Option* add_several(CLI::App& command, const std::string& name, std::vector<std::string>& values,
+                                const std::string& description) {
+  return command.add_option(name, values, description)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->allow_extra_args(false);
+}
+};  // namespace hsi4d::cli
 
 /// Refuses a first word that is no command or option, with the nearest one: CLI11 would only call it unexpected.
 void check_command_word(int argc, const char* const* argv, CommandLine& line) {
@@ -314,7 +351,15 @@ void check_command_word(int argc, const char* const* argv, CommandLine& line) {
 
 /// Refuses an option that the command does not have, with the nearest one; CLI11 would first ask for what is missing.
 void check_options(int argc, const char* const* argv, CommandLine& line) {
-  const CLI::App& command = *line.app.get_subcommand(argv[1]);
+  CLI::App* chosen = line.app.get_subcommand(argv[1]);
+  std::string words = argv[1];
+  const auto parts = chosen->get_subcommands([](const CLI::App*) { return true; });
+  for (CLI::App* part : parts) {
+    if (argc < 3 || part->get_name() != argv[2]) continue;
+    chosen = part;
+    words += " " + part->get_name();
+  }
+  const CLI::App& command = *chosen;
   std::vector<std::string> known;
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
@@ -323,7 +368,7 @@ void check_options(int argc, const char* const* argv, CommandLine& line) {
     const std::string word = std::string(argv[i]).substr(0, std::string(argv[i]).find('='));
     if (word == "--") return;
     if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;
-    throw UserError("hsi4d " + command.get_name() + ": there is no option \"" + word + "\"; known: " + joined(known) +
+    throw UserError("hsi4d " + words + ": there is no option \"" + word + "\"; known: " + joined(known) +
                     did_you_mean(word, known));
   }
 }
@@ -339,8 +384,9 @@ void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>
   } catch (const CLI::CallForVersion& version_text) {
     return print(std::string(version_text.what()) + "\n");
   } catch (const CLI::ParseError& mistake) {
-    const auto chosen = line.app.get_subcommands();
-    const std::string command = chosen.empty() ? "hsi4d" : "hsi4d " + chosen.front()->get_name();
+    std::string command = "hsi4d";
+    for (auto chosen = line.app.get_subcommands(); !chosen.empty(); chosen = chosen.front()->get_subcommands())
+      command += " " + chosen.front()->get_name();
     throw UserError(command + ": " + mistake.what() + "; `" + command + " --help` explains its arguments");
   }
   print(line.run());
