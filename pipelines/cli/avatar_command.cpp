@@ -37,6 +37,9 @@ void check_out(const AvatarOptions& o, const std::string& command) {
   check_writable(o.out);
 }
 
+/// To the micrometre.
+std::string millimetres(double metres) { return short_number(std::round(1e6 * metres) / 1e3) + " mm"; }
+
 std::string percent(Index count, Index all) {
   return short_number(100 * static_cast<double>(count) / static_cast<double>(std::max<Index>(all, 1))) + " %";
 }
@@ -92,8 +95,8 @@ std::string avatar_import_command(const AvatarOptions& o) {
     log_warning(o.in +
                 ": colours vary with the direction of view; an avatar's do not, and keep their part of degree 0");
   return o.out + ": " + count_text(import.avatar.count(), "Gaussian") + ", " + skeleton_text(import.avatar) +
-         "; from the surface " + short_number(1e3 * import.mean_distance) + " mm on average, " +
-         short_number(1e3 * import.largest_distance) + " mm at most\n";
+         "; from the surface " + millimetres(import.mean_distance) + " on average, " +
+         millimetres(import.largest_distance) + " at most\n";
 }
 
 std::string avatar_info_command(const std::string& path) {

@@ -354,10 +354,18 @@ void check_options(int argc, const char* const* argv, CommandLine& line) {
   CLI::App* chosen = line.app.get_subcommand(argv[1]);
   std::string words = argv[1];
   const auto parts = chosen->get_subcommands([](const CLI::App*) { return true; });
+  std::vector<std::string> part_names;
   for (CLI::App* part : parts) {
+    part_names.push_back(part->get_name());
     if (argc < 3 || part->get_name() != argv[2]) continue;
     chosen = part;
     words += " " + part->get_name();
+  }
+  const bool is_option = argc > 2 && *argv[2] == '-';
+  if (!parts.empty() && chosen->get_name() == argv[1] && !is_option) {
+    const std::string word = argc > 2 ? argv[2] : "";
+    throw UserError("hsi4d " + words + ": " + (argc > 2 ? "there is no command \"" + word + "\"" : "give a command") +
+                    "; known: " + joined(part_names) + (argc > 2 ? did_you_mean(word, part_names) : ""));
   }
   const CLI::App& command = *chosen;
   std::vector<std::string> known;

@@ -48,7 +48,8 @@ Light light_through(const BodyModel& body, const AvatarSettings& settings) {
   const double metre = std::min(4 / std::sqrt(1.65 / static_cast<double>(settings.gaussians)), 800.0);
   Light light;
   for (const double turn : {0.0, 90.0, 180.0, 305.0}) {
-    const SceneView view{.camera = camera_around(body, turn, metre)};
+    SceneView view;
+    view.camera = camera_around(body, turn, metre);
     const SceneImage rendered = render_scene(gaussians, view);
     const std::vector<char> covered = covered_pixels(body, view.camera);
     for (std::size_t i = 0; i < covered.size(); ++i) {
