@@ -93,7 +93,9 @@ TEST_CASE("synth makes the avatar of the body that a config names") {
   settings.object_gaussians = 60;
   write_dataset(settings, video_render_settings(), folder.path() / "named", {}, ConfigValue::make_object(), body);
   write_dataset(settings, video_render_settings(), folder.path() / "plain");
-  const auto avatar_of = [&](const char* name) { return read_avatar((folder.path() / name / "avatar.safetensors").string()); };
+  const auto avatar_of = [&](const char* name) {
+    return read_avatar((folder.path() / name / "avatar.safetensors").string());
+  };
   const Avatar named = avatar_of("named"), plain = avatar_of("plain");
   CHECK(named.means == plain.means);
   CHECK(named.weights.indices == plain.weights.indices);

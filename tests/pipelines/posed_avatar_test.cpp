@@ -134,8 +134,9 @@ TEST_CASE("render draws a body of a motion, in every precision") {
   const double sum = std::accumulate(images[0].begin(), images[0].end(), 0.0);
   CHECK(sum / static_cast<double>(images[0].size()) > 0.03);  // and was seen
 
-  const ProgramResult outside = run_hsi4d({"render", "--scene", "ball.ply", "--camera", "camera.json", "--motion",
-                                           "motion.npz", "--avatar", "avatar.safetensors", "--frame", "2", "--out", "a.png"});
+  const ProgramResult outside =
+      run_hsi4d({"render", "--scene", "ball.ply", "--camera", "camera.json", "--motion", "motion.npz", "--avatar",
+                 "avatar.safetensors", "--frame", "2", "--out", "a.png"});
   CHECK(outside.status == 2);
   CHECK(outside.err == "hsi4d render: --frame: motion.npz has no frame 2; allowed: 0 to 1\n");
 }
