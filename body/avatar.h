@@ -35,9 +35,10 @@ struct Avatar {
 /// How surface_avatar places Gaussians.
 struct AvatarSettings {
   Index gaussians = 5000;
-  double cover = 0.6;      ///< tangent scale over the mean distance of neighbours
+  double cover = 0.7;      ///< tangent scale over the mean distance of neighbours
   double thickness = 0.2;  ///< normal scale over tangent scale
   double opacity = 0.98;
+  double detail = 1;   ///< how much denser head, hands and feet are: 0 not at all, 1 as designed (fingers six times)
   double texture = 1;  ///< contrast of the patterns of the clothes: 0 plain, 1 as designed
   std::uint64_t seed = 0;
 };

@@ -1,5 +1,6 @@
 #include "body/skinning.h"
 
+#include <array>
 #include <cmath>
 
 #include "body/skinning_kernel.h"
@@ -336,6 +337,54 @@ struct TransformPoints {
   }
 };
 
+/// d_F += B(:,0:3)ᵀ d_F'
+template <class S>
+void add_transposed_frame(const S* b, const S* d_posed, S* d_frame) {
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c)
+      d_frame[3 * r + c] += (b[r] * d_posed[c] + b[4 + r] * d_posed[3 + c]) + b[8 + r] * d_posed[6 + c];
+  }
+}
+
+/// Inputs: transforms, points, frames. Outputs: points, frames.
+template <class S>
+struct SkinFrames {
+  static constexpr const char* kName = "skin_frames";
+  SkinWeights<S> weights;
+
+  void forward(NodeIo<S>& io) {
+    const auto& table = weights.tables().sparse;
+    parallel_for(weights.vertices(), kSkinGrain, [&](Index begin, Index end) {
+      kernels<S>().sparse_frames(table, io.in(0).data, io.in(1).data, io.in(2).data, io.out(0).data, io.out(1).data,
+                                 begin, end);
+    });
+  }
+
+  void backward(NodeIo<S>& io) {
+    const SkinTables<S>& tables = weights.tables();
+    const ConstArray<S> d_y = io.d_out(0), d_f = io.d_out(1);
+    if (io.wants(0)) {
+      gather_transforms(io, tables, [&](S* partial, Index begin, Index end) {
+        kernels<S>().sparse_frames_adjoint(tables.sparse, io.in(1).data, io.in(2).data, d_y ? d_y.data : nullptr,
+                                           d_f ? d_f.data : nullptr, partial, begin, end);
+      });
+    }
+    const bool points = io.wants(1) && d_y, frames = io.wants(2) && d_f;
+    if (!points && !frames) return;
+    const std::span<S> blended = io.scratch(weights.vertices() * kTransformSize);
+    S* d_points = points ? io.d_in(1).data : nullptr;
+    S* d_frames = frames ? io.d_in(2).data : nullptr;
+    parallel_for(weights.vertices(), kSkinGrain, [&](Index begin, Index end) {
+      kernels<S>().sparse_blend(tables.sparse, io.in(0).data, blended.data(), begin, end);
+      for (Index v = begin; v < end; ++v) {
+        const S* b = blended.data() + v * kTransformSize;
+        if (points) add_transposed(b, d_y.row(v), d_points + 3 * v);
+        if (frames) add_transposed_frame(b, d_f.row(v), d_frames + 9 * v);
+      }
+    });
+  }
+};
+
 }  // namespace
 
 template <class S>
@@ -393,18 +442,33 @@ Var<S> blend_transforms(const SkinWeights<S>& weights, Var<S> transforms, Source
 }
 
 template <class S>
+SkinnedFrames<S> skin_frames(const SkinWeights<S>& weights, Var<S> transforms, Var<S> points, Var<S> frames,
+                             Source where) {
+  HSI4D_CHECK(!weights.tables().is_dense, "frames need sparse weights");
+  HSI4D_CHECK_EQ(transforms.shape(), shape_of(weights.joints(), kTransformSize));
+  HSI4D_CHECK_EQ(points.shape(), shape_of(weights.vertices(), 3));
+  HSI4D_CHECK_EQ(frames.shape(), shape_of(weights.vertices(), 9));
+  Tape<S>& tape = transforms.owner();
+  const std::array<Var<S>, 3> inputs = {transforms, points, frames};
+  const std::array<Shape, 2> outputs = {points.shape(), frames.shape()};
+  const Var<S> posed = tape.record(SkinFrames<S>{weights}, std::span<const Var<S>>(inputs), outputs, where);
+  return {posed, tape.output(posed, 1)};
+}
+
+template <class S>
 Var<S> transform_points(Var<S> transforms, Var<S> points, Source where) {
   HSI4D_CHECK_EQ(points.shape(), shape_of(points.shape().rows, 3));
   HSI4D_CHECK_EQ(transforms.shape(), shape_of(points.shape().rows, kTransformSize));
   return transforms.owner().record(TransformPoints<S>{}, {transforms, points}, points.shape(), where);
 }
 
-#define HSI4D_INSTANTIATE(S)                                                          \
-  template class SkinWeights<S>;                                                      \
-  template void skin_points(const SkinWeights<S>&, const S*, const S*, S*);           \
-  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Source);         \
-  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Var<S>, Source); \
-  template Var<S> blend_transforms(const SkinWeights<S>&, Var<S>, Source);            \
+#define HSI4D_INSTANTIATE(S)                                                                    \
+  template class SkinWeights<S>;                                                                \
+  template void skin_points(const SkinWeights<S>&, const S*, const S*, S*);                     \
+  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Source);                   \
+  template Var<S> skin_points(const SkinWeights<S>&, Var<S>, Var<S>, Var<S>, Source);           \
+  template Var<S> blend_transforms(const SkinWeights<S>&, Var<S>, Source);                      \
+  template SkinnedFrames<S> skin_frames(const SkinWeights<S>&, Var<S>, Var<S>, Var<S>, Source); \
   template Var<S> transform_points(Var<S>, Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

@@ -5,6 +5,8 @@
 //   B_v = Σ_k w_vk A_jk        y_v = B_v x1_v                               (forward)
 //   d_x_v += B_v(:,0:3)ᵀ d_y_v,    d_A_j += Σ_v w_vj d_y_v ⊗ x1_v           (adjoint)
 //
+// and for frames F_v [3,3], axes that a point carries along, F'_v = B_v(:,0:3) F_v with O_v += d_F'_v F_vᵀ,
+//
 // so that d_A is the transposed blend of the outer products O_v = d_y_v ⊗ x1_v. Vertices are cut into blocks whose O_v
 // stay in the first-level cache; a list of (vertex, weight) by block and joint lets each joint gather its sum, and no
 // sum depends on which thread works on which chunk.
@@ -69,6 +71,11 @@ struct SkinKernels {
   void (*sparse_transform_adjoint)(Sparse, const S* points, const S* d_result, S* partial, Index begin, Index end);
   void (*sparse_blend)(Sparse, const S* transforms, S* blended, Index begin, Index end);
   void (*sparse_blend_adjoint)(Sparse, const S* d_blended, S* partial, Index begin, Index end);
+  /// Points and the frames [V,9] that they carry. Of the adjoint, a null `d_posed_points` or `d_posed_frames` is zero.
+  void (*sparse_frames)(Sparse, const S* transforms, const S* points, const S* frames, S* posed_points, S* posed_frames,
+                        Index begin, Index end);
+  void (*sparse_frames_adjoint)(Sparse, const S* points, const S* frames, const S* d_posed_points,
+                                const S* d_posed_frames, S* partial, Index begin, Index end);
   /// `saved` [panel, 12, kPanel] receives the blended transforms unless it is null.
   void (*dense_points)(Dense, const S* transforms, const S* points, S* result, S* saved, Index begin, Index end);
   void (*dense_point_adjoint)(const S* saved, const S* d_result, S* d_points, Index begin, Index end);

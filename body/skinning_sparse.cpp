@@ -348,6 +348,104 @@ void sparse_blend_adjoint(const SparseTable<S>& table, const S* d_blended, S* pa
   }
 }
 
+/// x with another number in its last lane.
+template <class S>
+HWY_INLINE Quad<S> with_last(Quad<S> x, S last) {
+  using D = typename Quad<S>::D;
+  constexpr int kLast = Quad<S>::kParts - 1;
+  x.part[kLast] = hn::IfThenElse(hn::FirstN(D(), Quad<S>::kLanes - 1), x.part[kLast], hn::Set(D(), last));
+  return x;
+}
+
+/// The rows of [F | x]; reads one number past the frame.
+template <class S>
+HWY_INLINE void load_frame(const S* frame, const S* point, Quad<S> (&rows)[4]) {
+  for (int r = 0; r < 3; ++r) rows[r] = with_last(Quad<S>::load(frame + 3 * r), point[r]);
+  rows[3] = with_last(Quad<S>::fill(0), S(1));
+}
+
+/// B [F | x; 0 | 1], as frame and point; writes one number past the frame.
+template <class S>
+HWY_INLINE void pose_frame(const TransformSum<S>& b, const S* frame, const S* point, S* posed_point, S* posed_frame) {
+  alignas(64) S transform[kTransformSize], posed[4];
+  b.store(transform);
+  Quad<S> rows[4];
+  load_frame(frame, point, rows);
+  for (int r = 0; r < 3; ++r) {
+    const S* t = transform + 4 * r;
+    Quad<S> y = add(mul(rows[0], Quad<S>::fill(t[0])), with_last(Quad<S>::fill(0), t[3]));
+    y = mul_add(rows[1], Quad<S>::fill(t[1]), y);
+    y = mul_add(rows[2], Quad<S>::fill(t[2]), y);
+    y.store(posed_frame + 3 * r);
+    y.store(posed);
+    posed_point[r] = posed[3];
+  }
+}
+
+/// The last four or fewer vertices go through copies, as those of a chunk must not touch what follows.
+template <class S, int K>
+void frames_of(const SparseTable<S>& table, const S* transforms, const S* points, const S* frames, S* posed_points,
+               S* posed_frames, Index begin, Index end) {
+  Index v = begin;
+  for (; v + 4 < end; v += 4) {
+    TransformSum<S> b[4];
+    blend<S, K>(table, transforms, v, b);
+    for (int i = 0; i < 4; ++i)
+      pose_frame(b[i], frames + 9 * (v + i), points + 3 * (v + i), posed_points + 3 * (v + i),
+                 posed_frames + 9 * (v + i));
+  }
+  for (; v < end; ++v) {
+    TransformSum<S> b[1];
+    blend<S, K>(table, transforms, v, b);
+    S frame[10] = {}, posed[10];
+    std::copy(frames + 9 * v, frames + 9 * v + 9, frame);
+    pose_frame(b[0], frame, points + 3 * v, posed_points + 3 * v, posed);
+    std::copy(posed, posed + 9, posed_frames + 9 * v);
+  }
+}
+
+template <class S>
+void sparse_frames(const SparseTable<S>& table, const S* transforms, const S* points, const S* frames, S* posed_points,
+                   S* posed_frames, Index begin, Index end) {
+  const auto run = table.per_vertex == 4 ? frames_of<S, 4> : frames_of<S, 0>;
+  run(table, transforms, points, frames, posed_points, posed_frames, begin, end);
+}
+
+/// O = d_F' Fᵀ beside d_y ⊗ (x, 1): the rows of d_y and d_F' times those of [F | x; 0 | 1] transposed.
+template <class S>
+HWY_INLINE void frame_product(const S* frame, const S* point, const S* d_y, const S* d_f, S* to) {
+  Quad<S> rows[4], columns[4];
+  load_frame(frame, point, rows);
+  transpose(rows, columns);
+  for (int r = 0; r < 3; ++r) {
+    Quad<S> sum = mul(columns[3], Quad<S>::fill(d_y[r]));
+    for (int c = 0; c < 3; ++c) sum = mul_add(columns[c], Quad<S>::fill(d_f[3 * r + c]), sum);
+    sum.store(to + 4 * r);
+  }
+}
+
+template <class S>
+void sparse_frames_adjoint(const SparseTable<S>& table, const S* points, const S* frames, const S* d_posed_points,
+                           const S* d_posed_frames, S* partial, Index begin, Index end) {
+  alignas(64) S outer[kSparseBlock * kTransformSize];
+  constexpr S kZeros[9] = {};
+  const Index point_step = d_posed_points == nullptr ? 0 : 3, frame_step = d_posed_frames == nullptr ? 0 : 9;
+  const S* d_y = point_step == 0 ? kZeros : d_posed_points;
+  const S* d_f = frame_step == 0 ? kZeros : d_posed_frames;
+  std::fill(partial, partial + table.joints * kTransformSize, S(0));
+  for (Index first = begin; first < end; first += kSparseBlock) {
+    const Index last = std::min(first + kSparseBlock, end);
+    for (Index v = first; v < last; ++v) {
+      const S* frame = frames + 9 * v;
+      S copy[10] = {};
+      if (v + 1 == table.vertices) frame = std::copy(frame, frame + 9, copy) - 9;
+      frame_product(frame, points + 3 * v, d_y + point_step * v, d_f + frame_step * v,
+                    outer + (v - first) * kTransformSize);
+    }
+    add_block(table, first / kSparseBlock, outer, partial);
+  }
+}
+
 }  // namespace
 
 template <class S>
@@ -357,6 +455,8 @@ void set_sparse(SkinKernels<S>& kernels) {
   kernels.sparse_transform_adjoint = sparse_transform_adjoint<S>;
   kernels.sparse_blend = sparse_blend<S>;
   kernels.sparse_blend_adjoint = sparse_blend_adjoint<S>;
+  kernels.sparse_frames = sparse_frames<S>;
+  kernels.sparse_frames_adjoint = sparse_frames_adjoint<S>;
 }
 template void set_sparse(SkinKernels<float>&);
 template void set_sparse(SkinKernels<double>&);

@@ -1,8 +1,14 @@
 #include "pipelines/bench_skinning.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
+#include "autodiff/elementwise.h"
+#include "autodiff/reduce.h"
+#include "autodiff/rotations.h"
+#include "body/avatar.h"
 #include "body/procedural_body.h"
 #include "body/smplx_body.h"
 #include "core/parallel.h"
@@ -10,6 +16,7 @@
 #include "core/stopwatch.h"
 #include "core/suggest.h"
 #include "core/text.h"
+#include "pipelines/posed_splats.h"
 
 namespace hsi4d {
 
@@ -145,11 +152,83 @@ void bench_workload(const NamedWorkload& workload, const SmplxModel& model, cons
   report(measured(workload, body, "both", options.threads, std::move(both)));
 }
 
+// --- Gaussians -------------------------------------------------------------------------------------------------------
+
+constexpr const char* kPosing = "posing";
+constexpr Index kPosedGaussians = 50000;
+
+/// Nanoseconds that the nodes from rotations to posed Gaussians have taken so far, forward and backward.
+std::array<double, 2> posing_time(const Tape<float>& tape) {
+  std::array<double, 2> time = {0, 0};
+  for (const NodeStatistics& node : tape.statistics()) {
+    if (node.name != "rotations_from_axis_angle" && node.name != "kinematic_chain" && node.name != "skin_frames")
+      continue;
+    time[0] += node.forward_ns;
+    time[1] += node.backward_ns;
+  }
+  return time;
+}
+
+/// An avatar's means and axes by the pose, as a frame graph has them, beside a loss that looks at every number.
+void bench_posing(const SkinningBench& options, const std::function<void(const SkinningMeasurement&)>& report) {
+  const Avatar avatar = surface_avatar(procedural_body(), {.gaussians = kPosedGaussians});
+  Tape<float> tape;
+  const auto constant = [&tape](const char* name, const std::vector<float>& numbers, Index cols) {
+    const Var<float> var = tape.constant(name, shape_of(static_cast<Index>(numbers.size()) / cols, cols));
+    tape.set(var, numbers);
+    return var;
+  };
+  const Random random(2, random_stream("bench.skinning"));
+  std::uint64_t at = 0;
+  const auto noise = [&](Index count) {
+    std::vector<float> numbers;
+    for (Index i = 0; i < count; ++i) numbers.push_back(random.uniform<float>(at++) - 0.5F);
+    return numbers;
+  };
+  const Var<float> pose = tape.parameter("pose", shape_of(kSmplxJoints, 3));
+  tape.set(pose, noise(3 * kSmplxJoints));
+  const GaussianVars<float> human = {constant("means", avatar.means, 3), constant("quats", avatar.quats, 4),
+                                     constant("log_scales", avatar.log_scales, 3),
+                                     constant("opacity_logits", avatar.opacity_logits, 1),
+                                     constant("colors", avatar.colors, 3)};
+  const Var<float> transl = tape.parameter("transl", shape_of(1, 3));
+  const SplatInputs<float> posed = skinned_splats(human, rotations_from_axis_angle(pose), transl, avatar);
+  const Var<float> loss = sum(posed.means * constant("d_means", noise(3 * kPosedGaussians), 3)) +
+                          sum(posed.axes * constant("d_axes", noise(9 * kPosedGaussians), 9));
+  tape.set_profiling(true);
+  constexpr int kWarmUp = 3;
+  std::array<std::vector<double>, 3> seconds;  // forward, backward, both
+  for (int i = -kWarmUp; i < options.repeats; ++i) {
+    tape.write(pose).data[3] += 1e-3F;
+    const std::array<double, 2> before = posing_time(tape);
+    tape.forward(loss);
+    tape.backward(loss);
+    const std::array<double, 2> after = posing_time(tape);
+    if (i < 0) continue;
+    for (std::size_t k = 0; k < 2; ++k) seconds[k].push_back(1e-9 * (after[k] - before[k]));
+    seconds[2].push_back(seconds[0].back() + seconds[1].back());
+  }
+  constexpr std::array<const char*, 3> kSteps = {"forward", "backward", "both"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::sort(seconds[k].begin(), seconds[k].end());
+    SkinningMeasurement m;
+    m.name = std::string("skinning/") + kPosing + "/" + kSteps[k];
+    m.threads = options.threads;
+    m.median_ms = 1e3 * seconds[k][seconds[k].size() / 2];
+    m.min_ms = 1e3 * seconds[k].front();
+    m.repeats = static_cast<int>(seconds[k].size());
+    m.vertices = kPosedGaussians;
+    m.joints = kSmplxJoints;
+    report(m);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> skinning_workloads() {
   std::vector<std::string> names;
   for (const NamedWorkload& w : kWorkloads) names.emplace_back(w.name);
+  names.emplace_back(kPosing);
   return names;
 }
 
@@ -160,12 +239,16 @@ void bench_skinning(const SkinningBench& options, const std::function<void(const
       throw UserError("hsi4d bench skinning: no workload \"" + name + "\"; known: " + joined(all) +
                       did_you_mean(name, all));
   }
-  const SmplxModel model = made_up_model();
+  const auto is_wanted = [&wanted = options.workloads](const char* name) {
+    return wanted.empty() || std::find(wanted.begin(), wanted.end(), name) != wanted.end();
+  };
+  std::optional<SmplxModel> model;
   for (const NamedWorkload& workload : kWorkloads) {
-    const auto& wanted = options.workloads;
-    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), workload.name) == wanted.end()) continue;
-    with_threads(options.threads, [&] { bench_workload(workload, model, options, report); });
+    if (!is_wanted(workload.name)) continue;
+    if (!model) model = made_up_model();
+    with_threads(options.threads, [&] { bench_workload(workload, *model, options, report); });
   }
+  if (is_wanted(kPosing)) with_threads(options.threads, [&] { bench_posing(options, report); });
 }
 
 }  // namespace hsi4d

@@ -1,4 +1,5 @@
-// `hsi4d bench skinning`: time of the SMPL-X body on the tape, forward and backward with respect to its pose.
+// `hsi4d bench skinning`: time of the SMPL-X body on the tape, forward and backward with respect to its pose,
+// and of the Gaussians on it.
 #pragma once
 
 #include <functional>
@@ -31,8 +32,9 @@ struct SkinningBench {
 std::vector<std::string> skinning_workloads();
 
 /// Measures every workload asked for: a body of 10,475 vertices and 486 correctives, made up from the procedural body,
-/// in float, with a fixed cotangent on the vertices. `report` gets each measurement as it is made. Throws UserError for
-/// a workload that is not known.
+/// in float, with a fixed cotangent on the vertices; and "posing", an avatar of 50,000 Gaussians from its joints'
+/// rotations to means and axes, with cotangents on both. `report` gets each measurement as it is made. Throws UserError
+/// for a workload that is not known.
 void bench_skinning(const SkinningBench& options, const std::function<void(const SkinningMeasurement&)>& report);
 
 }  // namespace hsi4d

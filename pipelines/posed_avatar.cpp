@@ -38,29 +38,34 @@ std::vector<float> net_colors(const Avatar& avatar, const BodyPose& pose, const 
   return {tape.value(colors).data, tape.value(colors).data + 3 * avatar.count()};
 }
 
+/// Harmonics of degree 0.
+std::vector<float> harmonics_of(std::vector<float> colors) {
+  for (float& color : colors) color = static_cast<float>((static_cast<double>(color) - 0.5) / kShC0);
+  return colors;
+}
+
 }  // namespace
 
-PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose, const Vector3<double>* center_world) {
+Gaussians rest_gaussians(const Avatar& avatar) {
   check_sizes(avatar);
+  return {.means = avatar.means,
+          .quats = avatar.quats,
+          .log_scales = avatar.log_scales,
+          .opacity_logits = avatar.opacity_logits,
+          .sh = harmonics_of(avatar.colors)};
+}
+
+PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose, const Vector3<double>* center_world) {
+  PosedGaussians posed{rest_gaussians(avatar), {}};
   const PosedJoints skeleton = pose_skeleton(avatar, pose);
-  PosedGaussians posed;
-  Gaussians& g = posed.gaussians;
-  g.means = avatar.means;
-  g.quats = avatar.quats;
-  g.log_scales = avatar.log_scales;
-  g.opacity_logits = avatar.opacity_logits;
   const SparseWeights& weights = avatar.weights;
-  posed.transforms.assign(12 * static_cast<std::size_t>(g.count()), 0.0);
+  posed.transforms.assign(12 * static_cast<std::size_t>(avatar.count()), 0.0);
   for (Index i = 0; i < weights.vertices * weights.per_vertex; ++i) {
     const double* joint = skeleton.transforms.data() + 12 * Index{weights.indices[static_cast<std::size_t>(i)]};
     double* blended = posed.transforms.data() + 12 * (i / weights.per_vertex);
     for (int e = 0; e < 12; ++e) blended[e] += weights.weights[static_cast<std::size_t>(i)] * joint[e];
   }
-  const std::vector<float> colors =
-      avatar.color_net ? net_colors(avatar, pose, posed.transforms, center_world) : avatar.colors;
-  g.sh.resize(colors.size());
-  std::transform(colors.begin(), colors.end(), g.sh.begin(),
-                 [](float color) { return static_cast<float>((static_cast<double>(color) - 0.5) / kShC0); });
+  if (avatar.color_net) posed.gaussians.sh = harmonics_of(net_colors(avatar, pose, posed.transforms, center_world));
   return posed;
 }
 

@@ -6,6 +6,10 @@
 
 namespace hsi4d {
 
+/// The avatar's Gaussians in the rest pose. Colours, the avatar's own, become harmonics of degree 0.
+/// Throws InternalError as check_sizes.
+Gaussians rest_gaussians(const Avatar& avatar);
+
 /// The avatar's Gaussians with the blended transform of each, Σ_j w_nj A_j, in double. Colours become harmonics of
 /// degree 0: those of the avatar's color net in this pose, where it has one.
 ///

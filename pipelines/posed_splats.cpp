@@ -66,12 +66,12 @@ template <class S>
 SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar,
                               const HumanColors<S>* colors) {
   const PosedSkeleton<S> skeleton = kinematic_chain(rotations, transl, avatar.parents, avatar.joints);
-  const Var<S> blended = blend_transforms(SkinWeights<S>(avatar.weights), skeleton.transforms);
-  const Var<S> means = transform_points(blended, human.means);
-  return {means, transform_axes(blended, gaussian_axes(human.quats, human.log_scales)),
-          gaussian_opacities(human.opacity_logits),
-          colors == nullptr ? human.colors
-                            : net_colors(*colors, human.colors, rotations, avatar, skeleton.transforms, means)};
+  const SkinnedFrames<S> posed = skin_frames(SkinWeights<S>(avatar.weights), skeleton.transforms, human.means,
+                                             gaussian_axes(human.quats, human.log_scales));
+  return {posed.points, posed.frames, gaussian_opacities(human.opacity_logits),
+          colors == nullptr
+              ? human.colors
+              : net_colors(*colors, human.colors, rotations, avatar, skeleton.transforms, posed.points)};
 }
 
 template <class S>

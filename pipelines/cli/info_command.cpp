@@ -10,6 +10,7 @@
 #include "core/exr.h"
 #include "core/image_io.h"
 #include "core/npz.h"
+#include "core/safetensors.h"
 #include "core/suggest.h"
 #include "pipelines/cli/text.h"
 #include "splat/info.h"
@@ -70,18 +71,7 @@ std::string splat_info(const std::string& path) {
   if (s.count == 0)
     return text + "  notice   " + (file.report.rows == 0 ? "the file holds no Gaussians" : "no Gaussian is left") +
            "\n";
-  const Counts suspicious = suspicion_counts(s.suspicions);
-  if (!suspicious.empty()) text += "  notice   " + counts_text(suspicious) + "\n";
-  text += "  bounds   ";
-  for (int c = 0; c < 3; ++c)
-    text += std::string(c > 0 ? ", " : "") + "xyz"[c] + " " + short_number(s.lower_world[c]) + " to " +
-            short_number(s.upper_world[c]);
-  text += " m\n";
-  text += "  opacity  " + distribution_text(s.opacity) + "\n";
-  text += "  scale    " + distribution_text(s.scale) + " m\n";
-  text += "  (smallest, 5 %, median, 95 %, largest; scale: standard deviations along all axes)\n";
-  text += histogram_text("opacity  ", s.opacity_histogram);
-  return text + histogram_text("scale    ", s.scale_histogram);
+  return text + statistics_text(s);
 }
 
 using Json = nlohmann::ordered_json;
@@ -134,6 +124,14 @@ std::string npz_info(const std::string& path) {
   return text;
 }
 
+std::string safetensors_info(const std::string& path) {
+  const Safetensors file = Safetensors::read(path);
+  std::string text = path + ": " + std::to_string(file.names().size()) + " arrays\n";
+  for (const std::string& name : file.names()) text += array_line(name, file.array(name));
+  for (const auto& [key, value] : file.metadata()) text += "  " + key + "  " + with_escapes(value) + "\n";
+  return text;
+}
+
 std::string npy_info(const std::string& path) { return path + ": an array\n" + array_line("", read_npy(path)); }
 
 std::string camera_line(const Camera& camera) {
@@ -174,11 +172,28 @@ struct Kind {
   const char* ending;
   std::string (*info)(const std::string&);
 };
-constexpr Kind kKinds[] = {{".ply", splat_info},  {".splat", splat_info}, {".spz", splat_info}, {".npz", npz_info},
-                           {".npy", npy_info},    {".json", camera_info}, {".png", image_info}, {".jpg", image_info},
-                           {".jpeg", image_info}, {".exr", exr_info}};
+constexpr Kind kKinds[] = {{".ply", splat_info},   {".splat", splat_info}, {".spz", splat_info},
+                           {".npz", npz_info},     {".npy", npy_info},     {".safetensors", safetensors_info},
+                           {".json", camera_info}, {".png", image_info},   {".jpg", image_info},
+                           {".jpeg", image_info},  {".exr", exr_info}};
 
 }  // namespace
+
+std::string statistics_text(const GaussianStatistics& s) {
+  std::string text;
+  const Counts suspicious = suspicion_counts(s.suspicions);
+  if (!suspicious.empty()) text += "  notice   " + counts_text(suspicious) + "\n";
+  text += "  bounds   ";
+  for (int c = 0; c < 3; ++c)
+    text += std::string(c > 0 ? ", " : "") + "xyz"[c] + " " + short_number(s.lower_world[c]) + " to " +
+            short_number(s.upper_world[c]);
+  text += " m\n";
+  text += "  opacity  " + distribution_text(s.opacity) + "\n";
+  text += "  scale    " + distribution_text(s.scale) + " m\n";
+  text += "  (smallest, 5 %, median, 95 %, largest; scale: standard deviations along all axes)\n";
+  text += histogram_text("opacity  ", s.opacity_histogram);
+  return text + histogram_text("scale    ", s.scale_histogram);
+}
 
 std::string info_command(const std::string& path, bool json) {
   if (json) {

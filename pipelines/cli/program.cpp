@@ -18,6 +18,7 @@
 #include "core/suggest.h"
 #include "core/text.h"
 #include "core/version.h"
+#include "pipelines/cli/avatar_command.h"
 #include "pipelines/cli/bench_command.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/convert_command.h"
@@ -67,6 +68,7 @@ struct CommandLine {
   std::string config, topic, file, out;
   std::vector<std::string> overrides, runs;
   bool print_config = false, quiet = false, json = false;
+  AvatarOptions avatar;
   ConvertOptions convert;
   RunArguments run_arguments;
   DemoArguments demo_arguments;
@@ -87,6 +89,7 @@ struct CommandLine {
     add_report();
     add_render();
     add_gradients();
+    add_avatar();
     add_convert();
     add_info();
     add_bench();
@@ -153,6 +156,42 @@ struct CommandLine {
         ->required();
     info->add_flag("--json", json, "Print one JSON object; for Gaussians");
     info->callback([this] { run = [this] { return info_command(file, json); }; });
+  }
+
+  void add_avatar() {
+    AvatarOptions& o = avatar;
+    CLI::App& command = *app.add_subcommand("avatar", "Make, import or describe the Gaussians of a body");
+    command.require_subcommand(1);
+    const auto add_body = [&o](CLI::App& sub) {
+      sub.add_option("--betas", o.betas, "Shape of the body model: the first betas; the mean shape without")
+          ->type_name("B,B,...");
+      sub.add_option("--out", o.out, "The avatar's file")->type_name("F.safetensors")->required();
+    };
+
+    CLI::App& make = *command.add_subcommand("make", "Dress a body in Gaussians, spread evenly over its surface");
+    make.add_option("--body-model", o.body_model, "A SMPL-X file; without, the body that comes with the program")
+        ->type_name("M.npz");
+    make.add_option("--gaussians", o.settings.gaussians, "How many; 20,000 to 300,000 are useful")->type_name("N");
+    make.add_option("--detail", o.settings.detail, "How much denser head, hands and feet are: 0 not at all, to 1")
+        ->type_name("X");
+    make.add_option("--cover", o.settings.cover, "Size along the surface over the distance of neighbours")
+        ->type_name("X");
+    make.add_option("--texture", o.settings.texture, "Contrast of the patterns, 0 to 1")->type_name("X");
+    make.add_option("--seed", o.settings.seed, "Seed of the places")->check(WholeNumber())->type_name("N");
+    add_body(make);
+    make.callback([this] { run = [this] { return avatar_make_command(avatar); }; });
+
+    CLI::App& bind = *command.add_subcommand("import", "Bind the Gaussians of a file to a body model");
+    bind.add_option("PLY", o.in, "Gaussians in the rest pose of the body model, in its frame: .ply, .splat or .spz")
+        ->required();
+    bind.add_option("--body-model", o.body_model, "A SMPL-X file; without, the body that comes with the program")
+        ->type_name("M.npz");
+    add_body(bind);
+    bind.callback([this] { run = [this] { return avatar_import_command(avatar); }; });
+
+    CLI::App& info = *command.add_subcommand("info", "Tell what is in an avatar's file");
+    info.add_option("FILE", file, "An avatar")->required();
+    info.callback([this] { run = [this] { return avatar_info_command(file); }; });
   }
 
   void add_convert() {

@@ -148,7 +148,8 @@ TEST_CASE("an avatar of a surface has as many Gaussians as asked for, on the sur
     CHECK(dot(Vector3<double>(frame.col(2)), normal) > 0.5);
     const float* s = a.log_scales.data() + 3 * i;
     CHECK(s[0] == s[1]);
-    CHECK(s[2] == Approx(s[0] + std::log(0.2)).margin(1e-5));
+    CHECK(s[2] > s[0] + std::log(0.2) - 1e-5);  // thicker where the surface bends
+    CHECK(s[2] < s[0]);
   }
 }
 
@@ -162,9 +163,9 @@ TEST_CASE("an avatar's Gaussians leave no hole and are not crowded") {
       nearest =
           std::min(nearest, (point(a.means, i) - p).norm() / std::exp(a.log_scales[static_cast<std::size_t>(3 * i)]));
     }
-    REQUIRE(nearest < 2.0);
+    REQUIRE(nearest < 1.5);
   }
-  // Two on the same side are no nearer than half the mean distance, which is scale / cover.
+  // Two on the same side are no nearer than half their distance on average, which is about scale / cover.
   const auto normal = [&](Index i) {
     const float* q = a.quats.data() + 4 * i;
     return Vector3<double>(quaternion_to_matrix(Vector4<double>(q[0], q[1], q[2], q[3])).col(2));
@@ -174,7 +175,7 @@ TEST_CASE("an avatar's Gaussians leave no hole and are not crowded") {
       if (k == i || dot(normal(i), normal(k)) <= 0) continue;
       const float scale =
           std::min(a.log_scales[static_cast<std::size_t>(3 * i)], a.log_scales[static_cast<std::size_t>(3 * k)]);
-      REQUIRE((point(a.means, i) - point(a.means, k)).norm() > 0.5 * std::exp(scale) / 0.6);
+      REQUIRE((point(a.means, i) - point(a.means, k)).norm() > 0.5 * std::exp(scale) / 0.7 / 1.6);
     }
   }
 }

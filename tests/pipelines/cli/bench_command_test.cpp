@@ -96,10 +96,17 @@ TEST_CASE("bench skinning measures a body and writes one object a measurement") 
   CHECK(names == std::vector<std::string>{"skinning/fixed_hands/forward", "skinning/fixed_hands/backward",
                                           "skinning/fixed_hands/both", "skinning/no_correctives/forward",
                                           "skinning/no_correctives/backward", "skinning/no_correctives/both"});
+  options.workloads = {"posing"};
+  CHECK(cli::bench_skinning_command(options).find("skinning/posing/both") != std::string::npos);
+  const auto posing =
+      nlohmann::json::parse(read_text_file(options.json).substr(0, read_text_file(options.json).find('\n')));
+  CHECK(posing.at("name") == "skinning/posing/forward");
+  CHECK(posing.at("vertices") == 50000);
+  CHECK(posing.at("min_ms") > 0);
   options.workloads = {"fixed_hand"};
   CHECK_THROWS_WITH(cli::bench_skinning_command(options),
                     "hsi4d bench skinning: no workload \"fixed_hand\"; known: smplx, smplx_floats, fixed_hands, "
-                    "fixed_hands_floats, no_correctives; did you mean \"fixed_hands\"?");
+                    "fixed_hands_floats, no_correctives, posing; did you mean \"fixed_hands\"?");
 }
 
 TEST_CASE("bench color_net measures forward and backward and writes one object a measurement") {

@@ -1,0 +1,32 @@
+// Gaussians of an avatar that another program made, bound to a body model.
+#pragma once
+
+#include <string>
+
+#include "body/avatar.h"
+#include "splat/gaussians.h"
+
+namespace hsi4d {
+
+/// Farther than this from the body, metres, Gaussians are no clothes or hair of it any more.
+inline constexpr double kFarFromBody = 0.15;
+
+/// What import_avatar found. Distances of means from the surface, metres.
+struct AvatarImport {
+  Avatar avatar;
+  double mean_distance = 0, largest_distance = 0;
+  Index far = 0;            ///< Gaussians beyond kFarFromBody
+  bool lost_views = false;  ///< harmonics above degree 0, which an avatar does not hold, were there and not all zero
+};
+
+/// Binds Gaussians to a body: each gets the skinning weights of the place of the surface that is nearest to its mean,
+/// interpolated in its triangle, the four largest, normalised. Means, quaternions, scales and opacities stay as they
+/// are; colours are the harmonics' part of degree 0, from 0 up.
+///
+/// @param gaussians  in the body's rest pose and frame (see BodyModel), metres
+/// @param source     what messages call them
+/// Throws DataError when there is none, or more than half of them are beyond kFarFromBody: they are then in another
+/// pose, unit or frame; InternalError when sizes do not fit or the body has no surface.
+AvatarImport import_avatar(const Gaussians& gaussians, const BodyModel& body, const std::string& source);
+
+}  // namespace hsi4d

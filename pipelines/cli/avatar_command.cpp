@@ -1,0 +1,111 @@
+#include "pipelines/cli/avatar_command.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/procedural_body.h"
+#include "body/smplx_file.h"
+#include "core/check.h"
+#include "core/log.h"
+#include "pipelines/avatar_import.h"
+#include "pipelines/cli/info_command.h"
+#include "pipelines/cli/scene_options.h"
+#include "pipelines/cli/text.h"
+#include "pipelines/posed_avatar.h"
+#include "splat/info.h"
+
+namespace hsi4d::cli {
+namespace {
+
+BodyModel body_of(const AvatarOptions& o, const std::string& command) {
+  if (o.body_model.empty()) {
+    if (!o.betas.empty()) throw UserError(command + "--betas is given without --body-model, whose shape they are");
+    return procedural_body();
+  }
+  std::vector<double> betas;
+  if (!o.betas.empty()) {
+    const auto count = static_cast<std::size_t>(std::count(o.betas.begin(), o.betas.end(), ',')) + 1;
+    betas = parse_numbers(o.betas, count, command + "--betas", "the numbers of a shape");
+  }
+  return rest_body(read_smplx(o.body_model, {.betas = std::ssize(betas), .expressions = 0, .correctives = false}),
+                   betas);
+}
+
+void check_out(const AvatarOptions& o, const std::string& command) {
+  check_ending(o.out, command + "--out", {".safetensors"});
+  check_no_input(o.out, command + "--out", {o.in, o.body_model});
+  check_writable(o.out);
+}
+
+/// To the micrometre.
+std::string millimetres(double metres) { return short_number(std::round(1e6 * metres) / 1e3) + " mm"; }
+
+std::string percent(Index count, Index all) {
+  return short_number(100 * static_cast<double>(count) / static_cast<double>(std::max<Index>(all, 1))) + " %";
+}
+
+/// Places of each Gaussian that are used, and how many joints move none.
+std::string weights_text(const Avatar& avatar) {
+  const Index k = avatar.weights.per_vertex, n = avatar.count();
+  std::vector<Index> by_count(static_cast<std::size_t>(k) + 1, 0);
+  std::vector<char> moves(static_cast<std::size_t>(avatar.joint_count()), 0);
+  for (Index i = 0; i < n; ++i) {
+    std::size_t used = 0;
+    for (Index at = i * k; at < (i + 1) * k; ++at) {
+      if (avatar.weights.weights[static_cast<std::size_t>(at)] == 0) continue;
+      ++used;
+      moves[static_cast<std::size_t>(avatar.weights.indices[static_cast<std::size_t>(at)])] = 1;
+    }
+    ++by_count[used];
+  }
+  std::string text = "up to " + std::to_string(k) + " a Gaussian (";
+  for (std::size_t used = 1; used < by_count.size(); ++used)
+    text += (used > 1 ? ", " : "") + std::to_string(used) + ": " + percent(by_count[used], n);
+  text += ")";
+  const auto idle = std::count(moves.begin(), moves.end(), 0);
+  return text + "; joints that move none: " + std::to_string(idle);
+}
+
+std::string skeleton_text(const Avatar& avatar) {
+  return count_text(avatar.joint_count(), "joint") +
+         (avatar.joint_names == smplx_joint_names() && avatar.parents == smplx_parents() ? " of SMPL-X" : "");
+}
+
+}  // namespace
+
+std::string avatar_make_command(const AvatarOptions& o) {
+  const std::string command = "hsi4d avatar make: ";
+  check_out(o, command);
+  const Avatar avatar = surface_avatar(body_of(o, command), o.settings);
+  write_avatar(o.out, avatar);
+  return o.out + ": " + count_text(avatar.count(), "Gaussian") + ", " + skeleton_text(avatar) + "\n";
+}
+
+std::string avatar_import_command(const AvatarOptions& o) {
+  const std::string command = "hsi4d avatar import: ";
+  check_out(o, command);
+  const BodyModel body = body_of(o, command);
+  const SplatFile file = read_scene(o.in);
+  const AvatarImport import = import_avatar(file.gaussians, body, o.in);
+  write_avatar(o.out, import.avatar);
+  if (import.far > 0)
+    log_warning(o.in + ": " + std::to_string(import.far) + " of " + count_text(import.avatar.count(), "Gaussian") +
+                " are more than " + short_number(kFarFromBody) + " m from the body, and follow its nearest part");
+  if (import.lost_views)
+    log_warning(o.in +
+                ": colours vary with the direction of view; an avatar's do not, and keep their part of degree 0");
+  return o.out + ": " + count_text(import.avatar.count(), "Gaussian") + ", " + skeleton_text(import.avatar) +
+         "; from the surface " + millimetres(import.mean_distance) + " on average, " +
+         millimetres(import.largest_distance) + " at most\n";
+}
+
+std::string avatar_info_command(const std::string& path) {
+  const Avatar avatar = read_avatar(path);
+  const GaussianStatistics s = statistics_of(rest_gaussians(avatar));
+  std::string text = path + ": avatar of " + count_text(s.count, "Gaussian") + ", " + skeleton_text(avatar) + "\n";
+  if (s.count == 0) return text + "  notice   the file holds no Gaussians\n";
+  text += "  weights  " + weights_text(avatar) + "\n";
+  return text + statistics_text(s);
+}
+
+}  // namespace hsi4d::cli
