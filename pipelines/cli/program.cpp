@@ -24,6 +24,7 @@
 #include "pipelines/cli/demo_command.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
+#include "pipelines/cli/pose_command.h"
 #include "pipelines/cli/render_command.h"
 #include "pipelines/cli/report_command.h"
 #include "pipelines/cli/run_command.h"
@@ -73,6 +74,7 @@ struct CommandLine {
   std::vector<LossDescription> losses;
   RenderOptions render;
   GradientsOptions gradients;
+  PoseOptions pose;
   BenchOptions bench;
   std::function<std::string()> run;
 
@@ -87,6 +89,7 @@ struct CommandLine {
     add_report();
     add_render();
     add_gradients();
+    add_pose();
     add_convert();
     add_info();
     add_bench();
@@ -271,6 +274,31 @@ struct CommandLine {
         "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
         "render.cap_gradient is pass (render.compatibility=inria makes it so).");
     command.callback([this] { run = [this] { return gradients_command(gradients); }; });
+  }
+
+  void add_pose() {
+    CLI::App& command = *app.add_subcommand("pose", "Pose an SMPL-X body: vertices and joints of every frame");
+    command.add_option("--body-model", pose.body_model, "The body, a SMPL-X file")->type_name("M.npz")->required();
+    command
+        .add_option("--params", pose.params,
+                    "Its parameters by their names in smplx, [T,n] or [n]; what is not there is zero")
+        ->type_name("P.npz")
+        ->required();
+    command.add_option("--out", pose.out, "Where vertices [T,V,3] and joints [T,J,3] go")
+        ->type_name("F.npz")
+        ->required();
+    command.add_option("--precision", pose.precision, "float or double")->type_name("WORD");
+    command
+        .add_option("--hands", pose.hands,
+                    "What the numbers of a hand are: full, 15 rotations; pca, coefficients of the model's components; "
+                    "auto, rotations if there are 45 and else coefficients")
+        ->type_name("WORD");
+    command.add_flag("--flat-hand-mean", pose.flat_hand_mean,
+                     "Hands are flat where their numbers are 0, not in the model's mean pose");
+    command.footer(
+        "Names: betas, expression, global_orient, body_pose, jaw_pose, leye_pose, reye_pose, left_hand_pose,\n"
+        "right_hand_pose, transl. Rotations are axis-angle vectors in radians, lengths metres.");
+    command.callback([this] { run = [this] { return pose_command(pose); }; });
   }
 
   void add_scene(CLI::App& command, SceneOptions& options) {
