@@ -7,6 +7,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
+#include "body/vposer.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
@@ -198,7 +199,9 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
     joint_rotations_.push_back(rotation_leaf(joints.name, joints.name, joints.count));
   }
   transl_ = leaf("transl", "transl", 1, 3, nullptr);
-  return {skinned_splats(vars, record_rotations(concat_rows<S>(joint_rotations_)), transl_, avatar), n};
+  const Var<S> rotations = record_rotations(concat_rows<S>(joint_rotations_));
+  inputs_.body_rotations = slice_rows(rotations, 1, kBodyPoseJoints);
+  return {skinned_splats(vars, rotations, transl_, avatar), n};
 }
 
 template <class S>
