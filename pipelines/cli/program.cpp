@@ -24,6 +24,7 @@
 #include "pipelines/cli/demo_command.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
+#include "pipelines/cli/motion_command.h"
 #include "pipelines/cli/pose_command.h"
 #include "pipelines/cli/render_command.h"
 #include "pipelines/cli/report_command.h"
@@ -75,6 +76,7 @@ struct CommandLine {
   RenderOptions render;
   GradientsOptions gradients;
   PoseOptions pose;
+  MotionOptions motion;
   BenchOptions bench;
   std::function<std::string()> run;
 
@@ -90,6 +92,7 @@ struct CommandLine {
     add_render();
     add_gradients();
     add_pose();
+    add_motion();
     add_convert();
     add_info();
     add_bench();
@@ -299,6 +302,30 @@ struct CommandLine {
         "Names: betas, expression, global_orient, body_pose, jaw_pose, leye_pose, reye_pose, left_hand_pose,\n"
         "right_hand_pose, transl. Rotations are axis-angle vectors in radians, lengths metres.");
     command.callback([this] { run = [this] { return pose_command(pose); }; });
+  }
+
+  void add_motion() {
+    CLI::App& command = *app.add_subcommand("motion", "Change a motion of a body: frame rate, up axis, format");
+    command
+        .add_option("IN", motion.in, "A motion by AMASS's or SMPL-X's names (.npz), or a folder of SMPLer-X's files")
+        ->required();
+    command.add_option("OUT", motion.out, "A motion (.npz), or the body in motion (.glb)")->required();
+    command
+        .add_option("--from-rate", motion.from_rate,
+                    "Frames a second of IN, instead of what it says; of a folder 30 without")
+        ->type_name("HZ");
+    command.add_option("--frame-rate", motion.frame_rate, "Frames a second of OUT")->type_name("HZ");
+    command.add_flag("--y-up", motion.is_y_up, "IN's world has y up: turn it, about the pelvis");
+    command
+        .add_option(
+            "--body-model", motion.body_model,
+            "The body, a SMPL-X file: where its pelvis is, its mean hands (to which SMPLer-X's add), and what a "
+            "GLB shows; without, the mean SMPL-X pelvis, and the program's own body")
+        ->type_name("M.npz");
+    command.add_option("--person", motion.person, "Which person of a folder, from 0")
+        ->check(WholeNumber(std::numeric_limits<int>::max()))
+        ->type_name("N");
+    command.callback([this] { run = [this] { return motion_command(motion); }; });
   }
 
   void add_scene(CLI::App& command, SceneOptions& options) {

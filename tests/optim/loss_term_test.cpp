@@ -244,8 +244,8 @@ TEST_CASE("joint_limits is zero within the ranges, and grows with the square bey
   };
   constexpr double kDegree = 3.14159265358979323846 / 180;
   CHECK(knee(150 * kDegree) == 0);
-  CHECK(knee(-18 * kDegree) == Approx(square(10 * kDegree)).epsilon(1e-10));  // 8 degrees back are allowed
-  CHECK(knee(-28 * kDegree) == Approx(square(20 * kDegree)).epsilon(1e-10));
+  CHECK(knee(-18 * kDegree) == Approx(100 * kDegree * kDegree).epsilon(1e-10));  // 8 degrees back are allowed
+  CHECK(knee(-28 * kDegree) == Approx(400 * kDegree * kDegree).epsilon(1e-10));
 }
 
 TEST_CASE("pose_prior prefers a body at ease to one that is not") {

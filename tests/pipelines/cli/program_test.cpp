@@ -175,8 +175,8 @@ TEST_CASE("the program and every subcommand answer --version and --help") {
   CHECK(version_text.out == std::string("hsi4d ") + version() + "\n");
   const ProgramResult help = run_hsi4d({"--help"});
   CHECK(help.status == 0);
-  for (const char* command : {"run", "demo", "synth", "report", "render", "gradients", "pose", "convert", "info",
-                              "check", "schema", "list"}) {
+  for (const char* command : {"run", "demo", "synth", "report", "render", "gradients", "pose", "motion", "convert",
+                              "info", "check", "schema", "list"}) {
     CHECK_THAT(help.out, Contains(command));
     const ProgramResult own = run_hsi4d({command, "--help"});
     CHECK(own.status == 0);
