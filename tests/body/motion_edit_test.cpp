@@ -164,7 +164,7 @@ void write_smplerx(const std::string& path, double value, std::int64_t betas = 1
 
 }  // namespace
 
-TEST_CASE("a folder of SMPLer-X files is a motion; frames without a file are filled") {
+TEST_CASE("a folder of SMPLer-X files is a motion, and frames without a file are filled") {
   const TemporaryFolder folder;
   std::filesystem::create_directory("smplx");
   write_smplerx("smplx/00008_0.npz", 0.5);
