@@ -89,7 +89,7 @@ TEST_CASE("faults of parameters are named") {
           f.add<double>("body_pose", {2, 60}, Numbers(120));
         }) == "p.npz: array 'body_pose': has shape [2,60]; allowed: [63], [T,63], [21,3], [T,21,3]");
   CHECK(message_for([](NpzWriter& f) {
-          f.add<double>("body_pose", {21, 3}, Numbers(63));
+          f.add<double>("body_pose", {3, 21}, Numbers(63));
         }) == "p.npz: array 'body_pose': has shape [3,21]; allowed: [63], [T,63], [21,3], [T,21,3]");
   CHECK(message_for([](NpzWriter& f) {
           f.add<double>("left_hand_pose", {2, 46}, Numbers(92));
