@@ -96,7 +96,53 @@ struct RotationsFrom6d {
   }
 };
 
+/// w = log R
+template <class S>
+struct AxisAngleFromRotations {
+  static constexpr const char* kName = "axis_angle_from_rotations";
+
+  void forward(NodeIo<S>& io) {
+    const ConstArray<S> r = io.in(0);
+    const Array<S> w = io.out();
+    parallel_for(r.shape.rows, kRotationGrain, [&](Index begin, Index end) {
+      for (Index j = begin; j < end; ++j) {
+        const Vector3<S> x = so3_log(matrix_at(r.row(j)));
+        for (int i = 0; i < 3; ++i) w.row(j)[i] = x[i];
+      }
+    });
+  }
+
+  void backward(NodeIo<S>& io) {
+    const ConstArray<S> r = io.in(0), d_w = io.d_out();
+    const Array<S> d_r = io.d_in(0);
+    parallel_for(r.shape.rows, kRotationGrain, [&](Index begin, Index end) {
+      for (Index j = begin; j < end; ++j) {
+        Matrix3<S> d = Matrix3<S>::Zero();
+        so3_log_adjoint(matrix_at(r.row(j)), vector_at(d_w.row(j)), d);
+        for (int row = 0; row < 3; ++row) {
+          for (int c = 0; c < 3; ++c) d_r.row(j)[3 * row + c] += d(row, c);
+        }
+      }
+    });
+  }
+
+  void add_signature(Signature& signature, NodeIo<S>& io) {
+    const ConstArray<S> r = io.in(0);
+    for (Index j = 0; j < r.shape.rows; ++j) {
+      const auto pivot = detail::pivot_quaternion(matrix_at(r.row(j)));
+      signature.add(2 * static_cast<std::uint64_t>(pivot.pivot) + (detail::hemisphere(pivot.q) > 0 ? 1 : 0));
+    }
+  }
+};
+
 }  // namespace
+
+template <class S>
+Var<S> axis_angle_from_rotations(Var<S> rotations, Source where) {
+  const Index joints = rotations.shape().rows;
+  HSI4D_CHECK_EQ(rotations.shape(), shape_of(joints, 9));
+  return rotations.owner().record(AxisAngleFromRotations<S>{}, {rotations}, shape_of(joints, 3), where);
+}
 
 template <class S>
 Var<S> rotations_from_axis_angle(Var<S> axis_angle, Source where) {
@@ -114,7 +160,8 @@ Var<S> rotations_from_6d(Var<S> columns, Source where) {
 
 #define HSI4D_INSTANTIATE(S)                                 \
   template Var<S> rotations_from_axis_angle(Var<S>, Source); \
-  template Var<S> rotations_from_6d(Var<S>, Source);
+  template Var<S> rotations_from_6d(Var<S>, Source);         \
+  template Var<S> axis_angle_from_rotations(Var<S>, Source);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)
 #undef HSI4D_INSTANTIATE

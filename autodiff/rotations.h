@@ -1,7 +1,7 @@
-// Rotation matrices of arrays of joints, from axis-angle vectors and from pairs of columns ("6D").
+// Rotation matrices of arrays of joints, from axis-angle vectors and from pairs of columns ("6D"), and back.
 //
-// Each row is one call of so3_exp (core/rotation.h) or rotation_from_6d (core/rotation_6d.h), value and adjoint, so
-// nothing is special at the identity, near half a turn or at parallel columns.
+// Each row is one call of so3_exp, so3_log (core/rotation.h) or rotation_from_6d (core/rotation_6d.h), value and
+// adjoint, so nothing is special at the identity, near half a turn or at parallel columns.
 #pragma once
 
 #include "autodiff/tape.h"
@@ -26,5 +26,14 @@ Var<S> rotations_from_axis_angle(Var<S> axis_angle, Source where = Source::curre
 /// the rows are not of 6.
 template <class S>
 Var<S> rotations_from_6d(Var<S> columns, Source where = Source::current());
+
+/// w_j = log R_j, |w_j| ≤ π, by the largest pivot's quaternion (row C5).
+///
+/// @param rotations  [J,9] rotation matrices, row-major
+/// @return           [J,3] axis-angle, radians
+/// Adjoint: rotations, of the pivot's formula as a function of nine free numbers. The result jumps at half a turn:
+/// which pivot was taken, and on which side, is part of the signature. Throws InternalError when the rows are not of 9.
+template <class S>
+Var<S> axis_angle_from_rotations(Var<S> rotations, Source where = Source::current());
 
 }  // namespace hsi4d

@@ -132,6 +132,36 @@ double read_frame_rate(const Npz& file) {
   return rate;
 }
 
+/// The mean over frames of `betas`.
+std::vector<double> read_betas(const Npz& file, int64_t frames) {
+  if (!file.has("betas")) return {};
+  const NpyArray& array = file.array("betas");
+  const auto& shape = array.shape();
+  const bool is_row = shape.size() == 1, is_table = shape.size() == 2 && (shape[0] == 1 || shape[0] == frames);
+  if (!is_row && !is_table) {
+    throw DataError(array.source() + ": has shape " + shape_text(shape) + "; allowed: [B], [1,B], [" +
+                    std::to_string(frames) + ",B]");
+  }
+  const std::vector<double> numbers = array.as<double>();
+  require_finite(array, numbers);
+  const auto width = static_cast<std::size_t>(shape.back());
+  if (width == 0) return {};
+  const std::size_t rows = numbers.size() / width;
+  std::vector<double> mean(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(width));
+  for (std::size_t i = 0; i < numbers.size() && rows > 1; ++i) {
+    mean[i % width] += (numbers[i] - numbers[i % width]) / static_cast<double>(rows);
+  }
+  return mean;
+}
+
+/// A text; "neutral" where the file has none that can be read.
+std::string read_gender(const Npz& file) {
+  if (!file.has("gender")) return Motion{}.gender;
+  const NpyArray& array = file.array("gender");
+  const bool is_text = array.kind() == NpyKind::bytes || array.kind() == NpyKind::unicode;
+  return is_text && array.size() == 1 ? array.text() : Motion{}.gender;
+}
+
 Motion motion_of(const Npz& file) {
   const NpyArray* trans = find(file, {"trans", "transl"});
   if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'");
@@ -140,6 +170,8 @@ Motion motion_of(const Npz& file) {
   const Rows places = rows_of(*trans, frames, 3);
   Motion motion;
   motion.frame_rate = read_frame_rate(file);
+  motion.betas = read_betas(file, frames);
+  motion.gender = read_gender(file);
   motion.poses.assign(static_cast<std::size_t>(frames), rest_pose(kSmplxJoints));
   for (std::size_t t = 0; t < motion.poses.size(); ++t) {
     motion.poses[t].transl = {places.at(t, 0), places.at(t, 1), places.at(t, 2)};
@@ -182,10 +214,13 @@ void write_motion(const std::string& path, const Motion& motion) {
   file.add<double>("trans", {frames, 3}, trans);
   add_joints(file, "poses", motion, 0, static_cast<std::size_t>(kSmplxJoints));
   for (const Part& part : kParts) add_joints(file, part.name, motion, part.joint, part.joints);
-  file.add<double>("betas", {10}, std::vector<double>(10, 0.0));
-  file.add_text("gender", "neutral");
+  std::vector<double> betas = motion.betas;
+  betas.resize(std::max<std::size_t>(betas.size(), 10));
+  file.add<double>("betas", {static_cast<int64_t>(betas.size())}, betas);
+  file.add_text("gender", motion.gender);
   file.add_text("surface_model_type", "smplx");
   file.add_scalar("mocap_frame_rate", motion.frame_rate);
+  file.add_scalar("mocap_framerate", motion.frame_rate);
   file.add_scalar("mocap_time_length", static_cast<double>(frames) / motion.frame_rate);
   file.write(path);
 }

@@ -70,8 +70,10 @@ template <class S>
 Rotations<S> rotations_of(Tape<S>& tape, Var<S> parameters, Index joints, const Source& where) {
   if (parameters.tape == nullptr) parameters = tape.constant("no rotation", shape_of(joints, 3), where);
   HSI4D_CHECK_EQ(parameters.shape().rows, joints);
-  if (parameters.shape().cols == 6) {
-    const Var<S> matrices = rotations_from_6d(parameters, where);
+  if (parameters.shape().cols != 3) {
+    const bool are_columns = parameters.shape().cols == 6;
+    const Var<S> matrices = are_columns ? rotations_from_6d(parameters, where) : parameters;
+    HSI4D_CHECK_EQ(matrices.shape(), shape_of(joints, 9));
     return {matrices, rotation_offsets(matrices, where)};
   }
   return {rotations_from_axis_angle(parameters, where), rotation_offsets_from_axis_angle(parameters, where)};
@@ -80,7 +82,9 @@ Rotations<S> rotations_of(Tape<S>& tape, Var<S> parameters, Index joints, const 
 template <class S>
 Rotations<S> hand_rotations(Tape<S>& tape, const SmplxBody<S>& body, Var<S> parameters, int side, const Source& where) {
   if (parameters.tape == nullptr) parameters = tape.constant("no rotation", shape_of(kHandJoints, 3), where);
-  if (parameters.shape() == shape_of(kHandJoints, 6)) return rotations_of(tape, parameters, kHandJoints, where);
+  const bool is_whole =
+      parameters.shape() == shape_of(kHandJoints, 6) || parameters.shape() == shape_of(kHandJoints, 9);
+  if (is_whole) return rotations_of(tape, parameters, kHandJoints, where);
   return rotations_of(tape, hand_pose(body, parameters, side, where), kHandJoints, where);
 }
 

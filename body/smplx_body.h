@@ -66,18 +66,19 @@ class SmplxBody {
 
 /// The parameters of a body on a tape; an empty Var is zero (no rotation).
 ///
-/// Rotations [n,3] are axis-angle vectors in radians, [n,6] pairs of columns (rotations_from_6d), relative to the
-/// parent. A hand [15,3] adds to the hand's mean pose, axis-angle to axis-angle; a hand [1,n], n coefficients of the
-/// file's first n components (PCA), too. A hand [15,6] is its whole rotation, without the mean.
+/// Rotations [n,3] are axis-angle vectors in radians, [n,6] pairs of columns (rotations_from_6d), [n,9] matrices by
+/// rows, relative to the parent. A hand [15,3] adds to the hand's mean pose, axis-angle to axis-angle; a hand [1,n], n
+/// coefficients of the file's first n components (PCA), too. A hand [15,6] or [15,9] is its whole rotation, without the
+/// mean.
 template <class S>
 struct SmplxParameters {
   Var<S> betas;          ///< [1,B]
   Var<S> expression;     ///< [1,E]
-  Var<S> global_orient;  ///< [1,3] or [1,6]; turns the body about its pelvis
-  Var<S> body_pose;      ///< [21,3] or [21,6]
-  Var<S> jaw_pose;       ///< [1,3] or [1,6], as the eyes
+  Var<S> global_orient;  ///< [1,3], [1,6] or [1,9]; turns the body about its pelvis
+  Var<S> body_pose;      ///< [21,3], [21,6] or [21,9]
+  Var<S> jaw_pose;       ///< [1,3], [1,6] or [1,9], as the eyes
   Var<S> leye_pose, reye_pose;
-  Var<S> left_hand_pose;  ///< [15,3], [15,6] or [1,n]
+  Var<S> left_hand_pose;  ///< [15,3], [15,6], [15,9] or [1,n]
   Var<S> right_hand_pose;
   Var<S> transl;  ///< [1,3] metres
 };

@@ -31,6 +31,8 @@ struct LossInputs {
   Var<S> object_depth;          ///< [O,1] mean camera z of each object's Gaussian centres, metres
   Var<S> object_depth_target;   ///< [O,1] what it was in the clip's first frame, metres
 
+  Var<S> body_rotations;  ///< [21,9] rotation matrices, by rows, of joints 1 to 21 relative to their parents
+
   std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
 
   static bool given(Var<S> input) { return input.tape != nullptr; }

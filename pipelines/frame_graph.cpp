@@ -7,6 +7,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
+#include "body/vposer.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
@@ -205,6 +206,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
   }
   transl_ = leaf("transl", "transl", 1, 3, nullptr);
   const Var<S> rotations = record_rotations(concat_rows<S>(joint_rotations_));
+  inputs_.body_rotations = slice_rows(rotations, 1, kBodyPoseJoints);
   if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations, transl_, avatar), n};
   HSI4D_CHECK_EQ(settings_.color_net->rows, n);
   const HumanColors<S> colors = record_color_net(*settings_.color_net);

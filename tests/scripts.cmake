@@ -16,3 +16,14 @@ add_test(NAME install
                            -DCOMPILER=${CMAKE_CXX_COMPILER} -DFLAGS=${sanitizer_flags} -DVERSION=${PROJECT_VERSION}
                            -P ${CMAKE_CURRENT_SOURCE_DIR}/install_test.cmake)
 set_tests_properties(layering test_names install PROPERTIES LABELS quick TIMEOUT 300)
+
+# Exporters of other programs' files, with NumPy and stand-ins for PyTorch and joblib.
+find_program(HSI4D_PYTHON python3)
+if(HSI4D_PYTHON)
+  add_test(NAME "exporters of VPoser, WHAM, GVHMR and TRAM"
+           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/exporters_test.py ${PROJECT_SOURCE_DIR}/tools
+                   $<TARGET_FILE:hsi4d>)
+  set_tests_properties("exporters of VPoser, WHAM, GVHMR and TRAM" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+else()
+  message(STATUS "There is no python3: the exporters in tools/ are not tested")
+endif()

@@ -5,11 +5,13 @@
 #include "optim/loss_term.h"
 
 // clang-format off
-#define HSI4D_LOSSES      \
-  HSI4D_LOSS(photometric) \
-  HSI4D_LOSS(masked_l2)   \
-  HSI4D_LOSS(center)      \
-  HSI4D_LOSS(depth)
+#define HSI4D_LOSSES       \
+  HSI4D_LOSS(photometric)  \
+  HSI4D_LOSS(masked_l2)    \
+  HSI4D_LOSS(center)       \
+  HSI4D_LOSS(depth)        \
+  HSI4D_LOSS(joint_limits) \
+  HSI4D_LOSS(pose_prior)
 // clang-format on
 
 namespace hsi4d {

@@ -25,6 +25,8 @@
 #include "pipelines/cli/demo_command.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
+#include "pipelines/cli/motion_command.h"
+#include "pipelines/cli/pose_command.h"
 #include "pipelines/cli/render_command.h"
 #include "pipelines/cli/report_command.h"
 #include "pipelines/cli/run_command.h"
@@ -75,6 +77,8 @@ struct CommandLine {
   std::vector<LossDescription> losses;
   RenderOptions render;
   GradientsOptions gradients;
+  PoseOptions pose;
+  MotionOptions motion;
   BenchOptions bench;
   std::function<std::string()> run;
 
@@ -90,6 +94,8 @@ struct CommandLine {
     add_render();
     add_gradients();
     add_avatar();
+    add_pose();
+    add_motion();
     add_convert();
     add_info();
     add_bench();
@@ -311,6 +317,55 @@ struct CommandLine {
         "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
         "render.cap_gradient is pass (render.compatibility=inria makes it so).");
     command.callback([this] { run = [this] { return gradients_command(gradients); }; });
+  }
+
+  void add_pose() {
+    CLI::App& command = *app.add_subcommand("pose", "Pose an SMPL-X body: vertices and joints of every frame");
+    command.add_option("--body-model", pose.body_model, "The body, a SMPL-X file")->type_name("M.npz")->required();
+    command
+        .add_option("--params", pose.params,
+                    "Its parameters by their names in smplx, [T,n] or [n]; what is not there is zero")
+        ->type_name("P.npz")
+        ->required();
+    command.add_option("--out", pose.out, "Where vertices [T,V,3] and joints [T,J,3] go")
+        ->type_name("F.npz")
+        ->required();
+    command.add_option("--precision", pose.precision, "float or double")->type_name("WORD");
+    command
+        .add_option("--hands", pose.hands,
+                    "What the numbers of a hand are: full, 15 rotations; pca, coefficients of the model's components; "
+                    "auto, rotations if there are 45 and else coefficients")
+        ->type_name("WORD");
+    command.add_flag("--flat-hand-mean", pose.flat_hand_mean,
+                     "Hands are flat where their numbers are 0, not in the model's mean pose");
+    command.footer(
+        "Names: betas, expression, global_orient, body_pose, jaw_pose, leye_pose, reye_pose, left_hand_pose,\n"
+        "right_hand_pose, transl. Rotations are axis-angle vectors in radians, lengths metres.");
+    command.callback([this] { run = [this] { return pose_command(pose); }; });
+  }
+
+  void add_motion() {
+    CLI::App& command = *app.add_subcommand("motion", "Change a motion of a body: frame rate, up axis, format");
+    command
+        .add_option("IN", motion.in, "A motion by AMASS's or SMPL-X's names (.npz), or a folder of SMPLer-X's files")
+        ->required();
+    command.add_option("OUT", motion.out, "A motion (.npz), or the body in motion (.glb)")->required();
+    command
+        .add_option("--from-rate", motion.from_rate,
+                    "Frames a second of IN, instead of what it says; of a folder 30 without")
+        ->type_name("HZ");
+    command.add_option("--frame-rate", motion.frame_rate, "Frames a second of OUT")->type_name("HZ");
+    command.add_flag("--y-up", motion.is_y_up, "IN's world has y up: turn it, about the pelvis");
+    command
+        .add_option(
+            "--body-model", motion.body_model,
+            "The body, a SMPL-X file: where its pelvis is, its mean hands (to which SMPLer-X's add), and what a "
+            "GLB shows; without, the mean SMPL-X pelvis, and the program's own body")
+        ->type_name("M.npz");
+    command.add_option("--person", motion.person, "Which person of a folder, from 0")
+        ->check(WholeNumber(std::numeric_limits<int>::max()))
+        ->type_name("N");
+    command.callback([this] { run = [this] { return motion_command(motion); }; });
   }
 
   void add_scene(CLI::App& command, SceneOptions& options) {

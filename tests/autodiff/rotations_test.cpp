@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "core/linear.h"
+#include "core/rotation.h"
 #include "core/rotation_6d.h"
 #include "tests/support/operator_check.h"
 
@@ -128,4 +129,43 @@ TEST_CASE("rotations refuse rows of another length") {
   CHECK_THROWS_WITH(rotations_from_axis_angle(tape.parameter("x", shape_of(4, 6))),
                     Catch::Contains("[4,6] against [4,3]"));
   CHECK_THROWS_WITH(rotations_from_6d(tape.parameter("x", shape_of(4, 3))), Catch::Contains("[4,3] against [4,6]"));
+}
+
+namespace {
+
+const auto kLog = [](const auto& in) { return axis_angle_from_rotations(in[0]); };
+
+/// Matrices [J,9] of axis-angle vectors.
+Numbers matrices_of(const Numbers& axis_angle) {
+  Numbers rows;
+  for (std::size_t j = 0; j < axis_angle.size() / 3; ++j) {
+    const double* w = axis_angle.data() + 3 * j;
+    const Matrix3<double> r = so3_exp(Vector3<double>(w[0], w[1], w[2]));
+    for (int i = 0; i < 9; ++i) rows.push_back(r(i / 3, i % 3));
+  }
+  return rows;
+}
+
+}  // namespace
+
+TEST_CASE("axis-angle vectors of rotations pass the operator checks, and are the inverse") {
+  Numbers w;
+  std::mt19937_64 random(30);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int i = 0; i < 60; ++i) w.push_back(1.7 * uniform(random));
+  for (const double size : {0.0, 1e-9, 1e-4, 3.0}) {
+    w.insert(w.end(), {size, 0, 0, 0, -size, 0, 0, size / 2, size / 3});
+  }
+  const Numbers rows = matrices_of(w);
+  const auto joints = static_cast<Index>(w.size() / 3);
+  check_operator("log", {{"r", shape_of(joints, 9), 0, 0, rows}}, kLog);
+  const Result back = run({rows.begin(), rows.begin() + 9}, 0,
+                          [](const auto& in) { return rotations_from_axis_angle(axis_angle_from_rotations(in[0])); });
+  for (std::size_t i = 0; i < 9; ++i) CHECK(back.value[i] == Approx(rows[i]).margin(1e-15));
+  Tape<double> tape;
+  const auto r = tape.parameter("r", shape_of(joints, 9));
+  tape.set(r, rows);
+  const auto log = kLog(std::vector{r});
+  tape.forward(log);
+  for (std::size_t i = 0; i < w.size(); ++i) CHECK(tape.value(log).data[i] == Approx(w[i]).margin(1e-14));
 }

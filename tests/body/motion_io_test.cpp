@@ -81,6 +81,8 @@ TEST_CASE("motion files have the arrays that AMASS has") {
   CHECK(file.array("betas").as<double>() == Numbers(10, 0.0));
   CHECK(file.array("gender").text() == "neutral");
   CHECK(file.array("surface_model_type").text() == "smplx");
+  CHECK(file.array("mocap_frame_rate").scalar<double>() == 29.97);
+  CHECK(file.array("mocap_framerate").scalar<double>() == 29.97);
   CHECK(file.array("mocap_time_length").scalar<double>() == 3 / 29.97);
   const std::vector<std::pair<std::string, std::size_t>> parts = {
       {"root_orient", 3}, {"pose_body", 63}, {"pose_jaw", 3}, {"pose_eye", 6}, {"pose_hand", 90}};
@@ -135,6 +137,33 @@ TEST_CASE("poses in parts are read, missing parts are zero") {
   CHECK(angle(motion, 0, "jaw", 0) == 0);
   CHECK(angle(motion, 0, "left_index1", 0) == 1);
   CHECK(angle(motion, 0, "right_index1", 0) == 46);
+}
+
+TEST_CASE("shape and gender go along") {
+  const TemporaryFolder folder;
+  Motion motion = random_motion(2, 72);
+  motion.betas = Numbers(16, 0.5);
+  motion.gender = "female";
+  write_motion(folder / "m.npz", motion);
+  const Motion read = read_motion(folder / "m.npz");
+  CHECK(read.betas == motion.betas);
+  CHECK(read.gender == "female");
+  motion.betas = {1, 2};
+  write_motion(folder / "m.npz", motion);
+  CHECK(read_motion(folder / "m.npz").betas == Numbers{1, 2, 0, 0, 0, 0, 0, 0, 0, 0});
+  const auto with_betas = [](std::initializer_list<std::int64_t> shape, const Numbers& numbers) {
+    return [=, shape = std::vector<std::int64_t>(shape)](NpzWriter& f) {
+      f.add<double>("trans", {2, 3}, counted(2, 3));
+      f.add<double>("poses", {2, 72}, counted(2, 72));
+      f.add<double>("betas", std::span<const std::int64_t>(shape), std::span<const double>(numbers));
+    };
+  };
+  CHECK(decoded(with_betas({2, 2}, {1, 2, 3, 6})).betas == Numbers{2, 4});
+  CHECK(decoded(with_betas({1, 3}, {1, 2, 3})).betas == Numbers{1, 2, 3});
+  CHECK(decoded(with_betas({0}, {})).betas.empty());
+  CHECK(message_for(with_betas({3, 1}, {1, 2, 3})) ==
+        "m.npz: array 'betas': has shape [3,1]; allowed: [B], [1,B], [2,B]");
+  CHECK(message_for(with_betas({2}, {1, INFINITY})) == "m.npz: array 'betas': frame 0, number 1 is not finite");
 }
 
 TEST_CASE("faults of motion files are named") {

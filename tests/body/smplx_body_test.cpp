@@ -467,3 +467,32 @@ TEST_CASE("parameters of a wrong shape are refused") {
   p.betas = tape.parameter("betas", shape_of(1, 9));
   CHECK_THROWS_WITH(pose_smplx(tape, body, p), Catch::Contains("[1,9] against [1,10]"));
 }
+
+TEST_CASE("rotations may be matrices") {
+  const SmplxArrays arrays = random_smplx({.vertices = 40, .seed = 31});
+  const SmplxModel model = model_of(arrays);
+  SmplxBodyOptions flat;
+  flat.flat_hand_mean = true;
+  const SmplxBody<double> body(model, flat);
+  const SmplxPose pose = random_smplx_pose(10, 10, 32);
+  Taped<double> taped(body, pose);
+  const auto matrices = [&](const char* name, Index first, Index count) {
+    Numbers numbers;
+    for (Index j = first; j < first + count; ++j) {
+      const double* w = pose.axis_angle.data() + 3 * j;
+      const Matrix3<double> r = so3_exp(Vector3<double>(w[0], w[1], w[2]));
+      for (int i = 0; i < 9; ++i) numbers.push_back(r(i / 3, i % 3));
+    }
+    return taped.leaf(name, count, numbers);
+  };
+  SmplxParameters<double> p = taped.p;
+  p.global_orient = matrices("global_orient", 0, 1);
+  p.body_pose = matrices("body_pose", 1, 21);
+  p.left_hand_pose = matrices("left_hand_pose", 25, 15);
+  const PosedSmplx<double> posed = pose_smplx(taped.tape, body, p);
+  taped.tape.forward(posed.vertices);
+  CHECK(largest_difference(numbers_of(taped.tape.value(posed.vertices)), reference_smplx(arrays, pose).vertices) <=
+        1e-9);
+  p.body_pose = taped.tape.parameter("wrong", shape_of(21, 4));
+  CHECK_THROWS_AS(pose_smplx(taped.tape, body, p), InternalError);
+}

@@ -1,8 +1,10 @@
-// Files of avatars and of motions.
+// Files of avatars, motions, SMPL-X parameters and VPoser weights.
 #include <string>
 
 #include "body/avatar.h"
 #include "body/motion_io.h"
+#include "body/smplx_sequence.h"
+#include "body/vposer.h"
 #include "core/npz.h"
 #include "tests/fuzz/fuzz.h"
 
@@ -55,14 +57,50 @@ Bytes small_motion(bool whole) {
   return file.encode();
 }
 
+Bytes small_parameters() {
+  NpzWriter file;
+  file.add<float>("body_pose", {21, 3}, std::vector<float>(63, 0.5F));
+  file.add<float>("left_hand_pose", {2, 6}, std::vector<float>(12, 0.5F));
+  file.add<double>("betas", {10}, std::vector<double>(10, 1));
+  return file.encode();
+}
+
+/// One neuron, one latent.
+Bytes small_vposer() {
+  NpzWriter file;
+  const auto add = [&](const std::string& name, std::int64_t rows, std::int64_t columns) {
+    const std::vector<float> numbers(static_cast<std::size_t>(rows * columns), 0.5F);
+    file.add<float>(name + ".weight", {rows, columns}, numbers);
+    file.add<float>(name + ".bias", {rows}, std::vector<float>(static_cast<std::size_t>(rows), 0.25F));
+  };
+  add("encoder_net.2", 1, 63);
+  add("encoder_net.6", 1, 1);
+  add("encoder_net.7", 1, 1);
+  add("encoder_net.8.mu", 1, 1);
+  add("decoder_net.0", 1, 1);
+  add("decoder_net.3", 1, 1);
+  add("decoder_net.5", 126, 1);
+  for (const auto& [name, count] : {std::pair{"encoder_net.1.", 63}, std::pair{"encoder_net.4.", 1}}) {
+    for (const char* part : {"weight", "bias", "running_mean", "running_var"}) {
+      file.add<float>(std::string(name) + part, {count}, std::vector<float>(static_cast<std::size_t>(count), 0.5F));
+    }
+  }
+  return file.encode();
+}
+
 }  // namespace
 
-std::vector<Bytes> corpus() { return {small_avatar(), first_avatar(), small_motion(true), small_motion(false)}; }
+std::vector<Bytes> corpus() {
+  return {small_avatar(),     first_avatar(),     small_motion(true),
+          small_motion(false), small_parameters(), small_vposer()};
+}
 
 bool accepts(std::span<const uint8_t> file) {
   const bool avatar = is_read([&] { check_sizes(decode_avatar(file, "fuzz")); });
   const bool motion = is_read([&] { decode_motion(file, "fuzz.npz"); });
-  return avatar || motion;
+  const bool parameters = is_read([&] { decode_smplx_sequence(file, "fuzz.npz"); });
+  const bool network = is_read([&] { decode_vposer(file, "fuzz.npz"); });
+  return avatar || motion || parameters || network;
 }
 
 }  // namespace hsi4d::fuzz

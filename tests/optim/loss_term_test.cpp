@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "autodiff/difference.h"
+#include "autodiff/rotations.h"
 #include "core/config_file.h"
+#include "core/rotation.h"
 #include "tests/support/operator_check.h"
 
 using namespace hsi4d;
@@ -13,6 +15,17 @@ using namespace hsi4d::test;
 namespace {
 
 constexpr Index kHeight = 13, kWidth = 21, kObjects = 3;
+
+/// Matrices by rows, some of joints far beyond their ranges.
+std::vector<double> some_rotations() {
+  std::vector<double> rows;
+  for (int j = 0; j < 21; ++j) {
+    const double size = 0.4 + 0.1 * j;
+    const Matrix3<double> r = so3_exp(Vector3<double>(size * std::sin(1.0 + j), size * std::cos(2.0 * j), -0.3 * size));
+    for (int i = 0; i < 9; ++i) rows.push_back(r(i / 3, i % 3));
+  }
+  return rows;
+}
 
 /// One of every input that a term may read, in the order of inputs_of. The third object is not to be seen in the frame.
 std::vector<OperatorInput> all_inputs() {
@@ -24,7 +37,8 @@ std::vector<OperatorInput> all_inputs() {
           {"object_opacity", image_shape<double>(kObjects, kHeight, kWidth), 0, 1},
           {"object_center_target", shape_of(kObjects, 3), 0, 1, {4.5, 6, 1, 12.25, 3.5, 1, 0, 0, 0}},
           {"object_depth", shape_of(kObjects, 1), 1, 3},
-          {"object_depth_target", shape_of(kObjects, 1), 1, 3}};
+          {"object_depth_target", shape_of(kObjects, 1), 1, 3},
+          {"body_rotations", shape_of(21, 9), 0, 0, some_rotations()}};
 }
 
 template <class S>
@@ -37,6 +51,7 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.object_center_target = in[4];
   inputs.object_depth = in[5];
   inputs.object_depth_target = in[6];
+  inputs.body_rotations = in[7];
   return inputs;
 }
 
@@ -201,4 +216,42 @@ TEST_CASE("depth is the mean squared difference of the objects' depths") {
   const auto loss = term_named("depth").record(inputs, {});
   tape.forward(loss);
   CHECK(tape.value(loss).scalar() == Approx((0.25 + 1) / 2).epsilon(1e-14));
+}
+
+namespace {
+
+/// A stage's inputs with the body's rotations alone, by axis-angle vectors.
+double body_loss(const std::string& name, const std::vector<double>& axis_angle) {
+  Tape<double> tape;
+  LossInputs<double> inputs;
+  const auto pose = tape.parameter("pose", shape_of(21, 3));
+  tape.set(pose, axis_angle);
+  inputs.body_rotations = rotations_from_axis_angle(pose);
+  const LossTerm& term = term_named(name);
+  const auto loss = term.record(inputs, term.description.defaults);
+  tape.forward(loss);
+  return tape.value(loss).scalar();
+}
+
+}  // namespace
+
+TEST_CASE("joint_limits is zero within the ranges, and grows with the square beyond them") {
+  std::vector<double> pose(63, 0.0);
+  CHECK(body_loss("joint_limits", pose) == 0);
+  const auto knee = [&](double bend) {
+    pose[3 * 3] = bend;
+    return body_loss("joint_limits", pose);
+  };
+  constexpr double kDegree = 3.14159265358979323846 / 180;
+  CHECK(knee(150 * kDegree) == 0);
+  CHECK(knee(-18 * kDegree) == Approx(100 * kDegree * kDegree).epsilon(1e-10));  // 8 degrees back are allowed
+  CHECK(knee(-28 * kDegree) == Approx(400 * kDegree * kDegree).epsilon(1e-10));
+}
+
+TEST_CASE("pose_prior prefers a body at ease to one that is not") {
+  std::vector<double> pose(63, 0.0), odd = pose;
+  odd[3 * 3] = -1.5;                         // a knee bent forward
+  odd[3 * 14 + 1] = 2.5;                     // a head turned round
+  CHECK(body_loss("pose_prior", pose) > 0);  // arms to the sides are not at ease
+  CHECK(body_loss("pose_prior", odd) > 2 * body_loss("pose_prior", pose));
 }

@@ -1,6 +1,7 @@
 #include "tests/support/smplx_reference.h"
 
 #include <cmath>
+#include <complex>
 #include <filesystem>
 #include <random>
 
@@ -12,26 +13,31 @@ namespace {
 
 constexpr int kJ = 55, kFeatures = 486;
 
-using Rows3 = std::array<std::array<double, 3>, 3>;
-using Rows4 = std::array<std::array<double, 4>, 4>;
+template <class C>
+using Rows3 = std::array<std::array<C, 3>, 3>;
+template <class C>
+using Rows4 = std::array<std::array<C, 4>, 4>;
 
 std::size_t at(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 /// Rodrigues' formula as textbooks have it; the unit matrix below 1e-150.
-Rows3 rodrigues(const double* w) {
-  const double angle = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-  Rows3 r = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  if (angle < 1e-150) return r;
-  const double x = w[0] / angle, y = w[1] / angle, z = w[2] / angle;
-  const double c = std::cos(angle), s = std::sin(angle), v = 2 * std::sin(angle / 2) * std::sin(angle / 2);
+template <class C>
+Rows3<C> rodrigues(const C* w) {
+  using std::abs, std::sqrt, std::cos, std::sin;
+  const C angle = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+  Rows3<C> r = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  if (abs(angle) < 1e-150) return r;
+  const C x = w[0] / angle, y = w[1] / angle, z = w[2] / angle;
+  const C c = cos(angle), s = sin(angle), v = 2.0 * sin(angle / 2.0) * sin(angle / 2.0);
   r = {{{c + v * x * x, v * x * y - s * z, v * x * z + s * y},
         {v * x * y + s * z, c + v * y * y, v * y * z - s * x},
         {v * x * z - s * y, v * y * z + s * x, c + v * z * z}}};
   return r;
 }
 
-Rows4 product(const Rows4& a, const Rows4& b) {
-  Rows4 m{};
+template <class C>
+Rows4<C> product(const Rows4<C>& a, const Rows4<C>& b) {
+  Rows4<C> m{};
   for (std::size_t i = 0; i < 4; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
       for (std::size_t k = 0; k < 4; ++k) m[i][j] += a[i][k] * b[k][j];
@@ -40,7 +46,8 @@ Rows4 product(const Rows4& a, const Rows4& b) {
   return m;
 }
 
-Rows4 homogeneous(const Rows3& r, double x, double y, double z) {
+template <class C>
+Rows4<C> homogeneous(const Rows3<C>& r, C x, C y, C z) {
   return {
       {{r[0][0], r[0][1], r[0][2], x}, {r[1][0], r[1][1], r[1][2], y}, {r[2][0], r[2][1], r[2][2], z}, {0, 0, 0, 1}}};
 }
@@ -158,10 +165,24 @@ SmplxPose random_smplx_pose(int betas, int expressions, std::uint64_t seed) {
   return pose;
 }
 
-SmplxResult reference_smplx(const SmplxArrays& a, const SmplxPose& pose) {
+template <class C>
+std::vector<std::array<std::array<C, 3>, 3>> reference_rotations(const SmplxPoseOf<C>& pose) {
+  std::vector<Rows3<C>> rotations;
+  for (std::size_t j = 0; j < kJ; ++j) rotations.push_back(rodrigues(pose.axis_angle.data() + 3 * j));
+  return rotations;
+}
+
+template <class C>
+SmplxResultOf<C> reference_smplx(const SmplxArrays& arrays, const SmplxPoseOf<C>& pose) {
+  return reference_smplx(arrays, pose, reference_rotations(pose));
+}
+
+template <class C>
+SmplxResultOf<C> reference_smplx(const SmplxArrays& a, const SmplxPoseOf<C>& pose,
+                                 const std::vector<Rows3<C>>& rotations) {
   const std::int64_t vertices = a.vertices;
   // Shape and expression.
-  std::vector<double> shaped = a.v_template;
+  std::vector<C> shaped(a.v_template.begin(), a.v_template.end());
   for (std::size_t row = 0; row < shaped.size(); ++row) {
     for (std::size_t b = 0; b < pose.betas.size(); ++b)
       shaped[row] += a.shapedirs[row * at(a.columns) + b] * pose.betas[b];
@@ -170,7 +191,7 @@ SmplxResult reference_smplx(const SmplxArrays& a, const SmplxPose& pose) {
     }
   }
   // Joints: of the shaped vertices, or as the file says outright.
-  std::vector<double> joints(3 * kJ);
+  std::vector<C> joints(3 * kJ);
   for (std::size_t i = 0; i < joints.size(); ++i) {
     if (!a.j_template.empty()) {
       const std::size_t width = a.j_shapedirs.size() / joints.size();
@@ -182,12 +203,10 @@ SmplxResult reference_smplx(const SmplxArrays& a, const SmplxPose& pose) {
       }
     }
   }
-  // Rotations, and the correctives that follow from them.
-  std::vector<Rows3> rotations;
-  std::vector<double> features;
-  for (std::size_t j = 0; j < kJ; ++j) {
-    rotations.push_back(rodrigues(pose.axis_angle.data() + 3 * j));
-    for (std::size_t i = 0; j > 0 && i < 9; ++i) features.push_back(rotations[j][i / 3][i % 3] - (i % 4 == 0 ? 1 : 0));
+  // The correctives that follow from the rotations.
+  std::vector<C> features;
+  for (std::size_t j = 1; j < kJ; ++j) {
+    for (std::size_t i = 0; i < 9; ++i) features.push_back(rotations[j][i / 3][i % 3] - (i % 4 == 0 ? 1.0 : 0.0));
   }
   if (!a.posedirs.empty()) {
     for (std::size_t row = 0; row < shaped.size(); ++row) {
@@ -195,33 +214,43 @@ SmplxResult reference_smplx(const SmplxArrays& a, const SmplxPose& pose) {
     }
   }
   // The chain, by products of 4×4 matrices.
-  std::vector<Rows4> world(kJ), from_rest(kJ);
-  SmplxResult result;
+  std::vector<Rows4<C>> world(kJ), from_rest(kJ);
+  SmplxResultOf<C> result;
   for (std::size_t j = 0; j < kJ; ++j) {
-    const double* rest = joints.data() + 3 * j;
+    const C* rest = joints.data() + 3 * j;
     const std::int64_t parent = a.parents[j];
-    const double* from = parent < 0 ? nullptr : joints.data() + 3 * parent;
-    const Rows4 local = homogeneous(rotations[j], rest[0] - (from ? from[0] : 0), rest[1] - (from ? from[1] : 0),
-                                    rest[2] - (from ? from[2] : 0));
+    const C zero[3] = {};
+    const C* from = parent < 0 ? zero : joints.data() + 3 * parent;
+    const Rows4<C> local = homogeneous<C>(rotations[j], rest[0] - from[0], rest[1] - from[1], rest[2] - from[2]);
     world[j] = parent < 0 ? local : product(world[at(parent)], local);
-    const Rows3 none = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-    from_rest[j] = product(world[j], homogeneous(none, -rest[0], -rest[1], -rest[2]));
+    const Rows3<C> none = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    from_rest[j] = product(world[j], homogeneous<C>(none, -rest[0], -rest[1], -rest[2]));
     for (std::size_t i = 0; i < 3; ++i) result.joints.push_back(world[j][i][3] + pose.transl[i]);
   }
   // Skinning, and the translation.
   for (std::int64_t v = 0; v < vertices; ++v) {
-    Rows4 blend{};
+    Rows4<C> blend{};
     for (std::size_t j = 0; j < kJ; ++j) {
-      for (std::size_t i = 0; i < 16; ++i)
-        blend[i / 4][i % 4] += a.weights[at(v * kJ) + j] * from_rest[j][i / 4][i % 4];
+      const double weight = a.weights[at(v * kJ) + j];
+      if (weight == 0) continue;
+      for (std::size_t i = 0; i < 16; ++i) blend[i / 4][i % 4] += weight * from_rest[j][i / 4][i % 4];
     }
     for (std::size_t i = 0; i < 3; ++i) {
-      const double* x = shaped.data() + 3 * v;
+      const C* x = shaped.data() + 3 * v;
       result.vertices.push_back(blend[i][0] * x[0] + blend[i][1] * x[1] + blend[i][2] * x[2] + blend[i][3] +
                                 pose.transl[i]);
     }
   }
   return result;
 }
+
+#define HSI4D_INSTANTIATE(C)                                                                        \
+  template std::vector<std::array<std::array<C, 3>, 3>> reference_rotations(const SmplxPoseOf<C>&); \
+  template SmplxResultOf<C> reference_smplx(const SmplxArrays&, const SmplxPoseOf<C>&);             \
+  template SmplxResultOf<C> reference_smplx(const SmplxArrays&, const SmplxPoseOf<C>&,              \
+                                            const std::vector<std::array<std::array<C, 3>, 3>>&);
+HSI4D_INSTANTIATE(double)
+HSI4D_INSTANTIATE(std::complex<double>)
+#undef HSI4D_INSTANTIATE
 
 }  // namespace hsi4d::test

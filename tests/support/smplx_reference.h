@@ -44,19 +44,33 @@ NpzWriter smplx_writer(const SmplxArrays& arrays);
 /// The body of the data folder, or nothing where it is missing; the path is set in both cases.
 std::optional<SmplxArrays> makehuman_arrays(std::string& path);
 
-/// Parameters as the public implementation names them.
-struct SmplxPose {
-  std::vector<double> betas, expression;
-  std::vector<double> axis_angle;  ///< [55,3], hands as they are: with their mean
-  std::array<double, 3> transl{};
+/// Parameters as the public implementation names them. C: double, or std::complex<double> for derivatives by complex
+/// step.
+template <class C>
+struct SmplxPoseOf {
+  std::vector<C> betas, expression;
+  std::vector<C> axis_angle;  ///< [55,3], hands as they are: with their mean
+  std::array<C, 3> transl{};
 };
+using SmplxPose = SmplxPoseOf<double>;
 /// A random pose; angles up to 2.5 rad.
 SmplxPose random_smplx_pose(int betas, int expressions, std::uint64_t seed);
 
-struct SmplxResult {
-  std::vector<double> vertices;  ///< [V,3]
-  std::vector<double> joints;    ///< [55,3]
+template <class C>
+struct SmplxResultOf {
+  std::vector<C> vertices;  ///< [V,3]
+  std::vector<C> joints;    ///< [55,3]
 };
-SmplxResult reference_smplx(const SmplxArrays& arrays, const SmplxPose& pose);
+using SmplxResult = SmplxResultOf<double>;
+template <class C>
+SmplxResultOf<C> reference_smplx(const SmplxArrays& arrays, const SmplxPoseOf<C>& pose);
+/// As reference_smplx, where rotations are matrices [55,3,3] and the pose's axis_angle is not looked at.
+template <class C>
+SmplxResultOf<C> reference_smplx(const SmplxArrays& arrays, const SmplxPoseOf<C>& pose,
+                                 const std::vector<std::array<std::array<C, 3>, 3>>& rotations);
+
+/// Rotation matrices [55,3,3] of a pose by Rodrigues' formula.
+template <class C>
+std::vector<std::array<std::array<C, 3>, 3>> reference_rotations(const SmplxPoseOf<C>& pose);
 
 }  // namespace hsi4d::test

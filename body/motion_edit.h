@@ -1,0 +1,71 @@
+// Motions of bodies, changed: other frame rates, another world, another body's pelvis.
+#pragma once
+
+#include "body/motion_io.h"
+#include "body/smplx_sequence.h"
+#include "core/rigid.h"
+
+namespace hsi4d {
+
+/// Between two poses: every joint turns at constant speed along the shorter way (slerp), the translation is linear.
+///
+/// @param u  0 gives a, 1 gives b, bit for bit
+/// Throws InternalError when the poses have different numbers of joints.
+BodyPose interpolated(const BodyPose& a, const BodyPose& b, double u);
+
+/// The same movement in another frame rate: frame k is at k / frame_rate seconds, from the first frame of `motion` to
+/// the last that is not after its end. Frames that coincide keep their bits.
+///
+/// Throws InternalError when there is no frame or a rate is not positive and finite.
+Motion resampled(const Motion& motion, double frame_rate);
+
+/// The same movement in another world, x_to = R x + c. A body turns about its pelvis and not about the origin, so
+///
+///   R_0' = R R_0,   t' = R t + (R − I) r_0 + c,
+///
+/// as pelvis (r_0 + t) and surface both move rigidly.
+///
+/// @param to_from       R and c
+/// @param pelvis_rest   r_0 [3] metres: rest_body(model, betas).joints of joint 0, or kSmplxPelvis
+Motion transformed(const Motion& motion, const Rigid<double>& to_from, const Vector3<double>& pelvis_rest);
+
+/// As above, with a transform a frame. Throws InternalError when there are not as many as frames.
+Motion transformed(const Motion& motion, const std::vector<Rigid<double>>& to_from, const Vector3<double>& pelvis_rest);
+
+/// z up from y up: (x, y, z) → (x, −z, y).
+Rigid<double> z_up_from_y_up();
+
+/// The same movement of a body whose pelvis stands elsewhere in its rest pose: t' = t + from − to.
+Motion with_pelvis(const Motion& motion, const Vector3<double>& from, const Vector3<double>& to);
+
+/// Where the pelvis of the public models stands in the rest pose, neutral and of mean shape, metres: for files that do
+/// not say what body they are of.
+inline const Vector3<double> kSmplxPelvis{0.00312326, -0.35140747, 0.01203655};
+inline const Vector3<double> kSmplPelvis{-0.00217368, -0.24078917, 0.02858379};
+
+/// Hands as they are, of hands that a file gives relative to the model's mean hands, as SMPLer-X does.
+Motion with_hand_means(const Motion& motion, const SmplxModel& model);
+
+/// A motion of SMPL-X parameters.
+///
+/// Throws DataError naming the file when a hand is given by components.
+Motion motion_of(const SmplxSequence& sequence, double frame_rate);
+
+/// What read_pose_folder found.
+struct PoseFolder {
+  Motion motion;
+  Index files = 0;   ///< that were read
+  Index filled = 0;  ///< frames without a file, interpolated between their neighbours
+};
+
+/// Reads a folder of SMPL-X parameters, a file a frame as SMPLer-X writes them: FRAME.npz or FRAME_PERSON.npz, or
+/// TEXT_FRAME…; FRAME is the first run of digits, PERSON one after it. See read_smplx_sequence for what is in them. The
+/// shape is the mean of all frames. As everything of SMPLer-X it is in the camera's frame (see transformed), and hands
+/// are relative to the model's mean hands (see with_hand_means).
+///
+/// @param person  files of others are passed over; files without a person are those of 0
+/// Throws UserError when the folder cannot be read or has no such file; DataError as read_smplx_sequence, for a file of
+/// several frames, two of the same frame, frames more than 1000 apart, and shapes of different lengths.
+PoseFolder read_pose_folder(const std::string& folder, double frame_rate, int person = 0);
+
+}  // namespace hsi4d

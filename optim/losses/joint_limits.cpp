@@ -1,0 +1,14 @@
+// L = Σ over the body's joints of how far they are beyond their ranges, radians².   [body/natural_pose.h]
+#include "body/pose_prior.h"
+#include "optim/losses/list.h"
+
+namespace hsi4d {
+
+LossTerm joint_limits_loss() {
+  return make_loss_term("joint_limits", "How far the body's joints are beyond their ranges", [](const auto& in) {
+    if (!in.given(in.body_rotations)) return decltype(in.body_rotations){};
+    return joint_limit_energy(in.body_rotations);
+  });
+}
+
+}  // namespace hsi4d

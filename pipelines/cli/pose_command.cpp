@@ -1,0 +1,78 @@
+#include "pipelines/cli/pose_command.h"
+
+#include "body/smplx_sequence.h"
+#include "core/check.h"
+#include "core/log.h"
+#include "core/npz.h"
+#include "core/suggest.h"
+#include "pipelines/cli/scene_options.h"
+#include "pipelines/cli/text.h"
+
+namespace hsi4d::cli {
+namespace {
+
+/// The place of `word` in `known`. Throws UserError that names the option.
+std::size_t choice_of(const std::string& word, const std::vector<std::string>& known, const std::string& option) {
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (known[i] == word) return i;
+  }
+  throw UserError("hsi4d pose: " + option + ": \"" + word + "\" is not known; allowed: " + joined(known) +
+                  did_you_mean(word, known));
+}
+
+/// Throws DataError when the parameters have more numbers than the model.
+void check_count(const SmplxSequence& sequence, const SmplxTrack& track, const char* name, const std::string& model,
+                 Index there) {
+  if (track.width <= there) return;
+  throw DataError(sequence.source + ": array '" + name + "': has " + std::to_string(track.width) +
+                  " numbers a frame; " + model + " has " + std::to_string(there));
+}
+
+SmplxModel model_for(const std::string& path, const SmplxSequence& sequence) {
+  try {
+    return read_smplx(path, {.betas = sequence.betas.width, .expressions = sequence.expression.width});
+  } catch (const DataError&) {
+    // If that is because there are more numbers than directions, the message should name both files.
+    const SmplxModel none = read_smplx(path, {.betas = 0, .expressions = 0, .correctives = false});
+    check_count(sequence, sequence.betas, "betas", path, none.betas_in_file);
+    check_count(sequence, sequence.expression, "expression", path, none.expressions_in_file);
+    throw;
+  }
+}
+
+template <class S>
+void write_frames(const PoseOptions& options, const SmplxModel& model, const SmplxSequence& sequence,
+                  SmplxHands hands) {
+  const SmplxFrames<S> posed = pose_frames<S>(model, sequence, hands, options.flat_hand_mean);
+  NpzWriter npz;
+  npz.add<S>("vertices", {sequence.frames, model.vertex_count(), 3}, posed.vertices);
+  npz.add<S>("joints", {sequence.frames, model.joint_count(), 3}, posed.joints);
+  npz.write(options.out);
+}
+
+}  // namespace
+
+std::string pose_command(const PoseOptions& options) {
+  check_ending(options.out, "hsi4d pose: --out", {".npz"});
+  const bool is_double = choice_of(options.precision, {"float", "double"}, "--precision") == 1;
+  constexpr SmplxHands kHands[] = {SmplxHands::kByWidth, SmplxHands::kFull, SmplxHands::kPca};
+  const SmplxHands hands = kHands[choice_of(options.hands, {"auto", "full", "pca"}, "--hands")];
+  check_no_input(options.out, "hsi4d pose: --out", {options.body_model, options.params});
+  check_writable(options.out);
+  const SmplxSequence sequence = read_smplx_sequence(options.params);
+  if (!sequence.passed_over.empty())
+    log_warning(options.params + ": passed over, no parameters: " + joined(sequence.passed_over));
+  const SmplxModel model = model_for(options.body_model, sequence);
+  if (model.rescaled_weights > 0)
+    log_warning(options.body_model + ": vertices whose skinning weights are divided by their sum: " +
+                std::to_string(model.rescaled_weights));
+  if (is_double) {
+    write_frames<double>(options, model, sequence, hands);
+  } else {
+    write_frames<float>(options, model, sequence, hands);
+  }
+  return options.out + ": " + count_text(sequence.frames, "frame") + " of " + std::to_string(model.vertex_count()) +
+         " vertices and " + std::to_string(model.joint_count()) + " joints\n";
+}
+
+}  // namespace hsi4d::cli

@@ -1,0 +1,190 @@
+"""tools/export_motion.py and tools/export_vposer.py on made files, and what hsi4d makes of them.
+
+    python3 tests/tools/exporters_test.py TOOLS HSI4D        # the folder tools/ and the program
+
+Exit status 77 (skipped) without NumPy. PyTorch and joblib are replaced by the modules in stubs/.
+"""
+
+import os
+import pathlib
+import pickle
+import subprocess
+import sys
+import tempfile
+
+try:
+    import numpy as np
+except ImportError:
+    print("skipped: Python has no NumPy")
+    sys.exit(77)
+
+tools, program = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
+stubs = pathlib.Path(__file__).resolve().parent / "stubs"
+sys.path[:0] = [str(tools), str(stubs)]
+import export_motion as em  # noqa: E402
+import torch  # noqa: E402
+
+rng = np.random.default_rng(1)
+
+
+def tensor(array):
+    return torch.Tensor(np.asarray(array, dtype=np.float32))
+
+
+def save(path, content):
+    pathlib.Path(path).parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "wb") as file:
+        pickle.dump(content, file)
+
+
+def run(script, *arguments):
+    paths = [str(stubs)] + [p for p in os.environ.get("PYTHONPATH", "").split(os.pathsep) if p]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    command = [sys.executable, str(tools / script), *map(str, arguments)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True)
+
+
+def export(script, *arguments):
+    result = run(script, *arguments)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def refused(expected, script, *arguments):
+    result = run(script, *arguments)
+    assert result.returncode == 1 and expected in result.stderr and "Traceback" not in result.stderr, result.stderr
+
+
+def close(a, b, tolerance=1e-6):
+    assert np.shape(a) == np.shape(b), (np.shape(a), np.shape(b))
+    assert np.abs(np.asarray(a) - b).max() <= tolerance, np.abs(np.asarray(a) - b).max()
+
+
+def reads(path):
+    result = subprocess.run([str(program), "motion", path, "read.npz"], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+
+
+Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], dtype=float)
+
+
+def rotations():
+    w = rng.normal(size=(300, 3))
+    w *= rng.uniform(0, 3.1, size=(300, 1)) / np.linalg.norm(w, axis=1, keepdims=True)
+    w[:3] = [[0, 0, 0], [np.pi, 0, 0], [1e-9, 0, 0]]
+    m = em.matrix_of_vector(np, w)
+    close(m @ np.swapaxes(m, -1, -2), np.tile(np.eye(3), (300, 1, 1)), 1e-14)
+    close(em.vector_of_matrix(np, m)[3:], w[3:], 1e-12)
+    close(em.matrix_of_vector(np, np.array([[0, 0, np.pi / 2]]))[0] @ [1, 0, 0], [0, 1, 0], 1e-15)
+    half = em.slerp(np, w[3:], w[3:], 0.5)
+    close(half, w[3:], 1e-12)
+
+
+def gvhmr():
+    frames = 7
+    one = {
+        "global_orient": tensor(rng.normal(size=(frames, 3)) * 0.5),
+        "body_pose": tensor(rng.normal(size=(frames, 63)) * 0.3),
+        "transl": tensor(rng.normal(size=(frames, 3))),
+        "betas": tensor(np.full((frames, 10), 0.5)),
+    }
+    save("hmr4d_results.pt", {"smpl_params_global": one, "smpl_params_incam": one})
+    assert "7 frames, gvhmr" in export("export_motion.py", "hmr4d_results.pt", "g.npz", "--fps", 25)
+    out = np.load("g.npz")
+    pelvis = np.array(em.SMPLX_PELVIS)
+    close(out["trans"] + pelvis, (one["transl"].array + pelvis) @ Z_UP.T)
+    close(em.matrix_of_vector(np, out["root_orient"]), Z_UP @ em.matrix_of_vector(np, one["global_orient"].array))
+    close(out["pose_body"], one["body_pose"].array)
+    close(out["betas"], np.full(10, 0.5))
+    assert out["mocap_frame_rate"] == 25 and out["mocap_framerate"] == 25
+    reads("g.npz")
+    export("export_motion.py", "hmr4d_results.pt", "c.npz", "--in-camera")
+    close(np.load("c.npz")["trans"], one["transl"].array)
+
+
+def wham():
+    one = {
+        "pose_world": rng.normal(size=(4, 72)) * 0.4,
+        "trans_world": rng.normal(size=(4, 3)),
+        "betas": np.ones((4, 10)),
+        "frame_ids": np.array([3, 4, 6, 7]),
+    }
+    save("wham_output.pkl", {0: one})
+    assert "5 frames, 1 of them interpolated" in export("export_motion.py", "wham_output.pkl", "w.npz")
+    out = np.load("w.npz")
+    rows = [0, 1, 3, 4]
+    places = (one["trans_world"] + em.SMPL_PELVIS) @ Z_UP.T
+    close(out["trans"][rows] + em.SMPLX_PELVIS, places)
+    close(out["trans"][2], (out["trans"][1] + out["trans"][3]) / 2)
+    close(out["pose_body"][rows], one["pose_world"][:, 3:66])
+    assert not out["betas"].any()  # SMPL's numbers are not SMPL-X's
+    reads("w.npz")
+    refused("has 1 people; --person can be 0 to 0", "export_motion.py", "wham_output.pkl", "w.npz", "--person", 3)
+    refused("there is no 'pose'", "export_motion.py", "wham_output.pkl", "w.npz", "--in-camera")
+    one["trans_world"][2, 1] = np.nan
+    save("bad.pkl", {0: one})
+    refused("frame 2 has a number that is not finite", "export_motion.py", "bad.pkl", "w.npz")
+
+
+def tram():
+    turns = em.matrix_of_vector(np, rng.normal(size=(6, 3)) * 0.2)
+    places = rng.normal(size=(6, 3))
+    poses = em.matrix_of_vector(np, rng.normal(size=(5, 24, 3)) * 0.4)
+    trans = rng.normal(size=(5, 1, 3))
+    frames = np.arange(1, 6)
+    save("clip/hps/.keep", 0)
+    content = {"pred_rotmat": tensor(poses), "pred_trans": tensor(trans), "pred_shape": tensor(np.ones((5, 10))), "frame": frames}
+    np.save("clip/hps/hps_track_0.npy", content)
+    refused("camera.npy", "export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
+    np.save("clip/camera.npy", {"pred_cam_R": turns, "pred_cam_T": places})
+    export("export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
+    out = np.load("t.npz")
+    pelvis = np.einsum("tij,tj->ti", turns[frames], trans[:, 0] + em.SMPL_PELVIS) + places[frames]
+    # The camera's y is down and z forward: x, z, −y of it are x, y, z of a world with z up.
+    close(out["trans"] + em.SMPLX_PELVIS, np.stack([pelvis[:, 0], pelvis[:, 2], -pelvis[:, 1]], axis=1))
+    reads("t.npz")
+
+
+def vposer():
+    net = {}
+
+    def linear(name, rows, columns):
+        net[f"vp_model.{name}.weight"] = tensor(rng.normal(size=(rows, columns)))
+        net[f"vp_model.{name}.bias"] = tensor(rng.normal(size=rows))
+
+    def normalization(name, count):
+        for part in ("weight", "bias", "running_mean"):
+            net[f"vp_model.{name}.{part}"] = tensor(rng.normal(size=count))
+        net[f"vp_model.{name}.running_var"] = tensor(rng.uniform(0.5, 1, size=count))
+
+    normalization("encoder_net.1", 63)
+    normalization("encoder_net.4", 20)
+    for name, rows, columns in (("encoder_net.2", 20, 63), ("encoder_net.6", 20, 20), ("encoder_net.7", 20, 20),
+                                ("encoder_net.8.mu", 4, 20), ("decoder_net.0", 20, 4), ("decoder_net.3", 20, 20),
+                                ("decoder_net.5", 126, 20)):
+        linear(name, rows, columns)
+    save("V02_05/snapshots/a.ckpt", {"state_dict": net, "epoch": 3})
+    config = '{"stages": {"s": {"iterations": 1, "optimize": {"body_pose": {"lr": 0.1}}, "losses": {"pose_prior": {"weights": "%s"}}}}}'
+    for out in ("v.npz", "v.safetensors"):
+        assert "22 arrays of a.ckpt, 4 latents" in export("export_vposer.py", "V02_05", out)
+        pathlib.Path("c.json").write_text(config % out)
+        result = subprocess.run([str(program), "check", "c.json"], capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr
+    close(np.load("v.npz")["decoder_net.5.weight"], net["vp_model.decoder_net.5.weight"].array, 0)
+    refused("there is no such file or folder", "export_vposer.py", "nowhere", "v.npz")
+    refused("allowed endings: .npz, .safetensors", "export_vposer.py", "V02_05", "v.pt")
+    del net["vp_model.decoder_net.3.bias"]
+    save("V02_05/snapshots/a.ckpt", {"state_dict": net})
+    refused("has no tensor decoder_net.3.bias", "export_vposer.py", "V02_05", "v.npz")
+
+
+folder = tempfile.TemporaryDirectory()
+os.chdir(folder.name)
+for test in (rotations, gvhmr, wham, tram, vposer):
+    test()
+    print(test.__name__, "passed")
+refused("there is no such file", "export_motion.py", "nowhere.pkl", "w.npz")
+refused("known endings are", "export_motion.py", stubs / "torch.py", "w.npz")
+refused("cannot be read", "export_motion.py", stubs / "torch.py", "w.npz", "--from", "wham")
+os.chdir(tools)
+folder.cleanup()

@@ -1,0 +1,281 @@
+#!/usr/bin/env python3
+"""Turns what pose estimators write into a motion file that hsi4d reads.
+
+    tools/export_motion.py wham_output.pkl motion.npz --person 0 --fps 30            # WHAM
+    tools/export_motion.py hmr4d_results.pt motion.npz --fps 30                      # GVHMR
+    tools/export_motion.py results/clip/hps/hps_track_0.npy motion.npz --fps 30      # TRAM, beside results/clip/camera.npy
+
+The motion is in the estimator's world, turned so that z is up, for a body of SMPL-X; rotations as axis-angle, metres.
+With --in-camera it is in the camera's frame of every frame (x right, y down, z forward) and not turned.
+
+| estimator | body   | its world                                                            |
+|-----------|--------|----------------------------------------------------------------------|
+| WHAM      | SMPL   | y up                                                                 |
+| GVHMR     | SMPL-X | y up                                                                 |
+| TRAM      | SMPL   | the first camera's: y down. Its gravity is not known, so z is up only |
+|           |        | as far as that camera was level                                      |
+
+A body turns about its pelvis, so turning a motion needs the pelvis of the estimator's body at rest: by default that of
+the neutral body of mean shape; --pelvis x,y,z for another. SMPL's pelvis stands elsewhere than SMPL-X's; the translation
+is corrected, so that the pelvis stays where the estimator has it. Frames that an estimator left out are interpolated.
+
+Needs Python with NumPy, and joblib for WHAM or PyTorch for GVHMR and TRAM. The inputs are pickles, which can run code
+when they are read: only read files whose origin you trust.
+"""
+
+import argparse
+import pathlib
+import sys
+
+SMPL_PELVIS = (-0.00217368, -0.24078917, 0.02858379)
+SMPLX_PELVIS = (0.00312326, -0.35140747, 0.01203655)
+
+
+def fail(message):
+    sys.exit("export_motion: " + message)
+
+
+def module(name):
+    try:
+        return __import__(name)
+    except ImportError as missing:
+        fail(f"Python's module {missing.name} is not there (pip install {missing.name})")
+
+
+def array(np, value, what, width):
+    """Rows of `width` finite numbers, float64."""
+    value = value.detach().cpu().numpy() if hasattr(value, "detach") else np.asarray(value)
+    value = value.astype(np.float64).reshape(len(value), -1) if value.size else value.reshape(0, width)
+    if value.shape[0] == 0 or value.shape[1] != width:
+        fail(f"{what}: has shape {list(value.shape)}; [frames,{width}] is needed")
+    if not np.isfinite(value).all():
+        fail(f"{what}: frame {int(np.argwhere(~np.isfinite(value))[0][0])} has a number that is not finite")
+    return value
+
+
+def need(table, key, what):
+    if not hasattr(table, "keys") or key not in table:
+        known = ", ".join(map(str, table.keys())) if hasattr(table, "keys") else type(table).__name__
+        fail(f"{what}: there is no {key!r}; there is {known}")
+    return table[key]
+
+
+# --- rotations, by quaternions (w, x, y, z), one a row ----------------------------------------------------------------
+
+
+def quaternion_of_vector(np, w):
+    half = np.linalg.norm(w, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), w * np.sinc(half / np.pi) / 2], axis=-1)
+
+
+def vector_of_quaternion(np, q):
+    q = np.where(q[..., :1] < 0, -q, q)
+    length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(length, q[..., :1])
+    return q[..., 1:] * np.where(length > 1e-12, angle / np.maximum(length, 1e-12), 2)
+
+
+def matrix_of_vector(np, w):
+    q = quaternion_of_vector(np, w)
+    s, v = q[..., 0], q[..., 1:]
+    m = 2 * v[..., :, None] * v[..., None, :]
+    eye = np.eye(3)
+    m += (1 - 2 * (v * v).sum(-1))[..., None, None] * eye
+    cross = np.zeros(v.shape[:-1] + (3, 3))
+    cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    cross -= np.swapaxes(cross, -1, -2)
+    return m + 2 * s[..., None, None] * cross
+
+
+def vector_of_matrix(np, m):
+    """By the largest component of the quaternion, so that half turns are as accurate as others."""
+    trace = np.trace(m, axis1=-2, axis2=-1)
+    diagonal = np.diagonal(m, axis1=-2, axis2=-1)
+    four = np.empty(m.shape[:-2] + (4, 4))
+    four[..., 0, 0] = 1 + trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        four[..., 1 + i, 1 + i] = 1 + 2 * diagonal[..., i] - trace
+        four[..., 0, 1 + i] = four[..., 1 + i, 0] = m[..., k, j] - m[..., j, k]
+        four[..., 1 + i, 1 + j] = four[..., 1 + j, 1 + i] = m[..., i, j] + m[..., j, i]
+    pivot = np.argmax(np.diagonal(four, axis1=-2, axis2=-1), axis=-1)
+    q = np.take_along_axis(four, pivot[..., None, None], axis=-2)[..., 0, :]
+    return vector_of_quaternion(np, q / np.linalg.norm(q, axis=-1, keepdims=True))
+
+
+def slerp(np, a, b, u):
+    """Between two rows of axis-angle vectors [J,3]."""
+    p, q = quaternion_of_vector(np, a), quaternion_of_vector(np, b)
+    q = np.where((p * q).sum(-1, keepdims=True) < 0, -q, q)
+    angle = np.arccos(np.clip((p * q).sum(-1, keepdims=True), -1, 1))
+    safe = np.where(angle < 1e-6, 1, np.sin(angle))
+    first = np.where(angle < 1e-6, 1 - u, np.sin((1 - u) * angle) / safe)
+    second = np.where(angle < 1e-6, u, np.sin(u * angle) / safe)
+    mixed = first * p + second * q
+    return vector_of_quaternion(np, mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))
+
+
+# --- estimators: pose [T,3J], trans [T,3], betas [T,B], frame numbers, whether the body is SMPL-X, world --------------
+
+
+def read_wham(np, path, arguments):
+    joblib = module("joblib")
+    people = joblib.load(path)
+    if not hasattr(people, "keys") or not len(people):
+        fail(f"{path}: holds no people; it is no wham_output.pkl")
+    keys = list(people.keys())
+    if arguments.person >= len(keys):
+        fail(f"{path}: has {len(keys)} people; --person can be 0 to {len(keys) - 1}")
+    one, what = people[keys[arguments.person]], f"{path}: person {keys[arguments.person]}"
+    suffix = "" if arguments.in_camera else "_world"
+    pose = array(np, need(one, "pose" + suffix, what), f"{what}: pose{suffix}", 72)
+    trans = array(np, need(one, "trans" + suffix, what), f"{what}: trans{suffix}", 3)
+    betas = array(np, need(one, "betas", what), f"{what}: betas", 10)
+    frames = one["frame_ids"] if "frame_ids" in one else range(len(pose))
+    return pose, trans, betas, frames, False, "y up"
+
+
+def read_gvhmr(np, path, arguments):
+    torch = module("torch")
+    results = torch.load(path, map_location="cpu", weights_only=not arguments.trust)
+    name = "smpl_params_incam" if arguments.in_camera else "smpl_params_global"
+    one, what = need(results, name, path), f"{path}: {name}"
+    root = array(np, need(one, "global_orient", what), f"{what}: global_orient", 3)
+    body = array(np, need(one, "body_pose", what), f"{what}: body_pose", 63)
+    trans = array(np, need(one, "transl", what), f"{what}: transl", 3)
+    betas = array(np, need(one, "betas", what), f"{what}: betas", 10)
+    return np.concatenate([root, body], axis=1), trans, betas, range(len(root)), True, "y up"
+
+
+def read_tram(np, path, arguments):
+    module("torch")  # the arrays in the file are tensors
+    one = np.load(path, allow_pickle=True).item()
+    rotations = need(one, "pred_rotmat", path)
+    rotations = array(np, rotations, f"{path}: pred_rotmat", 24 * 9).reshape(-1, 24, 3, 3)
+    trans = array(np, need(one, "pred_trans", path), f"{path}: pred_trans", 3)
+    betas = array(np, need(one, "pred_shape", path), f"{path}: pred_shape", 10)
+    frames = np.asarray(need(one, "frame", path)).reshape(-1)
+    pose = vector_of_matrix(np, rotations).reshape(-1, 72)
+    if arguments.in_camera:
+        return pose, trans, betas, frames, False, "camera"
+    camera_path = arguments.camera or path.parent.parent / "camera.npy"
+    if not camera_path.exists():
+        fail(f"{camera_path}: there is no such file; TRAM's camera.npy is needed (--camera), or --in-camera")
+    camera = np.load(camera_path, allow_pickle=True).item()
+    turns = np.asarray(need(camera, "pred_cam_R", camera_path), dtype=np.float64)
+    places = np.asarray(need(camera, "pred_cam_T", camera_path), dtype=np.float64).reshape(-1, 3)
+    if frames.max() >= len(turns):
+        fail(f"{camera_path}: has {len(turns)} frames; {path} is of frame {int(frames.max())} too")
+    pose, trans = moved(np, pose, trans, turns[frames], places[frames], pelvis_of(np, arguments, False))
+    return pose, trans, betas, frames, False, "y down"
+
+
+READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram}
+ENDINGS = {".pkl": "wham", ".pickle": "wham", ".pt": "gvhmr", ".npy": "tram"}
+
+
+# --- the motion -------------------------------------------------------------------------------------------------------
+
+
+def pelvis_of(np, arguments, is_smplx):
+    return np.array(arguments.pelvis or (SMPLX_PELVIS if is_smplx else SMPL_PELVIS))
+
+
+def moved(np, pose, trans, turns, places, pelvis):
+    """x' = R x + c: the body turns about its pelvis, t' = R t + (R - I) pelvis + c."""
+    pose = pose.copy()
+    pose[:, :3] = vector_of_matrix(np, turns @ matrix_of_vector(np, pose[:, :3]))
+    trans = np.einsum("tij,tj->ti", turns, trans + pelvis) - pelvis + places
+    return pose, trans
+
+
+def filled(np, pose, trans, frames, what):
+    """A row for every frame from the first to the last; those between neighbours are interpolated."""
+    frames = np.asarray(frames, dtype=np.int64).reshape(-1)
+    if len(frames) != len(pose) or len(trans) != len(pose):
+        fail(f"{what}: has {len(pose)} poses, {len(trans)} translations and {len(frames)} frame numbers")
+    order = np.argsort(frames, kind="stable")
+    pose, trans, frames = pose[order], trans[order], frames[order]
+    if (np.diff(frames) <= 0).any():
+        fail(f"{what}: has frame {int(frames[np.argwhere(np.diff(frames) <= 0)[0][0]])} twice")
+    if len(frames) > 1 and np.diff(frames).max() > 1000:
+        fail(f"{what}: has no frame for {int(np.diff(frames).max()) - 1} frames in a row; allowed: 999")
+    poses, places = [pose[0]], [trans[0]]
+    for i in range(1, len(frames)):
+        gap = int(frames[i] - frames[i - 1])
+        for k in range(1, gap):
+            u = k / gap
+            poses.append(slerp(np, pose[i - 1].reshape(-1, 3), pose[i].reshape(-1, 3), u).reshape(-1))
+            places.append((1 - u) * trans[i - 1] + u * trans[i])
+        poses.append(pose[i])
+        places.append(trans[i])
+    return np.stack(poses), np.stack(places), len(poses) - len(frames)
+
+
+def parsed_pelvis(text):
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 3:
+        raise argparse.ArgumentTypeError(f"{text!r} is no place; allowed: three numbers x,y,z")
+    return numbers
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("input", metavar="IN", type=pathlib.Path)
+    parser.add_argument("output", metavar="OUT.npz", type=pathlib.Path)
+    parser.add_argument("--from", dest="source", choices=READERS, help="the estimator; default: by IN's ending")
+    parser.add_argument("--fps", type=float, default=30, help="frames a second of the video; default: 30")
+    parser.add_argument("--person", type=int, default=0, help="which of WHAM's people, from 0")
+    parser.add_argument("--camera", type=pathlib.Path, help="TRAM's camera.npy; default: beside the folder of IN")
+    parser.add_argument("--in-camera", action="store_true", help="in the camera's frame, not turned")
+    parser.add_argument("--pelvis", type=parsed_pelvis, help="x,y,z of the estimator's body at rest, metres")
+    parser.add_argument("--trust", action="store_true", help="GVHMR: unpickle everything in IN, which can run code")
+    arguments = parser.parse_args()
+    if arguments.output.suffix != ".npz":
+        fail(f"{arguments.output}: allowed ending: .npz")
+    if not arguments.fps > 0 or arguments.fps == float("inf"):
+        fail(f"--fps: {arguments.fps} is out of range; allowed: above 0")
+    if arguments.person < 0:
+        fail(f"--person: {arguments.person} is out of range; allowed: 0 or more")
+    source = arguments.source or ENDINGS.get(arguments.input.suffix)
+    if source is None:
+        fail(f"{arguments.input}: known endings are {', '.join(ENDINGS)}; --from names the estimator")
+    if not arguments.input.exists():
+        fail(f"{arguments.input}: there is no such file")
+    np = module("numpy")
+    try:
+        pose, trans, betas, frames, is_smplx, world = READERS[source](np, arguments.input, arguments)
+    except (ValueError, TypeError, EOFError, KeyError, AttributeError, IndexError) as fault:
+        fail(f"{arguments.input}: is not what {source} writes: {fault}")
+    except Exception as fault:  # whatever an unpickler raises
+        fail(f"{arguments.input}: cannot be read: {fault}")
+    pose, trans, added = filled(np, pose, trans, frames, str(arguments.input))
+    pelvis = pelvis_of(np, arguments, is_smplx)
+    if not arguments.in_camera:
+        sign = 1 if world == "y up" else -1
+        turn = np.array([[1, 0, 0], [0, 0, -sign], [0, sign, 0]], dtype=np.float64)
+        pose, trans = moved(np, pose, trans, np.tile(turn, (len(pose), 1, 1)), np.zeros(3), pelvis)
+    if not is_smplx:
+        trans = trans + pelvis - np.array(SMPLX_PELVIS)
+    # SMPL's shape is not SMPL-X's: its numbers are left out.
+    shape = betas.mean(axis=0) if is_smplx else np.zeros(10)
+    np.savez(
+        arguments.output,
+        trans=trans,
+        root_orient=pose[:, :3],
+        pose_body=pose[:, 3:66],
+        betas=shape,
+        gender=np.array("neutral"),
+        surface_model_type=np.array("smplx"),
+        mocap_frame_rate=np.array(arguments.fps),
+        mocap_framerate=np.array(arguments.fps),
+    )
+    note = f", {added} of them interpolated" if added else ""
+    print(f"{arguments.output}: {len(pose)} frames{note}, {source}")
+
+
+if __name__ == "__main__":
+    main()
