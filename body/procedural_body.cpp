@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/procedural_directions.h"
 #include "body/procedural_shape.h"
 #include "body/procedural_weights.h"
 #include "body/surface_nets.h"
@@ -62,6 +63,32 @@ detail::NetMesh body_mesh() {
       {0, 1.1, 0});
 }
 
+/// The first `count` of the columns of a matrix.
+std::vector<double> first_columns(const std::vector<double>& matrix, Index columns, Index count) {
+  std::vector<double> result;
+  const Index rows = static_cast<Index>(matrix.size()) / columns;
+  for (Index row = 0; row < rows; ++row) {
+    const double* const from = matrix.data() + row * columns;
+    result.insert(result.end(), from, from + count);
+  }
+  return result;
+}
+
+/// A relaxed hand, and the ways from there to a fist, to spread fingers, and to a thumb across the palm.
+SmplxHand hand_space(int side) {
+  using detail::kClosedHand, detail::kRelaxedHand;
+  detail::HandBend spread = kRelaxedHand, thumb = kRelaxedHand;
+  spread.spread = 0.15;
+  thumb.thumb = kClosedHand.thumb;
+  const std::array<double, 45> mean = detail::hand_pose_of(kRelaxedHand, side);
+  SmplxHand hand{{mean.begin(), mean.end()}, {}};
+  for (const detail::HandBend& bend : {kClosedHand, spread, thumb}) {
+    const std::array<double, 45> pose = detail::hand_pose_of(bend, side);
+    for (std::size_t i = 0; i < pose.size(); ++i) hand.components.push_back(pose[i] - mean[i]);
+  }
+  return hand;
+}
+
 }  // namespace
 
 BodyModel procedural_body() {
@@ -78,6 +105,32 @@ BodyModel procedural_body() {
   body.faces = mesh.faces;
   body.weights = detail::procedural_weights(mesh);
   return body;
+}
+
+SmplxModel procedural_smplx(Index betas) {
+  constexpr Index kBetas = detail::kProceduralShapes.size();
+  HSI4D_CHECK(betas >= 0 && betas <= kBetas, std::to_string(betas) + " betas");
+  const BodyModel body = procedural_body();
+  const detail::ShapeDirections directions = detail::procedural_directions(body);
+  SmplxModel model;
+  model.source = "the procedural body";
+  model.vertices.assign(body.vertices.begin(), body.vertices.end());
+  model.faces = body.faces;
+  model.parents = body.parents;
+  model.joints = body.joints;
+  model.shape = first_columns(directions.vertices, kBetas, betas);
+  model.joint_shape = first_columns(directions.joints, kBetas, betas);
+  model.betas = betas;
+  model.betas_in_file = kBetas;
+  model.weights = {body.vertex_count(), body.joint_count(), {}};
+  model.weights.weights.resize(static_cast<std::size_t>(body.vertex_count() * body.joint_count()));
+  for (std::size_t i = 0; i < body.weights.indices.size(); ++i) {
+    const std::size_t vertex = i / static_cast<std::size_t>(body.weights.per_vertex);
+    const auto joint = static_cast<std::size_t>(body.weights.indices[i]);
+    model.weights.weights[vertex * body.parents.size() + joint] += body.weights.weights[i];
+  }
+  for (int side = 0; side < 2; ++side) model.hands[static_cast<std::size_t>(side)] = hand_space(side);
+  return model;
 }
 
 }  // namespace hsi4d

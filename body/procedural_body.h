@@ -2,6 +2,7 @@
 #pragma once
 
 #include "body/body_model.h"
+#include "body/smplx_file.h"
 
 namespace hsi4d {
 
@@ -12,5 +13,15 @@ namespace hsi4d {
 ///
 /// @return  the same bits every time; left and right are mirror images. Takes a fraction of a second.
 BodyModel procedural_body();
+
+/// The same body as a model with a shape space and a pose space of its hands, for all that takes a SMPL-X file. It has
+/// no expressions and no pose correctives.
+///
+/// Betas, a unit of each about a standard deviation among adults: height, weight, length of legs, of arms, of the
+/// torso, width of shoulders, of hips, belly, size of the head, of hands and feet. Hands are relaxed where their
+/// numbers are 0; their components are closing (1: a fist), spreading, and the thumb across the palm.
+///
+/// @param betas  how many of them, 0 to 10
+SmplxModel procedural_smplx(Index betas = 10);
 
 }  // namespace hsi4d

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <type_traits>
 
 #include "core/types.h"
@@ -49,9 +48,7 @@ T lane_constant(int x) {
   if constexpr (std::is_constructible_v<T, int>) {
     return T(x);
   } else {
-    T result{};
-    for (Index i = 0; i < kLanes; ++i) result[i] = static_cast<std::decay_t<decltype(result[0])>>(x);
-    return result;
+    return T{} + static_cast<std::decay_t<decltype(T{}[0])>>(x);
   }
 }
 
@@ -89,22 +86,17 @@ T lane_fma(const T& a, const T& b, const T& c) {
   }
 }
 
-template <class T>
-T lane_max(const T& a, const T& b) {
+/// The larger one; b may be one number for all lanes. A NaN in a gives b.
+template <class T, class U>
+T lane_max(const T& a, const U& b) {
   return a > b ? a : b;
 }
 
-/// Neither infinite nor NaN.
+/// Neither infinite nor NaN: for those x − x is NaN.
 template <class T>
 LaneMask<T> lane_finite(const T& x) {
-  using S = std::decay_t<decltype([](const T& v) {
-    if constexpr (std::is_floating_point_v<T>) {
-      return v;
-    } else {
-      return v[0];
-    }
-  }(x))>;
-  return lane_abs(x) <= std::numeric_limits<S>::max();
+  const T none = x - x;
+  return none == none;
 }
 
 /// True in the first `count` lanes.
@@ -115,15 +107,12 @@ LaneMask<Lanes<S>> first_lanes(Index count) {
   return result;
 }
 
+/// @param mask  of Lanes
 template <class M>
 bool any_lane(const M& mask) {
-  if constexpr (std::is_same_v<M, bool>) {
-    return mask;
-  } else {
-    auto any = mask[0];
-    for (Index i = 1; i < kLanes; ++i) any |= mask[i];
-    return any != 0;
-  }
+  auto any = mask[0];
+  for (Index i = 1; i < kLanes; ++i) any |= mask[i];
+  return any != 0;
 }
 
 /// Σ of the lanes, in a fixed order.
@@ -138,17 +127,13 @@ To convert_lanes(const From& x) {
   return __builtin_convertvector(x, To);
 }
 
-/// x rounded to S, as a T.
-template <class S, class T>
-T rounded_to(const T& x) {
-  if constexpr (std::is_floating_point_v<T>) {
-    return static_cast<T>(static_cast<S>(x));
-  } else {
-    return convert_lanes<T>(convert_lanes<Lanes<S>>(x));
-  }
+/// x rounded to S.
+template <class S>
+WideLanes rounded_to(const WideLanes& x) {
+  return convert_lanes<WideLanes>(convert_lanes<Lanes<S>>(x));
 }
 
-/// Numbers of eight rows, `stride` apart; where there are only `count` rows, the last one again.
+/// Numbers of eight rows, `stride` apart; where there are only `count` rows (at least one), the last one again.
 template <class S>
 Lanes<S> load_lanes(const S* x, Index stride, Index count) {
   Lanes<S> result{};

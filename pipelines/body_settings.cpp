@@ -7,23 +7,33 @@ namespace hsi4d {
 void describe(ConfigFields& f, BodySettings& s) {
   f.choice("kind", s.kind, kBodyKinds, "The body that comes with the program, or a model in a SMPL-X file");
   f.path("path", s.path, {.must_exist = true}, "The SMPL-X file (.npz), of kind smplx");
-  f.integer("betas", s.betas, {.min = 0, .max = 300}, "Numbers of its shape, of kind smplx");
+  f.integer("betas", s.betas, {.min = 0, .max = 300}, "Numbers of its shape; the body of kind procedural has 10");
+  f.numbers("shape", s.shape, {.min = -10, .max = 10},
+            "The betas of the body that synth makes an avatar of; fewer than `betas`: the others are 0");
   f.integer("expressions", s.expressions, {.min = 0, .max = 100}, "Numbers of its expression, of kind smplx");
   f.choice("hands", s.hands, kHandParameters,
-           "Numbers of a hand, of kind smplx: all joints, or coefficients of the file's hand components");
+           "Numbers of a hand: all joints, or coefficients of the body's hand components");
   f.integer("hand_components", s.hand_components, {.min = 1, .max = 45}, "How many of them, of hands pca");
   f.boolean("flat_hand_mean", s.flat_hand_mean,
-            "Where a hand's numbers are 0 it is flat, and not in the file's mean pose; of kind smplx");
+            "Where a hand's numbers are 0 it is flat, and not in the body's mean pose");
   f.rule({"path", "kind"}, [&s]() -> std::string {
     if (s.kind == BodyKind::kSmplx && s.path.empty()) return "kind smplx needs the file of a body model";
     if (s.kind == BodyKind::kProcedural && !s.path.empty()) return "kind procedural reads no file; kind smplx does";
     return "";
   });
+  f.rule({"betas", "kind"}, [&s]() -> std::string {
+    return s.kind == BodyKind::kProcedural && s.betas > 10 ? "the body of kind procedural has 10 betas" : "";
+  });
+  f.rule({"shape", "betas"}, [&s]() -> std::string {
+    const Index given = static_cast<Index>(s.shape.size());
+    return given > s.betas ? std::to_string(given) + " numbers; body.betas allows " + std::to_string(s.betas) : "";
+  });
 }
 
-SmplxModel read_smplx_body(const BodySettings& settings) {
-  HSI4D_CHECK(settings.kind == BodyKind::kSmplx, "the body is not of kind smplx");
-  SmplxModel model = read_smplx(settings.path.string(), {settings.betas, settings.expressions});
+SmplxModel body_model_of(const BodySettings& settings) {
+  SmplxModel model = settings.kind == BodyKind::kProcedural
+                         ? procedural_smplx(settings.betas)
+                         : read_smplx(settings.path.string(), {settings.betas, settings.expressions});
   for (const SmplxHand& hand : model.hands) {
     if (settings.hands != HandParameters::kPca || hand.component_count() >= settings.hand_components) continue;
     throw DataError(model.source + ": has " + std::to_string(hand.component_count()) + " components of a hand; " +
@@ -39,7 +49,10 @@ SmplxBodyOptions smplx_body_options(const BodySettings& settings) {
 }
 
 BodyModel rest_body(const BodySettings& settings) {
-  return settings.kind == BodyKind::kSmplx ? rest_body(read_smplx_body(settings)) : procedural_body();
+  if (settings.kind == BodyKind::kProcedural && settings.shape.empty()) return procedural_body();
+  std::vector<double> betas = settings.shape;
+  betas.resize(static_cast<std::size_t>(settings.betas));
+  return rest_body(body_model_of(settings), betas);
 }
 
 }  // namespace hsi4d

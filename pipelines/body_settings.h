@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <vector>
 
 #include "body/smplx_body.h"
 #include "core/config.h"
@@ -25,6 +26,7 @@ struct BodySettings {
   BodyKind kind = BodyKind::kProcedural;
   std::filesystem::path path;  ///< of kind smplx
   Index betas = 10;
+  std::vector<double> shape;  ///< the betas of the rest pose; those beyond its end are 0
   Index expressions = 10;
   HandParameters hands = HandParameters::kFull;
   Index hand_components = 12;  ///< of hands pca
@@ -33,14 +35,14 @@ struct BodySettings {
 
 void describe(ConfigFields& fields, BodySettings& settings);
 
-/// The SMPL-X model that the settings name. Throws as read_smplx; DataError naming the file when it has fewer hand
-/// components than are asked for; InternalError for another kind of body.
-SmplxModel read_smplx_body(const BodySettings& settings);
+/// The model that the settings name, in the layout of SMPL-X. Throws as read_smplx; DataError when it has fewer betas
+/// or hand components than are asked for.
+SmplxModel body_model_of(const BodySettings& settings);
 
 /// What the settings say of how that model is prepared.
 SmplxBodyOptions smplx_body_options(const BodySettings& settings);
 
-/// The body in its rest pose and mean shape, whatever its kind. Throws as read_smplx_body.
+/// The body in its rest pose and its shape, whatever its kind. Throws as body_model_of.
 BodyModel rest_body(const BodySettings& settings);
 
 }  // namespace hsi4d

@@ -69,7 +69,7 @@ HWY_INLINE void keep_bits(M m, int part, std::uint16_t* to) {
 
 /// 2ᵖ for p ≥ −126, 1 at 0, monotone, by a minimax polynomial of degree 5 of p − ⌊p⌋: it is off by 8e-8, with rounding
 /// by 1.8e-7 or 2.9 ulp at most. If exact, of degree 6, 2e-9, of what is left of p by rounding it: 1e-7, 1.2 ulp, and
-/// near p = 0, where 1 − 2ᵖ matters, half an ulp.
+/// near p = 0, where 1 − 2ᵖ matters, half an ulp; and 0 for p < −126.
 template <bool kExact>
 HWY_INLINE V exp2_of(V p) {
   const D d;
@@ -80,7 +80,7 @@ HWY_INLINE V exp2_of(V p) {
                           0.693147202855229f, 1.0f}) {
       y = hn::MulAdd(y, f, hn::Set(d, c));
     }
-    return times_power_of_floor(y, hn::Sub(p, f));
+    return hn::IfThenElseZero(hn::Ge(p, hn::Set(d, -126.0f)), times_power_of_floor(y, hn::Sub(p, f)));
   } else {
     const V f = fraction(p);
     V y = hn::Set(d, 0.0018671309482703458f);

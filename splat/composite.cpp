@@ -39,7 +39,6 @@ using detail::TileLists;
 using detail::Workspaces;
 
 constexpr Index kGrain = 512;
-constexpr Index kPixelRows = 16;  // a chunk
 
 /// Of a tile: fragments, and the list position after the last Gaussian composited in any pixel.
 struct TileCounts {
@@ -89,15 +88,14 @@ struct Composite {
   static bool has_background(const NodeIo<S>& io) { return io.inputs() % kStill != 0; }
   static int background_input(const NodeIo<S>& io) { return io.inputs() - 1; }
   static Index channels_of(const NodeIo<S>& io) { return io.in(kFeatures).shape.cols; }
-  /// The output that holds channel k, and its plane there.
-  static std::pair<int, Index> place_of_channel(const NodeIo<S>& io, Index k) {
-    const Index over = io.out(kChannels).shape.planes;
-    return k < over ? std::pair<int, Index>(kChannels, k) : std::pair<int, Index>(kMoreChannels, k - over);
-  }
   static detail::OutputImages<S> images_of(const NodeIo<S>& io) {
     const Array<S> over = io.out(kChannels);
     return {over, over.shape.planes < channels_of(io) ? io.out(kMoreChannels) : Array<S>{}, io.out(kTransmittance),
             has_background(io) ? io.in(background_input(io)).data : nullptr};
+  }
+  static detail::OutputCotangents<S> cotangents_of(const NodeIo<S>& io) {
+    const bool split = io.out(kChannels).shape.planes < channels_of(io);
+    return {io.d_out(kChannels), split ? io.d_out(kMoreChannels) : ConstArray<S>{}, io.d_out(kTransmittance)};
   }
 
   // --- Gaussians -----------------------------------------------------------------------------------------------------
@@ -315,7 +313,6 @@ struct Composite {
 
   TileCounts composite_plain(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* memory) {
     const CompositeScene<S> scene = scene_of(io);
-    const detail::OutputImages<S> images = images_of(io);
     const Index pixels = tiles.tile * tiles.tile;
     TileJob<S> job = job_of(tiles, tile);
     const bool moves = !job.entries.empty();
@@ -326,14 +323,7 @@ struct Composite {
     job.transmittance = memory;
     job.channels = memory + pixels;
     const Index fragments = detail::composite_tile(tiles.tile, scene, job);
-    for (Index r = 0; r < job.height; ++r) {
-      const S* const through = job.transmittance + r * tiles.tile;
-      detail::copy_row(through, job.width, &images.transmittance(job.top + r, job.left));
-      for (Index k = 0; k < scene.channels; ++k) {
-        images.put(k, job.channels + k * pixels + r * tiles.tile, through, job.width,
-                   images.at(k, job.top + r, job.left));
-      }
-    }
+    detail::store_tile(tiles.tile, job, images_of(io));
     return {fragments, moves ? static_cast<Index>(*std::max_element(job.last, job.last + pixels)) : 0};
   }
 
@@ -437,50 +427,11 @@ struct Composite {
     return (channels + 1) * pixels + work;
   }
 
-  /// d_channels and d_T of a tile's pixels, zero past the image's border. A channel over a background has
-  /// d_T += background d_channel.
-  static void load_cotangent(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* d_channels) {
-    const ConstArray<S> d_transmittance = io.d_out(kTransmittance);
-    const detail::OutputImages<S> images = images_of(io);
-    const Index pixels = tiles.tile * tiles.tile, channels = images.channels();
-    TileJob<S> place{};
-    place_job(tiles, tile, place);
-    S* const d_through = d_channels + channels * pixels;
-    std::fill_n(d_channels, (channels + 1) * pixels, S(0));
-    for (Index r = 0; d_transmittance && r < place.height; ++r) {
-      detail::copy_row(&d_transmittance(place.top + r, place.left), place.width, d_through + r * tiles.tile);
-    }
-    for (Index k = 0; k < channels; ++k) {
-      const auto [output, plane] = place_of_channel(io, k);
-      const ConstArray<S> d_image = io.d_out(output);
-      const S behind = images.behind(k);
-      S* const to = d_channels + k * pixels;
-      for (Index r = 0; d_image && r < place.height; ++r) {
-        detail::copy_row(&d_image(plane, place.top + r, place.left), place.width, to + r * tiles.tile);
-      }
-      for (Index i = 0; behind != S(0) && i < pixels; ++i) d_through[i] += behind * to[i];
-    }
-  }
-
-  /// d_background_k = Σ T d_channel_k
-  static void add_background_gradient(NodeIo<S>& io) {
-    const ConstArray<S> t = io.out(kTransmittance), g = io.d_out(kChannels);
-    if (!g) return;
-    for (Index k = 0; k < g.shape.planes; ++k) {
-      const double sum = parallel_sum(g.shape.rows, kPixelRows, [&](Index begin, Index end) {
-        double part = 0;
-        for (Index r = begin; r < end; ++r) {
-          const S *d = &g(k, r, 0), *through = t.row(r);
-          for (Index x = 0; x < g.shape.cols; ++x) part += static_cast<double>(through[x]) * static_cast<double>(d[x]);
-        }
-        return part;
-      });
-      io.d_in(background_input(io)).data[k] += static_cast<S>(sum);
-    }
-  }
-
   void backward(NodeIo<S>& io) {
-    if (has_background(io) && io.wants(background_input(io))) add_background_gradient(io);
+    const detail::OutputCotangents<S> cotangents = cotangents_of(io);
+    if (has_background(io) && io.wants(background_input(io))) {
+      detail::add_background_gradient(images_of(io), cotangents, io.d_in(background_input(io)).data);
+    }
     if (!wants_gradient(io)) return;
     Stopwatch watch;
     const TileGrid tiles = grid();
@@ -499,7 +450,9 @@ struct Composite {
       if (tile_counts[tile].end == 0) return;
       const Workspaces::Held held(workspaces);
       S* const d_channels = memory.data() + held.number() * size;
-      load_cotangent(io, tiles, tile, d_channels);
+      TileJob<S> place{};
+      place_job(tiles, tile, place);
+      detail::load_cotangent(images_of(io), cotangents, tiles.tile, place, d_channels);
       const auto is_zero = [](S x) { return x == S(0); };
       if (view.skip.zero_cotangent && std::all_of(d_channels, d_channels + (channels + 1) * pixels, is_zero)) return;
       adjoint_last[tile] = tile_last[tile];

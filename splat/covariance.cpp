@@ -50,7 +50,7 @@ template <class S>
 RotatedScales<S> read_gaussians(const S* q, const S* l, Index count) {
   RotatedScales<S> g;
   Lanes<S> largest{};
-  g.drawn = largest == largest;
+  g.drawn = first_lanes<S>(kLanes);
   S logs[3 * kLanes];
   for (Index i = 0; i < 3; ++i) {
     const Lanes<S> log_scale = load_lanes(l + i, 3, count);
@@ -64,7 +64,7 @@ RotatedScales<S> read_gaussians(const S* q, const S* l, Index count) {
     g.drawn = g.drawn & lane_finite(g.unit[i]);
     largest = lane_max(largest, lane_abs(g.unit[i]));
   }
-  g.drawn = g.drawn & (largest > lane_constant<Lanes<S>>(0));
+  g.drawn = g.drawn & (largest > S(0));
   for (Lanes<S>& number : g.unit) number = number / largest;
   const Lanes<S>* const u = g.unit;
   const Lanes<S> norm = lane_sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + u[3] * u[3]);

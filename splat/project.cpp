@@ -13,16 +13,15 @@ namespace {
 
 constexpr Index kGrain = 512;
 
-/// x held within [low, high]. T here: a number, or Lanes of them.
-template <class T>
+/// x held within [low, high].
 struct Held {
-  T value;
-  LaneMask<T> held;
+  WideLanes value;
+  LaneMask<WideLanes> held;
 };
 
-template <class T>
-Held<T> hold(const T& x, double low, double high) {
-  const LaneMask<T> below = x<low, above = x> high;
+Held hold(const WideLanes& x, double low, double high) {
+  const LaneMask<WideLanes> below = x < low;
+  const LaneMask<WideLanes> above = x > high;
   return {below ? low : (above ? high : x), below | above};
 }
 
@@ -48,63 +47,59 @@ Lens lens_of(const SplatView& view, const Camera& c, const Vector6<double>& xi) 
           (c.height - c.cy) / c.fy + margin_y};
 }
 
-// --- one Gaussian, or eight, in double -------------------------------------------------------------------------------
+// --- eight Gaussians, in double ------------------------------------------------------------------------------------
 
 /// Mean and axes in the camera's frame, and what both passes make of them.
-template <class T>
 struct InCamera {
-  T p[3], inverse_z;
-  T axes[3][3];  // W M
-  Held<T> ratio[2];
+  WideLanes p[3], inverse_z;
+  WideLanes axes[3][3];  // W M
+  Held ratio[2];
 };
 
 /// p = W (m − c)
-template <class T>
-void point_in_camera(const Lens& lens, const T* mean, T* p) {
+void point_in_camera(const Lens& lens, const WideLanes* mean, WideLanes* p) {
   const Matrix3<double>& w = lens.camera.rotation;
   const Vector3<double>& c = lens.camera.center;
-  const T d[3] = {mean[0] - c[0], mean[1] - c[1], mean[2] - c[2]};
+  const WideLanes d[3] = {mean[0] - c[0], mean[1] - c[1], mean[2] - c[2]};
   for (int r = 0; r < 3; ++r) p[r] = w(r, 0) * d[0] + w(r, 1) * d[1] + w(r, 2) * d[2];
 }
 
-template <class T>
-void take_into_camera(const Lens& lens, const T* axes, InCamera<T>& g) {
+void take_into_camera(const Lens& lens, const WideLanes* axes, InCamera& g) {
   g.inverse_z = 1.0 / g.p[2];
   const Matrix3<double>& w = lens.camera.rotation;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) g.axes[r][c] = w(r, 0) * axes[c] + w(r, 1) * axes[3 + c] + w(r, 2) * axes[6 + c];
   }
-  g.ratio[0] = hold<T>(g.p[0] * g.inverse_z, lens.low_x, lens.high_x);
-  g.ratio[1] = hold<T>(g.p[1] * g.inverse_z, lens.low_y, lens.high_y);
+  g.ratio[0] = hold(g.p[0] * g.inverse_z, lens.low_x, lens.high_x);
+  g.ratio[1] = hold(g.p[1] * g.inverse_z, lens.low_y, lens.high_y);
 }
 
 /// Whether a Gaussian has a depth, drawn or not: a smooth function of mean and camera, before `near` too.
-template <class S, class T>
-LaneMask<T> has_depth(const T* p) {
+template <class S>
+LaneMask<WideLanes> has_depth(const WideLanes* p) {
   return lane_finite(p[0]) & lane_finite(p[1]) & lane_finite(rounded_to<S>(p[2]));
 }
 
 /// Mean and factor in the image. Numbers of Gaussians that are not drawn mean nothing.
-template <class T>
 struct InImage {
-  T mean[2], mean_rest[2], factor[6];
-  LaneMask<T> drawn;
+  WideLanes mean[2], mean_rest[2], factor[6];
+  LaneMask<WideLanes> drawn;
 };
 
 /// @param S  what the results are rounded to
-template <class S, class T>
-InImage<T> project_gaussian(const Lens& lens, const InCamera<T>& g) {
-  InImage<T> image;
+template <class S>
+InImage project_gaussian(const Lens& lens, const InCamera& g) {
+  InImage image;
   image.drawn = lane_finite(g.p[0]) & lane_finite(g.p[1]) & (g.p[2] > lens.near) & lane_finite(g.p[2]);
   const double focal[2] = {lens.fx, lens.fy}, center[2] = {lens.cx, lens.cy};
-  LaneMask<T> some = g.p[2] != g.p[2];
+  LaneMask<WideLanes> some{};
   for (int i = 0; i < 2; ++i) {
-    const T mean = focal[i] * g.p[i] * g.inverse_z + center[i];
+    const WideLanes mean = focal[i] * g.p[i] * g.inverse_z + center[i];
     image.mean[i] = rounded_to<S>(mean);
     image.mean_rest[i] = mean - image.mean[i];
     image.drawn = image.drawn & lane_finite(image.mean[i]);
     for (int c = 0; c < 3; ++c) {
-      const T v = rounded_to<S>(focal[i] * g.inverse_z * (g.axes[i][c] - g.ratio[i].value * g.axes[2][c]));
+      const WideLanes v = rounded_to<S>(focal[i] * g.inverse_z * (g.axes[i][c] - g.ratio[i].value * g.axes[2][c]));
       image.factor[3 * i + c] = v;
       image.drawn = image.drawn & lane_finite(v);
       some = some | (v != 0.0);
@@ -115,34 +110,32 @@ InImage<T> project_gaussian(const Lens& lens, const InCamera<T>& g) {
 }
 
 /// Gradients of a drawn Gaussian in the camera's frame: of the point p, of the axes U = W M.
-template <class T>
 struct InCameraGradient {
-  T p[3], axes[3][3];
+  WideLanes p[3], axes[3][3];
 };
 
 /// V_0 = fx/z (U_0 − h_x U_2), V_1 likewise, u = fx x/z + cx. With a = d_V_0 · U: d_h_x = −fx/z a_2 unless held, and
 /// since V ∝ 1/z, d_z −= (V·d_V)/z.
 ///
 /// @param d_depth  of p_z itself
-template <class T>
-InCameraGradient<T> project_adjoint(const Lens& lens, const InCamera<T>& g, const T* d_mean_px, const T* d_factor,
-                                    const T& d_depth) {
-  const T zero{};
-  InCameraGradient<T> d{};
+InCameraGradient project_adjoint(const Lens& lens, const InCamera& g, const WideLanes* d_mean_px,
+                                 const WideLanes* d_factor, const WideLanes& d_depth) {
+  const WideLanes zero{};
+  InCameraGradient d{};
   d.p[2] = d_depth;
   const double lens_focal[2] = {lens.fx, lens.fy};
   for (int i = 0; i < 2; ++i) {
-    const T h = g.ratio[i].value, focal = lens_focal[i] * g.inverse_z;
-    T along = zero, d_ratio = zero;  // V_i · d_V_i, and the gradient of h
+    const WideLanes h = g.ratio[i].value, focal = lens_focal[i] * g.inverse_z;
+    WideLanes along = zero, d_ratio = zero;  // V_i · d_V_i, and the gradient of h
     for (int c = 0; c < 3; ++c) {
-      const T d_v = d_factor[3 * i + c] * focal;
+      const WideLanes d_v = d_factor[3 * i + c] * focal;
       along = along + d_v * (g.axes[i][c] - h * g.axes[2][c]);
       d_ratio = d_ratio - d_v * g.axes[2][c];
       d.axes[i][c] = d_v;
       d.axes[2][c] = d.axes[2][c] - h * d_v;
     }
     d_ratio = g.ratio[i].held ? zero : d_ratio;
-    const T d_place = focal * d_mean_px[i];
+    const WideLanes d_place = focal * d_mean_px[i];
     d.p[2] = d.p[2] - (along + d_place * g.p[i] + d_ratio * h) * g.inverse_z;
     d.p[i] = d_place + d_ratio * g.inverse_z;
   }
@@ -151,14 +144,13 @@ InCameraGradient<T> project_adjoint(const Lens& lens, const InCamera<T>& g, cons
 
 /// Gradients of the four intrinsics through a drawn Gaussian. V_0 and u − cx are proportional to fx; at a limit
 /// h = (±(clamp − 1) W/2 + {0, W} − cx)/fx, so that d_fx −= d_h h/fx and d_cx −= d_h/fx.
-template <class T>
-void intrinsics_adjoint(const Lens& lens, const InCamera<T>& g, const T* d_mean_px, const T* d_factor,
-                        T* d_intrinsics) {
-  const T zero{};
+void intrinsics_adjoint(const Lens& lens, const InCamera& g, const WideLanes* d_mean_px, const WideLanes* d_factor,
+                        WideLanes* d_intrinsics) {
+  const WideLanes zero{};
   const double focal[2] = {lens.fx, lens.fy};
   for (int i = 0; i < 2; ++i) {
-    const T h = g.ratio[i].value;
-    T d_focal = d_mean_px[i] * g.p[i], d_ratio = zero;  // both with a factor 1/z still to come
+    const WideLanes h = g.ratio[i].value;
+    WideLanes d_focal = d_mean_px[i] * g.p[i], d_ratio = zero;  // both with a factor 1/z still to come
     for (int c = 0; c < 3; ++c) {
       d_focal = d_focal + d_factor[3 * i + c] * (g.axes[i][c] - h * g.axes[2][c]);
       d_ratio = d_ratio - d_factor[3 * i + c] * focal[i] * g.axes[2][c];
@@ -192,8 +184,8 @@ struct Project {
   }
 
   /// Some Gaussians in the camera's frame.
-  static InCamera<WideLanes> taken(const Lens& lens, const S* mean, const S* axes, Index count) {
-    InCamera<WideLanes> g;
+  static InCamera taken(const Lens& lens, const S* mean, const S* axes, Index count) {
+    InCamera g;
     WideLanes m[3], a[9];
     for (Index i = 0; i < 3; ++i) m[i] = load_wide(mean + i, 3, count);
     for (Index i = 0; i < 9; ++i) a[i] = load_wide(axes + i, 9, count);
@@ -212,8 +204,8 @@ struct Project {
         for (Index n = begin; n < end; n += kLanes) {
           const Index count = end - n;
           const WideLanes zero{};
-          const InCamera<WideLanes> g = taken(lens, means.row(n), axes.row(n), count);
-          const InImage<WideLanes> image = project_gaussian<S>(lens, g);
+          const InCamera g = taken(lens, means.row(n), axes.row(n), count);
+          const InImage image = project_gaussian<S>(lens, g);
           for (Index i = 0; i < 2; ++i) {
             store_lanes<S>(image.drawn ? image.mean[i] : zero, means_px.row(n) + i, 2, count);
             store_lanes<S>(image.drawn ? image.mean_rest[i] : zero, means_rest.row(n) + i, 2, count);
@@ -274,15 +266,15 @@ struct Project {
   static void adjoint_of_rows(const Lens& lens, const Adjoint& a, Index n, Index count, WideLanes* d_delta,
                               WideLanes* d_intrinsics) {
     const WideLanes zero{};
-    LaneMask<WideLanes> drawn = zero != zero;
+    LaneMask<WideLanes> drawn{};
     for (Index i = 0; i < 6; ++i) drawn = drawn | (load_wide(a.factors.row(n) + i, 6, count) != zero);
     const WideLanes d_depth = a.d_depths ? load_wide(a.d_depths.row(n), 1, count) : zero;
     if (!any_lane(drawn | (d_depth != zero))) return;
-    const InCamera<WideLanes> g = taken(lens, a.means.row(n), a.axes.row(n), count);
+    const InCamera g = taken(lens, a.means.row(n), a.axes.row(n), count);
     WideLanes d_mean_px[2] = {}, d_factor[6] = {};
     for (Index i = 0; i < 2 && a.d_means_px; ++i) d_mean_px[i] = load_wide(a.d_means_px.row(n) + i, 2, count);
     for (Index i = 0; i < 6 && a.d_factors; ++i) d_factor[i] = load_wide(a.d_factors.row(n) + i, 6, count);
-    InCameraGradient<WideLanes> d = project_adjoint(lens, g, d_mean_px, d_factor, d_depth);
+    InCameraGradient d = project_adjoint(lens, g, d_mean_px, d_factor, d_depth);
     const LaneMask<WideLanes> with_depth = has_depth<S>(g.p);
     for (int i = 0; i < 3; ++i) {
       const WideLanes of_depth = i == 2 ? (with_depth ? d_depth : zero) : zero;
@@ -309,8 +301,8 @@ struct Project {
   ///
   /// @param drawn  those whose axes count
   /// @param rows   those that count
-  static void add_camera(const InCamera<WideLanes>& g, const InCameraGradient<WideLanes>& d,
-                         const LaneMask<WideLanes>& drawn, const LaneMask<WideLanes>& rows, WideLanes* d_delta) {
+  static void add_camera(const InCamera& g, const InCameraGradient& d, const LaneMask<WideLanes>& drawn,
+                         const LaneMask<WideLanes>& rows, WideLanes* d_delta) {
     const WideLanes zero{};
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, k = (i + 2) % 3;
@@ -329,7 +321,7 @@ struct Project {
     const ConstArray<S> means = io.in(kMeansIn), axes = io.in(kAxesIn);
     const Lens lens = this->lens(io);
     for (Index n = 0; n < means.shape.rows; ++n) {
-      const InCamera<WideLanes> g = taken(lens, means.row(n), axes.row(n), 1);
+      const InCamera g = taken(lens, means.row(n), axes.row(n), 1);
       const std::uint64_t drawn = project_gaussian<S>(lens, g).drawn[0] != 0;
       const std::uint64_t held_x = g.ratio[0].held[0] != 0, held_y = g.ratio[1].held[0] != 0;
       signature.add(drawn ? 2 + held_x + 2 * held_y : 1);

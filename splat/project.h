@@ -9,14 +9,11 @@
 // once. fx, fy, cx, cy are the camera's, or four numbers on the tape.
 #pragma once
 
-#include <algorithm>
-
 #include "splat/view.h"
 
 namespace hsi4d {
 
-/// Gaussians in the image. A row of `factors` that is six zeros marks a Gaussian that is not to be drawn
-/// (is_drawn).
+/// Gaussians in the image. A row of `factors` that is six zeros marks a Gaussian that is not to be drawn.
 template <class S>
 struct Projected {
   Var<S> means_px;    ///< [N,2] (u, v); the centre of row i, column j is (j + 0.5, i + 0.5)
@@ -25,12 +22,6 @@ struct Projected {
   Var<S> depth_rest;  ///< [N,1] what rounding took from the depths in float, zeros in double; has no adjoint
   Var<S> means_rest;  ///< [N,2] what rounding took from the means, likewise
 };
-
-/// Whether a Gaussian with this row of Projected::factors is to be drawn: it is not six zeros.
-template <class S>
-bool is_drawn(const S* factor) {
-  return std::any_of(factor, factor + 6, [](S v) { return v != S(0); });
-}
 
 /// Projects Gaussians with the camera Exp(ξ) · view.camera.
 ///

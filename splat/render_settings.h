@@ -84,7 +84,8 @@ struct RenderSkips {
 /// What changes the result a little: config section `approx`.
 struct RenderApproximations {
   /// What stands still behind all that moves in a tile is composited once into one layer, as if nothing were in front
-  /// of it. Off by at most transmittance_stop in each pixel. Needs static_layer.
+  /// of it. T of a pixel is off by at most transmittance_stop, or transmittance_stop / (1 − alpha_cap) where the stop
+  /// rule is exclusive, as either result may leave out the Gaussian that crosses it. Needs static_layer.
   bool collapse_suffix = false;
 };
 

@@ -62,7 +62,7 @@ WideLanes record_moments(bool of_blocks, const SplatRecord<S>* records, Index co
     constexpr double kInverse = 1 / kLog2Scale;
     for (int i = 1; i < 3; ++i) moments[i] = moments[i] * kInverse;
     for (int i = 3; i < 6; ++i) moments[i] = moments[i] * (kInverse * kInverse);
-    return moments[0] / lane_max(opacity, lane_constant<WideLanes>(0) + kLeastOpacity);
+    return moments[0] / lane_max(opacity, kLeastOpacity);
   }
   const WideLanes d_opacity = moments[0];  // of g = v/o
   for (Index i = 0; i < kMoments; ++i) moments[i] = moments[i] * opacity;

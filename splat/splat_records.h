@@ -112,8 +112,9 @@ void outlines_of(const SplatArrays<S>& splats, const RenderSettings& settings, c
   for (const WideLanes& v : factor) some = some | (v != 0.0);
   o.opacity = load(splats.opacities, n, 0);
   o.drawn = o.drawn & some & lane_finite(o.opacity);
+  if (!any_lane(o.drawn)) return;
   if (settings.antialias) o.opacity = o.opacity * blur_compensation(o.conic);
-  o.log2_opacity = lane_max(o.opacity, lane_constant<WideLanes>(0) + kLeastOpacity);
+  o.log2_opacity = lane_max(o.opacity, kLeastOpacity);
   for (Index i = 0; i < kLanes; ++i) o.log2_opacity[i] = std::log2(o.log2_opacity[i]);
   for (const WideLanes& number : {o.conic.l11, o.conic.l21, o.conic.l22, o.opacity, o.log2_opacity}) {
     o.drawn = o.drawn & lane_finite(rounded_to<S>(number));

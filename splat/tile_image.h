@@ -1,4 +1,4 @@
-// Pixels of a tile written into images. Used by composite.cpp.
+// Pixels of a tile written into images, and their cotangents read. Used by composite.cpp.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +6,9 @@
 #include <cstring>
 
 #include "autodiff/array.h"
+#include "core/parallel.h"
 #include "splat/block_kernel.h"
+#include "splat/composite_kernel.h"
 
 namespace hsi4d::detail {
 
@@ -45,6 +47,67 @@ struct OutputImages {
     for (Index i = 0; i < n; ++i) to[i] = from[i] + through[i] * color;
   }
 };
+
+/// Cotangents of OutputImages; those that nothing asked for are empty.
+template <class S>
+struct OutputCotangents {
+  ConstArray<S> over, rest, transmittance;
+};
+
+/// Adjoint of writing a tile: d_channels and, after them, d_T of its pixels, zero past the image's border. A channel
+/// over a background has d_T += background d_channel.
+///
+/// @param place       a job of the tile
+/// @param d_channels  [1 + channels][side][side]
+template <class S, class Job>
+void load_cotangent(const OutputImages<S>& images, const OutputCotangents<S>& d, Index side, const Job& place,
+                    S* d_channels) {
+  const Index pixels = side * side, channels = images.channels(), over = images.over.shape.planes;
+  S* const d_through = d_channels + channels * pixels;
+  std::fill_n(d_channels, (channels + 1) * pixels, S(0));
+  const auto load = [&](const ConstArray<S>& from, Index plane, S* to) {
+    for (Index r = 0; from && r < place.height; ++r) {
+      copy_row(&from(plane, place.top + r, place.left), place.width, to + r * side);
+    }
+  };
+  load(d.transmittance, 0, d_through);
+  for (Index k = 0; k < channels; ++k) {
+    const S behind = images.behind(k);
+    S* const to = d_channels + k * pixels;
+    k < over ? load(d.over, k, to) : load(d.rest, k - over, to);
+    for (Index i = 0; behind != S(0) && i < pixels; ++i) d_through[i] += behind * to[i];
+  }
+}
+
+/// d_background_k += Σ T d_channel_k
+template <class S>
+void add_background_gradient(const OutputImages<S>& images, const OutputCotangents<S>& d, S* d_background) {
+  constexpr Index kRows = 16;  // of pixels, at a time
+  const ConstArray<S> g = d.over;
+  for (Index k = 0; g && k < g.shape.planes; ++k) {
+    const double sum = parallel_sum(g.shape.rows, kRows, [&](Index begin, Index end) {
+      double part = 0;
+      for (Index r = begin; r < end; ++r) {
+        const S *row = &g(k, r, 0), *through = images.transmittance.row(r);
+        for (Index x = 0; x < g.shape.cols; ++x) part += static_cast<double>(through[x]) * static_cast<double>(row[x]);
+      }
+      return part;
+    });
+    d_background[k] += static_cast<S>(sum);
+  }
+}
+
+/// Writes what the plain kernel composited.
+template <class S>
+void store_tile(Index side, const TileJob<S>& job, const OutputImages<S>& images) {
+  for (Index r = 0; r < job.height; ++r) {
+    const S* const through = job.transmittance + r * side;
+    copy_row(through, job.width, &images.transmittance(job.top + r, job.left));
+    for (Index k = 0; k < images.channels(); ++k) {
+      images.put(k, job.channels + (k * side + r) * side, through, job.width, images.at(k, job.top + r, job.left));
+    }
+  }
+}
 
 /// Fetches the rows of the image that store_blocks will write.
 inline void fetch_blocks(const BlockJob& job, const OutputImages<float>& images) {

@@ -101,7 +101,7 @@ ReachOf<T> reach_of(const ConicOf<T>& conic, const T& x, const T& log2_opacity, 
   constexpr double kTwiceLn2 = 1.3862943611198906188;
   constexpr double kRoom = 1e-6;  // relative, some units in the last place of float
   const double epsilon = rules.epsilon;
-  const T exact = lane_sqrt(T(lane_max(T(kTwiceLn2 * (log2_opacity - rules.log2_alpha_min)), T{}) + 64 * epsilon));
+  const T exact = lane_sqrt(T(lane_max(T(kTwiceLn2 * (log2_opacity - rules.log2_alpha_min)), 0.0) + 64 * epsilon));
   const T inverse_yy = conic.l22 * conic.l22;
   const T width = lane_sqrt(conic.xx), height = conic.yy * conic.l22;
   const T reach = exact * (1.0 + 16 * epsilon * (1.0 + conic.l11 * width + lane_abs(conic.l21) * height));

@@ -2,12 +2,12 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/rotations.h"
 #include "core/rotation.h"
 #include "tests/support/operator_check.h"
+#include "tests/support/random_numbers.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
@@ -15,13 +15,6 @@ using namespace hsi4d::test;
 namespace {
 
 using Numbers = std::vector<double>;
-
-Numbers random_numbers(Index count, double size, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  Numbers numbers(static_cast<std::size_t>(count));
-  for (double& x : numbers) x = std::uniform_real_distribution<double>(-size, size)(random);
-  return numbers;
-}
 
 /// The same directions for both precisions.
 struct BothDirections {

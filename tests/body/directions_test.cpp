@@ -1,11 +1,11 @@
 #include "body/directions.h"
 
 #include <cmath>
-#include <random>
 
 #include "body/directions_kernel.h"
 #include "core/parallel.h"
 #include "tests/support/operator_check.h"
+#include "tests/support/random_numbers.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
@@ -13,13 +13,6 @@ using namespace hsi4d::test;
 namespace {
 
 using Numbers = std::vector<double>;
-
-Numbers random_numbers(Index count, double size, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  Numbers numbers(static_cast<std::size_t>(count));
-  for (double& x : numbers) x = std::uniform_real_distribution<double>(-size, size)(random);
-  return numbers;
-}
 
 /// P, the columns that a table takes of it, and what both directions must give.
 struct Problem {

@@ -41,13 +41,13 @@ TEST_CASE("the body of a config is the procedural one, or read from its file") {
   const SmplxArrays arrays = random_smplx({.vertices = 30, .correctives = false});
   smplx_writer(arrays).write(file);
   CHECK(rest_body(BodySettings{}).vertices == procedural_body().vertices);
-  CHECK_THROWS_AS(read_smplx_body(BodySettings{}), InternalError);
+  CHECK(body_model_of(BodySettings{}).betas == 10);
   BodySettings settings;
   settings.kind = BodyKind::kSmplx;
   settings.path = file;
   settings.betas = 3;
   settings.expressions = 2;
-  const SmplxModel model = read_smplx_body(settings);
+  const SmplxModel model = body_model_of(settings);
   CHECK(model.betas == 3);
   CHECK(model.expressions == 2);
   CHECK(rest_body(settings).vertices == std::vector<float>(arrays.v_template.begin(), arrays.v_template.end()));
@@ -55,7 +55,7 @@ TEST_CASE("the body of a config is the procedural one, or read from its file") {
   settings.flat_hand_mean = true;
   CHECK(smplx_body_options(settings).flat_hand_mean);
   settings.betas = 11;
-  CHECK_THROWS_WITH(read_smplx_body(settings), Catch::Contains("which holds 10 betas; 11 were asked for"));
+  CHECK_THROWS_WITH(body_model_of(settings), Catch::Contains("which holds 10 betas; 11 were asked for"));
 }
 
 TEST_CASE("hand components that a file has not are refused") {
@@ -68,13 +68,13 @@ TEST_CASE("hand components that a file has not are refused") {
   settings.kind = BodyKind::kSmplx;
   settings.path = file;
   settings.hand_components = 7;
-  CHECK_NOTHROW(read_smplx_body(settings));
+  CHECK_NOTHROW(body_model_of(settings));
   settings.hands = HandParameters::kPca;
-  CHECK_THROWS_WITH(read_smplx_body(settings), settings.path.string() +
-                                                   ": has 6 components of a hand; 7 were asked "
-                                                   "for (body.hand_components)");
+  CHECK_THROWS_WITH(body_model_of(settings), settings.path.string() +
+                                                 ": has 6 components of a hand; 7 were asked "
+                                                 "for (body.hand_components)");
   settings.hand_components = 6;
-  CHECK_NOTHROW(read_smplx_body(settings));
+  CHECK_NOTHROW(body_model_of(settings));
 }
 
 TEST_CASE("synth makes the avatar of the body that a config names") {
@@ -111,4 +111,20 @@ TEST_CASE("synth makes the avatar of the body that a config names") {
       write_dataset(settings, video_render_settings(), folder.path() / "wrong", {}, ConfigValue::make_object(), body),
       Catch::Contains("which holds 0 betas; 1 were asked for"));
   CHECK_FALSE(std::filesystem::exists(folder.path() / "wrong"));
+}
+
+TEST_CASE("a config shapes the body") {
+  BodySettings settings;
+  settings.shape = {2, 0, -1};
+  std::vector<double> betas(10, 0.0);
+  betas[0] = 2, betas[2] = -1;
+  CHECK(rest_body(settings).vertices == rest_body(procedural_smplx(), betas).vertices);
+  CHECK(rest_body(settings).vertices != procedural_body().vertices);
+  settings.betas = 3;
+  CHECK(rest_body(settings).joints == rest_body(procedural_smplx(), betas).joints);
+  settings.hands = HandParameters::kPca;
+  CHECK_THROWS_WITH(body_model_of(settings),
+                    "the procedural body: has 3 components of a hand; 12 were asked for (body.hand_components)");
+  settings.hand_components = 3;
+  CHECK_NOTHROW(body_model_of(settings));
 }

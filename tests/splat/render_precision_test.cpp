@@ -54,7 +54,7 @@ double longest_needle(const TapedSplats<double>& splats) {
   double longest = 1;
   for (std::size_t i = 0; i < factors.size(); i += 6) {
     hsi4d::detail::Conic conic;
-    if (!is_drawn(&factors[i]) || !hsi4d::detail::conic_of(&factors[i], splats.view.settings.blur, conic)) continue;
+    if (!hsi4d::detail::conic_of(&factors[i], splats.view.settings.blur, conic)) continue;
     const double larger = 0.5 * (conic.xx + conic.yy) + std::hypot(0.5 * (conic.xx - conic.yy), conic.xy);
     longest = std::max(longest, larger / std::sqrt(conic.determinant));
   }
