@@ -3,8 +3,6 @@
 #include <cmath>
 #include <numbers>
 #include <string>
-#include <system_error>
-#include <unistd.h>
 #include <utility>
 #include <vector>
 
@@ -12,6 +10,7 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/file.h"
+#include "core/folder_in_making.h"
 #include "core/image_io.h"
 #include "core/random.h"
 #include "core/rotation.h"
@@ -28,57 +27,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kDegree = std::numbers::pi / 180;
-
-/// A folder under a temporary name beside its own, which it gets when it is complete; else it is removed.
-class FolderInMaking {
- public:
-  explicit FolderInMaking(const fs::path& folder) : folder_(fs::absolute(folder).lexically_normal()) {
-    if (!folder_.has_filename()) folder_ = folder_.parent_path();  // "out/"
-    refuse_unless_free();
-    std::error_code error;
-    fs::create_directories(folder_.parent_path(), error);
-    temporary_ = folder_;
-    temporary_ += "." + std::to_string(::getpid()) + ".tmp";
-    if (error || !fs::create_directory(temporary_, error) || error)
-      throw UserError(folder_.string() + ": the folder cannot be made" + (error ? ": " + error.message() : ""));
-  }
-  ~FolderInMaking() {
-    std::error_code ignored;
-    if (!temporary_.empty()) fs::remove_all(temporary_, ignored);
-  }
-  FolderInMaking(const FolderInMaking&) = delete;
-  FolderInMaking& operator=(const FolderInMaking&) = delete;
-
-  /// Path of a file in it, whose folder is made.
-  std::string file(const fs::path& name) const {
-    const fs::path path = temporary_ / name;
-    std::error_code error;
-    fs::create_directories(path.parent_path(), error);
-    if (error) throw UserError(path.parent_path().string() + ": the folder cannot be made: " + error.message());
-    return path.string();
-  }
-
-  void commit() {
-    refuse_unless_free();
-    std::error_code error;
-    fs::rename(temporary_, folder_, error);  // replaces an empty folder
-    if (error) throw UserError(folder_.string() + ": the folder cannot be made: " + error.message());
-    temporary_.clear();
-  }
-
- private:
-  void refuse_unless_free() const {
-    std::error_code error;
-    if (!fs::exists(folder_, error) && !error) return;
-    if (!error && !fs::is_directory(folder_, error))
-      throw UserError(folder_.string() + ": there is something that is not a folder; name a new or empty folder");
-    if (!error && !fs::is_empty(folder_, error))
-      throw UserError(folder_.string() + ": the folder is not empty; name a new or empty one");
-    if (error) throw UserError(folder_.string() + ": " + error.message());
-  }
-
-  fs::path folder_, temporary_;
-};
 
 ConfigValue numbers(const Vector3<double>& v) {
   return ConfigValue::make_array(

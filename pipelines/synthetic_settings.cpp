@@ -9,6 +9,8 @@ constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 }  // namespace
 
 void describe(ConfigFields& f, SyntheticSettings& s) {
+  f.choice("kind", s.kind, kSyntheticKinds,
+           "A clip in a room, or views: pictures of the human alone in several poses, for `hsi4d avatar fit`");
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of textures, arrangement and noise");
   f.integer("frames", s.frames, {.min = 1, .max = 100000}, "Frames of the clip");
   f.number("frame_rate", s.frame_rate, {.min = 1, .max = 1000},
@@ -28,6 +30,8 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
   f.number("root_noise_deg", s.root_noise_deg, {.min = 0, .max = 90}, "The same of the whole body's orientation");
   f.number("root_noise_m", s.root_noise_m, {.min = 0, .max = 2},
            "Standard deviation of each coordinate of the initial motion's root, metres");
+  f.integer("views_cameras", s.views_cameras, {.min = 1, .max = 1000}, "Cameras in a ring, of kind views");
+  f.integer("views_poses", s.views_poses, {.min = 1, .max = 1000}, "Poses that each of them sees");
 }
 
 std::string synthetic_settings_json(const SyntheticSettings& settings, const BodySettings& body) {
@@ -35,7 +39,7 @@ std::string synthetic_settings_json(const SyntheticSettings& settings, const Bod
   BodySettings body_copy = body;
   ConfigFields fields;
   describe(fields, copy);
-  if (body.kind != BodyKind::kProcedural) fields.object("body", body_copy, "The body model");
+  if (body.kind != BodyKind::kProcedural || !body.shape.empty()) fields.object("body", body_copy, "The body model");
   return to_json(write_config(fields));
 }
 

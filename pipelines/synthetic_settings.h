@@ -17,12 +17,19 @@ enum class SyntheticObjectKind { kWateringCan, kBox };
 inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 2> kSyntheticObjectKinds = {
     {{SyntheticObjectKind::kWateringCan, "watering_can"}, {SyntheticObjectKind::kBox, "box"}}};
 
+/// What is made.
+enum class SyntheticKind { kClip, kViews };
+
+inline constexpr std::array<ConfigChoice<SyntheticKind>, 2> kSyntheticKinds = {
+    {{SyntheticKind::kClip, "clip"}, {SyntheticKind::kViews, "views"}}};
+
 /// Fewest Gaussians that the room and the object can be made of: one for each of their surfaces.
 inline constexpr Index kFewestRoomGaussians = 700;
 inline constexpr Index kFewestObjectGaussians = 60;
 
 /// What a synthetic dataset holds.
 struct SyntheticSettings {
+  SyntheticKind kind = SyntheticKind::kClip;
   std::int64_t seed = 0;
   Index frames = 8;
   double frame_rate = 10;  ///< frames a second
@@ -37,6 +44,8 @@ struct SyntheticSettings {
   double hand_noise_share = 0.25;
   double root_noise_deg = 2;
   double root_noise_m = 0.02;
+  Index views_cameras = 6;  ///< of kind views
+  Index views_poses = 4;
 };
 
 void describe(ConfigFields& fields, SyntheticSettings& settings);

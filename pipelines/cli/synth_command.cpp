@@ -5,6 +5,7 @@
 #include "pipelines/cli/terminal.h"
 #include "pipelines/run_config.h"
 #include "pipelines/synthetic.h"
+#include "pipelines/synthetic_views.h"
 
 namespace hsi4d::cli {
 
@@ -12,13 +13,19 @@ std::string synth_command(const std::filesystem::path& config, const std::vector
                           const std::filesystem::path& out, bool quiet, const std::vector<LossDescription>& losses) {
   const RunConfig run = load_run_config(config, overrides, losses);
   const InterruptWatch watch;
+  const bool of_views = run.synthetic.kind == SyntheticKind::kViews;
   with_threads(run.threads > 0 ? run.threads : thread_count(), [&] {
+    if (of_views) return write_views(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet), run.body);
     write_dataset(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet),
                   sections_beside_data(run, losses), run.body);
   });
+  const std::string size = std::to_string(run.synthetic.size_px) + " x " + std::to_string(run.synthetic.size_px) + " pixels";
+  if (of_views) {
+    return out.generic_string() + ": " + std::to_string(run.synthetic.views_cameras * run.synthetic.views_poses) +
+           " views of " + size + " for hsi4d avatar fit\n";
+  }
   const std::string frames = std::to_string(run.synthetic.frames) + (run.synthetic.frames == 1 ? " frame" : " frames");
-  const std::string size = std::to_string(run.synthetic.size_px);
-  return out.generic_string() + ": " + frames + " of " + size + " x " + size + " pixels with masks and truth\n";
+  return out.generic_string() + ": " + frames + " of " + size + " with masks and truth\n";
 }
 
 }  // namespace hsi4d::cli

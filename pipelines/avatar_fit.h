@@ -1,0 +1,83 @@
+// An avatar learnt from pictures: the look of Gaussians on a body, from images of it in known poses.
+//
+// All views share one tape. Between two iterations the next view's camera, pose and picture are written into its
+// leaves: the camera as the update ξ = Log(T_view T_first⁻¹) of the first one and its four intrinsics. A stage
+// (optim/stage.h) moves what its settings name:
+//
+//   colors, opacity_logits, log_scales, quats, means    numbers of the avatar's Gaussians in the rest pose
+//   color_net, avatar_features                          of its color net, if it has one
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "body/avatar.h"
+#include "core/config_value.h"
+#include "optim/loss_term.h"
+#include "optim/stage.h"
+#include "pipelines/body_settings.h"
+#include "pipelines/color_net_settings.h"
+#include "pipelines/observer.h"
+#include "pipelines/view_set.h"
+#include "splat/render_settings.h"
+
+namespace hsi4d {
+
+/// A config of `hsi4d avatar fit`.
+struct AvatarFitSettings {
+  std::filesystem::path views;     ///< views.json of the set
+  std::filesystem::path avatar;    ///< where it starts; empty: new Gaussians on the body
+  std::int64_t seed = 0;           ///< of new Gaussians, a new network, and the order of the views
+  int threads = 0;                 ///< 0: one a core
+  Index gaussians = 20000;         ///< of a new avatar
+  std::array<double, 3> background = {0.5, 0.5, 0.5};
+  std::vector<double> held_cameras;  ///< views of these cameras are not learnt from, but measured
+  std::vector<double> held_frames;   ///< nor those of these frames
+  BodySettings body;
+  ColorNetSettings color_net{.use = ColorNetUse::kOn};
+  RenderSettings render;
+  StageSettings stage;
+};
+
+void describe(ConfigFields& fields, AvatarFitSettings& settings, const std::vector<LossDescription>& losses);
+
+/// Reads a config of `hsi4d avatar fit`. Throws UserError with all of its problems.
+AvatarFitSettings load_avatar_fit(const std::filesystem::path& file, const std::vector<std::string>& overrides,
+                                  const std::vector<LossDescription>& losses);
+
+/// Names of the groups that its stage may move.
+std::vector<std::string> avatar_fit_groups();
+
+/// How well views are shown.
+struct ViewScore {
+  Index views = 0;
+  double psnr_db = 0;             ///< mean over views, of whole pictures
+  double psnr_foreground_db = 0;  ///< where masks are, weighted by them; of views that show somebody
+};
+
+struct AvatarFitResult {
+  Avatar avatar;
+  StageResult stage;
+  ViewScore learnt, held;
+};
+
+/// Whether a view is held back.
+bool is_held(const AvatarFitSettings& settings, const PosedView& view);
+
+/// The avatar that a fit starts from: that of its file, or Gaussians on the body, grey, with the color net that the
+/// settings ask for. Throws as read_avatar, rest_body.
+Avatar first_avatar(const AvatarFitSettings& settings);
+
+/// Learns an avatar. A function of the arguments alone, for any number of threads.
+///
+/// @param first  where it starts
+/// @param terms  that the stage may name; those that read `rendered`, `target` and `weight` have their inputs
+/// Throws UserError: cameras of different sizes, no view to learn from, poses of another skeleton; DataError for images
+/// as view_image; as run_stage; Interrupted.
+AvatarFitResult fit_avatar(const AvatarFitSettings& settings, const Avatar& first, const ViewSet& set,
+                           std::span<const LossTerm> terms, const Observer& observer = {});
+
+}  // namespace hsi4d

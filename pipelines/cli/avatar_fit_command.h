@@ -1,0 +1,20 @@
+// `hsi4d avatar fit`: an avatar learnt from pictures.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "optim/loss_term.h"
+
+namespace hsi4d::cli {
+
+/// Learns the avatar that a config describes and writes its file; tells progress on stderr unless `quiet`. Returns
+/// what the command prints: how well views are shown, those that were learnt from and those that were held back.
+///
+/// @param out  a file, *.safetensors
+/// Throws as load_avatar_fit, read_view_set, fit_avatar, write_avatar.
+std::string avatar_fit_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
+                               const std::filesystem::path& out, bool quiet, const std::vector<LossTerm>& terms);
+
+}  // namespace hsi4d::cli

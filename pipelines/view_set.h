@@ -1,0 +1,56 @@
+// Images of one human in known poses, seen by known cameras: what an avatar is made from.
+//
+// A folder with a file `views.json`:
+//
+//   {"format": "hsi4d views", "version": 1, "motion": "motion.npz", "cameras": "cameras.json",
+//    "views": [{"image": "images/0000.png", "mask": "masks/0000.png", "camera": 0, "frame": 0}, ...]}
+//
+// Names are relative to it. A view's camera is one of cameras.json (core/camera_file.h), its frame one of the motion
+// (body/motion_io.h). The share of each pixel that shows the human is the picture's alpha (PNG, not premultiplied), or the
+// mask, 8 bit grey; without both the picture has to show the human before the background of the fit.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "body/motion_io.h"
+#include "core/camera.h"
+#include "core/image.h"
+
+namespace hsi4d {
+
+/// Version of views.json that is written; newer ones are refused.
+inline constexpr int kViewSetVersion = 1;
+
+struct PosedView {
+  std::filesystem::path image;
+  std::filesystem::path mask;  ///< empty: the picture's alpha, if it has one
+  Index camera = 0;
+  Index frame = 0;
+};
+
+/// A set of views; its images stay in their files.
+struct ViewSet {
+  std::filesystem::path file;  ///< for messages
+  Motion motion;
+  std::vector<Camera> cameras;
+  std::vector<PosedView> views;
+};
+
+/// Reads a set. Throws UserError naming file, JSON pointer, value and what is allowed; as read_motion and read_cameras.
+ViewSet read_view_set(const std::filesystem::path& file);
+
+/// Text of views.json for views whose paths are relative to it already.
+std::string view_set_json(const std::string& motion, const std::string& cameras, const std::vector<PosedView>& views);
+
+/// A picture of the set, the colours [3,H,W] and the mask [1,H,W]; no pixels in a mask that is not there.
+struct ViewImage {
+  Image color, mask;
+};
+
+/// What a view shows of the human before one colour: mask · image + (1 − mask) · background, and the mask.
+/// Throws DataError naming the file when an image or mask has another size than the camera.
+ViewImage view_image(const ViewSet& set, const PosedView& view, const Vector3<double>& background);
+
+}  // namespace hsi4d

@@ -1,0 +1,186 @@
+#include "pipelines/avatar_fit.h"
+
+#include <catch2/catch.hpp>
+
+#include "body/procedural_body.h"
+#include "core/camera_file.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "core/parallel.h"
+#include "pipelines/posed_avatar.h"
+#include "pipelines/synthetic.h"
+#include "pipelines/synthetic_views.h"
+#include "tests/support/temporary_folder.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A stage that learns fast enough for a test.
+StageSettings quick_stage(int iterations) {
+  StageSettings stage;
+  stage.iterations = iterations;
+  stage.optimize = {{"colors", {.lr = 0.05, .lr_final_share = 0.1}},
+                    {"opacity_logits", {.lr = 0.02, .lr_final_share = 0.1}},
+                    {"color_net", {.lr = 0.001, .lr_final_share = 0.1}}};
+  stage.losses = {{"photometric", loss_settings("photometric")}};
+  return stage;
+}
+
+AvatarFitSettings quick_fit(const fs::path& views, int iterations = 150) {
+  AvatarFitSettings settings;
+  settings.views = views;
+  settings.gaussians = 2500;
+  settings.held_cameras = {2};
+  settings.render.blur = 0.1;
+  settings.stage = quick_stage(iterations);
+  return settings;
+}
+
+SyntheticSettings few_views() {
+  SyntheticSettings settings;
+  settings.kind = SyntheticKind::kViews;
+  settings.size_px = 96;
+  settings.avatar_gaussians = 4000;
+  settings.views_cameras = 4;
+  settings.views_poses = 2;
+  settings.seed = 5;
+  return settings;
+}
+
+/// A set of views made once for all tests.
+const fs::path& made_views() {
+  static const TemporaryFolder folder;
+  static const fs::path file = [] {
+    write_views(few_views(), video_render_settings(), folder / "views");
+    return folder / "views" / "views.json";
+  }();
+  return file;
+}
+
+AvatarFitResult fitted(const AvatarFitSettings& settings, const Observer& observer = {}) {
+  return fit_avatar(settings, first_avatar(settings), read_view_set(settings.views), loss_terms(), observer);
+}
+
+}  // namespace
+
+TEST_CASE("an avatar is learnt from pictures, and shown from where nobody stood") {
+  AvatarFitSettings settings = quick_fit(made_views());
+  settings.stage.iterations = 1;
+  const AvatarFitResult before = fitted(settings), after = fitted(quick_fit(made_views()));
+  WARN("held back: " << before.held.psnr_db << " dB before, " << after.held.psnr_db << " dB after, of the human "
+                     << after.held.psnr_foreground_db << "; learnt " << after.learnt.psnr_db);
+  CHECK(after.learnt.views == 6);
+  CHECK(after.held.views == 2);
+  CHECK(after.held.psnr_db > before.held.psnr_db + 6);
+  CHECK(after.held.psnr_db > 24);
+  CHECK(after.learnt.psnr_db > 25);
+  CHECK(after.avatar.count() == 2500);
+  CHECK(after.avatar.means == before.avatar.means);  // not among what moves
+  CHECK(after.avatar.colors != before.avatar.colors);
+  CHECK(after.avatar.color_net.has_value());
+  const TemporaryFolder folder;
+  write_avatar(folder / "a.safetensors", after.avatar);
+  CHECK(read_avatar(folder / "a.safetensors").colors == after.avatar.colors);
+}
+
+TEST_CASE("an avatar fit is the same for any number of threads and again") {
+  const AvatarFitSettings settings = quick_fit(made_views(), 8);
+  std::vector<float> colors;
+  for (const int threads : {1, 2, 3, 1}) {
+    with_threads(threads, [&] {
+      const AvatarFitResult result = fitted(settings);
+      if (colors.empty()) colors = result.avatar.colors;
+      CHECK(result.avatar.colors == colors);
+    });
+  }
+}
+
+TEST_CASE("views of one camera written as updates of another are those of the camera itself") {
+  // A fit that learns nothing shows the truth as the pictures do, from every camera and in every pose.
+  const ViewSet set = read_view_set(made_views());
+  AvatarFitSettings settings = quick_fit(made_views(), 1);
+  settings.avatar = made_views().parent_path() / "truth" / "avatar.safetensors";
+  settings.color_net.use = ColorNetUse::kOff;
+  settings.render = video_render_settings();
+  settings.render.blur = 0.15;
+  settings.stage.optimize = {{"colors", {.lr = 1e-12}}};
+  settings.held_cameras = {};
+  const AvatarFitResult result = fitted(settings);
+  CHECK(result.learnt.views == 8);
+  CHECK(result.learnt.psnr_db > 38);  // of 8 bits, and another pixel filter
+}
+
+TEST_CASE("a picture's alpha is its mask; views that make no sense are refused") {
+  const ViewSet set = read_view_set(made_views());
+  REQUIRE(set.views.size() == 8);
+  CHECK(set.cameras.size() == 4);
+  CHECK(set.motion.poses.size() == 2);
+  const ViewImage grey = view_image(set, set.views[3], {0.5, 0.5, 0.5}), red = view_image(set, set.views[3], {1, 0, 0});
+  CHECK(grey.mask(0, 0, 0) == 0);
+  CHECK(grey.mask(0, 48, 48) == 1);
+  CHECK(grey.color(1, 0, 0) == 0.5f);
+  CHECK(red.color(0, 0, 0) == 1.0f);
+  CHECK(red.color(2, 48, 48) == grey.color(2, 48, 48));
+
+  const TemporaryFolder folder;
+  fs::copy(made_views().parent_path(), folder / "views", fs::copy_options::recursive);
+  const fs::path file = folder / "views" / "views.json";
+  const auto fault = [&](std::vector<PosedView> views) {
+    write_text_file(file, view_set_json("motion.npz", "cameras.json", views));
+    try {
+      const ViewSet read = read_view_set(file);
+      view_image(read, read.views.front(), {0, 0, 0});
+    } catch (const std::exception& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  const PosedView good{"images/0000.png", {}, 0, 0};
+  CHECK(fault({good}) == "");
+  CHECK_THAT(fault({}), Catch::Contains("there is no view"));
+  CHECK_THAT(fault({good, {"images/0000.png", {}, 4, 0}}),
+             Catch::Contains("/views/1/camera: 4; there are 4, counted from 0"));
+  CHECK_THAT(fault({{"images/0000.png", {}, 0, 2}}), Catch::Contains("/views/0/frame: 2; there are 2"));
+  CHECK_THAT(fault({{"images/9.png", {}, 0, 0}}), Catch::Contains("images/9.png"));
+  write_image((folder / "views" / "small.png").string(), Image(3, 4, 4));
+  CHECK_THAT(fault({{"small.png", {}, 0, 0}}), Catch::Contains("is 4x4 pixels; its camera has 96x96"));
+  write_image((folder / "views" / "grey.png").string(), Image(1, 96, 96));
+  CHECK_THAT(fault({{"grey.png", {}, 0, 0}}), Catch::Contains("is grey"));
+  write_text_file(file, R"({"format": "hsi4d views", "version": 2, "motion": "motion.npz", "cameras": "cameras.json"})");
+  CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("/version"));
+  write_text_file(file, R"({"format": "views", "version": 1, "motion": "motion.npz", "cameras": "cameras.json"})");
+  CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("hsi4d views"));
+}
+
+TEST_CASE("an avatar fit refuses what it cannot do, and stops when asked") {
+  AvatarFitSettings settings = quick_fit(made_views(), 5);
+  settings.held_cameras = {0, 1, 2, 3};
+  CHECK_THROWS_WITH(fitted(settings), Catch::Contains("all views are held back"));
+  settings = quick_fit(made_views(), 5);
+  Observer observer;
+  observer.stop_requested = [] { return true; };
+  CHECK_THROWS_AS(fitted(settings, observer), Interrupted);
+}
+
+TEST_CASE("the config of an avatar fit is checked") {
+  const TemporaryFolder folder;
+  const auto load = [&](const std::string& text) {
+    write_text_file(folder / "fit.json", text);
+    return load_avatar_fit(folder / "fit.json", {}, descriptions_of(loss_terms()));
+  };
+  const std::string views = "\"views\": \"" + made_views().string() + "\"";
+  const AvatarFitSettings read = load("{" + views + R"(, "held_frames": [1], "stage": {"iterations": 3,
+      "optimize": {"colors": {"lr": 0.1}}, "losses": {"photometric": {}}}})");
+  CHECK(read.held_frames == std::vector<double>{1});
+  CHECK(read.stage.iterations == 3);
+  CHECK(is_held(read, {"a.png", {}, 0, 1}));
+  CHECK_FALSE(is_held(read, {"a.png", {}, 0, 0}));
+  CHECK_THROWS_WITH(load("{}"), Catch::Contains("views"));
+  CHECK_THROWS_WITH(load("{" + views + R"(, "held_cameras": [0.5]})"), Catch::Contains("whole numbers"));
+  CHECK_THROWS_WITH(load("{" + views + R"(, "stage": {"optimize": {"colours": {"lr": 1}}}})"),
+                    Catch::Contains("colors"));
+}
