@@ -108,7 +108,7 @@ BodyModel procedural_body() {
 }
 
 SmplxModel procedural_smplx(Index betas) {
-  constexpr Index kBetas = detail::kProceduralShapes.size();
+  constexpr Index kBetas = kProceduralBetas;
   HSI4D_CHECK(betas >= 0 && betas <= kBetas, std::to_string(betas) + " betas");
   const BodyModel body = procedural_body();
   const detail::ShapeDirections directions = detail::procedural_directions(body);

@@ -14,6 +14,9 @@ namespace hsi4d {
 /// @return  the same bits every time; left and right are mirror images. Takes a fraction of a second.
 BodyModel procedural_body();
 
+/// Numbers of the program's body's shape.
+inline constexpr Index kProceduralBetas = 10;
+
 /// The same body as a model with a shape space and a pose space of its hands, for all that takes a SMPL-X file. It has
 /// no expressions and no pose correctives.
 ///
@@ -21,7 +24,7 @@ BodyModel procedural_body();
 /// torso, width of shoulders, of hips, belly, size of the head, of hands and feet. Hands are relaxed where their
 /// numbers are 0; their components are closing (1: a fist), spreading, and the thumb across the palm.
 ///
-/// @param betas  how many of them, 0 to 10
+/// @param betas  how many of them, 0 to kProceduralBetas
 SmplxModel procedural_smplx(Index betas = 10);
 
 }  // namespace hsi4d

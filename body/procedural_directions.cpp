@@ -91,7 +91,7 @@ void put_turn(Vector turn, bool right, double* to) {
 }  // namespace
 
 ShapeDirections procedural_directions(const BodyModel& body) {
-  constexpr Index kDirections = kProceduralShapes.size();
+  constexpr Index kDirections = kProceduralBetas;
   const Index joints = body.joint_count(), vertices = body.vertex_count();
   ShapeDirections result;
   result.vertices.resize(static_cast<std::size_t>(3 * vertices * kDirections));

@@ -6,11 +6,12 @@
 #include <vector>
 
 #include "body/body_model.h"
+#include "body/procedural_body.h"
 
 namespace hsi4d::detail {
 
 /// What the shape directions change; a unit is about a standard deviation among adults.
-inline constexpr std::array<const char*, 10> kProceduralShapes = {
+inline constexpr std::array<const char*, kProceduralBetas> kProceduralShapes = {
     "height",         "weight",    "leg length", "arm length", "torso length",
     "shoulder width", "hip width", "belly",      "head size",  "size of hands and feet"};
 

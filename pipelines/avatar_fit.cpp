@@ -132,9 +132,7 @@ class FitGraph {
   const std::vector<ParameterGroup<S>>& groups() const { return groups_; }
 
  private:
-  static Shape shape_of_image(Var<S> image) {
-    return image_shape<S>(1, image.shape().rows, image.shape().cols);
-  }
+  static Shape shape_of_image(Var<S> image) { return image_shape<S>(1, image.shape().rows, image.shape().cols); }
 
   Var<S> leaf(const char* name, const std::vector<float>& values, Index cols) {
     const Var<S> var = tape_.parameter(name, shape_of(static_cast<Index>(values.size()) / cols, cols));
@@ -205,7 +203,8 @@ ViewScore score_of(FitGraph& graph, const std::vector<LoadedView>& views, bool h
     const Image picture = graph.picture();
     ++score.views;
     score.psnr_db += psnr_db(picture, view.image.color);
-    const std::optional<double> foreground = view.image.mask.empty() ? std::nullopt : psnr_db(picture, view.image.color, view.image.mask);
+    const std::optional<double> foreground =
+        view.image.mask.empty() ? std::nullopt : psnr_db(picture, view.image.color, view.image.mask);
     if (!foreground) continue;
     score.psnr_foreground_db += *foreground;
     ++masked;

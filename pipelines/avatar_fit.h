@@ -28,11 +28,11 @@ namespace hsi4d {
 
 /// A config of `hsi4d avatar fit`.
 struct AvatarFitSettings {
-  std::filesystem::path views;     ///< views.json of the set
-  std::filesystem::path avatar;    ///< where it starts; empty: new Gaussians on the body
-  std::int64_t seed = 0;           ///< of new Gaussians, a new network, and the order of the views
-  int threads = 0;                 ///< 0: one a core
-  Index gaussians = 20000;         ///< of a new avatar
+  std::filesystem::path views;   ///< views.json of the set
+  std::filesystem::path avatar;  ///< where it starts; empty: new Gaussians on the body
+  std::int64_t seed = 0;         ///< of new Gaussians, a new network, and the order of the views
+  int threads = 0;               ///< 0: one a core
+  Index gaussians = 20000;       ///< of a new avatar
   std::array<double, 3> background = {0.5, 0.5, 0.5};
   std::vector<double> held_cameras;  ///< views of these cameras are not learnt from, but measured
   std::vector<double> held_frames;   ///< nor those of these frames

@@ -22,7 +22,8 @@ void describe(ConfigFields& f, BodySettings& s) {
     return "";
   });
   f.rule({"betas", "kind"}, [&s]() -> std::string {
-    return s.kind == BodyKind::kProcedural && s.betas > 10 ? "the body of kind procedural has 10 betas" : "";
+    const bool too_many = s.kind == BodyKind::kProcedural && s.betas > kProceduralBetas;
+    return too_many ? "the body of kind procedural has " + std::to_string(kProceduralBetas) : "";
   });
   f.rule({"shape", "betas"}, [&s]() -> std::string {
     const Index given = static_cast<Index>(s.shape.size());

@@ -69,9 +69,8 @@ SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Va
   const SkinnedFrames<S> posed = skin_frames(SkinWeights<S>(avatar.weights), skeleton.transforms, human.means,
                                              gaussian_axes(human.quats, human.log_scales));
   return {posed.points, posed.frames, gaussian_opacities(human.opacity_logits),
-          colors == nullptr
-              ? human.colors
-              : net_colors(*colors, human.colors, rotations, avatar, skeleton.transforms, posed.points)};
+          colors == nullptr ? human.colors
+                            : net_colors(*colors, human.colors, rotations, avatar, skeleton.transforms, posed.points)};
 }
 
 template <class S>

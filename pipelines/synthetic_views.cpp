@@ -119,8 +119,10 @@ Image picture_with_alpha(const Avatar& avatar, const BodyPose& pose, const Camer
   Image planes(4, large.height, large.width);
   for (int y = 0; y < large.height; ++y) {
     for (int x = 0; x < large.width; ++x) {
-      const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(large.width) + static_cast<std::size_t>(x);
-      for (int c = 0; c < 3; ++c) planes(c, y, x) = static_cast<float>(large.image[3 * at + static_cast<std::size_t>(c)]);
+      const std::size_t at =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(large.width) + static_cast<std::size_t>(x);
+      for (int c = 0; c < 3; ++c)
+        planes(c, y, x) = static_cast<float>(large.image[3 * at + static_cast<std::size_t>(c)]);
       planes(3, y, x) = static_cast<float>(large.alpha[at]);
     }
   }

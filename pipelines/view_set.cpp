@@ -70,7 +70,7 @@ ViewSet read_view_set(const fs::path& file) {
 std::string view_set_json(const std::string& motion, const std::string& cameras, const std::vector<PosedView>& views) {
   ConfigValue root = ConfigValue::make_object();
   root.add("format", ConfigValue::make_string("hsi4d views"));
-  root.add("version", ConfigValue::make_number(kViewSetVersion));
+  root.add("version", ConfigValue::make_number(static_cast<double>(kViewSetVersion)));
   root.add("motion", ConfigValue::make_string(motion));
   root.add("cameras", ConfigValue::make_string(cameras));
   std::vector<ConfigValue> list;

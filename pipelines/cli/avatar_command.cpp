@@ -18,14 +18,17 @@ namespace hsi4d::cli {
 namespace {
 
 BodyModel body_of(const AvatarOptions& o, const std::string& command) {
-  if (o.body_model.empty()) {
-    if (!o.betas.empty()) throw UserError(command + "--betas is given without --body-model, whose shape they are");
-    return procedural_body();
-  }
   std::vector<double> betas;
   if (!o.betas.empty()) {
     const auto count = static_cast<std::size_t>(std::count(o.betas.begin(), o.betas.end(), ',')) + 1;
     betas = parse_numbers(o.betas, count, command + "--betas", "the numbers of a shape");
+  }
+  if (o.body_model.empty()) {
+    if (std::ssize(betas) > kProceduralBetas) {
+      throw UserError(command + "--betas: " + std::to_string(betas.size()) + " numbers; the program's body has " +
+                      std::to_string(kProceduralBetas));
+    }
+    return betas.empty() ? procedural_body() : rest_body(procedural_smplx(std::ssize(betas)), betas);
   }
   return rest_body(read_smplx(o.body_model, {.betas = std::ssize(betas), .expressions = 0, .correctives = false}),
                    betas);

@@ -19,6 +19,7 @@
 #include "core/text.h"
 #include "core/version.h"
 #include "pipelines/cli/avatar_command.h"
+#include "pipelines/cli/avatar_fit_command.h"
 #include "pipelines/cli/bench_command.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/convert_command.h"
@@ -93,7 +94,7 @@ struct CommandLine {
     add_report();
     add_render();
     add_gradients();
-    add_avatar();
+    add_avatar(terms);
     add_pose();
     add_motion();
     add_convert();
@@ -164,9 +165,9 @@ struct CommandLine {
     info->callback([this] { run = [this] { return info_command(file, json); }; });
   }
 
-  void add_avatar() {
+  void add_avatar(const std::vector<LossTerm>& terms) {
     AvatarOptions& o = avatar;
-    CLI::App& command = *app.add_subcommand("avatar", "Make, import or describe the Gaussians of a body");
+    CLI::App& command = *app.add_subcommand("avatar", "Make, import, learn or describe the Gaussians of a body");
     command.require_subcommand(1);
     const auto add_body = [&o](CLI::App& sub) {
       sub.add_option("--betas", o.betas, "Shape of the body model: the first betas; the mean shape without")
@@ -194,6 +195,15 @@ struct CommandLine {
         ->type_name("M.npz");
     add_body(bind);
     bind.callback([this] { run = [this] { return avatar_import_command(avatar); }; });
+
+    CLI::App& fit = *command.add_subcommand("fit", "Learn the look of an avatar from pictures of known poses");
+    fit.add_option("CONFIG", config, "What is learnt from and how: configs/avatar_fit.json")->required();
+    fit.add_option("--out", o.out, "The avatar's file")->type_name("F.safetensors")->required();
+    add_overrides(fit, overrides);
+    fit.add_flag("--quiet", quiet, "No progress on stderr");
+    fit.callback([this, &terms] {
+      run = [this, &terms] { return avatar_fit_command(config, overrides, avatar.out, quiet, terms); };
+    });
 
     CLI::App& info = *command.add_subcommand("info", "Tell what is in an avatar's file");
     info.add_option("FILE", file, "An avatar")->required();

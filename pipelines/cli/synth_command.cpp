@@ -15,11 +15,13 @@ std::string synth_command(const std::filesystem::path& config, const std::vector
   const InterruptWatch watch;
   const bool of_views = run.synthetic.kind == SyntheticKind::kViews;
   with_threads(run.threads > 0 ? run.threads : thread_count(), [&] {
-    if (of_views) return write_views(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet), run.body);
+    if (of_views)
+      return write_views(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet), run.body);
     write_dataset(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet),
                   sections_beside_data(run, losses), run.body);
   });
-  const std::string size = std::to_string(run.synthetic.size_px) + " x " + std::to_string(run.synthetic.size_px) + " pixels";
+  const std::string size =
+      std::to_string(run.synthetic.size_px) + " x " + std::to_string(run.synthetic.size_px) + " pixels";
   if (of_views) {
     return out.generic_string() + ": " + std::to_string(run.synthetic.views_cameras * run.synthetic.views_poses) +
            " views of " + size + " for hsi4d avatar fit\n";

@@ -91,8 +91,7 @@ Bytes small_vposer() {
 }  // namespace
 
 std::vector<Bytes> corpus() {
-  return {small_avatar(),     first_avatar(),     small_motion(true),
-          small_motion(false), small_parameters(), small_vposer()};
+  return {small_avatar(), first_avatar(), small_motion(true), small_motion(false), small_parameters(), small_vposer()};
 }
 
 bool accepts(std::span<const uint8_t> file) {

@@ -10,10 +10,9 @@
 #include "pipelines/posed_avatar.h"
 #include "pipelines/synthetic.h"
 #include "pipelines/synthetic_views.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 using namespace hsi4d;
-using namespace hsi4d::test;
 
 namespace {
 
@@ -23,10 +22,10 @@ namespace fs = std::filesystem;
 StageSettings quick_stage(int iterations) {
   StageSettings stage;
   stage.iterations = iterations;
-  stage.optimize = {{"colors", {.lr = 0.05, .lr_final_share = 0.1}},
-                    {"opacity_logits", {.lr = 0.02, .lr_final_share = 0.1}},
-                    {"color_net", {.lr = 0.001, .lr_final_share = 0.1}}};
-  stage.losses = {{"photometric", loss_settings("photometric")}};
+  stage.optimize = {{"colors", {.lr = 0.05, .lr_final_share = 0.1, .until = {}}},
+                    {"opacity_logits", {.lr = 0.02, .lr_final_share = 0.1, .until = {}}},
+                    {"color_net", {.lr = 0.001, .lr_final_share = 0.1, .until = {}}}};
+  stage.losses = {{"photometric", LossSettings{}}};
   return stage;
 }
 
@@ -55,8 +54,8 @@ SyntheticSettings few_views() {
 const fs::path& made_views() {
   static const TemporaryFolder folder;
   static const fs::path file = [] {
-    write_views(few_views(), video_render_settings(), folder / "views");
-    return folder / "views" / "views.json";
+    write_views(few_views(), video_render_settings(), fs::path(folder.path()) / "views");
+    return fs::path(folder.path()) / "views" / "views.json";
   }();
   return file;
 }
@@ -75,9 +74,9 @@ TEST_CASE("an avatar is learnt from pictures, and shown from where nobody stood"
                      << after.held.psnr_foreground_db << "; learnt " << after.learnt.psnr_db);
   CHECK(after.learnt.views == 6);
   CHECK(after.held.views == 2);
-  CHECK(after.held.psnr_db > before.held.psnr_db + 6);
-  CHECK(after.held.psnr_db > 24);
-  CHECK(after.learnt.psnr_db > 25);
+  CHECK(after.held.psnr_db > before.held.psnr_db + 4);
+  CHECK(after.held.psnr_db > 30);
+  CHECK(after.learnt.psnr_db > 38);
   CHECK(after.avatar.count() == 2500);
   CHECK(after.avatar.means == before.avatar.means);  // not among what moves
   CHECK(after.avatar.colors != before.avatar.colors);
@@ -107,7 +106,7 @@ TEST_CASE("views of one camera written as updates of another are those of the ca
   settings.color_net.use = ColorNetUse::kOff;
   settings.render = video_render_settings();
   settings.render.blur = 0.15;
-  settings.stage.optimize = {{"colors", {.lr = 1e-12}}};
+  settings.stage.optimize = {{"colors", {.lr = 1e-12, .until = {}}}};
   settings.held_cameras = {};
   const AvatarFitResult result = fitted(settings);
   CHECK(result.learnt.views == 8);
@@ -127,8 +126,8 @@ TEST_CASE("a picture's alpha is its mask; views that make no sense are refused")
   CHECK(red.color(2, 48, 48) == grey.color(2, 48, 48));
 
   const TemporaryFolder folder;
-  fs::copy(made_views().parent_path(), folder / "views", fs::copy_options::recursive);
-  const fs::path file = folder / "views" / "views.json";
+  fs::copy(made_views().parent_path(), fs::path(folder.path()) / "views", fs::copy_options::recursive);
+  const fs::path file = fs::path(folder.path()) / "views" / "views.json";
   const auto fault = [&](std::vector<PosedView> views) {
     write_text_file(file, view_set_json("motion.npz", "cameras.json", views));
     try {
@@ -146,11 +145,12 @@ TEST_CASE("a picture's alpha is its mask; views that make no sense are refused")
              Catch::Contains("/views/1/camera: 4; there are 4, counted from 0"));
   CHECK_THAT(fault({{"images/0000.png", {}, 0, 2}}), Catch::Contains("/views/0/frame: 2; there are 2"));
   CHECK_THAT(fault({{"images/9.png", {}, 0, 0}}), Catch::Contains("images/9.png"));
-  write_image((folder / "views" / "small.png").string(), Image(3, 4, 4));
+  write_image((fs::path(folder.path()) / "views" / "small.png").string(), Image(3, 4, 4));
   CHECK_THAT(fault({{"small.png", {}, 0, 0}}), Catch::Contains("is 4x4 pixels; its camera has 96x96"));
-  write_image((folder / "views" / "grey.png").string(), Image(1, 96, 96));
+  write_image((fs::path(folder.path()) / "views" / "grey.png").string(), Image(1, 96, 96));
   CHECK_THAT(fault({{"grey.png", {}, 0, 0}}), Catch::Contains("is grey"));
-  write_text_file(file, R"({"format": "hsi4d views", "version": 2, "motion": "motion.npz", "cameras": "cameras.json"})");
+  write_text_file(file,
+                  R"({"format": "hsi4d views", "version": 2, "motion": "motion.npz", "cameras": "cameras.json"})");
   CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("/version"));
   write_text_file(file, R"({"format": "views", "version": 1, "motion": "motion.npz", "cameras": "cameras.json"})");
   CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("hsi4d views"));
@@ -181,6 +181,55 @@ TEST_CASE("the config of an avatar fit is checked") {
   CHECK_FALSE(is_held(read, {"a.png", {}, 0, 0}));
   CHECK_THROWS_WITH(load("{}"), Catch::Contains("views"));
   CHECK_THROWS_WITH(load("{" + views + R"(, "held_cameras": [0.5]})"), Catch::Contains("whole numbers"));
-  CHECK_THROWS_WITH(load("{" + views + R"(, "stage": {"optimize": {"colours": {"lr": 1}}}})"),
+  CHECK_THROWS_WITH(load("{" + views + R"(, "stage": {"iterations": 1, "optimize": {"colours": {"lr": 1}}}})"),
                     Catch::Contains("colors"));
+}
+
+TEST_CASE("an avatar of a real body, learnt from the reference's pictures, is right in new views and poses", "[full]") {
+  const fs::path file = fs::path(HSI4D_SOURCE_DIR) / "../shared/data/bodies/makehuman_smplx_layout.npz";
+  if (!fs::exists(file)) {
+    WARN("skipped: " << file << " is not there");
+    return;
+  }
+  const TemporaryFolder folder;
+  AvatarFitSettings settings;
+  settings.body.kind = BodyKind::kSmplx;
+  settings.body.path = file;
+  AvatarSettings truth;
+  truth.gaussians = 8000;
+  truth.seed = 11;
+  const BodyModel body = rest_body(settings.body);
+  const Avatar shown = surface_avatar(body, truth);
+  // Six cameras and four poses to learn from; one of each is held back.
+  const Motion motion{10, view_poses(body, 5)};
+  const std::vector<Camera> cameras = ring_of_cameras(7, 128);
+  std::vector<PosedView> views;
+  fs::create_directories(fs::path(folder.path()) / "images");
+  for (Index pose = 0; pose < 5; ++pose) {
+    for (Index camera = 0; camera < 7; ++camera) {
+      const std::string name = "images/" + std::to_string(views.size()) + ".png";
+      write_image(folder / name, picture_with_alpha(shown, motion.poses[static_cast<std::size_t>(pose)],
+                                                    cameras[static_cast<std::size_t>(camera)], video_render_settings(),
+                                                    Precision::kReference, 2));
+      views.push_back({name, {}, camera, pose});
+    }
+  }
+  write_motion(folder / "motion.npz", motion);
+  write_cameras(folder / "cameras.json", cameras);
+  write_text_file(folder / "views.json", view_set_json("motion.npz", "cameras.json", views));
+  settings.views = folder / "views.json";
+  settings.held_cameras = {6};
+  settings.held_frames = {4};
+  settings.gaussians = 12000;
+  settings.seed = 3;
+  settings.render.blur = 0.13;
+  settings.stage = quick_stage(1200);
+  settings.stage.optimize.push_back({"log_scales", {.lr = 0.004, .lr_final_share = 0.1, .until = {}}});
+  const AvatarFitResult result = fitted(settings);
+  WARN("held back: " << result.held.views << " views, " << result.held.psnr_db << " dB, of the human alone "
+                     << result.held.psnr_foreground_db << " dB; learnt: " << result.learnt.views << " views, "
+                     << result.learnt.psnr_db << " dB; " << result.stage.seconds << " s");
+  CHECK(result.held.views == 11);
+  CHECK(result.learnt.views == 24);
+  CHECK(result.held.psnr_db >= 30);
 }

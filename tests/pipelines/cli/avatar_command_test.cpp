@@ -48,9 +48,9 @@ TEST_CASE("hsi4d avatar names what is wrong") {
     CHECK(result.status == 2);
     return result.err;
   };
-  CHECK(error({"avatar"}) == "hsi4d avatar: give a command; known: make, import, info\n");
+  CHECK(error({"avatar"}) == "hsi4d avatar: give a command; known: make, import, fit, info\n");
   CHECK(error({"avatar", "inf"}) ==
-        "hsi4d avatar: there is no command \"inf\"; known: make, import, info; did you mean \"info\"?\n");
+        "hsi4d avatar: there is no command \"inf\"; known: make, import, fit, info; did you mean \"info\"?\n");
   CHECK(error({"avatar", "make", "--gaussian", "3"}) ==
         "hsi4d avatar make: there is no option \"--gaussian\"; known: --help, --body-model, --gaussians, --detail, "
         "--cover, --texture, --seed, --betas, --out; did you mean \"--gaussians\"?\n");
@@ -58,8 +58,8 @@ TEST_CASE("hsi4d avatar names what is wrong") {
   CHECK_THAT(error({"avatar", "make", "--out", "a.npz"}), Contains("--out") && Contains(".safetensors"));
   CHECK(error({"avatar", "make", "--out", "a.safetensors", "--gaussians", "0"}) ==
         "avatar: gaussians is 0; allowed: 1 to 5e+06\n");
-  CHECK(error({"avatar", "make", "--out", "a.safetensors", "--betas", "1"}) ==
-        "hsi4d avatar make: --betas is given without --body-model, whose shape they are\n");
+  CHECK(error({"avatar", "make", "--out", "a.safetensors", "--betas", "1,2,3,4,5,6,7,8,9,0,1"}) ==
+        "hsi4d avatar make: --betas: 11 numbers; the program's body has 10\n");
   write_text_file("text.safetensors", "some text that is no avatar");
   CHECK_THAT(error({"avatar", "info", "text.safetensors"}), Contains("text.safetensors: claims a header of "));
   CHECK_THAT(error({"avatar", "info", "none.safetensors"}), Contains("none.safetensors"));
