@@ -159,7 +159,8 @@ struct CommandLine {
 
   void add_info() {
     CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
-    info->add_option("FILE", file, "A .ply, .splat, .spz, .npz, .npy, .json, .png, .jpg, .jpeg or .exr file")
+    info->add_option("FILE", file,
+                     "A .ply, .splat, .spz, .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg or .exr file")
         ->required();
     info->add_flag("--json", json, "Print one JSON object; for Gaussians");
     info->callback([this] { run = [this] { return info_command(file, json); }; });
@@ -197,7 +198,7 @@ struct CommandLine {
     bind.callback([this] { run = [this] { return avatar_import_command(avatar); }; });
 
     CLI::App& fit = *command.add_subcommand("fit", "Learn the look of an avatar from pictures of known poses");
-    fit.add_option("CONFIG", config, "What is learnt from and how: configs/avatar_fit.json")->required();
+    fit.add_option("CONFIG", config, "What is learnt from and how: configs/avatar/fit.json")->required();
     fit.add_option("--out", o.out, "The avatar's file")->type_name("F.safetensors")->required();
     add_overrides(fit, overrides);
     fit.add_flag("--quiet", quiet, "No progress on stderr");
@@ -419,7 +420,23 @@ void check_command_word(int argc, const char* const* argv, CommandLine& line) {
 
 /// Refuses an option that the command does not have, with the nearest one; CLI11 would first ask for what is missing.
 void check_options(int argc, const char* const* argv, CommandLine& line) {
-  const CLI::App& command = *line.app.get_subcommand(argv[1]);
+  CLI::App* chosen = line.app.get_subcommand(argv[1]);
+  std::string words = argv[1];
+  const auto parts = chosen->get_subcommands([](const CLI::App*) { return true; });
+  std::vector<std::string> part_names;
+  for (CLI::App* part : parts) {
+    part_names.push_back(part->get_name());
+    if (argc < 3 || part->get_name() != argv[2]) continue;
+    chosen = part;
+    words += " " + part->get_name();
+  }
+  const bool is_option = argc > 2 && *argv[2] == '-';
+  if (!parts.empty() && chosen->get_name() == argv[1] && !is_option) {
+    const std::string word = argc > 2 ? argv[2] : "";
+    throw UserError("hsi4d " + words + ": " + (argc > 2 ? "there is no command \"" + word + "\"" : "give a command") +
+                    "; known: " + joined(part_names) + (argc > 2 ? did_you_mean(word, part_names) : ""));
+  }
+  const CLI::App& command = *chosen;
   std::vector<std::string> known;
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
@@ -428,7 +445,7 @@ void check_options(int argc, const char* const* argv, CommandLine& line) {
     const std::string word = std::string(argv[i]).substr(0, std::string(argv[i]).find('='));
     if (word == "--") return;
     if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;
-    throw UserError("hsi4d " + command.get_name() + ": there is no option \"" + word + "\"; known: " + joined(known) +
+    throw UserError("hsi4d " + words + ": there is no option \"" + word + "\"; known: " + joined(known) +
                     did_you_mean(word, known));
   }
 }
@@ -444,8 +461,9 @@ void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>
   } catch (const CLI::CallForVersion& version_text) {
     return print(std::string(version_text.what()) + "\n");
   } catch (const CLI::ParseError& mistake) {
-    const auto chosen = line.app.get_subcommands();
-    const std::string command = chosen.empty() ? "hsi4d" : "hsi4d " + chosen.front()->get_name();
+    std::string command = "hsi4d";
+    for (auto chosen = line.app.get_subcommands(); !chosen.empty(); chosen = chosen.front()->get_subcommands())
+      command += " " + chosen.front()->get_name();
     throw UserError(command + ": " + mistake.what() + "; `" + command + " --help` explains its arguments");
   }
   print(line.run());

@@ -113,7 +113,7 @@ TEST_CASE("views of one camera written as updates of another are those of the ca
   CHECK(result.learnt.psnr_db > 38);  // of 8 bits, and another pixel filter
 }
 
-TEST_CASE("a picture's alpha is its mask; views that make no sense are refused") {
+TEST_CASE("a picture's alpha is its mask, and views that make no sense are refused") {
   const ViewSet set = read_view_set(made_views());
   REQUIRE(set.views.size() == 8);
   CHECK(set.cameras.size() == 4);
@@ -180,6 +180,8 @@ TEST_CASE("the config of an avatar fit is checked") {
   CHECK(is_held(read, {"a.png", {}, 0, 1}));
   CHECK_FALSE(is_held(read, {"a.png", {}, 0, 0}));
   CHECK_THROWS_WITH(load("{}"), Catch::Contains("views"));
+  const fs::path shipped = fs::path(HSI4D_SOURCE_DIR) / "configs" / "avatar" / "fit.json";
+  CHECK(load_avatar_fit(shipped, {"views=" + made_views().string()}, descriptions_of(loss_terms())).gaussians == 20000);
   CHECK_THROWS_WITH(load("{" + views + R"(, "held_cameras": [0.5]})"), Catch::Contains("whole numbers"));
   CHECK_THROWS_WITH(load("{" + views + R"(, "stage": {"iterations": 1, "optimize": {"colours": {"lr": 1}}}})"),
                     Catch::Contains("colors"));
