@@ -341,6 +341,7 @@ TEST_CASE("every shipped config runs", "[run]") {
   const DataSettings data = dataset_inputs(TinyDataset::folder());
   std::set<std::string> with_stages, without;
   for (const std::string& name : names_in(fs::path(HSI4D_SOURCE_DIR) / "configs")) {
+    if (fs::is_directory(fs::path(HSI4D_SOURCE_DIR) / "configs" / name)) continue;  // configs of other commands
     INFO(name);
     RunConfig config =
         load_run_config(fs::path(HSI4D_SOURCE_DIR) / "configs" / name, {}, descriptions_of(loss_terms()));
