@@ -35,8 +35,9 @@ std::string coordinate(double value) { return fixed_number(value, 1); }
 /// A tick's number: as few digits as tell ticks apart.
 std::string tick_text(double value) { return rounded(value, 6); }
 
-/// False for what has no place on the axes: not above 0 on a logarithmic scale, or so large that differences overflow.
-bool has_place(const Plot& plot, double y) { return std::fabs(y) <= 1e300 && (!plot.is_log || y > 0); }
+/// False for what has no place on the axes: so large that differences overflow; on a logarithmic scale what is not
+/// above 0, or so far from 1 that ratios overflow.
+bool has_place(const Plot& plot, double y) { return plot.is_log ? y >= 1e-150 && y <= 1e150 : std::fabs(y) <= 1e300; }
 
 struct Range {
   double low = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-# cmake -DBUILD=build folder -DSCRATCH=folder -DGENERATOR=… -DCOMPILER=… -DFLAGS=… -DVERSION=… -DROOT=source tree
+# cmake -DBUILD=build folder -DSCRATCH=folder -DGENERATOR=… -DCOMPILER=… -DVERSION=… -DROOT=source tree
 #       -P install_test.cmake
 # Installs the build into a fresh prefix, moves that prefix, and builds and runs the outside project of tests/install
 # against it.
@@ -42,7 +42,7 @@ endforeach()
 
 run("Configuring the outside project"
   ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/install -B ${SCRATCH}/outside -G ${GENERATOR}
-                   -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_FLAGS=${FLAGS} -DCMAKE_BUILD_TYPE=Release
+                   -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=Release
                    -DCMAKE_PREFIX_PATH=${SCRATCH}/prefix -DCMAKE_FIND_USE_PACKAGE_REGISTRY=OFF)
 run("Building the outside project" ${CMAKE_COMMAND} --build ${SCRATCH}/outside)
 run("The outside program" ${SCRATCH}/outside/outside)

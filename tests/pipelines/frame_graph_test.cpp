@@ -91,7 +91,7 @@ double smallest_joint_gradient(const Tape<double>& tape, const ParameterGroup<do
 
 }  // namespace
 
-TEST_CASE("the gradient of the whole chain is right for every parameter", "[frame_graph]") {
+TEST_CASE("the gradient of the whole chain is right for every parameter", "[frame_graph][release]") {
   const RotationParameters rotations = GENERATE(RotationParameters::kSixD, RotationParameters::kAxisAngle);
   Clip clip = small_clip(16, 14, 5000);
   clip.avatar = test::avatar_of_every_joint(clip.avatar, 2);
@@ -166,7 +166,7 @@ TEST_CASE("axis-angles are taken within half a turn, whatever the state says", "
   for (std::size_t i = 0; i < a.size(); ++i) CHECK(a[i] == Approx(b[i]).margin(1e-12));
 }
 
-TEST_CASE("the camera's gradient is right away from the camera that the graph was recorded with", "[frame_graph]") {
+TEST_CASE("the camera's gradient is right away from the camera that the graph was recorded with", "[frame_graph][release]") {
   const CameraIncrement increment =
       GENERATE(CameraIncrement::kCamera, CameraIncrement::kWorld, CameraIncrement::kScene);
   const Clip clip = small_clip(24, 20, 40);

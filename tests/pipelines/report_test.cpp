@@ -352,6 +352,7 @@ TEST_CASE("plots survive flat, single and extreme values") {
     for (const std::vector<std::pair<double, double>>& points : {std::vector<std::pair<double, double>>{{0, 1}},
                                                                  {{0, 2}, {1, 2}},
                                                                  {{0, 1e-300}, {1, 1e300}},
+                                                                 {{0, 1e-150}, {1, 1e150}},
                                                                  {{3, 0}, {4, 0}},
                                                                  {{0, -1.7e308}, {1, 1.7e308}},
                                                                  {{0, -5}, {10, 5}},
