@@ -6,14 +6,12 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
+#include "body/pose_layout.h"
 #include "body/skinning.h"
 
 namespace hsi4d {
 
 namespace {
-
-constexpr Index kHandJoints = 15;
-constexpr int kFirstHandJoint = 25;
 
 std::vector<int> joints_from_1_to(int last) {
   std::vector<int> joints(static_cast<std::size_t>(last));
@@ -110,7 +108,7 @@ Rotations<S> all_rotations(Tape<S>& tape, const SmplxBody<S>& body, const SmplxP
 
 SmplxBodyOptions::SmplxBodyOptions() : moving_joints(joints_from_1_to(static_cast<int>(kSmplxJoints) - 1)) {}
 
-std::vector<int> smplx_joints_without_hands() { return joints_from_1_to(kFirstHandJoint - 1); }
+std::vector<int> smplx_joints_without_hands() { return joints_from_1_to(static_cast<int>(kFirstHandJoint) - 1); }
 
 template <class S>
 SmplxBody<S>::SmplxBody(const SmplxModel& model, const SmplxBodyOptions& options) {

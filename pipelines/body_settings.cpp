@@ -1,6 +1,7 @@
 #include "pipelines/body_settings.h"
 
 #include "body/procedural_body.h"
+#include "pipelines/body_files.h"
 
 namespace hsi4d {
 
@@ -35,6 +36,7 @@ SmplxModel body_model_of(const BodySettings& settings) {
   SmplxModel model = settings.kind == BodyKind::kProcedural
                          ? procedural_smplx(settings.betas)
                          : read_smplx(settings.path.string(), {settings.betas, settings.expressions});
+  warn_of_repairs(model);
   for (const SmplxHand& hand : model.hands) {
     if (settings.hands != HandParameters::kPca || hand.component_count() >= settings.hand_components) continue;
     throw DataError(model.source + ": has " + std::to_string(hand.component_count()) + " components of a hand; " +

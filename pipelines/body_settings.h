@@ -35,8 +35,8 @@ struct BodySettings {
 
 void describe(ConfigFields& fields, BodySettings& settings);
 
-/// The model that the settings name, in the layout of SMPL-X. Throws as read_smplx; DataError when it has fewer betas
-/// or hand components than are asked for.
+/// The model that the settings name, in the layout of SMPL-X; weights that were repaired are told in the log. Throws as
+/// read_smplx; DataError when it has fewer betas or hand components than are asked for.
 SmplxModel body_model_of(const BodySettings& settings);
 
 /// What the settings say of how that model is prepared.
