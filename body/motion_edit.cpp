@@ -104,8 +104,8 @@ Motion resampled(const Motion& motion, double frame_rate) {
   const double frames = std::floor((last + kSame * (last + 1)) / step) + 1;
   if (frames > kMostFrames) {
     throw UserError("a motion of " + std::to_string(motion.poses.size()) + " frames, " +
-                    number_text(motion.frame_rate) + " a second, has " + rounded(frames, 4) + " at " +
-                    number_text(frame_rate) + " a second; allowed: at most " + rounded(kMostFrames, 7));
+                    number_text(motion.frame_rate) + " a second, has " + rounded(frames, 4) + " frames at " +
+                    rounded(frame_rate, 6) + " a second; allowed: at most " + rounded(kMostFrames, 7));
   }
   for (std::size_t k = 0; static_cast<double>(k) * step <= last + kSame * (last + 1); ++k) {
     const double at = std::min(static_cast<double>(k) * step, last);

@@ -156,7 +156,7 @@ double read_frame_rate(const Npz& file) {
   const double rate = array->scalar<double>();
   if (!(rate >= kSlowestMotion && rate <= kFastestMotion)) {
     throw DataError(array->source() + ": is " + number_text(rate) +
-                    " frames a second; allowed: " + number_text(kSlowestMotion) + " to " + number_text(kFastestMotion));
+                    " frames a second; allowed: " + number_text(kSlowestMotion) + " to " + rounded(kFastestMotion, 6));
   }
   return rate;
 }

@@ -20,7 +20,7 @@ constexpr double kFolderRate = 30;
 void check_rate(const std::optional<double>& rate, const std::string& option) {
   if (!rate || (*rate >= kSlowestMotion && *rate <= kFastestMotion)) return;
   throw UserError("hsi4d motion: " + option + ": " + number_text(*rate) +
-                  " is out of range; allowed: " + number_text(kSlowestMotion) + " to " + number_text(kFastestMotion));
+                  " is out of range; allowed: " + number_text(kSlowestMotion) + " to " + rounded(kFastestMotion, 6));
 }
 
 /// The body of a model file in the motion's shape, as far as the file has directions for it.

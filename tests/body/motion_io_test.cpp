@@ -15,6 +15,7 @@
 #include "tests/zip_archive.h"
 
 using namespace hsi4d;
+using test::ZipMember, test::archive_of, test::pickled_npy;
 
 namespace {
 
@@ -363,13 +364,13 @@ TEST_CASE("numbers of motion files are bounded") {
   };
   CHECK(message_for(with_trans(1e300)) == "m.npz: array 'trans': frame 0, number 1 is 1e+300; allowed: -1e7 to 1e7");
   CHECK(message_for(with_trans(-1.5e7)) ==
-        "m.npz: array 'trans': frame 0, number 1 is -15000000; allowed: -1e7 to 1e7");
+        "m.npz: array 'trans': frame 0, number 1 is -1.5e+07; allowed: -1e7 to 1e7");
   CHECK(decoded(with_trans(1e7)).poses[0].transl[1] == 1e7);
   CHECK(message_for([](NpzWriter& f) {
           f.add<double>("trans", {1, 3}, {0, 0, 0});
           f.add<double>("poses", {1, 72}, Numbers(72, 2e6));
-        }) == "m.npz: array 'poses': frame 0, number 0 is 2000000; allowed: -1e6 to 1e6");
-  for (const auto& [rate, text] : {std::pair{1e-9, "1e-09"}, {1e6, "1000000"}, {-1.0, "-1"}, {NAN, "nan"}}) {
+        }) == "m.npz: array 'poses': frame 0, number 0 is 2e+06; allowed: -1e6 to 1e6");
+  for (const auto& [rate, text] : {std::pair{1e-9, "1e-09"}, {1e6, "1e+06"}, {-1.0, "-1"}, {NAN, "nan"}}) {
     const double hertz = rate;
     CHECK(message_for(rows_of(165, [hertz](NpzWriter& f) { f.add_scalar("mocap_framerate", hertz); })) ==
           "m.npz: array 'mocap_framerate': is " + std::string(text) + " frames a second; allowed: 0.01 to 100000");
@@ -378,8 +379,8 @@ TEST_CASE("numbers of motion files are bounded") {
 
 TEST_CASE("arrays of Python objects are named as such") {
   const auto error_of = [](const std::string& pickled) {
-    std::vector<ZipMember> members = {{"trans.npy", encode_npy<double>({1, 3}, Numbers(3))},
-                                      {"poses.npy", encode_npy<double>({1, 165}, Numbers(165))}};
+    std::vector<ZipMember> members = {{"trans.npy", encode_npy<double>(std::vector<int64_t>{1, 3}, Numbers(3))},
+                                      {"poses.npy", encode_npy<double>(std::vector<int64_t>{1, 165}, Numbers(165))}};
     std::erase_if(members, [&](const ZipMember& member) { return member.name == pickled + ".npy"; });
     members.push_back({pickled + ".npy", pickled_npy()});
     try {
