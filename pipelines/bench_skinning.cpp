@@ -106,10 +106,11 @@ struct Recorded {
   }
 };
 
+bool is_hand(SmplxPart part) { return part == SmplxPart::kLeftHand || part == SmplxPart::kRightHand; }
+
 SkinningMeasurement measured(const NamedWorkload& workload, const SmplxBody<float>& body, const char* step, int threads,
                              std::vector<double> seconds) {
   std::sort(seconds.begin(), seconds.end());
-  const Directions<float>& moving = body.tables().correctives.moving();
   SkinningMeasurement m;
   m.name = std::string("skinning/") + workload.name + "/" + step;
   m.threads = threads;
@@ -118,16 +119,19 @@ SkinningMeasurement measured(const NamedWorkload& workload, const SmplxBody<floa
   m.repeats = static_cast<int>(seconds.size());
   m.vertices = body.vertex_count();
   m.joints = body.joint_count();
-  m.corrective_columns = moving.columns();
-  m.table_bytes = moving.bytes();
-  m.packing_error_m = moving.largest_error() + body.tables().correctives.fixed().largest_error();
+  for (std::size_t part = 0; part < kSmplxParts; ++part) {
+    const Directions<float>& correctives = body.tables().correctives[part].directions();
+    m.packing_error_m += correctives.largest_error();
+    if (!workload.hands_move && is_hand(static_cast<SmplxPart>(part))) continue;
+    m.corrective_columns += correctives.columns();
+    m.table_bytes += correctives.bytes();
+  }
   return m;
 }
 
 void bench_workload(const NamedWorkload& workload, const SmplxModel& model, const SkinningBench& options,
                     const std::function<void(const SkinningMeasurement&)>& report) {
   SmplxBodyOptions body_options;
-  if (!workload.hands_move) body_options.moving_joints = smplx_joints_without_hands();
   body_options.correctives = workload.correctives;
   body_options.packing = workload.packed ? kCorrectivePacking : 0;
   const SmplxBody<float> body(model, body_options);
