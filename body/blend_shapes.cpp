@@ -1,7 +1,6 @@
 #include "body/blend_shapes.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "core/parallel.h"
@@ -15,15 +14,14 @@ namespace {
 /// Σ |R_ik − δ_ik| is at most 3 ‖R − I‖ = 3 √(4 − 4 cos θ).
 constexpr double kOffsetReach = 8.4853;
 
-/// Adds Pᵀ d_result, or assigns it, to the coefficients at `to(column)`.
-template <class S, class To>
-void add_gathered(NodeIo<S>& io, const Directions<S>& directions, const S* d_result, bool assign, To&& to) {
+/// Adds Pᵀ d_result to d_coefficients, or assigns it.
+template <class S>
+void add_gathered(NodeIo<S>& io, const Directions<S>& directions, bool assign, S* d_coefficients) {
   S* scratch = io.scratch(gather_scratch(directions)).data();
   double* sums = io.template scratch<double>(directions.columns()).data();
-  gather_directions(directions, d_result, scratch, sums);
+  gather_directions(directions, io.d_out().data, scratch, sums);
   for (Index c = 0; c < directions.columns(); ++c) {
-    S& d = to(c);
-    d = assign ? static_cast<S>(sums[c]) : d + static_cast<S>(sums[c]);
+    d_coefficients[c] = assign ? static_cast<S>(sums[c]) : d_coefficients[c] + static_cast<S>(sums[c]);
   }
 }
 
@@ -45,8 +43,7 @@ struct BlendShapes {
     for (std::size_t k = 0; k < directions.size(); ++k) {
       const int input = static_cast<int>(k);
       if (!io.wants(input)) continue;
-      S* d = io.d_in(input).data;
-      add_gathered(io, directions[k], io.d_out().data, false, [&](Index c) -> S& { return d[c]; });
+      add_gathered(io, directions[k], false, io.d_in(input).data);
     }
   }
 };
@@ -55,61 +52,14 @@ template <class S>
 struct PoseCorrectives {
   static constexpr const char* kName = "pose_correctives";
   static constexpr bool kAssigns = true;
-  PoseDirections<S> directions;
-  Buffer<S> fixed = {};  // [V,3], displacements by the joints that do not move
+  Directions<S> directions;
 
-  /// f of the joints, one after the other.
-  static S* gathered(NodeIo<S>& io, const std::vector<int>& joints) {
-    S* coefficients = io.scratch(9 * static_cast<Index>(joints.size())).data();
-    for (std::size_t i = 0; i < joints.size(); ++i) {
-      std::copy(io.in(0).row(joints[i]), io.in(0).row(joints[i]) + 9, coefficients + 9 * i);
-    }
-    return coefficients;
-  }
-
-  bool has_fixed() const { return directions.fixed().bytes() > 0; }
-
-  std::uint64_t state_key(NodeIo<S>& io) {
-    Signature key;
-    if (!has_fixed()) return key.value();
-    using Bits = std::conditional_t<sizeof(S) == 4, std::uint32_t, std::uint64_t>;
-    for (const int joint : directions.fixed_joints()) {
-      for (int i = 0; i < 9; ++i) key.add(std::bit_cast<Bits>(io.in(0).row(joint)[i]));
-    }
-    return key.value();
-  }
-
-  void build_state(NodeIo<S>& io) {
-    if (!has_fixed()) return;
-    const Index numbers = 3 * directions.vertices();
-    fixed.resize(numbers);
-    std::fill(fixed.data(), fixed.data() + numbers, S(0));
-    add_directions(directions.fixed(), gathered(io, directions.fixed_joints()), fixed.data(), fixed.data());
-  }
-
-  void forward(NodeIo<S>& io) {
-    const S* points = io.in(1).data;
-    S* result = io.out().data;
-    if (has_fixed()) {
-      const S* offset = fixed.data();
-      on_best_isa([&] {
-        for (Index i = 0; i < 3 * directions.vertices(); ++i) result[i] = points[i] + offset[i];
-      });
-      points = result;
-    }
-    add_directions(directions.moving(), gathered(io, directions.moving_joints()), points, result);
-  }
+  void forward(NodeIo<S>& io) { add_directions(directions, io.in(0).data, io.in(1).data, io.out().data); }
 
   void backward(NodeIo<S>& io) {
-    const S* d_result = io.d_out().data;
-    if (io.wants(0)) {
-      const Array<S> d_offsets = io.d_in(0);
-      if (io.must_assign(0)) std::fill(d_offsets.data, d_offsets.data + d_offsets.shape.count(), S(0));
-      add_gathered(io, directions.moving(), d_result, false, [&](Index c) -> S& {
-        return d_offsets.row(directions.moving_joints()[static_cast<std::size_t>(c / 9)])[c % 9];
-      });
-    }
+    if (io.wants(0)) add_gathered(io, directions, io.must_assign(0), io.d_in(0).data);
     if (!io.wants(1)) return;
+    const S* d_result = io.d_out().data;
     S* d_points = io.d_in(1).data;
     const bool assign = io.must_assign(1);
     on_best_isa([&] {
@@ -117,8 +67,6 @@ struct PoseCorrectives {
         d_points[i] = assign ? d_result[i] : d_points[i] + d_result[i];
     });
   }
-
-  Index saved_bytes() const { return fixed.capacity_bytes(); }
 };
 
 template <class S>
@@ -184,32 +132,22 @@ Var<S> blend_shapes(std::span<const double> rest, std::span<const BlendTerm<S>> 
 }
 
 template <class S>
-PoseDirections<S>::PoseDirections(std::span<const double> values, Index vertices, Index joints,
-                                  std::vector<int> moving_joints, double packing)
-    : joints_(joints), moving_joints_(std::move(moving_joints)) {
-  HSI4D_CHECK(joints >= 1 && std::is_sorted(moving_joints_.begin(), moving_joints_.end(), std::less_equal<int>()),
-              "moving joints are not ascending");
-  DirectionSource moving{values, vertices, 9 * (joints - 1), {}, 9}, fixed = moving;
-  for (const int joint : moving_joints_) {
-    HSI4D_CHECK(joint >= 1 && joint < joints, "joint " + std::to_string(joint) + " has no correctives");
-    moving.group_begin.push_back(9 * (joint - 1));
-  }
-  for (int joint = 1; joint < joints; ++joint) {
-    if (std::binary_search(moving_joints_.begin(), moving_joints_.end(), joint)) continue;
-    fixed_joints_.push_back(joint);
-    fixed.group_begin.push_back(9 * (joint - 1));
-  }
-  // Half of the bound for each, unless one of them has it all.
-  const double share = moving.group_begin.empty() || fixed.group_begin.empty() ? packing : packing / 2;
-  moving_ = Directions<S>(moving, {share, kOffsetReach});
-  fixed_ = Directions<S>(fixed, {share, kOffsetReach});
+PoseDirections<S>::PoseDirections(std::span<const double> values, Index vertices, Index first, Index count,
+                                  double packing) {
+  HSI4D_CHECK(vertices >= 1 && values.size() % static_cast<std::size_t>(27 * vertices) == 0,
+              "correctives do not fit the vertices");
+  const Index joints = static_cast<Index>(values.size()) / (27 * vertices) + 1;
+  HSI4D_CHECK(first >= 1 && count >= 1 && first + count <= joints, "joints that have no correctives");
+  DirectionSource source{values, vertices, 9 * (joints - 1), {}, 9};
+  for (Index joint = first; joint < first + count; ++joint) source.group_begin.push_back(9 * (joint - 1));
+  directions_ = Directions<S>(source, {packing, kOffsetReach});
 }
 
 template <class S>
 Var<S> pose_correctives(const PoseDirections<S>& directions, Var<S> offsets, Var<S> points, Source where) {
   HSI4D_CHECK_EQ(offsets.shape(), shape_of(directions.joints(), 9));
   HSI4D_CHECK_EQ(points.shape(), shape_of(directions.vertices(), 3));
-  return offsets.owner().record(PoseCorrectives<S>{directions}, {offsets, points}, points.shape(), where);
+  return offsets.owner().record(PoseCorrectives<S>{directions.directions()}, {offsets, points}, points.shape(), where);
 }
 
 template <class S>

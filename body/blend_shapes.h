@@ -36,40 +36,33 @@ Var<S> blend_shapes(std::span<const double> rest, std::span<const BlendTerm<S>> 
 /// How far packing may move a vertex along an axis (see directions.h), metres.
 inline constexpr double kCorrectivePacking = 5e-6;
 
-/// P of the pose correctives, prepared. Immutable; copies share the numbers.
+/// P of the pose correctives of consecutive joints, prepared. Immutable; copies share the numbers.
 template <class S>
 class PoseDirections {
  public:
   /// No correctives.
   PoseDirections() = default;
-  /// @param values         [3V, 9(J−1)], rows are coordinates (3v + i)
-  /// @param moving_joints  joints ≥ 1 whose rotations change often, ascending. The correctives of the others are
-  ///                       computed only when a rotation of theirs has changed, and have no adjoint
-  /// @param packing        see directions.h, for any rotations; float only. 0: exact
+  /// @param values   [3V, 9(J−1)], rows are coordinates (3v + i)
+  /// @param first    the first of `count` joints, at least 1
+  /// @param packing  see directions.h, for any rotations; float only. 0: exact
   /// Throws InternalError when sizes do not fit or a joint is not there.
-  PoseDirections(std::span<const double> values, Index vertices, Index joints, std::vector<int> moving_joints,
+  PoseDirections(std::span<const double> values, Index vertices, Index first, Index count,
                  double packing = kCorrectivePacking);
 
-  Index vertices() const { return moving_.vertices(); }
-  Index joints() const { return joints_; }
-  const Directions<S>& moving() const { return moving_; }
-  const Directions<S>& fixed() const { return fixed_; }
-  const std::vector<int>& moving_joints() const { return moving_joints_; }
-  const std::vector<int>& fixed_joints() const { return fixed_joints_; }
+  Index vertices() const { return directions_.vertices(); }
+  Index joints() const { return directions_.columns() / 9; }
+  const Directions<S>& directions() const { return directions_; }
 
  private:
-  Index joints_ = 0;
-  Directions<S> moving_, fixed_;
-  std::vector<int> moving_joints_, fixed_joints_;
+  Directions<S> directions_;
 };
 
-/// y = x + Σ_j P_j f_j.
+/// y = x + Σ_j P_j f_j over the joints of `directions`.
 ///
-/// @param offsets  [J,9] f_j = vec(R_j − I), see rotation_offsets; row 0 is not read
+/// @param offsets  [joints,9] f_j = vec(R_j − I), see rotation_offsets
 /// @param points   [V,3] metres, rest pose
 /// @return         [V,3] metres
-/// Adjoint: offsets of the moving joints, points. None to the offsets of the other joints.
-/// Throws InternalError when a shape does not fit.
+/// Adjoint: offsets, points; each computed only when wanted. Throws InternalError when a shape does not fit.
 template <class S>
 Var<S> pose_correctives(const PoseDirections<S>& directions, Var<S> offsets, Var<S> points,
                         Source where = Source::current());

@@ -1,7 +1,6 @@
 #include "body/smplx_body.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
@@ -13,11 +12,14 @@ namespace hsi4d {
 
 namespace {
 
-std::vector<int> joints_from_1_to(int last) {
-  std::vector<int> joints(static_cast<std::size_t>(last));
-  std::iota(joints.begin(), joints.end(), 1);
-  return joints;
-}
+/// The joints of each SmplxPart.
+struct JointRun {
+  Index first, count;
+};
+constexpr std::array<JointRun, kSmplxParts> kPartJoints = {{{kFirstHandJoint, kHandJoints},
+                                                            {kFirstHandJoint + kHandJoints, kHandJoints},
+                                                            {kBodyJoints, kFirstHandJoint - kBodyJoints},
+                                                            {1, kBodyJoints - 1}}};
 
 /// All columns as one group.
 template <class S>
@@ -86,29 +88,31 @@ Rotations<S> hand_rotations(Tape<S>& tape, const SmplxBody<S>& body, Var<S> para
   return rotations_of(tape, hand_pose(body, parameters, side, where), kHandJoints, where);
 }
 
-/// All joints, in the order of SMPL-X.
+/// Rotations of all joints in the order of SMPL-X, and the offsets of each SmplxPart.
 template <class S>
-Rotations<S> all_rotations(Tape<S>& tape, const SmplxBody<S>& body, const SmplxParameters<S>& p, const Source& where) {
-  const std::array parts = {rotations_of(tape, p.global_orient, 1, where),
-                            rotations_of(tape, p.body_pose, 21, where),
-                            rotations_of(tape, p.jaw_pose, 1, where),
-                            rotations_of(tape, p.leye_pose, 1, where),
-                            rotations_of(tape, p.reye_pose, 1, where),
-                            hand_rotations(tape, body, p.left_hand_pose, 0, where),
-                            hand_rotations(tape, body, p.right_hand_pose, 1, where)};
-  std::array<Var<S>, parts.size()> matrices, offsets;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    matrices[i] = parts[i].matrices;
-    offsets[i] = parts[i].offsets;
-  }
-  return {concat_rows(std::span<const Var<S>>(matrices), where), concat_rows(std::span<const Var<S>>(offsets), where)};
+struct PoseRotations {
+  Var<S> matrices;
+  std::array<Var<S>, kSmplxParts> offsets;
+};
+
+template <class S>
+PoseRotations<S> pose_rotations(Tape<S>& tape, const SmplxBody<S>& body, const SmplxParameters<S>& p,
+                                const Source& where) {
+  const Rotations<S> root = rotations_of(tape, p.global_orient, 1, where);
+  const Rotations<S> joints = rotations_of(tape, p.body_pose, 21, where);
+  const Rotations<S> jaw = rotations_of(tape, p.jaw_pose, 1, where);
+  const Rotations<S> left_eye = rotations_of(tape, p.leye_pose, 1, where);
+  const Rotations<S> right_eye = rotations_of(tape, p.reye_pose, 1, where);
+  const Rotations<S> left = hand_rotations(tape, body, p.left_hand_pose, 0, where);
+  const Rotations<S> right = hand_rotations(tape, body, p.right_hand_pose, 1, where);
+  const std::array matrices = {root.matrices,      joints.matrices, jaw.matrices,  left_eye.matrices,
+                               right_eye.matrices, left.matrices,   right.matrices};
+  const std::array face = {jaw.offsets, left_eye.offsets, right_eye.offsets};
+  return {concat_rows(std::span<const Var<S>>(matrices), where),
+          {left.offsets, right.offsets, concat_rows(std::span<const Var<S>>(face), where), joints.offsets}};
 }
 
 }  // namespace
-
-SmplxBodyOptions::SmplxBodyOptions() : moving_joints(joints_from_1_to(static_cast<int>(kSmplxJoints) - 1)) {}
-
-std::vector<int> smplx_joints_without_hands() { return joints_from_1_to(static_cast<int>(kFirstHandJoint) - 1); }
 
 template <class S>
 SmplxBody<S>::SmplxBody(const SmplxModel& model, const SmplxBodyOptions& options) {
@@ -123,8 +127,11 @@ SmplxBody<S>::SmplxBody(const SmplxModel& model, const SmplxBodyOptions& options
   tables->joint_shape = all_directions<S>(model.joint_shape, joints, model.betas);
   tables->joint_expression = all_directions<S>(model.joint_expression, joints, model.expressions);
   if (options.correctives && !model.correctives.empty()) {
-    tables->correctives =
-        PoseDirections<S>(model.correctives, vertices, joints, options.moving_joints, options.packing);
+    for (std::size_t part = 0; part < kSmplxParts; ++part) {
+      const auto& [first, count] = kPartJoints[part];
+      const double share = static_cast<double>(count) / static_cast<double>(kSmplxJoints - 1);
+      tables->correctives[part] = PoseDirections<S>(model.correctives, vertices, first, count, share * options.packing);
+    }
   }
   tables->weights = std::make_unique<SkinWeights<S>>(skin_weights<S>(model.weights));
   for (std::size_t side = 0; side < 2; ++side) {
@@ -167,15 +174,17 @@ PosedSmplx<S> pose_smplx(Tape<S>& tape, const SmplxBody<S>& body, const SmplxPar
   posed.rest_vertices = blended(tape, "template", t.vertices, t.shape, p.betas, t.expression, p.expression, where);
   posed.rest_joints =
       blended(tape, "joints", t.joints, t.joint_shape, p.betas, t.joint_expression, p.expression, where);
-  const Rotations<S> rotations = all_rotations(tape, body, p, where);
+  const PoseRotations<S> rotations = pose_rotations(tape, body, p, where);
   posed.rotations = rotations.matrices;
   const Var<S> still = tape.constant("no translation", shape_of(1, 3), where);
   const Var<S> transl = p.transl.tape != nullptr ? p.transl : still;
   // Vertices take the translation last and not through the weights, whose sum is 1 to rounding only.
   const PosedSkeleton<S> in_place = kinematic_chain(posed.rotations, still, t.parents, posed.rest_joints, where);
-  const Var<S> corrected = t.correctives.joints() > 0
-                               ? pose_correctives(t.correctives, rotations.offsets, posed.rest_vertices, where)
-                               : posed.rest_vertices;
+  Var<S> corrected = posed.rest_vertices;
+  for (std::size_t part = 0; part < kSmplxParts; ++part) {
+    if (t.correctives[part].joints() == 0) continue;
+    corrected = pose_correctives(t.correctives[part], rotations.offsets[part], corrected, where);
+  }
   posed.vertices = skin_points(*t.weights, in_place.transforms, corrected, transl, where);
   const PosedSkeleton<S> moved = kinematic_chain(posed.rotations, transl, t.parents, posed.rest_joints, where);
   posed.joints = moved.joints;

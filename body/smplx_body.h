@@ -3,7 +3,7 @@
 //   x̄ = template + shape β + expression ψ            blend_shapes       once while β and ψ stay
 //   r = joints of x̄                                   blend_shapes
 //   R = rotations of the pose parameters              rotations
-//   x = x̄ + Σ_j P_j vec(R_j − I)                      pose_correctives
+//   x = x̄ + Σ_j P_j vec(R_j − I)                      pose_correctives   what moves last is added last
 //   A, p = chain of R about r                         kinematic_chain
 //   y = Σ_j w_j A_j (x, 1) + t,   joints = p + t      skin_points        the translation last
 //
@@ -11,6 +11,7 @@
 // them, joints without the surface.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -23,18 +24,14 @@ namespace hsi4d {
 
 /// How a body is prepared.
 struct SmplxBodyOptions {
-  /// Joints ≥ 1 whose pose correctives follow every change and have an adjoint, ascending; see PoseDirections. Of the
-  /// others only the correctives have none: their rotations move the body, with a gradient, all the same.
-  std::vector<int> moving_joints;
   bool correctives = true;              ///< false: none, even if the model has them
-  double packing = kCorrectivePacking;  ///< see PoseDirections
+  double packing = kCorrectivePacking;  ///< of all correctives together; see PoseDirections
   bool flat_hand_mean = false;          ///< true: hands are flat, not in the file's mean pose, where parameters are 0
-
-  SmplxBodyOptions();  ///< every joint moves
 };
 
-/// Joints 1 to 24 (body, jaw, eyes), for SmplxBodyOptions::moving_joints where hands keep their pose.
-std::vector<int> smplx_joints_without_hands();
+/// The parts of the pose that have correctives, each a node of the tape: what stays is not computed again.
+enum class SmplxPart { kLeftHand, kRightHand, kFace, kBody };
+inline constexpr std::size_t kSmplxParts = 4;
 
 /// A body model prepared for the tape in precision S. Immutable; copies share the tables.
 template <class S>
@@ -47,7 +44,7 @@ class SmplxBody {
     std::vector<int> parents;
     std::vector<double> vertices, joints;  // template
     Directions<S> shape, expression, joint_shape, joint_expression;
-    PoseDirections<S> correctives;
+    std::array<PoseDirections<S>, kSmplxParts> correctives;  // none or all
     std::unique_ptr<SkinWeights<S>> weights;
     std::array<std::vector<S>, 2> hand_means;       // [45]; zeros where flat_hand_mean
     std::array<std::vector<S>, 2> hand_components;  // [n,45]
@@ -96,8 +93,8 @@ struct PosedSmplx {
 
 /// Records the body in a pose.
 ///
-/// Adjoint: every parameter; see SmplxBodyOptions::moving_joints for the correctives.
-/// Throws InternalError when a parameter has another shape than above, or is not on `tape`.
+/// Adjoint: every parameter. Parts of the pose that are frozen, or were not written, cost nothing: their correctives
+/// are computed once. Throws InternalError when a parameter has another shape than above, or is not on `tape`.
 template <class S>
 PosedSmplx<S> pose_smplx(Tape<S>& tape, const SmplxBody<S>& body, const SmplxParameters<S>& parameters,
                          Source where = Source::current());

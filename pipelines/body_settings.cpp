@@ -11,12 +11,6 @@ void describe(ConfigFields& f, BodySettings& s) {
   f.integer("betas", s.betas, {.min = 0, .max = 300}, "Numbers of its shape; the body of kind procedural has 10");
   f.numbers("shape", s.shape, {.min = -10, .max = 10},
             "The betas of the body that synth makes an avatar of; fewer than `betas`: the others are 0");
-  f.integer("expressions", s.expressions, {.min = 0, .max = 100}, "Numbers of its expression, of kind smplx");
-  f.choice("hands", s.hands, kHandParameters,
-           "Numbers of a hand: all joints, or coefficients of the body's hand components");
-  f.integer("hand_components", s.hand_components, {.min = 1, .max = 45}, "How many of them, of hands pca");
-  f.boolean("flat_hand_mean", s.flat_hand_mean,
-            "Where a hand's numbers are 0 it is flat, and not in the body's mean pose");
   f.rule({"path", "kind"}, [&s]() -> std::string {
     if (s.kind == BodyKind::kSmplx && s.path.empty()) return "kind smplx needs the file of a body model";
     if (s.kind == BodyKind::kProcedural && !s.path.empty()) return "kind procedural reads no file; kind smplx does";
@@ -33,22 +27,10 @@ void describe(ConfigFields& f, BodySettings& s) {
 }
 
 SmplxModel body_model_of(const BodySettings& settings) {
-  SmplxModel model = settings.kind == BodyKind::kProcedural
-                         ? procedural_smplx(settings.betas)
-                         : read_smplx(settings.path.string(), {settings.betas, settings.expressions});
+  SmplxModel model = settings.kind == BodyKind::kProcedural ? procedural_smplx(settings.betas)
+                                                            : read_smplx(settings.path.string(), {settings.betas, 0});
   warn_of_repairs(model);
-  for (const SmplxHand& hand : model.hands) {
-    if (settings.hands != HandParameters::kPca || hand.component_count() >= settings.hand_components) continue;
-    throw DataError(model.source + ": has " + std::to_string(hand.component_count()) + " components of a hand; " +
-                    std::to_string(settings.hand_components) + " were asked for (body.hand_components)");
-  }
   return model;
-}
-
-SmplxBodyOptions smplx_body_options(const BodySettings& settings) {
-  SmplxBodyOptions options;
-  options.flat_hand_mean = settings.flat_hand_mean;
-  return options;
 }
 
 BodyModel rest_body(const BodySettings& settings) {

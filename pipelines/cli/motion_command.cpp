@@ -83,6 +83,14 @@ Prepared for_no_model(const MotionOptions& options, const Motion& motion, bool i
   return {for_body(motion, body), std::move(body)};
 }
 
+Motion at_rate(const Motion& motion, double frame_rate) {
+  try {
+    return resampled(motion, frame_rate);
+  } catch (const UserError& error) {
+    throw UserError("hsi4d motion: --frame-rate: " + std::string(error.what()));
+  }
+}
+
 }  // namespace
 
 std::string motion_command(const MotionOptions& options) {
@@ -97,7 +105,7 @@ std::string motion_command(const MotionOptions& options) {
                                                        : for_model(options, read, is_of_folder);
   Motion motion = prepared.motion;
   if (options.is_y_up) motion = transformed(motion, z_up_from_y_up(), motion.pelvis_rest.value_or(kSmplxPelvis));
-  if (options.frame_rate) motion = resampled(motion, *options.frame_rate);
+  if (options.frame_rate) motion = at_rate(motion, *options.frame_rate);
   if (is_glb) {
     write_glb(options.out, prepared.body, motion);
   } else {

@@ -73,6 +73,22 @@ TEST_CASE("a triangle without area is its longest edge or a point") {
   CHECK((nearest_on_triangle(point, {0, 0, 0}).point - Vector(1, 2, 3)).norm() == 0);
 }
 
+TEST_CASE("D6: a kilometre away the nearest place is the same, and of places that tie the first") {
+  BodyModel far = uneven();
+  for (std::size_t i = 0; i < far.vertices.size(); ++i) far.vertices[i] += i % 3 == 0 ? 1024.0F : -512.0F;
+  const SurfaceIndex index(far);
+  const Random random(4);
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    const Vector near(random.uniform(3 * i, -2, 2), random.uniform(3 * i + 1, -2, 2), random.uniform(3 * i + 2, -2, 2));
+    const Vector point = near + Vector(1024, -512, -512);
+    CHECK((index.nearest(point).point - point).norm() == Approx(brute_force(far, point)).epsilon(1e-9));
+  }
+  // Above the diagonal of the square two triangles tie.
+  for (const double at : {-8.0, -3.5, 2.25, 7.0}) {
+    CHECK(index.nearest(Vector(1024 + at, -512 + at, -512.5)).face == 0);
+  }
+}
+
 TEST_CASE("the nearest place of a surface is that of all its triangles") {
   check_against_brute_force(uneven(), 12, 400);
   check_against_brute_force(uneven(), 1.2, 400);

@@ -46,35 +46,11 @@ TEST_CASE("the body of a config is the procedural one, or read from its file") {
   settings.kind = BodyKind::kSmplx;
   settings.path = file;
   settings.betas = 3;
-  settings.expressions = 2;
   const SmplxModel model = body_model_of(settings);
   CHECK(model.betas == 3);
-  CHECK(model.expressions == 2);
   CHECK(rest_body(settings).vertices == std::vector<float>(arrays.v_template.begin(), arrays.v_template.end()));
-  CHECK_FALSE(smplx_body_options(settings).flat_hand_mean);
-  settings.flat_hand_mean = true;
-  CHECK(smplx_body_options(settings).flat_hand_mean);
   settings.betas = 11;
   CHECK_THROWS_WITH(body_model_of(settings), Catch::Contains("which holds 10 betas; 11 were asked for"));
-}
-
-TEST_CASE("hand components that a file has not are refused") {
-  const TemporaryFolder folder;
-  const std::string file = (folder.path() / "body.npz").string();
-  SmplxArrays arrays = random_smplx({.vertices = 3, .correctives = false});
-  arrays.hand_components[1].resize(45 * 6);
-  smplx_writer(arrays).write(file);
-  BodySettings settings;
-  settings.kind = BodyKind::kSmplx;
-  settings.path = file;
-  settings.hand_components = 7;
-  CHECK_NOTHROW(body_model_of(settings));
-  settings.hands = HandParameters::kPca;
-  CHECK_THROWS_WITH(body_model_of(settings), settings.path.string() +
-                                                 ": has 6 components of a hand; 7 were asked "
-                                                 "for (body.hand_components)");
-  settings.hand_components = 6;
-  CHECK_NOTHROW(body_model_of(settings));
 }
 
 TEST_CASE("synth makes the avatar of the body that a config names") {
@@ -84,7 +60,7 @@ TEST_CASE("synth makes the avatar of the body that a config names") {
   BodySettings body;
   body.kind = BodyKind::kSmplx;
   body.path = file;
-  body.betas = body.expressions = 0;
+  body.betas = 0;
   SyntheticSettings settings;
   settings.frames = 1;
   settings.size_px = 32;
@@ -122,9 +98,4 @@ TEST_CASE("a config shapes the body") {
   CHECK(rest_body(settings).vertices != procedural_body().vertices);
   settings.betas = 3;
   CHECK(rest_body(settings).joints == rest_body(procedural_smplx(), betas).joints);
-  settings.hands = HandParameters::kPca;
-  CHECK_THROWS_WITH(body_model_of(settings),
-                    "the procedural body: has 3 components of a hand; 12 were asked for (body.hand_components)");
-  settings.hand_components = 3;
-  CHECK_NOTHROW(body_model_of(settings));
 }

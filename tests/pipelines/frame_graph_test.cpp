@@ -166,7 +166,8 @@ TEST_CASE("axis-angles are taken within half a turn, whatever the state says", "
   for (std::size_t i = 0; i < a.size(); ++i) CHECK(a[i] == Approx(b[i]).margin(1e-12));
 }
 
-TEST_CASE("the camera's gradient is right away from the camera that the graph was recorded with", "[frame_graph][release]") {
+TEST_CASE("the camera's gradient is right away from the camera that the graph was recorded with",
+          "[frame_graph][release]") {
   const CameraIncrement increment =
       GENERATE(CameraIncrement::kCamera, CameraIncrement::kWorld, CameraIncrement::kScene);
   const Clip clip = small_clip(24, 20, 40);

@@ -79,7 +79,8 @@ TEST_CASE("motion keeps the pelvis where a motion of SMPL-H has it, for every bo
   smplx_writer(arrays).write("m.npz");
   const Vector3<double> model_pelvis = pelvis_of(rest_body(read_smplx("m.npz")).joints);
   const Motion source = some_motion();
-  const std::string warning = "warning: in.npz: is of SMPL-H, whose betas are no shape of SMPL-X: they are left out\n";
+  const std::string warning =
+      "hsi4d: warning: in.npz: is of SMPL-H, whose betas are no shape of SMPL-X: they are left out\n";
   for (const bool is_y_up : {false, true}) {
     const auto run = [&](std::vector<std::string> arguments) {
       arguments.insert(arguments.begin(), {"motion", "in.npz"});
@@ -112,10 +113,10 @@ TEST_CASE("motion puts SMPL-X on the program's body, and a motion of that body o
   motion.betas = {0.5, 1};
   write_motion("in.npz", motion);
   const ProgramResult glb = run_hsi4d({"motion", "in.npz", "out.glb"});
-  CHECK(
-      glb.err ==
-      "warning: in.npz: its betas are of SMPL-X and do not shape the program's body; --body-model has a body that they "
-      "do\n");
+  CHECK(glb.err ==
+        "hsi4d: warning: in.npz: its betas are of SMPL-X and do not shape the program's body; --body-model has a body "
+        "that they "
+        "do\n");
   CHECK((pelvis_in_glb("out.glb", 1) - (motion.poses[1].transl + kSmplxPelvis)).norm() < 1e-6);
   CHECK(run_hsi4d({"motion", "in.npz", "same.npz"}).err.empty());
   CHECK(read_motion("same.npz").poses[1].transl == motion.poses[1].transl);  // of a shape whose pelvis is not known
@@ -144,11 +145,11 @@ TEST_CASE("motion warns of what it does not know of hands, and of repaired weigh
   const ProgramResult plain = run_hsi4d({"motion", "frames", "out.npz"});
   CHECK(plain.status == 0);
   CHECK(plain.err ==
-        "warning: frames: hands are relative to the mean hands of the body model, which are not known without "
+        "hsi4d: warning: frames: hands are relative to the mean hands of the body model, which are not known without "
         "--body-model: they are taken as they are\n");
   CHECK(read_motion("out.npz").poses[0].rotation_of(25)[0] == 0.25);
   const ProgramResult model = run_hsi4d({"motion", "frames", "out.npz", "--body-model", "m.npz"});
-  const std::string repaired = "warning: m.npz: vertices whose skinning weights are divided by their sum: 1\n";
+  const std::string repaired = "hsi4d: warning: m.npz: vertices whose skinning weights are divided by their sum: 1\n";
   CHECK(model.err == repaired);
   CHECK(run_hsi4d({"avatar", "make", "--body-model", "m.npz", "--gaussians", "50", "--out", "a.safetensors"}).err ==
         repaired);
@@ -202,7 +203,8 @@ TEST_CASE("motion tells what is wrong") {
   CHECK(error({"in.npz", "out.npz", "--frame-rate", "0"}) ==
         "hsi4d motion: --frame-rate: 0 is out of range; allowed: 0.01 to 100000\n");
   CHECK(error({"in.npz", "out.npz", "--from-rate", "0.01", "--frame-rate", "100000"}) ==
-        "hsi4d: a motion of 5 frames, 0.01 a second, has 4e+07 frames at 100000 a second; allowed: at most 1000000\n");
+        "hsi4d motion: --frame-rate: a motion of 5 frames, 0.01 a second, has 4e+07 frames at 100000 a second; "
+        "allowed: at most 1000000\n");
   CHECK_THAT(error({"in.npz", "out.bvh"}), Contains("hsi4d motion: OUT") && Contains(".npz, .glb"));
   CHECK_THAT(error({"in.npz", "in.npz"}), Contains("hsi4d motion: OUT"));
   CHECK_THAT(error({"none.npz", "out.npz"}), Contains("none.npz"));
