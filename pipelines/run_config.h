@@ -92,6 +92,9 @@ ConfigValue without_data(ConfigValue tree);
 /// The config as such a tree.
 ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses);
 
+/// Files that the stages name, weights of a loss for example, by JSON pointer.
+std::vector<ConfigPath> stage_files(const RunConfig& config, const std::vector<LossDescription>& losses);
+
 /// The JSON Schema (draft 2020-12) of run configs.
 std::string run_config_schema(const std::vector<LossDescription>& losses);
 
