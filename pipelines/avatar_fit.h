@@ -47,7 +47,7 @@ struct AvatarFitSettings {
   StageSettings stage;
 };
 
-/// Tells the settings, with their ranges, to what reads, checks and lists configs.
+/// Describes a config: every setting with its range.
 /// @param losses  terms that the stage may name
 void describe(ConfigFields& fields, AvatarFitSettings& settings, const std::vector<LossDescription>& losses);
 
