@@ -57,6 +57,7 @@ struct RunConfig {
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 
+/// Describes the section: every setting with its range.
 void describe(ConfigFields& fields, CameraSettings& settings);
 
 /// What a config is read for: the more is asked of it, the more can be wrong.
