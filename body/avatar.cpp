@@ -1,7 +1,6 @@
 #include "body/avatar.h"
 
-#include <cmath>
-
+#include "core/finite_numbers.h"
 #include "core/npz.h"
 
 namespace hsi4d {
@@ -11,19 +10,6 @@ namespace {
 constexpr const char* kFormat = "hsi4d avatar";
 
 // Files are Safetensors or, of version 1, Npz.
-
-template <class File>
-std::vector<float> finite_numbers(const File& file, const char* name, std::initializer_list<int64_t> shape) {
-  const NpyArray& array = file.array(name);
-  std::vector<float> numbers = array.require_shape(shape).as<float>();
-  const std::size_t width = shape.size() < 2 ? 1 : static_cast<std::size_t>(*(shape.begin() + 1));
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (std::isfinite(numbers[i])) continue;
-    throw DataError(array.source() + ": row " + std::to_string(i / width) + ", number " + std::to_string(i % width) +
-                    " is not finite");
-  }
-  return numbers;
-}
 
 void check_first_format(const Npz& file) {
   if (!file.has("format")) throw DataError(file.source() + ": there is no array 'format'; this is no avatar");
@@ -60,13 +46,7 @@ void read_skeleton(const File& file, Avatar& avatar) {
   avatar.parents = parents.require_shape({-1}).as<std::int32_t>();
   const std::string fault = tree_fault(avatar.parents);
   if (!fault.empty()) throw DataError(parents.source() + ": " + fault);
-  const NpyArray& joints = file.array("joints");
-  avatar.joints = joints.require_shape({avatar.joint_count(), 3}).as<double>();
-  for (std::size_t i = 0; i < avatar.joints.size(); ++i) {
-    if (std::isfinite(avatar.joints[i])) continue;
-    throw DataError(joints.source() + ": row " + std::to_string(i / 3) + ", number " + std::to_string(i % 3) +
-                    " is not finite");
-  }
+  avatar.joints = finite_numbers<double>(file.array("joints"), {avatar.joint_count(), 3});
   avatar.joint_names = joint_names_of(file, avatar.joint_count());
 }
 
@@ -87,13 +67,13 @@ void read_weights(const File& file, Index count, Avatar& avatar) {
 template <class File>
 Avatar avatar_in(const File& file) {
   Avatar avatar;
-  avatar.means = finite_numbers(file, "means", {-1, 3});
+  avatar.means = finite_numbers<float>(file.array("means"), {-1, 3});
   const int64_t count = file.array("means").shape()[0];
-  avatar.quats = finite_numbers(file, "quats", {count, 4});
+  avatar.quats = finite_numbers<float>(file.array("quats"), {count, 4});
   check_quaternions(file.array("quats"), avatar.quats);
-  avatar.log_scales = finite_numbers(file, "log_scales", {count, 3});
-  avatar.opacity_logits = finite_numbers(file, "opacity_logits", {count});
-  avatar.colors = finite_numbers(file, "colors", {count, 3});
+  avatar.log_scales = finite_numbers<float>(file.array("log_scales"), {count, 3});
+  avatar.opacity_logits = finite_numbers<float>(file.array("opacity_logits"), {count});
+  avatar.colors = finite_numbers<float>(file.array("colors"), {count, 3});
   read_skeleton(file, avatar);
   read_weights(file, count, avatar);
   return avatar;

@@ -6,6 +6,7 @@
 
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
+#include "core/finite_numbers.h"
 #include "core/random.h"
 
 namespace hsi4d {
@@ -53,7 +54,8 @@ void read(Var<S> var, std::vector<double>& numbers) {
   std::transform(array.data, array.data + numbers.size(), numbers.begin(), [](S x) { return static_cast<double>(x); });
 }
 
-std::string layer_name(const char* what, std::size_t layer) { return kPrefix + (what + std::to_string(layer)); }
+std::string array_name(const char* what) { return std::string(kPrefix) + what; }
+std::string layer_name(const char* what, std::size_t layer) { return array_name(what) + std::to_string(layer); }
 
 void add_floats(SafetensorsWriter& file, const std::string& name, std::initializer_list<std::int64_t> shape,
                 const std::vector<double>& numbers) {
@@ -62,19 +64,14 @@ void add_floats(SafetensorsWriter& file, const std::string& name, std::initializ
   file.add<float>(name, shape, rounded);
 }
 
-std::vector<double> finite_numbers(const Safetensors& file, const std::string& name,
-                                   std::initializer_list<std::int64_t> shape) {
-  const NpyArray& array = file.array(name);
-  const std::vector<float> numbers = array.require_shape(shape).as<float>();
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (!std::isfinite(numbers[i]))
-      throw DataError(array.source() + ": number " + std::to_string(i) + " is not finite");
-  }
+/// What float32 keeps of an array; those of double are rounded.
+std::vector<double> rounded_numbers(const NpyArray& array, std::initializer_list<std::int64_t> shape) {
+  const std::vector<float> numbers = finite_numbers<float>(array, shape);
   return {numbers.begin(), numbers.end()};
 }
 
 std::vector<int> code_joints_of(const Safetensors& file, Index joints) {
-  const NpyArray& array = file.array(kPrefix + std::string("code_joints"));
+  const NpyArray& array = file.array(array_name("code_joints"));
   const std::vector<std::int32_t> found = array.require_shape({-1}).as<std::int32_t>();
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (found[i] >= 0 && found[i] < joints && (i == 0 || found[i] > found[i - 1])) continue;
@@ -82,6 +79,32 @@ std::vector<int> code_joints_of(const Safetensors& file, Index joints) {
                     "; allowed: joints 0 to " + std::to_string(joints - 1) + ", ascending");
   }
   return {found.begin(), found.end()};
+}
+
+/// @param inputs  outputs of the layer before; −1: any number
+ColorNet::Layer layer_of(const Safetensors& file, std::size_t number, Index inputs) {
+  const NpyArray& weights = file.array(layer_name("weights", number));
+  ColorNet::Layer layer;
+  layer.weights = rounded_numbers(weights, {inputs, -1});
+  layer.inputs = weights.shape()[0];
+  layer.outputs = weights.shape()[1];
+  if (layer.outputs < 1) throw DataError(weights.source() + ": has no columns; a layer gives at least one number");
+  layer.bias = rounded_numbers(file.array(layer_name("bias", number)), {layer.outputs});
+  return layer;
+}
+
+/// Throws DataError for weights or a bias of another layer than the first `layers`.
+void check_all_read(const Safetensors& file, std::size_t layers) {
+  std::vector<std::string> read;
+  for (std::size_t l = 0; l < layers; ++l) {
+    for (const char* what : {"weights", "bias"}) read.push_back(layer_name(what, l));
+  }
+  for (const std::string& name : file.names()) {
+    const bool is_of_layer = name.starts_with(array_name("weights")) || name.starts_with(array_name("bias"));
+    if (!is_of_layer || std::find(read.begin(), read.end(), name) != read.end()) continue;
+    throw DataError(file.array(name).source() + ": is of no layer of the network, which ends with '" + read.back() +
+                    "'; allowed: layers 0 to " + std::to_string(kMostMlpLayers - 1) + " without a gap");
+  }
 }
 
 }  // namespace
@@ -122,6 +145,7 @@ void check_sizes(const ColorNet& net) {
   Index inputs = net.features_per_row + (net.view_direction ? 3 : 0) + net.code_size();
   for (const ColorNet::Layer& layer : net.layers) {
     HSI4D_CHECK_EQ(layer.inputs, inputs);
+    HSI4D_CHECK(layer.outputs >= 1, "a layer gives no number");
     HSI4D_CHECK_EQ(static_cast<Index>(layer.weights.size()), layer.inputs * layer.outputs);
     HSI4D_CHECK_EQ(static_cast<Index>(layer.bias.size()), layer.outputs);
     inputs = layer.outputs;
@@ -169,20 +193,20 @@ Var<S> pose_code(Var<S> rotations, std::span<const int> joints, Source where) {
 
 template <class S>
 Var<S> color_net(const ColorNetVars<S>& net, Var<S> colors, Var<S> code, Var<S> directions, Source where) {
-  const Var<S> held = clamp(colors, kLeastColor, 1 - kLeastColor, where);
+  const Var<S> held = clamp(colors, kLeastColor, kLargestColor, where);
   const Var<S> logits = log(held, where) - log(Number<S>(1, where) - held, where);
   return mlp<S>({net.features, directions, code, logits}, net.layers, MlpOutput::kSigmoid, where);
 }
 
 void add_color_net(const ColorNet& net, SafetensorsWriter& file) {
   check_sizes(net);
-  add_floats(file, kPrefix + std::string("features"), {net.rows, net.features_per_row}, net.features);
+  add_floats(file, array_name("features"), {net.rows, net.features_per_row}, net.features);
   for (std::size_t l = 0; l < net.layers.size(); ++l) {
     const ColorNet::Layer& layer = net.layers[l];
     add_floats(file, layer_name("weights", l), {layer.inputs, layer.outputs}, layer.weights);
     add_floats(file, layer_name("bias", l), {layer.outputs}, layer.bias);
   }
-  file.add<std::int32_t>(kPrefix + std::string("code_joints"), {std::ssize(net.code_joints)},
+  file.add<std::int32_t>(array_name("code_joints"), {std::ssize(net.code_joints)},
                          std::vector<std::int32_t>(net.code_joints.begin(), net.code_joints.end()));
 }
 
@@ -193,24 +217,18 @@ void write_color_net(const std::string& path, const ColorNet& net) {
 }
 
 std::optional<ColorNet> color_net_of(const Safetensors& file, Index rows, Index joints) {
-  const std::string features = kPrefix + std::string("features");
+  const std::string features = array_name("features");
   if (!file.has(features)) return {};
   ColorNet net;
   net.rows = rows;
-  net.features = finite_numbers(file, features, {rows, -1});
+  net.features = rounded_numbers(file.array(features), {rows, -1});
   net.features_per_row = file.array(features).shape()[1];
   net.code_joints = code_joints_of(file, joints);
   for (std::size_t l = 0; l < kMostMlpLayers && file.has(layer_name("weights", l)); ++l) {
-    const std::string name = layer_name("weights", l);
-    ColorNet::Layer layer;
-    const Index before = l == 0 ? -1 : net.layers.back().outputs;
-    layer.weights = finite_numbers(file, name, {before, -1});
-    layer.inputs = file.array(name).shape()[0];
-    layer.outputs = file.array(name).shape()[1];
-    layer.bias = finite_numbers(file, layer_name("bias", l), {layer.outputs});
-    net.layers.push_back(std::move(layer));
+    net.layers.push_back(layer_of(file, l, l == 0 ? -1 : net.layers.back().outputs));
   }
-  const NpyArray& first = file.array(layer_name("weights", 0));
+  const NpyArray& first = file.array(layer_name("weights", 0));  // absent: this is told
+  check_all_read(file, net.layers.size());
   const Index without_direction = net.features_per_row + net.code_size();
   net.view_direction = net.layers.front().inputs == without_direction + 3;
   if (!net.view_direction && net.layers.front().inputs != without_direction) {

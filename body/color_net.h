@@ -25,8 +25,9 @@
 
 namespace hsi4d {
 
-/// Colours of an avatar are held this far from 0 and 1 before the logit: a quarter of a step of 8 bits.
-inline constexpr double kLeastColor = 1e-3;
+/// Colours of an avatar are held this far from 0 and 1 before the logit: a quarter of a step of 8 bits. Beyond them
+/// they have no gradient, so that who moves colours has to keep them in this range (ParameterGroup::range).
+inline constexpr double kLeastColor = 1e-3, kLargestColor = 1 - kLeastColor;
 /// Waves a metre of the first features.
 inline constexpr double kLowestFrequency = 0.25, kHighestFrequency = 4;
 
@@ -95,11 +96,12 @@ Var<S> pose_code(Var<S> rotations, std::span<const int> joints, Source where = S
 
 /// Colours of the Gaussians.
 ///
-/// @param colors      [N,3] RGB of the avatar itself, held in [kLeastColor, 1 − kLeastColor]
+/// @param colors      [N,3] RGB of the avatar itself, held in [kLeastColor, kLargestColor]
 /// @param code        [1,P] pose_code
 /// @param directions  [N,3] canonical_directions, or empty for a network without
 /// @return            [N,3] RGB, 0 to 1
-/// Adjoint: net, colors (none where one is held), code, directions. Throws InternalError when the shapes do not fit.
+/// Adjoint: net, colors (none where one is beyond the range), code, directions. Throws InternalError when the shapes do
+/// not fit.
 template <class S>
 Var<S> color_net(const ColorNetVars<S>& net, Var<S> colors, Var<S> code, Var<S> directions,
                  Source where = Source::current());
@@ -114,8 +116,8 @@ void write_color_net(const std::string& path, const ColorNet& net);
 /// The network of a file, or nothing when it has none. Numbers come back as float32 has them.
 /// @param rows    Gaussians
 /// @param joints  of their skeleton
-/// Throws DataError naming file and array: shapes that do not fit, a joint that is not there, a number that is not
-/// finite.
+/// Throws DataError naming file and array: shapes that do not fit, a layer without outputs, more layers than
+/// kMostMlpLayers or one missing in between, a joint that is not there, a number that is not finite.
 std::optional<ColorNet> color_net_of(const Safetensors& file, Index rows, Index joints);
 
 }  // namespace hsi4d

@@ -9,7 +9,6 @@ namespace hsi4d::detail {
 
 inline constexpr Index kTileVertices = 32;
 inline constexpr Index kTileRows = 3 * kTileVertices;
-inline constexpr Index kStreams = 16;                         ///< blocks that are read side by side
 inline constexpr Index kDirectionGrain = 64 * kTileVertices;  ///< vertices of a parallel chunk
 inline constexpr Index kDirectionLanes = 16;                  ///< of any instruction set, in float
 

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <tiny_gltf.h>
 
+#include "body/surface_index.h"
 #include "core/quaternion.h"
 
 namespace hsi4d {
@@ -61,27 +62,14 @@ class Parts {
   }
 };
 
-/// Unit normals of vertices, of the faces about them by area; up where there are none.
+/// Unit normals of vertices; up where there are none.
 std::vector<float> normals_of(const BodyModel& body) {
-  std::vector<double> sums(body.vertices.size());
-  const auto vertex = [&](std::int32_t v) {
-    const float* x = body.vertices.data() + 3 * v;
-    return Vector3<double>(static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2]));
-  };
-  for (std::size_t f = 0; f + 2 < body.faces.size(); f += 3) {
-    const Vector3<double> a = vertex(body.faces[f]), b = vertex(body.faces[f + 1]), c = vertex(body.faces[f + 2]);
-    const Vector3<double> normal = cross(Vector3<double>(b - a), Vector3<double>(c - a));
-    for (std::size_t k = 0; k < 3; ++k) {
-      for (int i = 0; i < 3; ++i) sums[static_cast<std::size_t>(3 * body.faces[f + k] + i)] += normal[i];
-    }
+  std::vector<float> numbers;
+  for (const Vector3<double>& normal : vertex_normals(body)) {
+    const Vector3<double> unit = normal.isZero(0) ? Vector3<double>(Vector3<double>::UnitY()) : normal;
+    for (int i = 0; i < 3; ++i) numbers.push_back(static_cast<float>(unit[i]));
   }
-  std::vector<float> normals;
-  for (std::size_t v = 0; v < sums.size(); v += 3) {
-    const auto direction = direction_of(Vector3<double>(sums[v], sums[v + 1], sums[v + 2]));
-    const Vector3<double> unit = direction.usable ? direction.unit : Vector3<double>(0, 1, 0);
-    for (int i = 0; i < 3; ++i) normals.push_back(static_cast<float>(unit[i]));
-  }
-  return normals;
+  return numbers;
 }
 
 /// Joints and weights of every vertex, four each: floats that sum to 1 as exactly as floats do, joint 0 where unused.

@@ -50,19 +50,6 @@ std::vector<double> densities_of(const BodyModel& body, double detail) {
   return densities;
 }
 
-/// [V] of length 1: the mean of the faces around, by area.
-std::vector<Vector> vertex_normals(const BodyModel& body) {
-  std::vector<Vector> normals(static_cast<std::size_t>(body.vertex_count()), Vector::Zero());
-  for (std::int32_t face = 0; face < body.face_count(); ++face) {
-    const std::array<Vector, 3> c = face_corners(body, face);
-    const Vector area = cross(Vector(c[1] - c[0]), Vector(c[2] - c[0]));
-    for (std::size_t i = 0; i < 3; ++i)
-      normals[static_cast<std::size_t>(body.faces[3 * static_cast<std::size_t>(face) + i])] += area;
-  }
-  for (Vector& normal : normals) normal = direction_of(normal).unit;
-  return normals;
-}
-
 Vector normal_at(const BodyModel& body, const std::vector<Vector>& normals, const SurfacePlace& place) {
   Vector sum = Vector::Zero();
   for (std::size_t i = 0; i < 3; ++i) {

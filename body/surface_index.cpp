@@ -73,6 +73,18 @@ Corners face_corners(const BodyModel& body, std::int32_t face) {
   return corners;
 }
 
+std::vector<Vector> vertex_normals(const BodyModel& body) {
+  std::vector<Vector> normals(static_cast<std::size_t>(body.vertex_count()), Vector::Zero());
+  for (std::int32_t face = 0; face < body.face_count(); ++face) {
+    const Corners c = face_corners(body, face);
+    const Vector area = cross(Vector(c[1] - c[0]), Vector(c[2] - c[0]));
+    for (std::size_t i = 0; i < 3; ++i)
+      normals[static_cast<std::size_t>(body.faces[3 * static_cast<std::size_t>(face) + i])] += area;
+  }
+  for (Vector& normal : normals) normal = direction_of(normal).unit;
+  return normals;
+}
+
 // --- the nearest of all ----------------------------------------------------------------------------------------------
 
 namespace {

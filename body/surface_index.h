@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "body/body_model.h"
 
@@ -22,6 +23,10 @@ SurfacePlace nearest_on_triangle(const std::array<Vector3<double>, 3>& corners, 
 
 /// Corners of a face, metres.
 std::array<Vector3<double>, 3> face_corners(const BodyModel& body, std::int32_t face);
+
+/// Normals of the vertices: the mean of the faces around each, by area.
+/// @return  [V] of length 1; zero where the faces around have no area, or there are none
+std::vector<Vector3<double>> vertex_normals(const BodyModel& body);
 
 /// Finds the nearest place of a whole surface: exact, in about the logarithm of the number of faces.
 ///

@@ -7,6 +7,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
 #include "core/file.h"
+#include "core/finite_numbers.h"
 #include "core/npz.h"
 #include "core/safetensors.h"
 
@@ -28,13 +29,7 @@ class Weights {
 
   /// Numbers of an array of this shape (−1: any length). Throws DataError.
   std::vector<double> numbers(const std::string& name, std::initializer_list<std::int64_t> shape) const {
-    const NpyArray& array = file_.array(prefix_ + name);
-    std::vector<double> numbers = array.require_shape(shape).as<double>();
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      if (!std::isfinite(numbers[i]))
-        throw DataError(array.source() + ": number " + std::to_string(i) + " is not finite");
-    }
-    return numbers;
+    return finite_numbers<double>(file_.array(prefix_ + name), shape);
   }
 
   /// A map to as many outputs as its bias has.

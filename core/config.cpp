@@ -232,6 +232,7 @@ ConfigField& ConfigFields::path(std::string_view name, std::filesystem::path& va
                                 std::string_view summary) {
   ConfigField& field = add_field(ConfigField::Kind::kValue, name, summary);
   field.allowed = rule.must_exist ? "a path of something that exists" : "a path";
+  field.is_path = true;
   field.schema = typed_schema("string");
   field.read = [&value, rule](const ConfigValue& written, const std::string& pointer, ConfigProblems& problems) {
     if (!expect_kind(written, Kind::kString, "a path in a string", "", pointer, problems)) return;

@@ -108,6 +108,7 @@ struct ConfigField {
   Kind kind = Kind::kValue;
   std::string name, summary, allowed;
   bool is_required = false;
+  bool is_path = false;                                   ///< kValue: `write` gives the path
   ConfigValue schema;                                     ///< kValue: type and range as JSON Schema
   Read read;                                              ///< kValue
   std::function<ConfigValue()> write;                     ///< kValue
@@ -340,6 +341,15 @@ void read_config(const ConfigValue& value, const ConfigFields& fields, ConfigPro
 
 /// Every setting with its present value, in the order of the description.
 ConfigValue write_config(const ConfigFields& fields);
+
+/// A path that is set.
+struct ConfigPath {
+  std::string pointer;
+  std::filesystem::path path;
+};
+
+/// The paths that are not empty, in the order of the description.
+std::vector<ConfigPath> list_paths(const ConfigFields& fields, const std::string& pointer = "");
 
 /// A JSON Schema (draft 2020-12) of configs with these fields. Required keys are named in the descriptions but not
 /// enforced, because a file may leave them to the file that it extends.

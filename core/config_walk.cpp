@@ -251,6 +251,28 @@ ConfigValue write_config(const ConfigFields& fields) {
   return object;
 }
 
+std::vector<ConfigPath> list_paths(const ConfigFields& fields, const std::string& pointer) {
+  std::vector<ConfigPath> all;
+  const auto add_inner = [&all](const ConfigFields& inner, const std::string& here) {
+    for (ConfigPath& path : list_paths(inner, here)) all.push_back(std::move(path));
+  };
+  for (const ConfigField& field : fields.fields()) {
+    const std::string here = child_pointer(pointer, field.name);
+    if (field.kind == FieldKind::kObject) add_inner(*field.children, here);
+    if (field.kind == FieldKind::kMap || field.kind == FieldKind::kList) {
+      std::size_t index = 0;
+      for (const auto& [name, inner] : field.entries()) {
+        add_inner(inner, child_pointer(here, field.kind == FieldKind::kMap ? name : std::to_string(index)));
+        ++index;
+      }
+    }
+    if (!field.is_path) continue;
+    std::string path = field.write().text;
+    if (!path.empty()) all.push_back({here, std::move(path)});
+  }
+  return all;
+}
+
 ConfigValue config_schema(const ConfigFields& fields, std::string_view title) {
   ConfigValue schema = ConfigValue::make_object();
   schema.add("$schema", ConfigValue::make_string("https://json-schema.org/draft/2020-12/schema"));

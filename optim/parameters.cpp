@@ -1,5 +1,7 @@
 #include "optim/parameters.h"
 
+#include <algorithm>
+
 #include "core/rotation.h"
 
 namespace hsi4d {
@@ -19,6 +21,25 @@ std::vector<Index> wrap_axis_angles(Var<S> axis_angles) {
   return changed;
 }
 
+template <class S>
+bool hold_in_range(Var<S> leaf, const ParameterRange& range) {
+  const S low = static_cast<S>(range.low), high = static_cast<S>(range.high);
+  const ConstArray<S> now = leaf.owner().value(leaf);
+  const Index cols = now.shape.cols;
+  Index out = 0;
+  for (Index r = 0; r < now.total_rows(); ++r) {
+    out += std::count_if(now.row(r), now.row(r) + cols, [&](S x) { return x < low || x > high; });
+  }
+  if (out == 0) return false;
+  const Array<S> held = leaf.owner().write(leaf);
+  for (Index r = 0; r < held.total_rows(); ++r) {
+    std::transform(held.row(r), held.row(r) + cols, held.row(r), [&](S x) { return std::clamp(x, low, high); });
+  }
+  return true;
+}
+
+template bool hold_in_range(Var<float>, const ParameterRange&);
+template bool hold_in_range(Var<double>, const ParameterRange&);
 template std::vector<Index> wrap_axis_angles(Var<float>);
 template std::vector<Index> wrap_axis_angles(Var<double>);
 

@@ -1,12 +1,18 @@
 // Parameters that stages move: leaves of a tape under a name that configs know.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "autodiff/tape.h"
 
 namespace hsi4d {
+
+/// The numbers that a parameter may have.
+struct ParameterRange {
+  double low = 0, high = 1;
+};
 
 /// What a config's `optimize` names: leaves of one tape that move together. Without leaves it is a name that a config
 /// may use although there is nothing to move (no object in the scene).
@@ -15,6 +21,7 @@ struct ParameterGroup {
   std::string name;
   std::vector<Var<S>> blocks;
   bool are_axis_angles = false;  ///< each row is a rotation: a stage keeps it within half a turn (wrap_axis_angles)
+  std::optional<ParameterRange> range = {};  ///< a stage keeps every number in it (hold_in_range)
 };
 
 /// The groups' names, in their order.
@@ -35,6 +42,19 @@ std::vector<std::string> names_of(const std::vector<ParameterGroup<S>>& groups) 
 template <class S>
 std::vector<Index> wrap_axis_angles(Var<S> axis_angles);
 
+/// Puts every number of a leaf that is out of the range on its nearer end: the projection of a step onto what is
+/// allowed [gradient projection: Bertsekas 1976]. Where an operator clamps the parameter to the same range, its
+/// gradient is that of the inside at the ends too, so that a number which was pushed against an end can come back;
+/// beyond it would have none, and stay.
+///
+/// @param leaf  written only if a number changes
+/// @return      whether one did
+/// Adjoint: none, a change of parameters between steps. Moments of an optimiser remain right.
+template <class S>
+bool hold_in_range(Var<S> leaf, const ParameterRange& range);
+
+extern template bool hold_in_range(Var<float>, const ParameterRange&);
+extern template bool hold_in_range(Var<double>, const ParameterRange&);
 extern template std::vector<Index> wrap_axis_angles(Var<float>);
 extern template std::vector<Index> wrap_axis_angles(Var<double>);
 

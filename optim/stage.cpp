@@ -134,6 +134,7 @@ class StageRun {
         loss_(record_loss(settings, terms, inputs, options.name)),
         adam_(tape, groups_, settings.optimizer) {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
+    for (const AdamGroup<S>& group : groups_) hold(group.parameters);
     for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
     if (options.kept == nullptr) return;
     for (const AdamGroup<S>& group : groups_) {
@@ -167,6 +168,7 @@ class StageRun {
     if (!step.rolled_back) {
       offender_.clear();
       wrap_rotations(step);
+      hold_ranges(step);
     }
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
@@ -182,6 +184,16 @@ class StageRun {
         for (const Index row : wrap_axis_angles(block)) adam_.clear_moments(block, row);
       }
     }
+  }
+
+  void hold_ranges(const StepReport& step) {
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      if (step.groups[g].moved) hold(groups_[g].parameters);
+    }
+  }
+  static void hold(const ParameterGroup<S>& group) {
+    if (!group.range) return;
+    for (const Var<S> block : group.blocks) hold_in_range(block, *group.range);
   }
 
   double evaluated_loss() const { return static_cast<double>(tape_.value(loss_.total).scalar()); }

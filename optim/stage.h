@@ -78,7 +78,8 @@ void check_groups(const StageSettings& settings, const std::vector<std::string>&
 ///
 /// Records Σ weight · term at the end of the tape, and in each iteration: lets gradients flow to the groups that are on
 /// in it and to no other of `available` (what is frozen costs nothing), runs the tape forward and backward, and takes
-/// an Adam step (optim/adam.h). Rows of groups that are axis-angles are wrapped after each step. A last forward run
+/// an Adam step (optim/adam.h). Rows of groups that are axis-angles are wrapped after each step. Numbers of named
+/// groups that have a range are held in it, after each step and before the first evaluation. A last forward run
 /// evaluates the parameters that are left; should they give a loss that is not finite, the last step is taken back. At
 /// the end (also by an exception) what was recorded is forgotten, and `available` is frozen or not as before.
 ///

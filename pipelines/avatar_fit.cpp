@@ -7,8 +7,10 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "core/text.h"
 #include "optim/metrics.h"
 #include "pipelines/posed_splats.h"
+#include "pipelines/tape_image.h"
 #include "splat/camera_center.h"
 
 namespace hsi4d {
@@ -64,6 +66,8 @@ class FitGraph {
     human_ = {leaf("means", avatar.means, 3), leaf("quats", avatar.quats, 4), leaf("log_scales", avatar.log_scales, 3),
               leaf("opacity_logits", avatar.opacity_logits, 1), leaf("colors", avatar.colors, 3)};
     HSI4D_CHECK_EQ(human_.means.shape().rows, n);
+    // What a file may say, or a network can see.
+    groups_.back().range = avatar.color_net ? ParameterRange{kLeastColor, kLargestColor} : ParameterRange{0, 1};
     xi_ = tape.constant("xi", shape_of(1, 6));
     intrinsics_ = tape.constant("intrinsics", shape_of(1, 4));
     rotations_ = tape.constant("rotations", shape_of(avatar.joint_count(), 9));
@@ -93,21 +97,16 @@ class FitGraph {
       for (Index i = 0; i < 9; ++i) rotations(j, i) = static_cast<S>(r(i / 3, i % 3));
     }
     write_image(inputs_.target, view.image.color);
-    if (!view.image.mask.empty()) return write_image(inputs_.weight, view.image.mask);
-    const Array<S> weight = tape_.write(inputs_.weight);
-    for (Index r = 0; r < weight.total_rows(); ++r) std::fill_n(weight.row(r), weight.shape.cols, S(1));
+    if (!view.image.mask.empty()) {
+      write_image(inputs_.weight, view.image.mask);
+    } else {
+      fill(inputs_.weight, S(1));
+    }
   }
 
   Image picture() {
     tape_.forward(inputs_.rendered);
-    const ConstArray<S> values = tape_.value(inputs_.rendered);
-    Image image(3, static_cast<int>(values.shape.rows), static_cast<int>(values.shape.cols));
-    for (int c = 0; c < 3; ++c) {
-      for (int y = 0; y < image.height(); ++y) {
-        for (int x = 0; x < image.width(); ++x) image(c, y, x) = std::clamp(values(c, y, x), 0.0F, 1.0F);
-      }
-    }
-    return image;
+    return held_image(tape_.value(inputs_.rendered), 0, 3);
   }
 
   /// What has been learnt, back into the avatar.
@@ -122,7 +121,6 @@ class FitGraph {
     read_leaf("log_scales", human_.log_scales, avatar.log_scales);
     read_leaf("opacity_logits", human_.opacity_logits, avatar.opacity_logits);
     read_leaf("colors", human_.colors, avatar.colors);
-    for (float& color : avatar.colors) color = std::clamp(color, 0.0F, 1.0F);
     if (!avatar.color_net) return;
     if (find_entry(moved, "color_net") != nullptr) read_layers(net_, *avatar.color_net);
     if (find_entry(moved, "avatar_features") != nullptr) read_features(net_, *avatar.color_net);
@@ -158,13 +156,6 @@ class FitGraph {
     return colors;
   }
 
-  void write_image(Var<S> var, const Image& image) {
-    const Array<S> array = tape_.write(var);
-    for (int c = 0; c < image.channels() && c < array.shape.planes; ++c) {
-      for (int y = 0; y < image.height(); ++y) std::copy_n(image.row(c, y), image.width(), &array(c, y, 0));
-    }
-  }
-
   Tape<S>& tape_;
   SplatView view_;
   GaussianVars<S> human_;
@@ -194,6 +185,18 @@ class ViewOrder {
   std::size_t count_ = 0;
 };
 
+/// Throws UserError unless each of the numbers of a setting is that of a view.
+void check_held(const AvatarFitSettings& settings, const ViewSet& set, const char* key, const char* what,
+                const std::vector<double>& numbers, Index PosedView::*number_of, std::size_t count) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto is_its = [&](const PosedView& view) { return static_cast<double>(view.*number_of) == numbers[i]; };
+    if (std::any_of(set.views.begin(), set.views.end(), is_its)) continue;
+    throw UserError((settings.file.empty() ? "" : settings.file.string() + ": ") + "/" + key + "/" + std::to_string(i) +
+                    ": no view of " + set.file.string() + " is of " + what + " " + number_text(numbers[i]) +
+                    "; there are " + std::to_string(count) + ", counted from 0");
+  }
+}
+
 ViewScore score_of(FitGraph& graph, const std::vector<LoadedView>& views, bool held) {
   ViewScore score;
   Index masked = 0;
@@ -206,11 +209,11 @@ ViewScore score_of(FitGraph& graph, const std::vector<LoadedView>& views, bool h
     const std::optional<double> foreground =
         view.image.mask.empty() ? std::nullopt : psnr_db(picture, view.image.color, view.image.mask);
     if (!foreground) continue;
-    score.psnr_foreground_db += *foreground;
+    score.psnr_foreground_db = score.psnr_foreground_db.value_or(0) + *foreground;
     ++masked;
   }
   if (score.views > 0) score.psnr_db /= static_cast<double>(score.views);
-  if (masked > 0) score.psnr_foreground_db /= static_cast<double>(masked);
+  if (score.psnr_foreground_db) *score.psnr_foreground_db /= static_cast<double>(masked);
   return score;
 }
 
@@ -240,6 +243,8 @@ Avatar first_avatar(const AvatarFitSettings& settings) {
 
 AvatarFitResult fit_avatar(const AvatarFitSettings& settings, const Avatar& first, const ViewSet& set,
                            std::span<const LossTerm> terms, const Observer& observer) {
+  check_held(settings, set, "held_cameras", "camera", settings.held_cameras, &PosedView::camera, set.cameras.size());
+  check_held(settings, set, "held_frames", "frame", settings.held_frames, &PosedView::frame, set.motion.poses.size());
   const std::vector<LoadedView> views = load_views(settings, set, first);
   std::vector<std::size_t> learnt;
   for (std::size_t v = 0; v < views.size(); ++v) {

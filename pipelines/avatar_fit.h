@@ -6,10 +6,14 @@
 //
 //   colors, opacity_logits, log_scales, quats, means    numbers of the avatar's Gaussians in the rest pose
 //   color_net, avatar_features                          of its color net, if it has one
+//
+// Colours stay from 0 to 1, or where the color net can see them (kLeastColor), so that what is measured is what a file
+// of the avatar shows.
 #pragma once
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,6 +32,7 @@ namespace hsi4d {
 
 /// A config of `hsi4d avatar fit`.
 struct AvatarFitSettings {
+  std::filesystem::path file;    ///< the config itself, for messages
   std::filesystem::path views;   ///< views.json of the set
   std::filesystem::path avatar;  ///< where it starts; empty: new Gaussians on the body
   std::int64_t seed = 0;         ///< of new Gaussians, a new network, and the order of the views
@@ -42,6 +47,8 @@ struct AvatarFitSettings {
   StageSettings stage;
 };
 
+/// Describes a config: every setting with its range.
+/// @param losses  terms that the stage may name
 void describe(ConfigFields& fields, AvatarFitSettings& settings, const std::vector<LossDescription>& losses);
 
 /// Reads a config of `hsi4d avatar fit`. Throws UserError with all of its problems.
@@ -54,14 +61,16 @@ std::vector<std::string> avatar_fit_groups();
 /// How well views are shown.
 struct ViewScore {
   Index views = 0;
-  double psnr_db = 0;             ///< mean over views, of whole pictures
-  double psnr_foreground_db = 0;  ///< where masks are, weighted by them; of views that show somebody
+  double psnr_db = 0;                        ///< mean over views, of whole pictures
+  std::optional<double> psnr_foreground_db;  ///< weighted by masks; mean over the views that have one and show somebody
 };
 
+/// What a fit has learnt.
 struct AvatarFitResult {
-  Avatar avatar;
-  StageResult stage;
-  ViewScore learnt, held;
+  Avatar avatar;      ///< as its file will be
+  StageResult stage;  ///< of the last view that was seen
+  ViewScore learnt;   ///< of that avatar, over the views that were learnt from
+  ViewScore held;     ///< and over those that were held back
 };
 
 /// Whether a view is held back.
@@ -75,8 +84,8 @@ Avatar first_avatar(const AvatarFitSettings& settings);
 ///
 /// @param first  where it starts
 /// @param terms  that the stage may name; those that read `rendered`, `target` and `weight` have their inputs
-/// Throws UserError: cameras of different sizes, no view to learn from, poses of another skeleton; DataError for images
-/// as view_image; as run_stage; Interrupted.
+/// Throws UserError: a held camera or frame of no view, cameras of different sizes, no view to learn from, poses of
+/// another skeleton; DataError for images as view_image; as run_stage; Interrupted.
 AvatarFitResult fit_avatar(const AvatarFitSettings& settings, const Avatar& first, const ViewSet& set,
                            std::span<const LossTerm> terms, const Observer& observer = {});
 

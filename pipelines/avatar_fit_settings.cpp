@@ -46,6 +46,7 @@ AvatarFitSettings load_avatar_fit(const std::filesystem::path& file, const std::
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, overrides, problems);
   AvatarFitSettings settings;
+  settings.file = file;
   ConfigFields fields;
   describe(fields, settings, losses);
   read_config(tree, fields, problems);

@@ -25,10 +25,11 @@ struct ColorNetMeasurement {
   double peak_share() const;
 };
 
+/// What is measured.
 struct ColorNetBench {
   std::vector<std::string> workloads;  ///< names; empty: all
   int threads = 1;
-  int repeats = 9;
+  int repeats = 9;  ///< of each, after some to warm up
 };
 
 /// Names of the workloads.

@@ -228,7 +228,7 @@ void bench_posing(const SkinningBench& options, const std::function<void(const S
     m.median_ms = 1e3 * seconds[k][seconds[k].size() / 2];
     m.min_ms = 1e3 * seconds[k].front();
     m.repeats = static_cast<int>(seconds[k].size());
-    m.vertices = kPosedGaussians;
+    m.gaussians = kPosedGaussians;
     m.joints = kSmplxJoints;
     report(m);
   }

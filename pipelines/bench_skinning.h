@@ -16,16 +16,19 @@ struct SkinningMeasurement {
   int threads = 1;
   double median_ms = 0, min_ms = 0;
   int repeats = 0;
-  Index vertices = 0, joints = 0;
+  Index vertices = 0;   ///< 0 where Gaussians are posed
+  Index gaussians = 0;  ///< 0 where vertices are
+  Index joints = 0;
   Index corrective_columns = 0;  ///< that follow every pose
   Index table_bytes = 0;         ///< of these columns, read once in each direction
   double packing_error_m = 0;    ///< most that packed numbers can move a vertex along an axis
 };
 
+/// What is measured.
 struct SkinningBench {
   std::vector<std::string> workloads;  ///< names; empty: all
   int threads = 1;
-  int repeats = 9;
+  int repeats = 9;  ///< of each, after some to warm up
 };
 
 /// Names of the workloads.

@@ -24,6 +24,7 @@ struct BodySettings {
   std::vector<double> shape;  ///< the betas of the rest pose; those beyond its end are 0
 };
 
+/// Describes the section: every setting with its range.
 void describe(ConfigFields& fields, BodySettings& settings);
 
 /// The model that the settings name, in the layout of SMPL-X, without expressions; weights that were repaired are told

@@ -30,6 +30,7 @@ struct ColorNetSettings {
   bool camera_gradient = false;
 };
 
+/// Describes the section: every setting with its range.
 void describe(ConfigFields& fields, ColorNetSettings& settings);
 
 /// The network with which a run begins, if it has one.

@@ -30,6 +30,7 @@ struct DataSettings {
 /// frames/, masks/, camera.json, initial.json, truth/ (none where it is missing). Paths are absolute.
 DataSettings dataset_inputs(const std::filesystem::path& folder);
 
+/// Describe the sections: every setting with its range.
 void describe(ConfigFields& fields, ObjectSettings& settings);
 void describe(ConfigFields& fields, DataSettings& settings);
 

@@ -11,6 +11,7 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
+#include "pipelines/tape_image.h"
 #include "splat/camera_center.h"
 
 namespace hsi4d {
@@ -39,19 +40,6 @@ template <class S>
 void write_numbers(Tape<S>& tape, Var<S> leaf, const double* values) {
   const Array<S> array = tape.write(leaf);
   for (Index i = 0; i < array.shape.count(); ++i) array.data[i] = static_cast<S>(values[i]);
-}
-
-template <class S>
-void write_image(Tape<S>& tape, Var<S> leaf, const Image& image) {
-  const Array<S> array = tape.write(leaf);
-  HSI4D_CHECK_EQ(array.shape.planes, static_cast<Index>(image.channels()));
-  HSI4D_CHECK_EQ(array.shape.rows, static_cast<Index>(image.height()));
-  HSI4D_CHECK_EQ(array.shape.cols, static_cast<Index>(image.width()));
-  for (int c = 0; c < image.channels(); ++c) {
-    for (int y = 0; y < image.height(); ++y) {
-      std::copy_n(image.row(c, y), image.width(), array.row(c * array.shape.rows + y));
-    }
-  }
 }
 
 template <class S>
@@ -350,12 +338,11 @@ void FrameGraph<S>::read_color_net(const ConfigMap<ParameterGroupSettings>& move
 template <class S>
 void FrameGraph<S>::set_targets(const FrameTargets& targets) {
   HSI4D_CHECK(targets.image != nullptr, "a frame needs an image to be compared with");
-  write_image(tape_, inputs_.target, *targets.image);
+  write_image(inputs_.target, *targets.image);
   if (targets.weight != nullptr) {
-    write_image(tape_, inputs_.weight, *targets.weight);
+    write_image(inputs_.weight, *targets.weight);
   } else {
-    const Array<S> weight = tape_.write(inputs_.weight);
-    for (Index r = 0; r < weight.total_rows(); ++r) std::fill_n(weight.row(r), weight.shape.cols, S(1));
+    fill(inputs_.weight, S(1));
   }
   if (!inputs_.given(inputs_.object_depth)) return;
   HSI4D_CHECK_EQ(targets.centers.size(), objects_.size());

@@ -26,12 +26,14 @@ Var<S> rigid_rows(Var<S> rotation, Var<S> translation) {
 }
 
 template <class S>
-Var<S> net_colors(const HumanColors<S>& colors, Var<S> own, Var<S> rotations, const Avatar& avatar,
+Var<S> net_colors(const HumanColors<S>& colors, Var<S> own, Var<S> rotations, const SkinWeights<S>& weights,
                   Var<S> joint_transforms, Var<S> means) {
   const auto passed = [&colors](Var<S> var) { return colors.pose_gradient ? var : stop_gradient(var); };
   Var<S> directions;
   if (colors.camera_center.tape != nullptr) {
-    const Var<S> blended = blend_transforms(SkinWeights<S>(avatar.weights), passed(joint_transforms));
+    // skin_frames keeps these in registers. To blend them once, into memory for all three, takes as long at best, and a
+    // third more without pose_gradient.
+    const Var<S> blended = blend_transforms(weights, passed(joint_transforms));
     directions = canonical_directions(blended, passed(means), colors.camera_center);
   }
   return color_net(colors.net, own, pose_code(passed(rotations), colors.code_joints), directions);
@@ -66,11 +68,12 @@ template <class S>
 SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar,
                               const HumanColors<S>* colors) {
   const PosedSkeleton<S> skeleton = kinematic_chain(rotations, transl, avatar.parents, avatar.joints);
-  const SkinnedFrames<S> posed = skin_frames(SkinWeights<S>(avatar.weights), skeleton.transforms, human.means,
-                                             gaussian_axes(human.quats, human.log_scales));
+  const SkinWeights<S> weights(avatar.weights);
+  const SkinnedFrames<S> posed =
+      skin_frames(weights, skeleton.transforms, human.means, gaussian_axes(human.quats, human.log_scales));
   return {posed.points, posed.frames, gaussian_opacities(human.opacity_logits),
           colors == nullptr ? human.colors
-                            : net_colors(*colors, human.colors, rotations, avatar, skeleton.transforms, posed.points)};
+                            : net_colors(*colors, human.colors, rotations, weights, skeleton.transforms, posed.points)};
 }
 
 template <class S>

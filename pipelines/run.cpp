@@ -92,7 +92,9 @@ RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losse
   check_run(config);
   EarlyMessages early;
   for (const RunNote& note : run_notes(config)) log_message(note.level, note.text);
-  const Clip clip = read_clip(config.data);  // before anything is written
+  Clip clip = read_clip(config.data);  // before anything is written
+  for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
+    clip.files.push_back({file.pointer, file.path});
   check_frames(config.data, clip, has_loss(config, "center"));
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));

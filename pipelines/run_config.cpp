@@ -94,6 +94,17 @@ ConfigValue sections_beside_data(const RunConfig& config, const std::vector<Loss
   return without_data(write_config(fields));
 }
 
+std::vector<ConfigPath> stage_files(const RunConfig& config, const std::vector<LossDescription>& losses) {
+  RunConfig copy = config;
+  ConfigFields fields;
+  describe(fields, copy, losses);
+  std::vector<ConfigPath> files = list_paths(fields);
+  std::erase_if(files, [](const ConfigPath& file) {
+    return !file.pointer.starts_with("/stages/") || !std::filesystem::is_regular_file(file.path);
+  });
+  return files;
+}
+
 std::string run_config_schema(const std::vector<LossDescription>& losses) {
   RunConfig defaults;
   ConfigFields fields;

@@ -57,6 +57,7 @@ struct RunConfig {
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 
+/// Describes the section: every setting with its range.
 void describe(ConfigFields& fields, CameraSettings& settings);
 
 /// What a config is read for: the more is asked of it, the more can be wrong.
@@ -91,6 +92,9 @@ ConfigValue without_data(ConfigValue tree);
 
 /// The config as such a tree.
 ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses);
+
+/// Files that the stages name, weights of a loss for example, by JSON pointer.
+std::vector<ConfigPath> stage_files(const RunConfig& config, const std::vector<LossDescription>& losses);
 
 /// The JSON Schema (draft 2020-12) of run configs.
 std::string run_config_schema(const std::vector<LossDescription>& losses);

@@ -1,12 +1,12 @@
 #include "pipelines/synthetic_render.h"
 
-#include <algorithm>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "autodiff/rotations.h"
 #include "pipelines/posed_splats.h"
+#include "pipelines/tape_image.h"
 
 namespace hsi4d {
 namespace {
@@ -41,15 +41,6 @@ SplatInputs<float> avatar_splats(Tape<float>& tape, const Avatar& avatar, const 
                                     constant(tape, "colors", avatar.colors, 3)};
   const Var<float> rotations = rotations_from_axis_angle(constant(tape, "pose", std::span(pose.axis_angle), 3));
   return skinned_splats(vars, rotations, constant(tape, "transl", std::span(pose.transl.data(), 3), 3), avatar);
-}
-
-/// Planes [first, first + count) of an image on the tape, held in [0, 1].
-Image held_image(const ConstArray<float>& values, int first, int count) {
-  Image image(count, static_cast<int>(values.shape.rows), static_cast<int>(values.shape.cols));
-  for (int c = 0; c < count; ++c)
-    for (int y = 0; y < image.height(); ++y)
-      for (int x = 0; x < image.width(); ++x) image(c, y, x) = std::clamp(values(first + c, y, x), 0.0F, 1.0F);
-  return image;
 }
 
 }  // namespace

@@ -48,6 +48,7 @@ struct SyntheticSettings {
   Index views_poses = 4;
 };
 
+/// Describes the section: every setting with its range.
 void describe(ConfigFields& fields, SyntheticSettings& settings);
 
 /// The settings as JSON text: what a dataset's synthetic.json holds. The body is in it unless it is the default.

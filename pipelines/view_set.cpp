@@ -58,11 +58,22 @@ Image read_sized(const fs::path& file, const Camera& camera) {
 
 }  // namespace
 
+std::vector<fs::path> ViewSet::files() const {
+  std::vector<fs::path> all = {file, motion_file, cameras_file};
+  for (const PosedView& view : views) {
+    all.push_back(view.image);
+    if (!view.mask.empty()) all.push_back(view.mask);
+  }
+  return all;
+}
+
 ViewSet read_view_set(const fs::path& file) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, {}, problems);
   const ViewSetFile read = read_settings<ViewSetFile>(tree, problems);
-  ViewSet set{file, read_motion(read.motion.string()), read_cameras(read.cameras.string()), read.views};
+  ViewSet set{
+      file,        read_motion(read.motion.string()), read_cameras(read.cameras.string()), read.views, read.motion,
+      read.cameras};
   check_numbers(set);
   return set;
 }

@@ -23,19 +23,24 @@ namespace hsi4d {
 /// Version of views.json that is written; newer ones are refused.
 inline constexpr int kViewSetVersion = 1;
 
+/// One picture: from where it was taken, and of which pose.
 struct PosedView {
   std::filesystem::path image;
   std::filesystem::path mask;  ///< empty: the picture's alpha, if it has one
-  Index camera = 0;
-  Index frame = 0;
+  Index camera = 0;            ///< of the set's cameras
+  Index frame = 0;             ///< of the set's motion
 };
 
 /// A set of views; its images stay in their files.
 struct ViewSet {
-  std::filesystem::path file;  ///< for messages
+  std::filesystem::path file;  ///< views.json itself, for messages
   Motion motion;
   std::vector<Camera> cameras;
   std::vector<PosedView> views;
+  std::filesystem::path motion_file, cameras_file;
+
+  /// All files of the set.
+  std::vector<std::filesystem::path> files() const;
 };
 
 /// Reads a set. Throws UserError naming file, JSON pointer, value and what is allowed; as read_motion and read_cameras.

@@ -98,6 +98,7 @@ void apply_quality(RenderSettings& settings, Quality quality);
 /// 1e-4, its square support of 3σ, and the gradient passed through the cap.
 void apply_compatibility(RenderSettings& settings, Compatibility compatibility);
 
+/// Describe the sections `skip` and `approx`.
 void describe(ConfigFields& fields, RenderSkips& skip);
 void describe(ConfigFields& fields, RenderApproximations& approx);
 

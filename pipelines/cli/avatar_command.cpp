@@ -72,6 +72,16 @@ std::string weights_text(const Avatar& avatar) {
   return text + "; joints that move none: " + std::to_string(idle);
 }
 
+std::string colors_text(const std::optional<ColorNet>& net) {
+  if (!net) return "the avatar's own, without a color net";
+  std::string widths = std::to_string(net->layers.front().inputs);
+  for (const ColorNet::Layer& layer : net->layers) widths += "-" + std::to_string(layer.outputs);
+  return "a color net of " + count_text(std::ssize(net->layers), "layer") + " (" + widths +
+         "): " + count_text(net->features_per_row, "feature") + " a Gaussian, pose of " +
+         count_text(std::ssize(net->code_joints), "joint") + ", " + (net->view_direction ? "with" : "without") +
+         " the direction of view";
+}
+
 std::string skeleton_text(const Avatar& avatar) {
   return count_text(avatar.joint_count(), "joint") +
          (avatar.joint_names == smplx_joint_names() && avatar.parents == smplx_parents() ? " of SMPL-X" : "");
@@ -110,7 +120,7 @@ std::string avatar_info_command(const std::string& path) {
   const GaussianStatistics s = statistics_of(rest_gaussians(avatar));
   std::string text = path + ": avatar of " + count_text(s.count, "Gaussian") + ", " + skeleton_text(avatar) + "\n";
   if (s.count == 0) return text + "  notice   the file holds no Gaussians\n";
-  text += "  weights  " + weights_text(avatar) + "\n";
+  text += "  weights  " + weights_text(avatar) + "\n  colors   " + colors_text(avatar.color_net) + "\n";
   return text + statistics_text(s);
 }
 

@@ -24,7 +24,7 @@ std::string avatar_make_command(const AvatarOptions& options);
 /// Throws UserError naming the option, and as read_scene, read_smplx and import_avatar.
 std::string avatar_import_command(const AvatarOptions& options);
 
-/// What an avatar's file holds: Gaussians, skeleton, weights, suspicious things.
+/// What an avatar's file holds: Gaussians, skeleton, weights, color net, suspicious things.
 /// Throws as read_avatar.
 std::string avatar_info_command(const std::string& path);
 

@@ -13,7 +13,9 @@ namespace hsi4d::cli {
 /// what the command prints: how well views are shown, those that were learnt from and those that were held back.
 ///
 /// @param out  a file, *.safetensors
-/// Throws as load_avatar_fit, read_view_set, fit_avatar, write_avatar.
+/// Throws UserError, before anything is learnt, when `out` has another ending, is a file that is read (the config, what
+/// the config names, a file of the set), or cannot be written; as load_avatar_fit, read_view_set, fit_avatar,
+/// write_avatar.
 std::string avatar_fit_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                                const std::filesystem::path& out, bool quiet, const std::vector<LossTerm>& terms);
 

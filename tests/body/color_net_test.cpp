@@ -189,5 +189,49 @@ TEST_CASE("what does not fit in a color net's file is told") {
   CHECK(written(14, 3) == "no error");
   CHECK(written(17, 3) == "no error");
   CHECK(written(15, 3).find("has 15 rows; allowed: 14, or 3 more with a direction of view") != std::string::npos);
+  CHECK(written(14, 0).find("color_net/weights0': has no columns; a layer gives at least one number") !=
+        std::string::npos);
   CHECK(written(14, 4).find("the last layer gives 4 numbers; allowed: 3") != std::string::npos);
+}
+
+TEST_CASE("a file with more layers than a color net can have, or without one in between, is refused") {
+  const auto read = [](const std::vector<int>& layers) {
+    SafetensorsWriter writer("test", 1);
+    writer.add<float>("color_net/features", {20, 3}, std::vector<float>(60));
+    writer.add<std::int32_t>("color_net/code_joints", {0}, std::vector<std::int32_t>{});
+    for (const int l : layers) {
+      writer.add<float>("color_net/weights" + std::to_string(l), {3, 3}, std::vector<float>(9));
+      writer.add<float>("color_net/bias" + std::to_string(l), {3}, std::vector<float>(3));
+    }
+    const Bytes bytes = writer.encode();
+    return message_of([&] {
+      const auto net = color_net_of(Safetensors::decode(bytes, "net"), 20, kJoints);
+      CHECK(net->layers.size() == layers.size());
+    });
+  };
+  CHECK(read({0, 1, 2, 3, 4, 5, 6, 7}) == "no error");
+  CHECK(read({0, 1, 2, 3, 4, 5, 6, 7, 8}) ==
+        "net: array 'color_net/weights8': is of no layer of the network, which ends with 'color_net/bias7'; allowed: "
+        "layers 0 to 7 without a gap");
+  CHECK(
+      read({0, 1, 3}).find("'color_net/weights3': is of no layer of the network, which ends with 'color_net/bias1'") !=
+      std::string::npos);
+  CHECK(read({1}).find("color_net/weights0") != std::string::npos);
+}
+
+TEST_CASE("a colour at an end of the range has a gradient, so that it can come back") {
+  const ColorNet net = new_color_net(random_means(2), kJoints, {});
+  Tape<float> tape;
+  const Var<float> colors = tape.parameter("colors", shape_of(2, 3));
+  tape.set(colors, {static_cast<float>(kLeastColor), static_cast<float>(kLargestColor), 0.5F, 0, 1, 0.25F});
+  const Var<float> pose = tape.constant("pose", shape_of(kJoints, 3));
+  const Var<float> loss = sum(
+      color_net(color_net_leaves(tape, net), colors, pose_code(rotations_from_axis_angle(pose), net.code_joints), {}));
+  tape.forward(loss);
+  tape.backward(loss);
+  const ConstArray<float> gradient = tape.gradient(colors);
+  for (Index i = 0; i < 3; ++i) CHECK(gradient.data[i] == Approx(1).epsilon(1e-4));
+  CHECK(gradient.data[3] == 0);  // beyond it there is none
+  CHECK(gradient.data[4] == 0);
+  CHECK(gradient.data[5] == Approx(1).epsilon(1e-4));
 }

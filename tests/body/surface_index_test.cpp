@@ -117,3 +117,17 @@ TEST_CASE("weights at a place are interpolated, the largest four kept and normal
   const std::vector<double> expected = {0.5, 0.3, 0.2, 0, 0.375 / 0.9, 0.2 / 0.9, 0.2 / 0.9, 0.125 / 0.9};
   for (std::size_t i = 0; i < expected.size(); ++i) CHECK(weights.weights[i] == Approx(expected[i]).margin(1e-15));
 }
+
+TEST_CASE("normals of vertices are those of the faces around them, by area; zero where there are none") {
+  BodyModel body;  // a square corner: one triangle in z = 0, one of three times its area in x = 0; then a point
+  body.vertices = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 3, 5, 5, 5, 2, 0, 0};
+  body.faces = {0, 1, 2, 0, 2, 3, 0, 1, 5};
+  const std::vector<Vector> normals = vertex_normals(body);
+  REQUIRE(normals.size() == 6);
+  CHECK((normals[1] - Vector(0, 0, 1)).norm() < 1e-15);
+  CHECK((normals[3] - Vector(1, 0, 0)).norm() < 1e-15);
+  CHECK((normals[0] - Vector(3, 0, 1) / std::sqrt(10.0)).norm() < 1e-15);
+  CHECK((normals[2] - normals[0]).norm() < 1e-15);
+  CHECK(normals[4] == Vector(0, 0, 0));  // of no face
+  CHECK(normals[5] == Vector(0, 0, 0));  // of a face without area
+}

@@ -65,6 +65,33 @@ void describe(ConfigFields& f, Settings& s) {
 
 }  // namespace kinds
 
+namespace paths {
+
+struct Leaf {
+  std::filesystem::path file;
+};
+
+struct Tree {
+  std::filesystem::path own, none;
+  double number = 1;
+  Leaf one;
+  ConfigMap<Leaf> named;
+  std::vector<Leaf> row;
+};
+
+void describe(ConfigFields& f, Leaf& s) { f.path("file", s.file, {}, "A file"); }
+
+void describe(ConfigFields& f, Tree& s) {
+  f.path("own", s.own, {}, "A file");
+  f.path("none", s.none, {}, "A file");
+  f.number("number", s.number, {}, "A number");
+  f.object("one", s.one, "A struct");
+  f.map("named", s.named, "Structs by name");
+  f.list("row", s.row, "Structs in a row");
+}
+
+}  // namespace paths
+
 namespace {
 
 kinds::Settings read(const std::string& text, const std::vector<std::string>& overrides = {}) {
@@ -93,6 +120,19 @@ std::string written(kinds::Settings settings) {
 }
 
 }  // namespace
+
+TEST_CASE("paths that are set are listed, wherever they are") {
+  paths::Tree tree{"/a", "", 2, {"/b"}, {{"x", {"/c"}}, {"y", {""}}, {"z", {"/d"}}}, {{""}, {"/e"}}};
+  ConfigFields fields;
+  describe(fields, tree);
+  std::vector<std::pair<std::string, std::string>> found;
+  for (const ConfigPath& path : list_paths(fields)) found.emplace_back(path.pointer, path.path.string());
+  CHECK(found == std::vector<std::pair<std::string, std::string>>{{"/own", "/a"},
+                                                                  {"/one/file", "/b"},
+                                                                  {"/named/x/file", "/c"},
+                                                                  {"/named/z/file", "/d"},
+                                                                  {"/row/1/file", "/e"}});
+}
 
 TEST_CASE("absent keys keep the defaults of the struct") {
   const kinds::Settings settings = read("{}");

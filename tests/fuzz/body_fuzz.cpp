@@ -12,7 +12,7 @@ namespace hsi4d::fuzz {
 
 namespace {
 
-Bytes small_avatar() {
+Bytes small_avatar(bool with_net) {
   Avatar a;
   a.means = {0, 1, 2};
   a.quats = {1, 0, 0, 0};
@@ -23,6 +23,7 @@ Bytes small_avatar() {
   a.parents = {-1, 0};
   a.joints = {0, 0, 0, 0, 1, 0};
   a.joint_names = {"root", "tip"};
+  if (with_net) a.color_net = new_color_net(a.means, a.joint_count(), {2, 3, 1, true, 0});
   return avatar_file(a).encode();
 }
 
@@ -91,7 +92,8 @@ Bytes small_vposer() {
 }  // namespace
 
 std::vector<Bytes> corpus() {
-  return {small_avatar(), first_avatar(), small_motion(true), small_motion(false), small_parameters(), small_vposer()};
+  return {small_avatar(false), small_avatar(true), first_avatar(), small_motion(true),
+          small_motion(false), small_parameters(), small_vposer()};
 }
 
 bool accepts(std::span<const uint8_t> file) {

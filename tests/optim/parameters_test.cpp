@@ -33,3 +33,18 @@ TEST_CASE("wrapping that changes nothing does not make results stale") {
   CHECK_NOTHROW(tape.backward(w, std::vector<float>{1, 1, 1}));
   CHECK(tape.mark().arrays == before.arrays);
 }
+
+TEST_CASE("numbers beyond a range are put on its ends, others stay as they are") {
+  Tape<float> tape;
+  const auto x = tape.parameter("x", image_shape<float>(2, 2, 3));  // rows with padding
+  const std::vector<float> given = {0.2F, 0.9F, 0.5F, -3, 7, 0.1F, 0.5F, 0.6F, 0.7F, 0.3F, 1e30F, -0.0F};
+  const std::vector<float> held = {0.2F, 0.8F, 0.5F, 0.2F, 0.8F, 0.2F, 0.5F, 0.6F, 0.7F, 0.3F, 0.8F, 0.2F};
+  tape.set(x, given);
+  CHECK(hold_in_range(x, {0.2, 0.8}));
+  std::vector<float> now;
+  for (Index r = 0; r < 4; ++r) now.insert(now.end(), tape.value(x).row(r), tape.value(x).row(r) + 3);
+  CHECK(now == held);
+  tape.forward(x);
+  CHECK_FALSE(hold_in_range(x, {0.2, 0.8}));
+  CHECK_NOTHROW(tape.backward(x, std::vector<float>(12, 1)));  // nothing was written: nothing is stale
+}

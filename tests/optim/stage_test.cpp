@@ -1,5 +1,6 @@
 #include "optim/stage.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -140,6 +141,38 @@ TEST_CASE("a stage keeps axis-angles within half a turn, and forgets what it kne
   CHECK(turn(false, 3).moments.blocks[0].mean[0] != 0);
   CHECK(turn(true, 5).w > wrapped.w);  // and on from there
   CHECK(turn(true, 5).w < 0);
+}
+
+TEMPLATE_TEST_CASE("a stage keeps parameters in their range, from where they come back", "", float, double) {
+  using S = TestType;
+  // What is rendered is clamped to the range, as an operator does that is defined on it alone: beyond it there is no
+  // gradient. The target is first above what can be shown, later in the middle.
+  const auto last = [](S start) {
+    Tape<S> tape;
+    const Var<S> x = tape.parameter("x", shape_of(2, 3));
+    tape.set(x, std::vector<S>(6, start));
+    LossInputs<S> inputs;
+    inputs.rendered = clamp(x, 0.1, 0.9);
+    inputs.target = tape.constant("target", shape_of(2, 3));
+    tape.set(inputs.target, std::vector<S>(6, S(2)));
+    std::vector<ParameterGroup<S>> groups = {{"x", {x}}};
+    groups[0].range = ParameterRange{0.1, 0.9};
+    const std::vector<LossTerm> terms = {make_loss_term(
+        "distance", "To the target", [](const auto& in) { return sum(square(in.rendered - in.target)); })};
+    StageSettings settings;
+    settings.iterations = 150;
+    settings.optimize = {{"x", moving(0.05)}};
+    settings.losses = {{"distance", weighted(1)}};
+    run_stage(tape, settings, terms, inputs, groups, [&](const IterationReport& report) {
+      const ConstArray<S> now = tape.value(x);
+      CHECK(std::all_of(now.data, now.data + 6, [](S v) { return v >= S(0.1) && v <= S(0.9); }));
+      if (report.iteration == 20) tape.set(inputs.target, std::vector<S>(6, S(0.5)));
+    });
+    return static_cast<double>(tape.value(x)(0, 0));
+  };
+  CHECK(last(S(0.5)) == Approx(0.5).margin(0.01));
+  CHECK(last(S(-4)) == Approx(0.5).margin(0.01));
+  CHECK(last(S(1.5)) == Approx(0.5).margin(0.01));
 }
 
 TEMPLATE_TEST_CASE("a stage makes its loss small and leaves the tape as it was", "", float, double) {

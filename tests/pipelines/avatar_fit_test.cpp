@@ -1,5 +1,8 @@
 #include "pipelines/avatar_fit.h"
 
+#include <algorithm>
+#include <array>
+
 #include <catch2/catch.hpp>
 
 #include "body/procedural_body.h"
@@ -71,12 +74,15 @@ TEST_CASE("an avatar is learnt from pictures, and shown from where nobody stood"
   settings.stage.iterations = 1;
   const AvatarFitResult before = fitted(settings), after = fitted(quick_fit(made_views()));
   WARN("held back: " << before.held.psnr_db << " dB before, " << after.held.psnr_db << " dB after, of the human "
-                     << after.held.psnr_foreground_db << "; learnt " << after.learnt.psnr_db);
+                     << after.held.psnr_foreground_db.value() << "; learnt " << after.learnt.psnr_db
+                     << ", of the human " << after.learnt.psnr_foreground_db.value());
   CHECK(after.learnt.views == 6);
   CHECK(after.held.views == 2);
   CHECK(after.held.psnr_db > before.held.psnr_db + 4);
   CHECK(after.held.psnr_db > 30);
+  CHECK(after.held.psnr_foreground_db.value() > 21);
   CHECK(after.learnt.psnr_db > 38);
+  CHECK(after.learnt.psnr_foreground_db.value() > 32);
   CHECK(after.avatar.count() == 2500);
   CHECK(after.avatar.means == before.avatar.means);  // not among what moves
   CHECK(after.avatar.colors != before.avatar.colors);
@@ -84,6 +90,49 @@ TEST_CASE("an avatar is learnt from pictures, and shown from where nobody stood"
   const TemporaryFolder folder;
   write_avatar(folder / "a.safetensors", after.avatar);
   CHECK(read_avatar(folder / "a.safetensors").colors == after.avatar.colors);
+}
+
+TEST_CASE("colours that are beyond what can be shown, or learnt, come back") {
+  const TemporaryFolder folder;
+  AvatarFitSettings settings = quick_fit(made_views(), 25);
+  settings.stage.optimize = {{"colors", {.lr = 0.05, .until = {}}}};
+  Avatar start = first_avatar(settings);
+  start.color_net.reset();
+  for (std::size_t i = 0; i < start.colors.size(); ++i) start.colors[i] = std::array{0.0F, 1.6F, -0.4F}[i % 3];
+  write_avatar(folder / "start.safetensors", start);
+  settings.avatar = folder / "start.safetensors";
+  for (const ColorNetUse use : {ColorNetUse::kOn, ColorNetUse::kOff}) {
+    settings.color_net.use = use;
+    AvatarFitSettings first = settings;
+    first.stage.iterations = 1;
+    const AvatarFitResult before = fitted(first), after = fitted(settings);
+    const double low = use == ColorNetUse::kOn ? kLeastColor : 0, high = use == ColorNetUse::kOn ? kLargestColor : 1;
+    const auto is_shown = [&](float c) { return c >= static_cast<float>(low) && c <= static_cast<float>(high); };
+    CHECK(std::all_of(after.avatar.colors.begin(), after.avatar.colors.end(), is_shown));
+    CHECK(after.learnt.psnr_foreground_db.value() > before.learnt.psnr_foreground_db.value() + 3);
+
+    // Of what does not move nothing is changed, be it as it may.
+    first.stage.optimize = {{"opacity_logits", {.lr = 0.05, .until = {}}}};
+    CHECK((fitted(first).avatar.colors == start.colors));
+  }
+}
+
+TEST_CASE("what a fit measures is what the file of its avatar shows") {
+  const TemporaryFolder folder;
+  for (const ColorNetUse use : {ColorNetUse::kOn, ColorNetUse::kOff}) {
+    AvatarFitSettings settings = quick_fit(made_views(), 8);
+    settings.stage.optimize = {{"colors", {.lr = 0.3, .until = {}}}, {"color_net", {.lr = 0.01, .until = {}}}};
+    settings.color_net.use = use;
+    const AvatarFitResult result = fitted(settings);
+    write_avatar(folder / "a.safetensors", result.avatar);
+    settings.avatar = folder / "a.safetensors";
+    settings.stage.iterations = 1;
+    settings.stage.optimize = {{"opacity_logits", {.lr = 1e-30, .until = {}}}};  // which changes nothing
+    const AvatarFitResult again = fitted(settings);
+    CHECK((again.avatar.colors == result.avatar.colors));
+    CHECK(again.held.psnr_db == result.held.psnr_db);
+    CHECK(again.learnt.psnr_foreground_db == result.learnt.psnr_foreground_db);
+  }
 }
 
 TEST_CASE("an avatar fit is the same for any number of threads and again") {
@@ -160,6 +209,14 @@ TEST_CASE("an avatar fit refuses what it cannot do, and stops when asked") {
   AvatarFitSettings settings = quick_fit(made_views(), 5);
   settings.held_cameras = {0, 1, 2, 3};
   CHECK_THROWS_WITH(fitted(settings), Catch::Contains("all views are held back"));
+  settings.file = "fit.json";
+  settings.held_cameras = {0, 4};
+  CHECK_THROWS_WITH(fitted(settings), Catch::Contains("fit.json: /held_cameras/1: no view of ") &&
+                                          Catch::Contains("is of camera 4; there are 4, counted from 0"));
+  settings.held_cameras = {};
+  settings.held_frames = {2};
+  CHECK_THROWS_WITH(fitted(settings), Catch::Contains("fit.json: /held_frames/0: no view of ") &&
+                                          Catch::Contains("is of frame 2; there are 2, counted from 0"));
   settings = quick_fit(made_views(), 5);
   Observer observer;
   observer.stop_requested = [] { return true; };
@@ -198,40 +255,48 @@ TEST_CASE("an avatar of a real body, learnt from the reference's pictures, is ri
   settings.body.kind = BodyKind::kSmplx;
   settings.body.path = file;
   AvatarSettings truth;
-  truth.gaussians = 8000;
+  truth.gaussians = 6000;
   truth.seed = 11;
   const BodyModel body = rest_body(settings.body);
   const Avatar shown = surface_avatar(body, truth);
-  // Six cameras and four poses to learn from; one of each is held back.
+  // Six cameras and four poses to learn from. Held back are a seventh camera and a fifth pose, and both together.
   const Motion motion{10, view_poses(body, 5)};
-  const std::vector<Camera> cameras = ring_of_cameras(7, 128);
+  const std::vector<Camera> cameras = ring_of_cameras(7, 96);
   std::vector<PosedView> views;
-  fs::create_directories(fs::path(folder.path()) / "images");
-  for (Index pose = 0; pose < 5; ++pose) {
-    for (Index camera = 0; camera < 7; ++camera) {
-      const std::string name = "images/" + std::to_string(views.size()) + ".png";
-      write_image(folder / name, picture_with_alpha(shown, motion.poses[static_cast<std::size_t>(pose)],
-                                                    cameras[static_cast<std::size_t>(camera)], video_render_settings(),
-                                                    Precision::kReference, 2));
-      views.push_back({name, {}, camera, pose});
-    }
+  for (Index pose = 0; pose < 4; ++pose) {
+    for (Index camera = 0; camera < 6; ++camera) views.push_back({{}, {}, camera, pose});
   }
+  const std::vector<std::pair<Index, Index>> held = {{6, 0}, {6, 2}, {0, 4}, {3, 4}, {6, 4}};
+  for (const auto& [camera, pose] : held) views.push_back({{}, {}, camera, pose});
+  fs::create_directories(fs::path(folder.path()) / "images");
+  parallel_for(std::ssize(views), 1, [&](Index begin, Index end) {  // the reference uses one thread a picture
+    for (Index v = begin; v < end; ++v) {
+      PosedView& view = views[static_cast<std::size_t>(v)];
+      view.image = "images/" + std::to_string(v) + ".png";
+      write_image(folder / view.image.string(),
+                  picture_with_alpha(shown, motion.poses[static_cast<std::size_t>(view.frame)],
+                                     cameras[static_cast<std::size_t>(view.camera)], video_render_settings(),
+                                     Precision::kReference, 2));
+    }
+  });
   write_motion(folder / "motion.npz", motion);
   write_cameras(folder / "cameras.json", cameras);
   write_text_file(folder / "views.json", view_set_json("motion.npz", "cameras.json", views));
   settings.views = folder / "views.json";
   settings.held_cameras = {6};
   settings.held_frames = {4};
-  settings.gaussians = 12000;
+  settings.gaussians = 8000;
   settings.seed = 3;
-  settings.render.blur = 0.13;
-  settings.stage = quick_stage(1200);
+  settings.render.blur = 0.08;
+  settings.stage = quick_stage(600);
   settings.stage.optimize.push_back({"log_scales", {.lr = 0.004, .lr_final_share = 0.1, .until = {}}});
   const AvatarFitResult result = fitted(settings);
   WARN("held back: " << result.held.views << " views, " << result.held.psnr_db << " dB, of the human alone "
-                     << result.held.psnr_foreground_db << " dB; learnt: " << result.learnt.views << " views, "
-                     << result.learnt.psnr_db << " dB; " << result.stage.seconds << " s");
-  CHECK(result.held.views == 11);
+                     << result.held.psnr_foreground_db.value() << " dB; learnt: " << result.learnt.views << " views, "
+                     << result.learnt.psnr_db << " dB, of the human alone " << result.learnt.psnr_foreground_db.value()
+                     << " dB; " << result.stage.seconds << " s");
+  CHECK(result.held.views == 5);
   CHECK(result.learnt.views == 24);
   CHECK(result.held.psnr_db >= 30);
+  CHECK(result.held.psnr_foreground_db.value() >= 30);
 }

@@ -4,6 +4,8 @@
 
 #include "core/check.h"
 #include "core/config_file.h"
+#include "core/file.h"
+#include "optim/loss_term.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_losses.h"
 
@@ -55,6 +57,24 @@ TEST_CASE("a run config is read into its structs") {
   CHECK(photo.weight == 0.5);
   CHECK(photo.own_as<PhotoSettings>().masked);
   CHECK(photo.own_as<PhotoSettings>().ssim_share == 0.1);
+}
+
+TEST_CASE("files that stages name are inputs of the run, by their pointers") {
+  const TemporaryFolder folder;
+  folder.write("w.npz", "weights");
+  const auto files_of = [&](const std::string& weights) {
+    const std::string text = R"({"body": {"kind": "smplx", "path": "w.npz"}, "stages": {"refine": {"iterations": 1,
+      "optimize": {}, "losses": {"pose_prior": {"weights": ")" +
+                             weights + R"("}}}}})";
+    const std::vector<LossDescription> losses = descriptions_of(loss_terms());
+    return stage_files(load_run_config(folder.write("run.json", text), {}, losses), losses);
+  };
+  CHECK(files_of("").empty());
+  CHECK(files_of(".").empty());  // a folder
+  const std::vector<ConfigPath> files = files_of("w.npz");
+  REQUIRE(files.size() == 1);
+  CHECK(files[0].pointer == "/stages/refine/losses/pose_prior/weights");
+  CHECK(read_text_file(files[0].path.string()) == "weights");
 }
 
 TEST_CASE("the resolved config holds every default and reads back to the same bytes") {

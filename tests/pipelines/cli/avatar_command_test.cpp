@@ -24,6 +24,7 @@ TEST_CASE("hsi4d avatar makes an avatar, tells of it and imports it again") {
 
   const ProgramResult told = run_hsi4d({"avatar", "info", "a.safetensors"});
   REQUIRE(told.status == 0);
+  CHECK_THAT(told.out, Contains("\n  colors   the avatar's own, without a color net\n"));
   CHECK_THAT(told.out, Contains("a.safetensors: avatar of 2000 Gaussians, 55 joints of SMPL-X\n  weights  up to 4 a "
                                 "Gaussian (1: ") &&
                            Contains("\n  bounds   x -") && Contains("\n  opacity  0.98, 0.98, 0.98, 0.98, 0.98\n") &&
@@ -39,6 +40,10 @@ TEST_CASE("hsi4d avatar makes an avatar, tells of it and imports it again") {
   CHECK_THAT(imported.out, Contains("b.safetensors: 2000 Gaussians, 55 joints of SMPL-X; from the surface 0 mm on "
                                     "average, 0 mm at most\n"));
   CHECK(read_avatar("b.safetensors").means == avatar.means);
+}
+
+TEST_CASE("hsi4d avatar make gives an avatar as many Gaussians as are useful, unless asked for fewer") {
+  CHECK(cli::AvatarOptions().settings.gaussians == 50000);
 }
 
 TEST_CASE("hsi4d avatar names what is wrong") {

@@ -101,7 +101,9 @@ TEST_CASE("bench skinning measures a body and writes one object a measurement") 
   const auto posing =
       nlohmann::json::parse(read_text_file(options.json).substr(0, read_text_file(options.json).find('\n')));
   CHECK(posing.at("name") == "skinning/posing/forward");
-  CHECK(posing.at("vertices") == 50000);
+  CHECK(posing.at("gaussians") == 50000);
+  CHECK_FALSE(posing.contains("vertices"));
+  CHECK_FALSE(posing.contains("corrective_columns"));
   CHECK(posing.at("min_ms") > 0);
   options.workloads = {"fixed_hand"};
   CHECK_THROWS_WITH(cli::bench_skinning_command(options),

@@ -1,0 +1,136 @@
+#include "pipelines/cli/avatar_fit_command.h"
+
+#include <catch2/catch.hpp>
+
+#include "body/avatar.h"
+#include "core/check.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "optim/loss_term.h"
+#include "pipelines/cli/avatar_command.h"
+#include "pipelines/synthetic_views.h"
+#include "pipelines/view_set.h"
+#include "tests/support/program.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kPixels = 24;
+
+/// A few small pictures of three cameras and a config to learn from them, in the current folder.
+void write_inputs() {
+  SyntheticSettings settings;
+  settings.kind = SyntheticKind::kViews;
+  settings.size_px = kPixels;
+  settings.supersample = 1;
+  settings.avatar_gaussians = 300;
+  settings.views_cameras = 3;
+  settings.views_poses = 1;
+  write_views(settings, {}, "views");
+  write_text_file("fit.json", R"({
+    "views": "views/views.json",
+    "gaussians": 200,
+    "held_cameras": [2],
+    "color_net": {"features": 4, "hidden_width": 8, "hidden_layers": 1},
+    "stage": {"iterations": 3, "optimize": {"colors": {"lr": 0.05}}, "losses": {"photometric": {}}}
+  })");
+}
+
+std::string fit(const std::string& out, const std::vector<std::string>& overrides = {}) {
+  return cli::avatar_fit_command("fit.json", overrides, out, true, loss_terms());
+}
+
+std::string refusal(const std::string& out, const std::vector<std::string>& overrides = {}) {
+  try {
+    fit(out, overrides);
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+}  // namespace
+
+TEST_CASE("hsi4d avatar fit learns an avatar, writes it and tells how well it shows the pictures") {
+  const TemporaryFolder folder;
+  write_inputs();
+  const ProgramResult fitted = run_hsi4d({"avatar", "fit", "fit.json", "--quiet", "--out", "a.safetensors"});
+  CHECK(fitted.err.empty());
+  REQUIRE(fitted.status == 0);
+  CHECK_THAT(fitted.out, Contains("a.safetensors: 200 Gaussians, 3 iterations, loss ") &&
+                             Contains("\n  learnt: 2 views, PSNR ") && Contains(" dB, of the human alone ") &&
+                             Contains("\n  held back: 1 view, PSNR "));
+  const Avatar avatar = read_avatar("a.safetensors");
+  CHECK(avatar.count() == 200);
+  CHECK(avatar.color_net.has_value());
+  CHECK_THAT(
+      cli::avatar_info_command("a.safetensors"),
+      Contains("\n  colors   a color net of 2 layers (193-8-3): 4 features a Gaussian, pose of 21 joints, without "
+               "the direction of view\n"));
+
+  // It goes on from there.
+  const std::string again = fit("b.safetensors", {"avatar=a.safetensors", "stage.iterations=1"});
+  CHECK_THAT(again, Contains("b.safetensors: 200 Gaussians, 1 iteration, loss "));
+}
+
+TEST_CASE("hsi4d avatar fit says nothing of the human alone where nothing tells which pixels show it") {
+  const TemporaryFolder folder;
+  write_inputs();
+  for (const char* name : {"views/images/0000.png", "views/images/0001.png", "views/images/0002.png"}) {
+    write_image(name, take_channels(read_image(name), 0, 3));
+  }
+  const std::string told = fit("a.safetensors", {"stage.iterations=1", "color_net.use=off"});
+  CHECK_THAT(told, Contains("held back: 1 view, PSNR ") && !Contains("of the human alone"));
+}
+
+TEST_CASE("hsi4d avatar fit looks where it writes before it learns, and replaces nothing that it reads") {
+  const TemporaryFolder folder;
+  write_inputs();
+  ViewSet set = read_view_set("views/views.json");
+  for (PosedView& view : set.views) view.image = fs::path("images") / view.image.filename();
+  write_image("views/mask.png", Image(1, kPixels, kPixels));
+  set.views[1].mask = "mask.png";
+  write_text_file("views/views.json", view_set_json("motion.npz", "cameras.json", set.views));
+  cli::AvatarOptions start;
+  start.settings.gaussians = 100;
+  start.out = "start.safetensors";
+  cli::avatar_make_command(start);
+  const std::vector<std::string> goes_on = {"avatar=start.safetensors"};
+
+  CHECK(refusal("a.npz") == "hsi4d avatar fit: --out: a.npz does not end as it must; allowed: .safetensors");
+  CHECK(refusal("views/images/0000.png") ==
+        "hsi4d avatar fit: --out: views/images/0000.png does not end as it must; allowed: .safetensors");
+  for (const char* name : {"fit.json", "views/views.json", "views/motion.npz", "views/cameras.json",
+                           "views/images/0000.png", "views/images/0002.png", "views/mask.png", "start.safetensors"}) {
+    const std::string before = file_text(name);
+    fs::remove("link.safetensors");
+    fs::create_symlink(name, "link.safetensors");
+    const std::string told = refusal("link.safetensors", goes_on);
+    CHECK_THAT(told, Contains("hsi4d avatar fit: --out: link.safetensors is the file that is read, ") &&
+                         Contains(fs::path(name).filename().string() + ", which would be replaced"));
+    CHECK(file_text(name) == before);
+  }
+  CHECK_THAT(refusal("start.safetensors", goes_on), Contains("start.safetensors is the file that is read"));
+
+  // Told before a picture is looked at: this one would be refused.
+  write_image("views/images/0001.png", Image(3, 5, 5));
+  CHECK_THAT(refusal("nowhere/a.safetensors"), Contains("nowhere/a.safetensors: cannot be written"));
+  CHECK_THROWS_WITH(fit("a.safetensors"), Contains("is 5x5 pixels"));
+  CHECK_FALSE(fs::exists("a.safetensors"));
+}
+
+TEST_CASE("hsi4d avatar fit refuses to hold back what is not there") {
+  const TemporaryFolder folder;
+  write_inputs();
+  CHECK_THAT(refusal("a.safetensors", {"held_cameras=[2,9]"}),
+             Contains("fit.json: /held_cameras/1: no view of ") &&
+                 Contains("views.json is of camera 9; there are 3, counted from 0"));
+  CHECK_THAT(refusal("a.safetensors", {"held_frames=[1]"}),
+             Contains("fit.json: /held_frames/0: no view of ") &&
+                 Contains("views.json is of frame 1; there are 1, counted from 0"));
+  CHECK_FALSE(fs::exists("a.safetensors"));
+}
