@@ -111,6 +111,7 @@ void check_sizes(const Avatar& avatar) {
 Avatar avatar_of(const Safetensors& file) {
   file.require_format(kFormat, kAvatarVersion);
   Avatar avatar = avatar_in(file);
+  if (file.metadata().contains("body")) avatar.body = file.text("body");
   avatar.color_net = color_net_of(file, avatar.count(), avatar.joint_count());
   return avatar;
 }
@@ -139,6 +140,7 @@ SafetensorsWriter avatar_file(const Avatar& avatar) {
   file.add<std::int32_t>("parents", {j}, avatar.parents);
   file.add<double>("joints", {j, 3}, avatar.joints);
   file.set_texts("joint_names", avatar.joint_names);
+  if (!avatar.body.empty()) file.set_text("body", avatar.body);
   if (avatar.color_net) add_color_net(*avatar.color_net, file);
   return file;
 }

@@ -26,6 +26,7 @@ struct Avatar {
   std::vector<int> parents;              ///< [J], −1 for the root, which is joint 0; a joint comes after its parent
   std::vector<double> joints;            ///< [J,3] metres, rest pose
   std::vector<std::string> joint_names;  ///< [J]
+  std::string body = {};                 ///< BodyModel::name of the body that it was made on; empty: not known
   std::optional<ColorNet> color_net;     ///< what makes the colours follow the pose; none: `colors` as they are
 
   Index count() const { return static_cast<Index>(opacity_logits.size()); }
@@ -64,7 +65,8 @@ inline constexpr int kAvatarVersion = 2;
 
 /// An avatar's file (docs/avatar.md): safetensors of format "hsi4d avatar", with F32 `means` [N,3], `quats` [N,4],
 /// `log_scales` [N,3], `opacity_logits` [N], `colors` [N,3]; I32 `weight_indices` [N,K] and F64 `weights` [N,K] (K of 1
-/// to 8); I32 `parents` [J]; F64 `joints` [J,3]; the text `joint_names`; and the arrays of a color net where it has one
+/// to 8); I32 `parents` [J]; F64 `joints` [J,3]; the text `joint_names` and, where it is
+/// known, `body`; and the arrays of a color net where it has one
 /// (add_color_net). Files of version 1, which are .npz
 /// archives, are read too; the content says which it is, not the ending.
 ///

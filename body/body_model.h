@@ -11,9 +11,13 @@
 
 namespace hsi4d {
 
+/// Names of bodies: of a SMPL-X file, and the program's own in any shape.
+inline constexpr const char* kSmplxName = "smplx";
+inline constexpr const char* kProceduralName = "procedural";
+
 /// A body in its rest pose, a T: SMPL-X frame, Y up, x to the body's left, z forward.
 struct BodyModel {
-  std::string name;
+  std::string name;                      ///< kSmplxName, kProceduralName
   std::vector<float> vertices;           ///< [V,3] metres
   std::vector<std::int32_t> faces;       ///< [F,3] vertices, counter-clockwise seen from outside
   std::vector<std::string> joint_names;  ///< [J]

@@ -9,12 +9,12 @@
 #include "body/body_model.h"
 #include "core/quaternion.h"
 #include "core/rotation.h"
+#include "core/text.h"
 
 namespace hsi4d {
 
 namespace {
 
-constexpr Index kFirstHandJoint = 25, kHandJoints = 15;
 /// Frames that a folder may lack in a row.
 constexpr std::int64_t kLongestGap = 1000;
 
@@ -101,6 +101,12 @@ Motion resampled(const Motion& motion, double frame_rate) {
   const auto last = static_cast<double>(motion.poses.size() - 1);
   // A last frame that rounding puts just after the end, or beside a frame, is meant to be there.
   constexpr double kSame = 1e-9;
+  const double frames = std::floor((last + kSame * (last + 1)) / step) + 1;
+  if (frames > kMostFrames) {
+    throw UserError("a motion of " + std::to_string(motion.poses.size()) + " frames, " +
+                    number_text(motion.frame_rate) + " a second, has " + rounded(frames, 4) + " frames at " +
+                    rounded(frame_rate, 6) + " a second; allowed: at most " + rounded(kMostFrames, 7));
+  }
   for (std::size_t k = 0; static_cast<double>(k) * step <= last + kSame * (last + 1); ++k) {
     const double at = std::min(static_cast<double>(k) * step, last);
     const double nearest = std::round(at);
@@ -140,8 +146,28 @@ Rigid<double> z_up_from_y_up() {
 
 Motion with_pelvis(const Motion& motion, const Vector3<double>& from, const Vector3<double>& to) {
   Motion result = motion;
+  result.pelvis_rest = to;
+  if (from == to) return result;
   for (BodyPose& pose : result.poses) pose.transl += from - to;
   return result;
+}
+
+Motion for_body(const Motion& motion, std::string_view name, const Vector3<double>& pelvis) {
+  const Vector3<double>& unsaid = name == kProceduralName ? kSmplxPelvis : pelvis;
+  return with_pelvis(motion, motion.pelvis_rest.value_or(unsaid), pelvis);
+}
+
+Motion for_body(const Motion& motion, const BodyModel& body) {
+  return for_body(motion, body.name, pelvis_of(body.joints));
+}
+
+Motion for_body(const Motion& motion, const Avatar& avatar) {
+  return for_body(motion, avatar.body, pelvis_of(avatar.joints));
+}
+
+Vector3<double> pelvis_of(std::span<const double> joints) {
+  HSI4D_CHECK(joints.size() >= 3, "a body without joints");
+  return {joints[0], joints[1], joints[2]};
 }
 
 Motion with_hand_means(const Motion& motion, const SmplxModel& model) {
@@ -150,7 +176,7 @@ Motion with_hand_means(const Motion& motion, const SmplxModel& model) {
     HSI4D_CHECK_EQ(pose.joints(), kSmplxJoints);
     for (std::size_t side = 0; side < 2; ++side) {
       const std::vector<double>& mean = model.hands[side].mean;
-      const std::size_t first = static_cast<std::size_t>(3 * kFirstHandJoint) + 45 * side;
+      const std::size_t first = static_cast<std::size_t>(3 * kFirstHandJoint + kHandNumbers * static_cast<Index>(side));
       for (std::size_t i = 0; i < mean.size(); ++i) pose.axis_angle[first + i] += mean[i];
     }
   }
@@ -176,7 +202,7 @@ Motion motion_of(const SmplxSequence& sequence, double frame_rate) {
   motion.poses.assign(static_cast<std::size_t>(sequence.frames), rest_pose(kSmplxJoints));
   for (const Run& run : runs) {
     const bool is_hand = run.joint >= kFirstHandJoint;
-    if (is_hand && run.track.is_given() && run.track.width != 3 * kHandJoints) {
+    if (is_hand && run.track.is_given() && run.track.width != kHandNumbers) {
       throw DataError(sequence.source + ": array '" + run.name + "': has " + std::to_string(run.track.width) +
                       " numbers a frame; of a motion's hand 45 are needed");
     }

@@ -1,7 +1,9 @@
 // Motions of bodies, changed: other frame rates, another world, another body's pelvis.
 #pragma once
 
+#include "body/avatar.h"
 #include "body/motion_io.h"
+#include "body/pose_layout.h"
 #include "body/smplx_sequence.h"
 #include "core/rigid.h"
 
@@ -13,10 +15,14 @@ namespace hsi4d {
 /// Throws InternalError when the poses have different numbers of joints.
 BodyPose interpolated(const BodyPose& a, const BodyPose& b, double u);
 
+/// Frames that resampled makes at most.
+inline constexpr double kMostFrames = 1e6;
+
 /// The same movement in another frame rate: frame k is at k / frame_rate seconds, from the first frame of `motion` to
 /// the last that is not after its end. Frames that coincide keep their bits.
 ///
-/// Throws InternalError when there is no frame or a rate is not positive and finite.
+/// Throws UserError when that makes more than kMostFrames; InternalError when there is no frame or a rate is not
+/// positive and finite.
 Motion resampled(const Motion& motion, double frame_rate);
 
 /// The same movement in another world, x_to = R x + c. A body turns about its pelvis and not about the origin, so
@@ -35,13 +41,25 @@ Motion transformed(const Motion& motion, const std::vector<Rigid<double>>& to_fr
 /// z up from y up: (x, y, z) → (x, −z, y).
 Rigid<double> z_up_from_y_up();
 
-/// The same movement of a body whose pelvis stands elsewhere in its rest pose: t' = t + from − to.
+/// The same movement of a body whose pelvis stands elsewhere in its rest pose: t' = t + from − to; `pelvis_rest` is
+/// `to`. Translations keep their bits where the two are the same.
 Motion with_pelvis(const Motion& motion, const Vector3<double>& from, const Vector3<double>& to);
 
-/// Where the pelvis of the public models stands in the rest pose, neutral and of mean shape, metres: for files that do
-/// not say what body they are of.
-inline const Vector3<double> kSmplxPelvis{0.00312326, -0.35140747, 0.01203655};
-inline const Vector3<double> kSmplPelvis{-0.00217368, -0.24078917, 0.02858379};
+/// The motion for a body to use it on: its pelvis is put where the motion has it, and `pelvis_rest` is the body's.
+///
+/// A motion that does not say where its pelvis stands in the rest pose is one of SMPL-X. On a body called
+/// kProceduralName its pelvis is then taken for kSmplxPelvis; any other body is taken for the one that the motion is of
+/// (an avatar of a person in a shape, and the motion of that person), and translations stay as they are.
+///
+/// @param name    of the body: BodyModel::name, Avatar::body
+/// @param pelvis  where the body's pelvis stands in its rest pose, metres
+Motion for_body(const Motion& motion, std::string_view name, const Vector3<double>& pelvis);
+Motion for_body(const Motion& motion, const BodyModel& body);
+Motion for_body(const Motion& motion, const Avatar& avatar);
+
+/// Where the root stands in the rest pose, metres.
+/// @param joints  [J,3], of a body or an avatar
+Vector3<double> pelvis_of(std::span<const double> joints);
 
 /// Hands as they are, of hands that a file gives relative to the model's mean hands, as SMPLer-X does.
 Motion with_hand_means(const Motion& motion, const SmplxModel& model);

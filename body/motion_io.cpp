@@ -5,8 +5,10 @@
 #include <optional>
 
 #include "body/body_model.h"
+#include "body/motion_edit.h"
 #include "body/pose_layout.h"
 #include "core/npz.h"
+#include "core/text.h"
 
 namespace hsi4d {
 
@@ -21,7 +23,7 @@ struct Part {
 };
 
 constexpr Part kParts[] = {
-    {"root_orient", "global_orient", 0, 1, true}, {"pose_body", "body_pose", 1, 21, true},
+    {"root_orient", "global_orient", 0, 1, true}, {"pose_body", "body_pose", 1, kBodyJoints - 1, true},
     {"pose_jaw", "jaw_pose", 22, 1, false},       {"pose_eye", "eye_pose", 23, 2, false},
     {"pose_hand", "hand_pose", 25, 30, false},
 };
@@ -35,13 +37,29 @@ struct Half {
 constexpr Half kHalves[] = {
     {"leye_pose", 23, 1}, {"reye_pose", 24, 1}, {"left_hand_pose", 25, 15}, {"right_hand_pose", 40, 15}};
 
-/// A model whose rows of `poses` are read; smplx_runs says what the numbers are.
+/// Body models whose motions are read.
+enum class Model { kSmplx, kSmplh, kSmpl };
+
+const char* name_of(Model model) {
+  return model == Model::kSmplx ? "SMPL-X" : model == Model::kSmplh ? "SMPL-H" : "SMPL";
+}
+
+const Vector3<double>& pelvis_of(Model model) {
+  return model == Model::kSmplx ? kSmplxPelvis : model == Model::kSmplh ? kSmplhPelvis : kSmplPelvis;
+}
+
+/// A length of the rows of `poses`; smplx_runs says what the numbers are.
 struct RowLayout {
-  const char* name;
   int64_t numbers;
+  Model model;
+  bool may_be_other;  // models share these joints: the file may say that it is of another one
 };
 
-constexpr RowLayout kRowLayouts[] = {{"SMPL-X", 165}, {"SMPL-H", 156}, {"SMPL", 72}};
+constexpr RowLayout kRowLayouts[] = {{165, Model::kSmplx, false},
+                                     {156, Model::kSmplh, true},
+                                     {72, Model::kSmpl, false},
+                                     {69, Model::kSmpl, false},
+                                     {66, Model::kSmpl, true}};
 
 struct Rows {
   std::vector<double> numbers;
@@ -49,26 +67,33 @@ struct Rows {
   double at(std::size_t frame, std::size_t i) const { return numbers[frame * width + i]; }
 };
 
-void require_finite(const NpyArray& array, const std::vector<double>& numbers) {
+void require_in_range(const NpyArray& array, const std::vector<double>& numbers, bool are_places = false) {
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (std::isfinite(numbers[i])) continue;
+    if (std::abs(numbers[i]) <= (are_places ? kLargestPlace : kLargestBodyNumber)) continue;
     const std::size_t width = static_cast<std::size_t>(array.shape().empty() ? 1 : array.shape().back());
     throw DataError(array.source() + ": frame " + std::to_string(i / width) + ", number " + std::to_string(i % width) +
-                    " is not finite");
+                    (std::isfinite(numbers[i]) ? " is " + number_text(numbers[i]) +
+                                                     "; allowed: " + (are_places ? "-1e7 to 1e7" : kBodyNumbersText)
+                                               : " is not finite"));
   }
 }
 
-Rows rows_of(const NpyArray& array, int64_t frames, int64_t width) {
+Rows rows_of(const NpyArray& array, int64_t frames, int64_t width, bool are_places = false) {
   Rows rows{array.require_shape({frames, width}).as<double>(), static_cast<std::size_t>(width)};
-  require_finite(array, rows.numbers);
+  require_in_range(array, rows.numbers, are_places);
   return rows;
 }
 
-const NpyArray* find(const Npz& file, std::initializer_list<const char*> names) {
-  for (const char* name : names) {
-    if (file.has(name)) return &file.array(name);
-  }
-  return nullptr;
+/// The array of that name, null where there is none. One of Python objects throws, saying why it is not read.
+const NpyArray* find(const Npz& file, const char* name) {
+  const bool is_skipped = std::any_of(file.skipped().begin(), file.skipped().end(),
+                                      [&](const Npz::Skipped& member) { return member.name == name; });
+  return file.has(name) || is_skipped ? &file.array(name) : nullptr;
+}
+
+const NpyArray* find(const Npz& file, const char* name, const char* also) {
+  const NpyArray* array = find(file, name);
+  return array != nullptr ? array : find(file, also);
 }
 
 void put_joints(const Rows& rows, std::size_t from, std::size_t to, std::size_t joints, Motion& motion) {
@@ -77,21 +102,23 @@ void put_joints(const Rows& rows, std::size_t from, std::size_t to, std::size_t 
   }
 }
 
-void read_whole_poses(const NpyArray& array, Motion& motion) {
+/// @param named  the model that the file says it is of
+/// @return       the model that it is of
+Model read_whole_poses(const NpyArray& array, std::optional<Model> named, Motion& motion) {
   const int64_t frames = static_cast<int64_t>(motion.poses.size());
   const auto& shape = array.shape();
   std::string allowed;
   for (const RowLayout& layout : kRowLayouts) {
     if (shape.size() == 2 && shape[0] == frames && shape[1] == layout.numbers) {
       const Rows rows = rows_of(array, frames, layout.numbers);
-      for (const PoseRun& run : smplx_runs(layout.numbers / 3)) {
-        put_joints(rows, static_cast<std::size_t>(run.from), static_cast<std::size_t>(run.to),
-                   static_cast<std::size_t>(run.joints), motion);
+      for (std::size_t t = 0; t < motion.poses.size(); ++t) {
+        const std::span row = std::span(rows.numbers).subspan(t * rows.width, rows.width);
+        motion.poses[t].axis_angle = smplx_pose(row, array.source()).axis_angle;
       }
-      return;
+      return layout.may_be_other ? named.value_or(layout.model) : layout.model;
     }
     allowed += (allowed.empty() ? "" : ", ") + shape_text(std::vector<int64_t>{frames, layout.numbers}) + " (" +
-               layout.name + ")";
+               name_of(layout.model) + ")";
   }
   throw DataError(array.source() + ": has shape " + shape_text(shape) + "; allowed: " + allowed);
 }
@@ -105,13 +132,14 @@ void read_joints(const NpyArray& array, std::size_t first, std::size_t joints, M
 void read_halves(const Npz& file, const Part& part, Motion& motion) {
   for (const Half& half : kHalves) {
     const bool is_of_part = half.joint >= part.joint && half.joint < part.joint + part.joints;
-    if (is_of_part && file.has(half.name)) read_joints(file.array(half.name), half.joint, half.joints, motion);
+    const NpyArray* array = is_of_part ? find(file, half.name) : nullptr;
+    if (array != nullptr) read_joints(*array, half.joint, half.joints, motion);
   }
 }
 
 void read_parts(const Npz& file, Motion& motion) {
   for (const Part& part : kParts) {
-    const NpyArray* array = find(file, {part.name, part.also});
+    const NpyArray* array = find(file, part.name, part.also);
     if (array != nullptr) {
       read_joints(*array, part.joint, part.joints, motion);
     } else if (part.needed) {
@@ -123,19 +151,21 @@ void read_parts(const Npz& file, Motion& motion) {
 }
 
 double read_frame_rate(const Npz& file) {
-  const NpyArray* array = find(file, {"mocap_frame_rate", "mocap_framerate"});
+  const NpyArray* array = find(file, "mocap_frame_rate", "mocap_framerate");
   if (array == nullptr) return Motion{}.frame_rate;
   const double rate = array->scalar<double>();
-  if (!(rate > 0) || !std::isfinite(rate)) {
-    throw DataError(array->source() + ": is " + std::to_string(rate) + "; allowed: a positive number");
+  if (!(rate >= kSlowestMotion && rate <= kFastestMotion)) {
+    throw DataError(array->source() + ": is " + number_text(rate) +
+                    " frames a second; allowed: " + number_text(kSlowestMotion) + " to " + rounded(kFastestMotion, 6));
   }
   return rate;
 }
 
 /// The mean over frames of `betas`.
 std::vector<double> read_betas(const Npz& file, int64_t frames) {
-  if (!file.has("betas")) return {};
-  const NpyArray& array = file.array("betas");
+  const NpyArray* found = find(file, "betas");
+  if (found == nullptr) return {};
+  const NpyArray& array = *found;
   const auto& shape = array.shape();
   const bool is_row = shape.size() == 1, is_table = shape.size() == 2 && (shape[0] == 1 || shape[0] == frames);
   if (!is_row && !is_table) {
@@ -143,7 +173,7 @@ std::vector<double> read_betas(const Npz& file, int64_t frames) {
                     std::to_string(frames) + ",B]");
   }
   const std::vector<double> numbers = array.as<double>();
-  require_finite(array, numbers);
+  require_in_range(array, numbers);
   const auto width = static_cast<std::size_t>(shape.back());
   if (width == 0) return {};
   const std::size_t rows = numbers.size() / width;
@@ -154,34 +184,63 @@ std::vector<double> read_betas(const Npz& file, int64_t frames) {
   return mean;
 }
 
-/// A text; "neutral" where the file has none that can be read.
-std::string read_gender(const Npz& file) {
-  if (!file.has("gender")) return Motion{}.gender;
-  const NpyArray& array = file.array("gender");
+/// The text in an array, where there is one that can be read.
+std::optional<std::string> read_text(const Npz& file, const char* name) {
+  if (!file.has(name)) return {};
+  const NpyArray& array = file.array(name);
   const bool is_text = array.kind() == NpyKind::bytes || array.kind() == NpyKind::unicode;
-  return is_text && array.size() == 1 ? array.text() : Motion{}.gender;
+  return is_text && array.size() == 1 ? std::optional(array.text()) : std::nullopt;
+}
+
+std::optional<Model> read_model(const Npz& file) {
+  const std::optional<std::string> text = read_text(file, "surface_model_type");
+  if (text == "smplx") return Model::kSmplx;
+  if (text == "smplh") return Model::kSmplh;
+  if (text == "smpl") return Model::kSmpl;
+  return {};
+}
+
+std::optional<Vector3<double>> read_pelvis(const Npz& file) {
+  const NpyArray* array = find(file, "pelvis_rest");
+  if (array == nullptr) return {};
+  const std::vector<double> x = array->require_shape({3}).as<double>();
+  require_in_range(*array, x);
+  return Vector3<double>(x[0], x[1], x[2]);
+}
+
+/// The same movement of the neutral SMPL-X of mean shape: of the other model's shape it knows nothing.
+Motion converted(Motion motion, Model model) {
+  motion = with_pelvis(motion, motion.pelvis_rest.value_or(pelvis_of(model)), kSmplxPelvis);
+  motion.converted_from = name_of(model);
+  motion.lost_shape = std::any_of(motion.betas.begin(), motion.betas.end(), [](double beta) { return beta != 0; });
+  motion.betas.clear();
+  motion.gender = Motion{}.gender;
+  return motion;
 }
 
 Motion motion_of(const Npz& file) {
-  const NpyArray* trans = find(file, {"trans", "transl"});
+  const NpyArray* trans = find(file, "trans", "transl");
   if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'");
   const int64_t frames = trans->require_shape({-1, 3}).shape()[0];
   if (frames == 0) throw DataError(trans->source() + ": holds no frame");
-  const Rows places = rows_of(*trans, frames, 3);
+  const Rows places = rows_of(*trans, frames, 3, true);
   Motion motion;
   motion.frame_rate = read_frame_rate(file);
   motion.betas = read_betas(file, frames);
-  motion.gender = read_gender(file);
+  motion.gender = read_text(file, "gender").value_or(motion.gender);
+  motion.pelvis_rest = read_pelvis(file);
   motion.poses.assign(static_cast<std::size_t>(frames), rest_pose(kSmplxJoints));
-  for (std::size_t t = 0; t < motion.poses.size(); ++t) {
-    motion.poses[t].transl = {places.at(t, 0), places.at(t, 1), places.at(t, 2)};
-  }
-  if (file.has("poses")) {
-    read_whole_poses(file.array("poses"), motion);
+  const std::optional<Model> named = read_model(file);
+  Model model = named.value_or(Model::kSmplx);
+  if (const NpyArray* poses = find(file, "poses"); poses != nullptr) {
+    model = read_whole_poses(*poses, named, motion);
   } else {
     read_parts(file, motion);
   }
-  return motion;
+  for (std::size_t t = 0; t < motion.poses.size(); ++t) {
+    motion.poses[t].transl = {places.at(t, 0), places.at(t, 1), places.at(t, 2)};
+  }
+  return model == Model::kSmplx ? motion : converted(std::move(motion), model);
 }
 
 void add_joints(NpzWriter& file, const char* name, const Motion& motion, std::size_t first, std::size_t joints) {
@@ -217,6 +276,10 @@ void write_motion(const std::string& path, const Motion& motion) {
   std::vector<double> betas = motion.betas;
   betas.resize(std::max<std::size_t>(betas.size(), 10));
   file.add<double>("betas", {static_cast<int64_t>(betas.size())}, betas);
+  if (motion.pelvis_rest) {
+    const Vector3<double>& pelvis = *motion.pelvis_rest;
+    file.add<double>("pelvis_rest", {3}, {pelvis[0], pelvis[1], pelvis[2]});
+  }
   file.add_text("gender", motion.gender);
   file.add_text("surface_model_type", "smplx");
   file.add_scalar("mocap_frame_rate", motion.frame_rate);

@@ -10,7 +10,7 @@ namespace hsi4d {
 
 namespace {
 
-constexpr Index kSmplhJoints = 52, kSmplJoints = 24, kBodyJoints = 22, kFirstHandJoint = 25;
+constexpr Index kSmplhJoints = 52, kSmplJoints = 24;
 
 }  // namespace
 

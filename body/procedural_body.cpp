@@ -94,7 +94,7 @@ SmplxHand hand_space(int side) {
 BodyModel procedural_body() {
   const detail::NetMesh mesh = body_mesh();
   BodyModel body;
-  body.name = "procedural";
+  body.name = kProceduralName;
   body.joint_names = smplx_joint_names();
   body.parents = smplx_parents();
   body.joints = detail::procedural_joints();
@@ -114,6 +114,7 @@ SmplxModel procedural_smplx(Index betas) {
   const detail::ShapeDirections directions = detail::procedural_directions(body);
   SmplxModel model;
   model.source = "the procedural body";
+  model.name = kProceduralName;
   model.vertices.assign(body.vertices.begin(), body.vertices.end());
   model.faces = body.faces;
   model.parents = body.parents;

@@ -5,19 +5,21 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
+#include "body/pose_layout.h"
 #include "body/skinning.h"
 
 namespace hsi4d {
 
 namespace {
 
-constexpr Index kHandJoints = 15;
-
 /// The joints of each SmplxPart.
 struct JointRun {
   Index first, count;
 };
-constexpr std::array<JointRun, kSmplxParts> kPartJoints = {{{25, 15}, {40, 15}, {22, 3}, {1, 21}}};
+constexpr std::array<JointRun, kSmplxParts> kPartJoints = {{{kFirstHandJoint, kHandJoints},
+                                                            {kFirstHandJoint + kHandJoints, kHandJoints},
+                                                            {kBodyJoints, kFirstHandJoint - kBodyJoints},
+                                                            {1, kBodyJoints - 1}}};
 
 /// All columns as one group.
 template <class S>

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "body/pose_layout.h"
 #include "core/npz.h"
 #include "core/text.h"
 
@@ -13,9 +14,6 @@ namespace {
 
 constexpr Index kJoints = kSmplxJoints;
 constexpr Index kCorrectiveColumns = 9 * (kJoints - 1);
-constexpr Index kHandNumbers = 45;
-/// Larger numbers are no metres, radians or weights of a body; with these, sums and products fit into floats.
-constexpr double kLargestNumber = 1e6;
 
 /// Columns of `shapedirs`: shape first, expression from `expression_begin` on.
 struct ShapeColumns {
@@ -39,15 +37,15 @@ std::string place_of(const NpyArray& array, Index number) {
   return "[" + text + "]";
 }
 
-/// The numbers of an array of this shape (−1: any length), none beyond kLargestNumber.
+/// The numbers of an array of this shape (−1: any length), none beyond kLargestBodyNumber.
 std::vector<double> checked_numbers(const Npz& file, const char* name, std::initializer_list<int64_t> shape) {
   const NpyArray& array = file.array(name);
   std::vector<double> numbers = array.require_shape(shape).as<double>();
   const auto bad =
-      std::find_if(numbers.begin(), numbers.end(), [](double x) { return !(std::abs(x) <= kLargestNumber); });
+      std::find_if(numbers.begin(), numbers.end(), [](double x) { return !(std::abs(x) <= kLargestBodyNumber); });
   if (bad == numbers.end()) return numbers;
   throw DataError(array.source() + ": number " + place_of(array, bad - numbers.begin()) + " is " + number_text(*bad) +
-                  "; allowed: -1e6 to 1e6");
+                  "; allowed: " + kBodyNumbersText);
 }
 
 /// Columns [first, first + count) of rows of `width` numbers.
@@ -220,7 +218,7 @@ BodyModel rest_body(const SmplxModel& model, std::span<const double> betas) {
     return points;
   };
   BodyModel body;
-  body.name = "smplx";
+  body.name = model.name;
   const std::vector<double> vertices = shaped(model.vertices, model.shape);
   body.vertices.assign(vertices.begin(), vertices.end());
   body.faces = model.faces;

@@ -28,6 +28,7 @@ struct SmplxHand {
 /// A body model as its file has it. J = 55 joints in the order of smplx_joint_names.
 struct SmplxModel {
   std::string source;                    ///< the file, for messages
+  std::string name = kSmplxName;         ///< of the bodies that it makes
   std::vector<double> vertices;          ///< [V,3] metres, the template
   std::vector<std::int32_t> faces;       ///< [F,3]
   std::vector<int> parents;              ///< [J], −1 for the pelvis

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/pose_layout.h"
 #include "core/npz.h"
 #include "core/suggest.h"
 #include "core/text.h"
@@ -10,10 +11,6 @@
 namespace hsi4d {
 
 namespace {
-
-constexpr Index kHandNumbers = 45;
-/// As in body models: larger numbers are no metres, radians or coefficients, and would not fit into floats.
-constexpr double kLargestNumber = 1e6;
 
 struct Field {
   const char* name;
@@ -33,8 +30,8 @@ constexpr Field kFields[] = {
     {"jaw_pose", &SmplxSequence::jaw_pose, 1, 3, 3},
     {"leye_pose", &SmplxSequence::leye_pose, 1, 3, 3},
     {"reye_pose", &SmplxSequence::reye_pose, 1, 3, 3},
-    {"left_hand_pose", &SmplxSequence::left_hand_pose, 15, 0, kHandNumbers},
-    {"right_hand_pose", &SmplxSequence::right_hand_pose, 15, 0, kHandNumbers},
+    {"left_hand_pose", &SmplxSequence::left_hand_pose, kHandJoints, 0, kHandNumbers},
+    {"right_hand_pose", &SmplxSequence::right_hand_pose, kHandJoints, 0, kHandNumbers},
     {"transl", &SmplxSequence::transl, 0, 3, 3},
 };
 
@@ -86,10 +83,10 @@ SmplxTrack read_track(const Field& field, const NpyArray& array, Index other_fra
   if (track.rows == 0) throw DataError(array.source() + ": holds no frame");
   track.numbers = array.as<double>();
   for (std::size_t i = 0; i < track.numbers.size(); ++i) {
-    if (std::abs(track.numbers[i]) <= kLargestNumber) continue;
+    if (std::abs(track.numbers[i]) <= kLargestBodyNumber) continue;
     const auto width = static_cast<std::size_t>(track.width);
     throw DataError(array.source() + ": frame " + std::to_string(i / width) + ", number " + std::to_string(i % width) +
-                    " is " + number_text(track.numbers[i]) + "; allowed: -1e6 to 1e6");
+                    " is " + number_text(track.numbers[i]) + "; allowed: " + kBodyNumbersText);
   }
   return track;
 }
@@ -135,7 +132,7 @@ bool read_tracks(const Npz& file, bool of_hands, SmplxSequence& sequence) {
   for (const Field& field : kFields) {
     const bool is_skipped = std::any_of(file.skipped().begin(), file.skipped().end(),
                                         [&](const Npz::Skipped& s) { return s.name == field.name; });
-    if ((field.joints == 15) != of_hands || (!file.has(field.name) && !is_skipped)) continue;
+    if ((field.joints == kHandJoints) != of_hands || (!file.has(field.name) && !is_skipped)) continue;
     sequence.*field.track = read_track(field, file.array(field.name), other_frames);
     is_any = true;
   }
@@ -208,9 +205,9 @@ SmplxFrames<S> pose_frames(const SmplxModel& model, const SmplxSequence& sequenc
     leaves.push_back({&track, var});
   };
   for (const Field& field : kFields) {
-    if (field.joints == 15) check_hand(model, sequence, field, hands);
+    if (field.joints == kHandJoints) check_hand(model, sequence, field, hands);
   }
-  const auto hand_rows = [&](const SmplxTrack& hand) { return is_pca(hand, hands) ? 1 : Index{15}; };
+  const auto hand_rows = [&](const SmplxTrack& hand) { return is_pca(hand, hands) ? 1 : kHandJoints; };
   add("betas", p.betas, sequence.betas, 1);
   add("expression", p.expression, sequence.expression, 1);
   add("global_orient", p.global_orient, sequence.global_orient, 1);

@@ -97,6 +97,7 @@ Avatar surface_avatar(const BodyModel& body, const AvatarSettings& settings) {
   avatar.parents = body.parents;
   avatar.joints = body.joints;
   avatar.joint_names = body.joint_names;
+  avatar.body = body.name;
   avatar.weights = {settings.gaussians, body.joint_count(), 4, {}, {}};
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const SurfaceSample& sample = samples[i];

@@ -16,11 +16,12 @@
 #include <vector>
 
 #include "autodiff/frozen_linear.h"
+#include "body/pose_layout.h"
 
 namespace hsi4d {
 
 /// Joints of a body pose: SMPL-X's 1 to 21.
-inline constexpr Index kBodyPoseJoints = 21;
+inline constexpr Index kBodyPoseJoints = kBodyJoints - 1;
 
 /// An affine map, by rows as PyTorch has it.
 struct LinearWeights {

@@ -64,6 +64,7 @@ AvatarImport import_avatar(const Gaussians& gaussians, const BodyModel& body, co
   avatar.parents = body.parents;
   avatar.joints = body.joints;
   avatar.joint_names = body.joint_names;
+  avatar.body = body.name;
   avatar.weights = {gaussians.count(), body.joint_count(), kWeightsKept, {}, {}};
   const std::vector<SurfacePlace> places = nearest_places(avatar.means, body);
   double sum = 0;

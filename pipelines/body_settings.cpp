@@ -1,6 +1,7 @@
 #include "pipelines/body_settings.h"
 
 #include "body/procedural_body.h"
+#include "pipelines/body_files.h"
 
 namespace hsi4d {
 
@@ -26,8 +27,10 @@ void describe(ConfigFields& f, BodySettings& s) {
 }
 
 SmplxModel body_model_of(const BodySettings& settings) {
-  return settings.kind == BodyKind::kProcedural ? procedural_smplx(settings.betas)
-                                                : read_smplx(settings.path.string(), {settings.betas, 0});
+  SmplxModel model = settings.kind == BodyKind::kProcedural ? procedural_smplx(settings.betas)
+                                                            : read_smplx(settings.path.string(), {settings.betas, 0});
+  warn_of_repairs(model);
+  return model;
 }
 
 BodyModel rest_body(const BodySettings& settings) {

@@ -27,8 +27,8 @@ struct BodySettings {
 /// Describes the section: every setting with its range.
 void describe(ConfigFields& fields, BodySettings& settings);
 
-/// The model that the settings name, in the layout of SMPL-X, without expressions. Throws as read_smplx; DataError when
-/// it has fewer betas than are asked for.
+/// The model that the settings name, in the layout of SMPL-X, without expressions; weights that were repaired are told
+/// in the log. Throws as read_smplx; DataError when it has fewer betas than are asked for.
 SmplxModel body_model_of(const BodySettings& settings);
 
 /// The body in its rest pose and its shape, whatever its kind. Throws as body_model_of.

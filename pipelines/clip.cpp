@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "pipelines/body_files.h"
 #include "pipelines/run_problems.h"
 #include "splat/splat_file.h"
 
@@ -131,14 +132,15 @@ std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, In
   return motion.poses;
 }
 
-std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, Index frames) {
+std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, const Avatar& avatar,
+                                   Index frames) {
   const auto expect = [&](std::size_t count, const char* file) {
     if (static_cast<Index>(count) == frames) return;
     throw DataError((folder / file).string() + ": has " + std::to_string(count) + " frames, the video " +
                     std::to_string(frames));
   };
   std::vector<SceneState> truth(static_cast<std::size_t>(frames));
-  const Motion motion = read_motion((folder / "motion.npz").string());
+  const Motion motion = read_motion_for((folder / "motion.npz").string(), avatar);
   expect(motion.poses.size(), "motion.npz");
   const std::vector<Camera> cameras = read_cameras((folder / "cameras.json").string());
   expect(cameras.size(), "cameras.json");
@@ -207,11 +209,11 @@ Clip read_clip(const DataSettings& data) {
     check_masks(data.masks / name, clip.frame_files);
   }
   check_masks(data.masks / kHumanMasks, clip.frame_files);
-  const Motion motion = read_motion(initial.motion.string());
+  const Motion motion = read_motion_for(initial.motion.string(), clip.avatar);
   clip.estimate = estimate_of(motion, initial.motion, clip.frames());
   clip.first.body = motion.poses.front();
   clip.frame_rate = motion.frame_rate;
-  if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.frames());
+  if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.avatar, clip.frames());
   clip.files = {{"/data/scene", data.scene},
                 {"/data/avatar", data.avatar},
                 {"/data/camera", data.camera},

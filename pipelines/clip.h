@@ -34,7 +34,7 @@ struct Clip {
   std::vector<ClipObject> objects;
   Avatar avatar;
   Camera camera;                         ///< of frame 0; size and intrinsics of all frames
-  SceneState first;                      ///< state of frame 0, given
+  SceneState first;                      ///< state of frame 0, given; poses are of the avatar's body
   std::vector<BodyPose> estimate;        ///< estimated poses by frame; empty: none
   double frame_rate = 10;                ///< frames a second
   std::vector<std::string> frame_files;  ///< in order

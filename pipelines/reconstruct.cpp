@@ -7,7 +7,7 @@
 #include <map>
 
 #include "body/kinematics.h"
-#include "body/motion_io.h"
+#include "body/motion_edit.h"
 #include "core/camera_file.h"
 #include "core/image_io.h"
 #include "core/log.h"
@@ -401,7 +401,9 @@ class Reconstruction {
     const std::vector<SceneState>& result = progress_.after_stage.back();
     std::vector<std::string> names;
     for (const ClipObject& object : clip_.objects) names.push_back(object.name);
-    write_motion(folder_.paths().motion(), {clip_.frame_rate, bodies_of(result)});
+    Motion motion{clip_.frame_rate, bodies_of(result)};
+    motion.pelvis_rest = pelvis_of(clip_.avatar.joints);
+    write_motion(folder_.paths().motion(), motion);
     if (!names.empty()) write_object_tracks(folder_.paths().objects(), names, result);
     write_cameras(folder_.paths().cameras(), cameras_of(result, clip_.camera));
     if (progress_.colors.net && moves_colors()) write_color_net(folder_.paths().color_net(), *progress_.colors.net);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "body/kinematics.h"
+#include "body/motion_edit.h"
 #include "core/check.h"
 #include "core/quaternion.h"
 #include "core/rotation.h"
@@ -353,6 +354,7 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
   SyntheticClip clip;
   clip.wrist_from_object = stage.wrist_from_object;
   clip.motion.frame_rate = settings.frame_rate;
+  clip.motion.pelvis_rest = pelvis_of(body.joints);
   for (Index frame = 0; frame < settings.frames; ++frame) {
     const double seconds = double(frame) / settings.frame_rate;
     clip.motion.poses.push_back(pose_at(stage, key_at(seconds)));

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <string>
 
-#include "body/motion_io.h"
+#include "body/motion_edit.h"
 #include "core/camera_file.h"
 #include "core/file.h"
 #include "core/folder_in_making.h"
@@ -145,7 +145,8 @@ void write_views(const SyntheticSettings& settings, const RenderSettings& render
   avatar_settings.gaussians = settings.avatar_gaussians;
   avatar_settings.seed = static_cast<std::uint64_t>(settings.seed);
   const Avatar avatar = surface_avatar(body, avatar_settings);
-  const Motion motion{kRateHz, view_poses(body, settings.views_poses)};
+  Motion motion{kRateHz, view_poses(body, settings.views_poses)};
+  motion.pelvis_rest = pelvis_of(body.joints);
   const std::vector<Camera> cameras = ring_of_cameras(settings.views_cameras, settings.size_px);
   write_avatar(out.file("truth/avatar.safetensors"), avatar);
   write_motion(out.file("motion.npz"), motion);

@@ -12,12 +12,14 @@ With --in-camera it is in the camera's frame of every frame (x right, y down, z 
 |-----------|--------|----------------------------------------------------------------------|
 | WHAM      | SMPL   | y up                                                                 |
 | GVHMR     | SMPL-X | y up                                                                 |
-| TRAM      | SMPL   | the first camera's: y down. Its gravity is not known, so z is up only |
-|           |        | as far as that camera was level                                      |
+| TRAM      | SMPL   | y up where its camera.npy has world_cam_R and world_cam_T, aligned   |
+|           |        | with an estimate of gravity. Older versions have the first camera's  |
+|           |        | world alone, y down: z is then up only as far as it was level        |
 
 A body turns about its pelvis, so turning a motion needs the pelvis of the estimator's body at rest: by default that of
 the neutral body of mean shape; --pelvis x,y,z for another. SMPL's pelvis stands elsewhere than SMPL-X's; the translation
-is corrected, so that the pelvis stays where the estimator has it. Frames that an estimator left out are interpolated.
+is corrected, so that the pelvis stays where the estimator has it; the file says where it stands at rest (pelvis_rest)
+where that is known. Frames that an estimator left out are interpolated.
 
 Needs Python with NumPy, and joblib for WHAM or PyTorch for GVHMR and TRAM. The inputs are pickles, which can run code
 when they are read: only read files whose origin you trust.
@@ -162,12 +164,17 @@ def read_tram(np, path, arguments):
     if not camera_path.exists():
         fail(f"{camera_path}: there is no such file; TRAM's camera.npy is needed (--camera), or --in-camera")
     camera = np.load(camera_path, allow_pickle=True).item()
-    turns = np.asarray(need(camera, "pred_cam_R", camera_path), dtype=np.float64)
-    places = np.asarray(need(camera, "pred_cam_T", camera_path), dtype=np.float64).reshape(-1, 3)
+    is_level = hasattr(camera, "keys") and "world_cam_R" in camera and "world_cam_T" in camera
+    name = "world_cam" if is_level else "pred_cam"
+    turns = need(camera, name + "_R", camera_path)
+    turns = array(np, turns, f"{camera_path}: {name}_R", 9).reshape(-1, 3, 3)
+    places = array(np, need(camera, name + "_T", camera_path), f"{camera_path}: {name}_T", 3)
+    if len(turns) != len(places):
+        fail(f"{camera_path}: {name}_R has {len(turns)} frames, {name}_T {len(places)}")
     if frames.max() >= len(turns):
         fail(f"{camera_path}: has {len(turns)} frames; {path} is of frame {int(frames.max())} too")
     pose, trans = moved(np, pose, trans, turns[frames], places[frames], pelvis_of(np, arguments, False))
-    return pose, trans, betas, frames, False, "y down"
+    return pose, trans, betas, frames, False, "y up" if is_level else "y down"
 
 
 READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram}
@@ -262,8 +269,12 @@ def main():
         trans = trans + pelvis - np.array(SMPLX_PELVIS)
     # SMPL's shape is not SMPL-X's: its numbers are left out.
     shape = betas.mean(axis=0) if is_smplx else np.zeros(10)
+    # Of a body of SMPL-X in a shape it is not known.
+    is_known = not is_smplx or arguments.pelvis or not shape.any()
+    rest = {"pelvis_rest": pelvis if is_smplx else np.array(SMPLX_PELVIS)} if is_known else {}
     np.savez(
         arguments.output,
+        **rest,
         trans=trans,
         root_orient=pose[:, :3],
         pose_body=pose[:, 3:66],

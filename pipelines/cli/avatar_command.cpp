@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/log.h"
 #include "pipelines/avatar_import.h"
+#include "pipelines/body_files.h"
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
@@ -30,8 +31,10 @@ BodyModel body_of(const AvatarOptions& o, const std::string& command) {
     }
     return betas.empty() ? procedural_body() : rest_body(procedural_smplx(std::ssize(betas)), betas);
   }
-  return rest_body(read_smplx(o.body_model, {.betas = std::ssize(betas), .expressions = 0, .correctives = false}),
-                   betas);
+  const SmplxModel model =
+      read_smplx(o.body_model, {.betas = std::ssize(betas), .expressions = 0, .correctives = false});
+  warn_of_repairs(model);
+  return rest_body(model, betas);
 }
 
 void check_out(const AvatarOptions& o, const std::string& command) {

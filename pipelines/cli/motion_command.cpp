@@ -1,6 +1,6 @@
 #include "pipelines/cli/motion_command.h"
 
-#include <cmath>
+#include <algorithm>
 #include <filesystem>
 
 #include "body/glb.h"
@@ -8,6 +8,7 @@
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "core/log.h"
+#include "pipelines/body_files.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
 
@@ -17,21 +18,27 @@ namespace {
 constexpr double kFolderRate = 30;
 
 void check_rate(const std::optional<double>& rate, const std::string& option) {
-  if (!rate || (*rate > 0 && std::isfinite(*rate))) return;
-  throw UserError("hsi4d motion: " + option + ": " + number_text(*rate) + " is out of range; allowed: above 0");
+  if (!rate || (*rate >= kSlowestMotion && *rate <= kFastestMotion)) return;
+  throw UserError("hsi4d motion: " + option + ": " + number_text(*rate) +
+                  " is out of range; allowed: " + number_text(kSlowestMotion) + " to " + rounded(kFastestMotion, 6));
 }
 
 /// The body of a model file in the motion's shape, as far as the file has directions for it.
 SmplxModel model_for(const std::string& path, const std::vector<double>& betas) {
   const SmplxModel bare = read_smplx(path, {.betas = 0, .expressions = 0, .correctives = false});
+  warn_of_repairs(bare);
   const Index count = std::min<Index>(bare.betas_in_file, static_cast<Index>(betas.size()));
   return count == 0 ? bare : read_smplx(path, {.betas = count, .expressions = 0, .correctives = false});
+}
+
+bool has_shape(const Motion& motion) {
+  return std::any_of(motion.betas.begin(), motion.betas.end(), [](double beta) { return beta != 0; });
 }
 
 Motion read_any(const MotionOptions& options, bool& is_of_folder) {
   is_of_folder = std::filesystem::is_directory(options.in);
   if (!is_of_folder) {
-    Motion motion = read_motion(options.in);
+    Motion motion = read_motion_aloud(options.in);
     motion.frame_rate = options.from_rate.value_or(motion.frame_rate);
     return motion;
   }
@@ -39,6 +46,49 @@ Motion read_any(const MotionOptions& options, bool& is_of_folder) {
   if (folder.filled > 0)
     log_warning(options.in + ": frames without a file, interpolated: " + std::to_string(folder.filled));
   return std::move(folder.motion);
+}
+
+/// The motion, moved to the body that it is written for.
+struct Prepared {
+  Motion motion;
+  BodyModel body;  ///< of a GLB file, or --body-model; else empty
+};
+
+/// For the body of --body-model, in the motion's shape.
+Prepared for_model(const MotionOptions& options, const Motion& motion, bool is_of_folder) {
+  const SmplxModel model = model_for(options.body_model, motion.betas);
+  const auto count = static_cast<std::size_t>(model.betas);
+  BodyModel body = rest_body(model, std::span(motion.betas).first(count));
+  Motion moved = for_body(motion, body);
+  if (is_of_folder) moved = with_hand_means(moved, model);
+  return {std::move(moved), std::move(body)};
+}
+
+/// For the program's own body (GLB), or for what reads a .npz: a SMPL-X of the motion's shape. Where that is the mean
+/// one, it is known where its pelvis stands.
+Prepared for_no_model(const MotionOptions& options, const Motion& motion, bool is_of_folder, bool is_glb) {
+  if (is_of_folder)
+    log_warning(options.in +
+                ": hands are relative to the mean hands of the body model, which are not known without --body-model: "
+                "they are taken as they are");
+  if (!is_glb) {
+    const bool is_mean = motion.pelvis_rest && !has_shape(motion);
+    return {is_mean ? for_body(motion, kSmplxName, kSmplxPelvis) : motion, {}};
+  }
+  if (has_shape(motion))
+    log_warning(options.in +
+                ": its betas are of SMPL-X and do not shape the program's body; --body-model has a body "
+                "that they do");
+  BodyModel body = procedural_body();
+  return {for_body(motion, body), std::move(body)};
+}
+
+Motion at_rate(const Motion& motion, double frame_rate) {
+  try {
+    return resampled(motion, frame_rate);
+  } catch (const UserError& error) {
+    throw UserError("hsi4d motion: --frame-rate: " + std::string(error.what()));
+  }
 }
 
 }  // namespace
@@ -50,21 +100,14 @@ std::string motion_command(const MotionOptions& options) {
   check_no_input(options.out, "hsi4d motion: OUT", {options.in, options.body_model});
   check_writable(options.out);
   bool is_of_folder = false;
-  Motion motion = read_any(options, is_of_folder);
-  BodyModel body;
-  Vector3<double> pelvis = kSmplxPelvis;
-  if (!options.body_model.empty()) {
-    const SmplxModel model = model_for(options.body_model, motion.betas);
-    body = rest_body(model, std::span(motion.betas).first(static_cast<std::size_t>(model.betas)));
-    pelvis = {body.joints[0], body.joints[1], body.joints[2]};
-    if (is_of_folder) motion = with_hand_means(motion, model);
-  } else if (is_glb) {
-    body = procedural_body();
-  }
-  if (options.is_y_up) motion = transformed(motion, z_up_from_y_up(), pelvis);
-  if (options.frame_rate) motion = resampled(motion, *options.frame_rate);
+  const Motion read = read_any(options, is_of_folder);
+  const Prepared prepared = options.body_model.empty() ? for_no_model(options, read, is_of_folder, is_glb)
+                                                       : for_model(options, read, is_of_folder);
+  Motion motion = prepared.motion;
+  if (options.is_y_up) motion = transformed(motion, z_up_from_y_up(), motion.pelvis_rest.value_or(kSmplxPelvis));
+  if (options.frame_rate) motion = at_rate(motion, *options.frame_rate);
   if (is_glb) {
-    write_glb(options.out, body, motion);
+    write_glb(options.out, prepared.body, motion);
   } else {
     write_motion(options.out, motion);
   }

@@ -5,6 +5,7 @@
 #include "core/log.h"
 #include "core/npz.h"
 #include "core/suggest.h"
+#include "pipelines/body_files.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
 
@@ -63,9 +64,7 @@ std::string pose_command(const PoseOptions& options) {
   if (!sequence.passed_over.empty())
     log_warning(options.params + ": passed over, no parameters: " + joined(sequence.passed_over));
   const SmplxModel model = model_for(options.body_model, sequence);
-  if (model.rescaled_weights > 0)
-    log_warning(options.body_model + ": vertices whose skinning weights are divided by their sum: " +
-                std::to_string(model.rescaled_weights));
+  warn_of_repairs(model);
   if (is_double) {
     write_frames<double>(options, model, sequence, hands);
   } else {

@@ -2,10 +2,10 @@
 
 #include <filesystem>
 
-#include "body/motion_io.h"
 #include "core/check.h"
 #include "core/image_io.h"
 #include "core/rotation.h"
+#include "pipelines/body_files.h"
 #include "pipelines/cli/pixel_table.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/posed_avatar.h"
@@ -37,8 +37,8 @@ const T& at_frame(const std::vector<T>& sequence, int frame, const std::string& 
 }
 
 PosedGaussians read_body(const RenderOptions& options, const Vector3<double>& center_world) {
-  const Motion motion = read_motion(options.motion);
   const Avatar avatar = read_avatar(options.avatar);
+  const Motion motion = read_motion_for(options.motion, avatar);
   const BodyPose& pose = at_frame(motion.poses, options.frame, options.motion);
   if (pose.joints() != avatar.joint_count())
     throw DataError(options.avatar + ": the avatar has " + std::to_string(avatar.joint_count()) +

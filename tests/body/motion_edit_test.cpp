@@ -7,7 +7,9 @@
 
 #include <catch2/catch.hpp>
 
+#include "body/avatar.h"
 #include "body/body_model.h"
+#include "body/procedural_body.h"
 #include "core/random.h"
 #include "core/rotation.h"
 #include "tests/support/smplx_reference.h"
@@ -129,6 +131,59 @@ TEST_CASE("a body with another pelvis: the pelvis stays where it was") {
     CHECK((motion.poses[t].transl + kSmplPelvis - moved.poses[t].transl - kSmplxPelvis).norm() < 1e-15);
     CHECK(moved.poses[t].axis_angle == motion.poses[t].axis_angle);
   }
+  CHECK(*moved.pelvis_rest == kSmplxPelvis);
+}
+
+TEST_CASE("a motion is moved to the body that it is used on") {
+  BodyModel body = procedural_body();
+  REQUIRE(body.name == kProceduralName);
+  const Vector3<double> pelvis = pelvis_of(body.joints);
+  REQUIRE((pelvis - kSmplxPelvis).norm() > 0.01);
+  Motion motion = random_motion(3, 10);
+  const auto check_pelvis = [&](const Motion& moved, const Vector3<double>& rest) {
+    for (std::size_t t = 0; t < 3; ++t) {
+      // Where the chain of joints has it.
+      const Vector3<double> there = pelvis_of(pose_joints(body, moved.poses[t]));
+      CHECK((there - (motion.poses[t].transl + rest)).norm() < 1e-14);
+    }
+  };
+  SECTION("of SMPL-X, on the program's body") { check_pelvis(for_body(motion, body), kSmplxPelvis); }
+  SECTION("of SMPL-X in some shape, on a body of SMPL-X: translations stay") {
+    body.name = kSmplxName;
+    const Motion moved = for_body(motion, body);
+    for (std::size_t t = 0; t < 3; ++t) CHECK(same_bits(moved.poses[t], motion.poses[t]));
+    CHECK(*moved.pelvis_rest == pelvis);
+    check_pelvis(moved, pelvis);
+  }
+  SECTION("whose pelvis is known, on any body") {
+    motion.pelvis_rest = {0.25, -0.125, 0.5};
+    for (const char* name : {kSmplxName, kProceduralName, ""}) {
+      body.name = name;
+      check_pelvis(for_body(motion, body), *motion.pelvis_rest);
+    }
+  }
+  SECTION("of this body: every bit stays") {
+    motion.pelvis_rest = pelvis;
+    for (std::size_t t = 0; t < 3; ++t) CHECK(same_bits(for_body(motion, body).poses[t], motion.poses[t]));
+  }
+  SECTION("on an avatar, which knows its body, in a file too") {
+    const Avatar avatar = surface_avatar(body, {.gaussians = 50});
+    check_pelvis(for_body(motion, avatar), kSmplxPelvis);
+    const Avatar read = avatar_of(Safetensors::decode(avatar_file(avatar).encode(), "a"));
+    CHECK(read.body == kProceduralName);
+    check_pelvis(for_body(motion, read), kSmplxPelvis);
+    BodyModel shaped = rest_body(procedural_smplx(2), std::vector<double>{1, 1});
+    CHECK(shaped.name == kProceduralName);
+  }
+}
+
+TEST_CASE("a motion is not resampled into more frames than fit") {
+  const Motion slow = random_motion(2, 11, 0.01);
+  CHECK(resampled(slow, 1000).poses.size() == 100001);
+  CHECK_THROWS_WITH(
+      resampled(slow, 1e5),
+      "a motion of 2 frames, 0.01 a second, has 1e+07 frames at 100000 a second; allowed: at most 1000000");
+  CHECK_THROWS_AS(resampled(random_motion(2, 12, 1e-9), 30), UserError);
 }
 
 TEST_CASE("hands relative to the model's mean become whole") {

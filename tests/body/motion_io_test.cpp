@@ -8,11 +8,14 @@
 #include <catch2/catch.hpp>
 
 #include "body/body_model.h"
+#include "body/pose_layout.h"
 #include "core/npz.h"
 #include "core/random.h"
 #include "tests/temporary_folder.h"
+#include "tests/zip_archive.h"
 
 using namespace hsi4d;
+using test::ZipMember, test::archive_of, test::pickled_npy;
 
 namespace {
 
@@ -154,7 +157,7 @@ TEST_CASE("shape and gender go along") {
   const auto with_betas = [](std::initializer_list<std::int64_t> shape, const Numbers& numbers) {
     return [=, shape = std::vector<std::int64_t>(shape)](NpzWriter& f) {
       f.add<double>("trans", {2, 3}, counted(2, 3));
-      f.add<double>("poses", {2, 72}, counted(2, 72));
+      f.add<double>("poses", {2, 165}, counted(2, 165));
       f.add<double>("betas", std::span<const std::int64_t>(shape), std::span<const double>(numbers));
     };
   };
@@ -174,10 +177,14 @@ TEST_CASE("faults of motion files are named") {
   CHECK(message_for([&](NpzWriter& f) { trans(f); }) == "m.npz: there is neither 'poses' nor 'root_orient'");
   CHECK(message_for([&](NpzWriter& f) {
           trans(f), f.add<double>("poses", {2, 75}, counted(2, 75));
-        }) == "m.npz: array 'poses': has shape [2,75]; allowed: [2,165] (SMPL-X), [2,156] (SMPL-H), [2,72] (SMPL)");
+        }) ==
+        "m.npz: array 'poses': has shape [2,75]; allowed: [2,165] (SMPL-X), [2,156] (SMPL-H), [2,72] (SMPL), "
+        "[2,69] (SMPL), [2,66] (SMPL)");
   CHECK(message_for([&](NpzWriter& f) {
           trans(f), f.add<double>("poses", {3, 72}, counted(3, 72));
-        }) == "m.npz: array 'poses': has shape [3,72]; allowed: [2,165] (SMPL-X), [2,156] (SMPL-H), [2,72] (SMPL)");
+        }) ==
+        "m.npz: array 'poses': has shape [3,72]; allowed: [2,165] (SMPL-X), [2,156] (SMPL-H), [2,72] (SMPL), "
+        "[2,69] (SMPL), [2,66] (SMPL)");
   CHECK(message_for([](NpzWriter& f) {
           f.add<double>("trans", {0, 3}, {});
         }) == "m.npz: array 'trans': holds no frame");
@@ -195,7 +202,7 @@ TEST_CASE("faults of motion files are named") {
           f.add<double>("poses", {2, 72}, poses);
         }) == "m.npz: array 'poses': frame 1, number 5 is not finite");
   CHECK(message_for([&](NpzWriter& f) { trans(f), f.add_scalar("mocap_frame_rate", 0.0); }) ==
-        "m.npz: array 'mocap_frame_rate': is 0.000000; allowed: a positive number");
+        "m.npz: array 'mocap_frame_rate': is 0 frames a second; allowed: 0.01 to 100000");
   CHECK_THROWS_AS(read_motion("no_such_motion.npz"), UserError);
   const TemporaryFolder folder;
   CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{10, {rest_pose(22)}}), InternalError);
@@ -254,4 +261,138 @@ TEST_CASE("eyes and hands are also read as the halves that SMPL-X names") {
     const auto infinite = with([](NpzWriter& f) { f.add<double>("reye_pose", {2, 3}, {0, 0, 0, 0, INFINITY, 0}); });
     CHECK(message_for(infinite) == "m.npz: array 'reye_pose': frame 1, number 1 is not finite");
   }
+}
+
+namespace {
+
+/// Two frames of a model whose rows have that many numbers, with what else is added.
+std::function<void(NpzWriter&)> rows_of(std::size_t width, const std::function<void(NpzWriter&)>& add_more) {
+  return [=](NpzWriter& f) {
+    f.add<double>("trans", {2, 3}, {0.5, -1, 2, 0.25, 3, -4});
+    Numbers poses = counted(2, width);
+    for (double& x : poses) x *= 1e-3;
+    f.add<double>("poses", {2, static_cast<int64_t>(width)}, poses);
+    add_more(f);
+  };
+}
+
+void add_shape(NpzWriter& f) {
+  f.add<double>("betas", {3}, {1, 0, -2});
+  f.add_text("gender", "male");
+}
+
+}  // namespace
+
+TEST_CASE("the pelvis of SMPL-H and SMPL stays where it was, and their shape is left out") {
+  const std::vector<std::tuple<std::size_t, std::string, Vector3<double>>> models = {
+      {156, "SMPL-H", kSmplhPelvis}, {72, "SMPL", kSmplPelvis}, {69, "SMPL", kSmplPelvis}, {66, "SMPL", kSmplPelvis}};
+  for (const auto& [width, name, pelvis] : models) {
+    INFO(width);
+    const Motion motion = decoded(rows_of(width, add_shape));
+    CHECK(motion.converted_from == name);
+    CHECK(motion.lost_shape);
+    CHECK(motion.betas.empty());
+    CHECK(motion.gender == "neutral");
+    REQUIRE(motion.pelvis_rest);
+    CHECK(*motion.pelvis_rest == kSmplxPelvis);
+    const Vector3<double> places[] = {{0.5, -1, 2}, {0.25, 3, -4}};
+    for (std::size_t t = 0; t < 2; ++t) {
+      CHECK((motion.poses[t].transl + *motion.pelvis_rest - (places[t] + pelvis)).norm() < 1e-14);
+      CHECK(motion.poses[t].rotation_of(0)[0] == 1e-3 * static_cast<double>(t * width + 1));
+      CHECK(angle(motion, t, "right_wrist", 2) == 1e-3 * static_cast<double>(t * width + 66));
+    }
+    CHECK_FALSE(decoded(rows_of(width, [](NpzWriter& f) { f.add<double>("betas", {2}, {0, 0}); })).lost_shape);
+  }
+  const Motion own = decoded(rows_of(165, add_shape));
+  CHECK(own.converted_from.empty());
+  CHECK_FALSE(own.lost_shape);
+  CHECK(own.betas == Numbers{1, 0, -2});
+  CHECK(own.gender == "male");
+  CHECK_FALSE(own.pelvis_rest);
+  CHECK(own.poses[0].transl == Vector3<double>(0.5, -1, 2));
+}
+
+TEST_CASE("a motion says of what model it is, and where its pelvis stands") {
+  const auto of_type = [](const char* type) {
+    return [type](NpzWriter& f) {
+      add_shape(f);
+      f.add_text("surface_model_type", type);
+    };
+  };
+  CHECK(decoded(rows_of(156, of_type("smplx"))).converted_from.empty());
+  CHECK(decoded(rows_of(156, of_type("smplx"))).betas.size() == 3);
+  CHECK(decoded(rows_of(156, of_type("mano"))).converted_from == "SMPL-H");
+  CHECK(decoded(rows_of(66, of_type("smplx"))).converted_from.empty());
+  CHECK(decoded(rows_of(66, of_type("smplh"))).converted_from == "SMPL-H");
+  CHECK(decoded(rows_of(165, of_type("smplh"))).converted_from.empty());
+  const auto parts = [](const char* type) {
+    return [type](NpzWriter& f) {
+      f.add<double>("trans", {1, 3}, {1, 2, 3});
+      f.add<double>("root_orient", {1, 3}, {0, 0, 0});
+      f.add<double>("pose_body", {1, 63}, counted(1, 63));
+      f.add_text("surface_model_type", type);
+    };
+  };
+  CHECK(decoded(parts("smplx")).poses[0].transl == Vector3<double>(1, 2, 3));
+  const Motion moved = decoded(parts("smplh"));
+  CHECK((moved.poses[0].transl + kSmplxPelvis - Vector3<double>(1, 2, 3) - kSmplhPelvis).norm() < 1e-14);
+
+  const auto with_pelvis = [](NpzWriter& f) { f.add<double>("pelvis_rest", {3}, {0.25, -0.5, 0.125}); };
+  CHECK(*decoded(rows_of(165, with_pelvis)).pelvis_rest == Vector3<double>(0.25, -0.5, 0.125));
+  const Motion smpl = decoded(rows_of(72, with_pelvis));
+  CHECK((smpl.poses[0].transl + kSmplxPelvis - Vector3<double>(0.75, -1.5, 2.125)).norm() < 1e-14);
+  CHECK(message_for(rows_of(165, [](NpzWriter& f) {
+          f.add<double>("pelvis_rest", {2}, {1, 2});
+        })) == "m.npz: array 'pelvis_rest': has shape [2]; [3] is needed");
+
+  const TemporaryFolder folder;
+  Motion motion = random_motion(2, 73);
+  motion.pelvis_rest = {0.1, -0.35, 1e-3};
+  write_motion(folder / "m.npz", motion);
+  CHECK(*read_motion(folder / "m.npz").pelvis_rest == *motion.pelvis_rest);
+  motion.pelvis_rest.reset();
+  write_motion(folder / "m.npz", motion);
+  CHECK_FALSE(Npz::read(folder / "m.npz").has("pelvis_rest"));
+}
+
+TEST_CASE("numbers of motion files are bounded") {
+  const auto with_trans = [](double x) {
+    return [x](NpzWriter& f) {
+      f.add<double>("trans", {1, 3}, {0, x, 0});
+      f.add<double>("poses", {1, 165}, Numbers(165));
+    };
+  };
+  CHECK(message_for(with_trans(1e300)) == "m.npz: array 'trans': frame 0, number 1 is 1e+300; allowed: -1e7 to 1e7");
+  CHECK(message_for(with_trans(-1.5e7)) ==
+        "m.npz: array 'trans': frame 0, number 1 is -1.5e+07; allowed: -1e7 to 1e7");
+  CHECK(decoded(with_trans(1e7)).poses[0].transl[1] == 1e7);
+  CHECK(message_for([](NpzWriter& f) {
+          f.add<double>("trans", {1, 3}, {0, 0, 0});
+          f.add<double>("poses", {1, 72}, Numbers(72, 2e6));
+        }) == "m.npz: array 'poses': frame 0, number 0 is 2e+06; allowed: -1e6 to 1e6");
+  for (const auto& [rate, text] : {std::pair{1e-9, "1e-09"}, {1e6, "1e+06"}, {-1.0, "-1"}, {NAN, "nan"}}) {
+    const double hertz = rate;
+    CHECK(message_for(rows_of(165, [hertz](NpzWriter& f) { f.add_scalar("mocap_framerate", hertz); })) ==
+          "m.npz: array 'mocap_framerate': is " + std::string(text) + " frames a second; allowed: 0.01 to 100000");
+  }
+}
+
+TEST_CASE("arrays of Python objects are named as such") {
+  const auto error_of = [](const std::string& pickled) {
+    std::vector<ZipMember> members = {{"trans.npy", encode_npy<double>(std::vector<int64_t>{1, 3}, Numbers(3))},
+                                      {"poses.npy", encode_npy<double>(std::vector<int64_t>{1, 165}, Numbers(165))}};
+    std::erase_if(members, [&](const ZipMember& member) { return member.name == pickled + ".npy"; });
+    members.push_back({pickled + ".npy", pickled_npy()});
+    try {
+      decode_motion(archive_of(members, false), "m.npz");
+    } catch (const DataError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  for (const char* name : {"trans", "poses", "betas", "mocap_frame_rate", "pelvis_rest"}) {
+    CHECK(error_of(name) ==
+          "m.npz: array '" + std::string(name) + "': holds Python objects (dtype '|O'), which are not unpickled");
+  }
+  CHECK(error_of("gender") == "accepted");
 }

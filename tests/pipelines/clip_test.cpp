@@ -5,9 +5,11 @@
 
 #include <catch2/catch.hpp>
 
+#include "body/motion_edit.h"
 #include "core/check.h"
 #include "core/image_io.h"
 #include "core/log.h"
+#include "core/npz.h"
 #include "splat/io_ply.h"
 #include "splat/splat_file.h"
 #include "tests/pipelines/tiny_run.h"
@@ -145,6 +147,28 @@ TEST_CASE("one frame of a motion is no estimate, no truth is no truth") {
   CHECK(clip.estimate.empty());
   CHECK_FALSE(clip.truth.has_value());
   CHECK(clip.first.body.axis_angle == motion.poses[0].axis_angle);
+}
+
+TEST_CASE("a motion of another body model stands where its file has it, estimate and truth alike") {
+  const CopiedDataset dataset;
+  const Clip plain = dataset.read();
+  std::vector<double> trans, poses;
+  for (const BodyPose& pose : plain.estimate) {
+    trans.insert(trans.end(), pose.transl.data(), pose.transl.data() + 3);
+    poses.insert(poses.end(), pose.axis_angle.begin(), pose.axis_angle.begin() + 72);
+  }
+  NpzWriter file;
+  const Index frames = plain.frames();
+  file.add<double>("trans", {frames, 3}, trans);
+  file.add<double>("poses", {frames, 72}, poses);
+  for (const char* name : {"initial_motion.npz", "truth/motion.npz"}) file.write((dataset.path / name).string());
+  const Clip clip = dataset.read();
+  for (std::size_t t = 0; t < static_cast<std::size_t>(frames); ++t) {
+    const Vector3<double> there = plain.estimate[t].transl + kSmplPelvis;
+    CHECK((pelvis_of(pose_joints(clip.avatar, clip.estimate[t])) - there).norm() < 1e-14);
+    CHECK((pelvis_of(pose_joints(clip.avatar, (*clip.truth)[t].body)) - there).norm() < 1e-14);
+  }
+  CHECK(clip.first.body.transl == clip.estimate[0].transl);
 }
 
 TEST_CASE("frames may have alpha, masks may have colours or be missing") {

@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "body/motion_io.h"
+#include "body/motion_edit.h"
 #include "body/procedural_body.h"
 #include "core/camera_file.h"
 #include "core/check.h"
@@ -192,6 +192,44 @@ Camera camera_at(const Vector3<double>& place) {
 }
 
 }  // namespace
+
+TEST_CASE("render puts the pelvis where the motion's body model has it") {
+  const TemporaryFolder folder;
+  const Avatar avatar = surface_avatar(procedural_body(), {.gaussians = 400});
+  write_avatar("avatar.safetensors", avatar);
+  write_camera("camera.json", camera_at({0, -3, 0}));
+  write_ply("nothing.ply", Gaussians{});
+  cli::RenderOptions options;
+  options.shared.scene = "nothing.ply";
+  options.shared.camera = "camera.json";
+  options.shared.precision = "double";
+  options.avatar = "avatar.safetensors";
+  options.out = "a.npz";
+  const auto rendered = [&](const char* motion) {
+    options.motion = motion;
+    cli::render_command(options);
+    return Npz::read("a.npz").array("image").as<double>();
+  };
+  Motion own;
+  own.poses = {rest_pose(55)};
+  own.poses[0].set_rotation(0, {std::acos(-1.0) / 2, 0, 0});
+  own.poses[0].transl = {0.1, 0.05, 0.2};
+  own.pelvis_rest = pelvis_of(avatar.joints);
+  write_motion("own.npz", own);
+  const std::vector<double> expected = rendered("own.npz");
+  CHECK(std::accumulate(expected.begin(), expected.end(), 0.0) / static_cast<double>(expected.size()) > 0.01);
+  const Vector3<double> there = own.poses[0].transl + *own.pelvis_rest;
+  for (const auto& [width, pelvis] : {std::pair{156, kSmplhPelvis}, {72, kSmplPelvis}, {165, kSmplxPelvis}}) {
+    const Vector3<double> trans = there - pelvis;
+    std::vector<double> pose = own.poses[0].axis_angle;
+    pose.resize(static_cast<std::size_t>(width));
+    NpzWriter file;
+    file.add<double>("trans", {1, 3}, std::vector<double>(trans.data(), trans.data() + 3));
+    file.add<double>("poses", {1, width}, pose);
+    file.write("other.npz");
+    CHECK(largest_difference(rendered("other.npz"), expected) < 1e-9);
+  }
+}
 
 TEST_CASE("a body looks the same wherever in the world it is, in float too (row A10)") {
   const TemporaryFolder folder;

@@ -97,7 +97,10 @@ def gvhmr():
     close(out["pose_body"], one["body_pose"].array)
     close(out["betas"], np.full(10, 0.5))
     assert out["mocap_frame_rate"] == 25 and out["mocap_framerate"] == 25
+    assert "pelvis_rest" not in out  # not known of a body in a shape
     reads("g.npz")
+    export("export_motion.py", "hmr4d_results.pt", "p.npz", "--pelvis=0.01,-0.3,0.02")
+    close(np.load("p.npz")["pelvis_rest"], [0.01, -0.3, 0.02], 0)
     export("export_motion.py", "hmr4d_results.pt", "c.npz", "--in-camera")
     close(np.load("c.npz")["trans"], one["transl"].array)
 
@@ -118,6 +121,7 @@ def wham():
     close(out["trans"][2], (out["trans"][1] + out["trans"][3]) / 2)
     close(out["pose_body"][rows], one["pose_world"][:, 3:66])
     assert not out["betas"].any()  # SMPL's numbers are not SMPL-X's
+    close(out["pelvis_rest"], em.SMPLX_PELVIS, 0)
     reads("w.npz")
     refused("has 1 people; --person can be 0 to 0", "export_motion.py", "wham_output.pkl", "w.npz", "--person", 3)
     refused("there is no 'pose'", "export_motion.py", "wham_output.pkl", "w.npz", "--in-camera")
@@ -143,6 +147,20 @@ def tram():
     # The camera's y is down and z forward: x, z, −y of it are x, y, z of a world with z up.
     close(out["trans"] + em.SMPLX_PELVIS, np.stack([pelvis[:, 0], pelvis[:, 2], -pelvis[:, 1]], axis=1))
     reads("t.npz")
+    # Aligned with gravity, y up: the newer world wins.
+    level = em.matrix_of_vector(np, np.array([[np.pi - 0.3, 0.05, 0.1]]))[0]
+    world = {"world_cam_R": level @ turns, "world_cam_T": places @ level.T}
+    np.save("clip/camera.npy", {"pred_cam_R": turns, "pred_cam_T": places, **world, "spec_focal": tensor([500.0])})
+    export("export_motion.py", "clip/hps/hps_track_0.npy", "l.npz")
+    out = np.load("l.npz")
+    close(out["trans"] + em.SMPLX_PELVIS, pelvis @ level.T @ Z_UP.T)
+    roots = np.einsum("ij,tjk,tkl->til", Z_UP @ level, turns[frames], poses[:, 0])
+    close(em.matrix_of_vector(np, out["root_orient"]), roots)
+    reads("l.npz")
+    np.save("clip/camera.npy", {"pred_cam_R": turns, "pred_cam_T": places[:3]})
+    refused("pred_cam_R has 6 frames, pred_cam_T 3", "export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
+    np.save("clip/camera.npy", {"pred_cam_R": turns[:4], "pred_cam_T": places[:4]})
+    refused("has 4 frames", "export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
 
 
 def vposer():

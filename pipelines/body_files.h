@@ -1,0 +1,21 @@
+// Files of bodies as the program reads them: what was repaired or left out is told in the log.
+#pragma once
+
+#include <string>
+
+#include "body/avatar.h"
+#include "body/motion_io.h"
+#include "body/smplx_file.h"
+
+namespace hsi4d {
+
+/// Tells how many vertices have repaired skinning weights, where there are any.
+void warn_of_repairs(const SmplxModel& model);
+
+/// Reads a motion, and tells what of it is left out because it is of another body model. Throws as read_motion.
+Motion read_motion_aloud(const std::string& path);
+
+/// As read_motion_aloud, moved to the avatar's body (for_body): its pelvis is where the file has it.
+Motion read_motion_for(const std::string& path, const Avatar& avatar);
+
+}  // namespace hsi4d
