@@ -6,6 +6,7 @@
 
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
+#include "body/pose_layout.h"
 #include "core/finite_numbers.h"
 #include "core/random.h"
 
@@ -14,7 +15,6 @@ namespace hsi4d {
 namespace {
 
 constexpr const char* kPrefix = "color_net/";
-constexpr Index kLastBodyJoint = 21;  // of SMPL-X
 
 /// Waves over the places of the rest pose.
 std::vector<double> first_features(std::span<const float> means, const ColorNetShape& shape) {
@@ -118,7 +118,7 @@ ColorNet new_color_net(std::span<const float> means, Index joints, const ColorNe
   net.features_per_row = shape.features;
   net.features = first_features(means, shape);
   net.view_direction = shape.view_direction;
-  for (int j = 1; j <= std::min(kLastBodyJoint, joints - 1); ++j) net.code_joints.push_back(j);
+  for (int j = 1; j <= std::min(kBodyJoints - 1, joints - 1); ++j) net.code_joints.push_back(j);
   const Random random(shape.seed, random_stream("color_net.weights"));
   std::uint64_t at = 0;
   Index inputs = shape.features + (shape.view_direction ? 3 : 0) + net.code_size();

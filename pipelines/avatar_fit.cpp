@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "body/motion_edit.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/rotation.h"
@@ -34,6 +35,7 @@ struct LoadedView {
 std::vector<LoadedView> load_views(const AvatarFitSettings& settings, const ViewSet& set, const Avatar& avatar) {
   const Camera& first = set.cameras[static_cast<std::size_t>(set.views.front().camera)];
   const Vector3<double> background(settings.background.data());
+  const Motion motion = for_body(set.motion, avatar);
   std::vector<LoadedView> views;
   for (const PosedView& view : set.views) {
     const Camera& camera = set.cameras[static_cast<std::size_t>(view.camera)];
@@ -46,7 +48,7 @@ std::vector<LoadedView> load_views(const AvatarFitSettings& settings, const View
     loaded.xi = se3_log(compose(camera.camera_from_world, inverse(first.camera_from_world)));
     loaded.intrinsics = {static_cast<S>(camera.fx), static_cast<S>(camera.fy), static_cast<S>(camera.cx),
                          static_cast<S>(camera.cy)};
-    loaded.pose = set.motion.poses[static_cast<std::size_t>(view.frame)];
+    loaded.pose = motion.poses[static_cast<std::size_t>(view.frame)];
     if (loaded.pose.joints() != avatar.joint_count()) {
       throw UserError(set.file.string() + ": poses of " + std::to_string(loaded.pose.joints()) +
                       " joints; the avatar has " + std::to_string(avatar.joint_count()));

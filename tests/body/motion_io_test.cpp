@@ -363,8 +363,7 @@ TEST_CASE("numbers of motion files are bounded") {
     };
   };
   CHECK(message_for(with_trans(1e300)) == "m.npz: array 'trans': frame 0, number 1 is 1e+300; allowed: -1e7 to 1e7");
-  CHECK(message_for(with_trans(-1.5e7)) ==
-        "m.npz: array 'trans': frame 0, number 1 is -1.5e+07; allowed: -1e7 to 1e7");
+  CHECK(message_for(with_trans(-1.5e7)) == "m.npz: array 'trans': frame 0, number 1 is -1.5e+07; allowed: -1e7 to 1e7");
   CHECK(decoded(with_trans(1e7)).poses[0].transl[1] == 1e7);
   CHECK(message_for([](NpzWriter& f) {
           f.add<double>("trans", {1, 3}, {0, 0, 0});
