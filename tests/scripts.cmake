@@ -18,7 +18,7 @@ if(NOT HSI4D_SANITIZE)  # nobody installs those
 endif()
 
 # Exporters of other programs' files, with NumPy and stand-ins for PyTorch and joblib.
-find_program(HSI4D_PYTHON python3)
+find_program(HSI4D_PYTHON python3 HINTS /usr/bin)  # the one that Debian's NumPy belongs to
 if(HSI4D_PYTHON)
   add_test(NAME "exporters of VPoser, WHAM, GVHMR and TRAM"
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/exporters_test.py ${PROJECT_SOURCE_DIR}/tools

@@ -118,7 +118,7 @@ TEST_CASE("weights at a place are interpolated, the largest four kept and normal
   for (std::size_t i = 0; i < expected.size(); ++i) CHECK(weights.weights[i] == Approx(expected[i]).margin(1e-15));
 }
 
-TEST_CASE("normals of vertices are those of the faces around them, by area; zero where there are none") {
+TEST_CASE("normals of vertices are those of the faces around them, by area, and zero where there are none") {
   BodyModel body;  // a square corner: one triangle in z = 0, one of three times its area in x = 0; then a point
   body.vertices = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 3, 5, 5, 5, 2, 0, 0};
   body.faces = {0, 1, 2, 0, 2, 3, 0, 1, 5};
