@@ -82,7 +82,7 @@ TEST_CASE("compositing passes the operator checks where nothing is cut [B6, B21]
   check_composite("composite, antialias, 1 channel", checked_splats(view, 1), view, options);
 }
 
-TEST_CASE("compositing passes the operator checks with every cut", "[parallel][isa]") {
+TEST_CASE("compositing passes the operator checks with every cut", "[release][parallel][isa]") {
   // A cut at any pixel of the image is a kink. Steps so small that they hardly ever reach one still leave differences
   // with nine digits.
   OperatorCheck options;

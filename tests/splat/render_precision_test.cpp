@@ -242,7 +242,7 @@ TEST_CASE("float agrees with double at the same depth keys: needles, to 1.2e-7 t
   std::printf("  at most %.2f of what the aspect allows\n", largest_share);
 }
 
-TEST_CASE("float agrees with double at the same depth keys: real scenes") {
+TEST_CASE("float agrees with double at the same depth keys: real scenes", "[release]") {
   Summary summary;
   std::vector<RealView> views = close_views();
   views.insert(views.begin(), cropped_view());

@@ -139,7 +139,7 @@ TEST_CASE("double agrees with the brute-force renderer: depth, groups and moved 
   worst_errors.report("depth, groups, transforms");
 }
 
-TEST_CASE("double agrees with the brute-force renderer: real scenes") {
+TEST_CASE("double agrees with the brute-force renderer: real scenes", "[release]") {
   std::vector<RealView> views = close_views();
   views.push_back(cropped_view());
   for (const RealView& view : views) {

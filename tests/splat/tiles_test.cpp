@@ -171,7 +171,7 @@ TEST_CASE("the antialias factor and its gradient are right at every size [A7]") 
   CHECK_FALSE(conic_of(flat.data(), 0, conic));
 }
 
-TEST_CASE("a factor that is left out of a tile has no pixel there that it would be drawn at [B7]") {
+TEST_CASE("a factor that is left out of a tile has no pixel there that it would be drawn at [B7]", "[release]") {
   RandomSequence random(4, 2);
   const TileGrid grid = tile_grid(75, 50, 16);
   RenderSettings settings;
