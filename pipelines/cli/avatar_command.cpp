@@ -7,8 +7,10 @@
 #include "body/smplx_file.h"
 #include "core/check.h"
 #include "core/log.h"
+#include "core/text.h"
 #include "pipelines/avatar_import.h"
 #include "pipelines/body_files.h"
+#include "pipelines/body_settings.h"
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
@@ -23,6 +25,10 @@ BodyModel body_of(const AvatarOptions& o, const std::string& command) {
   if (!o.betas.empty()) {
     const auto count = static_cast<std::size_t>(std::count(o.betas.begin(), o.betas.end(), ',')) + 1;
     betas = parse_numbers(o.betas, count, command + "--betas", "the numbers of a shape");
+    for (const double beta : betas) {
+      if (std::abs(beta) <= kLargestBeta) continue;
+      throw UserError(command + "--betas: " + rounded(beta, 6) + " is out of range; allowed: -10 to 10");
+    }
   }
   if (o.body_model.empty()) {
     if (std::ssize(betas) > kProceduralBetas) {

@@ -65,6 +65,8 @@ TEST_CASE("hsi4d avatar names what is wrong") {
         "avatar: gaussians is 0; allowed: 1 to 5e+06\n");
   CHECK(error({"avatar", "make", "--out", "a.safetensors", "--betas", "1,2,3,4,5,6,7,8,9,0,1"}) ==
         "hsi4d avatar make: --betas: 11 numbers; the program's body has 10\n");
+  CHECK(error({"avatar", "make", "--out", "a.safetensors", "--betas", "0,-10.5"}) ==
+        "hsi4d avatar make: --betas: -10.5 is out of range; allowed: -10 to 10\n");
   write_text_file("text.safetensors", "some text that is no avatar");
   CHECK_THAT(error({"avatar", "info", "text.safetensors"}), Contains("text.safetensors: claims a header of "));
   CHECK_THAT(error({"avatar", "info", "none.safetensors"}), Contains("none.safetensors"));
