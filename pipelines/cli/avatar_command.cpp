@@ -27,7 +27,8 @@ BodyModel body_of(const AvatarOptions& o, const std::string& command) {
     betas = parse_numbers(o.betas, count, command + "--betas", "the numbers of a shape");
     for (const double beta : betas) {
       if (std::abs(beta) <= kLargestBeta) continue;
-      throw UserError(command + "--betas: " + rounded(beta, 6) + " is out of range; allowed: -10 to 10");
+      throw UserError(command + "--betas: " + rounded(beta, 6) +
+                      " is out of range; allowed: " + rounded(-kLargestBeta, 6) + " to " + rounded(kLargestBeta, 6));
     }
   }
   if (o.body_model.empty()) {
