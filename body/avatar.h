@@ -65,10 +65,9 @@ inline constexpr int kAvatarVersion = 2;
 
 /// An avatar's file (docs/avatar.md): safetensors of format "hsi4d avatar", with F32 `means` [N,3], `quats` [N,4],
 /// `log_scales` [N,3], `opacity_logits` [N], `colors` [N,3]; I32 `weight_indices` [N,K] and F64 `weights` [N,K] (K of 1
-/// to 8); I32 `parents` [J]; F64 `joints` [J,3]; the text `joint_names` and, where it is
-/// known, `body`; and the arrays of a color net where it has one
-/// (add_color_net). Files of version 1, which are .npz
-/// archives, are read too; the content says which it is, not the ending.
+/// to 8); I32 `parents` [J]; F64 `joints` [J,3]; the text `joint_names` and, where it is known, `body`; and the arrays
+/// of a color net where it has one (add_color_net). Files of version 1, which are .npz archives, are read too; the
+/// content says which it is, not the ending.
 ///
 /// Weights are normalised (normalized_weights), quaternions are not.
 /// Throws UserError when the file cannot be read; DataError naming file and array: another format or a newer version, a
