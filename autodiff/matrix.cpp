@@ -194,6 +194,28 @@ Var<S> slice(Var<S> x, Index row, Index col, Index rows, Index cols, const Sourc
   return x.owner().record(SliceOp<S>{row, col}, {x}, shape_of(rows, cols), where);
 }
 
+/// Planes [first, first + planes of the output).
+template <class S>
+struct SlicePlanesOp {
+  static constexpr const char* kName = "slice_planes";
+  Index first;
+
+  void forward(NodeIo<S>& io) {
+    const Array<S> part = io.out();
+    const S* from = io.in(0).row(first * part.shape.rows);
+    std::copy_n(from, part.shape.memory(), part.data);
+  }
+  void backward(NodeIo<S>& io) {
+    if (!io.wants(0)) return;
+    const ConstArray<S> g = io.d_out();
+    const Array<S> d = io.d_in(0);
+    for (Index r = 0; r < g.total_rows(); ++r) {
+      S* to = d.row(first * g.shape.rows + r);
+      for (Index x = 0; x < g.shape.cols; ++x) to[x] += g.row(r)[x];
+    }
+  }
+};
+
 }  // namespace
 
 template <class S>
@@ -227,6 +249,16 @@ Var<S> slice_cols(Var<S> x, Index first, Index count, Source where) {
 }
 
 template <class S>
+Var<S> slice_planes(Var<S> x, Index first, Index count, Source where) {
+  Shape shape = x.shape();
+  HSI4D_CHECK(first >= 0 && count >= 0 && first + count <= shape.planes, "planes [" + std::to_string(first) + ", " +
+                                                                             std::to_string(first + count) + ") of " +
+                                                                             std::to_string(shape.planes));
+  shape.planes = count;
+  return x.owner().record(SlicePlanesOp<S>{first}, {x}, shape, where);
+}
+
+template <class S>
 Var<S> concat_rows(std::span<const Var<S>> parts, Source where) {
   return concat(parts, true, where);
 }
@@ -254,6 +286,7 @@ Var<S> gather_rows(Var<S> x, std::vector<std::uint32_t> index, Source where) {
   template Var<S> reshape(Var<S>, Index, Index, Source);        \
   template Var<S> slice_rows(Var<S>, Index, Index, Source);     \
   template Var<S> slice_cols(Var<S>, Index, Index, Source);     \
+  template Var<S> slice_planes(Var<S>, Index, Index, Source);   \
   template Var<S> concat_rows(std::span<const Var<S>>, Source); \
   template Var<S> concat_cols(std::span<const Var<S>>, Source); \
   template Var<S> gather_rows(Var<S>, std::vector<std::uint32_t>, Source);

@@ -27,6 +27,10 @@ Var<S> slice_rows(Var<S> x, Index first, Index count, Source where = Source::cur
 template <class S>
 Var<S> slice_cols(Var<S> x, Index first, Index count, Source where = Source::current());
 
+/// Planes [first, first + count). Adjoint: x.
+template <class S>
+Var<S> slice_planes(Var<S> x, Index first, Index count, Source where = Source::current());
+
 /// One-plane arrays of equal width stacked on top of each other. Adjoint: every part.
 template <class S>
 Var<S> concat_rows(std::span<const Var<S>> parts, Source where = Source::current());

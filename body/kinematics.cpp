@@ -2,11 +2,14 @@
 
 #include <algorithm>
 
+#include "core/parallel.h"
 #include "core/rotation.h"
 
 namespace hsi4d {
 
 namespace {
+
+constexpr Index kFrameGrain = 4;  // chains of 55 joints take microseconds
 
 using Vector = Vector3<double>;
 using Matrix = Matrix3<double>;
@@ -66,30 +69,39 @@ struct KinematicChain {
   static constexpr const char* kName = "kinematic_chain";
   std::vector<int> parents;
   std::vector<double> rest;  // of the last forward, where it is input 2
-  Buffer<Pose> poses = {};   // R_j and p_j, which the adjoint needs
+  Buffer<Pose> poses = {};   // R_j and p_j of each frame, which the adjoint needs
 
   Index joints() const { return static_cast<Index>(parents.size()); }
   Index saved_bytes() const { return poses.capacity_bytes(); }
 
   void forward(NodeIo<S>& io) {
-    const Vector transl = vector_at(io.in(1).data);
     if (io.inputs() == 3) {
       for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = static_cast<double>(io.in(2).data[i]);
     }
-    poses.resize(joints());
-    run_chain(parents, rest.data(), io.in(0).data, poses.data());
+    const Index frames = io.in(1).shape.rows;
+    poses.resize(frames * joints());
+    parallel_for(frames, kFrameGrain, [&](Index begin, Index end) {
+      for (Index t = begin; t < end; ++t) forward_frame(io, t);
+    });
+  }
+
+  void forward_frame(NodeIo<S>& io, Index t) {
+    const Vector transl = vector_at(io.in(1).row(t));
+    const Index first = t * joints();
+    run_chain(parents, rest.data(), io.in(0).row(first), &poses[first]);
     for (Index j = 0; j < joints(); ++j) {
-      put_joint(poses[j], vector_at(rest.data() + 3 * j), transl, io.out(0).row(j), io.out(1).row(j));
+      put_joint(poses[first + j], vector_at(rest.data() + 3 * j), transl, io.out(0).row(first + j),
+                io.out(1).row(first + j));
     }
   }
 
-  /// Cotangents of R_j and p_j as the outputs give them.
-  void seed(NodeIo<S>& io, Pose* d) const {
+  /// Cotangents of R_j and p_j as the outputs of a frame, whose first row is `first`, give them.
+  void seed(NodeIo<S>& io, Index first, Pose* d) const {
     const ConstArray<S> d_transforms = io.d_out(0), d_joints = io.d_out(1);
     for (Index j = 0; j < joints(); ++j) {
       d[j] = {};
       if (d_transforms) {
-        const S* g = d_transforms.row(j);
+        const S* g = d_transforms.row(first + j);
         const Vector d_offset(static_cast<double>(g[3]), static_cast<double>(g[7]), static_cast<double>(g[11]));
         const Vector r = vector_at(rest.data() + 3 * j);
         for (int row = 0; row < 3; ++row) {
@@ -99,54 +111,67 @@ struct KinematicChain {
         }
         d[j].position() = d_offset;
       }
-      if (d_joints) d[j].position() += vector_at(d_joints.row(j));
+      if (d_joints) d[j].position() += vector_at(d_joints.row(first + j));
     }
   }
 
-  /// d_r_j += R_qᵀ d_p_j − R_jᵀ g_j and d_r_q −= R_qᵀ d_p_j, of whole cotangents d_p.
-  void rest_adjoint(NodeIo<S>& io, const Pose* d) const {
-    double* d_rest = io.template scratch<double>(3 * joints()).data();
-    std::fill(d_rest, d_rest + 3 * joints(), 0.0);
+  /// Adds d_r_j += R_qᵀ d_p_j − R_jᵀ g_j and d_r_q −= R_qᵀ d_p_j of a frame, of whole cotangents d_p.
+  void add_rest_adjoint(NodeIo<S>& io, Index first, const Pose* d, double* d_rest) const {
     const auto at = [&](Index j) { return Eigen::Map<Vector>(d_rest + 3 * j); };
     for (Index j = 0; j < joints(); ++j) {
       const Index q = j == 0 ? 0 : parents[static_cast<std::size_t>(j)];
-      const Vector along = j == 0 ? Vector(d[0].position()) : Vector(poses[q].rotation().transpose() * d[j].position());
+      const Vector along =
+          j == 0 ? Vector(d[0].position()) : Vector(poses[first + q].rotation().transpose() * d[j].position());
       at(j) += along;
       if (j > 0) at(q) -= along;
       if (!io.d_out(0)) continue;
-      const S* g = io.d_out(0).row(j);
+      const S* g = io.d_out(0).row(first + j);
       const Vector d_offset(static_cast<double>(g[3]), static_cast<double>(g[7]), static_cast<double>(g[11]));
-      at(j) -= poses[j].rotation().transpose() * d_offset;
+      at(j) -= poses[first + j].rotation().transpose() * d_offset;
     }
-    for (Index i = 0; i < 3 * joints(); ++i) io.d_in(2).data[i] += static_cast<S>(d_rest[i]);
   }
 
   void backward(NodeIo<S>& io) {
-    Pose* d = io.template scratch<Pose>(joints()).data();
-    seed(io, d);
+    const Index frames = io.in(1).shape.rows;
+    Pose* d = io.template scratch<Pose>(frames * joints()).data();
+    parallel_for(frames, kFrameGrain, [&](Index begin, Index end) {
+      for (Index t = begin; t < end; ++t) backward_frame(io, t, d + t * joints());
+    });
+    if (io.inputs() != 3 || !io.wants(2)) return;
+    double* d_rest = io.template scratch<double>(3 * joints()).data();
+    std::fill(d_rest, d_rest + 3 * joints(), 0.0);
+    for (Index t = 0; t < frames; ++t) add_rest_adjoint(io, t * joints(), d + t * joints(), d_rest);
+    for (Index i = 0; i < 3 * joints(); ++i) io.d_in(2).data[i] += static_cast<S>(d_rest[i]);
+  }
+
+  /// d becomes the whole cotangents of R_j and p_j of a frame.
+  void backward_frame(NodeIo<S>& io, Index t, Pose* d) {
+    const Index first = t * joints();
+    seed(io, first, d);
     if (io.wants(1)) {
       Vector d_transl = Vector::Zero();
       for (Index j = 0; j < joints(); ++j) d_transl += d[j].position();
-      for (int i = 0; i < 3; ++i) io.d_in(1).data[i] += static_cast<S>(d_transl[i]);
+      for (int i = 0; i < 3; ++i) io.d_in(1).row(t)[i] += static_cast<S>(d_transl[i]);
     }
     const bool wants_rest = io.inputs() == 3 && io.wants(2);
     if (!io.wants(0) && !wants_rest) return;
+    const Pose* pose = &poses[first];
     for (Index j = joints(); j-- > 0;) {  // children before parents
       const bool root = j == 0;
       const Index q = root ? 0 : parents[static_cast<std::size_t>(j)];
       if (io.wants(0)) {
-        const Matrix d_local = root ? d[j].rotation() : Matrix(poses[q].rotation().transpose() * d[j].rotation());
-        S* d_rotation = io.d_in(0).row(j);
+        const Matrix d_local = root ? d[j].rotation() : Matrix(pose[q].rotation().transpose() * d[j].rotation());
+        S* d_rotation = io.d_in(0).row(first + j);
         for (int r = 0; r < 3; ++r) {
           for (int c = 0; c < 3; ++c) d_rotation[3 * r + c] += static_cast<S>(d_local(r, c));
         }
       }
       if (root) continue;
       const Vector bone = vector_at(rest.data() + 3 * j) - vector_at(rest.data() + 3 * q);
-      d[q].rotation() += d[j].rotation() * matrix_at(io.in(0).row(j)).transpose() + d[j].position() * bone.transpose();
+      const Matrix local = matrix_at(io.in(0).row(first + j));
+      d[q].rotation() += d[j].rotation() * local.transpose() + d[j].position() * bone.transpose();
       d[q].position() += d[j].position();
     }
-    if (wants_rest) rest_adjoint(io, d);
   }
 };
 
@@ -162,29 +187,29 @@ template <class S>
 PosedSkeleton<S> kinematic_chain(Var<S> rotations, Var<S> transl, std::vector<int> parents,
                                  std::vector<double> rest_joints, Source where) {
   check_skeleton(parents, rest_joints);
-  const Index joints = static_cast<Index>(parents.size());
-  HSI4D_CHECK_EQ(rotations.shape(), shape_of(joints, 9));
-  HSI4D_CHECK_EQ(transl.shape(), shape_of(1, 3));
+  const Index frames = transl.shape().rows, rows = frames * static_cast<Index>(parents.size());
+  HSI4D_CHECK_EQ(rotations.shape(), shape_of(rows, 9));
+  HSI4D_CHECK_EQ(transl.shape(), shape_of(frames, 3));
   Tape<S>& tape = rotations.owner();
   const Var<S> transforms =
       tape.record(KinematicChain<S>{std::move(parents), std::move(rest_joints)}, std::array{rotations, transl},
-                  std::array{shape_of(joints, 12), shape_of(joints, 3)}, where);
+                  std::array{shape_of(rows, 12), shape_of(rows, 3)}, where);
   return {transforms, tape.output(transforms, 1)};
 }
 
 template <class S>
 PosedSkeleton<S> kinematic_chain(Var<S> rotations, Var<S> transl, std::vector<int> parents, Var<S> rest_joints,
                                  Source where) {
-  const Index joints = static_cast<Index>(parents.size());
   std::vector<double> rest(3 * parents.size());
   check_skeleton(parents, rest);
-  HSI4D_CHECK_EQ(rotations.shape(), shape_of(joints, 9));
-  HSI4D_CHECK_EQ(transl.shape(), shape_of(1, 3));
+  const Index frames = transl.shape().rows, joints = static_cast<Index>(parents.size()), rows = frames * joints;
+  HSI4D_CHECK_EQ(rotations.shape(), shape_of(rows, 9));
+  HSI4D_CHECK_EQ(transl.shape(), shape_of(frames, 3));
   HSI4D_CHECK_EQ(rest_joints.shape(), shape_of(joints, 3));
   Tape<S>& tape = rotations.owner();
   const Var<S> transforms =
       tape.record(KinematicChain<S>{std::move(parents), std::move(rest)}, std::array{rotations, transl, rest_joints},
-                  std::array{shape_of(joints, 12), shape_of(joints, 3)}, where);
+                  std::array{shape_of(rows, 12), shape_of(rows, 3)}, where);
   return {transforms, tape.output(transforms, 1)};
 }
 

@@ -27,17 +27,18 @@
 
 namespace hsi4d {
 
-/// A skeleton in a pose, on the tape.
+/// A skeleton in the poses of T frames, on the tape.
+/// Frames are independent of each other; joint j of frame t is row J t + j.
 template <class S>
 struct PosedSkeleton {
-  Var<S> transforms;  ///< [J,12] posed_from_rest, rows [3,4]: rotation part and metres
-  Var<S> joints;      ///< [J,3] metres, world
+  Var<S> transforms;  ///< [T·J,12] posed_from_rest, rows [3,4]: rotation part and metres
+  Var<S> joints;      ///< [T·J,3] metres, world
 };
 
 /// The transforms and joints of a skeleton, as above.
 ///
-/// @param rotations    [J,9] rotation matrices relative to the parent, row-major; row 0 is global_orient
-/// @param transl       [1,3] metres, world
+/// @param rotations    [T·J,9] rotation matrices relative to the parent, row-major; row 0 of a frame is global_orient
+/// @param transl       [T,3] metres, world
 /// @param parents      [J], −1 for joint 0, and else smaller than the joint's own number
 /// @param rest_joints  [J,3] metres, rest pose
 /// Adjoint: rotations (as functions of nine free numbers each), transl. The rest joints are constants.
@@ -46,7 +47,7 @@ template <class S>
 PosedSkeleton<S> kinematic_chain(Var<S> rotations, Var<S> transl, std::vector<int> parents,
                                  std::vector<double> rest_joints, Source where = Source::current());
 
-/// As above, with the rest joints [J,3] on the tape too: they follow the body's shape.
+/// As above, with the rest joints [J,3], which all frames share, on the tape too: they follow the body's shape.
 ///
 /// Adjoint: rotations, transl, rest_joints.
 template <class S>

@@ -18,6 +18,7 @@ struct LossDescription {
   std::string summary;  ///< one line
   std::any defaults;    ///< its own settings before anything is read; empty for a term that has none
   void (*describe_settings)(ConfigFields&, std::any&) = nullptr;
+  std::vector<std::string> reads = {};  ///< inputs that are made on demand (LossTerm reading())
 };
 
 /// A loss term without settings of its own.

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "autodiff/tape.h"
 #include "optim/loss_description.h"
+#include "optim/motion_start.h"
 
 namespace hsi4d {
 
@@ -31,7 +33,20 @@ struct LossInputs {
   Var<S> object_depth;          ///< [O,1] mean camera z of each object's Gaussian centres, metres
   Var<S> object_depth_target;   ///< [O,1] what it was in the clip's first frame, metres
 
-  Var<S> body_rotations;  ///< [21,9] rotation matrices, by rows, of joints 1 to 21 relative to their parents
+  Var<S> human_opacity;  ///< [1,H,W] Σ T α of the human's Gaussians; only for terms that `read` it
+  Var<S> human_mask;     ///< [1,H,W] what of the frame shows the human, 0 to 1; with human_opacity
+  Var<S> object_masks;   ///< [O,H,W] the same of each object; with human_opacity
+
+  /// The body over the F frames that the stage sees: those before, which stand still, and those that it moves. A stage
+  /// of one frame sees up to three before it, one of the whole sequence frame 0.
+  Var<S> body_rotations;  ///< [21M,9] rotation matrices, by rows, of joints 1 to 21 relative to their parents in the M
+                          ///< frames that move
+  Var<S> joints;          ///< [F,66] places of joints 0 to 21, metres, world, a frame a row
+  Var<S> joints_start;    ///< [F,66] what they were when the stage began
+  std::shared_ptr<const MotionStart> motion;  ///< what was where when the stage began; null: not given
+  /// Record places of some of the human's and the objects' Gaussians, [P,3] metres, world, in frames that move.
+  std::function<Var<S>(const std::vector<BodyPoint>& points)> body_points;
+  std::function<Var<S>(const std::vector<ObjectPoint>& points)> object_points;
 
   std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
 
@@ -55,6 +70,15 @@ struct LossTerm {
     }
   }
 };
+
+/// Inputs that are made only for stages with a term that reads them, as they cost time in every iteration.
+inline constexpr const char* kReadsHumanOpacity = "human_opacity";
+
+/// A term that reads inputs which are made on demand.
+inline LossTerm reading(LossTerm term, std::vector<std::string> inputs) {
+  term.description.reads = std::move(inputs);
+  return term;
+}
 
 /// A loss term from a function of (inputs, settings) that is generic in the precision. F is a captureless lambda.
 template <class Settings, class F>

@@ -43,12 +43,18 @@ void describe(ConfigFields& f, ParameterGroupSettings& s) {
 
 void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescription>& losses) {
   f.integer("iterations", s.iterations, {.min = 1, .max = kMostIterations}, "Steps of the optimiser").required();
-  f.choice("draw", s.draw, kDraws, "What is rendered: all, or the static scene alone");
   f.choice(
-      "weight", s.weight, kPixelWeights,
-      "Pixels that count in weighted losses: all, or those that no human or object has covered in any frame so far");
+      "over", s.over, kStageScopes,
+      "What is optimised at once: a frame, each in its turn, or after them the whole sequence, which draws nothing");
+  f.choice("draw", s.draw, kDraws, "What is rendered: all, or the static scene alone");
+  f.choice("weight", s.weight, kPixelWeights,
+           "Pixels that count in weighted losses: all, those that no human or object has covered in any frame so far, "
+           "or those that the frame's masks cover");
   f.map("optimize", s.optimize, "What moves: parameter groups by name");
   f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
+  f.path("pose_weights", s.pose_weights, {.must_exist = true},
+         "VPoser's weights (tools/export_vposer.py), whose latents a stage over the sequence moves; without, natural "
+         "poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
 }
 

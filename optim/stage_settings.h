@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <optional>
 #include <vector>
 
@@ -35,20 +36,29 @@ struct ParameterGroupSettings {
 /// What a stage renders.
 enum class Draw { kAll, kScene };
 
-/// Which pixels count where a loss term uses weights.
-enum class PixelWeight { kAll, kUnoccluded };
+/// Which pixels count where a loss term uses weights: all; those that nothing has covered in any frame so far; those
+/// that the masks of this frame cover.
+enum class PixelWeight { kAll, kUnoccluded, kForeground };
+
+/// What a stage is run for: each frame in its turn, or all of them at once after that.
+enum class StageScope { kFrame, kSequence };
+
+inline constexpr std::array<ConfigChoice<StageScope>, 2> kStageScopes = {
+    {{StageScope::kFrame, "frame"}, {StageScope::kSequence, "sequence"}}};
 
 inline constexpr std::array<ConfigChoice<Draw>, 2> kDraws = {{{Draw::kAll, "all"}, {Draw::kScene, "scene"}}};
-inline constexpr std::array<ConfigChoice<PixelWeight>, 2> kPixelWeights = {
-    {{PixelWeight::kAll, "all"}, {PixelWeight::kUnoccluded, "unoccluded"}}};
+inline constexpr std::array<ConfigChoice<PixelWeight>, 3> kPixelWeights = {
+    {{PixelWeight::kAll, "all"}, {PixelWeight::kUnoccluded, "unoccluded"}, {PixelWeight::kForeground, "foreground"}}};
 
 /// One stage of the method.
 struct StageSettings {
   int iterations = 0;
+  StageScope over = StageScope::kFrame;
   Draw draw = Draw::kAll;
   PixelWeight weight = PixelWeight::kAll;
   ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
   ConfigMap<LossSettings> losses;              ///< by loss term
+  std::filesystem::path pose_weights;          ///< over the sequence: VPoser's weights; empty: natural poses
   OptimizerSettings optimizer;
 };
 

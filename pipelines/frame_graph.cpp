@@ -7,10 +7,10 @@
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
-#include "body/vposer.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
+#include "pipelines/motion_inputs.h"
 #include "pipelines/tape_image.h"
 #include "splat/camera_center.h"
 
@@ -90,6 +90,7 @@ template <class S>
 FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
                           const FrameGraphSettings& settings)
     : tape_(tape),
+      clip_(clip),
       settings_(settings),
       view_{clip.camera, clip.scene.origin_world, settings.render, settings.skip, settings.approx} {
   // Objects and the body are recorded in the world, and one render has one origin: the scene's must be zero until they
@@ -175,8 +176,9 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
   const GaussianVars<S> vars = gaussian_leaves("object", object.name, object.gaussians);
   const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
   const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
-  objects_.push_back({orient, transl});
-  return {rigid_splats(vars, record_rotations(orient), transl, xi_, view_), object.gaussians.count()};
+  const Var<S> rotation = record_rotations(orient);
+  objects_.push_back({orient, transl, rotation});
+  return {rigid_splats(vars, rotation, transl, xi_, view_), object.gaussians.count()};
 }
 
 template <class S>
@@ -193,12 +195,12 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
     joint_rotations_.push_back(rotation_leaf(joints.name, joints.name, joints.count));
   }
   transl_ = leaf("transl", "transl", 1, 3, nullptr);
-  const Var<S> rotations = record_rotations(concat_rows<S>(joint_rotations_));
-  inputs_.body_rotations = slice_rows(rotations, 1, kBodyPoseJoints);
-  if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations, transl_, avatar), n};
+  rotations_ = record_rotations(concat_rows<S>(joint_rotations_));
+  skeleton_ = kinematic_chain(rotations_, transl_, avatar.parents, avatar.joints);
+  if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations_, skeleton_, avatar), n};
   HSI4D_CHECK_EQ(settings_.color_net->rows, n);
   const HumanColors<S> colors = record_color_net(*settings_.color_net);
-  return {skinned_splats(vars, rotations, transl_, avatar, &colors), n};
+  return {skinned_splats(vars, rotations_, skeleton_, avatar, &colors), n};
 }
 
 template <class S>
@@ -228,14 +230,26 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
   Index row = 0;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     const bool is_object = p >= first_object && p < first_object + objects_.size();
-    if (is_object) request.groups.emplace_back(row, row + parts[p].count);
+    const bool is_human = settings_.draw == Draw::kAll && p + 1 == parts.size();
+    if (is_object || (is_human && settings_.human_opacity)) request.groups.emplace_back(row, row + parts[p].count);
     row += parts[p].count;
   }
   rendered_ = render_parts(parts, request);
   inputs_.rendered = rendered_.image;
   inputs_.target = tape_.constant("target", rendered_.image.shape());
   inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
-  if (!request.groups.empty()) record_object_inputs(parts, first_object);
+  if (settings_.draw == Draw::kScene) return;
+  if (!objects_.empty()) record_object_inputs(parts, first_object);
+  if (settings_.human_opacity) record_masks();
+}
+
+/// Opacities are those of the objects, and last of the human.
+template <class S>
+void FrameGraph<S>::record_masks() {
+  const auto objects = static_cast<Index>(objects_.size());
+  inputs_.human_opacity = objects == 0 ? rendered_.group_opacity : slice_planes(rendered_.group_opacity, objects, 1);
+  inputs_.human_mask = tape_.constant("human_mask", inputs_.human_opacity.shape());
+  if (objects > 0) inputs_.object_masks = tape_.constant("object_masks", inputs_.object_opacity.shape());
 }
 
 /// The scene is the first part; it stands still while the camera does.
@@ -248,6 +262,15 @@ Rendered<S> FrameGraph<S>::render_parts(const std::vector<Part>& parts, const Re
 }
 
 template <class S>
+void FrameGraph<S>::give_motion(const std::vector<SceneState>& frames) {
+  HSI4D_CHECK(settings_.draw == Draw::kAll, "a graph of the scene alone has no body");
+  std::vector<Var<S>> transforms;
+  for (const Object& object : objects_) transforms.push_back(rigid_rows(object.rotation, object.transl));
+  const Var<S> objects = transforms.empty() ? Var<S>{} : concat_rows<S>(transforms);
+  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects}, clip_, frames, inputs_);
+}
+
+template <class S>
 void FrameGraph<S>::record_object_inputs(const std::vector<Part>& parts, std::size_t first_object) {
   const auto count = static_cast<Index>(objects_.size());
   std::vector<Var<S>> depths;
@@ -256,7 +279,8 @@ void FrameGraph<S>::record_object_inputs(const std::vector<Part>& parts, std::si
     if (p >= first_object) depths.push_back(mean(slice_rows(rendered_.projected.depths, row, parts[p].count)));
     row += parts[p].count;
   }
-  inputs_.object_opacity = rendered_.group_opacity;
+  inputs_.object_opacity =
+      settings_.human_opacity ? slice_planes(rendered_.group_opacity, 0, count) : rendered_.group_opacity;
   inputs_.object_depth = concat_rows<S>(depths);
   inputs_.object_center_target = tape_.constant("object_center_target", shape_of(count, 3));
   inputs_.object_depth_target = tape_.constant("object_depth_target", shape_of(count, 1));
@@ -344,7 +368,9 @@ void FrameGraph<S>::set_targets(const FrameTargets& targets) {
   } else {
     fill(inputs_.weight, S(1));
   }
+  if (inputs_.given(inputs_.human_mask)) write_image(inputs_.human_mask, *targets.human_mask);
   if (!inputs_.given(inputs_.object_depth)) return;
+  if (inputs_.given(inputs_.object_masks)) write_images(inputs_.object_masks, targets.object_masks);
   HSI4D_CHECK_EQ(targets.centers.size(), objects_.size());
   HSI4D_CHECK_EQ(targets.depths.size(), objects_.size());
   for (std::size_t o = 0; o < objects_.size(); ++o) {

@@ -33,14 +33,17 @@ struct FrameGraphSettings {
   const ColorNet* color_net = nullptr;  ///< of the human's colours, read when the graph is recorded; null: the avatar's
   bool color_pose_gradient = true;      ///< colours of the net have a gradient in the pose
   bool color_camera_gradient = false;   ///< and, by the direction of view, in the camera
+  bool human_opacity = false;           ///< the losses read the human's opacity, which costs a channel of the render
 };
 
 /// What a frame is compared with.
 struct FrameTargets {
-  const Image* image = nullptr;          ///< [3,H,W]
-  const Image* weight = nullptr;         ///< [1,H,W]; null: every pixel counts
-  std::vector<Vector3<double>> centers;  ///< by object: x px, y px, 1 or 0 (none)
-  std::vector<double> depths;            ///< by object: mean camera z at the clip's first frame, metres
+  const Image* image = nullptr;                 ///< [3,H,W]
+  const Image* weight = nullptr;                ///< [1,H,W]; null: every pixel counts
+  std::vector<Vector3<double>> centers;         ///< by object: x px, y px, 1 or 0 (none)
+  std::vector<double> depths;                   ///< by object: mean camera z at the clip's first frame, metres
+  const Image* human_mask = nullptr;            ///< [1,H,W] coverage; needed with settings.human_opacity
+  std::vector<const Image*> object_masks = {};  ///< the same by object
 };
 
 /// Names of the groups of a frame graph, by what it draws.
@@ -68,6 +71,9 @@ class FrameGraph {
   void read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const;
   /// Reads features and layers of the color net back, those of them that are named in `moved`.
   void read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const;
+  /// Records what terms over the body's motion read. For graphs that draw all, once, after set_state.
+  /// @param frames  the states before this frame that such terms see, and last the one that was set
+  void give_motion(const std::vector<SceneState>& frames);
   /// Writes the frame: target, the weight of pixels, centres of the objects' masks. See FrameTargets.
   void set_targets(const FrameTargets& targets);
 
@@ -83,6 +89,7 @@ class FrameGraph {
   };
   struct Object {
     Var<S> orient, transl;
+    Var<S> rotation;  // [1,9] that orient gives
   };
 
   Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
@@ -95,12 +102,14 @@ class FrameGraph {
   HumanColors<S> record_color_net(const ColorNet& net);
   Var<S> record_rotations(Var<S> parameters) const;
   void record_render(const std::vector<Part>& parts, std::size_t first_object);
+  void record_masks();
   Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
   void record_object_inputs(const std::vector<Part>& parts, std::size_t first_object);
   void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
   Vector3<double> read_rotation(Var<S> leaf, Index row) const;
 
   Tape<S>& tape_;
+  const Clip& clip_;
   FrameGraphSettings settings_;
   SplatView view_;
   std::vector<ParameterGroup<S>> groups_;
@@ -110,7 +119,9 @@ class FrameGraph {
   std::vector<Object> objects_;
   Var<S> transl_;
   std::vector<Var<S>> joint_rotations_;  // by kJointGroups
-  ColorNetVars<S> color_net_;            // empty without a color net
+  Var<S> rotations_;                     // [55,9] that they give
+  PosedSkeleton<S> skeleton_;
+  ColorNetVars<S> color_net_;  // empty without a color net
   Rendered<S> rendered_;
   LossInputs<S> inputs_;
 };

@@ -5,7 +5,6 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "body/canonical_directions.h"
-#include "body/kinematics.h"
 #include "splat/covariance.h"
 #include "splat/opacity.h"
 #include "splat/sh.h"
@@ -13,17 +12,6 @@
 namespace hsi4d {
 
 namespace {
-
-/// [1,12], the rows of [R | t].
-template <class S>
-Var<S> rigid_rows(Var<S> rotation, Var<S> translation) {
-  std::array<Var<S>, 6> parts;
-  for (Index r = 0; r < 3; ++r) {
-    parts[static_cast<std::size_t>(2 * r)] = slice_cols(rotation, 3 * r, 3);
-    parts[static_cast<std::size_t>(2 * r + 1)] = slice_cols(translation, r, 1);
-  }
-  return concat_cols<S>(parts);
-}
 
 template <class S>
 Var<S> net_colors(const HumanColors<S>& colors, Var<S> own, Var<S> rotations, const SkinWeights<S>& weights,
@@ -50,6 +38,16 @@ Var<S> stacked(const std::vector<SplatInputs<S>>& parts, Member member) {
 }  // namespace
 
 template <class S>
+Var<S> rigid_rows(Var<S> rotation, Var<S> translation) {
+  std::array<Var<S>, 6> parts;
+  for (Index r = 0; r < 3; ++r) {
+    parts[static_cast<std::size_t>(2 * r)] = slice_cols(rotation, 3 * r, 3);
+    parts[static_cast<std::size_t>(2 * r + 1)] = slice_cols(translation, r, 1);
+  }
+  return concat_cols<S>(parts);
+}
+
+template <class S>
 SplatInputs<S> standing_splats(const GaussianVars<S>& scene, Var<S> xi, const SplatView& view) {
   return {scene.means, gaussian_axes(scene.quats, scene.log_scales), gaussian_opacities(scene.opacity_logits),
           sh_colors(scene.colors, scene.means, xi, view)};
@@ -65,9 +63,8 @@ SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<
 }
 
 template <class S>
-SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar,
-                              const HumanColors<S>* colors) {
-  const PosedSkeleton<S> skeleton = kinematic_chain(rotations, transl, avatar.parents, avatar.joints);
+SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, const PosedSkeleton<S>& skeleton,
+                              const Avatar& avatar, const HumanColors<S>* colors) {
   const SkinWeights<S> weights(avatar.weights);
   const SkinnedFrames<S> posed =
       skin_frames(weights, skeleton.transforms, human.means, gaussian_axes(human.quats, human.log_scales));
@@ -77,16 +74,26 @@ SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Va
 }
 
 template <class S>
+SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar,
+                              const HumanColors<S>* colors) {
+  return skinned_splats(human, rotations, kinematic_chain(rotations, transl, avatar.parents, avatar.joints), avatar,
+                        colors);
+}
+
+template <class S>
 SplatInputs<S> stacked_splats(const std::vector<SplatInputs<S>>& parts) {
   return {stacked(parts, &SplatInputs<S>::means), stacked(parts, &SplatInputs<S>::axes),
           stacked(parts, &SplatInputs<S>::opacities), stacked(parts, &SplatInputs<S>::colors)};
 }
 
-#define HSI4D_INSTANTIATE(S)                                                                              \
-  template SplatInputs<S> standing_splats(const GaussianVars<S>&, Var<S>, const SplatView&);              \
-  template SplatInputs<S> rigid_splats(const GaussianVars<S>&, Var<S>, Var<S>, Var<S>, const SplatView&); \
-  template SplatInputs<S> skinned_splats(const GaussianVars<S>&, Var<S>, Var<S>, const Avatar&,           \
-                                         const HumanColors<S>*);                                          \
+#define HSI4D_INSTANTIATE(S)                                                                                     \
+  template SplatInputs<S> standing_splats(const GaussianVars<S>&, Var<S>, const SplatView&);                     \
+  template SplatInputs<S> rigid_splats(const GaussianVars<S>&, Var<S>, Var<S>, Var<S>, const SplatView&);        \
+  template Var<S> rigid_rows(Var<S>, Var<S>);                                                                    \
+  template SplatInputs<S> skinned_splats(const GaussianVars<S>&, Var<S>, const PosedSkeleton<S>&, const Avatar&, \
+                                         const HumanColors<S>*);                                                 \
+  template SplatInputs<S> skinned_splats(const GaussianVars<S>&, Var<S>, Var<S>, const Avatar&,                  \
+                                         const HumanColors<S>*);                                                 \
   template SplatInputs<S> stacked_splats(const std::vector<SplatInputs<S>>&);
 HSI4D_INSTANTIATE(float)
 HSI4D_INSTANTIATE(double)

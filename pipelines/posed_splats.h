@@ -5,6 +5,7 @@
 
 #include "body/avatar.h"
 #include "body/color_net.h"
+#include "body/kinematics.h"
 #include "splat/render.h"
 
 namespace hsi4d {
@@ -33,6 +34,10 @@ template <class S>
 SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<S> transl, Var<S> xi,
                             const SplatView& view);
 
+/// [1,12], the rows of [R | t], of rotation [1,9] and translation [1,3]. Adjoint: both.
+template <class S>
+Var<S> rigid_rows(Var<S> rotation, Var<S> translation);
+
 /// What a human's colours follow beside the avatar's own.
 template <class S>
 struct HumanColors {
@@ -45,10 +50,14 @@ struct HumanColors {
 /// A human in a pose: linear blend skinning of rest-pose Gaussians, axes by the blended linear map (row D2).
 /// @param human      the avatar's numbers
 /// @param rotations  [J,9] of the joints
-/// @param transl     [1,3] metres, world
+/// @param skeleton   kinematic_chain of them
 /// @param colors     null: the avatar's own
-/// Adjoint: all numbers, rotations, transl, the network's numbers, the camera's centre. Without pose_gradient none
-/// flows through the colours to rotations and transl.
+/// Adjoint: all numbers, rotations, the skeleton, the network's numbers, the camera's centre. Without pose_gradient
+/// none flows through the colours to rotations and skeleton.
+template <class S>
+SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, const PosedSkeleton<S>& skeleton,
+                              const Avatar& avatar, const HumanColors<S>* colors = nullptr);
+/// As above, with the skeleton that the rotations and transl [1,3] (metres, world) give.
 template <class S>
 SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, Var<S> transl, const Avatar& avatar,
                               const HumanColors<S>* colors = nullptr);

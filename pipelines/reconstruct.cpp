@@ -5,9 +5,11 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <optional>
 
 #include "body/kinematics.h"
 #include "body/motion_edit.h"
+#include "body/pose_prior.h"
 #include "core/camera_file.h"
 #include "core/image_io.h"
 #include "core/log.h"
@@ -17,9 +19,10 @@
 #include "optim/stage.h"
 #include "pipelines/evaluate.h"
 #include "pipelines/frame_graph.h"
+#include "pipelines/frame_images.h"
 #include "pipelines/input_hashes.h"
-#include "pipelines/report_data.h"
 #include "pipelines/run_state.h"
+#include "pipelines/sequence_graph.h"
 
 namespace hsi4d {
 
@@ -27,67 +30,6 @@ namespace {
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
-/// Pixels of `mask` at or above the threshold, grown by `margin` pixels to all sides, are set in `covered`.
-void add_covered(const Image& mask, double threshold, int margin, Image& covered) {
-  const int height = mask.height(), width = mask.width();
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      if (static_cast<double>(mask(0, y, x)) < threshold) continue;
-      for (int i = std::max(0, y - margin); i <= std::min(height - 1, y + margin); ++i) {
-        std::fill(covered.row(0, i) + std::max(0, x - margin), covered.row(0, i) + std::min(width, x + margin + 1),
-                  1.0F);
-      }
-    }
-  }
-}
-
-void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered) {
-  add_covered(frame.human_mask, data.mask_threshold, data.mask_margin_px, covered);
-  for (const Image& mask : frame.object_masks) add_covered(mask, data.mask_threshold, data.mask_margin_px, covered);
-}
-
-Image complement(const Image& mask) {
-  Image result(1, mask.height(), mask.width());
-  for (int y = 0; y < mask.height(); ++y) {
-    for (int x = 0; x < mask.width(); ++x) result(0, y, x) = 1 - mask(0, y, x);
-  }
-  return result;
-}
-
-/// The larger of all masks, pixel by pixel.
-Image foreground_of(const ClipFrame& frame) {
-  Image result = frame.human_mask;
-  for (const Image& mask : frame.object_masks) {
-    for (int y = 0; y < result.height(); ++y) {
-      for (int x = 0; x < result.width(); ++x) result(0, y, x) = std::max(result(0, y, x), mask(0, y, x));
-    }
-  }
-  return result;
-}
-
-Image difference_image(const Image& a, const Image& b) {
-  Image result(a.channels(), a.height(), a.width());
-  for (int c = 0; c < a.channels(); ++c) {
-    for (int y = 0; y < a.height(); ++y) {
-      for (int x = 0; x < a.width(); ++x)
-        result(c, y, x) = static_cast<float>(kDifferenceGain) * std::fabs(a(c, y, x) - b(c, y, x));
-    }
-  }
-  return result;
-}
-
-template <class S>
-Image to_image(const ConstArray<S>& array) {
-  Image image(static_cast<int>(array.shape.planes), static_cast<int>(array.shape.rows),
-              static_cast<int>(array.shape.cols));
-  for (int c = 0; c < image.channels(); ++c) {
-    for (int y = 0; y < image.height(); ++y) {
-      for (int x = 0; x < image.width(); ++x) image(c, y, x) = static_cast<float>(array(c, y, x));
-    }
-  }
-  return image;
 }
 
 /// Where a state puts everything, for the metrics. A stage that draws the scene alone is judged by its camera alone.
@@ -119,12 +61,18 @@ std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
   return first_color_net(config.color_net, clip.avatar, config.seed);
 }
 
+/// Stages that are run frame by frame; those over the sequence come after them.
+std::size_t count_frame_stages(const RunConfig& config) {
+  const auto is_of_frame = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
+  return static_cast<std::size_t>(std::count_if(config.stages.begin(), config.stages.end(), is_of_frame));
+}
+
 /// What is in a checkpoint, if its inputs are still the same.
 RunProgress read_checkpoint(const std::string& file, const std::string& identity, const RunConfig& config,
                             const Clip& clip) {
   RunProgress progress;
   try {
-    progress = load_progress(file, identity, clip, config.stages.size(), first_net(config, clip));
+    progress = load_progress(file, identity, clip, count_frame_stages(config), first_net(config, clip));
   } catch (const DataError& damage) {
     throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
   }
@@ -137,13 +85,18 @@ RunProgress read_checkpoint(const std::string& file, const std::string& identity
   return progress;
 }
 
-/// What is told of a run that was stopped in frame `frame`: those before it are kept, frame 0 being given.
-std::string stop_message(Index frame) {
-  const std::string text = "interrupted in frame " + std::to_string(frame) + "; ";
+/// What is told of a run that was stopped in frame `frame` of `frames`, or after the last of them: those before it are
+/// kept, frame 0 being given.
+std::string stop_message(Index frame, Index frames) {
+  const std::string text =
+      "interrupted in " + (frame < frames ? "frame " + std::to_string(frame) : "a stage over all frames") + "; ";
   if (frame == 1) return text + "no frame was finished";
   return text + (frame == 2 ? "frame 1 is" : "frames 1 to " + std::to_string(frame - 1) + " are") +
          " finished and kept";
 }
+
+/// Frames before the one at hand that terms over the motion see: three differences need as many.
+constexpr std::ptrdiff_t kFramesBefore = 3;
 
 class Reconstruction {
  public:
@@ -155,13 +108,15 @@ class Reconstruction {
         observer_(observer),
         identity_(checkpoint_identity(config, losses)),
         clip_(clip),
-        progress_(first_progress(clip_, config.stages.size(), first_net(config, clip))),
+        frame_stages_(count_frame_stages(config)),
+        progress_(first_progress(clip_, frame_stages_, first_net(config, clip))),
         start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
 
   RunSummary run() {
     resume();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
+    if (frame_stages_ < config_.stages.size()) refine();
     bar_.finish();
     tell_left_out();
     write_results();
@@ -173,8 +128,13 @@ class Reconstruction {
  private:
   std::int64_t total_steps() const {
     std::int64_t steps = 0;
-    for (const auto& [name, stage] : config_.stages) steps += stage.iterations;
-    return steps * (clip_.frames() - 1);
+    for (std::size_t s = frame_stages_; s < config_.stages.size(); ++s) steps += config_.stages[s].second.iterations;
+    return steps + steps_a_frame() * (clip_.frames() - 1);
+  }
+  std::int64_t steps_a_frame() const {
+    std::int64_t steps = 0;
+    for (std::size_t s = 0; s < frame_stages_; ++s) steps += config_.stages[s].second.iterations;
+    return steps;
   }
 
   void resume() {
@@ -190,7 +150,7 @@ class Reconstruction {
       folder_.note("resumed with frame " + std::to_string(progress_.frames_done()) + " of " +
                    std::to_string(clip_.frames() - 1));
     folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
-    bar_.skip(total_steps() / (clip_.frames() - 1) * (progress_.frames_done() - 1));
+    bar_.skip(steps_a_frame() * (progress_.frames_done() - 1));
   }
 
   /// The state that frame `index` starts from: the one before, with the estimated pose of the limbs.
@@ -209,7 +169,7 @@ class Reconstruction {
     SceneState state = start_of(index);
     ColorState colors = progress_.colors;
     std::vector<SceneState> after;
-    for (std::size_t s = 0; s < config_.stages.size(); ++s) {
+    for (std::size_t s = 0; s < frame_stages_; ++s) {
       if (config_.precision == RunPrecision::kFloat) {
         run_frame_stage<float>(index, s, frame, state, colors);
       } else {
@@ -218,11 +178,59 @@ class Reconstruction {
       after.push_back(state);
     }
     progress_.colors = std::move(colors);
-    write_images(index, frame, state);
+    write_images(index, frame, state, progress_.image_errors);
+    write_start_image(index, frame);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
     progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
     progress_.seconds += seconds_since(begin);
     save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
+  }
+
+  /// The stages over the whole sequence, each from where the one before ended.
+  void refine() {
+    for (std::size_t s = frame_stages_; s < config_.stages.size(); ++s) {
+      std::vector<SceneState> states = result();
+      StageTotals totals;
+      if (config_.precision == RunPrecision::kFloat) {
+        run_sequence_stage<float>(s, states, totals);
+      } else {
+        run_sequence_stage<double>(s, states, totals);
+      }
+      refined_.push_back({std::move(states), totals});
+    }
+    refined_errors_.resize(1);
+    for (Index t = 1; t < clip_.frames(); ++t) {
+      const ClipFrame frame = read_frame(config_.data, clip_, t);
+      write_images(t, frame, result()[static_cast<std::size_t>(t)], refined_errors_);
+    }
+  }
+
+  template <class S>
+  void run_sequence_stage(std::size_t s, std::vector<SceneState>& states, StageTotals& totals) {
+    const auto& [name, stage] = config_.stages[s];
+    Tape<S> tape;
+    const bool moves_pose = find_entry(stage.optimize, "pose_latents") != nullptr;
+    const std::optional<PosePrior> prior =
+        moves_pose ? std::optional(read_pose_prior(stage.pose_weights.string())) : std::nullopt;
+    const SequenceGraph<S> graph(tape, clip_, states, prior ? &*prior : nullptr, config_.rotations);
+    std::string begin;
+    const auto note_iteration = [&](const IterationReport& report) {
+      if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
+      note(std::nullopt, s, report, nullptr);
+    };
+    const StageResult result = run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(), note_iteration,
+                                            {.name = name, .kept = nullptr});
+    graph.read_states(stage.optimize, states);
+    totals.iterations = result.iterations;
+    totals.rollbacks = result.rollbacks;
+    totals.seconds = result.seconds;
+    tell_terms_off(name, stage, result.off);
+    folder_.note("all frames, " + stage_line(name, result, begin));
+  }
+
+  /// All frames after the last stage so far.
+  const std::vector<SceneState>& result() const {
+    return refined_.empty() ? progress_.after_stage.back() : refined_.back().states;
   }
 
   FrameGraphSettings graph_settings(Draw draw, const ColorState& colors) const {
@@ -235,21 +243,43 @@ class Reconstruction {
             Vector3<double>(config_.background.data()),
             colors.net ? &*colors.net : nullptr,
             config_.color_net.pose_gradient,
-            config_.color_net.camera_gradient};
+            config_.color_net.camera_gradient,
+            false};
+  }
+
+  /// Whether a term that is on reads the human's opacity.
+  bool reads_human_opacity(const StageSettings& stage) const {
+    return std::any_of(losses_.begin(), losses_.end(), [&stage](const LossTerm& term) {
+      const LossSettings* const chosen = find_entry(stage.losses, term.description.name);
+      const std::vector<std::string>& reads = term.description.reads;
+      return chosen != nullptr && chosen->weight != 0 &&
+             std::find(reads.begin(), reads.end(), kReadsHumanOpacity) != reads.end();
+    });
+  }
+
+  /// The frames that terms over the motion see: up to kFramesBefore that are done, and the one at hand.
+  std::vector<SceneState> seen_frames(const SceneState& state) const {
+    const std::vector<SceneState>& done = progress_.after_stage.back();
+    std::vector<SceneState> frames(done.end() - std::min(kFramesBefore, std::ssize(done)), done.end());
+    frames.push_back(state);
+    return frames;
   }
 
   template <class S>
   void run_frame_stage(Index index, std::size_t s, const ClipFrame& frame, SceneState& state, ColorState& colors) {
     const auto& [name, stage] = config_.stages[s];
     Tape<S> tape;
-    FrameGraph<S> graph(tape, clip_, state.camera_from_world, graph_settings(stage.draw, colors));
+    FrameGraphSettings settings = graph_settings(stage.draw, colors);
+    settings.human_opacity = stage.draw == Draw::kAll && reads_human_opacity(stage);
+    FrameGraph<S> graph(tape, clip_, state.camera_from_world, settings);
     graph.set_state(state);
-    const Image weight = complement(progress_.covered);
+    if (stage.draw == Draw::kAll) graph.give_motion(seen_frames(state));
+    const Image weight = pixel_weights(stage.weight, frame);
     graph.set_targets(targets_of(frame, stage, weight));
     std::string begin;  // of the loss, for the log
     const auto note_iteration = [&](const IterationReport& report) {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
-      note(index, s, report, *graph.rendered().counters);
+      note(index, s, report, graph.rendered().counters.get());
     };
     const StageResult result =
         run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(), note_iteration,
@@ -264,7 +294,7 @@ class Reconstruction {
     for (const LeftOutObject& object : result.left_out) {
       progress_.left_out.push_back({s, index, object.object, object.term, object.reason});
     }
-    folder_.note(stage_line(index, name, result, begin) + left_out_text(result));
+    folder_.note("frame " + std::to_string(index) + ", " + stage_line(name, result, begin) + left_out_text(result));
   }
 
   static std::string loss_text(double loss, std::span<const LossValue> terms) {
@@ -273,12 +303,10 @@ class Reconstruction {
     return rounded(loss, 4) + " (" + joined(parts) + ")";
   }
 
-  /// What a stage did with a frame, for the log.
-  static std::string stage_line(Index frame, const std::string& stage, const StageResult& result,
-                                const std::string& begin) {
-    std::string text = "frame " + std::to_string(frame) + ", stage " + stage + ": " +
-                       std::to_string(result.iterations) + " iterations in " + rounded(result.seconds, 3) +
-                       " s, loss " + begin + " -> " + loss_text(result.loss, result.terms);
+  /// What a stage did, for the log.
+  static std::string stage_line(const std::string& stage, const StageResult& result, const std::string& begin) {
+    std::string text = "stage " + stage + ": " + std::to_string(result.iterations) + " iterations in " +
+                       rounded(result.seconds, 3) + " s, loss " + begin + " -> " + loss_text(result.loss, result.terms);
     if (result.rollbacks > 0) text += ", " + std::to_string(result.rollbacks) + " steps not taken";
     return text;
   }
@@ -318,12 +346,24 @@ class Reconstruction {
     }
   }
 
+  /// Empty where every pixel counts.
+  Image pixel_weights(PixelWeight weight, const ClipFrame& frame) const {
+    if (weight == PixelWeight::kUnoccluded) return complement(progress_.covered);
+    if (weight == PixelWeight::kAll) return {};
+    Image covered(1, clip_.camera.height, clip_.camera.width);
+    add_covered(frame, config_.data, covered);
+    return covered;
+  }
+
   FrameTargets targets_of(const ClipFrame& frame, const StageSettings& stage, const Image& weight) const {
     FrameTargets targets;
     targets.image = &frame.target;
-    targets.weight = stage.weight == PixelWeight::kUnoccluded ? &weight : nullptr;
-    for (const Image& mask : frame.object_masks)
+    targets.weight = stage.weight == PixelWeight::kAll ? nullptr : &weight;
+    targets.human_mask = &frame.human_mask;
+    for (const Image& mask : frame.object_masks) {
+      targets.object_masks.push_back(&mask);
       targets.centers.push_back(mask_center(mask, config_.data.mask_threshold));
+    }
     for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
       targets.depths.push_back(
           mean_depth(clip_.objects[o].gaussians, clip_.first.objects[o], clip_.first.camera_from_world));
@@ -331,24 +371,32 @@ class Reconstruction {
     return targets;
   }
 
-  void note(Index frame, std::size_t s, const IterationReport& report, const RenderCounters& counters) {
+  /// @param frame     none: all at once
+  /// @param counters  null: nothing was drawn
+  void note(std::optional<Index> frame, std::size_t s, const IterationReport& report, const RenderCounters* counters) {
     const std::string& stage = config_.stages[s].first;
-    StageTotals& totals = progress_.totals[s];
-    totals.tiles += counters.tiles;
-    totals.pairs += counters.pairs;
-    totals.fragments += counters.fragments;
     if (report.rolled_back) {
-      log_warning("frame " + std::to_string(frame) + ", stage " + stage + ", iteration " +
+      log_warning((frame ? "frame " + std::to_string(*frame) : "all frames") + ", stage " + stage + ", iteration " +
                   std::to_string(report.iteration) + ": no step, " + std::string(report.offender));
     }
     IterationRecord record;
-    record.frame = static_cast<int>(frame);
+    if (frame) record.frame = static_cast<int>(*frame);
     record.stage = stage;
     record.iteration = report.iteration;
     record.loss = report.loss;
     for (const LossValue& term : report.terms) record.losses.emplace_back(term.name, term.value);
     record.seconds = report.seconds;
     record.rolled_back = report.rolled_back;
+    if (counters != nullptr) add_counters(*counters, progress_.totals[s], record);
+    folder_.append_metrics(record);
+    bar_.step_with("loss", report.loss);
+    if (observer_.wants_stop()) throw Interrupted(stop_message(frame.value_or(clip_.frames()), clip_.frames()));
+  }
+
+  static void add_counters(const RenderCounters& counters, StageTotals& totals, IterationRecord& record) {
+    totals.tiles += counters.tiles;
+    totals.pairs += counters.pairs;
+    totals.fragments += counters.fragments;
     for (const auto& [name, count] : {std::pair{"tiles", counters.tiles},
                                       {"pairs", counters.pairs},
                                       {"groups", counters.groups},
@@ -357,9 +405,6 @@ class Reconstruction {
                                       {"adjoint_tiles", counters.adjoint_tiles}}) {
       record.counters.emplace_back(name, static_cast<double>(count));
     }
-    folder_.append_metrics(record);
-    bar_.step_with("loss", report.loss);
-    if (observer_.wants_stop()) throw Interrupted(stop_message(frame));
   }
 
   template <class S>
@@ -375,18 +420,20 @@ class Reconstruction {
                                                      : render_state<double>(state, colors);
   }
 
-  /// Writes the images of a frame and notes how far the start's and the result's are from the video's.
-  void write_images(Index index, const ClipFrame& frame, const SceneState& state) {
+  /// Writes the images of a frame and notes how far the result's is from the video's.
+  void write_images(Index index, const ClipFrame& frame, const SceneState& state, std::vector<MetricValues>& errors) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
-    const Image image = rendered_image(state, progress_.colors),
-                start = rendered_image(baseline_start(index), start_colors_);
+    const Image image = rendered_image(state, progress_.colors), foreground = foreground_of(frame);
     write_image(paths.frame_image(number, "target"), frame.target);
     write_image(paths.frame_image(number, "render"), image);
     write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
-    write_image(paths.frame_image(number, "start"), start);
-    const Image foreground = foreground_of(frame);
-    progress_.image_errors.push_back(image_errors(image, frame.target, &foreground));
+    errors.push_back(image_errors(image, frame.target, &foreground));
+  }
+
+  void write_start_image(Index index, const ClipFrame& frame) {
+    const Image start = rendered_image(baseline_start(index), start_colors_), foreground = foreground_of(frame);
+    write_image(folder_.paths().frame_image(static_cast<int>(index), "start"), start);
     progress_.start_errors.push_back(image_errors(start, frame.target, &foreground));
   }
 
@@ -398,14 +445,13 @@ class Reconstruction {
   }
 
   void write_results() const {
-    const std::vector<SceneState>& result = progress_.after_stage.back();
     std::vector<std::string> names;
     for (const ClipObject& object : clip_.objects) names.push_back(object.name);
-    Motion motion{clip_.frame_rate, bodies_of(result)};
+    Motion motion{clip_.frame_rate, bodies_of(result())};
     motion.pelvis_rest = pelvis_of(clip_.avatar.joints);
     write_motion(folder_.paths().motion(), motion);
-    if (!names.empty()) write_object_tracks(folder_.paths().objects(), names, result);
-    write_cameras(folder_.paths().cameras(), cameras_of(result, clip_.camera));
+    if (!names.empty()) write_object_tracks(folder_.paths().objects(), names, result());
+    write_cameras(folder_.paths().cameras(), cameras_of(result(), clip_.camera));
     if (progress_.colors.net && moves_colors()) write_color_net(folder_.paths().color_net(), *progress_.colors.net);
   }
 
@@ -424,7 +470,11 @@ class Reconstruction {
     for (std::size_t s = 0; s < config_.stages.size(); ++s) summary.metrics.push_back(summarize_stage(s));
     summary.baselines = {{"start", {}, {}}};
     if (clip_.truth) add_errors(summary);
-    add_image_errors(progress_.image_errors, summary.metrics.back().values, summary.per_frame);
+    std::vector<FrameMetrics> before_refinement;
+    if (!refined_.empty())
+      add_image_errors(progress_.image_errors, summary.metrics[frame_stages_ - 1].values, before_refinement);
+    add_image_errors(refined_.empty() ? progress_.image_errors : refined_errors_, summary.metrics.back().values,
+                     summary.per_frame);
     add_image_errors(progress_.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
     return summary;
   }
@@ -445,9 +495,11 @@ class Reconstruction {
 
   StageSummary summarize_stage(std::size_t s) const {
     const auto& [name, stage] = config_.stages[s];
-    const StageTotals& totals = progress_.totals[s];
+    const bool is_of_frame = s < frame_stages_;
+    const StageTotals& totals = is_of_frame ? progress_.totals[s] : refined_[s - frame_stages_].totals;
     StageSummary summary{name, totals.seconds, totals.iterations, {}};
-    if (clip_.truth) summary.values = errors_of(progress_.after_stage[s], stage.draw);
+    const std::vector<SceneState>& states = is_of_frame ? progress_.after_stage[s] : refined_[s - frame_stages_].states;
+    if (clip_.truth) summary.values = errors_of(states, stage.draw);
     for (const auto& [counter, count] : {std::pair{"rollbacks", totals.rollbacks},
                                          {"tiles", totals.tiles},
                                          {"pairs", totals.pairs},
@@ -473,7 +525,7 @@ class Reconstruction {
       summary.baselines.push_back(
           {name, errors_of(*states, Draw::kAll), sequence_errors(placed(clip_, *states, Draw::kAll), truth)});
     }
-    summary.per_frame = sequence_errors(placed(clip_, progress_.after_stage.back(), Draw::kAll), truth);
+    summary.per_frame = sequence_errors(placed(clip_, result(), Draw::kAll), truth);
   }
 
   const RunConfig& config_;
@@ -481,8 +533,17 @@ class Reconstruction {
   RunFolder& folder_;
   const Observer& observer_;
   std::string identity_;  // the text that a checkpoint of this run belongs to
+  /// All frames after a stage over the sequence.
+  struct Refined {
+    std::vector<SceneState> states;
+    StageTotals totals;
+  };
+
   const Clip& clip_;
+  std::size_t frame_stages_;
   RunProgress progress_;
+  std::vector<Refined> refined_;
+  std::vector<MetricValues> refined_errors_;  // of the images of the last, as progress_.image_errors
   const ColorState start_colors_;
   Progress bar_;
 };

@@ -106,7 +106,7 @@ void read_summary_file(const RunPaths& paths, ReportData& data) {
 
 struct MetricsLine {
   std::string stage;
-  int frame = 0;
+  std::optional<int> frame;
   double iteration = 0, seconds = 0;
   std::optional<double> loss;  // null where the step was rolled back
   bool rolled_back = false;

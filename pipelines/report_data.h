@@ -25,9 +25,9 @@ struct FrameImages {
   std::array<Bytes, kFrameKinds.size()> files;  ///< PNG files in the order of kFrameKinds; empty: there is none
 };
 
-/// How the loss of one stage went in one frame.
+/// How the loss of one stage went in one frame, or in all at once.
 struct LossCurve {
-  int frame = 0;
+  std::optional<int> frame;                       ///< none: all at once
   std::vector<std::pair<double, double>> points;  ///< iteration, loss; without those that were not finite
 };
 

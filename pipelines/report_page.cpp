@@ -236,16 +236,23 @@ std::string loss_caption(const StageCurves& stage) {
   }
   if (count == 0) return "";
   return "<p class=\"caption\">mean first loss " + loss_number(first / count) + ", mean last loss " +
-         loss_number(last / count) + " over " + std::to_string(count) + (count == 1 ? " frame" : " frames") + "</p>";
+         loss_number(last / count) +
+         (stage.curves.front().frame ? " over " + std::to_string(count) + (count == 1 ? " frame" : " frames")
+                                     : " of all frames together") +
+         "</p>";
+}
+
+std::string curve_name(const LossCurve& curve) {
+  return curve.frame ? "frame " + std::to_string(*curve.frame) : "all frames";
 }
 
 std::string ramp_legend(const StageCurves& stage) {
   if (stage.curves.size() < 2) return "";
   std::string stops;
   for (size_t i = 0; i < 5; ++i) stops += (i == 0 ? "" : ", ") + ramp_color(i, 5);
-  return "<p class=\"legend\"><span>frame " + std::to_string(stage.curves.front().frame) +
+  return "<p class=\"legend\"><span>" + curve_name(stage.curves.front()) +
          "<span class=\"ramp\" style=\"background:linear-gradient(to right, " + stops + ")\"></span>" +
-         std::to_string(stage.curves.back().frame) + "</span></p>";
+         curve_name(stage.curves.back()) + "</span></p>";
 }
 
 std::string losses_section(const ReportData& data) {
@@ -259,8 +266,8 @@ std::string losses_section(const ReportData& data) {
     plot.width = 560;
     for (size_t i = 0; i < stage.curves.size(); ++i) {
       const LossCurve& curve = stage.curves[i];
-      plot.lines.push_back({"frame " + std::to_string(curve.frame), ramp_color(i, stage.curves.size()),
-                            thinned(curve.points), false, false, stage.curves.size() > 12 ? 0.6 : 0.9});
+      plot.lines.push_back({curve_name(curve), ramp_color(i, stage.curves.size()), thinned(curve.points), false, false,
+                            stage.curves.size() > 12 ? 0.6 : 0.9});
     }
     text += "<div class=\"card\"><h3>" + row_label(stage.stage) + "</h3>" + ramp_legend(stage) + plot_svg(plot) +
             loss_caption(stage) + "</div>\n";

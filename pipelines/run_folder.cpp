@@ -159,7 +159,7 @@ ConfigValue record_number(double value, const std::string& pointer, bool rolled_
 
 std::string metrics_line(const IterationRecord& record) {
   ConfigValue line = ConfigValue::make_object();
-  line.add("frame", ConfigValue::make_integer(record.frame));
+  if (record.frame) line.add("frame", ConfigValue::make_integer(*record.frame));
   line.add("stage", ConfigValue::make_string(record.stage));
   line.add("iteration", ConfigValue::make_integer(record.iteration));
   line.add("loss", record_number(record.loss, "/loss", record.rolled_back));
@@ -174,12 +174,14 @@ std::string metrics_line(const IterationRecord& record) {
   return to_json_line(line) + "\n";
 }
 
-int frame_of_line(const std::string& text, const std::string& file, int line) {
-  const auto read = [&](int at) {
+/// None: the line is of all frames at once.
+std::optional<int> frame_of_line(const std::string& text, const std::string& file, int line) {
+  const auto read = [&](int at) -> std::optional<int> {
     const ConfigValue record = parse_json_text(text, file, at);
     check_kind(record, Kind::kObject, "");
+    if (find_member(record, "stage") == nullptr) fail_at(record, "", "there is no \"stage\"");
     const ConfigValue* const frame = find_member(record, "frame");
-    if (frame == nullptr) fail_at(record, "", "there is no \"frame\"");
+    if (frame == nullptr) return std::nullopt;
     return static_cast<int>(whole_number_of(*frame, "/frame"));
   };
   try {
@@ -196,7 +198,8 @@ std::string lines_up_to(const std::string& text, int last, const std::string& fi
   for (int line = 1; begin < text.size(); ++line) {
     const size_t end = text.find('\n', begin);
     if (end == std::string::npos) break;  // cut short by a kill
-    if (frame_of_line(text.substr(begin, end - begin), file, line) <= last) kept.append(text, begin, end + 1 - begin);
+    const std::optional<int> frame = frame_of_line(text.substr(begin, end - begin), file, line);
+    if (frame && *frame <= last) kept.append(text, begin, end + 1 - begin);
     begin = end + 1;
   }
   return kept;

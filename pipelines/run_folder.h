@@ -32,7 +32,7 @@ struct RunIdentity {
 
 /// One iteration, a line of metrics.jsonl.
 struct IterationRecord {
-  int frame = 0;
+  std::optional<int> frame;  ///< none: all at once
   std::string_view stage;
   Index iteration = 0;
   double loss = 0;
@@ -106,8 +106,9 @@ class RunFolder {
   /// Throws InternalError naming the member for a number that is not finite, unless the step was rolled back.
   void append_metrics(const IterationRecord& record);
 
-  /// Drops the lines of later frames, and a last line that was cut short: with `frame` that of the checkpoint, the file
-  /// is as if the run had never gone further. Throws DataError naming the line that is none of ours.
+  /// Drops the lines of later frames and of all frames at once, and a last line that was cut short: with `frame` that
+  /// of the checkpoint, the file is as if the run had never gone further. Throws DataError naming the line that is none
+  /// of ours.
   void truncate_metrics_after(int frame);
 
   /// Writes summary.json. Errors as summary_json.

@@ -9,6 +9,7 @@
 #include "core/text.h"
 #include "pipelines/clip.h"
 #include "pipelines/frame_graph.h"
+#include "pipelines/sequence_graph.h"
 
 namespace hsi4d {
 namespace {
@@ -17,7 +18,8 @@ namespace {
 
 void add_group_problems(const StageSettings& stage, const std::string& in, std::vector<RunProblem>& found) {
   const std::string where = in + "/optimize";
-  const std::vector<std::string> known = state_group_names(stage.draw);
+  const bool is_of_frame = stage.over == StageScope::kFrame;
+  const std::vector<std::string> known = is_of_frame ? state_group_names(stage.draw) : sequence_group_names();
   if (stage.optimize.empty())
     found.push_back({where, "no parameter group is named; known here: " + joined(known), {where}, true});
   for (const auto& [name, group] : stage.optimize) {
@@ -25,7 +27,7 @@ void add_group_problems(const StageSettings& stage, const std::string& in, std::
     if (std::find(known.begin(), known.end(), name) == known.end())
       found.push_back({place,
                        "there is no such parameter group" + (hint.empty() ? "; known here: " + joined(known) : hint),
-                       {in + "/draw"}});
+                       {in + "/draw", in + "/over"}});
     if (stage.iterations > 0 && group.from >= stage.iterations)
       found.push_back({child_pointer(place, "from"),
                        std::to_string(group.from) + " is beyond the stage's " + std::to_string(stage.iterations) +
@@ -49,6 +51,24 @@ void add_loss_problems(const StageSettings& stage, const std::string& in, std::v
                    joined(names) + (names.size() == 1 ? " has" : " have") +
                        " weight 0, which switches a loss off; a stage needs one that is on",
                    {where}});
+}
+
+/// Stages over the sequence begin where those of all frames ended.
+void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunProblem>& found) {
+  const std::string* sequence = nullptr;
+  for (const auto& [name, stage] : stages) {
+    const std::string where = child_pointer(child_pointer("/stages", name), "over");
+    if (stage.over == StageScope::kSequence) {
+      if (&stage == &stages.front().second)
+        found.push_back({where, "a stage over the sequence needs one over frames before it", {where}});
+      sequence = &name;
+    } else if (sequence != nullptr) {
+      found.push_back(
+          {where,
+           "a stage over frames cannot come after " + json_string(*sequence) + ", which is over the sequence",
+           {where, child_pointer(child_pointer("/stages", *sequence), "over")}});
+    }
+  }
 }
 
 // ---- Inputs ----
@@ -163,6 +183,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
     add_group_problems(stage, where, found);
     add_loss_problems(stage, where, found);
   }
+  add_order_problems(config.stages, found);
   add_name_problems(config.data, found);
   if (use == ConfigUse::kRun) add_input_problems(config.data, found);
   return found;

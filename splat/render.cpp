@@ -64,28 +64,6 @@ struct NormalizedDepth {
   }
 };
 
-/// Planes [first, first + planes of the output).
-template <class S>
-struct SlicePlanes {
-  static constexpr const char* kName = "slice_planes";
-  Index first;
-
-  void forward(NodeIo<S>& io) {
-    const Array<S> part = io.out();
-    const S* from = io.in(0).row(first * part.shape.rows);
-    std::copy_n(from, part.shape.memory(), part.data);
-  }
-  void backward(NodeIo<S>& io) {
-    if (!io.wants(0)) return;
-    const ConstArray<S> g = io.d_out();
-    const Array<S> d = io.d_in(0);
-    for (Index r = 0; r < g.total_rows(); ++r) {
-      S* to = d.row(first * g.shape.rows + r);
-      for (Index x = 0; x < g.shape.cols; ++x) to[x] += g.row(r)[x];
-    }
-  }
-};
-
 /// [N,1+G]: ones, and for each group 1 in its rows; without the ones when there is no depth.
 ///
 /// @param first_row  what groups call row 0
@@ -148,9 +126,7 @@ Rendered<S> render_sets(const SplatInputs<S>* still, const SplatInputs<S>& movin
   if (request.depth) {
     result.depth = tape.record(NormalizedDepth<S>{0, 1}, {composited.more_channels}, one, where);
     if (groups == 0) return result;
-    Shape group_image = one;
-    group_image.planes = groups;
-    result.group_opacity = tape.record(SlicePlanes<S>{2}, {composited.more_channels}, group_image, where);
+    result.group_opacity = slice_planes(composited.more_channels, 2, groups, where);
   } else if (groups > 0) {
     result.group_opacity = composited.more_channels;
   }

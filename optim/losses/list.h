@@ -10,6 +10,12 @@
   HSI4D_LOSS(masked_l2)    \
   HSI4D_LOSS(center)       \
   HSI4D_LOSS(depth)        \
+  HSI4D_LOSS(mask)         \
+  HSI4D_LOSS(fit)          \
+  HSI4D_LOSS(contact)      \
+  HSI4D_LOSS(smooth)       \
+  HSI4D_LOSS(ground)       \
+  HSI4D_LOSS(foot_sliding) \
   HSI4D_LOSS(joint_limits) \
   HSI4D_LOSS(pose_prior)
 // clang-format on

@@ -9,6 +9,7 @@
 #include "pipelines/frame_graph.h"
 #include "pipelines/run_config.h"
 #include "pipelines/run_problems.h"
+#include "pipelines/sequence_graph.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -61,13 +62,15 @@ std::string list_all_settings(const std::vector<LossDescription>& losses) {
   return table(rows);
 }
 
-/// What a stage may move, by what it draws.
+/// What a stage may move, by what it is over and what it draws.
 std::string list_stages() {
-  std::vector<std::vector<std::string>> rows = {{"DRAW", "GROUP", "MOVES"}};
+  std::vector<std::vector<std::string>> rows = {{"OVER", "DRAW", "GROUP", "MOVES"}};
   for (const ConfigChoice<Draw>& draw : kDraws) {
     for (const std::string& group : state_group_names(draw.value))
-      rows.push_back({draw.name, group, state_group_summary(group)});
+      rows.push_back({"frame", draw.name, group, state_group_summary(group)});
   }
+  for (const std::string& group : sequence_group_names())
+    rows.push_back({"sequence", "", group, sequence_group_summary(group)});
   return table(rows);
 }
 

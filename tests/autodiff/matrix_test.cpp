@@ -15,6 +15,8 @@ TEST_CASE("matrix operators pass the operator checks", "[parallel]") {
   check_operator("transpose", {{"x", shape_of(3, 5)}}, [](const auto& in) { return transpose(in[0]); });
   check_operator("reshape", {{"x", {2, 3, 5, 8}}}, [](const auto& in) { return reshape(in[0], 15, 2); });
   check_operator("slice_rows", {{"x", shape_of(6, 3)}}, [](const auto& in) { return slice_rows(in[0], 2, 3); });
+  check_operator("slice_planes", {{"x", image_shape<double>(5, 4, 7)}},
+                 [](const auto& in) { return slice_planes(in[0], 1, 3); });
   check_operator("slice_cols", {{"x", shape_of(6, 3)}}, [](const auto& in) { return slice_cols(in[0], 1, 2); });
   check_operator("concat_rows", {{"x", shape_of(2, 3)}, {"y", shape_of(4, 3)}},
                  [](const auto& in) { return concat_rows(std::span(in)); });

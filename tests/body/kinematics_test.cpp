@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
 #include "body/skinning.h"
@@ -100,6 +101,46 @@ double largest_difference(const Numbers& a, const Numbers& b) {
 }
 
 }  // namespace
+
+TEST_CASE("the kinematic chain of several frames passes the operator checks", "[parallel]") {
+  RandomSequence random(61);
+  const Skeleton s = random_skeleton(6, false, random);
+  const std::vector<OperatorInput> inputs = {
+      {"rotations", shape_of(9 * 6, 9)}, {"transl", shape_of(9, 3)}, {"rest", shape_of(6, 3)}};
+  check_operator("frames", inputs, [&](const auto& in) {
+    const auto posed = kinematic_chain(in[0], in[1], s.parents, s.rest);
+    return transform_points(posed.transforms, posed.joints) + 0.0 * sum(in[2]);
+  });
+  check_operator("frames and rest joints", inputs, [&](const auto& in) {
+    const auto posed = kinematic_chain(in[0], in[1], s.parents, in[2]);
+    return transform_points(posed.transforms, posed.joints);
+  });
+}
+
+TEST_CASE("frames of a kinematic chain are the same bits as each alone") {
+  RandomSequence random(62);
+  constexpr Index kFrames = 7, kJoints = 11;
+  const Skeleton s = random_skeleton(kJoints, false, random);
+  Tape<float> tape;
+  const auto rotations = tape.parameter("rotations", shape_of(kFrames * kJoints, 9));
+  const auto transl = tape.parameter("transl", shape_of(kFrames, 3));
+  for (const auto& leaf : {rotations, transl}) {
+    const auto array = tape.write(leaf);
+    for (Index i = 0; i < array.shape.count(); ++i) array.data[i] = static_cast<float>(random.normal());
+  }
+  const auto all = kinematic_chain(rotations, transl, s.parents, s.rest);
+  tape.forward(all.joints);
+  for (Index t = 0; t < kFrames; ++t) {
+    const auto one =
+        kinematic_chain(slice_rows(rotations, t * kJoints, kJoints), slice_rows(transl, t, 1), s.parents, s.rest);
+    tape.forward(one.joints);
+    for (Index j = 0; j < kJoints; ++j) {
+      for (Index c = 0; c < 12; ++c)
+        CHECK(tape.value(one.transforms)(j, c) == tape.value(all.transforms)(t * kJoints + j, c));
+      for (Index c = 0; c < 3; ++c) CHECK(tape.value(one.joints)(j, c) == tape.value(all.joints)(t * kJoints + j, c));
+    }
+  }
+}
 
 TEST_CASE("the kinematic chain passes the operator checks, for each output and both") {
   RandomSequence random(60);

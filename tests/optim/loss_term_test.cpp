@@ -4,8 +4,10 @@
 #include <cmath>
 
 #include "autodiff/difference.h"
+#include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
 #include "core/config_file.h"
+#include "core/random.h"
 #include "core/rotation.h"
 #include "tests/support/operator_check.h"
 
@@ -27,6 +29,57 @@ std::vector<double> some_rotations() {
   return rows;
 }
 
+constexpr Index kFrames = 5, kStill = 2, kBodyRows = 60, kObjectRows = 30;
+
+/// A human of a few Gaussians, each on one joint (every joint has one at least), and two objects: the first is at its
+/// right hand.
+struct MotionOfTest {
+  Avatar avatar;
+  std::array<Gaussians, 2> objects;
+  MotionStart start;
+
+  MotionOfTest() {
+    RandomSequence random(5);
+    SparseWeights& weights = avatar.weights;
+    weights.vertices = kBodyRows;
+    weights.joints = kSmplxJoints;
+    weights.per_vertex = 1;
+    for (Index v = 0; v < kBodyRows; ++v) {
+      weights.indices.push_back(static_cast<std::int32_t>(v % kSmplxJoints));
+      weights.weights.push_back(1);
+      for (int i = 0; i < 3; ++i) avatar.means.push_back(static_cast<float>(random.uniform(-0.04, 0.04)));
+    }
+    for (std::size_t o = 0; o < objects.size(); ++o) {
+      objects[o].opacity_logits.resize(kObjectRows);
+      for (Index i = 0; i < 3 * kObjectRows; ++i)
+        objects[o].means.push_back(static_cast<float>(random.uniform(-0.03, 0.03)));
+      start.objects.push_back(&objects[o]);
+    }
+    start.avatar = &avatar;
+    start.still_frames = kStill;
+    for (Index t = 0; t < kFrames; ++t) {
+      start.body.push_back(shifted(0.01 * static_cast<double>(t)));
+      start.world_from_object.push_back({{Matrix3<double>::Identity(), {0.01 * static_cast<double>(t), 0, 0}},
+                                         {Matrix3<double>::Identity(), {3, 0, 0}}});
+    }
+    start.first_body = shifted(0);
+  }
+  /// All joints at the same place.
+  static PosedJoints shifted(double x) {
+    PosedJoints posed;
+    for (Index j = 0; j < kSmplxJoints; ++j) {
+      posed.transforms.insert(posed.transforms.end(), {1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0});
+      posed.joints.insert(posed.joints.end(), {x, 0, 0});
+    }
+    return posed;
+  }
+};
+
+const MotionOfTest& motion_of_test() {
+  static const MotionOfTest motion;
+  return motion;
+}
+
 /// One of every input that a term may read, in the order of inputs_of. The third object is not to be seen in the frame.
 std::vector<OperatorInput> all_inputs() {
   // The stride is that of double; float arrays may have the same padding.
@@ -38,7 +91,14 @@ std::vector<OperatorInput> all_inputs() {
           {"object_center_target", shape_of(kObjects, 3), 0, 1, {4.5, 6, 1, 12.25, 3.5, 1, 0, 0, 0}},
           {"object_depth", shape_of(kObjects, 1), 1, 3},
           {"object_depth_target", shape_of(kObjects, 1), 1, 3},
-          {"body_rotations", shape_of(21, 9), 0, 0, some_rotations()}};
+          {"body_rotations", shape_of(21, 9), 0, 0, some_rotations()},
+          {"human_opacity", mask, 0, 1},
+          {"human_mask", mask, 0, 1},
+          {"object_masks", image_shape<double>(kObjects, kHeight, kWidth), 0, 1},
+          {"joints", shape_of(kFrames, 66)},
+          {"joints_start", shape_of(kFrames, 66)},
+          {"body_places", shape_of((kFrames - kStill) * kBodyRows, 3)},
+          {"object_places", shape_of((kFrames - kStill) * 2 * kObjectRows, 3)}};
 }
 
 template <class S>
@@ -52,6 +112,24 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.object_depth = in[5];
   inputs.object_depth_target = in[6];
   inputs.body_rotations = in[7];
+  inputs.human_opacity = in[8];
+  inputs.human_mask = in[9];
+  inputs.object_masks = in[10];
+  inputs.joints = in[11];
+  inputs.joints_start = in[12];
+  inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
+  inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
+    std::vector<std::uint32_t> rows;
+    for (const BodyPoint& p : points)
+      rows.push_back(static_cast<std::uint32_t>((p.frame - kStill) * kBodyRows + p.row));
+    return gather_rows(places, rows);
+  };
+  inputs.object_points = [places = in[14]](const std::vector<ObjectPoint>& points) {
+    std::vector<std::uint32_t> rows;
+    for (const ObjectPoint& p : points)
+      rows.push_back(static_cast<std::uint32_t>(((p.frame - kStill) * 2 + p.object) * kObjectRows + p.row));
+    return gather_rows(places, rows);
+  };
   return inputs;
 }
 
@@ -254,4 +332,137 @@ TEST_CASE("pose_prior prefers a body at ease to one that is not") {
   odd[3 * 14 + 1] = 2.5;                     // a head turned round
   CHECK(body_loss("pose_prior", pose) > 0);  // arms to the sides are not at ease
   CHECK(body_loss("pose_prior", odd) > 2 * body_loss("pose_prior", pose));
+}
+
+namespace {
+
+/// The term of the inputs of a sequence in which what moves is off by what the functions say.
+double motion_loss(const std::string& name, const std::string& settings,
+                   const std::function<double(Index frame, Index column)>& joint,
+                   const std::function<Vector3<double>(const BodyPoint&)>& body = {}) {
+  Tape<double> tape;
+  LossInputs<double> inputs;
+  inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
+  inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+  inputs.joints_start = tape.constant("joints_start", shape_of(kFrames, 66));
+  for (Index t = 0; t < kFrames; ++t) {
+    for (Index c = 0; c < 66; ++c) tape.write(inputs.joints)(t, c) = joint(t, c);
+  }
+  const auto leaf = [&tape](const char* leaf_name, const auto& points, const auto& place) {
+    const Var<double> var = tape.parameter(leaf_name, shape_of(std::ssize(points), 3));
+    for (Index i = 0; i < std::ssize(points); ++i) {
+      const Vector3<double> x = place(points[static_cast<std::size_t>(i)]);
+      std::copy_n(x.data(), 3, tape.write(var).row(i));
+    }
+    return var;
+  };
+  inputs.body_points = [&](const std::vector<BodyPoint>& points) { return leaf("body", points, body); };
+  inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
+    return leaf("object", points, [](const ObjectPoint& p) { return motion_of_test().start.place(p); });
+  };
+  const LossTerm& term = term_named(name);
+  LossSettings chosen{1, term.description.defaults, term.description.describe_settings};
+  ConfigFields fields;
+  describe(fields, chosen);
+  ConfigProblems problems;
+  read_config(load_config_text(settings, "a.json", "", {}, problems), fields, problems);
+  problems.throw_if_any();
+  const auto loss = term.record(inputs, chosen.own);
+  REQUIRE(loss.tape != nullptr);
+  tape.forward(loss);
+  return tape.value(loss).scalar();
+}
+
+double no_joint(Index, Index) { return 0; }
+
+}  // namespace
+
+TEST_CASE("fit is the mean over the moving frames of the squared distances of 22 joints") {
+  const double loss = motion_loss("fit", "{}", [](Index t, Index) { return t >= kStill ? 0.1 : 0; });
+  CHECK(loss == Approx(66 * 0.01).epsilon(1e-13));
+}
+
+TEST_CASE("smooth is the mean over adjacent frames of the squared differences of the order that is asked for") {
+  const auto speeding = [](Index t, Index c) { return c < 3 ? 0.1 * static_cast<double>(t * t) : 0; };
+  // Steps 0.1, 0.3, 0.5, 0.7; their changes 0.2; the changes of these 0.
+  CHECK(motion_loss("smooth", "{}", speeding) == Approx(3 * (0.01 + 0.09 + 0.25 + 0.49) / 4).epsilon(1e-13));
+  CHECK(motion_loss("smooth", R"({"order": 2})", speeding) == Approx(3 * 0.04).epsilon(1e-13));
+  CHECK(std::fabs(motion_loss("smooth", R"({"order": 3})", speeding)) < 1e-28);
+}
+
+TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain search") {
+  const MotionOfTest& test = motion_of_test();
+  for (const double distance : {0.02, 0.03, 10.0}) {
+    double expected = 0;
+    for (Index t = kStill; t < kFrames; ++t) {
+      double sum = 0;
+      Index pairs = 0;
+      for (Index row = 0; row < kBodyRows; ++row) {
+        if (!is_hand_joint(row % kSmplxJoints)) continue;
+        const Vector3<double> hand = test.start.place(BodyPoint{t, row});
+        double least = distance;
+        for (Index o = 0; o < 2; ++o) {
+          for (Index g = 0; g < kObjectRows; ++g)
+            least = std::min(least, (test.start.place(ObjectPoint{t, o, g}) - hand).norm());
+        }
+        if (!(least < distance)) continue;
+        sum += least * least;
+        ++pairs;
+      }
+      if (pairs > 0) expected += sum / static_cast<double>(pairs) / static_cast<double>(kFrames - kStill);
+    }
+    CHECK(expected > 0);
+    const double loss = motion_loss("contact", R"({"distance": )" + std::to_string(distance) + "}", no_joint,
+                                    [&](const BodyPoint& p) { return test.start.place(p); });
+    CHECK(loss == Approx(expected).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("contact is zero where no hand is near an object") {
+  CHECK(motion_loss("contact", R"({"distance": 1e-9})", no_joint) == 0);
+}
+
+TEST_CASE("ground is the squared change of the height of the lowest points of the feet") {
+  const MotionOfTest& test = motion_of_test();
+  const auto lifted = [&](const BodyPoint& p) -> Vector3<double> {
+    return test.start.place(p) + Vector3<double>(0.5, 0, p.frame == kStill ? 0.3 : 0);
+  };
+  CHECK(motion_loss("ground", R"({"points": 2})", no_joint, lifted) == Approx(0.09 / 3).epsilon(1e-12));
+}
+
+TEST_CASE("foot_sliding counts feet that stood when the stage began") {
+  // Joints stood at z = 0 and went 1 cm a frame, 0.1 m/s at 10 frames a second.
+  const auto sliding = [](Index t, Index c) { return c == 3 * 7 + 1 || c == 3 * 9 ? 0.1 * static_cast<double>(t) : 0; };
+  CHECK(motion_loss("foot_sliding", "{}", sliding) == Approx(0.01).epsilon(1e-12));  // joint 9 is no foot
+  CHECK(motion_loss("foot_sliding", R"({"speed": 0.05})", sliding) == 0);
+}
+
+TEST_CASE("mask compares the silhouettes of the human and of each object") {
+  Tape<double> tape;
+  LossInputs<double> inputs;
+  const auto leaf = [&tape](const char* name, Index planes, double value) {
+    const Var<double> var = tape.parameter(name, image_shape<double>(planes, 4, 5));
+    const Array<double> array = tape.write(var);
+    for (Index r = 0; r < array.total_rows(); ++r) std::fill_n(array.row(r), 5, value);
+    return var;
+  };
+  inputs.human_opacity = leaf("human", 1, 0.9);
+  inputs.human_mask = leaf("human mask", 1, 0.4);
+  const auto value = [&](const char* settings) {
+    const LossTerm& term = term_named("mask");
+    LossSettings chosen{1, term.description.defaults, term.description.describe_settings};
+    ConfigFields fields;
+    describe(fields, chosen);
+    ConfigProblems problems;
+    read_config(load_config_text(settings, "a.json", "", {}, problems), fields, problems);
+    const auto loss = term.record(inputs, chosen.own);
+    tape.forward(loss);
+    return tape.value(loss).scalar();
+  };
+  CHECK(value("{}") == Approx(0.25).epsilon(1e-13));
+  inputs.object_opacity = leaf("objects", 2, 0.5);
+  inputs.object_masks = leaf("object masks", 2, 0.3);
+  CHECK(value("{}") == Approx((0.25 + 2 * 0.04) / 3).epsilon(1e-13));
+  CHECK(value(R"({"human": false})") == Approx(0.04).epsilon(1e-13));
+  CHECK(value(R"({"objects": false})") == Approx(0.25).epsilon(1e-13));
 }

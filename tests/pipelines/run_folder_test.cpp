@@ -222,7 +222,7 @@ TEST_CASE("a line of metrics that is none of ours is told with its number") {
   here.write("a/metrics.jsonl", good + good + "{\"iteration\": 1}\n");
   CHECK_THROWS_MATCHES(
       folder.truncate_metrics_after(1), DataError,
-      Message("a/metrics.jsonl:3:1: there is no \"frame\"") || Message("a/metrics.jsonl:3: there is no \"frame\""));
+      Message("a/metrics.jsonl:3:1: there is no \"stage\"") || Message("a/metrics.jsonl:3: there is no \"stage\""));
 }
 
 TEST_CASE("two runs never write the same folder") {

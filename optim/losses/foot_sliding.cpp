@@ -1,0 +1,66 @@
+// L = mean over adjacent frames of Σ_j |J_{t+1} − J_t|² over the ankles and balls of the feet that stood when the stage
+// began, m²: nearer to the ground than `height` above where they were in the first frame, and slower than `speed`.
+#include <algorithm>
+
+#include "autodiff/difference.h"
+#include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
+#include "optim/losses/list.h"
+
+namespace hsi4d {
+
+namespace {
+
+struct FootSlidingSettings {
+  double height = 0.05;  // metres
+  double speed = 0.5;    // metres a second
+};
+
+void describe(ConfigFields& fields, FootSlidingSettings& settings) {
+  fields.number("height", settings.height, {.min = 0, .max = 10},
+                "A foot stands while it is at most this much higher than in the first frame, metres");
+  fields.number("speed", settings.speed, {.above = 0, .max = 100},
+                "and slower than this when the stage begins, metres a second");
+}
+
+Vector3<double> joint_of(const PosedJoints& body, Index joint) {
+  return Vector3<double>(body.joints.data() + 3 * joint);
+}
+
+bool stands(const MotionStart& motion, Index frame, Index joint, const FootSlidingSettings& settings) {
+  const Vector3<double> before = joint_of(motion.body_in(frame), joint),
+                        after = joint_of(motion.body_in(frame + 1), joint);
+  const double highest = joint_of(motion.first_body, joint)[2] + settings.height;
+  return before[2] <= highest && after[2] <= highest && (after - before).norm() * motion.frame_rate < settings.speed;
+}
+
+/// 1 for each coordinate of a joint that stands between a frame and the next, [F−1,3J].
+std::vector<double> standing_weights(const MotionStart& motion, Index coordinates,
+                                     const FootSlidingSettings& settings) {
+  std::vector<double> weights;
+  for (Index t = 0; t + 1 < motion.frames(); ++t) {
+    for (Index i = 0; i < coordinates; ++i)
+      weights.push_back(is_foot_joint(i / 3) && stands(motion, t, i / 3, settings) ? 1 : 0);
+  }
+  return weights;
+}
+
+}  // namespace
+
+LossTerm foot_sliding_loss() {
+  return make_loss_term<FootSlidingSettings>(
+      "foot_sliding", "How far feet that stand go between adjacent frames",
+      [](const auto& in, const FootSlidingSettings& settings) {
+        if (!in.given(in.joints) || !in.motion || in.motion->frames() < 2) return decltype(in.joints){};
+        const Shape shape = in.joints.shape();
+        const std::vector<double> stand = standing_weights(*in.motion, shape.cols, settings);
+        auto& tape = in.joints.owner();
+        const auto weights = tape.constant("standing", shape_of(shape.rows - 1, shape.cols));
+        const auto numbers = tape.write(weights);
+        std::copy(stand.begin(), stand.end(), numbers.data);
+        return l2(slice_rows(in.joints, 1, shape.rows - 1), slice_rows(in.joints, 0, shape.rows - 1), weights) *
+               static_cast<double>(shape.cols);
+      });
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,38 @@
+// L = mean over adjacent frames of Σ_j |Δᵏ J_j|², of the first 22 joints, m²: Δ J = J_{t+1} − J_t with `order` 1, by
+// which the method asks for small steps; 2 asks for steps that are alike, 3 for their changes to be.   [method, stage
+// 3]
+#include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
+#include "autodiff/reduce.h"
+#include "optim/losses/list.h"
+
+namespace hsi4d {
+
+namespace {
+
+struct SmoothSettings {
+  int order = 1;
+};
+
+void describe(ConfigFields& fields, SmoothSettings& settings) {
+  fields.integer("order", settings.order, {.min = 1, .max = 3},
+                 "Of the differences: 1 steps between adjacent frames, 2 changes of the steps, 3 changes of these");
+}
+
+}  // namespace
+
+LossTerm smooth_loss() {
+  return make_loss_term<SmoothSettings>("smooth", "How far joints go between adjacent frames",
+                                        [](const auto& in, const SmoothSettings& settings) {
+                                          if (!in.given(in.joints) || in.joints.shape().rows <= settings.order)
+                                            return decltype(in.joints){};
+                                          auto steps = in.joints;
+                                          for (int k = 0; k < settings.order; ++k) {
+                                            const Index rows = steps.shape().rows - 1;
+                                            steps = slice_rows(steps, 1, rows) - slice_rows(steps, 0, rows);
+                                          }
+                                          return sum(square(steps)) * (1 / static_cast<double>(steps.shape().rows));
+                                        });
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,52 @@
+#include "optim/motion_start.h"
+
+#include <algorithm>
+
+namespace hsi4d {
+
+namespace {
+
+Vector3<double> mean_of(const std::vector<float>& means, Index row) {
+  return Vector3<float>(means.data() + 3 * row).cast<double>();
+}
+
+}  // namespace
+
+Vector3<double> MotionStart::place(const BodyPoint& point) const {
+  const SparseWeights& weights = avatar->weights;
+  const PosedJoints& posed = body_in(point.frame);
+  const Vector3<double> rest = mean_of(avatar->means, point.row);
+  Vector3<double> place = Vector3<double>::Zero();
+  for (Index k = 0; k < weights.per_vertex; ++k) {
+    const auto at = static_cast<std::size_t>(point.row * weights.per_vertex + k);
+    const double* a = posed.transforms.data() + 12 * weights.indices[at];
+    for (int r = 0; r < 3; ++r) {
+      const double* row = a + 4 * r;
+      place[r] += weights.weights[at] * (row[0] * rest[0] + row[1] * rest[1] + row[2] * rest[2] + row[3]);
+    }
+  }
+  return place;
+}
+
+Vector3<double> MotionStart::place(const ObjectPoint& point) const {
+  const auto object = static_cast<std::size_t>(point.object);
+  return transform_point(world_from_object[static_cast<std::size_t>(point.frame)][object],
+                         mean_of(objects[object]->means, point.row));
+}
+
+bool is_hand_joint(Index joint) { return joint == 20 || joint == 21 || (joint >= 25 && joint < 55); }
+
+bool is_foot_joint(Index joint) { return joint == 7 || joint == 8 || joint == 10 || joint == 11; }
+
+std::vector<Index> rows_of_joints(const Avatar& avatar, bool (*is_part)(Index joint)) {
+  const SparseWeights& weights = avatar.weights;
+  std::vector<Index> rows;
+  for (Index v = 0; v < weights.vertices; ++v) {
+    const auto first = weights.weights.begin() + v * weights.per_vertex;
+    const auto largest = std::max_element(first, first + weights.per_vertex);
+    if (is_part(weights.indices[static_cast<std::size_t>(largest - weights.weights.begin())])) rows.push_back(v);
+  }
+  return rows;
+}
+
+}  // namespace hsi4d

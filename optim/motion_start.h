@@ -1,0 +1,55 @@
+// Where body and objects were in the frames that a stage sees, when it began: by it loss terms choose what they compare
+// (hands near an object, feet that stand), once, before the first iteration.
+#pragma once
+
+#include <vector>
+
+#include "body/avatar.h"
+#include "core/rigid.h"
+#include "splat/gaussians.h"
+
+namespace hsi4d {
+
+/// In place of a frame: the clip's first, which is given and may be long before those that a stage sees.
+inline constexpr Index kFirstFrame = -1;
+
+/// A Gaussian of the human in a frame.
+struct BodyPoint {
+  Index frame = 0, row = 0;
+};
+
+/// A Gaussian of an object in a frame.
+struct ObjectPoint {
+  Index frame = 0, object = 0, row = 0;
+};
+
+/// F frames: the first `still_frames` are behind the stage and stay as they are, the others move.
+struct MotionStart {
+  const Avatar* avatar = nullptr;
+  std::vector<const Gaussians*> objects;  ///< relative to their centroids
+  Index still_frames = 1;
+  double frame_rate = 10;                                          ///< frames a second
+  PosedJoints first_body;                                          ///< in the clip's first frame
+  std::vector<PosedJoints> body;                                   ///< [F]
+  std::vector<std::vector<Rigid<double>>> world_from_object = {};  ///< [F][O]
+
+  Index frames() const { return static_cast<Index>(body.size()); }
+  Index moving_frames() const { return frames() - still_frames; }
+
+  const PosedJoints& body_in(Index frame) const {
+    return frame == kFirstFrame ? first_body : body[static_cast<std::size_t>(frame)];
+  }
+  /// Where the Gaussian's centre was, metres, world.
+  Vector3<double> place(const BodyPoint& point) const;
+  Vector3<double> place(const ObjectPoint& point) const;
+};
+
+/// Joints of the SMPL-X layout that are hands (wrists and fingers), and feet (ankles and balls).
+bool is_hand_joint(Index joint);
+bool is_foot_joint(Index joint);
+
+/// Gaussians whose largest weight (of equal ones the first) is that of such a joint, ascending: a part of the human
+/// on any mesh.   [method.md, stage 3: hand vertices]
+std::vector<Index> rows_of_joints(const Avatar& avatar, bool (*is_part)(Index joint));
+
+}  // namespace hsi4d
