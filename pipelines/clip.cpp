@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
+#include "body/motion_edit.h"
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/config_file.h"
-#include "core/image_io.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -48,47 +49,6 @@ InitialSettings read_initial(const fs::path& file) {
   return read_settings<InitialSettings>(tree, problems);
 }
 
-/// Refuses 8.png, 9.png, 10.png: in the order of their names 10 comes first.
-void check_numbering(const std::vector<std::string>& names, const fs::path& folder) {
-  const auto is_number = [](const std::string& name) {
-    const std::string stem = fs::path(name).stem().string();
-    return !stem.empty() && std::all_of(stem.begin(), stem.end(), [](char c) { return c >= '0' && c <= '9'; });
-  };
-  if (!std::all_of(names.begin(), names.end(), is_number)) return;
-  for (const std::string& name : names) {
-    if (name.size() == names.front().size()) continue;
-    throw DataError(
-        folder.string() + ": \"" + names.front() + "\" and \"" + name +
-        "\" have different numbers of digits; frames are taken in the order of their names, so fill up with zeros");
-  }
-}
-
-/// Logs, checkpoints and reports hold the names.
-void check_characters(const std::vector<std::string>& names, const fs::path& folder) {
-  for (const std::string& name : names) {
-    if (is_plain_text(name)) continue;
-    throw UserError(folder.string() + ": the name \"" + with_escapes(name) +
-                    "\" is not UTF-8 text without control characters; rename the frame, and its masks with it");
-  }
-}
-
-std::vector<std::string> png_names(const fs::path& folder) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (entry.path().extension() == ".png") names.push_back(entry.path().filename().string());
-  }
-  if (error) throw UserError(folder.string() + ": cannot be listed as a folder of frames: " + error.message());
-  std::sort(names.begin(), names.end());
-  check_characters(names, folder);
-  check_numbering(names, folder);
-  if (names.size() < 2) {
-    throw UserError(folder.string() + ": holds " + std::to_string(names.size()) +
-                    " .png files; a clip needs at least 2 frames");
-  }
-  return names;
-}
-
 /// The Gaussians of a file; what its reader rejected or held is told in the log.
 Gaussians read_gaussians(const fs::path& file) {
   SplatFile read = read_splats(file.string());
@@ -118,6 +78,12 @@ ObjectPose initial_pose(const InitialSettings& initial, const std::string& name,
   const InitialPose* pose = find_entry(initial.objects, name);
   if (pose == nullptr) throw DataError(file.string() + ": /objects: there is no pose of the object \"" + name + "\"");
   return {Vector3<double>(pose->rotation.data()), Vector3<double>(pose->translation.data())};
+}
+
+/// The motion at the clip's rate, where that is told.
+Motion motion_of_clip(Motion motion, double frame_rate) {
+  if (frame_rate == 0 || motion.poses.size() < 2 || motion.frame_rate == frame_rate) return motion;
+  return resampled(motion, frame_rate);
 }
 
 /// Estimated poses: those of the motion file when it has more than frame 0.
@@ -155,25 +121,49 @@ std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std
   return truth;
 }
 
-Image read_mask(const fs::path& file, const Clip& clip) {
-  if (!fs::exists(file)) return Image(1, clip.camera.height, clip.camera.width);
-  Image mask = read_image(file.string());
-  if (mask.height() != clip.camera.height || mask.width() != clip.camera.width) {
-    throw DataError(file.string() + ": is " + std::to_string(mask.width()) + "x" + std::to_string(mask.height()) +
-                    " pixels, the camera's image " + std::to_string(clip.camera.width) + "x" +
-                    std::to_string(clip.camera.height));
-  }
-  return take_channels(mask, 0, 1);
+std::string size_text(const Image& image) {
+  return std::to_string(image.width()) + "x" + std::to_string(image.height());
+}
+
+std::string size_text(const Camera& camera) {
+  return std::to_string(camera.width) + "x" + std::to_string(camera.height);
+}
+
+bool has_size_of(const Image& image, const Camera& camera) {
+  return image.height() == camera.height && image.width() == camera.width;
+}
+
+/// Whether an image becomes one of the camera by taking means of its pixels: larger, and of the same shape but for
+/// the rounding of sizes.
+bool is_enlarged(const Image& image, const Camera& camera) {
+  if (image.width() < camera.width || image.height() < camera.height) return false;
+  const double across = static_cast<double>(image.width()) / camera.width,
+               down = static_cast<double>(image.height()) / camera.height;
+  return std::fabs(across / down - 1) < 1.0 / std::min(camera.width, camera.height);
+}
+
+/// The image of the camera's size.
+Image reduced(const Image& image, const Camera& camera) {
+  return has_size_of(image, camera) ? image : resize_area(image, camera.height, camera.width);
+}
+
+/// A mask that is as large as the frame of the video, in the camera's size; empty where there is none.
+Image read_mask(const MaskSource& source, const Clip& clip, Index index, const Image& frame) {
+  const Image mask = source.read(clip.video->frames, index);
+  if (mask.width() == 0) return Image(1, clip.camera.height, clip.camera.width);
+  if (mask.height() == frame.height() && mask.width() == frame.width()) return reduced(mask, clip.camera);
+  throw DataError(source.place(clip.video->frames, index) + ": is " + size_text(mask) + " pixels, " +
+                  (has_size_of(frame, clip.camera) ? "the camera's image " : "the video's frame ") + size_text(frame));
 }
 
 /// A folder of masks that is not there is a wrong name. Single masks may be missing: nothing is seen in that frame.
-void check_masks(const fs::path& folder, const std::vector<std::string>& frames) {
-  if (!fs::is_directory(folder)) throw DataError(folder.string() + ": there is no such folder of masks");
-  const auto missing =
-      std::count_if(frames.begin(), frames.end(), [&](const std::string& name) { return !fs::exists(folder / name); });
-  if (missing == 0) return;
-  log_warning(folder.string() + ": has no mask for " + std::to_string(missing) + " of " +
-              std::to_string(frames.size()) + " frames; these count as empty");
+MaskSource open_masks(const fs::path& folder, const std::string& name, const FrameSource& frames) {
+  const MaskSource masks(folder, name);
+  const Index missing = masks.missing(frames);
+  if (missing > 0)
+    log_warning(masks.path().string() + ": has no mask for " + std::to_string(missing) + " of " +
+                std::to_string(frames.count()) + " frames; these count as empty");
+  return masks;
 }
 
 /// False for a mask that nowhere reaches the threshold.
@@ -190,7 +180,8 @@ bool shows_something(const Image& mask, double threshold) {
 Clip read_clip(const DataSettings& data) {
   check_inputs(data);
   Clip clip;
-  clip.frame_files = png_names(data.frames);
+  auto video = std::make_shared<ClipVideo>(ClipVideo{{data.frames, {data.video_rate, data.frame_rate}}, {}});
+  clip.frame_files = video->frames.names();
   clip.scene = read_gaussians(data.scene);
   clip.avatar = read_avatar(data.avatar.string());
   if (clip.avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
@@ -201,15 +192,18 @@ Clip read_clip(const DataSettings& data) {
   const InitialSettings initial = read_initial(data.initial);
   clip.first.camera_from_world = clip.camera.camera_from_world;
   std::vector<std::string> names;
+  std::vector<MaskSource> object_masks;
   for (const auto& [name, object] : data.objects) {
     const Gaussians read = read_gaussians(object.gaussians);
     clip.objects.push_back({name, centred(read)});
     clip.first.objects.push_back(initial_pose(initial, name, data.initial));
     names.push_back(name);
-    check_masks(data.masks / name, clip.frame_files);
+    object_masks.push_back(open_masks(data.masks, name, video->frames));
   }
-  check_masks(data.masks / kHumanMasks, clip.frame_files);
-  const Motion motion = read_motion_for(initial.motion.string(), clip.avatar);
+  video->masks.push_back(open_masks(data.masks, kHumanMasks, video->frames));
+  video->masks.insert(video->masks.end(), object_masks.begin(), object_masks.end());
+  clip.video = video;
+  const Motion motion = motion_of_clip(read_motion_for(initial.motion.string(), clip.avatar), data.frame_rate);
   clip.estimate = estimate_of(motion, initial.motion, clip.frames());
   clip.first.body = motion.poses.front();
   clip.frame_rate = motion.frame_rate;
@@ -221,18 +215,27 @@ Clip read_clip(const DataSettings& data) {
                 {"/data/initial: /motion", initial.motion}};
   for (const auto& [name, object] : data.objects)
     clip.files.push_back({"/data/objects/" + name + "/gaussians", object.gaussians});
+  if (!video->frames.file().empty()) clip.files.push_back({"/data/frames", video->frames.file()});
+  for (const MaskSource& masks : video->masks) {
+    if (masks.is_video()) clip.files.push_back({"masks/" + masks.path().filename().string(), masks.path()});
+  }
   return clip;
 }
 
 void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
   std::vector<std::vector<bool>> is_seen(static_cast<std::size_t>(clip.frames()));  // [frame][object]
-  parallel_for(clip.frames(), 1, [&](Index begin, Index end) {
+  const auto look = [&](Index begin, Index end) {
     for (Index index = begin; index < end; ++index) {
-      for (const Image& mask : read_frame(data, clip, index).object_masks) {
+      for (const Image& mask : read_frame(clip, index).object_masks) {
         is_seen[static_cast<std::size_t>(index)].push_back(shows_something(mask, data.mask_threshold));
       }
     }
-  });
+  };
+  if (clip.video->frames.file().empty()) {
+    parallel_for(clip.frames(), 1, look);
+  } else {
+    look(0, clip.frames());  // videos are decoded in order
+  }
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
     std::vector<Index> hidden;
     for (std::size_t t = 1; t < is_seen.size(); ++t) {  // frame 0 is given
@@ -259,32 +262,28 @@ std::string frame_ranges(const std::vector<Index>& frames) {
 
 std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, Index index) {
   const std::string& name = clip.frame_files.at(static_cast<std::size_t>(index));
-  std::vector<ClipFile> files = {{"frames/" + name, data.frames / name}};
-  const auto add_mask = [&](const std::string& folder) {
-    files.push_back({"masks/" + folder + "/" + name, data.masks / folder / name});
-  };
-  add_mask(kHumanMasks);
-  for (const ClipObject& object : clip.objects) add_mask(object.name);
+  const FrameSource& frames = clip.video->frames;
+  std::vector<ClipFile> files;
+  if (frames.file().empty()) files.push_back({"frames/" + name, data.frames / name});
+  for (const MaskSource& masks : clip.video->masks) {
+    if (!masks.is_video())
+      files.push_back({"masks/" + masks.path().filename().string() + "/" + name, masks.file(frames, index)});
+  }
   return files;
 }
 
-ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index) {
-  const std::string& name = clip.frame_files.at(static_cast<std::size_t>(index));
-  const fs::path file = data.frames / name;
+ClipFrame read_frame(const Clip& clip, Index index) {
+  const FrameSource& frames = clip.video->frames;
+  const Image read = frames.read(index);
+  if (read.channels() < 3 || !(has_size_of(read, clip.camera) || is_enlarged(read, clip.camera))) {
+    throw DataError(frames.place(index) + ": is " + size_text(read) + " with " + std::to_string(read.channels()) +
+                    " channels; the camera's image is " + size_text(clip.camera) + " with 3");
+  }
   ClipFrame frame;
-  frame.target = read_image(file.string());
-  if (frame.target.channels() < 3 || frame.target.height() != clip.camera.height ||
-      frame.target.width() != clip.camera.width) {
-    throw DataError(file.string() + ": is " + std::to_string(frame.target.width()) + "x" +
-                    std::to_string(frame.target.height()) + " with " + std::to_string(frame.target.channels()) +
-                    " channels; the camera's image is " + std::to_string(clip.camera.width) + "x" +
-                    std::to_string(clip.camera.height) + " with 3");
-  }
-  frame.target = take_channels(frame.target, 0, 3);
-  frame.human_mask = read_mask(data.masks / kHumanMasks / name, clip);
-  for (const ClipObject& object : clip.objects) {
-    frame.object_masks.push_back(read_mask(data.masks / object.name / name, clip));
-  }
+  frame.target = take_channels(reduced(read, clip.camera), 0, 3);
+  frame.human_mask = read_mask(clip.video->masks.front(), clip, index, read);
+  for (std::size_t m = 1; m < clip.video->masks.size(); ++m)
+    frame.object_masks.push_back(read_mask(clip.video->masks[m], clip, index, read));
   return frame;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "core/camera.h"
 #include "core/image.h"
 #include "pipelines/data_settings.h"
+#include "pipelines/frame_source.h"
 #include "pipelines/state.h"
 #include "splat/gaussians.h"
 
@@ -28,16 +30,23 @@ struct ClipFile {
   std::filesystem::path path;
 };
 
+/// Pictures of the clip.
+struct ClipVideo {
+  FrameSource frames;
+  std::vector<MaskSource> masks;  ///< of the human, then of each object
+};
+
 /// All that stays the same over the clip. Frames are read one by one (read_frame).
 struct Clip {
   Gaussians scene;
   std::vector<ClipObject> objects;
   Avatar avatar;
-  Camera camera;                         ///< of frame 0; size and intrinsics of all frames
-  SceneState first;                      ///< state of frame 0, given; poses are of the avatar's body
-  std::vector<BodyPose> estimate;        ///< estimated poses by frame; empty: none
-  double frame_rate = 10;                ///< frames a second
-  std::vector<std::string> frame_files;  ///< in order
+  Camera camera;                           ///< of frame 0; size and intrinsics of all frames
+  SceneState first;                        ///< state of frame 0, given; poses are of the avatar's body
+  std::vector<BodyPose> estimate;          ///< estimated poses by frame; empty: none
+  double frame_rate = 10;                  ///< frames a second
+  std::vector<std::string> frame_files;    ///< names of the frames, in order
+  std::shared_ptr<const ClipVideo> video;  ///< what read_frame reads
   std::optional<std::vector<SceneState>> truth;
   std::vector<ClipFile> files;  ///< read for it, but for the truth, which no result depends on
 
@@ -64,10 +73,12 @@ Clip read_clip(const DataSettings& data);
 /// @param has_center  the run has the loss `center`, which such masks switch off
 void check_frames(const DataSettings& data, const Clip& clip, bool has_center);
 
-/// Reads frame `index` and its masks. A mask that has no file counts as empty. Throws as read_clip.
-ClipFrame read_frame(const DataSettings& data, const Clip& clip, Index index);
+/// Reads frame `index` and its masks, and reduces larger ones to the camera's size. A mask that has no file counts as
+/// empty. Throws as read_clip.
+ClipFrame read_frame(const Clip& clip, Index index);
 
-/// The files of a frame: the image, and the masks of human and objects, which may be missing.
+/// The files of a frame: the image, and the masks of human and objects, which may be missing. None of those that are in
+/// videos.
 std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, Index index);
 
 /// Frames in words: "3", "2-4, 9".

@@ -37,9 +37,15 @@ void describe(ConfigFields& f, DataSettings& s) {
   f.map("objects", s.objects, "Rigid objects that move, by name");
   f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.safetensors)");
   f.path("frames", s.frames, {.must_exist = true},
-         "Folder of the video's frames: .png files in the order of their names");
+         "The video: a file, or a folder of .png files in the order of their names; as large as the camera's image, or "
+         "larger");
   f.path("masks", s.masks, {.must_exist = true},
-         "Folder of masks: human/ and one folder an object, grey .png files with the names of the frames");
+         "Folder of masks: human/ and one folder an object, grey .png files with the names of the frames; or human.mp4 "
+         "and "
+         "so on");
+  f.number("video_rate", s.video_rate, {.min = 0, .max = 1e4}, "Frames a second of the video; 0: what its file says");
+  f.number("frame_rate", s.frame_rate, {.min = 0, .max = 1e4},
+           "Frames a second that are kept, the nearest ones; estimated poses are resampled to it; 0: all");
   f.path("camera", s.camera, {.must_exist = true}, "Camera of frame 0 (.json)");
   f.path("initial", s.initial, {.must_exist = true}, "State of frame 0 and estimated poses (.json)");
   f.path("truth", s.truth, {.must_exist = true},

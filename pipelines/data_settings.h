@@ -22,6 +22,8 @@ struct DataSettings {
   std::filesystem::path camera;
   std::filesystem::path initial;
   std::filesystem::path truth;
+  double video_rate = 0;  ///< frames a second of the video; 0: what its file says
+  double frame_rate = 0;  ///< frames a second that are kept; 0: all
   double mask_threshold = 0.5;
   int mask_margin_px = 1;
 };

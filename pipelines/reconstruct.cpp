@@ -21,6 +21,7 @@
 #include "pipelines/frame_graph.h"
 #include "pipelines/frame_images.h"
 #include "pipelines/input_hashes.h"
+#include "pipelines/run_results.h"
 #include "pipelines/run_state.h"
 #include "pipelines/sequence_graph.h"
 
@@ -119,7 +120,7 @@ class Reconstruction {
     if (frame_stages_ < config_.stages.size()) refine();
     bar_.finish();
     tell_left_out();
-    write_results();
+    write_all_results();
     const RunSummary summary = summarize();
     folder_.write_summary(summary);
     return summary;
@@ -142,7 +143,7 @@ class Reconstruction {
     if (folder_.resumed_from() && std::filesystem::exists(file)) {
       progress_ = read_checkpoint(file, identity_, config_, clip_);
     } else {
-      add_covered(read_frame(config_.data, clip_, 0), config_.data, progress_.covered);
+      add_covered(read_frame(clip_, 0), config_.data, progress_.covered);
       progress_.inputs = input_hashes(clip_.files) + input_hashes(frame_files(config_.data, clip_, 0));
     }
     folder_.take_over_config();
@@ -164,7 +165,7 @@ class Reconstruction {
 
   void run_frame(Index index) {
     const auto begin = std::chrono::steady_clock::now();
-    const ClipFrame frame = read_frame(config_.data, clip_, index);
+    const ClipFrame frame = read_frame(clip_, index);
     add_covered(frame, config_.data, progress_.covered);
     SceneState state = start_of(index);
     ColorState colors = progress_.colors;
@@ -200,7 +201,7 @@ class Reconstruction {
     }
     refined_errors_.resize(1);
     for (Index t = 1; t < clip_.frames(); ++t) {
-      const ClipFrame frame = read_frame(config_.data, clip_, t);
+      const ClipFrame frame = read_frame(clip_, t);
       write_images(t, frame, result()[static_cast<std::size_t>(t)], refined_errors_);
     }
   }
@@ -444,22 +445,12 @@ class Reconstruction {
     return state;
   }
 
-  void write_results() const {
-    std::vector<std::string> names;
-    for (const ClipObject& object : clip_.objects) names.push_back(object.name);
-    Motion motion{clip_.frame_rate, bodies_of(result())};
-    motion.pelvis_rest = pelvis_of(clip_.avatar.joints);
-    write_motion(folder_.paths().motion(), motion);
-    if (!names.empty()) write_object_tracks(folder_.paths().objects(), names, result());
-    write_cameras(folder_.paths().cameras(), cameras_of(result(), clip_.camera));
-    if (progress_.colors.net && moves_colors()) write_color_net(folder_.paths().color_net(), *progress_.colors.net);
-  }
-
-  bool moves_colors() const {
-    return std::any_of(config_.stages.begin(), config_.stages.end(), [](const auto& entry) {
-      const auto& moved = entry.second.optimize;
-      return find_entry(moved, "color_net") != nullptr || find_entry(moved, "avatar_features") != nullptr;
-    });
+  void write_all_results() const {
+    const RunPaths& paths = folder_.paths();
+    write_results(paths, config_, clip_, result(), progress_.colors);
+    write_body(paths, config_, clip_, result());
+    write_preview(paths, clip_, result(),
+                  [this](const SceneState& state) { return rendered_image(state, progress_.colors); });
   }
 
   RunSummary summarize() const {

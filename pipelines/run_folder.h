@@ -52,6 +52,9 @@ struct RunPaths {
   std::string metrics() const { return member("metrics.jsonl"); }
   std::string summary() const { return member("summary.json"); }
   std::string motion() const { return member("motion.npz"); }
+  std::string motion_at_30() const { return member("motion_30fps.npz"); }
+  std::string body() const { return member("body.glb"); }
+  std::string preview() const { return member("preview.mp4"); }
   std::string objects() const { return member("objects.npz"); }
   std::string cameras() const { return member("cameras.json"); }
   std::string color_net() const { return member("color_net.safetensors"); }

@@ -12,6 +12,7 @@
 
 #include "core/config_file.h"
 #include "optim/loss_term.h"
+#include "pipelines/clip.h"
 #include "pipelines/run.h"
 #include "pipelines/synthetic.h"
 #include "tests/support/temporary_folder.h"
@@ -189,5 +190,14 @@ inline double number_in(const MetricValues& values, const std::string& name) {
   REQUIRE(value != nullptr);
   return *value;
 }
+
+/// A copy of the dataset, to be changed.
+struct CopiedDataset {
+  TemporaryFolder folder;
+  std::filesystem::path path = folder.path() / "data";
+
+  CopiedDataset() { std::filesystem::copy(TinyDataset::folder(), path, std::filesystem::copy_options::recursive); }
+  Clip read() const { return read_clip(dataset_inputs(path)); }
+};
 
 }  // namespace hsi4d::test

@@ -1,0 +1,137 @@
+#include "core/process.h"
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "core/check.h"
+
+extern char** environ;  // POSIX asks programs to declare it
+
+namespace hsi4d {
+
+namespace {
+
+constexpr std::size_t kMostTold = 2000;  // bytes of what a program printed, in a message
+
+void close_if_open(int& descriptor) {
+  if (descriptor >= 0) close(descriptor);
+  descriptor = -1;
+}
+
+/// What a file holds, from its beginning.
+std::string content_of(int descriptor) {
+  std::string text;
+  std::array<char, 4096> part{};
+  off_t at = 0;
+  for (ssize_t count = 0; (count = pread(descriptor, part.data(), part.size(), at)) > 0; at += count)
+    text.append(part.data(), static_cast<std::size_t>(count));
+  return text;
+}
+
+std::string end_of(const std::string& text) {
+  const std::size_t last = text.find_last_not_of(" \n\r\t");
+  if (last == std::string::npos) return "; it printed nothing";
+  const std::string trimmed = text.substr(0, last + 1);
+  return trimmed.size() <= kMostTold ? ":\n" + trimmed : ":\n..." + trimmed.substr(trimmed.size() - kMostTold);
+}
+
+std::string fate_of(int status) {
+  if (WIFSIGNALED(status)) return "was ended by signal " + std::to_string(WTERMSIG(status));
+  return "ended with status " + std::to_string(WEXITSTATUS(status));
+}
+
+/// Starts the program with its standard descriptors; 0, or an error number.
+int spawn(const std::vector<std::string>& command, int input, int output, int error_output, pid_t& pid) {
+  std::vector<char*> arguments;
+  for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, input, 0);
+  posix_spawn_file_actions_adddup2(&actions, output, 1);
+  posix_spawn_file_actions_adddup2(&actions, error_output, 2);
+  const int error = posix_spawnp(&pid, command.front().c_str(), &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  return error;
+}
+
+}  // namespace
+
+ChildProcess::ChildProcess(std::vector<std::string> command, ChildOutput output) : command_(std::move(command)) {
+  HSI4D_CHECK(!command_.empty(), "a command needs a program");
+  // A socket and not a pipe: a program that stops reading is then an error and not a signal.
+  std::array<int, 2> ends{-1, -1}, pipe_ends{-1, -1};
+  output_ = memfd_create("output", MFD_CLOEXEC);
+  const bool is_read = output == ChildOutput::kRead;
+  const bool is_ready = output_ >= 0 && socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0 &&
+                        (!is_read || pipe2(pipe_ends.data(), O_CLOEXEC) == 0);
+  int error = is_ready ? 0 : errno;
+  input_ = ends[0];
+  stream_ = pipe_ends[0];
+  if (error == 0) error = spawn(command_, ends[1], is_read ? pipe_ends[1] : output_, output_, pid_);
+  close_if_open(ends[1]);
+  close_if_open(pipe_ends[1]);
+  if (error == 0) return;
+  close_if_open(input_);
+  close_if_open(output_);
+  close_if_open(stream_);
+  pid_ = -1;
+  throw UserError(command_.front() + ": cannot be run: " + std::strerror(error) +
+                  (error == ENOENT ? "; is it installed, and in PATH?" : ""));
+}
+
+ChildProcess::~ChildProcess() {
+  close_if_open(input_);
+  close_if_open(stream_);
+  if (pid_ > 0) {
+    kill(pid_, SIGTERM);
+    waitpid(pid_, nullptr, 0);
+  }
+  close_if_open(output_);
+}
+
+std::size_t ChildProcess::read(std::span<uint8_t> bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t count = ::read(stream_, bytes.data() + done, bytes.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) break;
+    done += static_cast<std::size_t>(count);
+  }
+  return done;
+}
+
+bool ChildProcess::write(std::span<const uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = send(input_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return true;
+}
+
+std::string ChildProcess::finish() {
+  HSI4D_CHECK(pid_ > 0, "the program's end was waited for before");
+  close_if_open(input_);
+  close_if_open(stream_);
+  int status = 0;
+  while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+  }
+  pid_ = -1;
+  std::string text = content_of(output_);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return text;
+  throw UserError(command_.front() + ": " + fate_of(status) + end_of(text));
+}
+
+std::string run_process(std::vector<std::string> command) { return ChildProcess(std::move(command)).finish(); }
+
+}  // namespace hsi4d

@@ -1,0 +1,175 @@
+#include "pipelines/frame_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "core/check.h"
+#include "core/image_io.h"
+#include "core/text.h"
+#include "core/video.h"
+
+namespace hsi4d {
+
+namespace detail {
+
+struct OpenVideo {
+  explicit OpenVideo(const std::filesystem::path& path) : reader(path.string()) {}
+
+  Image read(Index frame) {
+    const std::lock_guard lock(mutex);
+    return reader.read(frame);
+  }
+
+  std::mutex mutex;
+  VideoReader reader;
+};
+
+}  // namespace detail
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Index kFewestFrames = 2;
+
+/// Refuses 8.png, 9.png, 10.png: in the order of their names 10 comes first.
+void check_numbering(const std::vector<std::string>& names, const fs::path& folder) {
+  const auto is_number = [](const std::string& name) {
+    const std::string stem = fs::path(name).stem().string();
+    return !stem.empty() && std::all_of(stem.begin(), stem.end(), [](char c) { return c >= '0' && c <= '9'; });
+  };
+  if (!std::all_of(names.begin(), names.end(), is_number)) return;
+  for (const std::string& name : names) {
+    if (name.size() == names.front().size()) continue;
+    throw DataError(
+        folder.string() + ": \"" + names.front() + "\" and \"" + name +
+        "\" have different numbers of digits; frames are taken in the order of their names, so fill up with zeros");
+  }
+}
+
+/// Logs, checkpoints and reports hold the names.
+void check_characters(const std::vector<std::string>& names, const fs::path& folder) {
+  for (const std::string& name : names) {
+    if (is_plain_text(name)) continue;
+    throw UserError(folder.string() + ": the name \"" + with_escapes(name) +
+                    "\" is not UTF-8 text without control characters; rename the frame, and its masks with it");
+  }
+}
+
+/// The .png files of a folder, in the order of their names.
+std::vector<std::string> png_names(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".png") names.push_back(entry.path().filename().string());
+  }
+  if (error) throw UserError(folder.string() + ": cannot be listed as a folder of frames: " + error.message());
+  std::sort(names.begin(), names.end());
+  check_characters(names, folder);
+  check_numbering(names, folder);
+  if (std::ssize(names) < kFewestFrames) {
+    throw UserError(folder.string() + ": holds " + std::to_string(names.size()) +
+                    " .png files; a clip needs at least 2 frames");
+  }
+  return names;
+}
+
+/// Numbers of the frames of `count` that are kept.
+std::vector<Index> kept_frames(Index count, double video, double kept) {
+  std::vector<Index> numbers;
+  const double step = kept > 0 ? video / kept : 1;
+  for (Index t = 0;; ++t) {
+    const auto number = static_cast<Index>(std::llround(static_cast<double>(t) * step));
+    if (number >= count) return numbers;
+    numbers.push_back(number);
+  }
+}
+
+/// The rate of the video, where frames are to be chosen by it.
+double video_rate(const fs::path& path, double of_file, const FrameRates& rates) {
+  const double video = rates.video > 0 ? rates.video : of_file;
+  if (rates.kept == 0) return video;
+  if (video == 0)
+    throw UserError(path.string() + ": does not say how many frames a second it has, so that " +
+                    number_text(rates.kept) + " of them cannot be kept; data.video_rate says it");
+  if (rates.kept > video)
+    throw UserError(path.string() + ": has " + number_text(video) + " frames a second; data.frame_rate, " +
+                    number_text(rates.kept) + ", cannot be more");
+  return video;
+}
+
+fs::path video_in(const fs::path& folder, const std::string& name) {
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().stem() == name && is_video_name(entry.path().string())) return entry.path();
+  }
+  return {};
+}
+
+std::string frame_of(const fs::path& video, Index number) {
+  return video.string() + ": frame " + std::to_string(number);
+}
+
+}  // namespace
+
+FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(path) {
+  std::vector<std::string> files;
+  if (fs::is_directory(path)) {
+    files = png_names(path);
+  } else if (is_video_name(path.string())) {
+    video_ = std::make_shared<detail::OpenVideo>(path);
+  } else {
+    throw UserError(path.string() + ": is neither a folder of frames nor a video (" + video_endings() + ")");
+  }
+  const Index count = video_ ? video_->reader.frames() : std::ssize(files);
+  const double video = video_rate(path, video_ ? video_->reader.frame_rate() : 0, rates);
+  numbers_ = kept_frames(count, video, rates.kept);
+  frame_rate_ = rates.kept > 0 ? rates.kept : video;
+  for (const Index number : numbers_)
+    names_.push_back(video_ ? four_digits(number) + ".png" : files[static_cast<std::size_t>(number)]);
+  if (std::ssize(numbers_) < kFewestFrames)
+    throw UserError(path.string() + ": gives " + std::to_string(numbers_.size()) + " of its " + std::to_string(count) +
+                    " frames; a clip needs at least 2");
+}
+
+std::string FrameSource::place(Index frame) const {
+  return video_ ? frame_of(path_, number(frame)) : (path_ / names_[static_cast<std::size_t>(frame)]).string();
+}
+
+Image FrameSource::read(Index frame) const { return video_ ? video_->read(number(frame)) : read_image(place(frame)); }
+
+MaskSource::MaskSource(const fs::path& folder, const std::string& name) : path_(folder / name) {
+  if (fs::is_directory(path_)) return;
+  const fs::path video = video_in(folder, name);
+  if (video.empty()) throw DataError(path_.string() + ": there is no such folder of masks");
+  path_ = video;
+  video_ = std::make_shared<detail::OpenVideo>(video);
+}
+
+Index MaskSource::missing(const FrameSource& frames) const {
+  if (!video_) {
+    Index missing = 0;
+    for (Index t = 0; t < frames.count(); ++t) missing += fs::exists(file(frames, t)) ? 0 : 1;
+    return missing;
+  }
+  const Index needed = frames.number(frames.count() - 1) + 1;
+  if (video_->reader.frames() >= needed) return 0;
+  throw DataError(path_.string() + ": has " + std::to_string(video_->reader.frames()) +
+                  " frames, the clip needs the first " + std::to_string(needed));
+}
+
+fs::path MaskSource::file(const FrameSource& frames, Index frame) const {
+  return video_ ? fs::path() : path_ / frames.names()[static_cast<std::size_t>(frame)];
+}
+
+std::string MaskSource::place(const FrameSource& frames, Index frame) const {
+  return video_ ? frame_of(path_, frames.number(frame)) : file(frames, frame).string();
+}
+
+Image MaskSource::read(const FrameSource& frames, Index frame) const {
+  if (!video_ && !fs::exists(file(frames, frame))) return {};
+  return take_channels(video_ ? video_->read(frames.number(frame)) : read_image(place(frames, frame)), 0, 1);
+}
+
+}  // namespace hsi4d

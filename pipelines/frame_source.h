@@ -1,0 +1,83 @@
+// Where the pictures of a clip come from: a folder of images, or a video file, which both may have more frames a second
+// and larger ones than the clip.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/image.h"
+#include "core/types.h"
+
+namespace hsi4d {
+
+/// Which frames of a video a clip keeps.
+struct FrameRates {
+  double video = 0;  ///< frames a second of the video; 0: what its file says
+  double kept = 0;   ///< frames a second that are kept, the nearest ones; 0: all
+};
+
+namespace detail {
+struct OpenVideo;
+}
+
+/// Pictures of one size that follow each other. Copies share what is open. Any thread may read; a video is fast where
+/// frames are read in order.
+class FrameSource {
+ public:
+  /// Opens a video file, or lists a folder: its .png files in the order of their names.
+  ///
+  /// Frame t of the clip is frame round(t · video / kept) of the video.   [method.md, §1: of 153 frames 0, 3, ..., 150]
+  /// Throws UserError or DataError naming the path: no such file or folder, no video, names that are no plain text or
+  /// have different numbers of digits; rates without which frames cannot be chosen; fewer than two frames.
+  FrameSource(const std::filesystem::path& path, const FrameRates& rates);
+
+  Index count() const { return std::ssize(names_); }
+  /// Names of frames: those of the files, or "0003.png" for frame 3 of a video. Masks have the same.
+  const std::vector<std::string>& names() const { return names_; }
+  /// Frames a second of the clip; 0: nobody says.
+  double frame_rate() const { return frame_rate_; }
+  /// The one file that holds all frames; empty for a folder.
+  std::filesystem::path file() const { return video_ ? path_ : std::filesystem::path(); }
+  /// Number of a frame in the video; of a folder its place.
+  Index number(Index frame) const { return numbers_[static_cast<std::size_t>(frame)]; }
+  /// Which picture it is, for messages: "clip.mp4: frame 3", "frames/0003.png".
+  std::string place(Index frame) const;
+
+  /// [C,H,W]; RGB of a video. Throws as read_image and VideoReader::read.
+  Image read(Index frame) const;
+
+ private:
+  std::filesystem::path path_;
+  std::shared_ptr<detail::OpenVideo> video_;  // null: a folder
+  std::vector<std::string> names_;
+  std::vector<Index> numbers_;
+  double frame_rate_ = 0;
+};
+
+/// Masks of the human or of an object: a folder with images of the frames' names, of which some may be missing, or a
+/// video with the frames of the video.
+class MaskSource {
+ public:
+  /// @param folder  of the masks: NAME/ is in it, or NAME.mp4 (or another video)
+  /// Throws DataError when neither is there.
+  MaskSource(const std::filesystem::path& folder, const std::string& name);
+
+  /// How many of the frames have no mask. Throws DataError naming a video that has too few frames.
+  Index missing(const FrameSource& frames) const;
+  /// The folder or the video.
+  const std::filesystem::path& path() const { return path_; }
+  bool is_video() const { return video_ != nullptr; }
+  /// The file of a frame's mask, there or not; empty for a video.
+  std::filesystem::path file(const FrameSource& frames, Index frame) const;
+  std::string place(const FrameSource& frames, Index frame) const;
+  /// [1,H,W], the first channel; an empty image where there is no mask.
+  Image read(const FrameSource& frames, Index frame) const;
+
+ private:
+  std::filesystem::path path_;
+  std::shared_ptr<detail::OpenVideo> video_;  // null: a folder
+};
+
+}  // namespace hsi4d

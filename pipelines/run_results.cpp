@@ -1,0 +1,133 @@
+#include "pipelines/run_results.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "body/glb.h"
+#include "body/motion_edit.h"
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/image_io.h"
+#include "core/log.h"
+#include "core/rotation.h"
+#include "core/text.h"
+#include "core/video.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr double kSameJoints = 0.01;                 // metres that joints of the same body may be apart
+constexpr double kOtherSide = std::numbers::pi / 4;  // radians
+constexpr int kPanelWidth = 480;                     // pixels, at most
+
+bool moves_colors(const RunConfig& config) {
+  return std::any_of(config.stages.begin(), config.stages.end(), [](const auto& entry) {
+    const auto& moved = entry.second.optimize;
+    return find_entry(moved, "color_net") != nullptr || find_entry(moved, "avatar_features") != nullptr;
+  });
+}
+
+Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
+  Motion motion{clip.frame_rate, bodies_of(states)};
+  motion.pelvis_rest = pelvis_of(clip.avatar.joints);
+  return motion;
+}
+
+/// Why the body is not the one that the avatar was made on; empty where it is.
+std::string difference_of(const BodyModel& body, const Avatar& avatar) {
+  if (!avatar.body.empty() && avatar.body != body.name)
+    return "the avatar is of the body \"" + avatar.body + "\", and `body` says \"" + body.name + "\"";
+  double largest = 0;
+  for (std::size_t i = 0; i < body.joints.size(); ++i)
+    largest = std::max(largest, std::fabs(body.joints[i] - avatar.joints[i]));
+  if (largest <= kSameJoints) return "";
+  return "joints of the avatar are " + rounded(100 * largest, 2) + " cm from those of `body`: of another shape";
+}
+
+Image mean_of(const Image& a, const Image& b) {
+  Image mean(a.channels(), a.height(), a.width());
+  for (int c = 0; c < a.channels(); ++c) {
+    for (int y = 0; y < a.height(); ++y) {
+      for (int x = 0; x < a.width(); ++x) mean(c, y, x) = (a(c, y, x) + b(c, y, x)) / 2;
+    }
+  }
+  return mean;
+}
+
+/// No wider than a panel.
+Image panel_of(const Image& image) {
+  if (image.width() <= kPanelWidth) return image;
+  return resize_area(image, std::max(1, image.height() * kPanelWidth / image.width()), kPanelWidth);
+}
+
+Image beside(const std::vector<Image>& panels) {
+  const Image& first = panels.front();
+  Image all(first.channels(), first.height(), first.width() * static_cast<int>(panels.size()));
+  for (std::size_t i = 0; i < panels.size(); ++i) {
+    for (int c = 0; c < first.channels(); ++c) {
+      for (int y = 0; y < first.height(); ++y)
+        std::copy_n(panels[i].row(c, y), first.width(), all.row(c, y) + static_cast<int>(i) * first.width());
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
+                   const std::vector<SceneState>& states, const ColorState& colors) {
+  std::vector<std::string> names;
+  for (const ClipObject& object : clip.objects) names.push_back(object.name);
+  const Motion motion = motion_of(clip, states);
+  write_motion(paths.motion(), motion);
+  write_motion(paths.motion_at_30(), resampled(motion, kExportedRate));
+  if (!names.empty()) write_object_tracks(paths.objects(), names, states);
+  write_cameras(paths.cameras(), cameras_of(states, clip.camera));
+  if (colors.net && moves_colors(config)) write_color_net(paths.color_net(), *colors.net);
+}
+
+void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
+                const std::vector<SceneState>& states) {
+  const BodyModel body = rest_body(config.body);
+  const std::string difference = difference_of(body, clip.avatar);
+  if (!difference.empty()) {
+    log_info("body.glb is not written: " + difference);
+    return;
+  }
+  write_glb(paths.body(), body, motion_of(clip, states));
+}
+
+void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
+                   const std::function<Image(const SceneState& state)>& render) {
+  const Vector3<double> pelvis(pose_joints(clip.avatar, states.front().body).data());
+  std::optional<VideoWriter> video;
+  try {
+    for (std::size_t t = 0; t < states.size(); ++t) {
+      const ClipFrame frame = read_frame(clip, static_cast<Index>(t));
+      const Image image = render(states[t]);
+      SceneState other = states[t];
+      other.camera_from_world = turned_camera(states.front().camera_from_world, pelvis, kOtherSide);
+      std::vector<Image> panels;
+      for (const Image& panel : {frame.target, image, mean_of(frame.target, image), render(other)})
+        panels.push_back(panel_of(panel));
+      const Image all = beside(panels);
+      if (!video) video.emplace(paths.preview(), all.width(), all.height(), VideoFormat{.frame_rate = clip.frame_rate});
+      video->add(all);
+    }
+    video->commit();
+  } catch (const UserError& error) {
+    log_warning("preview.mp4 is not written: " + std::string(error.what()));
+  }
+}
+
+Rigid<double> turned_camera(const Rigid<double>& camera_from_world, const Vector3<double>& pivot, double angle) {
+  // x ↦ p + R (x − p) turns the camera; seen by it the world turns back.
+  const Matrix3<double> back = so3_exp(Vector3<double>(0, 0, -angle));
+  const Matrix3<double> rotation = camera_from_world.rotation * back;
+  return {rotation, camera_from_world.rotation * (pivot - back * pivot) + camera_from_world.translation};
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,39 @@
+// The files in which a run leaves its result.
+#pragma once
+
+#include <functional>
+
+#include "pipelines/clip.h"
+#include "pipelines/color_state.h"
+#include "pipelines/run_config.h"
+#include "pipelines/run_folder.h"
+
+namespace hsi4d {
+
+/// The rate of the copy of the motion that other programs take, the SMPL-X add-on for Blender for example.
+inline constexpr double kExportedRate = 30;
+
+/// Writes motion.npz, motion_30fps.npz, objects.npz, cameras.json, and color_net.safetensors where a stage moved it.
+/// @param states  the result by frame, frame 0 included
+void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
+                   const std::vector<SceneState>& states, const ColorState& colors);
+
+/// Writes body.glb, the body in motion: config.body, which has to be the avatar's: of its kind, and with joints where
+/// the avatar has them. Where it is another the log says so, and no file is written.
+void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
+                const std::vector<SceneState>& states);
+
+/// Writes preview.mp4: video, reconstruction, both one over the other, and the reconstruction from another side, next
+/// to each other. Where ffmpeg fails the log says so, and no file is written.
+///
+/// @param render  the image of a state, from its camera
+void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
+                   const std::function<Image(const SceneState& state)>& render);
+
+/// A camera that looks from another side: turned about the vertical axis through `pivot`.
+///
+/// @param pivot  metres, world
+/// @param angle  radians, counter-clockwise from above
+Rigid<double> turned_camera(const Rigid<double>& camera_from_world, const Vector3<double>& pivot, double angle);
+
+}  // namespace hsi4d

@@ -1,0 +1,44 @@
+#include "core/process.h"
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+
+using namespace hsi4d;
+using Catch::Matchers::Message;
+
+TEST_CASE("what a program prints comes back, and arguments are not those of a shell") {
+  CHECK(run_process({"printf", "%s|", "a b", "$HOME", "\"; rm x"}) == "a b|$HOME|\"; rm x|");
+}
+
+TEST_CASE("a program reads what is written, more than a pipe holds") {
+  ChildProcess count({"wc", "-c"});
+  const std::vector<uint8_t> part(100000, 'x');
+  for (int i = 0; i < 20; ++i) CHECK(count.write(part));
+  CHECK(count.finish() == "2000000\n");
+}
+
+TEST_CASE("a program that fails is told with its status and what it printed") {
+  CHECK_THROWS_MATCHES(run_process({"sh", "-c", "echo first; echo wrong >&2; exit 3"}), UserError,
+                       Message("sh: ended with status 3:\nfirst\nwrong"));
+  CHECK_THROWS_MATCHES(run_process({"false"}), UserError, Message("false: ended with status 1; it printed nothing"));
+  CHECK_THROWS_MATCHES(run_process({"sh", "-c", "kill -9 $$"}), UserError,
+                       Message("sh: was ended by signal 9; it printed nothing"));
+  CHECK_THROWS_MATCHES(
+      run_process({"hsi4d-no-such-program"}), UserError,
+      Message("hsi4d-no-such-program: cannot be run: No such file or directory; is it installed, and in PATH?"));
+}
+
+TEST_CASE("a program that stops reading is no signal to us") {
+  ChildProcess child({"sh", "-c", "echo enough; exit 4"});
+  const std::vector<uint8_t> part(1000000, 'x');
+  bool is_read = true;
+  for (int i = 0; i < 50 && is_read; ++i) is_read = child.write(part);
+  CHECK_FALSE(is_read);
+  CHECK_THROWS_MATCHES(child.finish(), UserError, Message("sh: ended with status 4:\nenough"));
+}
+
+TEST_CASE("a program that nobody waits for is ended") {
+  { ChildProcess sleep({"sleep", "1000"}); }
+  SUCCEED();
+}
