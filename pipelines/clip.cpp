@@ -7,78 +7,17 @@
 #include "body/motion_edit.h"
 #include "core/camera_file.h"
 #include "core/check.h"
-#include "core/config_file.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "pipelines/body_files.h"
 #include "pipelines/run_problems.h"
-#include "splat/splat_file.h"
 
 namespace hsi4d {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// initial.json: the state of frame 0, and estimated poses of all frames.
-struct InitialPose {
-  std::array<double, 3> rotation{}, translation{};
-};
-
-struct InitialSettings {
-  fs::path motion;
-  ConfigMap<InitialPose> objects;
-};
-
-void describe(ConfigFields& f, InitialPose& s) {
-  f.numbers("rotation", s.rotation, {}, "Axis-angle, radians").required();
-  f.numbers("translation", s.translation, {}, "Position of the object's centroid, metres").required();
-}
-
-void describe(ConfigFields& f, InitialSettings& s) {
-  f.path("motion", s.motion, {.must_exist = true, .may_be_empty = false},
-         "Poses (.npz): frame 0 exact, the others estimates; one frame alone: no estimates")
-      .required();
-  f.map("objects", s.objects, "Poses of the objects at frame 0, by name");
-}
-
-InitialSettings read_initial(const fs::path& file) {
-  ConfigProblems problems;
-  const ConfigValue tree = load_config(file, {}, problems);
-  return read_settings<InitialSettings>(tree, problems);
-}
-
-/// The Gaussians of a file; what its reader rejected or held is told in the log.
-Gaussians read_gaussians(const fs::path& file) {
-  SplatFile read = read_splats(file.string());
-  const std::string remarks = summary_text(read.report);
-  if (!remarks.empty()) log_warning(file.string() + ": " + remarks);
-  if (read.gaussians.count() == 0) throw DataError(file.string() + ": holds no Gaussians that can be used");
-  return std::move(read.gaussians);
-}
-
-/// Means relative to their centroid, whatever the file's were.
-Gaussians centred(Gaussians gaussians) {
-  const Index count = gaussians.count();
-  for (Index c = 0; c < 3; ++c) {
-    double sum = 0;
-    for (Index i = 0; i < count; ++i) sum += static_cast<double>(gaussians.means[static_cast<std::size_t>(3 * i + c)]);
-    const double mean = sum / static_cast<double>(count);
-    for (Index i = 0; i < count; ++i) {
-      float& x = gaussians.means[static_cast<std::size_t>(3 * i + c)];
-      x = static_cast<float>(static_cast<double>(x) - mean);
-    }
-  }
-  gaussians.origin_world.setZero();
-  return gaussians;
-}
-
-ObjectPose initial_pose(const InitialSettings& initial, const std::string& name, const fs::path& file) {
-  const InitialPose* pose = find_entry(initial.objects, name);
-  if (pose == nullptr) throw DataError(file.string() + ": /objects: there is no pose of the object \"" + name + "\"");
-  return {Vector3<double>(pose->rotation.data()), Vector3<double>(pose->translation.data())};
-}
 
 /// The motion at the clip's rate, where that is told.
 Motion motion_of_clip(Motion motion, double frame_rate) {
@@ -89,7 +28,6 @@ Motion motion_of_clip(Motion motion, double frame_rate) {
 /// Estimated poses: those of the motion file when it has more than frame 0.
 std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, Index frames) {
   const auto count = static_cast<Index>(motion.poses.size());
-  if (count == 0) throw DataError(file.string() + ": holds no frames");
   if (count == 1) return {};
   if (count != frames) {
     throw DataError(file.string() + ": holds " + std::to_string(count) + " poses, the video has " +
@@ -182,29 +120,20 @@ Clip read_clip(const DataSettings& data) {
   Clip clip;
   auto video = std::make_shared<ClipVideo>(ClipVideo{{data.frames, {data.video_rate, data.frame_rate}}, {}});
   clip.frame_files = video->frames.names();
-  clip.scene = read_gaussians(data.scene);
-  clip.avatar = read_avatar(data.avatar.string());
-  if (clip.avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
-    throw DataError(data.avatar.string() + ": has " + std::to_string(clip.avatar.parents.size()) +
-                    " joints; a run needs the " + std::to_string(kSmplxJoints) + " of SMPL-X");
-  }
   clip.camera = read_camera(data.camera.string());
-  const InitialSettings initial = read_initial(data.initial);
+  SceneSetup setup = read_scene_setup(data);
+  clip.scene = std::move(setup.scene);
+  clip.avatar = std::move(setup.avatar);
+  clip.objects = std::move(setup.objects);
   clip.first.camera_from_world = clip.camera.camera_from_world;
+  clip.first.objects = setup.poses;
   std::vector<std::string> names;
-  std::vector<MaskSource> object_masks;
-  for (const auto& [name, object] : data.objects) {
-    const Gaussians read = read_gaussians(object.gaussians);
-    clip.objects.push_back({name, centred(read)});
-    clip.first.objects.push_back(initial_pose(initial, name, data.initial));
-    names.push_back(name);
-    object_masks.push_back(open_masks(data.masks, name, video->frames));
-  }
+  for (const ClipObject& object : clip.objects) names.push_back(object.name);
   video->masks.push_back(open_masks(data.masks, kHumanMasks, video->frames));
-  video->masks.insert(video->masks.end(), object_masks.begin(), object_masks.end());
+  for (const std::string& name : names) video->masks.push_back(open_masks(data.masks, name, video->frames));
   clip.video = video;
-  const Motion motion = motion_of_clip(read_motion_for(initial.motion.string(), clip.avatar), data.frame_rate);
-  clip.estimate = estimate_of(motion, initial.motion, clip.frames());
+  const Motion motion = motion_of_clip(std::move(setup.motion), data.frame_rate);
+  clip.estimate = estimate_of(motion, setup.motion_file, clip.frames());
   clip.first.body = motion.poses.front();
   clip.frame_rate = motion.frame_rate;
   if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.avatar, clip.frames());
@@ -212,7 +141,7 @@ Clip read_clip(const DataSettings& data) {
                 {"/data/avatar", data.avatar},
                 {"/data/camera", data.camera},
                 {"/data/initial", data.initial},
-                {"/data/initial: /motion", initial.motion}};
+                {"/data/initial: /motion", setup.motion_file}};
   for (const auto& [name, object] : data.objects)
     clip.files.push_back({"/data/objects/" + name + "/gaussians", object.gaussians});
   if (!video->frames.file().empty()) clip.files.push_back({"/data/frames", video->frames.file()});

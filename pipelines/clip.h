@@ -7,22 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "body/avatar.h"
-#include "body/motion_io.h"
 #include "core/camera.h"
 #include "core/image.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/frame_source.h"
-#include "pipelines/state.h"
-#include "splat/gaussians.h"
+#include "pipelines/scene_setup.h"
 
 namespace hsi4d {
-
-/// One rigid object that moves.
-struct ClipObject {
-  std::string name;
-  Gaussians gaussians;  ///< relative to the centroid of their means
-};
 
 /// A file that a run reads.
 struct ClipFile {
