@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/config.h"
@@ -56,5 +57,19 @@ struct StageSettings {
 void describe(ConfigFields& fields, OptimizerSettings& settings);
 void describe(ConfigFields& fields, ParameterGroupSettings& settings);
 void describe(ConfigFields& fields, StageSettings& settings, const std::vector<LossDescription>& losses);
+
+/// A loss of a stage that cannot be used.
+struct LossFault {
+  std::string pointer;  ///< JSON pointer from the stage on: "/losses/pose_prior/weights"
+  std::string text;
+};
+
+/// Prepares the losses that are on and have not been prepared yet (LossDescription::prepare), so that what they read is
+/// read once, and before anything is written. A fault is placed at the file that the loss names, if it is one.
+/// @return  what its prepare function threw as UserError or DataError, a fault a loss
+std::vector<LossFault> prepare_losses(StageSettings& stage);
+
+/// Losses that are on and need what the stage does not have, in a stage that shows `having`, "a stage with ...".
+std::vector<LossFault> losses_without_inputs(const StageSettings& stage, const std::string& having);
 
 }  // namespace hsi4d

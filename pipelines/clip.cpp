@@ -210,6 +210,9 @@ Clip read_clip(const DataSettings& data) {
   }
   check_masks(data.masks / kHumanMasks, clip.frame_files);
   const Motion motion = read_motion_for(initial.motion.string(), clip.avatar);
+  if (!motion.says_frame_rate && motion.poses.size() > 1)
+    log_warning(initial.motion.string() + ": says no frame rate and is taken for " + rounded(motion.frame_rate, 4) +
+                " frames a second");
   clip.estimate = estimate_of(motion, initial.motion, clip.frames());
   clip.first.body = motion.poses.front();
   clip.frame_rate = motion.frame_rate;
