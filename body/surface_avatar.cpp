@@ -80,15 +80,16 @@ Matrix3<double> facing(const Vector& normal) {
 
 /// The colours about a place, in the mean: weights of a normal distribution along the surface at points of a hexagonal
 /// lattice. A Gaussian has one colour for all that it covers; with that of its middle alone, edges had teeth.
-constexpr double kBlurShare = 0.5;     // standard deviation over the distance of neighbours
-constexpr double kLatticeShare = 0.9;  // distance of the lattice's points over it
+constexpr double kBlurShare = 0.5;      // standard deviation over the distance of neighbours,
+constexpr double kLargestBlur = 0.005;  // metres; more would take the patterns from an avatar of few Gaussians
+constexpr double kLatticeShare = 0.9;   // distance of the lattice's points over it
 
 /// What of a place's colour is that of clothes on its second joint: seams are as smooth as skinning weights.
 double second_share(double first, double second) { return 1 - detail::smoothstep(-0.2, 0.2, first - second); }
 
 Vector color_around(const detail::Clothing& clothing, const SurfacePlace& place, const Matrix3<double>& frame,
                     double spacing, const std::array<int, 2>& joints, double second) {
-  const double step = kLatticeShare * kBlurShare * spacing;
+  const double step = kLatticeShare * std::min(kBlurShare * spacing, kLargestBlur);
   Vector sum = Vector::Zero();
   double weights = 0;
   for (int a = -2; a <= 2; ++a) {

@@ -9,8 +9,8 @@ namespace hsi4d {
 
 namespace {
 
-/// The energy of a likely pose is about the number of latents, the photometric loss a few hundredths.
-constexpr double kWeight = 1e-4;
+/// The energy of a likely pose is about the number of latents, the photometric loss a few hundredths: docs/numerics.md.
+constexpr double kWeight = 3e-5;
 
 struct PosePriorSettings {
   std::filesystem::path weights;

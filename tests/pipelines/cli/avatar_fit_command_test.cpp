@@ -124,6 +124,12 @@ TEST_CASE("hsi4d avatar fit tells what its config lacks, and what says nothing")
         "--set stage.losses={\"joint_limits\": {}}: /stage/losses/joint_limits: this loss needs the body, which a fit "
         "of an "
         "avatar does not have");
+  ViewSet set = read_view_set("views/views.json");
+  for (PosedView& view : set.views) view.image = fs::path("images") / view.image.filename();
+  set.views[1].camera = -1;
+  write_text_file("views/odd.json", view_set_json("motion.npz", "cameras.json", set.views));
+  CHECK_THAT(refusal("a.safetensors", {"views=views/odd.json"}),
+             Contains("/views/1/camera: -1 is out of range; allowed: 0 or more"));
   CHECK(refusal("a.safetensors", {"views=views/motion.npz"}) ==
         fs::absolute("views/motion.npz").string() + ": looks like a .npz or .zip archive, not like JSON");
 }
