@@ -1,5 +1,6 @@
 #include "body/avatar.h"
 
+#include "body/file_contents.h"
 #include "core/finite_numbers.h"
 #include "core/npz.h"
 
@@ -12,6 +13,7 @@ constexpr const char* kFormat = "hsi4d avatar";
 // Files are Safetensors or, of version 1, Npz.
 
 void check_first_format(const Npz& file) {
+  refuse_other_contents(file, {"an avatar"});
   if (!file.has("format")) throw DataError(file.source() + ": there is no array 'format'; this is no avatar");
   const std::string format = file.array("format").text();
   if (format != kFormat)

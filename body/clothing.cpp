@@ -19,7 +19,13 @@ constexpr int kPelvis = 0, kHipLeft = 1, kHipRight = 2, kKneeLeft = 4, kKneeRigh
 
 const Vector kSkin(0.80, 0.60, 0.48);
 const Vector kHair(0.20, 0.13, 0.09);
-const Vector kEyes(0.16, 0.12, 0.12);
+const Vector kEyeWhite(0.86, 0.84, 0.81);
+const Vector kIris(0.30, 0.21, 0.13);
+const Vector kPupil(0.05, 0.04, 0.04);
+const Vector kLashes(0.20, 0.13, 0.10);
+const Vector kLidShade(0.66, 0.46, 0.37);
+const Vector kLips(0.69, 0.40, 0.36);
+const Vector kLipLine(0.40, 0.20, 0.18);
 const Vector kShirtDark(0.16, 0.30, 0.56);
 const Vector kShirtLight(0.84, 0.82, 0.72);
 const Vector kButtons(0.70, 0.20, 0.18);
@@ -54,12 +60,7 @@ Clothing::Clothing(const BodyModel& body, double texture) : joints_(body.joints)
   head_size_ = std::max(top - joint(kHead)[1], 0.05) / 0.198;
 }
 
-Vector3<double> Clothing::color(const Vector& point, const Vector& normal, int joint) const {
-  const double light = 0.90 + 0.10 * normal[1];  // the light from above that clothes in photographs have
-  return fabric(point, joint) * light;
-}
-
-Vector3<double> Clothing::fabric(const Vector& p, int j) const {
+Vector3<double> Clothing::color(const Vector& p, int j) const {
   const double y = p[1];
   if (is_one_of(j, {kHead, kJaw, kEyeLeft, kEyeRight})) return head(p);
   if (j >= kEyeRight || is_one_of(j, {kElbowLeft, kElbowRight, kWristLeft, kWristRight})) return kSkin;
@@ -80,14 +81,59 @@ Vector3<double> Clothing::fabric(const Vector& p, int j) const {
   return y > joint(kNeck)[1] + 0.010 ? kSkin : shirt(p, false);
 }
 
+// Sizes of the face are those of an adult, metres: the opening of an eye is 30 x 12 mm, an iris 12 mm, a mouth 48 mm
+// wide and as far below the eyes as they are apart.
+
+Vector3<double> Clothing::on_face(const Vector& p, const Vector& centre) const {
+  return Vector((p - centre) / head_size_);
+}
+
+Vector3<double> Clothing::mouth_centre() const {
+  const Vector left = joint(kEyeLeft), right = joint(kEyeRight);
+  return Vector((left + right) / 2 - Vector(0, 0.062, 0.020) * head_size_);
+}
+
+double Clothing::detail(const Vector& p) const {
+  double nearest = 1;  // squared distance over that within which it is fine
+  for (const int j : {kEyeLeft, kEyeRight}) {
+    const Vector off = on_face(p, joint(j));
+    if (off[2] > 0) nearest = std::min(nearest, (off[0] * off[0] + off[1] * off[1]) / (0.030 * 0.030));
+  }
+  const Vector off = on_face(p, mouth_centre());
+  if (off[2] > 0) nearest = std::min(nearest, (off[0] * off[0] + 2 * off[1] * off[1]) / (0.036 * 0.036));
+  return kFaceDetail - (kFaceDetail - 1) * smoothstep(0.3, 1, nearest);
+}
+
 Vector3<double> Clothing::head(const Vector& p) const {
-  const Vector from = (p - joint(kHead)) / head_size_;
+  const Vector from = on_face(p, joint(kHead));
   if (from[1] > 0.088 + 0.85 * from[2]) return kHair;  // the hairline, from forehead to nape
   for (const int j : {kEyeLeft, kEyeRight}) {
-    const Vector off = p - joint(j);
-    if (off[2] > 0 && off[0] * off[0] + off[1] * off[1] < 0.011 * 0.011) return kEyes;
+    const Vector off = on_face(p, joint(j));
+    const double outward = j == kEyeLeft ? off[0] : -off[0];
+    if (off[2] > 0 && std::abs(outward) < 0.030 && std::abs(off[1]) < 0.035) return eye(outward, off[1]);
   }
-  return kSkin;
+  const Vector off = on_face(p, mouth_centre());
+  return off[2] > 0 && std::abs(off[0]) < 0.030 && std::abs(off[1]) < 0.020 ? mouth(off[0], off[1]) : kSkin;
+}
+
+Vector3<double> Clothing::eye(double x, double y) const {
+  const double share = x / 0.015, opening = 1 - share * share;  // of the almond, from corner to corner
+  const double upper = 0.0066 * opening, lower = -0.0050 * opening;
+  const double off = std::sqrt(x * x + (y - 0.0006) * (y - 0.0006));  // from the middle of the iris
+  if (opening > 0 && y < upper && y > lower) return off < 0.0024 ? kPupil : off < 0.0060 ? kIris : kEyeWhite;
+  if (opening > -0.25 && y >= upper && y < std::max(upper, 0.0) + 0.0020) return kLashes;
+  const double brow = 0.0190 - 7 * (x - 0.003) * (x - 0.003);
+  if (x > -0.016 && x < 0.023 && std::abs(y - brow) < 0.0026 - 0.05 * std::max(x, 0.0)) return kHair;
+  const double lid = std::sqrt(x * x / (0.020 * 0.020) + (y - 0.002) * (y - 0.002) / (0.013 * 0.013));
+  return kLidShade + (kSkin - kLidShade) * smoothstep(0.7, 1.1, lid);
+}
+
+Vector3<double> Clothing::mouth(double x, double y) const {
+  const double share = x / 0.024, full = 1 - share * share;
+  if (full <= 0) return kSkin;
+  const double bow = 1 - 0.25 * std::exp(-x * x / (0.004 * 0.004));  // of the upper lip
+  if (std::abs(y) < 0.0011) return kLipLine;
+  return y < 0.0065 * full * bow && y > -0.0090 * full ? kLips : kSkin;
 }
 
 Vector3<double> Clothing::shirt(const Vector& p, bool sleeve) const {

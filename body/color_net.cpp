@@ -15,6 +15,8 @@ namespace hsi4d {
 namespace {
 
 constexpr const char* kPrefix = "color_net/";
+constexpr const char* kFormat = "hsi4d color net";  // of a file of its own
+constexpr int kVersion = 1;
 
 /// Waves over the places of the rest pose.
 std::vector<double> first_features(std::span<const float> means, const ColorNetShape& shape) {
@@ -211,7 +213,7 @@ void add_color_net(const ColorNet& net, SafetensorsWriter& file) {
 }
 
 void write_color_net(const std::string& path, const ColorNet& net) {
-  SafetensorsWriter file("hsi4d color net", 1);
+  SafetensorsWriter file(kFormat, kVersion);
   add_color_net(net, file);
   file.write(path);
 }
@@ -241,6 +243,19 @@ std::optional<ColorNet> color_net_of(const Safetensors& file, Index rows, Index 
                     std::to_string(net.layers.back().outputs) + " numbers; allowed: 3");
   }
   return net;
+}
+
+ColorNet read_color_net(const std::string& path, Index rows, Index joints) {
+  const Safetensors file = Safetensors::read(path);
+  file.require_format(kFormat, kVersion);
+  const NpyArray& features = file.array(array_name("features"));  // absent: this is told
+  const std::vector<std::int64_t>& shape = features.shape();
+  if (!shape.empty() && shape[0] != rows) {
+    throw DataError(features.source() + ": has features of " + std::to_string(shape[0]) +
+                    " Gaussians; the avatar has " + std::to_string(rows) +
+                    ": the network is of another avatar, or of another run's");
+  }
+  return *color_net_of(file, rows, joints);
 }
 
 #define HSI4D_INSTANTIATE(S)                                            \

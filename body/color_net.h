@@ -120,4 +120,8 @@ void write_color_net(const std::string& path, const ColorNet& net);
 /// kMostMlpLayers or one missing in between, a joint that is not there, a number that is not finite.
 std::optional<ColorNet> color_net_of(const Safetensors& file, Index rows, Index joints);
 
+/// The network of a file of its own, as write_color_net and a run leave it. Throws UserError when the file cannot be
+/// read; DataError as color_net_of, for another format, a newer version, or features of another count of Gaussians.
+ColorNet read_color_net(const std::string& path, Index rows, Index joints);
+
 }  // namespace hsi4d

@@ -70,6 +70,17 @@ std::map<std::int64_t, std::string> files_of(const std::string& folder, int pers
   return files;
 }
 
+/// The parameters of a frame. Other programs write other things by the same names of files.
+SmplxSequence read_pose_file(const std::string& path) {
+  SmplxSequence sequence = read_smplx_sequence(path);
+  for (const auto& [track, name] :
+       {std::pair{&sequence.global_orient, "global_orient"}, {&sequence.body_pose, "body_pose"}}) {
+    if (track->is_given()) continue;
+    throw DataError(path + ": has no array '" + name + "', which every file of SMPLer-X has");
+  }
+  return sequence;
+}
+
 void check_rate(double frame_rate) {
   HSI4D_CHECK(frame_rate > 0 && std::isfinite(frame_rate), std::to_string(frame_rate) + " Hz");
 }
@@ -232,7 +243,7 @@ PoseFolder read_pose_folder(const std::string& folder, double frame_rate, int pe
   std::vector<BodyPose>& poses = result.motion.poses;
   std::int64_t before = -1;
   for (const auto& [frame, path] : files) {
-    const Motion one = motion_of(read_smplx_sequence(path), frame_rate);
+    const Motion one = motion_of(read_pose_file(path), frame_rate);
     if (one.poses.size() != 1) {
       throw DataError(path + ": has " + std::to_string(one.poses.size()) + " frames; a file of a folder has one");
     }

@@ -82,8 +82,9 @@ struct PoseFolder {
 /// are relative to the model's mean hands (see with_hand_means).
 ///
 /// @param person  files of others are passed over; files without a person are those of 0
-/// Throws UserError when the folder cannot be read or has no such file; DataError as read_smplx_sequence, for a file of
-/// several frames, two of the same frame, frames more than 1000 apart, and shapes of different lengths.
+/// Throws UserError when the folder cannot be read or has no such file; DataError as read_smplx_sequence, for a file
+/// without `global_orient` or `body_pose`, of several frames, two of the same frame, frames more than 1000 apart, and
+/// shapes of different lengths.
 PoseFolder read_pose_folder(const std::string& folder, double frame_rate, int person = 0);
 
 }  // namespace hsi4d

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "body/body_model.h"
+#include "body/file_contents.h"
 #include "body/motion_edit.h"
 #include "body/pose_layout.h"
 #include "core/npz.h"
@@ -67,20 +68,27 @@ struct Rows {
   double at(std::size_t frame, std::size_t i) const { return numbers[frame * width + i]; }
 };
 
-void require_in_range(const NpyArray& array, const std::vector<double>& numbers, bool are_places = false) {
+/// How large numbers may be, and what messages call that.
+struct Range {
+  double largest;
+  const char* text;
+};
+constexpr Range kBodyNumbers{kLargestBodyNumber, kBodyNumbersText}, kPlaces{kLargestPlace, "-1e7 to 1e7"},
+    kBetas{kLargestBeta, kBetasText};
+
+void require_in_range(const NpyArray& array, const std::vector<double>& numbers, const Range& range) {
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (std::abs(numbers[i]) <= (are_places ? kLargestPlace : kLargestBodyNumber)) continue;
+    if (std::abs(numbers[i]) <= range.largest) continue;
     const std::size_t width = static_cast<std::size_t>(array.shape().empty() ? 1 : array.shape().back());
-    throw DataError(array.source() + ": frame " + std::to_string(i / width) + ", number " + std::to_string(i % width) +
-                    (std::isfinite(numbers[i]) ? " is " + number_text(numbers[i]) +
-                                                     "; allowed: " + (are_places ? "-1e7 to 1e7" : kBodyNumbersText)
-                                               : " is not finite"));
+    throw DataError(
+        array.source() + ": frame " + std::to_string(i / width) + ", number " + std::to_string(i % width) +
+        (std::isfinite(numbers[i]) ? " is " + number_text(numbers[i]) + "; allowed: " + range.text : " is not finite"));
   }
 }
 
-Rows rows_of(const NpyArray& array, int64_t frames, int64_t width, bool are_places = false) {
+Rows rows_of(const NpyArray& array, int64_t frames, int64_t width, const Range& range = kBodyNumbers) {
   Rows rows{array.require_shape({frames, width}).as<double>(), static_cast<std::size_t>(width)};
-  require_in_range(array, rows.numbers, are_places);
+  require_in_range(array, rows.numbers, range);
   return rows;
 }
 
@@ -172,8 +180,12 @@ std::vector<double> read_betas(const Npz& file, int64_t frames) {
     throw DataError(array.source() + ": has shape " + shape_text(shape) + "; allowed: [B], [1,B], [" +
                     std::to_string(frames) + ",B]");
   }
+  if (shape.back() > kMostBetas) {
+    throw DataError(array.source() + ": has " + std::to_string(shape.back()) + " numbers of shape; allowed: at most " +
+                    std::to_string(kMostBetas));
+  }
   const std::vector<double> numbers = array.as<double>();
-  require_in_range(array, numbers);
+  require_in_range(array, numbers, kBetas);
   const auto width = static_cast<std::size_t>(shape.back());
   if (width == 0) return {};
   const std::size_t rows = numbers.size() / width;
@@ -192,19 +204,33 @@ std::optional<std::string> read_text(const Npz& file, const char* name) {
   return is_text && array.size() == 1 ? std::optional(array.text()) : std::nullopt;
 }
 
+/// A model's name as files spell it: "SMPL-X", "smplx_locked_head", "smpl+h".
+std::string plain_name(const std::string& text) {
+  std::string name;
+  for (const char c : text) {
+    if (c >= 'A' && c <= 'Z') name += static_cast<char>(c - 'A' + 'a');
+    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) name += c;
+  }
+  return name;
+}
+
+/// The model that the file says it is of, if it does. Throws DataError for one that is no whole body.
 std::optional<Model> read_model(const Npz& file) {
   const std::optional<std::string> text = read_text(file, "surface_model_type");
-  if (text == "smplx") return Model::kSmplx;
-  if (text == "smplh") return Model::kSmplh;
-  if (text == "smpl") return Model::kSmpl;
-  return {};
+  if (!text || text->empty()) return {};
+  const std::string name = plain_name(*text);
+  if (name.starts_with("smplx")) return Model::kSmplx;
+  if (name.starts_with("smplh")) return Model::kSmplh;
+  if (name.starts_with("smpl")) return Model::kSmpl;
+  throw DataError(file.array("surface_model_type").source() + ": is \"" + with_escapes(*text) +
+                  "\"; allowed: smplx, smplh, smpl");
 }
 
 std::optional<Vector3<double>> read_pelvis(const Npz& file) {
   const NpyArray* array = find(file, "pelvis_rest");
   if (array == nullptr) return {};
   const std::vector<double> x = array->require_shape({3}).as<double>();
-  require_in_range(*array, x);
+  require_in_range(*array, x, kBodyNumbers);
   return Vector3<double>(x[0], x[1], x[2]);
 }
 
@@ -219,12 +245,14 @@ Motion converted(Motion motion, Model model) {
 }
 
 Motion motion_of(const Npz& file) {
+  refuse_other_contents(file, {"a motion", "parameters of smplx"});
   const NpyArray* trans = find(file, "trans", "transl");
   if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'");
   const int64_t frames = trans->require_shape({-1, 3}).shape()[0];
   if (frames == 0) throw DataError(trans->source() + ": holds no frame");
-  const Rows places = rows_of(*trans, frames, 3, true);
+  const Rows places = rows_of(*trans, frames, 3, kPlaces);
   Motion motion;
+  motion.says_frame_rate = find(file, "mocap_frame_rate", "mocap_framerate") != nullptr;
   motion.frame_rate = read_frame_rate(file);
   motion.betas = read_betas(file, frames);
   motion.gender = read_text(file, "gender").value_or(motion.gender);

@@ -22,6 +22,7 @@ struct Motion {
   std::optional<Vector3<double>> pelvis_rest = {};
   std::string converted_from = {};  ///< "SMPL-H" or "SMPL", of whose poses these were made; empty: SMPL-X's own
   bool lost_shape = false;          ///< the file's betas are of that model, and left out
+  bool says_frame_rate = true;      ///< false: the file that it was read from does not; frame_rate is the default
 };
 
 /// Frame rates of motion files, frames a second.
@@ -39,13 +40,15 @@ inline constexpr double kSlowestMotion = 0.01, kFastestMotion = 1e5;
 /// where neither is there. `betas` is [B], [1,B] or [T,B], of which the mean is taken; `gender` a text. `pelvis_rest`
 /// [3] is Motion::pelvis_rest.
 ///
-/// A text `surface_model_type`, "smplx", "smplh" or "smpl", says of what model 156 or 66 numbers and parts are; without
-/// it parts are of SMPL-X. What is not becomes a motion of the neutral SMPL-X of mean shape: its pelvis is put where
-/// that of the file's model is (`pelvis_rest`, else of the neutral model of mean shape), betas and gender are left out.
+/// A text `surface_model_type`, "smplx", "smplh" or "smpl" (in any spelling, or with more after it), says of what model
+/// 156 or 66 numbers and parts are; without it parts are of SMPL-X. What is not becomes a motion of the neutral SMPL-X
+/// of mean shape: its pelvis is put where that of the file's model is (`pelvis_rest`, else of the neutral model of mean
+/// shape), betas and gender are left out.
 ///
-/// Throws UserError when the file cannot be read; DataError naming file and array: an array missing or of Python
-/// objects, a shape that does not fit, no frame, a number that is not finite or beyond 1e6 (of translations 1e7), a
-/// frame rate outside kSlowestMotion to kFastestMotion.
+/// Throws UserError when the file cannot be read; DataError naming file and array: a file of something else, an array
+/// missing or of Python objects, a shape that does not fit, no frame, a number that is not finite or beyond 1e6 (of
+/// translations 1e7; of betas kLargestBeta), more than kMostBetas betas, a frame rate outside kSlowestMotion to
+/// kFastestMotion.
 Motion read_motion(const std::string& path);
 /// As read_motion, of a file in memory. @param name  what messages call it
 Motion decode_motion(std::span<const std::uint8_t> file, const std::string& name);

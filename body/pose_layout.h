@@ -21,6 +21,11 @@ inline constexpr Index kHandNumbers = 3 * kHandJoints;
 /// floats. What messages call the range.
 inline constexpr double kLargestBodyNumber = 1e6;
 inline constexpr const char* kBodyNumbersText = "-1e6 to 1e6";
+/// Betas are this large at most, in files and configs: nobody is ten standard deviations from the mean.
+inline constexpr double kLargestBeta = 10;
+inline constexpr const char* kBetasText = "-10 to 10";
+/// And this many: the shape directions of SMPL-X 1.1.
+inline constexpr Index kMostBetas = 300;
 /// Of translations, metres: maps count their northings up to this.
 inline constexpr double kLargestPlace = 1e7;
 

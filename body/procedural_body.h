@@ -1,6 +1,9 @@
 // A body that needs no licence: made by code, in the SMPL-X layout.
 #pragma once
 
+#include <span>
+#include <string>
+
 #include "body/body_model.h"
 #include "body/smplx_file.h"
 
@@ -24,7 +27,18 @@ inline constexpr Index kProceduralBetas = 10;
 /// torso, width of shoulders, of hips, belly, size of the head, of hands and feet. Hands are relaxed where their
 /// numbers are 0; their components are closing (1: a fist), spreading, and the thumb across the palm.
 ///
+/// Beyond some shapes the surface folds over: see procedural_shape_fault.
+///
 /// @param betas  how many of them, 0 to kProceduralBetas
 SmplxModel procedural_smplx(Index betas = 10);
+
+/// A bone of the procedural body is this many times as long or thick as the mean body's, at least and at most. Thinner
+/// ones fold at the seams to their neighbours, and below 0 turn inside out.
+inline constexpr double kLeastStretch = 0.5, kLargestStretch = 2;
+
+/// What is wrong with a shape of the procedural body, "makes spine1 -0.6 times as deep as the mean body's; allowed: 0.5
+/// to 2"; empty where nothing is. Betas add up, so each being small is not enough.
+/// @param betas  at most kProceduralBetas
+std::string procedural_shape_fault(std::span<const double> betas);
 
 }  // namespace hsi4d

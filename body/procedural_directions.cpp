@@ -1,10 +1,13 @@
 #include "body/procedural_directions.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
 #include "body/procedural_shape.h"
 #include "core/rotation.h"
+#include "core/text.h"
 
 namespace hsi4d::detail {
 
@@ -63,17 +66,17 @@ bool hangs_on(const std::vector<int>& parents, int joint, int ancestor) {
 }
 
 /// s_j of one direction.
-std::vector<Vector> stretches_of(const BodyModel& body, int direction) {
-  std::vector<Vector> result(body.parents.size(), Vector::Zero());
+std::vector<Vector> stretches_of(const std::vector<std::string>& names, const std::vector<int>& parents,
+                                 int direction) {
+  std::vector<Vector> result(parents.size(), Vector::Zero());
   for (const Stretch& stretch : kStretches) {
     if (stretch.direction != direction) continue;
     for (std::size_t j = 0; j < result.size(); ++j) {
       for (const char* side : {"", "left_", "right_"}) {
-        const auto& names = body.joint_names;
         const auto named = std::find(names.begin(), names.end(), std::string(side) + stretch.joint);
         if (named == names.end()) continue;
         const int joint = static_cast<int>(named - names.begin()), at = static_cast<int>(j);
-        if (at == joint || (stretch.and_beyond && hangs_on(body.parents, at, joint))) result[j] += stretch.share;
+        if (at == joint || (stretch.and_beyond && hangs_on(parents, at, joint))) result[j] += stretch.share;
       }
     }
   }
@@ -100,7 +103,7 @@ ShapeDirections procedural_directions(const BodyModel& body) {
     for (Index i = 0; i < 3; ++i) to[static_cast<std::size_t>((3 * row + i) * kDirections + direction)] = d[i];
   };
   for (Index k = 0; k < kDirections; ++k) {
-    const std::vector<Vector> stretch = stretches_of(body, static_cast<int>(k));
+    const std::vector<Vector> stretch = stretches_of(body.joint_names, body.parents, static_cast<int>(k));
     std::vector<Vector> moved(stretch.size(), Vector::Zero());  // d_j
     for (Index j = 1; j < joints; ++j) {
       const auto at = static_cast<std::size_t>(j), parent = static_cast<std::size_t>(body.parents[at]);
@@ -148,3 +151,27 @@ std::array<double, 45> hand_pose_of(const HandBend& bend, int side) {
 }
 
 }  // namespace hsi4d::detail
+
+namespace hsi4d {
+
+std::string procedural_shape_fault(std::span<const double> betas) {
+  HSI4D_CHECK(std::ssize(betas) <= kProceduralBetas, std::to_string(betas.size()) + " betas");
+  const std::vector<std::string>& names = smplx_joint_names();
+  const std::vector<int>& parents = smplx_parents();
+  std::vector<Vector3<double>> scale(names.size(), Vector3<double>::Ones());
+  for (std::size_t k = 0; k < betas.size(); ++k) {
+    const auto stretch = detail::stretches_of(names, parents, static_cast<int>(k));
+    for (std::size_t j = 0; j < scale.size(); ++j) scale[j] += betas[k] * stretch[j];
+  }
+  for (std::size_t j = 0; j < scale.size(); ++j) {
+    for (int i = 0; i < 3; ++i) {
+      if (scale[j][i] >= kLeastStretch && scale[j][i] <= kLargestStretch) continue;
+      const std::array<const char*, 3> kAlong = {"wide", "high", "deep"};
+      return "makes " + names[j] + " " + rounded(scale[j][i], 3) + " times as " + kAlong[static_cast<std::size_t>(i)] +
+             " as the mean body's; allowed: " + number_text(kLeastStretch) + " to " + number_text(kLargestStretch);
+    }
+  }
+  return "";
+}
+
+}  // namespace hsi4d

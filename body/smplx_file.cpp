@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "body/file_contents.h"
 #include "body/pose_layout.h"
 #include "core/npz.h"
 #include "core/text.h"
@@ -181,6 +182,7 @@ SmplxHand read_hand(const Npz& file, const char* mean, const char* components) {
 SmplxModel model_of(const Npz& file, const SmplxFileOptions& options) {
   SmplxModel model;
   model.source = file.source();
+  refuse_other_contents(file, {"a body model"});
   for (const Npz::Skipped& member : file.skipped()) model.unread.push_back(member.name);
   model.vertices = checked_numbers(file, "v_template", {-1, 3});
   if (model.vertices.empty()) throw DataError(file.array("v_template").source() + ": holds no vertex");

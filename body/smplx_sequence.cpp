@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/file_contents.h"
 #include "body/pose_layout.h"
 #include "core/npz.h"
 #include "core/suggest.h"
@@ -20,11 +21,11 @@ struct Field {
   Index most_width;  // of those
 };
 
-constexpr Index kAnyWidth = 1000;
+constexpr Index kMostExpressions = 100;  // of SMPL-X 1.1
 
 constexpr Field kFields[] = {
-    {"betas", &SmplxSequence::betas, 0, 0, kAnyWidth},
-    {"expression", &SmplxSequence::expression, 0, 0, kAnyWidth},
+    {"betas", &SmplxSequence::betas, 0, 0, kMostBetas},
+    {"expression", &SmplxSequence::expression, 0, 0, kMostExpressions},
     {"global_orient", &SmplxSequence::global_orient, 1, 3, 3},
     {"body_pose", &SmplxSequence::body_pose, 21, 63, 63},
     {"jaw_pose", &SmplxSequence::jaw_pose, 1, 3, 3},
@@ -82,11 +83,13 @@ SmplxTrack read_track(const Field& field, const NpyArray& array, Index other_fra
   }
   if (track.rows == 0) throw DataError(array.source() + ": holds no frame");
   track.numbers = array.as<double>();
+  const bool are_betas = field.track == &SmplxSequence::betas;
   for (std::size_t i = 0; i < track.numbers.size(); ++i) {
-    if (std::abs(track.numbers[i]) <= kLargestBodyNumber) continue;
+    if (std::abs(track.numbers[i]) <= (are_betas ? kLargestBeta : kLargestBodyNumber)) continue;
     const auto width = static_cast<std::size_t>(track.width);
     throw DataError(array.source() + ": frame " + std::to_string(i / width) + ", number " + std::to_string(i % width) +
-                    " is " + number_text(track.numbers[i]) + "; allowed: " + kBodyNumbersText);
+                    " is " + number_text(track.numbers[i]) +
+                    "; allowed: " + (are_betas ? kBetasText : kBodyNumbersText));
   }
   return track;
 }
@@ -142,6 +145,12 @@ bool read_tracks(const Npz& file, bool of_hands, SmplxSequence& sequence) {
 SmplxSequence sequence_of(const Npz& file) {
   SmplxSequence sequence;
   sequence.source = file.source();
+  if (contents_of(file) == "a motion") {
+    throw DataError(file.source() +
+                    ": holds a motion by the names of AMASS, not parameters by those of smplx; `hsi4d "
+                    "motion` reads it, and with --body-model shows the body (.glb)");
+  }
+  refuse_other_contents(file, {"parameters of smplx"});
   sequence.passed_over = other_arrays(file);
   const bool is_body = read_tracks(file, false, sequence), is_hand = read_tracks(file, true, sequence);
   if (!is_body && !is_hand) {
@@ -181,6 +190,19 @@ struct Leaf {
 };
 
 }  // namespace
+
+SmplxTrack first_numbers(const SmplxTrack& track, Index width) {
+  if (track.width <= width) return track;
+  SmplxTrack first;
+  if (width == 0) return first;
+  first.width = width;
+  first.rows = track.rows;
+  for (Index row = 0; row < track.rows; ++row) {
+    const auto begin = track.numbers.begin() + row * track.width;
+    first.numbers.insert(first.numbers.end(), begin, begin + width);
+  }
+  return first;
+}
 
 SmplxSequence read_smplx_sequence(const std::string& path) { return sequence_of(Npz::read(path)); }
 

@@ -44,12 +44,15 @@ struct SmplxSequence {
 /// Each is [T,width], or [width] or [1,width] for all frames; rotations may be [T,J,3] or, for all frames, [J,3] too.
 /// Widths: `global_orient`, `jaw_pose`, `leye_pose`, `reye_pose`, `transl` 3; `body_pose` 63; `left_hand_pose`,
 /// `right_hand_pose` 45, or 1 to 45 coefficients ([15,3] is a hand, unless other parameters have 15 frames); `betas`,
-/// `expression` any. What is not there is zero.
+/// `expression` any up to 300 and 100. What is not there is zero.
 ///
 /// Throws UserError when the file cannot be read; DataError naming file and array: none of these arrays, or one whose
 /// name is nearly that of one that is missing; a shape that does not fit; frames that differ; no frame; a number that
-/// is not finite or beyond 1e6.
+/// is not finite or beyond 1e6 (of betas kLargestBeta).
 SmplxSequence read_smplx_sequence(const std::string& path);
+/// The first `width` numbers of each row; the track as it is where it has no more, not given where that is none.
+SmplxTrack first_numbers(const SmplxTrack& track, Index width);
+
 /// As read_smplx_sequence, of a file in memory. @param name  what messages call it
 SmplxSequence decode_smplx_sequence(std::span<const std::uint8_t> file, const std::string& name);
 

@@ -6,6 +6,7 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
+#include "body/file_contents.h"
 #include "core/file.h"
 #include "core/finite_numbers.h"
 #include "core/npz.h"
@@ -136,7 +137,9 @@ VposerWeights decode_vposer(std::span<const std::uint8_t> file, const std::strin
   if (looks_like_safetensors(file.first(std::min<std::size_t>(file.size(), 9)))) {
     return weights_of(Safetensors::decode(file, name));
   }
-  return weights_of(Npz::decode(file, name));
+  const Npz archive = Npz::decode(file, name);
+  refuse_other_contents(archive, {"the weights of VPoser"});
+  return weights_of(archive);
 }
 
 template <class S>

@@ -9,13 +9,12 @@
 
 #include "core/check.h"
 #include "core/suggest.h"
+#include "core/text.h"
 
 namespace hsi4d {
 namespace {
 
 using Kind = ConfigValue::Kind;
-
-std::string number_text(double value) { return ConfigValue::make_number(value).text; }
 
 std::string allowed_text(const NumberRange& range) {
   const bool has_min = std::isfinite(range.min), has_max = std::isfinite(range.max);
@@ -31,7 +30,10 @@ std::string allowed_text(const NumberRange& range) {
 }
 
 std::string allowed_text(const IntegerRange& range) {
-  std::string text = std::to_string(range.min) + " to " + std::to_string(range.max);
+  using Limits = std::numeric_limits<std::int64_t>;
+  std::string text = range.max < Limits::max()   ? std::to_string(range.min) + " to " + std::to_string(range.max)
+                     : range.min > Limits::min() ? std::to_string(range.min) + " or more"
+                                                 : "any whole number";
   if (range.multiple_of > 1) text += ", a multiple of " + std::to_string(range.multiple_of);
   return text;
 }

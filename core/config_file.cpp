@@ -8,6 +8,7 @@
 
 #include "core/check.h"
 #include "core/config_parse.h"
+#include "core/file_kind.h"
 #include "core/suggest.h"
 
 namespace hsi4d {
@@ -56,6 +57,8 @@ FileText read_file(const fs::path& file) {
   if (stream.bad()) return {"", "the file cannot be read"};
   text.resize(static_cast<std::size_t>(stream.gcount()));
   if (text.size() > kLargestConfig) return {"", "the file is larger than 8 MiB; a config is not"};
+  const std::string kind = file_kind(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+  if (!kind.empty() && kind != "JSON" && kind != "text") return {"", "looks like " + kind + ", not like JSON"};
   return {std::move(text), ""};
 }
 

@@ -16,6 +16,23 @@ constexpr std::size_t kMostProblems = 100;  // told of one config; the rest is c
 
 using Kind = ConfigValue::Kind;
 
+/// A key of a pointer without its escapes, ~1 for "/" and ~0 for "~".
+std::string unescaped(std::string_view key) {
+  std::string out;
+  for (std::size_t i = 0; i < key.size(); ++i) {
+    const bool is_escape = key[i] == '~' && i + 1 < key.size();
+    out += !is_escape ? key[i] : key[i + 1] == '1' ? '/' : '~';
+    if (is_escape) ++i;
+  }
+  return out;
+}
+
+const ConfigValue* find_item(const ConfigValue& array, const std::string& key) {
+  std::size_t index = 0;
+  const auto end = std::from_chars(key.data(), key.data() + key.size(), index);
+  return end.ec == std::errc() && index < array.items.size() ? &array.items[index] : nullptr;
+}
+
 template <class T>
 std::string number_text(T value) {
   HSI4D_CHECK(std::isfinite(value), "a config cannot hold a number that is not finite");
@@ -147,6 +164,20 @@ const ConfigValue* find_member(const ConfigValue& object, std::string_view key) 
     if (member.key == key) return &member.value;
   }
   return nullptr;
+}
+
+const ConfigOrigin& origin_at(const ConfigValue& tree, std::string_view pointer) {
+  const ConfigValue* node = &tree;
+  const ConfigOrigin* origin = &tree.origin;
+  for (std::size_t begin = 1; begin < pointer.size();) {
+    const std::size_t end = std::min(pointer.find('/', begin), pointer.size());
+    const std::string key = unescaped(pointer.substr(begin, end - begin));
+    begin = end + 1;
+    node = node->kind == Kind::kArray ? find_item(*node, key) : find_member(*node, key);
+    if (node == nullptr) return *origin;
+    origin = &node->origin;
+  }
+  return *origin;
 }
 
 ConfigValue merged(ConfigValue base, ConfigValue overlay) {

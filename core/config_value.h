@@ -69,6 +69,9 @@ struct ConfigMember {
 /// The member of an object named `key`, or null.
 const ConfigValue* find_member(const ConfigValue& object, std::string_view key);
 
+/// Where the value at a JSON pointer was written; where it was not, the object or array that it would be in.
+const ConfigOrigin& origin_at(const ConfigValue& tree, std::string_view pointer);
+
 /// `base` with `overlay` laid over it: objects merge key by key, everything else (arrays and null included) replaces.
 ConfigValue merged(ConfigValue base, ConfigValue overlay);
 

@@ -7,6 +7,7 @@
 #include <zip.h>
 
 #include "core/check.h"
+#include "core/file_kind.h"
 #include "core/text.h"
 
 namespace hsi4d {
@@ -35,12 +36,17 @@ struct ZipError {
 
 // Reading -------------------------------------------------------------------------------------------------------------
 
+bool is_zip(std::span<const uint8_t> file) { return file.size() > 1 && file[0] == 'P' && file[1] == 'K'; }
+
 Archive open_archive(std::span<const uint8_t> file, const std::string& source) {
   ZipError error;
   ZipSource buffer(zip_source_buffer_create(file.data(), file.size(), 0, &error.value));
   if (!buffer) throw InternalError(source + ": " + error.text());
   Archive archive(zip_open_from_source(buffer.get(), ZIP_RDONLY, &error.value));
-  if (!archive) fail(source, "cannot be read as a zip archive: " + error.text());
+  if (!archive) {
+    const std::string other = is_zip(file) ? "" : other_kind(file, "a .npz archive");
+    fail(source, other.empty() ? "cannot be read as a zip archive: " + error.text() : other);
+  }
   buffer.release();  // the archive owns it now
   return archive;
 }

@@ -12,6 +12,7 @@
 
 #include "core/check.h"
 #include "core/config_parse.h"
+#include "core/file_kind.h"
 #include "core/text.h"
 #include "core/types.h"
 
@@ -177,6 +178,10 @@ NpyArray array_of(const Entry& entry, const Type& type, std::span<const uint8_t>
 Safetensors Safetensors::read(const std::string& path) { return decode(read_file(path), path); }
 
 Safetensors Safetensors::decode(std::span<const uint8_t> file, const std::string& source) {
+  if (!looks_like_safetensors(file)) {
+    const std::string other = other_kind(file, "a .safetensors file");
+    if (!other.empty()) fail(source, other);
+  }
   Safetensors result;
   result.source_ = source;
   const int64_t length = header_length(file, source);

@@ -13,17 +13,30 @@ std::string joined(std::span<const std::string> words) {
   return text;
 }
 
+namespace {
+
+/// Whether a number is large, and still short enough to be read without an exponent.
+bool is_written_out(double value) { return std::abs(value) >= 1 && std::abs(value) < 1e12; }
+
+}  // namespace
+
 std::string rounded(double value, int digits) {
   if (!std::isfinite(value)) return std::isnan(value) ? "nan" : value < 0 ? "-inf" : "inf";
   std::array<char, 64> buffer;
   const auto end =
       std::to_chars(buffer.data(), buffer.data() + buffer.size(), value + 0.0, std::chars_format::general, digits);
-  return {buffer.data(), end.ptr};
+  if (std::find(buffer.data(), end.ptr, 'e') == end.ptr || !is_written_out(value)) return {buffer.data(), end.ptr};
+  double few = 0;
+  std::from_chars(buffer.data(), end.ptr, few);
+  return number_text(few);
 }
 
 std::string number_text(double value) {
-  std::array<char, 32> buffer;
-  return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
+  std::array<char, 64> buffer;
+  char* const end = buffer.data() + buffer.size();
+  const auto written = is_written_out(value) ? std::to_chars(buffer.data(), end, value, std::chars_format::fixed)
+                                             : std::to_chars(buffer.data(), end, value);
+  return {buffer.data(), written.ptr};
 }
 
 std::string four_digits(std::int64_t number) {

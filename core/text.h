@@ -11,7 +11,7 @@ namespace hsi4d {
 /// "a, b, c"; empty for no words.
 std::string joined(std::span<const std::string> words);
 
-/// A number in that many significant digits, "0.01234" or "1e-08"; 0 for −0; "nan", "inf" or "-inf".
+/// A number in that many significant digits, "0.01234", "123500" or "1e-08"; 0 for −0; "nan", "inf" or "-inf".
 std::string rounded(double value, int digits);
 
 /// A number in as many digits as give the same number back.

@@ -12,6 +12,13 @@
 
 namespace hsi4d {
 
+/// What a loss term reads, without which it is off: the image and nothing else; the body's pose or motion; objects, or
+/// the body, and the image.
+enum class LossNeeds { kImages, kBody, kObjects, kBodyInImage };
+
+/// What a term reads once from its settings; see LossDescription::prepare.
+using PrepareLoss = std::any (*)(const std::any& settings);
+
 /// A loss term as configs and `hsi4d list losses` see it. Made by describe_loss.
 struct LossDescription {
   std::string name;     ///< the key in a stage's `losses`
@@ -19,18 +26,34 @@ struct LossDescription {
   std::any defaults;    ///< its own settings before anything is read; empty for a term that has none
   void (*describe_settings)(ConfigFields&, std::any&) = nullptr;
   std::vector<std::string> reads = {};  ///< inputs that are made on demand (LossTerm reading())
+  PrepareLoss prepare = nullptr;  ///< reads the files that the settings name, say: once, before a run writes anything.
+                                  ///< What it returns is recorded from in place of the settings. Null: nothing to do
+  double weight = 1;              ///< the default
+  LossNeeds needs = LossNeeds::kImages;
 };
 
 /// A loss term without settings of its own.
 inline LossDescription describe_loss(std::string name, std::string summary) {
-  return {std::move(name), std::move(summary), {}, nullptr};
+  LossDescription loss;
+  loss.name = std::move(name);
+  loss.summary = std::move(summary);
+  return loss;
 }
 
 /// A loss term with its own settings: a struct with `void describe(ConfigFields&, Settings&)` beside it.
 template <class Settings>
 LossDescription describe_loss(std::string name, std::string summary, Settings defaults = {}) {
-  return {std::move(name), std::move(summary), std::move(defaults),
-          [](ConfigFields& fields, std::any& settings) { describe(fields, *std::any_cast<Settings>(&settings)); }};
+  LossDescription loss = describe_loss(std::move(name), std::move(summary));
+  loss.defaults = std::move(defaults);
+  loss.describe_settings = [](ConfigFields& fields, std::any& settings) {
+    describe(fields, *std::any_cast<Settings>(&settings));
+  };
+  return loss;
+}
+
+/// What a term is recorded from: what it prepares of its settings, or the settings. Throws what `prepare` throws.
+inline std::any prepared_loss(PrepareLoss prepare, const std::any& settings) {
+  return prepare != nullptr ? prepare(settings) : settings;
 }
 
 /// One entry of a stage's `losses`: the weight, and the term's own settings beside it.
@@ -38,6 +61,9 @@ struct LossSettings {
   double weight = 1;
   std::any own;
   void (*describe_own)(ConfigFields&, std::any&) = nullptr;
+  PrepareLoss prepare = nullptr;
+  LossNeeds needs = LossNeeds::kImages;
+  std::any prepared;  ///< of `own`, by prepare_losses (optim/stage_settings.h); empty before
 
   /// The term's own settings. Throws InternalError when the term has others than `Settings`.
   template <class Settings>
@@ -48,6 +74,11 @@ struct LossSettings {
     return *settings;
   }
 };
+
+/// The settings of a term before anything is read.
+inline LossSettings default_settings(const LossDescription& loss) {
+  return {loss.weight, loss.defaults, loss.describe_settings, loss.prepare, loss.needs, {}};
+}
 
 /// Describes the weight and the term's own settings.
 inline void describe(ConfigFields& fields, LossSettings& settings) {

@@ -57,17 +57,22 @@ struct LossInputs {
 /// an input that it needs is not given: the term is off then, and the stage reports it.
 struct LossTerm {
   LossDescription description;
-  Var<float> (*record_float)(const LossInputs<float>& inputs, const std::any& settings) = nullptr;
-  Var<double> (*record_double)(const LossInputs<double>& inputs, const std::any& settings) = nullptr;
+  Var<float> (*record_float)(const LossInputs<float>& inputs, const std::any& prepared) = nullptr;
+  Var<double> (*record_double)(const LossInputs<double>& inputs, const std::any& prepared) = nullptr;
 
-  /// Records the term. `settings` is what description.describe_settings filled in, or description.defaults.
+  /// Records the term. `prepared` is prepared_loss of its settings; of most terms those are the settings themselves.
   template <class S>
-  Var<S> record(const LossInputs<S>& inputs, const std::any& settings) const {
+  Var<S> record(const LossInputs<S>& inputs, const std::any& prepared) const {
     if constexpr (std::is_same_v<S, float>) {
-      return record_float(inputs, settings);
+      return record_float(inputs, prepared);
     } else {
-      return record_double(inputs, settings);
+      return record_double(inputs, prepared);
     }
+  }
+  /// As above by the default settings.
+  template <class S>
+  Var<S> record(const LossInputs<S>& inputs) const {
+    return record(inputs, prepared_loss(description.prepare, description.defaults));
   }
 };
 
@@ -90,6 +95,25 @@ LossTerm make_loss_term(std::string name, std::string summary, F) {
           [](const LossInputs<double>& inputs, const std::any& settings) {
             return F{}(inputs, std::any_cast<const Settings&>(settings));
           }};
+}
+
+/// A loss term that reads something of its settings once a run, before anything is written, and is then recorded from
+/// that: Prepare is a captureless lambda of the settings, F one of (inputs, what that returned). Prepare throws
+/// UserError or DataError; the message is told with the place in the config.
+template <class Settings, class Prepare, class F>
+LossTerm make_loss_term(std::string name, std::string summary, Prepare, F) {
+  using Prepared = std::decay_t<std::invoke_result_t<Prepare, const Settings&>>;
+  LossTerm term{describe_loss<Settings>(std::move(name), std::move(summary)),
+                [](const LossInputs<float>& inputs, const std::any& prepared) {
+                  return F{}(inputs, std::any_cast<const Prepared&>(prepared));
+                },
+                [](const LossInputs<double>& inputs, const std::any& prepared) {
+                  return F{}(inputs, std::any_cast<const Prepared&>(prepared));
+                }};
+  term.description.prepare = [](const std::any& settings) {
+    return std::any(Prepare{}(std::any_cast<const Settings&>(settings)));
+  };
+  return term;
 }
 
 /// A loss term without settings of its own; F is generic in (inputs).

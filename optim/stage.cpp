@@ -38,6 +38,12 @@ const LossTerm& term_named(const std::string& name, std::span<const LossTerm> te
       stage, "there is no loss term \"" + name + "\"" + did_you_mean(name, known) + " (known: " + joined(known) + ")"));
 }
 
+/// What a term is recorded from: what was prepared of its settings, or is now.
+std::any prepared_of(const LossSettings& chosen, const LossTerm& term) {
+  if (chosen.prepared.has_value()) return chosen.prepared;
+  return prepared_loss(term.description.prepare, chosen.own.has_value() ? chosen.own : term.description.defaults);
+}
+
 template <class S>
 RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossTerm> terms, const LossInputs<S>& inputs,
                             const std::string& stage) {
@@ -47,9 +53,7 @@ RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossT
   std::vector<std::string> reasons;
   for (const auto& [name, chosen] : settings.losses) {
     const LossTerm& term = term_named(name, terms, stage);
-    const Var<S> value = chosen.weight == 0
-                             ? Var<S>{}
-                             : term.record(asking, chosen.own.has_value() ? chosen.own : term.description.defaults);
+    const Var<S> value = chosen.weight == 0 ? Var<S>{} : term.record(asking, prepared_of(chosen, term));
     if (value.tape == nullptr) {
       loss.off.push_back(name);
       reasons.push_back(name + (chosen.weight == 0 ? " has weight 0" : " lacks an input"));

@@ -1,5 +1,7 @@
 #include "optim/stage_settings.h"
 
+#include "core/check.h"
+
 namespace hsi4d {
 namespace {
 
@@ -7,9 +9,27 @@ constexpr int kMostIterations = 1000000;
 
 std::vector<ConfigKey<LossSettings>> loss_keys(const std::vector<LossDescription>& losses) {
   std::vector<ConfigKey<LossSettings>> keys;
-  for (const LossDescription& loss : losses)
-    keys.push_back({loss.name, loss.summary, {1, loss.defaults, loss.describe_settings}});
+  for (const LossDescription& loss : losses) keys.push_back({loss.name, loss.summary, default_settings(loss)});
   return keys;
+}
+
+/// The place of a loss: of the one file that it names, else of itself.
+std::string place_of(const std::string& name, LossSettings& loss) {
+  const std::string pointer = child_pointer("/losses", name);
+  ConfigFields fields;
+  describe(fields, loss);
+  const std::vector<ConfigPath> files = list_paths(fields, pointer);
+  return files.size() == 1 ? files.front().pointer : pointer;
+}
+
+const char* words_of(LossNeeds needs) {
+  switch (needs) {
+    case LossNeeds::kImages: return "an image";
+    case LossNeeds::kBody: return "the body";
+    case LossNeeds::kObjects: return "objects";
+    case LossNeeds::kBodyInImage: return "the body in an image";
+  }
+  return "";
 }
 
 }  // namespace
@@ -56,6 +76,40 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
          "VPoser's weights (tools/export_vposer.py), whose latents a stage over the sequence moves; without, natural "
          "poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
+}
+
+std::vector<LossFault> prepare_losses(StageSettings& stage) {
+  std::vector<LossFault> faults;
+  if (stage.over == StageScope::kSequence && !stage.pose_prior) {
+    try {
+      stage.pose_prior = read_pose_prior(stage.pose_weights.string());
+    } catch (const UserError& mistake) {
+      faults.push_back({"/pose_weights", mistake.what()});
+    } catch (const DataError& damage) {
+      faults.push_back({"/pose_weights", damage.what()});
+    }
+  }
+  for (auto& [name, loss] : stage.losses) {
+    if (loss.weight == 0 || loss.prepare == nullptr || loss.prepared.has_value()) continue;
+    try {
+      loss.prepared = loss.prepare(loss.own);
+    } catch (const UserError& mistake) {
+      faults.push_back({place_of(name, loss), mistake.what()});
+    } catch (const DataError& damage) {
+      faults.push_back({place_of(name, loss), damage.what()});
+    }
+  }
+  return faults;
+}
+
+std::vector<LossFault> losses_without_inputs(const StageSettings& stage, LossNeeds has, const std::string& having) {
+  std::vector<LossFault> faults;
+  for (const auto& [name, loss] : stage.losses) {
+    if (loss.weight == 0 || loss.needs == has) continue;
+    faults.push_back({child_pointer("/losses", name), std::string("this loss needs ") + words_of(loss.needs) +
+                                                          ", which " + having + " does not have"});
+  }
+  return faults;
 }
 
 }  // namespace hsi4d

@@ -4,8 +4,10 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "body/pose_prior.h"
 #include "core/config.h"
 #include "optim/loss_description.h"
 
@@ -58,6 +60,7 @@ struct StageSettings {
   PixelWeight weight = PixelWeight::kAll;
   ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
   ConfigMap<LossSettings> losses;              ///< by loss term
+  std::optional<PosePrior> pose_prior;         ///< with pose_weights, by prepare_losses; empty before
   std::filesystem::path pose_weights;          ///< over the sequence: VPoser's weights; empty: natural poses
   OptimizerSettings optimizer;
 };
@@ -66,5 +69,22 @@ struct StageSettings {
 void describe(ConfigFields& fields, OptimizerSettings& settings);
 void describe(ConfigFields& fields, ParameterGroupSettings& settings);
 void describe(ConfigFields& fields, StageSettings& settings, const std::vector<LossDescription>& losses);
+
+/// A loss of a stage that cannot be used.
+struct LossFault {
+  std::string pointer;  ///< JSON pointer from the stage on: "/losses/pose_prior/weights"
+  std::string text;
+};
+
+/// Prepares the losses that are on and have not been prepared yet (LossDescription::prepare), and the pose prior of a
+/// stage over the sequence, so that what they read is read once, and before anything is written. A fault is placed at the file that the loss names, if it is one.
+/// @return  what its prepare function threw as UserError or DataError, a fault a loss
+std::vector<LossFault> prepare_losses(StageSettings& stage);
+
+/// Losses that are on and need what the stage does not have.
+///
+/// @param has     the one thing that it has
+/// @param having  the stage in words: "a stage with ..."
+std::vector<LossFault> losses_without_inputs(const StageSettings& stage, LossNeeds has, const std::string& having);
 
 }  // namespace hsi4d

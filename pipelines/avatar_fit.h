@@ -33,7 +33,7 @@ namespace hsi4d {
 /// A config of `hsi4d avatar fit`.
 struct AvatarFitSettings {
   std::filesystem::path file;    ///< the config itself, for messages
-  std::filesystem::path views;   ///< views.json of the set
+  std::filesystem::path views;   ///< views.json of the set; empty: not given yet
   std::filesystem::path avatar;  ///< where it starts; empty: new Gaussians on the body
   std::int64_t seed = 0;         ///< of new Gaussians, a new network, and the order of the views
   int threads = 0;               ///< 0: one a core
@@ -51,9 +51,18 @@ struct AvatarFitSettings {
 /// @param losses  terms that the stage may name
 void describe(ConfigFields& fields, AvatarFitSettings& settings, const std::vector<LossDescription>& losses);
 
-/// Reads a config of `hsi4d avatar fit`. Throws UserError with all of its problems.
+/// Reads a config of `hsi4d avatar fit`, and prepares its losses. Throws UserError with all of its problems, or that it
+/// is a config of `hsi4d run`.
+/// @param asks_views  whether it is a problem that it names no views
 AvatarFitSettings load_avatar_fit(const std::filesystem::path& file, const std::vector<std::string>& overrides,
-                                  const std::vector<LossDescription>& losses);
+                                  const std::vector<LossDescription>& losses, bool asks_views = true);
+
+/// Its text with every setting, defaults included.
+std::string resolved_avatar_fit(const AvatarFitSettings& settings, const std::vector<LossDescription>& losses);
+
+/// The JSON Schema (draft 2020-12) of such configs, and all of their settings.
+std::string avatar_fit_schema(const std::vector<LossDescription>& losses);
+std::vector<ConfigSetting> avatar_fit_settings(const std::vector<LossDescription>& losses);
 
 /// Names of the groups that its stage may move.
 std::vector<std::string> avatar_fit_groups();

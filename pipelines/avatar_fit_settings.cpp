@@ -2,6 +2,7 @@
 
 #include "core/config_file.h"
 #include "pipelines/avatar_fit.h"
+#include "pipelines/config_kind.h"
 
 namespace hsi4d {
 
@@ -9,11 +10,47 @@ namespace {
 
 constexpr int kMostThreads = 1024;
 
+/// The value itself, or the first one in it, that a --set has written; null: there is none.
+const ConfigValue* set_on_command_line(const ConfigValue& value) {
+  if (value.origin.source != nullptr && value.origin.source->is_command_line) return &value;
+  for (const ConfigMember& member : value.members) {
+    const ConfigValue* const found = set_on_command_line(member.value);
+    if (found != nullptr) return found;
+  }
+  return nullptr;
+}
+
 std::string fault_of_numbers(const std::vector<double>& numbers) {
   for (const double x : numbers) {
     if (x != std::floor(x)) return "whole numbers, counted from 0";
   }
   return "";
+}
+
+constexpr const char* kNoViews =
+    "not given; a fit needs the views.json of pictures in known poses. `hsi4d synth configs/avatar/views.json --out "
+    "DIR` "
+    "makes some; then --set views=DIR/views.json";
+
+/// What the command line says of a new avatar where none is made.
+void add_unused(const ConfigValue& tree, const AvatarFitSettings& settings, ConfigProblems& problems) {
+  if (settings.avatar.empty()) return;
+  for (const char* key : {"gaussians", "body"}) {
+    const ConfigValue* const value = find_member(tree, key);
+    const ConfigValue* const said = value == nullptr ? nullptr : set_on_command_line(*value);
+    if (said == nullptr) continue;
+    problems.add(said->origin, child_pointer("", key),
+                 "is of a new avatar; this fit goes on from " + settings.avatar.string() + ", /avatar, as it is");
+  }
+}
+
+void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProblems& problems) {
+  std::vector<LossFault> faults = losses_without_inputs(stage, LossNeeds::kImages, "a fit of an avatar");
+  for (LossFault& fault : prepare_losses(stage)) faults.push_back(std::move(fault));
+  for (const LossFault& fault : faults) {
+    const std::string pointer = "/stage" + fault.pointer;
+    problems.add(origin_at(tree, pointer), pointer, fault.text);
+  }
 }
 
 }  // namespace
@@ -23,7 +60,7 @@ std::vector<std::string> avatar_fit_groups() {
 }
 
 void describe(ConfigFields& f, AvatarFitSettings& s, const std::vector<LossDescription>& losses) {
-  f.path("views", s.views, {.must_exist = true, .may_be_empty = false}, "views.json of the pictures").required();
+  f.path("views", s.views, {.must_exist = true}, "views.json of the pictures; a fit needs one");
   f.path("avatar", s.avatar, {.must_exist = true}, "The avatar to go on from; without: new Gaussians on the body");
   f.integer("seed", s.seed, {.min = 0}, "Seed of a new avatar, of a new color net and of the order of the views");
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
@@ -42,17 +79,42 @@ void describe(ConfigFields& f, AvatarFitSettings& s, const std::vector<LossDescr
 }
 
 AvatarFitSettings load_avatar_fit(const std::filesystem::path& file, const std::vector<std::string>& overrides,
-                                  const std::vector<LossDescription>& losses) {
+                                  const std::vector<LossDescription>& losses, bool asks_views) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, overrides, problems);
+  require_kind(tree, ConfigKind::kAvatarFit, file);
   AvatarFitSettings settings;
   settings.file = file;
   ConfigFields fields;
   describe(fields, settings, losses);
   read_config(tree, fields, problems);
+  add_unused(tree, settings, problems);
+  if (asks_views && problems.empty() && settings.views.empty()) problems.add(tree.origin, "/views", kNoViews);
+  if (problems.empty()) add_loss_faults(tree, settings.stage, problems);
   problems.throw_if_any();
   check_groups(settings.stage, avatar_fit_groups(), file.string() + ": /stage/optimize");
   return settings;
+}
+
+std::string resolved_avatar_fit(const AvatarFitSettings& settings, const std::vector<LossDescription>& losses) {
+  AvatarFitSettings copy = settings;  // a description binds to something that it could change
+  ConfigFields fields;
+  describe(fields, copy, losses);
+  return to_json(write_config(fields));
+}
+
+std::string avatar_fit_schema(const std::vector<LossDescription>& losses) {
+  AvatarFitSettings defaults;
+  ConfigFields fields;
+  describe(fields, defaults, losses);
+  return to_json(config_schema(fields, "hsi4d avatar fit config"));
+}
+
+std::vector<ConfigSetting> avatar_fit_settings(const std::vector<LossDescription>& losses) {
+  AvatarFitSettings defaults;
+  ConfigFields fields;
+  describe(fields, defaults, losses);
+  return list_settings(fields);
 }
 
 }  // namespace hsi4d

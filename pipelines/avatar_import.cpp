@@ -1,6 +1,8 @@
 #include "pipelines/avatar_import.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "body/surface_index.h"
 #include "core/parallel.h"
@@ -47,7 +49,52 @@ bool varies_with_view(const Gaussians& gaussians) {
   return false;
 }
 
+using Cell = std::array<int, 3>;
+
+template <class Numbers>
+Cell cell_of(const Numbers& p) {
+  Cell cell;
+  for (std::size_t i = 0; i < 3; ++i)
+    cell[i] = static_cast<int>(std::floor(static_cast<double>(p[static_cast<Index>(i)]) / kCoverCell));
+  return cell;
+}
+
+/// The cells of the means, and those beside them, in order.
+std::vector<Cell> cells_near(const std::vector<float>& means) {
+  constexpr float kFarthest = 100;  // metres
+  std::vector<Cell> cells;
+  for (std::size_t i = 0; i < means.size(); i += 3) {
+    const Vector3<float> mean(means.data() + i);
+    if (mean.cwiseAbs().maxCoeff() < kFarthest) cells.push_back(cell_of(mean));
+  }
+  const auto sort = [](std::vector<Cell>& some) {
+    std::sort(some.begin(), some.end());
+    some.erase(std::unique(some.begin(), some.end()), some.end());
+  };
+  sort(cells);
+  std::vector<Cell> near;
+  for (const Cell& cell : cells) {
+    for (int k = 0; k < 27; ++k) near.push_back({cell[0] + k % 3 - 1, cell[1] + k / 3 % 3 - 1, cell[2] + k / 9 - 1});
+  }
+  sort(near);
+  return near;
+}
+
 }  // namespace
+
+double covered_share(const std::vector<float>& means, const BodyModel& body) {
+  const std::vector<Cell> near = cells_near(means);
+  double covered = 0, all = 0;
+  for (std::int32_t face = 0; face < body.face_count(); ++face) {
+    const auto corners = face_corners(body, face);
+    const Vector3<double> edge = corners[1] - corners[0], other = corners[2] - corners[0];
+    const double area = Vector3<double>(cross(edge, other)).norm() / 2;
+    const Vector3<double> middle = (corners[0] + corners[1] + corners[2]) / 3;
+    all += area;
+    if (std::binary_search(near.begin(), near.end(), cell_of(middle))) covered += area;
+  }
+  return all > 0 ? covered / all : 0;
+}
 
 AvatarImport import_avatar(const Gaussians& gaussians, const BodyModel& body, const std::string& source) {
   check_sizes(gaussians);
@@ -84,6 +131,12 @@ AvatarImport import_avatar(const Gaussians& gaussians, const BodyModel& body, co
                     " Gaussians are more than " + rounded(kFarFromBody, 3) + " m from the body (" +
                     rounded(result.mean_distance, 3) +
                     " m on average); they have to be in its rest pose: metres, Y up, facing +z, the pelvis near the "
+                    "origin (hsi4d convert moves, turns and scales)");
+  result.covered = covered_share(avatar.means, body);
+  if (result.covered < kLeastCovered)
+    throw DataError(source + ": is no avatar: only " + rounded(100 * result.covered, 2) +
+                    " % of the body has Gaussians near it; allowed: " + rounded(100 * kLeastCovered, 2) +
+                    " % or more, in its rest pose: metres, Y up, facing +z, arms to the sides, the pelvis near the "
                     "origin (hsi4d convert moves, turns and scales)");
   return result;
 }

@@ -11,6 +11,17 @@ void warn_of_repairs(const SmplxModel& model) {
               ": vertices whose skinning weights are divided by their sum: " + std::to_string(model.rescaled_weights));
 }
 
+void warn_of_excess(const std::string& file, const std::string& name, std::span<const double> numbers, Index width,
+                    const SmplxModel& model, Index there) {
+  if (width <= there) return;
+  bool is_zero = true;
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    is_zero = is_zero && (static_cast<Index>(i) % width < there || numbers[i] == 0);
+  if (is_zero) return;
+  log_warning(file + ": array '" + name + "': has " + std::to_string(width) + " numbers a frame; " + model.source +
+              " has " + std::to_string(there) + ", and the others are left out");
+}
+
 Motion read_motion_aloud(const std::string& path) {
   Motion motion = read_motion(path);
   if (motion.lost_shape)

@@ -1,6 +1,7 @@
 // Files of bodies as the program reads them: what was repaired or left out is told in the log.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "body/avatar.h"
@@ -11,6 +12,15 @@ namespace hsi4d {
 
 /// Tells how many vertices have repaired skinning weights, where there are any.
 void warn_of_repairs(const SmplxModel& model);
+
+/// Tells that numbers of shape or expression beyond what a model has are left out, unless all of those are 0.
+///
+/// @param file     that they are in, for the message, and
+/// @param name     of their array
+/// @param numbers  rows of `width`
+/// @param there    how many the model has
+void warn_of_excess(const std::string& file, const std::string& name, std::span<const double> numbers, Index width,
+                    const SmplxModel& model, Index there);
 
 /// Reads a motion, and tells what of it is left out because it is of another body model. Throws as read_motion.
 Motion read_motion_aloud(const std::string& path);

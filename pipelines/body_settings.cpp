@@ -1,5 +1,6 @@
 #include "pipelines/body_settings.h"
 
+#include "body/pose_layout.h"
 #include "body/procedural_body.h"
 #include "pipelines/body_files.h"
 
@@ -8,7 +9,8 @@ namespace hsi4d {
 void describe(ConfigFields& f, BodySettings& s) {
   f.choice("kind", s.kind, kBodyKinds, "The body that comes with the program, or a model in a SMPL-X file");
   f.path("path", s.path, {.must_exist = true}, "The SMPL-X file (.npz), of kind smplx");
-  f.integer("betas", s.betas, {.min = 0, .max = 300}, "Numbers of its shape; the body of kind procedural has 10");
+  f.integer("betas", s.betas, {.min = 0, .max = kMostBetas},
+            "Numbers of its shape; the body of kind procedural has 10");
   f.numbers("shape", s.shape, {.min = -kLargestBeta, .max = kLargestBeta},
             "The betas of the body that synth makes an avatar of; fewer than `betas`: the others are 0");
   f.rule({"path", "kind"}, [&s]() -> std::string {
@@ -23,6 +25,10 @@ void describe(ConfigFields& f, BodySettings& s) {
   f.rule({"shape", "betas"}, [&s]() -> std::string {
     const Index given = static_cast<Index>(s.shape.size());
     return given > s.betas ? std::to_string(given) + " numbers; body.betas allows " + std::to_string(s.betas) : "";
+  });
+  f.rule({"shape", "kind"}, [&s]() -> std::string {
+    const bool fits = s.kind == BodyKind::kProcedural && std::ssize(s.shape) <= kProceduralBetas;
+    return fits ? procedural_shape_fault(s.shape) : "";
   });
 }
 

@@ -16,9 +16,6 @@ enum class BodyKind { kProcedural, kSmplx };
 inline constexpr std::array<ConfigChoice<BodyKind>, 2> kBodyKinds = {
     {{BodyKind::kProcedural, "procedural"}, {BodyKind::kSmplx, "smplx"}}};
 
-/// Betas are this large at most: nobody is ten standard deviations from the mean.
-inline constexpr double kLargestBeta = 10;
-
 /// The body model.
 struct BodySettings {
   BodyKind kind = BodyKind::kProcedural;

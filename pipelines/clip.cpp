@@ -133,6 +133,9 @@ Clip read_clip(const DataSettings& data) {
   for (const std::string& name : names) video->masks.push_back(open_masks(data.masks, name, video->frames));
   clip.video = video;
   const Motion motion = motion_of_clip(std::move(setup.motion), data.frame_rate);
+  if (!motion.says_frame_rate && motion.poses.size() > 1 && data.frame_rate == 0)
+    log_warning(setup.motion_file.string() + ": says no frame rate and is taken for " + rounded(motion.frame_rate, 4) +
+                " frames a second");
   clip.estimate = estimate_of(motion, setup.motion_file, clip.frames());
   clip.first.body = motion.poses.front();
   clip.frame_rate = motion.frame_rate;

@@ -211,9 +211,8 @@ class Reconstruction {
     const auto& [name, stage] = config_.stages[s];
     Tape<S> tape;
     const bool moves_pose = find_entry(stage.optimize, "pose_latents") != nullptr;
-    const std::optional<PosePrior> prior =
-        moves_pose ? std::optional(read_pose_prior(stage.pose_weights.string())) : std::nullopt;
-    const SequenceGraph<S> graph(tape, clip_, states, prior ? &*prior : nullptr, config_.rotations);
+    const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
+    const SequenceGraph<S> graph(tape, clip_, states, moves_pose ? &prior : nullptr, config_.rotations);
     std::string begin;
     const auto note_iteration = [&](const IterationReport& report) {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);

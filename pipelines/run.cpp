@@ -88,8 +88,9 @@ RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Cl
 
 }  // namespace
 
-RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
-  check_run(config);
+RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses, const RunOptions& options) {
+  RunConfig config = asked;
+  prepare_run(config);
   EarlyMessages early;
   for (const RunNote& note : run_notes(config)) log_message(note.level, note.text);
   Clip clip = read_clip(config.data);  // before anything is written

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/config_file.h"
+#include "pipelines/config_kind.h"
 #include "pipelines/run_problems.h"
 
 namespace hsi4d {
@@ -58,6 +59,7 @@ RunConfig load_run_config(const std::filesystem::path& file, const std::vector<s
                           const std::vector<LossDescription>& losses, ConfigUse use) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, overrides, problems);
+  require_kind(tree, ConfigKind::kRun, file);
   return read_run_config(tree, losses, problems, use);
 }
 

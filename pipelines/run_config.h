@@ -71,7 +71,7 @@ enum class ConfigUse {
 void describe(ConfigFields& fields, RunConfig& config, const std::vector<LossDescription>& losses);
 
 /// Reads and checks a config file. Throws one UserError that tells every problem of the file, of the files that it
-/// extends, and of the overrides (KEY=VALUE), a line each.
+/// extends, and of the overrides (KEY=VALUE), a line each; or that it is a config of `hsi4d avatar fit`.
 RunConfig load_run_config(const std::filesystem::path& file, const std::vector<std::string>& overrides,
                           const std::vector<LossDescription>& losses, ConfigUse use = ConfigUse::kSettings);
 

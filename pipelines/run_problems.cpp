@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 
 #include "core/check.h"
 #include "core/suggest.h"
@@ -42,6 +41,14 @@ void add_loss_problems(const StageSettings& stage, const std::string& in, std::v
     found.push_back({where, "a stage needs a loss", {where}, true});
     return;
   }
+  const bool is_of_sequence = stage.over == StageScope::kSequence;
+  if (is_of_sequence || stage.draw == Draw::kScene) {
+    const LossNeeds has = is_of_sequence ? LossNeeds::kBody : LossNeeds::kImages;
+    const std::string having =
+        is_of_sequence ? "a stage with \"over\": \"sequence\"" : "a stage with \"draw\": \"scene\"";
+    for (LossFault& fault : losses_without_inputs(stage, has, having))
+      found.push_back({in + fault.pointer, std::move(fault.text), {in + "/draw", in + "/over"}});
+  }
   std::vector<std::string> names;
   for (const auto& [name, loss] : stage.losses) {
     if (loss.weight != 0) return;
@@ -69,6 +76,18 @@ void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunP
            {where, child_pointer(child_pointer("/stages", *sequence), "over")}});
     }
   }
+}
+
+std::vector<RunProblem> loss_faults(RunConfig& config) {
+  std::vector<RunProblem> found;
+  for (auto& [name, stage] : config.stages) {
+    const std::string where = child_pointer("/stages", name);
+    for (LossFault& fault : prepare_losses(stage)) {
+      const std::string place = where + fault.pointer;
+      found.push_back({place, std::move(fault.text), {place}});
+    }
+  }
+  return found;
 }
 
 // ---- Inputs ----
@@ -123,37 +142,6 @@ std::string without_static_layers(const RunConfig& config) {
   return config.precision == RunPrecision::kDouble ? "precision=double" : "";
 }
 
-// ---- Where they were written ----
-
-const ConfigValue* find_item(const ConfigValue& array, const std::string& key) {
-  std::size_t index = 0;
-  const auto end = std::from_chars(key.data(), key.data() + key.size(), index);
-  return end.ec == std::errc() && index < array.items.size() ? &array.items[index] : nullptr;
-}
-
-/// Where the setting was written; where it was not, the object that it would be in.
-const ConfigOrigin& origin_of(const ConfigValue& tree, const std::string& pointer) {
-  const ConfigValue* node = &tree;
-  const ConfigOrigin* origin = &tree.origin;
-  for (std::size_t begin = 1; begin < pointer.size();) {
-    const std::size_t end = std::min(pointer.find('/', begin), pointer.size());
-    const std::string key = pointer.substr(begin, end - begin);  // names of stages and objects need no escapes
-    begin = end + 1;
-    if (node->kind == ConfigValue::Kind::kArray) {
-      node = find_item(*node, key);
-      if (node == nullptr) return *origin;
-      origin = &node->origin;
-      continue;
-    }
-    const auto member = std::find_if(node->members.begin(), node->members.end(),
-                                     [&key](const ConfigMember& candidate) { return candidate.key == key; });
-    if (member == node->members.end()) return *origin;
-    node = &member->value;
-    origin = &node->origin;
-  }
-  return *origin;
-}
-
 /// Whether `problem` may be one only because of another, at the pointer `other`.
 bool may_follow(const RunProblem& problem, const std::string& other) {
   for (const std::string& need : problem.needs) {
@@ -162,6 +150,10 @@ bool may_follow(const RunProblem& problem, const std::string& other) {
   const std::size_t slash = problem.pointer.rfind('/') + 1;
   return problem.is_absence && other.starts_with(problem.pointer.substr(0, slash)) &&
          !nearest_name(other.substr(slash), {problem.pointer.substr(slash)}).empty();
+}
+
+void add(std::vector<RunProblem> more, std::vector<RunProblem>& found) {
+  for (RunProblem& problem : more) found.push_back(std::move(problem));
 }
 
 void throw_if_any(const std::vector<RunProblem>& found) {
@@ -189,14 +181,15 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   return found;
 }
 
-void add_run_problems(const ConfigValue& tree, const RunConfig& config, ConfigUse use, ConfigProblems& problems) {
+void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use, ConfigProblems& problems) {
   std::vector<RunProblem> found = run_problems(config, use);
+  if (use != ConfigUse::kSettings) add(loss_faults(config), found);
   const std::vector<std::string> before = problems.pointers();
   std::erase_if(found, [&before](const RunProblem& problem) {
     return std::any_of(before.begin(), before.end(),
                        [&problem](const std::string& other) { return may_follow(problem, other); });
   });
-  for (const RunProblem& problem : found) problems.add(origin_of(tree, problem.pointer), problem.pointer, problem.text);
+  for (const RunProblem& problem : found) problems.add(origin_at(tree, problem.pointer), problem.pointer, problem.text);
 }
 
 std::vector<RunNote> run_notes(const RunConfig& config) {
@@ -215,7 +208,11 @@ std::vector<RunNote> run_notes(const RunConfig& config) {
   return notes;
 }
 
-void check_run(const RunConfig& config) { throw_if_any(run_problems(config, ConfigUse::kRun)); }
+void prepare_run(RunConfig& config) {
+  std::vector<RunProblem> found = run_problems(config, ConfigUse::kRun);
+  add(loss_faults(config), found);
+  throw_if_any(found);
+}
 
 void check_inputs(const DataSettings& data) {
   std::vector<RunProblem> found;

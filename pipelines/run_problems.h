@@ -18,14 +18,14 @@ struct RunProblem {
   bool is_absence = false;         ///< a key is not written; an unknown key beside it may be meant
 };
 
-/// What no run could do: stages without loss or parameters, with parameters that are not in what they draw or never
-/// move, with every loss at weight 0; objects that are named as the human's masks are. For a run also what it lacks:
-/// stages, inputs.
+/// What no run could do: stages without loss or parameters, with parameters or losses of what they do not draw,
+/// parameters that never move, every loss at weight 0; objects that are named as the human's masks are. For a run also
+/// what it lacks: stages, inputs.
 std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use);
 
-/// Adds them with the places where the settings were written in `tree`. Those that may only follow from problems that
-/// were found before are left out.
-void add_run_problems(const ConfigValue& tree, const RunConfig& config, ConfigUse use, ConfigProblems& problems);
+/// Adds them with the places where the settings were written in `tree`, and those of losses that cannot be prepared;
+/// the others are prepared. Problems that may only follow from some that were found before are left out.
+void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use, ConfigProblems& problems);
 
 /// What is no mistake and yet is to be known of a config.
 struct RunNote {
@@ -36,10 +36,10 @@ struct RunNote {
 /// Approximations that are on, settings of `skip` and `approx` that switch others off or do nothing.
 std::vector<RunNote> run_notes(const RunConfig& config);
 
-/// Throws one UserError with every problem of a run, a line each.
-void check_run(const RunConfig& config);
+/// Prepares the losses of a run. Throws one UserError with every problem of it, a line each.
+void prepare_run(RunConfig& config);
 
-/// As check_run for the inputs alone.
+/// Throws one UserError with every problem of a run's inputs, a line each.
 void check_inputs(const DataSettings& data);
 
 }  // namespace hsi4d

@@ -64,7 +64,7 @@ LeftOut hidden_objects(Var<S> centres, Var<S> targets, double min_opacity) {
 }  // namespace
 
 LossTerm center_loss() {
-  return make_loss_term<CenterSettings>(
+  LossTerm term = make_loss_term<CenterSettings>(
       "center", "Distance between the centre of each rendered object and that of its mask in the frame",
       [](const auto& in, const CenterSettings& settings) {
         using Value = decltype(in.object_opacity);
@@ -78,6 +78,8 @@ LossTerm center_loss() {
         }
         return mean_squared_distance(centres, in.object_center_target, settings, unit_px);
       });
+  term.description.needs = LossNeeds::kObjects;
+  return term;
 }
 
 }  // namespace hsi4d

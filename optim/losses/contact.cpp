@@ -92,7 +92,7 @@ ContactPairs contact_pairs(const MotionStart& motion, double distance) {
 }  // namespace
 
 LossTerm contact_loss() {
-  return make_loss_term<ContactSettings>(
+  LossTerm term = make_loss_term<ContactSettings>(
       "contact", "How far hands are from the object that they were near to",
       [](const auto& in, const ContactSettings& settings) {
         using Value = decltype(in.joints);
@@ -106,6 +106,8 @@ LossTerm contact_loss() {
         std::copy(pairs.weights.begin(), pairs.weights.end(), numbers.data);
         return l2(hands, objects, weights) * static_cast<double>(hands.shape().count());
       });
+  term.description.needs = LossNeeds::kBody;
+  return term;
 }
 
 }  // namespace hsi4d

@@ -48,7 +48,7 @@ std::vector<double> standing_weights(const MotionStart& motion, Index coordinate
 }  // namespace
 
 LossTerm foot_sliding_loss() {
-  return make_loss_term<FootSlidingSettings>(
+  LossTerm term = make_loss_term<FootSlidingSettings>(
       "foot_sliding", "How far feet that stand go between adjacent frames",
       [](const auto& in, const FootSlidingSettings& settings) {
         if (!in.given(in.joints) || !in.motion || in.motion->frames() < 2) return decltype(in.joints){};
@@ -61,6 +61,8 @@ LossTerm foot_sliding_loss() {
         return l2(slice_rows(in.joints, 1, shape.rows - 1), slice_rows(in.joints, 0, shape.rows - 1), weights) *
                static_cast<double>(shape.cols);
       });
+  term.description.needs = LossNeeds::kBody;
+  return term;
 }
 
 }  // namespace hsi4d

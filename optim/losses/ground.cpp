@@ -45,7 +45,7 @@ LowestPoints lowest_points(const MotionStart& motion, const std::vector<Index>& 
 }  // namespace
 
 LossTerm ground_loss() {
-  return make_loss_term<GroundSettings>(
+  LossTerm term = make_loss_term<GroundSettings>(
       "ground", "How far the lower foot is above or below where the ground was in the first frame",
       [](const auto& in, const GroundSettings& settings) {
         using Value = decltype(in.joints);
@@ -63,6 +63,8 @@ LossTerm ground_loss() {
         const double ground = lowest_points(motion, feet, kFirstFrame, count).height;
         return mean(square(sum_cols(heights) * (1 / static_cast<double>(count)) - ground));
       });
+  term.description.needs = LossNeeds::kBody;
+  return term;
 }
 
 }  // namespace hsi4d

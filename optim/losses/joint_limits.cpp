@@ -4,11 +4,21 @@
 
 namespace hsi4d {
 
+namespace {
+
+constexpr double kWeight = 0.01;  // from 0.001 to 1 as good (docs/numerics.md)
+
+}  // namespace
+
 LossTerm joint_limits_loss() {
-  return make_loss_term("joint_limits", "How far the body's joints are beyond their ranges", [](const auto& in) {
-    if (!in.given(in.body_rotations)) return decltype(in.body_rotations){};
-    return joint_limit_energy(in.body_rotations);
-  });
+  LossTerm term =
+      make_loss_term("joint_limits", "How far the body's joints are beyond their ranges", [](const auto& in) {
+        if (!in.given(in.body_rotations)) return decltype(in.body_rotations){};
+        return joint_limit_energy(in.body_rotations);
+      });
+  term.description.weight = kWeight;
+  term.description.needs = LossNeeds::kBody;
+  return term;
 }
 
 }  // namespace hsi4d

@@ -20,7 +20,7 @@ void describe(ConfigFields& fields, MaskSettings& settings) {
 }  // namespace
 
 LossTerm mask_loss() {
-  return reading(
+  LossTerm term = reading(
       make_loss_term<MaskSettings>("mask", "Difference of the rendered silhouettes and the frame's masks",
                                    [](const auto& in, const MaskSettings& settings) {
                                      decltype(in.human_mask) human, objects;
@@ -34,6 +34,8 @@ LossTerm mask_loss() {
                                      return human * (1 / (1 + count)) + objects * (count / (1 + count));
                                    }),
       {kReadsHumanOpacity});
+  term.description.needs = LossNeeds::kBodyInImage;
+  return term;
 }
 
 }  // namespace hsi4d

@@ -9,6 +9,9 @@ namespace hsi4d {
 
 namespace {
 
+/// The energy of a likely pose is about the number of latents, the photometric loss a few hundredths: docs/numerics.md.
+constexpr double kWeight = 3e-5;
+
 struct PosePriorSettings {
   std::filesystem::path weights;
 };
@@ -21,12 +24,16 @@ void describe(ConfigFields& fields, PosePriorSettings& settings) {
 }  // namespace
 
 LossTerm pose_prior_loss() {
-  return make_loss_term<PosePriorSettings>("pose_prior", "How unlikely the body's pose is",
-                                           [](const auto& in, const PosePriorSettings& settings) {
-                                             if (!in.given(in.body_rotations)) return decltype(in.body_rotations){};
-                                             const PosePrior prior = read_pose_prior(settings.weights.string());
-                                             return prior.energy(prior.encode(in.body_rotations));
-                                           });
+  LossTerm term = make_loss_term<PosePriorSettings>(
+      "pose_prior", "How unlikely the body's pose is",
+      [](const PosePriorSettings& settings) { return read_pose_prior(settings.weights.string()); },
+      [](const auto& in, const PosePrior& prior) {
+        if (!in.given(in.body_rotations)) return decltype(in.body_rotations){};
+        return prior.energy(prior.encode(in.body_rotations));
+      });
+  term.description.weight = kWeight;
+  term.description.needs = LossNeeds::kBody;
+  return term;
 }
 
 }  // namespace hsi4d

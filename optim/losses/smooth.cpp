@@ -22,7 +22,7 @@ void describe(ConfigFields& fields, SmoothSettings& settings) {
 }  // namespace
 
 LossTerm smooth_loss() {
-  return make_loss_term<SmoothSettings>("smooth", "How far joints go between adjacent frames",
+  LossTerm term = make_loss_term<SmoothSettings>("smooth", "How far joints go between adjacent frames",
                                         [](const auto& in, const SmoothSettings& settings) {
                                           if (!in.given(in.joints) || in.joints.shape().rows <= settings.order)
                                             return decltype(in.joints){};
@@ -33,6 +33,8 @@ LossTerm smooth_loss() {
                                           }
                                           return sum(square(steps)) * (1 / static_cast<double>(steps.shape().rows));
                                         });
+  term.description.needs = LossNeeds::kBody;
+  return term;
 }
 
 }  // namespace hsi4d

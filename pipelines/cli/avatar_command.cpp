@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/motion_edit.h"
+#include "body/pose_layout.h"
 #include "body/procedural_body.h"
 #include "body/smplx_file.h"
 #include "core/check.h"
@@ -23,12 +25,10 @@ namespace {
 BodyModel body_of(const AvatarOptions& o, const std::string& command) {
   std::vector<double> betas;
   if (!o.betas.empty()) {
-    const auto count = static_cast<std::size_t>(std::count(o.betas.begin(), o.betas.end(), ',')) + 1;
-    betas = parse_numbers(o.betas, count, command + "--betas", "the numbers of a shape");
+    betas = parse_numbers(o.betas, 0, command + "--betas", "apart by commas, as in 0.5,-1");
     for (const double beta : betas) {
       if (std::abs(beta) <= kLargestBeta) continue;
-      throw UserError(command + "--betas: " + rounded(beta, 6) +
-                      " is out of range; allowed: " + rounded(-kLargestBeta, 6) + " to " + rounded(kLargestBeta, 6));
+      throw UserError(command + "--betas: " + number_text(beta) + " is out of range; allowed: " + kBetasText);
     }
   }
   if (o.body_model.empty()) {
@@ -36,6 +36,8 @@ BodyModel body_of(const AvatarOptions& o, const std::string& command) {
       throw UserError(command + "--betas: " + std::to_string(betas.size()) + " numbers; the program's body has " +
                       std::to_string(kProceduralBetas));
     }
+    if (const std::string fault = procedural_shape_fault(betas); !fault.empty())
+      throw UserError(command + "--betas: " + fault);
     return betas.empty() ? procedural_body() : rest_body(procedural_smplx(std::ssize(betas)), betas);
   }
   const SmplxModel model =
@@ -89,6 +91,17 @@ std::string colors_text(const std::optional<ColorNet>& net) {
          " the direction of view";
 }
 
+/// What body it is for: motions are put on it accordingly.
+std::string body_text(const Avatar& avatar) {
+  const Vector3<double> pelvis = pelvis_of(avatar.joints);
+  const std::string name = avatar.body == kProceduralName ? "the program's own (procedural)"
+                           : avatar.body == kSmplxName    ? "a SMPL-X model, in its person's shape"
+                           : avatar.body.empty()          ? "not said; taken for a SMPL-X model in its person's shape"
+                                                          : with_escapes(avatar.body);
+  return name + "; its pelvis rests at (" + short_number(pelvis[0]) + ", " + short_number(pelvis[1]) + ", " +
+         short_number(pelvis[2]) + ") m";
+}
+
 std::string skeleton_text(const Avatar& avatar) {
   return count_text(avatar.joint_count(), "joint") +
          (avatar.joint_names == smplx_joint_names() && avatar.parents == smplx_parents() ? " of SMPL-X" : "");
@@ -114,6 +127,9 @@ std::string avatar_import_command(const AvatarOptions& o) {
   if (import.far > 0)
     log_warning(o.in + ": " + std::to_string(import.far) + " of " + count_text(import.avatar.count(), "Gaussian") +
                 " are more than " + short_number(kFarFromBody) + " m from the body, and follow its nearest part");
+  if (import.covered < kWellCovered)
+    log_warning(o.in + ": only " + short_number(std::round(100 * import.covered)) +
+                " % of the body has Gaussians near it: is it in the rest pose, with the arms to the sides?");
   if (import.lost_views)
     log_warning(o.in +
                 ": colours vary with the direction of view; an avatar's do not, and keep their part of degree 0");
@@ -127,6 +143,7 @@ std::string avatar_info_command(const std::string& path) {
   const GaussianStatistics s = statistics_of(rest_gaussians(avatar));
   std::string text = path + ": avatar of " + count_text(s.count, "Gaussian") + ", " + skeleton_text(avatar) + "\n";
   if (s.count == 0) return text + "  notice   the file holds no Gaussians\n";
+  text += "  body     " + body_text(avatar) + "\n";
   text += "  weights  " + weights_text(avatar) + "\n  colors   " + colors_text(avatar.color_net) + "\n";
   return text + statistics_text(s);
 }

@@ -67,10 +67,19 @@ std::string json_line(const FilterMeasurement& m) {
   return line.dump() + "\n";
 }
 
-/// Billions of bytes a second that the correctives are read at; 0 where there are none.
-double rate(const SkinningMeasurement& m) {
-  const double reads = m.name.ends_with("/both") ? 2 : 1;
-  return m.median_ms > 0 ? reads * static_cast<double>(m.table_bytes) / m.median_ms / 1e6 : 0;
+/// Of the correctives, by forward and backward; 0 where there are none.
+double bytes_read(const SkinningMeasurement& m) {
+  return (m.name.ends_with("/both") ? 2 : 1) * static_cast<double>(m.table_bytes);
+}
+
+/// Billions of them a second.
+double rate(const SkinningMeasurement& m) { return m.median_ms > 0 ? bytes_read(m) / m.median_ms / 1e6 : 0; }
+
+/// With one decimal; a dash for nothing.
+std::string tenths(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f", value);
+  return value > 0 ? text : "-";
 }
 
 std::string json_line(const SkinningMeasurement& m) {
@@ -146,10 +155,10 @@ std::string bench_skinning_command(const BenchOptions& options) {
                 "columns", "MB read", "GB/s");
   table += line;
   bench_skinning({options.workloads, options.threads, options.repeats}, [&](const SkinningMeasurement& m) {
-    std::snprintf(line, sizeof line, "%-40s %10.3f %10.3f %9lld %8lld %10.1f %7.1f\n", m.name.c_str(), m.median_ms,
+    std::snprintf(line, sizeof line, "%-40s %10.3f %10.3f %9lld %8lld %10s %7s\n", m.name.c_str(), m.median_ms,
                   m.min_ms, static_cast<long long>(m.vertices + m.gaussians),
-                  static_cast<long long>(m.corrective_columns),
-                  (m.name.ends_with("/both") ? 2 : 1) * static_cast<double>(m.table_bytes) / 1e6, rate(m));
+                  static_cast<long long>(m.corrective_columns), tenths(bytes_read(m) / 1e6).c_str(),
+                  tenths(rate(m)).c_str());
     table += line;
     json += json_line(m);
   });
@@ -165,9 +174,10 @@ std::string bench_color_net_command(const BenchOptions& options) {
   table += line;
   double peak = 0;
   bench_color_net({options.workloads, options.threads, options.repeats}, [&](const ColorNetMeasurement& m) {
-    std::snprintf(line, sizeof line, "%-36s %10.3f %10.3f %9lld %6lld %6lld %10.1f %7.1f\n", m.name.c_str(),
-                  m.median_ms, m.min_ms, static_cast<long long>(m.gaussians), static_cast<long long>(m.hidden_width),
-                  static_cast<long long>(m.hidden_layers), 1e-6 * m.multiply_adds, 100 * m.peak_share());
+    std::snprintf(line, sizeof line, "%-36s %10.3f %10.3f %9lld %6lld %6lld %10s %7s\n", m.name.c_str(), m.median_ms,
+                  m.min_ms, static_cast<long long>(m.gaussians), static_cast<long long>(m.hidden_width),
+                  static_cast<long long>(m.hidden_layers), tenths(1e-6 * m.multiply_adds).c_str(),
+                  tenths(100 * m.peak_share()).c_str());
     table += line;
     json += json_line(m);
     peak = std::max(peak, m.fma_peak_per_s);

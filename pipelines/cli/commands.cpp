@@ -5,7 +5,9 @@
 
 #include "core/check.h"
 #include "core/suggest.h"
+#include "pipelines/avatar_fit.h"
 #include "pipelines/cli/text.h"
+#include "pipelines/config_kind.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/run_config.h"
 #include "pipelines/run_problems.h"
@@ -49,15 +51,28 @@ std::string summary(const std::filesystem::path& file, const RunConfig& config) 
   return text;
 }
 
+std::string check_fit(const std::filesystem::path& file, const std::vector<std::string>& overrides, bool print_config,
+                      const std::vector<LossDescription>& losses) {
+  const AvatarFitSettings fit = load_avatar_fit(file, overrides, losses, false);
+  if (print_config) return resolved_avatar_fit(fit, losses);
+  std::string text = file.generic_string() + ": OK, a config of `hsi4d avatar fit`\n";
+  text +=
+      "  views: " + (fit.views.empty() ? "not given; --set views=DIR/views.json" : fit.views.generic_string()) + "\n";
+  text += "  starts from " +
+          (fit.avatar.empty() ? count_text(fit.gaussians, "Gaussian") + " on the body" : fit.avatar.generic_string()) +
+          "\n";
+  return text + stage_summary("avatar fit", fit.stage);
+}
+
 std::string list_losses(const std::vector<LossDescription>& losses) {
   std::vector<std::vector<std::string>> rows;
   for (const LossDescription& loss : losses) rows.push_back({loss.name, loss.summary});
   return table(rows);
 }
 
-std::string list_all_settings(const std::vector<LossDescription>& losses) {
+std::string settings_table(const std::vector<ConfigSetting>& settings) {
   std::vector<std::vector<std::string>> rows = {{"SETTING", "DEFAULT", "ALLOWED", "MEANING"}};
-  for (const ConfigSetting& setting : run_config_settings(losses))
+  for (const ConfigSetting& setting : settings)
     rows.push_back({setting.pointer, setting.initial, setting.allowed, setting.summary});
   return table(rows);
 }
@@ -88,19 +103,28 @@ std::string list_scenes() {
 
 std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           bool print_config, const std::vector<LossDescription>& losses) {
+  if (config_kind(config) == ConfigKind::kAvatarFit) return check_fit(config, overrides, print_config, losses);
   const RunConfig run = load_run_config(config, overrides, losses, ConfigUse::kStages);
   return print_config ? resolved_config(run, losses) : summary(config, run);
 }
 
-std::string schema_command(const std::vector<LossDescription>& losses) { return run_config_schema(losses); }
+std::vector<std::string> schema_kinds() { return {"run", "avatar_fit"}; }
 
-std::vector<std::string> list_topics() { return {"losses", "stages", "scenes", "settings"}; }
+std::string schema_command(const std::string& kind, const std::vector<LossDescription>& losses) {
+  if (kind == "run") return run_config_schema(losses);
+  if (kind == "avatar_fit") return avatar_fit_schema(losses);
+  throw UserError("hsi4d schema: there are no configs of \"" + kind + "\"; known: " + joined(schema_kinds()) +
+                  did_you_mean(kind, schema_kinds()));
+}
+
+std::vector<std::string> list_topics() { return {"losses", "stages", "scenes", "settings", "avatar_fit"}; }
 
 std::string list_command(const std::string& topic, const std::vector<LossDescription>& losses) {
   if (topic == "losses") return list_losses(losses);
   if (topic == "stages") return list_stages();
   if (topic == "scenes") return list_scenes();
-  if (topic == "settings") return list_all_settings(losses);
+  if (topic == "settings") return settings_table(run_config_settings(losses));
+  if (topic == "avatar_fit") return settings_table(avatar_fit_settings(losses));
   throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + joined(list_topics()) +
                   did_you_mean(topic, list_topics()));
 }

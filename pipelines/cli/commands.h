@@ -9,13 +9,16 @@
 
 namespace hsi4d::cli {
 
-/// `hsi4d check CONFIG`: reads a config, throws UserError with all its problems, and returns a short summary, or the
-/// resolved config when `print_config` is set.
+/// `hsi4d check CONFIG`: reads a config of either kind, throws UserError with all its problems, and returns a short
+/// summary, or the resolved config when `print_config` is set.
 std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           bool print_config, const std::vector<LossDescription>& losses);
 
-/// `hsi4d schema`: the JSON Schema of run configs.
-std::string schema_command(const std::vector<LossDescription>& losses);
+/// `hsi4d schema [KIND]`: the JSON Schema of configs of `hsi4d run` ("run") or `hsi4d avatar fit` ("avatar_fit").
+/// Throws UserError for another kind.
+std::string schema_command(const std::string& kind, const std::vector<LossDescription>& losses);
+/// Its kinds.
+std::vector<std::string> schema_kinds();
 
 /// What `hsi4d list` can list.
 std::vector<std::string> list_topics();

@@ -67,7 +67,7 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
   const fs::path folder = arguments.out.empty() ? free_run_folder(config.name) : arguments.out;
   const fs::path dataset = folder / "dataset";
   name_inputs(dataset, config.data);
-  check_run(config);  // before a dataset is made for nothing
+  prepare_run(config);  // before a dataset is made for nothing
   if (!arguments.resume || !fs::exists(dataset)) {
     if (fs::exists(dataset)) {
       throw UserError(folder.string() +

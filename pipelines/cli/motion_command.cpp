@@ -24,9 +24,11 @@ void check_rate(const std::optional<double>& rate, const std::string& option) {
 }
 
 /// The body of a model file in the motion's shape, as far as the file has directions for it.
-SmplxModel model_for(const std::string& path, const std::vector<double>& betas) {
+SmplxModel model_for(const MotionOptions& options, const std::vector<double>& betas) {
+  const std::string& path = options.body_model;
   const SmplxModel bare = read_smplx(path, {.betas = 0, .expressions = 0, .correctives = false});
   warn_of_repairs(bare);
+  warn_of_excess(options.in, "betas", betas, std::ssize(betas), bare, bare.betas_in_file);
   const Index count = std::min<Index>(bare.betas_in_file, static_cast<Index>(betas.size()));
   return count == 0 ? bare : read_smplx(path, {.betas = count, .expressions = 0, .correctives = false});
 }
@@ -39,6 +41,9 @@ Motion read_any(const MotionOptions& options, bool& is_of_folder) {
   is_of_folder = std::filesystem::is_directory(options.in);
   if (!is_of_folder) {
     Motion motion = read_motion_aloud(options.in);
+    if (!options.from_rate && !motion.says_frame_rate)
+      log_warning(options.in + ": says no frame rate and is taken for " + short_number(motion.frame_rate) +
+                  " frames a second; --from-rate gives another");
     motion.frame_rate = options.from_rate.value_or(motion.frame_rate);
     return motion;
   }
@@ -56,7 +61,7 @@ struct Prepared {
 
 /// For the body of --body-model, in the motion's shape.
 Prepared for_model(const MotionOptions& options, const Motion& motion, bool is_of_folder) {
-  const SmplxModel model = model_for(options.body_model, motion.betas);
+  const SmplxModel model = model_for(options, motion.betas);
   const auto count = static_cast<std::size_t>(model.betas);
   BodyModel body = rest_body(model, std::span(motion.betas).first(count));
   Motion moved = for_body(motion, body);

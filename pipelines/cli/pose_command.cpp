@@ -21,24 +21,16 @@ std::size_t choice_of(const std::string& word, const std::vector<std::string>& k
                   did_you_mean(word, known));
 }
 
-/// Throws DataError when the parameters have more numbers than the model.
-void check_count(const SmplxSequence& sequence, const SmplxTrack& track, const char* name, const std::string& model,
-                 Index there) {
-  if (track.width <= there) return;
-  throw DataError(sequence.source + ": array '" + name + "': has " + std::to_string(track.width) +
-                  " numbers a frame; " + model + " has " + std::to_string(there));
-}
-
-SmplxModel model_for(const std::string& path, const SmplxSequence& sequence) {
-  try {
-    return read_smplx(path, {.betas = sequence.betas.width, .expressions = sequence.expression.width});
-  } catch (const DataError&) {
-    // If that is because there are more numbers than directions, the message should name both files.
-    const SmplxModel none = read_smplx(path, {.betas = 0, .expressions = 0, .correctives = false});
-    check_count(sequence, sequence.betas, "betas", path, none.betas_in_file);
-    check_count(sequence, sequence.expression, "expression", path, none.expressions_in_file);
-    throw;
-  }
+/// The model with as many betas and expressions as the parameters have, which lose those that it has not.
+SmplxModel model_for(const std::string& path, SmplxSequence& sequence) {
+  const SmplxModel bare = read_smplx(path, {.betas = 0, .expressions = 0, .correctives = false});
+  const auto cut = [&](const char* name, SmplxTrack& track, Index there) {
+    warn_of_excess(sequence.source, name, track.numbers, track.width, bare, there);
+    track = first_numbers(track, there);
+  };
+  cut("betas", sequence.betas, bare.betas_in_file);
+  cut("expression", sequence.expression, bare.expressions_in_file);
+  return read_smplx(path, {.betas = sequence.betas.width, .expressions = sequence.expression.width});
 }
 
 template <class S>
@@ -60,7 +52,7 @@ std::string pose_command(const PoseOptions& options) {
   const SmplxHands hands = kHands[choice_of(options.hands, {"auto", "full", "pca"}, "--hands")];
   check_no_input(options.out, "hsi4d pose: --out", {options.body_model, options.params});
   check_writable(options.out);
-  const SmplxSequence sequence = read_smplx_sequence(options.params);
+  SmplxSequence sequence = read_smplx_sequence(options.params);
   if (!sequence.passed_over.empty())
     log_warning(options.params + ": passed over, no parameters: " + joined(sequence.passed_over));
   const SmplxModel model = model_for(options.body_model, sequence);

@@ -68,7 +68,7 @@ class WholeNumber : public CLI::Validator {
 /// The subcommands with their arguments; `run` is what the chosen one does.
 struct CommandLine {
   CLI::App app{"4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d"};
-  std::string config, topic, file, out;
+  std::string config, topic, file, out, kind = "run";
   std::vector<std::string> overrides, runs;
   bool print_config = false, quiet = false, json = false;
   AvatarOptions avatar;
@@ -179,13 +179,22 @@ struct CommandLine {
     CLI::App& make = *command.add_subcommand("make", "Dress a body in Gaussians, spread evenly over its surface");
     make.add_option("--body-model", o.body_model, "A SMPL-X file; without, the body that comes with the program")
         ->type_name("M.npz");
-    make.add_option("--gaussians", o.settings.gaussians, "How many; 20,000 to 300,000 are useful")->type_name("N");
+    make.add_option("--gaussians", o.settings.gaussians, "How many; 20,000 to 300,000 are useful")
+        ->capture_default_str()
+        ->type_name("N");
     make.add_option("--detail", o.settings.detail, "How much denser head, hands and feet are: 0 not at all, to 1")
+        ->capture_default_str()
         ->type_name("X");
     make.add_option("--cover", o.settings.cover, "Size along the surface over the distance of neighbours")
+        ->capture_default_str()
         ->type_name("X");
-    make.add_option("--texture", o.settings.texture, "Contrast of the patterns, 0 to 1")->type_name("X");
-    make.add_option("--seed", o.settings.seed, "Seed of the places")->check(WholeNumber())->type_name("N");
+    make.add_option("--texture", o.settings.texture, "Contrast of the patterns, 0 to 1")
+        ->capture_default_str()
+        ->type_name("X");
+    make.add_option("--seed", o.settings.seed, "Seed of the places")
+        ->capture_default_str()
+        ->check(WholeNumber())
+        ->type_name("N");
     add_body(make);
     make.callback([this] { run = [this] { return avatar_make_command(avatar); }; });
 
@@ -269,7 +278,8 @@ struct CommandLine {
 
   void add_schema() {
     CLI::App* schema = app.add_subcommand("schema", "Print the JSON Schema of configs, for editors");
-    schema->callback([this] { run = [this] { return schema_command(losses); }; });
+    schema->add_option("KIND", kind, "Of which configs: " + joined(schema_kinds()) + "; default: run");
+    schema->callback([this] { run = [this] { return schema_command(kind, losses); }; });
   }
 
   void add_list() {
@@ -290,7 +300,7 @@ struct CommandLine {
   }
 
   void add_render() {
-    CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image");
+    CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image: a scene, objects, a body");
     add_scene(command, render.shared);
     add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
         ->type_name("F.{ply,splat,spz}");
@@ -303,6 +313,10 @@ struct CommandLine {
         ->check(WholeNumber())
         ->type_name("I");
     command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.safetensors");
+    command
+        .add_option("--color-net", render.color_net,
+                    "What colours the body in place of the avatar's own: a run's color_net.safetensors")
+        ->type_name("F.safetensors");
     add_several(command, "--debug-pixel", render.pixels,
                 "Print the Gaussians that make the pixel of column X and row Y, front to back, what was skipped, where "
                 "it stopped, and the sums")
@@ -315,7 +329,7 @@ struct CommandLine {
 
   void add_gradients() {
     CLI::App& command = *app.add_subcommand("gradients", "Differentiate the difference of a render from an image");
-    add_scene(command, gradients.shared);
+    add_scene(command, gradients.shared)->required();
     command.add_option("--target", gradients.target, "The image to compare with")
         ->type_name("F.{exr,png,npz}")
         ->required();
@@ -379,8 +393,10 @@ struct CommandLine {
     command.callback([this] { run = [this] { return motion_command(motion); }; });
   }
 
-  void add_scene(CLI::App& command, SceneOptions& options) {
-    command.add_option("--scene", options.scene, "Gaussians")->type_name("F.{ply,splat,spz}")->required();
+  /// Returns the option --scene.
+  CLI::Option* add_scene(CLI::App& command, SceneOptions& options) {
+    CLI::Option* const scene =
+        command.add_option("--scene", options.scene, "Gaussians")->type_name("F.{ply,splat,spz}");
     command.add_option("--camera", options.camera, "A camera, or nerfstudio's transforms.json")
         ->type_name("C.json")
         ->required();
@@ -393,6 +409,7 @@ struct CommandLine {
         ->type_name("WORD");
     add_several(command, "--set", options.settings, "Change a setting of the renderer: render.blur=0.1")
         ->type_name("render.KEY=VALUE");
+    return scene;
   }
 
   /// An option that may be given several times, with one value each time.

@@ -21,6 +21,10 @@ void check_options(const RenderOptions& options) {
     throw UserError(std::string("hsi4d render: ") + (options.motion.empty() ? "--avatar" : "--motion") +
                     " is given without " + (options.motion.empty() ? "--motion" : "--avatar") +
                     "; a body needs both, and --frame");
+  if (options.shared.scene.empty() && options.objects.empty() && options.avatar.empty())
+    throw UserError("hsi4d render: nothing to draw; give --scene, --object, or --avatar with --motion");
+  if (!options.color_net.empty() && options.avatar.empty())
+    throw UserError("hsi4d render: --color-net is given without --avatar, whose colours it says");
   if (!options.object_poses.empty() && options.objects.empty())
     throw UserError("hsi4d render: --objects is given without --object; it has poses of objects, not their Gaussians");
   if (options.motion.empty() && options.object_poses.empty() && options.frame != 0)
@@ -37,7 +41,9 @@ const T& at_frame(const std::vector<T>& sequence, int frame, const std::string& 
 }
 
 PosedGaussians read_body(const RenderOptions& options, const Vector3<double>& center_world) {
-  const Avatar avatar = read_avatar(options.avatar);
+  Avatar avatar = read_avatar(options.avatar);
+  if (!options.color_net.empty())
+    avatar.color_net = read_color_net(options.color_net, avatar.count(), avatar.joint_count());
   const Motion motion = read_motion_for(options.motion, avatar);
   const BodyPose& pose = at_frame(motion.poses, options.frame, options.motion);
   if (pose.joints() != avatar.joint_count())
@@ -98,10 +104,10 @@ void add_objects(const RenderOptions& options, Parts& parts) {
   }
 }
 
-/// Scene, objects and body.
+/// Scene, objects and body, as far as they are given.
 Parts read_all(const RenderOptions& options, const Camera& camera) {
   Parts parts;
-  parts.add_file(options.shared.scene);
+  if (!options.shared.scene.empty()) parts.add_file(options.shared.scene);
   add_objects(options, parts);
   if (!options.motion.empty()) parts.add(options.avatar, read_body(options, camera_center_world(camera)));
   return parts;
@@ -130,8 +136,8 @@ std::string render_command(const RenderOptions& options) {
   for (const std::string& pixel : options.pixels)
     pixels.push_back(parse_pixel(pixel, view.camera, "hsi4d render: --debug-pixel"));
   std::vector<std::string> inputs = options.objects;
-  inputs.insert(inputs.end(),
-                {options.shared.scene, options.shared.camera, options.object_poses, options.motion, options.avatar});
+  inputs.insert(inputs.end(), {options.shared.scene, options.shared.camera, options.object_poses, options.motion,
+                               options.avatar, options.color_net});
   check_no_input(options.out, "hsi4d render: --out", inputs);
   check_writable(options.out);
   Parts parts = read_all(options, view.camera);

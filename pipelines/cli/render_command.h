@@ -15,13 +15,14 @@ struct RenderOptions {
   std::string motion;                ///< --motion M.npz, with
   int frame = 0;                     ///< --frame I, of poses and motion, and
   std::string avatar;                ///< --avatar F.safetensors: a body drawn in that frame's pose
+  std::string color_net;             ///< --color-net F.safetensors: what colours it, in place of the avatar's own
   std::vector<std::string> pixels;   ///< --debug-pixel X,Y: column and row
   std::string out;                   ///< --out F.png, .exr or .npz
 };
 
-/// Renders and writes the image. PNG: 8 bit, clamped. EXR: R, G, B as float. npz: `image` [H,W,3], `alpha` [H,W] and
-/// `depth` [H,W], float32 for --precision float, else float64. Returns what the command prints: what made each of
-/// `pixels`, and a line about the image.
+/// Renders what is given of scene, objects and body, and writes the image. PNG: 8 bit, clamped. EXR: R, G, B as float.
+/// npz: `image` [H,W,3], `alpha` [H,W] and `depth` [H,W], float32 for --precision float, else float64. Returns what the
+/// command prints: what made each of `pixels`, and a line about the image.
 ///
 /// Throws UserError or DataError with one message for whatever is wrong with options and files.
 std::string render_command(const RenderOptions& options);

@@ -55,9 +55,9 @@ std::vector<double> parse_numbers(const std::string& text, std::size_t count, co
     if (at == end || *at != ',') break;
     ++at;
   }
-  if (at == end && numbers.size() == count) return numbers;
-  throw UserError(where + ": \"" + text + "\" is not understood; allowed: " + std::to_string(count) +
-                  " finite numbers " + names);
+  if (at == end && (count == 0 ? !numbers.empty() : numbers.size() == count)) return numbers;
+  throw UserError(where + ": \"" + text + "\" is not understood; allowed: " +
+                  (count == 0 ? "" : std::to_string(count) + " ") + "finite numbers " + names);
 }
 
 }  // namespace hsi4d::cli

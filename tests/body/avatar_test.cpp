@@ -237,7 +237,7 @@ TEST_CASE("an avatar is a function of the settings, and its seed counts") {
   CHECK(surface_avatar(body(), {.gaussians = 2000, .seed = 1}).means != avatar().means);
   CHECK(surface_avatar(body(), {.gaussians = 1}).count() == 1);
   CHECK(surface_avatar(body(), {.gaussians = 12345}).count() == 12345);
-  CHECK_THROWS_WITH(surface_avatar(body(), {.gaussians = 0}), "avatar: gaussians is 0; allowed: 1 to 5e+06");
+  CHECK_THROWS_WITH(surface_avatar(body(), {.gaussians = 0}), "avatar: gaussians is 0; allowed: 1 to 5000000");
   CHECK_THROWS_AS(surface_avatar(body(), {.opacity = 1}), UserError);
   CHECK_THROWS_AS(surface_avatar(body(), {.cover = std::nan("")}), UserError);
   CHECK_THROWS_AS(surface_avatar(BodyModel{}), InternalError);

@@ -166,6 +166,10 @@ TEST_CASE("shape and gender go along") {
   CHECK(decoded(with_betas({0}, {})).betas.empty());
   CHECK(message_for(with_betas({3, 1}, {1, 2, 3})) ==
         "m.npz: array 'betas': has shape [3,1]; allowed: [B], [1,B], [2,B]");
+  CHECK(message_for(with_betas({3}, {1, 0, -10.5})) ==
+        "m.npz: array 'betas': frame 0, number 2 is -10.5; allowed: -10 to 10");
+  CHECK(message_for(with_betas({301}, Numbers(301))) ==
+        "m.npz: array 'betas': has 301 numbers of shape; allowed: at most 300");
   CHECK(message_for(with_betas({2}, {1, INFINITY})) == "m.npz: array 'betas': frame 0, number 1 is not finite");
 }
 
@@ -321,7 +325,14 @@ TEST_CASE("a motion says of what model it is, and where its pelvis stands") {
   };
   CHECK(decoded(rows_of(156, of_type("smplx"))).converted_from.empty());
   CHECK(decoded(rows_of(156, of_type("smplx"))).betas.size() == 3);
-  CHECK(decoded(rows_of(156, of_type("mano"))).converted_from == "SMPL-H");
+  CHECK(decoded(rows_of(156, of_type("SMPL-X"))).converted_from.empty());
+  CHECK(decoded(rows_of(156, of_type("smplx_locked_head"))).converted_from.empty());
+  CHECK(decoded(rows_of(66, of_type("smpl+h"))).converted_from == "SMPL-H");
+  for (const char* other : {"mano", "flame", "star", "a\nb"}) {
+    const std::string shown = other[0] == 'a' ? "a\\x0ab" : other;
+    CHECK(message_for(rows_of(156, of_type(other))) ==
+          "m.npz: array 'surface_model_type': is \"" + shown + "\"; allowed: smplx, smplh, smpl");
+  }
   CHECK(decoded(rows_of(66, of_type("smplx"))).converted_from.empty());
   CHECK(decoded(rows_of(66, of_type("smplh"))).converted_from == "SMPL-H");
   CHECK(decoded(rows_of(165, of_type("smplh"))).converted_from.empty());
@@ -363,13 +374,14 @@ TEST_CASE("numbers of motion files are bounded") {
     };
   };
   CHECK(message_for(with_trans(1e300)) == "m.npz: array 'trans': frame 0, number 1 is 1e+300; allowed: -1e7 to 1e7");
-  CHECK(message_for(with_trans(-1.5e7)) == "m.npz: array 'trans': frame 0, number 1 is -1.5e+07; allowed: -1e7 to 1e7");
+  CHECK(message_for(with_trans(-1.5e7)) ==
+        "m.npz: array 'trans': frame 0, number 1 is -15000000; allowed: -1e7 to 1e7");
   CHECK(decoded(with_trans(1e7)).poses[0].transl[1] == 1e7);
   CHECK(message_for([](NpzWriter& f) {
           f.add<double>("trans", {1, 3}, {0, 0, 0});
           f.add<double>("poses", {1, 72}, Numbers(72, 2e6));
-        }) == "m.npz: array 'poses': frame 0, number 0 is 2e+06; allowed: -1e6 to 1e6");
-  for (const auto& [rate, text] : {std::pair{1e-9, "1e-09"}, {1e6, "1e+06"}, {-1.0, "-1"}, {NAN, "nan"}}) {
+        }) == "m.npz: array 'poses': frame 0, number 0 is 2000000; allowed: -1e6 to 1e6");
+  for (const auto& [rate, text] : {std::pair{1e-9, "1e-09"}, {1e6, "1000000"}, {-1.0, "-1"}, {NAN, "nan"}}) {
     const double hertz = rate;
     CHECK(message_for(rows_of(165, [hertz](NpzWriter& f) { f.add_scalar("mocap_framerate", hertz); })) ==
           "m.npz: array 'mocap_framerate': is " + std::string(text) + " frames a second; allowed: 0.01 to 100000");

@@ -108,7 +108,20 @@ TEST_CASE("faults of parameters are named") {
           f.add<double>("transl", {2, 3}, {0, 0, 0, 0, 0, std::numeric_limits<double>::quiet_NaN()});
         }) == "p.npz: array 'transl': frame 1, number 2 is nan; allowed: -1e6 to 1e6");
   CHECK(message_for([](NpzWriter& f) {
+          f.add<double>("betas", {2}, {0, 11});
+        }) == "p.npz: array 'betas': frame 0, number 1 is 11; allowed: -10 to 10");
+  CHECK(message_for([](NpzWriter& f) { f.add<double>("betas", {301}, Numbers(301)); }) ==
+        "p.npz: array 'betas': has shape [301]; allowed: [n], [T,n] with n of 1 to 300");
+  CHECK(message_for([](NpzWriter& f) {
           f.add<double>("poses", {2, 3}, Numbers(6));
+        }) ==
+        "p.npz: holds a motion by the names of AMASS, not parameters by those of smplx; `hsi4d motion` reads it, and "
+        "with --body-model shows the body (.glb)");
+  CHECK(message_for([](NpzWriter& f) {
+          f.add<double>("v_template", {2, 3}, Numbers(6));
+        }) == "p.npz: holds a body model, not parameters of smplx");
+  CHECK(message_for([](NpzWriter& f) {
+          f.add<double>("numbers", {2, 3}, Numbers(6));
         }) ==
         "p.npz: holds none of the parameters betas, expression, global_orient, body_pose, jaw_pose, leye_pose, "
         "reye_pose, left_hand_pose, right_hand_pose, transl");

@@ -17,7 +17,15 @@ TEST_CASE("words are joined by commas") {
 
 TEST_CASE("numbers are written in few digits, or in all that they need") {
   CHECK(rounded(0.0123456, 4) == "0.01235");
-  CHECK(rounded(123456, 4) == "1.235e+05");
+  CHECK(rounded(123456, 4) == "123500");
+  CHECK(rounded(1e5, 4) == "100000");
+  CHECK(rounded(-99999.9, 4) == "-100000");
+  CHECK(rounded(1e-8, 4) == "1e-08");
+  CHECK(rounded(1.5e20, 4) == "1.5e+20");
+  CHECK(number_text(1e8) == "100000000");
+  CHECK(number_text(1e5) == "100000");
+  CHECK(number_text(-123456.5) == "-123456.5");
+  CHECK(number_text(1e20) == "1e+20");
   CHECK(rounded(-0.0, 4) == "0");
   CHECK(rounded(-std::numeric_limits<double>::quiet_NaN(), 4) == "nan");
   CHECK(rounded(-std::numeric_limits<double>::infinity(), 4) == "-inf");

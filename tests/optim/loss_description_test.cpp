@@ -15,7 +15,7 @@ void describe(ConfigFields& f, Settings& s) { f.number("width", s.width, {.above
 
 TEST_CASE("a loss brings its own settings beside the weight") {
   const LossDescription loss = describe_loss("smooth", "Makes it smooth", smooth::Settings{0.25});
-  LossSettings settings{1, loss.defaults, loss.describe_settings};
+  LossSettings settings = default_settings(loss);
   CHECK(settings.own_as<smooth::Settings>().width == 0.25);
   const LossSettings untouched = settings;
   ConfigFields fields;
@@ -31,7 +31,7 @@ TEST_CASE("a loss brings its own settings beside the weight") {
 
 TEST_CASE("a loss without settings has a weight only") {
   const LossDescription loss = describe_loss("plain", "Plain");
-  LossSettings settings{1, loss.defaults, loss.describe_settings};
+  LossSettings settings = default_settings(loss);
   ConfigFields fields;
   describe(fields, settings);
   CHECK(fields.names() == std::vector<std::string>{"weight"});

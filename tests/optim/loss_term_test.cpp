@@ -138,8 +138,7 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
 TEST_CASE("every registered loss term passes the gradient check", "[parallel]") {
   REQUIRE_FALSE(loss_terms().empty());
   for (const LossTerm& term : loss_terms()) {
-    check_operator(term.description.name, all_inputs(),
-                   [&](const auto& in) { return term.record(inputs_of(in), term.description.defaults); },
+    check_operator(term.description.name, all_inputs(), [&](const auto& in) { return term.record(inputs_of(in)); },
                    {.entries = 24});
   }
 }
@@ -147,8 +146,25 @@ TEST_CASE("every registered loss term passes the gradient check", "[parallel]") 
 TEST_CASE("a registered loss term whose inputs are not given is off") {
   for (const LossTerm& term : loss_terms()) {
     INFO(term.description.name);
-    CHECK(term.record(LossInputs<double>{}, term.description.defaults).tape == nullptr);
-    CHECK(term.record(LossInputs<float>{}, term.description.defaults).tape == nullptr);
+    CHECK(term.record(LossInputs<double>{}).tape == nullptr);
+    CHECK(term.record(LossInputs<float>{}).tape == nullptr);
+  }
+}
+
+TEST_CASE("a registered loss term says whether it needs the body or objects") {
+  for (const LossTerm& term : loss_terms()) {
+    INFO(term.description.name);
+    std::vector<OperatorInput> given = all_inputs();
+    Tape<double> tape;
+    std::vector<Var<double>> vars;
+    for (const OperatorInput& input : given) vars.push_back(tape.parameter(input.name, input.shape));
+    LossInputs<double> all = inputs_of(vars), no_body = all, no_objects = all;
+    no_body.body_rotations = {};
+    no_objects.object_opacity = no_objects.object_center_target = no_objects.object_depth =
+        no_objects.object_depth_target = {};
+    CHECK(term.record(all).tape != nullptr);
+    CHECK((term.record(no_body).tape == nullptr) == (term.description.needs == LossNeeds::kBody));
+    CHECK((term.record(no_objects).tape == nullptr) == (term.description.needs == LossNeeds::kObjects));
   }
 }
 
@@ -180,8 +196,7 @@ double value_of_flat(const std::string& name, double value, bool with_weight) {
     inputs.weight = tape.constant("weight", image_shape<double>(1, kHeight, kWidth));
     std::fill_n(tape.write(inputs.weight).row(4), kWidth, 1.0);  // one row counts
   }
-  const auto& term = term_named(name);
-  const auto loss = term.record(inputs, term.description.defaults);
+  const auto loss = term_named(name).record(inputs);
   tape.forward(loss);
   return tape.value(loss).scalar();
 }
@@ -217,7 +232,7 @@ struct Objects {
   }
   double value(const std::string& settings = "{}") {
     const LossTerm& term = term_named("center");
-    LossSettings chosen{1, term.description.defaults, term.description.describe_settings};
+    LossSettings chosen = default_settings(term.description);
     ConfigFields fields;
     describe(fields, chosen);
     ConfigProblems problems;
@@ -305,8 +320,7 @@ double body_loss(const std::string& name, const std::vector<double>& axis_angle)
   const auto pose = tape.parameter("pose", shape_of(21, 3));
   tape.set(pose, axis_angle);
   inputs.body_rotations = rotations_from_axis_angle(pose);
-  const LossTerm& term = term_named(name);
-  const auto loss = term.record(inputs, term.description.defaults);
+  const auto loss = term_named(name).record(inputs);
   tape.forward(loss);
   return tape.value(loss).scalar();
 }
@@ -361,7 +375,7 @@ double motion_loss(const std::string& name, const std::string& settings,
     return leaf("object", points, [](const ObjectPoint& p) { return motion_of_test().start.place(p); });
   };
   const LossTerm& term = term_named(name);
-  LossSettings chosen{1, term.description.defaults, term.description.describe_settings};
+  LossSettings chosen = default_settings(term.description);
   ConfigFields fields;
   describe(fields, chosen);
   ConfigProblems problems;
@@ -450,7 +464,7 @@ TEST_CASE("mask compares the silhouettes of the human and of each object") {
   inputs.human_mask = leaf("human mask", 1, 0.4);
   const auto value = [&](const char* settings) {
     const LossTerm& term = term_named("mask");
-    LossSettings chosen{1, term.description.defaults, term.description.describe_settings};
+    LossSettings chosen = default_settings(term.description);
     ConfigFields fields;
     describe(fields, chosen);
     ConfigProblems problems;

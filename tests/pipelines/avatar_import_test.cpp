@@ -7,6 +7,7 @@
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "pipelines/posed_avatar.h"
+#include "pipelines/synthetic_scene.h"
 #include "splat/io_ply.h"
 #include "tests/support/temporary_folder.h"
 
@@ -110,4 +111,33 @@ TEST_CASE("Gaussians in another unit or place are no avatar of the body") {
                     Contains("a.ply: ") && Contains("of 3000 Gaussians are more than 0.15 m from the body") &&
                         Contains("they have to be in its rest pose"));
   CHECK_THROWS_WITH(import_avatar(Gaussians{}, body(), "a.ply"), "a.ply: holds no Gaussians");
+}
+
+TEST_CASE("Gaussians that cover little of the body are no avatar of it") {
+  CHECK(import_avatar(rest_gaussians(avatar()), body(), "a.ply").covered > 0.999);
+  // A watering can of 30 cm about the origin, all of it near the trunk.
+  Gaussians can = synthetic_object(SyntheticObjectKind::kWateringCan, 500, 1).gaussians;
+  CHECK_THROWS_WITH(import_avatar(can, body(), "can.ply"),
+                    Contains("can.ply: is no avatar: only ") && Contains("allowed: 40 % or more, in its rest pose"));
+  // A body without legs is warned of, no more.
+  Gaussians upper;
+  const Gaussians whole = rest_gaussians(avatar());
+  for (std::size_t i = 0; i < static_cast<std::size_t>(whole.count()); ++i) {
+    if (whole.means[3 * i + 1] < -0.4F) continue;
+    const auto take = [&](std::vector<float>& to, const std::vector<float>& from, std::size_t width) {
+      to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(i * width),
+                from.begin() + static_cast<std::ptrdiff_t>((i + 1) * width));
+    };
+    take(upper.means, whole.means, 3);
+    take(upper.quats, whole.quats, 4);
+    take(upper.log_scales, whole.log_scales, 3);
+    take(upper.opacity_logits, whole.opacity_logits, 1);
+    take(upper.sh, whole.sh, 3);
+  }
+  const double covered = import_avatar(upper, body(), "a.ply").covered;
+  CHECK(covered > kLeastCovered);
+  CHECK(covered < kWellCovered);
+  Gaussians far = upper;
+  for (float& x : far.means) x = 1e30F;
+  CHECK(covered_share(far.means, body()) == 0);
 }

@@ -231,6 +231,56 @@ TEST_CASE("render puts the pelvis where the motion's body model has it") {
   }
 }
 
+TEST_CASE("render draws a body alone, wherever it is, and with the color net of a run") {
+  const TemporaryFolder folder;
+  Avatar avatar = surface_avatar(procedural_body(), {.gaussians = 400});
+  write_avatar("avatar.safetensors", avatar);
+  write_ply("nothing.ply", Gaussians{});
+  cli::RenderOptions options;
+  options.shared.camera = "camera.json";
+  options.motion = "motion.npz";
+  options.avatar = "avatar.safetensors";
+  options.out = "a.npz";
+  const auto rendered = [&](double distance) {
+    const Vector3<double> shift(distance, -distance, 0);
+    Motion motion;
+    motion.poses = {rest_pose(55)};
+    motion.poses[0].set_rotation(0, {std::acos(-1.0) / 2, 0, 0});
+    motion.poses[0].set_rotation(16, {0, 0, -0.9});
+    motion.poses[0].transl = shift;
+    write_motion("motion.npz", motion);
+    write_camera("camera.json", camera_at(shift + Vector3<double>(0, -3, 0)));
+    CHECK_THAT(cli::render_command(options), Catch::Matchers::StartsWith("a.npz: 40 x 60 pixels of 400 Gaussians"));
+    return Npz::read("a.npz").array("image").as<double>();
+  };
+  const std::vector<double> alone = rendered(0);
+  CHECK(std::accumulate(alone.begin(), alone.end(), 0.0) / static_cast<double>(alone.size()) > 0.01);
+  CHECK(largest_difference(rendered(1e6), alone) < 1e-2);  // a Gaussian at the edge of its footprint may count or not
+  options.shared.scene = "nothing.ply";
+  CHECK(rendered(0) == alone);
+
+  options.shared.scene.clear();
+  options.color_net = "net.safetensors";
+  ColorNet net = new_color_net(avatar.means, 55, {4, 8, 1, false, 1});
+  for (std::size_t i = 0; i < 24; ++i) net.layers[1].weights[i] = 0.1 * static_cast<double>(i) - 1;
+  write_color_net("net.safetensors", net);
+  const std::vector<double> learnt = rendered(0);
+  CHECK(largest_difference(learnt, alone) > 0.1);
+  avatar.color_net = net;
+  write_avatar("avatar.safetensors", avatar);
+  options.color_net.clear();
+  CHECK(rendered(0) == learnt);
+
+  options.color_net = "net.safetensors";
+  write_avatar("avatar.safetensors", surface_avatar(procedural_body(), {.gaussians = 300}));
+  CHECK_THROWS_WITH(cli::render_command(options),
+                    "net.safetensors: array 'color_net/features': has features of 400 Gaussians; the avatar has 300: "
+                    "the network is of another avatar, or of another run's");
+  options.color_net = "avatar.safetensors";
+  CHECK_THROWS_WITH(cli::render_command(options),
+                    "avatar.safetensors: the format is 'hsi4d avatar'; allowed: 'hsi4d color net'");
+}
+
 TEST_CASE("a body looks the same wherever in the world it is, in float too (row A10)") {
   const TemporaryFolder folder;
   write_avatar("avatar.safetensors", surface_avatar(procedural_body(), {.gaussians = 400}));

@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "autodiff/elementwise.h"
+#include "autodiff/reduce.h"
 #include "body/motion_io.h"
 #include "core/camera_file.h"
 #include "core/image_io.h"
@@ -64,6 +66,9 @@ void check_refusal(const ProgramResult& result, const std::string& message) {
   CHECK(result.err == message + "\n");
 }
 
+struct NoSettings {};
+void describe(ConfigFields&, NoSettings&) {}
+
 Image black(int width, int height, int channels = 3) { return Image(channels, height, width); }
 
 }  // namespace
@@ -106,6 +111,51 @@ TEST_CASE("stages that cannot work are refused before anything is written", "[ru
   CHECK_THAT(result.err, Contains("/stages/last/losses: a stage needs a loss\n"));
   CHECK_FALSE(fs::exists("run"));
   CHECK(dataset.run({"--dry-run"}).err == result.err);
+}
+
+TEST_CASE("a damaged file that a loss names is found before anything is written, by check too", "[run]") {
+  const SpoiltDataset dataset;
+  std::ofstream(dataset.file("vposer.npz")) << "no archive";
+  dataset.edit_config([](nlohmann::ordered_json& config) {
+    config["stages"]["interaction"]["losses"]["pose_prior"]["weights"] = "vposer.npz";
+  });
+  const std::string place = dataset.file("config.json") + ":" + dataset.line_of("\"vposer.npz\"") +
+                            ": /stages/interaction/losses/pose_prior/weights: " + dataset.file("vposer.npz") + ": ";
+  const ProgramResult run = dataset.run();
+  check_refusal(run, place + "looks like text, not like a .npz archive");
+  CHECK(dataset.run({"--dry-run"}).err == run.err);
+  CHECK(run_hsi4d({"check", dataset.file("config.json")}).err == run.err);
+  CHECK_FALSE(fs::exists("run"));
+  const RunConfig config = load_run_config(dataset.file("config.json"), {}, descriptions_of(loss_terms()));
+  CHECK_THROWS_WITH(carry_out_tiny(config, "run"),
+                    "/stages/interaction/losses/pose_prior/weights: " + dataset.file("vposer.npz") +
+                        ": looks like text, not like a .npz archive");
+  CHECK_FALSE(fs::exists("run"));
+}
+
+TEST_CASE("what a loss reads is read once in a run", "[run]") {
+  static int reads = 0;
+  const TemporaryFolder here;
+  std::vector<LossTerm> terms = loss_terms();
+  terms.push_back(make_loss_term<NoSettings>(
+      "counted", "Counts what it reads", [](const NoSettings&) { return ++reads; },
+      [](const auto& in, int) { return mean(square(in.rendered - in.target)); }));
+  const RunConfig config =
+      load_run_config(tiny_config_file(), {R"(stages.interaction.losses={"counted": {}})"}, descriptions_of(terms));
+  CHECK(reads == 0);
+  carry_out(config, terms, {.folder = "run", .threads = 1, .observer = {}});
+  CHECK(reads == 1);  // over three frames
+}
+
+TEST_CASE("losses of what a stage does not draw are refused, as parameters are", "[run]") {
+  const SpoiltDataset dataset;
+  dataset.edit_config([](nlohmann::ordered_json& config) {
+    config["stages"]["camera"]["losses"]["joint_limits"] = {{"weight", 0.25}};
+    config["stages"]["camera"]["losses"]["depth"] = {{"weight", 0}};
+  });
+  check_refusal(dataset.run(), dataset.file("config.json") + ":" + dataset.line_of("\"joint_limits\"") +
+                                   ": /stages/camera/losses/joint_limits: this loss needs the body, which a stage with "
+                                   "\"draw\": \"scene\" does not have");
 }
 
 TEST_CASE("an object's name must not be the human's", "[run]") {

@@ -117,7 +117,8 @@ TEST_CASE("gradients of a sequence are right for every group and term") {
   total = total + term_named("smooth").record(inputs, term_named("smooth").description.defaults);
   total = total + term_named("contact").record(inputs, defaults) * 10.0;
   total = total + term_named("ground").record(inputs, term_named("ground").description.defaults);
-  total = total + term_named("pose_prior").record(inputs, term_named("pose_prior").description.defaults) * 1e-3;
+  const LossDescription& likely = term_named("pose_prior").description;
+  total = total + term_named("pose_prior").record(inputs, prepared_loss(likely.prepare, likely.defaults)) * 1e-3;
   for (const ParameterGroup<double>& group : graph.groups()) {
     INFO("group " << group.name);
     tape.unfreeze(group.blocks.front());
@@ -172,7 +173,9 @@ TEST_CASE("a stage over the sequence smooths a motion and stays near it") {
   Tape<float> tape;
   const SequenceGraph<float> graph(tape, clip, states, &prior, RotationParameters::kSixD);
   StageSettings settings = moving(sequence_group_names());
-  settings.losses = {{"fit", {}}, {"smooth", {0.5, term_named("smooth").description.defaults}}};
+  settings.losses = {{"fit", default_settings(term_named("fit").description)},
+                     {"smooth", default_settings(term_named("smooth").description)}};
+  settings.losses[1].second.weight = 0.5;
   run_stage<float>(tape, settings, loss_terms(), graph.loss_inputs(), graph.groups());
   graph.read_states(settings.optimize, states);
   CHECK(roughness(states) < 0.8 * roughness(before));

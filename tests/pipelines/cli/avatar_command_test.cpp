@@ -25,10 +25,12 @@ TEST_CASE("hsi4d avatar makes an avatar, tells of it and imports it again") {
   const ProgramResult told = run_hsi4d({"avatar", "info", "a.safetensors"});
   REQUIRE(told.status == 0);
   CHECK_THAT(told.out, Contains("\n  colors   the avatar's own, without a color net\n"));
-  CHECK_THAT(told.out, Contains("a.safetensors: avatar of 2000 Gaussians, 55 joints of SMPL-X\n  weights  up to 4 a "
-                                "Gaussian (1: ") &&
-                           Contains("\n  bounds   x -") && Contains("\n  opacity  0.98, 0.98, 0.98, 0.98, 0.98\n") &&
-                           Contains("\n  scale    "));
+  CHECK_THAT(told.out,
+             Contains("a.safetensors: avatar of 2000 Gaussians, 55 joints of SMPL-X\n  body     the program's own "
+                      "(procedural); its pelvis rests at (0, -0.35, -0.005) m\n  weights  up to 4 a "
+                      "Gaussian (1: ") &&
+                 Contains("\n  bounds   x -") && Contains("\n  opacity  0.98, 0.98, 0.98, 0.98, 0.98\n") &&
+                 Contains("\n  scale    "));
   const ProgramResult arrays = run_hsi4d({"info", "a.safetensors"});
   CHECK_THAT(arrays.out, Contains("a.safetensors: 9 arrays\n") && Contains("\n  means  [2000,3]  <f4\n") &&
                              Contains("\n  format  hsi4d avatar\n") && Contains("\n  version  2\n"));
@@ -62,13 +64,19 @@ TEST_CASE("hsi4d avatar names what is wrong") {
   CHECK_THAT(error({"avatar", "make"}), Contains("hsi4d avatar make: --out is required"));
   CHECK_THAT(error({"avatar", "make", "--out", "a.npz"}), Contains("--out") && Contains(".safetensors"));
   CHECK(error({"avatar", "make", "--out", "a.safetensors", "--gaussians", "0"}) ==
-        "avatar: gaussians is 0; allowed: 1 to 5e+06\n");
+        "avatar: gaussians is 0; allowed: 1 to 5000000\n");
   CHECK(error({"avatar", "make", "--out", "a.safetensors", "--betas", "1,2,3,4,5,6,7,8,9,0,1"}) ==
         "hsi4d avatar make: --betas: 11 numbers; the program's body has 10\n");
   CHECK(error({"avatar", "make", "--out", "a.safetensors", "--betas", "0,-10.5"}) ==
         "hsi4d avatar make: --betas: -10.5 is out of range; allowed: -10 to 10\n");
+  CHECK(
+      error({"avatar", "make", "--out", "a.safetensors", "--betas", "1,b"}) ==
+      "hsi4d avatar make: --betas: \"1,b\" is not understood; allowed: finite numbers apart by commas, as in 0.5,-1\n");
+  CHECK(error({"avatar", "make", "--out", "a.safetensors", "--betas", "10,10,10,10,10,10,10,10,10,10"}) ==
+        "hsi4d avatar make: --betas: makes pelvis 3.3 times as wide as the mean body's; allowed: 0.5 to 2\n");
   write_text_file("text.safetensors", "some text that is no avatar");
-  CHECK_THAT(error({"avatar", "info", "text.safetensors"}), Contains("text.safetensors: claims a header of "));
+  CHECK_THAT(error({"avatar", "info", "text.safetensors"}),
+             Contains("text.safetensors: looks like text, not like a .safetensors file"));
   CHECK_THAT(error({"avatar", "info", "none.safetensors"}), Contains("none.safetensors"));
   write_ply("far.ply", [] {
     Gaussians g;

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "body/avatar.h"
+#include "body/procedural_body.h"
 #include "core/check.h"
 #include "core/file.h"
 #include "core/image_io.h"
@@ -75,6 +76,62 @@ TEST_CASE("hsi4d avatar fit learns an avatar, writes it and tells how well it sh
   // It goes on from there.
   const std::string again = fit("b.safetensors", {"avatar=a.safetensors", "stage.iterations=1"});
   CHECK_THAT(again, Contains("b.safetensors: 200 Gaussians, 1 iteration, loss "));
+}
+
+TEST_CASE("configs of avatar fit are known to the other commands") {
+  const TemporaryFolder folder;
+  write_inputs();
+  const auto told = [](const std::vector<std::string>& arguments, int status = 0) {
+    const ProgramResult result = run_hsi4d(arguments);
+    CHECK(result.status == status);
+    return status == 0 ? result.out : result.err;
+  };
+  CHECK_THAT(told({"check", "fit.json", "--set", "views="}),
+             Contains("fit.json: OK, a config of `hsi4d avatar fit`\n  views: not given; --set views=DIR/views.json\n"
+                      "  starts from 200 Gaussians on the body\n  stage avatar fit: 3 iterations, 1 parameter group "
+                      "(colors), 1 loss (photometric)\n"));
+  CHECK_THAT(told({"check", "fit.json", "--print-config"}), Contains("\"held_frames\": []"));
+  CHECK(told({"check", "fit.json", "--set", "gausians=3"}, 2) ==
+        "--set gausians=3: /gausians: unknown key; did you mean \"gaussians\"?\n");
+  CHECK_THAT(told({"schema", "avatar_fit"}), Contains("hsi4d avatar fit config"));
+  CHECK_THAT(told({"schema"}), Contains("hsi4d run config"));
+  CHECK(told({"schema", "fit"}, 2) == "hsi4d schema: there are no configs of \"fit\"; known: run, avatar_fit\n");
+  CHECK_THAT(told({"list", "avatar_fit"}), Contains("/held_cameras"));
+  const std::string other =
+      "fit.json: is a config of `hsi4d avatar fit`, which learns an avatar from pictures: hsi4d avatar "
+      "fit fit.json --out F.safetensors\n";
+  CHECK(told({"run", "fit.json"}, 2) == other);
+  CHECK(told({"synth", "fit.json", "--out", "d"}, 2) == other);
+  write_text_file("run.json", R"({"stages": {}})");
+  CHECK(told({"avatar", "fit", "run.json", "--out", "a.safetensors"}, 2) ==
+        "run.json: is a config of `hsi4d run` and `hsi4d synth`, not of `hsi4d avatar fit`; configs/avatar/fit.json is "
+        "one\n");
+}
+
+TEST_CASE("hsi4d avatar fit tells what its config lacks, and what says nothing") {
+  const TemporaryFolder folder;
+  write_inputs();
+  CHECK(refusal("a.safetensors", {"views="}) ==
+        "fit.json:1: /views: not given; a fit needs the views.json of pictures in known poses. `hsi4d synth "
+        "configs/avatar/views.json --out DIR` makes some; then --set views=DIR/views.json");
+  write_avatar("start.safetensors", surface_avatar(procedural_body(), {.gaussians = 100}));
+  const std::string start = fs::absolute("start.safetensors").string();
+  CHECK(refusal("a.safetensors", {"avatar=start.safetensors", "gaussians=300"}) ==
+        "--set gaussians=300: /gaussians: is of a new avatar; this fit goes on from " + start + ", /avatar, as it is");
+  CHECK(refusal("a.safetensors", {"avatar=start.safetensors", "body.shape=[1]"}) ==
+        "--set body.shape=[1]: /body: is of a new avatar; this fit goes on from " + start + ", /avatar, as it is");
+  CHECK(refusal("a.safetensors", {R"(stage.losses={"joint_limits": {}})"}) ==
+        "--set stage.losses={\"joint_limits\": {}}: /stage/losses/joint_limits: this loss needs the body, which a fit "
+        "of an "
+        "avatar does not have");
+  ViewSet set = read_view_set("views/views.json");
+  for (PosedView& view : set.views) view.image = fs::path("images") / view.image.filename();
+  set.views[1].camera = -1;
+  write_text_file("views/odd.json", view_set_json("motion.npz", "cameras.json", set.views));
+  CHECK_THAT(refusal("a.safetensors", {"views=views/odd.json"}),
+             Contains("/views/1/camera: -1 is out of range; allowed: 0 or more"));
+  CHECK(refusal("a.safetensors", {"views=views/motion.npz"}) ==
+        fs::absolute("views/motion.npz").string() + ": looks like a .npz or .zip archive, not like JSON");
 }
 
 TEST_CASE("hsi4d avatar fit says nothing of the human alone where nothing tells which pixels show it") {

@@ -166,7 +166,7 @@ TEST_CASE("bench pixel_filter judges every filter at a height and writes one obj
     REQUIRE(name.substr(0, prefix.size()) == prefix);
     CHECK(m.at("gaussians") == 5000);
     CHECK(m.at("height_px") == 16);
-    CHECK(m.at("sigma_px").get<double>() == Approx(0.1).epsilon(0.1));
+    CHECK(m.at("sigma_px").get<double>() == Approx(0.115).epsilon(0.1));
     found[name.substr(prefix.size())] = m;
   }
   CHECK(found.size() == 8 * 3 + 2);

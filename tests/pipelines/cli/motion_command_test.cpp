@@ -30,7 +30,7 @@ Motion some_motion() {
 }
 
 /// A motion of SMPL-H in two frames, which are some_motion's first.
-void write_smplh(const std::string& path, const std::vector<double>& betas) {
+void write_smplh(const std::string& path, const std::vector<double>& betas, bool says_rate = true) {
   const Motion motion = some_motion();
   std::vector<double> trans, poses;
   for (std::size_t t = 0; t < 2; ++t) {
@@ -41,6 +41,7 @@ void write_smplh(const std::string& path, const std::vector<double>& betas) {
   file.add<double>("trans", {2, 3}, trans);
   file.add<double>("poses", {2, 156}, poses);
   file.add<double>("betas", {static_cast<std::int64_t>(betas.size())}, betas);
+  if (says_rate) file.add_scalar("mocap_framerate", 10.0);
   file.write(path);
 }
 
@@ -132,11 +133,22 @@ TEST_CASE("motion puts SMPL-X on the program's body, and a motion of that body o
   CHECK((pelvis_in_glb("own.glb", 1) - (motion.poses[1].transl + *motion.pelvis_rest)).norm() < 1e-6);
 }
 
+TEST_CASE("motion warns of a file without a frame rate, unless it is told one") {
+  const TemporaryFolder folder;
+  write_smplh("in.npz", {}, false);
+  CHECK(run_hsi4d({"motion", "in.npz", "out.npz"}).err ==
+        "hsi4d: warning: in.npz: says no frame rate and is taken for 10 frames a second; --from-rate gives another\n");
+  CHECK(run_hsi4d({"motion", "in.npz", "out.npz", "--from-rate", "120"}).err.empty());
+  CHECK(read_motion("out.npz").frame_rate == 120);
+}
+
 TEST_CASE("motion warns of what it does not know of hands, and of repaired weights") {
   const TemporaryFolder folder;
   std::filesystem::create_directory("frames");
   NpzWriter file;
   file.add<double>("transl", {1, 3}, std::vector<double>(3));
+  file.add<double>("global_orient", {1, 3}, std::vector<double>(3));
+  file.add<double>("body_pose", {21, 3}, std::vector<double>(63));
   file.add<double>("left_hand_pose", {15, 3}, std::vector<double>(45, 0.25));
   file.write("frames/1.npz");
   SmplxArrays arrays = random_smplx({.vertices = 30, .seed = 92});
@@ -181,13 +193,19 @@ TEST_CASE("motion takes pelvis, hands and shape of a body model") {
   Motion motion = some_motion();
   motion.betas = {0.5, -1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0};  // more than the file has directions
   write_motion("in.npz", motion);
-  CHECK(run_hsi4d({"motion", "in.npz", "out.npz", "--y-up", "--body-model", "m.npz"}).status == 0);
+  const ProgramResult turned = run_hsi4d({"motion", "in.npz", "out.npz", "--y-up", "--body-model", "m.npz"});
+  CHECK(turned.status == 0);
+  CHECK(turned.err.empty());
   const SmplxModel model = read_smplx("m.npz");
   const BodyModel body = rest_body(model, std::span(motion.betas).first(10));
   const Motion expected =
       transformed(motion, z_up_from_y_up(), Vector3<double>(body.joints[0], body.joints[1], body.joints[2]));
   CHECK(read_motion("out.npz").poses[3].transl == expected.poses[3].transl);
   CHECK(run_hsi4d({"motion", "in.npz", "out.glb", "--body-model", "m.npz"}).status == 0);
+  motion.betas[11] = 1;
+  write_motion("in.npz", motion);
+  CHECK(run_hsi4d({"motion", "in.npz", "out.npz", "--body-model", "m.npz"}).err ==
+        "hsi4d: warning: in.npz: array 'betas': has 12 numbers a frame; m.npz has 10, and the others are left out\n");
 }
 
 TEST_CASE("motion tells what is wrong") {
@@ -203,7 +221,7 @@ TEST_CASE("motion tells what is wrong") {
   CHECK(error({"in.npz", "out.npz", "--frame-rate", "0"}) ==
         "hsi4d motion: --frame-rate: 0 is out of range; allowed: 0.01 to 100000\n");
   CHECK(error({"in.npz", "out.npz", "--from-rate", "0.01", "--frame-rate", "100000"}) ==
-        "hsi4d motion: --frame-rate: a motion of 5 frames, 0.01 a second, has 4e+07 frames at 100000 a second; "
+        "hsi4d motion: --frame-rate: a motion of 5 frames, 0.01 a second, has 40000000 frames at 100000 a second; "
         "allowed: at most 1000000\n");
   CHECK_THAT(error({"in.npz", "out.bvh"}), Contains("hsi4d motion: OUT") && Contains(".npz, .glb"));
   CHECK_THAT(error({"in.npz", "in.npz"}), Contains("hsi4d motion: OUT"));

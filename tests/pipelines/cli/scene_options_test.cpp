@@ -43,6 +43,10 @@ TEST_CASE("what is wrong with the options is told to the letter") {
         "hsi4d render: --motion is given without --avatar; a body needs both, and --frame");
   CHECK(render_fault([](Options& o) { o.avatar = "a.npz"; }) ==
         "hsi4d render: --avatar is given without --motion; a body needs both, and --frame");
+  CHECK(render_fault([](Options& o) { o.shared.scene.clear(); }) ==
+        "hsi4d render: nothing to draw; give --scene, --object, or --avatar with --motion");
+  CHECK(render_fault([](Options& o) { o.color_net = "n.safetensors"; }) ==
+        "hsi4d render: --color-net is given without --avatar, whose colours it says");
   CHECK(render_fault([](Options& o) { o.frame = 2; }) ==
         "hsi4d render: --frame is given without --motion and --avatar, or --objects");
   CHECK_THAT(render_fault([](Options& o) { o.shared.scene = "missing.ply"; }), StartsWith("missing.ply: "));

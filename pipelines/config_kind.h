@@ -1,0 +1,25 @@
+// Which command a config is for. The two kinds have different sections, and messages should say which one is meant.
+#pragma once
+
+#include <filesystem>
+
+#include "core/config_value.h"
+
+namespace hsi4d {
+
+enum class ConfigKind {
+  kRun,        ///< of `hsi4d run`, `hsi4d synth` and `hsi4d demo`
+  kAvatarFit,  ///< of `hsi4d avatar fit`
+};
+
+/// By the names of its sections: `views` or `stage` are of an avatar fit alone, `stages`, `data` and `synthetic` of a
+/// run. What has neither is of a run.
+ConfigKind config_kind(const ConfigValue& tree);
+
+/// Of a file with what it extends. Throws UserError when it cannot be read.
+ConfigKind config_kind(const std::filesystem::path& file);
+
+/// Throws UserError, "FILE: is a config of `hsi4d avatar fit` …", when a tree is of the other kind than `wanted`.
+void require_kind(const ConfigValue& tree, ConfigKind wanted, const std::filesystem::path& file);
+
+}  // namespace hsi4d
