@@ -17,6 +17,7 @@
 #include "core/text.h"
 #include "pipelines/state.h"
 #include "pipelines/synthetic_motion.h"
+#include "pipelines/synthetic_object.h"
 #include "pipelines/synthetic_render.h"
 #include "pipelines/synthetic_scene.h"
 #include "splat/io_ply.h"
@@ -39,23 +40,30 @@ ConfigValue object_of(std::string_view key, ConfigValue value) {
   return object;
 }
 
-std::string initial_json(const std::string& name, const Rigid<double>& pose) {
-  ConfigValue state = ConfigValue::make_object();
-  state.add("rotation", numbers(so3_log(pose.rotation)));
-  state.add("translation", numbers(pose.translation));
+std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<double>>& poses) {
   ConfigValue root = ConfigValue::make_object();
   root.add("motion", ConfigValue::make_string("initial_motion.npz"));
-  root.add("objects", object_of(name, std::move(state)));
+  ConfigValue objects = ConfigValue::make_object();
+  if (object.exists()) {
+    ConfigValue state = ConfigValue::make_object();
+    state.add("rotation", numbers(so3_log(poses.front().rotation)));
+    state.add("translation", numbers(poses.front().translation));
+    objects.add(object.name, std::move(state));
+  }
+  root.add("objects", std::move(objects));
   return to_json(root);
 }
 
-ConfigValue data_section(const std::string& name) {
+ConfigValue data_section(const SyntheticObject& object) {
   ConfigValue data = ConfigValue::make_object();
   const auto add = [&data](std::string_view key, std::string_view file) {
     data.add(key, ConfigValue::make_string(file));
   };
   add("scene", "scene.ply");
-  data.add("objects", object_of(name, object_of("gaussians", ConfigValue::make_string("objects/" + name + ".ply"))));
+  if (object.exists()) {
+    const ConfigValue file = ConfigValue::make_string("objects/" + object.name + ".ply");
+    data.add("objects", object_of(object.name, object_of("gaussians", file)));
+  }
   add("avatar", "avatar.safetensors");
   add("frames", "frames");
   add("masks", "masks");
@@ -120,34 +128,35 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   avatar_settings.gaussians = settings.avatar_gaussians;
   avatar_settings.seed = seed;
   const Avatar avatar = surface_avatar(body, avatar_settings);
-  const SyntheticObject object = synthetic_object(settings.object, settings.object_gaussians, seed);
-  const SyntheticClip clip =
-      synthetic_clip(body, object, {settings.frames, settings.frame_rate, settings.size_px, settings.camera_drift});
-  const Gaussians room = synthetic_room(settings.scene_gaussians, clip.room, seed);
+  const SyntheticObject object = synthetic_object(settings);
+  const SyntheticClip clip = synthetic_clip(body, object, clip_settings(settings));
+  const Gaussians scene = synthetic_scene(settings, clip.plan);
 
   stop_if_asked();
-  write_ply(out.file("scene.ply"), room);
-  write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
+  write_ply(out.file("scene.ply"), scene);
   write_avatar(out.file("avatar.safetensors"), avatar);
   write_camera(out.file("camera.json"), clip.cameras.front());
   write_motion(out.file("initial_motion.npz"), disturbed_motion(clip.motion, settings));
-  write_text_file(out.file("initial.json"), initial_json(object.name, clip.object.front()));
+  write_text_file(out.file("initial.json"), initial_json(object, clip.object));
   write_motion(out.file("truth/motion.npz"), clip.motion);
-  write_objects(out.file("truth/objects.npz"), object.name, clip.object);
   write_cameras(out.file("truth/cameras.json"), clip.cameras);
+  if (object.exists()) {
+    write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
+    write_objects(out.file("truth/objects.npz"), object.name, clip.object);
+  }
   write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
-  write_text_file(out.file("config.json"),
-                  to_json(merged(object_of("data", data_section(object.name)), more_sections)));
+  write_text_file(out.file("config.json"), to_json(merged(object_of("data", data_section(object)), more_sections)));
 
-  const SyntheticRenderer renderer(room, object.gaussians, avatar, render);
+  const SyntheticRenderer renderer(scene, object.gaussians, avatar, render);
   Progress shown("frames", settings.frames, observer.progress, observer.progress_interval);
   for (std::size_t t = 0; t < clip.cameras.size(); ++t) {
     const std::string name = four_digits(static_cast<std::int64_t>(t)) + ".png";
     const SyntheticFrame frame =
-        renderer.frame(clip.motion.poses[t], clip.object[t], clip.cameras[t], settings.supersample);
+        renderer.frame(clip.motion.poses[t], object.exists() ? clip.object[t] : Rigid<double>(), clip.cameras[t],
+                       settings.supersample);
     write_image(out.file(fs::path("frames") / name), frame.color);
     write_image(out.file(fs::path("masks") / "human" / name), frame.human_mask);
-    write_image(out.file(fs::path("masks") / object.name / name), frame.object_mask);
+    if (object.exists()) write_image(out.file(fs::path("masks") / object.name / name), frame.object_mask);
     shown.step();
     stop_if_asked();
   }

@@ -51,9 +51,9 @@ SyntheticFrame SyntheticRenderer::frame(const BodyPose& pose, const Rigid<double
                        settings_};
   Tape<float> tape;
   const Var<float> xi = tape.constant("xi", shape_of(1, 6));
-  const std::vector<SplatInputs<float>> parts = {standing_splats(constants(tape, room_), xi, view),
-                                                 object_splats(tape, object_, world_from_object, xi, view),
-                                                 avatar_splats(tape, avatar_, pose)};
+  std::vector<SplatInputs<float>> parts = {standing_splats(constants(tape, room_), xi, view)};
+  if (object_.count() > 0) parts.push_back(object_splats(tape, object_, world_from_object, xi, view));
+  parts.push_back(avatar_splats(tape, avatar_, pose));
   const Index first = room_.count(), second = first + object_.count(), end = second + avatar_.count();
   RenderRequest request;
   request.groups = {{second, end}, {first, second}};
