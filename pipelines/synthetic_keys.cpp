@@ -215,7 +215,8 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
 /// The object is the seat. @param seat  of the pelvis when it sits, against standing
 KeyedMotion sit_motion(double seat, double chair_grip) {
   const Vector chair(0, -0.41, chair_grip);  // the middle of its seat
-  const HandKey left_leans = {{-0.02, 0.3, 0.24}, {18, 0, 0}, 20}, right_leans = {{0.02, 0.3, 0.24}, {18, 0, 0}, 20};
+  const HandKey left_leans = {{-0.03, 0.12, -0.04}, {25, 0, 0}, 20},
+                right_leans = {{0.03, 0.12, -0.04}, {25, 0, 0}, 20};
   KeyedMotion motion;
   motion.ground = {{0.05, 0.55}, -40};
   motion.feet = {foot(0.13, 0.03, 9), foot(-0.13, -0.01, -11)};
@@ -245,16 +246,16 @@ KeyedMotion sit_motion(double seat, double chair_grip) {
                   .spine = {12, 0, 0},
                   .head = {-8, 0, 0},
                   .object = chair,
-                  .left = on_thigh(-0.07, 0.1, -0.15),
-                  .right = on_thigh(0.07, 0.1, -0.15)},
+                  .left = on_thigh(-0.1, -0.06, -0.25),
+                  .right = on_thigh(0.1, -0.06, -0.25)},
                  {.seconds = 2.1,
                   .pelvis = {0, -0.415, seat},
                   .pelvis_turn = {-8, 0, 0},
                   .spine = {3, 0, 0},
                   .head = {2, 0, 0},
                   .object = chair,
-                  .left = on_thigh(-0.07, 0.06, -0.14),
-                  .right = on_thigh(0.07, 0.06, -0.14)},
+                  .left = on_thigh(-0.1, -0.1, -0.25),
+                  .right = on_thigh(0.1, -0.1, -0.25)},
                  {.seconds = kClipSeconds,  // turns on the seat
                   .pelvis = {0, -0.415, seat},
                   .pelvis_turn = {-8, 17, 0},
@@ -262,8 +263,8 @@ KeyedMotion sit_motion(double seat, double chair_grip) {
                   .head = {4, 14, 0},
                   .object = chair,
                   .object_turn = {0, 0, 17},
-                  .left = on_thigh(-0.12, 0.03, -0.14),
-                  .right = on_thigh(0.02, 0.1, -0.14)}};
+                  .left = on_thigh(-0.13, -0.13, -0.25),
+                  .right = on_thigh(0.06, -0.05, -0.25)}};
   return motion;
 }
 

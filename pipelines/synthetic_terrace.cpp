@@ -27,7 +27,7 @@ void add_flags(SceneKit& kit) {
         if (rim < 0.014) return Rgb(0.42, 0.42, 0.34);
         return Rgb(tone * (1 + 0.16 * kit.rough(Point(u * length * 7, v * kRow * 7, shift))));
       };
-      const double detail = y + kRow < kit.plan.seen_from_y ? 0.2 : 1;
+      const double detail = y + kRow < kit.plan.seen_from_y ? 0.2 : 2.2;
       kit.model.add_rectangle(Point(x, y, 0), Point(length, 0, 0), Point(0, kRow, 0), stone, detail);
       x += length;
     }

@@ -113,7 +113,7 @@ Moment walking_moment(const Actor& actor, double seconds) {
   FigureTarget& figure = moment.figure;
   figure.ground = path.at(path.distance(seconds));
   const double bob = 0.009 * std::cos(2 * kPi * (seconds - middle_time(1)) / kStep);
-  figure.pelvis = {0.018 * stands, -0.05 * lean, -0.02 - pace * (0.024 - bob) - 0.02 * lean};
+  figure.pelvis = {0.018 * stands, -0.03 * lean, -0.012 - pace * (0.018 - bob) - 0.008 * lean};
   figure.pelvis_turn = {2 + 5 * lean, -5 * lands, -2 * stands};
   figure.spine = {3 + 11 * lean, 7 * lands + 4 * pace, 2 * stands};
   figure.head = {2 - 8 * lean, 6 * pace - 2 * lands, 0};
