@@ -205,7 +205,7 @@ void make_bedroom(SceneKit& kit) {
   add_wardrobe(kit);
   add_lamp(kit);
   add_bunting(kit);
-  kit.add_plant(Point(0.12, 1.75, 0), 0.55);
+  kit.add_plant(Point(0.12, 1.6, 0), 0.55);
 }
 
 double bedroom_light(const ScenePlan& plan, const Point& p, const Point& normal) {

@@ -153,6 +153,7 @@ KeyedMotion pour_motion() {
 /// @param begin  height of the grip of what stands there
 KeyedMotion lift_motion(double begin, bool two_hands) {
   const double stoop = std::clamp((0.92 - begin) / 0.3, 0.0, 2.0), left = two_hands ? 0.0 : -0.1;
+  const double across = two_hands ? 0.0 : 1.0;  // a handle is turned across, or the wrist would not follow
   const Vector there(left, 0.52, begin);
   KeyedMotion motion;
   motion.ground = kBesideTable;
@@ -165,7 +166,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .object = there,
                   .away = {two_hands ? 0.0 : -0.04, -0.11, 0.13},
                   .grip = 16,
-                  .left = {{0.02, 0.06, 0.02}, {0, 0, 0}, 22}},
+                  .left = {{0.02, 0.06 + 0.1 * stoop, 0.02 - 0.12 * stoop}, {0, 0, 0}, 22}},
                  {.seconds = 0.55,
                   .pelvis = {-0.02, 0.06, -0.1 - 0.09 * stoop},
                   .pelvis_turn = {13, -6, 0},
@@ -173,7 +174,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .head = {14, -6, 0},
                   .object = there,
                   .grip = 30,
-                  .left = {{0.05, 0.12, 0.06}, {0, 0, 0}, 24}},
+                  .left = {{0.05 - 0.06 * stoop, 0.12 + 0.16 * stoop, 0.06 - 0.3 * stoop}, {0, 0, 0}, 24}},
                  {.seconds = 0.85,  // the fingers close, the knees give
                   .pelvis = {-0.02, 0.05, -0.125 - 0.1 * stoop},
                   .pelvis_turn = {14, -6, 0},
@@ -181,14 +182,14 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .head = {12, -6, 0},
                   .object = there,
                   .grip = 60,
-                  .left = {{0.05, 0.12, 0.06}, {0, 0, 0}, 26}},
+                  .left = {{0.05 - 0.06 * stoop, 0.12 + 0.16 * stoop, 0.06 - 0.3 * stoop}, {0, 0, 0}, 26}},
                  {.seconds = 1.6,
                   .pelvis = {0.02, -0.05, -0.03},
                   .pelvis_turn = {2, 2, 0},
                   .spine = {0, 2, -2},
                   .head = {16, 2, 0},
                   .object = {0.8 * left, 0.4, 1.1},
-                  .object_turn = {-6, 0, 4},
+                  .object_turn = {-6, 0, 4 + 36 * across},
                   .grip = 64,
                   .left = {{0.06, 0.03, 0.03}, {0, 0, 0}, 28}},
                  {.seconds = 2.25,
@@ -197,7 +198,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .spine = {-2, 18, -2},
                   .head = {2, 8, 0},
                   .object = {left + 0.14, 0.37, 1.3},
-                  .object_turn = {-10, 0, 26},
+                  .object_turn = {-10, 0, 26 + 54 * across},
                   .grip = 64,
                   .left = {{0.05, 0.02, 0.02}, {0, 0, 0}, 26}},
                  {.seconds = kClipSeconds,
@@ -206,7 +207,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .spine = {-3, 15, -1},
                   .head = {-2, 6, 0},
                   .object = {left + 0.1, 0.38, 1.33},
-                  .object_turn = {6, 0, 20},
+                  .object_turn = {6, 0, 20 + 56 * across},
                   .grip = 64,
                   .left = {{0.05, 0.02, 0.02}, {0, 0, 0}, 26}}};
   return motion;
@@ -425,6 +426,8 @@ Moment keyed_moment(const Actor& actor, double seconds) {
     figure.hands[i].shared = motion.hands_hang;
     figure.hands[i].curl_deg = hand.curl;
     figure.hands[i].elbow = ground.direction({0.65 * out, side == kLeft ? -0.5 : -0.6, side == kLeft ? -0.6 : -0.25});
+    if (actor.motion == SyntheticMotionKind::kLift && actor.object.hands[i])
+      figure.hands[i].elbow = ground.direction({0.9 * out, -0.2, -0.3});
   }
   if (actor.motion == SyntheticMotionKind::kWave) wave_hand(actor, ground, t, figure.hands[kLeft]);
   if (!actor.object.exists()) return moment;

@@ -39,7 +39,12 @@ void add_sky(SceneKit& kit) {
     const double cloud = ramp(0.08, 0.5, kit.rough(Point(x * 0.55, v * 7, 12)));
     return mixed(sky, Rgb(0.99, 0.99, 0.98), 0.85 * cloud * ramp(0.26, 0.36, v));
   };
-  kit.model.add({dome, paint, 0.02, 0, {}});
+  kit.model.add({dome, paint, 0.03, 0, {}});
+  const SheetShape behind = [dome](double u, double v) {  // what shows between the Gaussians of the first
+    const Point p = dome(u, v);
+    return Point(1.04 * p.x(), 1.5 + 1.04 * (p.y() - 1.5), p.z());
+  };
+  kit.model.add({behind, paint, 0.01, 0, {}});
 }
 
 void add_bush(SceneKit& kit, const Point& center, const Point& half, const Rgb& green, double rough, double detail) {

@@ -47,7 +47,7 @@ struct Path {
 
 Path path_of(SyntheticMotionKind motion) {
   if (motion == SyntheticMotionKind::kPush) return {{0, 0.25}, 0.65, 45, 0.42};
-  return {{0, 0.75}, 0.6, 62, 0.46};
+  return {{0, 0.75}, 0.6, 62, 0.445};
 }
 
 double landing_time(int step) { return kFirstLanding + (step - 1) * kStep; }
@@ -112,8 +112,8 @@ Moment walking_moment(const Actor& actor, double seconds) {
   Moment moment;
   FigureTarget& figure = moment.figure;
   figure.ground = path.at(path.distance(seconds));
-  const double bob = 0.009 * std::cos(2 * kPi * (seconds - middle_time(1)) / kStep);
-  figure.pelvis = {0.018 * stands, -0.03 * lean, -0.012 - pace * (0.018 - bob) - 0.008 * lean};
+  const double bob = 0.01 * std::cos(2 * kPi * (seconds - middle_time(1)) / kStep);
+  figure.pelvis = {0.018 * stands, -0.03 * lean, -0.009 - pace * (0.012 - bob) - 0.006 * lean};
   figure.pelvis_turn = {2 + 5 * lean, -5 * lands, -2 * stands};
   figure.spine = {3 + 11 * lean, 7 * lands + 4 * pace, 2 * stands};
   figure.head = {2 - 8 * lean, 6 * pace - 2 * lands, 0};
@@ -122,7 +122,7 @@ Moment walking_moment(const Actor& actor, double seconds) {
     swing_arm(actor, figure.ground, side, -17 * out_of(side) * lands + 3, figure);
   }
   if (!actor.object.exists()) return moment;
-  const Vector sway(0.5 * figure.pelvis[0], 0.012 * pace * std::cos(2 * kPi * seconds / kStep),
+  const Vector sway(0.5 * figure.pelvis[0], 0.006 * pace * std::cos(2 * kPi * seconds / kStep),
                     0.7 * (figure.pelvis[2] + 0.02));
   const Vector place = actor.object.carried + (pushes ? Vector(0, 0, 0) : sway);
   const Vector tilt =
