@@ -154,7 +154,7 @@ KeyedMotion pour_motion() {
 KeyedMotion lift_motion(double begin, bool two_hands) {
   const double stoop = std::clamp((0.92 - begin) / 0.3, 0.0, 2.0), left = two_hands ? 0.0 : -0.1;
   const double across = two_hands ? 0.0 : 1.0;  // a handle is turned across, or the wrist would not follow
-  const Vector there(left, 0.52, begin);
+  const Vector there(left, 0.52, begin), begin_turn(0, 0, stoop > 0.5 ? 0.0 : 40 * across);
   KeyedMotion motion;
   motion.ground = kBesideTable;
   motion.feet = {foot(0.15, 0.06, 12), foot(-0.15, -0.05, -14)};
@@ -164,6 +164,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .spine = {14 + 6 * stoop, -5, 1},
                   .head = {16, -4, 0},
                   .object = there,
+                  .object_turn = begin_turn,
                   .away = {two_hands ? 0.0 : -0.04, -0.11, 0.13},
                   .grip = 16,
                   .left = {{0.02, 0.06 + 0.1 * stoop, 0.02 - 0.12 * stoop}, {0, 0, 0}, 22}},
@@ -173,6 +174,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .spine = {23 + 9 * stoop, -9, 2},
                   .head = {14, -6, 0},
                   .object = there,
+                  .object_turn = begin_turn,
                   .grip = 30,
                   .left = {{0.05 - 0.06 * stoop, 0.12 + 0.16 * stoop, 0.06 - 0.3 * stoop}, {0, 0, 0}, 24}},
                  {.seconds = 0.85,  // the fingers close, the knees give
@@ -181,6 +183,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .spine = {24 + 9 * stoop, -9, 2},
                   .head = {12, -6, 0},
                   .object = there,
+                  .object_turn = begin_turn,
                   .grip = 60,
                   .left = {{0.05 - 0.06 * stoop, 0.12 + 0.16 * stoop, 0.06 - 0.3 * stoop}, {0, 0, 0}, 26}},
                  {.seconds = 1.6,
@@ -432,10 +435,11 @@ Moment keyed_moment(const Actor& actor, double seconds) {
   if (actor.motion == SyntheticMotionKind::kWave) wave_hand(actor, ground, t, figure.hands[kLeft]);
   if (!actor.object.exists()) return moment;
   const bool sits = actor.motion == SyntheticMotionKind::kSit;
-  const Vector pivot = actor.object.grip + (sits ? Vector(kChairBack, 0, 0) : Vector(0, 0, 0));
-  moment.object = object_on(ground, pivot, key.object, key.object_turn);
+  const ObjectPlace at{actor.object.grip + (sits ? Vector(kChairBack, 0, 0) : Vector(0, 0, 0)), key.object,
+                       key.object_turn};
+  moment.object = object_on(ground, at);
   moment.in_hand = !sits && actor.motion != SyntheticMotionKind::kLean && key.away.norm() == 0;
-  if (!sits) hold_object(actor, ground.direction(key.away), key.grip, moment);
+  if (!sits) hold_object(actor, at, key.away, key.grip, moment);
   return moment;
 }
 

@@ -136,7 +136,7 @@ void SceneKit::add_window(double left, double right, double low, double high) {
   const double middle = (left + right) / 2, y = kWall - 0.08, white = 0.96;
   model.add_rectangle(Point(middle - 0.02, y, low), Point(0.04, 0, 0), Point(0, 0, high - low),
                       plain(Rgb(white, white, white * 0.97)), 2);
-  model.add_rectangle(Point(left, y, low + 0.635 * (high - low)), Point(right - left, 0, 0), Point(0, 0, 0.035),
+  model.add_rectangle(Point(left, y, low + 0.66 * ((high - low) / 1.04)), Point(right - left, 0, 0), Point(0, 0, 0.035),
                       plain(Rgb(white, white, white * 0.97)), 2);
   model.add_box(
       Point(middle, kWall - 0.09, low - 0.07), Point((right - left) / 2 + 0.15, 0.09, 0.018), 0,

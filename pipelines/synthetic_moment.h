@@ -23,14 +23,23 @@ struct Moment {
   bool in_hand = false;                 ///< the object is fixed to the right wrist
 };
 
-/// The object with its point `pivot` at `place` (left, forward, up on the ground), turned about it by degrees about
+/// Where an object is: its point `pivot` at `place` (left, forward, up on the ground), turned about it by degrees about
 /// (left, forward, up) from where its front points forward.
-Rigid<double> object_on(const Ground& ground, const Vector3<double>& pivot, const Vector3<double>& place,
-                        const Vector3<double>& turn_deg);
+struct ObjectPlace {
+  Vector3<double> pivot;
+  Vector3<double> place;
+  Vector3<double> turn_deg = {0, 0, 0};
+};
+
+Rigid<double> object_on(const Ground& ground, const ObjectPlace& at);
+
+/// How a hand that holds the object is turned when the object's front points forward; world.
+Matrix3<double> grasp_on(const Ground& ground, const HandGrip& grip, int side);
 
 /// Puts the hands that hold the object to their grips.
-/// @param away  of the hands from the grips, world
-void hold_object(const Actor& actor, const Vector3<double>& away, double curl_deg, Moment& moment);
+/// @param away  of the hands from the grips: left, forward, up
+void hold_object(const Actor& actor, const ObjectPlace& at, const Vector3<double>& away, double curl_deg,
+                 Moment& moment);
 
 /// Where a wrist is when the arm hangs: left, forward, up.
 Vector3<double> hanging_wrist(const FigureSizes& sizes, int side);

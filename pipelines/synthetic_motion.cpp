@@ -62,13 +62,13 @@ void check_object(const SyntheticObject& object, SyntheticMotionKind motion) {
                   " needs an object: " + object_names_of(motion));
 }
 
-/// The frame of a wrist in which its object is fixed.
-Rigid<double> wrist_from_object(const Actor& actor) {
+/// The object in the frame of the wrist that it is fixed to: the same on any ground.
+Rigid<double> wrist_from_object(const Actor& actor, const Ground& ground) {
   const HandGrip& grip = *actor.object.hands[kRight];
-  Matrix object_from_hand;
-  object_from_hand << -grip.fingers, cross(grip.thumb, Vector(-grip.fingers)), grip.thumb;
+  Ground facing = ground;
+  facing.heading_deg -= 90;
   Rigid<double> result;
-  result.rotation = object_from_hand.transpose();
+  result.rotation = detail::grasp_on(ground, grip, kRight).transpose() * facing.turn();
   result.translation = actor.sizes.palm[kRight] - result.rotation * grip.point;
   return result;
 }
@@ -103,28 +103,36 @@ Vector3<double> hanging_wrist(const FigureSizes& sizes, int side) {
   return {out * (sizes.shoulder_width / 2 + 0.07), 0.02, sizes.shoulder - 0.975 * sizes.arm};
 }
 
-Rigid<double> object_on(const Ground& ground, const Vector3<double>& pivot, const Vector3<double>& place,
-                        const Vector3<double>& turn_deg) {
+Rigid<double> object_on(const Ground& ground, const ObjectPlace& at) {
   Ground facing = ground;  // the object's front is +x, a person's −y
   facing.heading_deg -= 90;
   Rigid<double> pose;
-  pose.rotation = so3_exp(Vector(ground.direction(turn_deg) * kDegree)) * facing.turn();
-  pose.translation = ground.point(place) - pose.rotation * pivot;
+  pose.rotation = so3_exp(Vector(ground.direction(at.turn_deg) * kDegree)) * facing.turn();
+  pose.translation = ground.point(at.place) - pose.rotation * at.pivot;
   return pose;
 }
 
-void hold_object(const Actor& actor, const Vector3<double>& away, double curl_deg, Moment& moment) {
+Matrix3<double> grasp_on(const Ground& ground, const HandGrip& grip, int side) {
+  const auto in_world = [&](const Vector& v) { return ground.direction({v.y(), v.x(), v.z()}); };
+  const Vector thumb = in_world(grip.thumb), fingers = in_world(grip.fingers);
+  const Vector out = side == kRight ? Vector(-fingers) : fingers;  // +x of the wrist's frame
+  Matrix grasp;
+  grasp << out, cross(thumb, out), thumb;
+  return grasp;
+}
+
+void hold_object(const Actor& actor, const ObjectPlace& at, const Vector3<double>& away, double curl_deg,
+                 Moment& moment) {
+  const Ground& ground = moment.figure.ground;
   for (const int side : {kLeft, kRight}) {
-    const auto& grip = actor.object.hands[static_cast<std::size_t>(side)];
-    if (!grip || !moment.object) continue;
-    const Vector out = side == kRight ? Vector(-grip->fingers) : grip->fingers;  // +x of the wrist's frame
-    Matrix object_from_hand;
-    object_from_hand << out, cross(grip->thumb, out), grip->thumb;
-    const Matrix turn = moment.object->rotation * object_from_hand;
-    FigureHand& hand = moment.figure.hands[static_cast<std::size_t>(side)];
+    const auto i = static_cast<std::size_t>(side);
+    const auto& grip = actor.object.hands[i];
+    if (!grip) continue;
+    const Matrix turn = so3_exp(Vector(ground.direction(at.turn_deg) * kDegree)) * grasp_on(ground, *grip, side);
+    const Vector beside = moment.object->rotation * Vector(grip->point - at.pivot) + ground.direction(away);
+    FigureHand& hand = moment.figure.hands[i];
     hand.turn = turn;
-    hand.wrist =
-        transform_point(*moment.object, grip->point) + away - turn * actor.sizes.palm[static_cast<std::size_t>(side)];
+    hand.wrist = ground.point(at.place) - turn * actor.sizes.palm[i] + beside;
     hand.curl_deg = curl_deg;
   }
 }
@@ -153,6 +161,7 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
   const Actor actor{figure_sizes(body), object, settings.motion};
   const auto moment_at = is_walking(settings.motion) ? detail::walking_moment : detail::keyed_moment;
   const int wrist = smplx_joint("right_wrist");
+  const Moment start = moment_at(actor, 0);
   SyntheticClip clip;
   clip.motion.frame_rate = settings.frame_rate;
   clip.motion.pelvis_rest = pelvis_of(body.joints);
@@ -161,13 +170,13 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
     const Moment moment = moment_at(actor, seconds);
     clip.motion.poses.push_back(posed_figure(body, moment.figure));
     if (moment.object) {
-      clip.object.push_back(moment.in_hand
-                                ? compose(joint_frame(body, clip.motion.poses.back(), wrist), wrist_from_object(actor))
-                                : *moment.object);
+      clip.object.push_back(moment.in_hand ? compose(joint_frame(body, clip.motion.poses.back(), wrist),
+                                                     wrist_from_object(actor, start.figure.ground))
+                                           : *moment.object);
     }
     clip.cameras.push_back(camera_at(seconds, settings));
   }
-  Moment first = moment_at(actor, 0);
+  Moment first = start;
   if (first.object) first.object = clip.object.front();
   clip.plan = plan_of(first, object, settings.motion);
   return clip;

@@ -127,12 +127,13 @@ Moment walking_moment(const Actor& actor, double seconds) {
   const Vector place = actor.object.carried + (pushes ? Vector(0, 0, 0) : sway);
   const Vector tilt =
       pushes ? Vector(0, 0, 0) : Vector(2.5 * pace * std::sin(2 * kPi * seconds / kStep), 0, -4 * lands);
-  moment.object = object_on(figure.ground, actor.object.grip, place, tilt);
+  const ObjectPlace at{actor.object.grip, place, tilt};
+  moment.object = object_on(figure.ground, at);
   moment.in_hand = !pushes;
   for (const int side : {kLeft, kRight})
     if (actor.object.hands[static_cast<std::size_t>(side)])
       figure.hands[static_cast<std::size_t>(side)].elbow = figure.ground.direction({0.65 * out_of(side), -0.6, -0.35});
-  hold_object(actor, Vector::Zero(), 62, moment);
+  hold_object(actor, at, Vector::Zero(), 62, moment);
   return moment;
 }
 

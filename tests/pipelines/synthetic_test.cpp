@@ -276,6 +276,24 @@ TEST_CASE("every scene with motion and object makes a dataset") {
   }
 }
 
+TEST_CASE("every shipped config of synth makes its dataset") {
+  const TemporaryFolder folder;
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(fs::path(HSI4D_SOURCE_DIR) / "configs" / "synthetic")) {
+    const std::string name = entry.path().stem().string();
+    INFO(name);
+    const ProgramResult made =
+        run_hsi4d({"synth", entry.path().string(), "--out", name, "--set", "synthetic.frames=3", "--set",
+                   "synthetic.size_px=48", "--set", "synthetic.scene_gaussians=1500", "--set",
+                   "synthetic.avatar_gaussians=400", "--set", "synthetic.object_gaussians=100"});
+    CHECK(made.status == 0);
+    CHECK(made.out == name + ": 3 frames of 48 x 48 pixels with masks and truth\n");
+    names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  CHECK(names == std::vector<std::string>{"disturbed", "faults", "walk"});
+}
+
 TEST_CASE("a dataset with all noise and faults is a function of its settings", "[parallel]") {
   const TemporaryFolder folder;
   SyntheticSettings settings = small_settings();
