@@ -83,21 +83,20 @@ void write_objects(const std::string& path, const std::string& name, const std::
 class Film {
  public:
   Film(const SyntheticSettings& settings, const RenderSettings& render, const BodyModel& body, const Avatar& tracked,
-       const Gaussians& scene, const Gaussians& object)
+       const Gaussians& scene, const SyntheticObject& object)
       : settings_(settings),
         render_(render),
         body_(body),
         scene_(scene),
         object_(object),
         avatar_(filmed_avatar(body, tracked, settings)),
-        occluders_(object_occluders(object)),
+        occluders_(object_occluders(object.gaussians)),
         revealed_(settings.faults.revealed, static_cast<std::uint64_t>(settings.seed)) {}
 
   /// Frames are asked for in order.
   SyntheticFrame frame(const SyntheticClip& clip, std::size_t t) {
     const BodyPose& pose = clip.motion.poses[t];
-    const bool has_object = object_.count() > 0;
-    const Rigid<double> place = has_object ? clip.object[t] : Rigid<double>();
+    const Rigid<double> place = object_.exists() ? clip.object[t] : Rigid<double>();
     const Camera& camera = clip.cameras[t];
     const double part = clip.cameras.size() > 1 ? double(t) / double(clip.cameras.size() - 1) : 0;
     Avatar avatar = with_faded_hands(avatar_, settings_.faults.hands_fade * hands_gone(part));
@@ -122,7 +121,7 @@ class Film {
   const RenderSettings& render_;
   const BodyModel& body_;
   const Gaussians& scene_;
-  const Gaussians& object_;
+  const SyntheticObject& object_;
   Avatar avatar_;
   std::vector<Occluder> occluders_;
   RevealedContent revealed_;
@@ -169,7 +168,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
   write_text_file(out.file("config.json"), to_json(merged(object_of("data", data_section(object)), more_sections)));
 
-  Film film(settings, render, body, avatar, scene, object.gaussians);
+  Film film(settings, render, body, avatar, scene, object);
   Progress shown("frames", settings.frames, observer.progress, observer.progress_interval);
   for (std::size_t t = 0; t < clip.cameras.size(); ++t) {
     const std::string name = four_digits(static_cast<std::int64_t>(t)) + ".png";

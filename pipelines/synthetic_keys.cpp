@@ -153,7 +153,8 @@ KeyedMotion pour_motion() {
 /// @param begin  height of the grip of what stands there
 KeyedMotion lift_motion(double begin, bool two_hands) {
   const double stoop = std::clamp((0.92 - begin) / 0.3, 0.0, 2.0), left = two_hands ? 0.0 : -0.1;
-  const double across = two_hands ? 0.0 : 1.0;  // a handle is turned across, or the wrist would not follow
+  const double high = stoop > 0.5 ? 1.14 : 1.33;  // what stood on the floor is tall
+  const double across = two_hands ? 0.0 : 1.0;    // a handle is turned across, or the wrist would not follow
   const Vector there(left, 0.52, begin), begin_turn(0, 0, stoop > 0.5 ? 0.0 : 40 * across);
   KeyedMotion motion;
   motion.ground = kBesideTable;
@@ -200,7 +201,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .pelvis_turn = {1, 14, 2},
                   .spine = {-2, 18, -2},
                   .head = {2, 8, 0},
-                  .object = {left + 0.14, 0.37, 1.3},
+                  .object = {left + 0.14, 0.37, high - 0.03},
                   .object_turn = {-10, 0, 26 + 54 * across},
                   .grip = 64,
                   .left = {{0.05, 0.02, 0.02}, {0, 0, 0}, 26}},
@@ -209,7 +210,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
                   .pelvis_turn = {1, 12, 1},
                   .spine = {-3, 15, -1},
                   .head = {-2, 6, 0},
-                  .object = {left + 0.1, 0.38, 1.33},
+                  .object = {left + 0.1, 0.38, high},
                   .object_turn = {6, 0, 20 + 56 * across},
                   .grip = 64,
                   .left = {{0.05, 0.02, 0.02}, {0, 0, 0}, 26}}};

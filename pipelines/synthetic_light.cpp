@@ -175,11 +175,13 @@ Avatar shaded_avatar(const Avatar& avatar, const BodyPose& pose, double strength
   return result;
 }
 
-Gaussians shaded_object(const Gaussians& object, const Rigid<double>& world_from_object, double strength) {
-  Gaussians result = object;
+Gaussians shaded_object(const SyntheticObject& object, const Rigid<double>& world_from_object, double strength) {
+  Gaussians result = object.gaussians;
   if (strength <= 0) return result;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(object.count()); ++i) {
-    const Vector normal = axis_of(object.quats, i, 2);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(result.count()); ++i) {
+    const Vector from_middle = row_of(result.means, i);
+    const Vector normal =
+        object.has_normals ? axis_of(result.quats, i, 2) : Vector(from_middle / std::max(from_middle.norm(), 1e-9));
     scale_color(result, i, lit(world_from_object.rotation * normal, strength) / lit(normal, strength));
   }
   return result;

@@ -6,6 +6,7 @@
 
 #include "body/avatar.h"
 #include "core/rigid.h"
+#include "pipelines/synthetic_object.h"
 #include "splat/gaussians.h"
 
 namespace hsi4d {
@@ -44,7 +45,8 @@ Gaussians shadowed_scene(const Gaussians& scene, const std::vector<Occluder>& oc
 /// surface_avatar makes it.
 Avatar shaded_avatar(const Avatar& avatar, const BodyPose& pose, double strength);
 
-/// An object with colours as its surface faces the light in a pose, against how it stands in its own frame.
-Gaussians shaded_object(const Gaussians& object, const Rigid<double>& world_from_object, double strength);
+/// An object with colours as its surface faces the light in a pose, against how it stands in its own frame. One without
+/// normals is lit as a ball around its centroid would be.
+Gaussians shaded_object(const SyntheticObject& object, const Rigid<double>& world_from_object, double strength);
 
 }  // namespace hsi4d

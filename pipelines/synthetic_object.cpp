@@ -355,7 +355,9 @@ SyntheticObject object_of_file(const SyntheticSettings& settings) {
   for (auto& hand : hold.hands)
     if (hand) hand->point += grip - hold.grip;
   hold.grip = grip;
-  return object_of(settings.object_file.stem().string(), std::move(gaussians), hold);
+  SyntheticObject object = object_of(settings.object_file.stem().string(), std::move(gaussians), hold);
+  object.has_normals = false;
+  return object;
 }
 
 }  // namespace

@@ -28,6 +28,7 @@ struct SyntheticObject {
   std::array<std::optional<HandGrip>, 2> hands = {};  ///< left, right: those that hold it
   double above_ground = 0;           ///< height of the origin over the ground that it stands on, metres
   Vector3<double> carried{0, 0, 0};  ///< where its grip is when it is carried: left, forward, up of the person, metres
+  bool has_normals = true;           ///< the third axis of each Gaussian is its outward normal, as of made ones
   bool on_floor = false;             ///< it stands on the floor, not on a table
 
   bool exists() const { return gaussians.count() > 0; }

@@ -117,11 +117,11 @@ TEST_CASE("shading follows the direction of surfaces") {
   pose.set_rotation(0, {0, 0, 3});  // turned around: other sides are bright
   CHECK(shaded_avatar(avatar, pose, 1).colors != lit.colors);
   const SyntheticObject object = synthetic_object(SyntheticObjectKind::kBox, 300, 0);
-  const Gaussians still = shaded_object(object.gaussians, Rigid<double>(), 1);  // as it stands, nothing changes
+  const Gaussians still = shaded_object(object, Rigid<double>(), 1);  // as it stands, nothing changes
   for (std::size_t i = 0; i < still.sh.size(); ++i) CHECK(still.sh[i] == Approx(object.gaussians.sh[i]).margin(1e-5));
   Rigid<double> turned;
   turned.rotation = so3_exp(Vector(1.5, 0, 0));
-  CHECK(shaded_object(object.gaussians, turned, 1).sh != still.sh);
+  CHECK(shaded_object(object, turned, 1).sh != still.sh);
 }
 
 TEST_CASE("the filmed human has other Gaussians and nearly the same colours") {

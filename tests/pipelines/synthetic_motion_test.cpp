@@ -175,6 +175,29 @@ TEST_CASE("planted feet stay where they are in every motion") {
   });
 }
 
+TEST_CASE("people of other shapes walk and sit on their own feet") {
+  for (const std::vector<double>& shape : {std::vector<double>{2, 1, 1}, std::vector<double>{-2, -1, -1}}) {
+    BodySettings settings;
+    settings.shape = shape;
+    const BodyModel person = rest_body(settings);
+    for (const SyntheticMotionKind motion : {SyntheticMotionKind::kWalk, SyntheticMotionKind::kSit}) {
+      const SyntheticObjectKind kind =
+          motion == SyntheticMotionKind::kSit ? SyntheticObjectKind::kOfficeChair : SyntheticObjectKind::kWateringCan;
+      INFO(pair_name(motion, kind) << ", height " << shape[0]);
+      const SyntheticClip clip = synthetic_clip(person, synthetic_object(kind, 600, 0), {45, 15, 64, 1, motion});
+      const auto foot = static_cast<std::size_t>(smplx_joint("left_foot"));
+      const double ground = row(pose_joints(person, clip.motion.poses[0]), foot).z();
+      for (std::size_t t = 1; t < clip.motion.poses.size(); ++t) {
+        const Vector before = row(pose_joints(person, clip.motion.poses[t - 1]), foot);
+        const Vector at = row(pose_joints(person, clip.motion.poses[t]), foot);
+        INFO("frame " << t);
+        CHECK(at.z() > ground - 0.002);
+        if (at.z() < ground + 0.001 && before.z() < ground + 0.001) CHECK((at - before).norm() < 0.005);
+      }
+    }
+  }
+}
+
 TEST_CASE("steps are as long as those of people") {
   const SyntheticObject none = synthetic_object(SyntheticObjectKind::kNone, 600, 0);
   const SyntheticClip clip = synthetic_clip(body(), none, {120, 30, 64, 1, SyntheticMotionKind::kWalk});
