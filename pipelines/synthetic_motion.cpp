@@ -33,7 +33,7 @@ struct Viewpoint {
 
 Viewpoint viewpoint_of(SyntheticMotionKind motion) {
   if (motion == SyntheticMotionKind::kWalk) return {{0.5, -2.5, 1.4}, {0.02, 0.5, 0.85}, 1.2};
-  if (motion == SyntheticMotionKind::kPush) return {{0.5, -3.2, 1.5}, {0, 0.35, 0.78}, 1.3};
+  if (motion == SyntheticMotionKind::kPush) return {{0.5, -3.5, 1.5}, {0, 0.35, 0.72}, 1.25};
   if (motion == SyntheticMotionKind::kWave) return {{0.45, -1.95, 1.4}, {0.05, 0.7, 0.9}, 1.15};
   return {{0.42, -1.56, 1.36}, {0.02, 0.72, 0.85}, 1.12};
 }

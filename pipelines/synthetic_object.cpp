@@ -6,6 +6,7 @@
 
 #include "core/check.h"
 #include "core/rotation.h"
+#include "pipelines/clip.h"
 #include "pipelines/synthetic_kit.h"
 #include "splat/splat_file.h"
 #include "splat/transform.h"
@@ -335,7 +336,10 @@ std::array<Point, 2> bulk_of(const Gaussians& gaussians) {
 
 /// The Gaussians of object_file on z = 0, turned and scaled, and where they are held.
 SyntheticObject object_of_file(const SyntheticSettings& settings) {
-  const std::string path = settings.object_file.string();
+  const std::string path = settings.object_file.string(), name = settings.object_file.stem().string();
+  if (name == kHumanMasks)
+    throw UserError(path + ": an object is called by its file's name, and masks of \"" + name +
+                    "\" are those of the person; rename the file");
   SplatFile file = read_splats(path);
   if (file.gaussians.count() == 0) throw DataError(path + ": holds no Gaussians that can be used");
   Similarity placed;
@@ -355,7 +359,7 @@ SyntheticObject object_of_file(const SyntheticSettings& settings) {
   for (auto& hand : hold.hands)
     if (hand) hand->point += grip - hold.grip;
   hold.grip = grip;
-  SyntheticObject object = object_of(settings.object_file.stem().string(), std::move(gaussians), hold);
+  SyntheticObject object = object_of(name, std::move(gaussians), hold);
   object.has_normals = false;
   return object;
 }

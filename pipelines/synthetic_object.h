@@ -38,7 +38,8 @@ struct SyntheticObject {
 SyntheticObject synthetic_object(SyntheticObjectKind kind, Index most, std::uint64_t seed);
 
 /// The object of the settings: of object_file, where there is one.
-/// Throws as read_splats; DataError when the file holds no Gaussians.
+/// Throws as read_splats; DataError when the file holds no Gaussians; UserError when it is called like the masks of the
+/// person.
 SyntheticObject synthetic_object(const SyntheticSettings& settings);
 
 /// One line of what an object is.

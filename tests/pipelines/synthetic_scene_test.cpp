@@ -183,4 +183,10 @@ TEST_CASE("an object file stands in for the object and is held where the setting
   CHECK(side.grip.x() == Approx(-0.1).margin(0.02));
   CHECK(side.grip.z() == Approx(0.2).margin(0.02));
   CHECK((side.hands[1]->point - side.grip).norm() < 1e-12);
+  write_ply("human.ply", vase.gaussians);
+  settings.object_file = "human.ply";
+  CHECK_THROWS_MATCHES(
+      synthetic_object(settings), UserError,
+      Catch::Matchers::Message("human.ply: an object is called by its file's name, and masks of \"human\" are those of "
+                               "the person; rename the file"));
 }
