@@ -24,10 +24,14 @@ std::string place_of(const std::string& name, LossSettings& loss) {
 
 const char* words_of(LossNeeds needs) {
   switch (needs) {
-    case LossNeeds::kImages: return "an image";
-    case LossNeeds::kBody: return "the body";
-    case LossNeeds::kObjects: return "objects";
-    case LossNeeds::kBodyInImage: return "the body in an image";
+    case LossNeeds::kImages:
+      return "an image";
+    case LossNeeds::kBody:
+      return "the body";
+    case LossNeeds::kObjects:
+      return "objects";
+    case LossNeeds::kBodyInImage:
+      return "the body in an image";
   }
   return "";
 }
@@ -106,8 +110,8 @@ std::vector<LossFault> losses_without_inputs(const StageSettings& stage, LossNee
   std::vector<LossFault> faults;
   for (const auto& [name, loss] : stage.losses) {
     if (loss.weight == 0 || loss.needs == has) continue;
-    faults.push_back({child_pointer("/losses", name), std::string("this loss needs ") + words_of(loss.needs) +
-                                                          ", which " + having + " does not have"});
+    faults.push_back({child_pointer("/losses", name),
+                      std::string("this loss needs ") + words_of(loss.needs) + ", which " + having + " does not have"});
   }
   return faults;
 }

@@ -77,7 +77,8 @@ struct LossFault {
 };
 
 /// Prepares the losses that are on and have not been prepared yet (LossDescription::prepare), and the pose prior of a
-/// stage over the sequence, so that what they read is read once, and before anything is written. A fault is placed at the file that the loss names, if it is one.
+/// stage over the sequence, so that what they read is read once, and before anything is written. A fault is placed at
+/// the file that the loss names, if it is one.
 /// @return  what its prepare function threw as UserError or DataError, a fault a loss
 std::vector<LossFault> prepare_losses(StageSettings& stage);
 

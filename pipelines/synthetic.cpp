@@ -1,7 +1,5 @@
 #include "pipelines/synthetic.h"
 
-#include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,11 +10,14 @@
 #include "core/file.h"
 #include "core/folder_in_making.h"
 #include "core/image_io.h"
-#include "core/random.h"
 #include "core/rotation.h"
 #include "core/text.h"
+#include "pipelines/clip.h"
 #include "pipelines/state.h"
+#include "pipelines/synthetic_faults.h"
+#include "pipelines/synthetic_light.h"
 #include "pipelines/synthetic_motion.h"
+#include "pipelines/synthetic_object.h"
 #include "pipelines/synthetic_render.h"
 #include "pipelines/synthetic_scene.h"
 #include "splat/io_ply.h"
@@ -25,8 +26,6 @@ namespace hsi4d {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 ConfigValue numbers(const Vector3<double>& v) {
   return ConfigValue::make_array(
@@ -39,23 +38,30 @@ ConfigValue object_of(std::string_view key, ConfigValue value) {
   return object;
 }
 
-std::string initial_json(const std::string& name, const Rigid<double>& pose) {
-  ConfigValue state = ConfigValue::make_object();
-  state.add("rotation", numbers(so3_log(pose.rotation)));
-  state.add("translation", numbers(pose.translation));
+std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<double>>& poses) {
   ConfigValue root = ConfigValue::make_object();
   root.add("motion", ConfigValue::make_string("initial_motion.npz"));
-  root.add("objects", object_of(name, std::move(state)));
+  ConfigValue objects = ConfigValue::make_object();
+  if (object.exists()) {
+    ConfigValue state = ConfigValue::make_object();
+    state.add("rotation", numbers(so3_log(poses.front().rotation)));
+    state.add("translation", numbers(poses.front().translation));
+    objects.add(object.name, std::move(state));
+  }
+  root.add("objects", std::move(objects));
   return to_json(root);
 }
 
-ConfigValue data_section(const std::string& name) {
+ConfigValue data_section(const SyntheticObject& object) {
   ConfigValue data = ConfigValue::make_object();
   const auto add = [&data](std::string_view key, std::string_view file) {
     data.add(key, ConfigValue::make_string(file));
   };
   add("scene", "scene.ply");
-  data.add("objects", object_of(name, object_of("gaussians", ConfigValue::make_string("objects/" + name + ".ply"))));
+  if (object.exists()) {
+    const ConfigValue file = ConfigValue::make_string("objects/" + object.name + ".ply");
+    data.add("objects", object_of(object.name, object_of("gaussians", file)));
+  }
   add("avatar", "avatar.safetensors");
   add("frames", "frames");
   add("masks", "masks");
@@ -73,34 +79,55 @@ void write_objects(const std::string& path, const std::string& name, const std::
   write_object_tracks(path, {name}, frames);
 }
 
-/// Three independent standard normals.
-Vector3<double> normal_vector(const Random& random, std::uint64_t index) {
-  const auto [x, y] = random.normal_pair(2 * index);
-  return {x, y, random.normal(2 * index + 1)};
-}
+/// The frames of the video one after the other, with what is done to them that the reconstruction does not know of.
+class Film {
+ public:
+  Film(const SyntheticSettings& settings, const RenderSettings& render, const BodyModel& body, const Avatar& tracked,
+       const Gaussians& scene, const SyntheticObject& object)
+      : settings_(settings),
+        render_(render),
+        body_(body),
+        scene_(scene),
+        object_(object),
+        avatar_(filmed_avatar(body, tracked, settings)),
+        occluders_(object_occluders(object.gaussians)),
+        revealed_(settings.faults.revealed, static_cast<std::uint64_t>(settings.seed)) {}
+
+  /// Frames are asked for in order.
+  SyntheticFrame frame(const SyntheticClip& clip, std::size_t t) {
+    const BodyPose& pose = clip.motion.poses[t];
+    const Rigid<double> place = object_.exists() ? clip.object[t] : Rigid<double>();
+    const Camera& camera = clip.cameras[t];
+    const double part = clip.cameras.size() > 1 ? double(t) / double(clip.cameras.size() - 1) : 0;
+    Avatar avatar = with_faded_hands(avatar_, settings_.faults.hands_fade * hands_gone(part));
+    if (settings_.faults.appearance > 0) avatar = with_changed_colors(avatar, part * settings_.faults.appearance);
+    avatar = shaded_avatar(avatar, pose, settings_.light.shading);
+    std::vector<Occluder> occluders;
+    if (settings_.light.shadow > 0) {
+      occluders = body_occluders(body_, pose);
+      const std::vector<Occluder> of_object = moved(occluders_, place);
+      occluders.insert(occluders.end(), of_object.begin(), of_object.end());
+    }
+    const Gaussians scene = shadowed_scene(scene_, occluders, camera_center_world(camera), settings_.light.shadow);
+    const Gaussians object = shaded_object(object_, place, settings_.light.shading);
+    const SyntheticRenderer renderer(scene, object, avatar, render_);
+    SyntheticFrame frame = renderer.frame(pose, place, camera, settings_.supersample);
+    revealed_.apply(frame);
+    return frame;
+  }
+
+ private:
+  const SyntheticSettings& settings_;
+  const RenderSettings& render_;
+  const BodyModel& body_;
+  const Gaussians& scene_;
+  const SyntheticObject& object_;
+  Avatar avatar_;
+  std::vector<Occluder> occluders_;
+  RevealedContent revealed_;
+};
 
 }  // namespace
-
-Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings) {
-  const Random random(static_cast<std::uint64_t>(settings.seed), random_stream("synthetic.initial_motion"));
-  Motion motion = truth;
-  for (std::size_t t = 1; t < motion.poses.size(); ++t) {
-    BodyPose& pose = motion.poses[t];
-    const std::uint64_t base = t * static_cast<std::uint64_t>(kSmplxJoints + 1);
-    const auto turn = [&](Index joint, double degrees) {
-      const Vector3<double> noise =
-          normal_vector(random, base + static_cast<std::uint64_t>(joint)) * (degrees * kDegree / std::sqrt(3.0));
-      const Matrix3<double> rotation = so3_exp(pose.rotation_of(joint)) * so3_exp(noise);
-      if (degrees > 0) pose.set_rotation(joint, so3_log(rotation));
-    };
-    turn(0, settings.root_noise_deg);
-    for (Index joint = 1; joint <= 21; ++joint) turn(joint, settings.pose_noise_deg);
-    for (Index joint = 25; joint < kSmplxJoints; ++joint)
-      turn(joint, settings.pose_noise_deg * settings.hand_noise_share);
-    pose.transl += normal_vector(random, base + static_cast<std::uint64_t>(kSmplxJoints)) * settings.root_noise_m;
-  }
-  return motion;
-}
 
 RenderSettings video_render_settings() {
   RenderSettings settings;
@@ -120,34 +147,39 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   avatar_settings.gaussians = settings.avatar_gaussians;
   avatar_settings.seed = seed;
   const Avatar avatar = surface_avatar(body, avatar_settings);
-  const SyntheticObject object = synthetic_object(settings.object, settings.object_gaussians, seed);
-  const SyntheticClip clip =
-      synthetic_clip(body, object, {settings.frames, settings.frame_rate, settings.size_px, settings.camera_drift});
-  const Gaussians room = synthetic_room(settings.scene_gaussians, clip.room, seed);
+  const SyntheticObject object = synthetic_object(settings);
+  const SyntheticClip clip = synthetic_clip(body, object, clip_settings(settings));
+  const Gaussians scene = synthetic_scene(settings, clip.plan);
 
   stop_if_asked();
-  write_ply(out.file("scene.ply"), room);
-  write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
+  write_ply(out.file("scene.ply"), scene);
   write_avatar(out.file("avatar.safetensors"), avatar);
   write_camera(out.file("camera.json"), clip.cameras.front());
   write_motion(out.file("initial_motion.npz"), disturbed_motion(clip.motion, settings));
-  write_text_file(out.file("initial.json"), initial_json(object.name, clip.object.front()));
+  write_text_file(out.file("initial.json"), initial_json(object, clip.object));
   write_motion(out.file("truth/motion.npz"), clip.motion);
-  write_objects(out.file("truth/objects.npz"), object.name, clip.object);
   write_cameras(out.file("truth/cameras.json"), clip.cameras);
+  if (object.exists()) {
+    write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
+    write_objects(out.file("truth/objects.npz"), object.name, clip.object);
+    if (settings.object_noise_deg > 0 || settings.object_noise_m > 0)
+      write_objects(out.file("initial_objects.npz"), object.name, disturbed_object(clip.object, settings));
+  }
   write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
-  write_text_file(out.file("config.json"),
-                  to_json(merged(object_of("data", data_section(object.name)), more_sections)));
+  write_text_file(out.file("config.json"), to_json(merged(object_of("data", data_section(object)), more_sections)));
 
-  const SyntheticRenderer renderer(room, object.gaussians, avatar, render);
+  Film film(settings, render, body, avatar, scene, object);
   Progress shown("frames", settings.frames, observer.progress, observer.progress_interval);
   for (std::size_t t = 0; t < clip.cameras.size(); ++t) {
     const std::string name = four_digits(static_cast<std::int64_t>(t)) + ".png";
-    const SyntheticFrame frame =
-        renderer.frame(clip.motion.poses[t], clip.object[t], clip.cameras[t], settings.supersample);
+    const SyntheticFrame frame = film.frame(clip, t);
+    const auto write_mask = [&](const std::string& of, const Image& mask) {
+      write_image(out.file(fs::path("masks") / of / name),
+                  disturbed_mask(mask, settings.masks, seed, of, static_cast<Index>(t)));
+    };
     write_image(out.file(fs::path("frames") / name), frame.color);
-    write_image(out.file(fs::path("masks") / "human" / name), frame.human_mask);
-    write_image(out.file(fs::path("masks") / object.name / name), frame.object_mask);
+    write_mask(kHumanMasks, frame.human_mask);
+    if (object.exists()) write_mask(object.name, frame.object_mask);
     shown.step();
     stop_if_asked();
   }

@@ -1,9 +1,11 @@
-// Datasets with exact ground truth, made by code: one room, one object, one motion, seen by a drifting camera.
+// Datasets with exact ground truth, made by code: a person who does something with an object in a scene, seen by a
+// drifting camera.
 //
 //   scene.ply  objects/NAME.ply  avatar.safetensors              Gaussians; the object's are relative to their mean
 //   frames/0000.png ...                                          8 bit
 //   masks/human/0000.png ...  masks/NAME/0000.png ...            8 bit grey: the share of the pixel
 //   camera.json  initial.json  initial_motion.npz                frame 0 exact, later frames disturbed
+//   initial_objects.npz                               poses of the object, disturbed; only with object_noise_*
 //   config.json                                                  a run config that names all this
 //   synthetic.json                                               the settings that it was made with
 //   truth/motion.npz  truth/objects.npz  truth/cameras.json
@@ -13,9 +15,9 @@
 
 #include <filesystem>
 
-#include "body/motion_io.h"
 #include "core/config_value.h"
 #include "pipelines/observer.h"
+#include "pipelines/synthetic_noise.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
 
@@ -25,11 +27,6 @@ namespace hsi4d {
 /// supersampled size, so that the pixel filter that the reconstruction should use is narrower, blur/supersample² + 1/16
 /// pixels² for a supersample of 2.
 RenderSettings video_render_settings();
-
-/// `truth` with noise on every frame but the first, as an estimator would have it: joints 1-21 turned by
-/// pose_noise_deg (the root of the mean squared angle, axes uniform), finger joints by hand_noise_share of that, the
-/// root by root_noise_deg and moved by root_noise_m (each coordinate's standard deviation). Jaw and eyes stay.
-Motion disturbed_motion(const Motion& truth, const SyntheticSettings& settings);
 
 /// Writes a dataset: the same bytes for the same settings, for any number of threads.
 ///

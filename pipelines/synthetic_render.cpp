@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "autodiff/rotations.h"
@@ -51,12 +52,13 @@ SyntheticFrame SyntheticRenderer::frame(const BodyPose& pose, const Rigid<double
                        settings_};
   Tape<float> tape;
   const Var<float> xi = tape.constant("xi", shape_of(1, 6));
-  const std::vector<SplatInputs<float>> parts = {standing_splats(constants(tape, room_), xi, view),
-                                                 object_splats(tape, object_, world_from_object, xi, view),
-                                                 avatar_splats(tape, avatar_, pose)};
+  std::vector<SplatInputs<float>> parts = {standing_splats(constants(tape, room_), xi, view)};
+  if (object_.count() > 0) parts.push_back(object_splats(tape, object_, world_from_object, xi, view));
+  parts.push_back(avatar_splats(tape, avatar_, pose));
   const Index first = room_.count(), second = first + object_.count(), end = second + avatar_.count();
   RenderRequest request;
-  request.groups = {{second, end}, {first, second}};
+  request.groups = {{second, end}};
+  if (object_.count() > 0) request.groups.push_back({first, second});
   const Rendered<float> rendered =
       render(stacked_splats(parts), xi, tape.constant("background", shape_of(1, 3)), view, request);
   tape.forward(rendered.image);
@@ -64,7 +66,8 @@ SyntheticFrame SyntheticRenderer::frame(const BodyPose& pose, const Rigid<double
   const auto reduced = [&](Var<float> var, int plane, int count) {
     return resize_area(held_image(tape.value(var), plane, count), camera.height, camera.width);
   };
-  return {reduced(rendered.image, 0, 3), reduced(rendered.group_opacity, 0, 1), reduced(rendered.group_opacity, 1, 1)};
+  Image object_mask = object_.count() > 0 ? reduced(rendered.group_opacity, 1, 1) : Image();
+  return {reduced(rendered.image, 0, 3), reduced(rendered.group_opacity, 0, 1), std::move(object_mask)};
 }
 
 }  // namespace hsi4d

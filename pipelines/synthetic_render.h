@@ -16,7 +16,7 @@ namespace hsi4d {
 struct SyntheticFrame {
   Image color;        ///< [3,H,W] in [0, 1]
   Image human_mask;   ///< [1,H,W] share of each pixel that shows the human, what hides it included
-  Image object_mask;  ///< [1,H,W] as human_mask
+  Image object_mask;  ///< [1,H,W] as human_mask; empty without an object
 };
 
 /// Draws a room, one object and an avatar in single precision.

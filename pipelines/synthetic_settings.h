@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "core/config.h"
 #include "core/types.h"
@@ -11,11 +13,44 @@
 
 namespace hsi4d {
 
-/// What is carried.
-enum class SyntheticObjectKind { kWateringCan, kBox };
+/// Where it happens.
+enum class SyntheticSceneKind { kLivingRoom, kKitchen, kBedroom, kGarden, kTerrace };
 
-inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 2> kSyntheticObjectKinds = {
-    {{SyntheticObjectKind::kWateringCan, "watering_can"}, {SyntheticObjectKind::kBox, "box"}}};
+inline constexpr std::array<ConfigChoice<SyntheticSceneKind>, 5> kSyntheticSceneKinds = {
+    {{SyntheticSceneKind::kLivingRoom, "living_room"},
+     {SyntheticSceneKind::kKitchen, "kitchen"},
+     {SyntheticSceneKind::kBedroom, "bedroom"},
+     {SyntheticSceneKind::kGarden, "garden"},
+     {SyntheticSceneKind::kTerrace, "terrace"}}};
+
+/// What is used.
+enum class SyntheticObjectKind { kWateringCan, kBox, kVase, kGuitar, kOfficeChair, kNone };
+
+inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 6> kSyntheticObjectKinds = {
+    {{SyntheticObjectKind::kWateringCan, "watering_can"},
+     {SyntheticObjectKind::kBox, "box"},
+     {SyntheticObjectKind::kVase, "vase"},
+     {SyntheticObjectKind::kGuitar, "guitar"},
+     {SyntheticObjectKind::kOfficeChair, "office_chair"},
+     {SyntheticObjectKind::kNone, "none"}}};
+
+/// What is done.
+enum class SyntheticMotionKind { kPour, kLift, kWalk, kPush, kSit, kLean, kWave };
+
+inline constexpr std::array<ConfigChoice<SyntheticMotionKind>, 7> kSyntheticMotionKinds = {
+    {{SyntheticMotionKind::kPour, "pour"},
+     {SyntheticMotionKind::kLift, "lift"},
+     {SyntheticMotionKind::kWalk, "walk"},
+     {SyntheticMotionKind::kPush, "push"},
+     {SyntheticMotionKind::kSit, "sit"},
+     {SyntheticMotionKind::kLean, "lean"},
+     {SyntheticMotionKind::kWave, "wave"}}};
+
+/// The objects that a motion makes sense with.
+const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion);
+
+/// The words of the objects that go with a motion: "watering_can, box, vase".
+std::string object_names_of(SyntheticMotionKind motion);
 
 /// What is made.
 enum class SyntheticKind { kClip, kViews };
@@ -23,9 +58,29 @@ enum class SyntheticKind { kClip, kViews };
 inline constexpr std::array<ConfigChoice<SyntheticKind>, 2> kSyntheticKinds = {
     {{SyntheticKind::kClip, "clip"}, {SyntheticKind::kViews, "views"}}};
 
-/// Fewest Gaussians that the room and the object can be made of: one for each of their surfaces.
-inline constexpr Index kFewestRoomGaussians = 700;
+/// Fewest Gaussians that a scene and an object can be made of: one for each of their surfaces.
+inline constexpr Index kFewestSceneGaussians = 700;
 inline constexpr Index kFewestObjectGaussians = 60;
+
+/// How frames are lit beyond what is baked into the colours.
+struct SyntheticLight {
+  double shading = 0;  ///< of human and object, by the direction of their surfaces
+  double shadow = 0;   ///< of human and object on the scene
+};
+
+/// Faults of generated videos; 0 leaves each out.
+struct SyntheticFaults {
+  double revealed = 0;    ///< invented content where the human or the object once was
+  double hands_fade = 0;  ///< how far the hands vanish in the middle of the clip
+  double appearance = 0;  ///< how far the human's colours have changed in the last frame
+};
+
+/// Faults of the masks; 0 leaves each out.
+struct SyntheticMaskNoise {
+  double grow_px = 0;        ///< outward; negative: eaten away
+  double jagged_px = 0;      ///< how far boundaries are off here and there
+  double dropped_share = 0;  ///< of masks that show nothing
+};
 
 /// What a synthetic dataset holds.
 struct SyntheticSettings {
@@ -35,21 +90,43 @@ struct SyntheticSettings {
   double frame_rate = 10;  ///< frames a second
   int size_px = 256;
   int supersample = 2;
+  SyntheticSceneKind scene = SyntheticSceneKind::kLivingRoom;
   SyntheticObjectKind object = SyntheticObjectKind::kWateringCan;
+  SyntheticMotionKind motion = SyntheticMotionKind::kPour;
+  std::filesystem::path scene_file;     ///< stands in for the scene
+  std::array<double, 3> scene_place{};  ///< of the file, where the person acts; metres after scene_scale
+  double scene_turn_deg = 0;            ///< about z
+  double scene_scale = 1;
+  std::filesystem::path object_file;  ///< stands in for the object
+  std::vector<double> object_grip;    ///< where it is held, in the file's coordinates; empty: middle of its top
+  double object_turn_deg = 0;         ///< about z, until its front is +x
+  double object_scale = 1;
   Index scene_gaussians = 12000;
   Index avatar_gaussians = 5000;
   Index object_gaussians = 1500;
+  double avatar_difference = 0;  ///< of the human in the video from the one in avatar.safetensors
+  SyntheticLight light;
   double camera_drift = 1;
   double pose_noise_deg = 8;
+  double pose_bias_deg = 0;
+  double pose_drift_deg = 0;
   double hand_noise_share = 0.25;
   double root_noise_deg = 2;
   double root_noise_m = 0.02;
+  double root_drift_m = 0;
+  double object_noise_deg = 0;
+  double object_noise_m = 0;
+  SyntheticMaskNoise masks;
+  SyntheticFaults faults;
   Index views_cameras = 6;  ///< of kind views
   Index views_poses = 4;
 };
 
 /// Describes the section: every setting with its range.
 void describe(ConfigFields& fields, SyntheticSettings& settings);
+void describe(ConfigFields& fields, SyntheticLight& settings);
+void describe(ConfigFields& fields, SyntheticFaults& settings);
+void describe(ConfigFields& fields, SyntheticMaskNoise& settings);
 
 /// The settings as JSON text: what a dataset's synthetic.json holds. The body is in it unless it is the default.
 std::string synthetic_settings_json(const SyntheticSettings& settings, const BodySettings& body = {});

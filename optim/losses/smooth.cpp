@@ -22,17 +22,16 @@ void describe(ConfigFields& fields, SmoothSettings& settings) {
 }  // namespace
 
 LossTerm smooth_loss() {
-  LossTerm term = make_loss_term<SmoothSettings>("smooth", "How far joints go between adjacent frames",
-                                        [](const auto& in, const SmoothSettings& settings) {
-                                          if (!in.given(in.joints) || in.joints.shape().rows <= settings.order)
-                                            return decltype(in.joints){};
-                                          auto steps = in.joints;
-                                          for (int k = 0; k < settings.order; ++k) {
-                                            const Index rows = steps.shape().rows - 1;
-                                            steps = slice_rows(steps, 1, rows) - slice_rows(steps, 0, rows);
-                                          }
-                                          return sum(square(steps)) * (1 / static_cast<double>(steps.shape().rows));
-                                        });
+  LossTerm term = make_loss_term<SmoothSettings>(
+      "smooth", "How far joints go between adjacent frames", [](const auto& in, const SmoothSettings& settings) {
+        if (!in.given(in.joints) || in.joints.shape().rows <= settings.order) return decltype(in.joints){};
+        auto steps = in.joints;
+        for (int k = 0; k < settings.order; ++k) {
+          const Index rows = steps.shape().rows - 1;
+          steps = slice_rows(steps, 1, rows) - slice_rows(steps, 0, rows);
+        }
+        return sum(square(steps)) * (1 / static_cast<double>(steps.shape().rows));
+      });
   term.description.needs = LossNeeds::kBody;
   return term;
 }

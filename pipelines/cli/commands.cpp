@@ -12,6 +12,7 @@
 #include "pipelines/run_config.h"
 #include "pipelines/run_problems.h"
 #include "pipelines/sequence_graph.h"
+#include "pipelines/synthetic_motion.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -89,13 +90,13 @@ std::string list_stages() {
   return table(rows);
 }
 
-/// What synthetic.object can be: the scenes that synth and demo make.
+/// What synthetic.scene, synthetic.motion and synthetic.object can be.
 std::string list_scenes() {
-  std::vector<std::vector<std::string>> rows = {{"SYNTHETIC.OBJECT", "SCENE"}};
-  for (const ConfigChoice<SyntheticObjectKind>& kind : kSyntheticObjectKinds)
-    rows.push_back({kind.name, std::string("A person in a room lifts ") +
-                                   (kind.value == SyntheticObjectKind::kBox ? "a box" : "a watering can") +
-                                   " from a table, turns and pours; the camera drifts"});
+  std::vector<std::vector<std::string>> rows = {{"SYNTHETIC", "", "WHAT", "OBJECTS"}};
+  for (const auto& kind : kSyntheticSceneKinds) rows.push_back({"scene", kind.name, scene_summary(kind.value), ""});
+  for (const auto& kind : kSyntheticMotionKinds)
+    rows.push_back({"motion", kind.name, motion_summary(kind.value), object_names_of(kind.value)});
+  for (const auto& kind : kSyntheticObjectKinds) rows.push_back({"object", kind.name, object_summary(kind.value), ""});
   return table(rows);
 }
 

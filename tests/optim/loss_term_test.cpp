@@ -159,7 +159,8 @@ TEST_CASE("a registered loss term says whether it needs the body or objects") {
     std::vector<Var<double>> vars;
     for (const OperatorInput& input : given) vars.push_back(tape.parameter(input.name, input.shape));
     LossInputs<double> all = inputs_of(vars), no_body = all, no_objects = all;
-    no_body.body_rotations = {};
+    no_body.body_rotations = no_body.joints = no_body.joints_start = {};
+    no_body.motion = nullptr;
     no_objects.object_opacity = no_objects.object_center_target = no_objects.object_depth =
         no_objects.object_depth_target = {};
     CHECK(term.record(all).tape != nullptr);

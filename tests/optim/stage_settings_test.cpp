@@ -101,8 +101,15 @@ TEST_CASE("losses that need what a stage does not have are named, unless they ar
   CHECK(text ==
         "/losses/center: this loss needs objects, which a picture does not have\n"
         "/losses/depth: this loss needs objects, which a picture does not have\n"
+        "/losses/mask: this loss needs the body in an image, which a picture does not have\n"
+        "/losses/fit: this loss needs the body, which a picture does not have\n"
+        "/losses/contact: this loss needs the body, which a picture does not have\n"
+        "/losses/smooth: this loss needs the body, which a picture does not have\n"
+        "/losses/ground: this loss needs the body, which a picture does not have\n"
+        "/losses/foot_sliding: this loss needs the body, which a picture does not have\n"
         "/losses/joint_limits: this loss needs the body, which a picture does not have\n"
         "/losses/pose_prior: this loss needs the body, which a picture does not have\n");
+  CHECK(losses_without_inputs(stage, LossNeeds::kBody, "a motion").size() == 5);  // all others
   for (auto& [name, loss] : stage.losses) loss.weight = 0;
   CHECK(losses_without_inputs(stage, LossNeeds::kImages, "a picture").empty());
 }

@@ -36,12 +36,10 @@ void write_changing_dataset(const fs::path& folder, const SyntheticSettings& set
   ConfigProblems problems;
   write_dataset(settings, video_render_settings(), folder, {},
                 load_config_text(kTinyStages, "tiny.json", folder.parent_path(), {}, problems));
-  const auto seed = static_cast<std::uint64_t>(settings.seed);
   const BodyModel body = rest_body(BodySettings{});
-  const SyntheticObject object = synthetic_object(settings.object, settings.object_gaussians, seed);
-  const SyntheticClip clip =
-      synthetic_clip(body, object, {settings.frames, settings.frame_rate, settings.size_px, settings.camera_drift});
-  const Gaussians room = synthetic_room(settings.scene_gaussians, clip.room, seed);
+  const SyntheticObject object = synthetic_object(settings);
+  const SyntheticClip clip = synthetic_clip(body, object, clip_settings(settings));
+  const Gaussians room = synthetic_scene(settings, clip.plan);
   const Avatar avatar = read_avatar(dataset_inputs(folder).avatar.string());
   const RenderSettings render = video_render_settings();  // the renderer keeps a reference
   for (std::size_t t = 0; t < clip.cameras.size(); ++t) {

@@ -363,7 +363,7 @@ TEST_CASE("every shipped config runs", "[run]") {
     INFO("its dataset");  // but for its size
     config.synthetic.frames = 2;
     config.synthetic.size_px = 32;
-    config.synthetic.scene_gaussians = kFewestRoomGaussians;
+    config.synthetic.scene_gaussians = kFewestSceneGaussians;
     config.synthetic.avatar_gaussians = 300;
     config.synthetic.object_gaussians = kFewestObjectGaussians;
     write_dataset(config.synthetic, video_render_settings(), folder + "-dataset");

@@ -17,7 +17,6 @@
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "pipelines/synthetic_motion.h"
-#include "pipelines/synthetic_scene.h"
 #include "splat/io_ply.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
@@ -80,10 +79,6 @@ std::vector<std::string> names_in(const std::map<std::string, std::string>& file
 
 Vector3<double> row(const std::vector<double>& values, std::size_t i) {
   return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
-}
-
-double degrees_between(const Matrix3<double>& a, const Matrix3<double>& b) {
-  return so3_log(Matrix3<double>(a.transpose() * b)).norm() * 180 / std::numbers::pi;
 }
 
 double mean_of(const Image& image) {
@@ -258,121 +253,76 @@ TEST_CASE("a dataset never lands in a folder that holds something") {
   for (const auto& entry : fs::directory_iterator(".")) CHECK(entry.path().extension() != ".tmp");
 }
 
-TEST_CASE("eight frames move as much as can be followed, and no more") {
-  const BodyModel body = procedural_body();
-  const SyntheticObject object = synthetic_object(SyntheticObjectKind::kWateringCan, 1500, 0);
-  const SyntheticSettings defaults;
-  const SyntheticClip clip = synthetic_clip(body, object, {defaults.frames, defaults.frame_rate, 256, 1});
-  REQUIRE(clip.motion.poses.size() == 8);
-  const auto joint_turn = [&](std::size_t a, std::size_t b, Index joint) {
-    return degrees_between(so3_exp(clip.motion.poses[a].rotation_of(joint)),
-                           so3_exp(clip.motion.poses[b].rotation_of(joint)));
-  };
-  const auto root_way = [&](std::size_t a, std::size_t b) {
-    return (clip.motion.poses[a].transl - clip.motion.poses[b].transl).norm();
-  };
-  const auto camera_way = [&](std::size_t a, std::size_t b) {
-    return (camera_center_world(clip.cameras[a]) - camera_center_world(clip.cameras[b])).norm();
-  };
-  const auto camera_turn = [&](std::size_t a, std::size_t b) {
-    return degrees_between(clip.cameras[a].camera_from_world.rotation, clip.cameras[b].camera_from_world.rotation);
-  };
-  for (std::size_t t = 1; t < 8; ++t) {
-    INFO("frame " << t);
-    CHECK(root_way(t - 1, t) <= 0.04);
-    CHECK((clip.object[t].translation - clip.object[t - 1].translation).norm() <= 0.05);
-    CHECK(camera_way(t - 1, t) <= 0.015);
-    CHECK(camera_turn(t - 1, t) <= 0.4);
-    for (Index joint = 0; joint < kSmplxJoints; ++joint) {
-      INFO(body.joint_names[static_cast<std::size_t>(joint)]);
-      CHECK(joint_turn(t - 1, t, joint) <= 12);
-    }
+TEST_CASE("every scene with motion and object makes a dataset") {
+  const TemporaryFolder folder;
+  SyntheticSettings settings = small_settings();
+  settings.frames = 2;
+  std::size_t scene = 0;
+  for (const auto& motion : kSyntheticMotionKinds) {
+    settings.motion = motion.value;
+    settings.object = objects_of(motion.value).back();
+    settings.scene = kSyntheticSceneKinds[scene++ % kSyntheticSceneKinds.size()].value;
+    INFO(motion.name);
+    write_dataset(settings, {}, motion.name);
+    const fs::path made = motion.name;
+    CHECK(mean_of(read_image((made / "frames/0001.png").string())) > 0.2);
+    const double human = mean_of(read_image((made / "masks/human/0001.png").string()));
+    CHECK(human > 0.02);
+    CHECK(human < 0.35);
+    const bool has_object = settings.object != SyntheticObjectKind::kNone;
+    CHECK(fs::exists(made / "objects") == has_object);
+    CHECK(fs::exists(made / "truth/objects.npz") == has_object);
+    CHECK_FALSE(fs::exists(made / "initial_objects.npz"));
   }
-  CHECK(root_way(0, 7) > 0.15);
-  CHECK((clip.object[7].translation - clip.object[0].translation).norm() > 0.2);
-  CHECK(degrees_between(clip.object[0].rotation, clip.object[7].rotation) > 15);
-  CHECK(camera_way(0, 7) > 0.09);
-  CHECK(camera_turn(0, 7) > 2);
-  for (const char* name :
-       {"left_knee", "right_shoulder", "left_shoulder", "right_elbow", "right_wrist", "left_index1"}) {
+}
+
+TEST_CASE("every shipped config of synth makes its dataset") {
+  const TemporaryFolder folder;
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(fs::path(HSI4D_SOURCE_DIR) / "configs" / "synthetic")) {
+    const std::string name = entry.path().stem().string();
     INFO(name);
-    CHECK(joint_turn(0, 7, smplx_joint(name)) > 10);
+    const ProgramResult made =
+        run_hsi4d({"synth", entry.path().string(), "--out", name, "--set", "synthetic.frames=3", "--set",
+                   "synthetic.size_px=48", "--set", "synthetic.scene_gaussians=1500", "--set",
+                   "synthetic.avatar_gaussians=400", "--set", "synthetic.object_gaussians=100"});
+    CHECK(made.status == 0);
+    CHECK(made.out == name + ": 3 frames of 48 x 48 pixels with masks and truth\n");
+    names.push_back(name);
   }
+  std::sort(names.begin(), names.end());
+  CHECK(names == std::vector<std::string>{"disturbed", "faults", "walk"});
 }
 
-TEST_CASE("the clip keeps its feet on the floor, its object in reach, and runs on for any number of frames") {
-  const BodyModel body = procedural_body();
-  const SyntheticObject object = synthetic_object(SyntheticObjectKind::kBox, 300, 0);
-  const SyntheticClip clip = synthetic_clip(body, object, {75, 10, 64, 1});
-  const auto start = pose_joints(body, clip.motion.poses[0]);
-  for (std::size_t t = 0; t < 75; ++t) {
-    INFO("frame " << t);
-    const auto joints = pose_joints(body, clip.motion.poses[t]);
-    for (const char* name : {"left_ankle", "right_ankle", "left_foot", "right_foot"}) {
-      const std::size_t joint = static_cast<std::size_t>(smplx_joint(name));
-      CHECK((row(joints, joint) - row(start, joint)).norm() < 1e-9);
-    }
-    CHECK(clip.object[t].translation.z() > 0.7);
-  }
-  for (std::size_t t = 0; t <= 60; ++t) {  // forwards and backwards
-    INFO("frame " << t);
-    CHECK((clip.motion.poses[t].transl - clip.motion.poses[60 - t].transl).norm() < 1e-9);
-  }
-  const Vector3<double> base = clip.object[0].translation - Vector3<double>(0, 0, object.above_ground);
-  CHECK(std::abs(base.z() - clip.room.table_top.z()) < 1e-9);  // it stands on the table
-  CHECK(so3_exp(so3_log(clip.object[0].rotation)).col(2).isApprox(Vector3<double>::UnitZ(), 1e-9));
-}
-
-TEST_CASE("room and object have about as many Gaussians as asked for, all of them sound") {
-  for (const Index most : {kFewestRoomGaussians, Index{3000}, Index{60000}}) {
-    const Gaussians room = synthetic_room(most, {}, 3);
-    INFO(most);
-    CHECK_NOTHROW(check_sizes(room));
-    CHECK(room.count() <= most);
-    if (most > 1000) CHECK(double(room.count()) > 0.85 * double(most));
-    CHECK(std::all_of(room.sh.begin(), room.sh.end(), [](float x) { return std::isfinite(x); }));
-    CHECK(
-        std::all_of(room.log_scales.begin(), room.log_scales.end(), [](float x) { return std::isfinite(x) && x < 1; }));
-    for (std::size_t i = 0; i < room.means.size(); i += 3) {
-      const bool inside = std::abs(room.means[i]) < 2.01F && std::abs(room.means[i + 1]) < 2.01F &&
-                          room.means[i + 2] > -0.01F && room.means[i + 2] < 2.61F;
-      if (!inside)
-        FAIL("a Gaussian outside of the room, at " << room.means[i] << ' ' << room.means[i + 1] << ' '
-                                                   << room.means[i + 2]);
-    }
-  }
-  for (const auto& choice : kSyntheticObjectKinds) {
-    INFO(choice.name);
-    CHECK(synthetic_object(choice.value, kFewestObjectGaussians, 0).gaussians.count() <= kFewestObjectGaussians);
-    CHECK(synthetic_object(choice.value, 1500, 0).gaussians.count() > 1300);
-  }
-}
-
-TEST_CASE("the initial motion is off by about what the settings say") {
-  Motion truth;
-  truth.poses.assign(200, rest_pose(kSmplxJoints));
-  for (BodyPose& pose : truth.poses) pose.set_rotation(4, {0.5, 0.2, -0.1});
-  SyntheticSettings settings;
-  const Motion motion = disturbed_motion(truth, settings);
-  const auto rms = [&](Index first, Index last) {
-    double sum = 0;
-    for (std::size_t t = 1; t < 200; ++t)
-      for (Index joint = first; joint <= last; ++joint)
-        sum += std::pow(
-            degrees_between(so3_exp(truth.poses[t].rotation_of(joint)), so3_exp(motion.poses[t].rotation_of(joint))),
-            2);
-    return std::sqrt(sum / (199.0 * double(last - first + 1)));
+TEST_CASE("a dataset with all noise and faults is a function of its settings", "[parallel]") {
+  const TemporaryFolder folder;
+  SyntheticSettings settings = small_settings();
+  settings.motion = SyntheticMotionKind::kWalk;
+  settings.light = {0.8, 0.9};
+  settings.avatar_difference = 1;
+  settings.masks = {-1, 2, 0.3};
+  settings.faults = {0.8, 1, 0.5};
+  settings.object_noise_deg = 10;
+  settings.object_noise_m = 0.05;
+  settings.pose_bias_deg = 3;
+  with_threads(1, [&] { write_dataset(settings, {}, "one"); });
+  with_threads(3, [&] { write_dataset(settings, {}, "three"); });
+  const auto one = content_of("one"), three = content_of("three");
+  CHECK(one == three);
+  CHECK(one.contains("initial_objects.npz"));
+  const Npz noisy = Npz::read("one/initial_objects.npz"), truth = Npz::read("one/truth/objects.npz");
+  const auto of = [](const Npz& file) {
+    return file.array("watering_can/translation").require_shape({3, 3}).as<double>();
   };
-  CHECK(rms(1, 21) == Approx(8).epsilon(0.05));
-  CHECK(rms(25, 54) == Approx(2).epsilon(0.05));
-  CHECK(rms(0, 0) == Approx(2).epsilon(0.15));
-  CHECK(rms(22, 24) == 0);
-  settings.pose_noise_deg = settings.root_noise_deg = settings.root_noise_m = 0;
-  const Motion same = disturbed_motion(truth, settings);
-  for (std::size_t t = 0; t < 200; ++t) {
-    CHECK(same.poses[t].axis_angle == truth.poses[t].axis_angle);
-    CHECK(same.poses[t].transl == truth.poses[t].transl);
-  }
+  CHECK((row(of(noisy), 0) - row(of(truth), 0)).norm() == 0);
+  CHECK((row(of(noisy), 1) - row(of(truth), 1)).norm() > 0.005);
+  settings.faults = {};
+  settings.light = {};
+  write_dataset(settings, {}, "plain");
+  const auto plain = content_of("plain");
+  for (const char* name : {"frames/0001.png", "frames/0002.png"}) CHECK(one.at(name) != plain.at(name));
+  for (const char* name : {"truth/motion.npz", "scene.ply", "avatar.safetensors"})
+    CHECK(one.at(name) == plain.at(name));
 }
 
 TEST_CASE("hsi4d synth makes a dataset, and refuses a folder in use") {
@@ -392,4 +342,8 @@ TEST_CASE("hsi4d synth makes a dataset, and refuses a folder in use") {
   CHECK(wrong.status == 2);
   CHECK(wrong.err.find("/synthetic/frames") != std::string::npos);
   CHECK_FALSE(fs::exists("new"));
+  const ProgramResult senseless = run_hsi4d({"synth", "config.json", "--out", "new", "--set", "synthetic.motion=push"});
+  CHECK(senseless.status == 2);
+  CHECK(senseless.err.find("the motion push makes no sense with the object watering_can; it goes with office_chair") !=
+        std::string::npos);
 }

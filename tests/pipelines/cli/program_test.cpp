@@ -161,7 +161,9 @@ TEST_CASE("list tells losses and settings") {
                          Contains("\nframe     all    body_pose        21 joints of the body\n"));
   CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 1 + 13 + 3);
   CHECK_THAT(cli::list_command("scenes", test_losses()),
-             Contains("\nwatering_can      A person in a room lifts a watering can") && Contains("\nbox  "));
+             Contains("\nscene      garden        a lawn with a path") &&
+                 Contains("\nmotion     push          walks in a circle, pushing it") && Contains("  office_chair\n") &&
+                 Contains("\nobject     vase "));
   const TemporaryFolder folder;
   const ProgramResult result = run_hsi4d({"list", "losses"});
   CHECK(result.status == 0);
