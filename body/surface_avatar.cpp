@@ -7,6 +7,7 @@
 #include "body/clothing.h"
 #include "body/procedural_shape.h"
 #include "body/surface_sampling.h"
+#include "core/parallel.h"
 #include "core/quaternion.h"
 #include "core/random.h"
 #include "core/text.h"
@@ -78,33 +79,75 @@ Matrix3<double> facing(const Vector& normal) {
   return frame;
 }
 
-/// The colours about a place, in the mean: weights of a normal distribution along the surface at points of a hexagonal
-/// lattice. A Gaussian has one colour for all that it covers; with that of its middle alone, edges had teeth.
+// A Gaussian's colour is the mean of those about its place, by a normal distribution along the surface: it has one for
+// all that it covers, and with that of its middle alone edges had teeth.
 constexpr double kBlurShare = 0.5;      // standard deviation over the distance of neighbours,
 constexpr double kLargestBlur = 0.005;  // metres; more would take the patterns from an avatar of few Gaussians
-constexpr double kLatticeShare = 0.9;   // distance of the lattice's points over it
+constexpr double kLatticeShare = 0.9;   // distance of the points that are looked at over it
 
-/// What of a place's colour is that of clothes on its second joint: seams are as smooth as skinning weights.
-double second_share(double first, double second) { return 1 - detail::smoothstep(-0.2, 0.2, first - second); }
+/// A point of a hexagonal lattice, in standard deviations, and its weight; the weights sum to 1.
+struct LatticePoint {
+  double u, v, weight;
+};
 
-Vector color_around(const detail::Clothing& clothing, const SurfacePlace& place, const Matrix3<double>& frame,
-                    double spacing, const std::array<int, 2>& joints, double second) {
-  const double step = kLatticeShare * std::min(kBlurShare * spacing, kLargestBlur);
-  Vector sum = Vector::Zero();
-  double weights = 0;
+std::vector<LatticePoint> lattice() {
+  std::vector<LatticePoint> points;
+  double sum = 0;
   for (int a = -2; a <= 2; ++a) {
     for (int b = -2; b <= 2; ++b) {
       if (std::abs(a + b) > 2) continue;
-      const double u = a + 0.5 * b, v = 0.8660254037844386 * b;
-      const double weight = std::exp(-0.5 * kLatticeShare * kLatticeShare * (u * u + v * v));
-      const Vector point = place.point + step * u * frame.col(0) + step * v * frame.col(1);
-      Vector color = clothing.color(point, joints[0]);
-      if (second > 0) color = color * (1 - second) + clothing.color(point, joints[1]) * second;
-      sum += weight * color;
-      weights += weight;
+      const double u = kLatticeShare * (a + 0.5 * b), v = kLatticeShare * 0.8660254037844386 * b;
+      points.push_back({u, v, std::exp(-0.5 * (u * u + v * v))});
+      sum += points.back().weight;
     }
   }
-  return sum / weights;
+  for (LatticePoint& point : points) point.weight /= sum;
+  return points;
+}
+
+/// A place with its frame, whose z is the normal, and the two joints that move it most.
+struct Dressed {
+  const SurfaceSample& sample;
+  Matrix3<double> frame;
+  std::array<int, 2> joints;
+  double second;  ///< share of the clothes on the second joint: seams are as smooth as skinning weights
+};
+
+Vector color_of(const detail::Clothing& clothing, const std::vector<LatticePoint>& points, const Dressed& place) {
+  const double blur = std::min(kBlurShare * place.sample.spacing, kLargestBlur);
+  Vector sum = Vector::Zero();
+  for (const LatticePoint& at : points) {
+    const Vector point = place.sample.place.point + blur * at.u * place.frame.col(0) + blur * at.v * place.frame.col(1);
+    Vector color = clothing.color(point, place.joints[0]);
+    if (place.second > 0) {
+      color = color * (1 - place.second) + clothing.color(point, place.joints[1]) * place.second;
+    }
+    sum += at.weight * color;
+  }
+  return sum * (0.90 + 0.10 * place.frame(1, 2));  // light from above, as clothes in photographs have it
+}
+
+/// [N,3]
+/// @param frames   of the samples
+/// @param weights  of the Gaussians, the largest of each first
+std::vector<float> colors_of(const detail::Clothing& clothing, const std::vector<SurfaceSample>& samples,
+                             const std::vector<Matrix3<double>>& frames, const SparseWeights& weights,
+                             const AvatarSettings& settings) {
+  constexpr Index kGrain = 256;
+  const std::vector<LatticePoint> points = lattice();
+  const Random noise(settings.seed, random_stream("avatar.color"));
+  std::vector<float> colors(3 * samples.size());
+  parallel_for(std::ssize(samples), kGrain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      const auto n = static_cast<std::size_t>(i), at = n * static_cast<std::size_t>(weights.per_vertex);
+      const double second = 1 - detail::smoothstep(-0.2, 0.2, weights.weights[at] - weights.weights[at + 1]);
+      const Dressed place{samples[n], frames[n], {weights.indices[at], weights.indices[at + 1]}, second};
+      const double speckle = 1 + 0.08 * settings.texture * (noise.uniform(static_cast<std::uint64_t>(i)) - 0.5);
+      const Vector color = color_of(clothing, points, place) * speckle;
+      for (int c = 0; c < 3; ++c) colors[3 * n + static_cast<std::size_t>(c)] = static_cast<float>(color[c]);
+    }
+  });
+  return colors;
 }
 
 void append(std::vector<float>& to, std::initializer_list<double> numbers) {
@@ -125,7 +168,7 @@ Avatar surface_avatar(const BodyModel& body, const AvatarSettings& settings) {
   const std::vector<SurfaceSample> samples =
       sample_surface(body, densities_of(body, clothing, settings.detail), settings.gaussians, settings.seed);
   const std::vector<Vector> normals = vertex_normals(body);
-  const Random noise(settings.seed, random_stream("avatar.color"));
+  std::vector<Matrix3<double>> frames;
 
   Avatar avatar;
   avatar.parents = body.parents;
@@ -146,14 +189,9 @@ Avatar surface_avatar(const BodyModel& body, const AvatarSettings& settings) {
                                std::log(std::max(tangent * settings.thickness, kBendShare * sample.bend))});
     append(avatar.opacity_logits, {std::log(settings.opacity / (1 - settings.opacity))});
     append_weights(body, sample.place, avatar.weights);
-    const std::size_t at = avatar.weights.indices.size() - 4;
-    const std::array<int, 2> joints = {avatar.weights.indices[at], avatar.weights.indices[at + 1]};
-    const double second = second_share(avatar.weights.weights[at], avatar.weights.weights[at + 1]);
-    const double speckle = 1 + 0.08 * settings.texture * (noise.uniform(static_cast<std::uint64_t>(i)) - 0.5);
-    const double light = 0.90 + 0.10 * normal[1];  // from above, as clothes in photographs have it
-    const Vector color = color_around(clothing, sample.place, frame, sample.spacing, joints, second) * light * speckle;
-    append(avatar.colors, {color[0], color[1], color[2]});
+    frames.push_back(frame);
   }
+  avatar.colors = colors_of(clothing, samples, frames, avatar.weights, settings);
   avatar.weights = normalized_weights(std::move(avatar.weights), "avatar");
   return avatar;
 }

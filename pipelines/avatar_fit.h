@@ -53,9 +53,14 @@ void describe(ConfigFields& fields, AvatarFitSettings& settings, const std::vect
 
 /// Reads a config of `hsi4d avatar fit`, and prepares its losses. Throws UserError with all of its problems, or that it
 /// is a config of `hsi4d run`.
-/// @param asks_views  whether it is a problem that it names no views
 AvatarFitSettings load_avatar_fit(const std::filesystem::path& file, const std::vector<std::string>& overrides,
-                                  const std::vector<LossDescription>& losses, bool asks_views = true);
+                                  const std::vector<LossDescription>& losses);
+
+/// As above of a tree that load_config made of `file`, telling its problems beside those found before.
+/// @param asks_views  whether it is a problem that it names no views
+AvatarFitSettings read_avatar_fit(const ConfigValue& tree, const std::filesystem::path& file,
+                                  const std::vector<LossDescription>& losses, ConfigProblems& problems,
+                                  bool asks_views = true);
 
 /// Its text with every setting, defaults included.
 std::string resolved_avatar_fit(const AvatarFitSettings& settings, const std::vector<LossDescription>& losses);

@@ -28,9 +28,8 @@ std::string fault_of_numbers(const std::vector<double>& numbers) {
 }
 
 constexpr const char* kNoViews =
-    "not given; a fit needs the views.json of pictures in known poses. `hsi4d synth configs/avatar/views.json --out "
-    "DIR` "
-    "makes some; then --set views=DIR/views.json";
+    "not given; a fit needs the views.json of pictures in known poses. "
+    "`hsi4d synth configs/avatar/views.json --out DIR` makes some; then --set views=DIR/views.json";
 
 /// What the command line says of a new avatar where none is made.
 void add_unused(const ConfigValue& tree, const AvatarFitSettings& settings, ConfigProblems& problems) {
@@ -79,10 +78,16 @@ void describe(ConfigFields& f, AvatarFitSettings& s, const std::vector<LossDescr
 }
 
 AvatarFitSettings load_avatar_fit(const std::filesystem::path& file, const std::vector<std::string>& overrides,
-                                  const std::vector<LossDescription>& losses, bool asks_views) {
+                                  const std::vector<LossDescription>& losses) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, overrides, problems);
   require_kind(tree, ConfigKind::kAvatarFit, file);
+  return read_avatar_fit(tree, file, losses, problems);
+}
+
+AvatarFitSettings read_avatar_fit(const ConfigValue& tree, const std::filesystem::path& file,
+                                  const std::vector<LossDescription>& losses, ConfigProblems& problems,
+                                  bool asks_views) {
   AvatarFitSettings settings;
   settings.file = file;
   ConfigFields fields;

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/check.h"
-#include "core/config_file.h"
 
 namespace hsi4d {
 
@@ -19,11 +18,6 @@ bool is_of_run(const ConfigValue& tree) { return has_one(tree, {"stages", "data"
 
 ConfigKind config_kind(const ConfigValue& tree) {
   return has_one(tree, {"views", "stage"}) && !is_of_run(tree) ? ConfigKind::kAvatarFit : ConfigKind::kRun;
-}
-
-ConfigKind config_kind(const std::filesystem::path& file) {
-  ConfigProblems problems;
-  return config_kind(load_config(file, {}, problems));
 }
 
 void require_kind(const ConfigValue& tree, ConfigKind wanted, const std::filesystem::path& file) {

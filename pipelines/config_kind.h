@@ -16,9 +16,6 @@ enum class ConfigKind {
 /// run. What has neither is of a run.
 ConfigKind config_kind(const ConfigValue& tree);
 
-/// Of a file with what it extends. Throws UserError when it cannot be read.
-ConfigKind config_kind(const std::filesystem::path& file);
-
 /// Throws UserError, "FILE: is a config of `hsi4d avatar fit` …", when a tree is of the other kind than `wanted`.
 void require_kind(const ConfigValue& tree, ConfigKind wanted, const std::filesystem::path& file);
 

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/check.h"
+#include "core/config_file.h"
 #include "core/suggest.h"
 #include "pipelines/avatar_fit.h"
 #include "pipelines/cli/text.h"
@@ -52,10 +53,7 @@ std::string summary(const std::filesystem::path& file, const RunConfig& config) 
   return text;
 }
 
-std::string check_fit(const std::filesystem::path& file, const std::vector<std::string>& overrides, bool print_config,
-                      const std::vector<LossDescription>& losses) {
-  const AvatarFitSettings fit = load_avatar_fit(file, overrides, losses, false);
-  if (print_config) return resolved_avatar_fit(fit, losses);
+std::string fit_summary(const std::filesystem::path& file, const AvatarFitSettings& fit) {
   std::string text = file.generic_string() + ": OK, a config of `hsi4d avatar fit`\n";
   text +=
       "  views: " + (fit.views.empty() ? "not given; --set views=DIR/views.json" : fit.views.generic_string()) + "\n";
@@ -104,8 +102,13 @@ std::string list_scenes() {
 
 std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           bool print_config, const std::vector<LossDescription>& losses) {
-  if (config_kind(config) == ConfigKind::kAvatarFit) return check_fit(config, overrides, print_config, losses);
-  const RunConfig run = load_run_config(config, overrides, losses, ConfigUse::kStages);
+  ConfigProblems problems;
+  const ConfigValue tree = load_config(config, overrides, problems);
+  if (config_kind(tree) == ConfigKind::kAvatarFit) {
+    const AvatarFitSettings fit = read_avatar_fit(tree, config, losses, problems, false);
+    return print_config ? resolved_avatar_fit(fit, losses) : fit_summary(config, fit);
+  }
+  const RunConfig run = read_run_config(tree, losses, problems, ConfigUse::kStages);
   return print_config ? resolved_config(run, losses) : summary(config, run);
 }
 

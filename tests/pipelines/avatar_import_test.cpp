@@ -7,7 +7,7 @@
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "pipelines/posed_avatar.h"
-#include "pipelines/synthetic_scene.h"
+#include "pipelines/synthetic_object.h"
 #include "splat/io_ply.h"
 #include "tests/support/temporary_folder.h"
 
