@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "pipelines/synthetic_kit.h"
 
 namespace hsi4d::detail {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kPi = std::numbers::pi;
 const Point kBed(-1.02, 1.68, 0);  // middle of its place on the floor
 const Point kBedHalf(0.93, 0.3, 0.22);
 
@@ -58,7 +59,7 @@ void add_bedroom_walls(SceneKit& kit) {
     }
 }
 
-/// Cloth over a mattress: a sheet with folds. @param high  of its upper side
+/// A quilt of patches over the mattress, which falls in folds at the front.
 void add_quilt(SceneKit& kit) {
   const std::array<Rgb, 6> patches = {Rgb(0.8, 0.36, 0.3), Rgb(0.94, 0.88, 0.76), Rgb(0.28, 0.45, 0.5),
                                       Rgb(0.9, 0.7, 0.36), Rgb(0.6, 0.7, 0.6),    Rgb(0.93, 0.84, 0.8)};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "pipelines/synthetic_kit.h"
 #include "pipelines/synthetic_plants.h"
@@ -10,6 +11,7 @@
 namespace hsi4d::detail {
 namespace {
 
+constexpr double kPi = std::numbers::pi;
 constexpr double kHedge = 2.35;  // y of its front, metres
 const Point kTree(1.45, 2.0, 0);
 
@@ -21,7 +23,7 @@ void add_lawn(SceneKit& kit) {
     const double left = -4.2, right = 4.2;
     const Paint grass = [&kit, left, right, low, high](double u, double v) {
       const Point p(left + u * (right - left), low + v * (high - low), 0);
-      const double stripe = ramp(-0.1, 0.1, std::sin(3.1416 * (p.x() + 0.35 * p.y()) / 0.55));
+      const double stripe = ramp(-0.1, 0.1, std::sin(kPi * (p.x() + 0.35 * p.y()) / 0.55));
       const Rgb tone = mixed(Rgb(0.3, 0.49, 0.17), Rgb(0.42, 0.6, 0.24), stripe);
       const double blades = kit.noise(p * 40), patches = kit.rough(p * 1.7);
       Rgb color = tone * (1 + 0.2 * blades + 0.16 * patches);
@@ -44,13 +46,13 @@ void add_path(SceneKit& kit) {
     const double turn = 3 * kit.random.uniform(), shift = 50 * kit.random.uniform();
     const Rgb tone = kit.varied(Rgb(0.66, 0.63, 0.57), 0.1);
     const SheetShape stone = [=, &kit](double u, double v) {
-      const double angle = -6.2831853 * u, r = v * (1 + 0.12 * std::sin(3 * angle + shift));
+      const double angle = -2 * kPi * u, r = v * (1 + 0.12 * std::sin(3 * angle + shift));
       const double x = a * r * std::cos(angle), y = b * r * std::sin(angle);
       return Point(at[0] + std::cos(turn) * x - std::sin(turn) * y, at[1] + std::sin(turn) * x + std::cos(turn) * y,
                    0.012 + 0.012 * (1 - v * v * v));
     };
     const Paint paint = [=, &kit](double u, double v) {
-      const double x = v * std::cos(6.2831853 * u), y = v * std::sin(6.2831853 * u);
+      const double x = v * std::cos(2 * kPi * u), y = v * std::sin(2 * kPi * u);
       return Rgb(tone * (1 + 0.22 * kit.rough(Point(x * 4, y * 4, shift))) * (v > 0.9 ? 0.72 : 1));
     };
     kit.model.add({stone, paint, 1.6, 0, {}});
@@ -85,7 +87,7 @@ void add_fence(SceneKit& kit) {
   kit.board(Point(-3.0, kHedge + 0.04, 0.95), Point(1.0, 0.012, 0.04), Rgb(0.52, 0.38, 0.26), 1);
 }
 
-/// A bench of slats between two frames, seen from the front.
+/// Two clay pots with bushes and flowers.
 void add_pots(SceneKit& kit) {
   const Rgb clay(0.72, 0.4, 0.25);
   for (const auto& [x, y, size] : {std::array<double, 3>{-1.75, 1.35, 1.0}, std::array<double, 3>{-1.42, 1.62, 0.75}}) {

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "pipelines/synthetic_kit.h"
 
 namespace hsi4d::detail {
 namespace {
 
+constexpr double kPi = std::numbers::pi;
 constexpr double kFront = 1.5, kTop = 0.9;  // of the cupboards, metres
 const Rgb kSage(0.5, 0.63, 0.55), kCream(0.93, 0.89, 0.78), kBrass(0.8, 0.62, 0.28), kSteel(0.72, 0.74, 0.76);
 
@@ -164,10 +166,7 @@ void add_things(SceneKit& kit) {
     const double angle = 1.257 * i;
     const Point at = bowl + Point(0.065 * std::cos(angle), 0.065 * std::sin(angle), 0.045 + 0.02 * (i % 2));
     kit.model.add_revolution(
-        at,
-        [](double v) {
-          return Vector2<double>(0.042 * std::sin(3.1416 * v) + 1e-4, 0.042 * (1 - std::cos(3.1416 * v)));
-        },
+        at, [](double v) { return Vector2<double>(0.042 * std::sin(kPi * v) + 1e-4, 0.042 * (1 - std::cos(kPi * v))); },
         plain(fruits[static_cast<std::size_t>(i)]), 1.5, 0.05);
   }
 }

@@ -126,7 +126,7 @@ Moment walking_moment(const Actor& actor, double seconds) {
                     0.7 * (figure.pelvis[2] + 0.02));
   const Vector place = actor.object.carried + (pushes ? Vector(0, 0, 0) : sway);
   const Vector tilt =
-      pushes ? Vector(0, 0, 0) : Vector(2.5 * pace * std::sin(2 * kPi * seconds / kStep), 0, -4 * lands);
+      pushes ? Vector(0, 0, 0) : Vector(1.5 * pace * std::sin(2 * kPi * seconds / kStep), 0, -2.5 * lands);
   const ObjectPlace at{actor.object.grip, place, tilt};
   moment.object = object_on(figure.ground, at);
   moment.in_hand = !pushes;
