@@ -36,6 +36,17 @@ std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, In
   return motion.poses;
 }
 
+/// As estimate_of, of the objects.
+std::vector<std::vector<ObjectPose>> object_estimate_of(const fs::path& file, const Clip& clip) {
+  if (file.empty() || clip.objects.empty()) return {};
+  std::vector<std::string> names;
+  for (const ClipObject& object : clip.objects) names.push_back(object.name);
+  std::vector<std::vector<ObjectPose>> tracks = read_object_tracks(file.string(), names);
+  if (std::ssize(tracks) == clip.frames()) return tracks;
+  throw DataError(file.string() + ": holds " + std::to_string(tracks.size()) + " frames, the video has " +
+                  std::to_string(clip.frames()));
+}
+
 std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, const Avatar& avatar,
                                    Index frames) {
   const auto expect = [&](std::size_t count, const char* file) {
@@ -137,6 +148,7 @@ Clip read_clip(const DataSettings& data) {
     log_warning(setup.motion_file.string() + ": says no frame rate and is taken for " + rounded(motion.frame_rate, 4) +
                 " frames a second");
   clip.estimate = estimate_of(motion, setup.motion_file, clip.frames());
+  clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
   clip.first.body = motion.poses.front();
   clip.frame_rate = motion.frame_rate;
   if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.avatar, clip.frames());
@@ -145,6 +157,7 @@ Clip read_clip(const DataSettings& data) {
                 {"/data/camera", data.camera},
                 {"/data/initial", data.initial},
                 {"/data/initial: /motion", setup.motion_file}};
+  if (!setup.object_tracks.empty()) clip.files.push_back({"/data/initial: /object_tracks", setup.object_tracks});
   for (const auto& [name, object] : data.objects)
     clip.files.push_back({"/data/objects/" + name + "/gaussians", object.gaussians});
   if (!video->frames.file().empty()) clip.files.push_back({"/data/frames", video->frames.file()});

@@ -32,12 +32,13 @@ struct Clip {
   Gaussians scene;
   std::vector<ClipObject> objects;
   Avatar avatar;
-  Camera camera;                           ///< of frame 0; size and intrinsics of all frames
-  SceneState first;                        ///< state of frame 0, given; poses are of the avatar's body
-  std::vector<BodyPose> estimate;          ///< estimated poses by frame; empty: none
-  double frame_rate = 10;                  ///< frames a second
-  std::vector<std::string> frame_files;    ///< names of the frames, in order
-  std::shared_ptr<const ClipVideo> video;  ///< what read_frame reads
+  Camera camera;                                         ///< of frame 0; size and intrinsics of all frames
+  SceneState first;                                      ///< state of frame 0, given; poses are of the avatar's body
+  std::vector<BodyPose> estimate;                        ///< estimated poses by frame; empty: none
+  std::vector<std::vector<ObjectPose>> object_estimate;  ///< estimated poses [frame][object]; empty: none
+  double frame_rate = 10;                                ///< frames a second
+  std::vector<std::string> frame_files;                  ///< names of the frames, in order
+  std::shared_ptr<const ClipVideo> video;                ///< what read_frame reads
   std::optional<std::vector<SceneState>> truth;
   std::vector<ClipFile> files;  ///< read for it, but for the truth, which no result depends on
 

@@ -154,20 +154,11 @@ class Reconstruction {
     bar_.skip(steps_a_frame() * (progress_.frames_done() - 1));
   }
 
-  /// The state that frame `index` starts from: the one before, with the estimated pose of the limbs.
-  SceneState start_of(Index index) const {
-    SceneState state = progress_.after_stage.back().back();
-    if (clip_.estimate.empty()) return state;
-    const std::vector<double>& estimated = clip_.estimate[static_cast<std::size_t>(index)].axis_angle;
-    std::copy(estimated.begin() + 3, estimated.end(), state.body.axis_angle.begin() + 3);
-    return state;
-  }
-
   void run_frame(Index index) {
     const auto begin = std::chrono::steady_clock::now();
     const ClipFrame frame = read_frame(clip_, index);
     add_covered(frame, config_.data, progress_.covered);
-    SceneState state = start_of(index);
+    SceneState state = frame_start(config_.start, clip_, progress_.after_stage.back());
     ColorState colors = progress_.colors;
     std::vector<SceneState> after;
     for (std::size_t s = 0; s < frame_stages_; ++s) {
@@ -441,6 +432,7 @@ class Reconstruction {
   SceneState baseline_start(Index index) const {
     SceneState state = clip_.first;
     if (!clip_.estimate.empty()) state.body = clip_.estimate[static_cast<std::size_t>(index)];
+    if (!clip_.object_estimate.empty()) state.objects = clip_.object_estimate[static_cast<std::size_t>(index)];
     return state;
   }
 

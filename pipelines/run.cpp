@@ -96,6 +96,7 @@ RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses
   Clip clip = read_clip(config.data);  // before anything is written
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});
+  check_start(config.start, clip);
   check_frames(config.data, clip, has_loss(config, "center"));
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));

@@ -33,6 +33,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
            "Numbers by which rotations are optimised: two columns of the matrix, or axis times angle");
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
   f.object("camera", s.camera, "How cameras are optimised");
+  f.object("start", s.start, "Where the stages of a frame begin");
   f.object("data", s.data, "The files that the run reads");
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
   f.object("color_net", s.color_net, "How the human's colours follow its pose");

@@ -12,6 +12,7 @@
 #include "pipelines/body_settings.h"
 #include "pipelines/color_net_settings.h"
 #include "pipelines/data_settings.h"
+#include "pipelines/frame_start.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
 
@@ -47,6 +48,7 @@ struct RunConfig {
   RotationParameters rotations = RotationParameters::kSixD;
   std::array<double, 3> background{};  ///< colour behind everything
   CameraSettings camera;
+  StartSettings start;
   DataSettings data;
   BodySettings body;
   ColorNetSettings color_net;

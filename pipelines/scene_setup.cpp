@@ -22,6 +22,7 @@ struct InitialPose {
 struct InitialSettings {
   fs::path motion;
   ConfigMap<InitialPose> objects;
+  fs::path object_tracks;
 };
 
 void describe(ConfigFields& f, InitialPose& s) {
@@ -34,6 +35,8 @@ void describe(ConfigFields& f, InitialSettings& s) {
          "Poses (.npz): frame 0 exact, the others estimates; one frame alone: no estimates")
       .required();
   f.map("objects", s.objects, "Poses of the objects at frame 0, by name");
+  f.path("object_tracks", s.object_tracks, {.must_exist = true},
+         "Estimated poses of the objects in all frames (.npz, as a run's objects.npz); empty: none");
 }
 
 InitialSettings read_initial(const fs::path& file) {
@@ -89,6 +92,7 @@ SceneSetup read_scene_setup(const DataSettings& data) {
     setup.poses.push_back(initial_pose(initial, name, data.initial));
   }
   setup.motion_file = initial.motion;
+  setup.object_tracks = initial.object_tracks;
   setup.motion = read_motion_for(initial.motion.string(), setup.avatar);
   if (setup.motion.poses.empty()) throw DataError(initial.motion.string() + ": holds no frames");
   return setup;

@@ -26,6 +26,8 @@ struct SceneSetup {
   Avatar avatar;
   Motion motion;  ///< of the avatar's body: frame 0 exact, the others, where there are any, estimates
   std::filesystem::path motion_file;
+  std::filesystem::path
+      object_tracks;  ///< estimated poses of the objects, NAME/rotation and NAME/translation; may be empty
 };
 
 /// Reads data.scene, avatar, objects and initial. Throws UserError or DataError naming the file: missing, damaged,

@@ -38,7 +38,9 @@ ConfigValue object_of(std::string_view key, ConfigValue value) {
   return object;
 }
 
-std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<double>>& poses) {
+constexpr const char* kObjectTracks = "initial_objects.npz";
+
+std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<double>>& poses, bool has_tracks) {
   ConfigValue root = ConfigValue::make_object();
   root.add("motion", ConfigValue::make_string("initial_motion.npz"));
   ConfigValue objects = ConfigValue::make_object();
@@ -49,6 +51,7 @@ std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<
     objects.add(object.name, std::move(state));
   }
   root.add("objects", std::move(objects));
+  if (has_tracks) root.add("object_tracks", ConfigValue::make_string(kObjectTracks));
   return to_json(root);
 }
 
@@ -156,14 +159,14 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_avatar(out.file("avatar.safetensors"), avatar);
   write_camera(out.file("camera.json"), clip.cameras.front());
   write_motion(out.file("initial_motion.npz"), disturbed_motion(clip.motion, settings));
-  write_text_file(out.file("initial.json"), initial_json(object, clip.object));
+  const bool has_tracks = object.exists() && (settings.object_noise_deg > 0 || settings.object_noise_m > 0);
+  write_text_file(out.file("initial.json"), initial_json(object, clip.object, has_tracks));
   write_motion(out.file("truth/motion.npz"), clip.motion);
   write_cameras(out.file("truth/cameras.json"), clip.cameras);
   if (object.exists()) {
     write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
     write_objects(out.file("truth/objects.npz"), object.name, clip.object);
-    if (settings.object_noise_deg > 0 || settings.object_noise_m > 0)
-      write_objects(out.file("initial_objects.npz"), object.name, disturbed_object(clip.object, settings));
+    if (has_tracks) write_objects(out.file(kObjectTracks), object.name, disturbed_object(clip.object, settings));
   }
   write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
   write_text_file(out.file("config.json"), to_json(merged(object_of("data", data_section(object)), more_sections)));

@@ -43,6 +43,7 @@ std::string folder_plan(const RunConfig& config, const std::vector<LossTerm>& lo
 /// What a run would do; reads its inputs and its folder, so that what is wrong with them shows.
 std::string plan(const RunConfig& config, const std::vector<LossTerm>& losses, const std::string& folder, bool resume) {
   const Clip clip = read_clip(config.data);
+  check_start(config.start, clip);
   check_frames(config.data, clip, has_loss(config, "center"));
   std::string text = folder_plan(config, losses, clip, folder, resume);
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +

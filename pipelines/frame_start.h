@@ -1,0 +1,38 @@
+// Where the stages of a frame begin.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "core/config.h"
+#include "pipelines/clip.h"
+#include "pipelines/state.h"
+
+namespace hsi4d {
+
+/// What a part of the state begins a frame with: where the frame before ended; the estimate of this frame; or where it
+/// would be, had it gone on as between the two frames before.
+enum class StartFrom { kPrevious, kEstimate, kVelocity };
+
+inline constexpr std::array<ConfigChoice<StartFrom>, 3> kStartsFrom = {
+    {{StartFrom::kPrevious, "previous"}, {StartFrom::kEstimate, "estimate"}, {StartFrom::kVelocity, "velocity"}}};
+
+/// Config section `start`. The defaults are the method's.   [method.md, stage 2]
+struct StartSettings {
+  StartFrom pose = StartFrom::kEstimate;  ///< joints but the root; without estimates as in the frame before
+  StartFrom root = StartFrom::kPrevious;  ///< place and heading of the body
+  StartFrom objects = StartFrom::kPrevious;
+  StartFrom camera = StartFrom::kPrevious;  ///< there are no estimates of it
+};
+
+/// Describes the section: every setting with its range.
+void describe(ConfigFields& fields, StartSettings& settings);
+
+/// Throws UserError naming the setting that asks for estimates which the clip does not have.
+void check_start(const StartSettings& settings, const Clip& clip);
+
+/// The state that the frame after `done` begins with.
+/// @param done  the states of the frames before, frame 0 included
+SceneState frame_start(const StartSettings& settings, const Clip& clip, const std::vector<SceneState>& done);
+
+}  // namespace hsi4d
