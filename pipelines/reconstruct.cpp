@@ -170,7 +170,9 @@ class Reconstruction {
       after.push_back(state);
     }
     progress_.colors = std::move(colors);
-    write_images(index, frame, state, progress_.image_errors);
+    write_images(index, frame, state, progress_.colors, progress_.image_errors);
+    if (progress_.colors.net && moves_colors(config_))
+      write_color_net(folder_.paths().frame_color_net(static_cast<int>(index)), *progress_.colors.net);
     write_start_image(index, frame);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
     progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
@@ -193,7 +195,7 @@ class Reconstruction {
     refined_errors_.resize(1);
     for (Index t = 1; t < clip_.frames(); ++t) {
       const ClipFrame frame = read_frame(clip_, t);
-      write_images(t, frame, result()[static_cast<std::size_t>(t)], refined_errors_);
+      write_images(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), refined_errors_);
     }
   }
 
@@ -217,6 +219,15 @@ class Reconstruction {
     totals.seconds = result.seconds;
     tell_terms_off(name, stage, result.off);
     folder_.note("all frames, " + stage_line(name, result, begin));
+  }
+
+  /// The color net as it was after a frame, in the precision of its file, so that a resumed run has the same.
+  ColorState colors_after(Index frame) const {
+    ColorState colors = start_colors_;
+    if (frame > 0 && colors.net && moves_colors(config_))
+      colors.net = read_color_net(folder_.paths().frame_color_net(static_cast<int>(frame)), clip_.avatar.count(),
+                                  clip_.avatar.joint_count());
+    return colors;
   }
 
   /// All frames after the last stage so far.
@@ -412,10 +423,11 @@ class Reconstruction {
   }
 
   /// Writes the images of a frame and notes how far the result's is from the video's.
-  void write_images(Index index, const ClipFrame& frame, const SceneState& state, std::vector<MetricValues>& errors) {
+  void write_images(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors,
+                    std::vector<MetricValues>& errors) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
-    const Image image = rendered_image(state, progress_.colors), foreground = foreground_of(frame);
+    const Image image = rendered_image(state, colors), foreground = foreground_of(frame);
     write_image(paths.frame_image(number, "target"), frame.target);
     write_image(paths.frame_image(number, "render"), image);
     write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
@@ -441,7 +453,7 @@ class Reconstruction {
     write_results(paths, config_, clip_, result(), progress_.colors);
     write_body(paths, config_, clip_, result());
     write_preview(paths, clip_, result(),
-                  [this](const SceneState& state) { return rendered_image(state, progress_.colors); });
+                  [this](Index frame, const SceneState& state) { return rendered_image(state, colors_after(frame)); });
   }
 
   RunSummary summarize() const {

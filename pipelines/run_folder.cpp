@@ -221,6 +221,10 @@ std::string_view run_state_name(RunState state) {
   return "";
 }
 
+std::string RunPaths::frame_color_net(int frame) const {
+  return (folder / "checkpoint" / ("color_net_" + four_digits(frame) + ".safetensors")).string();
+}
+
 std::string RunPaths::frame_image(int frame, std::string_view kind) const {
   return (folder / "frames" / (four_digits(frame) + "_" + std::string(kind) + ".png")).string();
 }

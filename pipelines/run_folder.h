@@ -62,6 +62,8 @@ struct RunPaths {
   std::string frames() const { return member("frames"); }
   std::string checkpoint() const { return member("checkpoint"); }
   std::string lock() const { return member(".lock"); }
+  /// checkpoint/color_net_NNNN.safetensors: the human's color net after a frame.
+  std::string frame_color_net(int frame) const;
   /// frames/NNNN_KIND.png; kinds: target, render, difference, and start where the run's start is rendered too.
   std::string frame_image(int frame, std::string_view kind) const;
 

@@ -23,13 +23,6 @@ constexpr double kSameJoints = 0.01;                 // metres that joints of th
 constexpr double kOtherSide = std::numbers::pi / 4;  // radians
 constexpr int kPanelWidth = 480;                     // pixels, at most
 
-bool moves_colors(const RunConfig& config) {
-  return std::any_of(config.stages.begin(), config.stages.end(), [](const auto& entry) {
-    const auto& moved = entry.second.optimize;
-    return find_entry(moved, "color_net") != nullptr || find_entry(moved, "avatar_features") != nullptr;
-  });
-}
-
 Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
   Motion motion{clip.frame_rate, bodies_of(states)};
   motion.pelvis_rest = pelvis_of(clip.avatar.joints);
@@ -77,6 +70,13 @@ Image beside(const std::vector<Image>& panels) {
 
 }  // namespace
 
+bool moves_colors(const RunConfig& config) {
+  return std::any_of(config.stages.begin(), config.stages.end(), [](const auto& entry) {
+    const auto& moved = entry.second.optimize;
+    return find_entry(moved, "color_net") != nullptr || find_entry(moved, "avatar_features") != nullptr;
+  });
+}
+
 void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
                    const std::vector<SceneState>& states, const ColorState& colors) {
   std::vector<std::string> names;
@@ -101,17 +101,18 @@ void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip
 }
 
 void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
-                   const std::function<Image(const SceneState& state)>& render) {
+                   const std::function<Image(Index frame, const SceneState& state)>& render) {
   const Vector3<double> pelvis(pose_joints(clip.avatar, states.front().body).data());
   std::optional<VideoWriter> video;
   try {
     for (std::size_t t = 0; t < states.size(); ++t) {
-      const ClipFrame frame = read_frame(clip, static_cast<Index>(t));
-      const Image image = render(states[t]);
+      const auto index = static_cast<Index>(t);
+      const ClipFrame frame = read_frame(clip, index);
+      const Image image = render(index, states[t]);
       SceneState other = states[t];
       other.camera_from_world = turned_camera(states.front().camera_from_world, pelvis, kOtherSide);
       std::vector<Image> panels;
-      for (const Image& panel : {frame.target, image, mean_of(frame.target, image), render(other)})
+      for (const Image& panel : {frame.target, image, mean_of(frame.target, image), render(index, other)})
         panels.push_back(panel_of(panel));
       const Image all = beside(panels);
       if (!video) video.emplace(paths.preview(), all.width(), all.height(), VideoFormat{.frame_rate = clip.frame_rate});

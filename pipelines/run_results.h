@@ -10,6 +10,9 @@
 
 namespace hsi4d {
 
+/// Whether some stage moves the color net.
+bool moves_colors(const RunConfig& config);
+
 /// The rate of the copy of the motion that other programs take, the SMPL-X add-on for Blender for example.
 inline constexpr double kExportedRate = 30;
 
@@ -26,9 +29,9 @@ void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip
 /// Writes preview.mp4: video, reconstruction, both one over the other, and the reconstruction from another side, next
 /// to each other. Where ffmpeg fails the log says so, and no file is written.
 ///
-/// @param render  the image of a state, from its camera
+/// @param render  the image of a state of a frame, from the state's camera
 void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
-                   const std::function<Image(const SceneState& state)>& render);
+                   const std::function<Image(Index frame, const SceneState& state)>& render);
 
 /// A camera that looks from another side: turned about the vertical axis through `pivot`.
 ///
