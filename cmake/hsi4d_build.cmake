@@ -64,9 +64,11 @@ endfunction()
 
 # The demo's configs become part of the program, so that it runs from anywhere.
 function(hsi4d_embed_demo_configs)
+  set(best ${PROJECT_SOURCE_DIR}/configs/best.json)
   set(demo ${PROJECT_SOURCE_DIR}/configs/demo.json)
   set(quick ${PROJECT_SOURCE_DIR}/configs/demo_quick.json)
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${demo} ${quick})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${best} ${demo} ${quick})
+  file(READ ${best} HSI4D_BEST_CONFIG)
   file(READ ${demo} HSI4D_DEMO_CONFIG)
   file(READ ${quick} HSI4D_DEMO_QUICK_CONFIG)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/demo_configs.cpp.in ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp @ONLY)

@@ -48,6 +48,19 @@ std::string fate_of(int status) {
   return "ended with status " + std::to_string(WEXITSTATUS(status));
 }
 
+/// The same at a number that is none of the standard ones, which a child gets others at.
+int beyond_standard(int descriptor) {
+  if (descriptor < 0 || descriptor > 2) return descriptor;
+  const int moved = fcntl(descriptor, F_DUPFD_CLOEXEC, 3);
+  close(descriptor);
+  return moved;
+}
+
+void wait_for(pid_t pid, int* status) {
+  while (waitpid(pid, status, 0) < 0 && errno == EINTR) {
+  }
+}
+
 /// Starts the program with its standard descriptors; 0, or an error number.
 int spawn(const std::vector<std::string>& command, int input, int output, int error_output, pid_t& pid) {
   std::vector<char*> arguments;
@@ -58,7 +71,12 @@ int spawn(const std::vector<std::string>& command, int input, int output, int er
   posix_spawn_file_actions_adddup2(&actions, input, 0);
   posix_spawn_file_actions_adddup2(&actions, output, 1);
   posix_spawn_file_actions_adddup2(&actions, error_output, 2);
-  const int error = posix_spawnp(&pid, command.front().c_str(), &actions, nullptr, arguments.data(), environ);
+  // A group of its own: what the terminal sends to us (Ctrl-C) is for us to pass on.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  const int error = posix_spawnp(&pid, command.front().c_str(), &actions, &attributes, arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   return error;
 }
@@ -74,6 +92,8 @@ ChildProcess::ChildProcess(std::vector<std::string> command, ChildOutput output)
   const bool is_ready = output_ >= 0 && socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0 &&
                         (!is_read || pipe2(pipe_ends.data(), O_CLOEXEC) == 0);
   int error = is_ready ? 0 : errno;
+  output_ = beyond_standard(output_);
+  for (int* const end : {&ends[0], &ends[1], &pipe_ends[0], &pipe_ends[1]}) *end = beyond_standard(*end);
   input_ = ends[0];
   stream_ = pipe_ends[0];
   if (error == 0) error = spawn(command_, ends[1], is_read ? pipe_ends[1] : output_, output_, pid_);
@@ -92,8 +112,8 @@ ChildProcess::~ChildProcess() {
   close_if_open(input_);
   close_if_open(stream_);
   if (pid_ > 0) {
-    kill(pid_, SIGTERM);
-    waitpid(pid_, nullptr, 0);
+    kill(pid_, SIGKILL);
+    wait_for(pid_, nullptr);
   }
   close_if_open(output_);
 }
@@ -124,8 +144,7 @@ std::string ChildProcess::finish() {
   close_if_open(input_);
   close_if_open(stream_);
   int status = 0;
-  while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
-  }
+  wait_for(pid_, &status);
   pid_ = -1;
   std::string text = content_of(output_);
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return text;

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <sstream>
+#include <utility>
 
 #include "core/check.h"
 #include "core/text.h"
@@ -34,7 +35,7 @@ std::string input_of(const std::string& path) { return "file:" + path; }
 std::string probe(const std::string& path) {
   try {
     return run_process({"ffprobe", "-v", "error", "-protocol_whitelist", "file", "-select_streams", "v:0",
-                        "-count_packets", "-show_entries", "stream=avg_frame_rate,nb_read_packets", "-of",
+                        "-count_frames", "-show_entries", "stream=avg_frame_rate,nb_read_frames", "-of",
                         "default=noprint_wrappers=1", input_of(path)});
   } catch (const UserError& error) {
     const std::string text = error.what();
@@ -74,7 +75,7 @@ std::vector<std::string> encoder_command(const std::string& path, int width, int
           // what it makes: one thread, so that the bytes are the same everywhere
           "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-threads", "1", "-pix_fmt", "yuv420p", "-crf",
           std::to_string(format.quality), "-movflags", "+faststart", "-colorspace", "smpte170m", "-fflags", "+bitexact",
-          "-flags:v", "+bitexact", "-f", "mp4", path};
+          "-flags:v", "+bitexact", "-f", "mp4", input_of(path)};
 }
 
 }  // namespace
@@ -82,7 +83,7 @@ std::vector<std::string> encoder_command(const std::string& path, int width, int
 VideoReader::VideoReader(const std::string& path) : path_(path) {
   read_file_start(path, 1);  // tells what is wrong with the path
   const std::string facts = probe(path);
-  const std::string rate = fact(facts, "avg_frame_rate"), count = fact(facts, "nb_read_packets");
+  const std::string rate = fact(facts, "avg_frame_rate"), count = fact(facts, "nb_read_frames");
   frames_ = whole_number(count);
   if (frames_ < 1) throw DataError(path + ": holds no video that can be read");
   if (frames_ == 1) throw DataError(path + ": holds one picture and no video");
@@ -105,8 +106,13 @@ Image VideoReader::read(Index frame) {
 /// PPM, one after the other: "P6\n<width> <height>\n255\n", then the pixels.
 Image VideoReader::next_frame() {
   const auto fail = [this](const std::string& why) {
-    const std::string text = path_ + ": frame " + std::to_string(next_) + " of " + std::to_string(frames_) + " " + why;
-    decoder_.reset();
+    std::string text = path_ + ": frame " + std::to_string(next_) + " of " + std::to_string(frames_) + " " + why;
+    try {
+      const std::string said = std::exchange(decoder_, nullptr)->finish();
+      if (!said.empty()) text += ": " + said;
+    } catch (const UserError& error) {
+      text += ": " + std::string(error.what());
+    }
     throw DataError(text);
   };
   std::string header;
@@ -157,7 +163,8 @@ void VideoWriter::add(const Image& frame) {
         frame_[at++] = static_cast<uint8_t>(std::lround(std::clamp(frame(c, y, x), 0.0F, 1.0F) * 255.0F));
     }
   }
-  if (!ffmpeg_.write(frame_)) ffmpeg_.finish();  // throws what it says
+  if (ffmpeg_.write(frame_)) return;
+  throw UserError("ffmpeg: no longer takes frames: " + ffmpeg_.finish());  // unless finish throws what it says
 }
 
 void VideoWriter::commit() {

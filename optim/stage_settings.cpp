@@ -80,6 +80,16 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
          "VPoser's weights (tools/export_vposer.py), whose latents a stage over the sequence moves; without, natural "
          "poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
+  f.rule({"draw", "over"}, [&s]() -> std::string {
+    return s.over == StageScope::kSequence && s.draw != Draw::kAll ? "a stage over the sequence draws nothing" : "";
+  });
+  f.rule({"weight", "over"}, [&s]() -> std::string {
+    return s.over == StageScope::kSequence && s.weight != PixelWeight::kAll ? "a stage over the sequence draws nothing"
+                                                                            : "";
+  });
+  f.rule({"pose_weights", "over"}, [&s]() -> std::string {
+    return s.over == StageScope::kFrame && !s.pose_weights.empty() ? "only a stage over the sequence has latents" : "";
+  });
 }
 
 std::vector<LossFault> prepare_losses(StageSettings& stage) {

@@ -19,21 +19,50 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The motion at the clip's rate, where that is told.
-Motion motion_of_clip(Motion motion, double frame_rate) {
-  if (frame_rate == 0 || motion.poses.size() < 2 || motion.frame_rate == frame_rate) return motion;
-  return resampled(motion, frame_rate);
+/// Those of the video's frames that the clip keeps, of a file that has all of them, or those alone.
+/// @param what     "poses"
+/// @param or_else  what is allowed too: ", or ..."
+template <class T>
+std::vector<T> kept(std::vector<T> all, const FrameSource& frames, const std::string& file, const char* what,
+                    const char* or_else = "") {
+  if (std::ssize(all) == frames.count()) return all;
+  if (std::ssize(all) != frames.video_count())
+    throw DataError(
+        file + ": holds " + std::to_string(all.size()) + " " + what + ", the video has " +
+        std::to_string(frames.video_count()) + " frames" +
+        (frames.count() == frames.video_count() ? "" : ", of which the clip keeps " + std::to_string(frames.count())) +
+        "; allowed: that many" + (frames.count() == frames.video_count() ? "" : ", of either") + or_else);
+  std::vector<T> some;
+  for (Index t = 0; t < frames.count(); ++t) some.push_back(std::move(all[static_cast<std::size_t>(frames.number(t))]));
+  return some;
 }
 
-/// Estimated poses: those of the motion file when it has more than frame 0.
-std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, Index frames) {
-  const auto count = static_cast<Index>(motion.poses.size());
+/// The pose at a moment of a motion, in seconds.
+BodyPose pose_at(const Motion& motion, double seconds) {
+  const double place = std::min(seconds * motion.frame_rate, static_cast<double>(motion.poses.size() - 1));
+  const auto before = static_cast<std::size_t>(place);
+  if (before + 1 == motion.poses.size()) return motion.poses.back();
+  return interpolated(motion.poses[before], motion.poses[before + 1], place - static_cast<double>(before));
+}
+
+/// Whether a motion of another rate than the video's goes on to the clip's last frame, but for half a frame of its own.
+bool covers(const Motion& motion, const FrameSource& frames) {
+  if (!motion.says_frame_rate || frames.video_rate() == 0) return false;
+  const double end = static_cast<double>(frames.number(frames.count() - 1)) / frames.video_rate();
+  return end <= (static_cast<double>(motion.poses.size()) - 0.5) / motion.frame_rate;
+}
+
+/// Estimated poses of the clip's frames: those of the motion file when it has more than frame 0. It has a pose for each
+/// frame of the clip or of the video; or it says its rate and is as long.
+std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, const FrameSource& frames) {
+  const Index count = std::ssize(motion.poses);
   if (count == 1) return {};
-  if (count != frames) {
-    throw DataError(file.string() + ": holds " + std::to_string(count) + " poses, the video has " +
-                    std::to_string(frames) + " frames; allowed: that many, or frame 0 alone");
-  }
-  return motion.poses;
+  if (count == frames.count() || count == frames.video_count() || !covers(motion, frames))
+    return kept(motion.poses, frames, file.string(), "poses", ", or frame 0 alone");
+  std::vector<BodyPose> poses;
+  for (Index t = 0; t < frames.count(); ++t)
+    poses.push_back(pose_at(motion, static_cast<double>(frames.number(t)) / frames.video_rate()));
+  return poses;
 }
 
 /// As estimate_of, of the objects.
@@ -41,32 +70,29 @@ std::vector<std::vector<ObjectPose>> object_estimate_of(const fs::path& file, co
   if (file.empty() || clip.objects.empty()) return {};
   std::vector<std::string> names;
   for (const ClipObject& object : clip.objects) names.push_back(object.name);
-  std::vector<std::vector<ObjectPose>> tracks = read_object_tracks(file.string(), names);
-  if (std::ssize(tracks) == clip.frames()) return tracks;
-  throw DataError(file.string() + ": holds " + std::to_string(tracks.size()) + " frames, the video has " +
-                  std::to_string(clip.frames()));
+  return kept(read_object_tracks(file.string(), names), clip.video->frames, file.string(), "frames");
+}
+
+/// The rate of the clip: that of its video, if it is known, or else of the motion.
+double rate_of(const FrameSource& frames, const SceneSetup& setup) {
+  if (frames.frame_rate() > 0) return frames.frame_rate();
+  if (!setup.motion.says_frame_rate && setup.motion.poses.size() > 1)
+    log_warning(setup.motion_file.string() + ": says no frame rate and is taken for " +
+                rounded(setup.motion.frame_rate, 4) + " frames a second");
+  return setup.motion.frame_rate;
 }
 
 std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, const Avatar& avatar,
-                                   Index frames) {
-  const auto expect = [&](std::size_t count, const char* file) {
-    if (static_cast<Index>(count) == frames) return;
-    throw DataError((folder / file).string() + ": has " + std::to_string(count) + " frames, the video " +
-                    std::to_string(frames));
-  };
-  std::vector<SceneState> truth(static_cast<std::size_t>(frames));
-  const Motion motion = read_motion_for((folder / "motion.npz").string(), avatar);
-  expect(motion.poses.size(), "motion.npz");
-  const std::vector<Camera> cameras = read_cameras((folder / "cameras.json").string());
-  expect(cameras.size(), "cameras.json");
-  std::vector<std::vector<ObjectPose>> objects(truth.size());
-  if (!names.empty()) {
-    objects = read_object_tracks((folder / "objects.npz").string(), names);
-    expect(objects.size(), "objects.npz");
-  }
-  for (std::size_t t = 0; t < truth.size(); ++t) {
-    truth[t] = {cameras[t].camera_from_world, objects[t], motion.poses[t]};
-  }
+                                   const FrameSource& frames) {
+  const auto file = [&folder](const char* name) { return (folder / name).string(); };
+  const std::vector<BodyPose> bodies =
+      kept(read_motion_for(file("motion.npz"), avatar).poses, frames, file("motion.npz"), "poses");
+  const std::vector<Camera> cameras = kept(read_cameras(file("cameras.json")), frames, file("cameras.json"), "cameras");
+  std::vector<std::vector<ObjectPose>> objects(bodies.size());
+  if (!names.empty())
+    objects = kept(read_object_tracks(file("objects.npz"), names), frames, file("objects.npz"), "frames");
+  std::vector<SceneState> truth(bodies.size());
+  for (std::size_t t = 0; t < truth.size(); ++t) truth[t] = {cameras[t].camera_from_world, objects[t], bodies[t]};
   return truth;
 }
 
@@ -143,15 +169,13 @@ Clip read_clip(const DataSettings& data) {
   video->masks.push_back(open_masks(data.masks, kHumanMasks, video->frames));
   for (const std::string& name : names) video->masks.push_back(open_masks(data.masks, name, video->frames));
   clip.video = video;
-  const Motion motion = motion_of_clip(std::move(setup.motion), data.frame_rate);
-  if (!motion.says_frame_rate && motion.poses.size() > 1 && data.frame_rate == 0)
-    log_warning(setup.motion_file.string() + ": says no frame rate and is taken for " + rounded(motion.frame_rate, 4) +
-                " frames a second");
-  clip.estimate = estimate_of(motion, setup.motion_file, clip.frames());
+  clip.estimate = estimate_of(setup.motion, setup.motion_file, video->frames);
   clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
-  clip.first.body = motion.poses.front();
-  clip.frame_rate = motion.frame_rate;
-  if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.avatar, clip.frames());
+  clip.first.body = setup.motion.poses.front();
+  clip.frame_rate = rate_of(video->frames, setup);
+  clip.betas = setup.motion.betas;
+  clip.gender = setup.motion.gender;
+  if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
   clip.files = {{"/data/scene", data.scene},
                 {"/data/avatar", data.avatar},
                 {"/data/camera", data.camera},
@@ -176,7 +200,10 @@ void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
       }
     }
   };
-  if (clip.video->frames.file().empty()) {
+  const bool has_videos =
+      !clip.video->frames.file().empty() ||
+      std::any_of(clip.video->masks.begin(), clip.video->masks.end(), [](const MaskSource& m) { return m.is_video(); });
+  if (!has_videos) {
     parallel_for(clip.frames(), 1, look);
   } else {
     look(0, clip.frames());  // videos are decoded in order

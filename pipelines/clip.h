@@ -36,6 +36,8 @@ struct Clip {
   SceneState first;                                      ///< state of frame 0, given; poses are of the avatar's body
   std::vector<BodyPose> estimate;                        ///< estimated poses by frame; empty: none
   std::vector<std::vector<ObjectPose>> object_estimate;  ///< estimated poses [frame][object]; empty: none
+  std::vector<double> betas;                             ///< of the person, as the motion file says; empty: not known
+  std::string gender = "neutral";                        ///< of the body model, likewise
   double frame_rate = 10;                                ///< frames a second
   std::vector<std::string> frame_files;                  ///< names of the frames, in order
   std::shared_ptr<const ClipVideo> video;                ///< what read_frame reads

@@ -87,7 +87,7 @@ std::vector<Index> kept_frames(Index count, double video, double kept) {
 }
 
 /// The rate of the video, where frames are to be chosen by it.
-double video_rate(const fs::path& path, double of_file, const FrameRates& rates) {
+double rate_of_video(const fs::path& path, double of_file, const FrameRates& rates) {
   const double video = rates.video > 0 ? rates.video : of_file;
   if (rates.kept == 0) return video;
   if (video == 0)
@@ -99,12 +99,18 @@ double video_rate(const fs::path& path, double of_file, const FrameRates& rates)
   return video;
 }
 
+/// The video called `name` in a folder; empty: there is none. Throws UserError where there are two.
 fs::path video_in(const fs::path& folder, const std::string& name) {
+  fs::path video;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (entry.path().stem() == name && is_video_name(entry.path().string())) return entry.path();
+    if (entry.path().stem() != name || !is_video_name(entry.path().string())) continue;
+    if (!video.empty())
+      throw UserError(video.string() + ", " + entry.path().string() + ": both hold masks of \"" + name +
+                      "\"; remove one");
+    video = entry.path();
   }
-  return {};
+  return video;
 }
 
 std::string frame_of(const fs::path& video, Index number) {
@@ -122,15 +128,15 @@ FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(
   } else {
     throw UserError(path.string() + ": is neither a folder of frames nor a video (" + video_endings() + ")");
   }
-  const Index count = video_ ? video_->reader.frames() : std::ssize(files);
-  const double video = video_rate(path, video_ ? video_->reader.frame_rate() : 0, rates);
-  numbers_ = kept_frames(count, video, rates.kept);
-  frame_rate_ = rates.kept > 0 ? rates.kept : video;
+  video_count_ = video_ ? video_->reader.frames() : std::ssize(files);
+  video_rate_ = rate_of_video(path, video_ ? video_->reader.frame_rate() : 0, rates);
+  numbers_ = kept_frames(video_count_, video_rate_, rates.kept);
+  frame_rate_ = rates.kept > 0 ? rates.kept : video_rate_;
   for (const Index number : numbers_)
     names_.push_back(video_ ? four_digits(number) + ".png" : files[static_cast<std::size_t>(number)]);
   if (std::ssize(numbers_) < kFewestFrames)
-    throw UserError(path.string() + ": gives " + std::to_string(numbers_.size()) + " of its " + std::to_string(count) +
-                    " frames; a clip needs at least 2");
+    throw UserError(path.string() + ": gives " + std::to_string(numbers_.size()) + " of its " +
+                    std::to_string(video_count_) + " frames; a clip needs at least 2");
 }
 
 std::string FrameSource::place(Index frame) const {
@@ -140,8 +146,12 @@ std::string FrameSource::place(Index frame) const {
 Image FrameSource::read(Index frame) const { return video_ ? video_->read(number(frame)) : read_image(place(frame)); }
 
 MaskSource::MaskSource(const fs::path& folder, const std::string& name) : path_(folder / name) {
-  if (fs::is_directory(path_)) return;
   const fs::path video = video_in(folder, name);
+  if (fs::is_directory(path_)) {
+    if (!video.empty())
+      throw UserError(path_.string() + ", " + video.string() + ": both hold masks of \"" + name + "\"; remove one");
+    return;
+  }
   if (video.empty()) throw DataError(path_.string() + ": there is no such folder of masks");
   path_ = video;
   video_ = std::make_shared<detail::OpenVideo>(video);

@@ -34,6 +34,10 @@ class FrameSource {
   FrameSource(const std::filesystem::path& path, const FrameRates& rates);
 
   Index count() const { return std::ssize(names_); }
+  /// Frames of the video, kept or not.
+  Index video_count() const { return video_count_; }
+  /// Frames a second of the video; 0: nobody says.
+  double video_rate() const { return video_rate_; }
   /// Names of frames: those of the files, or "0003.png" for frame 3 of a video. Masks have the same.
   const std::vector<std::string>& names() const { return names_; }
   /// Frames a second of the clip; 0: nobody says.
@@ -53,7 +57,8 @@ class FrameSource {
   std::shared_ptr<detail::OpenVideo> video_;  // null: a folder
   std::vector<std::string> names_;
   std::vector<Index> numbers_;
-  double frame_rate_ = 0;
+  Index video_count_ = 0;
+  double video_rate_ = 0, frame_rate_ = 0;
 };
 
 /// Masks of the human or of an object: a folder with images of the frames' names, of which some may be missing, or a

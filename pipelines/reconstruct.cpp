@@ -90,7 +90,7 @@ RunProgress read_checkpoint(const std::string& file, const std::string& identity
 /// kept, frame 0 being given.
 std::string stop_message(Index frame, Index frames) {
   const std::string text =
-      "interrupted in " + (frame < frames ? "frame " + std::to_string(frame) : "a stage over all frames") + "; ";
+      "interrupted " + (frame < frames ? "in frame " + std::to_string(frame) : "after the last frame") + "; ";
   if (frame == 1) return text + "no frame was finished";
   return text + (frame == 2 ? "frame 1 is" : "frames 1 to " + std::to_string(frame - 1) + " are") +
          " finished and kept";
@@ -120,9 +120,14 @@ class Reconstruction {
     if (frame_stages_ < config_.stages.size()) refine();
     bar_.finish();
     tell_left_out();
-    write_all_results();
+    write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
     const RunSummary summary = summarize();
     folder_.write_summary(summary);
+    write_body(folder_.paths(), config_, clip_, result());
+    write_preview(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
+      stop_if_asked(clip_.frames());
+      return rendered_image(state, colors_after(frame));
+    });
     return summary;
   }
 
@@ -182,6 +187,7 @@ class Reconstruction {
 
   /// The stages over the whole sequence, each from where the one before ended.
   void refine() {
+    const auto begin = std::chrono::steady_clock::now();
     for (std::size_t s = frame_stages_; s < config_.stages.size(); ++s) {
       std::vector<SceneState> states = result();
       StageTotals totals;
@@ -194,9 +200,11 @@ class Reconstruction {
     }
     refined_errors_.resize(1);
     for (Index t = 1; t < clip_.frames(); ++t) {
+      stop_if_asked(clip_.frames());
       const ClipFrame frame = read_frame(clip_, t);
       write_images(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), refined_errors_);
     }
+    refined_seconds_ = seconds_since(begin);
   }
 
   template <class S>
@@ -292,7 +300,8 @@ class Reconstruction {
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
-    if (index == 1) tell_terms_off(name, stage, result.off);
+    // By then all frames before are there that terms over the motion want to see.
+    if (index == std::min<Index>(kFramesBefore, clip_.frames() - 1)) tell_terms_off(name, stage, result.off);
     for (const LeftOutObject& object : result.left_out) {
       progress_.left_out.push_back({s, index, object.object, object.term, object.reason});
     }
@@ -392,7 +401,12 @@ class Reconstruction {
     if (counters != nullptr) add_counters(*counters, progress_.totals[s], record);
     folder_.append_metrics(record);
     bar_.step_with("loss", report.loss);
-    if (observer_.wants_stop()) throw Interrupted(stop_message(frame.value_or(clip_.frames()), clip_.frames()));
+    stop_if_asked(frame.value_or(clip_.frames()));
+  }
+
+  /// @param frame  the one at hand; that beyond the last: all are done
+  void stop_if_asked(Index frame) const {
+    if (observer_.wants_stop()) throw Interrupted(stop_message(frame, clip_.frames()));
   }
 
   static void add_counters(const RenderCounters& counters, StageTotals& totals, IterationRecord& record) {
@@ -448,19 +462,11 @@ class Reconstruction {
     return state;
   }
 
-  void write_all_results() const {
-    const RunPaths& paths = folder_.paths();
-    write_results(paths, config_, clip_, result(), progress_.colors);
-    write_body(paths, config_, clip_, result());
-    write_preview(paths, clip_, result(),
-                  [this](Index frame, const SceneState& state) { return rendered_image(state, colors_after(frame)); });
-  }
-
   RunSummary summarize() const {
     RunSummary summary;
     summary.name = config_.name;
     summary.frames = static_cast<int>(clip_.frames());
-    summary.seconds = progress_.seconds;
+    summary.seconds = progress_.seconds + refined_seconds_;
     for (std::size_t s = 0; s < config_.stages.size(); ++s) summary.metrics.push_back(summarize_stage(s));
     summary.baselines = {{"start", {}, {}}};
     if (clip_.truth) add_errors(summary);
@@ -493,7 +499,7 @@ class Reconstruction {
     const StageTotals& totals = is_of_frame ? progress_.totals[s] : refined_[s - frame_stages_].totals;
     StageSummary summary{name, totals.seconds, totals.iterations, {}};
     const std::vector<SceneState>& states = is_of_frame ? progress_.after_stage[s] : refined_[s - frame_stages_].states;
-    if (clip_.truth) summary.values = errors_of(states, stage.draw);
+    if (clip_.truth) summary.values = errors_of(states, is_of_frame ? stage.draw : Draw::kAll);
     for (const auto& [counter, count] : {std::pair{"rollbacks", totals.rollbacks},
                                          {"tiles", totals.tiles},
                                          {"pairs", totals.pairs},
@@ -537,6 +543,7 @@ class Reconstruction {
   std::size_t frame_stages_;
   RunProgress progress_;
   std::vector<Refined> refined_;
+  double refined_seconds_ = 0;
   std::vector<MetricValues> refined_errors_;  // of the images of the last, as progress_.image_errors
   const ColorState start_colors_;
   Progress bar_;

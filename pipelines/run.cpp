@@ -96,6 +96,10 @@ RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses
   Clip clip = read_clip(config.data);  // before anything is written
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});
+  if (config.body.kind == BodyKind::kSmplx) {
+    body_model_of(config.body);  // what is wrong with it shows before anything is written
+    clip.files.push_back({"/body/path", config.body.path});
+  }
   check_start(config.start, clip);
   check_frames(config.data, clip, has_loss(config, "center"));
   RunIdentity identity;

@@ -80,12 +80,15 @@ bool has_loss(const RunConfig& config, const std::string& name) {
 }
 
 ConfigValue without_data(ConfigValue tree) {
-  std::erase_if(tree.members, [](const ConfigMember& member) {
-    return member.key == "body" || member.key == "synthetic" || member.key == "threads";
-  });
+  std::erase_if(tree.members,
+                [](const ConfigMember& member) { return member.key == "synthetic" || member.key == "threads"; });
   for (ConfigMember& member : tree.members) {
+    std::vector<ConfigMember>& own = member.value.members;
+    if (member.key == "body") std::erase_if(own, [](const ConfigMember& setting) { return setting.key == "path"; });
     if (member.key != "data") continue;
-    std::erase_if(member.value.members, [](const ConfigMember& own) { return !own.key.starts_with("mask_"); });
+    std::erase_if(own, [](const ConfigMember& setting) {
+      return !setting.key.starts_with("mask_") && !setting.key.ends_with("_rate");
+    });
   }
   return tree;
 }
@@ -95,6 +98,16 @@ ConfigValue sections_beside_data(const RunConfig& config, const std::vector<Loss
   ConfigFields fields;
   describe(fields, copy, losses);
   return without_data(write_config(fields));
+}
+
+ConfigValue dataset_sections(const RunConfig& config, const std::vector<LossDescription>& losses) {
+  ConfigValue tree = sections_beside_data(config, losses);
+  if (config.body.path.empty()) return tree;
+  for (ConfigMember& member : tree.members) {
+    if (member.key == "body")
+      member.value.add("path", ConfigValue::make_string(std::filesystem::absolute(config.body.path).string()));
+  }
+  return tree;
 }
 
 std::vector<ConfigPath> stage_files(const RunConfig& config, const std::vector<LossDescription>& losses) {

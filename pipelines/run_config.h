@@ -88,12 +88,15 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
 /// Whether a stage that draws the objects has the loss, with a weight that is not 0.
 bool has_loss(const RunConfig& config, const std::string& name);
 
-/// A tree of a config without what another dataset or machine would change: the files of data, body, synthetic,
+/// A tree of a config without what another dataset or machine would change: the files of data and body, synthetic,
 /// threads. Two runs of the same data with equal trees have the same result.
 ConfigValue without_data(ConfigValue tree);
 
 /// The config as such a tree.
 ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses);
+
+/// As sections_beside_data, with the body's file (its absolute path): what a dataset's config takes over.
+ConfigValue dataset_sections(const RunConfig& config, const std::vector<LossDescription>& losses);
 
 /// Files that the stages name, weights of a loss for example, by JSON pointer.
 std::vector<ConfigPath> stage_files(const RunConfig& config, const std::vector<LossDescription>& losses);

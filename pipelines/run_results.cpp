@@ -26,6 +26,8 @@ constexpr int kPanelWidth = 480;                     // pixels, at most
 Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
   Motion motion{clip.frame_rate, bodies_of(states)};
   motion.pelvis_rest = pelvis_of(clip.avatar.joints);
+  motion.betas = clip.betas;
+  motion.gender = clip.gender;
   return motion;
 }
 
@@ -91,13 +93,19 @@ void write_results(const RunPaths& paths, const RunConfig& config, const Clip& c
 
 void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
                 const std::vector<SceneState>& states) {
-  const BodyModel body = rest_body(config.body);
-  const std::string difference = difference_of(body, clip.avatar);
-  if (!difference.empty()) {
-    log_info("body.glb is not written: " + difference);
-    return;
+  try {
+    const BodyModel body = rest_body(config.body);
+    const std::string difference = difference_of(body, clip.avatar);
+    if (difference.empty()) {
+      write_glb(paths.body(), body, motion_of(clip, states));
+    } else {
+      log_info("body.glb is not written: " + difference);
+    }
+  } catch (const UserError& error) {
+    log_warning("body.glb is not written: " + std::string(error.what()));
+  } catch (const DataError& error) {
+    log_warning("body.glb is not written: " + std::string(error.what()));
   }
-  write_glb(paths.body(), body, motion_of(clip, states));
 }
 
 void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
@@ -119,6 +127,8 @@ void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<Sc
       video->add(all);
     }
     video->commit();
+  } catch (const DataError& error) {
+    log_warning("preview.mp4 is not written: " + std::string(error.what()));
   } catch (const UserError& error) {
     log_warning("preview.mp4 is not written: " + std::string(error.what()));
   }

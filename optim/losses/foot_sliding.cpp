@@ -34,11 +34,14 @@ bool stands(const MotionStart& motion, Index frame, Index joint, const FootSlidi
   return before[2] <= highest && after[2] <= highest && (after - before).norm() * motion.frame_rate < settings.speed;
 }
 
-/// 1 for each coordinate of a joint that stands between a frame and the next, [F−1,3J].
+/// The first frame that is followed by one that moves.
+Index first_pair(const MotionStart& motion) { return std::max<Index>(0, motion.still_frames - 1); }
+
+/// 1 for each coordinate of a joint that stands between such a frame and the next.
 std::vector<double> standing_weights(const MotionStart& motion, Index coordinates,
                                      const FootSlidingSettings& settings) {
   std::vector<double> weights;
-  for (Index t = 0; t + 1 < motion.frames(); ++t) {
+  for (Index t = first_pair(motion); t + 1 < motion.frames(); ++t) {
     for (Index i = 0; i < coordinates; ++i)
       weights.push_back(is_foot_joint(i / 3) && stands(motion, t, i / 3, settings) ? 1 : 0);
   }
@@ -52,14 +55,15 @@ LossTerm foot_sliding_loss() {
       "foot_sliding", "How far feet that stand go between adjacent frames",
       [](const auto& in, const FootSlidingSettings& settings) {
         if (!in.given(in.joints) || !in.motion || in.motion->frames() < 2) return decltype(in.joints){};
-        const Shape shape = in.joints.shape();
-        const std::vector<double> stand = standing_weights(*in.motion, shape.cols, settings);
+        const Index coordinates = in.joints.shape().cols, first = first_pair(*in.motion),
+                    pairs = in.motion->frames() - 1 - first;
+        const std::vector<double> stand = standing_weights(*in.motion, coordinates, settings);
         auto& tape = in.joints.owner();
-        const auto weights = tape.constant("standing", shape_of(shape.rows - 1, shape.cols));
+        const auto weights = tape.constant("standing", shape_of(pairs, coordinates));
         const auto numbers = tape.write(weights);
         std::copy(stand.begin(), stand.end(), numbers.data);
-        return l2(slice_rows(in.joints, 1, shape.rows - 1), slice_rows(in.joints, 0, shape.rows - 1), weights) *
-               static_cast<double>(shape.cols);
+        return l2(slice_rows(in.joints, first + 1, pairs), slice_rows(in.joints, first, pairs), weights) *
+               static_cast<double>(coordinates);
       });
   term.description.needs = LossNeeds::kBody;
   return term;

@@ -1,6 +1,8 @@
-// L = mean over adjacent frames of Σ_j |Δᵏ J_j|², of the first 22 joints, m²: Δ J = J_{t+1} − J_t with `order` 1, by
-// which the method asks for small steps; 2 asks for steps that are alike, 3 for their changes to be.   [method, stage
-// 3]
+// L = mean over adjacent frames, some of which move, of Σ_j |Δᵏ J_j|², of the first 22 joints, m²: Δ J = J_{t+1} − J_t
+// with `order` 1, by which the method asks for small steps; 2 asks for steps that are alike, 3 for their changes to be.
+// [method, stage 3]
+#include <algorithm>
+
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
@@ -24,8 +26,12 @@ void describe(ConfigFields& fields, SmoothSettings& settings) {
 LossTerm smooth_loss() {
   LossTerm term = make_loss_term<SmoothSettings>(
       "smooth", "How far joints go between adjacent frames", [](const auto& in, const SmoothSettings& settings) {
-        if (!in.given(in.joints) || in.joints.shape().rows <= settings.order) return decltype(in.joints){};
-        auto steps = in.joints;
+        if (!in.given(in.joints) || !in.motion) return decltype(in.joints){};
+        // Differences between frames that stand say nothing.
+        const Index first = std::max<Index>(0, in.motion->still_frames - settings.order);
+        const Index frames = in.joints.shape().rows - first;
+        if (frames <= settings.order) return decltype(in.joints){};
+        auto steps = slice_rows(in.joints, first, frames);
         for (int k = 0; k < settings.order; ++k) {
           const Index rows = steps.shape().rows - 1;
           steps = slice_rows(steps, 1, rows) - slice_rows(steps, 0, rows);

@@ -22,9 +22,9 @@ namespace fs = std::filesystem;
 RunConfig demo_config(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
   ConfigProblems problems;
   const std::string name = arguments.quick ? "demo_quick.json" : "demo.json";
+  const std::map<std::string, std::string> texts = demo_config_texts();
   const ConfigValue tree =
-      load_config_text(std::string(demo_config_text(arguments.quick)), name, fs::current_path(), arguments.overrides,
-                       problems, {{"demo.json", std::string(demo_config_text(false))}});
+      load_config_text(texts.at(name), name, fs::current_path(), arguments.overrides, problems, texts);
   return read_run_config(tree, descriptions_of(losses), problems, ConfigUse::kStages);
 }
 
@@ -40,7 +40,7 @@ void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, 
   const int asked = run_threads(arguments.threads), threads = asked > 0 ? asked : config.threads;
   with_threads(threads > 0 ? threads : thread_count(), [&] {
     write_dataset(config.synthetic, video_render_settings(), dataset, observer_on_terminal(arguments.quiet),
-                  sections_beside_data(config, descriptions_of(losses)), config.body);
+                  dataset_sections(config, descriptions_of(losses)), config.body);
   });
 }
 

@@ -1,11 +1,12 @@
 // The demo's configs, which are part of the program so that it runs from anywhere.
 #pragma once
 
-#include <string_view>
+#include <map>
+#include <string>
 
 namespace hsi4d::cli {
 
-/// The text of configs/demo_quick.json, or of configs/demo.json.
-std::string_view demo_config_text(bool quick);
+/// Texts by name: demo_quick.json and demo.json, and best.json, which that extends.
+std::map<std::string, std::string> demo_config_texts();
 
 }  // namespace hsi4d::cli

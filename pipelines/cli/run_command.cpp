@@ -43,6 +43,7 @@ std::string folder_plan(const RunConfig& config, const std::vector<LossTerm>& lo
 /// What a run would do; reads its inputs and its folder, so that what is wrong with them shows.
 std::string plan(const RunConfig& config, const std::vector<LossTerm>& losses, const std::string& folder, bool resume) {
   const Clip clip = read_clip(config.data);
+  if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
   check_start(config.start, clip);
   check_frames(config.data, clip, has_loss(config, "center"));
   std::string text = folder_plan(config, losses, clip, folder, resume);
@@ -53,7 +54,8 @@ std::string plan(const RunConfig& config, const std::vector<LossTerm>& losses, c
     text += "  object " + object.name + " of " + count_text(object.gaussians.count(), "Gaussian") + "\n";
   }
   for (const auto& [name, stage] : config.stages) {
-    text += "  stage " + name + ": " + count_text(stage.iterations, "iteration") + " a frame\n";
+    text += "  stage " + name + ": " + count_text(stage.iterations, "iteration") +
+            (stage.over == StageScope::kFrame ? " a frame\n" : " over the sequence\n");
   }
   for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
   return text;

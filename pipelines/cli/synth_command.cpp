@@ -18,7 +18,7 @@ std::string synth_command(const std::filesystem::path& config, const std::vector
     if (of_views)
       return write_views(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet), run.body);
     write_dataset(run.synthetic, video_render_settings(), out, observer_on_terminal(quiet),
-                  sections_beside_data(run, losses), run.body);
+                  dataset_sections(run, losses), run.body);
   });
   const std::string size =
       std::to_string(run.synthetic.size_px) + " x " + std::to_string(run.synthetic.size_px) + " pixels";

@@ -197,19 +197,22 @@ TEST_CASE("inputs of another length are told with both", "[run]") {
     Motion motion = read_motion(dataset.file("truth/motion.npz"));
     motion.poses.resize(3);
     write_motion(dataset.file("truth/motion.npz"), motion);
-    check_failure(dataset, dataset.file("truth/motion.npz") + ": has 3 frames, the video 4");
+    check_failure(dataset,
+                  dataset.file("truth/motion.npz") + ": holds 3 poses, the video has 4 frames; allowed: that many");
   }
   SECTION("truth of the cameras") {
     std::vector<Camera> cameras = read_cameras(dataset.file("truth/cameras.json"));
     cameras.push_back(cameras.front());
     write_cameras(dataset.file("truth/cameras.json"), cameras);
-    check_failure(dataset, dataset.file("truth/cameras.json") + ": has 5 frames, the video 4");
+    check_failure(dataset,
+                  dataset.file("truth/cameras.json") + ": holds 5 cameras, the video has 4 frames; allowed: that many");
   }
   SECTION("truth of the objects") {
     std::vector<SceneState> frames(2);
     for (SceneState& frame : frames) frame.objects.resize(1);
     write_object_tracks(dataset.file("truth/objects.npz"), {kTinyObject}, frames);
-    check_failure(dataset, dataset.file("truth/objects.npz") + ": has 2 frames, the video 4");
+    check_failure(dataset,
+                  dataset.file("truth/objects.npz") + ": holds 2 frames, the video has 4 frames; allowed: that many");
   }
   SECTION("the estimate") {
     Motion motion = read_motion(dataset.file("initial_motion.npz"));

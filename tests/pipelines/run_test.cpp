@@ -369,7 +369,7 @@ TEST_CASE("every shipped config runs", "[run]") {
     write_dataset(config.synthetic, video_render_settings(), folder + "-dataset");
     CHECK(fs::exists(folder + "-dataset/truth/motion.npz"));
   }
-  CHECK(with_stages == std::set<std::string>{"demo", "demo_quick", "paper"});
+  CHECK(with_stages == std::set<std::string>{"best", "demo", "demo_quick", "paper"});
   CHECK(without == std::set<std::string>{"accurate", "compare_gsplat", "default", "synthetic"});
 }
 
