@@ -6,6 +6,7 @@
 
 #include "body/file_contents.h"
 #include "body/pose_layout.h"
+#include "body/surface_index.h"
 #include "core/npz.h"
 #include "core/text.h"
 
@@ -228,6 +229,14 @@ BodyModel rest_body(const SmplxModel& model, std::span<const double> betas) {
   body.parents = model.parents;
   body.joints = shaped(model.joints, model.joint_shape);
   body.weights = largest_weights(model.weights, 4, model.source + ": array 'weights'");
+  double area = 0;
+  for (std::int32_t face = 0; face < body.face_count(); ++face) {
+    const std::array<Vector3<double>, 3> corners = face_corners(body, face);
+    area += (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
+  }
+  if (!(area > 0))
+    throw DataError(model.source + ": array 'f': " + std::to_string(body.face_count()) +
+                    " faces without area; allowed: a surface");
   return body;
 }
 

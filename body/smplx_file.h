@@ -72,7 +72,8 @@ SmplxModel decode_smplx(std::span<const std::uint8_t> file, const std::string& n
 
 /// The body in its rest pose and shape β: template, joints, and the four largest weights of each vertex.
 /// @param betas  as many as there are in the model, or none: the template
-/// Throws InternalError when there are another number of them.
+/// Throws DataError naming file and array when the faces have no area: there is nothing to put Gaussians on, or to see.
+/// InternalError when there are another number of betas.
 BodyModel rest_body(const SmplxModel& model, std::span<const double> betas = {});
 
 }  // namespace hsi4d

@@ -43,6 +43,23 @@ void add_unused(const ConfigValue& tree, const AvatarFitSettings& settings, Conf
   }
 }
 
+/// Settings of a stage that a fit does not have, and groups that would never move.
+void add_stage_faults(const ConfigValue& tree, const StageSettings& stage, ConfigProblems& problems) {
+  const auto add = [&](const std::string& key, const std::string& text) {
+    const std::string pointer = "/stage" + key;
+    problems.add(origin_at(tree, pointer), pointer, text);
+  };
+  if (stage.over != StageScope::kFrame) add("/over", "a fit of an avatar sees one view at a time");
+  if (stage.draw != Draw::kAll) add("/draw", "a fit of an avatar draws the avatar alone");
+  if (stage.weight != PixelWeight::kAll) add("/weight", "all pixels of a view count");
+  for (const auto& [name, group] : stage.optimize) {
+    if (stage.iterations > 0 && group.from >= stage.iterations)
+      add(child_pointer("/optimize", name) + "/from", std::to_string(group.from) + " is beyond the stage's " +
+                                                          std::to_string(stage.iterations) +
+                                                          " iterations; the group would never move");
+  }
+}
+
 void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProblems& problems) {
   std::vector<LossFault> faults = losses_without_inputs(stage, LossNeeds::kImages, "a fit of an avatar");
   for (LossFault& fault : prepare_losses(stage)) faults.push_back(std::move(fault));
@@ -95,7 +112,10 @@ AvatarFitSettings read_avatar_fit(const ConfigValue& tree, const std::filesystem
   read_config(tree, fields, problems);
   add_unused(tree, settings, problems);
   if (asks_views && problems.empty() && settings.views.empty()) problems.add(tree.origin, "/views", kNoViews);
-  if (problems.empty()) add_loss_faults(tree, settings.stage, problems);
+  if (problems.empty()) {
+    add_stage_faults(tree, settings.stage, problems);
+    add_loss_faults(tree, settings.stage, problems);
+  }
   problems.throw_if_any();
   check_groups(settings.stage, avatar_fit_groups(), file.string() + ": /stage/optimize");
   return settings;

@@ -19,9 +19,10 @@ namespace hsi4d {
 
 namespace {
 
-constexpr double kSameJoints = 0.01;                 // metres that joints of the same body may be apart
-constexpr double kOtherSide = std::numbers::pi / 4;  // radians
-constexpr int kPanelWidth = 480;                     // pixels, at most
+constexpr double kSameJoints = 0.01;  // metres that joints of the same body may be apart
+constexpr std::array<double, 8> kOtherSides = {45, -45, 30, -30, 60, -60, 20, -20};  // degrees
+constexpr double kFreeView = 0.1;                                                    // metres around the line of sight
+constexpr int kPanelWidth = 480;                                                     // pixels, at most
 
 Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
   Motion motion{clip.frame_rate, bodies_of(states)};
@@ -40,6 +41,36 @@ std::string difference_of(const BodyModel& body, const Avatar& avatar) {
     largest = std::max(largest, std::fabs(body.joints[i] - avatar.joints[i]));
   if (largest <= kSameJoints) return "";
   return "joints of the avatar are " + rounded(100 * largest, 2) + " cm from those of `body`: of another shape";
+}
+
+/// How many Gaussians of the scene are in the way between a camera and what it looks at.
+Index count_between(const Gaussians& scene, const Vector3<double>& eye, const Vector3<double>& target) {
+  const Vector3<double> way = target - eye;
+  Index count = 0;
+  for (Index i = 0; i < scene.count(); ++i) {
+    const Vector3<double> place = Vector3<float>(scene.means.data() + 3 * i).cast<double>() + scene.origin_world - eye;
+    const double share = place.dot(way) / way.squaredNorm();
+    if (share < 0 || share > 0.9) continue;  // behind the camera, or at what it looks at
+    const float* scales = scene.log_scales.data() + 3 * i;
+    const double size = std::exp(static_cast<double>(*std::max_element(scales, scales + 3)));
+    if ((place - share * way).norm() < kFreeView + size) ++count;
+  }
+  return count;
+}
+
+/// The side from which the scene hides the body least.
+Rigid<double> camera_of_other_side(const Clip& clip, const SceneState& first) {
+  const Vector3<double> pelvis(pose_joints(clip.avatar, first.body).data());
+  Rigid<double> best;
+  Index least = -1;
+  for (const double degrees : kOtherSides) {
+    const Rigid<double> camera = turned_camera(first.camera_from_world, pelvis, degrees * std::numbers::pi / 180);
+    const Index count = count_between(clip.scene, -(camera.rotation.transpose() * camera.translation), pelvis);
+    if (least >= 0 && count >= least) continue;
+    least = count;
+    best = camera;
+  }
+  return best;
 }
 
 Image mean_of(const Image& a, const Image& b) {
@@ -110,7 +141,7 @@ void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip
 
 void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
                    const std::function<Image(Index frame, const SceneState& state)>& render) {
-  const Vector3<double> pelvis(pose_joints(clip.avatar, states.front().body).data());
+  const Rigid<double> other_side = camera_of_other_side(clip, states.front());
   std::optional<VideoWriter> video;
   try {
     for (std::size_t t = 0; t < states.size(); ++t) {
@@ -118,7 +149,7 @@ void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<Sc
       const ClipFrame frame = read_frame(clip, index);
       const Image image = render(index, states[t]);
       SceneState other = states[t];
-      other.camera_from_world = turned_camera(states.front().camera_from_world, pelvis, kOtherSide);
+      other.camera_from_world = other_side;
       std::vector<Image> panels;
       for (const Image& panel : {frame.target, image, mean_of(frame.target, image), render(index, other)})
         panels.push_back(panel_of(panel));
