@@ -232,7 +232,8 @@ BodyModel rest_body(const SmplxModel& model, std::span<const double> betas) {
   double area = 0;
   for (std::int32_t face = 0; face < body.face_count(); ++face) {
     const std::array<Vector3<double>, 3> corners = face_corners(body, face);
-    area += (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
+    const Vector3<double> a = corners[1] - corners[0], b = corners[2] - corners[0];
+    area += cross(a, b).norm() / 2;
   }
   if (!(area > 0))
     throw DataError(model.source + ": array 'f': " + std::to_string(body.face_count()) +
