@@ -1,6 +1,7 @@
 // What a frame graph gives to terms over masks and over the body's motion.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <catch2/catch.hpp>
 
@@ -66,7 +67,8 @@ Image random_mask(std::uint64_t seed) {
 }
 
 /// The sum of the terms that read masks and motion, each of weight so that none is lost beside the others.
-Var<double> motion_and_mask_loss(const LossInputs<double>& inputs) {
+/// @param values  each term's, by name
+Var<double> motion_and_mask_loss(const LossInputs<double>& inputs, std::map<std::string, Var<double>>& values) {
   Var<double> total = {};
   for (const auto& [name, weight] : {std::pair{"mask", 1.0},
                                      {"fit", 3.0},
@@ -78,6 +80,7 @@ Var<double> motion_and_mask_loss(const LossInputs<double>& inputs) {
     INFO(name);
     const Var<double> value = term_named(name).record(inputs);
     REQUIRE(value.tape != nullptr);
+    values.emplace(name, value);
     total = total.tape == nullptr ? value * weight : total + value * weight;
   }
   return total;
@@ -98,6 +101,7 @@ TEST_CASE("gradients of terms over masks and motion are right for body and objec
   const RotationParameters rotations = GENERATE(RotationParameters::kSixD, RotationParameters::kAxisAngle);
   Clip clip = small_clip(kWidth, kHeight, 5000);
   clip.avatar = test::avatar_of_every_joint(clip.avatar, 2);
+  clip.first.body.set_rotation(4, Vector3<double>(-0.6, 0, 0));  // a knee beyond its range
   // An object at each hand, so that there is contact with both.
   const PosedJoints body = pose_skeleton(clip.avatar, clip.first.body);
   for (std::size_t o = 0; o < 2; ++o) {
@@ -113,7 +117,8 @@ TEST_CASE("gradients of terms over masks and motion are right for body and objec
   targets.human_mask = &human;
   targets.object_masks = {&first, &second};
   graph.set_targets(targets);
-  const Var<double> loss = motion_and_mask_loss(graph.loss_inputs());
+  std::map<std::string, Var<double>> values;
+  const Var<double> loss = motion_and_mask_loss(graph.loss_inputs(), values);
   // Away from the start, so that what is compared with it has a slope.
   for (const ParameterGroup<double>& group : graph.groups()) {
     if (group.name != "transl" && group.name != "body_pose" && group.name != "object_transl") continue;
@@ -122,6 +127,11 @@ TEST_CASE("gradients of terms over masks and motion are right for body and objec
       for (Index i = 0; i < numbers.shape.count(); ++i)
         numbers.data[i] += 0.02 * std::sin(1.7 * static_cast<double>(i) + 1);
     }
+  }
+  tape.forward(loss);
+  for (const auto& [name, value] : values) {
+    INFO("term " << name << ": " << tape.value(value).scalar());
+    CHECK(tape.value(value).scalar() > 1e-5);
   }
   for (const char* name : {"transl", "global_orient", "body_pose", "object_orient", "object_transl"}) {
     INFO("group " << name);

@@ -13,6 +13,7 @@
 #include "pipelines/frame_images.h"
 #include "pipelines/state.h"
 #include "tests/pipelines/tiny_run.h"
+#include "tests/support/vposer_checkpoint.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
@@ -231,4 +232,20 @@ TEST_CASE("images after a stage over the sequence have each frame's own color ne
   CHECK_THROWS_AS(carry_out_tiny(config, "again", 1, false, [&] { return ++count == kInFrames + 3; }), Interrupted);
   carry_out_tiny(config, "again", 2, true);
   CHECK(differences("run", "again") == kNone);
+}
+
+TEST_CASE("a run whose stage over the sequence has VPoser's weights moves in its latents", "[run][sequence]") {
+  const TemporaryFolder here;
+  const Bytes bytes = random_vposer(48, 32, 11).npz();
+  here.write("vposer.npz", std::string(bytes.begin(), bytes.end()));
+  const std::string weights = "stages.refinement.pose_weights=" + fs::absolute("vposer.npz").string();
+  const RunConfig config = refined_config({weights, "stages.refinement.iterations=3"});
+  const RunSummary summary = carry_out_tiny(config, "vposer"), natural = carry_out_tiny(refined_config(), "natural");
+  const double joints = number_in(summary.metrics.back().values, "mpjpe_mm");
+  CHECK(std::isfinite(joints));
+  CHECK(joints > number_in(natural.metrics.back().values, "mpjpe_mm") + 20);  // random weights have poses of their own
+  CHECK(number_in(summary.metrics[1].values, "mpjpe_mm") == number_in(natural.metrics[1].values, "mpjpe_mm"));
+  CHECK(metrics_of("vposer").size() == kInFrames + 3);
+  carry_out_tiny(config, "again", 2);
+  CHECK(differences("vposer", "again") == kNone);
 }
