@@ -347,6 +347,7 @@ TEST_CASE("excess beyond ranges passes the operator checks, within them, beyond 
   check("pure twists", twists);
 }
 
+// Row D7: joints turned by up to 2π.
 TEST_CASE("excess beyond ranges is finite everywhere, at half turns too") {
   Numbers pose;
   for (int j = 0; j < 21; ++j) {
@@ -365,6 +366,58 @@ TEST_CASE("excess beyond ranges is finite everywhere, at half turns too") {
     tape.backward(energy);
     CHECK(std::isfinite(tape.value(energy).scalar()));
     for (const double d : numbers_of(tape.gradient(x))) CHECK(std::isfinite(d));
+  }
+}
+
+namespace {
+
+/// Energy of latents and its gradient by them.
+template <class S>
+std::pair<double, Numbers> energy_of(const PosePrior& prior, const Numbers& latents) {
+  Tape<S> tape;
+  const Var<S> z = tape.parameter("z", shape_of(1, prior.latents()));
+  tape.set(z, std::vector<S>(latents.begin(), latents.end()));
+  const Var<S> energy = prior.energy(z);
+  tape.forward(energy);
+  tape.backward(energy);
+  return {static_cast<double>(tape.value(energy).scalar()), numbers_of(tape.gradient(z))};
+}
+
+}  // namespace
+
+// Row D8: a mixture's likelihood would underflow, a normal distribution's logarithm does not.
+TEMPLATE_TEST_CASE("however unlikely a pose is, its energy is finite and leads back to the likely ones", "", float,
+                   double) {
+  const PosePrior vposer = vposer_prior(random_vposer(24, 6, 5).weights()), natural = natural_pose_prior();
+  RandomNumbers random(10);
+  for (const PosePrior* prior : {&vposer, &natural}) {
+    for (const double far : {1.0, 30.0, 1e3, 1e6}) {
+      INFO(prior->name() << ", latents of " << far);
+      const Numbers z = random.numbers(static_cast<std::size_t>(prior->latents()), far);
+      const auto [energy, gradient] = energy_of<TestType>(*prior, z);
+      double squares = 0;
+      for (std::size_t i = 0; i < z.size(); ++i) {
+        squares += z[i] * z[i];
+        CHECK(gradient[i] == Approx(2 * z[i]).epsilon(1e-6));
+      }
+      CHECK(energy == Approx(squares).epsilon(1e-5));
+    }
+  }
+  // Poses turned by nearly half a turn, and by more, from what is natural.
+  for (const double turn : {3.0, 3.14, 4.5, 6.28}) {
+    INFO("turned by " << turn);
+    Numbers pose(63, 0.0);
+    for (std::size_t j = 0; j < 21; ++j) pose[3 * j + j % 3] = turn;
+    for (const PosePrior* prior : {&vposer, &natural}) {
+      Tape<TestType> tape;
+      const auto x = tape.parameter("pose", shape_of(21, 3));
+      tape.set(x, std::vector<TestType>(pose.begin(), pose.end()));
+      const auto energy = prior->energy(prior->encode(rotations_from_axis_angle(x)));
+      tape.forward(energy);
+      tape.backward(energy);
+      CHECK(std::isfinite(tape.value(energy).scalar()));
+      for (const double d : numbers_of(tape.gradient(x))) CHECK(std::isfinite(d));
+    }
   }
 }
 
