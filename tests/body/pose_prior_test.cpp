@@ -1,108 +1,27 @@
 #include "body/pose_prior.h"
 
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <random>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/rotations.h"
 #include "body/body_model.h"
 #include "body/natural_pose.h"
-#include "core/npz.h"
 #include "core/rotation.h"
-#include "core/safetensors.h"
 #include "tests/support/operator_check.h"
+#include "tests/support/vposer_checkpoint.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
 
 namespace {
 
-using Numbers = std::vector<double>;
 constexpr double kDegree = std::numbers::pi / 180;
-
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : random_(seed) {}
-  double operator()(double low = -1, double high = 1) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  Numbers numbers(std::size_t count, double size = 1) {
-    Numbers all(count);
-    for (double& x : all) x = (*this)(-size, size);
-    return all;
-  }
-
- private:
-  std::mt19937_64 random_;
-};
-
-/// A checkpoint's arrays by name.
-struct Checkpoint {
-  struct Array {
-    std::vector<std::int64_t> shape;
-    Numbers numbers;
-  };
-  std::map<std::string, Array> arrays;
-
-  void add(const std::string& name, std::vector<std::int64_t> shape, Numbers numbers) {
-    arrays[name] = {std::move(shape), std::move(numbers)};
-  }
-  const Numbers& operator[](const std::string& name) const { return arrays.at(name).numbers; }
-
-  Bytes npz(const std::string& prefix = "") const {
-    NpzWriter file;
-    for (const auto& [name, array] : arrays)
-      file.add<double>(prefix + name, std::span<const std::int64_t>(array.shape),
-                       std::span<const double>(array.numbers));
-    return file.encode();
-  }
-  Bytes safetensors() const {
-    SafetensorsWriter file;
-    for (const auto& [name, array] : arrays)
-      file.add<double>(name, std::span<const std::int64_t>(array.shape), std::span<const double>(array.numbers));
-    return file.encode();
-  }
-  VposerWeights weights() const { return decode_vposer(npz(), "v.npz"); }
-};
-
-/// A network of random numbers, H neurons, D latents.
-Checkpoint random_checkpoint(std::int64_t h, std::int64_t d, std::uint64_t seed) {
-  Random random(seed);
-  Checkpoint c;
-  const auto linear = [&](const std::string& name, std::int64_t out, std::int64_t in) {
-    c.add(name + ".weight", {out, in},
-          random.numbers(static_cast<std::size_t>(out * in), 1.7 / std::sqrt(static_cast<double>(in))));
-    c.add(name + ".bias", {out}, random.numbers(static_cast<std::size_t>(out), 0.3));
-  };
-  const auto normalization = [&](const std::string& name, std::int64_t n) {
-    const auto count = static_cast<std::size_t>(n);
-    c.add(name + ".weight", {n}, random.numbers(count));
-    c.add(name + ".bias", {n}, random.numbers(count, 0.3));
-    c.add(name + ".running_mean", {n}, random.numbers(count, 0.2));
-    Numbers variance = random.numbers(count);
-    for (double& x : variance) x = x * x;
-    c.add(name + ".running_var", {n}, variance);
-    c.add(name + ".num_batches_tracked", {}, {7});
-  };
-  normalization("encoder_net.1", 63);
-  linear("encoder_net.2", h, 63);
-  normalization("encoder_net.4", h);
-  linear("encoder_net.6", h, h);
-  linear("encoder_net.7", h, h);
-  linear("encoder_net.8.mu", d, h);
-  linear("encoder_net.8.logvar", d, h);
-  linear("decoder_net.0", h, d);
-  linear("decoder_net.3", h, h);
-  linear("decoder_net.5", 126, h);
-  return c;
-}
 
 // --- the network as it is published, layer by layer, in plain loops
 // ---------------------------------------------------
 
-Numbers plain_linear(const Checkpoint& c, const std::string& name, const Numbers& x) {
+Numbers plain_linear(const VposerCheckpoint& c, const std::string& name, const Numbers& x) {
   const Numbers &weight = c[name + ".weight"], &bias = c[name + ".bias"];
   Numbers y = bias;
   for (std::size_t o = 0; o < y.size(); ++o) {
@@ -111,7 +30,7 @@ Numbers plain_linear(const Checkpoint& c, const std::string& name, const Numbers
   return y;
 }
 
-Numbers plain_normalization(const Checkpoint& c, const std::string& name, Numbers x) {
+Numbers plain_normalization(const VposerCheckpoint& c, const std::string& name, Numbers x) {
   for (std::size_t i = 0; i < x.size(); ++i) {
     x[i] =
         (x[i] - c[name + ".running_mean"][i]) / std::sqrt(c[name + ".running_var"][i] + 1e-5) * c[name + ".weight"][i] +
@@ -125,14 +44,14 @@ Numbers plain_leaky(Numbers x) {
   return x;
 }
 
-Numbers plain_encode(const Checkpoint& c, const Numbers& pose) {
+Numbers plain_encode(const VposerCheckpoint& c, const Numbers& pose) {
   Numbers x = plain_linear(c, "encoder_net.2", plain_normalization(c, "encoder_net.1", pose));
   x = plain_normalization(c, "encoder_net.4", plain_leaky(x));
   return plain_linear(c, "encoder_net.8.mu", plain_linear(c, "encoder_net.7", plain_linear(c, "encoder_net.6", x)));
 }
 
 /// [21,9] by rows.
-Numbers plain_decode(const Checkpoint& c, const Numbers& z) {
+Numbers plain_decode(const VposerCheckpoint& c, const Numbers& z) {
   Numbers x = plain_leaky(plain_linear(c, "decoder_net.0", z));
   x = plain_linear(c, "decoder_net.5", plain_leaky(plain_linear(c, "decoder_net.3", x)));
   Numbers rows;
@@ -211,11 +130,11 @@ double excess_of(const Numbers& axis_angle) {
 
 TEST_CASE("VPoser agrees with the published network in plain loops") {
   for (const auto& [h, d] : {std::pair{48, 8}, std::pair{512, 32}}) {
-    const Checkpoint c = random_checkpoint(h, d, 1);
+    const VposerCheckpoint c = random_vposer(h, d, 1);
     const PosePrior prior = vposer_prior(c.weights());
     CHECK(prior.name() == "vposer");
     REQUIRE(prior.latents() == d);
-    Random random(2);
+    RandomNumbers random(2);
     constexpr std::size_t kFrames = 6;
     const Numbers z = random.numbers(kFrames * static_cast<std::size_t>(d), 2), pose = random.numbers(63 * kFrames);
     Numbers rotations, latents;
@@ -238,7 +157,7 @@ TEST_CASE("VPoser agrees with the published network in plain loops") {
 }
 
 TEST_CASE("VPoser's weights are read from both kinds of files, with the checkpoint's prefix too") {
-  const Checkpoint c = random_checkpoint(20, 5, 3);
+  const VposerCheckpoint c = random_vposer(20, 5, 3);
   const VposerWeights plain = c.weights(), prefixed = decode_vposer(c.npz("vp_model."), "v.npz"),
                       tensors = decode_vposer(c.safetensors(), "v.safetensors");
   for (const VposerWeights* other : {&prefixed, &tensors}) {
@@ -252,9 +171,9 @@ TEST_CASE("VPoser's weights are read from both kinds of files, with the checkpoi
 }
 
 TEST_CASE("faults of VPoser's weights are named") {
-  const Checkpoint good = random_checkpoint(20, 5, 4);
+  const VposerCheckpoint good = random_vposer(20, 5, 4);
   const auto spoilt = [&](const std::string& name, std::vector<std::int64_t> shape, Numbers numbers) {
-    Checkpoint c = good;
+    VposerCheckpoint c = good;
     c.add(name, std::move(shape), std::move(numbers));
     return message_of(c.npz());
   };
@@ -271,7 +190,7 @@ TEST_CASE("faults of VPoser's weights are named") {
   CHECK(spoilt("encoder_net.1.running_mean", {63}, bad) ==
         "v.npz: array 'encoder_net.1.running_mean': number 7 is not finite");
   for (const auto& [name, array] : good.arrays) {
-    Checkpoint c = good;
+    VposerCheckpoint c = good;
     c.arrays.erase(name);
     const bool is_used = name.find("logvar") == std::string::npos && name.find("tracked") == std::string::npos;
     const std::string message = message_of(c.npz());
@@ -284,8 +203,8 @@ TEST_CASE("faults of VPoser's weights are named") {
 }
 
 TEST_CASE("priors pass the operator checks", "[parallel]") {
-  const PosePrior vposer = vposer_prior(random_checkpoint(24, 6, 5).weights()), natural = natural_pose_prior();
-  Random random(6);
+  const PosePrior vposer = vposer_prior(random_vposer(24, 6, 5).weights()), natural = natural_pose_prior();
+  RandomNumbers random(6);
   const Numbers rotations = matrices_of(random.numbers(2 * 63, 1.2));
   for (const PosePrior* prior : {&vposer, &natural}) {
     const OperatorInput latents{"z", shape_of(2, prior->latents())};
@@ -299,7 +218,7 @@ TEST_CASE("priors pass the operator checks", "[parallel]") {
 TEST_CASE("natural poses: latents stand for poses one to one, zeros for the body at ease") {
   const PosePrior prior = natural_pose_prior();
   CHECK(prior.latents() == 63);
-  Random random(7);
+  RandomNumbers random(7);
   const Numbers z = random.numbers(5 * 63, 2);
   const Numbers rotations = decoded<double>(prior, z, 5);
   Tape<double> tape;
@@ -395,7 +314,7 @@ TEST_CASE("ranges have the sides that bodies have") {
 }
 
 TEST_CASE("a rotation is taken apart into twist and swing") {
-  Random random(8);
+  RandomNumbers random(8);
   for (int axis = 0; axis < 3; ++axis) {
     for (int n = 0; n < 200; ++n) {
       Vector3<double> swing(random(), random(), random()), twist = Vector3<double>::Zero();
@@ -414,7 +333,7 @@ TEST_CASE("a rotation is taken apart into twist and swing") {
 }
 
 TEST_CASE("excess beyond ranges passes the operator checks, within them, beyond them, at small swings", "[parallel]") {
-  Random random(9);
+  RandomNumbers random(9);
   const auto check = [](const char* name, const Numbers& axis_angle) {
     const auto rows = static_cast<Index>(axis_angle.size() / 3);
     check_operator(name, {{"rotations", shape_of(rows, 9), 0, 0, matrices_of(axis_angle)}},
@@ -428,6 +347,7 @@ TEST_CASE("excess beyond ranges passes the operator checks, within them, beyond 
   check("pure twists", twists);
 }
 
+// Row D7: joints turned by up to 2π.
 TEST_CASE("excess beyond ranges is finite everywhere, at half turns too") {
   Numbers pose;
   for (int j = 0; j < 21; ++j) {
@@ -446,6 +366,58 @@ TEST_CASE("excess beyond ranges is finite everywhere, at half turns too") {
     tape.backward(energy);
     CHECK(std::isfinite(tape.value(energy).scalar()));
     for (const double d : numbers_of(tape.gradient(x))) CHECK(std::isfinite(d));
+  }
+}
+
+namespace {
+
+/// Energy of latents and its gradient by them.
+template <class S>
+std::pair<double, Numbers> energy_of(const PosePrior& prior, const Numbers& latents) {
+  Tape<S> tape;
+  const Var<S> z = tape.parameter("z", shape_of(1, prior.latents()));
+  tape.set(z, std::vector<S>(latents.begin(), latents.end()));
+  const Var<S> energy = prior.energy(z);
+  tape.forward(energy);
+  tape.backward(energy);
+  return {static_cast<double>(tape.value(energy).scalar()), numbers_of(tape.gradient(z))};
+}
+
+}  // namespace
+
+// Row D8: a mixture's likelihood would underflow, a normal distribution's logarithm does not.
+TEMPLATE_TEST_CASE("however unlikely a pose is, its energy is finite and leads back to the likely ones", "", float,
+                   double) {
+  const PosePrior vposer = vposer_prior(random_vposer(24, 6, 5).weights()), natural = natural_pose_prior();
+  RandomNumbers random(10);
+  for (const PosePrior* prior : {&vposer, &natural}) {
+    for (const double far : {1.0, 30.0, 1e3, 1e6}) {
+      INFO(prior->name() << ", latents of " << far);
+      const Numbers z = random.numbers(static_cast<std::size_t>(prior->latents()), far);
+      const auto [energy, gradient] = energy_of<TestType>(*prior, z);
+      double squares = 0;
+      for (std::size_t i = 0; i < z.size(); ++i) {
+        squares += z[i] * z[i];
+        CHECK(gradient[i] == Approx(2 * z[i]).epsilon(1e-6));
+      }
+      CHECK(energy == Approx(squares).epsilon(1e-5));
+    }
+  }
+  // Poses turned by nearly half a turn, and by more, from what is natural.
+  for (const double turn : {3.0, 3.14, 4.5, 6.28}) {
+    INFO("turned by " << turn);
+    Numbers pose(63, 0.0);
+    for (std::size_t j = 0; j < 21; ++j) pose[3 * j + j % 3] = turn;
+    for (const PosePrior* prior : {&vposer, &natural}) {
+      Tape<TestType> tape;
+      const auto x = tape.parameter("pose", shape_of(21, 3));
+      tape.set(x, std::vector<TestType>(pose.begin(), pose.end()));
+      const auto energy = prior->energy(prior->encode(rotations_from_axis_angle(x)));
+      tape.forward(energy);
+      tape.backward(energy);
+      CHECK(std::isfinite(tape.value(energy).scalar()));
+      for (const double d : numbers_of(tape.gradient(x))) CHECK(std::isfinite(d));
+    }
   }
 }
 

@@ -1,11 +1,20 @@
 #include "core/process.h"
 
+#include <cerrno>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <signal.h>
+#include <thread>
+
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "tests/support/temporary_folder.h"
 
 using namespace hsi4d;
 using Catch::Matchers::Message;
+using hsi4d::test::TemporaryFolder;
 
 TEST_CASE("what a program prints comes back, and arguments are not those of a shell") {
   CHECK(run_process({"printf", "%s|", "a b", "$HOME", "\"; rm x"}) == "a b|$HOME|\"; rm x|");
@@ -39,6 +48,17 @@ TEST_CASE("a program that stops reading is no signal to us") {
 }
 
 TEST_CASE("a program that nobody waits for is ended") {
-  { ChildProcess sleep({"sleep", "1000"}); }
-  SUCCEED();
+  const TemporaryFolder here;
+  pid_t pid = 0;
+  {
+    ChildProcess child({"sh", "-c", "echo $$ > pid.tmp; mv pid.tmp pid; exec sleep 1000"});
+    for (int i = 0; i < 2000 && !std::filesystem::exists("pid"); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    REQUIRE(std::filesystem::exists("pid"));
+    std::ifstream("pid") >> pid;
+    REQUIRE(pid > 1);
+    CHECK(kill(pid, 0) == 0);  // it runs
+  }
+  CHECK(kill(pid, 0) == -1);  // it is gone, and waited for
+  CHECK(errno == ESRCH);
 }

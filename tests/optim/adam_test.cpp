@@ -126,6 +126,7 @@ TEST_CASE("steps do not depend on the scale of the loss when eps does not count"
   CHECK(trace(scale, 1e-8) != trace(1, 1e-8));
 }
 
+// Rows D4 and F1: at step 7 of a run.
 TEMPLATE_TEST_CASE("one bad number leaves parameters and moments as they were", "", float, double) {
   using S = TestType;
   const S largest = static_cast<S>(3e38);
@@ -178,6 +179,7 @@ TEST_CASE("a denormal gradient counts as zero") {
   CHECK(adam.moments("all").blocks[0].mean[1] == 0);
 }
 
+// Row D4.
 TEST_CASE("a loss that is not finite is a bad step too") {
   Slopes<double> problem(shape_of(2, 2));
   ParameterGroupSettings settings;
@@ -192,6 +194,7 @@ TEST_CASE("a loss that is not finite is a bad step too") {
   CHECK(problem.numbers() == std::vector<double>(4, 0));
 }
 
+// Row D4.
 TEST_CASE("two bad evaluations in a row take the step before them back, bitwise") {
   Slopes<float> problem(shape_of(5, 3));
   ParameterGroupSettings settings;

@@ -7,6 +7,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
 #include "core/config_file.h"
+#include "core/parallel.h"
 #include "core/random.h"
 #include "core/rotation.h"
 #include "tests/support/operator_check.h"
@@ -430,6 +431,49 @@ TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain 
     const double loss = motion_loss("contact", R"({"distance": )" + std::to_string(distance) + "}", no_joint,
                                     [&](const BodyPoint& p) { return test.start.place(p); });
     CHECK(loss == Approx(expected).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("of Gaussians at the same distance contact takes the same ones each time, the first object's (row D6)") {
+  // Every Gaussian of an object twice, and a second object that is in the same place, and has the same.
+  MotionOfTest tied;
+  for (Gaussians& object : tied.objects) {
+    object = motion_of_test().objects[0];
+    const std::vector<float> means = object.means;
+    object.means.insert(object.means.end(), means.begin(), means.end());
+    object.opacity_logits.resize(2 * kObjectRows);
+  }
+  tied.start.objects = {&tied.objects[0], &tied.objects[1]};
+  for (auto& poses : tied.start.world_from_object) poses[1] = poses[0];
+  const auto chosen = [&](int threads) {
+    std::vector<ObjectPoint> all;
+    with_threads(threads, [&] {
+      Tape<double> tape;
+      LossInputs<double> inputs;
+      inputs.motion = std::shared_ptr<const MotionStart>(&tied.start, [](const MotionStart*) {});
+      inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+      inputs.body_points = [&](const std::vector<BodyPoint>& points) {
+        return tape.parameter("hands", shape_of(std::ssize(points), 3));
+      };
+      inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
+        all = points;
+        return tape.parameter("objects", shape_of(std::ssize(points), 3));
+      };
+      REQUIRE(term_named("contact").record(inputs).tape != nullptr);
+    });
+    return all;
+  };
+  const std::vector<ObjectPoint> first = chosen(1);
+  REQUIRE(first.size() > 10);
+  for (const ObjectPoint& point : first) CHECK(point.object == 0);
+  for (const int threads : {1, 2, 3}) {
+    const std::vector<ObjectPoint> again = chosen(threads);
+    REQUIRE(again.size() == first.size());
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      CHECK(again[i].frame == first[i].frame);
+      CHECK(again[i].object == first[i].object);
+      CHECK(again[i].row == first[i].row);
+    }
   }
 }
 

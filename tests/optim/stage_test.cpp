@@ -291,6 +291,7 @@ TEST_CASE("stages that can not run say why") {
                     Contains("groups \"base\" and \"objects\" share the parameter 'base'"));
 }
 
+// Row D4: a NaN in iteration 7 leaves the numbers of iteration 6, and the report names the operator.
 TEST_CASE("a fault that passes costs one iteration") {
   Picture<double> picture;
   StageSettings settings = usual_stage();

@@ -11,6 +11,7 @@
 #include "core/image_io.h"
 #include "core/parallel.h"
 #include "pipelines/posed_avatar.h"
+#include "pipelines/run_config.h"
 #include "pipelines/synthetic.h"
 #include "pipelines/synthetic_views.h"
 #include "tests/temporary_folder.h"
@@ -242,6 +243,40 @@ TEST_CASE("the config of an avatar fit is checked") {
   CHECK_THROWS_WITH(load("{" + views + R"(, "held_cameras": [0.5]})"), Catch::Contains("whole numbers"));
   CHECK_THROWS_WITH(load("{" + views + R"(, "stage": {"iterations": 1, "optimize": {"colours": {"lr": 1}}}})"),
                     Catch::Contains("colors"));
+}
+
+TEST_CASE("the shipped views are learnt by the shipped fit") {
+  const TemporaryFolder folder;
+  const fs::path configs = fs::path(HSI4D_SOURCE_DIR) / "configs" / "avatar";
+  // As they are but for sizes and counts.
+  RunConfig made = load_run_config(configs / "views.json", {}, descriptions_of(loss_terms()));
+  CHECK(made.synthetic.kind == SyntheticKind::kViews);
+  made.synthetic.size_px = 48;
+  made.synthetic.avatar_gaussians = 1500;
+  made.synthetic.views_cameras = 3;
+  made.synthetic.views_poses = 2;
+  const fs::path views = fs::path(folder.path()) / "views";
+  write_views(made.synthetic, video_render_settings(), views);
+  AvatarFitSettings settings = load_avatar_fit(
+      configs / "fit.json", {"views=" + (views / "views.json").string(), "gaussians=1000", "stage.iterations=12"},
+      descriptions_of(loss_terms()));
+  for (auto& [name, group] : settings.stage.optimize) group.from = 0;  // as later iterations would be
+  AvatarFitSettings first = settings;
+  first.stage.iterations = 1;
+  const AvatarFitResult before = fitted(first), after = fitted(settings);
+  INFO("learnt " << before.learnt.psnr_db << " dB before, " << after.learnt.psnr_db << " dB after");
+  CHECK(after.learnt.views == 6);
+  CHECK(after.held.views == 0);
+  CHECK(after.learnt.psnr_db > before.learnt.psnr_db + 1);
+  CHECK(after.stage.rollbacks == 0);
+  const Avatar start = first_avatar(settings);  // everything that the stage names has moved
+  CHECK(after.avatar.colors != start.colors);
+  CHECK(after.avatar.opacity_logits != start.opacity_logits);
+  CHECK(after.avatar.log_scales != start.log_scales);
+  CHECK(after.avatar.means != start.means);
+  REQUIRE(after.avatar.color_net.has_value());
+  CHECK(after.avatar.color_net->layers.back().bias != start.color_net->layers.back().bias);
+  CHECK(after.avatar.color_net->features != start.color_net->features);
 }
 
 TEST_CASE("an avatar of a real body, learnt from the reference's pictures, is right in new views and poses", "[full]") {

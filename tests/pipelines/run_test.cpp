@@ -81,6 +81,36 @@ double number_at(const nlohmann::json& object, const char* name) {
   return object[name].get<double>();
 }
 
+fs::path shipped_configs() { return fs::path(HSI4D_SOURCE_DIR) / "configs"; }
+
+/// Makes the dataset that a shipped config describes, but for its size, and runs the config on it, or on the tiny one,
+/// each stage for two iterations.
+/// @return  whether it has stages: one without is a base for others, or settings of a render or dataset, and runs with
+///          those of a tiny one
+bool check_shipped_config(const fs::path& file, const std::string& folder, bool on_its_own) {
+  INFO(file);
+  RunConfig config = load_run_config(file, {}, descriptions_of(loss_terms()));
+  const bool has_stages = !config.stages.empty();
+  if (!has_stages) config.stages = tiny_config().stages;
+  for (auto& [stage, settings] : config.stages) {
+    settings.iterations = 2;
+    for (auto& [group, moved] : settings.optimize) moved.from = 0;  // as later iterations would be
+  }
+  config.synthetic.frames = 2;
+  config.synthetic.size_px = 32;
+  config.synthetic.scene_gaussians = kFewestSceneGaussians;
+  config.synthetic.avatar_gaussians = 300;
+  config.synthetic.object_gaussians = kFewestObjectGaussians;
+  write_dataset(config.synthetic, video_render_settings(), folder + "-dataset");
+  CHECK(fs::exists(folder + "-dataset/truth/motion.npz"));
+  config.data = dataset_inputs(on_its_own ? fs::path(folder + "-dataset") : TinyDataset::folder());
+  const RunSummary summary = carry_out_tiny(config, folder);
+  CHECK(summary.metrics.size() == config.stages.size());
+  CHECK(number_in(summary.metrics.back().values, "psnr_db") > 10);
+  CHECK(json_of(folder + "/status.json")["state"] == "done");
+  return has_stages;
+}
+
 }  // namespace
 
 TEST_CASE("a run leaves a whole run folder, and a result better than its baselines", "[run]") {
@@ -339,38 +369,24 @@ TEST_CASE("a dry run looks at the folder as the run would", "[run]") {
 
 TEST_CASE("every shipped config runs", "[run]") {
   const TemporaryFolder here;
-  const DataSettings data = dataset_inputs(TinyDataset::folder());
   std::set<std::string> with_stages, without;
-  for (const std::string& name : names_in(fs::path(HSI4D_SOURCE_DIR) / "configs")) {
-    if (fs::is_directory(fs::path(HSI4D_SOURCE_DIR) / "configs" / name)) continue;  // configs of other commands
-    INFO(name);
-    RunConfig config =
-        load_run_config(fs::path(HSI4D_SOURCE_DIR) / "configs" / name, {}, descriptions_of(loss_terms()));
-    const std::string folder = fs::path(name).stem().string();
-    (config.stages.empty() ? without : with_stages).insert(folder);
-    // A config without stages is a base for others, or settings of a render or dataset: its run has those of a tiny
-    // one.
-    if (config.stages.empty()) config.stages = tiny_config().stages;
-    for (auto& [stage, settings] : config.stages) {
-      settings.iterations = 2;
-      for (auto& [group, moved] : settings.optimize) moved.from = 0;  // as later iterations would be
-    }
-    config.data = data;
-    const RunSummary summary = carry_out_tiny(config, folder);
-    CHECK(summary.metrics.size() == config.stages.size());
-    CHECK(number_in(summary.metrics.back().values, "psnr_db") > 10);
-    CHECK(json_of(folder + "/status.json")["state"] == "done");
-    INFO("its dataset");  // but for its size
-    config.synthetic.frames = 2;
-    config.synthetic.size_px = 32;
-    config.synthetic.scene_gaussians = kFewestSceneGaussians;
-    config.synthetic.avatar_gaussians = 300;
-    config.synthetic.object_gaussians = kFewestObjectGaussians;
-    write_dataset(config.synthetic, video_render_settings(), folder + "-dataset");
-    CHECK(fs::exists(folder + "-dataset/truth/motion.npz"));
+  for (const std::string& name : names_in(shipped_configs())) {
+    if (fs::is_directory(shipped_configs() / name)) continue;  // see below; those of other commands have their tests
+    const std::string stem = fs::path(name).stem().string();
+    (check_shipped_config(shipped_configs() / name, stem, false) ? with_stages : without).insert(stem);
   }
   CHECK(with_stages == std::set<std::string>{"best", "demo", "demo_quick", "paper"});
   CHECK(without == std::set<std::string>{"accurate", "compare_gsplat", "default", "synthetic"});
+}
+
+TEST_CASE("every shipped config of a generated dataset runs", "[run]") {
+  const TemporaryFolder here;
+  std::set<std::string> with_stages;
+  for (const std::string& name : names_in(shipped_configs() / "synthetic")) {
+    const std::string stem = fs::path(name).stem().string();
+    if (check_shipped_config(shipped_configs() / "synthetic" / name, stem, true)) with_stages.insert(stem);
+  }
+  CHECK(with_stages == std::set<std::string>{"disturbed", "faults", "walk"});
 }
 
 TEST_CASE("the demo halves the errors of what it is given, and tells them", "[full][demo]") {

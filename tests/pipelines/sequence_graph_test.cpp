@@ -8,10 +8,13 @@
 #include "autodiff/gradcheck.h"
 #include "autodiff/reduce.h"
 #include "body/motion_edit.h"
+#include "core/config_file.h"
 #include "core/rotation.h"
 #include "optim/metrics.h"
 #include "optim/stage.h"
 #include "tests/pipelines/small_clip.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/vposer_checkpoint.h"
 
 using namespace hsi4d;
 using test::small_clip;
@@ -36,6 +39,17 @@ std::vector<SceneState> some_states(const Clip& clip) {
 const LossTerm& term_named(const std::string& name) {
   return *std::find_if(loss_terms().begin(), loss_terms().end(),
                        [&](const LossTerm& term) { return term.description.name == name; });
+}
+
+/// The settings of a term that JSON text gives.
+std::any own_settings(const std::string& name, const std::string& text) {
+  LossSettings settings = default_settings(term_named(name).description);
+  ConfigFields fields;
+  describe(fields, settings);
+  ConfigProblems problems;
+  read_config(load_config_text(text, "loss.json", "", {}, problems), fields, problems);
+  problems.throw_if_any();
+  return settings.own;
 }
 
 double largest_joint_distance(const Clip& clip, const SceneState& a, const SceneState& b) {
@@ -117,6 +131,14 @@ TEST_CASE("gradients of a sequence are right for every group and term") {
   total = total + term_named("smooth").record(inputs, term_named("smooth").description.defaults);
   total = total + term_named("contact").record(inputs, defaults) * 10.0;
   total = total + term_named("ground").record(inputs, term_named("ground").description.defaults);
+  // With all feet that are not high up, be they as fast as they may.
+  const Var<double> sliding =
+      term_named("foot_sliding").record(inputs, own_settings("foot_sliding", R"({"speed": 100})"));
+  const Var<double> limits = term_named("joint_limits").record(inputs);
+  total = total + sliding + limits;
+  tape.forward(total);
+  CHECK(tape.value(sliding).scalar() > 1e-4);
+  CHECK(tape.value(limits).scalar() > 1e-4);
   const LossDescription& likely = term_named("pose_prior").description;
   total = total + term_named("pose_prior").record(inputs, prepared_loss(likely.prepare, likely.defaults)) * 1e-3;
   for (const ParameterGroup<double>& group : graph.groups()) {
@@ -181,4 +203,45 @@ TEST_CASE("a stage over the sequence smooths a motion and stays near it") {
   CHECK(roughness(states) < 0.8 * roughness(before));
   for (std::size_t t = 0; t < states.size(); ++t) CHECK(largest_joint_distance(clip, states[t], before[t]) < 0.25);
   CHECK(largest_joint_distance(clip, states[0], before[0]) == 0);
+}
+
+TEST_CASE("a stage over the sequence moves the latents of VPoser where its settings name weights") {
+  const test::TemporaryFolder here;
+  const Bytes bytes = test::random_vposer(40, 32, 9).npz();
+  here.write("vposer.npz", std::string(bytes.begin(), bytes.end()));
+  const Clip clip = small_clip(16, 14, 100);
+  std::vector<SceneState> states = some_states(clip);
+  StageSettings settings = moving(sequence_group_names());
+  settings.iterations = 8;
+  settings.losses = {{"smooth", default_settings(term_named("smooth").description)}};
+  settings.pose_weights = "vposer.npz";
+  const PosePrior prior = read_pose_prior(settings.pose_weights.string());
+  Tape<double> tape;
+  const SequenceGraph<double> graph(tape, clip, states, &prior, RotationParameters::kSixD);
+  const auto latents = std::find_if(graph.groups().begin(), graph.groups().end(),
+                                    [](const ParameterGroup<double>& group) { return group.name == "pose_latents"; });
+  REQUIRE(latents != graph.groups().end());
+  CHECK(latents->blocks.front().shape() == shape_of(kFrames - 1, 32));
+  // They start as the encoder has them, and the joints where the decoder puts them.
+  const std::vector<double> encoded =
+      prior.encode(std::span<const double>(states[2].body.axis_angle).subspan(3, 3 * kBodyPoseJoints));
+  for (Index i = 0; i < 32; ++i)
+    CHECK(tape.value(latents->blocks.front())(1, i) == Approx(encoded[static_cast<std::size_t>(i)]).margin(1e-12));
+  double first = 0, last = 0;
+  run_stage<double>(tape, settings, loss_terms(), graph.loss_inputs(), graph.groups(), [&](const IterationReport& at) {
+    if (at.iteration == 0) first = at.loss;
+    last = at.loss;
+  });
+  CHECK(last < first);
+  std::vector<SceneState> after = states;
+  graph.read_states(settings.optimize, after);
+  Tape<double> decoder;
+  const Var<double> moved = decoder.parameter("z", shape_of(1, 32));
+  std::copy_n(tape.value(latents->blocks.front()).row(1), 32, decoder.write(moved).data);
+  const Var<double> rotations = prior.decode(moved);
+  decoder.forward(rotations);
+  for (Index j = 0; j < kBodyPoseJoints; ++j) {
+    const Matrix3<double> joint = so3_exp(after[2].body.rotation_of(j + 1));
+    for (Index i = 0; i < 9; ++i) CHECK(joint(i / 3, i % 3) == Approx(decoder.value(rotations)(j, i)).margin(1e-9));
+  }
 }

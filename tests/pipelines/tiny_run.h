@@ -141,8 +141,11 @@ inline nlohmann::json without_seconds(nlohmann::json value) {
 /// the members of summary.json without seconds.
 inline std::map<std::string, std::string> result_of(const std::filesystem::path& run) {
   std::map<std::string, std::string> result;
-  for (const char* name : {"config.resolved.json", "motion.npz", "objects.npz", "cameras.json"}) {
+  for (const char* name : {"config.resolved.json", "motion.npz", "motion_30fps.npz", "objects.npz", "cameras.json"}) {
     result[name] = file_text(run / name);
+  }
+  for (const char* name : {"body.glb", "preview.mp4", "color_net.safetensors"}) {  // not every run has these
+    if (std::filesystem::exists(run / name)) result[name] = file_text(run / name);
   }
   for (const auto& entry : std::filesystem::directory_iterator(run / "frames")) {
     result["frames/" + entry.path().filename().string()] = file_text(entry.path());
