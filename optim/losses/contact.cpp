@@ -2,6 +2,8 @@
 // the stage began are drawn to it. C_t has the Gaussians h of the hands that then were nearer than `distance` to one of
 // an object, μ the nearest; where it is empty L_t = 0.   [method, stage 3: Eqs. S2, S3]
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <nanoflann.hpp>
 
@@ -44,7 +46,16 @@ struct ContactPairs {
   std::vector<double> weights;  // of each pair's squared distance in the loss
 };
 
-/// For each hand point the nearest Gaussian among all objects (of equals the first object's), if it is near enough.
+/// The first of the centres that are at this squared distance, which is the least: trees have an order of their own.
+Index first_at(const Tree& tree, const Vector3<double>& place, double squared) {
+  std::vector<std::pair<std::uint32_t, double>> found;
+  tree.radiusSearch(place.data(), std::nextafter(squared, HUGE_VAL), found, {});
+  std::uint32_t first = std::numeric_limits<std::uint32_t>::max();
+  for (const auto& item : found) first = std::min(first, item.first);
+  return static_cast<Index>(first);
+}
+
+/// For each hand point the nearest Gaussian among all objects (of equals the first), if it is near enough.  [row D6]
 class Neighbours {
  public:
   Neighbours(const MotionStart& motion, double distance) : motion_(motion), distance_(distance) {
@@ -65,7 +76,7 @@ class Neighbours {
         double squared = 0;
         if (trees_[o]->knnSearch(local.data(), 1, &found, &squared) == 0 || !(squared < least)) continue;
         least = squared;
-        nearest = {frame, static_cast<Index>(o), static_cast<Index>(found)};
+        nearest = {frame, static_cast<Index>(o), first_at(*trees_[o], local, squared)};
       }
       if (nearest.object < 0) continue;
       pairs.hands.push_back(hand);

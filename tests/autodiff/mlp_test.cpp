@@ -178,6 +178,7 @@ TEST_CASE("mlp passes the operator checks", "[parallel]") {
   for (const Net& net : nets) {
     OperatorCheck options;
     options.entries = net.rows > 1000 ? 6 : 24;
+    if (net.rows == 3) options.float_tolerance = 1e-4;  // a gradient is one number, whose few terms may cancel
     check_operator(
         "mlp of " + std::to_string(net.rows) + " rows", net.inputs(), [&net](const auto& in) { return net.record(in); },
         options);

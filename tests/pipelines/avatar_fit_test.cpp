@@ -257,9 +257,10 @@ TEST_CASE("the shipped views are learnt by the shipped fit") {
   made.synthetic.views_poses = 2;
   const fs::path views = fs::path(folder.path()) / "views";
   write_views(made.synthetic, video_render_settings(), views);
-  AvatarFitSettings settings = load_avatar_fit(
-      configs / "fit.json", {"views=" + (views / "views.json").string(), "gaussians=1000", "stage.iterations=12"},
-      descriptions_of(loss_terms()));
+  AvatarFitSettings settings =
+      load_avatar_fit(configs / "fit.json", {"views=" + (views / "views.json").string(), "gaussians=1000"},
+                      descriptions_of(loss_terms()));
+  settings.stage.iterations = 12;
   for (auto& [name, group] : settings.stage.optimize) group.from = 0;  // as later iterations would be
   AvatarFitSettings first = settings;
   first.stage.iterations = 1;

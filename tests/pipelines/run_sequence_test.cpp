@@ -59,7 +59,7 @@ const nlohmann::json& entry_of(const nlohmann::json& summary, const std::string&
 /// What a run stopped after `last` iterations says.
 std::string stop_message_at(int last) {
   const int frame = (last - 1) / kInAFrame + 1;
-  if (frame >= kTinyFrames) return "interrupted in a stage over all frames; frames 1 to 3 are finished and kept";
+  if (frame >= kTinyFrames) return "interrupted after the last frame; frames 1 to 3 are finished and kept";
   const char* const kept = frame == 1   ? "no frame was finished"
                            : frame == 2 ? "frame 1 is finished and kept"
                                         : "frames 1 to 2 are finished and kept";
