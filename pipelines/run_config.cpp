@@ -33,6 +33,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
            "Numbers by which rotations are optimised: two columns of the matrix, or axis times angle");
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
   f.object("camera", s.camera, "How cameras are optimised");
+  f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");
   f.object("start", s.start, "Where the stages of a frame begin");
   f.object("data", s.data, "The files that the run reads");
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
@@ -80,8 +81,9 @@ bool has_loss(const RunConfig& config, const std::string& name) {
 }
 
 ConfigValue without_data(ConfigValue tree) {
-  std::erase_if(tree.members,
-                [](const ConfigMember& member) { return member.key == "synthetic" || member.key == "threads"; });
+  std::erase_if(tree.members, [](const ConfigMember& member) {
+    return member.key == "synthetic" || member.key == "threads" || member.key == "camera_selection";
+  });
   for (ConfigMember& member : tree.members) {
     std::vector<ConfigMember>& own = member.value.members;
     if (member.key == "body") std::erase_if(own, [](const ConfigMember& setting) { return setting.key == "path"; });

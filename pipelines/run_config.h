@@ -10,6 +10,7 @@
 #include "optim/loss_description.h"
 #include "optim/stage_settings.h"
 #include "pipelines/body_settings.h"
+#include "pipelines/camera_selection.h"
 #include "pipelines/color_net_settings.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/frame_start.h"
@@ -48,6 +49,7 @@ struct RunConfig {
   RotationParameters rotations = RotationParameters::kSixD;
   std::array<double, 3> background{};  ///< colour behind everything
   CameraSettings camera;
+  CameraSelectionSettings camera_selection;
   StartSettings start;
   DataSettings data;
   BodySettings body;

@@ -31,6 +31,7 @@
 #include "pipelines/cli/render_command.h"
 #include "pipelines/cli/report_command.h"
 #include "pipelines/cli/run_command.h"
+#include "pipelines/cli/select_camera_command.h"
 #include "pipelines/cli/synth_command.h"
 #include "pipelines/reconstruct.h"
 
@@ -81,6 +82,7 @@ struct CommandLine {
   PoseOptions pose;
   MotionOptions motion;
   BenchOptions bench;
+  SelectCameraOptions select_camera;
   std::function<std::string()> run;
 
   explicit CommandLine(const std::vector<LossTerm>& terms) : losses(descriptions_of(terms)) {
@@ -91,6 +93,7 @@ struct CommandLine {
     add_run(terms);
     add_demo(terms);
     add_synth();
+    add_select_camera();
     add_report();
     add_render();
     add_gradients();
@@ -149,6 +152,20 @@ struct CommandLine {
     add_overrides(*synth, overrides);
     synth->add_flag("--quiet", quiet, "No progress on stderr");
     synth->callback([this] { run = [this] { return synth_command(config, overrides, out, quiet, losses); }; });
+  }
+
+  void add_select_camera() {
+    SelectCameraOptions& o = select_camera;
+    CLI::App* command = app.add_subcommand("select-camera", "Choose the camera of a clip's first frame");
+    command
+        ->add_option("CONFIG", o.config,
+                     "A config with scene, avatar and initial state; section camera_selection says how")
+        ->required();
+    add_overrides(*command, o.overrides);
+    command->add_option("--out", o.out, "Where to: a camera file")->type_name("F.json");
+    command->add_option("--image", o.image, "Image of what it sees")->type_name("F.{png,jpg,exr}");
+    command->add_flag("--quiet", o.quiet, "No progress on stderr");
+    command->callback([this] { run = [this] { return select_camera_command(select_camera, losses); }; });
   }
 
   void add_report() {
