@@ -209,7 +209,10 @@ TEST_CASE("priors pass the operator checks", "[parallel]") {
   for (const PosePrior* prior : {&vposer, &natural}) {
     const OperatorInput latents{"z", shape_of(2, prior->latents())};
     const OperatorInput pose{"rotations", shape_of(42, 9), 0, 0, rotations};
-    check_operator(prior->name() + " decode", {latents}, [&](const auto& in) { return prior->decode(in[0]); });
+    OperatorCheck options;
+    options.float_tolerance = 1e-4;  // random weights make some columns of a rotation nearly parallel
+    check_operator(
+        prior->name() + " decode", {latents}, [&](const auto& in) { return prior->decode(in[0]); }, options);
     check_operator(prior->name() + " encode", {pose}, [&](const auto& in) { return prior->encode(in[0]); });
     check_operator(prior->name() + " energy", {latents}, [&](const auto& in) { return prior->energy(in[0]); });
   }
