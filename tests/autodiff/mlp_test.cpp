@@ -178,9 +178,14 @@ TEST_CASE("mlp passes the operator checks", "[parallel]") {
   for (const Net& net : nets) {
     OperatorCheck options;
     options.entries = net.rows > 1000 ? 6 : 24;
-    if (net.rows == 3) options.float_tolerance = 1e-4;  // a gradient is one number, whose few terms may cancel
+    std::vector<OperatorInput> inputs = net.inputs();
+    // Of layers of one unit, numbers that are the same for every seed: others make a sum before it cancel in float.
+    for (std::size_t i = 0; net.rows == 3 && i < inputs.size(); ++i) {
+      for (Index k = 0; k < inputs[i].shape.count(); ++k)
+        inputs[i].values.push_back(0.4 + 0.1 * static_cast<double>((i + 2 * static_cast<std::size_t>(k)) % 5));
+    }
     check_operator(
-        "mlp of " + std::to_string(net.rows) + " rows", net.inputs(), [&net](const auto& in) { return net.record(in); },
+        "mlp of " + std::to_string(net.rows) + " rows", inputs, [&net](const auto& in) { return net.record(in); },
         options);
   }
 }
