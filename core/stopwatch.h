@@ -1,6 +1,7 @@
 // Time that a piece of work takes.
 #pragma once
 
+#include <chrono>
 #include <ctime>
 #include <utility>
 
@@ -25,5 +26,10 @@ class Stopwatch {
   }
   double last_ = seconds();
 };
+
+/// Seconds of the wall clock since `start`, for what people wait for.
+inline double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 }  // namespace hsi4d

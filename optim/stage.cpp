@@ -5,6 +5,7 @@
 
 #include "autodiff/elementwise.h"
 #include "autodiff/inspect.h"
+#include "core/stopwatch.h"
 #include "core/suggest.h"
 #include "core/text.h"
 
@@ -13,8 +14,6 @@ namespace hsi4d {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 std::string message_of(const std::string& stage, const std::string& text) { return "stage '" + stage + "': " + text; }
 

@@ -14,6 +14,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/rotation.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "optim/metrics.h"
 #include "optim/stage.h"
@@ -28,10 +29,6 @@
 namespace hsi4d {
 
 namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
 
 /// Where a state puts everything, for the metrics. A stage that draws the scene alone is judged by its camera alone.
 FrameState placed(const Clip& clip, const SceneState& state, Draw draw) {

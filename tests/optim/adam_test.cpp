@@ -9,6 +9,7 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "tests/support/allocation_counter.h"
 
 using namespace hsi4d;
@@ -289,7 +290,7 @@ TEST_CASE("moments that fade away never become denormal") {
       problem.tape.backward(problem.loss);
       adam.step(first + i, 200000, 0);
     }
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return seconds_since(start);
   };
   const double early = seconds_of(6000, 1);      // m is still normal: 0.9^6000 = 1e-275
   const double fading = seconds_of(1500, 6001);  // m passes the smallest normal number after 6700 steps
