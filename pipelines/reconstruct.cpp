@@ -9,7 +9,6 @@
 
 #include "body/kinematics.h"
 #include "body/motion_edit.h"
-#include "body/pose_prior.h"
 #include "core/camera_file.h"
 #include "core/image_io.h"
 #include "core/log.h"
@@ -17,14 +16,12 @@
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "optim/metrics.h"
-#include "optim/stage.h"
 #include "pipelines/evaluate.h"
-#include "pipelines/frame_graph.h"
 #include "pipelines/frame_images.h"
 #include "pipelines/input_hashes.h"
+#include "pipelines/reconstruct_stage.h"
 #include "pipelines/run_results.h"
 #include "pipelines/run_state.h"
-#include "pipelines/sequence_graph.h"
 
 namespace hsi4d {
 
@@ -93,9 +90,6 @@ std::string stop_message(Index frame, Index frames) {
          " finished and kept";
 }
 
-/// Frames before the one at hand that terms over the motion see: three differences need as many.
-constexpr std::ptrdiff_t kFramesBefore = 3;
-
 class Reconstruction {
  public:
   Reconstruction(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
@@ -123,7 +117,7 @@ class Reconstruction {
     write_body(folder_.paths(), config_, clip_, result());
     write_preview(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
       stop_if_asked(clip_.frames());
-      return rendered_image(state, colors_after(frame));
+      return render_state(config_, clip_, state, colors_after(frame));
     });
     return summary;
   }
@@ -164,11 +158,7 @@ class Reconstruction {
     ColorState colors = progress_.colors;
     std::vector<SceneState> after;
     for (std::size_t s = 0; s < frame_stages_; ++s) {
-      if (config_.precision == RunPrecision::kFloat) {
-        run_frame_stage<float>(index, s, frame, state, colors);
-      } else {
-        run_frame_stage<double>(index, s, frame, state, colors);
-      }
+      run_in_frame(s, {index, frame, progress_.covered, progress_.after_stage.back()}, state, colors);
       after.push_back(state);
     }
     progress_.colors = std::move(colors);
@@ -187,12 +177,7 @@ class Reconstruction {
     const auto begin = std::chrono::steady_clock::now();
     for (std::size_t s = frame_stages_; s < config_.stages.size(); ++s) {
       std::vector<SceneState> states = result();
-      StageTotals totals;
-      if (config_.precision == RunPrecision::kFloat) {
-        run_sequence_stage<float>(s, states, totals);
-      } else {
-        run_sequence_stage<double>(s, states, totals);
-      }
+      const StageTotals totals = run_over_sequence(s, states);
       refined_.push_back({std::move(states), totals});
     }
     refined_errors_.resize(1);
@@ -204,26 +189,17 @@ class Reconstruction {
     refined_seconds_ = seconds_since(begin);
   }
 
-  template <class S>
-  void run_sequence_stage(std::size_t s, std::vector<SceneState>& states, StageTotals& totals) {
+  StageTotals run_over_sequence(std::size_t s, std::vector<SceneState>& states) {
     const auto& [name, stage] = config_.stages[s];
-    Tape<S> tape;
-    const bool moves_pose = find_entry(stage.optimize, "pose_latents") != nullptr;
-    const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
-    const SequenceGraph<S> graph(tape, clip_, states, moves_pose ? &prior : nullptr, config_.rotations);
-    std::string begin;
+    std::string begin;  // of the loss, for the log
     const auto note_iteration = [&](const IterationReport& report) {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
       note(std::nullopt, s, report, nullptr);
     };
-    const StageResult result = run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(), note_iteration,
-                                            {.name = name, .kept = nullptr});
-    graph.read_states(stage.optimize, states);
-    totals.iterations = result.iterations;
-    totals.rollbacks = result.rollbacks;
-    totals.seconds = result.seconds;
+    const StageResult result = run_sequence_stage({config_, clip_, losses_, s}, states, note_iteration);
     tell_terms_off(name, stage, result.off);
     folder_.note("all frames, " + stage_line(name, result, begin));
+    return {result.iterations, result.rollbacks, result.seconds};
   }
 
   /// The color net as it was after a frame, in the precision of its file, so that a resumed run has the same.
@@ -240,69 +216,25 @@ class Reconstruction {
     return refined_.empty() ? progress_.after_stage.back() : refined_.back().states;
   }
 
-  FrameGraphSettings graph_settings(Draw draw, const ColorState& colors) const {
-    return {config_.render,
-            config_.skip,
-            config_.approx,
-            config_.rotations,
-            config_.camera.increment,
-            draw,
-            Vector3<double>(config_.background.data()),
-            colors.net ? &*colors.net : nullptr,
-            config_.color_net.pose_gradient,
-            config_.color_net.camera_gradient,
-            false};
-  }
-
-  /// Whether a term that is on reads the human's opacity.
-  bool reads_human_opacity(const StageSettings& stage) const {
-    return std::any_of(losses_.begin(), losses_.end(), [&stage](const LossTerm& term) {
-      const LossSettings* const chosen = find_entry(stage.losses, term.description.name);
-      const std::vector<std::string>& reads = term.description.reads;
-      return chosen != nullptr && chosen->weight != 0 &&
-             std::find(reads.begin(), reads.end(), kReadsHumanOpacity) != reads.end();
-    });
-  }
-
-  /// The frames that terms over the motion see: up to kFramesBefore that are done, and the one at hand.
-  std::vector<SceneState> seen_frames(const SceneState& state) const {
-    const std::vector<SceneState>& done = progress_.after_stage.back();
-    std::vector<SceneState> frames(done.end() - std::min(kFramesBefore, std::ssize(done)), done.end());
-    frames.push_back(state);
-    return frames;
-  }
-
-  template <class S>
-  void run_frame_stage(Index index, std::size_t s, const ClipFrame& frame, SceneState& state, ColorState& colors) {
+  void run_in_frame(std::size_t s, const FrameTask& frame, SceneState& state, ColorState& colors) {
     const auto& [name, stage] = config_.stages[s];
-    Tape<S> tape;
-    FrameGraphSettings settings = graph_settings(stage.draw, colors);
-    settings.human_opacity = stage.draw == Draw::kAll && reads_human_opacity(stage);
-    FrameGraph<S> graph(tape, clip_, state.camera_from_world, settings);
-    graph.set_state(state);
-    if (stage.draw == Draw::kAll) graph.give_motion(seen_frames(state));
-    const Image weight = pixel_weights(stage.weight, frame);
-    graph.set_targets(targets_of(frame, stage, weight));
     std::string begin;  // of the loss, for the log
-    const auto note_iteration = [&](const IterationReport& report) {
+    const auto note_iteration = [&](const IterationReport& report, const RenderCounters& counters) {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
-      note(index, s, report, graph.rendered().counters.get());
+      note(frame.index, s, report, &counters);
     };
-    const StageResult result =
-        run_stage<S>(tape, stage, losses_, graph.loss_inputs(), graph.groups(), note_iteration,
-                     {.name = name + ", frame " + std::to_string(index), .kept = &colors.moments});
-    graph.read_state(stage.optimize, state);
-    if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
+    const StageResult result = run_frame_stage({config_, clip_, losses_, s}, frame, state, colors, note_iteration);
     StageTotals& totals = progress_.totals[s];
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
     // By then all frames before are there that terms over the motion want to see.
-    if (index == std::min<Index>(kFramesBefore, clip_.frames() - 1)) tell_terms_off(name, stage, result.off);
+    if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1)) tell_terms_off(name, stage, result.off);
     for (const LeftOutObject& object : result.left_out) {
-      progress_.left_out.push_back({s, index, object.object, object.term, object.reason});
+      progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
     }
-    folder_.note("frame " + std::to_string(index) + ", " + stage_line(name, result, begin) + left_out_text(result));
+    folder_.note("frame " + std::to_string(frame.index) + ", " + stage_line(name, result, begin) +
+                 left_out_text(result));
   }
 
   static std::string loss_text(double loss, std::span<const LossValue> terms) {
@@ -354,31 +286,6 @@ class Reconstruction {
     }
   }
 
-  /// Empty where every pixel counts.
-  Image pixel_weights(PixelWeight weight, const ClipFrame& frame) const {
-    if (weight == PixelWeight::kUnoccluded) return complement(progress_.covered);
-    if (weight == PixelWeight::kAll) return {};
-    Image covered(1, clip_.camera.height, clip_.camera.width);
-    add_covered(frame, config_.data, covered);
-    return covered;
-  }
-
-  FrameTargets targets_of(const ClipFrame& frame, const StageSettings& stage, const Image& weight) const {
-    FrameTargets targets;
-    targets.image = &frame.target;
-    targets.weight = stage.weight == PixelWeight::kAll ? nullptr : &weight;
-    targets.human_mask = &frame.human_mask;
-    for (const Image& mask : frame.object_masks) {
-      targets.object_masks.push_back(&mask);
-      targets.centers.push_back(mask_center(mask, config_.data.mask_threshold));
-    }
-    for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
-      targets.depths.push_back(
-          mean_depth(clip_.objects[o].gaussians, clip_.first.objects[o], clip_.first.camera_from_world));
-    }
-    return targets;
-  }
-
   /// @param frame     none: all at once
   /// @param counters  null: nothing was drawn
   void note(std::optional<Index> frame, std::size_t s, const IterationReport& report, const RenderCounters* counters) {
@@ -420,25 +327,12 @@ class Reconstruction {
     }
   }
 
-  template <class S>
-  Image render_state(const SceneState& state, const ColorState& colors) const {
-    Tape<S> tape;
-    FrameGraph<S> graph(tape, clip_, state.camera_from_world, graph_settings(Draw::kAll, colors));
-    graph.set_state(state);
-    tape.forward(graph.rendered().image);
-    return to_image(tape.value(graph.rendered().image));
-  }
-  Image rendered_image(const SceneState& state, const ColorState& colors) const {
-    return config_.precision == RunPrecision::kFloat ? render_state<float>(state, colors)
-                                                     : render_state<double>(state, colors);
-  }
-
   /// Writes the images of a frame and notes how far the result's is from the video's.
   void write_images(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors,
                     std::vector<MetricValues>& errors) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
-    const Image image = rendered_image(state, colors), foreground = foreground_of(frame);
+    const Image image = render_state(config_, clip_, state, colors), foreground = foreground_of(frame);
     write_image(paths.frame_image(number, "target"), frame.target);
     write_image(paths.frame_image(number, "render"), image);
     write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
@@ -446,7 +340,8 @@ class Reconstruction {
   }
 
   void write_start_image(Index index, const ClipFrame& frame) {
-    const Image start = rendered_image(baseline_start(index), start_colors_), foreground = foreground_of(frame);
+    const Image start = render_state(config_, clip_, baseline_start(index), start_colors_);
+    const Image foreground = foreground_of(frame);
     write_image(folder_.paths().frame_image(static_cast<int>(index), "start"), start);
     progress_.start_errors.push_back(image_errors(start, frame.target, &foreground));
   }

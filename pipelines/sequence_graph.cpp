@@ -16,7 +16,6 @@ namespace {
 
 constexpr const char* kTransl = "transl";
 constexpr const char* kOrient = "global_orient";
-constexpr const char* kLatents = "pose_latents";
 
 constexpr Index kRowNumbers = 9;  // of a rotation
 constexpr Index kOtherJoints = kSmplxJoints - 1 - kBodyPoseJoints;
@@ -73,12 +72,12 @@ Matrix3<double> matrix_of(const S* rows) {
 
 }  // namespace
 
-std::vector<std::string> sequence_group_names() { return {kTransl, kOrient, kLatents}; }
+std::vector<std::string> sequence_group_names() { return {kTransl, kOrient, kPoseLatents}; }
 
 std::string sequence_group_summary(const std::string& name) {
   if (name == kTransl) return "Places of the body in all frames but the first";
   if (name == kOrient) return "Headings of the body in these frames";
-  if (name == kLatents) return "Latents of the pose prior, which stand for the body's joints in these frames";
+  if (name == kPoseLatents) return "Latents of the pose prior, which stand for the body's joints in these frames";
   throw InternalError("there is no group of the sequence called '" + name + "'");
 }
 
@@ -128,10 +127,10 @@ template <class S>
 Var<S> SequenceGraph<S>::record_body(const std::vector<SceneState>& states, const PosePrior* prior) {
   const std::vector<double> start = axis_angles(states, 1, kBodyPoseJoints);
   if (prior == nullptr) {
-    groups_.push_back({kLatents, {}});
+    groups_.push_back({kPoseLatents, {}});
     return constant_rotations("body", start);
   }
-  const Var<S> latents = leaf(kLatents, prior->latents());
+  const Var<S> latents = leaf(kPoseLatents, prior->latents());
   write_rows(tape_, latents, prior->encode(start));
   body_rotations_ = prior->decode(latents);
   return reshape(body_rotations_, frames_, kRowNumbers * kBodyPoseJoints);
@@ -164,7 +163,7 @@ void SequenceGraph<S>::read_states(const ConfigMap<ParameterGroupSettings>& move
             w, Vector3<double>(static_cast<double>(x[3]), static_cast<double>(x[4]), static_cast<double>(x[5]))));
       body.set_rotation(0, w);
     }
-    if (body_rotations_.tape == nullptr || !is_moved(kLatents)) continue;
+    if (body_rotations_.tape == nullptr || !is_moved(kPoseLatents)) continue;
     const ConstArray<S> rotations = tape_.value(body_rotations_);
     for (Index j = 0; j < kBodyPoseJoints; ++j)
       body.set_rotation(j + 1, so3_log(matrix_of(rotations.row(t * kBodyPoseJoints + j))));

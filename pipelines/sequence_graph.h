@@ -18,6 +18,9 @@
 
 namespace hsi4d {
 
+/// The group of the latents of the pose prior, which stand for the joints.
+inline constexpr const char* kPoseLatents = "pose_latents";
+
 /// Names of the groups that a stage over the sequence may move.
 std::vector<std::string> sequence_group_names();
 /// One of them in words. Throws InternalError for another name.

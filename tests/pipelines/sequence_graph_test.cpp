@@ -173,7 +173,7 @@ TEST_CASE("only what a stage names comes back, and frame 0 stands") {
       const BodyPose &a = before[t].body, &b = after[t].body;
       CHECK((a.transl == b.transl) == (t == 0 || name != "transl"));
       CHECK((a.rotation_of(0) == b.rotation_of(0)) == (t == 0 || name != "global_orient"));
-      CHECK((a.rotation_of(5) == b.rotation_of(5)) == (t == 0 || name != "pose_latents"));
+      CHECK((a.rotation_of(5) == b.rotation_of(5)) == (t == 0 || name != kPoseLatents));
       for (const Index joint : {22, 30, 54}) CHECK(a.rotation_of(joint) == b.rotation_of(joint));
     }
   }
@@ -219,7 +219,7 @@ TEST_CASE("a stage over the sequence moves the latents of VPoser where its setti
   Tape<double> tape;
   const SequenceGraph<double> graph(tape, clip, states, &prior, RotationParameters::kSixD);
   const auto latents = std::find_if(graph.groups().begin(), graph.groups().end(),
-                                    [](const ParameterGroup<double>& group) { return group.name == "pose_latents"; });
+                                    [](const ParameterGroup<double>& group) { return group.name == kPoseLatents; });
   REQUIRE(latents != graph.groups().end());
   CHECK(latents->blocks.front().shape() == shape_of(kFrames - 1, 32));
   // They start as the encoder has them, and the joints where the decoder puts them.

@@ -1,0 +1,134 @@
+#include "pipelines/reconstruct_stage.h"
+
+#include <algorithm>
+
+#include "body/pose_prior.h"
+#include "pipelines/frame_graph.h"
+#include "pipelines/frame_images.h"
+#include "pipelines/sequence_graph.h"
+
+namespace hsi4d {
+
+namespace {
+
+FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const ColorState& colors) {
+  return {config.render,
+          config.skip,
+          config.approx,
+          config.rotations,
+          config.camera.increment,
+          draw,
+          Vector3<double>(config.background.data()),
+          colors.net ? &*colors.net : nullptr,
+          config.color_net.pose_gradient,
+          config.color_net.camera_gradient,
+          false};
+}
+
+/// Whether a term that is on reads the human's opacity.
+bool reads_human_opacity(const std::vector<LossTerm>& losses, const StageSettings& stage) {
+  return std::any_of(losses.begin(), losses.end(), [&stage](const LossTerm& term) {
+    const LossSettings* const chosen = find_entry(stage.losses, term.description.name);
+    const std::vector<std::string>& reads = term.description.reads;
+    return chosen != nullptr && chosen->weight != 0 &&
+           std::find(reads.begin(), reads.end(), kReadsHumanOpacity) != reads.end();
+  });
+}
+
+/// The frames that terms over the motion see: up to kFramesBefore that are done, and the one at hand.
+std::vector<SceneState> seen_frames(std::span<const SceneState> done, const SceneState& state) {
+  std::vector<SceneState> frames(done.end() - std::min(kFramesBefore, std::ssize(done)), done.end());
+  frames.push_back(state);
+  return frames;
+}
+
+/// Empty where every pixel counts.
+Image pixel_weights(PixelWeight weight, const FrameTask& task, const DataSettings& data) {
+  if (weight == PixelWeight::kUnoccluded) return complement(task.covered);
+  if (weight == PixelWeight::kAll) return {};
+  Image covered(1, task.covered.height(), task.covered.width());
+  add_covered(task.frame, data, covered);
+  return covered;
+}
+
+FrameTargets targets_of(const StageTask& task, const ClipFrame& frame, const Image& weight) {
+  const Clip& clip = task.clip;
+  FrameTargets targets;
+  targets.image = &frame.target;
+  targets.weight = task.config.stages[task.stage].second.weight == PixelWeight::kAll ? nullptr : &weight;
+  targets.human_mask = &frame.human_mask;
+  for (const Image& mask : frame.object_masks) {
+    targets.object_masks.push_back(&mask);
+    targets.centers.push_back(mask_center(mask, task.config.data.mask_threshold));
+  }
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    targets.depths.push_back(
+        mean_depth(clip.objects[o].gaussians, clip.first.objects[o], clip.first.camera_from_world));
+  }
+  return targets;
+}
+
+template <class S>
+StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+                               const FrameStageCallback& callback) {
+  const auto& [name, stage] = task.config.stages[task.stage];
+  Tape<S> tape;
+  FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
+  settings.human_opacity = stage.draw == Draw::kAll && reads_human_opacity(task.losses, stage);
+  FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
+  graph.set_state(state);
+  if (stage.draw == Draw::kAll) graph.give_motion(seen_frames(frame.done, state));
+  const Image weight = pixel_weights(stage.weight, frame, task.config.data);
+  graph.set_targets(targets_of(task, frame.frame, weight));
+  const StageResult result =
+      run_stage<S>(tape, stage, task.losses, graph.loss_inputs(), graph.groups(),
+                   [&](const IterationReport& report) { callback(report, *graph.rendered().counters); },
+                   {.name = name + ", frame " + std::to_string(frame.index), .kept = &colors.moments});
+  graph.read_state(stage.optimize, state);
+  if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
+  return result;
+}
+
+template <class S>
+StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>& states,
+                                  const StageCallback& callback) {
+  const auto& [name, stage] = task.config.stages[task.stage];
+  Tape<S> tape;
+  const bool moves_pose = find_entry(stage.optimize, kPoseLatents) != nullptr;
+  const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
+  const SequenceGraph<S> graph(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);
+  const StageResult result = run_stage<S>(tape, stage, task.losses, graph.loss_inputs(), graph.groups(), callback,
+                                          {.name = name, .kept = nullptr});
+  graph.read_states(stage.optimize, states);
+  return result;
+}
+
+template <class S>
+Image render_state_in(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {
+  Tape<S> tape;
+  FrameGraph<S> graph(tape, clip, state.camera_from_world, graph_settings(config, Draw::kAll, colors));
+  graph.set_state(state);
+  tape.forward(graph.rendered().image);
+  return to_image(tape.value(graph.rendered().image));
+}
+
+}  // namespace
+
+StageResult run_frame_stage(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+                            const FrameStageCallback& callback) {
+  return task.config.precision == RunPrecision::kFloat
+             ? run_frame_stage_in<float>(task, frame, state, colors, callback)
+             : run_frame_stage_in<double>(task, frame, state, colors, callback);
+}
+
+StageResult run_sequence_stage(const StageTask& task, std::vector<SceneState>& states, const StageCallback& callback) {
+  return task.config.precision == RunPrecision::kFloat ? run_sequence_stage_in<float>(task, states, callback)
+                                                       : run_sequence_stage_in<double>(task, states, callback);
+}
+
+Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {
+  return config.precision == RunPrecision::kFloat ? render_state_in<float>(config, clip, state, colors)
+                                                  : render_state_in<double>(config, clip, state, colors);
+}
+
+}  // namespace hsi4d
