@@ -69,6 +69,14 @@ void check_start(const StartSettings& settings, const Clip& clip) {
     throw UserError("/start/objects: \"estimate\": data.initial names no object_tracks");
 }
 
+SceneState given_start(const Clip& clip, Index frame) {
+  const auto index = static_cast<std::size_t>(frame);
+  SceneState state = clip.first;
+  if (!clip.estimate.empty()) state.body = clip.estimate[index];
+  if (!clip.object_estimate.empty()) state.objects = clip.object_estimate[index];
+  return state;
+}
+
 SceneState frame_start(const StartSettings& settings, const Clip& clip, const std::vector<SceneState>& done) {
   const std::size_t index = done.size();
   SceneState state = done.back();

@@ -7,12 +7,10 @@
 #include <map>
 #include <optional>
 
-#include "body/kinematics.h"
 #include "body/motion_edit.h"
 #include "core/camera_file.h"
 #include "core/image_io.h"
 #include "core/log.h"
-#include "core/rotation.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "optim/metrics.h"
@@ -22,28 +20,11 @@
 #include "pipelines/reconstruct_stage.h"
 #include "pipelines/run_results.h"
 #include "pipelines/run_state.h"
+#include "pipelines/summarize_run.h"
 
 namespace hsi4d {
 
 namespace {
-
-/// Where a state puts everything, for the metrics. A stage that draws the scene alone is judged by its camera alone.
-FrameState placed(const Clip& clip, const SceneState& state, Draw draw) {
-  FrameState frame;
-  frame.camera_from_world = state.camera_from_world;
-  if (draw == Draw::kScene) return frame;
-  frame.joints = pose_joints(clip.avatar, state.body);
-  for (const ObjectPose& pose : state.objects) {
-    frame.world_from_object.push_back({so3_exp(pose.rotation), pose.translation});
-  }
-  return frame;
-}
-
-std::vector<FrameState> placed(const Clip& clip, const std::vector<SceneState>& states, Draw draw) {
-  std::vector<FrameState> frames;
-  for (const SceneState& state : states) frames.push_back(placed(clip, state, draw));
-  return frames;
-}
 
 std::string checkpoint_file(const RunPaths& paths) { return paths.checkpoint() + "/progress.npz"; }
 
@@ -112,7 +93,7 @@ class Reconstruction {
     bar_.finish();
     tell_left_out();
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
-    const RunSummary summary = summarize();
+    const RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     folder_.write_summary(summary);
     write_body(folder_.paths(), config_, clip_, result());
     write_preview(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
@@ -178,15 +159,15 @@ class Reconstruction {
     for (std::size_t s = frame_stages_; s < config_.stages.size(); ++s) {
       std::vector<SceneState> states = result();
       const StageTotals totals = run_over_sequence(s, states);
-      refined_.push_back({std::move(states), totals});
+      refinement_.stages.push_back({std::move(states), totals});
     }
-    refined_errors_.resize(1);
+    refinement_.image_errors.resize(1);
     for (Index t = 1; t < clip_.frames(); ++t) {
       stop_if_asked(clip_.frames());
       const ClipFrame frame = read_frame(clip_, t);
-      write_images(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), refined_errors_);
+      write_images(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), refinement_.image_errors);
     }
-    refined_seconds_ = seconds_since(begin);
+    refinement_.seconds = seconds_since(begin);
   }
 
   StageTotals run_over_sequence(std::size_t s, std::vector<SceneState>& states) {
@@ -211,10 +192,7 @@ class Reconstruction {
     return colors;
   }
 
-  /// All frames after the last stage so far.
-  const std::vector<SceneState>& result() const {
-    return refined_.empty() ? progress_.after_stage.back() : refined_.back().states;
-  }
+  const std::vector<SceneState>& result() const { return result_of(progress_, refinement_); }
 
   void run_in_frame(std::size_t s, const FrameTask& frame, SceneState& state, ColorState& colors) {
     const auto& [name, stage] = config_.stages[s];
@@ -340,84 +318,10 @@ class Reconstruction {
   }
 
   void write_start_image(Index index, const ClipFrame& frame) {
-    const Image start = render_state(config_, clip_, baseline_start(index), start_colors_);
+    const Image start = render_state(config_, clip_, given_start(clip_, index), start_colors_);
     const Image foreground = foreground_of(frame);
     write_image(folder_.paths().frame_image(static_cast<int>(index), "start"), start);
     progress_.start_errors.push_back(image_errors(start, frame.target, &foreground));
-  }
-
-  /// What the run is given for a frame before it does anything.
-  SceneState baseline_start(Index index) const {
-    SceneState state = clip_.first;
-    if (!clip_.estimate.empty()) state.body = clip_.estimate[static_cast<std::size_t>(index)];
-    if (!clip_.object_estimate.empty()) state.objects = clip_.object_estimate[static_cast<std::size_t>(index)];
-    return state;
-  }
-
-  RunSummary summarize() const {
-    RunSummary summary;
-    summary.name = config_.name;
-    summary.frames = static_cast<int>(clip_.frames());
-    summary.seconds = progress_.seconds + refined_seconds_;
-    for (std::size_t s = 0; s < config_.stages.size(); ++s) summary.metrics.push_back(summarize_stage(s));
-    summary.baselines = {{"start", {}, {}}};
-    if (clip_.truth) add_errors(summary);
-    std::vector<FrameMetrics> before_refinement;
-    if (!refined_.empty())
-      add_image_errors(progress_.image_errors, summary.metrics[frame_stages_ - 1].values, before_refinement);
-    add_image_errors(refined_.empty() ? progress_.image_errors : refined_errors_, summary.metrics.back().values,
-                     summary.per_frame);
-    add_image_errors(progress_.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
-    return summary;
-  }
-
-  /// Adds errors of images, which need no truth, to means and frames.
-  static void add_image_errors(const std::vector<MetricValues>& errors, MetricValues& means,
-                               std::vector<FrameMetrics>& per_frame) {
-    std::vector<FrameMetrics> images;
-    for (std::size_t t = 1; t < errors.size(); ++t) images.push_back({static_cast<int>(t), errors[t]});
-    for (std::size_t t = 0; t < images.size(); ++t) {
-      if (per_frame.size() <= t) per_frame.push_back({images[t].frame, {}});
-      MetricValues& values = per_frame[t].values;
-      values.insert(values.end(), images[t].values.begin(), images[t].values.end());
-    }
-    const MetricValues added = mean_errors(images);
-    means.insert(means.end(), added.begin(), added.end());
-  }
-
-  StageSummary summarize_stage(std::size_t s) const {
-    const auto& [name, stage] = config_.stages[s];
-    const bool is_of_frame = s < frame_stages_;
-    const StageTotals& totals = is_of_frame ? progress_.totals[s] : refined_[s - frame_stages_].totals;
-    StageSummary summary{name, totals.seconds, totals.iterations, {}};
-    const std::vector<SceneState>& states = is_of_frame ? progress_.after_stage[s] : refined_[s - frame_stages_].states;
-    if (clip_.truth) summary.values = errors_of(states, is_of_frame ? stage.draw : Draw::kAll);
-    for (const auto& [counter, count] : {std::pair{"rollbacks", totals.rollbacks},
-                                         {"tiles", totals.tiles},
-                                         {"pairs", totals.pairs},
-                                         {"fragments", totals.fragments}}) {
-      summary.values.emplace_back(counter, static_cast<double>(count));
-    }
-    return summary;
-  }
-
-  MetricValues errors_of(const std::vector<SceneState>& states, Draw draw) const {
-    return sequence_summary(placed(clip_, states, draw), placed(clip_, *clip_.truth, draw), clip_.frame_rate);
-  }
-
-  void add_errors(RunSummary& summary) const {
-    const std::vector<FrameState> truth = placed(clip_, *clip_.truth, Draw::kAll);
-    std::vector<SceneState> start, copy;
-    for (Index t = 0; t < clip_.frames(); ++t) {
-      start.push_back(baseline_start(t));
-      copy.push_back(clip_.first);
-    }
-    summary.baselines.clear();
-    for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{"copy_frame_0", &copy}}) {
-      summary.baselines.push_back(
-          {name, errors_of(*states, Draw::kAll), sequence_errors(placed(clip_, *states, Draw::kAll), truth)});
-    }
-    summary.per_frame = sequence_errors(placed(clip_, result(), Draw::kAll), truth);
   }
 
   const RunConfig& config_;
@@ -425,18 +329,10 @@ class Reconstruction {
   RunFolder& folder_;
   const Observer& observer_;
   std::string identity_;  // the text that a checkpoint of this run belongs to
-  /// All frames after a stage over the sequence.
-  struct Refined {
-    std::vector<SceneState> states;
-    StageTotals totals;
-  };
-
   const Clip& clip_;
   std::size_t frame_stages_;
   RunProgress progress_;
-  std::vector<Refined> refined_;
-  double refined_seconds_ = 0;
-  std::vector<MetricValues> refined_errors_;  // of the images of the last, as progress_.image_errors
+  RefinementProgress refinement_;
   const ColorState start_colors_;
   Progress bar_;
 };

@@ -125,6 +125,10 @@ SceneState state_from(const double* numbers, const Clip& clip) {
 
 }  // namespace
 
+const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement) {
+  return refinement.stages.empty() ? progress.after_stage.back() : refinement.stages.back().states;
+}
+
 RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net) {
   RunProgress progress;
   progress.after_stage.assign(stages, {clip.first});

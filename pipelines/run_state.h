@@ -43,6 +43,22 @@ struct RunProgress {
   Index frames_done() const { return after_stage.empty() ? 0 : static_cast<Index>(after_stage.front().size()); }
 };
 
+/// All frames after a stage over the sequence.
+struct RefinedStates {
+  std::vector<SceneState> states;  ///< by frame, frame 0 included
+  StageTotals totals;
+};
+
+/// What the stages over the sequence have found, which come after all frames. It is in no checkpoint.
+struct RefinementProgress {
+  std::vector<RefinedStates> stages;
+  std::vector<MetricValues> image_errors;  ///< of the last of them, by frame, as those of RunProgress
+  double seconds = 0;
+};
+
+/// The states by frame after the last stage so far.
+const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement);
+
 /// Nothing done but the given frame 0.
 /// @param net  with which the run begins, if it has one
 RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net = {});

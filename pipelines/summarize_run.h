@@ -1,0 +1,17 @@
+// What a run came to: the errors of each of its stages, and of what it was given.
+#pragma once
+
+#include "pipelines/clip.h"
+#include "pipelines/run_config.h"
+#include "pipelines/run_state.h"
+#include "pipelines/run_summary.h"
+
+namespace hsi4d {
+
+/// The summary of a run that is at its end. Errors of poses are there where the clip has truth; those of images always
+/// are, at the last stage and at the last before the refinement.
+/// @param progress, refinement  all frames and all stages are done
+RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunProgress& progress,
+                         const RefinementProgress& refinement);
+
+}  // namespace hsi4d
