@@ -2,24 +2,19 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
-#include <map>
 #include <optional>
 
-#include "body/motion_edit.h"
-#include "core/camera_file.h"
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
-#include "core/text.h"
-#include "optim/metrics.h"
 #include "pipelines/evaluate.h"
 #include "pipelines/frame_images.h"
 #include "pipelines/input_hashes.h"
 #include "pipelines/reconstruct_stage.h"
 #include "pipelines/run_results.h"
 #include "pipelines/run_state.h"
+#include "pipelines/stage_log.h"
 #include "pipelines/summarize_run.h"
 
 namespace hsi4d {
@@ -91,7 +86,7 @@ class Reconstruction {
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
     if (frame_stages_ < config_.stages.size()) refine();
     bar_.finish();
-    tell_left_out();
+    warn_of_left_out(progress_.left_out, config_, clip_);
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
     const RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     folder_.write_summary(summary);
@@ -178,8 +173,8 @@ class Reconstruction {
       note(std::nullopt, s, report, nullptr);
     };
     const StageResult result = run_sequence_stage({config_, clip_, losses_, s}, states, note_iteration);
-    tell_terms_off(name, stage, result.off);
-    folder_.note("all frames, " + stage_line(name, result, begin));
+    warn_of_terms_off(result.off, name, stage);
+    folder_.note("all frames, " + stage_text(name, result, begin, clip_));
     return {result.iterations, result.rollbacks, result.seconds};
   }
 
@@ -207,61 +202,11 @@ class Reconstruction {
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
     // By then all frames before are there that terms over the motion want to see.
-    if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1)) tell_terms_off(name, stage, result.off);
+    if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1)) warn_of_terms_off(result.off, name, stage);
     for (const LeftOutObject& object : result.left_out) {
       progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
     }
-    folder_.note("frame " + std::to_string(frame.index) + ", " + stage_line(name, result, begin) +
-                 left_out_text(result));
-  }
-
-  static std::string loss_text(double loss, std::span<const LossValue> terms) {
-    std::vector<std::string> parts;
-    for (const LossValue& term : terms) parts.push_back(term.name + " " + rounded(term.value, 4));
-    return rounded(loss, 4) + " (" + joined(parts) + ")";
-  }
-
-  /// What a stage did, for the log.
-  static std::string stage_line(const std::string& stage, const StageResult& result, const std::string& begin) {
-    std::string text = "stage " + stage + ": " + std::to_string(result.iterations) + " iterations in " +
-                       rounded(result.seconds, 3) + " s, loss " + begin + " -> " + loss_text(result.loss, result.terms);
-    if (result.rollbacks > 0) text += ", " + std::to_string(result.rollbacks) + " steps not taken";
-    return text;
-  }
-
-  std::string left_out_text(const StageResult& result) const {
-    std::string text;
-    for (const LeftOutObject& object : result.left_out) {
-      text += ", " + object.term + " without " + clip_.objects[static_cast<std::size_t>(object.object)].name + " in " +
-              std::to_string(object.evaluations) + " of " + std::to_string(result.iterations + 1) + " evaluations";
-    }
-    return text;
-  }
-
-  /// Every object that a term of a stage left out: one warning, with its frames.
-  void tell_left_out() const {
-    std::map<std::string, std::vector<Index>> frames;  // by message
-    std::vector<std::string> messages;                 // in the order in which it first happened
-    for (const LeftOutInFrame& entry : progress_.left_out) {
-      const std::string begin = "stage " + config_.stages[entry.stage].first + ": the loss \"" + entry.term +
-                                "\" was off for the object \"" +
-                                clip_.objects[static_cast<std::size_t>(entry.object)].name + "\" (" + entry.reason +
-                                "), in some iterations at least, in ";
-      if (frames[begin].empty()) messages.push_back(begin);
-      if (frames[begin].empty() || frames[begin].back() != entry.frame) frames[begin].push_back(entry.frame);
-    }
-    for (const std::string& begin : messages) {
-      const std::vector<Index>& of_object = frames[begin];
-      log_warning(begin + (of_object.size() == 1 ? "frame " : "frames ") + frame_ranges(of_object));
-    }
-  }
-
-  static void tell_terms_off(const std::string& name, const StageSettings& stage, const std::vector<std::string>& off) {
-    for (const std::string& term : off) {
-      const LossSettings* const settings = find_entry(stage.losses, term);
-      log_warning("stage " + name + ": the loss \"" + term + "\" is off: " +
-                  (settings != nullptr && settings->weight == 0 ? "its weight is 0" : "it lacks an input"));
-    }
+    folder_.note("frame " + std::to_string(frame.index) + ", " + stage_text(name, result, begin, clip_));
   }
 
   /// @param frame     none: all at once

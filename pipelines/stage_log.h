@@ -1,0 +1,28 @@
+// What the log says of the stages of a run.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "optim/stage.h"
+#include "pipelines/clip.h"
+#include "pipelines/run_config.h"
+#include "pipelines/run_state.h"
+
+namespace hsi4d {
+
+/// A loss and its terms: "0.1234 (l1 0.1, ssim 0.2)".
+std::string loss_text(double loss, std::span<const LossValue> terms);
+
+/// What a stage did: iterations, time, loss before and after, steps not taken, objects that terms left out.
+/// @param begin  loss_text of the first iteration
+std::string stage_text(const std::string& stage, const StageResult& result, const std::string& begin, const Clip& clip);
+
+/// Every object that a term of a stage left out: one warning, with its frames.
+void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip);
+
+/// Every term of a stage that is off: one warning, with the reason.
+void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings);
+
+}  // namespace hsi4d
