@@ -1,12 +1,10 @@
 // The command line: the only file that includes CLI11.
 #include "pipelines/cli/program.h"
 
-#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <functional>
 #include <limits>
-#include <new>
 #include <optional>
 
 #include <CLI/CLI.hpp>
@@ -15,15 +13,16 @@
 #include "core/config_value.h"
 #include "core/log.h"
 #include "core/simd.h"
-#include "core/suggest.h"
 #include "core/text.h"
 #include "core/version.h"
 #include "pipelines/cli/avatar_command.h"
 #include "pipelines/cli/avatar_fit_command.h"
 #include "pipelines/cli/bench_command.h"
+#include "pipelines/cli/command_words.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/convert_command.h"
 #include "pipelines/cli/demo_command.h"
+#include "pipelines/cli/failure.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/motion_command.h"
@@ -33,12 +32,9 @@
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/select_camera_command.h"
 #include "pipelines/cli/synth_command.h"
-#include "pipelines/reconstruct.h"
 
 namespace hsi4d::cli {
 namespace {
-
-constexpr const char* kReport = "this is a bug in hsi4d, please report it: ";
 
 void print(const std::string& text) {
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
@@ -106,13 +102,6 @@ struct CommandLine {
     add_check();
     add_schema();
     add_list();
-  }
-
-  std::vector<std::string> command_names() {
-    std::vector<std::string> names;
-    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-      names.push_back(command->get_name());
-    return names;
   }
 
  private:
@@ -439,55 +428,20 @@ struct CommandLine {
   }
 };
 
-/// Refuses a first word that is no command or option, with the nearest one: CLI11 would only call it unexpected.
-void check_command_word(int argc, const char* const* argv, CommandLine& line) {
-  const std::vector<std::string> names = line.command_names();
-  if (argc < 2) throw UserError("hsi4d: give a command: " + joined(names) + "; `hsi4d --help` explains them");
-  const std::string word = argv[1];
-  const std::vector<std::string> options = {"-h", "--help", "--version"};
-  const bool is_option = word.starts_with("-");
-  const std::vector<std::string>& known = is_option ? options : names;
-  if (std::find(known.begin(), known.end(), word) != known.end()) return;
-  throw UserError("hsi4d: there is no " + std::string(is_option ? "option" : "command") + " \"" + word +
-                  "\"; known: " + joined(known) + did_you_mean(word, known));
-}
-
-/// Refuses an option that the command does not have, with the nearest one; CLI11 would first ask for what is missing.
-void check_options(int argc, const char* const* argv, CommandLine& line) {
-  CLI::App* chosen = line.app.get_subcommand(argv[1]);
-  std::string words = argv[1];
-  const auto parts = chosen->get_subcommands([](const CLI::App*) { return true; });
-  std::vector<std::string> part_names;
-  for (CLI::App* part : parts) {
-    part_names.push_back(part->get_name());
-    if (argc < 3 || part->get_name() != argv[2]) continue;
-    chosen = part;
-    words += " " + part->get_name();
-  }
-  const bool is_option = argc > 2 && *argv[2] == '-';
-  if (!parts.empty() && chosen->get_name() == argv[1] && !is_option) {
-    const std::string word = argc > 2 ? argv[2] : "";
-    throw UserError("hsi4d " + words + ": " + (argc > 2 ? "there is no command \"" + word + "\"" : "give a command") +
-                    "; known: " + joined(part_names) + (argc > 2 ? did_you_mean(word, part_names) : ""));
-  }
-  const CLI::App& command = *chosen;
-  std::vector<std::string> known;
+/// What a command knows, and its commands.
+CommandWords words_of(const CLI::App& command) {
+  CommandWords words{command.get_name(), {}, {}};
+  for (const CLI::App* part : command.get_subcommands([](const CLI::App*) { return true; }))
+    words.commands.push_back(words_of(*part));
   for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    for (const std::string& name : option->get_lnames()) words.options.push_back("--" + name);
   }
-  for (int i = 2; i < argc; ++i) {
-    const std::string word = std::string(argv[i]).substr(0, std::string(argv[i]).find('='));
-    if (word == "--") return;
-    if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;
-    throw UserError("hsi4d " + words + ": there is no option \"" + word + "\"; known: " + joined(known) +
-                    did_you_mean(word, known));
-  }
+  return words;
 }
 
 void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
   CommandLine line(losses);
-  check_command_word(argc, argv, line);
-  if (*argv[1] != '-') check_options(argc, argv, line);
+  check_words(argc, argv, words_of(line.app));
   try {
     line.app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -504,24 +458,6 @@ void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>
 }
 
 }  // namespace
-
-Failure describe_failure(const std::exception_ptr& error) {
-  try {
-    std::rethrow_exception(error);
-  } catch (const UserError& mistake) {
-    return {kUserMistake, mistake.what()};
-  } catch (const DataError& mistake) {
-    return {kUserMistake, mistake.what()};
-  } catch (const Interrupted& stop) {
-    return {kInterrupted, "hsi4d: " + std::string(stop.what())};
-  } catch (const std::bad_alloc&) {
-    return {kUserMistake, "hsi4d: there is not enough memory for this"};
-  } catch (const std::exception& bug) {
-    return {kOurBug, kReport + std::string(bug.what())};
-  } catch (...) {
-    return {kOurBug, kReport + std::string("an exception of unknown type")};
-  }
-}
 
 int run_program(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
   try {
