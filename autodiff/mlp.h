@@ -7,7 +7,7 @@
 //
 // The activation follows z for large z and 0 for small ones, as max(0, z), but has all derivatives: a gradient check
 // then sees no kinks, of which every weight would meet as many as there are rows. It needs no division and no
-// exponential (docs/numerics.md says what that is worth).
+// exponential (docs/numerics/body.md says what that is worth).
 //
 // The code meets its rows of W_1 once per evaluation, not once a row. Hidden values are not kept from forward to
 // backward but made again, block by block, in the first- and second-level cache. Sums over rows are taken in S within a

@@ -4,7 +4,7 @@
 //
 // A_j [3,4] takes the rest pose of joint j to its pose. B_v is an affine map and in general no rotation: it shrinks,
 // and is singular for two opposite bones. No rotation is ever extracted from it; Gaussians use its linear part as it is
-// (docs/numerics.md, D2), so everything here is finite and linear in A and in x.
+// (docs/numerics/failures.md, D2), so everything here is finite and linear in A and in x.
 //
 // skin_points is for vertices, skin_frames for Gaussians, whose axes follow too: in both B_v never leaves the
 // registers. Who needs B_v itself takes blend_transforms, and then transform_points.

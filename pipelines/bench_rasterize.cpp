@@ -65,7 +65,8 @@ struct Step {
   const char* name;
   double RenderTimes::*time;
   WorkUnit unit;
-  double operations = 0;  ///< on the vector ports for a group of 16 lanes (docs/numerics.md); 0: not counted
+  double operations =
+      0;  ///< on the vector ports for a group of 16 lanes (docs/numerics/measurements.md); 0: not counted
 };
 constexpr double kLanes = 16;  // a block of 4×4 pixels
 constexpr double kForward = 20, kBackward = 17 + 6 + 8 + 7, kBackwardOfColors = 2 + 3 + 1;

@@ -6,7 +6,7 @@ namespace hsi4d {
 
 namespace {
 
-constexpr double kWeight = 0.01;  // from 0.001 to 1 as good (docs/numerics.md)
+constexpr double kWeight = 0.01;  // from 0.001 to 1 as good (docs/numerics/body.md)
 
 }  // namespace
 

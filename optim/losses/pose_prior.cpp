@@ -9,7 +9,8 @@ namespace hsi4d {
 
 namespace {
 
-/// The energy of a likely pose is about the number of latents, the photometric loss a few hundredths: docs/numerics.md.
+/// The energy of a likely pose is about the number of latents, the photometric loss a few hundredths:
+/// docs/numerics/body.md.
 constexpr double kWeight = 3e-5;
 
 struct PosePriorSettings {

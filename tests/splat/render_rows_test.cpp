@@ -1,4 +1,4 @@
-// Rows of docs/numerics.md that take a whole render, several of them, or a fit.
+// Rows of docs/numerics/failures.md that take a whole render, several of them, or a fit.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
