@@ -1,0 +1,151 @@
+// The loss terms that look at the motion over several frames.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "core/parallel.h"
+#include "tests/support/loss_terms.h"
+#include "tests/support/operator_check.h"
+#include "tests/support/test_motion.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+
+namespace {
+
+/// The term of the inputs of a sequence in which what moves is off by what the functions say.
+double motion_loss(const std::string& name, const std::string& settings,
+                   const std::function<double(Index frame, Index column)>& joint,
+                   const std::function<Vector3<double>(const BodyPoint&)>& body = {}) {
+  Tape<double> tape;
+  LossInputs<double> inputs;
+  inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
+  inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+  inputs.joints_start = tape.constant("joints_start", shape_of(kFrames, 66));
+  for (Index t = 0; t < kFrames; ++t) {
+    for (Index c = 0; c < 66; ++c) tape.write(inputs.joints)(t, c) = joint(t, c);
+  }
+  const auto leaf = [&tape](const char* leaf_name, const auto& points, const auto& place) {
+    const Var<double> var = tape.parameter(leaf_name, shape_of(std::ssize(points), 3));
+    for (Index i = 0; i < std::ssize(points); ++i) {
+      const Vector3<double> x = place(points[static_cast<std::size_t>(i)]);
+      std::copy_n(x.data(), 3, tape.write(var).row(i));
+    }
+    return var;
+  };
+  inputs.body_points = [&](const std::vector<BodyPoint>& points) { return leaf("body", points, body); };
+  inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
+    return leaf("object", points, [](const ObjectPoint& p) { return motion_of_test().start.place(p); });
+  };
+  const auto loss = record_term(name, inputs, settings);
+  REQUIRE(loss.tape != nullptr);
+  tape.forward(loss);
+  return tape.value(loss).scalar();
+}
+
+double no_joint(Index, Index) { return 0; }
+
+}  // namespace
+
+TEST_CASE("fit is the mean over the moving frames of the squared distances of 22 joints") {
+  const double loss = motion_loss("fit", "{}", [](Index t, Index) { return t >= kStill ? 0.1 : 0; });
+  CHECK(loss == Approx(66 * 0.01).epsilon(1e-13));
+}
+
+TEST_CASE("smooth is the mean over adjacent frames of the squared differences of the order that is asked for") {
+  const auto speeding = [](Index t, Index c) { return c < 3 ? 0.1 * static_cast<double>(t * t) : 0; };
+  // Steps 0.1 (between frames that stand), 0.3, 0.5, 0.7; their changes 0.2; the changes of these 0.
+  CHECK(motion_loss("smooth", "{}", speeding) == Approx(3 * (0.09 + 0.25 + 0.49) / 3).epsilon(1e-13));
+  CHECK(motion_loss("smooth", R"({"order": 2})", speeding) == Approx(3 * 0.04).epsilon(1e-13));
+  CHECK(std::fabs(motion_loss("smooth", R"({"order": 3})", speeding)) < 1e-28);
+}
+
+TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain search") {
+  const MotionOfTest& test = motion_of_test();
+  for (const double distance : {0.02, 0.03, 10.0}) {
+    double expected = 0;
+    for (Index t = kStill; t < kFrames; ++t) {
+      double sum = 0;
+      Index pairs = 0;
+      for (Index row = 0; row < kBodyRows; ++row) {
+        if (!is_hand_joint(row % kSmplxJoints)) continue;
+        const Vector3<double> hand = test.start.place(BodyPoint{t, row});
+        double least = distance;
+        for (Index o = 0; o < 2; ++o) {
+          for (Index g = 0; g < kObjectRows; ++g)
+            least = std::min(least, (test.start.place(ObjectPoint{t, o, g}) - hand).norm());
+        }
+        if (!(least < distance)) continue;
+        sum += least * least;
+        ++pairs;
+      }
+      if (pairs > 0) expected += sum / static_cast<double>(pairs) / static_cast<double>(kFrames - kStill);
+    }
+    CHECK(expected > 0);
+    const double loss = motion_loss("contact", R"({"distance": )" + std::to_string(distance) + "}", no_joint,
+                                    [&](const BodyPoint& p) { return test.start.place(p); });
+    CHECK(loss == Approx(expected).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("of Gaussians at the same distance contact takes the same ones each time, the first object's (row D6)") {
+  // Every Gaussian of an object twice, and a second object that is in the same place, and has the same.
+  MotionOfTest tied;
+  for (Gaussians& object : tied.objects) {
+    object = motion_of_test().objects[0];
+    const std::vector<float> means = object.means;
+    object.means.insert(object.means.end(), means.begin(), means.end());
+    object.opacity_logits.resize(2 * kObjectRows);
+  }
+  tied.start.objects = {&tied.objects[0], &tied.objects[1]};
+  for (auto& poses : tied.start.world_from_object) poses[1] = poses[0];
+  const auto chosen = [&](int threads) {
+    std::vector<ObjectPoint> all;
+    with_threads(threads, [&] {
+      Tape<double> tape;
+      LossInputs<double> inputs;
+      inputs.motion = std::shared_ptr<const MotionStart>(&tied.start, [](const MotionStart*) {});
+      inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+      inputs.body_points = [&](const std::vector<BodyPoint>& points) {
+        return tape.parameter("hands", shape_of(std::ssize(points), 3));
+      };
+      inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
+        all = points;
+        return tape.parameter("objects", shape_of(std::ssize(points), 3));
+      };
+      REQUIRE(term_named("contact").record(inputs).tape != nullptr);
+    });
+    return all;
+  };
+  const std::vector<ObjectPoint> first = chosen(1);
+  REQUIRE(first.size() > 10);
+  for (const ObjectPoint& point : first) CHECK(point.object == 0);
+  for (const int threads : {1, 2, 3}) {
+    const std::vector<ObjectPoint> again = chosen(threads);
+    REQUIRE(again.size() == first.size());
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      CHECK(again[i].frame == first[i].frame);
+      CHECK(again[i].object == first[i].object);
+      CHECK(again[i].row == first[i].row);
+    }
+  }
+}
+
+TEST_CASE("contact is zero where no hand is near an object") {
+  CHECK(motion_loss("contact", R"({"distance": 1e-9})", no_joint) == 0);
+}
+
+TEST_CASE("ground is the squared change of the height of the lowest points of the feet") {
+  const MotionOfTest& test = motion_of_test();
+  const auto lifted = [&](const BodyPoint& p) -> Vector3<double> {
+    return test.start.place(p) + Vector3<double>(0.5, 0, p.frame == kStill ? 0.3 : 0);
+  };
+  CHECK(motion_loss("ground", R"({"points": 2})", no_joint, lifted) == Approx(0.09 / 3).epsilon(1e-12));
+}
+
+TEST_CASE("foot_sliding counts feet that stood when the stage began") {
+  // Joints stood at z = 0 and went 1 cm a frame, 0.1 m/s at 10 frames a second.
+  const auto sliding = [](Index t, Index c) { return c == 3 * 7 + 1 || c == 3 * 9 ? 0.1 * static_cast<double>(t) : 0; };
+  CHECK(motion_loss("foot_sliding", "{}", sliding) == Approx(0.01).epsilon(1e-12));  // joint 9 is no foot
+  CHECK(motion_loss("foot_sliding", R"({"speed": 0.05})", sliding) == 0);
+}

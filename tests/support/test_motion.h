@@ -1,0 +1,63 @@
+// A short motion of a human of a few Gaussians beside two objects, for terms that look at one.
+#pragma once
+
+#include <array>
+
+#include "core/random.h"
+#include "optim/motion_start.h"
+
+namespace hsi4d::test {
+
+/// Frames, of which the first stand; Gaussians of the body and of each object.
+inline constexpr Index kFrames = 5, kStill = 2, kBodyRows = 60, kObjectRows = 30;
+
+/// A human of a few Gaussians, each on one joint (every joint has one at least), and two objects: the first is at its
+/// right hand.
+struct MotionOfTest {
+  Avatar avatar;
+  std::array<Gaussians, 2> objects;
+  MotionStart start;
+
+  MotionOfTest() {
+    RandomSequence random(5);
+    SparseWeights& weights = avatar.weights;
+    weights.vertices = kBodyRows;
+    weights.joints = kSmplxJoints;
+    weights.per_vertex = 1;
+    for (Index v = 0; v < kBodyRows; ++v) {
+      weights.indices.push_back(static_cast<std::int32_t>(v % kSmplxJoints));
+      weights.weights.push_back(1);
+      for (int i = 0; i < 3; ++i) avatar.means.push_back(static_cast<float>(random.uniform(-0.04, 0.04)));
+    }
+    for (std::size_t o = 0; o < objects.size(); ++o) {
+      objects[o].opacity_logits.resize(kObjectRows);
+      for (Index i = 0; i < 3 * kObjectRows; ++i)
+        objects[o].means.push_back(static_cast<float>(random.uniform(-0.03, 0.03)));
+      start.objects.push_back(&objects[o]);
+    }
+    start.avatar = &avatar;
+    start.still_frames = kStill;
+    for (Index t = 0; t < kFrames; ++t) {
+      start.body.push_back(shifted(0.01 * static_cast<double>(t)));
+      start.world_from_object.push_back({{Matrix3<double>::Identity(), {0.01 * static_cast<double>(t), 0, 0}},
+                                         {Matrix3<double>::Identity(), {3, 0, 0}}});
+    }
+    start.first_body = shifted(0);
+  }
+  /// All joints at the same place.
+  static PosedJoints shifted(double x) {
+    PosedJoints posed;
+    for (Index j = 0; j < kSmplxJoints; ++j) {
+      posed.transforms.insert(posed.transforms.end(), {1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0});
+      posed.joints.insert(posed.joints.end(), {x, 0, 0});
+    }
+    return posed;
+  }
+};
+
+inline const MotionOfTest& motion_of_test() {
+  static const MotionOfTest motion;
+  return motion;
+}
+
+}  // namespace hsi4d::test
