@@ -8,17 +8,17 @@
 #include <filesystem>
 #include <limits>
 #include <sys/stat.h>
-#include <system_error>
 #include <unistd.h>
 #include <utility>
 
 #include "core/check.h"
+#include "core/system_message.h"
 
 namespace hsi4d {
 namespace {
 
 [[noreturn]] void fail(const std::string& path, const std::string& what, int error) {
-  throw UserError(path + ": " + what + ": " + std::generic_category().message(error));
+  throw UserError(path + ": " + what + ": " + system_message(error));
 }
 
 class Descriptor {

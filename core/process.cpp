@@ -3,7 +3,6 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstring>
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/mman.h>
@@ -11,7 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "core/check.h"
+#include "core/system_message.h"
 
 extern char** environ;  // POSIX asks programs to declare it
 
@@ -104,8 +103,8 @@ ChildProcess::ChildProcess(std::vector<std::string> command, ChildOutput output)
   close_if_open(output_);
   close_if_open(stream_);
   pid_ = -1;
-  throw UserError(command_.front() + ": cannot be run: " + std::strerror(error) +
-                  (error == ENOENT ? "; is it installed, and in PATH?" : ""));
+  throw ProgramNotStartedError(command_.front() + ": cannot be run: " + system_message(error) +
+                               (error == ENOENT ? "; is it installed, and in PATH?" : ""));
 }
 
 ChildProcess::~ChildProcess() {

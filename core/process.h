@@ -6,7 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "core/check.h"
+
 namespace hsi4d {
+
+/// A program could not be started: most likely it is not installed.
+class ProgramNotStartedError : public UserError {
+ public:
+  using UserError::UserError;
+};
 
 /// Where a program's standard output goes: collected for `finish`, or read as it comes.
 enum class ChildOutput { kCollected, kRead };
@@ -16,7 +24,7 @@ class ChildProcess {
  public:
   /// Starts a program.
   /// @param command  the program, looked up in PATH, and its arguments; no shell is involved
-  /// Throws UserError naming the program when it cannot be started.
+  /// Throws ProgramNotStartedError naming the program.
   explicit ChildProcess(std::vector<std::string> command, ChildOutput output = ChildOutput::kCollected);
   /// Ends a child that nobody waited for.
   ~ChildProcess();

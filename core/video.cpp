@@ -37,10 +37,10 @@ std::string probe(const std::string& path) {
     return run_process({"ffprobe", "-v", "error", "-protocol_whitelist", "file", "-select_streams", "v:0",
                         "-count_frames", "-show_entries", "stream=avg_frame_rate,nb_read_frames", "-of",
                         "default=noprint_wrappers=1", input_of(path)});
+  } catch (const ProgramNotStartedError&) {
+    throw;
   } catch (const UserError& error) {
-    const std::string text = error.what();
-    if (text.find("cannot be run") != std::string::npos) throw;
-    throw DataError(path + ": is not a video that can be read: " + text);
+    throw DataError(path + ": is not a video that can be read: " + error.what());
   }
 }
 

@@ -8,12 +8,12 @@
 #include <ctime>
 #include <fcntl.h>
 #include <sys/file.h>
-#include <system_error>
 #include <unistd.h>
 
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
+#include "core/system_message.h"
 #include "core/text.h"
 #include "core/version.h"
 #include "pipelines/json_text.h"
@@ -41,8 +41,6 @@ std::string host_name() {
   if (::gethostname(buffer.data(), buffer.size() - 1) != 0) return "unknown";
   return buffer.data();
 }
-
-std::string system_message(int error) { return std::generic_category().message(error); }
 
 std::string busy_message(const std::string& folder) {
   return folder + ": another process is writing this run; wait for it, or choose another folder";
