@@ -1,6 +1,10 @@
 #include "optim/motion_start.h"
 
 #include <algorithm>
+#include <array>
+
+#include "body/body_model.h"
+#include "body/pose_layout.h"
 
 namespace hsi4d {
 
@@ -34,9 +38,17 @@ Vector3<double> MotionStart::place(const ObjectPoint& point) const {
                          mean_of(objects[object]->means, point.row));
 }
 
-bool is_hand_joint(Index joint) { return joint == 20 || joint == 21 || (joint >= 25 && joint < 55); }
+bool is_hand_joint(Index joint) {
+  static const std::array wrists = {smplx_joint("left_wrist"), smplx_joint("right_wrist")};
+  const bool is_of_fingers = joint >= kFirstHandJoint && joint < kFirstHandJoint + 2 * kHandJoints;
+  return is_of_fingers || std::find(wrists.begin(), wrists.end(), joint) != wrists.end();
+}
 
-bool is_foot_joint(Index joint) { return joint == 7 || joint == 8 || joint == 10 || joint == 11; }
+bool is_foot_joint(Index joint) {
+  static const std::array feet = {smplx_joint("left_ankle"), smplx_joint("right_ankle"), smplx_joint("left_foot"),
+                                  smplx_joint("right_foot")};
+  return std::find(feet.begin(), feet.end(), joint) != feet.end();
+}
 
 std::vector<Index> rows_of_joints(const Avatar& avatar, bool (*is_part)(Index joint)) {
   const SparseWeights& weights = avatar.weights;
