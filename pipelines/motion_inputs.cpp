@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "optim/metrics.h"
+#include "pipelines/tape_rows.h"
 
 namespace hsi4d {
 
@@ -29,14 +30,6 @@ std::shared_ptr<const MotionStart> start_of(const Clip& clip, const std::vector<
     start->world_from_object.push_back(std::move(objects));
   }
   return start;
-}
-
-template <class S>
-Var<S> constant_rows(Tape<S>& tape, const char* name, const std::vector<double>& numbers, Index cols) {
-  const Var<S> leaf = tape.constant(name, shape_of(std::ssize(numbers) / cols, cols));
-  const Array<S> array = tape.write(leaf);
-  std::transform(numbers.begin(), numbers.end(), array.data, [](double x) { return static_cast<S>(x); });
-  return leaf;
 }
 
 /// Joints of frames [first, last) when the stage began.

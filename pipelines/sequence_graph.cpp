@@ -9,6 +9,7 @@
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
 #include "pipelines/motion_inputs.h"
+#include "pipelines/tape_rows.h"
 
 namespace hsi4d {
 
@@ -28,13 +29,6 @@ std::vector<double> axis_angles(const std::vector<SceneState>& states, Index fir
     all.insert(all.end(), begin, begin + 3 * count);
   }
   return all;
-}
-
-template <class S>
-void write_rows(Tape<S>& tape, Var<S> leaf, const std::vector<double>& numbers) {
-  const Array<S> array = tape.write(leaf);
-  HSI4D_CHECK_EQ(array.shape.count(), std::ssize(numbers));
-  std::transform(numbers.begin(), numbers.end(), array.data, [](double x) { return static_cast<S>(x); });
 }
 
 /// Rotations as numbers that a stage moves: axis-angle within half a turn (row D9), or two columns of the matrix.
@@ -92,7 +86,7 @@ SequenceGraph<S>::SequenceGraph(Tape<S>& tape, const Clip& clip, const std::vect
     const Vector3<double>& transl = states[t].body.transl;
     places.insert(places.end(), transl.data(), transl.data() + 3);
   }
-  write_rows(tape_, transl_, places);
+  write_rows(transl_, places);
   MovingFrames<S> moving;
   moving.rotations = record_rotations(states, prior);
   moving.skeleton = kinematic_chain(moving.rotations, transl_, clip.avatar.parents, clip.avatar.joints);
@@ -115,7 +109,7 @@ Var<S> SequenceGraph<S>::record_rotations(const std::vector<SceneState>& states,
   const bool is_axis_angle = rotation_parameters_ == RotationParameters::kAxisAngle;
   orient_ = leaf(kOrient, is_axis_angle ? 3 : 6);
   groups_.back().are_axis_angles = is_axis_angle;
-  write_rows(tape_, orient_, rotation_numbers(axis_angles(states, 0, 1), rotation_parameters_));
+  write_rows(orient_, rotation_numbers(axis_angles(states, 0, 1), rotation_parameters_));
   const Var<S> headings = is_axis_angle ? rotations_from_axis_angle(orient_) : rotations_from_6d(orient_);
   const Var<S> others = constant_rotations("hands and head", axis_angles(states, 1 + kBodyPoseJoints, kOtherJoints));
   const std::array parts = {headings, record_body(states, prior), others};
@@ -131,7 +125,7 @@ Var<S> SequenceGraph<S>::record_body(const std::vector<SceneState>& states, cons
     return constant_rotations("body", start);
   }
   const Var<S> latents = leaf(kPoseLatents, prior->latents());
-  write_rows(tape_, latents, prior->encode(start));
+  write_rows(latents, prior->encode(start));
   body_rotations_ = prior->decode(latents);
   return reshape(body_rotations_, frames_, kRowNumbers * kBodyPoseJoints);
 }
@@ -140,9 +134,7 @@ Var<S> SequenceGraph<S>::record_body(const std::vector<SceneState>& states, cons
 template <class S>
 Var<S> SequenceGraph<S>::constant_rotations(const char* name, const std::vector<double>& axis_angle) {
   const std::vector<double> rows = matrix_rows(axis_angle);
-  const Var<S> constant = tape_.constant(name, shape_of(frames_, std::ssize(rows) / frames_));
-  write_rows(tape_, constant, rows);
-  return constant;
+  return constant_rows(tape_, name, rows, std::ssize(rows) / frames_);
 }
 
 template <class S>
