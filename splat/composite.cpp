@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
-#include <limits>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -15,7 +14,9 @@
 #include "core/stopwatch.h"
 #include "core/workspaces.h"
 #include "splat/block_kernel.h"
+#include "splat/composite_io.h"
 #include "splat/composite_kernel.h"
+#include "splat/kept_tiles.h"
 #include "splat/pixel_step.h"
 #include "splat/slot_sums.h"
 #include "splat/tile_image.h"
@@ -25,18 +26,32 @@ namespace hsi4d {
 
 namespace {
 
+using detail::background_input;
+using detail::channels_of;
 using detail::CompositeRules;
 using detail::CompositeScene;
+using detail::cotangents_of;
 using detail::DepthKeyed;
+using detail::gradients_of;
+using detail::has_background;
+using detail::has_still;
+using detail::images_of;
 using detail::kMoments;
 using detail::kSegment;
+using detail::rows_of;
 using detail::SplatRecord;
+using detail::still_rows;
 using detail::TileAdjoint;
 using detail::TileEntry;
 using detail::TileGrid;
 using detail::TileJob;
 using detail::TileLists;
+using detail::wants_features;
+using detail::wants_gradient;
+using detail::wants_shape;
 using detail::Workspaces;
+using enum detail::CompositeInput;
+using enum detail::CompositeOutput;
 
 constexpr Index kGrain = 512;
 
@@ -52,20 +67,12 @@ struct Composite {
   SplatView view;
   std::shared_ptr<RenderCounters> counters;
 
-  /// Of what moves; those of what stands still follow, if there is any, then the background, if there is one.
-  enum Input { kMeans, kFactors, kDepths, kRest, kMeansRest, kOpacities, kFeatures, kStill };
-  enum Output { kChannels, kTransmittance, kMoreChannels };
-
   Buffer<SplatRecord<S>> records = {};  ///< of all rows, those that stand still first
   detail::TilePlans planned = {};
   // What the backward pass needs of every tile.
   Buffer<DepthKeyed> tile_last = {};     ///< the last Gaussian composited in any pixel; index −1: none
   Buffer<DepthKeyed> adjoint_last = {};  ///< the same, of tiles with an adjoint; of the last backward run
-  Buffer<Index> checkpoint_begin = {};   ///< pieces of a tile's, or a block's, pixels
-  Buffer<S> checkpoints = {};
-  Buffer<detail::ListPosition<S>> last = {};  ///< plain kernel
-  Buffer<Index> run_begin = {};               ///< block kernel
-  Buffer<detail::BlockRun> runs = {};         ///< block kernel
+  detail::KeptTiles<S> kept = {};
   Buffer<TileCounts> tile_counts = {};
   Buffer<std::uint32_t> settled = {};  ///< of each tile: blocks whose outputs hold what stands still, and nothing else
   const S* written = nullptr;          ///< the output that `settled` tells of
@@ -75,32 +82,9 @@ struct Composite {
   TileGrid grid() const {
     return detail::tile_grid(view.camera.width, view.camera.height, static_cast<Index>(view.settings.tile));
   }
-  static bool wants_any(const NodeIo<S>& io, std::initializer_list<int> inputs) {
-    return std::any_of(inputs.begin(), inputs.end(),
-                       [&](int i) { return io.wants(i) || (has_still(io) && io.wants(kStill + i)); });
-  }
-  static bool wants_shape(const NodeIo<S>& io) { return wants_any(io, {kMeans, kMeansRest, kFactors, kOpacities}); }
-  static bool wants_features(const NodeIo<S>& io) { return wants_any(io, {kFeatures}); }
-  static bool wants_gradient(const NodeIo<S>& io) { return wants_shape(io) || wants_features(io); }
-
-  // --- outputs -------------------------------------------------------------------------------------------------------
-
-  static bool has_background(const NodeIo<S>& io) { return io.inputs() % kStill != 0; }
-  static int background_input(const NodeIo<S>& io) { return io.inputs() - 1; }
-  static Index channels_of(const NodeIo<S>& io) { return io.in(kFeatures).shape.cols; }
-  static detail::OutputImages<S> images_of(const NodeIo<S>& io) {
-    const Array<S> over = io.out(kChannels);
-    return {over, over.shape.planes < channels_of(io) ? io.out(kMoreChannels) : Array<S>{}, io.out(kTransmittance),
-            has_background(io) ? io.in(background_input(io)).data : nullptr};
-  }
-  static detail::OutputCotangents<S> cotangents_of(const NodeIo<S>& io) {
-    const bool split = io.out(kChannels).shape.planes < channels_of(io);
-    return {io.d_out(kChannels), split ? io.d_out(kMoreChannels) : ConstArray<S>{}, io.d_out(kTransmittance)};
-  }
 
   // --- Gaussians -----------------------------------------------------------------------------------------------------
 
-  static bool has_still(const NodeIo<S>& io) { return io.inputs() >= 2 * kStill; }
   /// True: those that stand still are listed by themselves, and kept.
   bool keeps_still(const NodeIo<S>& io) const {
     if (!has_still(io) || !view.skip.static_tiles) return false;
@@ -109,16 +93,6 @@ struct Composite {
     }
     return true;
   }
-  static Index still_rows(const NodeIo<S>& io) { return has_still(io) ? io.in(kStill + kMeans).shape.rows : 0; }
-
-  static detail::SplatArrays<S> splats_of(const NodeIo<S>& io, int first) {
-    return {io.in(first + kMeans),     io.in(first + kFactors),   io.in(first + kDepths),  io.in(first + kRest),
-            io.in(first + kMeansRest), io.in(first + kOpacities), io.in(first + kFeatures)};
-  }
-  static detail::SplatRows<S> rows_of(const NodeIo<S>& io) {
-    return {has_still(io) ? splats_of(io, kStill) : detail::SplatArrays<S>{}, splats_of(io, 0), still_rows(io)};
-  }
-
   /// The state is what is made of Gaussians that stand still.
   std::uint64_t state_key(NodeIo<S>& io) const {
     if (!keeps_still(io)) return 0;
@@ -186,12 +160,10 @@ struct Composite {
 
   /// The job of a tile, without `transmittance` and `channels`.
   TileJob<S> job_of(const TileGrid& tiles, Index tile) {
-    const Index pixels = tiles.tile * tiles.tile;
     TileJob<S> job{};
     place_job(tiles, tile, job);
     job.entries = planned.plans[tile].entries;
-    job.last = last.data() + tile * pixels;
-    job.checkpoints = checkpoints.size() > 0 ? checkpoints.data() + checkpoint_begin[tile] * pixels : nullptr;
+    kept.give(tiles, tile, job);
     return job;
   }
 
@@ -203,32 +175,8 @@ struct Composite {
     job.blocks = planned.plans[tile].blocks;
     const detail::TileLayer& layer = planned.layer(tile);
     job.start = layer.made && layer.first > 0 ? layer.front.data() : nullptr;
-    if (runs.size() == 0) return job;
-    job.runs = runs.data() + run_begin[tile];
-    job.checkpoints = checkpoints.data() + checkpoint_begin[tile] * detail::kBlockPixels;
+    kept.give(tile, job);
     return job;
-  }
-
-  /// Room for what the forward pass keeps for the backward pass.
-  void place_kept(const NodeIo<S>& io, const TileGrid& tiles) {
-    const bool blocks = in_blocks(io), wanted = wants_gradient(io);
-    const Index side = tiles.tile, across = side / detail::kBlockSide;
-    checkpoint_begin.resize(tiles.count() + 1);
-    run_begin.resize(tiles.count() + 1);
-    Index place = 0, run = 0;
-    for (Index tile = 0; tile < tiles.count(); ++tile) {
-      checkpoint_begin[tile] = place;
-      run_begin[tile] = run;
-      const auto size = static_cast<Index>(planned.plans[tile].entries.size());
-      if (!wanted || size == 0) continue;
-      place += blocks ? detail::checkpoints_of(side, size, planned.plans[tile].groups) : (size - 1) / kSegment;
-      run += detail::block_chunks(size) * across * across;
-    }
-    checkpoint_begin[tiles.count()] = place;
-    run_begin[tiles.count()] = run;
-    checkpoints.resize(place * (blocks ? detail::kBlockPixels : side * side));
-    runs.resize(blocks ? run : 0);
-    last.resize(blocks ? 0 : tiles.count() * side * side);
   }
 
   /// Memory of a worker: pixels of a tile twice, workspace.
@@ -286,14 +234,14 @@ struct Composite {
     const Index numbers = detail::block_state(tiles.tile, scene.channels);
     const detail::TilePlan& plan = planned.plans[tile];
     detail::TileLayer& layer = planned.layer(tile);
-    const std::span<const TileEntry> kept = planned.still.of_tile(tile);
-    const bool layered = plan_rules(io).in_layers && !kept.empty(), collapse = view.approx.collapse_suffix;
+    const std::span<const TileEntry> still = planned.still.of_tile(tile);
+    const bool layered = plan_rules(io).in_layers && !still.empty(), collapse = view.approx.collapse_suffix;
     detail::BlockJob job = block_job_of(tiles, tile);
     job.state = memory;
     job.workspace = memory + 2 * numbers;
     Index fragments = 0;
     if (layered && !layer.made) {
-      fragments += detail::make_layer(tiles.tile, scene, job, kept, collapse, layer);
+      fragments += detail::make_layer(tiles.tile, scene, job, still, collapse, layer);
       job.start = layer.first > 0 ? layer.front.data() : nullptr;
     }
     if (job.start != nullptr) {
@@ -333,7 +281,7 @@ struct Composite {
     list(io, second, rows - second, planned.moving, counters->times);
     Stopwatch watch;
     planned.plan(rows_of(io), view.settings, tiles, plan_rules(io));
-    place_kept(io, tiles);
+    kept.place(planned, tiles, in_blocks(io), wants_gradient(io));
     tile_counts.resize(tiles.count());
     tile_last.resize(tiles.count());
     const std::uint64_t over = has_background(io) ? io.version(background_input(io)) : 0;
@@ -370,9 +318,7 @@ struct Composite {
   RenderCounters counters_before(const TileGrid& tiles, bool layered) const {
     RenderCounters result;
     result.times = counters->times;
-    result.kept_bytes = checkpoints.size() * static_cast<Index>(sizeof(S)) +
-                        runs.size() * static_cast<Index>(sizeof(detail::BlockRun)) +
-                        last.size() * static_cast<Index>(sizeof(detail::ListPosition<S>));
+    result.kept_bytes = kept.bytes();
     for (const detail::SplatLists* part : {&planned.still, &planned.moving}) {
       for (Index i = 0; i < part->count; ++i) {
         const TileLists::Slots slots = part->lists.slots[i];
@@ -381,12 +327,12 @@ struct Composite {
     }
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       const detail::TilePlan& plan = planned.plans[tile];
-      const auto kept = static_cast<Index>(planned.still.of_tile(tile).size());
-      const bool moves = !plan.entries.empty(), restored = kept > 0 && unsettled(tiles, tile) != 0;
+      const auto still = static_cast<Index>(planned.still.of_tile(tile).size());
+      const bool moves = !plan.entries.empty(), restored = still > 0 && unsettled(tiles, tile) != 0;
       result.tiles += moves || restored ? 1 : 0;
       result.groups += plan.groups;
-      result.pairs += static_cast<Index>(plan.entries.size() + plan.behind.size()) + (restored ? kept : 0);
-      result.layers += layered && moves && kept > 0 && !planned.layer(tile).made ? 1 : 0;
+      result.pairs += static_cast<Index>(plan.entries.size() + plan.behind.size()) + (restored ? still : 0);
+      result.layers += layered && moves && still > 0 && !planned.layer(tile).made ? 1 : 0;
     }
     return result;
   }
@@ -466,12 +412,6 @@ struct Composite {
     counters->times.reduce_s = watch.lap();
   }
 
-  /// @param inputs  number of the first input of a set
-  static detail::SplatGradients<S> gradients_of(const NodeIo<S>& io, int inputs) {
-    const auto d = [&](int input) { return io.wants(inputs + input) ? io.d_in(inputs + input) : Array<S>{}; };
-    return {d(kMeans), d(kMeansRest), d(kFactors), d(kOpacities), d(kFeatures)};
-  }
-
   /// Adds what the sums of rows [begin, end) of the lists mean to the gradients of both sets.
   void reduce(const NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index begin, Index end) const {
     const detail::SplatRows<S> rows = rows_of(io);
@@ -497,9 +437,9 @@ struct Composite {
     const CompositeRules<S> rules = detail::composite_rules<S>(view.settings);
     std::vector<TileEntry> entries;
     for (Index tile = 0; tile < tiles.count(); ++tile) {
-      const std::span<const TileEntry> kept = planned.still.of_tile(tile), moved = planned.moving.of_tile(tile);
-      entries.resize(kept.size() + moved.size());
-      detail::merge_entries(rows_of(io), view.settings, kept, moved, entries.data());
+      const std::span<const TileEntry> still = planned.still.of_tile(tile), moved = planned.moving.of_tile(tile);
+      entries.resize(still.size() + moved.size());
+      detail::merge_entries(rows_of(io), view.settings, still, moved, entries.data());
       TileJob<S> place{};
       place_job(tiles, tile, place);
       signature.add(entries.size());
@@ -522,25 +462,10 @@ struct Composite {
 
   Index saved_bytes() const {
     return records.capacity_bytes() + planned.capacity_bytes() + tile_last.capacity_bytes() +
-           adjoint_last.capacity_bytes() + checkpoint_begin.capacity_bytes() + checkpoints.capacity_bytes() +
-           last.capacity_bytes() + run_begin.capacity_bytes() + runs.capacity_bytes() + tile_counts.capacity_bytes() +
+           adjoint_last.capacity_bytes() + kept.capacity_bytes() + tile_counts.capacity_bytes() +
            settled.capacity_bytes();
   }
 };
-
-/// Rows of a set whose shapes fit.
-template <class S>
-Index check_set(const SplatSet<S>& set, Index channels) {
-  const Index rows = set.opacities.shape().rows;
-  HSI4D_CHECK_EQ(set.projected.means_px.shape(), shape_of(rows, 2));
-  HSI4D_CHECK_EQ(set.projected.factors.shape(), shape_of(rows, 6));
-  HSI4D_CHECK_EQ(set.projected.depths.shape(), shape_of(rows, 1));
-  HSI4D_CHECK_EQ(set.projected.depth_rest.shape(), shape_of(rows, 1));
-  HSI4D_CHECK_EQ(set.projected.means_rest.shape(), shape_of(rows, 2));
-  HSI4D_CHECK_EQ(set.opacities.shape(), shape_of(rows, 1));
-  HSI4D_CHECK_EQ(set.features.shape(), shape_of(rows, channels));
-  return rows;
-}
 
 /// @param sets  what moves, then what stands still, if there is any
 template <class S>
@@ -551,15 +476,7 @@ Composited<S> record_composite(std::initializer_list<SplatSet<S>> sets, Var<S> b
   HSI4D_CHECK(channels >= 1, "no features");
   const int tile = view.settings.tile;
   HSI4D_CHECK(tile == 8 || tile == 16, "tile = " + std::to_string(tile) + "; allowed: 8, 16");
-  std::vector<Var<S>> inputs;
-  Index rows = 0;
-  for (const SplatSet<S>& set : sets) {
-    rows += check_set(set, channels);
-    const Projected<S>& p = set.projected;
-    inputs.insert(inputs.end(),
-                  {p.means_px, p.factors, p.depths, p.depth_rest, p.means_rest, set.opacities, set.features});
-  }
-  HSI4D_CHECK(rows <= std::numeric_limits<std::int32_t>::max(), std::to_string(rows) + " Gaussians");
+  std::vector<Var<S>> inputs = detail::inputs_of(sets, channels);
   const Index width = view.camera.width, height = view.camera.height;
   Index over = channels;
   if (background.tape != nullptr) {
