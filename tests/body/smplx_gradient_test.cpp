@@ -8,6 +8,7 @@
 #include "body/smplx_body.h"
 #include "core/rotation.h"
 #include "tests/support/operator_check.h"
+#include "tests/support/random_numbers.h"
 #include "tests/support/smplx_reference.h"
 
 using namespace hsi4d;
@@ -16,7 +17,6 @@ using namespace hsi4d::test;
 namespace {
 
 using Complex = std::complex<double>;
-using Numbers = std::vector<double>;
 using ComplexNumbers = std::vector<Complex>;
 constexpr double kStep = 1e-30;
 
@@ -135,26 +135,10 @@ State<double> taped_gradients(const SmplxBody<S>& body, const Case& c, const Sta
   return gradients;
 }
 
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : random_(seed) {}
-  double operator()(double low = -1, double high = 1) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  Numbers numbers(std::size_t count, double size = 1) {
-    Numbers all(count);
-    for (double& x : all) x = (*this)(-size, size);
-    return all;
-  }
-
- private:
-  std::mt19937_64 random_;
-};
-
 /// Poses that are told apart by the kinds of their angles.
 enum class Angles { kRandom, kNone, kTiny, kHalfTurns, kFullTurns };
 
-State<double> state_of(Form form, Angles angles, Random& random) {
+State<double> state_of(Form form, Angles angles, RandomNumbers& random) {
   State<double> state;
   state[0] = random.numbers(10, 2);
   state[1] = random.numbers(10, 2);
@@ -207,7 +191,7 @@ SmplxBodyOptions options_of(Form form) {
 void check_gradients(const SmplxArrays& arrays, const SmplxModel& model, Form form, Angles angles, int directions,
                      std::uint64_t seed) {
   INFO("form " << static_cast<int>(form) << ", angles " << static_cast<int>(angles));
-  Random random(seed);
+  RandomNumbers random(seed);
   const Case c{arrays, form};
   const State<double> state = state_of(form, angles, random);
   const Cotangent g{random.numbers(3 * static_cast<std::size_t>(arrays.vertices)), random.numbers(165)};

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
-#include <random>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,27 +11,9 @@
 #include "body/vposer.h"
 #include "core/npz.h"
 #include "core/safetensors.h"
+#include "tests/support/random_numbers.h"
 
 namespace hsi4d::test {
-
-using Numbers = std::vector<double>;
-
-/// Uniform numbers of a seed.
-class RandomNumbers {
- public:
-  explicit RandomNumbers(std::uint64_t seed) : random_(seed) {}
-  double operator()(double low = -1, double high = 1) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  Numbers numbers(std::size_t count, double size = 1) {
-    Numbers all(count);
-    for (double& x : all) x = (*this)(-size, size);
-    return all;
-  }
-
- private:
-  std::mt19937_64 random_;
-};
 
 /// The arrays of a VPoser checkpoint by name.
 struct VposerCheckpoint {
