@@ -2,6 +2,7 @@
 
 #include "core/config_file.h"
 #include "pipelines/avatar_fit.h"
+#include "pipelines/config_fields.h"
 #include "pipelines/config_kind.h"
 
 namespace hsi4d {
@@ -122,24 +123,17 @@ AvatarFitSettings read_avatar_fit(const ConfigValue& tree, const std::filesystem
 }
 
 std::string resolved_avatar_fit(const AvatarFitSettings& settings, const std::vector<LossDescription>& losses) {
-  AvatarFitSettings copy = settings;  // a description binds to something that it could change
-  ConfigFields fields;
-  describe(fields, copy, losses);
-  return to_json(write_config(fields));
+  return with_fields(settings, losses, [](const ConfigFields& fields) { return to_json(write_config(fields)); });
 }
 
 std::string avatar_fit_schema(const std::vector<LossDescription>& losses) {
-  AvatarFitSettings defaults;
-  ConfigFields fields;
-  describe(fields, defaults, losses);
-  return to_json(config_schema(fields, "hsi4d avatar fit config"));
+  return with_fields(AvatarFitSettings{}, losses, [](const ConfigFields& fields) {
+    return to_json(config_schema(fields, "hsi4d avatar fit config"));
+  });
 }
 
 std::vector<ConfigSetting> avatar_fit_settings(const std::vector<LossDescription>& losses) {
-  AvatarFitSettings defaults;
-  ConfigFields fields;
-  describe(fields, defaults, losses);
-  return list_settings(fields);
+  return with_fields(AvatarFitSettings{}, losses, [](const ConfigFields& fields) { return list_settings(fields); });
 }
 
 }  // namespace hsi4d

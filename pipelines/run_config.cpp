@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/config_file.h"
+#include "pipelines/config_fields.h"
 #include "pipelines/config_kind.h"
 #include "pipelines/run_problems.h"
 
@@ -66,10 +67,7 @@ RunConfig load_run_config(const std::filesystem::path& file, const std::vector<s
 }
 
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses) {
-  RunConfig copy = config;  // a description binds to something that it could change
-  ConfigFields fields;
-  describe(fields, copy, losses);
-  return to_json(write_config(fields));
+  return with_fields(config, losses, [](const ConfigFields& fields) { return to_json(write_config(fields)); });
 }
 
 bool has_loss(const RunConfig& config, const std::string& name) {
@@ -96,10 +94,7 @@ ConfigValue without_data(ConfigValue tree) {
 }
 
 ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses) {
-  RunConfig copy = config;
-  ConfigFields fields;
-  describe(fields, copy, losses);
-  return without_data(write_config(fields));
+  return without_data(with_fields(config, losses, write_config));
 }
 
 ConfigValue dataset_sections(const RunConfig& config, const std::vector<LossDescription>& losses) {
@@ -113,10 +108,8 @@ ConfigValue dataset_sections(const RunConfig& config, const std::vector<LossDesc
 }
 
 std::vector<ConfigPath> stage_files(const RunConfig& config, const std::vector<LossDescription>& losses) {
-  RunConfig copy = config;
-  ConfigFields fields;
-  describe(fields, copy, losses);
-  std::vector<ConfigPath> files = list_paths(fields);
+  std::vector<ConfigPath> files =
+      with_fields(config, losses, [](const ConfigFields& fields) { return list_paths(fields); });
   std::erase_if(files, [](const ConfigPath& file) {
     return !file.pointer.starts_with("/stages/") || !std::filesystem::is_regular_file(file.path);
   });
@@ -124,17 +117,12 @@ std::vector<ConfigPath> stage_files(const RunConfig& config, const std::vector<L
 }
 
 std::string run_config_schema(const std::vector<LossDescription>& losses) {
-  RunConfig defaults;
-  ConfigFields fields;
-  describe(fields, defaults, losses);
-  return to_json(config_schema(fields, "hsi4d run config"));
+  return with_fields(RunConfig{}, losses,
+                     [](const ConfigFields& fields) { return to_json(config_schema(fields, "hsi4d run config")); });
 }
 
 std::vector<ConfigSetting> run_config_settings(const std::vector<LossDescription>& losses) {
-  RunConfig defaults;
-  ConfigFields fields;
-  describe(fields, defaults, losses);
-  return list_settings(fields);
+  return with_fields(RunConfig{}, losses, [](const ConfigFields& fields) { return list_settings(fields); });
 }
 
 }  // namespace hsi4d
