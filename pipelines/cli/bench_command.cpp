@@ -1,6 +1,7 @@
 #include "pipelines/cli/bench_command.h"
 
 #include <algorithm>
+#include <cstdarg>
 #include <cstdio>
 
 #include <nlohmann/json.hpp>
@@ -44,11 +45,25 @@ std::string json_line(const Measurement& m) {
   return line.dump() + "\n";
 }
 
+/// As printf writes it.
+[[gnu::format(printf, 1, 2)]] std::string formatted(const char* format, ...) {
+  char text[256];
+  std::va_list numbers;
+  va_start(numbers, format);
+  std::vsnprintf(text, sizeof text, format, numbers);
+  va_end(numbers);
+  return text;
+}
+
 /// " 34.5" of a hundred, or nothing.
 std::string share_text(const Measurement& m) {
-  char text[16] = "";
-  if (m.peak_share()) std::snprintf(text, sizeof text, " %6.1f", 100 * *m.peak_share());
-  return text;
+  return m.peak_share() ? formatted(" %6.1f", 100 * *m.peak_share()) : "";
+}
+
+/// What shares are of; nothing where none was measured.
+std::string peak_line(double peak) {
+  if (!(peak > 0)) return "";
+  return formatted("peak %%: of the %.1f G multiply-adds a second that were measured beside it\n", 1e-9 * peak);
 }
 
 std::string json_line(const FilterMeasurement& m) {
@@ -76,11 +91,7 @@ double bytes_read(const SkinningMeasurement& m) {
 double rate(const SkinningMeasurement& m) { return m.median_ms > 0 ? bytes_read(m) / m.median_ms / 1e6 : 0; }
 
 /// With one decimal; a dash for nothing.
-std::string tenths(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f", value);
-  return value > 0 ? text : "-";
-}
+std::string tenths(double value) { return value > 0 ? formatted("%.1f", value) : "-"; }
 
 std::string json_line(const SkinningMeasurement& m) {
   nlohmann::ordered_json line = {{"name", m.name},           {"threads", m.threads}, {"isa", isa_name(best_isa())},
@@ -121,45 +132,34 @@ std::string json_line(const ColorNetMeasurement& m) {
 
 std::string bench_rasterize_command(const BenchOptions& options) {
   std::string json, table;
-  char line[160];
-  std::snprintf(line, sizeof line, "%-44s %10s %10s %7s %10s %12s %8s %-9s %6s\n", "", "median ms", "least ms", "tiles",
-                "pairs", "fragments", "M/s", "of", "peak %");
-  table += line;
+  table += formatted("%-44s %10s %10s %7s %10s %12s %8s %-9s %6s\n", "", "median ms", "least ms", "tiles", "pairs",
+                     "fragments", "M/s", "of", "peak %");
   double peak = 0;
   bench_rasterize({options.workloads, options.threads, options.repeats}, [&](const Measurement& m) {
-    std::snprintf(line, sizeof line, "%-44s %10.3f %10.3f %7lld %10lld %12lld %8.0f %-9s", m.name.c_str(), m.median_ms,
-                  m.min_ms, static_cast<long long>(m.tiles), static_cast<long long>(m.pairs),
-                  static_cast<long long>(m.fragments), m.millions_per_s(), unit_name(m.unit));
-    table += line + share_text(m) + "\n";
+    table += formatted("%-44s %10.3f %10.3f %7lld %10lld %12lld %8.0f %-9s", m.name.c_str(), m.median_ms, m.min_ms,
+                       static_cast<long long>(m.tiles), static_cast<long long>(m.pairs),
+                       static_cast<long long>(m.fragments), m.millions_per_s(), unit_name(m.unit)) +
+             share_text(m) + "\n";
     if (m.image_error && m.gradient_error) {
-      std::snprintf(line, sizeof line, "%-44s image within %.2g, gradients within %.2g (relative L2) of all rendered\n",
-                    "", *m.image_error, *m.gradient_error);
-      table += line;
+      table += formatted("%-44s image within %.2g, gradients within %.2g (relative L2) of all rendered\n", "",
+                         *m.image_error, *m.gradient_error);
     }
     json += json_line(m);
     peak = std::max(peak, m.fma_peak_per_s);
   });
-  if (peak > 0) {
-    std::snprintf(line, sizeof line, "peak %%: of the %.1f G multiply-adds a second that were measured beside it\n",
-                  1e-9 * peak);
-    table += line;
-  }
+  table += peak_line(peak);
   if (!options.json.empty()) write_text_file(options.json, json);
   return table;
 }
 
 std::string bench_skinning_command(const BenchOptions& options) {
   std::string json, table;
-  char line[160];
-  std::snprintf(line, sizeof line, "%-40s %10s %10s %9s %8s %10s %7s\n", "", "median ms", "least ms", "points",
-                "columns", "MB read", "GB/s");
-  table += line;
+  table += formatted("%-40s %10s %10s %9s %8s %10s %7s\n", "", "median ms", "least ms", "points", "columns", "MB read",
+                     "GB/s");
   bench_skinning({options.workloads, options.threads, options.repeats}, [&](const SkinningMeasurement& m) {
-    std::snprintf(line, sizeof line, "%-40s %10.3f %10.3f %9lld %8lld %10s %7s\n", m.name.c_str(), m.median_ms,
-                  m.min_ms, static_cast<long long>(m.vertices + m.gaussians),
-                  static_cast<long long>(m.corrective_columns), tenths(bytes_read(m) / 1e6).c_str(),
-                  tenths(rate(m)).c_str());
-    table += line;
+    table += formatted("%-40s %10.3f %10.3f %9lld %8lld %10s %7s\n", m.name.c_str(), m.median_ms, m.min_ms,
+                       static_cast<long long>(m.vertices + m.gaussians), static_cast<long long>(m.corrective_columns),
+                       tenths(bytes_read(m) / 1e6).c_str(), tenths(rate(m)).c_str());
     json += json_line(m);
   });
   if (!options.json.empty()) write_text_file(options.json, json);
@@ -168,45 +168,35 @@ std::string bench_skinning_command(const BenchOptions& options) {
 
 std::string bench_color_net_command(const BenchOptions& options) {
   std::string json, table;
-  char line[160];
-  std::snprintf(line, sizeof line, "%-36s %10s %10s %9s %6s %6s %10s %7s\n", "", "median ms", "least ms", "gaussians",
-                "width", "layers", "M mul-add", "peak %");
-  table += line;
+  table += formatted("%-36s %10s %10s %9s %6s %6s %10s %7s\n", "", "median ms", "least ms", "gaussians", "width",
+                     "layers", "M mul-add", "peak %");
   double peak = 0;
   bench_color_net({options.workloads, options.threads, options.repeats}, [&](const ColorNetMeasurement& m) {
-    std::snprintf(line, sizeof line, "%-36s %10.3f %10.3f %9lld %6lld %6lld %10s %7s\n", m.name.c_str(), m.median_ms,
-                  m.min_ms, static_cast<long long>(m.gaussians), static_cast<long long>(m.hidden_width),
-                  static_cast<long long>(m.hidden_layers), tenths(1e-6 * m.multiply_adds).c_str(),
-                  tenths(100 * m.peak_share()).c_str());
-    table += line;
+    table += formatted("%-36s %10.3f %10.3f %9lld %6lld %6lld %10s %7s\n", m.name.c_str(), m.median_ms, m.min_ms,
+                       static_cast<long long>(m.gaussians), static_cast<long long>(m.hidden_width),
+                       static_cast<long long>(m.hidden_layers), tenths(1e-6 * m.multiply_adds).c_str(),
+                       tenths(100 * m.peak_share()).c_str());
     json += json_line(m);
     peak = std::max(peak, m.fma_peak_per_s);
   });
-  if (peak > 0) {
-    std::snprintf(line, sizeof line, "peak %%: of the %.1f G multiply-adds a second that were measured beside it\n",
-                  1e-9 * peak);
-    table += line;
-  }
+  table += peak_line(peak);
   if (!options.json.empty()) write_text_file(options.json, json);
   return table;
 }
 
 std::string bench_pixel_filter_command(const BenchOptions& options) {
   std::string json, table;
-  char line[200];
-  std::snprintf(line, sizeof line, "%-50s %9s %9s %9s %9s %9s %8s %8s %10s\n", "", "sigma px", "blur px2", "width px",
-                "half px", "size px", "light %", "rms", "distance %");
-  table += line;
+  table += formatted("%-50s %9s %9s %9s %9s %9s %8s %8s %10s\n", "", "sigma px", "blur px2", "width px", "half px",
+                     "size px", "light %", "rms", "distance %");
   PixelFilterBench bench;
   bench.figures = options.workloads;
   bench.threads = options.threads;
   if (!options.heights_px.empty()) bench.heights_px = options.heights_px;
   bench_pixel_filter(bench, [&](const FilterMeasurement& m) {
     const SilhouetteError& e = m.error;
-    std::snprintf(line, sizeof line, "%-50s %9.2f %9.4f %+9.3f %+9.3f %+9.3f %+8.2f %8.4f %+10.2f\n", m.name.c_str(),
-                  m.sigma_px, m.blur, e.width_px, e.half_width_px, m.distance_error * m.height_px, 100 * e.brightness,
-                  e.rms, 100 * m.distance_error);
-    table += line;
+    table += formatted("%-50s %9.2f %9.4f %+9.3f %+9.3f %+9.3f %+8.2f %8.4f %+10.2f\n", m.name.c_str(), m.sigma_px,
+                       m.blur, e.width_px, e.half_width_px, m.distance_error * m.height_px, 100 * e.brightness, e.rms,
+                       100 * m.distance_error);
     json += json_line(m);
   });
   if (!options.json.empty()) write_text_file(options.json, json);
