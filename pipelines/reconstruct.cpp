@@ -468,6 +468,7 @@ class Reconstruction {
     summary.frames = static_cast<int>(clip_.frames());
     summary.seconds = progress_.seconds + refined_seconds_;
     for (std::size_t s = 0; s < config_.stages.size(); ++s) summary.metrics.push_back(summarize_stage(s));
+    summary.has_truth = clip_.truth.has_value();
     summary.baselines = {{"start", {}, {}}};
     if (clip_.truth) add_errors(summary);
     std::vector<FrameMetrics> before_refinement;

@@ -150,6 +150,7 @@ std::string summary_json(const RunSummary& summary) {
   tree.add("name", ConfigValue::make_string(summary.name));
   tree.add("frames", ConfigValue::make_integer(summary.frames));
   add_number(tree, "", "seconds", summary.seconds);
+  tree.add("truth", ConfigValue::make_boolean(summary.has_truth));
   ConfigValue stages = ConfigValue::make_array();
   for (size_t i = 0; i < summary.metrics.size(); ++i)
     stages.items.push_back(stage_json(summary.metrics[i], child_pointer("/metrics", std::to_string(i))));
@@ -178,6 +179,10 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
   summary.name = string_member(tree, "name");
   summary.frames = static_cast<int>(read_count(tree, "", "frames"));
   summary.seconds = read_number(tree, "", "seconds");
+  if (const ConfigValue* const truth = find_member(tree, "truth")) {  // version 0.1 does not say
+    check_kind(*truth, Kind::kBoolean, "/truth");
+    summary.has_truth = truth->boolean;
+  }
   if (const ConfigValue* const stages = find_member(tree, "metrics")) {
     check_kind(*stages, Kind::kArray, "/metrics");
     for (size_t i = 0; i < stages->items.size(); ++i)
