@@ -7,6 +7,7 @@
 
 #include "core/check.h"
 #include "core/config_value.h"
+#include "core/text.h"
 #include "pipelines/json_text.h"
 
 namespace hsi4d {
@@ -128,12 +129,6 @@ double as_shown(double value, int decimals) {
   double shown = 0;
   std::from_chars(text.data(), text.data() + text.size(), shown);
   return shown;
-}
-
-/// The number of characters of UTF-8 text.
-size_t characters(std::string_view text) {
-  return static_cast<size_t>(
-      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
 }  // namespace
@@ -275,11 +270,11 @@ std::string error_table(const RunSummary& summary) {
   }
   std::vector<size_t> widths(lines[0].size());
   for (const auto& line : lines)
-    for (size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], characters(line[i]));
+    for (size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], count_characters(line[i]));
   std::string text;
   for (const auto& line : lines) {
     for (size_t i = 0; i < line.size(); ++i) {
-      const std::string blanks(widths[i] - characters(line[i]), ' ');
+      const std::string blanks(widths[i] - count_characters(line[i]), ' ');
       text += i == 0 ? line[i] + blanks : "  " + blanks + line[i];
     }
     text.erase(text.find_last_not_of(' ') + 1);
