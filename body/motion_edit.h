@@ -76,6 +76,9 @@ struct PoseFolder {
   Index filled = 0;  ///< frames without a file, interpolated between their neighbours
 };
 
+/// Frames a second of such a folder where nobody says: that of most videos.
+inline constexpr double kPoseFolderRate = 30;
+
 /// Reads a folder of SMPL-X parameters, a file a frame as SMPLer-X writes them: FRAME.npz or FRAME_PERSON.npz, or
 /// TEXT_FRAME…; FRAME is the first run of digits, PERSON one after it. See read_smplx_sequence for what is in them. The
 /// shape is the mean of all frames. As everything of SMPLer-X it is in the camera's frame (see transformed), and hands

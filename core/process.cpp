@@ -2,15 +2,23 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <fcntl.h>
+#include <filesystem>
+#include <limits>
 #include <spawn.h>
+#include <sstream>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
+#include <thread>
 #include <unistd.h>
 
+#include "core/check.h"
 #include "core/system_message.h"
+#include "core/text.h"
 
 extern char** environ;  // POSIX asks programs to declare it
 
@@ -18,7 +26,9 @@ namespace hsi4d {
 
 namespace {
 
-constexpr std::size_t kMostTold = 2000;  // bytes of what a program printed, in a message
+constexpr std::chrono::milliseconds kLook{20};  // between looks at whether a program has ended
+constexpr double kSecondsToGo = 2;              // of one that is asked to end, before it is killed
+constexpr std::size_t kMostTold = 2000;         // bytes of what a program printed, in a message
 
 void close_if_open(int& descriptor) {
   if (descriptor >= 0) close(descriptor);
@@ -33,13 +43,6 @@ std::string content_of(int descriptor) {
   for (ssize_t count = 0; (count = pread(descriptor, part.data(), part.size(), at)) > 0; at += count)
     text.append(part.data(), static_cast<std::size_t>(count));
   return text;
-}
-
-std::string end_of(const std::string& text) {
-  const std::size_t last = text.find_last_not_of(" \n\r\t");
-  if (last == std::string::npos) return "; it printed nothing";
-  const std::string trimmed = text.substr(0, last + 1);
-  return trimmed.size() <= kMostTold ? ":\n" + trimmed : ":\n..." + trimmed.substr(trimmed.size() - kMostTold);
 }
 
 std::string fate_of(int status) {
@@ -142,12 +145,80 @@ std::string ChildProcess::finish() {
   HSI4D_CHECK(pid_ > 0, "the program's end was waited for before");
   close_if_open(input_);
   close_if_open(stream_);
-  int status = 0;
-  wait_for(pid_, &status);
+  wait_for(pid_, &status_);
   pid_ = -1;
+  return result();
+}
+
+std::optional<std::string> ChildProcess::finish(const ProcessLimits& limits) {
+  HSI4D_CHECK(pid_ > 0, "the program's end was waited for before");
+  close_if_open(input_);
+  close_if_open(stream_);
+  const double seconds = limits.seconds > 0 ? limits.seconds : std::numeric_limits<double>::infinity();
+  if (has_ended_within(seconds, limits.stop_requested)) return result();
+  const bool is_stopped = limits.stop_requested && limits.stop_requested();
+  end();
+  if (is_stopped) return std::nullopt;
+  throw UserError(command_.front() + ": was ended after " + number_text(limits.seconds) +
+                  " seconds, which is all the time it has" + end_of_output(content_of(output_)));
+}
+
+bool ChildProcess::has_ended_within(double seconds, const std::function<bool()>& stop_requested) {
+  using Clock = std::chrono::steady_clock;
+  for (const Clock::time_point begin = Clock::now();;) {
+    const pid_t ended = waitpid(pid_, &status_, WNOHANG);
+    if (ended == pid_) {
+      pid_ = -1;
+      return true;
+    }
+    if (stop_requested && stop_requested()) return false;
+    if (std::chrono::duration<double>(Clock::now() - begin).count() > seconds) return false;
+    std::this_thread::sleep_for(kLook);
+  }
+}
+
+void ChildProcess::end() {
+  const pid_t group = pid_;
+  kill(-group, SIGTERM);
+  if (!has_ended_within(kSecondsToGo, {})) {
+    kill(-group, SIGKILL);
+    wait_for(pid_, nullptr);
+  }
+  kill(-group, SIGKILL);  // what it has left behind
+  pid_ = -1;
+}
+
+std::string ChildProcess::result() {
   std::string text = content_of(output_);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return text;
-  throw UserError(command_.front() + ": " + fate_of(status) + end_of(text));
+  if (WIFEXITED(status_) && WEXITSTATUS(status_) == 0) return text;
+  throw UserError(command_.front() + ": " + fate_of(status_) + end_of_output(text));
+}
+
+std::string end_of_output(const std::string& text) {
+  const std::size_t last = text.find_last_not_of(" \n\r\t");
+  if (last == std::string::npos) return "; it printed nothing";
+  const std::string trimmed = text.substr(0, last + 1);
+  return trimmed.size() <= kMostTold ? ":\n" + trimmed : ":\n..." + trimmed.substr(trimmed.size() - kMostTold);
+}
+
+std::string find_program(const std::string& name) {
+  namespace fs = std::filesystem;
+  const auto can_run = [](const fs::path& file) {
+    std::error_code error;
+    return fs::is_regular_file(file, error) && access(file.c_str(), X_OK) == 0;
+  };
+  if (name.find('/') != std::string::npos) return can_run(name) ? name : "";
+  const char* const path = std::getenv("PATH");
+  std::istringstream folders(path == nullptr ? "/bin:/usr/bin" : path);
+  for (std::string folder; !name.empty() && std::getline(folders, folder, ':');) {
+    const fs::path file = fs::path(folder.empty() ? "." : folder) / name;
+    if (can_run(file)) return file.string();
+  }
+  return "";
+}
+
+std::optional<std::string> run_process(std::vector<std::string> command, const ProcessLimits& limits) {
+  return ChildProcess(std::move(command)).finish(limits);
 }
 
 std::string run_process(std::vector<std::string> command) { return ChildProcess(std::move(command)).finish(); }

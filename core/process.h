@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +20,12 @@ class ProgramNotStartedError : public UserError {
 
 /// Where a program's standard output goes: collected for `finish`, or read as it comes.
 enum class ChildOutput { kCollected, kRead };
+
+/// What a program gets that may take long.
+struct ProcessLimits {
+  double seconds = 0;                         ///< after which it is ended; 0: it takes as long as it takes
+  std::function<bool()> stop_requested = {};  ///< asked many times a second; empty: never
+};
 
 /// A program that runs until `finish`. It does not see our standard input.
 class ChildProcess {
@@ -44,11 +52,35 @@ class ChildProcess {
   /// ended with status 0.
   std::string finish();
 
+  /// As finish, within limits: see run_process.
+  std::optional<std::string> finish(const ProcessLimits& limits);
+
  private:
+  /// Waits until `seconds` are over. @return  whether it has ended
+  bool has_ended_within(double seconds, const std::function<bool()>& stop_requested);
+  /// Ends it with its group.
+  void end();
+  /// Its end is known: what it printed, or what is thrown of it.
+  std::string result();
+
   std::vector<std::string> command_;
   int pid_ = -1, input_ = -1, output_ = -1;
+  int status_ = 0;   // as waitpid gives it, once it has ended
   int stream_ = -1;  // its standard output, where that is read
 };
+
+/// The end of what a program printed, to go on with after a message: ":\n..." or "; it printed nothing".
+std::string end_of_output(const std::string& text);
+
+/// The file of a program as a command would start it: a name with a '/' itself, others from the folders of PATH; empty
+/// where there is none that can be executed.
+std::string find_program(const std::string& name);
+
+/// Runs a program to its end, or to that of its time. It is ended with all that it has started in its process group:
+/// asked to (SIGTERM), and killed where it does not go.
+/// @return  as `finish`; nothing when it was asked to stop
+/// Throws as `finish`; UserError with the program's name and the end of what it printed when its time is over.
+std::optional<std::string> run_process(std::vector<std::string> command, const ProcessLimits& limits);
 
 /// Runs a program to its end. As ChildProcess, without input.
 std::string run_process(std::vector<std::string> command);

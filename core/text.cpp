@@ -72,6 +72,11 @@ std::size_t plain_length(std::string_view text) {
 
 }  // namespace
 
+std::size_t count_characters(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
 bool is_plain_text(std::string_view text) {
   while (!text.empty()) {
     const std::size_t length = plain_length(text);

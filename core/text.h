@@ -24,6 +24,9 @@ std::string four_digits(std::int64_t number);
 /// cut sequences and halves of surrogate pairs are not).
 std::size_t utf8_length(std::string_view text);
 
+/// The number of characters of UTF-8 text, for columns of a table.
+std::size_t count_characters(std::string_view text);
+
 /// Whether it is UTF-8 without control characters: something that every terminal, file and JSON text can hold.
 bool is_plain_text(std::string_view text);
 

@@ -43,21 +43,29 @@ bool is_video_name(const std::string& path);
 /// These endings in words: ".mp4, .mov, ...".
 std::string video_endings();
 
+/// How many pixels share their colour in a video; brightness is each pixel's own.
+enum class VideoColor {
+  kShared,    ///< 4:2:0, blocks of 2x2: for any player, as generators write it
+  kEachPixel  ///< 4:4:4: closer to what was rendered, not for every player
+};
+
 /// How a video is written.
 struct VideoFormat {
   double frame_rate = 10;  ///< frames a second
   int quality = 18;        ///< x264's constant rate factor: 0 without loss, 18 hardly visible, 51 worst
+  VideoColor color = VideoColor::kShared;
 };
 
-/// A video that comes into being when it is complete, as an AtomicFile: H.264 in MP4, 4:2:0, for any player. The same
-/// bytes for the same frames, on the same version of ffmpeg.
+/// A video that comes into being when it is complete, as an AtomicFile: H.264 in MP4, 8 bit. The same bytes for the
+/// same frames, on the same version of ffmpeg.
 class VideoWriter {
  public:
   /// @param path  UTF-8, ending in .mp4
   /// Throws UserError when ffmpeg is missing, the ending is another, or the path cannot be written.
   VideoWriter(const std::string& path, int width, int height, const VideoFormat& format = {});
 
-  /// Appends a frame [3,H,W], clamped to [0, 1]. Sizes that are odd get a black row or column, as 4:2:0 asks for.
+  /// Appends a frame [3,H,W], clamped to [0, 1]. Sizes that are odd get a black row or column where colours
+  /// are shared.
   /// Throws UserError with ffmpeg's words when it fails, InternalError for another size.
   void add(const Image& frame);
 

@@ -1,5 +1,7 @@
 #include "pipelines/body_files.h"
 
+#include <algorithm>
+
 #include "body/motion_edit.h"
 #include "core/log.h"
 
@@ -20,6 +22,14 @@ void warn_of_excess(const std::string& file, const std::string& name, std::span<
   if (is_zero) return;
   log_warning(file + ": array '" + name + "': has " + std::to_string(width) + " numbers a frame; " + model.source +
               " has " + std::to_string(there) + ", and the others are left out");
+}
+
+SmplxModel read_model_for(const std::string& path, const std::string& motion, const std::vector<double>& betas) {
+  const SmplxModel bare = read_smplx(path, {.betas = 0, .expressions = 0, .correctives = false});
+  warn_of_repairs(bare);
+  warn_of_excess(motion, "betas", betas, std::ssize(betas), bare, bare.betas_in_file);
+  const Index count = std::min<Index>(bare.betas_in_file, static_cast<Index>(betas.size()));
+  return count == 0 ? bare : read_smplx(path, {.betas = count, .expressions = 0, .correctives = false});
 }
 
 Motion read_motion_aloud(const std::string& path) {

@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "body/avatar.h"
 #include "body/motion_io.h"
@@ -21,6 +22,13 @@ void warn_of_repairs(const SmplxModel& model);
 /// @param there    how many the model has
 void warn_of_excess(const std::string& file, const std::string& name, std::span<const double> numbers, Index width,
                     const SmplxModel& model, Index there);
+
+/// Reads a body model with as many directions of shape as a motion has numbers for, as far as the file has them: the
+/// first `betas` numbers are those of the model that is returned. Tells what is repaired or left out. Throws as
+/// read_smplx.
+///
+/// @param motion  the file that the betas are of, for messages
+SmplxModel read_model_for(const std::string& path, const std::string& motion, const std::vector<double>& betas);
 
 /// Reads a motion, and tells what of it is left out because it is of another body model. Throws as read_motion.
 Motion read_motion_aloud(const std::string& path);

@@ -96,6 +96,14 @@ std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std
   return truth;
 }
 
+/// Whether there is a truth to compare with. A dataset may have been handed on without it.
+bool has_truth(const DataSettings& data) {
+  if (data.truth.empty() || fs::exists(data.truth)) return !data.truth.empty();
+  log_warning(data.truth.string() +
+              ": there is no such folder (data.truth); the result is not compared with the truth");
+  return false;
+}
+
 std::string size_text(const Image& image) {
   return std::to_string(image.width()) + "x" + std::to_string(image.height());
 }
@@ -175,7 +183,7 @@ Clip read_clip(const DataSettings& data) {
   clip.frame_rate = rate_of(video->frames, setup);
   clip.betas = setup.motion.betas;
   clip.gender = setup.motion.gender;
-  if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
+  if (has_truth(data)) clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
   clip.files = {{"/data/scene", data.scene},
                 {"/data/avatar", data.avatar},
                 {"/data/camera", data.camera},
@@ -189,6 +197,10 @@ Clip read_clip(const DataSettings& data) {
     if (masks.is_video()) clip.files.push_back({"masks/" + masks.path().filename().string(), masks.path()});
   }
   return clip;
+}
+
+bool fits_camera(const Image& frame, const Camera& camera) {
+  return has_size_of(frame, camera) || is_enlarged(frame, camera);
 }
 
 void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
@@ -247,7 +259,7 @@ std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, In
 ClipFrame read_frame(const Clip& clip, Index index) {
   const FrameSource& frames = clip.video->frames;
   const Image read = frames.read(index);
-  if (read.channels() < 3 || !(has_size_of(read, clip.camera) || is_enlarged(read, clip.camera))) {
+  if (read.channels() < 3 || !fits_camera(read, clip.camera)) {
     throw DataError(frames.place(index) + ": is " + size_text(read) + " with " + std::to_string(read.channels()) +
                     " channels; the camera's image is " + size_text(clip.camera) + " with 3");
   }

@@ -67,6 +67,10 @@ Clip read_clip(const DataSettings& data);
 /// @param has_center  the run has the loss `center`, which such masks switch off
 void check_frames(const DataSettings& data, const Clip& clip, bool has_center);
 
+/// Whether a frame becomes an image of the camera: as large, or larger and of the same shape but for the rounding of
+/// sizes.
+bool fits_camera(const Image& frame, const Camera& camera);
+
 /// Reads frame `index` and its masks, and reduces larger ones to the camera's size. A mask that has no file counts as
 /// empty. Throws as read_clip.
 ClipFrame read_frame(const Clip& clip, Index index);

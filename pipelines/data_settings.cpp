@@ -13,7 +13,7 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
   data.scene = base / "scene.ply";
   data.avatar = base / "avatar.safetensors";
   if (!fs::exists(data.avatar) && fs::exists(base / "avatar.npz")) data.avatar = base / "avatar.npz";  // of version 1
-  data.frames = base / "frames";
+  data.frames = base / (fs::exists(base / kDatasetVideo) ? kDatasetVideo : "frames");
   data.masks = base / "masks";
   data.camera = base / "camera.json";
   data.initial = base / "initial.json";
@@ -48,8 +48,8 @@ void describe(ConfigFields& f, DataSettings& s) {
            "Frames a second that are kept, the nearest ones; estimated poses are resampled to it; 0: all");
   f.path("camera", s.camera, {.must_exist = true}, "Camera of frame 0 (.json)");
   f.path("initial", s.initial, {.must_exist = true}, "State of frame 0 and estimated poses (.json)");
-  f.path("truth", s.truth, {.must_exist = true},
-         "Folder with motion.npz, objects.npz, cameras.json to compare the result with; empty: none");
+  f.path("truth", s.truth, {},
+         "Folder with motion.npz, objects.npz, cameras.json to compare the result with; empty, or not there: none");
   f.number("mask_threshold", s.mask_threshold, {.above = 0, .max = 1}, "Coverage from which a pixel belongs to a mask");
   f.integer("mask_margin_px", s.mask_margin_px, {.min = 0, .max = 64},
             "Pixels by which masks grow before they keep the camera stage from what is not scene");

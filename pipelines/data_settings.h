@@ -28,8 +28,12 @@ struct DataSettings {
   int mask_margin_px = 1;
 };
 
+/// The video of a dataset, where it is one file.
+inline constexpr const char* kDatasetVideo = "video.mp4";
+
 /// The inputs in a dataset's folder, as `hsi4d synth` lays them out: scene.ply, objects/NAME.ply, avatar.safetensors,
-/// frames/, masks/, camera.json, initial.json, truth/ (none where it is missing). Paths are absolute.
+/// video.mp4 (or frames/ where there is none), masks/, camera.json, initial.json, truth/ (none where it is missing).
+/// Paths are absolute.
 DataSettings dataset_inputs(const std::filesystem::path& folder);
 
 /// Describe the sections: every setting with its range.

@@ -13,9 +13,11 @@ void add_body_errors(MetricValues& errors, const FrameState& estimate, const Fra
   errors.emplace_back("mpjpe_mm", mpjpe_mm(estimate.joints, truth.joints));
   errors.emplace_back("pa_mpjpe_mm", pa_mpjpe_mm(estimate.joints, truth.joints));
   errors.emplace_back("world_mpjpe_mm", world_mpjpe_mm(estimate.joints, truth.joints));
-  const WorldErrorParts parts = world_error_parts(estimate.joints, truth.joints, truth.camera_from_world.rotation);
-  errors.emplace_back("world_mpjpe_image_mm", parts.image_mm);
-  errors.emplace_back("world_mpjpe_depth_mm", parts.depth_mm);
+  if (truth.camera_from_world) {
+    const WorldErrorParts parts = world_error_parts(estimate.joints, truth.joints, truth.camera_from_world->rotation);
+    errors.emplace_back("world_mpjpe_image_mm", parts.image_mm);
+    errors.emplace_back("world_mpjpe_depth_mm", parts.depth_mm);
+  }
   errors.emplace_back("root_translation_mm", root_translation_mm(estimate.joints, truth.joints));
 }
 
@@ -48,7 +50,8 @@ MetricValues frame_errors(const FrameState& estimate, const FrameState& truth) {
   if (!estimate.joints.empty() && !truth.joints.empty()) add_body_errors(errors, estimate, truth);
   if (!estimate.world_from_object.empty() && !truth.world_from_object.empty())
     add_object_errors(errors, estimate, truth);
-  const PoseError camera = camera_error(estimate.camera_from_world, truth.camera_from_world);
+  if (!estimate.camera_from_world || !truth.camera_from_world) return errors;
+  const PoseError camera = camera_error(*estimate.camera_from_world, *truth.camera_from_world);
   errors.emplace_back("camera_translation_cm", camera.translation_cm);
   errors.emplace_back("camera_rotation_deg", camera.rotation_deg);
   return errors;

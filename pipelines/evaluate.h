@@ -1,6 +1,7 @@
 // Errors of a whole sequence against the truth, with the names that summary.json has.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,12 +16,13 @@ namespace hsi4d {
 struct FrameState {
   std::vector<double> joints;                    ///< [J,3] metres, world; empty: no body
   std::vector<Rigid<double>> world_from_object;  ///< objects in a fixed order, about their centroids
-  Rigid<double> camera_from_world;
+  std::optional<Rigid<double>> camera_from_world;
 };
 
-/// The errors of one frame: mpjpe_mm, pa_mpjpe_mm, world_mpjpe_mm and its parts in the true camera's view,
-/// root_translation_mm; object_translation_cm, object_rotation_deg (means over the objects); camera_translation_cm,
-/// camera_rotation_deg. Throws InternalError when the two have different counts of joints or objects.
+/// The errors of one frame: mpjpe_mm, pa_mpjpe_mm, world_mpjpe_mm and its parts in the true camera's view where that is
+/// known, root_translation_mm; object_translation_cm, object_rotation_deg (means over the objects);
+/// camera_translation_cm, camera_rotation_deg. Throws InternalError when the two have different counts of joints or
+/// objects.
 MetricValues frame_errors(const FrameState& estimate, const FrameState& truth);
 
 /// psnr_db, ssim, and psnr_foreground_db where a foreground is given and not empty.

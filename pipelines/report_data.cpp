@@ -95,6 +95,8 @@ void read_summary_file(const RunPaths& paths, ReportData& data) {
   data.summary = parse_summary(read_text_file(paths.summary()), paths.summary());
   if (make_error_table(*data.summary).columns.empty())
     data.notes.emplace_back("summary.json has no errors: the run had no ground truth to compare with.");
+  else if (!data.summary->has_truth)
+    data.notes.emplace_back("The run had no ground truth: errors of body, objects and camera are not measured.");
   if (data.summary->baselines.empty())
     data.notes.emplace_back("summary.json has no baselines: the result is shown without its start.");
   if (!data.summary->name.empty()) data.name = data.summary->name;

@@ -11,6 +11,7 @@
 #include "core/version.h"
 #include "pipelines/report.h"
 #include "pipelines/run_problems.h"
+#include "pipelines/sources.h"
 
 namespace hsi4d {
 
@@ -93,6 +94,13 @@ RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses
   prepare_run(config);
   EarlyMessages early;
   for (const RunNote& note : run_notes(config)) log_message(note.level, note.text);
+  RunIdentity identity;
+  identity.config = resolved_config(config, descriptions_of(losses));  // without what programs outside make
+  on_threads(options.threads > 0 ? options.threads : config.threads, [&] {
+    if (!has_sources(config.sources)) return;
+    look_at_run_folder(options.folder, identity.config, options.resume);  // before anything is made for nothing
+    config.data = make_sources(config, options.observer);
+  });
   Clip clip = read_clip(config.data);  // before anything is written
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});
@@ -102,8 +110,6 @@ RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses
   }
   check_start(config.start, clip);
   check_frames(config.data, clip, has_loss(config, "center"));
-  RunIdentity identity;
-  identity.config = resolved_config(config, descriptions_of(losses));
   identity.seed = config.seed;
   const int threads = options.threads > 0 ? options.threads : config.threads;
   identity.threads = threads > 0 ? threads : thread_count();

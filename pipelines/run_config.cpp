@@ -14,6 +14,16 @@ constexpr int kMostThreads = 1024;
 /// The largest whole number that every JSON tool keeps (RFC 8259, section 6).
 constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 
+constexpr const char* kSourcesFolder = "generated";  // beside a config
+
+/// Takes from section `sources` what its outputs do not depend on.
+void without_places(ConfigValue& sources) {
+  std::erase_if(sources.members, [](const ConfigMember& member) { return member.key == "folder"; });
+  for (ConfigMember& member : sources.members) {
+    std::erase_if(member.value.members, [](const ConfigMember& setting) { return setting.key == "timeout_s"; });
+  }
+}
+
 }  // namespace
 
 void describe(ConfigFields& f, CameraSettings& s) {
@@ -37,6 +47,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");
   f.object("start", s.start, "Where the stages of a frame begin");
   f.object("data", s.data, "The files that the run reads");
+  f.object("sources", s.sources, "Programs outside that make the video and the masks of `data`");
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
   f.object("color_net", s.color_net, "How the human's colours follow its pose");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
@@ -63,7 +74,10 @@ RunConfig load_run_config(const std::filesystem::path& file, const std::vector<s
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, overrides, problems);
   require_kind(tree, ConfigKind::kRun, file);
-  return read_run_config(tree, losses, problems, use);
+  RunConfig config = read_run_config(tree, losses, problems, use);
+  if (has_sources(config.sources) && config.sources.folder.empty())
+    config.sources.folder = std::filesystem::absolute(file).parent_path().lexically_normal() / kSourcesFolder;
+  return config;
 }
 
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses) {
@@ -84,6 +98,7 @@ ConfigValue without_data(ConfigValue tree) {
   });
   for (ConfigMember& member : tree.members) {
     std::vector<ConfigMember>& own = member.value.members;
+    if (member.key == "sources") without_places(member.value);
     if (member.key == "body") std::erase_if(own, [](const ConfigMember& setting) { return setting.key == "path"; });
     if (member.key != "data") continue;
     std::erase_if(own, [](const ConfigMember& setting) {

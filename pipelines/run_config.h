@@ -14,6 +14,7 @@
 #include "pipelines/color_net_settings.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/frame_start.h"
+#include "pipelines/source_settings.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
 
@@ -52,6 +53,7 @@ struct RunConfig {
   CameraSelectionSettings camera_selection;
   StartSettings start;
   DataSettings data;
+  SourceSettings sources;
   BodySettings body;
   ColorNetSettings color_net;
   SyntheticSettings synthetic;

@@ -103,19 +103,45 @@ void add_name_problems(const DataSettings& data, std::vector<RunProblem>& found)
   }
 }
 
-void add_input_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+/// What is wrong with the programs that make video and masks.
+void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  struct Program {
+    const char* name;
+    const std::vector<std::string>& command;
+    const std::vector<std::string>& placeholders;
+    const std::filesystem::path& given;
+    const char* key;
+  };
+  const SourceSettings& sources = config.sources;
+  for (const Program& program :
+       {Program{"video", sources.video.command, video_placeholders(), config.data.frames, "frames"},
+        Program{"masks", sources.masks.command, mask_placeholders(), config.data.masks, "masks"}}) {
+    const std::string section = std::string("/sources/") + program.name, key = std::string("/data/") + program.key;
+    for (CommandFault& fault : command_faults(program.command, program.placeholders))
+      found.push_back({section + fault.pointer, std::move(fault.text), {section + "/command"}});
+    if (!program.command.empty() && !program.given.empty())
+      found.push_back({key, "given, and " + section + " makes it too; remove one", {key, section}});
+    if (sources.prompt.empty() && uses_placeholder(program.command, "prompt"))
+      found.push_back({"/sources/prompt", "not given; " + section + "/command has {prompt}", {"/sources"}, true});
+  }
+}
+
+void add_input_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  const DataSettings& data = config.data;
   struct Input {
     const std::filesystem::path& path;
     const char* key;
     const char* what;
+    bool is_made = false;  // by a program outside
   };
+  const bool makes_video = !config.sources.video.command.empty(), makes_masks = !config.sources.masks.command.empty();
   const std::array inputs = {Input{data.scene, "scene", "a scene"},
                              Input{data.avatar, "avatar", "an avatar"},
-                             Input{data.frames, "frames", "the frames of a video"},
-                             Input{data.masks, "masks", "masks of the human and the objects"},
+                             Input{data.frames, "frames", "the frames of a video", makes_video},
+                             Input{data.masks, "masks", "masks of the human and the objects", makes_masks},
                              Input{data.camera, "camera", "the camera of frame 0"},
                              Input{data.initial, "initial", "the state of frame 0"}};
-  const auto is_missing = [](const Input& input) { return input.path.empty(); };
+  const auto is_missing = [](const Input& input) { return input.path.empty() && !input.is_made; };
   if (std::all_of(inputs.begin(), inputs.end(), is_missing)) {
     std::vector<std::string> keys;
     for (const Input& input : inputs) keys.emplace_back(input.key);
@@ -177,7 +203,8 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   }
   add_order_problems(config.stages, found);
   add_name_problems(config.data, found);
-  if (use == ConfigUse::kRun) add_input_problems(config.data, found);
+  add_source_problems(config, found);
+  if (use == ConfigUse::kRun) add_input_problems(config, found);
   return found;
 }
 
@@ -217,7 +244,9 @@ void prepare_run(RunConfig& config) {
 void check_inputs(const DataSettings& data) {
   std::vector<RunProblem> found;
   add_name_problems(data, found);
-  add_input_problems(data, found);
+  RunConfig config;
+  config.data = data;
+  add_input_problems(config, found);
   throw_if_any(found);
 }
 

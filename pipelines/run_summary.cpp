@@ -7,6 +7,7 @@
 
 #include "core/check.h"
 #include "core/config_value.h"
+#include "core/text.h"
 #include "pipelines/json_text.h"
 
 namespace hsi4d {
@@ -130,12 +131,6 @@ double as_shown(double value, int decimals) {
   return shown;
 }
 
-/// The number of characters of UTF-8 text.
-size_t characters(std::string_view text) {
-  return static_cast<size_t>(
-      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-}
-
 }  // namespace
 
 const double* find_metric(const MetricValues& values, std::string_view name) {
@@ -150,6 +145,7 @@ std::string summary_json(const RunSummary& summary) {
   tree.add("name", ConfigValue::make_string(summary.name));
   tree.add("frames", ConfigValue::make_integer(summary.frames));
   add_number(tree, "", "seconds", summary.seconds);
+  tree.add("truth", ConfigValue::make_boolean(summary.has_truth));
   ConfigValue stages = ConfigValue::make_array();
   for (size_t i = 0; i < summary.metrics.size(); ++i)
     stages.items.push_back(stage_json(summary.metrics[i], child_pointer("/metrics", std::to_string(i))));
@@ -178,6 +174,10 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
   summary.name = string_member(tree, "name");
   summary.frames = static_cast<int>(read_count(tree, "", "frames"));
   summary.seconds = read_number(tree, "", "seconds");
+  if (const ConfigValue* const truth = find_member(tree, "truth")) {  // version 0.1 does not say
+    check_kind(*truth, Kind::kBoolean, "/truth");
+    summary.has_truth = truth->boolean;
+  }
   if (const ConfigValue* const stages = find_member(tree, "metrics")) {
     check_kind(*stages, Kind::kArray, "/metrics");
     for (size_t i = 0; i < stages->items.size(); ++i)
@@ -270,11 +270,11 @@ std::string error_table(const RunSummary& summary) {
   }
   std::vector<size_t> widths(lines[0].size());
   for (const auto& line : lines)
-    for (size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], characters(line[i]));
+    for (size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], count_characters(line[i]));
   std::string text;
   for (const auto& line : lines) {
     for (size_t i = 0; i < line.size(); ++i) {
-      const std::string blanks(widths[i] - characters(line[i]), ' ');
+      const std::string blanks(widths[i] - count_characters(line[i]), ' ');
       text += i == 0 ? line[i] + blanks : "  " + blanks + line[i];
     }
     text.erase(text.find_last_not_of(' ') + 1);

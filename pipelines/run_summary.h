@@ -42,6 +42,7 @@ struct RunSummary {
   std::string name;
   int frames = 0;
   double seconds = 0;
+  bool has_truth = true;              ///< false: errors of body, objects and camera could not be measured
   std::vector<StageSummary> metrics;  ///< in order, the last one is the final one
   std::vector<Baseline> baselines;
   std::vector<FrameMetrics> per_frame;  ///< of the result
@@ -49,7 +50,7 @@ struct RunSummary {
 
 /// The text of summary.json:
 ///
-///   {"name", "frames", "seconds", "metrics": [{"stage", "seconds", "iterations", NAME: NUMBER...}...],
+///   {"name", "frames", "seconds", "truth": BOOL, "metrics": [{"stage", "seconds", "iterations", NAME: NUMBER...}...],
 ///    "baselines": {NAME: {NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
 ///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last only where some baseline has it)
 ///

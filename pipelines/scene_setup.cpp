@@ -78,6 +78,8 @@ ObjectPose initial_pose(const InitialSettings& initial, const std::string& name,
 
 }  // namespace
 
+fs::path initial_motion_file(const DataSettings& data) { return read_initial(data.initial).motion; }
+
 SceneSetup read_scene_setup(const DataSettings& data) {
   SceneSetup setup;
   setup.scene = read_gaussians(data.scene);

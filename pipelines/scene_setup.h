@@ -30,6 +30,9 @@ struct SceneSetup {
       object_tracks;  ///< estimated poses of the objects, NAME/rotation and NAME/translation; may be empty
 };
 
+/// The motion that data.initial names. Throws UserError naming what is wrong with that file.
+std::filesystem::path initial_motion_file(const DataSettings& data);
+
 /// Reads data.scene, avatar, objects and initial. Throws UserError or DataError naming the file: missing, damaged,
 /// without what is needed of it.
 SceneSetup read_scene_setup(const DataSettings& data);

@@ -92,6 +92,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
       summary.metrics.push_back(summarize_stage(name, clip, refined.states, Draw::kAll, refined.totals));
     }
   }
+  summary.has_truth = clip.truth.has_value();
   summary.baselines = {{"start", {}, {}}};
   if (clip.truth) add_errors(clip, result_of(progress, refinement), summary);
   const bool is_refined = !refinement.stages.empty();

@@ -1,5 +1,6 @@
 #include "pipelines/synthetic.h"
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,8 +11,10 @@
 #include "core/file.h"
 #include "core/folder_in_making.h"
 #include "core/image_io.h"
+#include "core/process.h"
 #include "core/rotation.h"
 #include "core/text.h"
+#include "core/video.h"
 #include "pipelines/clip.h"
 #include "pipelines/state.h"
 #include "pipelines/synthetic_faults.h"
@@ -55,7 +58,7 @@ std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<
   return to_json(root);
 }
 
-ConfigValue data_section(const SyntheticObject& object) {
+ConfigValue data_section(const SyntheticObject& object, SyntheticVideo video) {
   ConfigValue data = ConfigValue::make_object();
   const auto add = [&data](std::string_view key, std::string_view file) {
     data.add(key, ConfigValue::make_string(file));
@@ -66,7 +69,7 @@ ConfigValue data_section(const SyntheticObject& object) {
     data.add("objects", object_of(object.name, object_of("gaussians", file)));
   }
   add("avatar", "avatar.safetensors");
-  add("frames", "frames");
+  add("frames", video == SyntheticVideo::kPng ? "frames" : kDatasetVideo);
   add("masks", "masks");
   add("camera", "camera.json");
   add("initial", "initial.json");
@@ -80,6 +83,38 @@ void write_objects(const std::string& path, const std::string& name, const std::
     frames[t].objects = {{so3_log(poses[t].rotation), poses[t].translation}};
   }
   write_object_tracks(path, {name}, frames);
+}
+
+/// Where the frames of the video go, as settings.video says.
+class FrameFiles {
+ public:
+  FrameFiles(const SyntheticSettings& settings, const FolderInMaking& out) : out_(out) {
+    if (settings.video == SyntheticVideo::kPng) return;
+    VideoFormat format{.frame_rate = settings.frame_rate, .quality = settings.video_quality};
+    if (settings.video == SyntheticVideo::kMp4) format.color = VideoColor::kEachPixel;
+    video_.emplace(out.file(kDatasetVideo), settings.size_px, settings.size_px, format);
+  }
+
+  /// @param name  "0003.png"
+  void add(const std::string& name, const Image& frame) {
+    if (video_) return video_->add(frame);
+    write_image(out_.file(fs::path("frames") / name), frame);
+  }
+
+  void commit() {
+    if (video_) video_->commit();
+  }
+
+ private:
+  const FolderInMaking& out_;
+  std::optional<VideoWriter> video_;
+};
+
+void check_ffmpeg(const SyntheticSettings& settings) {
+  if (settings.video == SyntheticVideo::kPng || !find_program("ffmpeg").empty()) return;
+  throw UserError(
+      "ffmpeg: is not in PATH, and writes the video of a dataset; install it, or keep the frames as PNG files with "
+      "synthetic.video=png");
 }
 
 /// The frames of the video one after the other, with what is done to them that the reconstruction does not know of.
@@ -140,6 +175,7 @@ RenderSettings video_render_settings() {
 
 void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const fs::path& folder,
                    const Observer& observer, const ConfigValue& more_sections, const BodySettings& body_settings) {
+  check_ffmpeg(settings);
   FolderInMaking out(folder);
   const auto stop_if_asked = [&] {
     if (observer.wants_stop()) throw Interrupted("interrupted while a dataset was made; nothing is left of it");
@@ -169,8 +205,10 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
     if (has_tracks) write_objects(out.file(kObjectTracks), object.name, disturbed_object(clip.object, settings));
   }
   write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
-  write_text_file(out.file("config.json"), to_json(merged(object_of("data", data_section(object)), more_sections)));
+  write_text_file(out.file("config.json"),
+                  to_json(merged(object_of("data", data_section(object, settings.video)), more_sections)));
 
+  FrameFiles frames(settings, out);
   Film film(settings, render, body, avatar, scene, object);
   Progress shown("frames", settings.frames, observer.progress, observer.progress_interval);
   for (std::size_t t = 0; t < clip.cameras.size(); ++t) {
@@ -180,12 +218,14 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
       write_image(out.file(fs::path("masks") / of / name),
                   disturbed_mask(mask, settings.masks, seed, of, static_cast<Index>(t)));
     };
-    write_image(out.file(fs::path("frames") / name), frame.color);
+    if (t == 0) write_image(out.file("first_frame.png"), frame.color);
+    frames.add(name, frame.color);
     write_mask(kHumanMasks, frame.human_mask);
     if (object.exists()) write_mask(object.name, frame.object_mask);
     shown.step();
     stop_if_asked();
   }
+  frames.commit();
   shown.finish();
   out.commit();
 }

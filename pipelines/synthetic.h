@@ -2,7 +2,8 @@
 // drifting camera.
 //
 //   scene.ply  objects/NAME.ply  avatar.safetensors              Gaussians; the object's are relative to their mean
-//   frames/0000.png ...                                          8 bit
+//   video.mp4, or frames/0000.png ...                            8 bit (synthetic.video)
+//   first_frame.png                                              frame 0, exact to 8 bit
 //   masks/human/0000.png ...  masks/NAME/0000.png ...            8 bit grey: the share of the pixel
 //   camera.json  initial.json  initial_motion.npz                frame 0 exact, later frames disturbed
 //   initial_objects.npz                               poses of the object, disturbed; only with object_noise_*
@@ -33,8 +34,8 @@ RenderSettings video_render_settings();
 /// @param folder         new or empty; its parents are made. It appears when everything in it is complete
 /// @param more_sections  an object: sections of config.json beside `data`, for example stages; null: none
 /// @param body_settings  who is seen
-/// Throws as rest_body of the settings; UserError when the folder is there and not empty, or cannot be written;
-/// Interrupted when asked to stop: then nothing is left.
+/// Throws as rest_body of the settings; UserError when ffmpeg is needed and missing, when the folder is there and not
+/// empty, or cannot be written; Interrupted when asked to stop: then nothing is left.
 void write_dataset(const SyntheticSettings& settings, const RenderSettings& render, const std::filesystem::path& folder,
                    const Observer& observer = {}, const ConfigValue& more_sections = ConfigValue::make_object(),
                    const BodySettings& body_settings = {});

@@ -124,6 +124,17 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
            "Frames a second; a lower rate gives larger steps between frames");
   f.integer("size_px", s.size_px, {.min = 16, .max = 8192}, "Width and height of a frame, pixels");
   f.integer("supersample", s.supersample, {.min = 1, .max = 8}, "Frames are rendered at this multiple and reduced");
+  f.choice(
+      "video", s.video, kSyntheticVideos,
+      "How frames are kept: mp4: video.mp4, H.264 with a colour a pixel (4:4:4); mp4_420: four pixels share one, as "
+      "generators write it; png: frames/, exact and without ffmpeg");
+  f.integer("video_quality", s.video_quality, {.min = 0, .max = 51},
+            "Constant rate factor of the H.264: 0 without loss but that of colours, 51 worst");
+  f.rule({"video", "size_px"}, [&s]() -> std::string {
+    if (s.video != SyntheticVideo::kMp4Shared || s.size_px % 2 == 0) return "";
+    return "mp4_420 has blocks of 2x2 pixels, which size_px " + std::to_string(s.size_px) +
+           " cannot be divided into; take an even size, or mp4";
+  });
   f.choice("scene", s.scene, kSyntheticSceneKinds, "Where it happens; `hsi4d list scenes` tells what there is");
   f.choice("object", s.object, kSyntheticObjectKinds, "What is used");
   f.choice("motion", s.motion, kSyntheticMotionKinds, "What is done; each motion has its objects");

@@ -58,6 +58,16 @@ enum class SyntheticKind { kClip, kViews };
 inline constexpr std::array<ConfigChoice<SyntheticKind>, 2> kSyntheticKinds = {
     {{SyntheticKind::kClip, "clip"}, {SyntheticKind::kViews, "views"}}};
 
+/// How the frames of a clip are kept.
+enum class SyntheticVideo {
+  kMp4,        ///< video.mp4, H.264 of 8 bit, a colour a pixel (4:4:4)
+  kMp4Shared,  ///< the same with colours shared by four pixels (4:2:0), as generators write it
+  kPng         ///< frames/, exact to 8 bit
+};
+
+inline constexpr std::array<ConfigChoice<SyntheticVideo>, 3> kSyntheticVideos = {
+    {{SyntheticVideo::kMp4, "mp4"}, {SyntheticVideo::kMp4Shared, "mp4_420"}, {SyntheticVideo::kPng, "png"}}};
+
 /// Fewest Gaussians that a scene and an object can be made of: one for each of their surfaces.
 inline constexpr Index kFewestSceneGaussians = 700;
 inline constexpr Index kFewestObjectGaussians = 60;
@@ -90,6 +100,8 @@ struct SyntheticSettings {
   double frame_rate = 10;  ///< frames a second
   int size_px = 256;
   int supersample = 2;
+  SyntheticVideo video = SyntheticVideo::kMp4;
+  int video_quality = 4;  ///< x264's constant rate factor
   SyntheticSceneKind scene = SyntheticSceneKind::kLivingRoom;
   SyntheticObjectKind object = SyntheticObjectKind::kWateringCan;
   SyntheticMotionKind motion = SyntheticMotionKind::kPour;

@@ -15,24 +15,6 @@
 namespace hsi4d::cli {
 namespace {
 
-constexpr double kFolderRate = 30;
-
-void check_rate(const std::optional<double>& rate, const std::string& option) {
-  if (!rate || (*rate >= kSlowestMotion && *rate <= kFastestMotion)) return;
-  throw UserError("hsi4d motion: " + option + ": " + number_text(*rate) +
-                  " is out of range; allowed: " + number_text(kSlowestMotion) + " to " + rounded(kFastestMotion, 6));
-}
-
-/// The body of a model file in the motion's shape, as far as the file has directions for it.
-SmplxModel model_for(const MotionOptions& options, const std::vector<double>& betas) {
-  const std::string& path = options.body_model;
-  const SmplxModel bare = read_smplx(path, {.betas = 0, .expressions = 0, .correctives = false});
-  warn_of_repairs(bare);
-  warn_of_excess(options.in, "betas", betas, std::ssize(betas), bare, bare.betas_in_file);
-  const Index count = std::min<Index>(bare.betas_in_file, static_cast<Index>(betas.size()));
-  return count == 0 ? bare : read_smplx(path, {.betas = count, .expressions = 0, .correctives = false});
-}
-
 bool has_shape(const Motion& motion) {
   return std::any_of(motion.betas.begin(), motion.betas.end(), [](double beta) { return beta != 0; });
 }
@@ -47,7 +29,7 @@ Motion read_any(const MotionOptions& options, bool& is_of_folder) {
     motion.frame_rate = options.from_rate.value_or(motion.frame_rate);
     return motion;
   }
-  PoseFolder folder = read_pose_folder(options.in, options.from_rate.value_or(kFolderRate), options.person);
+  PoseFolder folder = read_pose_folder(options.in, options.from_rate.value_or(kPoseFolderRate), options.person);
   if (folder.filled > 0)
     log_warning(options.in + ": frames without a file, interpolated: " + std::to_string(folder.filled));
   return std::move(folder.motion);
@@ -61,7 +43,7 @@ struct Prepared {
 
 /// For the body of --body-model, in the motion's shape.
 Prepared for_model(const MotionOptions& options, const Motion& motion, bool is_of_folder) {
-  const SmplxModel model = model_for(options, motion.betas);
+  const SmplxModel model = read_model_for(options.body_model, options.in, motion.betas);
   const auto count = static_cast<std::size_t>(model.betas);
   BodyModel body = rest_body(model, std::span(motion.betas).first(count));
   Motion moved = for_body(motion, body);
@@ -100,8 +82,8 @@ Motion at_rate(const Motion& motion, double frame_rate) {
 
 std::string motion_command(const MotionOptions& options) {
   const bool is_glb = check_ending(options.out, "hsi4d motion: OUT", {".npz", ".glb"}) == ".glb";
-  check_rate(options.from_rate, "--from-rate");
-  check_rate(options.frame_rate, "--frame-rate");
+  check_rate(options.from_rate, "hsi4d motion: --from-rate");
+  check_rate(options.frame_rate, "hsi4d motion: --frame-rate");
   check_no_input(options.out, "hsi4d motion: OUT", {options.in, options.body_model});
   check_writable(options.out);
   bool is_of_folder = false;

@@ -22,6 +22,7 @@
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/convert_command.h"
 #include "pipelines/cli/demo_command.h"
+#include "pipelines/cli/evaluate_command.h"
 #include "pipelines/cli/failure.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
@@ -79,6 +80,7 @@ struct CommandLine {
   MotionOptions motion;
   BenchOptions bench;
   SelectCameraOptions select_camera;
+  EvaluateOptions evaluate;
   std::function<std::string()> run;
 
   explicit CommandLine(const std::vector<LossTerm>& terms) : losses(descriptions_of(terms)) {
@@ -90,6 +92,7 @@ struct CommandLine {
     add_demo(terms);
     add_synth();
     add_select_camera();
+    add_evaluate();
     add_report();
     add_render();
     add_gradients();
@@ -155,6 +158,35 @@ struct CommandLine {
     command->add_option("--image", o.image, "Image of what it sees")->type_name("F.{png,jpg,exr}");
     command->add_flag("--quiet", o.quiet, "No progress on stderr");
     command->callback([this] { run = [this] { return select_camera_command(select_camera, losses); }; });
+  }
+
+  void add_evaluate() {
+    EvaluateOptions& o = evaluate;
+    CLI::App* command =
+        app.add_subcommand("evaluate", "Errors of runs and motions against the truth, by summary.json's names");
+    command
+        ->add_option("RUN", o.inputs,
+                     "Folders of runs, motions by AMASS's or SMPL-X's names (.npz), folders of SMPLer-X's files")
+        ->required();
+    command
+        ->add_option(
+            "--truth", o.truth,
+            "What they are compared with: a dataset of hsi4d synth, a run, a motion; for runs what their config "
+            "names, without")
+        ->type_name("PATH");
+    command
+        ->add_option("--body-model", o.body_model,
+                     "A SMPL-X file: joints are those of this body, each motion's in its own shape")
+        ->type_name("M.npz");
+    command
+        ->add_option("--avatar", o.avatar,
+                     "Joints are those of this avatar; without either, of the avatar of the run or dataset")
+        ->type_name("F.safetensors");
+    command->add_option("--from-rate", o.from_rate, "Frames a second of the motions, instead of what they say")
+        ->type_name("HZ");
+    command->add_option("--person", o.person, "Which person of a folder, from 0")->check(WholeNumber())->type_name("N");
+    command->add_option("--json", o.json, "Write all numbers into a file, those of each frame too")->type_name("F");
+    command->callback([this] { run = [this] { return evaluate_command(evaluate); }; });
   }
 
   void add_report() {

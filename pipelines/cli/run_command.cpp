@@ -3,11 +3,13 @@
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/progress.h"
+#include "core/text.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/clip.h"
 #include "pipelines/run_problems.h"
+#include "pipelines/sources.h"
 
 namespace hsi4d::cli {
 
@@ -30,9 +32,10 @@ std::string folder_of(const RunArguments& arguments, const RunConfig& config) {
 }
 
 /// What becomes of a run folder, "would write runs/demo".
-std::string folder_plan(const RunConfig& config, const std::vector<LossTerm>& losses, const Clip& clip,
-                        const std::string& folder, bool resume) {
-  const auto state = look_at_run_folder(folder, resolved_config(config, descriptions_of(losses)), resume);
+/// @param identity  the resolved config as it was asked for
+std::string folder_plan(const RunConfig& config, const std::string& identity, const std::vector<LossTerm>& losses,
+                        const Clip& clip, const std::string& folder, bool resume) {
+  const auto state = look_at_run_folder(folder, identity, resume);
   if (!state) return "would write " + folder + "\n";
   const Index finished = finished_frames(folder, config, clip, losses), all = clip.frames() - 1;
   return "would go on with " + folder + " (" + std::string(run_state_name(*state)) + "): " + std::to_string(finished) +
@@ -40,25 +43,55 @@ std::string folder_plan(const RunConfig& config, const std::vector<LossTerm>& lo
          (all - finished == 1 ? " is" : " are") + " left\n";
 }
 
-/// What a run would do; reads its inputs and its folder, so that what is wrong with them shows.
-std::string plan(const RunConfig& config, const std::vector<LossTerm>& losses, const std::string& folder, bool resume) {
-  const Clip clip = read_clip(config.data);
-  if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
-  check_start(config.start, clip);
-  check_frames(config.data, clip, has_loss(config, "center"));
-  std::string text = folder_plan(config, losses, clip, folder, resume);
-  text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
-          std::to_string(clip.camera.height) + ", scene of " + count_text(clip.scene.count(), "Gaussian") +
-          ", human of " + std::to_string(clip.avatar.count()) + "\n";
-  for (const ClipObject& object : clip.objects) {
-    text += "  object " + object.name + " of " + count_text(object.gaussians.count(), "Gaussian") + "\n";
-  }
+std::string stages_text(const RunConfig& config) {
+  std::string text;
   for (const auto& [name, stage] : config.stages) {
     text += "  stage " + name + ": " + count_text(stage.iterations, "iteration") +
             (stage.over == StageScope::kFrame ? " a frame\n" : " over the sequence\n");
   }
   for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
   return text;
+}
+
+/// Takes over into `config.data` what programs outside have made already.
+/// @return  what they would be run for; empty: nothing is left to make
+std::string sources_plan(RunConfig& config) {
+  std::string text, masks = config.sources.masks.command.empty() ? "" : "masks";
+  for (const SourceOutput& output : planned_sources(config)) {
+    if (output.what == "masks") masks.clear();
+    (output.what == "video" ? config.data.frames : config.data.masks) = output.path;
+    if (!output.is_there) text += "  would run " + joined(output.command) + "\n    for " + output.path.string() + "\n";
+  }
+  if (!masks.empty()) text += "  would then run " + joined(config.sources.masks.command) + "\n";
+  return text;
+}
+
+/// As plan, of a run whose video or masks are not made yet.
+std::string plan_without_clip(const RunConfig& config, const std::string& identity, const std::string& folder,
+                              bool resume, const std::string& sources) {
+  look_at_run_folder(folder, identity, resume);
+  const SceneSetup setup = read_scene_setup(config.data);
+  return "would write " + folder + "\n" + sources + "  scene of " + count_text(setup.scene.count(), "Gaussian") +
+         ", human of " + std::to_string(setup.avatar.count()) + "\n" + stages_text(config);
+}
+
+/// What a run would do; reads its inputs and its folder, so that what is wrong with them shows.
+std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, const std::string& folder, bool resume) {
+  RunConfig config = asked;
+  const std::string identity = resolved_config(config, descriptions_of(losses)), sources = sources_plan(config);
+  if (!sources.empty()) return plan_without_clip(config, identity, folder, resume, sources);
+  const Clip clip = read_clip(config.data);
+  if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
+  check_start(config.start, clip);
+  check_frames(config.data, clip, has_loss(config, "center"));
+  std::string text = folder_plan(config, identity, losses, clip, folder, resume);
+  text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
+          std::to_string(clip.camera.height) + ", scene of " + count_text(clip.scene.count(), "Gaussian") +
+          ", human of " + std::to_string(clip.avatar.count()) + "\n";
+  for (const ClipObject& object : clip.objects) {
+    text += "  object " + object.name + " of " + count_text(object.gaussians.count(), "Gaussian") + "\n";
+  }
+  return text + stages_text(config);
 }
 
 }  // namespace
@@ -82,8 +115,11 @@ RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>&
 }
 
 std::string result_text(const RunSummary& summary, const std::string& folder) {
-  return error_table(summary) + "\n" + std::to_string(summary.frames) + " frames in " + duration_text(summary.seconds) +
-         "; report: " + (std::filesystem::path(folder) / "report.html").string() + "\n";
+  const std::string note =
+      summary.has_truth ? "" : "no ground truth: errors of body, objects and camera are not measured\n";
+  return error_table(summary) + note + "\n" + std::to_string(summary.frames) + " frames in " +
+         duration_text(summary.seconds) + "; report: " + (std::filesystem::path(folder) / "report.html").string() +
+         "\n";
 }
 
 std::string run_command(const RunArguments& arguments, const std::vector<LossTerm>& losses) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "body/motion_io.h"
 #include "core/check.h"
 
 namespace hsi4d::cli {
@@ -27,13 +28,13 @@ std::string table(const std::vector<std::vector<std::string>>& rows) {
   std::vector<std::size_t> widths;
   for (const auto& row : rows) {
     widths.resize(std::max(widths.size(), row.size()));
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], count_characters(row[i]));
   }
   std::string text;
   for (const auto& row : rows) {
     for (std::size_t i = 0; i < row.size(); ++i) {
       text += row[i];
-      if (i + 1 < row.size()) text.append(widths[i] - row[i].size() + 2, ' ');
+      if (i + 1 < row.size()) text.append(widths[i] - count_characters(row[i]) + 2, ' ');
     }
     text.erase(text.find_last_not_of(' ') + 1);
     text += "\n";
@@ -58,6 +59,12 @@ std::vector<double> parse_numbers(const std::string& text, std::size_t count, co
   if (at == end && (count == 0 ? !numbers.empty() : numbers.size() == count)) return numbers;
   throw UserError(where + ": \"" + text + "\" is not understood; allowed: " +
                   (count == 0 ? "" : std::to_string(count) + " ") + "finite numbers " + names);
+}
+
+void check_rate(const std::optional<double>& rate, const std::string& where) {
+  if (!rate || (*rate >= kSlowestMotion && *rate <= kFastestMotion)) return;
+  throw UserError(where + ": " + number_text(*rate) + " is out of range; allowed: " + number_text(kSlowestMotion) +
+                  " to " + rounded(kFastestMotion, 6));
 }
 
 }  // namespace hsi4d::cli

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,5 +28,9 @@ std::string table(const std::vector<std::vector<std::string>>& rows);
 /// Throws UserError that names the text and what is allowed.
 std::vector<double> parse_numbers(const std::string& text, std::size_t count, const std::string& where,
                                   const std::string& names);
+
+/// Throws UserError unless a rate of frames, where it is given, is one that motions can have.
+/// @param where  starts the message: "hsi4d motion: --from-rate"
+void check_rate(const std::optional<double>& rate, const std::string& where);
 
 }  // namespace hsi4d::cli

@@ -62,3 +62,44 @@ TEST_CASE("a program that nobody waits for is ended") {
   CHECK(kill(pid, 0) == -1);  // it is gone, and waited for
   CHECK(errno == ESRCH);
 }
+
+TEST_CASE("programs are found as commands would start them") {
+  const TemporaryFolder here;
+  CHECK(find_program("sh").ends_with("/sh"));
+  CHECK(find_program("no_such_program_hsi4d").empty());
+  CHECK(find_program("").empty());
+  here.write("tool", "#!/bin/sh\n");
+  CHECK(find_program("./tool").empty());  // not executable yet
+  std::filesystem::permissions("tool", std::filesystem::perms::owner_all);
+  CHECK(find_program("./tool") == "./tool");
+  CHECK(find_program("tool").empty());  // the current folder is not in PATH
+  CHECK(find_program("./").empty());
+}
+
+TEST_CASE("a program that takes too long is ended with all that it has started") {
+  const TemporaryFolder here;
+  const auto begin = std::chrono::steady_clock::now();
+  CHECK_THROWS_MATCHES(run_process({"sh", "-c", "echo begun; sleep 60 & echo $! > child.txt; wait"}, {.seconds = 0.3}),
+                       UserError, Message("sh: was ended after 0.3 seconds, which is all the time it has:\nbegun"));
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(20));
+  int child = 0;
+  std::ifstream("child.txt") >> child;
+  REQUIRE(child > 0);
+  for (int i = 0; i < 100 && kill(child, 0) == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  const bool is_gone = kill(child, 0) != 0;
+  std::ifstream stat("/proc/" + std::to_string(child) + "/stat");  // gone, or dead and not yet collected by init
+  std::string number, name, state;
+  stat >> number >> name >> state;
+  CHECK((is_gone || state == "Z"));
+
+  CHECK(run_process({"sh", "-c", "echo done"}, ProcessLimits{.seconds = 30}) == "done\n");
+  CHECK_THROWS_MATCHES(run_process({"sh", "-c", "echo why >&2; exit 4"}, ProcessLimits{}), UserError,
+                       Message("sh: ended with status 4:\nwhy"));
+}
+
+TEST_CASE("a program is ended when it is asked for, even one that does not want to") {
+  int asked = 0;
+  const auto result = run_process({"sh", "-c", "trap '' TERM; while true; do sleep 0.05; done"},
+                                  {.seconds = 0, .stop_requested = [&asked] { return ++asked > 3; }});
+  CHECK_FALSE(result.has_value());
+}

@@ -110,3 +110,24 @@ TEST_CASE("files that are no videos, or damaged ones, are told") {
     }
   }
 }
+
+TEST_CASE("a colour a pixel is closer to the picture than one for four, and keeps odd sizes") {
+  const TemporaryFolder here;
+  Image sharp(3, 33, 47);  // a chessboard of colours, each of two pixels a side
+  for (int y = 0; y < 33; ++y) {
+    for (int x = 0; x < 47; ++x) sharp((x / 2 + y / 2) % 3, y, x) = 0.9F;
+  }
+  const auto written = [&](const std::string& path, VideoColor color) {
+    VideoWriter video(path, 47, 33, {.frame_rate = 10, .quality = 2, .color = color});
+    for (int t = 0; t < 2; ++t) video.add(sharp);
+    video.commit();
+    return VideoReader(path).read(1);
+  };
+  const Image each = written("each.mp4", VideoColor::kEachPixel), shared = written("shared.mp4", VideoColor::kShared);
+  CHECK(each.width() == 47);
+  CHECK(each.height() == 33);
+  CHECK(shared.width() == 48);
+  CHECK(shared.height() == 34);
+  CHECK(mean_difference(each, sharp) < 0.02);
+  CHECK(mean_difference(shared, sharp) > 3 * mean_difference(each, sharp));
+}

@@ -21,8 +21,8 @@ std::vector<std::string> small_dataset(const std::string& frames) {
   for (const std::string& setting :
        {"synthetic.frames=" + frames, std::string("synthetic.size_px=48"),
         std::string("synthetic.scene_gaussians=1500"), std::string("synthetic.avatar_gaussians=500"),
-        std::string("synthetic.object_gaussians=150"), std::string("stages.camera.iterations=1"),
-        std::string("stages.interaction.iterations=1")}) {
+        std::string("synthetic.object_gaussians=150"), std::string("synthetic.video=png"),
+        std::string("stages.camera.iterations=1"), std::string("stages.interaction.iterations=1")}) {
     words.insert(words.end(), {"--set", setting});
   }
   return words;

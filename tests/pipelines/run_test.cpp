@@ -432,3 +432,32 @@ TEST_CASE("the demo halves the errors of what it is given, and tells them", "[fu
     }
   }
 }
+
+TEST_CASE("a dataset without its truth gives the same result, and the summary says what is missing", "[run]") {
+  const TemporaryFolder here;
+  const CopiedDataset dataset;
+  const std::string config = (dataset.path / "config.json").string();
+  REQUIRE(run_hsi4d({"run", config, "--out", "with", "--threads", "1"}).status == 0);
+  fs::remove_all(dataset.path / "truth");
+  CHECK_THAT(run_hsi4d({"run", config, "--out", "dry", "--dry-run"}).out, StartsWith("would write dry\n"));
+  const ProgramResult run = run_hsi4d({"run", config, "--out", "without", "--threads", "1"});
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  CHECK_THAT(run.err, Contains((dataset.path / "truth").string() +
+                               ": there is no such folder (data.truth); the result is not compared with the truth"));
+  CHECK_THAT(run.out, Contains("PSNR [dB]") &&
+                          Contains("no ground truth: errors of body, objects and camera are not measured\n"));
+  CHECK_THAT(run.out, !Contains("MPJPE"));
+  CHECK_THAT(file_text("without/report.html"), Contains("The run had no ground truth"));
+  for (const char* name : {"motion.npz", "objects.npz", "cameras.json"}) {
+    INFO(name);
+    CHECK(file_text(fs::path("with") / name) == file_text(fs::path("without") / name));
+  }
+  const nlohmann::json known = json_of("with/summary.json"), unknown = json_of("without/summary.json");
+  CHECK(known["truth"] == true);
+  CHECK(unknown["truth"] == false);
+  CHECK(known["metrics"].back().contains("mpjpe_mm"));
+  for (const char* name : {"mpjpe_mm", "object_translation_cm", "camera_rotation_deg"})
+    CHECK_FALSE(unknown["metrics"].back().contains(name));
+  CHECK(number_at(unknown["metrics"].back(), "psnr_db") == number_at(known["metrics"].back(), "psnr_db"));
+}

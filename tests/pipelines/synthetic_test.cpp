@@ -1,6 +1,7 @@
 #include "pipelines/synthetic.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 
@@ -16,6 +17,8 @@
 #include "core/npz.h"
 #include "core/parallel.h"
 #include "core/rotation.h"
+#include "optim/metrics.h"
+#include "pipelines/clip.h"
 #include "pipelines/synthetic_motion.h"
 #include "splat/io_ply.h"
 #include "tests/support/program.h"
@@ -31,6 +34,7 @@ SyntheticSettings small_settings() {
   SyntheticSettings settings;
   settings.frames = 3;
   settings.size_px = 48;
+  settings.video = SyntheticVideo::kPng;
   settings.scene_gaussians = 1500;
   settings.avatar_gaussians = 600;
   settings.object_gaussians = 200;
@@ -42,6 +46,7 @@ const std::vector<std::string>& dataset_files() {
       "avatar.safetensors",
       "camera.json",
       "config.json",
+      "first_frame.png",
       "frames/0000.png",
       "frames/0001.png",
       "frames/0002.png",
@@ -333,7 +338,8 @@ TEST_CASE("hsi4d synth makes a dataset, and refuses a folder in use") {
   CHECK(made.err.find("rror") == std::string::npos);
   CHECK(made.out == "data: 1 frame of 32 x 32 pixels with masks and truth\n");
   REQUIRE(made.status == 0);
-  CHECK(fs::exists("data/frames/0000.png"));
+  CHECK(fs::exists("data/first_frame.png"));
+  CHECK(fs::exists("data/video.mp4"));
   const ProgramResult again = run_hsi4d({"synth", "config.json", "--out", "data"});
   CHECK(again.status == 2);
   CHECK(again.out.empty());
@@ -346,4 +352,69 @@ TEST_CASE("hsi4d synth makes a dataset, and refuses a folder in use") {
   CHECK(senseless.status == 2);
   CHECK(senseless.err.find("the motion push makes no sense with the object watering_can; it goes with office_chair") !=
         std::string::npos);
+}
+
+TEST_CASE("the video of a dataset is one file that shows what was rendered", "[parallel]") {
+  const TemporaryFolder folder;
+  SyntheticSettings settings = small_settings();
+  settings.size_px = 96;
+  settings.frame_rate = 12.5;
+  write_dataset(settings, {}, "png");
+  struct Kind {
+    SyntheticVideo video;
+    double least_db;
+  };
+  for (const Kind& kind : {Kind{SyntheticVideo::kMp4, 44}, Kind{SyntheticVideo::kMp4Shared, 38}}) {
+    INFO(choice_name<SyntheticVideo>(kSyntheticVideos, kind.video));
+    settings.video = kind.video;
+    with_threads(1, [&] { write_dataset(settings, {}, "one"); });
+    with_threads(2, [&] { write_dataset(settings, {}, "two"); });
+    const auto one = content_of("one"), png = content_of("png");
+    CHECK(one == content_of("two"));
+    CHECK_FALSE(one.contains("frames/0000.png"));
+    CHECK(one.at("first_frame.png") == png.at("frames/0000.png"));
+    for (const auto& [name, bytes] : png) {
+      if (name.starts_with("frames/") || name == "config.json" || name == "synthetic.json") continue;
+      INFO(name);
+      CHECK(one.at(name) == bytes);  // masks and all else are as exact as with PNG frames
+    }
+    const DataSettings data = dataset_inputs("one");
+    CHECK(data.frames == fs::absolute("one/video.mp4"));
+    ConfigProblems problems;
+    CHECK(find_member(*find_member(load_config("one/config.json", {}, problems), "data"), "frames")->text ==
+          "video.mp4");
+    const Clip clip = read_clip(data);
+    CHECK(clip.frames() == 3);
+    CHECK(clip.frame_rate == 12.5);
+    for (Index t = 0; t < 3; ++t) {
+      const std::string name = "png/frames/" + clip.frame_files[static_cast<std::size_t>(t)];
+      CHECK(psnr_db(read_frame(clip, t).target, read_image(name)) > kind.least_db);
+    }
+    fs::remove_all("one"), fs::remove_all("two");
+  }
+}
+
+TEST_CASE("a video that cannot be written is refused before anything is made") {
+  const TemporaryFolder folder;
+  SyntheticSettings settings = small_settings();
+  settings.video = SyntheticVideo::kMp4;
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", folder.path().c_str(), 1);  // nothing is in it
+  const std::string told = message_of([&] { write_dataset(settings, {}, "data"); });
+  settings.video = SyntheticVideo::kPng;
+  const std::string without = message_of([&] { write_dataset(settings, {}, "png"); });
+  setenv("PATH", path.c_str(), 1);
+  CHECK(told ==
+        "ffmpeg: is not in PATH, and writes the video of a dataset; install it, or keep the frames as PNG files with "
+        "synthetic.video=png");
+  CHECK_FALSE(fs::exists("data"));
+  CHECK(without == "no error");
+  CHECK(fs::exists("png/frames/0002.png"));
+
+  folder.write("config.json", R"({"synthetic": {"size_px": 33, "video": "mp4_420"}})");
+  const ProgramResult odd = run_hsi4d({"synth", "config.json", "--out", "odd"});
+  CHECK(odd.status == 2);
+  CHECK(odd.err ==
+        "config.json:1: /synthetic/video: mp4_420 has blocks of 2x2 pixels, which size_px 33 cannot be divided into; "
+        "take an even size, or mp4\n");
 }

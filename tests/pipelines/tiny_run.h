@@ -60,6 +60,7 @@ class TinyDataset {
     SyntheticSettings settings;
     settings.frames = kTinyFrames;
     settings.size_px = kTinyPixels;
+    settings.video = SyntheticVideo::kPng;  // no ffmpeg: fast, and frames that tests can change
     settings.scene_gaussians = 1500;
     settings.avatar_gaussians = 500;
     settings.object_gaussians = 150;

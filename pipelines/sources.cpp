@@ -1,0 +1,290 @@
+#include "pipelines/sources.h"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <unistd.h>
+
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "core/log.h"
+#include "core/process.h"
+#include "core/progress.h"
+#include "core/text.h"
+#include "optim/checkpoint.h"
+#include "pipelines/camera_selection.h"
+#include "pipelines/clip.h"
+#include "pipelines/input_hashes.h"
+#include "pipelines/scene_render.h"
+#include "splat/render_settings.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// ---- What it is made of ----
+
+ConfigValue strings(const std::vector<std::string>& texts) {
+  ConfigValue array = ConfigValue::make_array();
+  for (const std::string& text : texts) array.items.push_back(ConfigValue::make_string(text));
+  return array;
+}
+
+std::vector<std::string> masked_names(const DataSettings& data) {
+  std::vector<std::string> names = {kHumanMasks};
+  for (const auto& [name, object] : data.objects) names.push_back(name);
+  return names;
+}
+
+/// What the first frame shows, and how.
+ConfigValue first_frame_record(const RunConfig& config) {
+  const DataSettings& data = config.data;
+  std::vector<ClipFile> files = {{"scene", data.scene},
+                                 {"avatar", data.avatar},
+                                 {"camera", data.camera},
+                                 {"initial", data.initial},
+                                 {"motion", initial_motion_file(data)}};
+  for (const auto& [name, object] : data.objects) files.push_back({"object " + name, object.gaussians});
+  ConfigValue record = ConfigValue::make_object();
+  record.add("files", ConfigValue::make_string(input_hashes(files)));
+  ConfigValue background = ConfigValue::make_array();
+  for (const double value : config.background) background.items.push_back(ConfigValue::make_number(value));
+  record.add("background", std::move(background));
+  RenderSettings render = config.render;  // a description binds to something that it could change
+  ConfigFields fields;
+  describe(fields, render);
+  record.add("render", write_config(fields));
+  return record;
+}
+
+ConfigValue command_record(const RunConfig& config, const std::vector<std::string>& command) {
+  ConfigValue record = ConfigValue::make_object();
+  record.add("command", strings(command));
+  if (uses_placeholder(command, "prompt")) record.add("prompt", ConfigValue::make_string(config.sources.prompt));
+  return record;
+}
+
+std::string ending_of(VideoOutput output) {
+  return output == VideoOutput::kFrames ? "" : "." + std::string(choice_name<VideoOutput>(kVideoOutputs, output));
+}
+
+fs::path record_file(const SourceOutput& output) { return output.path.string() + ".json"; }
+
+SourceOutput output_of(const RunConfig& config, const std::string& what, const std::vector<std::string>& command,
+                       const ConfigValue& record, const std::string& ending) {
+  SourceOutput output{what, command, {}, to_json(record), false};
+  output.path = config.sources.folder / (what + "-" + text_hash(output.record) + ending);
+  const fs::path made_of = record_file(output);
+  output.is_there = fs::exists(output.path) && fs::exists(made_of) && read_text_file(made_of.string()) == output.record;
+  return output;
+}
+
+SourceOutput video_output(const RunConfig& config) {
+  const VideoSourceSettings& video = config.sources.video;
+  ConfigValue record = command_record(config, video.command);
+  if (uses_placeholder(video.command, "first_frame")) record.add("first_frame", first_frame_record(config));
+  return output_of(config, "video", video.command, record, ending_of(video.output));
+}
+
+/// The content of a video, a file or a folder of frames.
+std::string video_hashes(const FrameSource& frames, const fs::path& path) {
+  if (!frames.file().empty()) return input_hashes({{"video", path}});
+  std::vector<ClipFile> files;
+  for (const std::string& name : frames.names()) files.push_back({name, path / name});
+  return input_hashes(files);
+}
+
+FrameSource frames_of(const DataSettings& data) { return {data.frames, {data.video_rate, data.frame_rate}}; }
+
+SourceOutput mask_output(const RunConfig& config, const DataSettings& data) {
+  const std::vector<std::string>& command = config.sources.masks.command;
+  ConfigValue record = command_record(config, command);
+  record.add("video", ConfigValue::make_string(video_hashes(frames_of(data), data.frames)));
+  record.add("masks_of", strings(masked_names(data)));
+  return output_of(config, "masks", command, record, "");
+}
+
+// ---- What was made ----
+
+std::string size_text(const Image& image) {
+  return std::to_string(image.width()) + "x" + std::to_string(image.height());
+}
+
+void check_video(const RunConfig& config, const fs::path& path) {
+  DataSettings data = config.data;
+  data.frames = path;
+  const FrameSource frames = frames_of(data);
+  const Index wanted = config.sources.video.frames;
+  if (wanted > 0 && frames.video_count() != wanted)
+    throw DataError("has " + std::to_string(frames.video_count()) + " frames; sources.video.frames asks for " +
+                    std::to_string(wanted));
+  const Camera camera = read_camera(data.camera.string());
+  for (Index t = 0; t < frames.count(); ++t) {
+    const Image frame = frames.read(t);
+    if (frame.channels() >= 3 && fits_camera(frame, camera)) continue;
+    throw DataError("frame " + std::to_string(frames.number(t)) + " is " + size_text(frame) + " with " +
+                    std::to_string(frame.channels()) + " channels; the camera's image is " +
+                    std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                    " with 3, and a video is as large, or larger and of its shape");
+  }
+}
+
+void check_masks(const DataSettings& data, const fs::path& folder) {
+  if (!fs::is_directory(folder))
+    throw DataError("is no folder; masks are in human/ and a folder an object in it, or human.mp4 and so on");
+  const FrameSource frames = frames_of(data);
+  const Image frame = frames.read(0);
+  for (const std::string& name : masked_names(data)) {
+    const MaskSource masks(folder, name);
+    const Index missing = masks.missing(frames);
+    if (missing == frames.count())
+      throw DataError(name + " has no mask of any frame; their names are those of the frames, " +
+                      frames.names().front() + " to " + frames.names().back());
+    for (Index t = 0; t < frames.count(); ++t) {
+      const Image mask = masks.read(frames, t);
+      if (mask.width() == 0 || (mask.width() == frame.width() && mask.height() == frame.height())) continue;
+      throw DataError("the mask of " + name + " in frame " + std::to_string(frames.number(t)) + " is " +
+                      size_text(mask) + " pixels, the video's frame " + size_text(frame));
+    }
+  }
+}
+
+// ---- Making it ----
+
+/// A folder that is removed at the end.
+class WorkFolder {
+ public:
+  explicit WorkFolder(const fs::path& path) : path_(path) {
+    std::error_code error;
+    fs::create_directories(path, error);
+    if (error) throw UserError(path.string() + ": the folder cannot be made: " + error.message());
+  }
+  ~WorkFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  WorkFolder(const WorkFolder&) = delete;
+  WorkFolder& operator=(const WorkFolder&) = delete;
+
+  fs::path member(const std::string& name) const { return path_ / name; }
+
+ private:
+  fs::path path_;
+};
+
+/// Moves a file or folder in one step over one that may be there.
+void put(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  if (fs::is_directory(to)) fs::remove_all(to, error);
+  fs::rename(from, to, error);
+  if (error) throw UserError(to.string() + ": cannot be written: " + error.message());
+}
+
+/// Runs the program, looks at what it wrote, and gives that its name.
+template <class Check>
+void make(const SourceOutput& output, const fs::path& out, const std::vector<std::string>& command,
+          const ProcessLimits& limits, Check check) {
+  const std::string section = "/sources/" + output.what + ": ";
+  log_info(output.what + ": runs " + joined(command));
+  const auto begin = std::chrono::steady_clock::now();
+  std::optional<std::string> said;
+  try {
+    said = run_process(command, limits);
+  } catch (const UserError& error) {
+    throw UserError(section + error.what());
+  }
+  if (!said)
+    throw Interrupted("interrupted while " + command.front() + " made the " + output.what + "; nothing is left of it");
+  if (!fs::exists(out))
+    throw UserError(section + command.front() + ": ended with status 0 and wrote nothing at {out}, " + out.string() +
+                    end_of_output(*said));
+  try {
+    check(out);
+  } catch (const std::exception& error) {  // UserError, DataError, of any reader
+    fs::path refused = output.path;
+    refused.replace_filename(output.path.stem().string() + ".refused" + output.path.extension().string());
+    put(out, refused);
+    throw DataError(section + command.front() + " wrote what cannot be used, kept as " + refused.string() + ": " +
+                    error.what() + end_of_output(*said));
+  }
+  put(out, output.path);
+  write_text_file(record_file(output).string(), output.record);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+  log_info(output.what + ": " + output.path.string() + ", made in " + duration_text(taken.count()));
+}
+
+WorkFolder work_folder(const SourceOutput& output) {
+  return WorkFolder(output.path.string() + "." + std::to_string(::getpid()) + ".tmp");
+}
+
+void make_video(const RunConfig& config, const SourceOutput& output, const Observer& observer) {
+  const WorkFolder work = work_folder(output);
+  const fs::path first = work.member("first_frame.png"),
+                 out = work.member("video" + ending_of(config.sources.video.output));
+  const bool has_first_frame = uses_placeholder(output.command, "first_frame");
+  if (has_first_frame) write_image(first.string(), first_frame_image(config));
+  make(output, out,
+       filled_in(output.command,
+                 {{"first_frame", first.string()}, {"prompt", config.sources.prompt}, {"out", out.string()}}),
+       {config.sources.video.timeout_s, observer.stop_requested},
+       [&config](const fs::path& made) { check_video(config, made); });
+  if (has_first_frame) put(first, config.sources.folder / (output.path.stem().string() + ".first_frame.png"));
+}
+
+void make_masks(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
+                const Observer& observer) {
+  const WorkFolder work = work_folder(output);
+  const fs::path out = work.member("masks");
+  std::string names;
+  for (const std::string& name : masked_names(data)) names += (names.empty() ? "" : ",") + name;
+  make(output, out,
+       filled_in(output.command, {{"video", data.frames.string()},
+                                  {"objects", names},
+                                  {"prompt", config.sources.prompt},
+                                  {"out", out.string()}}),
+       {config.sources.masks.timeout_s, observer.stop_requested},
+       [&data](const fs::path& made) { check_masks(data, made); });
+}
+
+}  // namespace
+
+std::vector<SourceOutput> planned_sources(const RunConfig& config) {
+  std::vector<SourceOutput> outputs;
+  DataSettings data = config.data;
+  if (!config.sources.video.command.empty()) {
+    outputs.push_back(video_output(config));
+    if (!outputs.back().is_there) return outputs;
+    data.frames = outputs.back().path;
+  }
+  if (!config.sources.masks.command.empty()) outputs.push_back(mask_output(config, data));
+  return outputs;
+}
+
+DataSettings make_sources(const RunConfig& config, const Observer& observer) {
+  DataSettings data = config.data;
+  if (!config.sources.video.command.empty()) {
+    const SourceOutput video = video_output(config);
+    if (!video.is_there) make_video(config, video, observer);
+    data.frames = video.path;
+  }
+  if (!config.sources.masks.command.empty()) {
+    const SourceOutput masks = mask_output(config, data);
+    if (!masks.is_there) make_masks(config, data, masks, observer);
+    data.masks = masks.path;
+  }
+  return data;
+}
+
+Image first_frame_image(const RunConfig& config) {
+  const SceneSetup setup = read_scene_setup(config.data);
+  const Camera camera = read_camera(config.data.camera.string());
+  const Vector3<double> center =
+      -(camera.camera_from_world.rotation.transpose() * camera.camera_from_world.translation);
+  return render_picture(first_frame(setup, center).all, {camera, config.background, config.render, {}}).image;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,49 @@
+// Video and masks that programs outside make, as config section `sources` says.
+//
+//   FOLDER/video-KEY.mp4         what the video's program wrote, once it was found to be right
+//   FOLDER/video-KEY.mp4.json    what it was made of: command, prompt, inputs. KEY is the hash of this text
+//   FOLDER/video-KEY.first_frame.png
+//   FOLDER/masks-KEY/            likewise: human/, NAME/, or human.mp4, ...
+//   FOLDER/masks-KEY.json
+//
+// What is there, made of the same, is not made again.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pipelines/observer.h"
+#include "pipelines/run_config.h"
+
+namespace hsi4d {
+
+/// One thing that a program makes.
+struct SourceOutput {
+  std::string what;                  ///< "video" or "masks"
+  std::vector<std::string> command;  ///< as in the config
+  std::filesystem::path path;        ///< where it is, or will be
+  std::string record;                ///< what it is made of, JSON
+  bool is_there = false;             ///< made before, of the same
+};
+
+/// What the programs would make, in order; nothing is run. The masks are left out as long as the video that they are
+/// made of is not there.
+/// Throws UserError or DataError naming an input that is missing.
+std::vector<SourceOutput> planned_sources(const RunConfig& config);
+
+/// The inputs of a run, with the video and masks that programs make, made now where they are not there yet.
+///
+/// The program's output goes to a temporary folder, is looked at (frames and their sizes, masks of the human and of
+/// each object), and gets its name. What is not right is kept under another name, since it may have cost something.
+///
+/// Throws UserError naming the section, the program, and the end of what it printed: it cannot be run, fails, takes
+/// longer than timeout_s, writes nothing; DataError for what it writes; Interrupted when asked to stop, with nothing
+/// left. Throws as read_scene_setup, where the first frame is rendered.
+DataSettings make_sources(const RunConfig& config, const Observer& observer);
+
+/// I_0: everything in the state of frame 0, as the camera of frame 0 sees it, [3,H,W] clamped to [0, 1].  [method.md,
+/// §2]
+Image first_frame_image(const RunConfig& config);
+
+}  // namespace hsi4d

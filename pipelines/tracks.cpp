@@ -1,0 +1,221 @@
+#include "pipelines/tracks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numeric>
+
+#include "body/kinematics.h"
+#include "body/motion_edit.h"
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/npz.h"
+#include "core/rotation.h"
+#include "core/text.h"
+#include "pipelines/body_files.h"
+#include "pipelines/data_settings.h"
+#include "pipelines/json_text.h"
+#include "pipelines/run_folder.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kSameMoment = 1e-6;  // frames
+
+// ---- Files ----
+
+/// The objects of a file of tracks: NAME of NAME/rotation.
+std::vector<std::string> object_names(const std::string& file) {
+  const std::string ending = "/rotation";
+  std::vector<std::string> names;
+  const Npz archive = Npz::read(file);
+  for (const std::string& name : archive.names()) {
+    if (name.ends_with(ending)) names.push_back(name.substr(0, name.size() - ending.size()));
+  }
+  return names;
+}
+
+void check_count(const std::string& file, std::size_t count, const char* what, const Track& track) {
+  if (static_cast<Index>(count) == track.frames()) return;
+  throw DataError(file + ": holds " + std::to_string(count) + " " + what + ", the motion beside it has " +
+                  std::to_string(track.frames()) + " frames");
+}
+
+/// motion.npz, and objects.npz and cameras.json where they are there.
+Track read_track_folder(const fs::path& folder, const std::string& name) {
+  const auto file = [&folder](const char* member) { return (folder / member).string(); };
+  Track track;
+  track.name = name;
+  track.motion = read_motion_aloud(file("motion.npz"));
+  if (fs::exists(file("objects.npz"))) {
+    track.objects = object_names(file("objects.npz"));
+    track.object_poses = read_object_tracks(file("objects.npz"), track.objects);
+    check_count(file("objects.npz"), track.object_poses.size(), "frames", track);
+  }
+  if (fs::exists(file("cameras.json"))) {
+    for (const Camera& camera : read_cameras(file("cameras.json")))
+      track.camera_from_world.push_back(camera.camera_from_world);
+    check_count(file("cameras.json"), track.camera_from_world.size(), "cameras", track);
+  }
+  return track;
+}
+
+Track read_pose_track(const std::string& path, const TrackOptions& options) {
+  PoseFolder folder = read_pose_folder(path, options.frame_rate.value_or(kPoseFolderRate), options.person);
+  if (folder.filled > 0) log_warning(path + ": frames without a file, interpolated: " + std::to_string(folder.filled));
+  return {path, std::move(folder.motion), {}, {}, {}};
+}
+
+/// A path in section `data` of the config of a run; empty where it is not given.
+fs::path data_path(const std::string& run, std::string_view key) {
+  const std::string file = RunPaths{run}.config();
+  if (!fs::exists(file)) return {};
+  const ConfigValue tree = parse_json_text(read_text_file(file), file);
+  const ConfigValue* const data = find_member(tree, "data");
+  if (data == nullptr) return {};
+  const std::string path = string_member(*data, key);
+  return path.empty() ? fs::path() : fs::path(path_beside(file, path));
+}
+
+// ---- Time ----
+
+/// Between two of `count` values, at `place` frames.
+/// @param value    of a frame
+/// @param between  as interpolated
+template <class Value, class Between>
+auto at_place(Index count, double place, Value value, Between between) {
+  const double nearest = std::round(place), last = static_cast<double>(count - 1);
+  if (std::fabs(place - nearest) < kSameMoment || place >= last)
+    return value(static_cast<std::size_t>(std::clamp(nearest, 0.0, last)));
+  const double before = std::floor(place);
+  const auto index = static_cast<std::size_t>(before);
+  return between(value(index), value(index + 1), place - before);
+}
+
+/// Turns at constant speed, moves on a line.
+Rigid<double> between_poses(const Rigid<double>& a, const Rigid<double>& b, double u) {
+  return {a.rotation * so3_exp(Vector3<double>(u * so3_log(Matrix3<double>(a.rotation.transpose() * b.rotation)))),
+          (1 - u) * a.translation + u * b.translation};
+}
+
+/// The camera's centre moves on a line.
+Rigid<double> between_cameras(const Rigid<double>& a, const Rigid<double>& b, double u) {
+  return inverse(between_poses(inverse(a), inverse(b), u));
+}
+
+FrameState state_at(const Track& track, const RestSkeleton& body, const std::vector<std::size_t>& objects,
+                    double place) {
+  FrameState state;
+  const BodyPose pose = at_place(
+      track.frames(), place, [&track](std::size_t t) { return track.motion.poses[t]; }, interpolated);
+  if (pose.axis_angle.size() != body.joints.size())
+    throw DataError(track.name + ": its poses have " + std::to_string(pose.axis_angle.size() / 3) +
+                    " joints, the body " + std::to_string(body.joints.size() / 3));
+  state.joints = pose_joints(body.parents, body.joints, pose);
+  for (const std::size_t object : objects) {
+    const auto pose_of = [&track, object](std::size_t t) {
+      const ObjectPose& at = track.object_poses[t][object];
+      return Rigid<double>{so3_exp(at.rotation), at.translation};
+    };
+    state.world_from_object.push_back(at_place(track.frames(), place, pose_of, between_poses));
+  }
+  if (!track.camera_from_world.empty())
+    state.camera_from_world = at_place(
+        track.frames(), place, [&track](std::size_t t) { return track.camera_from_world[t]; }, between_cameras);
+  return state;
+}
+
+/// Where `track` has the objects of `wanted`, where both have objects.
+std::vector<std::size_t> places_of(const Track& track, const Track& wanted) {
+  std::vector<std::size_t> places;
+  if (track.object_poses.empty() || wanted.object_poses.empty()) return places;
+  for (const std::string& name : wanted.objects) {
+    const auto at = std::find(track.objects.begin(), track.objects.end(), name);
+    if (at == track.objects.end())
+      throw DataError(track.name + ": there is no object \"" + name + "\", which " + wanted.name + " has; there is " +
+                      joined(track.objects));
+    places.push_back(static_cast<std::size_t>(at - track.objects.begin()));
+  }
+  return places;
+}
+
+/// The rate of `track`, beside that of `other`.
+double rate_of(const Track& track, const Track& other) {
+  if (track.motion.says_frame_rate) return track.motion.frame_rate;
+  if (track.frames() == other.frames() && other.motion.says_frame_rate) return other.motion.frame_rate;
+  throw UserError(track.name + ": says no frame rate, and has " + std::to_string(track.frames()) + " frames where " +
+                  other.name + " has " + std::to_string(other.frames()) + "; --from-rate says it");
+}
+
+}  // namespace
+
+bool is_run_folder(const std::string& path) { return fs::exists(RunPaths{path}.status()); }
+
+Track read_track(const std::string& path, const TrackOptions& options) {
+  if (!fs::exists(path)) throw UserError(path + ": there is no such file or folder");
+  if (fs::is_directory(path)) {
+    const fs::path folder = path;
+    if (is_run_folder(path) && !fs::exists(folder / "motion.npz"))
+      throw UserError(path + ": the run has no motion.npz; it has not come to its end");
+    if (fs::exists(folder / "motion.npz")) return read_track_folder(folder, path);
+    if (fs::exists(folder / "truth" / "motion.npz")) return read_track_folder(folder / "truth", path);
+    if (fs::exists(folder / "initial.json"))
+      throw UserError(path + ": is a dataset without truth/motion.npz, which errors are measured against");
+    return read_pose_track(path, options);
+  }
+  if (!path.ends_with(".npz")) throw UserError(path + ": is neither a folder of a run or dataset nor a motion (.npz)");
+  Track track;
+  track.name = path;
+  track.motion = read_motion_aloud(path);
+  if (options.frame_rate) {
+    track.motion.frame_rate = *options.frame_rate;
+    track.motion.says_frame_rate = true;
+  }
+  return track;
+}
+
+std::string avatar_of_track(const std::string& path) {
+  if (is_run_folder(path)) {
+    const fs::path avatar = data_path(path, "avatar");
+    return fs::exists(avatar) ? avatar.string() : "";
+  }
+  for (const fs::path& folder : {fs::path(path), fs::path(path).parent_path()}) {  // "data", "data/truth"
+    const fs::path avatar = dataset_inputs(folder.empty() ? "." : folder).avatar;
+    if (fs::is_directory(path) && fs::exists(avatar)) return avatar.string();
+  }
+  return "";
+}
+
+std::string truth_of_run(const std::string& path) {
+  const fs::path truth = data_path(path, "truth");
+  return truth.empty() || !fs::exists(truth) ? "" : truth.string();
+}
+
+AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, const Track& truth,
+                      const RestSkeleton& truth_body) {
+  const double estimate_rate = rate_of(estimate, truth), truth_rate = rate_of(truth, estimate);
+  const std::vector<std::size_t> objects = places_of(estimate, truth);
+  std::vector<std::size_t> true_objects(objects.size());
+  std::iota(true_objects.begin(), true_objects.end(), std::size_t{0});
+  AlignedTracks tracks;
+  tracks.frame_rate = std::min(estimate_rate, truth_rate);
+  const double end = std::min(static_cast<double>(estimate.frames() - 1) / estimate_rate,
+                              static_cast<double>(truth.frames() - 1) / truth_rate);
+  const auto count = static_cast<Index>(std::floor(end * tracks.frame_rate + kSameMoment)) + 1;
+  if (count < 2)
+    throw UserError(estimate.name + ": has " + std::to_string(estimate.frames()) + " frames and " + truth.name + " " +
+                    std::to_string(truth.frames()) + "; errors are those of the frames after the first that both have");
+  for (Index k = 0; k < count; ++k) {
+    const double seconds = static_cast<double>(k) / tracks.frame_rate;
+    tracks.estimate.push_back(state_at(estimate, estimate_body, objects, seconds * estimate_rate));
+    tracks.truth.push_back(state_at(truth, truth_body, true_objects, seconds * truth_rate));
+  }
+  return tracks;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,72 @@
+// Motions that are compared: of a body, objects and a camera over time, from the files of runs, datasets and other
+// programs.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "body/avatar.h"
+#include "body/motion_io.h"
+#include "core/rigid.h"
+#include "pipelines/evaluate.h"
+#include "pipelines/state.h"
+
+namespace hsi4d {
+
+/// What moves, by frame. Objects and cameras may be missing; what is there has as many frames as the body.
+struct Track {
+  std::string name;                                   ///< what messages call it: the path
+  Motion motion;                                      ///< of the body
+  std::vector<std::string> objects;                   ///< names, in the order of object_poses
+  std::vector<std::vector<ObjectPose>> object_poses;  ///< [frame][object]; empty: none are known
+  std::vector<Rigid<double>> camera_from_world;       ///< by frame; empty: none are known
+
+  Index frames() const { return std::ssize(motion.poses); }
+};
+
+/// How motions of other programs are read.
+struct TrackOptions {
+  std::optional<double> frame_rate;  ///< frames a second of a motion, instead of what it says
+  int person = 0;                    ///< of a folder of SMPLer-X
+};
+
+/// Whether a folder is one that `hsi4d run` writes.
+bool is_run_folder(const std::string& path);
+
+/// Reads what a path holds: a run folder (motion.npz, objects.npz, cameras.json), a dataset with truth/, such a truth/
+/// itself, a motion (.npz), or a folder of SMPLer-X (read_pose_folder).
+///
+/// Throws UserError naming the path for anything else, a run that has not come to its end, and a dataset without truth;
+/// UserError and DataError of the readers; DataError where counts of frames differ.
+Track read_track(const std::string& path, const TrackOptions& options = {});
+
+/// The avatar that belongs to a run folder (its config's), or to a dataset; empty where there is none.
+std::string avatar_of_track(const std::string& path);
+
+/// The truth that the config of a run folder names; empty where it names none, or that is not there.
+std::string truth_of_run(const std::string& path);
+
+/// A skeleton in its rest pose.
+struct RestSkeleton {
+  std::vector<int> parents;
+  std::vector<double> joints;  ///< [J,3] metres
+};
+
+/// Two tracks at the same moments.
+struct AlignedTracks {
+  double frame_rate = 0;  ///< frames a second of both
+  std::vector<FrameState> estimate, truth;
+};
+
+/// Both tracks at the frames of the slower one, from the first frame that both have on, as long as both last. Between
+/// frames rotations turn at constant speed, places are linear; moments within 1e-6 frames of a frame are that frame. A
+/// track that does not say its rate has the other's if it has as many frames.
+///
+/// @param estimate_body, truth_body  whose joints are compared
+/// Throws UserError naming the track whose rate nobody knows, and where fewer than two frames are left; DataError where
+/// the estimate has not the truth's objects, or a pose has another number of joints than the body.
+AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, const Track& truth,
+                      const RestSkeleton& truth_body);
+
+}  // namespace hsi4d

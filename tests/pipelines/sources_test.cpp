@@ -1,0 +1,333 @@
+// Programs outside that make the video and the masks: stand-ins, small shell scripts, that are run for real.
+#include "pipelines/sources.h"
+
+#include <algorithm>
+#include <fstream>
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+#include "core/image_io.h"
+#include "optim/metrics.h"
+#include "tests/pipelines/tiny_run.h"
+#include "tests/support/program.h"
+#include "tests/support/running_program.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+using Catch::Matchers::Matches;
+using Catch::Matchers::StartsWith;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder with two programs and a config that runs the tiny dataset with what they make.
+struct Workshop {
+  TemporaryFolder here;
+  nlohmann::json config;
+
+  Workshop() {
+    const std::string data = TinyDataset::folder().string();
+    script("film", "echo \"$2\" >> film.txt; test -s \"$1\" || exit 9; cp -r " + data + "/frames \"$3\"");
+    script("mask", "echo \"$2\" >> mask.txt; test -d \"$1\" || exit 9; cp -r " + data + "/masks \"$3\"");
+    config = {{"extends", tiny_config_file()},
+              {"data", {{"frames", ""}, {"masks", ""}}},
+              {"sources",
+               {{"prompt", "A person; pours \"water\""},
+                {"video", {{"command", {"./film", "{first_frame}", "{prompt}", "{out}"}}, {"output", "frames"}}},
+                {"masks", {{"command", {"./mask", "{video}", "{objects}", "{out}"}}}}}}};
+    write();
+  }
+
+  static void script(const std::string& name, const std::string& text) {
+    std::ofstream(name) << "#!/bin/sh\n" << text << "\n";
+    fs::permissions(name, fs::perms::owner_all);
+  }
+  void write() const { std::ofstream("config.json") << config.dump(2); }
+
+  static ProgramResult run(const std::string& out, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words = {"run", "config.json", "--threads", "1", "--out", out};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_hsi4d(words);
+  }
+  /// The message of a run that is refused before it has a folder.
+  static std::string refusal() {
+    const ProgramResult result = run("run");
+    CHECK(result.status == 2);
+    CHECK(result.out.empty());
+    CHECK_FALSE(fs::exists("run"));
+    std::string message;  // without what was told of the work before
+    std::istringstream text(result.err);
+    for (std::string line; std::getline(text, line);) {
+      if (!line.starts_with("hsi4d: ")) message += line + "\n";
+    }
+    return message;
+  }
+};
+
+std::vector<std::string> lines_of(const std::string& file) {
+  std::vector<std::string> lines;
+  std::istringstream text(fs::exists(file) ? file_text(file) : "");
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  return lines;
+}
+
+/// The names in generated/, hashes as KEY.
+std::vector<std::string> made() {
+  std::vector<std::string> names;
+  if (!fs::exists("generated")) return names;
+  for (const auto& entry : fs::directory_iterator("generated")) {
+    std::string name = entry.path().filename().string();
+    if (name.find('-') != std::string::npos) name.replace(name.find('-') + 1, 16, "KEY");
+    names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+fs::path made_file(const std::string& start, const std::string& end) {
+  for (const auto& entry : fs::directory_iterator("generated")) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(start) && name.ends_with(end)) return entry.path();
+  }
+  return {};
+}
+
+using Names = std::vector<std::string>;
+
+const std::string kPlaces = "[\\s\\S]*";  // of folders and hashes, in a message
+
+}  // namespace
+
+TEST_CASE("placeholders are replaced within arguments, other braces are text") {
+  const Names command = {"go", "--in={first_frame}", "{prompt}{out}", "{\"steps\": 30}", "{{out}}", "{}", "{ out }",
+                         "{"};
+  CHECK(filled_in(command, {{"first_frame", "a b.png"}, {"prompt", "{out}"}, {"out", "o"}}) ==
+        Names{"go", "--in=a b.png", "{out}o", "{\"steps\": 30}", "{out}", "{}", "{ out }", "{"});
+  CHECK(placeholders_in("{a}-{{b}}-{c_1}") == Names{"a", "c_1"});
+  CHECK(uses_placeholder(command, "prompt"));
+  CHECK_FALSE(uses_placeholder({"go", "{{prompt}}"}, "prompt"));
+  CHECK_THROWS_AS(filled_in({"{in}"}, {}), InternalError);
+}
+
+TEST_CASE("commands that cannot work are told with their places") {
+  Workshop workshop;
+  workshop.config["sources"]["prompt"] = "";
+  workshop.config["sources"]["video"]["command"] = {"no_such_program", "{prompt}", "{first_fram}"};
+  workshop.config["sources"]["masks"]["command"] = {"./mask", "{first_frame}", "{out}"};
+  workshop.config["data"]["masks"] = (TinyDataset::folder() / "masks").string();
+  workshop.write();
+  for (const char* command : {"check", "run"}) {
+    const ProgramResult result = run_hsi4d({command, "config.json"});
+    INFO(result.err);
+    CHECK(result.status == 2);
+    std::vector<std::string> told;
+    std::istringstream text(result.err);
+    std::string line;
+    std::getline(text, line);
+    CHECK(line == "6 problems in config.json:");
+    while (std::getline(text, line)) told.push_back(line.substr(line.find(" /") + 1));
+    std::sort(told.begin(), told.end());
+    CHECK(told ==
+          Names{"/data/masks: given, and /sources/masks makes it too; remove one",
+                "/sources/masks/command/1: there is no placeholder {first_frame}; known here: {video}, {objects}, "
+                "{prompt}, {out}; {{first_frame}} is that text",
+                "/sources/prompt: not given; /sources/video/command has {prompt}",
+                "/sources/video/command/0: there is no program \"no_such_program\" that can be executed in PATH",
+                "/sources/video/command/2: there is no placeholder {first_fram}; known here: {first_frame}, "
+                "{prompt}, {out}; did you mean \"first_frame\"?; {{first_fram}} is that text",
+                "/sources/video/command: {out} is missing: the program has to be told where to write"});
+  }
+  CHECK(made().empty());
+  CHECK(lines_of("film.txt").empty());
+}
+
+TEST_CASE("the shipped templates lack nothing but the programs that they name") {
+  const TemporaryFolder here;
+  for (const char* name : {"./kling.sh", "generate.py", "sam2_masks.py"}) Workshop::script(name, "exit 1");
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(fs::path(HSI4D_SOURCE_DIR) / "configs" / "sources")) {
+    if (entry.path().extension() != ".json") continue;
+    INFO(entry.path());
+    ++count;
+    const RunConfig config = load_run_config(entry.path(), {}, descriptions_of(loss_terms()));
+    CHECK(config.sources.folder == entry.path().parent_path() / "generated");
+    CHECK(config.data.frame_rate > 0);
+    for (const auto& [command, known] : {std::pair{config.sources.video.command, video_placeholders()},
+                                         {config.sources.masks.command, mask_placeholders()}}) {
+      Names with_program = command;
+      with_program.front() = "sh";
+      CHECK(command_faults(with_program, known).empty());
+    }
+    for (const char* name : {"first_frame", "prompt", "out"})
+      CHECK(uses_placeholder(config.sources.video.command, name));
+    CHECK_THROWS_WITH(load_run_config(entry.path(), {"sources.video.command=[\"no_such\", \"{out}\"]"},
+                                      descriptions_of(loss_terms()), ConfigUse::kStages),
+                      Contains("there is no program \"no_such\" that can be executed in PATH"));
+  }
+  CHECK(count == 2);
+}
+
+TEST_CASE("the first frame is what the state of frame 0 looks like") {
+  const RunConfig config = tiny_config();
+  const Image image = first_frame_image(config),
+              seen = read_image((TinyDataset::folder() / "first_frame.png").string());
+  CHECK(image.width() == kTinyPixels);
+  CHECK(psnr_db(image, seen) > 25);
+}
+
+TEST_CASE("a run makes its video and masks by programs, once for what they are made of", "[run]") {
+  Workshop workshop;
+  const std::string prompt = "A person; pours \"water\"";
+  const ProgramResult dry = Workshop::run("run", {"--dry-run"});
+  INFO(dry.err);
+  CHECK(dry.status == 0);
+  CHECK_THAT(
+      dry.out,
+      Matches("would write run\n  would run ./film, \\{first_frame\\}, \\{prompt\\}, \\{out\\}\n    for " + kPlaces +
+              "/generated/video-[0-9a-f]{16}\n  would then run ./mask, \\{video\\}, "
+              "\\{objects\\}, \\{out\\}\n  scene of " +
+              kPlaces));
+  CHECK(run_hsi4d({"check", "config.json"}).status == 0);
+  CHECK(made().empty());
+  CHECK(lines_of("film.txt").empty());
+
+  const ProgramResult first = Workshop::run("run");
+  INFO(first.err);
+  REQUIRE(first.status == 0);
+  CHECK(lines_of("film.txt") == Names{prompt});
+  CHECK(lines_of("mask.txt") == Names{"human," + kTinyObject});
+  const Names all = {"masks-KEY", "masks-KEY.json", "video-KEY", "video-KEY.first_frame.png", "video-KEY.json"};
+  CHECK(made() == all);
+  CHECK(read_image(made_file("video", ".first_frame.png").string()).width() == kTinyPixels);
+  CHECK(json_of(made_file("video", ".json"))["prompt"] == prompt);
+  carry_out_tiny(tiny_config(), "plain");
+  for (const char* name : {"motion.npz", "objects.npz", "cameras.json"})
+    CHECK(file_text(fs::path("run") / name) == file_text(fs::path("plain") / name));
+  CHECK_THAT(file_text("run/log.txt"), Contains("video: runs ./film, "));
+
+  // Another run, and one that goes on, have the same video.
+  CHECK(Workshop::run("again").status == 0);
+  CHECK(Workshop::run("run", {"--resume"}).status == 0);
+  CHECK_THAT(Workshop::run("dry", {"--dry-run"}).out, StartsWith("would write dry\n  4 frames of 48x48, scene of "));
+  CHECK(run_hsi4d({"run", "run/config.resolved.json", "--out", "resolved"}).status == 0);
+  CHECK(lines_of("film.txt").size() == 1);
+  CHECK(lines_of("mask.txt").size() == 1);
+
+  // Another prompt is another video; its masks are those of the same frames. A run does not go on with it.
+  CHECK_THAT(Workshop::run("run", {"--resume", "--set", "sources.prompt=sits"}).err, Contains("prompt"));
+  CHECK(lines_of("film.txt").size() == 1);
+  CHECK(Workshop::run("other", {"--set", "sources.prompt=sits"}).status == 0);
+  CHECK(lines_of("film.txt") == Names{prompt, "sits"});
+  CHECK(lines_of("mask.txt").size() == 1);
+  // What the first frame shows counts too.
+  CHECK(Workshop::run("bright", {"--set", "background=[1,1,1]"}).status == 0);
+  CHECK(lines_of("film.txt").size() == 3);
+  // A record that was lost, or an output, is made again.
+  fs::remove(made_file("masks", ".json"));
+  CHECK(Workshop::run("lost").status == 0);
+  CHECK(lines_of("mask.txt").size() == 2);
+  CHECK(temporaries_in("generated").empty());
+}
+
+TEST_CASE("masks alone can be made of a video that is there", "[run]") {
+  Workshop workshop;
+  workshop.config["sources"].erase("video");
+  workshop.config["data"]["frames"] = (TinyDataset::folder() / "frames").string();
+  workshop.config["sources"]["folder"] = "made/here";
+  workshop.write();
+  const ProgramResult result = Workshop::run("run");
+  INFO(result.err);
+  CHECK(result.status == 0);
+  CHECK(lines_of("film.txt").empty());
+  CHECK(lines_of("mask.txt").size() == 1);
+  CHECK_FALSE(fs::exists("generated"));
+  CHECK(fs::exists("made/here"));
+}
+
+TEST_CASE("programs that fail are told with the end of what they print", "[run]") {
+  Workshop workshop;
+  const std::string section = "/sources/video: ./film";
+  SECTION("an exit status") {
+    Workshop::script("film", "echo no credit left >&2; exit 3");
+    CHECK(Workshop::refusal() == section + ": ended with status 3:\nno credit left\n");
+    CHECK(made().empty());
+  }
+  SECTION("no output") {
+    Workshop::script("film", "echo all went well");
+    CHECK_THAT(Workshop::refusal(), Matches(section + ": ended with status 0 and wrote nothing at \\{out\\}, " +
+                                            kPlaces + "/video:\nall went well\n"));
+    CHECK(made().empty());
+  }
+  SECTION("time") {
+    workshop.config["sources"]["video"]["timeout_s"] = 0.3;
+    workshop.write();
+    Workshop::script("film", "echo begun; sleep 60");
+    CHECK(Workshop::refusal() == section + ": was ended after 0.3 seconds, which is all the time it has:\nbegun\n");
+    CHECK(made().empty());
+  }
+  SECTION("what is no video") {
+    workshop.config["sources"]["video"]["output"] = "mp4";
+    workshop.write();
+    Workshop::script("film", "echo text > \"$3\"");
+    CHECK_THAT(Workshop::refusal(),
+               Matches(section + " wrote what cannot be used, kept as " + kPlaces +
+                       "/video-[0-9a-f]{16}.refused.mp4: " + kPlaces + "is not a video that can be read" + kPlaces));
+    CHECK(made() == Names{"video-KEY.refused.mp4"});
+  }
+  SECTION("size") {
+    const std::string data = TinyDataset::folder().string();
+    write_image("wide.png", Image(3, 48, 96));
+    Workshop::script("film", "cp -r " + data + "/frames \"$3\"; cp wide.png \"$3/0002.png\"");
+    CHECK_THAT(
+        Workshop::refusal(),
+        Contains("frame 2 is 96x48 with 3 channels; the camera's image is 48x48 with 3, and a video is as large, "
+                 "or larger and of its shape"));
+    CHECK(made() == Names{"video-KEY.refused"});
+  }
+  SECTION("length") {
+    workshop.config["sources"]["video"]["frames"] = 5;
+    workshop.write();
+    CHECK_THAT(Workshop::refusal(), Contains("has 4 frames; sources.video.frames asks for 5; it printed nothing\n"));
+  }
+  SECTION("masks of an object") {
+    Workshop::script("mask",
+                     "cp -r " + TinyDataset::folder().string() + "/masks \"$3\"; rm -r \"$3/" + kTinyObject + "\"");
+    CHECK_THAT(Workshop::refusal(), StartsWith("/sources/masks: ./mask wrote what cannot be used") &&
+                                        Contains(kTinyObject + ": there is no such folder of masks"));
+  }
+  SECTION("names of masks") {
+    Workshop::script("mask", "cp -r " + TinyDataset::folder().string() +
+                                 "/masks \"$3\"; cd \"$3/human\"; "
+                                 "for f in *; do mv $f mask_$f; done");
+    CHECK_THAT(Workshop::refusal(),
+               Contains("human has no mask of any frame; their names are those of the frames, 0000.png to 0003.png"));
+  }
+  SECTION("sizes of masks") {
+    write_image("small.png", Image(1, 24, 24));
+    Workshop::script("mask", "cp -r " + TinyDataset::folder().string() +
+                                 "/masks \"$3\"; cp small.png "
+                                 "\"$3/human/0003.png\"");
+    CHECK_THAT(Workshop::refusal(), Contains("the mask of human in frame 3 is 24x24 pixels, the video's frame 48x48"));
+  }
+  SECTION("a folder in use is refused before anything is made") {
+    fs::create_directory("run");
+    std::ofstream("run/note.txt") << "mine";
+    CHECK(Workshop::run("run").status == 2);
+    CHECK(lines_of("film.txt").empty());
+  }
+}
+
+TEST_CASE("Ctrl-C ends the program that is run, and leaves nothing", "[run]") {
+  const Workshop workshop;
+  Workshop::script("film", "echo $$ > pid.txt; sleep 60");
+  RunningProgram program({"run", "config.json", "--out", "run"});
+  const auto is_begun = [] { return fs::exists("pid.txt") && !file_text("pid.txt").empty(); };
+  REQUIRE(program.signal_at(SIGINT, is_begun));
+  CHECK(program.result() == 130);
+  CHECK_THAT(program.text(), Contains("interrupted while ./film made the video; nothing is left of it"));
+  CHECK(made().empty());
+  CHECK_FALSE(fs::exists("run"));
+  CHECK(kill(std::stoi(file_text("pid.txt")), 0) != 0);
+}
