@@ -4,8 +4,9 @@
 #include <cmath>
 
 #include "core/progress.h"
+#include "pipelines/report_assets.h"
 #include "pipelines/report_plots.h"
-#include "pipelines/report_style.h"
+#include "pipelines/report_published.h"
 
 namespace hsi4d {
 namespace {
@@ -388,11 +389,14 @@ std::string report_page(const ReportData& data) {
   if (data.summary) page += figures_section(*data.summary);
   page += errors_section(data);
   page += frames_section(data);
+  page += view3d_section(data);
   if (data.summary) page += frame_errors_section(*data.summary);
+  if (data.summary) page += published_section(*data.summary);
   page += losses_section(data);
   page += time_section(data);
   page += notes_section(data);
   page += config_section(data);
+  page += moving_data(data);
   return page + "</main>\n</body>\n</html>\n";
 }
 
