@@ -50,8 +50,9 @@ const startImages = () => {
     target.classList.toggle("whole", times > 1);
   };
 
-  // The larger of the images of a canvas says how large it is: what is less detailed is drawn to its size.
-  const prepare = (target, images) => {
+  // The largest of the images says how large both canvases are: what is less detailed is drawn to its size.
+  const prepare = target => {
+    const images = [shown.left, shown.right, shown.beside].filter(image => image);
     const largest = images.reduce((a, b) => widthOf(b) > widthOf(a) ? b : a);
     if (target.width !== widthOf(largest)) target.width = widthOf(largest);
     if (target.height !== heightOf(largest)) target.height = heightOf(largest);
@@ -61,16 +62,16 @@ const startImages = () => {
     return context;
   };
 
-  const showPlace = (box, absent, is_there) => {
-    box.hidden = !is_there;
-    absent.hidden = is_there;
+  const showPlace = (box, absent, isThere) => {
+    box.hidden = !isThere;
+    absent.hidden = isThere;
   };
 
   const paint = () => {
     const { left, right, beside } = shown;
     showPlace(compare, get("compare-absent"), !!(left && right));
     if (left && right) {
-      const context = prepare(canvas, [left, right]), { width, height } = canvas;
+      const context = prepare(canvas), { width, height } = canvas;
       context.drawImage(left, 0, 0, width, height);
       context.save();
       context.beginPath();
@@ -80,7 +81,7 @@ const startImages = () => {
       context.restore();
     }
     showPlace(get("other"), get("other-absent"), !!beside);
-    if (beside) prepare(other, [beside]).drawImage(beside, 0, 0, other.width, other.height);
+    if (beside) prepare(other).drawImage(beside, 0, 0, other.width, other.height);
   };
 
   const show = async frame => {

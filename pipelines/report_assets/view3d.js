@@ -52,8 +52,10 @@ const startView3d = async () => {
   };
   const gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
   if (!gl) return tell("This browser shows no WebGL 2, which the 3D view needs. The rest of the report does not.");
-  if (typeof DecompressionStream === "undefined") return tell("This browser is too old for the 3D view: it cannot unpack gzip.");
-  canvas.addEventListener("webglcontextlost", () => tell("The graphics driver has dropped the 3D view; load the page anew."));
+  if (typeof DecompressionStream === "undefined")
+    return tell("This browser is too old for the 3D view: it cannot unpack gzip.");
+  canvas.addEventListener("webglcontextlost",
+    () => tell("The graphics driver has dropped the 3D view; load the page anew."));
 
   const data = await readView3d(get("view3d-data").textContent);
   const drawSplats = makeSplats(gl, data), drawMesh = makeMesh(gl, data), drawLines = makeLines(gl);
@@ -62,14 +64,15 @@ const startView3d = async () => {
   const cameraOf = t => poseOf(data["cameras/poses"], t);
   const parents = data["skeleton/parents"], middle = poseSkeleton(data, "body", frames >> 1).places;
   const eye = makeEye(cameraOf(frames >> 1), middle[0]);
-  const floor = Math.min(...[0, frames >> 1, frames - 1].flatMap(t => poseSkeleton(data, "body", t).places.map(p => p[2])));
+  const floor = Math.min(...[0, frames >> 1, frames - 1]
+    .flatMap(t => poseSkeleton(data, "body", t).places.map(place => place[2])));
   const pairs = list => list.slice(1).flatMap((point, i) => [list[i], point]);
   const path = pairs(Array.from({ length: frames }, (_, t) => centerOf(cameraOf(t))));
   const hasTruth = !!data["truth/translations"];
   const shows = name => get("show-" + name)?.checked;
   if (!drawMesh) get("show-skeleton").checked = true;
-  for (const [name, is_there] of [["truth", hasTruth && drawMesh], ["body", drawMesh], ["objects", objects > 0]])
-    get("show-" + name).parentElement.hidden = !is_there;
+  for (const [name, isThere] of [["truth", hasTruth && drawMesh], ["body", drawMesh], ["objects", objects > 0]])
+    get("show-" + name).parentElement.hidden = !isThere;
 
   const grid = Array.from({ length: 11 }, (_, i) => i - 5).flatMap(k => [[k, -5], [k, 5], [-5, k], [5, k]])
     .map(([x, y]) => [middle[0][0] + x, middle[0][1] + y, floor]);
@@ -107,7 +110,7 @@ const startView3d = async () => {
     if (!shows("scene")) drawLines(camera, grid, colors3d.grid);
     if (shows("camera") && !eye.follows) {
       drawLines(camera, path, colors3d.path);
-      drawLines(camera, frustum(cameraOf(t), 0.12 * eye.distance), colors3d.camera);
+      drawLines(camera, frustum(cameraOf(t), 0.4), colors3d.camera);
     }
     if (shows("truth") && drawMesh && hasTruth)
       drawMesh(camera, poseSkeleton(data, "truth", t).transforms, colors3d.truth);
