@@ -152,7 +152,7 @@ std::string frames_section(const ReportData& data) {
 
 std::string view3d_section(const ReportData& data) {
   if (data.view3d.file.empty()) return "";
-  return "<section id=\"view3d\">\n<h2>In space</h2>\n<div class=\"card\">\n<div class=\"stage\"><canvas "
+  return "<section id=\"view3d\">\n<h2>3D view</h2>\n<div class=\"card\">\n<div class=\"stage\"><canvas "
          "id=\"view3d-canvas\" tabindex=\"0\" aria-label=\"the reconstruction in space: arrow keys turn it, plus and "
          "minus come nearer and go away\"></canvas><p id=\"view3d-message\">The 3D view needs JavaScript.</p></div>\n" +
          scrubber(data) + "<div class=\"layers\">\n" + layer("scene", "scene", "", true) +

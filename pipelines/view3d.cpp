@@ -18,8 +18,8 @@ namespace hsi4d {
 
 namespace {
 
-constexpr double kLeastRadius = 10;        // metres around the human that are shown, however near the camera is
-constexpr double kRadiusOverDistance = 3;  // or this many times the farthest camera's distance
+constexpr double kLeastRadius = 30;         // metres around the human that are shown, however near the camera is
+constexpr double kRadiusOverDistance = 10;  // or this many times the farthest camera's distance
 
 void add_numbers(const auto& numbers, std::vector<float>& all) {
   for (Index i = 0; i < numbers.size(); ++i) all.push_back(static_cast<float>(numbers[i]));

@@ -272,7 +272,7 @@ TEST_CASE("hostile names do no harm") {
   here.write("a/config.resolved.json", "{\"</pre><script>\": 1}");
   const std::string page = report_html("a");
   CHECK(tag_fault(page) == "");
-  CHECK(count_of(page, "<script>") == 1);  // ours
+  CHECK(count_of(page, "<script>") == 1);   // ours
   CHECK(count_of(page, "</script>") == 3);  // and of the data
   for (const char* bad : {"<b>", "<i ", "<img src=x", "<u>", "<s>", "<q>", "<h>", "<d>", "alert('", "\a"}) {
     INFO(bad);
