@@ -179,6 +179,7 @@ std::string frame_errors_section(const RunSummary& summary) {
     Plot plot;
     plot.title = std::string(facts.label) + " by frame";
     plot.x_label = "frame";
+    plot.is_timed = true;
     plot.unit = facts.unit;
     plot.decimals = facts.decimals;
     plot.begins_at_zero = facts.better <= 0;

@@ -40,6 +40,11 @@ const timeline = (() => {
     get frame() { return frames[index]; },
     get next() { return frames[(index + 1) % frames.length]; },
     onChange(listener) { listeners.push(listener); },
+    goNear(frame) {
+      const away = frames.map(each => Math.abs(each - frame));
+      stop();
+      go(away.indexOf(Math.min(...away)));
+    },
     start() { go(index); },
   };
 })();

@@ -169,6 +169,16 @@ async function testTime(page) {
   const stopped = await page.locator('.frame-name').first().textContent();
   await page.waitForTimeout(400);
   check('what plays can be stopped', await page.locator('.frame-name').first().textContent() === stopped);
+  const plot = page.locator('svg.plot.timed').first();
+  const { from, to, left, right } = await plot.evaluate((svg) => ({ ...svg.dataset }));
+  const [start, end, begins, ends] = [from, to, left, right].map(Number);
+  const place = begins + (1 - start) / (end - start) * (ends - begins);  // of frame 1
+  const { width, height } = await plot.boundingBox();
+  const scale = width / await plot.evaluate((svg) => svg.viewBox.baseVal.width);
+  await plot.click({ position: { x: place * scale, y: height / 2 } });
+  check('a click into a plot goes to its frame', await page.locator('.frame-name').first().textContent() === 'frame 1');
+  const marked = Number(await plot.locator('.now').getAttribute('x1'));
+  check('which is marked there', Math.abs(marked - place) < 0.1, `${marked} and ${place}`);
   await scrub(0, 2);
   await page.waitForFunction(() => document.getElementById('compare').dataset.frame === '2');
 }

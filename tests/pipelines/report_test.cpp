@@ -180,6 +180,8 @@ TEST_CASE("a report has every section, well formed, and asks for nothing from ou
   CHECK_THAT(page, Contains("<title>result, frame 2: 27.7 mm</title>"));
   CHECK_THAT(page, Contains("<title>start, frame 1: 50.0 mm</title>"));
   CHECK_THAT(page, Contains("<title>copy_frame_0 (mean)</title>"));
+  CHECK(count_of(page, "<svg class=\"plot timed\" data-from=\"1.0\" data-to=\"2.0\" data-left=\"") == 2);
+  CHECK(count_of(page, "<line class=\"now\" visibility=\"hidden\"") == 2);
   // A loss curve for each frame of each stage.
   CHECK(count_of(page, "<title>frame 1</title>") == 2);
   CHECK(count_of(page, "<title>frame 2</title>") == 2);
