@@ -1,5 +1,5 @@
 // The 3D view: what is shown in a frame, and the eye that turns around it.
-const colors3d = { body: [0.76, 0.8, 0.88, 1], truth: [0.25, 0.85, 0.55, 0.5], camera: [1, 0.85, 0.3, 1],
+const colors3d = { body: [0.76, 0.8, 0.88, 1], truth: [0.25, 0.85, 0.55, 0.38], camera: [1, 0.85, 0.3, 1],
   path: [1, 0.85, 0.3, 0.7], skeleton: [0.35, 0.75, 1, 1], grid: [0.5, 0.55, 0.6, 0.35] };
 
 // Where one looks from: around `target`, z up; or through the reconstructed camera.

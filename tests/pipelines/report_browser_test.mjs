@@ -260,11 +260,32 @@ async function testWithoutWebGl(url) {
   await browser.close();
 }
 
+// Reports of runs that lack something.
+async function testPartial(run) {
+  const write = () => execFileSync(program, ['report', run], { stdio: 'ignore' });
+  const url = pathToFileURL(join(run, 'report.html')).href;
+  rmSync(join(run, 'frames'), { recursive: true });
+  write();
+  const space = await open(url, { args: software, viewport: { width: 500, height: 400 } });
+  await space.page.waitForFunction(() => Number(document.querySelector('#view3d-canvas').dataset.drawn ?? 0) > 0);
+  await space.page.locator('.scrubber input').fill('0');
+  await space.page.waitForFunction(() => document.querySelector('#view3d-canvas').dataset.frame === '0');
+  check('the 3D view goes without images', space.faults.length === 0, space.faults.join('; '));
+  await space.browser.close();
+  rmSync(join(run, 'view3d.safetensors'));
+  write();
+  const bare = await open(url, { args: software, viewport: { width: 500, height: 400 } });
+  check('a report without both has no fault', bare.faults.length === 0, bare.faults.join('; '));
+  check('and tells what is missing', /view3d.safetensors is missing/.test(await bare.page.locator('#notes').textContent()));
+  await bare.browser.close();
+}
+
 const folder = mkdtempSync(join(tmpdir(), 'hsi4d_report_'));
 try {
   const url = makeReport(join(folder, 'demo'));
   await testWhole(url);
   await testWithoutWebGl(url);
+  await testPartial(join(folder, 'demo', 'run'));
 } finally {
   rmSync(folder, { recursive: true });
 }
