@@ -75,6 +75,21 @@ function(hsi4d_embed_demo_configs)
   target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp)
 endfunction()
 
+# The report's style and scripts, in the order in which they need each other, become part of the library.
+function(hsi4d_embed_report_assets)
+  set(folder ${PROJECT_SOURCE_DIR}/pipelines/report_assets)
+  set(HSI4D_REPORT_SCRIPTS "")
+  foreach(name timeline compare plots view3d_data view3d_draw view3d start)
+    file(READ ${folder}/${name}.js script)
+    string(APPEND HSI4D_REPORT_SCRIPTS "R\"hsi4d(${script})hsi4d\", ")
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/${name}.js)
+  endforeach()
+  file(READ ${folder}/report.css HSI4D_REPORT_CSS)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/report.css)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/report_assets.cpp.in ${PROJECT_BINARY_DIR}/generated/report_assets.cpp @ONLY)
+  target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/report_assets.cpp)
+endfunction()
+
 # hsi4d_find_commit(OUT): the commit that is checked out, or "unknown" where the source is not the top of a git checkout.
 # A commit configures the build anew; changes that are not committed are not told.
 function(hsi4d_find_commit out)

@@ -190,14 +190,15 @@ Bytes encode_png(const std::string& path, const Image& image, int bits) {
   throw UserError(path + ": PNG with " + std::to_string(bits) + " bits; 8 and 16 are allowed");
 }
 
-Bytes encode_jpeg(const std::string& path, const Image& image, int quality) {
+Bytes encode_jpeg(const std::string& path, const Image& image, const ImageFormat& format) {
+  const int quality = format.jpeg_quality;
   check_channels(path, image, {1, 3}, "1 or 3");
   if (quality < 1 || quality > 100) {
     throw UserError(path + ": JPEG with quality " + std::to_string(quality) + "; 1 to 100 is allowed");
   }
   OIIO::ImageSpec spec = packed_spec(image, OIIO::TypeDesc::UINT8);
   spec.attribute("Compression", "jpeg:" + std::to_string(quality));
-  spec.attribute("jpeg:subsampling", "4:4:4");  // half the colour resolution shows at a mask's edge
+  spec.attribute("jpeg:subsampling", format.jpeg_half_color ? "4:2:0" : "4:4:4");
   return encode_packed(path, "jpeg", spec, quantise<uint8_t>(path, image).data());
 }
 
@@ -233,7 +234,7 @@ Image read_image(const std::string& path, const ImageLimits& limits) {
 Bytes encode_image(const std::string& path, const Image& image, const ImageFormat& format) {
   const std::string ending = ending_of(path);
   if (ending == ".png") return encode_png(path, image, format.png_bits);
-  if (ending == ".jpg" || ending == ".jpeg") return encode_jpeg(path, image, format.jpeg_quality);
+  if (ending == ".jpg" || ending == ".jpeg") return encode_jpeg(path, image, format);
   if (ending == ".exr") return encode_exr(path, image, format.exr_half);
   throw UserError(path + ": images are written as .png, .jpg, .jpeg or .exr");
 }

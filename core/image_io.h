@@ -12,9 +12,10 @@ namespace hsi4d {
 
 /// How write_image stores numbers; each field matters to one format.
 struct ImageFormat {
-  int png_bits = 8;       ///< 8 or 16
-  int jpeg_quality = 95;  ///< 1 to 100
-  bool exr_half = false;  ///< 16-bit instead of 32-bit floats
+  int png_bits = 8;              ///< 8 or 16
+  int jpeg_quality = 95;         ///< 1 to 100
+  bool jpeg_half_color = false;  ///< colour in half the resolution (4:2:0): a quarter smaller, seen at sharp edges
+  bool exr_half = false;         ///< 16-bit instead of 32-bit floats
 };
 
 /// An image file: PNG, JPEG, OpenEXR, or whatever else OpenImageIO reads.

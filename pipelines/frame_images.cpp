@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipelines/report_data.h"
+#include "pipelines/report_images.h"
 
 namespace hsi4d {
 

@@ -16,6 +16,7 @@
 #include "pipelines/run_state.h"
 #include "pipelines/stage_log.h"
 #include "pipelines/summarize_run.h"
+#include "pipelines/view3d.h"
 
 namespace hsi4d {
 
@@ -90,8 +91,9 @@ class Reconstruction {
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
     const RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     folder_.write_summary(summary);
-    write_body(folder_.paths(), config_, clip_, result());
-    write_preview(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
+    const std::optional<BodyModel> body = write_body(folder_.paths(), config_, clip_, result());
+    view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
+    write_views(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
       stop_if_asked(clip_.frames());
       return render_state(config_, clip_, state, colors_after(frame));
     });

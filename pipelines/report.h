@@ -7,12 +7,12 @@ namespace hsi4d {
 
 /// Writes report.html of a run folder, and returns its path.
 ///
-/// It has the run's state and settings, the table of errors, plots of the errors by frame and of the losses, where the
-/// time went, and the frames (target, render, difference) to slide through and compare. Styles, plots, images and the
-/// script are inside the file; it makes no request. The same folder gives the same bytes.
+/// It has the run's state and settings, the table of errors, the frames with a divider between input and result, a 3D
+/// view, plots of the errors by frame and of the losses, the paper's figures, and where the time went. Styles, plots,
+/// images and scripts are inside the file; it makes no request. The same folder gives the same bytes.
 ///
-/// Read: status.json, config.resolved.json, summary.json, metrics.jsonl,
-/// frames/NNNN_{target,render,difference,start}.png. What is missing is told in the report; a last line of
+/// Read: status.json, config.resolved.json, summary.json, metrics.jsonl, view3d.safetensors,
+/// frames/NNNN_{target,render,start,side}.png. What is missing is told in the report; a last line of
 /// metrics.jsonl that was cut short is, too. Throws UserError when the folder does not exist or holds no run, DataError
 /// naming file and line for a file that is damaged.
 std::string write_report(const std::string& run_folder);

@@ -1,9 +1,7 @@
 #include "pipelines/report_data.h"
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
-#include <map>
 #include <system_error>
 
 #include "core/check.h"
@@ -17,9 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Kind = ConfigValue::Kind;
-
-/// More than this of images would make a page that browsers open slowly; every other frame is then left out, and so on.
-constexpr size_t kMostImageBytes = size_t{64} << 20;
 
 bool is_file(const std::string& path) {
   std::error_code error;
@@ -178,89 +173,12 @@ void read_metrics_file(const RunPaths& paths, ReportData& data) {
   }
 }
 
-// ---- frames/ ----
-
-/// "0007_render.png" -> 7 and the place of "render" in kFrameKinds.
-std::optional<std::pair<int, size_t>> parse_image_name(const std::string& name) {
-  const size_t bar = name.find('_');
-  if (bar == std::string::npos || bar < 4 || !name.ends_with(".png")) return std::nullopt;
-  int frame = 0;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + bar, frame);
-  if (error != std::errc() || end != name.data() + bar || frame < 0) return std::nullopt;
-  const std::string kind = name.substr(bar + 1, name.size() - bar - 5);
-  const auto* const at = std::find(kFrameKinds.begin(), kFrameKinds.end(), kind);
-  if (at == kFrameKinds.end()) return std::nullopt;
-  return std::pair(frame, static_cast<size_t>(at - kFrameKinds.begin()));
-}
-
-using FrameFiles = std::map<int, std::array<std::string, kFrameKinds.size()>>;
-
-FrameFiles find_images(const fs::path& folder) {
-  FrameFiles files;
-  std::error_code error;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    const auto parsed = parse_image_name(it->path().filename().string());
-    if (parsed) files[parsed->first][parsed->second] = it->path().string();
-  }
-  return files;
-}
-
-/// Leaves out frames until the images are few enough; every second, third, ... stays.
-void thin_out(FrameFiles& files, std::vector<std::string>& notes) {
-  size_t bytes = 0;
-  for (const auto& [frame, names] : files) {
-    for (const std::string& name : names) {
-      std::error_code error;
-      const auto size = name.empty() ? 0 : fs::file_size(name, error);
-      if (!error) bytes += size;
-    }
-  }
-  const size_t step = (bytes + kMostImageBytes - 1) / kMostImageBytes;
-  if (step <= 1) return;
-  FrameFiles kept;
-  size_t number = 0;
-  for (auto& [frame, names] : files) {
-    if (number++ % step == 0) kept[frame] = std::move(names);
-  }
-  notes.push_back("Of " + std::to_string(files.size()) + " frames with images every " + std::to_string(step) +
-                  "th is shown, to keep this file small.");
-  files = std::move(kept);
-}
-
-bool is_png(const Bytes& file) {
-  constexpr std::array<uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-  return file.size() > kSignature.size() && std::equal(kSignature.begin(), kSignature.end(), file.begin());
-}
-
-void read_frames(const RunPaths& paths, ReportData& data) {
-  FrameFiles files = find_images(paths.frames());
-  if (files.empty()) {
-    data.notes.emplace_back("There are no images in frames/.");
+void read_view_file(const RunPaths& paths, ReportData& data) {
+  if (!is_file(paths.view3d())) {
+    data.notes.emplace_back("view3d.safetensors is missing: there is no 3D view.");
     return;
   }
-  thin_out(files, data.notes);
-  std::array<size_t, kFrameKinds.size()> missing{};
-  for (const auto& [frame, names] : files) {
-    FrameImages images{frame, {}};
-    for (size_t k = 0; k < names.size(); ++k) {
-      if (names[k].empty()) {
-        ++missing[k];
-        continue;
-      }
-      Bytes file = read_file(names[k]);
-      if (is_png(file)) {
-        images.files[k] = std::move(file);
-      } else {
-        data.notes.push_back("frames/" + fs::path(names[k]).filename().string() + " is not a PNG image.");
-      }
-    }
-    data.frames.push_back(std::move(images));
-  }
-  for (size_t k = 0; k < 3; ++k) {  // `start` is not written by every run
-    if (missing[k] > 0)
-      data.notes.push_back("Of " + std::to_string(files.size()) + " frames " + std::to_string(missing[k]) +
-                           " have no image of the kind \"" + std::string(kFrameKinds[k]) + "\".");
-  }
+  data.view3d = read_view3d(paths.view3d());
 }
 
 fs::path whole_path(const fs::path& folder) {
@@ -295,7 +213,8 @@ ReportData read_report_data(const std::string& run_folder) {
   read_config_file(paths, data);
   read_summary_file(paths, data);
   read_metrics_file(paths, data);
-  read_frames(paths, data);
+  data.frames = read_frame_images(paths.frames(), data.notes);
+  read_view_file(paths, data);
   return data;
 }
 

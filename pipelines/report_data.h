@@ -1,7 +1,6 @@
 // What a report tells, read from a run folder.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,20 +9,11 @@
 
 #include "core/file.h"
 #include "core/types.h"
+#include "pipelines/report_images.h"
 #include "pipelines/run_summary.h"
+#include "pipelines/view3d.h"
 
 namespace hsi4d {
-
-/// The images of a frame, frames/NNNN_KIND.png; `start` is the frame as the run was given it.
-inline constexpr std::array<std::string_view, 4> kFrameKinds = {"target", "render", "difference", "start"};
-
-/// The difference image shows differences this many times as large as they are.
-inline constexpr int kDifferenceGain = 4;
-
-struct FrameImages {
-  int frame = 0;
-  std::array<Bytes, kFrameKinds.size()> files;  ///< PNG files in the order of kFrameKinds; empty: there is none
-};
 
 /// How the loss of one stage went in one frame, or in all at once.
 struct LossCurve {
@@ -51,6 +41,7 @@ struct ReportData {
   std::optional<RunSummary> summary;
   std::vector<StageCurves> stages;  ///< in the order of their first line
   std::vector<FrameImages> frames;
+  View3d view3d;
   std::vector<std::string> notes;  ///< what is missing or odd
 };
 

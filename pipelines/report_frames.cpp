@@ -1,32 +1,21 @@
-// The frames of a report: images as data URIs in a script, so that each is there once, whatever shows it.
+// What of a report moves: the frames, and the 3D view. Images and the view's file stand in the page as data, so that
+// each is there once, whatever shows it.
 #include <algorithm>
+#include <set>
 
+#include "core/base64.h"
+#include "core/compression.h"
 #include "core/config_value.h"
+#include "pipelines/report_assets.h"
 #include "pipelines/report_page.h"
 #include "pipelines/report_plots.h"
-#include "pipelines/report_style.h"
 
 namespace hsi4d {
 namespace {
 
-constexpr size_t kStart = 3;  // in kFrameKinds
+// ---- Data ----
 
-/// RFC 4648, section 4.
-std::string base64(const Bytes& bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const size_t left = std::min<size_t>(3, bytes.size() - i);
-    unsigned group = static_cast<unsigned>(bytes[i]) << 16U;
-    if (left > 1) group |= static_cast<unsigned>(bytes[i + 1]) << 8U;
-    if (left > 2) group |= static_cast<unsigned>(bytes[i + 2]);
-    for (size_t k = 0; k < 4; ++k) text += k <= left ? kDigits[(group >> (18 - 6 * k)) & 63U] : '=';
-  }
-  return text;
-}
-
-/// "joints 12.3 mm, object place 1.20 cm": the errors of a frame of the result.
+/// "MPJPE 12.3 mm · PSNR 30.00 dB": the errors of a frame of the result.
 std::string frame_errors_text(const ReportData& data, int frame) {
   if (!data.summary) return "";
   std::string text;
@@ -42,83 +31,144 @@ std::string frame_errors_text(const ReportData& data, int frame) {
   return text;
 }
 
-/// A script's data may hold no "</script>": "<" is written as an escape.
+/// JSON text in a script element, which may hold no "</script>": "<" is written as an escape.
 std::string script_string(const std::string& text) {
   std::string out;
   for (const char c : json_string(text)) out += c == '<' ? std::string("\\u003c") : std::string(1, c);
   return out;
 }
 
-std::string frames_script(const ReportData& data) {
-  std::string text = "const kinds = [\"target\", \"render\", \"difference\"];\nconst frames = [\n";
-  for (const FrameImages& frame : data.frames) {
-    text += "{frame: " + std::to_string(frame.frame) +
-            ", errors: " + script_string(frame_errors_text(data, frame.frame)) + ", images: {";
-    for (size_t k = 0; k < kFrameKinds.size(); ++k) {
-      if (!frame.files[k].empty())
-        text += "\n " + std::string(kFrameKinds[k]) + ": \"data:image/png;base64," + base64(frame.files[k]) + "\",";
-    }
-    text += "}},\n";
+std::string files_json(const FrameImages& frame) {
+  std::string text;
+  for (size_t k = 0; k < kFrameKinds.size(); ++k) {
+    if (frame.files[k].empty()) continue;
+    text += (text.empty() ? "" : ",") + ("\n \"" + std::string(kFrameKinds[k])) +
+            "\": \"data:" + std::string(image_mime(frame.files[k])) + ";base64," + base64(frame.files[k]) + "\"";
   }
-  return text + "];";
+  return "{" + text + "}";
 }
 
-bool has_start(const ReportData& data) {
+std::string data_elements(const ReportData& data) {
+  constexpr double kUsualRate = 10;
+  const double rate = data.view3d.file.empty() ? kUsualRate : data.view3d.frame_rate;
+  std::string text = "<script type=\"application/json\" id=\"frames-data\">{\"rate\": " + fixed_number(rate, 3) +
+                     ", \"gain\": " + std::to_string(kDifferenceGain) +
+                     ", \"frames3d\": " + std::to_string(data.view3d.frames) + ", \"images\": [";
+  for (size_t i = 0; i < data.frames.size(); ++i) {
+    const FrameImages& frame = data.frames[i];
+    text += (i == 0 ? "\n" : ",\n") + ("{\"frame\": " + std::to_string(frame.frame)) +
+            ", \"errors\": " + script_string(frame_errors_text(data, frame.frame)) +
+            ", \"files\": " + files_json(frame) + "}";
+  }
+  text += "]}</script>\n";
+  if (data.view3d.file.empty()) return text;
+  return text + "<script type=\"text/plain\" id=\"view3d-data\">" + base64(compress_gzip(data.view3d.file)) +
+         "</script>\n";
+}
+
+// ---- What one sees ----
+
+/// Every frame that has an image or is in the 3D view.
+std::set<int> frame_numbers(const ReportData& data) {
+  std::set<int> numbers;
+  for (const FrameImages& frame : data.frames) numbers.insert(frame.frame);
+  for (Index t = 0; t < data.view3d.frames; ++t) numbers.insert(static_cast<int>(t));
+  return numbers;
+}
+
+/// Buttons and a slider through the frames. Every one of a page shows the same frame.
+std::string scrubber(const ReportData& data) {
+  // The middle frame stands for a run better than the last, which is the farthest from what was given.
+  const size_t count = frame_numbers(data).size();
+  return "<div class=\"controls scrubber\"><button class=\"previous\" aria-label=\"previous frame\">‹</button>"
+         "<button class=\"play\">play</button><button class=\"next\" aria-label=\"next frame\">›</button>"
+         "<span class=\"frame-name\"></span><input type=\"range\" aria-label=\"frame\" min=\"0\" max=\"" +
+         std::to_string(count - 1) + "\" value=\"" + std::to_string(count / 2) + "\"/></div>\n";
+}
+
+bool has_kind(const ReportData& data, std::string_view kind) {
+  const auto at = static_cast<size_t>(std::find(kFrameKinds.begin(), kFrameKinds.end(), kind) - kFrameKinds.begin());
   return std::any_of(data.frames.begin(), data.frames.end(),
-                     [](const FrameImages& frame) { return !frame.files[kStart].empty(); });
+                     [at](const FrameImages& frame) { return !frame.files[at].empty(); });
 }
 
 /// What a kind of image is called; a difference tells how much it is enlarged.
 std::string kind_label(std::string_view kind) {
-  return std::string(kind) + (kind == "difference" ? " ×" + std::to_string(kDifferenceGain) : "");
+  if (kind == "target") return "input";
+  if (kind == "render") return "reconstruction";
+  if (kind == "side") return "another side";
+  if (kind == "difference") return "difference ×" + std::to_string(kDifferenceGain);
+  return std::string(kind);
 }
 
-std::string image_choice(const std::string& id, const std::string& label, std::string_view chosen, bool with_start) {
+std::string image_choice(const ReportData& data, const std::string& id, const std::string& label,
+                         std::string_view chosen) {
   std::string text = "<label>" + label + " <select id=\"" + id + "\">";
-  for (size_t k = 0; k < kFrameKinds.size(); ++k) {
-    if (k == kStart && !with_start) continue;
-    const std::string kind(kFrameKinds[k]);
-    text += "<option value=\"" + kind + "\"" + (kind == chosen ? " selected=\"selected\"" : "") + ">" +
+  for (const std::string_view kind : {"target", "render", "side", "difference", "start"}) {
+    if ((kind == "side" || kind == "start") && !has_kind(data, kind)) continue;
+    text += "<option value=\"" + std::string(kind) + "\"" + (kind == chosen ? " selected=\"selected\"" : "") + ">" +
             kind_label(kind) + "</option>";
   }
   return text + "</select></label>\n";
 }
 
-/// Two images of a frame, one over the other up to where the reader puts their edge.
-std::string compare_figure(bool with_start) {
-  return "<figure><div class=\"compare\" id=\"compare\"><img id=\"under\" alt=\"left image\"/>"
-         "<img class=\"over\" id=\"over\" alt=\"right image\"/><div class=\"edge\" id=\"edge\"></div></div>\n"
+/// Two images of a frame, one over the other up to where the reader drags their edge.
+std::string compare_figure(const ReportData& data) {
+  return "<figure><div class=\"compare frame-box\" id=\"compare\"><canvas id=\"compare-canvas\" role=\"img\" "
+         "aria-label=\"two images of the frame\"></canvas>"
+         "<span class=\"tag\" id=\"tag-left\"></span><span class=\"tag\" id=\"tag-right\"></span>"
+         "<div class=\"edge\" id=\"edge\" role=\"slider\" tabindex=\"0\" aria-label=\"where the two images meet\" "
+         "aria-valuemin=\"0\" aria-valuemax=\"100\" aria-valuenow=\"50\"></div></div>\n"
          "<div class=\"absent\" id=\"compare-absent\" hidden=\"hidden\">This frame lacks one of the two images.</div>\n"
          "<figcaption class=\"controls\">" +
-         image_choice("left", "left", with_start ? "start" : "target", with_start) +
-         "<input type=\"range\" id=\"split\" aria-label=\"where the two images meet\" min=\"0\" max=\"100\" "
-         "step=\"0.5\" value=\"50\"/>\n" +
-         image_choice("right", "right", "render", with_start) + "</figcaption></figure>\n";
+         image_choice(data, "left", "left", "target") + image_choice(data, "right", "right", "render") +
+         "</figcaption></figure>\n";
+}
+
+std::string beside_figure(const ReportData& data) {
+  return "<figure><div class=\"frame-box\" id=\"other\"><canvas id=\"other-canvas\" role=\"img\" "
+         "aria-label=\"another image of the frame\"></canvas></div>\n"
+         "<div class=\"absent\" id=\"other-absent\" hidden=\"hidden\">This frame lacks this image.</div>\n"
+         "<figcaption class=\"controls\">" +
+         image_choice(data, "beside", "beside it", has_kind(data, "side") ? "side" : "difference") +
+         "</figcaption></figure>\n";
+}
+
+/// A box to tick: whether a part of the 3D view is shown.
+std::string layer(const std::string& name, const std::string& label, const std::string& color, bool is_shown) {
+  return "<label><input type=\"checkbox\" id=\"show-" + name + "\"" + (is_shown ? " checked=\"checked\"" : "") + "/>" +
+         (color.empty() ? "" : "<span class=\"box\" style=\"background:" + color + "\"></span>") + label + "</label>\n";
 }
 
 }  // namespace
 
 std::string frames_section(const ReportData& data) {
   if (data.frames.empty()) return "";
-  // The middle frame stands for a run better than the last, which is the farthest from what was given.
-  const size_t first = data.frames.size() / 2;
-  std::string text =
-      "<section id=\"frames\">\n<h2>Frames</h2>\n<noscript><p class=\"nothing\">The images need "
-      "JavaScript.</p></noscript>\n"
-      "<div class=\"card\">\n<div class=\"controls\"><button id=\"previous\" aria-label=\"previous frame\">‹</button>"
-      "<button id=\"play\">play</button><button id=\"next\" aria-label=\"next frame\">›</button>"
-      "<span class=\"frame-name\" id=\"frame-name\"></span>"
-      "<input type=\"range\" id=\"slider\" aria-label=\"frame\" min=\"0\" max=\"" +
-      std::to_string(data.frames.size() - 1) + "\" value=\"" + std::to_string(first) +
-      "\"/></div>\n<p class=\"frame-errors\" id=\"frame-errors\"></p>\n<div class=\"images\">\n";
-  for (size_t k = 0; k < kStart; ++k) {
-    const std::string kind(kFrameKinds[k]);
-    text += "<figure><img id=\"image-" + kind + "\" alt=\"" + kind +
-            "\" hidden=\"hidden\"/><div class=\"absent\" id=\"image-" + kind + "-absent\">no image</div><figcaption>" +
-            kind_label(kind) + "</figcaption></figure>\n";
-  }
-  text += compare_figure(has_start(data)) + "</div>\n</div>\n</section>\n<script>\n";
-  return text + frames_script(data) + std::string(report_script()) + "</script>\n";
+  return "<section id=\"frames\">\n<h2>Frames</h2>\n<noscript><p class=\"nothing\">The images need "
+         "JavaScript.</p></noscript>\n<div class=\"card\">\n" +
+         scrubber(data) + "<p class=\"frame-errors\" id=\"frame-errors\"></p>\n<div class=\"images\">\n" +
+         compare_figure(data) + beside_figure(data) + "</div>\n</div>\n</section>\n";
+}
+
+std::string view3d_section(const ReportData& data) {
+  if (data.view3d.file.empty()) return "";
+  return "<section id=\"view3d\">\n<h2>3D view</h2>\n<div class=\"card\">\n<div class=\"stage\"><canvas "
+         "id=\"view3d-canvas\" tabindex=\"0\" aria-label=\"the reconstruction in space: arrow keys turn it, plus and "
+         "minus come nearer and go away\"></canvas><p id=\"view3d-message\">The 3D view needs JavaScript.</p></div>\n" +
+         scrubber(data) + "<div class=\"layers\">\n" + layer("scene", "scene", "", true) +
+         layer("objects", "objects", "", true) + layer("body", "body", "#c2cce0", true) +
+         layer("truth", "true body", "#40d98c", false) + layer("camera", "camera and its path", "#ffd94d", true) +
+         layer("skeleton", "skeleton", "#59bfff", false) +
+         "<button id=\"view3d-follow\">through the camera</button><button id=\"view3d-reset\">reset</button></div>\n" +
+         "<p class=\"caption\">Drag to turn; drag with the right button, shift or two fingers to move; wheel (after a "
+         "click) or pinch to come nearer. Of the scene there is a sample of its Gaussians, in the colours they have "
+         "from "
+         "everywhere; the body is a mesh.</p>\n</div>\n</section>\n";
+}
+
+std::string moving_data(const ReportData& data) {
+  if (data.frames.empty() && data.view3d.file.empty()) return "";
+  return data_elements(data) + "<script>\n" + report_script() + "</script>\n";
 }
 
 }  // namespace hsi4d

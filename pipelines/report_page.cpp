@@ -4,8 +4,9 @@
 #include <cmath>
 
 #include "core/progress.h"
+#include "pipelines/report_assets.h"
 #include "pipelines/report_plots.h"
-#include "pipelines/report_style.h"
+#include "pipelines/report_published.h"
 
 namespace hsi4d {
 namespace {
@@ -178,6 +179,7 @@ std::string frame_errors_section(const RunSummary& summary) {
     Plot plot;
     plot.title = std::string(facts.label) + " by frame";
     plot.x_label = "frame";
+    plot.is_timed = true;
     plot.unit = facts.unit;
     plot.decimals = facts.decimals;
     plot.begins_at_zero = facts.better <= 0;
@@ -388,11 +390,14 @@ std::string report_page(const ReportData& data) {
   if (data.summary) page += figures_section(*data.summary);
   page += errors_section(data);
   page += frames_section(data);
+  page += view3d_section(data);
   if (data.summary) page += frame_errors_section(*data.summary);
+  if (data.summary) page += published_section(*data.summary);
   page += losses_section(data);
   page += time_section(data);
   page += notes_section(data);
   page += config_section(data);
+  page += moving_data(data);
   return page + "</main>\n</body>\n</html>\n";
 }
 

@@ -157,6 +157,13 @@ void append_line(std::string& svg, const Plot& plot, const PlotLine& line, const
   svg += "\"><title>" + html_escape(line.label) + "</title></polyline>" + dots + "\n";
 }
 
+/// The rest of the class, and where which frame is: from which to which, and at which x these are.
+std::string timed_attributes(const Plot& plot, const Axis& x) {
+  return " timed\" data-from=\"" + coordinate(x.range.low) + "\" data-to=\"" + coordinate(x.range.high) +
+         "\" data-left=\"" + coordinate(plot_x(plot, x, x.range.low)) + "\" data-right=\"" +
+         coordinate(plot_x(plot, x, x.range.high)) + "\"";
+}
+
 }  // namespace
 
 std::string html_escape(const std::string& text) {
@@ -207,9 +214,13 @@ std::string plot_svg(const Plot& plot) {
   if (plot.begins_at_zero && !plot.is_log) ys.add(0);
   const Axis x = linear_axis(xs, 8, plot.has_whole_x, false);
   const Axis y = plot.is_log ? log_axis(ys) : linear_axis(ys, 5, false, true);
-  std::string svg = "<svg class=\"plot\" role=\"img\" viewBox=\"0 0 " + fixed_number(plot.width, 0) + " " +
-                    fixed_number(kHeight, 0) + "\" aria-label=\"" + html_escape(plot.title) + "\">\n";
+  std::string svg = "<svg class=\"plot" + (plot.is_timed ? timed_attributes(plot, x) : "\"") +
+                    " role=\"img\" viewBox=\"0 0 " + fixed_number(plot.width, 0) + " " + fixed_number(kHeight, 0) +
+                    "\" aria-label=\"" + html_escape(plot.title) + "\">\n";
   append_axes(svg, plot, x, y);
+  if (plot.is_timed)
+    svg += "<line class=\"now\" visibility=\"hidden\" x1=\"0\" x2=\"0\" y1=\"" + coordinate(kTop) + "\" y2=\"" +
+           coordinate(kHeight - kBottom) + "\"/>";
   for (const PlotLine& line : plot.lines) append_line(svg, plot, line, x, y);
   return svg + "</svg>";
 }

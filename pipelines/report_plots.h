@@ -28,6 +28,7 @@ struct Plot {
   bool begins_at_zero = false;  ///< y, unless it is logarithmic
   bool has_whole_x = true;      ///< x ticks at whole numbers only
   int decimals = 2;             ///< of y in tooltips
+  bool is_timed = false;        ///< x is the frame, of which the page's script marks the one that is looked at
   double width = 380;           ///< in the units of the view box, where letters are 12 high; the page scales it
 };
 

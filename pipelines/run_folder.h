@@ -54,6 +54,7 @@ struct RunPaths {
   std::string motion() const { return member("motion.npz"); }
   std::string motion_at_30() const { return member("motion_30fps.npz"); }
   std::string body() const { return member("body.glb"); }
+  std::string view3d() const { return member("view3d.safetensors"); }
   std::string preview() const { return member("preview.mp4"); }
   std::string objects() const { return member("objects.npz"); }
   std::string cameras() const { return member("cameras.json"); }
@@ -64,7 +65,7 @@ struct RunPaths {
   std::string lock() const { return member(".lock"); }
   /// checkpoint/color_net_NNNN.safetensors: the human's color net after a frame.
   std::string frame_color_net(int frame) const;
-  /// frames/NNNN_KIND.png; kinds: target, render, difference, and start where the run's start is rendered too.
+  /// frames/NNNN_KIND.png; kinds: target, render, difference, start (the run's start) and side (from another side).
   std::string frame_image(int frame, std::string_view kind) const;
 
  private:

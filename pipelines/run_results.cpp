@@ -101,6 +101,49 @@ Image beside(const std::vector<Image>& panels) {
   return all;
 }
 
+/// preview.mp4 in the making. Its first failure is logged; from then on nothing is done.
+class Preview {
+ public:
+  Preview(std::string path, double frame_rate) : path_(std::move(path)), frame_rate_(frame_rate) {}
+
+  /// Appends images of one size, next to each other.
+  void add(const std::vector<Image>& images) {
+    attempt([&] {
+      std::vector<Image> panels;
+      for (const Image& image : images) panels.push_back(panel_of(image));
+      const Image all = beside(panels);
+      if (!video_) video_.emplace(path_, all.width(), all.height(), VideoFormat{.frame_rate = frame_rate_});
+      video_->add(all);
+    });
+  }
+
+  void commit() {
+    attempt([&] { video_->commit(); });
+  }
+
+ private:
+  template <class F>
+  void attempt(F&& step) {
+    if (failed_) return;
+    try {
+      return step();
+    } catch (const DataError& error) {
+      tell(error);
+    } catch (const UserError& error) {
+      tell(error);
+    }
+  }
+  void tell(const std::exception& error) {
+    failed_ = true;
+    log_warning("preview.mp4 is not written: " + std::string(error.what()));
+  }
+
+  std::string path_;
+  double frame_rate_;
+  std::optional<VideoWriter> video_;
+  bool failed_ = false;
+};
+
 }  // namespace
 
 bool moves_colors(const RunConfig& config) {
@@ -122,14 +165,16 @@ void write_results(const RunPaths& paths, const RunConfig& config, const Clip& c
   if (colors.net && moves_colors(config)) write_color_net(paths.color_net(), *colors.net);
 }
 
-void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
-                const std::vector<SceneState>& states) {
+std::optional<BodyModel> write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
+                                    const std::vector<SceneState>& states) {
+  std::optional<BodyModel> body;
   try {
-    const BodyModel body = rest_body(config.body);
-    const std::string difference = difference_of(body, clip.avatar);
+    body = rest_body(config.body);
+    const std::string difference = difference_of(*body, clip.avatar);
     if (difference.empty()) {
-      write_glb(paths.body(), body, motion_of(clip, states));
+      write_glb(paths.body(), *body, motion_of(clip, states));
     } else {
+      body.reset();
       log_info("body.glb is not written: " + difference);
     }
   } catch (const UserError& error) {
@@ -137,32 +182,29 @@ void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip
   } catch (const DataError& error) {
     log_warning("body.glb is not written: " + std::string(error.what()));
   }
+  return body;
 }
 
-void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
-                   const std::function<Image(Index frame, const SceneState& state)>& render) {
+void write_views(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
+                 const std::function<Image(Index frame, const SceneState& state)>& render) {
   const Rigid<double> other_side = camera_of_other_side(clip, states.front());
-  std::optional<VideoWriter> video;
-  try {
-    for (std::size_t t = 0; t < states.size(); ++t) {
-      const auto index = static_cast<Index>(t);
-      const ClipFrame frame = read_frame(clip, index);
-      const Image image = render(index, states[t]);
-      SceneState other = states[t];
-      other.camera_from_world = other_side;
-      std::vector<Image> panels;
-      for (const Image& panel : {frame.target, image, mean_of(frame.target, image), render(index, other)})
-        panels.push_back(panel_of(panel));
-      const Image all = beside(panels);
-      if (!video) video.emplace(paths.preview(), all.width(), all.height(), VideoFormat{.frame_rate = clip.frame_rate});
-      video->add(all);
+  Preview preview(paths.preview(), clip.frame_rate);
+  for (std::size_t t = 0; t < states.size(); ++t) {
+    const auto index = static_cast<Index>(t);
+    const auto number = static_cast<int>(t);
+    const ClipFrame frame = read_frame(clip, index);
+    const Image image = render(index, states[t]);
+    SceneState other = states[t];
+    other.camera_from_world = other_side;
+    const Image side = render(index, other);
+    if (t == 0) {
+      write_image(paths.frame_image(number, "target"), frame.target);
+      write_image(paths.frame_image(number, "render"), image);
     }
-    video->commit();
-  } catch (const DataError& error) {
-    log_warning("preview.mp4 is not written: " + std::string(error.what()));
-  } catch (const UserError& error) {
-    log_warning("preview.mp4 is not written: " + std::string(error.what()));
+    write_image(paths.frame_image(number, "side"), side);
+    preview.add({frame.target, image, mean_of(frame.target, image), side});
   }
+  preview.commit();
 }
 
 Rigid<double> turned_camera(const Rigid<double>& camera_from_world, const Vector3<double>& pivot, double angle) {

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
+#include "body/body_model.h"
 #include "pipelines/clip.h"
 #include "pipelines/color_state.h"
 #include "pipelines/run_config.h"
@@ -23,15 +25,17 @@ void write_results(const RunPaths& paths, const RunConfig& config, const Clip& c
 
 /// Writes body.glb, the body in motion: config.body, which has to be the avatar's: of its kind, and with joints where
 /// the avatar has them. Where it is another the log says so, and no file is written.
-void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
-                const std::vector<SceneState>& states);
+/// @return  the body; nothing where it is another, or cannot be read
+std::optional<BodyModel> write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
+                                    const std::vector<SceneState>& states);
 
-/// Writes preview.mp4: video, reconstruction, both one over the other, and the reconstruction from another side, next
-/// to each other. Where ffmpeg fails the log says so, and no file is written.
+/// Writes what a viewer shows: frames/NNNN_side.png of every frame, the reconstruction from another side; frame 0 as it
+/// was given, frames/0000_{target,render}.png; and preview.mp4: video, reconstruction, both one over the other, and the
+/// other side, next to each other. Where ffmpeg fails the log says so, and no video is written.
 ///
 /// @param render  the image of a state of a frame, from the state's camera
-void write_preview(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
-                   const std::function<Image(Index frame, const SceneState& state)>& render);
+void write_views(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
+                 const std::function<Image(Index frame, const SceneState& state)>& render);
 
 /// A camera that looks from another side: turned about the vertical axis through `pivot`.
 ///

@@ -26,3 +26,15 @@ if(HSI4D_PYTHON)
 else()
   message(STATUS "There is no python3: the exporters in tools/ are not tested")
 endif()
+
+# The report in a browser; it says so where playwright-core or Chromium is missing (tools/test_report installs them).
+find_program(HSI4D_NODE node)
+if(HSI4D_SANITIZE)  # the pages are the same, and the program takes longer to make one
+elseif(HSI4D_NODE)
+  add_test(NAME "the report in a browser"
+           COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/report_browser_test.mjs $<TARGET_FILE:hsi4d>
+                   ${PROJECT_SOURCE_DIR}/build/report_browser/node_modules)
+  set_tests_properties("the report in a browser" PROPERTIES LABELS quick SKIP_RETURN_CODE 77 TIMEOUT 300)
+else()
+  message(STATUS "There is no node: the report is not tested in a browser")
+endif()

@@ -5,11 +5,15 @@
 #include <set>
 
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
 #include "core/check.h"
+#include "core/compression.h"
 #include "core/image_io.h"
 #include "pipelines/report_plots.h"
 #include "pipelines/run_folder.h"
+#include "pipelines/view3d.h"
+#include "tests/pipelines/small_clip.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 
@@ -70,6 +74,30 @@ size_t count_of(const std::string& text, const std::string& part) {
   return count;
 }
 
+/// What stands between the first `begin` and the next `end`.
+std::string text_between(const std::string& page, const std::string& begin, const std::string& end) {
+  const size_t at = page.find(begin);
+  REQUIRE(at != std::string::npos);
+  const size_t from = at + begin.size();
+  return page.substr(from, page.find(end, from) - from);
+}
+
+Bytes from_base64(const std::string& text) {
+  CHECK(text.size() % 4 == 0);
+  const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  Bytes bytes;
+  unsigned bits = 0, count = 0;
+  for (const char c : text) {
+    if (c == '=') break;
+    bits = (bits << 6U) | static_cast<unsigned>(digits.find(c));
+    count += 6;
+    if (count < 8) continue;
+    count -= 8;
+    bytes.push_back(static_cast<std::uint8_t>(bits >> count));
+  }
+  return bytes;
+}
+
 RunSummary summary_named(const std::string& name) {
   RunSummary summary;
   summary.name = name;
@@ -77,7 +105,10 @@ RunSummary summary_named(const std::string& name) {
   summary.seconds = 20;
   summary.metrics = {
       {"camera", 2, 60, {{"camera_translation_cm", 0.25}}},
-      {"interaction", 12, 600, {{"mpjpe_mm", 20}, {"psnr_db", 31}, {"jitter", 9.5}, {"fragments", 1234567}}}};
+      {"interaction",
+       12,
+       600,
+       {{"mpjpe_mm", 20}, {"psnr_db", 31}, {"contact_share", 0.75}, {"jitter", 9.5}, {"fragments", 1234567}}}};
   summary.baselines = {
       {"start", {{"mpjpe_mm", 60}, {"psnr_db", 20}}, {{1, {{"mpjpe_mm", 50}}}, {2, {{"mpjpe_mm", 70}}}}},
       {"copy_frame_0", {{"mpjpe_mm", 45}}, {}}};
@@ -93,11 +124,13 @@ void make_run(const std::string& path, const std::string& name) {
     for (const char* stage : {"camera", "interaction"})
       for (int i = 0; i < 300; ++i)
         folder.append_metrics({frame, stage, i, 0.5 / (i + frame), {{"photometric", 0.5 / (i + frame)}}, 0.01});
-    for (const char* kind : {"target", "render", "difference"}) {
+    for (const char* kind : {"target", "render", "difference", "side"}) {
       image(0, 1, 1) += 0.1F;
       write_image(folder.paths().frame_image(frame, kind), image);
     }
   }
+  const Clip clip = small_clip(32, 24, 20);
+  view3d_file(clip, {clip.first, clip.first, clip.first}, nullptr).write(folder.paths().view3d());
   folder.write_summary(summary_named(name));
   folder.set_state(RunState::kDone);
 }
@@ -119,7 +152,8 @@ TEST_CASE("a report has every section, well formed, and asks for nothing from ou
   const std::string page = file_text("a/report.html");
   CHECK(tag_fault(page) == "");
   const std::set<std::string> ids = ids_of(page);
-  for (const char* id : {"errors", "frames", "errors-by-frame", "losses", "time", "config", "slider", "compare"}) {
+  for (const char* id : {"errors", "frames", "errors-by-frame", "losses", "time", "config", "compare", "edge",
+                         "published", "view3d", "view3d-canvas", "frames-data", "view3d-data"}) {
     INFO(id);
     CHECK(ids.contains(id));
   }
@@ -146,6 +180,8 @@ TEST_CASE("a report has every section, well formed, and asks for nothing from ou
   CHECK_THAT(page, Contains("<title>result, frame 2: 27.7 mm</title>"));
   CHECK_THAT(page, Contains("<title>start, frame 1: 50.0 mm</title>"));
   CHECK_THAT(page, Contains("<title>copy_frame_0 (mean)</title>"));
+  CHECK(count_of(page, "<svg class=\"plot timed\" data-from=\"1.0\" data-to=\"2.0\" data-left=\"") == 2);
+  CHECK(count_of(page, "<line class=\"now\" visibility=\"hidden\"") == 2);
   // A loss curve for each frame of each stage.
   CHECK(count_of(page, "<title>frame 1</title>") == 2);
   CHECK(count_of(page, "<title>frame 2</title>") == 2);
@@ -154,18 +190,23 @@ TEST_CASE("a report has every section, well formed, and asks for nothing from ou
   CHECK_THAT(page, Contains("1\xE2\x80\xAF"
                             "234\xE2\x80\xAF"
                             "567"));
-  // Six images, each once, as PNG files in base64; the frame's errors beside them.
+  // Three kinds of images, each once, as PNG files in base64; the frame's errors beside them.
   CHECK(count_of(page, "data:image/png;base64,iVBORw0KGgo") == 6);
-  CHECK_THAT(page, Contains("{frame: 2, errors: \"MPJPE 27.7 mm · PSNR 32.00 dB\""));
-  for (const char* kind : {"target", "render", "difference"})
-    CHECK_THAT(page, Contains(std::string("id=\"image-") + kind));
-  CHECK_THAT(page, Contains("<figcaption>difference ×4</figcaption>"));
+  CHECK_THAT(page, Contains("{\"frame\": 2, \"errors\": \"MPJPE 27.7 mm · PSNR 32.00 dB\", \"files\": {"));
+  CHECK_THAT(page, Contains("{\"rate\": 10.000, \"gain\": 4, \"frames3d\": 3, \"images\": ["));
+  CHECK_THAT(page, Contains(">difference ×4</option>") && Contains(">another side</option>"));
+  CHECK(page.find(">start</option>") == std::string::npos);  // there is no such image
+  // The paper's figures, and the run's where it has them.
+  CHECK_THAT(page, Contains("penetration of the scene ↓</th><td>static</td><td class=\"none\">–</td><td>0.019</td>"
+                            "<td>TRUMANS 0.046, LINGO 0.058</td>"));
+  CHECK_THAT(page, Contains("contact ↑</th><td>dynamic</td><td class=\"own\">0.750</td><td>0.835</td>"
+                            "<td>CHOIS 0.687, LINGO 0.699</td>"));
 }
 
 TEST_CASE("a report opens on the middle frame") {
   const TemporaryFolder here;
-  make_run("a", "a walk");
-  for (const char* name : {"0003", "0004", "0005"})
+  make_run("a", "a walk");  // with frames 0 to 2 in the 3D view
+  for (const char* name : {"0003", "0004"})
     fs::copy("a/frames/0001_render.png", std::string("a/frames/") + name + "_render.png");
   CHECK_THAT(report_html("a"), Contains("min=\"0\" max=\"4\" value=\"2\""));
 }
@@ -193,28 +234,29 @@ TEST_CASE("the same run gives the same bytes, and reporting twice changes nothin
   CHECK(report_html("a") == page);
 }
 
-TEST_CASE("images come out of base64 as they went in") {
+TEST_CASE("images and the 3D view come out of the page as they went in") {
   const TemporaryFolder here;
   make_run("a", "a");
   const std::string page = report_html("a");
-  const std::string image = file_text("a/frames/0001_render.png");
-  const size_t at = page.find(" render: \"data:image/png;base64,");
-  REQUIRE(at != std::string::npos);
-  const size_t begin = page.find(',', at) + 1;
-  const std::string text = page.substr(begin, page.find('"', begin) - begin);
-  CHECK(text.size() % 4 == 0);
-  const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string back;
-  unsigned bits = 0, count = 0;
-  for (const char c : text) {
-    if (c == '=') break;
-    bits = (bits << 6U) | static_cast<unsigned>(digits.find(c));
-    count += 6;
-    if (count < 8) continue;
-    count -= 8;
-    back += static_cast<char>((bits >> count) & 255U);
-  }
-  CHECK(back == image);
+  CHECK(from_base64(text_between(page, "\"render\": \"data:image/png;base64,", "\"")) ==
+        read_file("a/frames/0001_render.png"));
+  const Bytes packed = from_base64(text_between(page, "id=\"view3d-data\">", "<")),
+              view = read_file("a/view3d.safetensors");
+  GzipReader reader(packed, "the page");
+  Bytes unpacked(view.size());
+  reader.read(unpacked);
+  reader.expect_end();
+  CHECK(unpacked == view);
+}
+
+TEST_CASE("the page's data is JSON") {
+  const TemporaryFolder here;
+  make_run("a", "a");
+  const nlohmann::json data = nlohmann::json::parse(text_between(report_html("a"), "id=\"frames-data\">", "</script>"));
+  REQUIRE(data["images"].size() == 2);
+  CHECK(data["images"][0]["frame"] == 1);
+  for (const char* kind : {"target", "render", "side"}) CHECK(data["images"][1]["files"].contains(kind));
+  CHECK(data["images"][1]["files"].size() == 3);
 }
 
 TEST_CASE("hostile names do no harm") {
@@ -232,8 +274,8 @@ TEST_CASE("hostile names do no harm") {
   here.write("a/config.resolved.json", "{\"</pre><script>\": 1}");
   const std::string page = report_html("a");
   CHECK(tag_fault(page) == "");
-  CHECK(count_of(page, "<script>") == 1);  // ours
-  CHECK(count_of(page, "</script>") == 1);
+  CHECK(count_of(page, "<script>") == 1);   // ours
+  CHECK(count_of(page, "</script>") == 3);  // and of the data
   for (const char* bad : {"<b>", "<i ", "<img src=x", "<u>", "<s>", "<q>", "<h>", "<d>", "alert('", "\a"}) {
     INFO(bad);
     CHECK(page.find(bad) == std::string::npos);
@@ -257,7 +299,7 @@ TEST_CASE("what is missing is told, and is no error") {
   const std::string page = report_html("a");
   CHECK(tag_fault(page) == "");
   for (const char* note : {"status.json is missing", "summary.json is missing", "metrics.jsonl is missing",
-                           "There are no images in frames/."})
+                           "view3d.safetensors is missing", "There are no images in frames/."})
     CHECK_THAT(page, Contains(note));
   CHECK_THAT(page, Contains("<span class=\"badge unknown\">unknown</span>") && Contains("No errors were measured."));
   CHECK(count_of(page, "<script>") == 0);
@@ -273,7 +315,7 @@ TEST_CASE("what is missing is told, and is no error") {
        {"config.resolved.json is missing", "Of 2 frames 1 have no image of the kind &quot;render&quot;.",
         "frames/0001_target.png is not a PNG image.", "The last line of metrics.jsonl was cut short and is left out."})
     CHECK_THAT(partial, Contains(note));
-  CHECK(count_of(partial, "data:image/png;base64,") == 4);
+  CHECK(count_of(partial, "data:image/png;base64,") == 4);  // of six: one is missing, one no image
 
   make_run("c", "c");
   fs::remove("c/summary.json");  // time comes from the lines then
@@ -324,6 +366,7 @@ TEST_CASE("damaged files are told with file and line") {
     }
     return std::string("accepted");
   };
+  CHECK_THAT(message_of("view3d.safetensors", "12345678"), Catch::Matchers::StartsWith("a/view3d.safetensors: "));
   CHECK_THAT(message_of("status.json", "{\n\"state\": }"), Catch::Matchers::StartsWith("a/status.json:2:"));
   CHECK_THAT(message_of("config.resolved.json", "{"), Catch::Matchers::StartsWith("a/config.resolved.json:1:"));
   CHECK_THAT(message_of("summary.json", "{\n\n\"metrics\": 1}"), Catch::Matchers::StartsWith("a/summary.json:3:"));

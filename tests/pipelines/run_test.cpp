@@ -35,7 +35,7 @@ RunConfig longer_config() { return tiny_config({"stages.camera.iterations=30", "
 
 void check_frames(const fs::path& run) {
   for (int frame = 1; frame < kTinyFrames; ++frame) {
-    for (const char* kind : {"target", "render", "difference", "start"}) {
+    for (const char* kind : {"target", "render", "difference", "start", "side"}) {
       const std::string file = RunPaths{run}.frame_image(frame, kind);
       INFO(file);
       const Image image = read_image(file);
@@ -44,7 +44,8 @@ void check_frames(const fs::path& run) {
       CHECK(image.height() == kTinyPixels);
     }
   }
-  CHECK(names_in(run / "frames").size() == 4 * (kTinyFrames - 1));
+  CHECK(names_in(run / "frames").size() == 5 * (kTinyFrames - 1) + 3);
+  for (const char* kind : {"target", "render", "side"}) CHECK(fs::exists(RunPaths{run}.frame_image(0, kind)));
 }
 
 void check_metrics_lines(const fs::path& run, int camera_iterations, int interaction_iterations) {
@@ -120,7 +121,7 @@ TEST_CASE("a run leaves a whole run folder, and a result better than its baselin
   CHECK(names_in(run) == std::set<std::string>{".lock", "body.glb", "cameras.json", "checkpoint",
                                                "config.resolved.json", "frames", "log.txt", "metrics.jsonl",
                                                "motion.npz", "motion_30fps.npz", "objects.npz", "preview.mp4",
-                                               "report.html", "status.json", "summary.json"});
+                                               "report.html", "status.json", "summary.json", "view3d.safetensors"});
   CHECK(temporaries_in(run).empty());
   CHECK(json_of(run / "status.json")["state"] == "done");
   CHECK(json_of(run / "status.json")["threads"] == 1);

@@ -142,7 +142,8 @@ inline nlohmann::json without_seconds(nlohmann::json value) {
 /// the members of summary.json without seconds.
 inline std::map<std::string, std::string> result_of(const std::filesystem::path& run) {
   std::map<std::string, std::string> result;
-  for (const char* name : {"config.resolved.json", "motion.npz", "motion_30fps.npz", "objects.npz", "cameras.json"}) {
+  for (const char* name : {"config.resolved.json", "motion.npz", "motion_30fps.npz", "objects.npz", "cameras.json",
+                           "view3d.safetensors"}) {
     result[name] = file_text(run / name);
   }
   for (const char* name : {"body.glb", "preview.mp4", "color_net.safetensors"}) {  // not every run has these
