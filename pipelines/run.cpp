@@ -11,6 +11,7 @@
 #include "core/version.h"
 #include "pipelines/report.h"
 #include "pipelines/run_problems.h"
+#include "pipelines/visibility.h"
 
 namespace hsi4d {
 
@@ -101,6 +102,7 @@ RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses
     clip.files.push_back({"/body/path", config.body.path});
   }
   check_start(config.start, clip);
+  check_first_view(clip, config.data.camera.string());
   check_frames(config.data, clip, has_loss(config, "center"));
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));

@@ -8,6 +8,7 @@
 #include "pipelines/cli/text.h"
 #include "pipelines/clip.h"
 #include "pipelines/run_problems.h"
+#include "pipelines/visibility.h"
 
 namespace hsi4d::cli {
 
@@ -45,6 +46,7 @@ std::string plan(const RunConfig& config, const std::vector<LossTerm>& losses, c
   const Clip clip = read_clip(config.data);
   if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
   check_start(config.start, clip);
+  check_first_view(clip, config.data.camera.string());
   check_frames(config.data, clip, has_loss(config, "center"));
   std::string text = folder_plan(config, losses, clip, folder, resume);
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
