@@ -94,7 +94,7 @@ run("Configuring" ${CMAKE_COMMAND} -S ${source} -B ${build} -G ${GENERATOR} -DCM
 run("Building the program with the new term" ${CMAKE_COMMAND} --build ${build} --parallel 2 --target hsi4d)
 set(program ${build}/bin/hsi4d)
 run("hsi4d list losses" ${program} list losses)
-expect("What hsi4d list losses prints" "${output}" "  ${name}")
+expect("What hsi4d list losses prints" "${output}" "${name}")
 run("hsi4d schema" ${program} schema)
 expect("The schema" "${output}" "\"${name}\"")
 run("hsi4d check" ${program} check mine.json)

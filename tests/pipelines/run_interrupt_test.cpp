@@ -1,6 +1,8 @@
 // The program, stopped by signals at moments that nobody chose, and resumed.
+#include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <optional>
 
 #include <catch2/catch.hpp>
 
@@ -20,6 +22,19 @@ using Clock = std::chrono::steady_clock;
 const std::vector<std::string> kNone;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+constexpr int kStepsOfFile = 4;  // what a file counts in steps_of: as much as so many iterations
+
+/// How far a run has come: iterations and files that it has written. Other than time it does not depend on what else
+/// the machine does.
+int steps_of(const std::string& run) {
+  const std::string metrics = file_text(run + "/metrics.jsonl");
+  auto steps = static_cast<int>(std::count(metrics.begin(), metrics.end(), '\n'));
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(run, error), end; !error && it != end; it.increment(error))
+    steps += kStepsOfFile;
+  return steps;
+}
 
 /// The config of the tiny dataset with a color net that moves, and a stage over the sequence.
 std::string write_every_kind_of_stage() {
@@ -84,15 +99,13 @@ void check_resumes(const std::string& run) {
   CHECK(all_differences("whole", run) == kNone);
 }
 
-/// Writes "whole", never stopped. Returns how long that took, seconds.
-double run_whole() {
-  const Clock::time_point start = Clock::now();
+/// Writes "whole", never stopped.
+void run_whole() {
   const ProgramResult result = run_hsi4d(arguments_for("whole", false));
   INFO(result.err);
   REQUIRE(result.status == 0);
   REQUIRE(fs::exists("whole/color_net.safetensors"));
   REQUIRE(fs::exists("whole/checkpoint/color_net_0003.safetensors"));
-  return seconds_since(start);
 }
 
 struct Tally {
@@ -100,21 +113,38 @@ struct Tally {
   void add(Fate fate) { ++(fate == Fate::kDone ? done : fate == Fate::kStopped ? stopped : killed); }
 };
 
-/// Tries as many runs, each stopped at a moment of its own part of the time that a whole one takes, every other one
-/// again when it was resumed; SIGINT and SIGKILL in turn.
+/// A moment up to 20 ms after a run has come so far.
+class LittleLater {
+ public:
+  LittleLater(std::string run, double steps, RandomSequence& random)
+      : run_(std::move(run)), steps_(steps), delay_s_(random.uniform(0, 0.02)) {}
+  bool operator()() {
+    if (!reached_ && steps_of(run_) >= steps_) reached_ = Clock::now();
+    return reached_ && seconds_since(*reached_) >= delay_s_;
+  }
+
+ private:
+  std::string run_;
+  double steps_, delay_s_;
+  std::optional<Clock::time_point> reached_;
+};
+
+/// Tries as many runs, each stopped at a moment of its own part of a whole one, every other one again when it was
+/// resumed; SIGINT and SIGKILL in turn.
 Tally interrupt_at_random(int tries) {
-  const double whole = run_whole();
+  run_whole();
+  const int whole = steps_of("whole");
   RandomSequence random(20);
   Tally tally;
   for (int attempt = 0; attempt < tries; ++attempt) {
     const std::string run = "run" + std::to_string(attempt);
     const int signal = attempt % 2 == 0 ? SIGINT : SIGKILL;
-    double seconds = whole * (attempt + random.uniform(0, 1)) / tries;
+    double steps = whole * (attempt + random.uniform(0, 1)) / tries;
     for (int stop = 0; stop <= attempt / 2 % 2; ++stop) {
-      INFO("try " << attempt << ", signal " << signal << " after " << seconds << " s of " << whole);
-      const Clock::time_point start = Clock::now();
-      tally.add(run_until(run, signal, [&] { return seconds_since(start) >= seconds; }));
-      seconds = random.uniform(0, whole);
+      INFO("try " << attempt << ", stop " << stop << ", signal " << signal << " after " << steps << " steps of "
+                  << whole);
+      tally.add(run_until(run, signal, LittleLater(run, steps, random)));
+      steps = random.uniform(steps_of(run), whole);
     }
     INFO("try " << attempt << ", signal " << signal);
     check_resumes(run);
