@@ -130,10 +130,25 @@ Image reduced(const Image& image, const Camera& camera) {
   return has_size_of(image, camera) ? image : resize_area(image, camera.height, camera.width);
 }
 
+/// Files of floats may hold anything.
+void check_finite(const Image& image, const std::string& place) {
+  for (int c = 0; c < image.channels(); ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      const float* row = image.row(c, y);
+      const float* bad = std::find_if(row, row + image.width(), [](float value) { return !std::isfinite(value); });
+      if (bad == row + image.width()) continue;
+      throw DataError(place + ": the number at row " + std::to_string(y) + ", column " + std::to_string(bad - row) +
+                      ", channel " + std::to_string(c) + " is " + (std::isnan(*bad) ? "NaN" : "infinite") +
+                      "; frames and masks hold finite numbers");
+    }
+  }
+}
+
 /// A mask that is as large as the frame of the video, in the camera's size; empty where there is none.
 Image read_mask(const MaskSource& source, const Clip& clip, Index index, const Image& frame) {
   const Image mask = source.read(clip.video->frames, index);
   if (mask.width() == 0) return Image(1, clip.camera.height, clip.camera.width);
+  check_finite(mask, source.place(clip.video->frames, index));
   if (mask.height() == frame.height() && mask.width() == frame.width()) return reduced(mask, clip.camera);
   throw DataError(source.place(clip.video->frames, index) + ": is " + size_text(mask) + " pixels, " +
                   (has_size_of(frame, clip.camera) ? "the camera's image " : "the video's frame ") + size_text(frame));
@@ -204,12 +219,13 @@ bool fits_camera(const Image& frame, const Camera& camera) {
 }
 
 void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
-  std::vector<std::vector<bool>> is_seen(static_cast<std::size_t>(clip.frames()));  // [frame][object]
+  std::vector<std::vector<bool>> is_seen(static_cast<std::size_t>(clip.frames()));  // [frame][human, then objects]
   const auto look = [&](Index begin, Index end) {
     for (Index index = begin; index < end; ++index) {
-      for (const Image& mask : read_frame(clip, index).object_masks) {
-        is_seen[static_cast<std::size_t>(index)].push_back(shows_something(mask, data.mask_threshold));
-      }
+      std::vector<bool>& seen = is_seen[static_cast<std::size_t>(index)];
+      const ClipFrame frame = read_frame(clip, index);
+      seen.push_back(shows_something(frame.human_mask, data.mask_threshold));
+      for (const Image& mask : frame.object_masks) seen.push_back(shows_something(mask, data.mask_threshold));
     }
   };
   const bool has_videos =
@@ -220,17 +236,21 @@ void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
   } else {
     look(0, clip.frames());  // videos are decoded in order
   }
-  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+  const auto warn_if_hidden = [&](std::size_t mask, const std::string& name, const std::string& what,
+                                  const std::string& effect) {
     std::vector<Index> hidden;
     for (std::size_t t = 1; t < is_seen.size(); ++t) {  // frame 0 is given
-      if (!is_seen[t][o]) hidden.push_back(static_cast<Index>(t));
+      if (!is_seen[t][mask]) hidden.push_back(static_cast<Index>(t));
     }
-    if (hidden.empty()) continue;
-    log_warning((data.masks / clip.objects[o].name).string() + ": the object is hidden in " +
+    if (hidden.empty()) return;
+    log_warning((data.masks / name).string() + ": " + what + " is hidden in " +
                 (hidden.size() == 1 ? "frame " : "frames ") + frame_ranges(hidden) +
-                ": no pixel reaches data.mask_threshold" +
-                (has_center ? "; the loss \"center\" is off for it there" : ""));
-  }
+                ": no pixel reaches data.mask_threshold" + effect);
+  };
+  warn_if_hidden(0, kHumanMasks, "the human", "");
+  for (std::size_t o = 0; o < clip.objects.size(); ++o)
+    warn_if_hidden(1 + o, clip.objects[o].name, "the object",
+                   has_center ? "; the loss \"center\" is off for it there" : "");
 }
 
 std::string frame_ranges(const std::vector<Index>& frames) {
@@ -264,7 +284,9 @@ ClipFrame read_frame(const Clip& clip, Index index) {
                     " channels; the camera's image is " + size_text(clip.camera) + " with 3");
   }
   ClipFrame frame;
-  frame.target = take_channels(reduced(read, clip.camera), 0, 3);
+  const Image colors = take_channels(read, 0, 3);
+  check_finite(colors, frames.place(index));
+  frame.target = reduced(colors, clip.camera);
   frame.human_mask = read_mask(clip.video->masks.front(), clip, index, read);
   for (std::size_t m = 1; m < clip.video->masks.size(); ++m)
     frame.object_masks.push_back(read_mask(clip.video->masks[m], clip, index, read));

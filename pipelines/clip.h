@@ -62,8 +62,8 @@ inline constexpr const char* kHumanMasks = "human";
 Clip read_clip(const DataSettings& data);
 
 /// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on.
-/// Objects that some masks after frame 0 show nothing of are told in the log, each with its frames. Throws as
-/// read_frame.
+/// A human or an object that some masks after frame 0 show nothing of is told in the log, each with its frames. Throws
+/// as read_frame.
 /// @param has_center  the run has the loss `center`, which such masks switch off
 void check_frames(const DataSettings& data, const Clip& clip, bool has_center);
 
@@ -72,7 +72,7 @@ void check_frames(const DataSettings& data, const Clip& clip, bool has_center);
 bool fits_camera(const Image& frame, const Camera& camera);
 
 /// Reads frame `index` and its masks, and reduces larger ones to the camera's size. A mask that has no file counts as
-/// empty. Throws as read_clip.
+/// empty. Throws as read_clip; a number that is not finite too, with its row and column.
 ClipFrame read_frame(const Clip& clip, Index index);
 
 /// The files of a frame: the image, and the masks of human and objects, which may be missing. None of those that are in

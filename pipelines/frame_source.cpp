@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <mutex>
+#include <optional>
 
 #include "core/check.h"
 #include "core/image_io.h"
+#include "core/log.h"
 #include "core/text.h"
 #include "core/video.h"
 
@@ -33,13 +36,14 @@ namespace fs = std::filesystem;
 
 constexpr Index kFewestFrames = 2;
 
+bool is_number(const std::string& text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
 /// Refuses 8.png, 9.png, 10.png: in the order of their names 10 comes first.
 void check_numbering(const std::vector<std::string>& names, const fs::path& folder) {
-  const auto is_number = [](const std::string& name) {
-    const std::string stem = fs::path(name).stem().string();
-    return !stem.empty() && std::all_of(stem.begin(), stem.end(), [](char c) { return c >= '0' && c <= '9'; });
-  };
-  if (!std::all_of(names.begin(), names.end(), is_number)) return;
+  const auto is_numbered = [](const std::string& name) { return is_number(fs::path(name).stem().string()); };
+  if (!std::all_of(names.begin(), names.end(), is_numbered)) return;
   for (const std::string& name : names) {
     if (name.size() == names.front().size()) continue;
     throw DataError(
@@ -57,12 +61,50 @@ void check_characters(const std::vector<std::string>& names, const fs::path& fol
   }
 }
 
+/// The number that a name is, "0012.png"; none where it is no number, or a large one.
+std::optional<Index> number_of(const std::string& name) {
+  constexpr std::size_t kMostDigits = 15;
+  const std::string stem = fs::path(name).stem().string();
+  if (stem.size() > kMostDigits || !is_number(stem)) return std::nullopt;
+  return std::stoll(stem);
+}
+
+/// Frames count as equally far apart in time; where their numbers are not, one is missing.
+void warn_of_gaps(const std::vector<std::string>& names, const fs::path& folder) {
+  std::optional<Index> least;
+  std::size_t widest = 0;
+  Index widest_step = 0;
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    const std::optional<Index> before = number_of(names[i - 1]), here = number_of(names[i]);
+    if (!before || !here) return;
+    const Index step = *here - *before;
+    if (!least || step < *least) least = step;
+    if (step <= widest_step) continue;
+    widest_step = step;
+    widest = i;
+  }
+  if (least && widest_step > *least)
+    log_warning(folder.string() + ": \"" + names[widest - 1] + "\" is followed by \"" + names[widest] +
+                "\"; frames count as equally far apart in time, so one seems to be missing");
+}
+
+/// What else is in a folder that may have been meant for frames: "; its 12 .jpg files are not read".
+std::string unread_text(const std::map<std::string, Index>& count_of_ending) {
+  std::string text;
+  for (const auto& [ending, count] : count_of_ending)
+    text += (text.empty() ? "; its " : ", ") + std::to_string(count) + " " + ending;
+  return text.empty() ? "" : text + " files are not read";
+}
+
 /// The .png files of a folder, in the order of their names.
 std::vector<std::string> png_names(const fs::path& folder) {
   std::vector<std::string> names;
+  std::map<std::string, Index> others;  // by ending
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (entry.path().extension() == ".png") names.push_back(entry.path().filename().string());
+    const std::string ending = entry.path().extension().string();
+    if (ending == ".png") names.push_back(entry.path().filename().string());
+    if (ending != ".png" && !ending.empty() && is_plain_text(ending)) ++others[ending];
   }
   if (error) throw UserError(folder.string() + ": cannot be listed as a folder of frames: " + error.message());
   std::sort(names.begin(), names.end());
@@ -70,8 +112,9 @@ std::vector<std::string> png_names(const fs::path& folder) {
   check_numbering(names, folder);
   if (std::ssize(names) < kFewestFrames) {
     throw UserError(folder.string() + ": holds " + std::to_string(names.size()) +
-                    " .png files; a clip needs at least 2 frames");
+                    " .png files; a clip needs at least 2 frames" + unread_text(others));
   }
+  warn_of_gaps(names, folder);
   return names;
 }
 

@@ -55,16 +55,20 @@ Gaussians rest_gaussians(const Avatar& avatar) {
           .sh = harmonics_of(avatar.colors)};
 }
 
-PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose, const Vector3<double>* center_world) {
-  PosedGaussians posed{rest_gaussians(avatar), {}};
+std::vector<double> blended_transforms(const Avatar& avatar, const BodyPose& pose) {
   const PosedJoints skeleton = pose_skeleton(avatar, pose);
   const SparseWeights& weights = avatar.weights;
-  posed.transforms.assign(12 * static_cast<std::size_t>(avatar.count()), 0.0);
+  std::vector<double> transforms(12 * static_cast<std::size_t>(avatar.count()));
   for (Index i = 0; i < weights.vertices * weights.per_vertex; ++i) {
     const double* joint = skeleton.transforms.data() + 12 * Index{weights.indices[static_cast<std::size_t>(i)]};
-    double* blended = posed.transforms.data() + 12 * (i / weights.per_vertex);
+    double* blended = transforms.data() + 12 * (i / weights.per_vertex);
     for (int e = 0; e < 12; ++e) blended[e] += weights.weights[static_cast<std::size_t>(i)] * joint[e];
   }
+  return transforms;
+}
+
+PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose, const Vector3<double>* center_world) {
+  PosedGaussians posed{rest_gaussians(avatar), blended_transforms(avatar, pose)};
   if (avatar.color_net) posed.gaussians.sh = harmonics_of(net_colors(avatar, pose, posed.transforms, center_world));
   return posed;
 }

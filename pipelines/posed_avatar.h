@@ -10,6 +10,10 @@ namespace hsi4d {
 /// Throws InternalError as check_sizes.
 Gaussians rest_gaussians(const Avatar& avatar);
 
+/// The blended transform of each of the avatar's Gaussians, Σ_j w_nj A_j, rows [3,4]: [N,12], in double. Throws
+/// InternalError when pose and avatar differ in their joints.
+std::vector<double> blended_transforms(const Avatar& avatar, const BodyPose& pose);
+
 /// The avatar's Gaussians with the blended transform of each, Σ_j w_nj A_j, in double. Colours become harmonics of
 /// degree 0: those of the avatar's color net in this pose, where it has one.
 ///

@@ -17,6 +17,7 @@
 #include "pipelines/stage_log.h"
 #include "pipelines/summarize_run.h"
 #include "pipelines/view3d.h"
+#include "pipelines/visibility.h"
 
 namespace hsi4d {
 
@@ -88,6 +89,8 @@ class Reconstruction {
     if (frame_stages_ < config_.stages.size()) refine();
     bar_.finish();
     warn_of_left_out(progress_.left_out, config_, clip_);
+    warn_of_still_groups(progress_.still, config_);
+    warn_of_what_is_out_of_view(clip_, result());
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
     const RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     folder_.write_summary(summary);
@@ -194,7 +197,9 @@ class Reconstruction {
   void run_in_frame(std::size_t s, const FrameTask& frame, SceneState& state, ColorState& colors) {
     const auto& [name, stage] = config_.stages[s];
     std::string begin;  // of the loss, for the log
+    GradientWatch gradients;
     const auto note_iteration = [&](const IterationReport& report, const RenderCounters& counters) {
+      gradients.see(report.groups);
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
       note(frame.index, s, report, &counters);
     };
@@ -208,6 +213,7 @@ class Reconstruction {
     for (const LeftOutObject& object : result.left_out) {
       progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
     }
+    for (const std::string& group : gradients.still_groups()) progress_.still.push_back({s, frame.index, group});
     folder_.note("frame " + std::to_string(frame.index) + ", " + stage_text(name, result, begin, clip_));
   }
 

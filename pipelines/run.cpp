@@ -12,6 +12,7 @@
 #include "pipelines/report.h"
 #include "pipelines/run_problems.h"
 #include "pipelines/sources.h"
+#include "pipelines/visibility.h"
 
 namespace hsi4d {
 
@@ -109,6 +110,7 @@ RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses
     clip.files.push_back({"/body/path", config.body.path});
   }
   check_start(config.start, clip);
+  check_first_view(clip, config.data.camera.string());
   check_frames(config.data, clip, has_loss(config, "center"));
   identity.seed = config.seed;
   const int threads = options.threads > 0 ? options.threads : config.threads;

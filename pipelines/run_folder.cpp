@@ -323,6 +323,11 @@ void remove_temporaries(const fs::path& folder) {
   }
 }
 
+void remove_all_temporaries(const RunPaths& paths) {
+  for (const fs::path& folder : {paths.folder, fs::path(paths.frames()), fs::path(paths.checkpoint())})
+    remove_temporaries(folder);
+}
+
 }  // namespace
 
 std::optional<RunState> look_at_run_folder(const std::string& path, const std::string& config, bool resume) {
@@ -340,7 +345,6 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
   lock_ = std::make_unique<Lock>(paths_);
   const Found found = look_at_folder(paths_);  // as it is now that nobody else writes
   check_resumable(paths_, found, identity_.config, resume);
-  remove_temporaries(paths_.folder);
   started_ = now_text();
   if (found.is_run) {
     resumed_from_ = found_state(found.status);
@@ -350,10 +354,8 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
   } else {
     write_text_file(paths_.config(), identity_.config);  // first: it makes the folder one of a run, should we be killed
   }
-  for (const std::string& folder : {paths_.frames(), paths_.checkpoint()}) {
-    make_folder(folder);
-    remove_temporaries(folder);
-  }
+  for (const std::string& folder : {paths_.frames(), paths_.checkpoint()}) make_folder(folder);
+  remove_all_temporaries(paths_);
   metrics_ = std::make_unique<Appender>(paths_.metrics());
   log_.emplace(log_to_file(paths_.log()));
   write_status();
@@ -362,6 +364,8 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
 RunFolder::~RunFolder() = default;
 
 void RunFolder::set_state(RunState state, std::string_view message) {
+  // An encoder that outlived a run that was killed may have made its file after we came.
+  if (state != RunState::kRunning) remove_all_temporaries(paths_);
   state_ = state;
   message_ = message;
   write_status();

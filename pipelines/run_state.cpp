@@ -78,6 +78,32 @@ std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip
   return left_out;
 }
 
+constexpr const char* kStill = "still";
+
+/// A line each: "STAGE FRAME GROUP".
+std::string still_text(const std::vector<StillGroup>& still) {
+  std::string text;
+  for (const StillGroup& entry : still)
+    text += std::to_string(entry.stage) + " " + std::to_string(entry.frame) + " " + entry.group + "\n";
+  return text;
+}
+
+std::vector<StillGroup> still_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages) {
+  std::vector<StillGroup> still;
+  if (!checkpoint.has(kStill)) return still;
+  std::istringstream lines(checkpoint.text(kStill));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    StillGroup entry;
+    words >> entry.stage >> entry.frame >> entry.group;
+    if (!words || entry.stage >= stages || entry.frame < 1 || entry.frame >= clip.frames())
+      throw DataError(checkpoint.source() + ": \"" + kStill + "\" holds \"" + line +
+                      "\", which is no stage, frame and group of this clip");
+    still.push_back(entry);
+  }
+  return still;
+}
+
 /// One state as numbers: camera [R | t] (12), then 6 an object, then the body's transl (3) and axis-angles (165).
 void append(const SceneState& state, std::vector<double>& numbers) {
   for (Index r = 0; r < 3; ++r) {
@@ -160,6 +186,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
   if (!progress.left_out.empty()) checkpoint.set(kLeftOut, left_out_text(progress.left_out));
+  if (!progress.still.empty()) checkpoint.set(kStill, still_text(progress.still));
   store_color_state(progress.colors, checkpoint);
   store_errors("image_errors", progress.image_errors, checkpoint);
   store_errors("start_errors", progress.start_errors, checkpoint);
@@ -213,6 +240,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   progress.inputs = checkpoint.text("inputs");
   progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
   progress.left_out = left_out_of(checkpoint, clip, stages);
+  progress.still = still_of(checkpoint, clip, stages);
   progress.image_errors = stored_errors("image_errors", done, checkpoint);
   progress.start_errors = stored_errors("start_errors", done, checkpoint);
   return progress;

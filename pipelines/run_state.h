@@ -27,6 +27,13 @@ struct LeftOutInFrame {
   std::string term, reason;
 };
 
+/// A group of parameters whose gradient was 0 in every iteration of a stage of a frame: nothing depended on it.
+struct StillGroup {
+  std::size_t stage = 0;
+  Index frame = 0;
+  std::string group;
+};
+
 /// Everything that the next frame depends on, or that the end of the run tells.
 struct RunProgress {
   std::vector<std::vector<SceneState>> after_stage;  ///< [stage][frame]; frame 0 is the given one
@@ -36,6 +43,7 @@ struct RunProgress {
   std::string inputs;                                ///< what was read so far, in the form of input_hashes
   Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
   std::vector<LeftOutInFrame> left_out;              ///< in the order in which it happened
+  std::vector<StillGroup> still;                     ///< likewise
   ColorState colors;                                 ///< after the last frame done
   double seconds = 0;                                ///< of the frames done
 

@@ -1,7 +1,5 @@
 #include "pipelines/stage_log.h"
 
-#include <map>
-
 #include "core/log.h"
 #include "core/text.h"
 
@@ -17,6 +15,27 @@ std::string left_out_text(const StageResult& result, const Clip& clip) {
   }
   return text;
 }
+
+/// Messages, each of several frames.
+class FramesOfMessages {
+ public:
+  void add(const std::string& begin, Index frame) {
+    std::vector<Index>& frames = frames_[begin];
+    if (frames.empty()) order_.push_back(begin);
+    if (frames.empty() || frames.back() != frame) frames.push_back(frame);
+  }
+  /// Each once, with its frames, in the order in which it was first added.
+  void warn() const {
+    for (const std::string& begin : order_) {
+      const std::vector<Index>& frames = frames_.at(begin);
+      log_warning(begin + (frames.size() == 1 ? "frame " : "frames ") + frame_ranges(frames));
+    }
+  }
+
+ private:
+  std::map<std::string, std::vector<Index>> frames_;
+  std::vector<std::string> order_;
+};
 
 }  // namespace
 
@@ -35,20 +54,40 @@ std::string stage_text(const std::string& stage, const StageResult& result, cons
 }
 
 void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip) {
-  std::map<std::string, std::vector<Index>> frames;  // by message
-  std::vector<std::string> messages;                 // in the order in which it first happened
+  FramesOfMessages messages;
   for (const LeftOutInFrame& entry : left_out) {
     const std::string begin = "stage " + config.stages[entry.stage].first + ": the loss \"" + entry.term +
                               "\" was off for the object \"" +
                               clip.objects[static_cast<std::size_t>(entry.object)].name + "\" (" + entry.reason +
                               "), in some iterations at least, in ";
-    if (frames[begin].empty()) messages.push_back(begin);
-    if (frames[begin].empty() || frames[begin].back() != entry.frame) frames[begin].push_back(entry.frame);
+    messages.add(begin, entry.frame);
   }
-  for (const std::string& begin : messages) {
-    const std::vector<Index>& of_object = frames[begin];
-    log_warning(begin + (of_object.size() == 1 ? "frame " : "frames ") + frame_ranges(of_object));
+  messages.warn();
+}
+
+void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig& config) {
+  FramesOfMessages messages;
+  for (const StillGroup& entry : still)
+    messages.add("stage " + config.stages[entry.stage].first + ": nothing depends on the group \"" + entry.group +
+                     "\" (its gradient is 0 in every iteration) in ",
+                 entry.frame);
+  messages.warn();
+}
+
+void GradientWatch::see(std::span<const GroupStep> groups) {
+  for (const GroupStep& group : groups) {
+    if (!group.moved) continue;
+    const auto known = has_gradient_.try_emplace(std::string(group.name), false).first;
+    known->second = known->second || group.gradient_norm > 0;
   }
+}
+
+std::vector<std::string> GradientWatch::still_groups() const {
+  std::vector<std::string> names;
+  for (const auto& [name, has_gradient] : has_gradient_) {
+    if (!has_gradient) names.push_back(name);
+  }
+  return names;
 }
 
 void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings) {

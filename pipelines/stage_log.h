@@ -1,6 +1,7 @@
 // What the log says of the stages of a run.
 #pragma once
 
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,6 +22,20 @@ std::string stage_text(const std::string& stage, const StageResult& result, cons
 
 /// Every object that a term of a stage left out: one warning, with its frames.
 void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip);
+
+/// Every group that had no gradient in all of a stage: one warning, with its frames.
+void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig& config);
+
+/// Sees the iterations of a stage.
+class GradientWatch {
+ public:
+  void see(std::span<const GroupStep> groups);
+  /// Groups that were on in some iteration, and had a gradient other than 0 in none.
+  std::vector<std::string> still_groups() const;
+
+ private:
+  std::map<std::string, bool, std::less<>> has_gradient_;  // by group that was on
+};
 
 /// Every term of a stage that is off: one warning, with the reason.
 void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings);

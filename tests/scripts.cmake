@@ -16,6 +16,14 @@ if(NOT HSI4D_SANITIZE)  # sanitized libraries are not installed
   set_tests_properties(install PROPERTIES LABELS quick TIMEOUT 300)
 endif()
 
+if(NOT HSI4D_SANITIZE)
+  add_test(NAME adding_a_loss
+    COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/adding_a_loss
+                             -DGENERATOR=${CMAKE_GENERATOR} -DCOMPILER=${CMAKE_CXX_COMPILER}
+                             -P ${CMAKE_CURRENT_SOURCE_DIR}/adding_a_loss_test.cmake)
+  set_tests_properties(adding_a_loss PROPERTIES LABELS full TIMEOUT 3600)
+endif()
+
 # Exporters of other programs' files, with NumPy and stand-ins for PyTorch and joblib.
 find_program(HSI4D_PYTHON python3 HINTS /usr/bin)  # the one that Debian's NumPy belongs to
 if(HSI4D_PYTHON)

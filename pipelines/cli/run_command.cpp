@@ -10,6 +10,7 @@
 #include "pipelines/clip.h"
 #include "pipelines/run_problems.h"
 #include "pipelines/sources.h"
+#include "pipelines/visibility.h"
 
 namespace hsi4d::cli {
 
@@ -83,6 +84,7 @@ std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, co
   const Clip clip = read_clip(config.data);
   if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
   check_start(config.start, clip);
+  check_first_view(clip, config.data.camera.string());
   check_frames(config.data, clip, has_loss(config, "center"));
   std::string text = folder_plan(config, identity, losses, clip, folder, resume);
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +

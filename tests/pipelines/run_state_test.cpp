@@ -208,6 +208,27 @@ TEST_CASE("a checkpoint with entries that cannot be is refused, whatever they ar
   CHECK_THAT(error_with("image_errors/1/ssim", Doubles{}), Contains("\"image_errors/1/ssim\" holds 0 numbers"));
 }
 
+TEST_CASE("groups without a gradient are in a checkpoint, and nothing that is not of the clip") {
+  const TemporaryFolder here;
+  const Clip clip = three_frames();
+  RunProgress progress = random_progress(clip);
+  progress.still = {{0, 1, "camera"}, {1, 2, "body_pose"}};
+  save_progress(kFile, kConfig, progress);
+  const std::vector<StillGroup> read = load_progress(kFile, kConfig, clip, kStages).still;
+  REQUIRE(read.size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    CHECK(read[i].stage == progress.still[i].stage);
+    CHECK(read[i].frame == progress.still[i].frame);
+    CHECK(read[i].group == progress.still[i].group);
+  }
+  for (const std::string line : {"2 1 camera", "0 3 camera", "0 0 camera", "-1 1 camera", "0 1", "x"}) {
+    INFO(line);
+    save_with(clip, "still", line + "\n");
+    CHECK(loading_error(clip) ==
+          kFile + ": \"still\" holds \"" + line + "\", which is no stage, frame and group of this clip");
+  }
+}
+
 TEST_CASE("what losses left out is in a checkpoint, and nothing that is not of the clip") {
   const TemporaryFolder here;
   const Clip clip = three_frames();

@@ -1,0 +1,252 @@
+// What a run does with what the camera does not see, and with pictures that say nothing.
+#include <limits>
+
+#include <catch2/catch.hpp>
+
+#include "body/motion_io.h"
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/image_io.h"
+#include "core/log.h"
+#include "pipelines/visibility.h"
+#include "splat/io_ply.h"
+#include "tests/pipelines/tiny_run.h"
+#include "tests/support/program.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+using Texts = std::vector<std::string>;
+
+/// The texts of warnings while `action` runs.
+template <class F>
+Texts warnings_of(F&& action) {
+  Texts texts;
+  const LogSink sink =
+      log_to([&texts](LogLevel, std::string_view text) { texts.emplace_back(text); }, LogLevel::kWarning);
+  action();
+  return texts;
+}
+
+Index count_holding(const Texts& texts, const std::string& part) {
+  return std::count_if(texts.begin(), texts.end(), [&](const std::string& text) { return Contains(part).match(text); });
+}
+
+/// A copy of the dataset, to be spoilt, and runs of it.
+struct Spoilt : CopiedDataset {
+  std::string file(const std::string& name) const { return (path / name).string(); }
+  RunConfig config(const Texts& overrides = {}) const {
+    return load_run_config(path / "config.json", overrides, descriptions_of(loss_terms()));
+  }
+  Texts run(const std::string& out, const Texts& overrides = {}) const {
+    return warnings_of([&] { carry_out_tiny(config(overrides), out); });
+  }
+  /// The program refuses it before anything is written, with these words; a dry run too.
+  void check_refused(const std::string& message) const {
+    for (const Texts& more : {Texts{"--out", "run"}, Texts{"--out", "run", "--dry-run"}}) {
+      Texts words = {"run", file("config.json")};
+      words.insert(words.end(), more.begin(), more.end());
+      const ProgramResult result = run_hsi4d(words);
+      CHECK(result.status == 2);
+      CHECK(result.out.empty());
+      CHECK(result.err == message + "\n");
+      CHECK_FALSE(fs::exists("run"));
+    }
+  }
+  /// An image of every mask of `name`.
+  void write_masks(const std::string& name, const Image& image) const {
+    for (const auto& entry : fs::directory_iterator(path / "masks" / name)) write_image(entry.path().string(), image);
+  }
+  /// Every mean of a file of Gaussians moved.
+  void move_gaussians(const std::string& name, std::size_t axis, float metres) const {
+    Gaussians g = read_ply(file(name)).gaussians;
+    for (std::size_t i = axis; i < g.means.size(); i += 3) g.means[i] += metres;
+    write_ply(file(name), g);
+  }
+};
+
+Image of_one_value(float value) {
+  Image image(1, kTinyPixels, kTinyPixels);
+  for (int y = 0; y < kTinyPixels; ++y) std::fill_n(image.row(0, y), kTinyPixels, value);
+  return image;
+}
+
+/// An image of floats under a name that ends as a PNG's; what a file is, its content tells.
+void write_as_exr(const std::string& name, const Image& image) {
+  const fs::path exr = fs::path(name).replace_extension(".exr");
+  write_image(exr.string(), image);
+  fs::rename(exr, name);
+}
+
+const std::string kNoGradient = " (its gradient is 0 in every iteration) in ";
+
+}  // namespace
+
+TEST_CASE("Gaussians in view are those whose centres are in the image, in front of the camera") {
+  const Clip clip = read_clip(dataset_inputs(TinyDataset::folder()));
+  const GaussiansInView first = gaussians_in_view(clip, clip.first);
+  CHECK(first.scene > 500);
+  CHECK(first.scene < clip.scene.count());
+  CHECK(first.human > 400);
+  CHECK(first.objects == std::vector<Index>{clip.objects[0].gaussians.count()});
+  SceneState moved = clip.first;
+  const Matrix3<double>& rotation = clip.camera.camera_from_world.rotation;
+  moved.body.transl += Vector3<double>(20 * rotation.row(0).transpose());             // to the right of the image
+  moved.objects[0].translation -= Vector3<double>(20 * rotation.row(2).transpose());  // behind the camera
+  CHECK(gaussians_in_view(clip, moved) == GaussiansInView{first.scene, 0, {0}});
+}
+
+TEST_CASE("a body that leaves the view is told with its frames, and comes back", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  Motion motion = read_motion(dataset.file("initial_motion.npz"));
+  motion.poses[2].transl += Vector3<double>(50, 0, 0);
+  write_motion(dataset.file("initial_motion.npz"), motion);
+  const Texts overrides = {"start.root=estimate"};
+  const Texts told = dataset.run("run", overrides);
+  CHECK(told == Texts{"stage interaction: nothing depends on the group \"body_pose\"" + kNoGradient + "frame 2",
+                      "stage interaction: nothing depends on the group \"global_orient\"" + kNoGradient + "frame 2",
+                      "stage interaction: nothing depends on the group \"transl\"" + kNoGradient + "frame 2",
+                      "the human is out of view in frame 2: none of its 500 Gaussians has its centre in the image, "
+                      "which tells nothing of it there"});
+  const Motion result = read_motion("run/motion.npz");
+  CHECK(result.poses[2].transl[0] == Approx(motion.poses[2].transl[0]).epsilon(1e-6));
+  CHECK((result.poses[3].transl - motion.poses[3].transl).norm() < 0.2);
+  CHECK(result.poses[3].transl != motion.poses[3].transl);
+  CHECK(json_of("run/status.json")["state"] == "done");
+
+  int count = 0;  // stopped in frame 3, when frame 2 is in the checkpoint
+  const RunConfig config = dataset.config(overrides);
+  CHECK_THROWS_AS(carry_out_tiny(config, "halves", 1, false, [&] { return ++count == 2 * kPerFrame + 3; }),
+                  Interrupted);
+  CHECK(warnings_of([&] { carry_out_tiny(config, "halves", 1, true); }) == told);
+  CHECK(differences("run", "halves").empty());
+}
+
+TEST_CASE("an object that is never seen stays where it is given, and all that is off for it is told", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  dataset.write_masks(kTinyObject, of_one_value(0));
+  write_changed(dataset.file("initial.json"), dataset.file("initial.json"), [](nlohmann::ordered_json& initial) {
+    initial["objects"][kTinyObject]["translation"] = {0, -30, 0};
+  });
+  const Texts told = dataset.run("run", {"stages.interaction.losses.depth.weight=0"});
+  CHECK(count_holding(told,
+                      "masks/watering_can: the object is hidden in frames 1-3: no pixel reaches "
+                      "data.mask_threshold; the loss \"center\" is off for it there") == 1);
+  CHECK(count_holding(told, "nothing depends on the group \"object_transl\"" + kNoGradient + "frames 1-3") == 1);
+  CHECK(count_holding(told, "nothing depends on the group \"object_orient\"" + kNoGradient + "frames 1-3") == 1);
+  CHECK(count_holding(told, "the object \"watering_can\" is out of view in frames 1-3: none of its ") == 1);
+  const auto tracks = read_object_tracks("run/objects.npz", {kTinyObject});
+  for (const std::vector<ObjectPose>& frame : tracks) CHECK(frame[0].translation[1] == Approx(-30).epsilon(1e-6));
+  for (const nlohmann::json& line : metrics_of("run"))
+    if (line["stage"] == "interaction") CHECK(line["losses"]["center"] == 0);
+}
+
+TEST_CASE("a camera that has nothing of the scene in view is told before the work, and finds nothing by it", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  dataset.move_gaussians("scene.ply", 1, -60);
+  const Texts told = dataset.run("run");
+  const std::string count = std::to_string(read_ply(dataset.file("scene.ply")).gaussians.count());
+  REQUIRE_FALSE(told.empty());
+  CHECK(told.front() == dataset.file("camera.json") + ": none of the scene's " + count +
+                            " Gaussians is in view in frame 0; what a stage is to find by the scene, it cannot");
+  CHECK(count_holding(told, "stage camera: nothing depends on the group \"camera\"" + kNoGradient + "frames 1-3") == 1);
+  CHECK(count_holding(told, "the scene is out of view in frames 1-3: none of its " + count +
+                                " Gaussians has its "
+                                "centre in the image, which tells nothing of it there") == 1);
+  const std::vector<Camera> cameras = read_cameras("run/cameras.json");
+  for (const Camera& camera : cameras)
+    CHECK((camera.camera_from_world.translation - cameras[0].camera_from_world.translation).norm() < 1e-9);
+}
+
+TEST_CASE("a camera that sees nothing at all is refused before anything is written", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  Camera camera = read_camera(dataset.file("camera.json"));
+  for (const Index row : {0, 2}) {  // y up and z backwards, as OpenGL has them, but for the sign of y
+    camera.camera_from_world.rotation.row(row) *= -1;
+    camera.camera_from_world.translation[row] *= -1;
+  }
+  write_camera(dataset.file("camera.json"), camera);
+  dataset.check_refused(dataset.file("camera.json") +
+                        ": nothing is in view in frame 0, neither scene nor human nor objects. The pose must be "
+                        "camera_from_world in OpenCV's axes (x right, y down, z forward), in metres");
+}
+
+TEST_CASE("masks that cover everything leave the camera where it is, which is told", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  dataset.write_masks("human", of_one_value(1));
+  CHECK(dataset.run("run") ==
+        Texts{"stage camera: nothing depends on the group \"camera\"" + kNoGradient + "frames 1-3"});
+}
+
+TEST_CASE("masks that show nothing of the human are told with their frames", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  write_image(dataset.file("masks/human/0002.png"), of_one_value(0));
+  CHECK(dataset.run("run") ==
+        Texts{dataset.file("masks/human") + ": the human is hidden in frame 2: no pixel reaches data.mask_threshold"});
+  CHECK(json_of("run/status.json")["state"] == "done");
+}
+
+TEST_CASE("frames and masks with numbers that are not finite are refused before anything is written", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  SECTION("a frame") {
+    Image frame = read_image(dataset.file("frames/0002.png"));
+    frame(1, 5, 7) = std::numeric_limits<float>::quiet_NaN();
+    write_as_exr(dataset.file("frames/0002.png"), frame);
+    dataset.check_refused(dataset.file("frames/0002.png") +
+                          ": the number at row 5, column 7, channel 1 is NaN; frames and masks hold finite numbers");
+  }
+  SECTION("a mask") {
+    Image mask = of_one_value(0);
+    mask(0, 40, 0) = std::numeric_limits<float>::infinity();
+    write_as_exr(dataset.file("masks/watering_can/0001.png"), mask);
+    dataset.check_refused(
+        dataset.file("masks/watering_can/0001.png") +
+        ": the number at row 40, column 0, channel 0 is infinite; frames and masks hold finite numbers");
+  }
+  SECTION("floats that are finite are read as they are") {
+    for (const char* name : {"frames/0001.png", "frames/0003.png"})
+      write_as_exr(dataset.file(name), read_image(dataset.file(name)));
+    CHECK(dataset.run("run").empty());
+    carry_out_tiny(tiny_config(), "plain");
+    CHECK(file_text("run/motion.npz") == file_text("plain/motion.npz"));
+  }
+}
+
+TEST_CASE("a folder of frames in another format is told, and numbers that leave a gap", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  SECTION("JPEG") {
+    fs::remove_all(dataset.path / "frames");
+    fs::create_directory(dataset.path / "frames");
+    for (const char* name : {"frames/0000.jpg", "frames/0001.jpg", "frames/0002.JPG", "frames/notes"})
+      std::ofstream(dataset.file(name)) << "x";
+    dataset.check_refused(
+        dataset.file("frames") +
+        ": holds 0 .png files; a clip needs at least 2 frames; its 1 .JPG, 2 .jpg files are not read");
+  }
+  SECTION("a frame is missing, and the motion is of frame 0 alone") {
+    fs::remove(dataset.path / "frames/0002.png");
+    fs::remove_all(dataset.path / "truth");
+    Motion motion = read_motion(dataset.file("initial_motion.npz"));
+    motion.poses.resize(1);
+    write_motion(dataset.file("initial_motion.npz"), motion);
+    RunConfig config = dataset.config({"data.truth="});
+    CHECK(warnings_of([&] { read_clip(config.data); }) ==
+          Texts{dataset.file("frames") +
+                ": \"0001.png\" is followed by \"0003.png\"; frames count as equally far apart in time, so one seems "
+                "to be missing"});
+    fs::remove(dataset.path / "frames/0000.png");  // 1 and 3
+    CHECK(warnings_of([&] { read_clip(config.data); }).empty());
+  }
+}
