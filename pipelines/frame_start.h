@@ -11,11 +11,14 @@
 namespace hsi4d {
 
 /// What a part of the state begins a frame with: where the frame before ended; the estimate of this frame; or where it
-/// would be, had it gone on as between the two frames before.
-enum class StartFrom { kPrevious, kEstimate, kVelocity };
+/// would be, had it gone on as between the two frames before; or the one of these that the image says is best
+/// (pipelines/start_choice.h).
+enum class StartFrom { kPrevious, kEstimate, kVelocity, kBest };
 
-inline constexpr std::array<ConfigChoice<StartFrom>, 3> kStartsFrom = {
-    {{StartFrom::kPrevious, "previous"}, {StartFrom::kEstimate, "estimate"}, {StartFrom::kVelocity, "velocity"}}};
+inline constexpr std::array<ConfigChoice<StartFrom>, 4> kStartsFrom = {{{StartFrom::kPrevious, "previous"},
+                                                                        {StartFrom::kEstimate, "estimate"},
+                                                                        {StartFrom::kVelocity, "velocity"},
+                                                                        {StartFrom::kBest, "best"}}};
 
 /// Config section `start`. The defaults are the method's.   [method.md, stage 2]
 struct StartSettings {
@@ -34,7 +37,8 @@ void check_start(const StartSettings& settings, const Clip& clip);
 /// What a run is given for a frame before it does anything: the estimates where there are some, else frame 0.
 SceneState given_start(const Clip& clip, Index frame);
 
-/// The state that the frame after `done` begins with.
+/// The state that the frame after `done` begins with: of parts whose best start is asked for, where the frame before
+/// ended.
 /// @param done  the states of the frames before, frame 0 included
 SceneState frame_start(const StartSettings& settings, const Clip& clip, const std::vector<SceneState>& done);
 

@@ -15,6 +15,7 @@
 #include "pipelines/run_results.h"
 #include "pipelines/run_state.h"
 #include "pipelines/stage_log.h"
+#include "pipelines/start_choice.h"
 #include "pipelines/summarize_run.h"
 #include "pipelines/view3d.h"
 #include "pipelines/visibility.h"
@@ -138,7 +139,12 @@ class Reconstruction {
     SceneState state = frame_start(config_.start, clip_, progress_.after_stage.back());
     ColorState colors = progress_.colors;
     std::vector<SceneState> after;
+    bool has_start = !chooses_start(config_.start);
     for (std::size_t s = 0; s < frame_stages_; ++s) {
+      if (!has_start && config_.stages[s].second.draw == Draw::kAll) {
+        state = choose_start(config_, clip_, progress_.after_stage.back(), frame, state, colors);
+        has_start = true;
+      }
       run_in_frame(s, {index, frame, progress_.covered, progress_.after_stage.back()}, state, colors);
       after.push_back(state);
     }

@@ -71,6 +71,7 @@ Image random_mask(std::uint64_t seed) {
 Var<double> motion_and_mask_loss(const LossInputs<double>& inputs, std::map<std::string, Var<double>>& values) {
   Var<double> total = {};
   for (const auto& [name, weight] : {std::pair{"mask", 1.0},
+                                     {"center", 1e-3},
                                      {"fit", 3.0},
                                      {"contact", 10.0},
                                      {"smooth", 2.0},
