@@ -60,7 +60,7 @@ Index whole_number(const std::string& text) {
 }
 
 /// Conversion between RGB and the colours of a video. Without it swscale takes the nearest colour of 4:2:0 for all four
-/// pixels and rounds coarsely, which costs 4 dB (docs/numerics.md).
+/// pixels and rounds coarsely, which costs 4 to 6 dB (docs/numerics.md).
 constexpr const char* kConversion = "accurate_rnd+full_chroma_int+bicubic";
 
 std::vector<std::string> decoder_command(const std::string& path) {

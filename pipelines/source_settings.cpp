@@ -89,7 +89,7 @@ const std::vector<std::string>& video_placeholders() {
 }
 
 const std::vector<std::string>& mask_placeholders() {
-  static const std::vector<std::string> names = {"video", "objects", "prompt", "out"};
+  static const std::vector<std::string> names = {"video", "objects", "first_masks", "prompt", "out"};
   return names;
 }
 

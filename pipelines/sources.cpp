@@ -19,12 +19,27 @@
 #include "pipelines/input_hashes.h"
 #include "pipelines/scene_render.h"
 #include "splat/render_settings.h"
+#include "splat/sh_basis.h"
 
 namespace hsi4d {
 
 namespace {
 
 namespace fs = std::filesystem;
+
+// ---- The first frame ----
+
+SceneView first_view(const RunConfig& config) {
+  return {read_camera(config.data.camera.string()), config.background, config.render, {}};
+}
+
+/// Rows [begin, end) white and all others black: an image is then what share of a pixel they are.
+void paint(Gaussians& gaussians, Index begin, Index end) {
+  gaussians = with_sh_degree(gaussians, 0);
+  const auto white = static_cast<float>(0.5 / kShC0);
+  for (Index i = 0; i < gaussians.count(); ++i)
+    std::fill_n(gaussians.sh.begin() + 3 * i, 3, i >= begin && i < end ? white : -white);
+}
 
 // ---- What it is made of ----
 
@@ -105,6 +120,7 @@ SourceOutput mask_output(const RunConfig& config, const DataSettings& data) {
   ConfigValue record = command_record(config, command);
   record.add("video", ConfigValue::make_string(video_hashes(frames_of(data), data.frames)));
   record.add("masks_of", strings(masked_names(data)));
+  if (uses_placeholder(command, "first_masks")) record.add("first_masks", first_frame_record(config));
   return output_of(config, "masks", command, record, "");
 }
 
@@ -184,6 +200,25 @@ void put(const fs::path& from, const fs::path& to) {
   if (error) throw UserError(to.string() + ": cannot be written: " + error.message());
 }
 
+/// What a check of files throws; empty: nothing.
+template <class Check>
+std::string fault_of(Check check) {
+  try {
+    check();
+  } catch (const UserError& error) {
+    return error.what();
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string with_replaced(std::string text, const std::string& from, const std::string& to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+  return text;
+}
+
 /// Runs the program, looks at what it wrote, and gives that its name.
 template <class Check>
 void make(const SourceOutput& output, const fs::path& out, const std::vector<std::string>& command,
@@ -202,14 +237,13 @@ void make(const SourceOutput& output, const fs::path& out, const std::vector<std
   if (!fs::exists(out))
     throw UserError(section + command.front() + ": ended with status 0 and wrote nothing at {out}, " + out.string() +
                     end_of_output(*said));
-  try {
-    check(out);
-  } catch (const std::exception& error) {  // UserError, DataError, of any reader
+  const std::string fault = fault_of([&] { check(out); });
+  if (!fault.empty()) {
     fs::path refused = output.path;
     refused.replace_filename(output.path.stem().string() + ".refused" + output.path.extension().string());
     put(out, refused);
     throw DataError(section + command.front() + " wrote what cannot be used, kept as " + refused.string() + ": " +
-                    error.what() + end_of_output(*said));
+                    with_replaced(fault, out.string(), refused.string()) + end_of_output(*said));
   }
   put(out, output.path);
   write_text_file(record_file(output).string(), output.record);
@@ -235,14 +269,24 @@ void make_video(const RunConfig& config, const SourceOutput& output, const Obser
   if (has_first_frame) put(first, config.sources.folder / (output.path.stem().string() + ".first_frame.png"));
 }
 
+void write_first_masks(const RunConfig& config, const fs::path& folder) {
+  const std::vector<std::string> names = masked_names(config.data);
+  const std::vector<Image> masks = first_masks(config);
+  fs::create_directories(folder);
+  for (std::size_t i = 0; i < names.size(); ++i) write_image((folder / (names[i] + ".png")).string(), masks[i]);
+}
+
 void make_masks(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
                 const Observer& observer) {
   const WorkFolder work = work_folder(output);
   const fs::path out = work.member("masks");
   std::string names;
   for (const std::string& name : masked_names(data)) names += (names.empty() ? "" : ",") + name;
+  const fs::path first = work.member("first_masks");
+  if (uses_placeholder(output.command, "first_masks")) write_first_masks(config, first);
   make(output, out,
        filled_in(output.command, {{"video", data.frames.string()},
+                                  {"first_masks", first.string()},
                                   {"objects", names},
                                   {"prompt", config.sources.prompt},
                                   {"out", out.string()}}),
@@ -281,10 +325,25 @@ DataSettings make_sources(const RunConfig& config, const Observer& observer) {
 
 Image first_frame_image(const RunConfig& config) {
   const SceneSetup setup = read_scene_setup(config.data);
-  const Camera camera = read_camera(config.data.camera.string());
-  const Vector3<double> center =
-      -(camera.camera_from_world.rotation.transpose() * camera.camera_from_world.translation);
-  return render_picture(first_frame(setup, center).all, {camera, config.background, config.render, {}}).image;
+  const SceneView view = first_view(config);
+  return render_picture(first_frame(setup, camera_center_world(view.camera)).all, view).image;
+}
+
+std::vector<Image> first_masks(const RunConfig& config) {
+  const SceneSetup setup = read_scene_setup(config.data);
+  SceneView view = first_view(config);
+  view.background = {0, 0, 0};
+  PosedGaussians all = first_frame(setup, camera_center_world(view.camera)).all;
+  std::vector<Index> ends = {setup.scene.count()};  // of scene, objects, human
+  for (const ClipObject& object : setup.objects) ends.push_back(ends.back() + object.gaussians.count());
+  ends.push_back(all.gaussians.count());
+  std::vector<Image> masks;
+  for (std::size_t part = 1; part < ends.size(); ++part) {
+    paint(all.gaussians, ends[part - 1], ends[part]);
+    masks.push_back(take_channels(render_picture(all, view).image, 0, 1));
+  }
+  std::rotate(masks.begin(), masks.end() - 1, masks.end());  // the human first
+  return masks;
 }
 
 }  // namespace hsi4d

@@ -42,6 +42,9 @@ std::vector<SourceOutput> planned_sources(const RunConfig& config);
 /// left. Throws as read_scene_setup, where the first frame is rendered.
 DataSettings make_sources(const RunConfig& config, const Observer& observer);
 
+/// Coverage of the human and then of each object in I_0, what hides them taken away, [1,H,W] each.
+std::vector<Image> first_masks(const RunConfig& config);
+
 /// I_0: everything in the state of frame 0, as the camera of frame 0 sees it, [3,H,W] clamped to [0, 1].  [method.md,
 /// §2]
 Image first_frame_image(const RunConfig& config);
