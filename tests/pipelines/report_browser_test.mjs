@@ -220,7 +220,7 @@ async function testSpace(page) {
   check('the wheel comes nearer', !turned.equals(near));
   check('a key turns it', !near.equals(await pictureAfter(page, () => page.keyboard.press('ArrowLeft'))));
   check('reset is where it began', first.equals(await pictureAfter(page, () => page.click('#view3d-reset'))));
-  for (const part of ['scene', 'objects', 'body', 'truth', 'camera', 'skeleton']) {
+  for (const part of ['scene', 'objects', 'body', 'truth', 'camera', 'skeleton', 'cut']) {
     const changed = await pictureAfter(page, () => page.click(`#show-${part}`));
     check(`"${part}" can be switched`, !first.equals(changed));
     await pictureAfter(page, () => page.click(`#show-${part}`));
