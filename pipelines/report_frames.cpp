@@ -158,7 +158,7 @@ std::string view3d_section(const ReportData& data) {
          scrubber(data) + "<div class=\"layers\">\n" + layer("scene", "scene", "", true) +
          layer("objects", "objects", "", true) + layer("body", "body", "#c2cce0", true) +
          layer("truth", "true body", "#40d98c", false) + layer("camera", "camera and its path", "#ffd94d", true) +
-         layer("skeleton", "skeleton", "#59bfff", false) +
+         layer("skeleton", "skeleton", "#59bfff", false) + layer("cut", "cut the front away", "", false) +
          "<button id=\"view3d-follow\">through the camera</button><button id=\"view3d-reset\">reset</button></div>\n" +
          "<p class=\"caption\">Drag to turn; drag with the right button, shift or two fingers to move; wheel (after a "
          "click) or pinch to come nearer. Of the scene there is a sample of its Gaussians, in the colours they have "

@@ -42,7 +42,7 @@ elseif(HSI4D_NODE)
   add_test(NAME "the report in a browser"
            COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/report_browser_test.mjs $<TARGET_FILE:hsi4d>
                    ${PROJECT_SOURCE_DIR}/build/report_browser/node_modules)
-  set_tests_properties("the report in a browser" PROPERTIES LABELS quick SKIP_RETURN_CODE 77 TIMEOUT 300)
+  set_tests_properties("the report in a browser" PROPERTIES LABELS quick SKIP_RETURN_CODE 77 TIMEOUT 600)
 else()
   message(STATUS "There is no node: the report is not tested in a browser")
 endif()

@@ -114,7 +114,8 @@ const startView3d = async () => {
     }
     if (shows("truth") && drawMesh && hasTruth)
       drawMesh(camera, poseSkeleton(data, "truth", t).transforms, colors3d.truth);
-    drawSplats(camera, worlds, worlds.map((_, part) => shows(part === 0 ? "scene" : "objects")));
+    const cut = shows("cut") && !eye.follows ? Math.max(0.05, eye.distance - 0.9) : 0.05;
+    drawSplats(camera, worlds, worlds.map((_, part) => shows(part === 0 ? "scene" : "objects")), cut);
     if (shows("skeleton")) {
       gl.disable(gl.DEPTH_TEST);
       drawLines(camera, bones(body.places), colors3d.skeleton);

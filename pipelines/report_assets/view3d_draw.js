@@ -136,9 +136,9 @@ const makeSplats = (gl, data) => {
   gl.vertexAttribDivisor(1, 1);
   gl.bindVertexArray(null);
 
-  // Far ones first, by counting depths of 16 bits; returns how many are drawn.
+  // Far ones first, by counting depths of 16 bits; returns how many are drawn. Of the scene none nearer than `cut`.
   const depths = new Float32Array(count), keys = new Uint16Array(count), starts = new Uint32Array(65537);
-  const sort = (view, worlds, isShown) => {
+  const sort = (view, worlds, isShown, cut) => {
     // Depth is a linear function of a part's own coordinates.
     const axis = view.rotation.slice(6, 9);
     const rows3 = worlds.map(({ rotation: r, translation: t }) => [...turned(transposed(r), axis),
@@ -147,7 +147,7 @@ const makeSplats = (gl, data) => {
     for (let i = 0; i < count; ++i) {
       const row = rows3[parts[i]], at = 12 * i;
       const depth = row[0] * numbers[at] + row[1] * numbers[at + 1] + row[2] * numbers[at + 2] + row[3];
-      depths[i] = isShown[parts[i]] && depth > 0.05 ? depth : -1;
+      depths[i] = isShown[parts[i]] && depth > (parts[i] === 0 ? cut : 0.05) ? depth : -1;
       if (depths[i] < 0) continue;
       near = Math.min(near, depth);
       far = Math.max(far, depth);
@@ -165,8 +165,8 @@ const makeSplats = (gl, data) => {
     return drawn;
   };
 
-  return (camera, worlds, isShown) => {
-    const drawn = sort(camera.view, worlds, isShown);
+  return (camera, worlds, isShown, cut) => {
+    const drawn = sort(camera.view, worlds, isShown, cut);
     gl.useProgram(shader.program);
     gl.bindVertexArray(vertices);
     gl.bindBuffer(gl.ARRAY_BUFFER, order);

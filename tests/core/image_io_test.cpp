@@ -104,6 +104,9 @@ TEST_CASE("JPEG comes back close, and closer with more quality") {
   CHECK(worst(100) < 0.02f);
   CHECK(worst(10) > 2 * worst(100));
   CHECK(decode_image(encode_image("a.jpeg", take_channels(image, 0, 1)), "a.jpeg").channels() == 1);
+  const ImageFormat half{.jpeg_quality = 80, .jpeg_half_color = true};
+  CHECK(10 * encode_image("a.jpg", image, half).size() < 9 * encode_image("a.jpg", image, {.jpeg_quality = 80}).size());
+  CHECK(decode_image(encode_image("a.jpg", image, half), "a.jpg").width() == 48);
 }
 
 TEST_CASE("OpenEXR images keep every float, half is rounded") {

@@ -57,6 +57,7 @@ function makeReport(folder) {
 async function open(url, { args, viewport, hasTouch = false }) {
   const browser = await chromium.launch({ executablePath, args: ['--no-sandbox', ...args] });
   const page = await (await browser.newContext({ viewport, hasTouch })).newPage();
+  page.setDefaultTimeout(120_000);  // of a machine that is busy and draws without a graphics card
   const faults = [];
   page.on('console', (message) => {
     // Hints about speed, of drivers and of what this test reads back, are no fault of the page.
@@ -75,11 +76,16 @@ const software = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-
 const canvas3d = '#view3d-canvas';
 const drawn = (page) => page.$eval(canvas3d, (canvas) => Number(canvas.dataset.drawn ?? 0));
 
-// What an element looks like once `deed` is done and the 3D view has been drawn anew.
-async function pictureAfter(page, deed) {
+// Does `deed` and waits until the 3D view has been drawn anew.
+async function drawAfter(page, deed) {
   const before = await drawn(page);
   await deed();
   await page.waitForFunction((count) => Number(document.querySelector('#view3d-canvas').dataset.drawn ?? 0) > count, before);
+}
+
+// What the 3D view then looks like.
+async function pictureAfter(page, deed) {
+  await drawAfter(page, deed);
   return page.locator(canvas3d).screenshot();
 }
 
@@ -220,10 +226,10 @@ async function testSpace(page) {
   check('the wheel comes nearer', !turned.equals(near));
   check('a key turns it', !near.equals(await pictureAfter(page, () => page.keyboard.press('ArrowLeft'))));
   check('reset is where it began', first.equals(await pictureAfter(page, () => page.click('#view3d-reset'))));
-  for (const part of ['scene', 'objects', 'body', 'truth', 'camera', 'skeleton']) {
+  for (const part of ['scene', 'objects', 'body', 'truth', 'camera', 'skeleton', 'cut']) {
     const changed = await pictureAfter(page, () => page.click(`#show-${part}`));
     check(`"${part}" can be switched`, !first.equals(changed));
-    await pictureAfter(page, () => page.click(`#show-${part}`));
+    await drawAfter(page, () => page.click(`#show-${part}`));
   }
   // Through the camera it shows what the renderer of the program did, but for the body, which is a mesh.
   const same = await differenceFromRender(page, await pictureAfter(page, () => page.click('#view3d-follow')), 2);
@@ -233,7 +239,7 @@ async function testSpace(page) {
 }
 
 async function testWhole(url) {
-  const { browser, page, faults } = await open(url, { args: software, viewport: { width: 800, height: 600 }, hasTouch: true });
+  const { browser, page, faults } = await open(url, { args: software, viewport: { width: 700, height: 500 }, hasTouch: true });
   await page.waitForFunction(() => Number(document.querySelector('#view3d-canvas').dataset.drawn ?? 0) > 0);
   await page.waitForFunction(() => document.getElementById('compare').dataset.frame);
   check('the 3D view has no message', await page.locator('#view3d-message').isHidden());
