@@ -68,8 +68,8 @@ void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConf
 void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig& config) {
   FramesOfMessages messages;
   for (const StillGroup& entry : still)
-    messages.add("stage " + config.stages[entry.stage].first + ": nothing depends on the group \"" + entry.group +
-                     "\" (its gradient is 0 in every iteration) in ",
+    messages.add("stage " + config.stages[entry.stage].first + ": what the losses see did not depend on the group \"" +
+                     entry.group + "\" (its gradient was 0 in every iteration) in ",
                  entry.frame);
   messages.warn();
 }
