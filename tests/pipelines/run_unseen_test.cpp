@@ -86,18 +86,23 @@ const std::string kNoGradient = " (its gradient was 0 in every iteration) in ";
 
 }  // namespace
 
-TEST_CASE("Gaussians in view are those whose centres are in the image, in front of the camera") {
+TEST_CASE("what is in view has a centre in the image, in front of the camera") {
   const Clip clip = read_clip(dataset_inputs(TinyDataset::folder()));
-  const GaussiansInView first = gaussians_in_view(clip, clip.first);
-  CHECK(first.scene > 500);
-  CHECK(first.scene < clip.scene.count());
-  CHECK(first.human > 400);
-  CHECK(first.objects == std::vector<Index>{clip.objects[0].gaussians.count()});
-  SceneState moved = clip.first;
+  CHECK(parts_in_view(clip, clip.first) == PartsInView{true, true, {true}});
   const Matrix3<double>& rotation = clip.camera.camera_from_world.rotation;
-  moved.body.transl += Vector3<double>(20 * rotation.row(0).transpose());             // to the right of the image
-  moved.objects[0].translation -= Vector3<double>(20 * rotation.row(2).transpose());  // behind the camera
-  CHECK(gaussians_in_view(clip, moved) == GaussiansInView{first.scene, 0, {0}});
+  const Vector3<double> right = rotation.row(0).transpose(), forward = rotation.row(2).transpose();
+  SceneState moved = clip.first;
+  moved.objects[0].translation -= 20 * forward;  // behind the camera, where it would be projected into the image
+  CHECK(parts_in_view(clip, moved) == PartsInView{true, true, {false}});
+  for (const double side : {-20.0, 20.0}) {
+    moved.body.transl = clip.first.body.transl + side * right;
+    CHECK(parts_in_view(clip, moved) == PartsInView{true, false, {false}});
+  }
+  moved = clip.first;
+  moved.body.transl += right;  // a part of it is still there
+  CHECK(parts_in_view(clip, moved) == PartsInView{true, true, {true}});
+  moved.camera_from_world.translation[2] -= 50;  // past all of it
+  CHECK(parts_in_view(clip, moved) == PartsInView{false, false, {false}});
 }
 
 TEST_CASE("a body that leaves the view is told with its frames, and comes back", "[run]") {
