@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "body/avatar.h"
 #include "body/motion_io.h"
 #include "core/camera_file.h"
 #include "core/check.h"
@@ -133,6 +134,24 @@ TEST_CASE("a body that leaves the view is told with its frames, and comes back",
                   Interrupted);
   CHECK(warnings_of([&] { carry_out_tiny(config, "halves", 1, true); }) == told);
   CHECK(differences("run", "halves").empty());
+}
+
+TEST_CASE("a hand that nothing shows is told in the log alone", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  Avatar avatar = read_avatar(dataset.file("avatar.safetensors"));
+  for (std::size_t i = 0; i < avatar.weights.indices.size(); ++i) {  // its Gaussians become those of the forearm
+    std::int32_t& joint = avatar.weights.indices[i];
+    if (joint >= 25 && joint < 40) joint = 18;
+  }
+  write_avatar(dataset.file("avatar.safetensors"), avatar);
+  write_changed(dataset.file("config.json"), dataset.file("config.json"), [](nlohmann::ordered_json& config) {
+    config["stages"]["interaction"]["optimize"]["left_hand_pose"] = {{"lr", 0.01}};
+  });
+  CHECK(dataset.run("run").empty());
+  CHECK_THAT(file_text("run/log.txt"), Contains(" info stage interaction: what the losses see did not depend on the "
+                                                "group \"left_hand_pose\"" +
+                                                kNoGradient + "frames 1-3\n"));
 }
 
 TEST_CASE("an object that is never seen stays where it is given, and all that is off for it is told", "[run]") {
