@@ -1,5 +1,7 @@
 #include "pipelines/stage_log.h"
 
+#include <utility>
+
 #include "core/log.h"
 #include "core/text.h"
 
@@ -19,23 +21,26 @@ std::string left_out_text(const StageResult& result, const Clip& clip) {
 /// Messages, each of several frames.
 class FramesOfMessages {
  public:
-  void add(const std::string& begin, Index frame) {
+  void add(const std::string& begin, Index frame, LogLevel level = LogLevel::kWarning) {
     std::vector<Index>& frames = frames_[begin];
-    if (frames.empty()) order_.push_back(begin);
+    if (frames.empty()) order_.emplace_back(level, begin);
     if (frames.empty() || frames.back() != frame) frames.push_back(frame);
   }
   /// Each once, with its frames, in the order in which it was first added.
-  void warn() const {
-    for (const std::string& begin : order_) {
+  void log() const {
+    for (const auto& [level, begin] : order_) {
       const std::vector<Index>& frames = frames_.at(begin);
-      log_warning(begin + (frames.size() == 1 ? "frame " : "frames ") + frame_ranges(frames));
+      log_message(level, begin + (frames.size() == 1 ? "frame " : "frames ") + frame_ranges(frames));
     }
   }
 
  private:
   std::map<std::string, std::vector<Index>> frames_;
-  std::vector<std::string> order_;
+  std::vector<std::pair<LogLevel, std::string>> order_;
 };
+
+/// Hands, jaw and eyes: the body or an object may be in front of them.
+bool is_often_hidden(const std::string& group) { return group.ends_with("_pose") && group != "body_pose"; }
 
 }  // namespace
 
@@ -62,16 +67,16 @@ void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConf
                               "), in some iterations at least, in ";
     messages.add(begin, entry.frame);
   }
-  messages.warn();
+  messages.log();
 }
 
 void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig& config) {
   FramesOfMessages messages;
   for (const StillGroup& entry : still)
-    messages.add("stage " + config.stages[entry.stage].first + ": nothing depends on the group \"" + entry.group +
-                     "\" (its gradient is 0 in every iteration) in ",
-                 entry.frame);
-  messages.warn();
+    messages.add("stage " + config.stages[entry.stage].first + ": what the losses see did not depend on the group \"" +
+                     entry.group + "\" (its gradient was 0 in every iteration) in ",
+                 entry.frame, is_often_hidden(entry.group) ? LogLevel::kInfo : LogLevel::kWarning);
+  messages.log();
 }
 
 void GradientWatch::see(std::span<const GroupStep> groups) {

@@ -9,16 +9,16 @@
 
 namespace hsi4d {
 
-/// How many Gaussians have their centre in the image, in front of the camera.
-struct GaussiansInView {
-  Index scene = 0, human = 0;
-  std::vector<Index> objects = {};  ///< by object
+/// What has a Gaussian whose centre is in the image, in front of the camera.
+struct PartsInView {
+  bool scene = false, human = false;
+  std::vector<bool> objects = {};  ///< by object
 
-  bool operator==(const GaussiansInView&) const = default;
+  bool operator==(const PartsInView&) const = default;
 };
 
-/// Of the clip's Gaussians in a state of it.
-GaussiansInView gaussians_in_view(const Clip& clip, const SceneState& state);
+/// Of the clip in a state of it.
+PartsInView parts_in_view(const Clip& clip, const SceneState& state);
 
 /// Throws DataError naming the file of the camera when it has nothing at all in view in frame 0, which is given. Warns
 /// when it has nothing of the scene.

@@ -143,8 +143,10 @@ Tally interrupt_at_random(int tries) {
     for (int stop = 0; stop <= attempt / 2 % 2; ++stop) {
       INFO("try " << attempt << ", stop " << stop << ", signal " << signal << " after " << steps << " steps of "
                   << whole);
-      tally.add(run_until(run, signal, LittleLater(run, steps, random)));
-      steps = random.uniform(steps_of(run), whole);
+      const Fate fate = run_until(run, signal, LittleLater(run, steps, random));
+      tally.add(fate);
+      if (fate == Fate::kDone) break;
+      steps = random.uniform(std::min(steps_of(run), whole - 1), whole);
     }
     INFO("try " << attempt << ", signal " << signal);
     check_resumes(run);
