@@ -11,6 +11,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "pipelines/body_files.h"
+#include "pipelines/penetration.h"
 #include "pipelines/run_problems.h"
 
 namespace hsi4d {
@@ -175,6 +176,10 @@ Clip read_clip(const DataSettings& data) {
   clip.frame_rate = rate_of(video->frames, setup);
   clip.betas = setup.motion.betas;
   clip.gender = setup.motion.gender;
+  if (!data.surface.empty()) {
+    clip.surface = read_mesh_distance(data.surface.string(), kMeasuredThickness);
+    clip.surface_file = data.surface.string();
+  }
   if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
   clip.files = {{"/data/scene", data.scene},
                 {"/data/avatar", data.avatar},

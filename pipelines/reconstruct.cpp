@@ -11,6 +11,7 @@
 #include "body/motion_edit.h"
 #include "body/pose_prior.h"
 #include "core/camera_file.h"
+#include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/rotation.h"
@@ -20,7 +21,9 @@
 #include "pipelines/evaluate.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/frame_images.h"
+#include "pipelines/gradient_table.h"
 #include "pipelines/input_hashes.h"
+#include "pipelines/penetration.h"
 #include "pipelines/run_results.h"
 #include "pipelines/run_state.h"
 #include "pipelines/sequence_graph.h"
@@ -398,6 +401,7 @@ class Reconstruction {
     for (const LossValue& term : report.terms) record.losses.emplace_back(term.name, term.value);
     record.seconds = report.seconds;
     record.rolled_back = report.rolled_back;
+    record.gradient_shares = report.gradient_shares;
     if (counters != nullptr) add_counters(*counters, progress_.totals[s], record);
     folder_.append_metrics(record);
     bar_.step_with("loss", report.loss);
@@ -476,6 +480,8 @@ class Reconstruction {
     add_image_errors(refined_.empty() ? progress_.image_errors : refined_errors_, summary.metrics.back().values,
                      summary.per_frame);
     add_image_errors(progress_.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
+    if (clip_.surface) add_penetration(summary);
+    add_gradient_shares(summary);
     return summary;
   }
 
@@ -493,13 +499,53 @@ class Reconstruction {
     means.insert(means.end(), added.begin(), added.end());
   }
 
+  /// The frames after a stage.
+  const std::vector<SceneState>& states_after(std::size_t s) const {
+    return s < frame_stages_ ? progress_.after_stage[s] : refined_[s - frame_stages_].states;
+  }
+
+  /// Of the start, of what every stage that moves the body left, and of the result's frames.
+  void add_penetration(RunSummary& summary) const {
+    summary.surface = clip_.surface_file;
+    const auto add = [](const MetricValues& more, MetricValues& values) {
+      values.insert(values.end(), more.begin(), more.end());
+    };
+    const auto add_all = [&](const std::vector<SceneState>& states, MetricValues& means,
+                             std::vector<FrameMetrics>& per_frame) {
+      const std::vector<Penetration> counts = penetration_by_frame(clip_, states);
+      add(mean_penetration(counts), means);
+      for (FrameMetrics& frame : per_frame)
+        add(penetration_values(counts[static_cast<std::size_t>(frame.frame)]), frame.values);
+    };
+    std::vector<SceneState> start;
+    for (Index t = 0; t < clip_.frames(); ++t) start.push_back(baseline_start(t));
+    add_all(start, summary.baselines[0].values, summary.baselines[0].per_frame);
+    std::vector<FrameMetrics> none;
+    for (std::size_t s = 0; s < config_.stages.size(); ++s) {
+      if (s < frame_stages_ && config_.stages[s].second.draw == Draw::kScene) continue;
+      const bool is_last = s + 1 == config_.stages.size();
+      add_all(states_after(s), summary.metrics[s].values, is_last ? summary.per_frame : none);
+    }
+  }
+
+  /// From the lines of metrics.jsonl, which a run that was resumed has whole.
+  void add_gradient_shares(RunSummary& summary) const {
+    const auto measures = [](const auto& entry) { return entry.second.gradient_shares > 0; };
+    if (std::none_of(config_.stages.begin(), config_.stages.end(), measures)) return;
+    const std::string lines = read_text_file(folder_.paths().metrics());
+    for (std::size_t s = 0; s < config_.stages.size(); ++s) {
+      if (measures(config_.stages[s]))
+        summary.metrics[s].gradient_shares =
+            mean_gradient_shares(lines, config_.stages[s].first, folder_.paths().metrics());
+    }
+  }
+
   StageSummary summarize_stage(std::size_t s) const {
     const auto& [name, stage] = config_.stages[s];
     const bool is_of_frame = s < frame_stages_;
     const StageTotals& totals = is_of_frame ? progress_.totals[s] : refined_[s - frame_stages_].totals;
     StageSummary summary{name, totals.seconds, totals.iterations, {}};
-    const std::vector<SceneState>& states = is_of_frame ? progress_.after_stage[s] : refined_[s - frame_stages_].states;
-    if (clip_.truth) summary.values = errors_of(states, is_of_frame ? stage.draw : Draw::kAll);
+    if (clip_.truth) summary.values = errors_of(states_after(s), is_of_frame ? stage.draw : Draw::kAll);
     for (const auto& [counter, count] : {std::pair{"rollbacks", totals.rollbacks},
                                          {"tiles", totals.tiles},
                                          {"pairs", totals.pairs},

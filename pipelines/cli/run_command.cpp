@@ -7,6 +7,7 @@
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/clip.h"
+#include "pipelines/gradient_table.h"
 #include "pipelines/run_problems.h"
 
 namespace hsi4d::cli {
@@ -82,7 +83,9 @@ RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>&
 }
 
 std::string result_text(const RunSummary& summary, const std::string& folder) {
-  return error_table(summary) + "\n" + std::to_string(summary.frames) + " frames in " + duration_text(summary.seconds) +
+  const std::string shares = gradient_table(summary);
+  return error_table(summary) + (shares.empty() ? "" : "\n" + shares) + "\n" + std::to_string(summary.frames) +
+         " frames in " + duration_text(summary.seconds) +
          "; report: " + (std::filesystem::path(folder) / "report.html").string() + "\n";
 }
 

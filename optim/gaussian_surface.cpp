@@ -1,0 +1,206 @@
+#include "optim/gaussian_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <nanoflann.hpp>
+
+#include "core/check.h"
+#include "core/parallel.h"
+#include "core/quaternion.h"
+
+namespace hsi4d {
+
+namespace {
+
+using Point = Vector3<double>;
+
+constexpr double kOpaque = 0.5, kFlat = 0.5;
+constexpr std::size_t kNeighbours = 8;
+/// A disc reaches so many widths from its centre; so far it hides what is behind, and is solid behind itself.
+constexpr double kReach = 2;
+
+/// Edge of the cells in which discs hide others, metres; and how many cells from a disc it is that they begin: nearer
+/// ones are tried disc by disc.
+constexpr double kCell = 0.05, kNearCells = 3;
+/// Discs next to one that may hide it.
+constexpr std::size_t kNearDiscs = 32;
+/// Cells along an axis at most; the scene's far parts are then hidden by nothing.
+constexpr std::int64_t kMostCells = 512;
+constexpr Index kGrain = 256;
+
+/// Discs, as nanoflann reads them.
+struct Centers {
+  std::vector<SurfaceDisc> discs;
+  std::size_t kdtree_get_point_count() const { return discs.size(); }
+  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return discs[i].center[static_cast<Eigen::Index>(axis)];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+
+using KdTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Centers>, Centers, 3, std::uint32_t>;
+
+/// Whether a ray from a point meets a disc within `farthest` metres, and not only where it begins.
+bool meets(const SurfaceDisc& disc, const Point& from, const Point& direction, double farthest) {
+  constexpr double kBegin = 0.004;  // metres: discs of one surface are no nearer than that in front of each other
+  const double across = dot(disc.normal, direction);
+  if (std::fabs(across) < 1e-3) return false;
+  const double along = dot(disc.normal, Point(disc.center - from)) / across;
+  if (!(along > kBegin && along < farthest)) return false;
+  return (from + along * direction - disc.center).norm() < kReach * disc.width;
+}
+
+/// Cells of space that hold discs, around the viewpoints.
+class Occupied {
+ public:
+  Occupied(const std::vector<SurfaceDisc>& discs, const std::vector<Point>& viewpoints) {
+    const double half = 0.5 * static_cast<double>(kMostCells) * kCell;
+    Point middle = Point::Zero();
+    for (const Point& p : viewpoints) middle += p / static_cast<double>(viewpoints.size());
+    Point low = Point::Constant(std::numeric_limits<double>::infinity()), high = -low;
+    for (const SurfaceDisc& disc : discs) {
+      low = low.cwiseMin(disc.center);
+      high = high.cwiseMax(disc.center);
+    }
+    low_ = low.cwiseMax(middle - Point::Constant(half));
+    high = high.cwiseMin(middle + Point::Constant(half));
+    for (int i = 0; i < 3; ++i)
+      count_[i] = std::max<std::int64_t>(1, static_cast<std::int64_t>((high[i] - low_[i]) / kCell) + 1);
+    cells_.resize(static_cast<std::size_t>(count_[0] * count_[1] * count_[2]), false);
+    for (const SurfaceDisc& disc : discs) {
+      const std::int64_t at = cell_of(disc.center);
+      if (at >= 0) cells_[static_cast<std::size_t>(at)] = true;
+    }
+  }
+
+  /// Whether a cell between two points is occupied.
+  bool between(const Point& from, const Point& to) const {
+    const Point way = to - from;
+    const auto steps = static_cast<std::int64_t>(way.norm() / (0.5 * kCell));
+    for (std::int64_t i = 0; i <= steps; ++i) {
+      const std::int64_t at = cell_of(from + way * (static_cast<double>(i) / static_cast<double>(steps + 1)));
+      if (at >= 0 && cells_[static_cast<std::size_t>(at)]) return true;
+    }
+    return false;
+  }
+
+ private:
+  std::int64_t cell_of(const Point& p) const {
+    std::int64_t at = 0;
+    for (int i = 0; i < 3; ++i) {
+      const double x = std::floor((p[i] - low_[i]) / kCell);
+      if (!(x >= 0 && x < static_cast<double>(count_[i]))) return -1;
+      at = at * count_[i] + static_cast<std::int64_t>(x);
+    }
+    return at;
+  }
+
+  Point low_;
+  std::array<std::int64_t, 3> count_{};
+  std::vector<bool> cells_;
+};
+
+Point point_at(const std::vector<float>& numbers, Index row) {
+  return Vector3<float>(numbers.data() + 3 * row).cast<double>();
+}
+
+}  // namespace
+
+std::vector<SurfaceDisc> surface_discs(const Gaussians& gaussians) {
+  std::vector<SurfaceDisc> discs;
+  const float opaque_logit = static_cast<float>(std::log(kOpaque / (1 - kOpaque)));
+  for (Index g = 0; g < gaussians.count(); ++g) {
+    if (!(gaussians.opacity_logits[static_cast<std::size_t>(g)] >= opaque_logit)) continue;
+    const Point log_scales = point_at(gaussians.log_scales, g);
+    Eigen::Index shortest = 0, longest = 0;
+    log_scales.minCoeff(&shortest);
+    log_scales.maxCoeff(&longest);
+    if (shortest == longest) continue;
+    const double middle = log_scales[3 - shortest - longest];
+    if (!(log_scales[shortest] <= middle + std::log(kFlat))) continue;
+    const Vector4<double> q = Vector4<float>(gaussians.quats.data() + 4 * g).cast<double>();
+    const Point normal = detail::unit_quaternion_to_matrix(direction_of(q).unit).col(shortest);
+    discs.push_back({gaussians.origin_world + point_at(gaussians.means, g), normal, std::exp(log_scales[longest])});
+  }
+  return discs;
+}
+
+std::vector<SurfaceDisc> facing(const std::vector<SurfaceDisc>& discs, const std::vector<Vector3<double>>& viewpoints) {
+  if (discs.empty() || viewpoints.empty()) return {};
+  const Centers centers{discs};
+  const KdTree tree(3, centers);
+  const Occupied occupied(discs, viewpoints);
+  constexpr double kNear = kNearCells * kCell;
+  std::vector<int> sides(discs.size(), 0);
+  parallel_for(std::ssize(discs), kGrain, [&](Index begin, Index end) {
+    std::array<std::uint32_t, kNearDiscs> near;
+    std::array<double, kNearDiscs> squared;
+    for (Index i = begin; i < end; ++i) {
+      const SurfaceDisc& disc = discs[static_cast<std::size_t>(i)];
+      const std::size_t found = tree.knnSearch(disc.center.data(), kNearDiscs, near.data(), squared.data());
+      for (const Point& viewpoint : viewpoints) {
+        const auto way = direction_of(Point(viewpoint - disc.center));
+        const double side = dot(way.unit, disc.normal);
+        if (std::fabs(side) < 0.05) continue;  // along the surface: seen by nobody
+        bool is_hidden = false;
+        for (std::size_t k = 0; k < found && !is_hidden; ++k)
+          is_hidden =
+              near[k] != static_cast<std::uint32_t>(i) && meets(discs[near[k]], disc.center, way.unit, way.length);
+        if (is_hidden || (way.length > kNear && occupied.between(disc.center + way.unit * kNear, viewpoint))) continue;
+        sides[static_cast<std::size_t>(i)] = side > 0 ? 1 : -1;
+        break;
+      }
+    }
+  });
+  std::vector<SurfaceDisc> turned;
+  for (std::size_t i = 0; i < discs.size(); ++i) {
+    if (sides[i] == 0) continue;
+    turned.push_back(discs[i]);
+    turned.back().normal *= sides[i];
+  }
+  return turned;
+}
+
+struct GaussianDistance::Tree {
+  Centers centers;
+  KdTree tree;
+  explicit Tree(std::vector<SurfaceDisc> discs) : centers{std::move(discs)}, tree(3, centers) {}
+};
+
+GaussianDistance::GaussianDistance(std::vector<SurfaceDisc> discs, double thickness) : thickness_(thickness) {
+  HSI4D_CHECK(!discs.empty(), "there is no surface");
+  tree_ = std::make_unique<const Tree>(std::move(discs));
+}
+
+GaussianDistance::~GaussianDistance() = default;
+
+double GaussianDistance::at(const Vector3<double>& point) const {
+  std::array<std::uint32_t, kNeighbours> near;
+  std::array<double, kNeighbours> squared;
+  const std::size_t found = tree_->tree.knnSearch(point.data(), kNeighbours, near.data(), squared.data());
+  const std::vector<SurfaceDisc>& discs = tree_->centers.discs;
+  const SurfaceDisc& nearest = discs[near[0]];
+  const double spread = 2 * nearest.width * nearest.width;
+  double sum = 0, weights = 0;
+  for (std::size_t k = 0; k < found; ++k) {
+    const SurfaceDisc& disc = discs[near[k]];
+    if (dot(disc.normal, nearest.normal) < 0) continue;
+    const double weight = std::exp(-(squared[k] - squared[0]) / spread);
+    sum += weight * dot(disc.normal, Point(point - disc.center));
+    weights += weight;
+  }
+  const double distance = sum / weights;
+  if (distance >= 0) return distance;
+  const Point from = point - nearest.center;
+  const double beside = (from - nearest.normal * dot(nearest.normal, from)).norm();
+  const bool is_known = distance >= -thickness_ && beside <= kReach * nearest.width;
+  return is_known ? distance : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace hsi4d
