@@ -46,13 +46,15 @@ struct Centers {
 using KdTree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Centers>, Centers, 3, std::uint32_t>;
 
-/// Whether a ray from a point meets a disc within `farthest` metres, and not only where it begins.
+/// Discs whose planes are nearer to each other than this are of one surface, with its noise, metres.
+constexpr double kOneSurface = 0.015;
+
+/// Whether a ray from a point meets a disc of another surface within `farthest` metres.
 bool meets(const SurfaceDisc& disc, const Point& from, const Point& direction, double farthest) {
-  constexpr double kBegin = 0.004;  // metres: discs of one surface are no nearer than that in front of each other
-  const double across = dot(disc.normal, direction);
-  if (std::fabs(across) < 1e-3) return false;
-  const double along = dot(disc.normal, Point(disc.center - from)) / across;
-  if (!(along > kBegin && along < farthest)) return false;
+  const double across = dot(disc.normal, direction), offset = dot(disc.normal, Point(disc.center - from));
+  if (std::fabs(across) < 1e-3 || std::fabs(offset) < kOneSurface) return false;
+  const double along = offset / across;
+  if (!(along > 0 && along < farthest)) return false;
   return (from + along * direction - disc.center).norm() < kReach * disc.width;
 }
 

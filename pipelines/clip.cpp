@@ -178,7 +178,7 @@ Clip read_clip(const DataSettings& data) {
   clip.gender = setup.motion.gender;
   if (!data.surface.empty()) {
     clip.surface = read_mesh_distance(data.surface.string(), kMeasuredThickness);
-    clip.surface_file = data.surface.string();
+    clip.surface_file = data.surface.filename().string();
   }
   if (!data.truth.empty()) clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
   clip.files = {{"/data/scene", data.scene},

@@ -79,7 +79,7 @@ TEST_CASE("faults of an OBJ file are told with their line") {
   CHECK(fault_of(kTriangle + "v nan 0 0\nf 1 2 3\n", "a.obj") ==
         "a.obj: vertex 3 has the coordinate nan; allowed are numbers from -1e6 to 1e6");
   CHECK(fault_of(kTriangle + "v 0 1e7 0\nf 1 2 3\n", "a.obj") ==
-        "a.obj: vertex 3 has the coordinate 1e+07; allowed are numbers from -1e6 to 1e6");
+        "a.obj: vertex 3 has the coordinate 10000000; allowed are numbers from -1e6 to 1e6");
   CHECK(fault_of(kTriangle, "a.obj") == "a.obj: the mesh has no faces");
   CHECK(fault_of("", "a.obj") == "a.obj: the mesh has no faces");
   CHECK(fault_of(kTriangle + "f 1 2 2\n", "a.obj") == "a.obj: none of the mesh's 1 triangles has an area");

@@ -291,7 +291,7 @@ TEST_CASE("every shipped config of synth makes its dataset") {
     names.push_back(name);
   }
   std::sort(names.begin(), names.end());
-  CHECK(names == std::vector<std::string>{"disturbed", "faults", "walk"});
+  CHECK(names == std::vector<std::string>{"disturbed", "faults", "table", "walk"});
 }
 
 TEST_CASE("a dataset with all noise and faults is a function of its settings", "[parallel]") {
