@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
+#include <numeric>
 
 #include "core/check.h"
 #include "core/parallel.h"
@@ -21,13 +22,10 @@ constexpr std::size_t kNeighbours = 8;
 /// A disc reaches so many widths from its centre; so far it hides what is behind, and is solid behind itself.
 constexpr double kReach = 2;
 
-/// Edge of the cells in which discs hide others, metres; and how many cells from a disc it is that they begin: nearer
-/// ones are tried disc by disc.
-constexpr double kCell = 0.05, kNearCells = 3;
-/// Discs next to one that may hide it.
-constexpr std::size_t kNearDiscs = 32;
+/// Edge of the cells in which discs that may hide others are looked for, metres.
+constexpr double kCell = 0.05;
 /// Cells along an axis at most; the scene's far parts are then hidden by nothing.
-constexpr std::int64_t kMostCells = 512;
+constexpr std::int64_t kMostCells = 256;
 constexpr Index kGrain = 256;
 
 /// Discs, as nanoflann reads them.
@@ -58,54 +56,74 @@ bool meets(const SurfaceDisc& disc, const Point& from, const Point& direction, d
   return (from + along * direction - disc.center).norm() < kReach * disc.width;
 }
 
-/// Cells of space that hold discs, around the viewpoints.
-class Occupied {
+/// Discs by the cells of space that their centres are in, around the viewpoints.
+class DiscCells {
  public:
-  Occupied(const std::vector<SurfaceDisc>& discs, const std::vector<Point>& viewpoints) {
+  DiscCells(const std::vector<SurfaceDisc>& discs, const std::vector<Point>& viewpoints) : discs_(discs) {
+    set_bounds(viewpoints);
+    std::vector<std::int64_t> cells;
+    begins_.resize(static_cast<std::size_t>(count_[0] * count_[1] * count_[2]) + 1, 0);
+    for (const SurfaceDisc& disc : discs) {
+      cells.push_back(cell_of(disc.center));
+      if (cells.back() >= 0) ++begins_[static_cast<std::size_t>(cells.back()) + 1];
+    }
+    std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
+    order_.resize(begins_.back());
+    std::vector<std::uint32_t> next(begins_.begin(), begins_.end() - 1);
+    for (std::size_t i = 0; i < discs.size(); ++i) {
+      if (cells[i] >= 0) order_[next[static_cast<std::size_t>(cells[i])]++] = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  /// Whether a disc of another surface is between two points, by the cells on the way.
+  bool is_hidden(const Point& from, const Point& to) const {
+    const auto way = direction_of(Point(to - from));
+    const auto steps = static_cast<std::int64_t>(way.length / (0.5 * kCell)) + 1;
+    std::int64_t last = -1;
+    for (std::int64_t i = 0; i < steps; ++i) {
+      const std::int64_t cell = cell_of(from + way.unit * (0.5 * kCell * static_cast<double>(i)));
+      if (cell < 0 || cell == last) continue;
+      last = cell;
+      for (std::uint32_t k = begins_[static_cast<std::size_t>(cell)]; k < begins_[static_cast<std::size_t>(cell) + 1];
+           ++k) {
+        if (meets(discs_[order_[k]], from, way.unit, way.length)) return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  void set_bounds(const std::vector<Point>& viewpoints) {
     const double half = 0.5 * static_cast<double>(kMostCells) * kCell;
     Point middle = Point::Zero();
     for (const Point& p : viewpoints) middle += p / static_cast<double>(viewpoints.size());
     Point low = Point::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    for (const SurfaceDisc& disc : discs) {
+    for (const SurfaceDisc& disc : discs_) {
       low = low.cwiseMin(disc.center);
       high = high.cwiseMax(disc.center);
     }
     low_ = low.cwiseMax(middle - Point::Constant(half));
     high = high.cwiseMin(middle + Point::Constant(half));
     for (int i = 0; i < 3; ++i)
-      count_[i] = std::max<std::int64_t>(1, static_cast<std::int64_t>((high[i] - low_[i]) / kCell) + 1);
-    cells_.resize(static_cast<std::size_t>(count_[0] * count_[1] * count_[2]), false);
-    for (const SurfaceDisc& disc : discs) {
-      const std::int64_t at = cell_of(disc.center);
-      if (at >= 0) cells_[static_cast<std::size_t>(at)] = true;
-    }
+      count_[static_cast<std::size_t>(i)] =
+          std::max<std::int64_t>(1, static_cast<std::int64_t>((high[i] - low_[i]) / kCell) + 1);
   }
 
-  /// Whether a cell between two points is occupied.
-  bool between(const Point& from, const Point& to) const {
-    const Point way = to - from;
-    const auto steps = static_cast<std::int64_t>(way.norm() / (0.5 * kCell));
-    for (std::int64_t i = 0; i <= steps; ++i) {
-      const std::int64_t at = cell_of(from + way * (static_cast<double>(i) / static_cast<double>(steps + 1)));
-      if (at >= 0 && cells_[static_cast<std::size_t>(at)]) return true;
-    }
-    return false;
-  }
-
- private:
   std::int64_t cell_of(const Point& p) const {
     std::int64_t at = 0;
     for (int i = 0; i < 3; ++i) {
+      const auto count = count_[static_cast<std::size_t>(i)];
       const double x = std::floor((p[i] - low_[i]) / kCell);
-      if (!(x >= 0 && x < static_cast<double>(count_[i]))) return -1;
-      at = at * count_[i] + static_cast<std::int64_t>(x);
+      if (!(x >= 0 && x < static_cast<double>(count))) return -1;
+      at = at * count + static_cast<std::int64_t>(x);
     }
     return at;
   }
 
+  const std::vector<SurfaceDisc>& discs_;
   Point low_;
   std::array<std::int64_t, 3> count_{};
-  std::vector<bool> cells_;
+  std::vector<std::uint32_t> begins_, order_;  // of each cell, in order_; rows of discs
 };
 
 Point point_at(const std::vector<float>& numbers, Index row) {
@@ -135,26 +153,16 @@ std::vector<SurfaceDisc> surface_discs(const Gaussians& gaussians) {
 
 std::vector<SurfaceDisc> facing(const std::vector<SurfaceDisc>& discs, const std::vector<Vector3<double>>& viewpoints) {
   if (discs.empty() || viewpoints.empty()) return {};
-  const Centers centers{discs};
-  const KdTree tree(3, centers);
-  const Occupied occupied(discs, viewpoints);
-  constexpr double kNear = kNearCells * kCell;
+  const DiscCells cells(discs, viewpoints);
   std::vector<int> sides(discs.size(), 0);
   parallel_for(std::ssize(discs), kGrain, [&](Index begin, Index end) {
-    std::array<std::uint32_t, kNearDiscs> near;
-    std::array<double, kNearDiscs> squared;
     for (Index i = begin; i < end; ++i) {
       const SurfaceDisc& disc = discs[static_cast<std::size_t>(i)];
-      const std::size_t found = tree.knnSearch(disc.center.data(), kNearDiscs, near.data(), squared.data());
       for (const Point& viewpoint : viewpoints) {
         const auto way = direction_of(Point(viewpoint - disc.center));
         const double side = dot(way.unit, disc.normal);
         if (std::fabs(side) < 0.05) continue;  // along the surface: seen by nobody
-        bool is_hidden = false;
-        for (std::size_t k = 0; k < found && !is_hidden; ++k)
-          is_hidden =
-              near[k] != static_cast<std::uint32_t>(i) && meets(discs[near[k]], disc.center, way.unit, way.length);
-        if (is_hidden || (way.length > kNear && occupied.between(disc.center + way.unit * kNear, viewpoint))) continue;
+        if (cells.is_hidden(disc.center, viewpoint)) continue;
         sides[static_cast<std::size_t>(i)] = side > 0 ? 1 : -1;
         break;
       }

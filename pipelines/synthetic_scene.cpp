@@ -84,7 +84,7 @@ TriangleMesh synthetic_solids(const SyntheticSettings& settings, const ScenePlan
   SceneKit kit(plan, static_cast<std::uint64_t>(settings.seed));
   maker_of(settings.scene).make(kit);
   kit.add_support();
-  constexpr double kHalf = 5, kDeep = 0.5;  // metres: of the ground
+  constexpr double kHalf = 5, kDeep = 2;  // metres: of the ground
   kit.box({0, 0, -kDeep}, {kHalf, kHalf, kDeep}, detail::plain({0, 0, 0}));
   return kit.model.boxes();
 }

@@ -103,7 +103,8 @@ TEST_CASE("a run with the loss penetration has the body less in the ground, and 
   const TemporaryFolder folder;
   const auto share = [&](const char* name, const std::string& weight, std::vector<std::string> overrides) {
     overrides.push_back(R"(stages.interaction.losses={"fit": {}, "penetration": {"weight": )" + weight + "}}");
-    overrides.push_back(R"(stages.interaction.optimize={"transl": {"lr": 0.003}})");
+    overrides.push_back(R"(stages.interaction.optimize={"transl": {"lr": 0.01, "lr_final_share": 0.05}})");
+    overrides.emplace_back("stages.interaction.iterations=40");
     carry_out_tiny(tiny_config(overrides), name);
     const nlohmann::json summary = json_of(std::string(name) + "/summary.json");
     CHECK(summary["surface"] == "surface.ply");
