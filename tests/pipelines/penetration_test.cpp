@@ -101,8 +101,10 @@ TEST_CASE("penetration counts the human's Gaussians in the solid, and how deep t
 
 TEST_CASE("a run with the loss penetration has the body less in the ground, and says so", "[release]") {
   const TemporaryFolder folder;
-  const auto share = [&](const char* name, const std::string& weight, std::vector<std::string> overrides) {
-    overrides.push_back(R"(stages.interaction.losses={"fit": {}, "penetration": {"weight": )" + weight + "}}");
+  const auto depth = [&](const char* name, const std::string& weight, std::vector<std::string> overrides) {
+    const std::string mesh = (TinyDataset::folder() / "truth" / "surface.ply").string();
+    overrides.push_back(R"(stages.interaction.losses={"fit": {}, "penetration": {"mesh": ")" + mesh +
+                        R"(", "weight": )" + weight + "}}");
     overrides.push_back(R"(stages.interaction.optimize={"transl": {"lr": 0.01, "lr_final_share": 0.05}})");
     overrides.emplace_back("stages.interaction.iterations=40");
     carry_out_tiny(tiny_config(overrides), name);
@@ -111,10 +113,11 @@ TEST_CASE("a run with the loss penetration has the body less in the ground, and 
     CHECK_FALSE(summary["metrics"][0].contains("penetration_share"));
     CHECK(summary["baselines"]["start"].contains("penetration_share"));
     CHECK(summary["per_frame"][0].contains("penetration_depth_mm"));
-    return summary["metrics"][1]["penetration_share"].get<double>();
+    const nlohmann::json& stage = summary["metrics"][1];  // depth of all points, millimetres
+    return stage["penetration_share"].get<double>() * stage["penetration_depth_mm"].get<double>();
   };
   const std::vector<std::string> estimate = {R"(start={"root": "estimate"})"};
-  const double without = share("without", "0", estimate), with = share("with", "1000", estimate);
-  CHECK(without > 0.005);
-  CHECK(with < 0.5 * without);
+  const double without = depth("without", "0", estimate), with = depth("with", "100000", estimate);
+  CHECK(without > 0.1);
+  CHECK(with < 0.3 * without);
 }
