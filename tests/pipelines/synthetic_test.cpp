@@ -59,6 +59,7 @@ const std::vector<std::string>& dataset_files() {
       "truth/cameras.json",
       "truth/motion.npz",
       "truth/objects.npz",
+      "truth/surface.ply",
   };
   return files;
 }
