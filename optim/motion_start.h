@@ -26,7 +26,9 @@ struct ObjectPoint {
 /// F frames: the first `still_frames` are behind the stage and stay as they are, the others move.
 struct MotionStart {
   const Avatar* avatar = nullptr;
-  std::vector<const Gaussians*> objects;  ///< relative to their centroids
+  std::vector<const Gaussians*> objects;                          ///< relative to their centroids
+  const Gaussians* scene = nullptr;                               ///< null: none is known
+  Vector3<double> first_camera_center = Vector3<double>::Zero();  ///< of the clip's first frame, metres, world
   Index still_frames = 1;
   double frame_rate = 10;                                          ///< frames a second
   PosedJoints first_body;                                          ///< in the clip's first frame

@@ -162,6 +162,8 @@ class StageRun {
     const auto start = Clock::now();
     for (const AdamGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
     tape_.forward(loss_.total);
+    shares_.clear();
+    if (settings_.gradient_shares > 0 && i % settings_.gradient_shares == 0) shares_ = shares_of_terms(i);
     tape_.backward(loss_.total);
     check_reached(i);
     read_terms();
@@ -175,7 +177,14 @@ class StageRun {
     }
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
-              seconds_since(start)});
+              seconds_since(start), shares_});
+  }
+
+  std::vector<GradientShare> shares_of_terms(Index iteration) {
+    std::vector<WeightedTerm<S>> terms;
+    for (std::size_t k = 0; k < loss_.terms.size(); ++k)
+      terms.push_back({loss_.values[k].name, loss_.terms[k], loss_.values[k].weight});
+    return gradient_shares<S>(tape_, terms, groups_, iteration);
   }
 
   /// Row D9: beyond a whole turn the derivative of an axis-angle vanishes, so none gets that far. What Adam knew of the
@@ -300,6 +309,7 @@ class StageRun {
   Adam<S> adam_;
   Index undone_at_end_ = 0;
   std::vector<std::vector<Index>> left_out_;  // evaluations, by loss_.left_out and object
+  std::vector<GradientShare> shares_;         // of this iteration
   std::string offender_;                      // of the last evaluation, if it was bad
 };
 

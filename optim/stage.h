@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "optim/adam.h"
+#include "optim/gradient_shares.h"
 #include "optim/loss_term.h"
 #include "optim/parameters.h"
 #include "optim/stage_settings.h"
@@ -28,10 +29,11 @@ struct IterationReport {
   double loss = 0;                   ///< weighted sum, before this iteration's step
   std::span<const LossValue> terms;  ///< in the order of the settings
   std::span<const GroupStep> groups;
-  bool rolled_back = false;   ///< nothing moved in this iteration: a number was not finite
-  Index rollbacks = 0;        ///< so far
-  std::string_view offender;  ///< when rolled_back: the first number that was not finite
-  double seconds = 0;         ///< of this iteration
+  bool rolled_back = false;                             ///< nothing moved in this iteration: a number was not finite
+  Index rollbacks = 0;                                  ///< so far
+  std::string_view offender;                            ///< when rolled_back: the first number that was not finite
+  double seconds = 0;                                   ///< of this iteration
+  std::span<const GradientShare> gradient_shares = {};  ///< where the settings ask for them; empty in a bad evaluation
 };
 
 /// Called after every iteration. May throw to end the stage: the parameters then stay as they are.
@@ -78,7 +80,8 @@ void check_groups(const StageSettings& settings, const std::vector<std::string>&
 ///
 /// Records Σ weight · term at the end of the tape, and in each iteration: lets gradients flow to the groups that are on
 /// in it and to no other of `available` (what is frozen costs nothing), runs the tape forward and backward, and takes
-/// an Adam step (optim/adam.h). Rows of groups that are axis-angles are wrapped after each step. Numbers of named
+/// an Adam step (optim/adam.h). Where settings.gradient_shares asks, it runs backward for each term by itself before
+/// that, which changes no result. Rows of groups that are axis-angles are wrapped after each step. Numbers of named
 /// groups that have a range are held in it, after each step and before the first evaluation. A last forward run
 /// evaluates the parameters that are left; should they give a loss that is not finite, the last step is taken back. At
 /// the end (also by an exception) what was recorded is forgotten, and `available` is frozen or not as before.

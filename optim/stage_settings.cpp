@@ -76,6 +76,9 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
            "or those that the frame's masks cover");
   f.map("optimize", s.optimize, "What moves: parameter groups by name");
   f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
+  f.integer("gradient_shares", s.gradient_shares, {.min = 0, .max = kMostIterations},
+            "Measures each loss's share of the gradient in every this many-th iteration, which costs a backward pass a "
+            "loss; 0: never");
   f.path("pose_weights", s.pose_weights, {.must_exist = true},
          "VPoser's weights (tools/export_vposer.py), whose latents a stage over the sequence moves; without, natural "
          "poses by anatomy");

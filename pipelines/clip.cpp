@@ -11,6 +11,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "pipelines/body_files.h"
+#include "pipelines/penetration.h"
 #include "pipelines/run_problems.h"
 
 namespace hsi4d {
@@ -96,11 +97,11 @@ std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std
   return truth;
 }
 
-/// Whether there is a truth to compare with. A dataset may have been handed on without it.
-bool has_truth(const DataSettings& data) {
-  if (data.truth.empty() || fs::exists(data.truth)) return !data.truth.empty();
-  log_warning(data.truth.string() +
-              ": there is no such folder (data.truth); the result is not compared with the truth");
+/// Whether there is something to compare with. A dataset may have been handed on without it.
+/// @param key, use  the setting, and what is not done without it
+bool is_there(const fs::path& path, const char* key, const char* use) {
+  if (path.empty() || fs::exists(path)) return !path.empty();
+  log_warning(path.string() + ": there is no such file or folder (data." + key + "); " + use);
   return false;
 }
 
@@ -198,7 +199,12 @@ Clip read_clip(const DataSettings& data) {
   clip.frame_rate = rate_of(video->frames, setup);
   clip.betas = setup.motion.betas;
   clip.gender = setup.motion.gender;
-  if (has_truth(data)) clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
+  if (is_there(data.surface, "surface", "penetration is not measured")) {
+    clip.surface = read_mesh_distance(data.surface.string(), kMeasuredThickness);
+    clip.surface_file = data.surface.filename().string();
+  }
+  if (is_there(data.truth, "truth", "the result is not compared with the truth"))
+    clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
   clip.files = {{"/data/scene", data.scene},
                 {"/data/avatar", data.avatar},
                 {"/data/camera", data.camera},

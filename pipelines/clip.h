@@ -9,6 +9,7 @@
 
 #include "core/camera.h"
 #include "core/image.h"
+#include "optim/mesh_distance.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/frame_source.h"
 #include "pipelines/scene_setup.h"
@@ -42,6 +43,8 @@ struct Clip {
   std::vector<std::string> frame_files;                  ///< names of the frames, in order
   std::shared_ptr<const ClipVideo> video;                ///< what read_frame reads
   std::optional<std::vector<SceneState>> truth;
+  std::shared_ptr<const MeshDistance> surface;  ///< of data.surface; null: not known
+  std::string surface_file;
   std::vector<ClipFile> files;  ///< read for it, but for the truth, which no result depends on
 
   Index frames() const { return static_cast<Index>(frame_files.size()); }

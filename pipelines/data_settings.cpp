@@ -18,6 +18,7 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
   data.camera = base / "camera.json";
   data.initial = base / "initial.json";
   if (fs::exists(base / "truth")) data.truth = base / "truth";
+  if (fs::exists(base / "truth" / "surface.ply")) data.surface = base / "truth" / "surface.ply";
   std::error_code error;  // no such folder: no objects
   for (const fs::directory_entry& entry : fs::directory_iterator(base / "objects", error)) {
     if (has_splat_ending(entry.path().string())) data.objects.push_back({entry.path().stem().string(), {entry.path()}});
@@ -50,6 +51,10 @@ void describe(ConfigFields& f, DataSettings& s) {
   f.path("initial", s.initial, {.must_exist = true}, "State of frame 0 and estimated poses (.json)");
   f.path("truth", s.truth, {},
          "Folder with motion.npz, objects.npz, cameras.json to compare the result with; empty, or not there: none");
+  f.path(
+      "surface", s.surface, {},
+      "Mesh of what is solid in the scene (.obj, .ply, .glb), metres, world, by which penetration is measured; no loss "
+      "reads it; empty: not measured");
   f.number("mask_threshold", s.mask_threshold, {.above = 0, .max = 1}, "Coverage from which a pixel belongs to a mask");
   f.integer("mask_margin_px", s.mask_margin_px, {.min = 0, .max = 64},
             "Pixels by which masks grow before they keep the camera stage from what is not scene");

@@ -22,8 +22,9 @@ struct DataSettings {
   std::filesystem::path camera;
   std::filesystem::path initial;
   std::filesystem::path truth;
-  double video_rate = 0;  ///< frames a second of the video; 0: what its file says
-  double frame_rate = 0;  ///< frames a second that are kept; 0: all
+  std::filesystem::path surface;  ///< a mesh of what is solid, to measure penetration by; empty: not measured
+  double video_rate = 0;          ///< frames a second of the video; 0: what its file says
+  double frame_rate = 0;          ///< frames a second that are kept; 0: all
   double mask_threshold = 0.5;
   int mask_margin_px = 1;
 };
@@ -32,8 +33,8 @@ struct DataSettings {
 inline constexpr const char* kDatasetVideo = "video.mp4";
 
 /// The inputs in a dataset's folder, as `hsi4d synth` lays them out: scene.ply, objects/NAME.ply, avatar.safetensors,
-/// video.mp4 (or frames/ where there is none), masks/, camera.json, initial.json, truth/ (none where it is missing).
-/// Paths are absolute.
+/// video.mp4 (or frames/ where there is none), masks/, camera.json, initial.json, truth/ and truth/surface.ply (none
+/// where they are missing). Paths are absolute.
 DataSettings dataset_inputs(const std::filesystem::path& folder);
 
 /// Describe the sections: every setting with its range.

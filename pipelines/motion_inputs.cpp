@@ -20,6 +20,8 @@ std::shared_ptr<const MotionStart> start_of(const Clip& clip, const std::vector<
   auto start = std::make_shared<MotionStart>();
   start->avatar = &clip.avatar;
   for (const ClipObject& object : clip.objects) start->objects.push_back(&object.gaussians);
+  start->scene = &clip.scene;
+  start->first_camera_center = inverse(clip.first.camera_from_world).translation;
   start->still_frames = std::ssize(frames) - moving;
   start->frame_rate = clip.frame_rate;
   start->first_body = pose_skeleton(clip.avatar, clip.first.body);

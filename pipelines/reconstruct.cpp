@@ -93,7 +93,8 @@ class Reconstruction {
     warn_of_still_groups(progress_.still, config_);
     warn_of_what_is_out_of_view(clip_, result());
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
-    const RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
+    RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
+    add_gradient_shares(config_, folder_.paths().metrics(), summary);
     folder_.write_summary(summary);
     const std::optional<BodyModel> body = write_body(folder_.paths(), config_, clip_, result());
     view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
@@ -239,6 +240,7 @@ class Reconstruction {
     for (const LossValue& term : report.terms) record.losses.emplace_back(term.name, term.value);
     record.seconds = report.seconds;
     record.rolled_back = report.rolled_back;
+    record.gradient_shares = report.gradient_shares;
     if (counters != nullptr) add_counters(*counters, progress_.totals[s], record);
     folder_.append_metrics(record);
     bar_.step_with("loss", report.loss);

@@ -16,6 +16,7 @@
 #include "core/system_message.h"
 #include "core/text.h"
 #include "core/version.h"
+#include "pipelines/gradient_table.h"
 #include "pipelines/json_text.h"
 #include "pipelines/run_config.h"
 
@@ -165,6 +166,7 @@ std::string metrics_line(const IterationRecord& record) {
   for (const auto& [name, value] : record.losses)
     losses.add(name, record_number(value, child_pointer("/losses", name), record.rolled_back));
   line.add("losses", std::move(losses));
+  if (!record.gradient_shares.empty()) line.add("gradient_shares", gradient_shares_json(record.gradient_shares));
   for (const auto& [name, value] : record.counters)
     line.add(name, record_number(value, child_pointer("", name), false));
   line.add("seconds", record_number(record.seconds, "/seconds", false));

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,6 +13,7 @@
 
 #include "core/log.h"
 #include "core/types.h"
+#include "optim/gradient_shares.h"
 #include "pipelines/run_summary.h"
 
 namespace hsi4d {
@@ -38,7 +40,8 @@ struct IterationRecord {
   double loss = 0;
   std::vector<std::pair<std::string, double>> losses;  ///< the terms
   double seconds = 0;
-  bool rolled_back = false;    ///< the step was undone; numbers that are not finite are then written as null
+  bool rolled_back = false;  ///< the step was undone; numbers that are not finite are then written as null
+  std::span<const GradientShare> gradient_shares = {};
   MetricValues counters = {};  ///< work done: tiles, pairs, groups, fragments, layers, adjoint_tiles
 };
 

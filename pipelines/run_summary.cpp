@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/text.h"
+#include "pipelines/gradient_table.h"
 #include "pipelines/json_text.h"
 
 namespace hsi4d {
@@ -35,6 +36,7 @@ ConfigValue stage_json(const StageSummary& stage, const std::string& pointer) {
   add_number(object, pointer, "seconds", stage.seconds);
   object.add("iterations", ConfigValue::make_integer(stage.iterations));
   add_values(object, pointer, stage.values);
+  if (!stage.gradient_shares.empty()) object.add("gradient_shares", mean_shares_json(stage.gradient_shares));
   return object;
 }
 
@@ -81,6 +83,8 @@ StageSummary read_stage(const ConfigValue& value, const std::string& pointer) {
   stage.seconds = read_number(value, pointer, "seconds");
   stage.iterations = read_count(value, pointer, "iterations");
   stage.values = read_values(value, pointer, {"seconds", "iterations"});
+  if (const ConfigValue* const shares = find_member(value, "gradient_shares"))
+    stage.gradient_shares = parse_mean_shares(*shares, child_pointer(pointer, "gradient_shares"));
   return stage;
 }
 
@@ -146,6 +150,7 @@ std::string summary_json(const RunSummary& summary) {
   tree.add("frames", ConfigValue::make_integer(summary.frames));
   add_number(tree, "", "seconds", summary.seconds);
   tree.add("truth", ConfigValue::make_boolean(summary.has_truth));
+  if (!summary.surface.empty()) tree.add("surface", ConfigValue::make_string(summary.surface));
   ConfigValue stages = ConfigValue::make_array();
   for (size_t i = 0; i < summary.metrics.size(); ++i)
     stages.items.push_back(stage_json(summary.metrics[i], child_pointer("/metrics", std::to_string(i))));
@@ -178,6 +183,7 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
     check_kind(*truth, Kind::kBoolean, "/truth");
     summary.has_truth = truth->boolean;
   }
+  summary.surface = string_member(tree, "surface");
   if (const ConfigValue* const stages = find_member(tree, "metrics")) {
     check_kind(*stages, Kind::kArray, "/metrics");
     for (size_t i = 0; i < stages->items.size(); ++i)

@@ -16,12 +16,21 @@ using MetricValues = std::vector<std::pair<std::string, double>>;
 /// The value of that name, or null.
 const double* find_metric(const MetricValues& values, std::string_view name);
 
+/// What of a group's gradient came from a term (optim/gradient_shares.h): means over the evaluations that were looked
+/// at.
+struct MeanGradientShare {
+  std::string group, term;
+  double share = 0, cosine = 0;
+  Index evaluations = 0;
+};
+
 /// One stage: its errors at its end, and counters.
 struct StageSummary {
   std::string stage;
   double seconds = 0;
   Index iterations = 0;
   MetricValues values;
+  std::vector<MeanGradientShare> gradient_shares = {};  ///< empty: not measured
 };
 
 /// The errors of one frame.
@@ -43,6 +52,7 @@ struct RunSummary {
   int frames = 0;
   double seconds = 0;
   bool has_truth = true;              ///< false: errors of body, objects and camera could not be measured
+  std::string surface;                ///< the mesh by which penetration was measured; empty: it was not
   std::vector<StageSummary> metrics;  ///< in order, the last one is the final one
   std::vector<Baseline> baselines;
   std::vector<FrameMetrics> per_frame;  ///< of the result
@@ -50,9 +60,12 @@ struct RunSummary {
 
 /// The text of summary.json:
 ///
-///   {"name", "frames", "seconds", "truth": BOOL, "metrics": [{"stage", "seconds", "iterations", NAME: NUMBER...}...],
+///   {"name", "frames", "seconds", "truth": BOOL, "surface",
+///    "metrics": [{"stage", "seconds", "iterations", NAME: NUMBER...,
+///                 "gradient_shares": {GROUP: {TERM: {"share", "cosine", "evaluations"}...}...}}...],
 ///    "baselines": {NAME: {NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
-///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last only where some baseline has it)
+///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface" and "gradient_shares"
+///    only where there are any)
 ///
 /// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and
 /// for a name that occurs twice.

@@ -1,9 +1,14 @@
 #include "pipelines/summarize_run.h"
 
+#include <algorithm>
+
 #include "body/kinematics.h"
+#include "core/file.h"
 #include "core/rotation.h"
 #include "pipelines/evaluate.h"
 #include "pipelines/frame_start.h"
+#include "pipelines/gradient_table.h"
+#include "pipelines/penetration.h"
 
 namespace hsi4d {
 
@@ -74,6 +79,34 @@ void add_image_errors(const std::vector<MetricValues>& errors, MetricValues& mea
   means.insert(means.end(), added.begin(), added.end());
 }
 
+/// Of the start, of what every stage that moves the body left, and of the result's frames.
+void add_penetration(const RunConfig& config, const Clip& clip, const RunProgress& progress,
+                     const RefinementProgress& refinement, RunSummary& summary) {
+  summary.surface = clip.surface_file;
+  const auto add = [](const MetricValues& more, MetricValues& values) {
+    values.insert(values.end(), more.begin(), more.end());
+  };
+  const auto add_all = [&](const std::vector<SceneState>& states, MetricValues& means,
+                           std::vector<FrameMetrics>& per_frame) {
+    const std::vector<Penetration> counts = penetration_by_frame(clip, states);
+    add(mean_penetration(counts), means);
+    for (FrameMetrics& frame : per_frame)
+      add(penetration_values(counts[static_cast<std::size_t>(frame.frame)]), frame.values);
+  };
+  std::vector<SceneState> start;
+  for (Index t = 0; t < clip.frames(); ++t) start.push_back(given_start(clip, t));
+  add_all(start, summary.baselines[0].values, summary.baselines[0].per_frame);
+  std::vector<FrameMetrics> none;
+  const std::size_t frame_stages = progress.after_stage.size();
+  for (std::size_t s = 0; s < config.stages.size(); ++s) {
+    if (s < frame_stages && config.stages[s].second.draw == Draw::kScene) continue;
+    const std::vector<SceneState>& states =
+        s < frame_stages ? progress.after_stage[s] : refinement.stages[s - frame_stages].states;
+    const bool is_last = s + 1 == config.stages.size();
+    add_all(states, summary.metrics[s].values, is_last ? summary.per_frame : none);
+  }
+}
+
 }  // namespace
 
 RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunProgress& progress,
@@ -103,7 +136,18 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   add_image_errors(is_refined ? refinement.image_errors : progress.image_errors, summary.metrics.back().values,
                    summary.per_frame);
   add_image_errors(progress.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
+  if (clip.surface) add_penetration(config, clip, progress, refinement, summary);
   return summary;
+}
+
+void add_gradient_shares(const RunConfig& config, const std::string& metrics_file, RunSummary& summary) {
+  const auto measures = [](const auto& entry) { return entry.second.gradient_shares > 0; };
+  if (std::none_of(config.stages.begin(), config.stages.end(), measures)) return;
+  const std::string lines = read_text_file(metrics_file);
+  for (std::size_t s = 0; s < config.stages.size(); ++s) {
+    if (measures(config.stages[s]))
+      summary.metrics[s].gradient_shares = mean_gradient_shares(lines, config.stages[s].first, metrics_file);
+  }
 }
 
 }  // namespace hsi4d

@@ -42,6 +42,7 @@ ConfigValue object_of(std::string_view key, ConfigValue value) {
 }
 
 constexpr const char* kObjectTracks = "initial_objects.npz";
+constexpr const char* kSurfaceFile = "truth/surface.ply";
 
 std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<double>>& poses, bool has_tracks) {
   ConfigValue root = ConfigValue::make_object();
@@ -58,7 +59,7 @@ std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<
   return to_json(root);
 }
 
-ConfigValue data_section(const SyntheticObject& object, SyntheticVideo video) {
+ConfigValue data_section(const SyntheticObject& object, SyntheticVideo video, bool has_surface) {
   ConfigValue data = ConfigValue::make_object();
   const auto add = [&data](std::string_view key, std::string_view file) {
     data.add(key, ConfigValue::make_string(file));
@@ -74,6 +75,7 @@ ConfigValue data_section(const SyntheticObject& object, SyntheticVideo video) {
   add("camera", "camera.json");
   add("initial", "initial.json");
   add("truth", "truth");
+  if (has_surface) add("surface", kSurfaceFile);
   return data;
 }
 
@@ -205,8 +207,10 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
     if (has_tracks) write_objects(out.file(kObjectTracks), object.name, disturbed_object(clip.object, settings));
   }
   write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
-  write_text_file(out.file("config.json"),
-                  to_json(merged(object_of("data", data_section(object, settings.video)), more_sections)));
+  const TriangleMesh solids = synthetic_solids(settings, clip.plan);
+  if (!solids.faces.empty()) write_mesh(out.file(kSurfaceFile), solids);
+  const ConfigValue data = object_of("data", data_section(object, settings.video, !solids.faces.empty()));
+  write_text_file(out.file("config.json"), to_json(merged(data, more_sections)));
 
   FrameFiles frames(settings, out);
   Film film(settings, render, body, avatar, scene, object);

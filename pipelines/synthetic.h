@@ -10,6 +10,7 @@
 //   config.json                                                  a run config that names all this
 //   synthetic.json                                               the settings that it was made with
 //   truth/motion.npz  truth/objects.npz  truth/cameras.json
+//   truth/surface.ply                                 a mesh of what is certainly solid (synthetic_solids)
 //
 // An object's pose is x_world = exp(rotation) x_object + translation.
 #pragma once

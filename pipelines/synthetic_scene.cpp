@@ -79,6 +79,16 @@ Gaussians synthetic_scene(const SyntheticSettings& settings, const ScenePlan& pl
   return concatenated(parts);
 }
 
+TriangleMesh synthetic_solids(const SyntheticSettings& settings, const ScenePlan& plan) {
+  if (!settings.scene_file.empty()) return {};
+  SceneKit kit(plan, static_cast<std::uint64_t>(settings.seed));
+  maker_of(settings.scene).make(kit);
+  kit.add_support();
+  constexpr double kHalf = 5, kDeep = 2;  // metres: of the ground
+  kit.box({0, 0, -kDeep}, {kHalf, kHalf, kDeep}, detail::plain({0, 0, 0}));
+  return kit.model.boxes();
+}
+
 const char* scene_summary(SyntheticSceneKind kind) { return maker_of(kind).summary; }
 
 }  // namespace hsi4d

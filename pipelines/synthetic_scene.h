@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "optim/mesh_file.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/gaussians.h"
 
@@ -27,6 +28,10 @@ Gaussians synthetic_scene(SyntheticSceneKind kind, Index most, const ScenePlan& 
 /// The scene of the settings: of scene_file with what the plan asks for put into it, where there is one.
 /// Throws as read_splats; DataError when the file holds no Gaussians.
 Gaussians synthetic_scene(const SyntheticSettings& settings, const ScenePlan& plan);
+
+/// What is certainly solid in the scene of the settings: the ground, and the boxes that furniture is made of. What is
+/// round or soft (plants, curtains, tubes), and walls, are not in it. Of a scene_file nothing is known: no faces.
+TriangleMesh synthetic_solids(const SyntheticSettings& settings, const ScenePlan& plan);
 
 /// One line of what a scene is.
 const char* scene_summary(SyntheticSceneKind kind);

@@ -24,6 +24,9 @@ constexpr double kFlatness = 0.05;
 
 constexpr double kOpacityLogit = 5;
 
+/// How much deeper the solids of boxes without a bottom go, metres: these stand on something.
+constexpr double kBuried = 0.02;
+
 /// Towards where the baked highlights come from.
 const Vector3<double> kHighlight = Vector3<double>(-0.35, -0.55, 0.76).normalized();
 
@@ -160,6 +163,23 @@ void SurfaceModel::add_box(const Vector3<double>& center, const Vector3<double>&
   add_rectangle(center + x + y - z, -2 * x, 2 * z, paint(3), detail, gloss);
   if (with_bottom) add_rectangle(center - x + y - z, 2 * x, -2 * y, paint(4), detail, gloss);
   add_rectangle(center - x - y + z, 2 * x, 2 * y, paint(5), detail, gloss);
+  Matrix3<double> half_axes;
+  half_axes << x, y, z;
+  add_solid(center, half_axes, with_bottom ? 0 : kBuried);
+}
+
+void SurfaceModel::add_solid(const Vector3<double>& center, const Matrix3<double>& half_axes, double deeper) {
+  const auto first = static_cast<std::int32_t>(boxes_.vertices.size());
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3<double> signs((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
+    boxes_.vertices.emplace_back(center + half_axes * signs - Vector3<double>(0, 0, signs[2] < 0 ? deeper : 0));
+  }
+  for (const std::array<int, 4>& side : std::array<std::array<int, 4>, 6>{
+           {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}}) {
+    std::array<std::int32_t, 4> corners{};
+    for (std::size_t i = 0; i < 4; ++i) corners[i] = first + side[i];
+    detail::add_polygon(corners, boxes_);
+  }
 }
 
 void SurfaceModel::add_revolution(const Vector3<double>& base, const std::function<Vector2<double>(double v)>& profile,

@@ -8,6 +8,7 @@
 
 #include "core/linear.h"
 #include "core/types.h"
+#include "optim/mesh_file.h"
 #include "splat/gaussians.h"
 
 namespace hsi4d {
@@ -68,6 +69,9 @@ class SurfaceModel {
   void add_tube(const std::function<Vector3<double>(double v)>& curve, const std::function<double(double v)>& radius,
                 Paint color, double detail = 1, double gloss = 0);
 
+  /// The boxes that were added, closed, each a piece of its own; those without a bottom go kBuried deeper.
+  const TriangleMesh& boxes() const { return boxes_; }
+
   Index sheets() const { return static_cast<Index>(sheets_.size()); }
 
   /// Covers every sheet with a grid of flat discs aligned with (u, v), wide enough to leave no holes. Cells are square
@@ -80,7 +84,10 @@ class SurfaceModel {
   Gaussians covered(Index most, const Light& light, std::uint64_t seed) const;
 
  private:
+  void add_solid(const Vector3<double>& center, const Matrix3<double>& half_axes, double deeper);
+
   std::vector<Sheet> sheets_;
+  TriangleMesh boxes_;
 };
 
 }  // namespace hsi4d

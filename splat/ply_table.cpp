@@ -276,6 +276,23 @@ class RowReader {
     }
   }
 
+  void read_lists(const PlyElement& element, int column, FunctionRef<void(Index, std::span<const double>)> take) {
+    begin(element);
+    std::vector<double> values;
+    for (row_ = 0; row_ < element.rows; ++row_) {
+      for (std::size_t p = 0; p < element.properties.size(); ++p) {
+        const PlyProperty& property = element.properties[p];
+        if (p != static_cast<std::size_t>(column)) {
+          skip(property);
+          continue;
+        }
+        values.resize(property.count_type ? list_length(property) : 1);
+        for (double& value : values) value = number(property.type);
+      }
+      take(row_, values);
+    }
+  }
+
   void expect_end() {
     if (format_ == PlyFormat::kAscii) skip_spaces();
     if (at_ == file_.size()) return;
@@ -294,14 +311,19 @@ class RowReader {
       number(property.type);
       return;
     }
+    const std::size_t length = list_length(property);
+    if (format_ != PlyFormat::kAscii) return advance(length * size_of(property.type));
+    for (std::size_t i = 0; i < length; ++i) number(property.type);
+  }
+
+  /// Reads how many numbers of a list follow: no more than the file has bytes for.
+  std::size_t list_length(const PlyProperty& property) {
     const double count = number(*property.count_type);
     const std::size_t least = format_ == PlyFormat::kAscii ? 1 : size_of(property.type);
     if (!(count >= 0) || count != std::floor(count) || count > static_cast<double>((file_.size() - at_) / least))
       fail("property " + in_quotes(property.name) + " has a list of " + count_text(count) + " numbers; the file has " +
            std::to_string(file_.size() - at_) + " bytes left");
-    const auto length = static_cast<std::size_t>(count);
-    if (format_ != PlyFormat::kAscii) return advance(length * least);
-    for (std::size_t i = 0; i < length; ++i) number(property.type);
+    return static_cast<std::size_t>(count);
   }
 
   double number(PlyType type) {
@@ -375,6 +397,19 @@ void read_ply_rows(std::span<const std::uint8_t> file, const PlyHeader& header, 
   for (int e = 0; e < static_cast<int>(header.elements.size()); ++e) {
     if (e == element) {
       reader.read(header.elements[static_cast<std::size_t>(e)], columns, take);
+    } else {
+      reader.skip(header.elements[static_cast<std::size_t>(e)]);
+    }
+  }
+  reader.expect_end();
+}
+
+void read_ply_lists(std::span<const std::uint8_t> file, const PlyHeader& header, const std::string& name, int element,
+                    int column, FunctionRef<void(Index, std::span<const double>)> take) {
+  RowReader reader(file, header, name);
+  for (int e = 0; e < static_cast<int>(header.elements.size()); ++e) {
+    if (e == element) {
+      reader.read_lists(header.elements[static_cast<std::size_t>(e)], column, take);
     } else {
       reader.skip(header.elements[static_cast<std::size_t>(e)]);
     }

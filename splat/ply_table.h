@@ -56,4 +56,11 @@ PlyHeader read_ply_header(std::span<const std::uint8_t> file, const std::string&
 void read_ply_rows(std::span<const std::uint8_t> file, const PlyHeader& header, const std::string& name, int element,
                    std::span<const int> columns, FunctionRef<void(Index row, std::span<const double> values)> take);
 
+/// Reads one property of an element, in order, and walks over all else: a list gives its numbers, another property one.
+///
+/// @param column  place of the element's property
+/// Throws as read_ply_rows.
+void read_ply_lists(std::span<const std::uint8_t> file, const PlyHeader& header, const std::string& name, int element,
+                    int column, FunctionRef<void(Index row, std::span<const double> values)> take);
+
 }  // namespace hsi4d

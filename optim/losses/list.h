@@ -16,6 +16,7 @@
   HSI4D_LOSS(smooth)       \
   HSI4D_LOSS(ground)       \
   HSI4D_LOSS(foot_sliding) \
+  HSI4D_LOSS(penetration)  \
   HSI4D_LOSS(joint_limits) \
   HSI4D_LOSS(pose_prior)
 // clang-format on

@@ -1,6 +1,7 @@
 #include "pipelines/cli/report_command.h"
 
 #include "core/file.h"
+#include "pipelines/gradient_table.h"
 #include "pipelines/report_data.h"
 #include "pipelines/report_page.h"
 #include "pipelines/run_folder.h"
@@ -14,7 +15,7 @@ std::string report_command(const std::vector<std::string>& runs) {
     const std::string path = RunPaths{run}.report();
     write_text_file(path, report_page(data));
     text += (text.empty() ? "" : "\n") + path + "\n";
-    if (data.summary) text += error_table(*data.summary);
+    if (data.summary) text += error_table(*data.summary) + gradient_table(*data.summary);
     for (const std::string& note : data.notes) text += "note: " + note + "\n";
   }
   return text;

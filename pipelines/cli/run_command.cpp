@@ -8,6 +8,7 @@
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/clip.h"
+#include "pipelines/gradient_table.h"
 #include "pipelines/run_problems.h"
 #include "pipelines/sources.h"
 #include "pipelines/visibility.h"
@@ -117,11 +118,12 @@ RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>&
 }
 
 std::string result_text(const RunSummary& summary, const std::string& folder) {
+  const std::string shares = gradient_table(summary);
   const std::string note =
       summary.has_truth ? "" : "no ground truth: errors of body, objects and camera are not measured\n";
-  return error_table(summary) + note + "\n" + std::to_string(summary.frames) + " frames in " +
-         duration_text(summary.seconds) + "; report: " + (std::filesystem::path(folder) / "report.html").string() +
-         "\n";
+  return error_table(summary) + note + (shares.empty() ? "" : "\n" + shares) + "\n" + std::to_string(summary.frames) +
+         " frames in " + duration_text(summary.seconds) +
+         "; report: " + (std::filesystem::path(folder) / "report.html").string() + "\n";
 }
 
 std::string run_command(const RunArguments& arguments, const std::vector<LossTerm>& losses) {

@@ -107,6 +107,7 @@ TEST_CASE("losses that need what a stage does not have are named, unless they ar
         "/losses/smooth: this loss needs the body, which a picture does not have\n"
         "/losses/ground: this loss needs the body, which a picture does not have\n"
         "/losses/foot_sliding: this loss needs the body, which a picture does not have\n"
+        "/losses/penetration: this loss needs the body, which a picture does not have\n"
         "/losses/joint_limits: this loss needs the body, which a picture does not have\n"
         "/losses/pose_prior: this loss needs the body, which a picture does not have\n");
   CHECK(losses_without_inputs(stage, LossNeeds::kBody, "a motion").size() == 5);  // all others

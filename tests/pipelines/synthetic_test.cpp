@@ -64,6 +64,7 @@ const std::vector<std::string>& dataset_files() {
       "truth/cameras.json",
       "truth/motion.npz",
       "truth/objects.npz",
+      "truth/surface.ply",
   };
   return files;
 }
@@ -296,7 +297,7 @@ TEST_CASE("every shipped config of synth makes its dataset") {
     names.push_back(name);
   }
   std::sort(names.begin(), names.end());
-  CHECK(names == std::vector<std::string>{"alone", "disturbed", "faults", "walk"});
+  CHECK(names == std::vector<std::string>{"alone", "disturbed", "faults", "table", "walk"});
 }
 
 TEST_CASE("a dataset with all noise and faults is a function of its settings", "[parallel]") {

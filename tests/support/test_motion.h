@@ -5,6 +5,7 @@
 
 #include "core/random.h"
 #include "optim/motion_start.h"
+#include "tests/optim/surface_of_test.h"
 
 namespace hsi4d::test {
 
@@ -16,6 +17,7 @@ inline constexpr Index kFrames = 5, kStill = 2, kBodyRows = 60, kObjectRows = 30
 struct MotionOfTest {
   Avatar avatar;
   std::array<Gaussians, 2> objects;
+  Gaussians scene;  // a floor
   MotionStart start;
 
   MotionOfTest() {
@@ -35,6 +37,9 @@ struct MotionOfTest {
         objects[o].means.push_back(static_cast<float>(random.uniform(-0.03, 0.03)));
       start.objects.push_back(&objects[o]);
     }
+    add_sheet(scene, {-1, -1, -0.2}, {2, 0, 0}, {0, 2, 0}, 0.1);
+    start.scene = &scene;
+    start.first_camera_center = {0, 0, 1.5};
     start.avatar = &avatar;
     start.still_frames = kStill;
     for (Index t = 0; t < kFrames; ++t) {
