@@ -366,11 +366,11 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
 RunFolder::~RunFolder() = default;
 
 void RunFolder::set_state(RunState state, std::string_view message) {
-  // An encoder that outlived a run that was killed may have made its file after we came.
-  if (state != RunState::kRunning) remove_all_temporaries(paths_);
   state_ = state;
   message_ = message;
   write_status();
+  // An encoder that outlived a run that was killed may have made its file after we came.
+  if (state != RunState::kRunning) remove_all_temporaries(paths_);
 }
 
 void RunFolder::take_over_config() {
