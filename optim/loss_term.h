@@ -25,7 +25,7 @@ template <class S>
 struct LossInputs {
   Var<S> rendered;  ///< [3,H,W] the image of the present state, sRGB values as they are
   Var<S> target;    ///< [3,H,W] the video's frame
-  Var<S> weight;    ///< [1,H,W] how much a pixel counts, 0 to 1
+  Var<S> weight;    ///< [1,H,W] how much a pixel counts, 0 to 1; not given where all do
 
   Var<S> object_opacity;  ///< [O,H,W] rendered opacity Σ T α of each object's Gaussians, occluders included, 0 to 1
   Var<S> object_center_target;  ///< [O,3] centre of each object in the frame: x px, y px (pixel centres at +0.5), and

@@ -39,8 +39,8 @@ struct ParameterGroupSettings {
 enum class Draw { kAll, kScene };
 
 /// Which pixels count where a loss term uses weights: all; those that nothing has covered in any frame so far; those
-/// that the masks of this frame cover.
-enum class PixelWeight { kAll, kUnoccluded, kForeground };
+/// that the masks of this frame do not cover; those that they do.
+enum class PixelWeight { kAll, kUnoccluded, kBackground, kForeground };
 
 /// What a stage is run for: each frame in its turn, or all of them at once after that.
 enum class StageScope { kFrame, kSequence };
@@ -49,8 +49,10 @@ inline constexpr std::array<ConfigChoice<StageScope>, 2> kStageScopes = {
     {{StageScope::kFrame, "frame"}, {StageScope::kSequence, "sequence"}}};
 
 inline constexpr std::array<ConfigChoice<Draw>, 2> kDraws = {{{Draw::kAll, "all"}, {Draw::kScene, "scene"}}};
-inline constexpr std::array<ConfigChoice<PixelWeight>, 3> kPixelWeights = {
-    {{PixelWeight::kAll, "all"}, {PixelWeight::kUnoccluded, "unoccluded"}, {PixelWeight::kForeground, "foreground"}}};
+inline constexpr std::array<ConfigChoice<PixelWeight>, 4> kPixelWeights = {{{PixelWeight::kAll, "all"},
+                                                                            {PixelWeight::kUnoccluded, "unoccluded"},
+                                                                            {PixelWeight::kBackground, "background"},
+                                                                            {PixelWeight::kForeground, "foreground"}}};
 
 /// One stage of the method.
 struct StageSettings {

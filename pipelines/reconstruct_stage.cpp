@@ -48,7 +48,7 @@ Image pixel_weights(PixelWeight weight, const FrameTask& task, const DataSetting
   if (weight == PixelWeight::kAll) return {};
   Image covered(1, task.covered.height(), task.covered.width());
   add_covered(task.frame, data, covered);
-  return covered;
+  return weight == PixelWeight::kForeground ? covered : complement(covered);
 }
 
 FrameTargets targets_of(const StageTask& task, const ClipFrame& frame, const Image& weight) {
@@ -80,8 +80,10 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   if (stage.draw == Draw::kAll) graph.give_motion(seen_frames(frame.done, state));
   const Image weight = pixel_weights(stage.weight, frame, task.config.data);
   graph.set_targets(targets_of(task, frame.frame, weight));
+  LossInputs<S> inputs = graph.loss_inputs();
+  if (stage.weight == PixelWeight::kAll) inputs.weight = {};
   const StageResult result =
-      run_stage<S>(tape, stage, task.losses, graph.loss_inputs(), graph.groups(),
+      run_stage<S>(tape, stage, task.losses, inputs, graph.groups(),
                    [&](const IterationReport& report) { callback(report, *graph.rendered().counters); },
                    {.name = name + ", frame " + std::to_string(frame.index), .kept = &colors.moments});
   graph.read_state(stage.optimize, state);

@@ -1,5 +1,5 @@
-// L = (1 − λ) L1 + λ (1 − SSIM), the difference of the rendered image and the frame.
-// [3DGS, eq. 7; λ: method, stage 2]
+// L = (1 − λ) L1 + λ (1 − SSIM), the difference of the rendered image and the frame; where pixels have weights B, of
+// the two images times B: what does not count is black in both. [3DGS, eq. 7; λ: method, stage 2]
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/ssim.h"
@@ -18,17 +18,22 @@ void describe(ConfigFields& fields, PhotometricSettings& settings) {
                 "Share of the structural term: (1 - share) L1 + share (1 - SSIM)");
 }
 
+template <class S>
+Var<S> difference(Var<S> a, Var<S> b, double ssim_share) {
+  if (ssim_share == 0) return l1(a, b);
+  if (ssim_share == 1) return d_ssim(a, b);
+  return l1(a, b) * (1 - ssim_share) + d_ssim(a, b) * ssim_share;
+}
+
 }  // namespace
 
 LossTerm photometric_loss() {
   return make_loss_term<PhotometricSettings>(
-      "photometric", "L1 and structural difference of the rendered image and the frame",
+      "photometric", "L1 and structural difference of the rendered image and the frame where the weight says so",
       [](const auto& in, const PhotometricSettings& settings) {
         if (!in.given(in.rendered) || !in.given(in.target)) return decltype(in.rendered){};
-        const double share = settings.ssim_share;
-        if (share == 0) return l1(in.rendered, in.target);
-        if (share == 1) return d_ssim(in.rendered, in.target);
-        return l1(in.rendered, in.target) * (1 - share) + d_ssim(in.rendered, in.target) * share;
+        if (!in.given(in.weight)) return difference(in.rendered, in.target, settings.ssim_share);
+        return difference(in.rendered * in.weight, in.target * in.weight, settings.ssim_share);
       });
 }
 

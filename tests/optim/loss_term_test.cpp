@@ -160,6 +160,9 @@ TEST_CASE("photometric is zero for equal images and its L1 share is that of the 
   const double loss = value_of_flat("photometric", 0.5, false);
   CHECK(loss > 0.9 * 0.5);
   CHECK(loss < 0.9 * 0.5 + 0.1);
+  const double of_a_row = value_of_flat("photometric", 0.5, true);
+  CHECK(of_a_row > 0.9 * 0.5 / kHeight);
+  CHECK(of_a_row < loss);
 }
 
 namespace {
