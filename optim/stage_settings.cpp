@@ -71,9 +71,10 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
       "over", s.over, kStageScopes,
       "What is optimised at once: a frame, each in its turn, or after them the whole sequence, which draws nothing");
   f.choice("draw", s.draw, kDraws, "What is rendered: all, or the static scene alone");
-  f.choice("weight", s.weight, kPixelWeights,
-           "Pixels that count in weighted losses: all, those that no human or object has covered in any frame so far, "
-           "or those that the frame's masks cover");
+  f.choice(
+      "weight", s.weight, kPixelWeights,
+      "Pixels that count in weighted losses: all, those that no human or object has covered in any frame so far, those "
+      "that the frame's masks leave, or those that they cover");
   f.map("optimize", s.optimize, "What moves: parameter groups by name");
   f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
   f.integer("gradient_shares", s.gradient_shares, {.min = 0, .max = kMostIterations},

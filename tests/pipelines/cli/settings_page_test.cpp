@@ -1,0 +1,68 @@
+// docs/settings.md tells every setting, as it is, with an example that is right.
+#include <filesystem>
+
+#include <catch2/catch.hpp>
+
+#include "core/config_file.h"
+#include "optim/loss_term.h"
+#include "pipelines/run_config.h"
+#include "tests/support/temporary_folder.h"
+
+using namespace hsi4d;
+
+namespace {
+
+std::vector<LossDescription> all_losses() { return descriptions_of(loss_terms()); }
+
+std::string page() { return test::file_text(std::filesystem::path(HSI4D_SOURCE_DIR) / "docs" / "settings.md"); }
+
+/// The cells of the table's row that begins with this setting; empty: there is none.
+std::vector<std::string> row_of(const std::string& text, const std::string& setting) {
+  const std::string begin = "\n| `" + setting + "` |";
+  const std::size_t at = text.find(begin);
+  if (at == std::string::npos) return {};
+  const std::size_t end = text.find('\n', at + 1);
+  std::string line = text.substr(at + 1, end - at - 1);
+  std::vector<std::string> cells;
+  std::size_t from = 2;
+  for (std::size_t to; (to = line.find(" | ", from)) != std::string::npos; from = to + 3)
+    cells.push_back(line.substr(from, to - from));
+  cells.push_back(line.substr(from, line.size() - from - 2));
+  return cells;
+}
+
+std::string escaped(std::string text) {
+  for (std::size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) text.insert(at, "\\");
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("the page of settings tells every setting as it is") {
+  const std::string text = page();
+  for (const ConfigSetting& setting : run_config_settings(all_losses())) {
+    INFO(setting.pointer << ": tools/settings_page writes the page again");
+    const std::vector<std::string> cells = row_of(text, setting.pointer);
+    REQUIRE(cells.size() == 5);
+    CHECK(cells[1] == "`" + escaped(setting.initial) + "`");
+    CHECK(cells[2] == escaped(setting.allowed));
+    CHECK(cells[3] == escaped(setting.summary));
+  }
+}
+
+TEST_CASE("the page's examples are right") {
+  const std::string text = page();
+  for (const ConfigSetting& setting : run_config_settings(all_losses())) {
+    const std::vector<std::string> cells = row_of(text, setting.pointer);
+    REQUIRE(cells.size() == 5);
+    const std::string example = cells[4].substr(1, cells[4].size() - 2);
+    INFO(setting.pointer << ": " << example);
+    ConfigProblems problems;
+    const ConfigValue tree = load_config_text(example, "example.json", "/", {}, problems);
+    REQUIRE(problems.empty());
+    read_run_config(tree, all_losses(), problems, ConfigUse::kStages);
+    // What else the config would need is not there, nor are the files.
+    const bool is_path = setting.allowed.find("path") != std::string::npos;
+    for (const std::string& pointer : problems.pointers()) CHECK((is_path || pointer != setting.pointer));
+  }
+}
