@@ -42,7 +42,8 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("render", s.render, "How Gaussians become pixels");
   f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");
   f.object("approx", s.approx, "What may be computed nearly, and faster");
-  f.map("stages", s.stages, "The stages of the run by name, in the order in which they run",
+  f.map("stages", s.stages,
+        "The stages of the run by name, in the order in which they run; those over the first frame run first",
         [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });
 }
 
@@ -52,6 +53,9 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
   ConfigFields fields;
   describe(fields, config, losses);
   read_config(tree, fields, problems);
+  // They run first wherever they are written: a file that extends another one can only append stages.
+  std::stable_partition(config.stages.begin(), config.stages.end(),
+                        [](const auto& entry) { return entry.second.over == StageScope::kFirst; });
   add_run_problems(tree, config, use, problems);
   problems.throw_if_any();
   return config;

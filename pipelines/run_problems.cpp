@@ -17,7 +17,7 @@ namespace {
 
 void add_group_problems(const StageSettings& stage, const std::string& in, std::vector<RunProblem>& found) {
   const std::string where = in + "/optimize";
-  const bool is_of_frame = stage.over == StageScope::kFrame;
+  const bool is_of_frame = stage.over != StageScope::kSequence;
   const std::vector<std::string> known = is_of_frame ? state_group_names(stage.draw) : sequence_group_names();
   if (stage.optimize.empty())
     found.push_back({where, "no parameter group is named; known here: " + joined(known), {where}, true});
@@ -60,22 +60,35 @@ void add_loss_problems(const StageSettings& stage, const std::string& in, std::v
                    {where}});
 }
 
-/// Stages over the sequence begin where those of all frames ended.
+std::string scope_in_words(StageScope scope) {
+  if (scope == StageScope::kFirst) return "over the first frame";
+  return scope == StageScope::kFrame ? "over frames" : "over the sequence";
+}
+
+/// Stages over the first frame, then those over each of the others, then those over the sequence: each begins where
+/// those before ended.
 void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunProblem>& found) {
-  const std::string* sequence = nullptr;
-  for (const auto& [name, stage] : stages) {
-    const std::string where = child_pointer(child_pointer("/stages", name), "over");
-    if (stage.over == StageScope::kSequence) {
-      if (&stage == &stages.front().second)
-        found.push_back({where, "a stage over the sequence needs one over frames before it", {where}});
-      sequence = &name;
-    } else if (sequence != nullptr) {
-      found.push_back(
-          {where,
-           "a stage over frames cannot come after " + json_string(*sequence) + ", which is over the sequence",
-           {where, child_pointer(child_pointer("/stages", *sequence), "over")}});
+  const auto place = [](const std::string& name) { return child_pointer(child_pointer("/stages", name), "over"); };
+  const auto is_of_frames = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
+  const bool has_frames = std::any_of(stages.begin(), stages.end(), is_of_frames);
+  const std::pair<std::string, StageSettings>* latest = nullptr;  // of those so far
+  for (const auto& entry : stages) {
+    const auto& [name, stage] = entry;
+    if (latest != nullptr && stage.over < latest->second.over) {
+      found.push_back({place(name),
+                       "a stage " + scope_in_words(stage.over) + " cannot come after " + json_string(latest->first) +
+                           ", which is " + scope_in_words(latest->second.over),
+                       {place(name), place(latest->first)}});
+      continue;
     }
+    if (latest == nullptr && stage.over == StageScope::kSequence)
+      found.push_back({place(name), "a stage over the sequence needs one over frames before it", {place(name)}});
+    latest = &entry;
   }
+  if (!has_frames && !stages.empty() && stages.front().second.over == StageScope::kFirst)
+    found.push_back({place(stages.front().first),
+                     "a stage over the first frame needs one over frames after it",
+                     {place(stages.front().first)}});
 }
 
 std::vector<RunProblem> loss_faults(RunConfig& config) {

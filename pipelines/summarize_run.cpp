@@ -31,10 +31,9 @@ MetricValues errors_of(const Clip& clip, const std::vector<SceneState>& states, 
   return sequence_summary(placed(clip, states, draw), placed(clip, *clip.truth, draw), clip.frame_rate);
 }
 
-StageSummary summarize_stage(const std::string& name, const Clip& clip, const std::vector<SceneState>& states,
-                             Draw draw, const StageTotals& totals) {
-  StageSummary summary{name, totals.seconds, totals.iterations, {}};
-  if (clip.truth) summary.values = errors_of(clip, states, draw);
+/// Time and work of a stage beside its errors.
+StageSummary summarize_stage(const std::string& name, MetricValues errors, const StageTotals& totals) {
+  StageSummary summary{name, totals.seconds, totals.iterations, std::move(errors)};
   for (const auto& [counter, count] : {std::pair{"rollbacks", totals.rollbacks},
                                        {"tiles", totals.tiles},
                                        {"pairs", totals.pairs},
@@ -42,6 +41,29 @@ StageSummary summarize_stage(const std::string& name, const Clip& clip, const st
     summary.values.emplace_back(counter, static_cast<double>(count));
   }
   return summary;
+}
+
+/// Errors of the first frame.
+MetricValues first_frame_errors(const Clip& clip, const SceneState& state, Draw draw) {
+  if (!clip.truth) return {};
+  return frame_errors(placed(clip, state, draw), placed(clip, clip.truth->front(), draw));
+}
+
+void append(const MetricValues& more, MetricValues& values) { values.insert(values.end(), more.begin(), more.end()); }
+
+/// The stages over the first frame, and frame 0 as it was given.
+void add_first_frame(const RunConfig& config, const Clip& clip, const RunProgress& progress, RunSummary& summary) {
+  if (progress.first_frame.empty()) return;
+  Baseline given{"given_frame_0", first_frame_errors(clip, clip.first, Draw::kAll), {}, true};
+  append(progress.start_errors[0], given.values);
+  summary.baselines.push_back(std::move(given));
+  for (std::size_t s = 0; s < progress.first_frame.size(); ++s) {
+    const auto& [name, stage] = config.stages[s];
+    const FirstFrameState& found = progress.first_frame[s];
+    summary.metrics.push_back(summarize_stage(name, first_frame_errors(clip, found.state, stage.draw), found.totals));
+    summary.metrics.back().of_frame_0 = true;
+  }
+  append(progress.image_errors[0], summary.metrics.back().values);
 }
 
 /// Baselines and errors by frame, against the clip's truth.
@@ -52,7 +74,6 @@ void add_errors(const Clip& clip, const std::vector<SceneState>& result, RunSumm
     start.push_back(given_start(clip, t));
     copy.push_back(clip.first);
   }
-  summary.baselines.clear();
   for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{"copy_frame_0", &copy}}) {
     summary.baselines.push_back(
         {name, errors_of(clip, *states, Draw::kAll), sequence_errors(placed(clip, *states, Draw::kAll), truth)});
@@ -67,11 +88,9 @@ void add_image_errors(const std::vector<MetricValues>& errors, MetricValues& mea
   for (std::size_t t = 1; t < errors.size(); ++t) images.push_back({static_cast<int>(t), errors[t]});
   for (std::size_t t = 0; t < images.size(); ++t) {
     if (per_frame.size() <= t) per_frame.push_back({images[t].frame, {}});
-    MetricValues& values = per_frame[t].values;
-    values.insert(values.end(), images[t].values.begin(), images[t].values.end());
+    append(images[t].values, per_frame[t].values);
   }
-  const MetricValues added = mean_errors(images);
-  means.insert(means.end(), added.begin(), added.end());
+  append(mean_errors(images), means);
 }
 
 }  // namespace
@@ -82,22 +101,24 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   summary.name = config.name;
   summary.frames = static_cast<int>(clip.frames());
   summary.seconds = progress.seconds + refinement.seconds;
-  const std::size_t frame_stages = progress.after_stage.size();
-  for (std::size_t s = 0; s < config.stages.size(); ++s) {
-    const auto& [name, stage] = config.stages[s];
-    if (s < frame_stages) {
-      summary.metrics.push_back(summarize_stage(name, clip, progress.after_stage[s], stage.draw, progress.totals[s]));
-    } else {
-      const RefinedStates& refined = refinement.stages[s - frame_stages];
-      summary.metrics.push_back(summarize_stage(name, clip, refined.states, Draw::kAll, refined.totals));
-    }
+  const auto add_stage = [&](const std::vector<SceneState>& states, const StageTotals& totals) {
+    const auto& [name, stage] = config.stages[summary.metrics.size()];
+    summary.metrics.push_back(
+        summarize_stage(name, clip.truth ? errors_of(clip, states, stage.draw) : MetricValues{}, totals));
+  };
+  if (clip.truth) {
+    add_errors(clip, result_of(progress, refinement), summary);
+  } else {
+    summary.baselines = {{"start", {}, {}}};
   }
-  summary.baselines = {{"start", {}, {}}};
-  if (clip.truth) add_errors(clip, result_of(progress, refinement), summary);
+  add_first_frame(config, clip, progress, summary);
+  for (std::size_t s = 0; s < progress.after_stage.size(); ++s) add_stage(progress.after_stage[s], progress.totals[s]);
+  const std::size_t last_of_frames = summary.metrics.size() - 1;
+  for (const RefinedStates& refined : refinement.stages) add_stage(refined.states, refined.totals);
   const bool is_refined = !refinement.stages.empty();
   if (is_refined) {
     std::vector<FrameMetrics> before_refinement;
-    add_image_errors(progress.image_errors, summary.metrics[frame_stages - 1].values, before_refinement);
+    add_image_errors(progress.image_errors, summary.metrics[last_of_frames].values, before_refinement);
   }
   add_image_errors(is_refined ? refinement.image_errors : progress.image_errors, summary.metrics.back().values,
                    summary.per_frame);

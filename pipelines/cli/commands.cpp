@@ -79,9 +79,11 @@ std::string settings_table(const std::vector<ConfigSetting>& settings) {
 /// What a stage may move, by what it is over and what it draws.
 std::string list_stages() {
   std::vector<std::vector<std::string>> rows = {{"OVER", "DRAW", "GROUP", "MOVES"}};
-  for (const ConfigChoice<Draw>& draw : kDraws) {
-    for (const std::string& group : state_group_names(draw.value))
-      rows.push_back({"frame", draw.name, group, state_group_summary(group)});
+  for (const char* over : {"first_frame", "frame"}) {
+    for (const ConfigChoice<Draw>& draw : kDraws) {
+      for (const std::string& group : state_group_names(draw.value))
+        rows.push_back({over, draw.name, group, state_group_summary(group)});
+    }
   }
   for (const std::string& group : sequence_group_names())
     rows.push_back({"sequence", "", group, sequence_group_summary(group)});

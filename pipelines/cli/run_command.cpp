@@ -55,7 +55,9 @@ std::string plan(const RunConfig& config, const std::vector<LossTerm>& losses, c
   }
   for (const auto& [name, stage] : config.stages) {
     text += "  stage " + name + ": " + count_text(stage.iterations, "iteration") +
-            (stage.over == StageScope::kFrame ? " a frame\n" : " over the sequence\n");
+            (stage.over == StageScope::kFirst   ? " over the first frame\n"
+             : stage.over == StageScope::kFrame ? " a frame\n"
+                                                : " over the sequence\n");
   }
   for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
   return text;
