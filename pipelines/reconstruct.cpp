@@ -96,7 +96,7 @@ class Reconstruction {
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
     const RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     folder_.write_summary(summary);
-    write_body(folder_.paths(), config_, clip_, result());
+    write_body(folder_.paths(), config_.body, clip_.avatar, motion_of(clip_, result()));
     write_preview(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
       stop_if_asked(clip_.frames());
       return render_state(config_, clip_, state, colors_after(frame));

@@ -36,6 +36,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");
   f.object("start", s.start, "Where the stages of a frame begin");
   f.object("data", s.data, "The files that the run reads");
+  f.list("chain", s.chain, "Clips that follow one another, each from the last state of the one before");
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
   f.object("color_net", s.color_net, "How the human's colours follow its pose");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
@@ -56,6 +57,7 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
   // They run first wherever they are written: a file that extends another one can only append stages.
   std::stable_partition(config.stages.begin(), config.stages.end(),
                         [](const auto& entry) { return entry.second.over == StageScope::kFirst; });
+  if (problems.empty()) lay_over_data(tree, config.chain, problems);
   add_run_problems(tree, config, use, problems);
   problems.throw_if_any();
   return config;
@@ -84,17 +86,31 @@ bool has_loss(const RunConfig& config, const std::string& name) {
   });
 }
 
+namespace {
+
+/// Leaves of the section `data` what is no file.
+void drop_files(ConfigValue& data) {
+  std::erase_if(data.members, [](const ConfigMember& setting) {
+    return !setting.key.starts_with("mask_") && !setting.key.ends_with("_rate");
+  });
+}
+
+}  // namespace
+
 ConfigValue without_data(ConfigValue tree) {
   std::erase_if(tree.members, [](const ConfigMember& member) {
-    return member.key == "synthetic" || member.key == "threads" || member.key == "camera_selection";
+    return member.key == "synthetic" || member.key == "threads" || member.key == "camera_selection" ||
+           (member.key == "chain" && member.value.items.empty());
   });
   for (ConfigMember& member : tree.members) {
     std::vector<ConfigMember>& own = member.value.members;
     if (member.key == "body") std::erase_if(own, [](const ConfigMember& setting) { return setting.key == "path"; });
-    if (member.key != "data") continue;
-    std::erase_if(own, [](const ConfigMember& setting) {
-      return !setting.key.starts_with("mask_") && !setting.key.ends_with("_rate");
-    });
+    if (member.key == "data") drop_files(member.value);
+    for (ConfigValue& clip : member.value.items) {
+      for (ConfigMember& of_clip : clip.members) {
+        if (member.key == "chain" && of_clip.key == "data") drop_files(of_clip.value);
+      }
+    }
   }
   return tree;
 }
@@ -108,6 +124,7 @@ ConfigValue sections_beside_data(const RunConfig& config, const std::vector<Loss
 
 ConfigValue dataset_sections(const RunConfig& config, const std::vector<LossDescription>& losses) {
   ConfigValue tree = sections_beside_data(config, losses);
+  std::erase_if(tree.members, [](const ConfigMember& member) { return member.key == "chain"; });
   if (config.body.path.empty()) return tree;
   for (ConfigMember& member : tree.members) {
     if (member.key == "body")

@@ -1,7 +1,6 @@
 #include "pipelines/run_problems.h"
 
 #include <algorithm>
-#include <array>
 
 #include "core/check.h"
 #include "core/suggest.h"
@@ -105,44 +104,81 @@ std::vector<RunProblem> loss_faults(RunConfig& config) {
 
 // ---- Inputs ----
 
-void add_name_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+/// @param in  the section, "/data"
+void add_name_problems(const DataSettings& data, const std::string& in, std::vector<RunProblem>& found) {
   for (const auto& [name, object] : data.objects) {
     if (name.empty())
-      found.push_back({"/data/objects", "an object's name is empty; it names the folder of its masks", {}});
+      found.push_back({in + "/objects", "an object's name is empty; it names the folder of its masks", {}});
     if (name == kHumanMasks)
-      found.push_back({child_pointer("/data/objects", name),
+      found.push_back({child_pointer(in + "/objects", name),
                        json_string(name) + " is the folder of the human's masks; use another name",
                        {}});
   }
 }
 
-void add_input_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+/// @param has_state  frame 0 is that in which another clip ended
+void add_input_problems(const DataSettings& data, const std::string& in, bool has_state,
+                        std::vector<RunProblem>& found) {
   struct Input {
     const std::filesystem::path& path;
     const char* key;
     const char* what;
   };
-  const std::array inputs = {Input{data.scene, "scene", "a scene"},
-                             Input{data.avatar, "avatar", "an avatar"},
-                             Input{data.frames, "frames", "the frames of a video"},
-                             Input{data.masks, "masks", "masks of the human and the objects"},
-                             Input{data.camera, "camera", "the camera of frame 0"},
-                             Input{data.initial, "initial", "the state of frame 0"}};
+  std::vector<Input> inputs = {Input{data.scene, "scene", "a scene"}, Input{data.avatar, "avatar", "an avatar"},
+                               Input{data.frames, "frames", "the frames of a video"},
+                               Input{data.masks, "masks", "masks of the human and the objects"},
+                               Input{data.camera, "camera", "the camera of frame 0"}};
+  if (!has_state) inputs.push_back(Input{data.initial, "initial", "the state of frame 0"});
   const auto is_missing = [](const Input& input) { return input.path.empty(); };
   if (std::all_of(inputs.begin(), inputs.end(), is_missing)) {
     std::vector<std::string> keys;
     for (const Input& input : inputs) keys.emplace_back(input.key);
-    found.push_back({"/data",
+    found.push_back({in,
                      "no inputs are given; a run needs " + joined(keys) +
                          ". `hsi4d synth` makes a dataset with a config beside it to run; `hsi4d demo` makes one and "
                          "runs it",
-                     {"/data"},
+                     {in},
                      true});
     return;
   }
   for (const Input& input : inputs) {
-    const std::string place = std::string("/data/") + input.key;
+    const std::string place = in + "/" + input.key;
     if (is_missing(input)) found.push_back({place, std::string("not given; a run needs ") + input.what, {place}, true});
+  }
+}
+
+// ---- Chains ----
+
+bool is_folder_name(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  });
+}
+
+std::string object_names(const DataSettings& data) {
+  std::vector<std::string> names;
+  for (const auto& [name, object] : data.objects) names.push_back(name);
+  return names.empty() ? "none" : joined(names);
+}
+
+void add_chain_problems(const std::vector<ChainClip>& chain, ConfigUse use, std::vector<RunProblem>& found) {
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const ChainClip& clip = chain[i];
+    const std::string where = child_pointer("/chain", std::to_string(i));
+    if (!is_folder_name(clip.name))
+      found.push_back(
+          {where + "/name", json_string(clip.name) + " is no name of a folder; allowed: letters, digits, _ and -", {}});
+    for (std::size_t k = 0; k < i; ++k) {
+      if (chain[k].name == clip.name)
+        found.push_back({where + "/name", json_string(clip.name) + " is the name of another clip too", {}});
+    }
+    if (object_names(clip.data) != object_names(chain.front().data))
+      found.push_back({where + "/data/objects",
+                       "the clip has the objects " + object_names(clip.data) + ", the first one " +
+                           object_names(chain.front().data) + "; the clips of a chain have the same, in one order",
+                       {}});
+    add_name_problems(clip.data, where + "/data", found);
+    if (use == ConfigUse::kRun) add_input_problems(clip.data, where + "/data", i > 0, found);
   }
 }
 
@@ -189,8 +225,12 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
     add_loss_problems(stage, where, found);
   }
   add_order_problems(config.stages, found);
-  add_name_problems(config.data, found);
-  if (use == ConfigUse::kRun) add_input_problems(config.data, found);
+  if (!config.chain.empty()) {
+    add_chain_problems(config.chain, use, found);
+    return found;
+  }
+  add_name_problems(config.data, "/data", found);
+  if (use == ConfigUse::kRun) add_input_problems(config.data, "/data", false, found);
   return found;
 }
 
@@ -229,8 +269,8 @@ void prepare_run(RunConfig& config) {
 
 void check_inputs(const DataSettings& data) {
   std::vector<RunProblem> found;
-  add_name_problems(data, found);
-  add_input_problems(data, found);
+  add_name_problems(data, "/data", found);
+  add_input_problems(data, "/data", false, found);
   throw_if_any(found);
 }
 

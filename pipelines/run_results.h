@@ -21,10 +21,12 @@ inline constexpr double kExportedRate = 30;
 void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
                    const std::vector<SceneState>& states, const ColorState& colors);
 
-/// Writes body.glb, the body in motion: config.body, which has to be the avatar's: of its kind, and with joints where
-/// the avatar has them. Where it is another the log says so, and no file is written.
-void write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
-                const std::vector<SceneState>& states);
+/// The bodies of the frames as motion.npz has them.
+Motion motion_of(const Clip& clip, const std::vector<SceneState>& states);
+
+/// Writes body.glb, the body in motion. It has to be the avatar's: of its kind, and with joints where the avatar has
+/// them. Where it is another the log says so, and no file is written.
+void write_body(const RunPaths& paths, const BodySettings& body, const Avatar& avatar, const Motion& motion);
 
 /// Writes preview.mp4: video, reconstruction, both one over the other, and the reconstruction from another side, next
 /// to each other. Where ffmpeg fails the log says so, and no file is written.

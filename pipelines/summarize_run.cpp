@@ -2,28 +2,15 @@
 
 #include "body/kinematics.h"
 #include "core/rotation.h"
-#include "pipelines/evaluate.h"
 #include "pipelines/frame_start.h"
 
 namespace hsi4d {
 
 namespace {
 
-/// Where a state puts everything, for the metrics. A stage that draws the scene alone is judged by its camera alone.
-FrameState placed(const Clip& clip, const SceneState& state, Draw draw) {
-  FrameState frame;
-  frame.camera_from_world = state.camera_from_world;
-  if (draw == Draw::kScene) return frame;
-  frame.joints = pose_joints(clip.avatar, state.body);
-  for (const ObjectPose& pose : state.objects) {
-    frame.world_from_object.push_back({so3_exp(pose.rotation), pose.translation});
-  }
-  return frame;
-}
-
 std::vector<FrameState> placed(const Clip& clip, const std::vector<SceneState>& states, Draw draw) {
   std::vector<FrameState> frames;
-  for (const SceneState& state : states) frames.push_back(placed(clip, state, draw));
+  for (const SceneState& state : states) frames.push_back(placed(clip.avatar, state, draw));
   return frames;
 }
 
@@ -46,7 +33,7 @@ StageSummary summarize_stage(const std::string& name, MetricValues errors, const
 /// Errors of the first frame.
 MetricValues first_frame_errors(const Clip& clip, const SceneState& state, Draw draw) {
   if (!clip.truth) return {};
-  return frame_errors(placed(clip, state, draw), placed(clip, clip.truth->front(), draw));
+  return frame_errors(placed(clip.avatar, state, draw), placed(clip.avatar, clip.truth->front(), draw));
 }
 
 void append(const MetricValues& more, MetricValues& values) { values.insert(values.end(), more.begin(), more.end()); }
@@ -94,6 +81,17 @@ void add_image_errors(const std::vector<MetricValues>& errors, MetricValues& mea
 }
 
 }  // namespace
+
+FrameState placed(const Avatar& avatar, const SceneState& state, Draw draw) {
+  FrameState frame;
+  frame.camera_from_world = state.camera_from_world;
+  if (draw == Draw::kScene) return frame;
+  frame.joints = pose_joints(avatar, state.body);
+  for (const ObjectPose& pose : state.objects) {
+    frame.world_from_object.push_back({so3_exp(pose.rotation), pose.translation});
+  }
+  return frame;
+}
 
 RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunProgress& progress,
                          const RefinementProgress& refinement) {

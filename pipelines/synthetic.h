@@ -10,6 +10,9 @@
 //   synthetic.json                                               the settings that it was made with
 //   truth/motion.npz  truth/objects.npz  truth/cameras.json
 //
+// Of several clips (synthetic.clips) each has its own clips/NAME/ with frames, masks, camera, initial state and truth;
+// config.json is that of a chain.
+//
 // An object's pose is x_world = exp(rotation) x_object + translation.
 #pragma once
 

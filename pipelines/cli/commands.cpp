@@ -47,6 +47,11 @@ std::string summary(const std::filesystem::path& file, const RunConfig& config) 
   if (render.compatibility != Compatibility::kNone)
     text += ", as " + std::string(choice_name<Compatibility>(kCompatibilities, render.compatibility));
   text += "\n";
+  if (!config.chain.empty()) {
+    std::vector<std::string> names;
+    for (const ChainClip& clip : config.chain) names.push_back(clip.name);
+    text += "  chain of " + count_text(std::ssize(names), "clip") + " (" + joined(names) + ")\n";
+  }
   for (const auto& [name, stage] : config.stages) text += stage_summary(name, stage);
   if (config.stages.empty()) text += "  no stages\n";
   for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
