@@ -228,7 +228,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_text_file(out.file("config.json"), to_json(merged(data_sections(object, settings.clips), more_sections)));
 
   const std::vector<SyntheticClip> clips =
-      cut_into_clips(whole, whole_settings, settings.clips, {scene, object, avatar}, observer);
+      cut_into_clips(whole, whole_settings, settings.clips, {scene, object, avatar});
   Progress shown("frames", settings.frames * settings.clips, observer.progress, observer.progress_interval);
   for (Index k = 0; k < settings.clips; ++k) {
     const auto& clip = clips[static_cast<std::size_t>(k)];

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "body/avatar.h"
-#include "pipelines/observer.h"
 #include "pipelines/synthetic_motion.h"
 
 namespace hsi4d {
@@ -17,13 +16,12 @@ struct SyntheticSetting {
   const Avatar& avatar;
 };
 
-/// Cuts a clip of `clips` · (`frames` − 1) + 1 frames. The first one keeps its cameras. Those of each other begin where
-/// its first frame is seen best of a few places around (select_camera), and drift from there as the first one's do.
-///
+/// Cuts a clip of `clips` · (`frames` − 1) + 1 frames. The first one keeps its cameras. Those of each other begin 20 or
+/// 30 degrees beside, where most of the human is to be seen in its first frame (count_visible), and drift from there as
+/// the first one's do.
 /// @param settings  of the whole
-/// Throws UserError when the human is seen from none of them, Interrupted when asked to stop.
 std::vector<SyntheticClip> cut_into_clips(const SyntheticClip& whole, const ClipSettings& settings, Index clips,
-                                          const SyntheticSetting& filmed, const Observer& observer);
+                                          const SyntheticSetting& filmed);
 
 /// "clip1" for clip 0.
 std::string clip_name(Index clip);
