@@ -10,7 +10,7 @@
 
 namespace hsi4d {
 
-/// In place of a frame: the clip's first, which is given and may be long before those that a stage sees.
+/// In place of a frame: the clip's first, which may be long before those that a stage sees.
 inline constexpr Index kFirstFrame = -1;
 
 /// A Gaussian of the human in a frame.

@@ -69,7 +69,8 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   f.integer("iterations", s.iterations, {.min = 1, .max = kMostIterations}, "Steps of the optimiser").required();
   f.choice(
       "over", s.over, kStageScopes,
-      "What is optimised at once: a frame, each in its turn, or after them the whole sequence, which draws nothing");
+      "What is optimised at once: a frame, each in its turn; the first frame before them, which is given otherwise; or "
+      "after them the whole sequence, which draws nothing");
   f.choice("draw", s.draw, kDraws, "What is rendered: all, or the static scene alone");
   f.choice(
       "weight", s.weight, kPixelWeights,
@@ -92,7 +93,8 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
                                                                             : "";
   });
   f.rule({"pose_weights", "over"}, [&s]() -> std::string {
-    return s.over == StageScope::kFrame && !s.pose_weights.empty() ? "only a stage over the sequence has latents" : "";
+    return s.over != StageScope::kSequence && !s.pose_weights.empty() ? "only a stage over the sequence has latents"
+                                                                      : "";
   });
 }
 

@@ -42,11 +42,12 @@ enum class Draw { kAll, kScene };
 /// that the masks of this frame do not cover; those that they do.
 enum class PixelWeight { kAll, kUnoccluded, kBackground, kForeground };
 
-/// What a stage is run for: each frame in its turn, or all of them at once after that.
-enum class StageScope { kFrame, kSequence };
+/// What a stage is run for: the first frame, which is given otherwise; then each later one in its turn; then all of
+/// them at once.
+enum class StageScope { kFirst, kFrame, kSequence };
 
-inline constexpr std::array<ConfigChoice<StageScope>, 2> kStageScopes = {
-    {{StageScope::kFrame, "frame"}, {StageScope::kSequence, "sequence"}}};
+inline constexpr std::array<ConfigChoice<StageScope>, 3> kStageScopes = {
+    {{StageScope::kFirst, "first_frame"}, {StageScope::kFrame, "frame"}, {StageScope::kSequence, "sequence"}}};
 
 inline constexpr std::array<ConfigChoice<Draw>, 2> kDraws = {{{Draw::kAll, "all"}, {Draw::kScene, "scene"}}};
 inline constexpr std::array<ConfigChoice<PixelWeight>, 4> kPixelWeights = {{{PixelWeight::kAll, "all"},

@@ -178,11 +178,14 @@ bool shows_something(const Image& mask, double threshold) {
 
 Clip read_clip(const DataSettings& data) {
   check_inputs(data);
+  return make_clip(data, read_scene_setup(data));
+}
+
+Clip make_clip(const DataSettings& data, SceneSetup setup) {
   Clip clip;
   auto video = std::make_shared<ClipVideo>(ClipVideo{{data.frames, {data.video_rate, data.frame_rate}}, {}});
   clip.frame_files = video->frames.names();
   clip.camera = read_camera(data.camera.string());
-  SceneSetup setup = read_scene_setup(data);
   clip.scene = std::move(setup.scene);
   clip.avatar = std::move(setup.avatar);
   clip.objects = std::move(setup.objects);

@@ -64,6 +64,9 @@ inline constexpr const char* kHumanMasks = "human";
 /// fit each other.
 Clip read_clip(const DataSettings& data);
 
+/// As read_clip, of a scene that is read. data.initial is of no meaning.
+Clip make_clip(const DataSettings& data, SceneSetup setup);
+
 /// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on.
 /// A human or an object that some masks after frame 0 show nothing of is told in the log, each with its frames. Throws
 /// as read_frame.

@@ -262,12 +262,12 @@ Rendered<S> FrameGraph<S>::render_parts(const std::vector<Part>& parts, const Re
 }
 
 template <class S>
-void FrameGraph<S>::give_motion(const std::vector<SceneState>& frames) {
+void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<SceneState>& frames) {
   HSI4D_CHECK(settings_.draw == Draw::kAll, "a graph of the scene alone has no body");
   std::vector<Var<S>> transforms;
   for (const Object& object : objects_) transforms.push_back(rigid_rows(object.rotation, object.transl));
   const Var<S> objects = transforms.empty() ? Var<S>{} : concat_rows<S>(transforms);
-  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects}, clip_, frames, inputs_);
+  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects}, clip_, first, frames, inputs_);
 }
 
 template <class S>

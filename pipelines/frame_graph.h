@@ -72,8 +72,9 @@ class FrameGraph {
   /// Reads features and layers of the color net back, those of them that are named in `moved`.
   void read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const;
   /// Records what terms over the body's motion read. For graphs that draw all, once, after set_state.
+  /// @param first   the clip's first frame
   /// @param frames  the states before this frame that such terms see, and last the one that was set
-  void give_motion(const std::vector<SceneState>& frames);
+  void give_motion(const SceneState& first, const std::vector<SceneState>& frames);
   /// Writes the frame: target, the weight of pixels, centres of the objects' masks. See FrameTargets.
   void set_targets(const FrameTargets& targets);
 

@@ -16,15 +16,16 @@ namespace {
 
 constexpr Index kCoordinates = 3 * kMetricJoints;
 
-std::shared_ptr<const MotionStart> start_of(const Clip& clip, const std::vector<SceneState>& frames, Index moving) {
+std::shared_ptr<const MotionStart> start_of(const Clip& clip, const SceneState& first,
+                                            const std::vector<SceneState>& frames, Index moving) {
   auto start = std::make_shared<MotionStart>();
   start->avatar = &clip.avatar;
   for (const ClipObject& object : clip.objects) start->objects.push_back(&object.gaussians);
   start->scene = &clip.scene;
-  start->first_camera_center = inverse(clip.first.camera_from_world).translation;
+  start->first_camera_center = inverse(first.camera_from_world).translation;
   start->still_frames = std::ssize(frames) - moving;
   start->frame_rate = clip.frame_rate;
-  start->first_body = pose_skeleton(clip.avatar, clip.first.body);
+  start->first_body = pose_skeleton(clip.avatar, first.body);
   for (const SceneState& frame : frames) {
     start->body.push_back(pose_skeleton(clip.avatar, frame.body));
     std::vector<Rigid<double>> objects;
@@ -130,10 +131,10 @@ Var<S> record_object_points(Tape<S>& tape, Var<S> transforms, const MotionStart&
 }  // namespace
 
 template <class S>
-void give_motion(const MovingFrames<S>& moving, const Clip& clip, const std::vector<SceneState>& frames,
-                 LossInputs<S>& inputs) {
+void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneState& first,
+                 const std::vector<SceneState>& frames, LossInputs<S>& inputs) {
   const Index count = moving.rotations.shape().rows / kSmplxJoints;
-  const std::shared_ptr<const MotionStart> motion = start_of(clip, frames, count);
+  const std::shared_ptr<const MotionStart> motion = start_of(clip, first, frames, count);
   inputs.motion = motion;
   inputs.body_rotations = body_rotation_rows(moving.rotations);
   inputs.joints = joint_rows(moving, *motion);
@@ -149,8 +150,9 @@ void give_motion(const MovingFrames<S>& moving, const Clip& clip, const std::vec
   };
 }
 
-template void give_motion(const MovingFrames<float>&, const Clip&, const std::vector<SceneState>&, LossInputs<float>&);
-template void give_motion(const MovingFrames<double>&, const Clip&, const std::vector<SceneState>&,
+template void give_motion(const MovingFrames<float>&, const Clip&, const SceneState&, const std::vector<SceneState>&,
+                          LossInputs<float>&);
+template void give_motion(const MovingFrames<double>&, const Clip&, const SceneState&, const std::vector<SceneState>&,
                           LossInputs<double>&);
 
 }  // namespace hsi4d

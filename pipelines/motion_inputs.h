@@ -17,15 +17,16 @@ struct MovingFrames {
 
 /// Fills in body_rotations, joints, joints_start, motion, body_points and object_points.
 ///
+/// @param first   the clip's first frame
 /// @param frames  states when the stage begins: some that stand still, then the M that move
 /// The clip must outlive the inputs.
 template <class S>
-void give_motion(const MovingFrames<S>& moving, const Clip& clip, const std::vector<SceneState>& frames,
-                 LossInputs<S>& inputs);
+void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneState& first,
+                 const std::vector<SceneState>& frames, LossInputs<S>& inputs);
 
-extern template void give_motion(const MovingFrames<float>&, const Clip&, const std::vector<SceneState>&,
-                                 LossInputs<float>&);
-extern template void give_motion(const MovingFrames<double>&, const Clip&, const std::vector<SceneState>&,
-                                 LossInputs<double>&);
+extern template void give_motion(const MovingFrames<float>&, const Clip&, const SceneState&,
+                                 const std::vector<SceneState>&, LossInputs<float>&);
+extern template void give_motion(const MovingFrames<double>&, const Clip&, const SceneState&,
+                                 const std::vector<SceneState>&, LossInputs<double>&);
 
 }  // namespace hsi4d

@@ -35,10 +35,9 @@ std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
   return first_color_net(config.color_net, clip.avatar, config.seed);
 }
 
-/// Stages that are run frame by frame; those over the sequence come after them.
-std::size_t count_frame_stages(const RunConfig& config) {
-  const auto is_of_frame = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
-  return static_cast<std::size_t>(std::count_if(config.stages.begin(), config.stages.end(), is_of_frame));
+std::size_t count_stages(const RunConfig& config, StageScope over) {
+  const auto is_over = [over](const auto& entry) { return entry.second.over == over; };
+  return static_cast<std::size_t>(std::count_if(config.stages.begin(), config.stages.end(), is_over));
 }
 
 /// What is in a checkpoint, if its inputs are still the same.
@@ -46,7 +45,8 @@ RunProgress read_checkpoint(const std::string& file, const std::string& identity
                             const Clip& clip) {
   RunProgress progress;
   try {
-    progress = load_progress(file, identity, clip, count_frame_stages(config), first_net(config, clip));
+    progress = load_progress(file, identity, clip, count_stages(config, StageScope::kFrame), first_net(config, clip),
+                             count_stages(config, StageScope::kFirst));
   } catch (const DataError& damage) {
     throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
   }
@@ -60,12 +60,16 @@ RunProgress read_checkpoint(const std::string& file, const std::string& identity
 }
 
 /// What is told of a run that was stopped in frame `frame` of `frames`, or after the last of them: those before it are
-/// kept, frame 0 being given.
-std::string stop_message(Index frame, Index frames) {
+/// kept.
+/// @param first  the first frame that is worked on: 1, or 0 where frame 0 is not as given
+std::string stop_message(Index frame, Index frames, Index first) {
   const std::string text =
       "interrupted " + (frame < frames ? "in frame " + std::to_string(frame) : "after the last frame") + "; ";
-  if (frame == 1) return text + "no frame was finished";
-  return text + (frame == 2 ? "frame 1 is" : "frames 1 to " + std::to_string(frame - 1) + " are") +
+  if (frame == first) return text + "no frame was finished";
+  const std::string from = std::to_string(first);
+  return text +
+         (frame == first + 1 ? "frame " + from + " is"
+                             : "frames " + from + " to " + std::to_string(frame - 1) + " are") +
          " finished and kept";
 }
 
@@ -79,15 +83,17 @@ class Reconstruction {
         observer_(observer),
         identity_(checkpoint_identity(config, losses)),
         clip_(clip),
-        frame_stages_(count_frame_stages(config)),
+        first_stages_(count_stages(config, StageScope::kFirst)),
+        frame_stages_(count_stages(config, StageScope::kFrame)),
         progress_(first_progress(clip_, frame_stages_, first_net(config, clip))),
         start_colors_(progress_.colors),
         bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
 
   RunSummary run() {
     resume();
+    if (progress_.frames_done() == 0) run_first_frame();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
-    if (frame_stages_ < config_.stages.size()) refine();
+    if (sequence_stage() < config_.stages.size()) refine();
     bar_.finish();
     warn_of_left_out(progress_.left_out, config_, clip_);
     warn_of_still_groups(progress_.still, config_);
@@ -96,7 +102,8 @@ class Reconstruction {
     RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
     folder_.write_summary(summary);
-    const std::optional<BodyModel> body = write_body(folder_.paths(), config_, clip_, result());
+    const std::optional<BodyModel> body =
+        write_body(folder_.paths(), config_.body, clip_.avatar, motion_of(clip_, result()));
     view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
     write_views(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
       stop_if_asked(clip_.frames());
@@ -106,22 +113,27 @@ class Reconstruction {
   }
 
  private:
-  std::int64_t total_steps() const {
+  /// Stages over the first frame come first, then those over frames, and last those over the sequence.
+  std::size_t sequence_stage() const { return first_stages_ + frame_stages_; }
+
+  std::int64_t steps_of(StageScope over) const {
     std::int64_t steps = 0;
-    for (std::size_t s = frame_stages_; s < config_.stages.size(); ++s) steps += config_.stages[s].second.iterations;
-    return steps + steps_a_frame() * (clip_.frames() - 1);
-  }
-  std::int64_t steps_a_frame() const {
-    std::int64_t steps = 0;
-    for (std::size_t s = 0; s < frame_stages_; ++s) steps += config_.stages[s].second.iterations;
+    for (const auto& [name, stage] : config_.stages) steps += stage.over == over ? stage.iterations : 0;
     return steps;
   }
+  /// Steps of the frames before `frame`.
+  std::int64_t steps_before(Index frame) const {
+    if (frame == 0) return 0;
+    return steps_of(StageScope::kFirst) + steps_of(StageScope::kFrame) * (frame - 1);
+  }
+  std::int64_t total_steps() const { return steps_before(clip_.frames()) + steps_of(StageScope::kSequence); }
 
   void resume() {
     const std::string file = checkpoint_file(folder_.paths());
     if (folder_.resumed_from() && std::filesystem::exists(file)) {
       progress_ = read_checkpoint(file, identity_, config_, clip_);
     } else {
+      if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
       add_covered(read_frame(clip_, 0), config_.data, progress_.covered);
       progress_.inputs = input_hashes(clip_.files) + input_hashes(frame_files(config_.data, clip_, 0));
     }
@@ -130,7 +142,23 @@ class Reconstruction {
       folder_.note("resumed with frame " + std::to_string(progress_.frames_done()) + " of " +
                    std::to_string(clip_.frames() - 1));
     folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
-    bar_.skip(steps_a_frame() * (progress_.frames_done() - 1));
+    bar_.skip(steps_before(progress_.frames_done()));
+  }
+
+  /// The stages over frame 0, from the given state on. What they find stands in its place from then on.
+  void run_first_frame() {
+    const auto begin = std::chrono::steady_clock::now();
+    const ClipFrame frame = read_frame(clip_, 0);
+    progress_.image_errors.clear();
+    progress_.start_errors.clear();
+    write_start_image(0, frame);
+    SceneState state = clip_.first;
+    for (std::size_t s = 0; s < first_stages_; ++s) {
+      StageTotals totals;
+      run_in_frame(s, {0, frame, progress_.covered, {}}, state, progress_.colors, totals);
+      progress_.first_frame.push_back({state, totals});
+    }
+    end_frame(0, frame, std::vector(frame_stages_, state), begin);
   }
 
   void run_frame(Index index) {
@@ -142,20 +170,28 @@ class Reconstruction {
     std::vector<SceneState> after;
     bool has_start = !chooses_start(config_.start);
     for (std::size_t s = 0; s < frame_stages_; ++s) {
-      if (!has_start && config_.stages[s].second.draw == Draw::kAll) {
+      if (!has_start && config_.stages[first_stages_ + s].second.draw == Draw::kAll) {
         state = choose_start(config_, clip_, progress_.after_stage.back(), frame, state, colors);
         has_start = true;
       }
-      run_in_frame(s, {index, frame, progress_.covered, progress_.after_stage.back()}, state, colors);
+      run_in_frame(first_stages_ + s, {index, frame, progress_.covered, progress_.after_stage.back()}, state, colors,
+                   progress_.totals[s]);
       after.push_back(state);
     }
     progress_.colors = std::move(colors);
-    write_images(index, frame, state, progress_.colors, progress_.image_errors);
+    write_start_image(index, frame);
+    progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
+    end_frame(index, frame, after, begin);
+  }
+
+  /// Keeps what was found in a frame: in memory, as images, in the checkpoint.
+  /// @param after  the state after each stage over frames
+  void end_frame(Index index, const ClipFrame& frame, const std::vector<SceneState>& after,
+                 std::chrono::steady_clock::time_point begin) {
+    write_images(index, frame, after.back(), progress_.colors, progress_.image_errors);
     if (progress_.colors.net && moves_colors(config_))
       write_color_net(folder_.paths().frame_color_net(static_cast<int>(index)), *progress_.colors.net);
-    write_start_image(index, frame);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
-    progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
     progress_.seconds += seconds_since(begin);
     save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
   }
@@ -163,7 +199,7 @@ class Reconstruction {
   /// The stages over the whole sequence, each from where the one before ended.
   void refine() {
     const auto begin = std::chrono::steady_clock::now();
-    for (std::size_t s = frame_stages_; s < config_.stages.size(); ++s) {
+    for (std::size_t s = sequence_stage(); s < config_.stages.size(); ++s) {
       std::vector<SceneState> states = result();
       const StageTotals totals = run_over_sequence(s, states);
       refinement_.stages.push_back({std::move(states), totals});
@@ -182,7 +218,7 @@ class Reconstruction {
     std::string begin;  // of the loss, for the log
     const auto note_iteration = [&](const IterationReport& report) {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
-      note(std::nullopt, s, report, nullptr);
+      note(std::nullopt, s, report, nullptr, nullptr);
     };
     const StageResult result = run_sequence_stage({config_, clip_, losses_, s}, states, note_iteration);
     warn_of_terms_off(result.off, name, stage);
@@ -193,7 +229,7 @@ class Reconstruction {
   /// The color net as it was after a frame, in the precision of its file, so that a resumed run has the same.
   ColorState colors_after(Index frame) const {
     ColorState colors = start_colors_;
-    if (frame > 0 && colors.net && moves_colors(config_))
+    if (frame >= first_worked_on() && colors.net && moves_colors(config_))
       colors.net = read_color_net(folder_.paths().frame_color_net(static_cast<int>(frame)), clip_.avatar.count(),
                                   clip_.avatar.joint_count());
     return colors;
@@ -201,22 +237,25 @@ class Reconstruction {
 
   const std::vector<SceneState>& result() const { return result_of(progress_, refinement_); }
 
-  void run_in_frame(std::size_t s, const FrameTask& frame, SceneState& state, ColorState& colors) {
+  Index first_worked_on() const { return first_stages_ > 0 ? 0 : 1; }
+
+  /// @param totals  of the stage, to which this is added
+  void run_in_frame(std::size_t s, const FrameTask& frame, SceneState& state, ColorState& colors, StageTotals& totals) {
     const auto& [name, stage] = config_.stages[s];
     std::string begin;  // of the loss, for the log
     GradientWatch gradients;
     const auto note_iteration = [&](const IterationReport& report, const RenderCounters& counters) {
       gradients.see(report.groups);
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
-      note(frame.index, s, report, &counters);
+      note(frame.index, s, report, &counters, &totals);
     };
     const StageResult result = run_frame_stage({config_, clip_, losses_, s}, frame, state, colors, note_iteration);
-    StageTotals& totals = progress_.totals[s];
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
     // By then all frames before are there that terms over the motion want to see.
-    if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1)) warn_of_terms_off(result.off, name, stage);
+    if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1) || stage.over == StageScope::kFirst)
+      warn_of_terms_off(result.off, name, stage);
     for (const LeftOutObject& object : result.left_out) {
       progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
     }
@@ -225,8 +264,9 @@ class Reconstruction {
   }
 
   /// @param frame     none: all at once
-  /// @param counters  null: nothing was drawn
-  void note(std::optional<Index> frame, std::size_t s, const IterationReport& report, const RenderCounters* counters) {
+  /// @param counters, totals  null: nothing was drawn
+  void note(std::optional<Index> frame, std::size_t s, const IterationReport& report, const RenderCounters* counters,
+            StageTotals* totals) {
     const std::string& stage = config_.stages[s].first;
     if (report.rolled_back) {
       log_warning((frame ? "frame " + std::to_string(*frame) : "all frames") + ", stage " + stage + ", iteration " +
@@ -241,7 +281,7 @@ class Reconstruction {
     record.seconds = report.seconds;
     record.rolled_back = report.rolled_back;
     record.gradient_shares = report.gradient_shares;
-    if (counters != nullptr) add_counters(*counters, progress_.totals[s], record);
+    if (counters != nullptr) add_counters(*counters, *totals, record);
     folder_.append_metrics(record);
     bar_.step_with("loss", report.loss);
     stop_if_asked(frame.value_or(clip_.frames()));
@@ -249,7 +289,7 @@ class Reconstruction {
 
   /// @param frame  the one at hand; that beyond the last: all are done
   void stop_if_asked(Index frame) const {
-    if (observer_.wants_stop()) throw Interrupted(stop_message(frame, clip_.frames()));
+    if (observer_.wants_stop()) throw Interrupted(stop_message(frame, clip_.frames(), first_worked_on()));
   }
 
   static void add_counters(const RenderCounters& counters, StageTotals& totals, IterationRecord& record) {
@@ -291,7 +331,7 @@ class Reconstruction {
   const Observer& observer_;
   std::string identity_;  // the text that a checkpoint of this run belongs to
   const Clip& clip_;
-  std::size_t frame_stages_;
+  std::size_t first_stages_, frame_stages_;
   RunProgress progress_;
   RefinementProgress refinement_;
   const ColorState start_colors_;

@@ -51,8 +51,15 @@ Image pixel_weights(PixelWeight weight, const FrameTask& task, const DataSetting
   return weight == PixelWeight::kForeground ? covered : complement(covered);
 }
 
-FrameTargets targets_of(const StageTask& task, const ClipFrame& frame, const Image& weight) {
+/// Frame 0 as the stages of a frame see it: as it was found, or, while it is looked for, as it was given.
+const SceneState& first_state(const StageTask& task, const FrameTask& frame) {
+  return frame.done.empty() ? task.clip.first : frame.done.front();
+}
+
+FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, const Image& weight) {
   const Clip& clip = task.clip;
+  const ClipFrame& frame = frame_task.frame;
+  const SceneState& first = first_state(task, frame_task);
   FrameTargets targets;
   targets.image = &frame.target;
   targets.weight = task.config.stages[task.stage].second.weight == PixelWeight::kAll ? nullptr : &weight;
@@ -62,8 +69,7 @@ FrameTargets targets_of(const StageTask& task, const ClipFrame& frame, const Ima
     targets.centers.push_back(mask_center(mask, task.config.data.mask_threshold));
   }
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
-    targets.depths.push_back(
-        mean_depth(clip.objects[o].gaussians, clip.first.objects[o], clip.first.camera_from_world));
+    targets.depths.push_back(mean_depth(clip.objects[o].gaussians, first.objects[o], first.camera_from_world));
   }
   return targets;
 }
@@ -77,9 +83,9 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   settings.human_opacity = stage.draw == Draw::kAll && reads_human_opacity(task.losses, stage);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
   graph.set_state(state);
-  if (stage.draw == Draw::kAll) graph.give_motion(seen_frames(frame.done, state));
+  if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));
   const Image weight = pixel_weights(stage.weight, frame, task.config.data);
-  graph.set_targets(targets_of(task, frame.frame, weight));
+  graph.set_targets(targets_of(task, frame, weight));
   LossInputs<S> inputs = graph.loss_inputs();
   if (stage.weight == PixelWeight::kAll) inputs.weight = {};
   const StageResult result =

@@ -30,7 +30,7 @@ struct FrameTask {
   Index index = 0;
   const ClipFrame& frame;
   const Image& covered;              ///< [1,H,W] 1 where the human or an object has been so far, in this frame too
-  std::span<const SceneState> done;  ///< the result of the frames before, frame 0 included
+  std::span<const SceneState> done;  ///< the result of the frames before, frame 0 included; none in frame 0
 };
 
 /// Frames before the one at hand that terms over the motion see: three differences need as many.

@@ -129,10 +129,16 @@ std::string errors_section(const ReportData& data) {
     }
     text += "</tr>\n";
   }
+  std::string of_frame_0;
+  for (const ErrorTable::Row& row : table.rows) {
+    if (row.of_frame_0) of_frame_0 += (of_frame_0.empty() ? "" : ", ") + row_label(row.name);
+  }
   return text +
          "</tbody></table></div>\n<p class=\"caption\">Means over the frames that were optimised; columns in grey are "
          "what no optimisation gives, the others the end of each stage. The best of each row is "
-         "marked.</p>\n</section>\n";
+         "marked." +
+         (of_frame_0.empty() ? "" : " Of frame 0 alone, and compared with each other: " + of_frame_0 + ".") +
+         "</p>\n</section>\n";
 }
 
 // ---- Errors by frame ----
@@ -166,10 +172,12 @@ PlotLine baseline_line(const Baseline& baseline, const RunSummary& summary, std:
 
 std::string frame_errors_legend(const RunSummary& summary) {
   std::string text = "<p class=\"legend\">";
-  for (const Baseline& baseline : summary.baselines)
+  for (const Baseline& baseline : summary.baselines) {
+    if (baseline.of_frame_0) continue;
     text += "<span><span class=\"key" + std::string(baseline.per_frame.empty() ? " dashed" : "") +
             "\" style=\"border-color:" + baseline_color(baseline) + "\"></span>" + row_label(baseline.name) +
             (baseline.per_frame.empty() ? ", mean" : "") + "</span>";
+  }
   return text + "<span><span class=\"key\" style=\"border-color:var(--result)\"></span>result</span></p>\n";
 }
 
@@ -185,8 +193,9 @@ std::string frame_errors_section(const RunSummary& summary) {
     plot.begins_at_zero = facts.better <= 0;
     const PlotLine result = frame_line("result", "var(--result)", summary.per_frame, facts.name);
     if (result.points.empty()) continue;
-    for (const Baseline& baseline : summary.baselines)
-      plot.lines.push_back(baseline_line(baseline, summary, facts.name));
+    for (const Baseline& baseline : summary.baselines) {
+      if (!baseline.of_frame_0) plot.lines.push_back(baseline_line(baseline, summary, facts.name));
+    }
     plot.lines.push_back(result);
     cards += "<div class=\"card\" title=\"" + text_of(facts.summary) + "\"><h3>" + text_of(facts.label) +
              (facts.unit.empty() ? "" : " [" + text_of(facts.unit) + "]") + "</h3>" + plot_svg(plot) + "</div>\n";

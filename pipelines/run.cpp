@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/check.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/progress.h"
@@ -47,17 +48,6 @@ std::string opening(const RunConfig& config, const Clip& clip, const RunIdentity
          std::to_string(identity.threads) + (identity.threads == 1 ? " thread, " : " threads, ") + identity.precision;
 }
 
-/// Notes how the run ended. Where that cannot be written either (a full disk), what ended it is still what is thrown.
-void note_end(RunFolder& folder, RunState state, const std::string& message) noexcept {
-  try {
-    // In the run's log alone: whoever called gets the exception, and would read the message twice.
-    folder.note(std::string(run_state_name(state)) + ": " + message,
-                state == RunState::kFailed ? LogLevel::kError : LogLevel::kInfo);
-    folder.set_state(state, message);
-  } catch (const std::exception&) {
-  }
-}
-
 /// Last line of the log of a run that is done.
 std::string closing(const RunSummary& summary) {
   std::string text = "done: " + std::to_string(summary.frames) + " frames in " + duration_text(summary.seconds);
@@ -90,7 +80,18 @@ RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Cl
 
 }  // namespace
 
+void note_end(RunFolder& folder, RunState state, const std::string& message) noexcept {
+  try {
+    // In the run's log alone: whoever called gets the exception, and would read the message twice.
+    folder.note(std::string(run_state_name(state)) + ": " + message,
+                state == RunState::kFailed ? LogLevel::kError : LogLevel::kInfo);
+    folder.set_state(state, message);
+  } catch (const std::exception&) {
+  }
+}
+
 RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses, const RunOptions& options) {
+  HSI4D_CHECK(asked.chain.empty(), "a chain is carried out by carry_out_chain");
   RunConfig config = asked;
   prepare_run(config);
   EarlyMessages early;

@@ -16,6 +16,10 @@ struct RunOptions {
   Observer observer;
 };
 
+/// Notes in log.txt and status.json how a run ended. Where that cannot be written either (a full disk), what ended it
+/// is still what is thrown.
+void note_end(RunFolder& folder, RunState state, const std::string& message) noexcept;
+
 /// Carries out a run and leaves its folder complete, report.html included. status.json then says "done"; "interrupted"
 /// or "failed" when this throws.
 ///

@@ -48,13 +48,15 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("start", s.start, "Where the stages of a frame begin");
   f.object("data", s.data, "The files that the run reads");
   f.object("sources", s.sources, "Programs outside that make the video and the masks of `data`");
+  f.list("chain", s.chain, "Clips that follow one another, each from the last state of the one before");
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
   f.object("color_net", s.color_net, "How the human's colours follow its pose");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
   f.object("render", s.render, "How Gaussians become pixels");
   f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");
   f.object("approx", s.approx, "What may be computed nearly, and faster");
-  f.map("stages", s.stages, "The stages of the run by name, in the order in which they run",
+  f.map("stages", s.stages,
+        "The stages of the run by name, in the order in which they run; those over the first frame run first",
         [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });
 }
 
@@ -64,6 +66,10 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
   ConfigFields fields;
   describe(fields, config, losses);
   read_config(tree, fields, problems);
+  // They run first wherever they are written: a file that extends another one can only append stages.
+  std::stable_partition(config.stages.begin(), config.stages.end(),
+                        [](const auto& entry) { return entry.second.over == StageScope::kFirst; });
+  if (problems.empty()) lay_over_data(tree, config.chain, problems);
   add_run_problems(tree, config, use, problems);
   problems.throw_if_any();
   return config;
@@ -92,18 +98,32 @@ bool has_loss(const RunConfig& config, const std::string& name) {
   });
 }
 
+namespace {
+
+/// Leaves of the section `data` what is no file.
+void drop_files(ConfigValue& data) {
+  std::erase_if(data.members, [](const ConfigMember& setting) {
+    return !setting.key.starts_with("mask_") && !setting.key.ends_with("_rate");
+  });
+}
+
+}  // namespace
+
 ConfigValue without_data(ConfigValue tree) {
   std::erase_if(tree.members, [](const ConfigMember& member) {
-    return member.key == "synthetic" || member.key == "threads" || member.key == "camera_selection";
+    return member.key == "synthetic" || member.key == "threads" || member.key == "camera_selection" ||
+           (member.key == "chain" && member.value.items.empty());
   });
   for (ConfigMember& member : tree.members) {
     std::vector<ConfigMember>& own = member.value.members;
     if (member.key == "sources") without_places(member.value);
     if (member.key == "body") std::erase_if(own, [](const ConfigMember& setting) { return setting.key == "path"; });
-    if (member.key != "data") continue;
-    std::erase_if(own, [](const ConfigMember& setting) {
-      return !setting.key.starts_with("mask_") && !setting.key.ends_with("_rate");
-    });
+    if (member.key == "data") drop_files(member.value);
+    for (ConfigValue& clip : member.value.items) {
+      for (ConfigMember& of_clip : clip.members) {
+        if (member.key == "chain" && of_clip.key == "data") drop_files(of_clip.value);
+      }
+    }
   }
   return tree;
 }
@@ -114,6 +134,7 @@ ConfigValue sections_beside_data(const RunConfig& config, const std::vector<Loss
 
 ConfigValue dataset_sections(const RunConfig& config, const std::vector<LossDescription>& losses) {
   ConfigValue tree = sections_beside_data(config, losses);
+  std::erase_if(tree.members, [](const ConfigMember& member) { return member.key == "chain"; });
   if (config.body.path.empty()) return tree;
   for (ConfigMember& member : tree.members) {
     if (member.key == "body")

@@ -11,6 +11,7 @@
 #include "optim/stage_settings.h"
 #include "pipelines/body_settings.h"
 #include "pipelines/camera_selection.h"
+#include "pipelines/chain_settings.h"
 #include "pipelines/color_net_settings.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/frame_start.h"
@@ -54,6 +55,7 @@ struct RunConfig {
   StartSettings start;
   DataSettings data;
   SourceSettings sources;
+  std::vector<ChainClip> chain;  ///< clips that follow one another, each with its whole data; empty: one clip
   BodySettings body;
   ColorNetSettings color_net;
   SyntheticSettings synthetic;
@@ -92,8 +94,8 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
 /// Whether a stage that draws the objects has the loss, with a weight that is not 0.
 bool has_loss(const RunConfig& config, const std::string& name);
 
-/// A tree of a config without what another dataset or machine would change: the files of data and body, synthetic,
-/// threads. Two runs of the same data with equal trees have the same result.
+/// A tree of a config without what another dataset or machine would change: the files of data, chain and body,
+/// synthetic, threads. Two runs of the same data with equal trees have the same result.
 ConfigValue without_data(ConfigValue tree);
 
 /// The config as such a tree.

@@ -326,8 +326,9 @@ void remove_temporaries(const fs::path& folder) {
 }
 
 void remove_all_temporaries(const RunPaths& paths) {
-  for (const fs::path& folder : {paths.folder, fs::path(paths.frames()), fs::path(paths.checkpoint())})
-    remove_temporaries(folder);
+  for (const fs::path& folder : {paths.folder, fs::path(paths.frames()), fs::path(paths.checkpoint())}) {
+    if (fs::exists(folder)) remove_temporaries(folder);  // a chain has frames in its clips alone
+  }
 }
 
 }  // namespace
@@ -356,9 +357,11 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
   } else {
     write_text_file(paths_.config(), identity_.config);  // first: it makes the folder one of a run, should we be killed
   }
-  for (const std::string& folder : {paths_.frames(), paths_.checkpoint()}) make_folder(folder);
+  if (!identity_.is_chain) {
+    for (const std::string& folder : {paths_.frames(), paths_.checkpoint()}) make_folder(folder);
+    metrics_ = std::make_unique<Appender>(paths_.metrics());
+  }
   remove_all_temporaries(paths_);
-  metrics_ = std::make_unique<Appender>(paths_.metrics());
   log_.emplace(log_to_file(paths_.log()));
   write_status();
 }
@@ -396,7 +399,10 @@ void RunFolder::write_status() {
   write_text_file(paths_.status(), to_json(status));
 }
 
-void RunFolder::append_metrics(const IterationRecord& record) { metrics_->append(metrics_line(record)); }
+void RunFolder::append_metrics(const IterationRecord& record) {
+  HSI4D_CHECK(metrics_ != nullptr, "a chain has no metrics of its own");
+  metrics_->append(metrics_line(record));
+}
 
 void RunFolder::truncate_metrics_after(int frame) {
   const std::string text = read_text_file(paths_.metrics());

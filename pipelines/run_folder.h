@@ -30,6 +30,7 @@ struct RunIdentity {
   std::int64_t seed = 0;
   int threads = 0;
   std::string precision = "float";
+  bool is_chain = false;  ///< of clips with folders of their own: without frames, checkpoint and metrics.jsonl
 };
 
 /// One iteration, a line of metrics.jsonl.

@@ -17,7 +17,7 @@ namespace {
 
 void add_group_problems(const StageSettings& stage, const std::string& in, std::vector<RunProblem>& found) {
   const std::string where = in + "/optimize";
-  const bool is_of_frame = stage.over == StageScope::kFrame;
+  const bool is_of_frame = stage.over != StageScope::kSequence;
   const std::vector<std::string> known = is_of_frame ? state_group_names(stage.draw) : sequence_group_names();
   if (stage.optimize.empty())
     found.push_back({where, "no parameter group is named; known here: " + joined(known), {where}, true});
@@ -60,22 +60,35 @@ void add_loss_problems(const StageSettings& stage, const std::string& in, std::v
                    {where}});
 }
 
-/// Stages over the sequence begin where those of all frames ended.
+std::string scope_in_words(StageScope scope) {
+  if (scope == StageScope::kFirst) return "over the first frame";
+  return scope == StageScope::kFrame ? "over frames" : "over the sequence";
+}
+
+/// Stages over the first frame, then those over each of the others, then those over the sequence: each begins where
+/// those before ended.
 void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunProblem>& found) {
-  const std::string* sequence = nullptr;
-  for (const auto& [name, stage] : stages) {
-    const std::string where = child_pointer(child_pointer("/stages", name), "over");
-    if (stage.over == StageScope::kSequence) {
-      if (&stage == &stages.front().second)
-        found.push_back({where, "a stage over the sequence needs one over frames before it", {where}});
-      sequence = &name;
-    } else if (sequence != nullptr) {
-      found.push_back(
-          {where,
-           "a stage over frames cannot come after " + json_string(*sequence) + ", which is over the sequence",
-           {where, child_pointer(child_pointer("/stages", *sequence), "over")}});
+  const auto place = [](const std::string& name) { return child_pointer(child_pointer("/stages", name), "over"); };
+  const auto is_of_frames = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
+  const bool has_frames = std::any_of(stages.begin(), stages.end(), is_of_frames);
+  const std::pair<std::string, StageSettings>* latest = nullptr;  // of those so far
+  for (const auto& entry : stages) {
+    const auto& [name, stage] = entry;
+    if (latest != nullptr && stage.over < latest->second.over) {
+      found.push_back({place(name),
+                       "a stage " + scope_in_words(stage.over) + " cannot come after " + json_string(latest->first) +
+                           ", which is " + scope_in_words(latest->second.over),
+                       {place(name), place(latest->first)}});
+      continue;
     }
+    if (latest == nullptr && stage.over == StageScope::kSequence)
+      found.push_back({place(name), "a stage over the sequence needs one over frames before it", {place(name)}});
+    latest = &entry;
   }
+  if (!has_frames && !stages.empty() && stages.front().second.over == StageScope::kFirst)
+    found.push_back({place(stages.front().first),
+                     "a stage over the first frame needs one over frames after it",
+                     {place(stages.front().first)}});
 }
 
 std::vector<RunProblem> loss_faults(RunConfig& config) {
@@ -92,12 +105,13 @@ std::vector<RunProblem> loss_faults(RunConfig& config) {
 
 // ---- Inputs ----
 
-void add_name_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+/// @param in  the section, "/data"
+void add_name_problems(const DataSettings& data, const std::string& in, std::vector<RunProblem>& found) {
   for (const auto& [name, object] : data.objects) {
     if (name.empty())
-      found.push_back({"/data/objects", "an object's name is empty; it names the folder of its masks", {}});
+      found.push_back({in + "/objects", "an object's name is empty; it names the folder of its masks", {}});
     if (name == kHumanMasks)
-      found.push_back({child_pointer("/data/objects", name),
+      found.push_back({child_pointer(in + "/objects", name),
                        json_string(name) + " is the folder of the human's masks; use another name",
                        {}});
   }
@@ -126,36 +140,77 @@ void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found
   }
 }
 
-void add_input_problems(const RunConfig& config, std::vector<RunProblem>& found) {
-  const DataSettings& data = config.data;
+/// What of the inputs need not be given.
+struct KnownInputs {
+  bool video = false, masks = false;  ///< a program outside makes them
+  bool state = false;                 ///< frame 0 is that in which another clip ended
+};
+
+/// @param in  the section, "/data"
+void add_input_problems(const DataSettings& data, const std::string& in, const KnownInputs& known,
+                        std::vector<RunProblem>& found) {
   struct Input {
     const std::filesystem::path& path;
     const char* key;
     const char* what;
-    bool is_made = false;  // by a program outside
+    bool is_known = false;
   };
-  const bool makes_video = !config.sources.video.command.empty(), makes_masks = !config.sources.masks.command.empty();
   const std::array inputs = {Input{data.scene, "scene", "a scene"},
                              Input{data.avatar, "avatar", "an avatar"},
-                             Input{data.frames, "frames", "the frames of a video", makes_video},
-                             Input{data.masks, "masks", "masks of the human and the objects", makes_masks},
+                             Input{data.frames, "frames", "the frames of a video", known.video},
+                             Input{data.masks, "masks", "masks of the human and the objects", known.masks},
                              Input{data.camera, "camera", "the camera of frame 0"},
-                             Input{data.initial, "initial", "the state of frame 0"}};
-  const auto is_missing = [](const Input& input) { return input.path.empty() && !input.is_made; };
+                             Input{data.initial, "initial", "the state of frame 0", known.state}};
+  const auto is_missing = [](const Input& input) { return input.path.empty() && !input.is_known; };
   if (std::all_of(inputs.begin(), inputs.end(), is_missing)) {
     std::vector<std::string> keys;
     for (const Input& input : inputs) keys.emplace_back(input.key);
-    found.push_back({"/data",
+    found.push_back({in,
                      "no inputs are given; a run needs " + joined(keys) +
                          ". `hsi4d synth` makes a dataset with a config beside it to run; `hsi4d demo` makes one and "
                          "runs it",
-                     {"/data"},
+                     {in},
                      true});
     return;
   }
   for (const Input& input : inputs) {
-    const std::string place = std::string("/data/") + input.key;
+    const std::string place = in + "/" + input.key;
     if (is_missing(input)) found.push_back({place, std::string("not given; a run needs ") + input.what, {place}, true});
+  }
+}
+
+// ---- Chains ----
+
+bool is_folder_name(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  });
+}
+
+std::string object_names(const DataSettings& data) {
+  std::vector<std::string> names;
+  for (const auto& [name, object] : data.objects) names.push_back(name);
+  return names.empty() ? "none" : joined(names);
+}
+
+void add_chain_problems(const std::vector<ChainClip>& chain, ConfigUse use, std::vector<RunProblem>& found) {
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const ChainClip& clip = chain[i];
+    const std::string where = child_pointer("/chain", std::to_string(i));
+    if (!is_folder_name(clip.name))
+      found.push_back(
+          {where + "/name", json_string(clip.name) + " is no name of a folder; allowed: letters, digits, _ and -", {}});
+    for (std::size_t k = 0; k < i; ++k) {
+      if (chain[k].name == clip.name)
+        found.push_back({where + "/name", json_string(clip.name) + " is the name of another clip too", {}});
+    }
+    if (object_names(clip.data) != object_names(chain.front().data))
+      found.push_back({where + "/data/objects",
+                       "the clip has the objects " + object_names(clip.data) + ", the first one " +
+                           object_names(chain.front().data) + "; the clips of a chain have the same, in one order",
+                       {}});
+    add_name_problems(clip.data, where + "/data", found);
+    if (use == ConfigUse::kRun) add_input_problems(clip.data, where + "/data", {.state = i > 0}, found);
   }
 }
 
@@ -202,9 +257,22 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
     add_loss_problems(stage, where, found);
   }
   add_order_problems(config.stages, found);
-  add_name_problems(config.data, found);
+  if (!config.chain.empty()) {
+    if (has_sources(config.sources))
+      found.push_back({"/sources",
+                       "programs make video and masks of one clip, and this config is a chain; make those of each clip "
+                       "by a config of its own, and name them in the clip's data",
+                       {"/sources", "/chain"}});
+    add_chain_problems(config.chain, use, found);
+    return found;
+  }
+  add_name_problems(config.data, "/data", found);
   add_source_problems(config, found);
-  if (use == ConfigUse::kRun) add_input_problems(config, found);
+  if (use == ConfigUse::kRun) {
+    const SourceSettings& sources = config.sources;
+    add_input_problems(config.data, "/data",
+                       {.video = !sources.video.command.empty(), .masks = !sources.masks.command.empty()}, found);
+  }
   return found;
 }
 
@@ -243,10 +311,8 @@ void prepare_run(RunConfig& config) {
 
 void check_inputs(const DataSettings& data) {
   std::vector<RunProblem> found;
-  add_name_problems(data, found);
-  RunConfig config;
-  config.data = data;
-  add_input_problems(config, found);
+  add_name_problems(data, "/data", found);
+  add_input_problems(data, "/data", {}, found);
   throw_if_any(found);
 }
 

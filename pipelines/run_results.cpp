@@ -24,14 +24,6 @@ constexpr std::array<double, 8> kOtherSides = {45, -45, 30, -30, 60, -60, 20, -2
 constexpr double kFreeView = 0.1;                                                    // metres around the line of sight
 constexpr int kPanelWidth = 480;                                                     // pixels, at most
 
-Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
-  Motion motion{clip.frame_rate, bodies_of(states)};
-  motion.pelvis_rest = pelvis_of(clip.avatar.joints);
-  motion.betas = clip.betas;
-  motion.gender = clip.gender;
-  return motion;
-}
-
 /// Why the body is not the one that the avatar was made on; empty where it is.
 std::string difference_of(const BodyModel& body, const Avatar& avatar) {
   if (!avatar.body.empty() && avatar.body != body.name)
@@ -153,6 +145,14 @@ bool moves_colors(const RunConfig& config) {
   });
 }
 
+Motion motion_of(const Clip& clip, const std::vector<SceneState>& states) {
+  Motion motion{clip.frame_rate, bodies_of(states)};
+  motion.pelvis_rest = pelvis_of(clip.avatar.joints);
+  motion.betas = clip.betas;
+  motion.gender = clip.gender;
+  return motion;
+}
+
 void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
                    const std::vector<SceneState>& states, const ColorState& colors) {
   std::vector<std::string> names;
@@ -165,14 +165,14 @@ void write_results(const RunPaths& paths, const RunConfig& config, const Clip& c
   if (colors.net && moves_colors(config)) write_color_net(paths.color_net(), *colors.net);
 }
 
-std::optional<BodyModel> write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
-                                    const std::vector<SceneState>& states) {
+std::optional<BodyModel> write_body(const RunPaths& paths, const BodySettings& settings, const Avatar& avatar,
+                                    const Motion& motion) {
   std::optional<BodyModel> body;
   try {
-    body = rest_body(config.body);
-    const std::string difference = difference_of(*body, clip.avatar);
+    body = rest_body(settings);
+    const std::string difference = difference_of(*body, avatar);
     if (difference.empty()) {
-      write_glb(paths.body(), *body, motion_of(clip, states));
+      write_glb(paths.body(), *body, motion);
     } else {
       body.reset();
       log_info("body.glb is not written: " + difference);

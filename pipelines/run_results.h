@@ -23,11 +23,14 @@ inline constexpr double kExportedRate = 30;
 void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
                    const std::vector<SceneState>& states, const ColorState& colors);
 
-/// Writes body.glb, the body in motion: config.body, which has to be the avatar's: of its kind, and with joints where
-/// the avatar has them. Where it is another the log says so, and no file is written.
+/// The bodies of the frames as motion.npz has them.
+Motion motion_of(const Clip& clip, const std::vector<SceneState>& states);
+
+/// Writes body.glb, the body in motion. It has to be the avatar's: of its kind, and with joints where the avatar has
+/// them. Where it is another the log says so, and no file is written.
 /// @return  the body; nothing where it is another, or cannot be read
-std::optional<BodyModel> write_body(const RunPaths& paths, const RunConfig& config, const Clip& clip,
-                                    const std::vector<SceneState>& states);
+std::optional<BodyModel> write_body(const RunPaths& paths, const BodySettings& body, const Avatar& avatar,
+                                    const Motion& motion);
 
 /// Writes what a viewer shows: frames/NNNN_side.png of every frame, the reconstruction from another side; frame 0 as it
 /// was given, frames/0000_{target,render}.png; and preview.mp4: video, reconstruction, both one over the other, and the

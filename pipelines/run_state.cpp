@@ -24,14 +24,14 @@ std::string error_name(const char* kind, std::size_t frame, const std::string& n
 }
 
 void store_errors(const char* kind, const std::vector<MetricValues>& errors, Checkpoint& checkpoint) {
-  for (std::size_t t = 1; t < errors.size(); ++t) {
+  for (std::size_t t = 0; t < errors.size(); ++t) {
     for (const auto& [name, value] : errors[t]) checkpoint.set(error_name(kind, t, name), std::vector<double>{value});
   }
 }
 
 std::vector<MetricValues> stored_errors(const char* kind, std::size_t frames, const Checkpoint& checkpoint) {
   std::vector<MetricValues> errors(frames);
-  for (std::size_t t = 1; t < frames; ++t) {
+  for (std::size_t t = 0; t < frames; ++t) {
     for (const char* name : kImageErrors) {
       const std::string entry = error_name(kind, t, name);
       if (!checkpoint.has(entry)) continue;
@@ -57,7 +57,10 @@ std::string left_out_text(const std::vector<LeftOutInFrame>& left_out) {
   return text;
 }
 
-std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages) {
+/// @param stages       over the first frame and over frames
+/// @param first_frame  1, or 0 where there are stages over frame 0
+std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages,
+                                        Index first_frame) {
   std::vector<LeftOutInFrame> left_out;
   if (!checkpoint.has(kLeftOut)) return left_out;
   std::istringstream lines(checkpoint.text(kLeftOut));
@@ -69,7 +72,7 @@ std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip
     std::getline(words, entry.term, '\t');
     std::getline(words, entry.reason);
     if (!words || entry.stage >= stages || entry.object < 0 || entry.object >= std::ssize(clip.objects) ||
-        entry.frame < 1 || entry.frame >= clip.frames()) {
+        entry.frame < first_frame || entry.frame >= clip.frames()) {
       throw DataError(checkpoint.source() + ": \"" + kLeftOut + "\" holds \"" + line +
                       "\", which is no stage, frame, object, term and reason of this clip");
     }
@@ -88,7 +91,9 @@ std::string still_text(const std::vector<StillGroup>& still) {
   return text;
 }
 
-std::vector<StillGroup> still_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages) {
+/// @param stages, first_frame  as left_out_of
+std::vector<StillGroup> still_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages,
+                                 Index first_frame) {
   std::vector<StillGroup> still;
   if (!checkpoint.has(kStill)) return still;
   std::istringstream lines(checkpoint.text(kStill));
@@ -96,7 +101,7 @@ std::vector<StillGroup> still_of(const Checkpoint& checkpoint, const Clip& clip,
     std::istringstream words(line);
     StillGroup entry;
     words >> entry.stage >> entry.frame >> entry.group;
-    if (!words || entry.stage >= stages || entry.frame < 1 || entry.frame >= clip.frames())
+    if (!words || entry.stage >= stages || entry.frame < first_frame || entry.frame >= clip.frames())
       throw DataError(checkpoint.source() + ": \"" + kStill + "\" holds \"" + line +
                       "\", which is no stage, frame and group of this clip");
     still.push_back(entry);
@@ -149,6 +154,70 @@ SceneState state_from(const double* numbers, const Clip& clip) {
   return state;
 }
 
+// ---- Totals ----
+
+/// Counts and seconds of stages, as a checkpoint has them.
+struct StoredTotals {
+  std::vector<std::int64_t> counts;  // kCounts a stage
+  std::vector<double> seconds;
+
+  void add(const StageTotals& totals) {
+    counts.insert(counts.end(), {totals.iterations, totals.rollbacks, totals.tiles, totals.pairs, totals.fragments});
+    seconds.push_back(totals.seconds);
+  }
+};
+
+StageTotals totals_at(const std::vector<std::int64_t>& counts, const std::vector<double>& seconds, std::size_t stage) {
+  const std::int64_t* count = counts.data() + kCounts * stage;
+  return {count[0], count[1], seconds[stage], count[2], count[3], count[4]};
+}
+
+// ---- Entries of a checkpoint ----
+
+/// Throws DataError unless an entry has as many numbers as this clip needs.
+void expect_size(const Checkpoint& checkpoint, const std::string& name, std::size_t found, std::size_t wanted) {
+  if (found == wanted) return;
+  throw DataError(checkpoint.source() + ": \"" + name + "\" holds " + std::to_string(found) +
+                  " numbers, this clip needs " + std::to_string(wanted) +
+                  "; the inputs have changed since the run began");
+}
+
+/// An entry of states, all of them finite.
+const std::vector<double>& stored_states(const Checkpoint& checkpoint, const std::string& name, std::size_t numbers) {
+  const std::vector<double>& states = checkpoint.doubles(name);
+  expect_size(checkpoint, name, states.size(), numbers);
+  if (!std::all_of(states.begin(), states.end(), [](double x) { return std::isfinite(x); }))
+    throw DataError(checkpoint.source() + ": \"" + name + "\" holds a number that is not finite");
+  return states;
+}
+
+void store_first_frame(const std::vector<FirstFrameState>& stages, Checkpoint& checkpoint) {
+  if (stages.empty()) return;
+  std::vector<double> states;
+  StoredTotals totals;
+  for (const FirstFrameState& stage : stages) {
+    append(stage.state, states);
+    totals.add(stage.totals);
+  }
+  checkpoint.set("first_frame/states", std::move(states));
+  checkpoint.set("first_frame/counts", std::move(totals.counts));
+  checkpoint.set("first_frame/seconds", std::move(totals.seconds));
+}
+
+std::vector<FirstFrameState> stored_first_frame(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages) {
+  std::vector<FirstFrameState> found;
+  if (stages == 0) return found;
+  const auto per_state = static_cast<std::size_t>(numbers_per_state(clip));
+  const std::vector<double>& states = stored_states(checkpoint, "first_frame/states", stages * per_state);
+  const std::vector<std::int64_t>& counts = checkpoint.integers("first_frame/counts");
+  expect_size(checkpoint, "first_frame/counts", counts.size(), kCounts * stages);
+  const std::vector<double>& seconds = checkpoint.doubles("first_frame/seconds");
+  expect_size(checkpoint, "first_frame/seconds", seconds.size(), stages);
+  for (std::size_t s = 0; s < stages; ++s)
+    found.push_back({state_from(states.data() + s * per_state, clip), totals_at(counts, seconds, s)});
+  return found;
+}
+
 }  // namespace
 
 const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement) {
@@ -168,20 +237,18 @@ RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<C
 
 void save_progress(const std::string& file, const std::string& config, const RunProgress& progress) {
   Checkpoint checkpoint;
-  std::vector<double> states, seconds;
-  std::vector<std::int64_t> counts;
+  std::vector<double> states;
+  StoredTotals totals;
   for (const auto& stage : progress.after_stage) {
     for (const SceneState& state : stage) append(state, states);
   }
-  for (const StageTotals& totals : progress.totals) {
-    counts.insert(counts.end(), {totals.iterations, totals.rollbacks, totals.tiles, totals.pairs, totals.fragments});
-    seconds.push_back(totals.seconds);
-  }
-  seconds.push_back(progress.seconds);
+  for (const StageTotals& stage : progress.totals) totals.add(stage);
+  totals.seconds.push_back(progress.seconds);
   checkpoint.set("frames", std::vector<std::int64_t>{progress.frames_done()});
   checkpoint.set("states", std::move(states));
-  checkpoint.set("counts", std::move(counts));
-  checkpoint.set("seconds", std::move(seconds));
+  checkpoint.set("counts", std::move(totals.counts));
+  checkpoint.set("seconds", std::move(totals.seconds));
+  store_first_frame(progress.first_frame, checkpoint);
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
@@ -194,12 +261,10 @@ void save_progress(const std::string& file, const std::string& config, const Run
 }
 
 RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
-                          std::optional<ColorNet> net) {
+                          std::optional<ColorNet> net, std::size_t first_stages) {
   const Checkpoint checkpoint = load_checkpoint(file, text_hash(config));
-  const auto expect = [&file](const std::string& name, std::size_t found, std::size_t wanted) {
-    if (found == wanted) return;
-    throw DataError(file + ": \"" + name + "\" holds " + std::to_string(found) + " numbers, this clip needs " +
-                    std::to_string(wanted) + "; the inputs have changed since the run began");
+  const auto expect = [&checkpoint](const char* name, std::size_t found, std::size_t wanted) {
+    expect_size(checkpoint, name, found, wanted);
   };
   RunProgress progress = first_progress(clip, stages, std::move(net));
   const std::vector<std::int64_t>& frames = checkpoint.integers("frames");
@@ -216,11 +281,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
                     std::to_string(clip.camera.height) + "; the inputs have changed since the run began");
   }
   const auto done = static_cast<std::size_t>(frames[0]), per_state = static_cast<std::size_t>(numbers_per_state(clip));
-  const std::vector<double>& states = checkpoint.doubles("states");
-  expect("states", states.size(), stages * done * per_state);
-  if (!std::all_of(states.begin(), states.end(), [](double x) { return std::isfinite(x); })) {
-    throw DataError(file + ": \"states\" holds a number that is not finite");
-  }
+  const std::vector<double>& states = stored_states(checkpoint, "states", stages * done * per_state);
   const std::vector<std::int64_t>& counts = checkpoint.integers("counts");
   expect("counts", counts.size(), kCounts * stages);
   const std::vector<double>& seconds = checkpoint.doubles("seconds");
@@ -230,17 +291,18 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
     for (std::size_t t = 0; t < done; ++t) {
       progress.after_stage[s].push_back(state_from(states.data() + (s * done + t) * per_state, clip));
     }
-    const std::int64_t* count = counts.data() + kCounts * s;
-    progress.totals[s] = {count[0], count[1], seconds[s], count[2], count[3], count[4]};
+    progress.totals[s] = totals_at(counts, seconds, s);
   }
   progress.seconds = seconds.back();
+  progress.first_frame = stored_first_frame(checkpoint, clip, first_stages);
   const std::vector<float>& covered = checkpoint.floats("covered");
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);
   progress.inputs = checkpoint.text("inputs");
   progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
-  progress.left_out = left_out_of(checkpoint, clip, stages);
-  progress.still = still_of(checkpoint, clip, stages);
+  const Index first_frame = first_stages > 0 ? 0 : 1;
+  progress.left_out = left_out_of(checkpoint, clip, first_stages + stages, first_frame);
+  progress.still = still_of(checkpoint, clip, first_stages + stages, first_frame);
   progress.image_errors = stored_errors("image_errors", done, checkpoint);
   progress.start_errors = stored_errors("start_errors", done, checkpoint);
   return progress;

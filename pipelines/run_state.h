@@ -34,11 +34,18 @@ struct StillGroup {
   std::string group;
 };
 
+/// Frame 0 after a stage over the first frame.
+struct FirstFrameState {
+  SceneState state;
+  StageTotals totals;
+};
+
 /// Everything that the next frame depends on, or that the end of the run tells.
 struct RunProgress {
-  std::vector<std::vector<SceneState>> after_stage;  ///< [stage][frame]; frame 0 is the given one
-  std::vector<StageTotals> totals;                   ///< by stage
-  std::vector<MetricValues> image_errors;            ///< [frame]; none of frame 0
+  std::vector<FirstFrameState> first_frame;          ///< by stage over the first frame; none: frame 0 is as given
+  std::vector<std::vector<SceneState>> after_stage;  ///< [stage over frames][frame]; frame 0 is the given or found one
+  std::vector<StageTotals> totals;                   ///< by stage over frames
+  std::vector<MetricValues> image_errors;            ///< [frame]; none of a frame 0 that is as given
   std::vector<MetricValues> start_errors;            ///< the same of what each frame's image was given
   std::string inputs;                                ///< what was read so far, in the form of input_hashes
   Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
@@ -68,6 +75,7 @@ struct RefinementProgress {
 const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement);
 
 /// Nothing done but the given frame 0.
+/// @param stages  how many there are over frames
 /// @param net  with which the run begins, if it has one
 RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net = {});
 
@@ -77,8 +85,9 @@ void save_progress(const std::string& file, const std::string& config, const Run
 
 /// Reads it back, bit for bit. Throws DataError naming the file when it is damaged, of another config, or of another
 /// clip.
-/// @param net  as of first_progress
+/// @param stages, net   as of first_progress
+/// @param first_stages  how many there are over the first frame
 RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
-                          std::optional<ColorNet> net = {});
+                          std::optional<ColorNet> net = {}, std::size_t first_stages = 0);
 
 }  // namespace hsi4d

@@ -33,6 +33,7 @@ void add_values(ConfigValue& object, const std::string& pointer, const MetricVal
 ConfigValue stage_json(const StageSummary& stage, const std::string& pointer) {
   ConfigValue object = ConfigValue::make_object();
   object.add("stage", ConfigValue::make_string(stage.stage));
+  if (stage.of_frame_0) object.add("frame", ConfigValue::make_integer(0));
   add_number(object, pointer, "seconds", stage.seconds);
   object.add("iterations", ConfigValue::make_integer(stage.iterations));
   add_values(object, pointer, stage.values);
@@ -82,7 +83,8 @@ StageSummary read_stage(const ConfigValue& value, const std::string& pointer) {
   if (stage.stage.empty()) fail_at(value, pointer, "there is no \"stage\", the name of the stage");
   stage.seconds = read_number(value, pointer, "seconds");
   stage.iterations = read_count(value, pointer, "iterations");
-  stage.values = read_values(value, pointer, {"seconds", "iterations"});
+  stage.of_frame_0 = find_member(value, "frame") != nullptr;
+  stage.values = read_values(value, pointer, {"seconds", "iterations", "frame"});
   if (const ConfigValue* const shares = find_member(value, "gradient_shares"))
     stage.gradient_shares = parse_mean_shares(*shares, child_pointer(pointer, "gradient_shares"));
   return stage;
@@ -105,7 +107,7 @@ Baseline& baseline_named(std::vector<Baseline>& baselines, const std::string& na
   for (Baseline& baseline : baselines) {
     if (baseline.name == name) return baseline;
   }
-  return baselines.emplace_back(Baseline{name, {}, {}});
+  return baselines.emplace_back(Baseline{name, {}, {}, false});
 }
 
 void read_baselines(const ConfigValue& tree, RunSummary& summary) {
@@ -114,7 +116,9 @@ void read_baselines(const ConfigValue& tree, RunSummary& summary) {
     for (const ConfigMember& member : means->members) {
       const std::string place = child_pointer("/baselines", member.key);
       check_kind(member.value, Kind::kObject, place);
-      baseline_named(summary.baselines, member.key).values = read_values(member.value, place, {});
+      Baseline& baseline = baseline_named(summary.baselines, member.key);
+      baseline.of_frame_0 = find_member(member.value, "frame") != nullptr;
+      baseline.values = read_values(member.value, place, {"frame"});
     }
   }
   if (const ConfigValue* const frames = find_member(tree, "baselines_per_frame")) {
@@ -160,6 +164,7 @@ std::string summary_json(const RunSummary& summary) {
     const std::string place = child_pointer("/baselines", baseline.name);
     HSI4D_CHECK(find_member(means, baseline.name) == nullptr, "summary.json: " + place + ": the name occurs twice");
     ConfigValue object = ConfigValue::make_object();
+    if (baseline.of_frame_0) object.add("frame", ConfigValue::make_integer(0));
     add_values(object, place, baseline.values);
     means.add(baseline.name, std::move(object));
     if (!baseline.per_frame.empty())
@@ -234,6 +239,7 @@ bool ErrorTable::is_best(std::size_t row, std::size_t column) const {
   bool some_is_worse = false;
   for (const Row& other : rows) {
     if (other.values[column] == nullptr || !std::isfinite(*other.values[column])) continue;
+    if (other.of_frame_0 != rows[row].of_frame_0) continue;
     const double ahead = (as_shown(*other.values[column], facts.decimals) - shown_own) * facts.better;
     if (ahead > 0) return false;
     some_is_worse = some_is_worse || ahead < 0;
@@ -243,8 +249,10 @@ bool ErrorTable::is_best(std::size_t row, std::size_t column) const {
 
 ErrorTable make_error_table(const RunSummary& summary) {
   std::vector<std::pair<const MetricValues*, ErrorTable::Row>> sources;
-  for (const Baseline& baseline : summary.baselines) sources.push_back({&baseline.values, {baseline.name, true, {}}});
-  for (const StageSummary& stage : summary.metrics) sources.push_back({&stage.values, {stage.stage, false, {}}});
+  for (const Baseline& baseline : summary.baselines)
+    sources.push_back({&baseline.values, {baseline.name, true, {}, baseline.of_frame_0}});
+  for (const StageSummary& stage : summary.metrics)
+    sources.push_back({&stage.values, {stage.stage, false, {}, stage.of_frame_0}});
   ErrorTable table;
   for (const MetricFacts& facts : metric_facts()) {
     const bool occurs = std::any_of(sources.begin(), sources.end(), [&facts](const auto& source) {

@@ -31,6 +31,7 @@ struct StageSummary {
   Index iterations = 0;
   MetricValues values;
   std::vector<MeanGradientShare> gradient_shares = {};  ///< empty: not measured
+  bool of_frame_0 = false;  ///< a stage over the first frame: the errors are those of frame 0 alone
 };
 
 /// The errors of one frame.
@@ -39,11 +40,13 @@ struct FrameMetrics {
   MetricValues values;
 };
 
-/// A result without the method, to compare with: "start" (what the run was given), "copy_frame_0" (nothing moves).
+/// A result without the method, to compare with: "start" (what the run was given), "copy_frame_0" (nothing moves), and
+/// of a run with stages over the first frame "given_frame_0" (frame 0 as it was given).
 struct Baseline {
   std::string name;
   MetricValues values;                  ///< means over the frames
   std::vector<FrameMetrics> per_frame;  ///< may be empty
+  bool of_frame_0 = false;              ///< the errors are those of frame 0 alone
 };
 
 /// summary.json. Means are over the frames that were optimised, 1 to T; frame 0 is given.
@@ -61,12 +64,13 @@ struct RunSummary {
 /// The text of summary.json:
 ///
 ///   {"name", "frames", "seconds", "truth": BOOL, "surface",
-///    "metrics": [{"stage", "seconds", "iterations", NAME: NUMBER...,
+///    "metrics": [{"stage", "frame"?, "seconds", "iterations", NAME: NUMBER...,
 ///                 "gradient_shares": {GROUP: {TERM: {"share", "cosine", "evaluations"}...}...}}...],
-///    "baselines": {NAME: {NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
+///    "baselines": {NAME: {"frame"?, NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
 ///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface" and "gradient_shares"
 ///    only where there are any)
 ///
+/// with "frame": 0 where errors are those of frame 0 alone.
 /// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and
 /// for a name that occurs twice.
 std::string summary_json(const RunSummary& summary);
@@ -99,11 +103,13 @@ struct ErrorTable {
     std::string name;
     bool is_baseline = false;
     std::vector<const double*> values;  ///< a column each, into the summary; null: not measured
+    bool of_frame_0 = false;            ///< of frame 0 alone
   };
   std::vector<const MetricFacts*> columns;
   std::vector<Row> rows;
 
-  /// True where no row's value as shown (to the decimals of its metric) is better, and some row's is worse.
+  /// True where no row's value as shown (to the decimals of its metric) is better, and some row's is worse; rows of
+  /// frame 0 alone are compared with each other.
   bool is_best(std::size_t row, std::size_t column) const;
 };
 

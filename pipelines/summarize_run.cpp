@@ -5,7 +5,6 @@
 #include "body/kinematics.h"
 #include "core/file.h"
 #include "core/rotation.h"
-#include "pipelines/evaluate.h"
 #include "pipelines/frame_start.h"
 #include "pipelines/gradient_table.h"
 #include "pipelines/penetration.h"
@@ -14,21 +13,9 @@ namespace hsi4d {
 
 namespace {
 
-/// Where a state puts everything, for the metrics. A stage that draws the scene alone is judged by its camera alone.
-FrameState placed(const Clip& clip, const SceneState& state, Draw draw) {
-  FrameState frame;
-  frame.camera_from_world = state.camera_from_world;
-  if (draw == Draw::kScene) return frame;
-  frame.joints = pose_joints(clip.avatar, state.body);
-  for (const ObjectPose& pose : state.objects) {
-    frame.world_from_object.push_back({so3_exp(pose.rotation), pose.translation});
-  }
-  return frame;
-}
-
 std::vector<FrameState> placed(const Clip& clip, const std::vector<SceneState>& states, Draw draw) {
   std::vector<FrameState> frames;
-  for (const SceneState& state : states) frames.push_back(placed(clip, state, draw));
+  for (const SceneState& state : states) frames.push_back(placed(clip.avatar, state, draw));
   return frames;
 }
 
@@ -36,10 +23,9 @@ MetricValues errors_of(const Clip& clip, const std::vector<SceneState>& states, 
   return sequence_summary(placed(clip, states, draw), placed(clip, *clip.truth, draw), clip.frame_rate);
 }
 
-StageSummary summarize_stage(const std::string& name, const Clip& clip, const std::vector<SceneState>& states,
-                             Draw draw, const StageTotals& totals) {
-  StageSummary summary{name, totals.seconds, totals.iterations, {}};
-  if (clip.truth) summary.values = errors_of(clip, states, draw);
+/// Time and work of a stage beside its errors.
+StageSummary summarize_stage(const std::string& name, MetricValues errors, const StageTotals& totals) {
+  StageSummary summary{name, totals.seconds, totals.iterations, std::move(errors)};
   for (const auto& [counter, count] : {std::pair{"rollbacks", totals.rollbacks},
                                        {"tiles", totals.tiles},
                                        {"pairs", totals.pairs},
@@ -47,6 +33,29 @@ StageSummary summarize_stage(const std::string& name, const Clip& clip, const st
     summary.values.emplace_back(counter, static_cast<double>(count));
   }
   return summary;
+}
+
+/// Errors of the first frame.
+MetricValues first_frame_errors(const Clip& clip, const SceneState& state, Draw draw) {
+  if (!clip.truth) return {};
+  return frame_errors(placed(clip.avatar, state, draw), placed(clip.avatar, clip.truth->front(), draw));
+}
+
+void append(const MetricValues& more, MetricValues& values) { values.insert(values.end(), more.begin(), more.end()); }
+
+/// The stages over the first frame, and frame 0 as it was given.
+void add_first_frame(const RunConfig& config, const Clip& clip, const RunProgress& progress, RunSummary& summary) {
+  if (progress.first_frame.empty()) return;
+  Baseline given{"given_frame_0", first_frame_errors(clip, clip.first, Draw::kAll), {}, true};
+  append(progress.start_errors[0], given.values);
+  summary.baselines.push_back(std::move(given));
+  for (std::size_t s = 0; s < progress.first_frame.size(); ++s) {
+    const auto& [name, stage] = config.stages[s];
+    const FirstFrameState& found = progress.first_frame[s];
+    summary.metrics.push_back(summarize_stage(name, first_frame_errors(clip, found.state, stage.draw), found.totals));
+    summary.metrics.back().of_frame_0 = true;
+  }
+  append(progress.image_errors[0], summary.metrics.back().values);
 }
 
 /// Baselines and errors by frame, against the clip's truth.
@@ -57,7 +66,6 @@ void add_errors(const Clip& clip, const std::vector<SceneState>& result, RunSumm
     start.push_back(given_start(clip, t));
     copy.push_back(clip.first);
   }
-  summary.baselines.clear();
   for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{"copy_frame_0", &copy}}) {
     summary.baselines.push_back(
         {name, errors_of(clip, *states, Draw::kAll), sequence_errors(placed(clip, *states, Draw::kAll), truth)});
@@ -72,36 +80,46 @@ void add_image_errors(const std::vector<MetricValues>& errors, MetricValues& mea
   for (std::size_t t = 1; t < errors.size(); ++t) images.push_back({static_cast<int>(t), errors[t]});
   for (std::size_t t = 0; t < images.size(); ++t) {
     if (per_frame.size() <= t) per_frame.push_back({images[t].frame, {}});
-    MetricValues& values = per_frame[t].values;
-    values.insert(values.end(), images[t].values.begin(), images[t].values.end());
+    append(images[t].values, per_frame[t].values);
   }
-  const MetricValues added = mean_errors(images);
-  means.insert(means.end(), added.begin(), added.end());
+  append(mean_errors(images), means);
+}
+
+/// Of frame 0 as it was given, and as every stage over it that moves the body left it.
+void add_first_penetration(const RunConfig& config, const Clip& clip, const RunProgress& progress,
+                           RunSummary& summary) {
+  const auto add = [&clip](const SceneState& state, MetricValues& values) {
+    append(penetration_values(penetration_by_frame(clip, {state}).front()), values);
+  };
+  for (Baseline& baseline : summary.baselines) {
+    if (baseline.of_frame_0) add(clip.first, baseline.values);
+  }
+  for (std::size_t s = 0; s < progress.first_frame.size(); ++s) {
+    if (config.stages[s].second.draw == Draw::kAll) add(progress.first_frame[s].state, summary.metrics[s].values);
+  }
 }
 
 /// Of the start, of what every stage that moves the body left, and of the result's frames.
 void add_penetration(const RunConfig& config, const Clip& clip, const RunProgress& progress,
                      const RefinementProgress& refinement, RunSummary& summary) {
   summary.surface = clip.surface_file;
-  const auto add = [](const MetricValues& more, MetricValues& values) {
-    values.insert(values.end(), more.begin(), more.end());
-  };
+  add_first_penetration(config, clip, progress, summary);
   const auto add_all = [&](const std::vector<SceneState>& states, MetricValues& means,
                            std::vector<FrameMetrics>& per_frame) {
     const std::vector<Penetration> counts = penetration_by_frame(clip, states);
-    add(mean_penetration(counts), means);
+    append(mean_penetration(counts), means);
     for (FrameMetrics& frame : per_frame)
-      add(penetration_values(counts[static_cast<std::size_t>(frame.frame)]), frame.values);
+      append(penetration_values(counts[static_cast<std::size_t>(frame.frame)]), frame.values);
   };
   std::vector<SceneState> start;
   for (Index t = 0; t < clip.frames(); ++t) start.push_back(given_start(clip, t));
   add_all(start, summary.baselines[0].values, summary.baselines[0].per_frame);
   std::vector<FrameMetrics> none;
-  const std::size_t frame_stages = progress.after_stage.size();
-  for (std::size_t s = 0; s < config.stages.size(); ++s) {
-    if (s < frame_stages && config.stages[s].second.draw == Draw::kScene) continue;
+  const std::size_t first = progress.first_frame.size(), refined = first + progress.after_stage.size();
+  for (std::size_t s = first; s < config.stages.size(); ++s) {
+    if (s < refined && config.stages[s].second.draw == Draw::kScene) continue;
     const std::vector<SceneState>& states =
-        s < frame_stages ? progress.after_stage[s] : refinement.stages[s - frame_stages].states;
+        s < refined ? progress.after_stage[s - first] : refinement.stages[s - refined].states;
     const bool is_last = s + 1 == config.stages.size();
     add_all(states, summary.metrics[s].values, is_last ? summary.per_frame : none);
   }
@@ -109,29 +127,42 @@ void add_penetration(const RunConfig& config, const Clip& clip, const RunProgres
 
 }  // namespace
 
+FrameState placed(const Avatar& avatar, const SceneState& state, Draw draw) {
+  FrameState frame;
+  frame.camera_from_world = state.camera_from_world;
+  if (draw == Draw::kScene) return frame;
+  frame.joints = pose_joints(avatar, state.body);
+  for (const ObjectPose& pose : state.objects) {
+    frame.world_from_object.push_back({so3_exp(pose.rotation), pose.translation});
+  }
+  return frame;
+}
+
 RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunProgress& progress,
                          const RefinementProgress& refinement) {
   RunSummary summary;
   summary.name = config.name;
   summary.frames = static_cast<int>(clip.frames());
   summary.seconds = progress.seconds + refinement.seconds;
-  const std::size_t frame_stages = progress.after_stage.size();
-  for (std::size_t s = 0; s < config.stages.size(); ++s) {
-    const auto& [name, stage] = config.stages[s];
-    if (s < frame_stages) {
-      summary.metrics.push_back(summarize_stage(name, clip, progress.after_stage[s], stage.draw, progress.totals[s]));
-    } else {
-      const RefinedStates& refined = refinement.stages[s - frame_stages];
-      summary.metrics.push_back(summarize_stage(name, clip, refined.states, Draw::kAll, refined.totals));
-    }
-  }
   summary.has_truth = clip.truth.has_value();
-  summary.baselines = {{"start", {}, {}}};
-  if (clip.truth) add_errors(clip, result_of(progress, refinement), summary);
+  const auto add_stage = [&](const std::vector<SceneState>& states, const StageTotals& totals) {
+    const auto& [name, stage] = config.stages[summary.metrics.size()];
+    summary.metrics.push_back(
+        summarize_stage(name, clip.truth ? errors_of(clip, states, stage.draw) : MetricValues{}, totals));
+  };
+  if (clip.truth) {
+    add_errors(clip, result_of(progress, refinement), summary);
+  } else {
+    summary.baselines = {{"start", {}, {}}};
+  }
+  add_first_frame(config, clip, progress, summary);
+  for (std::size_t s = 0; s < progress.after_stage.size(); ++s) add_stage(progress.after_stage[s], progress.totals[s]);
+  const std::size_t last_of_frames = summary.metrics.size() - 1;
+  for (const RefinedStates& refined : refinement.stages) add_stage(refined.states, refined.totals);
   const bool is_refined = !refinement.stages.empty();
   if (is_refined) {
     std::vector<FrameMetrics> before_refinement;
-    add_image_errors(progress.image_errors, summary.metrics[frame_stages - 1].values, before_refinement);
+    add_image_errors(progress.image_errors, summary.metrics[last_of_frames].values, before_refinement);
   }
   add_image_errors(is_refined ? refinement.image_errors : progress.image_errors, summary.metrics.back().values,
                    summary.per_frame);

@@ -4,11 +4,15 @@
 #include <string>
 
 #include "pipelines/clip.h"
+#include "pipelines/evaluate.h"
 #include "pipelines/run_config.h"
 #include "pipelines/run_state.h"
 #include "pipelines/run_summary.h"
 
 namespace hsi4d {
+
+/// Where a state puts everything, for the metrics. A stage that draws the scene alone is judged by its camera alone.
+FrameState placed(const Avatar& avatar, const SceneState& state, Draw draw = Draw::kAll);
 
 /// The summary of a run that is at its end. Errors of poses are there where the clip has truth; those of images always
 /// are, at the last stage and at the last before the refinement; penetration where the clip has a surface.

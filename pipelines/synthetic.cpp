@@ -1,5 +1,6 @@
 #include "pipelines/synthetic.h"
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "core/video.h"
 #include "pipelines/clip.h"
 #include "pipelines/state.h"
+#include "pipelines/synthetic_chain.h"
 #include "pipelines/synthetic_faults.h"
 #include "pipelines/synthetic_light.h"
 #include "pipelines/synthetic_motion.h"
@@ -59,24 +61,49 @@ std::string initial_json(const SyntheticObject& object, const std::vector<Rigid<
   return to_json(root);
 }
 
-ConfigValue data_section(const SyntheticObject& object, SyntheticVideo video, bool has_surface) {
+void add_file(ConfigValue& data, std::string_view key, const fs::path& file) {
+  data.add(key, ConfigValue::make_string(file.generic_string()));
+}
+
+/// Files that all clips share.
+ConfigValue shared_data(const SyntheticObject& object, bool has_surface) {
   ConfigValue data = ConfigValue::make_object();
-  const auto add = [&data](std::string_view key, std::string_view file) {
-    data.add(key, ConfigValue::make_string(file));
-  };
-  add("scene", "scene.ply");
+  add_file(data, "scene", "scene.ply");
   if (object.exists()) {
     const ConfigValue file = ConfigValue::make_string("objects/" + object.name + ".ply");
     data.add("objects", object_of(object.name, object_of("gaussians", file)));
   }
-  add("avatar", "avatar.safetensors");
-  add("frames", video == SyntheticVideo::kPng ? "frames" : kDatasetVideo);
-  add("masks", "masks");
-  add("camera", "camera.json");
-  add("initial", "initial.json");
-  add("truth", "truth");
-  if (has_surface) add("surface", kSurfaceFile);
+  add_file(data, "avatar", "avatar.safetensors");
+  if (has_surface) add_file(data, "surface", kSurfaceFile);
   return data;
+}
+
+/// Files of a clip in its folder.
+ConfigValue clip_data(const fs::path& folder, SyntheticVideo video) {
+  ConfigValue data = ConfigValue::make_object();
+  add_file(data, "frames", folder / (video == SyntheticVideo::kPng ? "frames" : kDatasetVideo));
+  add_file(data, "masks", folder / "masks");
+  add_file(data, "camera", folder / "camera.json");
+  add_file(data, "initial", folder / "initial.json");
+  add_file(data, "truth", folder / "truth");
+  return data;
+}
+
+/// Where the files of a clip are in the dataset.
+fs::path folder_of(Index clip, Index clips) { return clips == 1 ? fs::path() : fs::path("clips") / clip_name(clip); }
+
+/// The sections that name the dataset's files.
+ConfigValue data_sections(const SyntheticObject& object, const SyntheticSettings& settings, bool has_surface) {
+  ConfigValue shared = shared_data(object, has_surface);
+  if (settings.clips == 1) return object_of("data", merged(std::move(shared), clip_data({}, settings.video)));
+  ConfigValue sections = object_of("data", std::move(shared)), chain = ConfigValue::make_array();
+  for (Index k = 0; k < settings.clips; ++k) {
+    ConfigValue clip = object_of("name", ConfigValue::make_string(clip_name(k)));
+    clip.add("data", clip_data(folder_of(k, settings.clips), settings.video));
+    chain.items.push_back(std::move(clip));
+  }
+  sections.add("chain", std::move(chain));
+  return sections;
 }
 
 void write_objects(const std::string& path, const std::string& name, const std::vector<Rigid<double>>& poses) {
@@ -86,31 +113,6 @@ void write_objects(const std::string& path, const std::string& name, const std::
   }
   write_object_tracks(path, {name}, frames);
 }
-
-/// Where the frames of the video go, as settings.video says.
-class FrameFiles {
- public:
-  FrameFiles(const SyntheticSettings& settings, const FolderInMaking& out) : out_(out) {
-    if (settings.video == SyntheticVideo::kPng) return;
-    VideoFormat format{.frame_rate = settings.frame_rate, .quality = settings.video_quality};
-    if (settings.video == SyntheticVideo::kMp4) format.color = VideoColor::kEachPixel;
-    video_.emplace(out.file(kDatasetVideo), settings.size_px, settings.size_px, format);
-  }
-
-  /// @param name  "0003.png"
-  void add(const std::string& name, const Image& frame) {
-    if (video_) return video_->add(frame);
-    write_image(out_.file(fs::path("frames") / name), frame);
-  }
-
-  void commit() {
-    if (video_) video_->commit();
-  }
-
- private:
-  const FolderInMaking& out_;
-  std::optional<VideoWriter> video_;
-};
 
 void check_ffmpeg(const SyntheticSettings& settings) {
   if (settings.video == SyntheticVideo::kPng || !find_program("ffmpeg").empty()) return;
@@ -167,6 +169,78 @@ class Film {
   RevealedContent revealed_;
 };
 
+void stop_if_asked(const Observer& observer) {
+  if (observer.wants_stop()) throw Interrupted("interrupted while a dataset was made; nothing is left of it");
+}
+
+/// A clip's part of a dataset.
+struct ClipFiles {
+  const FolderInMaking& out;
+  fs::path folder;
+
+  std::string file(const fs::path& name) const { return out.file(folder / name); }
+};
+
+/// Where the frames of the video go, as settings.video says.
+class FrameFiles {
+ public:
+  FrameFiles(const SyntheticSettings& settings, const ClipFiles& files) : files_(files) {
+    if (settings.video == SyntheticVideo::kPng) return;
+    VideoFormat format{.frame_rate = settings.frame_rate, .quality = settings.video_quality};
+    if (settings.video == SyntheticVideo::kMp4) format.color = VideoColor::kEachPixel;
+    video_.emplace(files.file(kDatasetVideo), settings.size_px, settings.size_px, format);
+  }
+
+  /// @param name  "0003.png"
+  void add(const std::string& name, const Image& frame) {
+    if (video_) return video_->add(frame);
+    write_image(files_.file(fs::path("frames") / name), frame);
+  }
+
+  void commit() {
+    if (video_) video_->commit();
+  }
+
+ private:
+  const ClipFiles& files_;
+  std::optional<VideoWriter> video_;
+};
+
+/// Camera, initial state and truth.
+void write_states(const ClipFiles& files, const SyntheticClip& clip, const SyntheticObject& object,
+                  const SyntheticSettings& settings) {
+  write_camera(files.file("camera.json"), clip.cameras.front());
+  write_motion(files.file("initial_motion.npz"), disturbed_motion(clip.motion, settings));
+  const bool has_tracks = object.exists() && (settings.object_noise_deg > 0 || settings.object_noise_m > 0);
+  write_text_file(files.file("initial.json"), initial_json(object, clip.object, has_tracks));
+  write_motion(files.file("truth/motion.npz"), clip.motion);
+  write_cameras(files.file("truth/cameras.json"), clip.cameras);
+  if (!object.exists()) return;
+  write_objects(files.file("truth/objects.npz"), object.name, clip.object);
+  if (has_tracks) write_objects(files.file(kObjectTracks), object.name, disturbed_object(clip.object, settings));
+}
+
+/// Frames and masks. @param after_frame  called after each
+void write_frames(const ClipFiles& files, const SyntheticClip& clip, const SyntheticObject& object,
+                  const SyntheticSettings& settings, Film& film, const std::function<void()>& after_frame) {
+  const auto seed = static_cast<std::uint64_t>(settings.seed);
+  FrameFiles frames(settings, files);
+  for (std::size_t t = 0; t < clip.cameras.size(); ++t) {
+    const std::string name = four_digits(static_cast<std::int64_t>(t)) + ".png";
+    const SyntheticFrame frame = film.frame(clip, t);
+    const auto write_mask = [&](const std::string& of, const Image& mask) {
+      write_image(files.file(fs::path("masks") / of / name),
+                  disturbed_mask(mask, settings.masks, seed, of, static_cast<Index>(t)));
+    };
+    if (t == 0) write_image(files.file("first_frame.png"), frame.color);
+    frames.add(name, frame.color);
+    write_mask(kHumanMasks, frame.human_mask);
+    if (object.exists()) write_mask(object.name, frame.object_mask);
+    after_frame();
+  }
+  frames.commit();
+}
+
 }  // namespace
 
 RenderSettings video_render_settings() {
@@ -179,9 +253,6 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
                    const Observer& observer, const ConfigValue& more_sections, const BodySettings& body_settings) {
   check_ffmpeg(settings);
   FolderInMaking out(folder);
-  const auto stop_if_asked = [&] {
-    if (observer.wants_stop()) throw Interrupted("interrupted while a dataset was made; nothing is left of it");
-  };
   const std::uint64_t seed = static_cast<std::uint64_t>(settings.seed);
   const BodyModel body = rest_body(body_settings);
   AvatarSettings avatar_settings;
@@ -189,47 +260,34 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   avatar_settings.seed = seed;
   const Avatar avatar = surface_avatar(body, avatar_settings);
   const SyntheticObject object = synthetic_object(settings);
-  const SyntheticClip clip = synthetic_clip(body, object, clip_settings(settings));
-  const Gaussians scene = synthetic_scene(settings, clip.plan);
-
-  stop_if_asked();
+  const ClipSettings whole_settings = clip_settings(settings);
+  const SyntheticClip whole = synthetic_clip(body, object, whole_settings);
+  const Gaussians scene = synthetic_scene(settings, whole.plan);
+  stop_if_asked(observer);
   write_ply(out.file("scene.ply"), scene);
   write_avatar(out.file("avatar.safetensors"), avatar);
-  write_camera(out.file("camera.json"), clip.cameras.front());
-  write_motion(out.file("initial_motion.npz"), disturbed_motion(clip.motion, settings));
-  const bool has_tracks = object.exists() && (settings.object_noise_deg > 0 || settings.object_noise_m > 0);
-  write_text_file(out.file("initial.json"), initial_json(object, clip.object, has_tracks));
-  write_motion(out.file("truth/motion.npz"), clip.motion);
-  write_cameras(out.file("truth/cameras.json"), clip.cameras);
-  if (object.exists()) {
-    write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
-    write_objects(out.file("truth/objects.npz"), object.name, clip.object);
-    if (has_tracks) write_objects(out.file(kObjectTracks), object.name, disturbed_object(clip.object, settings));
-  }
+  if (object.exists()) write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
   write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
-  const TriangleMesh solids = synthetic_solids(settings, clip.plan);
+  const TriangleMesh solids = synthetic_solids(settings, whole.plan);
   if (!solids.faces.empty()) write_mesh(out.file(kSurfaceFile), solids);
-  const ConfigValue data = object_of("data", data_section(object, settings.video, !solids.faces.empty()));
+  const ConfigValue data = data_sections(object, settings, !solids.faces.empty());
   write_text_file(out.file("config.json"), to_json(merged(data, more_sections)));
 
-  FrameFiles frames(settings, out);
-  Film film(settings, render, body, avatar, scene, object);
-  Progress shown("frames", settings.frames, observer.progress, observer.progress_interval);
-  for (std::size_t t = 0; t < clip.cameras.size(); ++t) {
-    const std::string name = four_digits(static_cast<std::int64_t>(t)) + ".png";
-    const SyntheticFrame frame = film.frame(clip, t);
-    const auto write_mask = [&](const std::string& of, const Image& mask) {
-      write_image(out.file(fs::path("masks") / of / name),
-                  disturbed_mask(mask, settings.masks, seed, of, static_cast<Index>(t)));
-    };
-    if (t == 0) write_image(out.file("first_frame.png"), frame.color);
-    frames.add(name, frame.color);
-    write_mask(kHumanMasks, frame.human_mask);
-    if (object.exists()) write_mask(object.name, frame.object_mask);
-    shown.step();
-    stop_if_asked();
+  const std::vector<SyntheticClip> clips =
+      cut_into_clips(whole, whole_settings, settings.clips, {scene, object, avatar});
+  Progress shown("frames", settings.frames * settings.clips, observer.progress, observer.progress_interval);
+  for (Index k = 0; k < settings.clips; ++k) {
+    const auto& clip = clips[static_cast<std::size_t>(k)];
+    SyntheticSettings noise = settings;  // another in each clip
+    noise.seed += k;
+    const ClipFiles files{out, folder_of(k, settings.clips)};
+    write_states(files, clip, object, noise);
+    Film film(settings, render, body, avatar, scene, object);
+    write_frames(files, clip, object, noise, film, [&] {
+      shown.step();
+      stop_if_asked(observer);
+    });
   }
-  frames.commit();
   shown.finish();
   out.commit();
 }

@@ -12,6 +12,9 @@
 //   truth/motion.npz  truth/objects.npz  truth/cameras.json
 //   truth/surface.ply                                 a mesh of what is certainly solid (synthetic_solids)
 //
+// Of several clips (synthetic.clips) each has its own clips/NAME/ with frames, masks, camera, initial state and truth;
+// config.json is that of a chain.
+//
 // An object's pose is x_world = exp(rotation) x_object + translation.
 #pragma once
 

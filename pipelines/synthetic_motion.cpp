@@ -25,34 +25,6 @@ bool is_walking(SyntheticMotionKind motion) {
   return motion == SyntheticMotionKind::kWalk || motion == SyntheticMotionKind::kPush;
 }
 
-/// Where a camera stands and looks at time 0, metres; focal length in widths of the image.
-struct Viewpoint {
-  Vector eye, target;
-  double focal;
-};
-
-Viewpoint viewpoint_of(SyntheticMotionKind motion) {
-  if (motion == SyntheticMotionKind::kWalk) return {{0.5, -2.5, 1.4}, {0.02, 0.5, 0.85}, 1.2};
-  if (motion == SyntheticMotionKind::kPush) return {{0.5, -3.5, 1.5}, {0, 0.35, 0.72}, 1.25};
-  if (motion == SyntheticMotionKind::kWave) return {{0.45, -1.95, 1.4}, {0.05, 0.7, 0.9}, 1.15};
-  return {{0.42, -1.56, 1.36}, {0.02, 0.72, 0.85}, 1.12};
-}
-
-Camera camera_at(double seconds, const ClipSettings& settings) {
-  constexpr double kFastest = 0.142;  // metres a second
-  constexpr double kSwing = 0.4;      // radians a second: it comes back after 8 seconds
-  const double way = settings.camera_drift * kFastest / kSwing * std::sin(kSwing * seconds);
-  const Viewpoint view = viewpoint_of(settings.motion);
-  Camera camera;
-  camera.width = camera.height = settings.size_px;
-  camera.fx = camera.fy = view.focal * settings.size_px;
-  camera.cx = 0.512 * settings.size_px;
-  camera.cy = 0.494 * settings.size_px;
-  camera.camera_from_world =
-      look_at(view.eye + way * Vector(-0.94, 0.26, 0.22), view.target + way * Vector(0.12, 0, -0.04));
-  return camera;
-}
-
 void check_object(const SyntheticObject& object, SyntheticMotionKind motion) {
   const auto& objects = objects_of(motion);
   const bool may_be_none = std::find(objects.begin(), objects.end(), SyntheticObjectKind::kNone) != objects.end();
@@ -139,8 +111,35 @@ void hold_object(const Actor& actor, const ObjectPlace& at, const Vector3<double
 
 }  // namespace detail
 
+Viewpoint first_viewpoint(SyntheticMotionKind motion) {
+  if (motion == SyntheticMotionKind::kWalk) return {{0.5, -2.5, 1.4}, {0.02, 0.5, 0.85}, 1.2};
+  if (motion == SyntheticMotionKind::kPush) return {{0.5, -3.5, 1.5}, {0, 0.35, 0.72}, 1.25};
+  if (motion == SyntheticMotionKind::kWave) return {{0.45, -1.95, 1.4}, {0.05, 0.7, 0.9}, 1.15};
+  return {{0.42, -1.56, 1.36}, {0.02, 0.72, 0.85}, 1.12};
+}
+
+Camera camera_at(const Viewpoint& view, double seconds, const ClipSettings& settings) {
+  constexpr double kFastest = 0.142;  // metres a second
+  constexpr double kSwing = 0.4;      // radians a second: it comes back after 8 seconds
+  const double way = settings.camera_drift * kFastest / kSwing * std::sin(kSwing * seconds);
+  Vector of_eye(-0.94, 0.26, 0.22), of_target(0.12, 0, -0.04);
+  if (view.turn != 0) {
+    const Matrix turn = so3_exp(Vector(0, 0, view.turn));
+    of_eye = turn * of_eye;
+    of_target = turn * of_target;
+  }
+  Camera camera;
+  camera.width = camera.height = settings.size_px;
+  camera.fx = camera.fy = view.focal * settings.size_px;
+  camera.cx = 0.512 * settings.size_px;
+  camera.cy = 0.494 * settings.size_px;
+  camera.camera_from_world = look_at(view.eye + way * of_eye, view.target + way * of_target);
+  return camera;
+}
+
 ClipSettings clip_settings(const SyntheticSettings& settings) {
-  return {settings.frames, settings.frame_rate, settings.size_px, settings.camera_drift, settings.motion};
+  return {settings.clips * (settings.frames - 1) + 1, settings.frame_rate, settings.size_px, settings.camera_drift,
+          settings.motion};
 }
 
 Rigid<double> joint_frame(const BodyModel& body, const BodyPose& pose, int joint) {
@@ -174,7 +173,7 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
                                                      wrist_from_object(actor, start.figure.ground))
                                            : *moment.object);
     }
-    clip.cameras.push_back(camera_at(seconds, settings));
+    clip.cameras.push_back(camera_at(first_viewpoint(settings.motion), seconds, settings));
   }
   Moment first = start;
   if (first.object) first.object = clip.object.front();

@@ -33,8 +33,21 @@ struct ClipSettings {
   SyntheticMotionKind motion = SyntheticMotionKind::kPour;
 };
 
-/// The clip that the settings ask for.
+/// The clip that the settings ask for; of several, which follow one another, all frames.
 ClipSettings clip_settings(const SyntheticSettings& settings);
+
+/// Where a camera stands and looks at first.
+struct Viewpoint {
+  Vector3<double> eye, target;  ///< metres
+  double focal = 1;             ///< widths of the image
+  double turn = 0;              ///< of its drift about z, radians; 0: that of one that looks along +y
+};
+
+/// Where the camera of a motion stands at first.
+Viewpoint first_viewpoint(SyntheticMotionKind motion);
+
+/// The camera after so many seconds of drift.
+Camera camera_at(const Viewpoint& view, double seconds, const ClipSettings& settings);
 
 /// The exact state of every frame.
 struct SyntheticClip {

@@ -97,6 +97,7 @@ struct SyntheticSettings {
   SyntheticKind kind = SyntheticKind::kClip;
   std::int64_t seed = 0;
   Index frames = 8;
+  Index clips = 1;         ///< that follow one another, of `frames` each, the last of one the first of the next
   double frame_rate = 10;  ///< frames a second
   int size_px = 256;
   int supersample = 2;

@@ -47,6 +47,11 @@ std::string summary(const std::filesystem::path& file, const RunConfig& config) 
   if (render.compatibility != Compatibility::kNone)
     text += ", as " + std::string(choice_name<Compatibility>(kCompatibilities, render.compatibility));
   text += "\n";
+  if (!config.chain.empty()) {
+    std::vector<std::string> names;
+    for (const ChainClip& clip : config.chain) names.push_back(clip.name);
+    text += "  chain of " + count_text(std::ssize(names), "clip") + " (" + joined(names) + ")\n";
+  }
   for (const auto& [name, stage] : config.stages) text += stage_summary(name, stage);
   if (config.stages.empty()) text += "  no stages\n";
   for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
@@ -79,9 +84,11 @@ std::string settings_table(const std::vector<ConfigSetting>& settings) {
 /// What a stage may move, by what it is over and what it draws.
 std::string list_stages() {
   std::vector<std::vector<std::string>> rows = {{"OVER", "DRAW", "GROUP", "MOVES"}};
-  for (const ConfigChoice<Draw>& draw : kDraws) {
-    for (const std::string& group : state_group_names(draw.value))
-      rows.push_back({"frame", draw.name, group, state_group_summary(group)});
+  for (const char* over : {"first_frame", "frame"}) {
+    for (const ConfigChoice<Draw>& draw : kDraws) {
+      for (const std::string& group : state_group_names(draw.value))
+        rows.push_back({over, draw.name, group, state_group_summary(group)});
+    }
   }
   for (const std::string& group : sequence_group_names())
     rows.push_back({"sequence", "", group, sequence_group_summary(group)});

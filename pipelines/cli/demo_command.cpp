@@ -64,6 +64,8 @@ void name_inputs(const fs::path& dataset, DataSettings& data) {
 std::string demo_command(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
   if (arguments.resume && arguments.out.empty()) throw UserError("hsi4d demo: --resume needs --out, to know with what");
   RunConfig config = demo_config(arguments, losses);
+  if (config.synthetic.clips > 1)
+    throw UserError("/synthetic/clips: hsi4d demo makes one clip; hsi4d synth makes chains, for hsi4d run");
   const fs::path folder = arguments.out.empty() ? free_run_folder(config.name) : arguments.out;
   const fs::path dataset = folder / "dataset";
   name_inputs(dataset, config.data);

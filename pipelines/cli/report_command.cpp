@@ -1,6 +1,7 @@
 #include "pipelines/cli/report_command.h"
 
 #include "core/file.h"
+#include "pipelines/chain_report.h"
 #include "pipelines/gradient_table.h"
 #include "pipelines/report_data.h"
 #include "pipelines/report_page.h"
@@ -11,6 +12,10 @@ namespace hsi4d::cli {
 std::string report_command(const std::vector<std::string>& runs) {
   std::string text;
   for (const std::string& run : runs) {
+    if (is_chain_folder(run)) {
+      text += (text.empty() ? "" : "\n") + write_chain_report(run) + "\n";
+      continue;
+    }
     const ReportData data = read_report_data(run);
     const std::string path = RunPaths{run}.report();
     write_text_file(path, report_page(data));

@@ -4,6 +4,7 @@
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "core/text.h"
+#include "pipelines/chain.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
@@ -49,7 +50,9 @@ std::string stages_text(const RunConfig& config) {
   std::string text;
   for (const auto& [name, stage] : config.stages) {
     text += "  stage " + name + ": " + count_text(stage.iterations, "iteration") +
-            (stage.over == StageScope::kFrame ? " a frame\n" : " over the sequence\n");
+            (stage.over == StageScope::kFirst   ? " over the first frame\n"
+             : stage.over == StageScope::kFrame ? " a frame\n"
+                                                : " over the sequence\n");
   }
   for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
   return text;
@@ -97,6 +100,43 @@ std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, co
   return text + stages_text(config);
 }
 
+/// As plan, of a chain: all its clips.
+std::string chain_plan(const RunConfig& config, const std::vector<LossTerm>& losses, const std::string& folder,
+                       bool resume) {
+  const std::vector<ClipFacts> clips = check_chain(config);
+  const auto state = look_at_run_folder(folder, resolved_config(config, descriptions_of(losses)), resume);
+  std::string text = "would write " + folder + "\n";
+  if (state)
+    text = "would go on with " + folder + " (" + std::string(run_state_name(*state)) +
+           "): " + std::to_string(finished_clips(config, folder, losses)) + " of " + std::to_string(clips.size()) +
+           " clips are finished\n";
+  for (const ClipFacts& clip : clips) text += "  clip " + clip.name + ": " + count_text(clip.frames, "frame") + "\n";
+  return text + stages_text(config);
+}
+
+std::string shown(const ChainTable& shown_table) {
+  if (shown_table.metrics.empty()) return "";
+  std::vector<std::vector<std::string>> rows(1, {""});
+  rows[0].insert(rows[0].end(), shown_table.columns.begin(), shown_table.columns.end());
+  for (std::size_t m = 0; m < shown_table.metrics.size(); ++m) {
+    rows.push_back({shown_metric(*shown_table.metrics[m])});
+    for (const double* value : shown_table.values[m])
+      rows.back().push_back(shown_value(*shown_table.metrics[m], value));
+  }
+  return table(rows) + "\n";
+}
+
+ChainSummary run_chain_on_terminal(const RunConfig& config, const std::vector<LossTerm>& losses,
+                                   const RunOptions& options) {
+  const InterruptWatch watch;
+  try {
+    return carry_out_chain(config, losses, options);
+  } catch (const Interrupted& stop) {
+    throw Interrupted(std::string(stop.what()) + "; the same command with --out " + options.folder +
+                      " --resume goes on");
+  }
+}
+
 }  // namespace
 
 int run_threads(std::optional<int> asked) { return !asked ? 0 : *asked == 0 ? thread_count() : *asked; }
@@ -126,6 +166,10 @@ std::string result_text(const RunSummary& summary, const std::string& folder) {
          "; report: " + (std::filesystem::path(folder) / "report.html").string() + "\n";
 }
 
+std::string chain_result_text(const ChainSummary& summary, const std::string& folder) {
+  return shown(clip_table(summary)) + shown(join_table(summary)) + result_text(summary.all, folder);
+}
+
 std::string run_command(const RunArguments& arguments, const std::vector<LossTerm>& losses) {
   std::vector<std::string> overrides = arguments.overrides;
   if (arguments.seed) overrides.push_back("seed=" + std::to_string(*arguments.seed));
@@ -137,6 +181,10 @@ std::string run_command(const RunArguments& arguments, const std::vector<LossTer
   options.resume = arguments.resume;
   options.threads = run_threads(arguments.threads);
   options.observer = observer_on_terminal(false);
+  if (!config.chain.empty()) {
+    if (arguments.dry_run) return chain_plan(config, losses, options.folder, arguments.resume);
+    return chain_result_text(run_chain_on_terminal(config, losses, options), options.folder);
+  }
   if (arguments.dry_run) return plan(config, losses, options.folder, arguments.resume);
   return result_text(run_on_terminal(config, losses, options, options.folder), options.folder);
 }

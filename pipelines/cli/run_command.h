@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "optim/loss_term.h"
+#include "pipelines/chain_summary.h"
 #include "pipelines/run.h"
 
 namespace hsi4d::cli {
@@ -40,5 +41,8 @@ std::string free_run_folder(const std::string& name);
 
 /// The table of errors, the time and where the report is.
 std::string result_text(const RunSummary& summary, const std::string& folder);
+
+/// The errors of a chain's clips, at its joins, and over all.
+std::string chain_result_text(const ChainSummary& summary, const std::string& folder);
 
 }  // namespace hsi4d::cli

@@ -26,7 +26,9 @@ std::string synth_command(const std::filesystem::path& config, const std::vector
     return out.generic_string() + ": " + std::to_string(run.synthetic.views_cameras * run.synthetic.views_poses) +
            " views of " + size + " for hsi4d avatar fit\n";
   }
-  const std::string frames = std::to_string(run.synthetic.frames) + (run.synthetic.frames == 1 ? " frame" : " frames");
+  const std::string clips = run.synthetic.clips == 1 ? "" : std::to_string(run.synthetic.clips) + " clips of ";
+  const std::string frames =
+      clips + std::to_string(run.synthetic.frames) + (run.synthetic.frames == 1 ? " frame" : " frames");
   return out.generic_string() + ": " + frames + " of " + size + " with masks and truth\n";
 }
 

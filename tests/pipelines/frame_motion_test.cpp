@@ -112,7 +112,7 @@ TEST_CASE("gradients of terms over masks and motion are right for body and objec
   Tape<double> tape;
   FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings_with_human(rotations));
   graph.set_state(clip.first);
-  graph.give_motion(frames_before(clip));
+  graph.give_motion(clip.first, frames_before(clip));
   const Image image(3, kHeight, kWidth), human = random_mask(6), first = random_mask(7), second = random_mask(8);
   FrameTargets targets{&image, nullptr, {{14.5, 11.25, 1}, {6.5, 14.5, 1}}, {2.5, 3.5}};
   targets.human_mask = &human;
@@ -168,7 +168,7 @@ TEST_CASE("an object is drawn to the hand as the hand is to it", "[frame_graph]"
   Tape<double> tape;
   FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings_with_human());
   graph.set_state(clip.first);
-  graph.give_motion(frames_before(clip));
+  graph.give_motion(clip.first, frames_before(clip));
   const Var<double> loss = term_named("contact").record(graph.loss_inputs());
   const ParameterGroup<double>& objects = group_named(graph, "object_transl");
   const Var<double> hand = group_named(graph, "transl").blocks.front();
@@ -230,7 +230,7 @@ TEST_CASE("points and joints that terms over the motion read are where the state
     Tape<double> tape;
     FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings_with_human(rotations));
     graph.set_state(clip.first);
-    graph.give_motion(frames);
+    graph.give_motion(clip.first, frames);
     const LossInputs<double>& in = graph.loss_inputs();
     REQUIRE(in.motion != nullptr);
     CHECK(in.motion->still_frames == before);

@@ -271,7 +271,7 @@ TEST_CASE("a folder of frames in another format is told, and numbers that leave 
     Motion motion = read_motion(dataset.file("initial_motion.npz"));
     motion.poses.resize(1);
     write_motion(dataset.file("initial_motion.npz"), motion);
-    RunConfig config = dataset.config({"data.truth="});
+    RunConfig config = dataset.config({"data.truth=", "data.surface="});
     CHECK(warnings_of([&] { read_clip(config.data); }) ==
           Texts{dataset.file("frames") +
                 ": \"0001.png\" is followed by \"0003.png\"; frames count as equally far apart in time, so one seems "
