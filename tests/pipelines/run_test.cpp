@@ -389,7 +389,7 @@ TEST_CASE("every shipped config of a generated dataset runs", "[run]") {
     const std::string stem = fs::path(name).stem().string();
     if (check_shipped_config(shipped_configs() / "synthetic" / name, stem, true)) with_stages.insert(stem);
   }
-  CHECK(with_stages == std::set<std::string>{"alone", "chain", "disturbed", "faults", "table", "walk"});
+  CHECK(with_stages == std::set<std::string>{"alone", "chain", "disturbed", "faults", "full_size", "table", "walk"});
 }
 
 TEST_CASE("the demo halves the errors of what it is given, and tells them", "[full][demo]") {

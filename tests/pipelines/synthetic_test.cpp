@@ -299,7 +299,7 @@ TEST_CASE("every shipped config of synth makes its dataset") {
     names.push_back(name);
   }
   std::sort(names.begin(), names.end());
-  CHECK(names == std::vector<std::string>{"alone", "chain", "disturbed", "faults", "table", "walk"});
+  CHECK(names == std::vector<std::string>{"alone", "chain", "disturbed", "faults", "full_size", "table", "walk"});
 }
 
 TEST_CASE("a dataset with all noise and faults is a function of its settings", "[parallel]") {
