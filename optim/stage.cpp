@@ -110,6 +110,7 @@ class TapeGuard {
     }
   }
   void restore() const {
+    tape_.set_profiling(false);
     tape_.rewind(mark_);
     auto was_frozen = frozen_.begin();
     for (const ParameterGroup<S>& group : available_) {
@@ -152,21 +153,32 @@ class StageRun {
     for (Index i = 0; i < settings_.iterations; ++i) iterate(i, callback);
     evaluate_the_end();
     keep_moments();
-    return {
-        settings_.iterations, evaluated_loss(),  loss_.values, std::move(loss_.off), adam_.rollbacks() + undone_at_end_,
-        seconds_since(start), left_out_objects()};
+    return {settings_.iterations,
+            evaluated_loss(),
+            loss_.values,
+            std::move(loss_.off),
+            adam_.rollbacks() + undone_at_end_,
+            seconds_since(start),
+            times_,
+            left_out_objects(),
+            options_.profile ? tape_.statistics() : std::vector<NodeStatistics>()};
   }
 
  private:
   void iterate(Index i, const StageCallback& callback) {
     const auto start = Clock::now();
     for (const AdamGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
+    const auto set_up = Clock::now();
     tape_.forward(loss_.total);
+    times_.forward += seconds_since(set_up);
     shares_.clear();
     if (settings_.gradient_shares > 0 && i % settings_.gradient_shares == 0) shares_ = shares_of_terms(i);
+    const auto evaluated = Clock::now();
     tape_.backward(loss_.total);
+    times_.backward += seconds_since(evaluated);
     check_reached(i);
     read_terms();
+    const auto differentiated = Clock::now();
     const double loss = evaluated_loss();
     const StepReport step = adam_.step(i, settings_.iterations, loss);
     if (step.rolled_back) note_rollback(*step.bad, i);
@@ -175,6 +187,7 @@ class StageRun {
       wrap_rotations(step);
       hold_ranges(step);
     }
+    times_.step += seconds_since(differentiated);
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
               seconds_since(start), shares_});
@@ -281,7 +294,9 @@ class StageRun {
 
   /// The parameters that are left must not be those of a step into the void.
   void evaluate_the_end() {
+    const auto start = Clock::now();
     tape_.forward(loss_.total);
+    times_.forward += seconds_since(start);
     read_terms();
     if (std::isfinite(evaluated_loss())) return;
     offender_ = "the loss is " + rounded(evaluated_loss(), 6) + first_bad_node();
@@ -310,7 +325,8 @@ class StageRun {
   Index undone_at_end_ = 0;
   std::vector<std::vector<Index>> left_out_;  // evaluations, by loss_.left_out and object
   std::vector<GradientShare> shares_;         // of this iteration
-  std::string offender_;                      // of the last evaluation, if it was bad
+  StageTimes times_;
+  std::string offender_;  // of the last evaluation, if it was bad
 };
 
 }  // namespace
@@ -332,6 +348,8 @@ StageResult run_stage(Tape<S>& tape, const StageSettings& settings, std::span<co
                       const StageCallback& callback, const StageOptions& options) {
   check_groups(settings, names_of(available), "stage '" + options.name + "'");
   const TapeGuard<S> guard(tape, available);
+  if (options.profile) tape.clear_statistics();
+  tape.set_profiling(options.profile);
   try {
     StageResult result = StageRun<S>(tape, settings, terms, inputs, available, options).run(callback);
     guard.restore();

@@ -46,6 +46,12 @@ struct LeftOutObject {
   Index evaluations = 0;  ///< of iterations + 1
 };
 
+/// Where the time of a stage went, seconds.
+struct StageTimes {
+  double forward = 0, backward = 0;  ///< of the tape
+  double step = 0;                   ///< looking at every number, moving the parameters
+};
+
 /// What a stage has done.
 struct StageResult {
   Index iterations = 0;
@@ -54,7 +60,9 @@ struct StageResult {
   std::vector<std::string> off;  ///< terms of the settings that lacked an input, or have weight 0
   Index rollbacks = 0;
   double seconds = 0;
+  StageTimes times;
   std::vector<LeftOutObject> left_out;  ///< by term and object, in order
+  std::vector<NodeStatistics> nodes;    ///< of the tape, losses included, with StageOptions::profile
 };
 
 /// What the settings do not say.
@@ -63,6 +71,7 @@ struct StageOptions {
   /// Groups named here go on from these moments (none yet: an entry without blocks), and leave theirs here at the end.
   /// All others start afresh.
   AdamState* kept = nullptr;
+  bool profile = false;  ///< measure the time of every node
 };
 
 /// A stage was given up: more evaluations than max_rollbacks were not finite. Not a bug: the message says which

@@ -7,15 +7,11 @@
 #include "splat/render_counters.h"
 
 namespace hsi4d {
-namespace {
 
-/// Resident memory of the process at its most.
 Index peak_memory_bytes() {
   rusage usage{};
   return getrusage(RUSAGE_SELF, &usage) == 0 ? static_cast<Index>(usage.ru_maxrss) * 1024 : 0;
 }
-
-}  // namespace
 
 Index Measurement::work() const {
   return unit == WorkUnit::kGaussians ? gaussians : unit == WorkUnit::kPairs ? pairs : fragments;

@@ -8,6 +8,8 @@
 
 namespace hsi4d {
 
+struct StageWatch;
+
 /// Somebody asked for the work to stop. The message says what is left of it.
 class Interrupted : public std::runtime_error {
  public:
@@ -19,6 +21,7 @@ struct Observer {
   ProgressSink progress = {};                 ///< empty: nobody
   double progress_interval = 0.1;             ///< seconds
   std::function<bool()> stop_requested = {};  ///< asked after every iteration or frame; empty: never
+  const StageWatch* stages = nullptr;         ///< who wants to know where the time of stages goes; null: nobody
 
   bool wants_stop() const { return stop_requested && stop_requested(); }
 };

@@ -220,7 +220,8 @@ class Reconstruction {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
       note(std::nullopt, s, report, nullptr, nullptr);
     };
-    const StageResult result = run_sequence_stage({config_, clip_, losses_, s}, states, note_iteration);
+    const StageResult result =
+        run_sequence_stage({config_, clip_, losses_, s, observer_.stages}, states, note_iteration);
     warn_of_terms_off(result.off, name, stage);
     folder_.note("all frames, " + stage_text(name, result, begin, clip_));
     return {result.iterations, result.rollbacks, result.seconds};
@@ -249,7 +250,8 @@ class Reconstruction {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
       note(frame.index, s, report, &counters, &totals);
     };
-    const StageResult result = run_frame_stage({config_, clip_, losses_, s}, frame, state, colors, note_iteration);
+    const StageResult result =
+        run_frame_stage({config_, clip_, losses_, s, observer_.stages}, frame, state, colors, note_iteration);
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;

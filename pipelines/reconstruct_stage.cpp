@@ -74,10 +74,15 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   return targets;
 }
 
+Index tiles_in_image(const Camera& camera, int tile) {
+  return Index{(camera.width + tile - 1) / tile} * ((camera.height + tile - 1) / tile);
+}
+
 template <class S>
 StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
                                const FrameStageCallback& callback) {
   const auto& [name, stage] = task.config.stages[task.stage];
+  StageProbe probe(task.watch);
   Tape<S> tape;
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
   settings.human_opacity = stage.draw == Draw::kAll && reads_human_opacity(task.losses, stage);
@@ -88,12 +93,21 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   graph.set_targets(targets_of(task, frame, weight));
   LossInputs<S> inputs = graph.loss_inputs();
   if (stage.weight == PixelWeight::kAll) inputs.weight = {};
-  const StageResult result =
-      run_stage<S>(tape, stage, task.losses, inputs, graph.groups(),
-                   [&](const IterationReport& report) { callback(report, *graph.rendered().counters); },
-                   {.name = name + ", frame " + std::to_string(frame.index), .kept = &colors.moments});
+  const StageResult result = run_stage<S>(
+      tape, stage, task.losses, inputs, graph.groups(),
+      [&](const IterationReport& report) {
+        const RenderCounters& counters = *graph.rendered().counters;
+        probe.iteration_ended(report, &counters);
+        callback(report, counters);
+        probe.iteration_begins();
+      },
+      {.name = name + ", frame " + std::to_string(frame.index), .kept = &colors.moments, .profile = probe.is_on()});
   graph.read_state(stage.optimize, state);
   if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
+  probe.stage_ended(result, {.stage = name,
+                             .frame = frame.index,
+                             .tiles_of_image = tiles_in_image(task.clip.camera, task.config.render.tile),
+                             .tape_bytes = tape.memory_bytes()});
   return result;
 }
 
@@ -101,13 +115,20 @@ template <class S>
 StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>& states,
                                   const StageCallback& callback) {
   const auto& [name, stage] = task.config.stages[task.stage];
+  StageProbe probe(task.watch);
   Tape<S> tape;
   const bool moves_pose = find_entry(stage.optimize, kPoseLatents) != nullptr;
   const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
   const SequenceGraph<S> graph(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);
-  const StageResult result = run_stage<S>(tape, stage, task.losses, graph.loss_inputs(), graph.groups(), callback,
-                                          {.name = name, .kept = nullptr});
+  const StageResult result = run_stage<S>(tape, stage, task.losses, graph.loss_inputs(), graph.groups(),
+                                          [&](const IterationReport& report) {
+                                            probe.iteration_ended(report, nullptr);
+                                            callback(report);
+                                            probe.iteration_begins();
+                                          },
+                                          {.name = name, .kept = nullptr, .profile = probe.is_on()});
   graph.read_states(stage.optimize, states);
+  probe.stage_ended(result, {.stage = name, .tape_bytes = tape.memory_bytes()});
   return result;
 }
 

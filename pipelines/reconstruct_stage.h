@@ -12,6 +12,7 @@
 #include "pipelines/clip.h"
 #include "pipelines/color_state.h"
 #include "pipelines/run_config.h"
+#include "pipelines/stage_profile.h"
 #include "pipelines/state.h"
 #include "splat/render.h"
 
@@ -23,6 +24,7 @@ struct StageTask {
   const Clip& clip;
   const std::vector<LossTerm>& losses;  ///< that the config may name
   std::size_t stage = 0;                ///< in config.stages
+  const StageWatch* watch = nullptr;    ///< null: nobody wants to know where time goes
 };
 
 /// A frame that stages work on.

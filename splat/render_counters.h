@@ -9,6 +9,8 @@ namespace hsi4d {
 struct RenderTimes {
   double still_s = 0;  ///< records, order and lists of the Gaussians that stand still; 0 when they were kept
   double records_s = 0, sort_s = 0, bin_s = 0, forward_s = 0, backward_s = 0, reduce_s = 0;
+
+  RenderTimes& operator+=(const RenderTimes& other);
 };
 
 /// What the last runs did.
@@ -23,6 +25,25 @@ struct RenderCounters {
   Index adjoint_tiles = 0;  ///< tiles that the backward run visited
   Index kept_bytes = 0;     ///< of the pixels, from forward to backward, beside the outputs
   RenderTimes times;
+
+  /// Adds what other runs did.
+  RenderCounters& operator+=(const RenderCounters& other);
 };
+
+inline RenderTimes& RenderTimes::operator+=(const RenderTimes& other) {
+  for (const auto part : {&RenderTimes::still_s, &RenderTimes::records_s, &RenderTimes::sort_s, &RenderTimes::bin_s,
+                          &RenderTimes::forward_s, &RenderTimes::backward_s, &RenderTimes::reduce_s})
+    this->*part += other.*part;
+  return *this;
+}
+
+inline RenderCounters& RenderCounters::operator+=(const RenderCounters& other) {
+  for (const auto count : {&RenderCounters::visible, &RenderCounters::pairs, &RenderCounters::groups,
+                           &RenderCounters::fragments, &RenderCounters::tiles, &RenderCounters::reached,
+                           &RenderCounters::layers, &RenderCounters::adjoint_tiles, &RenderCounters::kept_bytes})
+    this->*count += other.*count;
+  times += other.times;
+  return *this;
+}
 
 }  // namespace hsi4d

@@ -4,14 +4,11 @@
 
 #include "core/check.h"
 #include "core/config_file.h"
-#include "core/file.h"
-#include "core/parallel.h"
+#include "pipelines/cli/dataset.h"
 #include "pipelines/cli/demo_configs.h"
-#include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/run_problems.h"
-#include "pipelines/synthetic.h"
 
 namespace hsi4d::cli {
 
@@ -26,37 +23,6 @@ RunConfig demo_config(const DemoArguments& arguments, const std::vector<LossTerm
   const ConfigValue tree =
       load_config_text(texts.at(name), name, fs::current_path(), arguments.overrides, problems, texts);
   return read_run_config(tree, descriptions_of(losses), problems, ConfigUse::kStages);
-}
-
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw UserError(folder.string() + ": the folder cannot be made: " + error.message());
-}
-
-void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, const DemoArguments& arguments,
-                  const fs::path& dataset) {
-  const InterruptWatch watch;
-  const int asked = run_threads(arguments.threads), threads = asked > 0 ? asked : config.threads;
-  with_threads(threads > 0 ? threads : thread_count(), [&] {
-    write_dataset(config.synthetic, video_render_settings(), dataset, observer_on_terminal(arguments.quiet),
-                  dataset_sections(config, descriptions_of(losses)), config.body);
-  });
-}
-
-/// The dataset that is gone on with must be the one that the config asks for.
-void check_dataset(const RunConfig& config, const fs::path& dataset) {
-  const std::string file = (dataset / "synthetic.json").string();
-  if (read_text_file(file) == synthetic_settings_json(config.synthetic, config.body)) return;
-  throw UserError(file + ": the dataset was made with other settings than these; make a new one in another folder");
-}
-
-/// Names the files of a dataset and keeps the other settings.
-void name_inputs(const fs::path& dataset, DataSettings& data) {
-  DataSettings named = dataset_inputs(dataset);
-  named.mask_threshold = data.mask_threshold;
-  named.mask_margin_px = data.mask_margin_px;
-  data = std::move(named);
 }
 
 }  // namespace
@@ -75,8 +41,7 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
       throw UserError(folder.string() +
                       ": holds a demo already; --resume goes on with it, another --out makes a new one");
     }
-    make_folder(folder);
-    make_dataset(config, losses, arguments, dataset);
+    make_dataset(config, losses, dataset, arguments.threads, arguments.quiet);
   } else {
     check_dataset(config, dataset);
   }

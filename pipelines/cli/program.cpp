@@ -18,6 +18,7 @@
 #include "pipelines/cli/avatar_command.h"
 #include "pipelines/cli/avatar_fit_command.h"
 #include "pipelines/cli/bench_command.h"
+#include "pipelines/cli/bench_stages_command.h"
 #include "pipelines/cli/command_words.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/convert_command.h"
@@ -79,6 +80,7 @@ struct CommandLine {
   PoseOptions pose;
   MotionOptions motion;
   BenchOptions bench;
+  BenchStagesOptions bench_stages;
   SelectCameraOptions select_camera;
   EvaluateOptions evaluate;
   std::function<std::string()> run;
@@ -101,7 +103,7 @@ struct CommandLine {
     add_motion();
     add_convert();
     add_info();
-    add_bench();
+    add_bench(terms);
     add_check();
     add_schema();
     add_list();
@@ -282,23 +284,34 @@ struct CommandLine {
     command.callback([this] { run = [this] { return convert_command(convert); }; });
   }
 
-  void add_bench() {
+  void add_bench(const std::vector<LossTerm>& terms) {
     CLI::App* command = app.add_subcommand("bench",
-                                           "Measure the speed of the renderer or the body, or the pixel filter: a "
-                                           "table, and one JSON object a measurement");
-    command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter")
+                                           "Measure the speed of the renderer, the body or a whole run, or the pixel "
+                                           "filter: a table, and one JSON object a measurement");
+    command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter, stages")
         ->required()
-        ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter"}));
-    command->add_option("--workload", bench.workloads, "Only these; default: all");
-    command->add_option("--threads", bench.threads, "Threads")->check(CLI::Range(1, 1024));
+        ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter", "stages"}));
+    command->add_option("--workload", bench.workloads, "Only these; default: all; not of stages");
+    command->add_option("--threads", bench.threads, "Threads; default: 1, of stages what the config says")
+        ->check(CLI::Range(1, 1024));
     command
         ->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of all but pixel_filter")
         ->check(CLI::Range(1, 1000));
     command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
         ->check(CLI::Range(8.0, 2048.0));
     command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
-    command->callback([this] {
-      run = [this] {
+    command->add_option("--config", bench_stages.config, "Of stages: the config that is run")->type_name("F.json");
+    command->add_option("--out", bench_stages.out, "Of stages: folder of dataset and runs; default: runs/bench/CONFIG");
+    command->add_option("--plot", bench_stages.plot, "Of stages: file for a picture of an iteration's parts")
+        ->type_name("F.svg");
+    add_overrides(*command, bench_stages.overrides);
+    command->callback([this, command, &terms] {
+      run = [this, command, &terms] {
+        if (topic == "stages") {
+          bench_stages.json = bench.json;
+          bench_stages.threads = command->count("--threads") > 0 ? bench.threads : 0;
+          return bench_stages_command(bench_stages, terms);
+        }
         if (topic == "skinning") return bench_skinning_command(bench);
         if (topic == "color_net") return bench_color_net_command(bench);
         return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);

@@ -1,0 +1,232 @@
+#include "pipelines/bench_stages.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "core/parallel.h"
+#include "core/simd.h"
+#include "pipelines/report_plots.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// A part of an iteration, for tables and plots: an operator, or what is in none.
+struct CostPart {
+  std::string name;
+  double forward_ms = 0, backward_ms = 0;  ///< an iteration
+  Index forward_runs = 0, forward_skips = 0, backward_runs = 0;
+
+  double ms() const { return forward_ms + backward_ms; }
+};
+
+double per_iteration(double seconds, const StageCost& cost) {
+  return cost.sum.iterations > 0 ? 1e3 * seconds / static_cast<double>(cost.sum.iterations) : 0;
+}
+
+double per_iteration(Index count, const StageCost& cost) {
+  return cost.sum.iterations > 0 ? static_cast<double>(count) / static_cast<double>(cost.sum.iterations) : 0;
+}
+
+void add_operators(const std::vector<OperatorProfile>& more, std::vector<OperatorProfile>& operators) {
+  for (const OperatorProfile& o : more) {
+    const auto is_it = [&o](const OperatorProfile& known) { return known.name == o.name; };
+    const auto place = std::find_if(operators.begin(), operators.end(), is_it);
+    if (place == operators.end()) {
+      operators.push_back(o);
+      continue;
+    }
+    place->nodes = std::max(place->nodes, o.nodes);
+    place->forward_runs += o.forward_runs;
+    place->forward_skips += o.forward_skips;
+    place->backward_runs += o.backward_runs;
+    place->forward_seconds += o.forward_seconds;
+    place->backward_seconds += o.backward_seconds;
+  }
+}
+
+/// Operators, the largest first; then the tape's own time and the steps.
+std::vector<CostPart> parts_of(const StageCost& cost) {
+  std::vector<CostPart> parts;
+  double forward = 0, backward = 0;
+  for (const OperatorProfile& o : cost.sum.operators) {
+    parts.push_back({o.name, per_iteration(o.forward_seconds, cost), per_iteration(o.backward_seconds, cost),
+                     o.forward_runs, o.forward_skips, o.backward_runs});
+    forward += o.forward_seconds;
+    backward += o.backward_seconds;
+  }
+  std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
+  const StageTimes& times = cost.sum.times;
+  parts.push_back({"the tape itself", per_iteration(std::max(0.0, times.forward - forward), cost),
+                   per_iteration(std::max(0.0, times.backward - backward), cost), 0, 0, 0});
+  parts.push_back({"checks and steps", 0, per_iteration(times.step, cost), 0, 0, 0});
+  return parts;
+}
+
+template <class... Numbers>
+std::string line(const char* format, Numbers... numbers) {
+  char text[512];
+  std::snprintf(text, sizeof text, format, numbers...);
+  return text;
+}
+
+std::string stage_line(const StageCost& cost, bool counts_allocations) {
+  const RenderCounters& c = cost.sum.counters;
+  const double all = static_cast<double>(cost.sum.tiles_of_image);
+  std::string text =
+      line("%-16s %9lld %8.2f %8.2f %8.1f", cost.stage.c_str(), static_cast<long long>(cost.sum.iterations),
+           per_iteration(cost.sum.iteration_seconds, cost), cost.median_ms(), cost.sum.seconds);
+  text += all > 0 ? line(" %6.0f of %-6.0f %9.0f %11.0f", per_iteration(c.tiles, cost), all,
+                         per_iteration(c.pairs, cost), per_iteration(c.fragments, cost))
+                  : line(" %16s %9s %11s", "-", "-", "-");
+  text += counts_allocations ? line(" %8.2f", per_iteration(static_cast<Index>(cost.sum.allocations), cost))
+                             : line(" %8s", "-");
+  return text + line(" %7.1f\n", 1e-6 * static_cast<double>(cost.sum.tape_bytes));
+}
+
+std::string part_lines(const StageCost& cost) {
+  std::string text;
+  const double whole = per_iteration(cost.sum.times.forward + cost.sum.times.backward + cost.sum.times.step, cost);
+  for (const CostPart& part : parts_of(cost)) {
+    if (!(part.ms() > 0)) continue;
+    text += line("  %-26s %8.3f %8.3f %6.1f %%\n", part.name.c_str(), part.forward_ms, part.backward_ms,
+                 100 * part.ms() / whole);
+  }
+  return text;
+}
+
+}  // namespace
+
+double StageCost::median_ms() const {
+  if (ms_an_iteration.empty()) return 0;
+  std::vector<double> sorted = ms_an_iteration;
+  std::sort(sorted.begin(), sorted.end());
+  return sorted[sorted.size() / 2];
+}
+
+void add_profile(const StageProfile& profile, std::vector<StageCost>& stages) {
+  const auto is_it = [&profile](const StageCost& known) { return known.stage == profile.stage; };
+  auto place = std::find_if(stages.begin(), stages.end(), is_it);
+  if (place == stages.end()) {
+    stages.push_back({});
+    place = stages.end() - 1;
+    place->stage = place->sum.stage = profile.stage;
+  }
+  StageProfile& sum = place->sum;
+  place->frames += profile.frame ? 1 : 0;
+  if (profile.iterations > 0)
+    place->ms_an_iteration.push_back(1e3 * profile.iteration_seconds / static_cast<double>(profile.iterations));
+  sum.iterations += profile.iterations;
+  sum.seconds += profile.seconds;
+  sum.iteration_seconds += profile.iteration_seconds;
+  sum.times.forward += profile.times.forward;
+  sum.times.backward += profile.times.backward;
+  sum.times.step += profile.times.step;
+  sum.counters += profile.counters;
+  sum.allocations += profile.allocations;
+  sum.tiles_of_image = profile.tiles_of_image;
+  sum.nodes = std::max(sum.nodes, profile.nodes);
+  sum.tape_bytes = std::max(sum.tape_bytes, profile.tape_bytes);
+  add_operators(profile.operators, sum.operators);
+}
+
+double optimisation_seconds(const RunCost& cost) {
+  double seconds = 0;
+  for (const StageCost& stage : cost.stages) seconds += stage.sum.iteration_seconds;
+  return seconds;
+}
+
+std::string cost_table(const RunCost& cost) {
+  std::string text = line("%-16s %9s %8s %8s %8s %16s %9s %11s %8s %7s\n", "stage", "iterat.", "ms each", "median",
+                          "all, s", "tiles", "pairs", "fragments", "allocat.", "tape MB");
+  for (const StageCost& stage : cost.stages) text += stage_line(stage, cost.counts_allocations);
+  for (const StageCost& stage : cost.stages) {
+    text +=
+        line("\n%-28s %8s %8s\n", (stage.stage + ", ms an iteration").c_str(), "forward", "back") + part_lines(stage);
+  }
+  return text + line("\noptimisation %.1f s of %.1f s on %d threads (%s), at most %.0f MB\n",
+                     optimisation_seconds(cost), cost.seconds, thread_count(), isa_name(best_isa()),
+                     1e-6 * static_cast<double>(cost.peak_memory_bytes));
+}
+
+std::string cost_json(const RunCost& cost) {
+  std::string text;
+  for (const StageCost& stage : cost.stages) {
+    const StageProfile& sum = stage.sum;
+    nlohmann::ordered_json entry = {{"stage", stage.stage},
+                                    {"threads", thread_count()},
+                                    {"isa", isa_name(best_isa())},
+                                    {"frames", stage.frames},
+                                    {"iterations", sum.iterations},
+                                    {"ms", per_iteration(sum.iteration_seconds, stage)},
+                                    {"median_ms", stage.median_ms()},
+                                    {"seconds", sum.seconds},
+                                    {"nodes", sum.nodes},
+                                    {"tape_bytes", sum.tape_bytes}};
+    if (sum.tiles_of_image > 0)
+      entry.update({{"tiles_of_image", sum.tiles_of_image},
+                    {"tiles", per_iteration(sum.counters.tiles, stage)},
+                    {"pairs", per_iteration(sum.counters.pairs, stage)},
+                    {"fragments", per_iteration(sum.counters.fragments, stage)},
+                    {"adjoint_tiles", per_iteration(sum.counters.adjoint_tiles, stage)},
+                    {"layers", per_iteration(sum.counters.layers, stage)}});
+    if (cost.counts_allocations) entry["allocations"] = per_iteration(static_cast<Index>(sum.allocations), stage);
+    text += entry.dump() + "\n";
+    for (const CostPart& part : parts_of(stage)) {
+      const nlohmann::ordered_json of_part = {{"stage", stage.stage},
+                                              {"operator", part.name},
+                                              {"forward_ms", part.forward_ms},
+                                              {"backward_ms", part.backward_ms},
+                                              {"forward_runs", part.forward_runs},
+                                              {"forward_skips", part.forward_skips},
+                                              {"backward_runs", part.backward_runs}};
+      text += of_part.dump() + "\n";
+    }
+  }
+  const nlohmann::ordered_json all = {{"optimisation_s", optimisation_seconds(cost)},
+                                      {"seconds", cost.seconds},
+                                      {"peak_memory_bytes", cost.peak_memory_bytes}};
+  return text + all.dump() + "\n";
+}
+
+std::string cost_svg(const RunCost& cost, const std::string& title) {
+  constexpr double kLeft = 130, kWidth = 760, kBar = 26, kRow = 20, kTop = 44;
+  double longest = 0;
+  for (const StageCost& stage : cost.stages) longest = std::max(longest, stage.median_ms());
+  std::string body = line("<text x=\"12\" y=\"26\" font-size=\"16\">%s</text>\n", html_escape(title).c_str());
+  double y = kTop;
+  for (const StageCost& stage : cost.stages) {
+    const double whole = per_iteration(stage.sum.iteration_seconds, stage), scale = longest > 0 ? kWidth / longest : 0;
+    body += line("<text x=\"12\" y=\"%.0f\">%s</text>\n", y + 17, html_escape(stage.stage).c_str());
+    double x = kLeft;
+    std::vector<CostPart> parts = parts_of(stage);
+    std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
+    double row = y + kBar + 14, at = kLeft;
+    for (std::size_t i = 0; i < parts.size() && parts[i].ms() > 0; ++i) {
+      const double width = parts[i].ms() * scale;
+      body += line(
+          "<rect x=\"%.1f\" y=\"%.0f\" width=\"%.1f\" height=\"%.0f\" fill=\"%s\"><title>%s: %.2f ms</title></rect>\n",
+          x, y, width, kBar, part_color(i).c_str(), html_escape(parts[i].name).c_str(), parts[i].ms());
+      x += width;
+      if (parts[i].ms() < 0.02 * whole || i >= 8) continue;
+      const std::string label = parts[i].name + line(" %.2f", parts[i].ms());
+      const double length = 8.0 + 16 + 6.6 * static_cast<double>(label.size());
+      if (at + length > kLeft + kWidth) at = kLeft, row += kRow;
+      body += line(
+          "<rect x=\"%.1f\" y=\"%.0f\" width=\"10\" height=\"10\" fill=\"%s\"/><text x=\"%.1f\" y=\"%.0f\">%s</text>\n",
+          at, row - 9, part_color(i).c_str(), at + 14, row, html_escape(label).c_str());
+      at += length;
+    }
+    body += line("<text x=\"%.1f\" y=\"%.0f\">%.2f ms</text>\n", x + 6, y + 17, whole);
+    y = row + 30;
+  }
+  return line(
+             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 980 %.0f\" font-family=\"sans-serif\" "
+             "font-size=\"12\" fill=\"#222\">\n<rect width=\"980\" height=\"%.0f\" fill=\"#fff\"/>\n",
+             y, y) +
+         body + "</svg>\n";
+}
+
+}  // namespace hsi4d
