@@ -1,6 +1,7 @@
 #include "autodiff/difference.h"
 
 #include "autodiff/elementwise.h"
+#include "autodiff/image_difference.h"
 #include "autodiff/map.h"
 
 namespace hsi4d {
@@ -15,28 +16,39 @@ Var<S> mean_over(const Var<S> (&inputs)[K], const F& f, const Source& where) {
   return sum_over(inputs, f, where) * Operand<S>(1.0 / static_cast<double>(count), where);
 }
 
+/// Mean of F over images.
+template <class F, class S>
+Var<S> image_mean(Var<S> a, Var<S> b, Var<S> weight, const Source& where) {
+  return detail::image_difference<S, F>(a, b, weight, where) *
+         Operand<S>(1.0 / static_cast<double>(a.shape().count()), where);
+}
+
 }  // namespace
 
 template <class S>
 Var<S> l1(Var<S> a, Var<S> b, Source where) {
+  if (detail::are_images(a, b, Var<S>{})) return image_mean<detail::AbsoluteDifference>(a, b, Var<S>{}, where);
   return mean_over(
       {a, b}, [](auto x, auto y) { return abs(x - y); }, where);
 }
 
 template <class S>
 Var<S> l1(Var<S> a, Var<S> b, Var<S> weight, Source where) {
+  if (detail::are_images(a, b, weight)) return image_mean<detail::AbsoluteDifference>(a, b, weight, where);
   return mean_over(
       {a, b, weight}, [](auto x, auto y, auto w) { return w * abs(x - y); }, where);
 }
 
 template <class S>
 Var<S> l2(Var<S> a, Var<S> b, Source where) {
+  if (detail::are_images(a, b, Var<S>{})) return image_mean<detail::SquaredDifference>(a, b, Var<S>{}, where);
   return mean_over(
       {a, b}, [](auto x, auto y) { return square(x - y); }, where);
 }
 
 template <class S>
 Var<S> l2(Var<S> a, Var<S> b, Var<S> weight, Source where) {
+  if (detail::are_images(a, b, weight)) return image_mean<detail::SquaredDifference>(a, b, weight, where);
   return mean_over(
       {a, b, weight}, [](auto x, auto y, auto w) { return w * square(x - y); }, where);
 }

@@ -109,25 +109,37 @@ struct SliceOp {
 template <class S>
 struct ConcatOp {
   static constexpr const char* kName = "concat";
+  static constexpr bool kAssigns = true;
   bool along_rows;
 
+  /// Calls f(part, row, col, begin, end) for rows [begin, end) of a part that lies at (row, col) of the output.
   template <class F>
-  void for_parts(const NodeIo<S>& io, F&& f) const {
+  void for_rows(const NodeIo<S>& io, const F& f) const {
     Index row = 0, col = 0;
     for (int i = 0; i < io.inputs(); ++i) {
       const Shape& part = io.in(i).shape;
-      f(i, row, col, part);
+      parallel_for(part.rows, kMovedNumbers / std::max<Index>(1, part.cols) + 1,
+                   [&](Index begin, Index end) { f(i, row, col, begin, end); });
       (along_rows ? row : col) += along_rows ? part.rows : part.cols;
     }
   }
   void forward(NodeIo<S>& io) {
-    for_parts(io, [&](int i, Index row, Index col, const Shape& part) {
-      matrix_of(io.out()).block(row, col, part.rows, part.cols) = matrix_of(io.in(i));
+    for_rows(io, [&io](int i, Index row, Index col, Index begin, Index end) {
+      const ConstArray<S> x = io.in(i);
+      const Array<S> y = io.out();
+      for (Index r = begin; r < end; ++r) std::copy_n(x.row(r), x.shape.cols, y.row(row + r) + col);
     });
   }
   void backward(NodeIo<S>& io) {
-    for_parts(io, [&](int i, Index row, Index col, const Shape& part) {
-      if (io.wants(i)) matrix_of(io.d_in(i)) += matrix_of(io.d_out()).block(row, col, part.rows, part.cols);
+    for_rows(io, [&io](int i, Index row, Index col, Index begin, Index end) {
+      if (!io.wants(i)) return;
+      const Array<S> d_x = io.d_in(i);
+      const ConstArray<S> d_y = io.d_out();
+      io.begin_rows(i, begin, end);
+      for (Index r = begin; r < end; ++r) {
+        const S* from = d_y.row(row + r) + col;
+        for (Index c = 0; c < d_x.shape.cols; ++c) d_x.row(r)[c] += from[c];
+      }
     });
   }
 };

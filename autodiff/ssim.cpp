@@ -16,7 +16,7 @@ namespace {
 
 using detail::SsimRect;
 using detail::SsimSweep;
-static_assert(kSsimTilePx == detail::kSsimTile);
+static_assert(detail::kSsimTile == kMaskSquare);
 
 constexpr Index kStripTiles = 64;   // widest sweep: its rows have to stay in the second-level cache
 constexpr Index kMinBandTiles = 8;  // a band repeats 10 rows of its neighbours
@@ -45,14 +45,14 @@ TileRect bounds(const Touched& touched, Index row_begin, Index row_end, Index co
 }
 
 SsimRect pixels_of(const TileRect& tiles, const Shape& image) {
-  return {tiles.row_begin * kSsimTilePx, std::min(tiles.row_end * kSsimTilePx, image.rows),
-          tiles.col_begin * kSsimTilePx, std::min(tiles.col_end * kSsimTilePx, image.cols)};
+  return {tiles.row_begin * kMaskSquare, std::min(tiles.row_end * kMaskSquare, image.rows),
+          tiles.col_begin * kMaskSquare, std::min(tiles.col_end * kMaskSquare, image.cols)};
 }
 
 /// Cuts the tiles that the touched ones change into bands and strips. A function of the shapes and `touched` alone.
 template <class Touched>
 void plan_units(const Shape& image, const Touched& touched, Buffer<Unit>& units) {
-  const Index rows = ssim_tiles(image.rows), cols = ssim_tiles(image.cols);
+  const Index rows = mask_squares(image.rows), cols = mask_squares(image.cols);
   units.resize(rows * ((cols + kStripTiles - 1) / kStripTiles));
   Index count = 0;
   const TileRect all = bounds(touched, 0, rows, cols);
@@ -104,7 +104,9 @@ struct Evaluation {
   Buffer<Unit> units;
   Buffer<double> tile_sums;  // [planes][tile rows][tile cols]: Σ (1 − ssim)/2
 
-  void prepare(const Shape& image) { tile_sums.resize(image.planes * ssim_tiles(image.rows) * ssim_tiles(image.cols)); }
+  void prepare(const Shape& image) {
+    tile_sums.resize(image.planes * mask_squares(image.rows) * mask_squares(image.cols));
+  }
 
   double d_ssim(const Shape& image) const {
     return 2 * pairwise_sum(tile_sums.data(), tile_sums.size()) / static_cast<double>(image.count());
@@ -122,7 +124,7 @@ struct Evaluation {
     const Index workspaces = std::min({static_cast<Index>(thread_count()), chunks, kMostWorkspaces});
     S* const workspace = allocate(workspaces * workspace_size);
     Slots slots(workspaces);
-    const Index tile_cols = ssim_tiles(shape.cols), tiles = ssim_tiles(shape.rows) * tile_cols;
+    const Index tile_cols = mask_squares(shape.cols), tiles = mask_squares(shape.rows) * tile_cols;
     const double range2 = settings.data_range * settings.data_range;
     run_chunks(chunks, [&](Index chunk) {
       const Index plane = chunk / units.size();
@@ -183,14 +185,25 @@ struct DSsimOp {
   static constexpr const char* kName = "d_ssim";
   static constexpr bool kAssigns = true;
   SsimSettings settings;
-  Evaluation<S> evaluation = {};
+  Evaluation<S> evaluation = {};  // keeps the sums of tiles that do not change
   std::array<Buffer<S>, 2> gradients = {};
+
+  /// Tiles whose sums may have changed, or in which the gradient is read.
+  void plan(const NodeIo<S>& io, const Shape& shape) {
+    const TileMask *const changed = io.changed(0), *const read = io.read(0);
+    const bool in_squares =
+        changed != nullptr && !io.is_changed(1) && !io.wants(1) && (read != nullptr || !io.wants(0));
+    if (!in_squares) return plan_units(shape, kAllTouched, evaluation.units);
+    plan_units(
+        shape, [&](Index row, Index col) { return changed->has(row, col) || (io.wants(0) && read->has(row, col)); },
+        evaluation.units);
+  }
 
   void forward(NodeIo<S>& io) {
     const std::array images = {io.in(0), io.in(1)};
     const Shape& shape = images[0].shape;
     evaluation.prepare(shape);
-    plan_units(shape, kAllTouched, evaluation.units);
+    plan(io, shape);
     const auto allocate = [&](Index n) { return io.template scratch<S>(n).data(); };
     // ssim is symmetric: the gradient of the target is that of the image with the roles swapped.
     for (const int i : {0, 1}) {
@@ -214,67 +227,11 @@ struct DSsimOp {
   Index saved_bytes() const { return gradients[0].capacity_bytes() + gradients[1].capacity_bytes(); }
 };
 
-template <class S>
-struct TileSumsOp {
-  static constexpr const char* kName = "ssim_tile_sums";
-  SsimSettings settings;
-  Evaluation<S> evaluation = {};
-
-  void forward(NodeIo<S>& io) {
-    const Shape& shape = io.in(0).shape;
-    evaluation.prepare(shape);
-    plan_units(shape, kAllTouched, evaluation.units);
-    evaluation.run(io.in(0), io.in(1), settings, nullptr, {},
-                   [&](Index n) { return io.template scratch<S>(n).data(); });
-    const Array<S> out = io.out();
-    const Index tiles = evaluation.tile_sums.size();  // the output has no padding: high parts, then low parts
-    for (Index i = 0; i < tiles; ++i) {
-      const double sum = evaluation.tile_sums[i];
-      out.data[i] = static_cast<S>(sum);
-      out.data[tiles + i] = static_cast<S>(sum - static_cast<double>(out.data[i]));
-    }
-  }
-  void backward(NodeIo<S>&) {}
-};
-
-template <class S>
-struct RegionOp {
-  static constexpr const char* kName = "d_ssim_region";
-  SsimSettings settings;
-  Evaluation<S> evaluation = {};
-  Buffer<S> gradient = {};
-
-  void forward(NodeIo<S>& io) {
-    const ConstArray<S> image = io.in(0), touched = io.in(2), base = io.in(3);
-    evaluation.prepare(image.shape);
-    const Index tiles = evaluation.tile_sums.size();
-    for (Index i = 0; i < tiles; ++i) {
-      evaluation.tile_sums[i] = static_cast<double>(base.data[i]) + static_cast<double>(base.data[tiles + i]);
-    }
-    plan_units(
-        image.shape, [&](Index r, Index c) { return touched(r, c) != 0; }, evaluation.units);
-    if (io.wants(0)) gradient.resize(image.shape.memory());
-    evaluation.run(image, io.in(1), settings, io.wants(0) ? gradient.data() : nullptr, {},
-                   [&](Index n) { return io.template scratch<S>(n).data(); });
-    io.out().scalar() = static_cast<S>(evaluation.d_ssim(image.shape));
-  }
-
-  void backward(NodeIo<S>& io) {
-    if (io.wants(0)) evaluation.add_gradient(io.d_out().scalar(), gradient, io.d_in(0), false);
-  }
-
-  Index saved_bytes() const { return gradient.capacity_bytes(); }
-};
-
 void check_images(const Shape& image, const Shape& target, const SsimSettings& settings) {
   HSI4D_CHECK(image.same_size(target), detail::both_values(image, target));
   HSI4D_CHECK(image.count() > 0, "ssim of an empty image");
   HSI4D_CHECK(settings.data_range >= 1e-6 && settings.data_range <= 1e6,
               "data_range = " + std::to_string(settings.data_range) + ", allowed are 1e-6 to 1e6");
-}
-
-Shape tile_sums_shape(const Shape& image) {
-  return {2 * image.planes, ssim_tiles(image.rows), ssim_tiles(image.cols), ssim_tiles(image.cols)};
 }
 
 }  // namespace
@@ -288,24 +245,6 @@ Var<S> d_ssim(Var<S> image, Var<S> target, const SsimSettings& settings, Source 
 template <class S>
 Var<S> ssim(Var<S> image, Var<S> target, const SsimSettings& settings, Source where) {
   return S(1) - d_ssim(image, target, settings, where);
-}
-
-template <class S>
-Var<S> ssim_tile_sums(Var<S> base, Var<S> target, const SsimSettings& settings, Source where) {
-  check_images(base.shape(), target.shape(), settings);
-  return base.owner().record(TileSumsOp<S>{settings}, {base, target}, tile_sums_shape(base.shape()), where);
-}
-
-template <class S>
-Var<S> d_ssim_region(Var<S> image, Var<S> target, const SsimRegion<S>& region, const SsimSettings& settings,
-                     Source where) {
-  check_images(image.shape(), target.shape(), settings);
-  const Shape sums = tile_sums_shape(image.shape());
-  HSI4D_CHECK_EQ(region.tile_sums.shape(), sums);
-  HSI4D_CHECK(region.touched.shape().same_size(shape_of(sums.rows, sums.cols)),
-              detail::both_values(region.touched.shape(), shape_of(sums.rows, sums.cols)));
-  return image.owner().record(RegionOp<S>{settings}, {image, target, region.touched, region.tile_sums}, kScalarShape,
-                              where);
 }
 
 template <class S>
@@ -329,12 +268,10 @@ double mean_ssim(const ConstArray<S>& image, const ConstArray<S>& target, const 
   return ssim_map(image, target, Array<S>(), settings);
 }
 
-#define HSI4D_SSIM(S)                                                                               \
-  template Var<S> d_ssim(Var<S>, Var<S>, const SsimSettings&, Source);                              \
-  template Var<S> ssim(Var<S>, Var<S>, const SsimSettings&, Source);                                \
-  template Var<S> ssim_tile_sums(Var<S>, Var<S>, const SsimSettings&, Source);                      \
-  template Var<S> d_ssim_region(Var<S>, Var<S>, const SsimRegion<S>&, const SsimSettings&, Source); \
-  template double mean_ssim(const ConstArray<S>&, const ConstArray<S>&, const SsimSettings&);       \
+#define HSI4D_SSIM(S)                                                                         \
+  template Var<S> d_ssim(Var<S>, Var<S>, const SsimSettings&, Source);                        \
+  template Var<S> ssim(Var<S>, Var<S>, const SsimSettings&, Source);                          \
+  template double mean_ssim(const ConstArray<S>&, const ConstArray<S>&, const SsimSettings&); \
   template double ssim_map(const ConstArray<S>&, const ConstArray<S>&, const Array<S>&, const SsimSettings&);
 HSI4D_SSIM(float)
 HSI4D_SSIM(double)

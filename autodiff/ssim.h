@@ -36,18 +36,13 @@ struct SsimSettings {
   double data_range = 1;  ///< R: 1 for values in [0,1], 255 for [0,255]; within [1e-6, 1e6]
 };
 
-/// Side of the tiles that the region form is told about, and whose sums are kept, in pixels.
-inline constexpr Index kSsimTilePx = 16;
-
-/// Number of tiles that `pixels` take.
-constexpr Index ssim_tiles(Index pixels) { return (pixels + kSsimTilePx - 1) / kSsimTilePx; }
-
 /// D-SSIM: 1 − mean ssim of two images.
 ///
 /// @param image   [C,H,W]
 /// @param target  [C,H,W]
 /// @return        scalar in [0, 2]; NaN where an input is not finite
-/// Adjoint: image, target. Forward computes the gradients of the inputs that need one in the same sweep.
+/// Adjoint: image, target. Forward computes the gradients of the inputs that need one in the same sweep. Where `image`
+/// tells which squares changed (NodeIo::changed), the others' sums are kept: the same bits.
 /// Throws InternalError for different or empty shapes, or a data range outside of its limits.
 template <class S>
 Var<S> d_ssim(Var<S> image, Var<S> target, const SsimSettings& settings = {}, Source where = Source::current());
@@ -55,34 +50,6 @@ Var<S> d_ssim(Var<S> image, Var<S> target, const SsimSettings& settings = {}, So
 /// Mean ssim, 1 − d_ssim. See there.
 template <class S>
 Var<S> ssim(Var<S> image, Var<S> target, const SsimSettings& settings = {}, Source where = Source::current());
-
-/// Sums of ssim over the tiles of an image that stays (the static scene), for d_ssim_region.
-///
-/// @param base    [C,H,W]
-/// @param target  [C,H,W]
-/// @return        [2C, ssim_tiles(H), ssim_tiles(W)]: Σ (1 − ssim)/2 of each tile as a sum of two numbers, the high
-/// parts
-///                first. It runs again only when base or target is written.
-/// Adjoint: none. Throws as d_ssim.
-template <class S>
-Var<S> ssim_tile_sums(Var<S> base, Var<S> target, const SsimSettings& settings = {}, Source where = Source::current());
-
-/// Where an image differs from the base of its tile sums.
-template <class S>
-struct SsimRegion {
-  Var<S> touched;    ///< [ssim_tiles(H), ssim_tiles(W)]: not 0 where `image` may differ from `base`
-  Var<S> tile_sums;  ///< ssim_tile_sums(base, target)
-};
-
-/// D-SSIM of an image that equals a base outside of some tiles: the same bits as d_ssim(image, target), at the cost of
-/// the touched tiles and their neighbours.
-///
-/// Adjoint: image, at least in the touched tiles and there the same bits as d_ssim (other pixels around them may get
-/// theirs, the rest gets none: they are constant). None for target, touched, tile_sums.
-/// Throws InternalError for shapes that do not fit.
-template <class S>
-Var<S> d_ssim_region(Var<S> image, Var<S> target, const SsimRegion<S>& region, const SsimSettings& settings = {},
-                     Source where = Source::current());
 
 /// Mean ssim of two images [C,H,W], without a tape (a metric). Throws as d_ssim.
 template <class S>

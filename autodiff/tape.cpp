@@ -158,7 +158,7 @@ template <class S>
 Array<S> Tape<S>::write(Var<S> leaf) {
   ArrayRecord& array = arrays_[checked(leaf)];
   HSI4D_CHECK(array.producer == kLeaf, "only leaves are written; '" + array.name + "' is computed");
-  array.version = ++clock_;
+  array.version_before = std::exchange(array.version, ++clock_);
   return {array.value, array.shape};
 }
 

@@ -17,6 +17,7 @@
 // nothing. See docs/architecture.md for how to write an operator.
 #pragma once
 
+#include <algorithm>
 #include <cstring>
 #include <initializer_list>
 #include <span>
@@ -27,6 +28,7 @@
 
 #include "autodiff/arena.h"
 #include "autodiff/array.h"
+#include "autodiff/tile_mask.h"
 #include "core/check.h"
 
 namespace hsi4d {
@@ -98,11 +100,36 @@ class NodeIo {
   bool wants(int i) const { return tape_->arrays_[input_ids_[i]].needs_gradient; }
   /// Changes whenever input i was written or computed again; never a number it had before.
   std::uint64_t version(int i) const { return tape_->arrays_[input_ids_[i]].version; }
+  /// In forward: true unless input i is what it was in this node's run before.
+  bool is_changed(int i) const { return version(i) > ran_before_; }
+  /// In forward: the squares of input i, an image, outside of which it is what it was in this node's run before; null:
+  /// all of it may have changed.
+  const TileMask* changed(int i) const {
+    const auto& array = tape_->arrays_[input_ids_[i]];
+    return ran_before_ != 0 && array.version_before <= ran_before_ ? array.changed : nullptr;
+  }
+  /// The squares of input i, an image, in which its adjoint will be read; null: everywhere. What is outside of them
+  /// need not be added, nor assigned.
+  const TileMask* read(int i) const { return tape_->arrays_[input_ids_[i]].read; }
+  /// In forward: output j is what it was before outside of these squares (kPersistentOutputs), and its adjoint is read
+  /// in those. Null: everywhere. The masks have to live as long as the operator.
+  void tell_squares(int j, const TileMask* changed, const TileMask* read) const {
+    auto& array = tape_->arrays_[first_output_ + static_cast<std::uint32_t>(j)];
+    array.changed = changed;
+    array.read = read;
+  }
   /// Adjoint of input i, to be added to, never overwritten (but see must_assign).
   Array<S> d_in(int i) const { return tape_->adjoint_view(input_ids_[i]); }
   /// True when nothing has been added to d_in(i) yet and its numbers are undefined: the operator then assigns what it
   /// else would add. Only operators that declare kAssigns meet it.
   bool must_assign(int i) const { return (assign_mask_ >> i & 1u) != 0; }
+  /// For operators that add to rows: makes rows [begin, end) of d_in(i), counted through all planes, zero if they must
+  /// be assigned. Does nothing where no gradient is wanted.
+  void begin_rows(int i, Index begin, Index end) const {
+    if (!wants(i) || !must_assign(i)) return;
+    const Array<S> d = d_in(i);
+    std::fill(d.row(begin), d.row(end), S(0));
+  }
   /// Adjoint of output j; empty (false) when the loss does not depend on output j, which only operators with several
   /// outputs can meet.
   ConstArray<S> d_out(int j = 0) const { return tape_->adjoint_view(first_output_ + static_cast<std::uint32_t>(j)); }
@@ -119,6 +146,7 @@ class NodeIo {
   const std::uint32_t* input_ids_ = nullptr;
   std::uint32_t input_count_ = 0;
   std::uint32_t first_output_ = 0;
+  std::uint64_t ran_before_ = 0;  // clock of the forward before this one; 0: there is none that counts
   std::uint64_t assign_mask_ = 0;
 };
 
@@ -259,8 +287,11 @@ class Tape {
   struct ArrayRecord {
     Shape shape;
     S* value = nullptr;
-    S* adjoint = nullptr;        // inside the adjoint buffer of the active plan; null when there is none
-    std::uint64_t version = 0;   // clock of the last write
+    S* adjoint = nullptr;       // inside the adjoint buffer of the active plan; null when there is none
+    std::uint64_t version = 0;  // clock of the last write
+    std::uint64_t version_before = 0;
+    const TileMask* changed = nullptr;  // by the last write; see NodeIo::changed
+    const TileMask* read = nullptr;
     std::uint32_t producer = 0;  // node, or kLeaf
     std::uint32_t stamp = 0;
     bool constant = false;  // a leaf that can not be unfrozen

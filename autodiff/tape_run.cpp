@@ -55,7 +55,9 @@ template <class S>
 void Tape<S>::forward_node(NodeRecord& node) {
   NodeIo<S> io = io_of(node);
   const auto start = profiling_ ? Clock::now() : Clock::time_point{};
+  io.ran_before_ = node.ran_at;
   node.ran_at = 0;  // stays so if the operator throws
+  for (std::uint32_t j = 0; j < node.output_count; ++j) io.tell_squares(static_cast<int>(j), nullptr, nullptr);
   if (node.table->state_key != nullptr) {
     const std::uint64_t key = node.table->state_key(node.op, io);
     if (!node.state_valid || key != node.state_key) {
@@ -68,7 +70,10 @@ void Tape<S>::forward_node(NodeRecord& node) {
   node.table->forward(node.op, io);
   scratch_.reset();
   node.ran_at = ++clock_;
-  for (std::uint32_t j = 0; j < node.output_count; ++j) arrays_[node.first_output + j].version = clock_;
+  for (std::uint32_t j = 0; j < node.output_count; ++j) {
+    ArrayRecord& output = arrays_[node.first_output + j];
+    output.version_before = std::exchange(output.version, clock_);
+  }
   ++node.forward_runs;
   if (profiling_) node.forward_ns += nanoseconds_since(start);
 }

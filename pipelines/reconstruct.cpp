@@ -303,6 +303,7 @@ class Reconstruction {
                                       {"groups", counters.groups},
                                       {"fragments", counters.fragments},
                                       {"layers", counters.layers},
+                                      {"told_squares", counters.told_squares},
                                       {"adjoint_tiles", counters.adjoint_tiles}}) {
       record.counters.emplace_back(name, static_cast<double>(count));
     }

@@ -54,6 +54,7 @@ using enum detail::CompositeInput;
 using enum detail::CompositeOutput;
 
 constexpr Index kGrain = 512;
+constexpr Index kUntouched = -1;  // fragments of a tile whose outputs stayed as they were
 
 /// Of a tile: fragments, and the list position after the last Gaussian composited in any pixel.
 struct TileCounts {
@@ -63,6 +64,7 @@ struct TileCounts {
 template <class S>
 struct Composite {
   static constexpr const char* kName = "composite";
+  static constexpr bool kAssigns = true;
   static constexpr bool kPersistentOutputs = true;  // blocks that nothing touches which moves are not written again
   SplatView view;
   std::shared_ptr<RenderCounters> counters;
@@ -77,6 +79,7 @@ struct Composite {
   Buffer<std::uint32_t> settled = {};  ///< of each tile: blocks whose outputs hold what stands still, and nothing else
   const S* written = nullptr;          ///< the output that `settled` tells of
   std::uint64_t written_over = 0;      ///< version of the background that it lies over
+  TileMask changed = {}, read = {};    ///< see NodeIo::tell_squares
   double still_s = 0;                  ///< seconds of the state built for the next forward run
 
   TileGrid grid() const {
@@ -296,7 +299,7 @@ struct Composite {
     const Index size = forward_memory(io, tiles.tile);
     const std::span<S> memory = io.scratch(size * workspaces.count());
     run_chunks(tiles.count(), [&](Index tile) {
-      tile_counts[tile] = {0, 0};
+      tile_counts[tile] = {kUntouched, 0};
       tile_last[tile] = {0, -1};
       if (planned.plans[tile].entries.empty() && settled[tile] == detail::all_blocks(tiles.tile)) return;
       const Workspaces::Held held(workspaces);
@@ -307,11 +310,30 @@ struct Composite {
       const std::int32_t index = planned.plans[tile].entries[static_cast<std::size_t>(end - 1)].index;
       tile_last[tile] = {rows_of(io).key(view.settings, index), index};
     });
+    tell_squares(io, tiles);
     counters->times.forward_s = watch.lap();
     for (const TileCounts& counts : tile_counts.span()) {
-      counters->fragments += counts.fragments;
+      counters->fragments += std::max(counts.fragments, Index(0));
       counters->reached += counts.end;
     }
+  }
+
+  /// Losses need to look again only where a tile was written, and to differentiate only where the backward run reads.
+  void tell_squares(const NodeIo<S>& io, const TileGrid& tiles) {
+    const Index across = kMaskSquare / tiles.tile;  // tiles in a square
+    changed.clear(tiles.height, tiles.width);
+    read.clear(tiles.height, tiles.width);
+    for (Index tile = 0; tile < tiles.count(); ++tile) {
+      const Index row = tile / tiles.cols / across, col = tile % tiles.cols / across;
+      if (tile_counts[tile].fragments != kUntouched) changed.add(row, col);
+      if (tile_counts[tile].end > 0) read.add(row, col);
+    }
+    const bool is_read_everywhere = has_background(io) && io.wants(background_input(io));
+    if (!view.skip.unchanged_pixels) return;
+    const int outputs = images_of(io).rest ? 3 : 2;
+    for (int output = 0; output < outputs; ++output)
+      io.tell_squares(output, &changed, is_read_everywhere ? nullptr : &read);
+    counters->told_squares = changed.count();
   }
 
   /// What is known before the tiles are composited.
@@ -375,6 +397,7 @@ struct Composite {
 
   void backward(NodeIo<S>& io) {
     const detail::OutputCotangents<S> cotangents = cotangents_of(io);
+    if (has_background(io)) io.begin_rows(background_input(io), 0, 1);
     if (has_background(io) && io.wants(background_input(io))) {
       detail::add_background_gradient(images_of(io), cotangents, io.d_in(background_input(io)).data);
     }
@@ -417,6 +440,10 @@ struct Composite {
     const detail::SplatRows<S> rows = rows_of(io);
     const Index first = planned.moving.first + begin, after = planned.moving.first + end;
     const Index middle = std::clamp(rows.second, first, after);
+    for (int input = 0; input < kStill; ++input) {
+      if (first < middle) io.begin_rows(kStill + input, first, middle);
+      io.begin_rows(input, middle - rows.second, after - rows.second);
+    }
     const detail::SlotSums<S> sums{
         adjoint.sums,  adjoint.stride,       adjoint.wants_shape || in_blocks(io) ? kMoments : 0,
         in_blocks(io), planned.moving.lists, {adjoint_last.data(), static_cast<std::size_t>(adjoint_last.size())}};
@@ -461,9 +488,9 @@ struct Composite {
   }
 
   Index saved_bytes() const {
-    return records.capacity_bytes() + planned.capacity_bytes() + tile_last.capacity_bytes() +
-           adjoint_last.capacity_bytes() + kept.capacity_bytes() + tile_counts.capacity_bytes() +
-           settled.capacity_bytes();
+    return records.capacity_bytes() + planned.capacity_bytes() + tile_last.capacity_bytes() + changed.capacity_bytes() +
+           read.capacity_bytes() + adjoint_last.capacity_bytes() + kept.capacity_bytes() +
+           tile_counts.capacity_bytes() + settled.capacity_bytes();
   }
 };
 

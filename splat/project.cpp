@@ -164,6 +164,7 @@ void intrinsics_adjoint(const Lens& lens, const InCamera& g, const WideLanes* d_
 template <class S>
 struct Project {
   static constexpr const char* kName = "project";
+  static constexpr bool kAssigns = true;
   SplatView view;
   bool own_intrinsics = true;  ///< those of the view, not an input
 
@@ -239,6 +240,8 @@ struct Project {
               {},
               io.wants(kXi),
               !own_intrinsics && io.wants(kIntrinsics)};
+    io.begin_rows(kXi, 0, 1);
+    if (!own_intrinsics) io.begin_rows(kIntrinsics, 0, 1);
     if (io.wants(kMeansIn)) a.d_means = io.d_in(kMeansIn);
     if (io.wants(kAxesIn)) a.d_axes = io.d_in(kAxesIn);
     const Lens lens = this->lens(io);
@@ -248,6 +251,7 @@ struct Project {
     parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
       on_best_isa([&] {
         WideLanes d_delta[6] = {}, d_intrinsics[4] = {};
+        for (const int input : {kMeansIn, kAxesIn}) io.begin_rows(input, begin, end);
         for (Index n = begin; n < end; n += kLanes) adjoint_of_rows(lens, a, n, end - n, d_delta, d_intrinsics);
         for (Index i = 0; i < 6; ++i)
           partials[static_cast<std::size_t>(6 * chunk + i)] = sum_of_lanes<double>(d_delta[i]);

@@ -50,6 +50,8 @@ void describe(ConfigFields& f, RenderSkips& s) {
   f.boolean("static_layer", s.static_layer,
             "Composite what stands in front of all that moves once, and leave it and what stands behind out of the "
             "backward pass");
+  f.boolean("unchanged_pixels", s.unchanged_pixels,
+            "Leave pixels out of the losses that are as they were in the iteration before");
   f.boolean("zero_cotangent", s.zero_cotangent, "Leave tiles out of the backward pass where the loss sees nothing");
 }
 

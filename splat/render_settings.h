@@ -79,6 +79,9 @@ struct RenderSkips {
   bool static_layer = true;
   /// The adjoint leaves out tiles whose cotangent is zero, as where a mask makes a loss blind.
   bool zero_cotangent = true;
+  /// Losses over pixels look again at those that were written, and give gradients to those that the adjoint reads. The
+  /// same bits.
+  bool unchanged_pixels = true;
 };
 
 /// What changes the result a little: config section `approx`.

@@ -18,8 +18,9 @@ using Catch::Matchers::Contains;
 namespace {
 
 const std::vector<std::string> kAllOff = {"skip.static_tiles=false", "skip.static_layer=false",
-                                          "skip.zero_cotangent=false"};
+                                          "skip.zero_cotangent=false", "skip.unchanged_pixels=false"};
 const std::vector<std::string> kTilesOnly = {"skip.static_layer=false", "skip.zero_cotangent=false"};
+const std::vector<std::string> kAllPixels = {"skip.static_layer=false", "skip.unchanged_pixels=false"};
 const std::vector<std::string> kAllButLayers = {"skip.static_layer=false"};
 const std::vector<std::string> kCollapsed = {"approx.collapse_suffix=true"};
 
@@ -74,11 +75,17 @@ std::vector<std::string> notes_of(const std::vector<std::string>& overrides) {
 TEST_CASE("skips that are set in a config leave the result's bits, or nearly, and save what their counters say",
           "[run]") {
   const TemporaryFolder here;
-  const SkipRun off("off", kAllOff), tiles("tiles", kTilesOnly), cotangent("cotangent", kAllButLayers), on("on", {});
+  const SkipRun off("off", kAllOff), tiles("tiles", kTilesOnly), cotangent("cotangent", kAllButLayers), on("on", {}),
+      pixels("pixels", kAllPixels);
   CHECK(tiles.motion == off.motion);
   CHECK(tiles.objects == off.objects);
   CHECK(cotangent.motion == off.motion);
   CHECK(cotangent.objects == off.objects);
+  CHECK(pixels.motion == off.motion);
+  CHECK(pixels.objects == off.objects);
+  CHECK(pixels.counted("told_squares") == 0);
+  CHECK(cotangent.counted("told_squares") > 0);
+  CHECK(cotangent.counted("told_squares") < off.counted("tiles"));
   const double near = largest_difference(on, off);
   INFO("with static layers " << near << " m or rad off");
   CHECK(near <= 1e-5);  // 6e-7

@@ -131,7 +131,7 @@ struct OneSet {
 
 SplatView view_with(const RenderSettings& settings, bool tiles, bool layer, bool collapse = false) {
   SplatView view = view_of_size(kWidth, kHeight, settings);
-  view.skip = {tiles, layer, true};
+  view.skip = {tiles, layer, true, true};
   view.approx = {collapse};
   return view;
 }

@@ -1,0 +1,163 @@
+#include "autodiff/image_difference.h"
+
+#include <array>
+
+#include "core/parallel.h"
+#include "core/simd.h"
+
+namespace hsi4d::detail {
+
+namespace {
+
+constexpr int kA = 0, kB = 1, kWeight = 2;
+
+/// Columns [begin, end) of an image.
+struct Run {
+  Index begin, end;
+};
+
+/// Runs of neighbouring squares of a row of squares, as columns of pixels.
+///
+/// @param mask  null: all of them
+template <class Body>
+void for_runs(const TileMask* mask, Index square_row, Index cols, const Body& body) {
+  if (mask == nullptr) return body(Run{0, cols});
+  const Index squares = mask->cols();
+  for (Index c = 0; c < squares; ++c) {
+    if (!mask->has(square_row, c)) continue;
+    const Index first = c;
+    while (c < squares && mask->has(square_row, c)) ++c;
+    body(Run{first * kMaskSquare, std::min(c * kMaskSquare, cols)});
+  }
+}
+
+/// The sum of a square's 16 columns, always in this order.
+double column_sum(const double* columns) {
+  double sums[kMaskSquare];
+  std::copy_n(columns, kMaskSquare, sums);
+  for (Index half = kMaskSquare / 2; half > 0; half /= 2) {
+    for (Index lane = 0; lane < half; ++lane) sums[lane] += sums[lane + half];
+  }
+  return sums[0];
+}
+
+template <class S, class F>
+struct ImageDifference {
+  static constexpr const char* kName = "image_difference";
+  static constexpr bool kAssigns = true;
+  Buffer<double> sums = {};  ///< [planes][rows of squares][squares of a row]
+
+  static const S* weights(const NodeIo<S>& io, Index plane, Index row) {
+    if (io.inputs() <= kWeight) return nullptr;
+    const ConstArray<S> weight = io.in(kWeight);
+    return &weight(weight.shape.planes == 1 ? 0 : plane, row, 0);
+  }
+  static bool wants_weight(const NodeIo<S>& io) { return io.inputs() > kWeight && io.wants(kWeight); }
+
+  /// Squares of `a` that have to be summed again; null: all.
+  static const TileMask* to_sum(const NodeIo<S>& io) {
+    if (io.is_changed(kB) || (io.inputs() > kWeight && io.is_changed(kWeight))) return nullptr;
+    return io.changed(kA);
+  }
+  /// Squares that need a gradient; null: all.
+  static const TileMask* to_differentiate(const NodeIo<S>& io) {
+    return io.wants(kB) || wants_weight(io) ? nullptr : io.read(kA);
+  }
+
+  void forward(NodeIo<S>& io) {
+    const ConstArray<S> a = io.in(kA), b = io.in(kB);
+    const Index rows = mask_squares(a.shape.rows), cols = mask_squares(a.shape.cols), planes = a.shape.planes;
+    const TileMask* const mask = to_sum(io);
+    sums.resize(planes * rows * cols);
+    const Index width = cols * kMaskSquare;
+    const std::span<double> columns = io.template scratch<double>(planes * rows * width);
+    run_chunks(planes * rows, [&](Index chunk) {
+      on_best_isa([&] {
+        const Index plane = chunk / rows, square_row = chunk % rows;
+        double* const mine = columns.data() + chunk * width;
+        for_runs(mask, square_row, a.shape.cols, [&](const Run& run) {
+          const Index first = run.begin / kMaskSquare, end = mask_squares(run.end);
+          std::fill_n(mine + run.begin, (end - first) * kMaskSquare, 0.0);
+          const Index last_row = std::min((square_row + 1) * kMaskSquare, a.shape.rows);
+          for (Index r = square_row * kMaskSquare; r < last_row; ++r)
+            add_row(&a(plane, r, 0), &b(plane, r, 0), weights(io, plane, r), run, mine);
+          for (Index c = first; c < end; ++c) sums[chunk * cols + c] = column_sum(mine + c * kMaskSquare);
+        });
+      });
+    });
+    io.out().scalar() = static_cast<S>(pairwise_sum(sums.data(), sums.size()));
+  }
+
+  static void add_row(const S* a, const S* b, const S* w, const Run& run, double* columns) {
+    if (w == nullptr) {
+#pragma GCC ivdep
+      for (Index c = run.begin; c < run.end; ++c) columns[c] += static_cast<double>(F::value(a[c] - b[c]));
+    } else {
+#pragma GCC ivdep
+      for (Index c = run.begin; c < run.end; ++c) columns[c] += static_cast<double>(w[c] * F::value(a[c] - b[c]));
+    }
+  }
+
+  // d_a = g w f'(a − b) = −d_b,  d_w = g f(a − b)
+  void backward(NodeIo<S>& io) {
+    const Shape shape = io.in(kA).shape;
+    const TileMask* const mask = to_differentiate(io);
+    run_chunks(mask_squares(shape.rows), [&](Index square_row) {
+      on_best_isa([&] {
+        const Index last_row = std::min((square_row + 1) * kMaskSquare, shape.rows);
+        for_runs(mask, square_row, shape.cols, [&](const Run& run) {
+          for (Index plane = 0; plane < shape.planes; ++plane) {
+            for (Index r = square_row * kMaskSquare; r < last_row; ++r) differentiate_row(io, plane, r, run);
+          }
+        });
+      });
+    });
+  }
+
+  static void differentiate_row(const NodeIo<S>& io, Index plane, Index row, const Run& run) {
+    const S g = io.d_out().scalar();
+    const S *const a = &io.in(kA)(plane, row, 0), *const b = &io.in(kB)(plane, row, 0);
+    const S* const w = weights(io, plane, row);
+    for (const int i : {kA, kB}) {
+      if (!io.wants(i)) continue;
+      const S sign = i == kA ? g : -g;
+      put(&io.d_in(i)(plane, row, 0), io.must_assign(i), run,
+          [&](Index c) { return (w == nullptr ? sign : sign * w[c]) * F::derivative(a[c] - b[c]); });
+    }
+    if (!wants_weight(io)) return;
+    const bool is_shared = io.in(kWeight).shape.planes == 1;
+    put(&io.d_in(kWeight)(is_shared ? 0 : plane, row, 0), io.must_assign(kWeight) && (plane == 0 || !is_shared), run,
+        [&](Index c) { return g * F::value(a[c] - b[c]); });
+  }
+
+  template <class Term>
+  static void put(S* d, bool assign, const Run& run, const Term& term) {
+    if (assign) {
+#pragma GCC ivdep
+      for (Index c = run.begin; c < run.end; ++c) d[c] = term(c);
+    } else {
+#pragma GCC ivdep
+      for (Index c = run.begin; c < run.end; ++c) d[c] += term(c);
+    }
+  }
+
+  Index saved_bytes() const { return sums.capacity_bytes(); }
+};
+
+}  // namespace
+
+template <class S, class F>
+Var<S> image_difference(Var<S> a, Var<S> b, Var<S> weight, Source where) {
+  HSI4D_CHECK(are_images(a, b, weight), "images of different sizes, or too small");
+  std::array<Var<S>, 3> inputs = {a, b, weight};
+  return a.owner().record(ImageDifference<S, F>{},
+                          std::span<const Var<S>>(inputs).first(weight.tape != nullptr ? 3 : 2),
+                          std::array{kScalarShape}, where);
+}
+
+template Var<float> image_difference<float, AbsoluteDifference>(Var<float>, Var<float>, Var<float>, Source);
+template Var<double> image_difference<double, AbsoluteDifference>(Var<double>, Var<double>, Var<double>, Source);
+template Var<float> image_difference<float, SquaredDifference>(Var<float>, Var<float>, Var<float>, Source);
+template Var<double> image_difference<double, SquaredDifference>(Var<double>, Var<double>, Var<double>, Source);
+
+}  // namespace hsi4d::detail

@@ -1,0 +1,52 @@
+// How far two images are apart, summed square by square, so that only what changed is summed again. Used by
+// difference.h; not part of the public interface.
+#pragma once
+
+#include "autodiff/tape.h"
+
+namespace hsi4d::detail {
+
+/// Whether image_difference can take them: images of one size, large enough to have squares, the weight of one plane or
+/// all.
+template <class S>
+bool are_images(Var<S> a, Var<S> b, Var<S> weight) {
+  const Shape& image = a.shape();
+  if (image.rows < kMaskSquare || image.cols < kMaskSquare || !image.same_size(b.shape())) return false;
+  if (weight.tape == nullptr) return true;
+  const Shape& w = weight.shape();
+  return w.rows == image.rows && w.cols == image.cols && (w.planes == 1 || w.planes == image.planes);
+}
+
+/// |d|; its derivative is 0 at 0.
+struct AbsoluteDifference {
+  template <class S>
+  static S value(S d) {
+    return d < S(0) ? -d : d;
+  }
+  template <class S>
+  static S derivative(S d) {
+    return d > S(0) ? S(1) : d < S(0) ? S(-1) : d;  // 0, or not a number
+  }
+};
+
+/// d²
+struct SquaredDifference {
+  template <class S>
+  static S value(S d) {
+    return d * d;
+  }
+  template <class S>
+  static S derivative(S d) {
+    return d + d;
+  }
+};
+
+/// Σ w f(a − b) over all numbers, in double, in an order that does not depend on what changed.
+///
+/// @param a, b    [C,H,W]
+/// @param weight  [1,H,W], [C,H,W] or none
+/// Adjoint: all inputs.
+template <class S, class F>
+Var<S> image_difference(Var<S> a, Var<S> b, Var<S> weight, Source where);
+
+}  // namespace hsi4d::detail
