@@ -368,6 +368,7 @@ class Tape {
   std::vector<std::uint8_t> carries_;   // scratch of build: a gradient arrives at it
   std::vector<std::uint8_t> assigned_;  // scratch of place_adjoints
   Buffer<S> adjoints_;
+  Index defined_adjoints_ = 0;  // numbers of them that were written since there was room for them
   std::uint64_t clock_ = 1;
   std::uint64_t structure_ = 1;          // changes with recording and freezing
   std::uint64_t current_structure_ = 0;  // the one that needs_gradient describes

@@ -13,6 +13,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+template <class S>
+void clear_padding(const Array<S>& array) {
+  if (array.shape.dense()) return;
+  for (Index r = 0; r < array.total_rows(); ++r) {
+    std::fill(array.row(r) + array.shape.cols, array.row(r) + array.shape.stride, S(0));
+  }
+}
+
 double nanoseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::nano>(Clock::now() - start).count();
 }
@@ -33,10 +41,18 @@ template <class S>
 void Tape<S>::activate(const Plan& plan) {
   if (active_result_ == plan.result && active_structure_ == plan.structure) return;
   for (ArrayRecord& array : arrays_) array.adjoint = nullptr;
+  const S* const before = adjoints_.data();
   adjoints_.resize(plan.adjoint_size);
-  // Once for all of them: the padding of adjoints that are assigned is never written again.
-  std::fill_n(adjoints_.data(), plan.adjoint_size, S(0));
-  for (const auto& slot : plan.adjoints) arrays_[slot.array].adjoint = adjoints_.data() + slot.offset;
+  if (adjoints_.data() != before) defined_adjoints_ = 0;
+  if (plan.adjoint_size > defined_adjoints_) {
+    std::fill(adjoints_.data() + defined_adjoints_, adjoints_.data() + plan.adjoint_size, S(0));
+    defined_adjoints_ = plan.adjoint_size;
+  }
+  for (const auto& slot : plan.adjoints) {
+    ArrayRecord& array = arrays_[slot.array];
+    array.adjoint = adjoints_.data() + slot.offset;
+    clear_padding(adjoint_view(slot.array));  // it may hold what lay there before, and is never written
+  }
   active_result_ = plan.result;
   active_structure_ = plan.structure;
 }
@@ -211,6 +227,8 @@ void Tape<S>::set_anomaly(bool on) {
   if (on && !anomaly_) {  // what ran before was not looked at
     for (NodeRecord& node : nodes_) node.ran_at = 0;
     for (Plan& plan : plans_) plan.forward_at = 0;
+    active_structure_ = 0;  // adjoints that nobody reads must be finite too
+    defined_adjoints_ = 0;
   }
   anomaly_ = on;
 }

@@ -97,6 +97,28 @@ std::string part_lines(const StageCost& cost) {
   return text;
 }
 
+/// Steps of the operator `composite`, by name; ms an iteration.
+std::vector<std::pair<std::string, double>> composite_steps(const StageCost& cost) {
+  const RenderTimes& t = cost.sum.counters.times;
+  std::vector<std::pair<std::string, double>> steps;
+  for (const auto& [name, seconds] : {std::pair{"still", t.still_s},
+                                      {"records", t.records_s},
+                                      {"sort", t.sort_s},
+                                      {"bin", t.bin_s},
+                                      {"forward", t.forward_s},
+                                      {"backward", t.backward_s},
+                                      {"reduce", t.reduce_s}})
+    steps.emplace_back(name, per_iteration(seconds, cost));
+  return steps;
+}
+
+std::string composite_line(const StageCost& cost) {
+  if (cost.sum.tiles_of_image == 0) return "";
+  std::string text = "  of composite:";
+  for (const auto& [name, ms] : composite_steps(cost)) text += line(" %s %.2f", name.c_str(), ms);
+  return text + "\n";
+}
+
 }  // namespace
 
 double StageCost::median_ms() const {
@@ -143,8 +165,8 @@ std::string cost_table(const RunCost& cost) {
                           "all, s", "tiles", "pairs", "fragments", "allocat.", "tape MB");
   for (const StageCost& stage : cost.stages) text += stage_line(stage, cost.counts_allocations);
   for (const StageCost& stage : cost.stages) {
-    text +=
-        line("\n%-28s %8s %8s\n", (stage.stage + ", ms an iteration").c_str(), "forward", "back") + part_lines(stage);
+    text += line("\n%-28s %8s %8s\n", (stage.stage + ", ms an iteration").c_str(), "forward", "back") +
+            part_lines(stage) + composite_line(stage);
   }
   return text + line("\noptimisation %.1f s of %.1f s on %d threads (%s), at most %.0f MB\n",
                      optimisation_seconds(cost), cost.seconds, thread_count(), isa_name(best_isa()),
@@ -171,7 +193,9 @@ std::string cost_json(const RunCost& cost) {
                     {"pairs", per_iteration(sum.counters.pairs, stage)},
                     {"fragments", per_iteration(sum.counters.fragments, stage)},
                     {"adjoint_tiles", per_iteration(sum.counters.adjoint_tiles, stage)},
-                    {"layers", per_iteration(sum.counters.layers, stage)}});
+                    {"layers", per_iteration(sum.counters.layers, stage)},
+                    {"told_squares", per_iteration(sum.counters.told_squares, stage)},
+                    {"composite_ms", composite_steps(stage)}});
     if (cost.counts_allocations) entry["allocations"] = per_iteration(static_cast<Index>(sum.allocations), stage);
     text += entry.dump() + "\n";
     for (const CostPart& part : parts_of(stage)) {

@@ -35,6 +35,13 @@ Var<S> stacked(const std::vector<SplatInputs<S>>& parts, Member member) {
   return concat_rows<S>(rows);
 }
 
+/// A rigid object is a body of one joint: points and axes are moved in one operator, in vectors.
+template <class S>
+SkinWeights<S> weights_of_one_joint(Index rows) {
+  const auto count = static_cast<std::size_t>(rows);
+  return SkinWeights<S>(SparseWeights{rows, 1, 1, std::vector<std::int32_t>(count, 0), std::vector<double>(count, 1)});
+}
+
 }  // namespace
 
 template <class S>
@@ -57,9 +64,11 @@ template <class S>
 SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<S> transl, Var<S> xi,
                             const SplatView& view) {
   const Var<S> transform = rigid_rows(rotation, transl);
-  const Var<S> means = matmul(object.means, transpose(reshape(rotation, 3, 3))) + transl;
-  return {means, transform_axes(transform, gaussian_axes(object.quats, object.log_scales)),
-          gaussian_opacities(object.opacity_logits), sh_colors(object.colors, means, xi, view, transform)};
+  const Index rows = object.means.shape().rows;
+  const SkinnedFrames<S> posed = skin_frames(weights_of_one_joint<S>(rows), transform, object.means,
+                                             gaussian_axes(object.quats, object.log_scales));
+  return {posed.points, posed.frames, gaussian_opacities(object.opacity_logits),
+          sh_colors(object.colors, posed.points, xi, view, transform)};
 }
 
 template <class S>

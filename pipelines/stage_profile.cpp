@@ -42,7 +42,7 @@ std::int64_t StageProbe::allocation_count() const { return watch_->allocation_co
 
 void StageProbe::iteration_ended(const IterationReport& report, const RenderCounters* counters) {
   if (!is_on()) return;
-  if (report.iteration > 0) allocations_ += allocation_count() - before_;
+  if (report.iteration >= report.iterations / 2) allocations_ += allocation_count() - before_;
   iteration_seconds_ += report.seconds;
   if (counters != nullptr) counters_ += *counters;
 }

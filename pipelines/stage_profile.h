@@ -32,7 +32,7 @@ struct StageProfile {
   Index nodes = 0;               ///< of the tape
   RenderCounters counters = {};  ///< sums over the iterations; none over the sequence
   Index tiles_of_image = 0;      ///< in one image; 0: nothing was drawn
-  std::int64_t allocations = 0;  ///< by iterations after the first, where they are counted
+  std::int64_t allocations = 0;  ///< by the second half of the iterations, where they are counted
   Index tape_bytes = 0;
 };
 
