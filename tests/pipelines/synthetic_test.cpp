@@ -285,7 +285,7 @@ TEST_CASE("every scene with motion and object makes a dataset") {
 TEST_CASE("every shipped config of synth makes its dataset") {
   const TemporaryFolder folder;
   std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(fs::path(HSI4D_SOURCE_DIR) / "configs" / "synthetic")) {
+  for (const auto& entry : fs::recursive_directory_iterator(fs::path(HSI4D_SOURCE_DIR) / "configs" / "synthetic")) {
     if (!entry.is_regular_file()) continue;
     const std::string name = entry.path().stem().string();
     INFO(name);
@@ -299,7 +299,10 @@ TEST_CASE("every shipped config of synth makes its dataset") {
     names.push_back(name);
   }
   std::sort(names.begin(), names.end());
-  CHECK(names == std::vector<std::string>{"alone", "chain", "disturbed", "faults", "full_size", "table", "walk"});
+  CHECK(names == std::vector<std::string>{"alone", "bedroom_push_chair", "bedroom_sit_chair", "chain", "disturbed",
+                                          "faults", "full_size", "garden_walk_can", "kitchen_pour_can",
+                                          "living_room_lift_guitar", "living_room_walk_vase", "table",
+                                          "terrace_walk_box", "terrace_wave_guitar", "walk"});
 }
 
 TEST_CASE("a dataset with all noise and faults is a function of its settings", "[parallel]") {
