@@ -13,6 +13,7 @@
 #include "core/check.h"
 #include "core/log.h"
 #include "core/system_message.h"
+#include "pipelines/observer.h"
 
 namespace hsi4d {
 
