@@ -120,7 +120,7 @@ TEST_CASE("parts of a value stand behind it, as many as fit") {
   CHECK(progress_line(state) == "x 1/4, 25%, loss 0.0216 (photometric 0.0201, center 0.0012, mask 3), 3 s left");
   const std::string two = "x 1/4, 25%, loss 0.0216 (photometric 0.0201, center 0.0012, …), 3 s left";
   CHECK(progress_bar(state, 73) == two);
-  CHECK(progress_bar(state, 71) == "x 1/4, 25%, loss 0.0216 (photometric 0.0201, …), 3 s left");
+  CHECK(progress_bar(state, 65) == "x 1/4, 25%, loss 0.0216 (photometric 0.0201, …), 3 s left");
   CHECK(progress_bar(state, 40) == "x 1/4, 25%, loss 0.0216, 3 s left");
   CHECK(progress_bar(state, 10) == "x 1/4, 25%");
 }
