@@ -64,6 +64,7 @@ ChosenStart choose_start(const RunConfig& config, const Clip& clip, const std::v
     }
   }
   if (settings.objects == StartFrom::kBest && !clip.objects.empty()) {
+    best.from[kObjects] = StartFrom::kPrevious;  // as in `state`; what is as near does not take its place
     for (const StartFrom objects : starts_of(settings.objects, !clip.object_estimate.empty())) {
       settings.objects = objects;
       ChosenStart candidate = best;

@@ -399,7 +399,7 @@ TEST_CASE("every shipped config of a generated dataset runs", "[run]") {
   CHECK(with_stages == std::set<std::string>{"alone", "chain", "disturbed", "faults", "full_size", "table", "walk"});
 }
 
-TEST_CASE("every shipped clip of the accuracy table runs", "[run]") {
+TEST_CASE("every shipped clip of the accuracy table runs", "[run][release]") {
   const TemporaryFolder here;
   for (const std::string& name : names_in(shipped_configs() / "synthetic" / "clips")) {
     const fs::path file = shipped_configs() / "synthetic" / "clips" / name;
@@ -411,8 +411,8 @@ TEST_CASE("every shipped clip of the accuracy table runs", "[run]") {
 
 TEST_CASE("the shipped example of real Gaussians runs with others in their places", "[run]") {
   const TemporaryFolder here;
-  fs::copy(shipped_configs(), "tree/configs", fs::copy_options::recursive);
   fs::create_directories("tree/runs/robot");
+  fs::copy(shipped_configs(), "tree/configs", fs::copy_options::recursive);
   fs::create_directories("shared/data/bodies");
   fs::copy_file(fs::path(HSI4D_SOURCE_DIR) / "tests/assets/playbot_ground_crop.ply", "tree/runs/robot/ground.ply");
   fs::copy_file(TinyDataset::folder() / "objects" / (kTinyObject + ".ply"), "tree/runs/robot/robot.ply");
