@@ -417,7 +417,8 @@ TEST_CASE("the shipped example of real Gaussians runs with others in their place
   fs::copy_file(fs::path(HSI4D_SOURCE_DIR) / "tests/assets/playbot_ground_crop.ply", "tree/runs/robot/ground.ply");
   fs::copy_file(TinyDataset::folder() / "objects" / (kTinyObject + ".ply"), "tree/runs/robot/robot.ply");
   procedural_file().write("shared/data/bodies/makehuman_smplx_layout.npz");
-  RunConfig config = load_run_config("tree/configs/examples/robot.json", {}, descriptions_of(loss_terms()));
+  RunConfig config =
+      load_run_config("tree/configs/examples/robot.json", {"body.betas=0"}, descriptions_of(loss_terms()));
   CHECK(fs::exists(config.synthetic.scene_file));
   CHECK(fs::exists(config.synthetic.object_file));
   CHECK(config.body.kind == BodyKind::kSmplx);
