@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <mutex>
+#include <optional>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -70,6 +74,13 @@ class Distributor : public spdlog::sinks::base_sink<std::mutex> {
   void remove(const spdlog::sink_ptr& target) {
     const std::lock_guard lock(mutex_);
     sinks_.erase(std::remove(sinks_.begin(), sinks_.end(), target), sinks_.end());
+    if (warned_) warned_->erase(target.get());
+  }
+  /// Whether a warning goes to each sink once.
+  void set_warnings_once(bool once) {
+    const std::lock_guard lock(mutex_);
+    warned_.reset();
+    if (once) warned_.emplace();
   }
   spdlog::level::level_enum least_level() {
     const std::lock_guard lock(mutex_);
@@ -91,12 +102,20 @@ class Distributor : public spdlog::sinks::base_sink<std::mutex> {
 
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
-    for (const spdlog::sink_ptr& target : sinks_) hand(*target, message);
+    for (const spdlog::sink_ptr& target : sinks_) {
+      if (is_new(*target, message)) hand(*target, message);
+    }
   }
   void flush_() override {}
 
  private:
+  bool is_new(const spdlog::sinks::sink& target, const spdlog::details::log_msg& message) {
+    if (!warned_ || message.level != spdlog::level::warn) return true;
+    return (*warned_)[&target].emplace(message.payload.data(), message.payload.size()).second;
+  }
+
   std::vector<spdlog::sink_ptr> sinks_;
+  std::optional<std::map<const spdlog::sinks::sink*, std::set<std::string>>> warned_;  // what each was sent
   std::atomic<std::int64_t> failures_{0};
 };
 
@@ -196,6 +215,9 @@ bool is_logged(LogLevel level) { return the_log().logger.should_log(spdlog_level
 void log_message(LogLevel level, std::string_view message) {
   the_log().logger.log(spdlog_level(level), spdlog::string_view_t(message.data(), message.size()));
 }
+
+WarningsOnce::WarningsOnce() { the_log().sinks->set_warnings_once(true); }
+WarningsOnce::~WarningsOnce() { the_log().sinks->set_warnings_once(false); }
 
 std::int64_t log_failures() { return the_log().sinks->failures(); }
 

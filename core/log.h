@@ -53,6 +53,16 @@ inline void log_info(std::string_view message) { log_message(LogLevel::kInfo, me
 inline void log_warning(std::string_view message) { log_message(LogLevel::kWarning, message); }
 inline void log_error(std::string_view message) { log_message(LogLevel::kError, message); }
 
+/// While it lives, no sink gets the same warning twice: for work that looks at the same inputs several times. One at a
+/// time.
+class WarningsOnce {
+ public:
+  WarningsOnce();
+  ~WarningsOnce();
+  WarningsOnce(const WarningsOnce&) = delete;
+  WarningsOnce& operator=(const WarningsOnce&) = delete;
+};
+
 /// How many messages sinks have failed to write (a full disk, a function that threw) since the program began.
 std::int64_t log_failures();
 

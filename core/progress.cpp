@@ -27,6 +27,48 @@ double share_done(const ProgressState& state) {
   return state.total > 0 ? std::clamp(static_cast<double>(state.done) / static_cast<double>(state.total), 0.0, 1.0) : 0;
 }
 
+/// " (l1 0.01, ssim 0.0234)" with the first `shown` parts; nothing without parts.
+std::string parts_text(std::span<const ProgressPart> parts, std::size_t shown) {
+  if (parts.empty() || shown == 0) return "";
+  std::string text;
+  for (const ProgressPart& part : parts.first(shown)) {
+    text.append(text.empty() ? " (" : ", ").append(part.name).append(" ") += rounded(part.value, 3);
+  }
+  return text.append(shown < parts.size() ? ", …)" : ")");
+}
+
+/// The line with the first `shown` parts of its value.
+std::string line_with(const ProgressState& state, std::size_t shown) {
+  std::string text(state.task);
+  const auto append = [&text](std::string_view before, std::string_view figure, std::string_view after) {
+    text.append(before).append(figure).append(after);
+  };
+  append(" ", std::to_string(state.done), "");
+  if (state.total > 0) {
+    append("/", std::to_string(state.total), "");
+    append(", ", std::to_string(static_cast<int>(100 * share_done(state))), "%");
+  }
+  if (state.steps_per_second > 0) append(", ", rounded(state.steps_per_second, 3), " steps/s");
+  if (!state.value_name.empty()) {
+    append(", ", state.value_name, " ");
+    text += rounded(state.value, 4) + parts_text(state.parts, shown);
+  }
+  if (state.is_finished) {
+    append(", took ", duration_text(state.seconds), "");
+  } else if (state.seconds_left >= 0) {
+    append(", ", duration_text(state.seconds_left), " left");
+  }
+  return text;
+}
+
+/// The line with as many parts as fit.
+std::string fitted_line(const ProgressState& state, int columns) {
+  std::size_t shown = state.parts.size();
+  std::string line = line_with(state, shown);
+  while (shown > 0 && static_cast<int>(count_characters(line)) > columns) line = line_with(state, --shown);
+  return line;
+}
+
 }  // namespace
 
 Progress::Progress(std::string_view task, std::int64_t total, ProgressSink sink, double interval, ProgressClock clock)
@@ -51,26 +93,28 @@ void Progress::skip(std::int64_t steps) {
   last_done_ += steps;
 }
 
-void Progress::step(std::int64_t steps) {
+void Progress::step(std::int64_t steps) { count(steps, {}); }
+
+void Progress::step_with(const char* name, double value, std::span<const ProgressPart> parts) {
+  value_name_ = name;
+  value_ = value;
+  count(1, parts);
+}
+
+void Progress::count(std::int64_t steps, std::span<const ProgressPart> parts) {
   done_ += steps;
   if (!sink_ || is_finished_) return;
   const double now = clock_();
-  if (!has_reported_ || now - last_report_ >= interval_) report(now, false);
-}
-
-void Progress::step_with(const char* name, double value) {
-  value_name_ = name;
-  value_ = value;
-  step();
+  if (!has_reported_ || now - last_report_ >= interval_) report(now, false, parts);
 }
 
 void Progress::finish() {
   if (!sink_ || is_finished_) return;
   is_finished_ = true;
-  report(clock_(), true);
+  report(clock_(), true, {});
 }
 
-void Progress::report(double now, bool is_finished) {
+void Progress::report(double now, bool is_finished, std::span<const ProgressPart> parts) {
   const double passed = now - last_report_;
   if (passed > 0) {
     const double rate = static_cast<double>(done_ - last_done_) / passed;
@@ -91,6 +135,7 @@ void Progress::report(double now, bool is_finished) {
     state.seconds_left = static_cast<double>(std::max<std::int64_t>(total_ - done_, 0)) / rate_;
   state.value_name = value_name_;
   state.value = value_;
+  state.parts = parts;
   state.is_finished = is_finished;
   sink_(state);
 }
@@ -106,31 +151,10 @@ std::string duration_text(double seconds) {
   return text;
 }
 
-std::string progress_line(const ProgressState& state) {
-  std::string text(state.task);
-  const auto append = [&text](std::string_view before, std::string_view figure, std::string_view after) {
-    text.append(before).append(figure).append(after);
-  };
-  append(" ", std::to_string(state.done), "");
-  if (state.total > 0) {
-    append("/", std::to_string(state.total), "");
-    append(", ", std::to_string(static_cast<int>(100 * share_done(state))), "%");
-  }
-  if (state.steps_per_second > 0) append(", ", rounded(state.steps_per_second, 3), " steps/s");
-  if (!state.value_name.empty()) {
-    append(", ", state.value_name, " ");
-    text += rounded(state.value, 4);
-  }
-  if (state.is_finished) {
-    append(", took ", duration_text(state.seconds), "");
-  } else if (state.seconds_left >= 0) {
-    append(", ", duration_text(state.seconds_left), " left");
-  }
-  return text;
-}
+std::string progress_line(const ProgressState& state) { return line_with(state, state.parts.size()); }
 
 std::string progress_bar(const ProgressState& state, int columns) {
-  const std::string line = progress_line(state);
+  const std::string line = fitted_line(state, columns);
   std::size_t width = 0, end = 0;  // in characters and bytes, as far as fits
   for (std::size_t i = 0; i <= line.size(); ++i) {
     const bool begins = i == line.size() || (static_cast<unsigned char>(line[i]) & 0xC0U) != 0x80U;

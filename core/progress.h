@@ -4,22 +4,30 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 
 namespace hsi4d {
 
+/// A part of the number worth watching: a term of a loss.
+struct ProgressPart {
+  std::string_view name;
+  double value = 0;
+};
+
 /// A task at one moment. Views are valid during the call that receives it.
 struct ProgressState {
   std::string_view task;
   std::int64_t done = 0;
-  std::int64_t total = 0;       ///< 0: not known
-  double seconds = 0;           ///< since the task began
-  double steps_per_second = 0;  ///< of late; 0: not known yet
-  double seconds_left = -1;     ///< negative: not known
-  std::string_view value_name;  ///< "loss"; empty: none was given
-  double value = 0;             ///< the latest one
-  bool is_finished = false;     ///< the last call of this task
+  std::int64_t total = 0;                    ///< 0: not known
+  double seconds = 0;                        ///< since the task began
+  double steps_per_second = 0;               ///< of late; 0: not known yet
+  double seconds_left = -1;                  ///< negative: not known
+  std::string_view value_name;               ///< "loss"; empty: none was given
+  double value = 0;                          ///< the latest one
+  std::span<const ProgressPart> parts = {};  ///< of that value; none when the task is finished
+  bool is_finished = false;                  ///< the last call of this task
 };
 
 /// Shows a state. Called on the thread that steps.
@@ -47,13 +55,14 @@ class Progress {
   void skip(std::int64_t steps);
   /// `steps` more are done.
   void step(std::int64_t steps = 1);
-  /// As step(), with a number worth watching; `name` must outlive the task (a literal).
-  void step_with(const char* name, double value);
+  /// As step(), with a number worth watching; `name` must outlive the task (a literal), `parts` only the call.
+  void step_with(const char* name, double value, std::span<const ProgressPart> parts = {});
   /// Reports the end, once; the destructor does the same.
   void finish();
 
  private:
-  void report(double now, bool is_finished);
+  void report(double now, bool is_finished, std::span<const ProgressPart> parts);
+  void count(std::int64_t steps, std::span<const ProgressPart> parts);
 
   std::array<char, 64> task_{};
   std::size_t task_size_ = 0;
@@ -72,11 +81,11 @@ class Progress {
 /// "12 s", "3:07", "1:02:45": seconds for people; "?" when negative or not finite.
 std::string duration_text(double seconds);
 
-/// One line: "interaction 120/300, 40%, 52.1 steps/s, loss 0.01234, 3 s left".
+/// One line: "interaction 120/300, 40%, 52.1 steps/s, loss 0.01234 (l1 0.01, ssim 0.0234), 3 s left".
 std::string progress_line(const ProgressState& state);
 
-/// As progress_line with a bar of the width that is left in `columns`; the bar goes first, then figures, when space
-/// runs out.
+/// As progress_line with a bar of the width that is left in `columns`. When space runs out the bar goes first, then the
+/// parts from the last one on ("(l1 0.01, …)"), then figures.
 std::string progress_bar(const ProgressState& state, int columns);
 
 }  // namespace hsi4d

@@ -6,6 +6,7 @@
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
+#include "core/log.h"
 #include "core/parallel.h"
 #include "core/version.h"
 #include "pipelines/chain_report.h"
@@ -99,8 +100,35 @@ void write_start(const ChainPaths& paths, const ClipFacts& clip, const std::vect
   write_text_file(paths.start(clip.name), to_json(root));
 }
 
+/// The config of a clip, which begins with the state that the one before left.
+RunConfig started_config(const RunConfig& chain, std::size_t index, const ChainPaths& paths) {
+  RunConfig clip = clip_config(chain, index);
+  if (index > 0) clip.data.initial = fs::absolute(paths.start(chain.chain[index].name));
+  return clip;
+}
+
+/// Whether a clip is done, with the inputs that it has now.
+/// Throws DataError naming an input that has changed since.
 bool is_done(const RunConfig& clip, const std::string& folder, const std::vector<LossTerm>& losses) {
-  return look_at_run_folder(folder, resolved_config(clip, descriptions_of(losses)), true) == RunState::kDone;
+  if (look_at_run_folder(folder, resolved_config(clip, descriptions_of(losses)), true) != RunState::kDone) return false;
+  RunConfig prepared = clip;
+  prepare_run(prepared);
+  const Clip inputs = read_run_clip(prepared, losses);
+  return finished_frames(folder, prepared, inputs, losses) + 1 == inputs.frames();  // not without a checkpoint
+}
+
+/// Calls `work`; what it throws of the clip begins with the clip's number and name.
+template <class F>
+auto with_clip_named(const RunConfig& chain, std::size_t index, const F& work) {
+  try {
+    return work();
+  } catch (const Interrupted& stop) {
+    throw Interrupted(clip_in_words(chain, index) + ": " + stop.what());
+  } catch (const UserError& mistake) {
+    throw UserError(clip_in_words(chain, index) + ": " + mistake.what());
+  } catch (const DataError& damage) {
+    throw DataError(clip_in_words(chain, index) + ": " + damage.what());
+  }
 }
 
 /// One after the other, and each from where the one before ended.
@@ -124,24 +152,17 @@ class Chain {
 
  private:
   void run_clip(std::size_t i, const RunFolder& folder) const {
-    RunConfig clip = clip_config(config_, i);
-    if (i > 0) clip.data.initial = fs::absolute(paths_.start(clips_[i].name));
+    const RunConfig clip = started_config(config_, i, paths_);
     RunOptions options = options_;
     options.folder = paths_.clip(clips_[i].name);
-    if (options.resume && is_done(clip, options.folder, losses_)) {
-      if (!fs::exists(RunPaths{options.folder}.report())) write_report(options.folder);  // killed before it was written
-      return;
-    }
-    folder.note("begins " + clip_in_words(config_, i));
-    try {
+    with_clip_named(config_, i, [&] {
+      if (options.resume && is_done(clip, options.folder, losses_)) {
+        if (!fs::exists(RunPaths{options.folder}.report())) write_report(options.folder);  // killed before that
+        return;
+      }
+      folder.note("begins " + clip_in_words(config_, i));
       carry_out(clip, losses_, options);
-    } catch (const Interrupted& stop) {
-      throw Interrupted(clip_in_words(config_, i) + ": " + stop.what());
-    } catch (const UserError& mistake) {
-      throw UserError(clip_in_words(config_, i) + ": " + mistake.what());
-    } catch (const DataError& damage) {
-      throw DataError(clip_in_words(config_, i) + ": " + damage.what());
-    }
+    });
   }
 
   const RunConfig& config_;
@@ -186,12 +207,18 @@ std::vector<ClipFacts> check_chain(const RunConfig& config) {
 std::size_t finished_clips(const RunConfig& config, const std::string& folder, const std::vector<LossTerm>& losses) {
   const ChainPaths paths{fs::path(folder)};
   std::size_t done = 0;
-  while (done < config.chain.size() && is_done(clip_config(config, done), paths.clip(config.chain[done].name), losses))
-    ++done;
+  const auto next_is_done = [&] {
+    return with_clip_named(config, done, [&] {
+      const std::string folder_of_clip = paths.clip(config.chain[done].name);
+      return fs::exists(folder_of_clip) && is_done(started_config(config, done, paths), folder_of_clip, losses);
+    });
+  };
+  while (done < config.chain.size() && next_is_done()) ++done;
   return done;
 }
 
 ChainSummary carry_out_chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
+  const WarningsOnce once;  // inputs are looked at here, and again when their clip begins
   const std::vector<ClipFacts> clips = check_chain(config);  // before anything is written
   RunFolder folder(options.folder, identity_of(config, losses, options.threads), options.resume);
   folder.take_over_config();

@@ -45,7 +45,8 @@ RunConfig clip_config(const RunConfig& chain, std::size_t index);
 /// the human, another frame rate.
 std::vector<ClipFacts> check_chain(const RunConfig& config);
 
-/// How many clips of the chain in a folder are done.
+/// How many clips of the chain in a folder are done. Throws DataError naming the clip and its inputs that have changed
+/// since.
 std::size_t finished_clips(const RunConfig& config, const std::string& folder, const std::vector<LossTerm>& losses);
 
 /// Carries out the clips of `config.chain` one after the other, and joins what they found. With options.resume clips

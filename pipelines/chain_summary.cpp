@@ -90,6 +90,24 @@ StageSummary joined_stage(const std::vector<ClipSummary>& clips, std::size_t s) 
   return joined;
 }
 
+/// Sums over the clips, whose config is one.
+StartSummary joined_start(const std::vector<ClipSummary>& clips) {
+  StartSummary joined;
+  for (const ClipSummary& clip : clips) {
+    joined.seconds += clip.summary.start.seconds;
+    for (const StartCounts& part : clip.summary.start.parts) {
+      const auto is_same = [&part](const StartCounts& other) { return other.part == part.part; };
+      const auto at = std::find_if(joined.parts.begin(), joined.parts.end(), is_same);
+      if (at == joined.parts.end()) {
+        joined.parts.push_back(part);
+        continue;
+      }
+      for (std::size_t i = 0; i < part.begun.size(); ++i) at->begun[i].second += part.begun[i].second;
+    }
+  }
+  return joined;
+}
+
 /// Errors by frame, counted as frames of the chain.
 void append_frames(const std::vector<FrameMetrics>& frames, int begin, std::vector<FrameMetrics>& all) {
   for (const FrameMetrics& frame : frames) all.push_back({begin + frame.frame, frame.values});
@@ -210,6 +228,7 @@ RunSummary joined_summary(const std::string& name, const std::vector<ClipSummary
   all.frames = clips.back().begin + clips.back().summary.frames;
   all.has_truth =
       std::any_of(clips.begin(), clips.end(), [](const ClipSummary& clip) { return clip.summary.has_truth; });
+  all.start = joined_start(clips);
   for (const ClipSummary& clip : clips) {
     all.seconds += clip.summary.seconds;
     if (all.surface.empty()) all.surface = clip.summary.surface;

@@ -8,6 +8,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "core/text.h"
 #include "pipelines/evaluate.h"
 #include "pipelines/frame_images.h"
 #include "pipelines/input_hashes.h"
@@ -171,7 +172,7 @@ class Reconstruction {
     bool has_start = !chooses_start(config_.start);
     for (std::size_t s = 0; s < frame_stages_; ++s) {
       if (!has_start && config_.stages[first_stages_ + s].second.draw == Draw::kAll) {
-        state = choose_start(config_, clip_, progress_.after_stage.back(), frame, state, colors);
+        state = chosen_start(index, frame, state, colors);
         has_start = true;
       }
       run_in_frame(first_stages_ + s, {index, frame, progress_.covered, progress_.after_stage.back()}, state, colors,
@@ -182,6 +183,19 @@ class Reconstruction {
     write_start_image(index, frame);
     progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
     end_frame(index, frame, after, begin);
+  }
+
+  /// Where the stages that draw everything begin, told in the log.
+  SceneState chosen_start(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors) {
+    const auto begin = std::chrono::steady_clock::now();
+    const ChosenStart chosen = choose_start(config_, clip_, progress_.after_stage.back(), frame, state, colors);
+    const double seconds = seconds_since(begin);
+    progress_.start.add(chosen);
+    progress_.start.seconds += seconds;
+    const std::string text = start_text(chosen);
+    if (!text.empty())
+      folder_.note("frame " + std::to_string(index) + ", start: " + text + ", chosen in " + rounded(seconds, 3) + " s");
+    return chosen.state;
   }
 
   /// Keeps what was found in a frame: in memory, as images, in the checkpoint.
@@ -285,8 +299,14 @@ class Reconstruction {
     record.gradient_shares = report.gradient_shares;
     if (counters != nullptr) add_counters(*counters, *totals, record);
     folder_.append_metrics(record);
-    bar_.step_with("loss", report.loss);
+    show(report);
     stop_if_asked(frame.value_or(clip_.frames()));
+  }
+
+  void show(const IterationReport& report) {
+    terms_.clear();
+    for (const LossValue& term : report.terms) terms_.push_back({term.name, term.value});
+    bar_.step_with("loss", report.loss, terms_);
   }
 
   /// @param frame  the one at hand; that beyond the last: all are done
@@ -339,6 +359,7 @@ class Reconstruction {
   RefinementProgress refinement_;
   const ColorState start_colors_;
   Progress bar_;
+  std::vector<ProgressPart> terms_;  // of the iteration at hand
 };
 
 }  // namespace

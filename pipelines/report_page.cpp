@@ -286,6 +286,49 @@ std::string losses_section(const ReportData& data) {
   return text + "</div>\n</section>\n";
 }
 
+// ---- Shares of the gradient ----
+
+/// A row a group, a column a term with its share and its cosine.
+std::string shares_table(const std::vector<MeanGradientShare>& shares) {
+  std::vector<std::string> groups, terms;
+  for (const MeanGradientShare& share : shares) {
+    if (std::find(groups.begin(), groups.end(), share.group) == groups.end()) groups.push_back(share.group);
+    if (std::find(terms.begin(), terms.end(), share.term) == terms.end()) terms.push_back(share.term);
+  }
+  std::string text = "<table>\n<thead><tr><th>group</th>";
+  for (const std::string& term : terms) text += "<th>" + row_label(term) + "</th>";
+  text += "</tr></thead>\n<tbody>\n";
+  for (const std::string& group : groups) {
+    text += "<tr><th scope=\"row\">" + row_label(group) + "</th>";
+    for (const std::string& term : terms) {
+      const auto at = std::find_if(shares.begin(), shares.end(), [&](const MeanGradientShare& share) {
+        return share.group == group && share.term == term;
+      });
+      text += at == shares.end()
+                  ? "<td class=\"none\">–</td>"
+                  : "<td>" + fixed_number(100 * at->share, 1) + " % (" + fixed_number(at->cosine, 2) + ")</td>";
+    }
+    text += "</tr>\n";
+  }
+  return text + "</tbody></table>";
+}
+
+std::string shares_section(const ReportData& data) {
+  if (!data.summary) return "";
+  std::string cards;
+  for (const StageSummary& stage : data.summary->metrics) {
+    if (stage.gradient_shares.empty()) continue;
+    cards += "<div class=\"card wide\"><h3>" + row_label(stage.stage) + "</h3>" + shares_table(stage.gradient_shares) +
+             "</div>\n";
+  }
+  if (cards.empty()) return "";
+  return "<section id=\"shares\">\n<h2>Shares of the gradient</h2>\n" + cards +
+         "<p class=\"caption\">How much of the gradient of a group of parameters comes from which loss term, means "
+         "over "
+         "the iterations that were looked at; in brackets the cosine with the whole gradient, below 0 where the term "
+         "pulls against it.</p>\n</section>\n";
+}
+
 // ---- Time ----
 
 struct TimeRow {
@@ -298,7 +341,8 @@ struct TimeRow {
 std::vector<TimeRow> time_rows(const ReportData& data) {
   std::vector<TimeRow> rows;
   if (data.summary) {
-    double sum = 0;
+    double sum = data.summary->start.seconds;
+    if (sum > 0) rows.push_back({"start", sum, 0, nullptr});  // which of several was the best
     for (const StageSummary& stage : data.summary->metrics) {
       rows.push_back({stage.stage, stage.seconds, stage.iterations, &stage.values});
       sum += stage.seconds;
@@ -403,6 +447,7 @@ std::string report_page(const ReportData& data) {
   if (data.summary) page += frame_errors_section(*data.summary);
   if (data.summary) page += published_section(*data.summary);
   page += losses_section(data);
+  page += shares_section(data);
   page += time_section(data);
   page += notes_section(data);
   page += config_section(data);

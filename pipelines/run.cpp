@@ -90,6 +90,20 @@ void note_end(RunFolder& folder, RunState state, const std::string& message) noe
   }
 }
 
+Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
+  Clip clip = read_clip(config.data);
+  for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
+    clip.files.push_back({file.pointer, file.path});
+  if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});
+  return clip;
+}
+
+void check_run_clip(const RunConfig& config, const Clip& clip) {
+  check_start(config.start, clip);
+  check_first_view(clip, config.data.camera.string());
+  check_frames(config.data, clip, has_loss(config, "center"));
+}
+
 RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses, const RunOptions& options) {
   HSI4D_CHECK(asked.chain.empty(), "a chain is carried out by carry_out_chain");
   RunConfig config = asked;
@@ -103,16 +117,9 @@ RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses
     look_at_run_folder(options.folder, identity.config, options.resume);  // before anything is made for nothing
     config.data = make_sources(config, options.observer);
   });
-  Clip clip = read_clip(config.data);  // before anything is written
-  for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
-    clip.files.push_back({file.pointer, file.path});
-  if (config.body.kind == BodyKind::kSmplx) {
-    body_model_of(config.body);  // what is wrong with it shows before anything is written
-    clip.files.push_back({"/body/path", config.body.path});
-  }
-  check_start(config.start, clip);
-  check_first_view(clip, config.data.camera.string());
-  check_frames(config.data, clip, has_loss(config, "center"));
+  const Clip clip = read_run_clip(config, losses);                       // before anything is written
+  if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);  // what is wrong with it shows now
+  check_run_clip(config, clip);
   identity.seed = config.seed;
   const int threads = options.threads > 0 ? options.threads : config.threads;
   identity.threads = threads > 0 ? threads : thread_count();

@@ -20,6 +20,13 @@ struct RunOptions {
 /// is still what is thrown.
 void note_end(RunFolder& folder, RunState state, const std::string& message) noexcept;
 
+/// The clip of a run, and in `files` all that is read of it, the files that stages and body name included.
+Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses);
+
+/// What can be told of a clip before it runs. Throws UserError for a start or frames that cannot be; warns of what is
+/// odd.
+void check_run_clip(const RunConfig& config, const Clip& clip);
+
 /// Carries out a run and leaves its folder complete, report.html included. status.json then says "done"; "interrupted"
 /// or "failed" when this throws.
 ///

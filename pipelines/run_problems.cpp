@@ -91,6 +91,24 @@ void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunP
                      {place(stages.front().first)}});
 }
 
+/// The best start is chosen by images of everything, before the first stage that draws it.
+void add_start_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  const auto is_of_frames = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
+  const auto chooses = [](const auto& entry) {
+    return entry.second.over == StageScope::kFrame && entry.second.draw == Draw::kAll;
+  };
+  if (std::none_of(config.stages.begin(), config.stages.end(), is_of_frames)) return;
+  if (std::any_of(config.stages.begin(), config.stages.end(), chooses)) return;
+  for (const auto& [key, from] :
+       {std::pair{"pose", config.start.pose}, {"root", config.start.root}, {"objects", config.start.objects}}) {
+    if (from == StartFrom::kBest)
+      found.push_back({std::string("/start/") + key,
+                       "\"best\" is never chosen: it compares images of everything, and every stage over frames has "
+                       "\"draw\": \"scene\"",
+                       {"/start", "/stages"}});
+  }
+}
+
 std::vector<RunProblem> loss_faults(RunConfig& config) {
   std::vector<RunProblem> found;
   for (auto& [name, stage] : config.stages) {
@@ -257,6 +275,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
     add_loss_problems(stage, where, found);
   }
   add_order_problems(config.stages, found);
+  add_start_problems(config, found);
   if (!config.chain.empty()) {
     if (has_sources(config.sources))
       found.push_back({"/sources",

@@ -218,6 +218,27 @@ std::vector<FirstFrameState> stored_first_frame(const Checkpoint& checkpoint, co
   return found;
 }
 
+void store_start(const StartTotals& start, Checkpoint& checkpoint) {
+  std::vector<std::int64_t> frames;
+  for (const auto& part : start.frames) frames.insert(frames.end(), part.begin(), part.end());
+  checkpoint.set("start/frames", std::move(frames));
+  checkpoint.set("start/seconds", std::vector<double>{start.seconds});
+}
+
+/// Nothing where there is none: a checkpoint of a version that did not count.
+StartTotals stored_start(const Checkpoint& checkpoint) {
+  StartTotals start;
+  if (!checkpoint.has("start/frames")) return start;
+  const std::vector<std::int64_t>& frames = checkpoint.integers("start/frames");
+  expect_size(checkpoint, "start/frames", frames.size(), kChosenParts.size() * kChosenStarts.size());
+  const std::vector<double>& seconds = checkpoint.doubles("start/seconds");
+  expect_size(checkpoint, "start/seconds", seconds.size(), 1);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    start.frames[i / kChosenStarts.size()][i % kChosenStarts.size()] = frames[i];
+  start.seconds = seconds[0];
+  return start;
+}
+
 }  // namespace
 
 const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement) {
@@ -254,6 +275,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("inputs", progress.inputs);
   if (!progress.left_out.empty()) checkpoint.set(kLeftOut, left_out_text(progress.left_out));
   if (!progress.still.empty()) checkpoint.set(kStill, still_text(progress.still));
+  if (progress.start.seconds > 0) store_start(progress.start, checkpoint);
   store_color_state(progress.colors, checkpoint);
   store_errors("image_errors", progress.image_errors, checkpoint);
   store_errors("start_errors", progress.start_errors, checkpoint);
@@ -299,6 +321,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);
   progress.inputs = checkpoint.text("inputs");
+  progress.start = stored_start(checkpoint);
   progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
   const Index first_frame = first_stages > 0 ? 0 : 1;
   progress.left_out = left_out_of(checkpoint, clip, first_stages + stages, first_frame);

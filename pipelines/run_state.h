@@ -8,6 +8,7 @@
 #include "pipelines/clip.h"
 #include "pipelines/color_state.h"
 #include "pipelines/run_summary.h"
+#include "pipelines/start_choice.h"
 #include "pipelines/state.h"
 
 namespace hsi4d {
@@ -51,6 +52,7 @@ struct RunProgress {
   Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
   std::vector<LeftOutInFrame> left_out;              ///< in the order in which it happened
   std::vector<StillGroup> still;                     ///< likewise
+  StartTotals start;                                 ///< where the best start was chosen
   ColorState colors;                                 ///< after the last frame done
   double seconds = 0;                                ///< of the frames done
 

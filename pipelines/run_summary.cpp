@@ -52,6 +52,17 @@ ConfigValue frames_json(const std::vector<FrameMetrics>& frames, const std::stri
   return array;
 }
 
+ConfigValue start_json(const StartSummary& start) {
+  ConfigValue object = ConfigValue::make_object();
+  add_number(object, "/start", "seconds", start.seconds);
+  for (const StartCounts& part : start.parts) {
+    ConfigValue counts = ConfigValue::make_object();
+    for (const auto& [name, frames] : part.begun) counts.add(name, ConfigValue::make_integer(frames));
+    object.add(part.part, std::move(counts));
+  }
+  return object;
+}
+
 // ---- Reading ----
 
 /// Every number of an object but those named in `taken`; null (a gap) and other kinds are passed over.
@@ -129,6 +140,21 @@ void read_baselines(const ConfigValue& tree, RunSummary& summary) {
   }
 }
 
+StartSummary read_start(const ConfigValue& value) {
+  check_kind(value, Kind::kObject, "/start");
+  StartSummary start;
+  start.seconds = read_number(value, "/start", "seconds");
+  for (const ConfigMember& part : value.members) {
+    if (part.value.kind != Kind::kObject) continue;
+    StartCounts counts{part.key, {}};
+    const std::string place = child_pointer("/start", part.key);
+    for (const ConfigMember& begun : part.value.members)
+      counts.begun.emplace_back(begun.key, whole_number_of(begun.value, child_pointer(place, begun.key)));
+    start.parts.push_back(std::move(counts));
+  }
+  return start;
+}
+
 // ---- The table ----
 
 /// The number that a reader sees: ties in the table are ties of what is printed.
@@ -159,6 +185,7 @@ std::string summary_json(const RunSummary& summary) {
   for (size_t i = 0; i < summary.metrics.size(); ++i)
     stages.items.push_back(stage_json(summary.metrics[i], child_pointer("/metrics", std::to_string(i))));
   tree.add("metrics", std::move(stages));
+  if (!summary.start.parts.empty()) tree.add("start", start_json(summary.start));
   ConfigValue means = ConfigValue::make_object(), by_frame = ConfigValue::make_object();
   for (const Baseline& baseline : summary.baselines) {
     const std::string place = child_pointer("/baselines", baseline.name);
@@ -194,6 +221,7 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
     for (size_t i = 0; i < stages->items.size(); ++i)
       summary.metrics.push_back(read_stage(stages->items[i], child_pointer("/metrics", std::to_string(i))));
   }
+  if (const ConfigValue* const start = find_member(tree, "start")) summary.start = read_start(*start);
   read_baselines(tree, summary);
   if (const ConfigValue* const frames = find_member(tree, "per_frame"))
     summary.per_frame = read_frames(*frames, "/per_frame");

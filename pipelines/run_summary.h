@@ -49,6 +49,18 @@ struct Baseline {
   bool of_frame_0 = false;              ///< the errors are those of frame 0 alone
 };
 
+/// How often a part of the state began a frame with which of its starts, where the best of them is taken.
+struct StartCounts {
+  std::string part;                                  ///< "pose", "root" or "objects"
+  std::vector<std::pair<std::string, Index>> begun;  ///< frames by start: "previous", "estimate", "velocity"
+};
+
+/// What choosing the best starts came to.
+struct StartSummary {
+  double seconds = 0;
+  std::vector<StartCounts> parts;  ///< empty: nothing was chosen
+};
+
 /// summary.json. Means are over the frames that were optimised, 1 to T; frame 0 is given.
 struct RunSummary {
   std::string name;
@@ -57,6 +69,7 @@ struct RunSummary {
   bool has_truth = true;              ///< false: errors of body, objects and camera could not be measured
   std::string surface;                ///< the mesh by which penetration was measured; empty: it was not
   std::vector<StageSummary> metrics;  ///< in order, the last one is the final one
+  StartSummary start;
   std::vector<Baseline> baselines;
   std::vector<FrameMetrics> per_frame;  ///< of the result
 };
@@ -66,9 +79,10 @@ struct RunSummary {
 ///   {"name", "frames", "seconds", "truth": BOOL, "surface",
 ///    "metrics": [{"stage", "frame"?, "seconds", "iterations", NAME: NUMBER...,
 ///                 "gradient_shares": {GROUP: {TERM: {"share", "cosine", "evaluations"}...}...}}...],
+///    "start": {"seconds", PART: {START: FRAMES...}...},
 ///    "baselines": {NAME: {"frame"?, NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
-///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface" and "gradient_shares"
-///    only where there are any)
+///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface", "start" and
+///    "gradient_shares" only where there are any)
 ///
 /// with "frame": 0 where errors are those of frame 0 alone.
 /// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and

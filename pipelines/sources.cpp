@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
-#include <unistd.h>
 
 #include "core/camera_file.h"
 #include "core/check.h"
@@ -18,6 +17,7 @@
 #include "pipelines/clip.h"
 #include "pipelines/input_hashes.h"
 #include "pipelines/scene_render.h"
+#include "pipelines/source_lock.h"
 #include "splat/render_settings.h"
 #include "splat/sh_basis.h"
 
@@ -245,18 +245,15 @@ void make(const SourceOutput& output, const fs::path& out, const std::vector<std
     throw DataError(section + command.front() + " wrote what cannot be used, kept as " + refused.string() + ": " +
                     with_replaced(fault, out.string(), refused.string()) + end_of_output(*said));
   }
-  put(out, output.path);
+  // The record first: only with both is it there, and the program may cost something.
   write_text_file(record_file(output).string(), output.record);
+  put(out, output.path);
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
   log_info(output.what + ": " + output.path.string() + ", made in " + duration_text(taken.count()));
 }
 
-WorkFolder work_folder(const SourceOutput& output) {
-  return WorkFolder(output.path.string() + "." + std::to_string(::getpid()) + ".tmp");
-}
-
 void make_video(const RunConfig& config, const SourceOutput& output, const Observer& observer) {
-  const WorkFolder work = work_folder(output);
+  const WorkFolder work(work_folder_of(output.path));
   const fs::path first = work.member("first_frame.png"),
                  out = work.member("video" + ending_of(config.sources.video.output));
   const bool has_first_frame = uses_placeholder(output.command, "first_frame");
@@ -278,7 +275,7 @@ void write_first_masks(const RunConfig& config, const fs::path& folder) {
 
 void make_masks(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
                 const Observer& observer) {
-  const WorkFolder work = work_folder(output);
+  const WorkFolder work(work_folder_of(output.path));
   const fs::path out = work.member("masks");
   std::string names;
   for (const std::string& name : masked_names(data)) names += (names.empty() ? "" : ",") + name;
@@ -292,6 +289,19 @@ void make_masks(const RunConfig& config, const DataSettings& data, const SourceO
                                   {"out", out.string()}}),
        {config.sources.masks.timeout_s, observer.stop_requested},
        [&data](const fs::path& made) { check_masks(data, made); });
+}
+
+/// Makes what is not there; by one process at a time, and the others have it then.
+/// @param plan  the output as it is now
+template <class Plan, class Make>
+fs::path made(const Plan& plan, const Observer& observer, const Make& make_it) {
+  SourceOutput output = plan();
+  if (output.is_there) return output.path;
+  sweep_work_folders(output.path.parent_path());
+  const SourceLock lock(output.path, observer.stop_requested);
+  output = plan();
+  if (!output.is_there) make_it(output);
+  return output.path;
 }
 
 }  // namespace
@@ -311,14 +321,12 @@ std::vector<SourceOutput> planned_sources(const RunConfig& config) {
 DataSettings make_sources(const RunConfig& config, const Observer& observer) {
   DataSettings data = config.data;
   if (!config.sources.video.command.empty()) {
-    const SourceOutput video = video_output(config);
-    if (!video.is_there) make_video(config, video, observer);
-    data.frames = video.path;
+    data.frames = made([&] { return video_output(config); }, observer,
+                       [&](const SourceOutput& video) { make_video(config, video, observer); });
   }
   if (!config.sources.masks.command.empty()) {
-    const SourceOutput masks = mask_output(config, data);
-    if (!masks.is_there) make_masks(config, data, masks, observer);
-    data.masks = masks.path;
+    data.masks = made([&] { return mask_output(config, data); }, observer,
+                      [&](const SourceOutput& masks) { make_masks(config, data, masks, observer); });
   }
   return data;
 }

@@ -3,12 +3,17 @@
 #include <cmath>
 #include <limits>
 
+#include "core/text.h"
 #include "pipelines/frame_start.h"
 #include "pipelines/reconstruct_stage.h"
 
 namespace hsi4d {
 
 namespace {
+
+constexpr std::size_t kPose = 0, kRoot = 1, kObjects = 2;  // of kChosenParts
+
+std::string start_name(StartFrom from) { return std::string(choice_name<StartFrom>(kStartsFrom, from)); }
 
 double mean_absolute_difference(const Image& a, const Image& b) {
   double sum = 0;
@@ -33,12 +38,13 @@ bool chooses_start(const StartSettings& settings) {
   return settings.pose == StartFrom::kBest || settings.root == StartFrom::kBest || settings.objects == StartFrom::kBest;
 }
 
-SceneState choose_start(const RunConfig& config, const Clip& clip, const std::vector<SceneState>& done,
-                        const ClipFrame& frame, const SceneState& state, const ColorState& colors) {
-  SceneState best = state;
+ChosenStart choose_start(const RunConfig& config, const Clip& clip, const std::vector<SceneState>& done,
+                         const ClipFrame& frame, const SceneState& state, const ColorState& colors) {
+  ChosenStart best{state, {}};
   double least = std::numeric_limits<double>::infinity();
-  const auto consider = [&](const SceneState& candidate) {
-    const double difference = mean_absolute_difference(render_state(config, clip, candidate, colors), frame.target);
+  const auto consider = [&](const ChosenStart& candidate) {
+    const double difference =
+        mean_absolute_difference(render_state(config, clip, candidate.state, colors), frame.target);
     if (!(difference < least)) return;
     least = difference;
     best = candidate;
@@ -49,21 +55,55 @@ SceneState choose_start(const RunConfig& config, const Clip& clip, const std::ve
       for (const StartFrom pose : starts_of(config.start.pose, !clip.estimate.empty())) {
         settings.root = root;
         settings.pose = pose;
-        SceneState candidate = best;
-        candidate.body = frame_start(settings, clip, done).body;
+        ChosenStart candidate = best;
+        candidate.state.body = frame_start(settings, clip, done).body;
+        if (config.start.pose == StartFrom::kBest) candidate.from[kPose] = pose;
+        if (config.start.root == StartFrom::kBest) candidate.from[kRoot] = root;
         consider(candidate);
       }
     }
   }
   if (settings.objects == StartFrom::kBest && !clip.objects.empty()) {
+    best.from[kObjects] = StartFrom::kPrevious;  // as in `state`; what is as near does not take its place
     for (const StartFrom objects : starts_of(settings.objects, !clip.object_estimate.empty())) {
       settings.objects = objects;
-      SceneState candidate = best;
-      candidate.objects = frame_start(settings, clip, done).objects;
+      ChosenStart candidate = best;
+      candidate.state.objects = frame_start(settings, clip, done).objects;
+      candidate.from[kObjects] = objects;
       consider(candidate);
     }
   }
   return best;
+}
+
+void StartTotals::add(const ChosenStart& chosen) {
+  for (std::size_t part = 0; part < kChosenParts.size(); ++part) {
+    for (std::size_t start = 0; start < kChosenStarts.size(); ++start)
+      frames[part][start] += chosen.from[part] == kChosenStarts[start] ? 1 : 0;
+  }
+}
+
+std::string start_text(const ChosenStart& chosen) {
+  std::vector<std::string> parts;
+  for (std::size_t part = 0; part < kChosenParts.size(); ++part) {
+    if (chosen.from[part]) parts.push_back(std::string(kChosenParts[part]) + " " + start_name(*chosen.from[part]));
+  }
+  return joined(parts);
+}
+
+StartSummary summarize_start(const StartTotals& totals) {
+  StartSummary summary;
+  summary.seconds = totals.seconds;
+  for (std::size_t part = 0; part < kChosenParts.size(); ++part) {
+    StartCounts counts{kChosenParts[part], {}};
+    Index frames = 0;
+    for (std::size_t start = 0; start < kChosenStarts.size(); ++start) {
+      counts.begun.emplace_back(start_name(kChosenStarts[start]), totals.frames[part][start]);
+      frames += totals.frames[part][start];
+    }
+    if (frames > 0) summary.parts.push_back(std::move(counts));
+  }
+  return summary;
 }
 
 }  // namespace hsi4d

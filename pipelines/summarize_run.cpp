@@ -145,6 +145,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   summary.frames = static_cast<int>(clip.frames());
   summary.seconds = progress.seconds + refinement.seconds;
   summary.has_truth = clip.truth.has_value();
+  summary.start = summarize_start(progress.start);
   const auto add_stage = [&](const std::vector<SceneState>& states, const StageTotals& totals) {
     const auto& [name, stage] = config.stages[summary.metrics.size()];
     summary.metrics.push_back(

@@ -71,15 +71,37 @@ Track read_pose_track(const std::string& path, const TrackOptions& options) {
   return {path, std::move(folder.motion), {}, {}, {}};
 }
 
-/// A path in section `data` of the config of a run; empty where it is not given.
-fs::path data_path(const std::string& run, std::string_view key) {
+/// A path in section `data` of the config of a run, or of each clip of a chain; empty where it is not given.
+std::vector<fs::path> data_paths(const std::string& run, std::string_view key) {
   const std::string file = RunPaths{run}.config();
   if (!fs::exists(file)) return {};
   const ConfigValue tree = parse_json_text(read_text_file(file), file);
-  const ConfigValue* const data = find_member(tree, "data");
-  if (data == nullptr) return {};
-  const std::string path = string_member(*data, key);
-  return path.empty() ? fs::path() : fs::path(path_beside(file, path));
+  std::vector<fs::path> paths;
+  const auto add_of = [&](const ConfigValue& holder) {
+    const ConfigValue* const data = find_member(holder, "data");
+    const std::string path = data == nullptr ? "" : string_member(*data, key);
+    paths.push_back(path.empty() ? fs::path() : fs::path(path_beside(file, path)));
+  };
+  const ConfigValue* const chain = find_member(tree, "chain");
+  if (chain == nullptr || chain->items.empty()) {
+    add_of(tree);
+  } else {
+    for (const ConfigValue& clip : chain->items) add_of(clip);
+  }
+  return paths;
+}
+
+/// Puts a track behind another whose last frame is its first.
+void append_track(const Track& more, Track& track) {
+  if (more.objects != track.objects || more.camera_from_world.empty() != track.camera_from_world.empty() ||
+      more.motion.frame_rate != track.motion.frame_rate)
+    throw DataError(more.name + ": has other objects, cameras or another frame rate than " + track.name);
+  const auto append = [](const auto& from, auto& to) {
+    if (!from.empty()) to.insert(to.end(), from.begin() + 1, from.end());
+  };
+  append(more.motion.poses, track.motion.poses);
+  append(more.object_poses, track.object_poses);
+  append(more.camera_from_world, track.camera_from_world);
 }
 
 // ---- Time ----
@@ -181,8 +203,8 @@ Track read_track(const std::string& path, const TrackOptions& options) {
 
 std::string avatar_of_track(const std::string& path) {
   if (is_run_folder(path)) {
-    const fs::path avatar = data_path(path, "avatar");
-    return fs::exists(avatar) ? avatar.string() : "";
+    const std::vector<fs::path> avatars = data_paths(path, "avatar");
+    return !avatars.empty() && fs::exists(avatars.front()) ? avatars.front().string() : "";
   }
   for (const fs::path& folder : {fs::path(path), fs::path(path).parent_path()}) {  // "data", "data/truth"
     const fs::path avatar = dataset_inputs(folder.empty() ? "." : folder).avatar;
@@ -191,9 +213,20 @@ std::string avatar_of_track(const std::string& path) {
   return "";
 }
 
-std::string truth_of_run(const std::string& path) {
-  const fs::path truth = data_path(path, "truth");
-  return truth.empty() || !fs::exists(truth) ? "" : truth.string();
+std::vector<std::string> truths_of_run(const std::string& path) {
+  std::vector<std::string> truths;
+  for (const fs::path& truth : data_paths(path, "truth")) {
+    if (truth.empty() || !fs::exists(truth)) return {};
+    truths.push_back(truth.string());
+  }
+  return truths;
+}
+
+Track read_joined_tracks(const std::vector<std::string>& paths) {
+  HSI4D_CHECK(!paths.empty(), "there is no track to join");
+  Track track = read_track(paths.front());
+  for (std::size_t i = 1; i < paths.size(); ++i) append_track(read_track(paths[i]), track);
+  return track;
 }
 
 AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, const Track& truth,

@@ -44,8 +44,13 @@ Track read_track(const std::string& path, const TrackOptions& options = {});
 /// The avatar that belongs to a run folder (its config's), or to a dataset; empty where there is none.
 std::string avatar_of_track(const std::string& path);
 
-/// The truth that the config of a run folder names; empty where it names none, or that is not there.
-std::string truth_of_run(const std::string& path);
+/// The truth that the config of a run folder names, of a chain that of each clip; empty where one is not named, or not
+/// there.
+std::vector<std::string> truths_of_run(const std::string& path);
+
+/// Reads tracks of which each begins with the last frame of the one before, as one. Throws as read_track, and DataError
+/// where they do not fit each other.
+Track read_joined_tracks(const std::vector<std::string>& paths);
 
 /// A skeleton in its rest pose.
 struct RestSkeleton {

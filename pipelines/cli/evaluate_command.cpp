@@ -7,6 +7,7 @@
 #include "core/config_value.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/text.h"
 #include "pipelines/body_files.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
@@ -31,16 +32,18 @@ struct Spread {
   std::size_t count = 0;
 };
 
-std::string truth_of(const EvaluateOptions& options, const std::string& input) {
-  if (!options.truth.empty()) return options.truth;
+/// One path, or of a chain that of each clip.
+std::vector<std::string> truths_of(const EvaluateOptions& options, const std::string& input) {
+  if (!options.truth.empty()) return {options.truth};
   if (!is_run_folder(input))
     throw UserError("hsi4d evaluate: " + input +
                     ": --truth says what it is compared with: a dataset of hsi4d synth, or a motion");
-  const std::string truth = truth_of_run(input);
-  if (truth.empty())
+  std::vector<std::string> truths = truths_of_run(input);
+  if (truths.empty())
     throw UserError("hsi4d evaluate: " + input +
-                    ": the run's config names no truth that is there; --truth says what it is compared with");
-  return truth;
+                    ": the run's config names no truth that is there (of a chain: of each clip); --truth says what it "
+                    "is compared with");
+  return truths;
 }
 
 /// The skeleton of an avatar; the motions are moved to stand on it.
@@ -75,13 +78,13 @@ std::string avatar_for(const EvaluateOptions& options, const std::string& input,
 }
 
 Evaluation evaluated(const EvaluateOptions& options, const std::string& input) {
-  const std::string truth_path = truth_of(options, input);
-  Track estimate = read_track(input, {options.from_rate, options.person}), truth = read_track(truth_path);
-  const std::string avatar = avatar_for(options, input, truth_path);
+  const std::vector<std::string> truths = truths_of(options, input);
+  Track estimate = read_track(input, {options.from_rate, options.person}), truth = read_joined_tracks(truths);
+  const std::string avatar = avatar_for(options, input, truths.front());
   const RestSkeleton estimate_body = put_on_body(options, avatar, estimate),
                      truth_body = put_on_body(options, avatar, truth);
   const AlignedTracks tracks = aligned(estimate, estimate_body, truth, truth_body);
-  Evaluation result{input, truth_path, std::ssize(tracks.truth), tracks.frame_rate, {}, {}};
+  Evaluation result{input, joined(truths), std::ssize(tracks.truth), tracks.frame_rate, {}, {}};
   result.values = sequence_summary(tracks.estimate, tracks.truth, tracks.frame_rate);
   result.per_frame = sequence_errors(tracks.estimate, tracks.truth);
   for (const auto& [name, value] : result.values) {

@@ -85,11 +85,9 @@ std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, co
   RunConfig config = asked;
   const std::string identity = resolved_config(config, descriptions_of(losses)), sources = sources_plan(config);
   if (!sources.empty()) return plan_without_clip(config, identity, folder, resume, sources);
-  const Clip clip = read_clip(config.data);
+  const Clip clip = read_run_clip(config, losses);
   if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
-  check_start(config.start, clip);
-  check_first_view(clip, config.data.camera.string());
-  check_frames(config.data, clip, has_loss(config, "center"));
+  check_run_clip(config, clip);
   std::string text = folder_plan(config, identity, losses, clip, folder, resume);
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
           std::to_string(clip.camera.height) + ", scene of " + count_text(clip.scene.count(), "Gaussian") +

@@ -99,3 +99,21 @@ TEST_CASE("threads may log at the same time", "[parallel]") {
   }
   CHECK(seen.size() == 1000);
 }
+
+TEST_CASE("warnings go once to each sink as long as that is asked for") {
+  std::vector<std::string> first, second;
+  const LogSink one = log_to([&first](LogLevel, std::string_view message) { first.emplace_back(message); });
+  {
+    const WarningsOnce once;
+    log_warning("a");
+    log_warning("a");
+    log_info("i");
+    log_info("i");
+    const LogSink two = log_to([&second](LogLevel, std::string_view message) { second.emplace_back(message); });
+    log_warning("a");
+    log_warning("b");
+  }
+  log_warning("a");
+  CHECK(first == std::vector<std::string>{"a", "i", "i", "b", "a"});
+  CHECK(second == std::vector<std::string>{"a", "b"});
+}

@@ -107,6 +107,39 @@ TEST_CASE("durations read well") {
   CHECK(duration_text(std::numeric_limits<double>::infinity()) == "?");
 }
 
+TEST_CASE("parts of a value stand behind it, as many as fit") {
+  const std::vector<ProgressPart> parts = {{"photometric", 0.020123}, {"center", 0.0012}, {"mask", 3}};
+  ProgressState state;
+  state.task = "x";
+  state.done = 1;
+  state.total = 4;
+  state.value_name = "loss";
+  state.value = 0.0216;
+  state.parts = parts;
+  state.seconds_left = 3;
+  CHECK(progress_line(state) == "x 1/4, 25%, loss 0.0216 (photometric 0.0201, center 0.0012, mask 3), 3 s left");
+  const std::string two = "x 1/4, 25%, loss 0.0216 (photometric 0.0201, center 0.0012, …), 3 s left";
+  CHECK(progress_bar(state, 73) == two);
+  CHECK(progress_bar(state, 65) == "x 1/4, 25%, loss 0.0216 (photometric 0.0201, …), 3 s left");
+  CHECK(progress_bar(state, 40) == "x 1/4, 25%, loss 0.0216, 3 s left");
+  CHECK(progress_bar(state, 10) == "x 1/4, 25%");
+}
+
+TEST_CASE("parts are those of the step that is reported, and the end has none") {
+  now = 0;
+  std::vector<Shown> shown;
+  Progress progress("x", 3, keep_in(shown), 1.0, fake_clock);
+  for (int i = 1; i <= 2; ++i) {
+    now += 2;
+    progress.step_with("loss", i, std::vector<ProgressPart>{{"a", i - 0.5}});
+  }
+  progress.finish();
+  REQUIRE(shown.size() == 3);
+  CHECK_THAT(shown[0].line, Catch::Matchers::Contains("loss 1 (a 0.5)"));
+  CHECK_THAT(shown[1].line, Catch::Matchers::Contains("loss 2 (a 1.5)"));
+  CHECK_THAT(shown[2].line, Catch::Matchers::Contains("loss 2, took"));
+}
+
 TEST_CASE("lines and bars hold what fits") {
   ProgressState state;
   state.task = "interaction";

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <catch2/catch.hpp>
 
 #include "body/motion_io.h"
 #include "core/camera_file.h"
 #include "core/check.h"
+#include "core/log.h"
 #include "pipelines/chain_report.h"
 #include "pipelines/state.h"
 #include "tests/pipelines/tiny_run.h"
@@ -209,6 +211,76 @@ TEST_CASE("a chain that was stopped anywhere and resumed has the bits of one tha
     check_same_chains("run", "whole");
     fs::remove_all("run");
   }
+}
+
+TEST_CASE("a chain does not go on with a clip that is done of other frames", "[run][chain]") {
+  const TemporaryFolder here;
+  fs::copy(TinyChain::folder(), "data", fs::copy_options::recursive);
+  const RunConfig config =
+      load_run_config("data/config.json", {"stages.camera.iterations=1", "stages.interaction.iterations=1"},
+                      descriptions_of(loss_terms()), ConfigUse::kRun);
+  int count = 0;
+  CHECK_THROWS_AS(carry_out_tiny_chain(config, "run", 1, false, [&] { return ++count == 12; }), Interrupted);
+  CHECK(finished_clips(config, "run", loss_terms()) == 1);
+  fs::copy_file("data/clips/clip1/frames/0001.png", "data/clips/clip1/frames/0002.png",
+                fs::copy_options::overwrite_existing);
+  const std::string message =
+      "clip 1 of 2, clip1: " + fs::absolute("data/clips/clip1/frames/0002.png").string() +
+      ": is not what the run began with (frames/0002.png)\nrun/clips/clip1/checkpoint/progress.npz: goes on with the "
+      "inputs as they were; without it the run begins anew";
+  CHECK_THROWS_MATCHES(finished_clips(config, "run", loss_terms()), DataError, Message(message));
+  CHECK_THROWS_MATCHES(carry_out_tiny_chain(config, "run", 1, true), DataError, Message(message));
+  fs::remove("run/clips/clip1/checkpoint/progress.npz");
+  CHECK(finished_clips(config, "run", loss_terms()) == 0);
+  carry_out_tiny_chain(config, "run", 1, true);
+  CHECK(file_text("run/clips/clip1/frames/0002_target.png") == file_text("run/clips/clip1/frames/0001_target.png"));
+}
+
+TEST_CASE("warnings of a chain's inputs are told once, and are in the log of their clip", "[run][chain]") {
+  const TemporaryFolder here;
+  fs::copy(TinyChain::folder(), "data", fs::copy_options::recursive);
+  fs::remove("data/clips/clip2/masks/human/0001.png");
+  std::vector<std::string> told;
+  const LogSink sink = log_to([&told](LogLevel level, std::string_view text) {
+    if (level == LogLevel::kWarning) told.emplace_back(text);
+  });
+  carry_out_tiny_chain(
+      load_run_config("data/config.json", {"stages.camera.iterations=1", "stages.interaction.iterations=1"},
+                      descriptions_of(loss_terms()), ConfigUse::kRun),
+      "run");
+  const auto of_mask = [](const std::string& text) {
+    return text.find("has no mask for 1 of 3 frames") != std::string::npos;
+  };
+  REQUIRE(std::count_if(told.begin(), told.end(), of_mask) == 1);
+  CHECK(std::set<std::string>(told.begin(), told.end()).size() == told.size());
+  CHECK_THAT(file_text("run/clips/clip2/log.txt"), Contains(*std::find_if(told.begin(), told.end(), of_mask)));
+}
+
+TEST_CASE("evaluate knows the truth of a whole chain", "[run][chain]") {
+  const TemporaryFolder here;
+  carry_out_tiny_chain(chain_config({"stages.camera.iterations=1", "stages.interaction.iterations=2"}), "run");
+  const ProgramResult result = run_hsi4d({"evaluate", "run", "--json", "e.json"});
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  const nlohmann::json errors = json_of("e.json")["results"][0], summary = json_of("run/summary.json");
+  CHECK(errors["frames"] == kAllFrames);
+  for (const char* name : {"mpjpe_mm", "world_mpjpe_mm", "object_translation_cm", "camera_translation_cm"}) {
+    INFO(name);
+    REQUIRE(errors.contains(name));
+    CHECK(errors[name].get<double>() == Approx(summary["metrics"].back()[name].get<double>()).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("starts that were chosen are counted over all clips", "[chain]") {
+  std::vector<ClipSummary> clips(3);
+  for (ClipSummary& clip : clips) clip.summary.frames = 2;
+  clips[0].summary.start = {0.5, {{"objects", {{"previous", 1}, {"estimate", 0}, {"velocity", 2}}}}};
+  clips[2].summary.start = {0.25, {{"objects", {{"previous", 3}, {"estimate", 1}, {"velocity", 0}}}}};
+  const StartSummary all = joined_summary("all", clips).start;
+  CHECK(all.seconds == 0.75);
+  REQUIRE(all.parts.size() == 1);
+  CHECK(all.parts[0].begun ==
+        std::vector<std::pair<std::string, Index>>{{"previous", 4}, {"estimate", 1}, {"velocity", 2}});
 }
 
 TEST_CASE("shares of the gradient are means over the evaluations of all clips", "[chain]") {

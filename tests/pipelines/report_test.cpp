@@ -1,6 +1,7 @@
 #include "pipelines/report.h"
 
 #include <algorithm>
+#include <fstream>
 #include <limits>
 #include <set>
 
@@ -201,6 +202,26 @@ TEST_CASE("a report has every section, well formed, and asks for nothing from ou
                             "<td>TRUMANS 0.046, LINGO 0.058</td>"));
   CHECK_THAT(page, Contains("contact ↑</th><td>dynamic</td><td class=\"own\">0.750</td><td>0.835</td>"
                             "<td>CHOIS 0.687, LINGO 0.699</td>"));
+}
+
+TEST_CASE("a report shows shares of the gradient and the time of chosen starts where there are any") {
+  const TemporaryFolder here;
+  make_run("a", "a walk");
+  CHECK_FALSE(ids_of(report_html("a")).contains("shares"));
+  RunSummary summary = summary_named("a walk");
+  summary.metrics[1].gradient_shares = {{"transl", "photometric", 0.75, 0.98, 4},
+                                        {"body_pose", "pose_prior", 0.5, -0.25, 4}};
+  summary.start = {1.5, {{"objects", {{"previous", 1}, {"estimate", 0}, {"velocity", 1}}}}};
+  std::ofstream("a/summary.json") << summary_json(summary);
+  const std::string page = report_html("a");
+  CHECK(tag_fault(page) == "");
+  CHECK_THAT(page,
+             Contains("<h3>interaction</h3><table>\n<thead><tr><th>group</th><th>photometric</th><th>pose prior</th>"
+                      "</tr></thead>\n<tbody>\n<tr><th scope=\"row\">transl</th><td>75.0 % (0.98)</td>"
+                      "<td class=\"none\">–</td></tr>\n<tr><th scope=\"row\">body pose</th>"
+                      "<td class=\"none\">–</td><td>50.0 % (-0.25)</td></tr>\n</tbody></table>"));
+  CHECK_THAT(page, Contains("</span>start</th><td>1.50</td><td>7.5 %</td>") &&
+                       Contains("</span>other</th><td>4.50</td><td>22.5 %</td>"));
 }
 
 TEST_CASE("a report opens on the middle frame") {

@@ -60,6 +60,8 @@ RunProgress random_progress(const Clip& clip) {
   progress.inputs = "cbf29ce484222325 /data/scene\n- masks/human/0001.png\n";
   progress.covered(0, 3, 4) = 1;
   progress.seconds = 12.345;
+  progress.start.frames[1] = {1, 0, 2};
+  progress.start.seconds = 0.125;
   return progress;
 }
 

@@ -21,6 +21,7 @@ RunSummary small_summary() {
                      {"interaction", 10, 600, {{"mpjpe_mm", 20.04}, {"camera_translation_cm", 0.125}, {"ssim", 0.9}}}};
   summary.baselines = {{"start", {{"mpjpe_mm", 60}, {"ssim", 0.5}}, {{1, {{"mpjpe_mm", 50}}}, {2, {{"mpjpe_mm", 70}}}}},
                        {"copy_frame_0", {{"mpjpe_mm", 20.01}}, {}}};
+  summary.start = {0.25, {{"objects", {{"previous", 3}, {"estimate", 0}, {"velocity", 4}}}}};
   summary.per_frame = {{1, {{"mpjpe_mm", 10}}}, {2, {{"mpjpe_mm", 30.1}}}};
   return summary;
 }
@@ -36,6 +37,10 @@ TEST_CASE("a summary reads back as it was written") {
   REQUIRE(back.metrics.size() == 2);
   CHECK(back.metrics[0].iterations == 60);
   CHECK(back.metrics[0].values == MetricValues{{"camera_translation_cm", 0.125}, {"tiles", 4096}});
+  CHECK(back.start.seconds == 0.25);
+  REQUIRE(back.start.parts.size() == 1);
+  CHECK(back.start.parts[0].begun ==
+        std::vector<std::pair<std::string, Index>>{{"previous", 3}, {"estimate", 0}, {"velocity", 4}});
   REQUIRE(back.baselines.size() == 2);
   CHECK(back.baselines[0].per_frame.size() == 2);
   CHECK(*find_metric(back.per_frame[1].values, "mpjpe_mm") == 30.1);

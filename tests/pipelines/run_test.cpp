@@ -14,6 +14,7 @@
 #include "pipelines/cli/run_command.h"
 #include "pipelines/state.h"
 #include "tests/pipelines/tiny_run.h"
+#include "tests/support/procedural_file.h"
 #include "tests/support/program.h"
 
 using namespace hsi4d;
@@ -84,15 +85,10 @@ double number_at(const nlohmann::json& object, const char* name) {
 
 fs::path shipped_configs() { return fs::path(HSI4D_SOURCE_DIR) / "configs"; }
 
-/// Makes the dataset that a shipped config describes, but for its size, and runs the config on it, or on the tiny one,
-/// each stage for two iterations.
-/// @return  whether it has stages: one without is a base for others, or settings of a render or dataset, and runs with
-///          those of a tiny one
-bool check_shipped_config(const fs::path& file, const std::string& folder, bool on_its_own) {
-  INFO(file);
-  RunConfig config = load_run_config(file, {}, descriptions_of(loss_terms()));
-  const bool has_stages = !config.stages.empty();
-  if (!has_stages) config.stages = tiny_config().stages;
+/// Makes the dataset that a config describes, but for its size, and runs the config on it, or on the tiny one, each
+/// stage for two iterations.
+void check_small_run(RunConfig config, const std::string& folder, bool on_its_own) {
+  INFO(folder);
   for (auto& [stage, settings] : config.stages) {
     settings.iterations = 2;
     for (auto& [group, moved] : settings.optimize) moved.from = 0;  // as later iterations would be
@@ -103,13 +99,24 @@ bool check_shipped_config(const fs::path& file, const std::string& folder, bool 
   config.synthetic.scene_gaussians = kFewestSceneGaussians;
   config.synthetic.avatar_gaussians = 300;
   config.synthetic.object_gaussians = kFewestObjectGaussians;
-  write_dataset(config.synthetic, video_render_settings(), folder + "-dataset");
+  write_dataset(config.synthetic, video_render_settings(), folder + "-dataset", {}, ConfigValue::make_object(),
+                config.body);
   CHECK(fs::exists(folder + "-dataset/truth/motion.npz"));
   config.data = dataset_inputs(on_its_own ? fs::path(folder + "-dataset") : TinyDataset::folder());
   const RunSummary summary = carry_out_tiny(config, folder);
   CHECK(summary.metrics.size() == config.stages.size());
   CHECK(number_in(summary.metrics.back().values, "psnr_db") > 10);
   CHECK(json_of(folder + "/status.json")["state"] == "done");
+}
+
+/// Runs a shipped config as check_small_run does.
+/// @return  whether it has stages: one without is a base for others, or settings of a render or dataset, and runs with
+///          those of a tiny one
+bool check_shipped_config(const fs::path& file, const std::string& folder, bool on_its_own) {
+  RunConfig config = load_run_config(file, {}, descriptions_of(loss_terms()));
+  const bool has_stages = !config.stages.empty();
+  if (!has_stages) config.stages = tiny_config().stages;
+  check_small_run(config, folder, on_its_own);
   return has_stages;
 }
 
@@ -377,7 +384,7 @@ TEST_CASE("every shipped config runs", "[run]") {
     const std::string stem = fs::path(name).stem().string();
     (check_shipped_config(shipped_configs() / name, stem, false) ? with_stages : without).insert(stem);
   }
-  CHECK(with_stages == std::set<std::string>{"best", "demo", "demo_quick", "fit_first_frame", "paper"});
+  CHECK(with_stages == std::set<std::string>{"best", "demo", "demo_quick", "fit_first_frame", "paper", "paper_static"});
   CHECK(without == std::set<std::string>{"accurate", "compare_gsplat", "default", "synthetic"});
 }
 
@@ -390,6 +397,71 @@ TEST_CASE("every shipped config of a generated dataset runs", "[run]") {
     if (check_shipped_config(shipped_configs() / "synthetic" / name, stem, true)) with_stages.insert(stem);
   }
   CHECK(with_stages == std::set<std::string>{"alone", "chain", "disturbed", "faults", "full_size", "table", "walk"});
+}
+
+TEST_CASE("every shipped clip of the accuracy table runs", "[run][release]") {
+  const TemporaryFolder here;
+  for (const std::string& name : names_in(shipped_configs() / "synthetic" / "clips")) {
+    const fs::path file = shipped_configs() / "synthetic" / "clips" / name;
+    RunConfig config = load_run_config(file, {}, descriptions_of(loss_terms()));
+    config.stages = tiny_config().stages;  // theirs come from another file, which has its test above
+    check_small_run(config, fs::path(name).stem().string(), true);
+  }
+}
+
+TEST_CASE("the shipped example of real Gaussians runs with others in their places", "[run]") {
+  const TemporaryFolder here;
+  fs::create_directories("tree/runs/robot");
+  fs::copy(shipped_configs(), "tree/configs", fs::copy_options::recursive);
+  fs::create_directories("shared/data/bodies");
+  fs::copy_file(fs::path(HSI4D_SOURCE_DIR) / "tests/assets/playbot_ground_crop.ply", "tree/runs/robot/ground.ply");
+  fs::copy_file(TinyDataset::folder() / "objects" / (kTinyObject + ".ply"), "tree/runs/robot/robot.ply");
+  procedural_file().write("shared/data/bodies/makehuman_smplx_layout.npz");
+  RunConfig config =
+      load_run_config("tree/configs/examples/robot.json", {"body.betas=0"}, descriptions_of(loss_terms()));
+  CHECK(fs::exists(config.synthetic.scene_file));
+  CHECK(fs::exists(config.synthetic.object_file));
+  CHECK(config.body.kind == BodyKind::kSmplx);
+  check_small_run(config, "robot", true);
+}
+
+TEST_CASE("every shipped config has a test") {
+  std::set<std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(shipped_configs())) {
+    const fs::path place = fs::relative(entry.path(), shipped_configs());
+    if (entry.is_regular_file() && place.has_parent_path()) files.insert(place.generic_string());
+  }
+  // Those at the top, of synthetic/ and of synthetic/clips/ are looked for by the tests above, those of sources/ by
+  // sources_test.cpp, and each of synthetic/ by synthetic_test.cpp too.
+  std::erase_if(files, [](const std::string& file) {
+    return file.starts_with("synthetic/") || (file.starts_with("sources/") && file.ends_with(".json"));
+  });
+  CHECK(files == std::set<std::string>{"avatar/fit.json", "avatar/views.json",  // avatar_fit_test.cpp
+                                       "examples/robot.json",                   // above
+                                       "sources/README.md"});
+}
+
+TEST_CASE("the whole demo is as accurate as the project promises", "[full][demo]") {
+  const TemporaryFolder here;
+  const ProgramResult demo = run_hsi4d({"demo", "--quiet", "--out", "demo"});
+  INFO(demo.err);
+  INFO(demo.out);
+  REQUIRE(demo.status == 0);
+  const nlohmann::json config = json_of("demo/run/config.resolved.json"), summary = json_of("demo/run/summary.json");
+  CHECK(config["synthetic"]["size_px"] == 512);
+  CHECK(summary["frames"] == 16);
+  REQUIRE(summary["metrics"].size() == 3);
+  const nlohmann::json &interaction = summary["metrics"][1], &last = summary["metrics"][2];
+  CHECK(last["stage"] == "refinement");
+  CHECK(number_at(last, "mpjpe_mm") <= 20);
+  CHECK(number_at(last, "world_mpjpe_mm") <= 50);
+  CHECK(number_at(last, "object_translation_cm") <= 1.5);
+  CHECK(number_at(last, "object_rotation_deg") <= 2);
+  CHECK(number_at(last, "camera_rotation_deg") <= 0.15);
+  CHECK(number_at(last, "camera_translation_cm") <= 1);
+  CHECK(number_at(last, "psnr_foreground_db") >= 26);
+  CHECK(number_at(last, "world_mpjpe_mm") <= 1.02 * number_at(interaction, "world_mpjpe_mm"));
+  CHECK(number_at(last, "jitter") < number_at(interaction, "jitter"));
 }
 
 TEST_CASE("the demo halves the errors of what it is given, and tells them", "[full][demo]") {

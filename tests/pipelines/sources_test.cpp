@@ -2,13 +2,16 @@
 #include "pipelines/sources.h"
 
 #include <algorithm>
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
 #include "core/image_io.h"
 #include "optim/metrics.h"
+#include "pipelines/source_lock.h"
 #include "tests/pipelines/tiny_run.h"
 #include "tests/support/program.h"
 #include "tests/support/running_program.h"
@@ -96,6 +99,16 @@ fs::path made_file(const std::string& start, const std::string& end) {
 }
 
 using Names = std::vector<std::string>;
+
+/// Waits until something has come; false when that takes more than ten seconds.
+template <class F>
+bool comes(const F& moment) {
+  for (int i = 0; i < 400; ++i) {
+    if (moment()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(25));
+  }
+  return false;
+}
 
 const std::string kPlaces = "[\\s\\S]*";  // of folders and hashes, in a message
 
@@ -346,4 +359,63 @@ TEST_CASE("Ctrl-C ends the program that is run, and leaves nothing", "[run]") {
   CHECK(made().empty());
   CHECK_FALSE(fs::exists("run"));
   CHECK(kill(std::stoi(file_text("pid.txt")), 0) != 0);
+}
+
+TEST_CASE("two runs that want the same video make it once", "[run]") {
+  const Workshop workshop;
+  const std::string data = TinyDataset::folder().string();
+  Workshop::script(
+      "film", "echo \"$2\" >> film.txt; while ! test -e go; do sleep 0.05; done; cp -r " + data + "/frames \"$3\"");
+  RunningProgram first({"run", "config.json", "--threads", "1", "--out", "first"});
+  REQUIRE(comes([] { return !lines_of("film.txt").empty(); }));
+  RunningProgram second({"run", "config.json", "--threads", "1", "--out", "second"});
+  CHECK(comes([&second] { return second.text().find("another process makes it") != std::string::npos; }));
+  std::ofstream("go") << "";
+  CHECK(comes([&] { return !first.is_running() && !second.is_running(); }));
+  CHECK(first.result() == 0);
+  CHECK(second.result() == 0);
+  CHECK(lines_of("film.txt").size() == 1);
+  CHECK(lines_of("mask.txt").size() == 1);
+  CHECK(made() == Names{"masks-KEY", "masks-KEY.json", "video-KEY", "video-KEY.first_frame.png", "video-KEY.json"});
+}
+
+TEST_CASE("a killed run leaves a work folder that the next one removes", "[run]") {
+  const Workshop workshop;
+  Workshop::script("film", "echo $$ > pid.txt; exec sleep 60");
+  RunningProgram program({"run", "config.json", "--out", "run"});
+  const auto is_begun = [] { return fs::exists("pid.txt") && !file_text("pid.txt").empty(); };
+  REQUIRE(program.signal_at(SIGKILL, is_begun));
+  kill(std::stoi(file_text("pid.txt")), SIGKILL);  // the generator goes on without its caller
+  const auto work_folders = [] {
+    const Names names = made();
+    return std::count_if(names.begin(), names.end(), [](const std::string& name) { return name.ends_with(".tmp"); });
+  };
+  CHECK(work_folders() == 1);
+  fs::create_directories("generated/video-0123456789abcdef.mp4.1.tmp");  // of another prompt, process 1 is alive
+  fs::create_directories("generated/mine.1.tmp");
+  Workshop::script("film", "cp -r " + TinyDataset::folder().string() + "/frames \"$3\"");
+  CHECK(Workshop::run("run").status == 0);
+  CHECK(made() ==
+        Names{"masks-KEY", "masks-KEY.json", "mine.1.tmp", "video-KEY", "video-KEY.first_frame.png", "video-KEY.json"});
+}
+
+TEST_CASE("what is being made elsewhere is not swept, and what has its record alone is not there", "[run]") {
+  const Workshop workshop;
+  const fs::path output = "generated/video-0123456789abcdef.mp4";
+  {
+    const SourceLock lock(output, {});
+    fs::create_directories(output.string() + ".1.tmp");
+    sweep_work_folders("generated");
+    CHECK(fs::exists(output.string() + ".1.tmp"));
+    CHECK_THROWS_AS(SourceLock(output, [] { return true; }), Interrupted);
+  }
+  sweep_work_folders("generated");
+  CHECK(fs::is_empty("generated"));
+
+  // As a kill leaves it between the record and the video: the video is made. After the video nothing is made again.
+  REQUIRE(Workshop::run("run").status == 0);
+  fs::remove_all("generated" / made_file("video", ".json").stem());
+  CHECK(Workshop::run("again").status == 0);
+  CHECK(lines_of("film.txt").size() == 2);
+  CHECK(lines_of("mask.txt").size() == 1);
 }

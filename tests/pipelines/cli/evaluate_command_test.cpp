@@ -105,9 +105,9 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
     CHECK(refused({"one"}) == "one: the run has no motion.npz; it has not come to its end\n");
     write_changed("two/config.resolved.json", "two/config.resolved.json",
                   [](auto& tree) { tree["data"]["truth"] = ""; });
-    CHECK(
-        refused({"two"}) ==
-        "hsi4d evaluate: two: the run's config names no truth that is there; --truth says what it is compared with\n");
+    CHECK(refused({"two"}) ==
+          "hsi4d evaluate: two: the run's config names no truth that is there (of a chain: of each clip); --truth says "
+          "what it is compared with\n");
     CHECK(evaluated({"two", "--truth", data("truth")})["results"][0]["mpjpe_mm"] == b);
   }
 }
