@@ -39,11 +39,12 @@ struct IterationReport {
 /// Called after every iteration. May throw to end the stage: the parameters then stay as they are.
 using StageCallback = std::function<void(const IterationReport&)>;
 
-/// An object that a term left out in some evaluations of a stage.
+/// An object, or the human, that a term left out in some evaluations of a stage.
 struct LeftOutObject {
   std::string term, reason;
   Index object = 0;
-  Index evaluations = 0;  ///< of iterations + 1
+  Index evaluations = 0;                       ///< of iterations + 1
+  bool of_human = false, is_of_masks = false;  ///< as LeftOut has them
 };
 
 /// What a stage has done.
@@ -55,6 +56,7 @@ struct StageResult {
   Index rollbacks = 0;
   double seconds = 0;
   std::vector<LeftOutObject> left_out;  ///< by term and object, in order
+  std::vector<LossNote> notes;          ///< in the order of the terms
 };
 
 /// What the settings do not say.

@@ -112,7 +112,7 @@ RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses
   }
   check_start(config.start, clip);
   check_first_view(clip, config.data.camera.string());
-  check_frames(config.data, clip, has_loss(config, "center"));
+  check_frames(config.data, clip, losses_over_masks(config));
   identity.seed = config.seed;
   const int threads = options.threads > 0 ? options.threads : config.threads;
   identity.threads = threads > 0 ? threads : thread_count();

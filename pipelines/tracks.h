@@ -44,6 +44,10 @@ Track read_track(const std::string& path, const TrackOptions& options = {});
 /// The avatar that belongs to a run folder (its config's), or to a dataset; empty where there is none.
 std::string avatar_of_track(const std::string& path);
 
+/// The files of a track's objects, in its order, by the config of a run folder or the dataset; none where one of them
+/// is not there.
+std::vector<std::string> object_files_of_track(const std::string& path, const Track& track);
+
 /// The truth that the config of a run folder names; empty where it names none, or that is not there.
 std::string truth_of_run(const std::string& path);
 
@@ -57,6 +61,7 @@ struct RestSkeleton {
 struct AlignedTracks {
   double frame_rate = 0;  ///< frames a second of both
   std::vector<FrameState> estimate, truth;
+  std::vector<SceneState> states;  ///< the estimate's bodies and all of its objects; no cameras
 };
 
 /// Both tracks at the frames of the slower one, from the first frame that both have on, as long as both last. Between

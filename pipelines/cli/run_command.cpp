@@ -89,7 +89,7 @@ std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, co
   if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
   check_start(config.start, clip);
   check_first_view(clip, config.data.camera.string());
-  check_frames(config.data, clip, has_loss(config, "center"));
+  check_frames(config.data, clip, losses_over_masks(config));
   std::string text = folder_plan(config, identity, losses, clip, folder, resume);
   text += "  " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
           std::to_string(clip.camera.height) + ", scene of " + count_text(clip.scene.count(), "Gaussian") +
