@@ -1,8 +1,11 @@
 // What a config needs to know of a loss term: its name, one line about it, and its own settings.
 #pragma once
 
+#include <algorithm>
 #include <any>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <typeinfo>
 #include <utility>
 #include <vector>
@@ -19,13 +22,16 @@ enum class LossNeeds { kImages, kBody, kObjects, kBodyInImage };
 /// What a term reads once from its settings; see LossDescription::prepare.
 using PrepareLoss = std::any (*)(const std::any& settings);
 
+/// The inputs made on demand (kReads… in optim/loss_term.h) that a term reads with these settings.
+using LossReads = std::function<std::vector<std::string>(const std::any& settings)>;
+
 /// A loss term as configs and `hsi4d list losses` see it. Made by describe_loss.
 struct LossDescription {
   std::string name;     ///< the key in a stage's `losses`
   std::string summary;  ///< one line
   std::any defaults;    ///< its own settings before anything is read; empty for a term that has none
   void (*describe_settings)(ConfigFields&, std::any&) = nullptr;
-  std::vector<std::string> reads = {};  ///< inputs that are made on demand (LossTerm reading())
+  LossReads reads = {};           ///< made by reading() of optim/loss_term.h. Null: no such input
   PrepareLoss prepare = nullptr;  ///< reads the files that the settings name, say: once, before a run writes anything.
                                   ///< What it returns is recorded from in place of the settings. Null: nothing to do
   double weight = 1;              ///< the default
@@ -64,6 +70,7 @@ struct LossSettings {
   PrepareLoss prepare = nullptr;
   LossNeeds needs = LossNeeds::kImages;
   std::any prepared;  ///< of `own`, by prepare_losses (optim/stage_settings.h); empty before
+  LossReads reads = {};
 
   /// The term's own settings. Throws InternalError when the term has others than `Settings`.
   template <class Settings>
@@ -75,9 +82,16 @@ struct LossSettings {
   }
 };
 
+/// Whether a term with these settings is on and reads the input, one that is made on demand.
+inline bool reads_input(const LossSettings& loss, std::string_view input) {
+  if (loss.weight == 0 || !loss.reads) return false;
+  const std::vector<std::string> inputs = loss.reads(loss.own);
+  return std::find(inputs.begin(), inputs.end(), input) != inputs.end();
+}
+
 /// The settings of a term before anything is read.
 inline LossSettings default_settings(const LossDescription& loss) {
-  return {loss.weight, loss.defaults, loss.describe_settings, loss.prepare, loss.needs, {}};
+  return {loss.weight, loss.defaults, loss.describe_settings, loss.prepare, loss.needs, {}, loss.reads};
 }
 
 /// Describes the weight and the term's own settings.

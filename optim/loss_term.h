@@ -12,11 +12,19 @@
 
 namespace hsi4d {
 
-/// Objects that a term may leave out of its sum, though its inputs are given.
+/// What a term may leave out of its sum, though its inputs are given: objects, or the human.
 struct LeftOut {
   std::string term, reason;
-  Index objects = 0;
+  Index objects = 0;                              ///< 1 of the human
   std::function<bool(Index object)> is_left_out;  ///< in the tape's last forward run
+  bool of_human = false;
+  bool is_of_masks = false;  ///< it follows from the frame's masks, of which a run warns before it begins
+};
+
+/// What a term tells of what it found when it was recorded.
+struct LossNote {
+  std::string term, text;  ///< "hands near an object in 3 of 9 frames"
+  bool is_idle = false;    ///< the term moves nothing in this stage
 };
 
 /// What a loss term may read, by name. A Var without a tape stands for what the stage does not have; `given` asks.
@@ -27,15 +35,18 @@ struct LossInputs {
   Var<S> target;    ///< [3,H,W] the video's frame
   Var<S> weight;    ///< [1,H,W] how much a pixel counts, 0 to 1; not given where all do
 
-  Var<S> object_opacity;  ///< [O,H,W] rendered opacity Σ T α of each object's Gaussians, occluders included, 0 to 1
+  Var<S> object_opacity;  ///< [O,H,W] rendered opacity Σ T α of each object's Gaussians, occluders included, 0 to 1;
+                          ///< only for terms that `read` it, as the next three
   Var<S> object_center_target;  ///< [O,3] centre of each object in the frame: x px, y px (pixel centres at +0.5), and
                                 ///< 1, or 0 where the frame shows none of it
+  Var<S> object_masks;          ///< [O,H,W] what of the frame shows each object, 0 to 1
+  Var<S> object_seen;           ///< [O,1,1] 1, or 0 where the frame shows none of the object
   Var<S> object_depth;          ///< [O,1] mean camera z of each object's Gaussian centres, metres
   Var<S> object_depth_target;   ///< [O,1] what it was in the clip's first frame, metres
 
-  Var<S> human_opacity;  ///< [1,H,W] Σ T α of the human's Gaussians; only for terms that `read` it
-  Var<S> human_mask;     ///< [1,H,W] what of the frame shows the human, 0 to 1; with human_opacity
-  Var<S> object_masks;   ///< [O,H,W] the same of each object; with human_opacity
+  Var<S> human_opacity;  ///< [1,H,W] Σ T α of the human's Gaussians; only for terms that `read` it, as the next two
+  Var<S> human_mask;     ///< [1,H,W] what of the frame shows the human, 0 to 1
+  Var<S> human_seen;     ///< [1,1] 1, or 0 where the frame shows none of the human
 
   /// The body over the F frames that the stage sees: those before, which stand still, and those that it moves. A stage
   /// of one frame sees up to three before it, one of the whole sequence frame 0.
@@ -49,6 +60,7 @@ struct LossInputs {
   std::function<Var<S>(const std::vector<ObjectPoint>& points)> object_points;
 
   std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
+  std::vector<LossNote>* notes = nullptr;    ///< where it tells what it found; null: nobody asks
 
   static bool given(Var<S> input) { return input.tape != nullptr; }
 };
@@ -76,12 +88,24 @@ struct LossTerm {
   }
 };
 
-/// Inputs that are made only for stages with a term that reads them, as they cost time in every iteration.
+/// Inputs that are made only for stages with a term that reads them: each is a channel of the render, which costs time
+/// in every iteration. What the frame says of the same (masks, centres) comes with them.
 inline constexpr const char* kReadsHumanOpacity = "human_opacity";
+inline constexpr const char* kReadsObjectOpacity = "object_opacity";
 
 /// A term that reads inputs which are made on demand.
 inline LossTerm reading(LossTerm term, std::vector<std::string> inputs) {
-  term.description.reads = std::move(inputs);
+  term.description.reads = [inputs = std::move(inputs)](const std::any&) { return inputs; };
+  return term;
+}
+
+/// One whose settings say which of them it reads.
+/// @param inputs_of  the inputs of a `const Settings&`
+template <class Settings, class F>
+LossTerm reading(LossTerm term, F inputs_of) {
+  term.description.reads = [inputs_of](const std::any& settings) -> std::vector<std::string> {
+    return inputs_of(std::any_cast<const Settings&>(settings));
+  };
   return term;
 }
 

@@ -25,6 +25,7 @@ struct RecordedLoss {
   std::vector<LossValue> values;  // of `terms`
   std::vector<std::string> off;
   std::vector<LeftOut> left_out;
+  std::vector<LossNote> notes;
 };
 
 const LossTerm& term_named(const std::string& name, std::span<const LossTerm> terms, const std::string& stage) {
@@ -49,6 +50,7 @@ RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossT
   RecordedLoss<S> loss;
   LossInputs<S> asking = inputs;
   asking.left_out = &loss.left_out;
+  asking.notes = &loss.notes;
   std::vector<std::string> reasons;
   for (const auto& [name, chosen] : settings.losses) {
     const LossTerm& term = term_named(name, terms, stage);
@@ -161,6 +163,7 @@ class StageRun {
             seconds_since(start),
             times_,
             left_out_objects(),
+            loss_.notes,
             options_.profile ? tape_.statistics() : std::vector<NodeStatistics>()};
   }
 
@@ -239,7 +242,9 @@ class StageRun {
     for (std::size_t k = 0; k < left_out_.size(); ++k) {
       for (std::size_t o = 0; o < left_out_[k].size(); ++o) {
         if (left_out_[k][o] == 0) continue;
-        objects.push_back({loss_.left_out[k].term, loss_.left_out[k].reason, static_cast<Index>(o), left_out_[k][o]});
+        const LeftOut& asked = loss_.left_out[k];
+        objects.push_back(
+            {asked.term, asked.reason, static_cast<Index>(o), left_out_[k][o], asked.of_human, asked.is_of_masks});
       }
     }
     return objects;

@@ -39,11 +39,12 @@ struct IterationReport {
 /// Called after every iteration. May throw to end the stage: the parameters then stay as they are.
 using StageCallback = std::function<void(const IterationReport&)>;
 
-/// An object that a term left out in some evaluations of a stage.
+/// An object, or the human, that a term left out in some evaluations of a stage.
 struct LeftOutObject {
   std::string term, reason;
   Index object = 0;
-  Index evaluations = 0;  ///< of iterations + 1
+  Index evaluations = 0;                       ///< of iterations + 1
+  bool of_human = false, is_of_masks = false;  ///< as LeftOut has them
 };
 
 /// Where the time of a stage went, seconds.
@@ -62,6 +63,7 @@ struct StageResult {
   double seconds = 0;
   StageTimes times;
   std::vector<LeftOutObject> left_out;  ///< by term and object, in order
+  std::vector<LossNote> notes;          ///< in the order of the terms
   std::vector<NodeStatistics> nodes;    ///< of the tape, losses included, with StageOptions::profile
 };
 

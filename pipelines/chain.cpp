@@ -48,7 +48,7 @@ ClipFacts check_clip(const RunConfig& chain, std::size_t index) {
   const Clip clip = make_clip(data, std::move(setup));
   check_start(chain.start, clip);
   if (index == 0) check_first_view(clip, data.camera.string());
-  check_frames(data, clip, has_loss(chain, "center"));
+  check_frames(data, clip, losses_over_masks(chain));
   facts.frames = clip.frames();
   facts.frame_rate = clip.frame_rate;
   facts.avatar = clip.avatar;

@@ -174,6 +174,15 @@ bool shows_something(const Image& mask, double threshold) {
   return false;
 }
 
+/// What hidden masks do to the losses, as the end of a message.
+std::string off_text(const std::vector<std::string>& losses) {
+  std::vector<std::string> quoted;
+  for (const std::string& name : losses) quoted.push_back("\"" + name + "\"");
+  if (quoted.empty()) return "";
+  return (quoted.size() == 1 ? "; the loss " : "; the losses ") + joined(quoted) +
+         (quoted.size() == 1 ? " is" : " are") + " off for it there";
+}
+
 }  // namespace
 
 Clip read_clip(const DataSettings& data) {
@@ -227,7 +236,7 @@ bool fits_camera(const Image& frame, const Camera& camera) {
   return has_size_of(frame, camera) || is_enlarged(frame, camera);
 }
 
-void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
+void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses) {
   std::vector<std::vector<bool>> is_seen(static_cast<std::size_t>(clip.frames()));  // [frame][human, then objects]
   const auto look = [&](Index begin, Index end) {
     for (Index index = begin; index < end; ++index) {
@@ -246,7 +255,7 @@ void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
     look(0, clip.frames());  // videos are decoded in order
   }
   const auto warn_if_hidden = [&](std::size_t mask, const std::string& name, const std::string& what,
-                                  const std::string& effect) {
+                                  const std::vector<std::string>& off) {
     std::vector<Index> hidden;
     for (std::size_t t = 1; t < is_seen.size(); ++t) {  // frame 0 is given
       if (!is_seen[t][mask]) hidden.push_back(static_cast<Index>(t));
@@ -254,12 +263,11 @@ void check_frames(const DataSettings& data, const Clip& clip, bool has_center) {
     if (hidden.empty()) return;
     log_warning((data.masks / name).string() + ": " + what + " is hidden in " +
                 (hidden.size() == 1 ? "frame " : "frames ") + frame_ranges(hidden) +
-                ": no pixel reaches data.mask_threshold" + effect);
+                ": no pixel reaches data.mask_threshold" + off_text(off));
   };
-  warn_if_hidden(0, kHumanMasks, "the human", "");
+  warn_if_hidden(0, kHumanMasks, "the human", losses.human);
   for (std::size_t o = 0; o < clip.objects.size(); ++o)
-    warn_if_hidden(1 + o, clip.objects[o].name, "the object",
-                   has_center ? "; the loss \"center\" is off for it there" : "");
+    warn_if_hidden(1 + o, clip.objects[o].name, "the object", losses.objects);
 }
 
 std::string frame_ranges(const std::vector<Index>& frames) {

@@ -67,11 +67,16 @@ Clip read_clip(const DataSettings& data);
 /// As read_clip, of a scene that is read. data.initial is of no meaning.
 Clip make_clip(const DataSettings& data, SceneSetup setup);
 
+/// Names of loss terms that are off for what a mask shows nothing of.
+struct LossesOverMasks {
+  std::vector<std::string> human, objects;
+};
+
 /// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on.
 /// A human or an object that some masks after frame 0 show nothing of is told in the log, each with its frames. Throws
 /// as read_frame.
-/// @param has_center  the run has the loss `center`, which such masks switch off
-void check_frames(const DataSettings& data, const Clip& clip, bool has_center);
+/// @param losses  those of the run that such masks switch off
+void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses);
 
 /// Whether a frame becomes an image of the camera: as large, or larger and of the same shape but for the rounding of
 /// sizes.

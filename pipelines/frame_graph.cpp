@@ -231,7 +231,8 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
   for (std::size_t p = 0; p < parts.size(); ++p) {
     const bool is_object = p >= first_object && p < first_object + objects_.size();
     const bool is_human = settings_.draw == Draw::kAll && p + 1 == parts.size();
-    if (is_object || (is_human && settings_.human_opacity)) request.groups.emplace_back(row, row + parts[p].count);
+    if ((is_object && settings_.object_opacity) || (is_human && settings_.human_opacity))
+      request.groups.emplace_back(row, row + parts[p].count);
     row += parts[p].count;
   }
   rendered_ = render_parts(parts, request);
@@ -239,17 +240,29 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
   inputs_.target = tape_.constant("target", rendered_.image.shape());
   inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
   if (settings_.draw == Draw::kScene) return;
-  if (!objects_.empty()) record_object_inputs(parts, first_object);
-  if (settings_.human_opacity) record_masks();
+  if (!objects_.empty()) record_object_depths(parts, first_object);
+  if (draws_objects()) record_object_masks();
+  if (settings_.human_opacity) record_human_inputs();
 }
 
 /// Opacities are those of the objects, and last of the human.
 template <class S>
-void FrameGraph<S>::record_masks() {
-  const auto objects = static_cast<Index>(objects_.size());
-  inputs_.human_opacity = objects == 0 ? rendered_.group_opacity : slice_planes(rendered_.group_opacity, objects, 1);
+void FrameGraph<S>::record_human_inputs() {
+  inputs_.human_opacity = draws_objects()
+                              ? slice_planes(rendered_.group_opacity, static_cast<Index>(objects_.size()), 1)
+                              : rendered_.group_opacity;
   inputs_.human_mask = tape_.constant("human_mask", inputs_.human_opacity.shape());
-  if (objects > 0) inputs_.object_masks = tape_.constant("object_masks", inputs_.object_opacity.shape());
+  inputs_.human_seen = tape_.constant("human_seen", kScalarShape);
+}
+
+template <class S>
+void FrameGraph<S>::record_object_masks() {
+  const auto count = static_cast<Index>(objects_.size());
+  inputs_.object_opacity =
+      settings_.human_opacity ? slice_planes(rendered_.group_opacity, 0, count) : rendered_.group_opacity;
+  inputs_.object_center_target = tape_.constant("object_center_target", shape_of(count, 3));
+  inputs_.object_masks = tape_.constant("object_masks", inputs_.object_opacity.shape());
+  inputs_.object_seen = tape_.constant("object_seen", Shape{count, 1, 1, 1});
 }
 
 /// The scene is the first part; it stands still while the camera does.
@@ -271,7 +284,7 @@ void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<Scene
 }
 
 template <class S>
-void FrameGraph<S>::record_object_inputs(const std::vector<Part>& parts, std::size_t first_object) {
+void FrameGraph<S>::record_object_depths(const std::vector<Part>& parts, std::size_t first_object) {
   const auto count = static_cast<Index>(objects_.size());
   std::vector<Var<S>> depths;
   Index row = 0;  // of what moves
@@ -279,10 +292,7 @@ void FrameGraph<S>::record_object_inputs(const std::vector<Part>& parts, std::si
     if (p >= first_object) depths.push_back(mean(slice_rows(rendered_.projected.depths, row, parts[p].count)));
     row += parts[p].count;
   }
-  inputs_.object_opacity =
-      settings_.human_opacity ? slice_planes(rendered_.group_opacity, 0, count) : rendered_.group_opacity;
   inputs_.object_depth = concat_rows<S>(depths);
-  inputs_.object_center_target = tape_.constant("object_center_target", shape_of(count, 3));
   inputs_.object_depth_target = tape_.constant("object_depth_target", shape_of(count, 1));
 }
 
@@ -368,16 +378,25 @@ void FrameGraph<S>::set_targets(const FrameTargets& targets) {
   } else {
     fill(inputs_.weight, S(1));
   }
-  if (inputs_.given(inputs_.human_mask)) write_image(inputs_.human_mask, *targets.human_mask);
+  if (inputs_.given(inputs_.human_mask)) {
+    write_image(inputs_.human_mask, *targets.human_mask);
+    fill(inputs_.human_seen, S(targets.human_seen ? 1 : 0));
+  }
   if (!inputs_.given(inputs_.object_depth)) return;
-  if (inputs_.given(inputs_.object_masks)) write_images(inputs_.object_masks, targets.object_masks);
-  HSI4D_CHECK_EQ(targets.centers.size(), objects_.size());
   HSI4D_CHECK_EQ(targets.depths.size(), objects_.size());
+  write_numbers(tape_, inputs_.object_depth_target, targets.depths.data());
+  if (inputs_.given(inputs_.object_masks)) set_object_masks(targets);
+}
+
+template <class S>
+void FrameGraph<S>::set_object_masks(const FrameTargets& targets) {
+  HSI4D_CHECK_EQ(targets.centers.size(), objects_.size());
+  write_images(inputs_.object_masks, targets.object_masks);
   for (std::size_t o = 0; o < objects_.size(); ++o) {
     S* center = tape_.write(inputs_.object_center_target).row(static_cast<Index>(o));
     for (Index i = 0; i < 3; ++i) center[i] = static_cast<S>(targets.centers[o][i]);
+    tape_.write(inputs_.object_seen).data[o] = center[2];
   }
-  write_numbers(tape_, inputs_.object_depth_target, targets.depths.data());
 }
 
 Vector3<double> mask_center(const Image& mask, double threshold) {

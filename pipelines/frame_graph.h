@@ -34,16 +34,18 @@ struct FrameGraphSettings {
   bool color_pose_gradient = true;      ///< colours of the net have a gradient in the pose
   bool color_camera_gradient = false;   ///< and, by the direction of view, in the camera
   bool human_opacity = false;           ///< the losses read the human's opacity, which costs a channel of the render
+  bool object_opacity = false;          ///< likewise of the objects, a channel each
 };
 
 /// What a frame is compared with.
 struct FrameTargets {
   const Image* image = nullptr;                 ///< [3,H,W]
   const Image* weight = nullptr;                ///< [1,H,W]; null: every pixel counts
-  std::vector<Vector3<double>> centers;         ///< by object: x px, y px, 1 or 0 (none)
+  std::vector<Vector3<double>> centers;         ///< by object: x px, y px, 1 or 0 (none); with object_masks
   std::vector<double> depths;                   ///< by object: mean camera z at the clip's first frame, metres
   const Image* human_mask = nullptr;            ///< [1,H,W] coverage; needed with settings.human_opacity
-  std::vector<const Image*> object_masks = {};  ///< the same by object
+  bool human_seen = true;                       ///< the frame shows some of the human
+  std::vector<const Image*> object_masks = {};  ///< coverage by object; needed with settings.object_opacity
 };
 
 /// Names of the groups of a frame graph, by what it draws.
@@ -103,9 +105,12 @@ class FrameGraph {
   HumanColors<S> record_color_net(const ColorNet& net);
   Var<S> record_rotations(Var<S> parameters) const;
   void record_render(const std::vector<Part>& parts, std::size_t first_object);
-  void record_masks();
+  void record_human_inputs();
   Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
-  void record_object_inputs(const std::vector<Part>& parts, std::size_t first_object);
+  void record_object_depths(const std::vector<Part>& parts, std::size_t first_object);
+  void record_object_masks();
+  void set_object_masks(const FrameTargets& targets);
+  bool draws_objects() const { return settings_.object_opacity && !objects_.empty(); }
   void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
   Vector3<double> read_rotation(Var<S> leaf, Index row) const;
 

@@ -237,6 +237,7 @@ class Reconstruction {
     const StageResult result =
         run_sequence_stage({config_, clip_, losses_, s, observer_.stages}, states, note_iteration);
     warn_of_terms_off(result.off, name, stage);
+    warn_of_idle_terms(result.notes, name);
     folder_.note("all frames, " + stage_text(name, result, begin, clip_));
     return {result.iterations, result.rollbacks, result.seconds};
   }
@@ -273,7 +274,8 @@ class Reconstruction {
     if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1) || stage.over == StageScope::kFirst)
       warn_of_terms_off(result.off, name, stage);
     for (const LeftOutObject& object : result.left_out) {
-      progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
+      if (!object.is_of_masks && !object.of_human)
+        progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
     }
     for (const std::string& group : gradients.still_groups()) progress_.still.push_back({s, frame.index, group});
     folder_.note("frame " + std::to_string(frame.index) + ", " + stage_text(name, result, begin, clip_));
@@ -318,7 +320,8 @@ class Reconstruction {
     totals.tiles += counters.tiles;
     totals.pairs += counters.pairs;
     totals.fragments += counters.fragments;
-    for (const auto& [name, count] : {std::pair{"tiles", counters.tiles},
+    for (const auto& [name, count] : {std::pair{"channels", counters.channels},
+                                      {"tiles", counters.tiles},
                                       {"pairs", counters.pairs},
                                       {"groups", counters.groups},
                                       {"fragments", counters.fragments},

@@ -21,18 +21,14 @@ FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const Colo
           Vector3<double>(config.background.data()),
           colors.net ? &*colors.net : nullptr,
           config.color_net.pose_gradient,
-          config.color_net.camera_gradient,
-          false};
+          config.color_net.camera_gradient};
 }
 
-/// Whether a term that is on reads the human's opacity.
-bool reads_human_opacity(const std::vector<LossTerm>& losses, const StageSettings& stage) {
-  return std::any_of(losses.begin(), losses.end(), [&stage](const LossTerm& term) {
-    const LossSettings* const chosen = find_entry(stage.losses, term.description.name);
-    const std::vector<std::string>& reads = term.description.reads;
-    return chosen != nullptr && chosen->weight != 0 &&
-           std::find(reads.begin(), reads.end(), kReadsHumanOpacity) != reads.end();
-  });
+/// Whether a term that is on reads an input which is made on demand.
+bool some_loss_reads(const StageSettings& stage, const char* input) {
+  return stage.draw == Draw::kAll && std::any_of(stage.losses.begin(), stage.losses.end(), [input](const auto& entry) {
+           return reads_input(entry.second, input);
+         });
 }
 
 /// The frames that terms over the motion see: up to kFramesBefore that are done, and the one at hand.
@@ -64,6 +60,7 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   targets.image = &frame.target;
   targets.weight = task.config.stages[task.stage].second.weight == PixelWeight::kAll ? nullptr : &weight;
   targets.human_mask = &frame.human_mask;
+  targets.human_seen = mask_center(frame.human_mask, task.config.data.mask_threshold)[2] != 0;
   for (const Image& mask : frame.object_masks) {
     targets.object_masks.push_back(&mask);
     targets.centers.push_back(mask_center(mask, task.config.data.mask_threshold));
@@ -85,7 +82,8 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   StageProbe probe(task.watch);
   Tape<S> tape;
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
-  settings.human_opacity = stage.draw == Draw::kAll && reads_human_opacity(task.losses, stage);
+  settings.human_opacity = some_loss_reads(stage, kReadsHumanOpacity);
+  settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
   graph.set_state(state);
   if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));

@@ -101,7 +101,7 @@ Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses)
 void check_run_clip(const RunConfig& config, const Clip& clip) {
   check_start(config.start, clip);
   check_first_view(clip, config.data.camera.string());
-  check_frames(config.data, clip, has_loss(config, "center"));
+  check_frames(config.data, clip, losses_over_masks(config));
 }
 
 RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses, const RunOptions& options) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/config_file.h"
+#include "optim/loss_term.h"
 #include "pipelines/config_fields.h"
 #include "pipelines/config_kind.h"
 #include "pipelines/run_problems.h"
@@ -90,12 +91,19 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
   return with_fields(config, losses, [](const ConfigFields& fields) { return to_json(write_config(fields)); });
 }
 
-bool has_loss(const RunConfig& config, const std::string& name) {
-  return std::any_of(config.stages.begin(), config.stages.end(), [&](const auto& entry) {
-    const StageSettings& stage = entry.second;
-    const LossSettings* const loss = find_entry(stage.losses, name);
-    return stage.draw == Draw::kAll && loss != nullptr && loss->weight != 0;
-  });
+LossesOverMasks losses_over_masks(const RunConfig& config) {
+  const auto reading = [&config](std::initializer_list<std::string> names, const char* input) {
+    std::vector<std::string> found;
+    for (const std::string& name : names) {
+      const bool is_on = std::any_of(config.stages.begin(), config.stages.end(), [&](const auto& entry) {
+        const LossSettings* const loss = find_entry(entry.second.losses, name);
+        return entry.second.draw == Draw::kAll && loss != nullptr && reads_input(*loss, input);
+      });
+      if (is_on) found.push_back(name);
+    }
+    return found;
+  };
+  return {reading({"mask"}, kReadsHumanOpacity), reading({"center", "mask"}, kReadsObjectOpacity)};
 }
 
 namespace {

@@ -12,6 +12,7 @@
 #include "pipelines/body_settings.h"
 #include "pipelines/camera_selection.h"
 #include "pipelines/chain_settings.h"
+#include "pipelines/clip.h"
 #include "pipelines/color_net_settings.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/frame_start.h"
@@ -91,8 +92,9 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
 /// The text of config.resolved.json: every setting, defaults included. Reading it back gives the same config and text.
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses);
 
-/// Whether a stage that draws the objects has the loss, with a weight that is not 0.
-bool has_loss(const RunConfig& config, const std::string& name);
+/// The losses of stages that draw human and objects which empty masks switch off: `center` and `mask`, by their
+/// settings.
+LossesOverMasks losses_over_masks(const RunConfig& config);
 
 /// A tree of a config without what another dataset or machine would change: the files of data, chain and body,
 /// synthetic, threads. Two runs of the same data with equal trees have the same result.

@@ -243,10 +243,12 @@ const std::vector<MetricFacts>& metric_facts() {
       {"psnr_db", "PSNR", "dB", "Peak signal-to-noise ratio, at most 100", 2, 1},
       {"psnr_foreground_db", "PSNR, foreground", "dB", "Peak signal-to-noise ratio of human and objects", 2, 1},
       {"ssim", "SSIM", "", "Structural similarity", 4, 1},
-      {"contact_share", "contact", "", "Share of frames with a hand near the object", 3, 0},
+      {"contact_share", "contact", "", "Share of frames in which a hand joint is nearer than 5 cm to an object", 3, 0},
+      {"contact_distance_mm", "contact distance", "mm",
+       "How far from it the hands' Gaussians that near are, on average", 1, 0},
       {"penetration_share", "penetration", "", "Share of vertices inside something", 4, -1},
       {"penetration_depth_mm", "penetration depth", "mm", "How deep they are inside, on average", 1, -1},
-      {"foot_sliding_mm", "foot sliding", "mm", "How far feet on the ground slide in a frame", 1, -1},
+      {"foot_sliding_mm", "foot sliding", "mm", "How far feet that stand slide in 0.1 s", 1, -1},
       {"jitter", "jitter", "m/s³", "Mean third derivative of the joints' places", 1, -1},
   };
   return facts;

@@ -54,7 +54,6 @@ Gaussians read_gaussians(const fs::path& file) {
   return std::move(read.gaussians);
 }
 
-/// Means relative to their centroid, whatever the file's were.
 Gaussians centred(Gaussians gaussians) {
   const Index count = gaussians.count();
   for (Index c = 0; c < 3; ++c) {
@@ -78,6 +77,8 @@ ObjectPose initial_pose(const InitialSettings& initial, const std::string& name,
 
 }  // namespace
 
+Gaussians read_object(const fs::path& file) { return centred(read_gaussians(file)); }
+
 fs::path initial_motion_file(const DataSettings& data) { return read_initial(data.initial).motion; }
 
 SceneSetup read_scene_setup(const DataSettings& data) {
@@ -90,7 +91,7 @@ SceneSetup read_scene_setup(const DataSettings& data) {
   }
   const InitialSettings initial = read_initial(data.initial);
   for (const auto& [name, object] : data.objects) {
-    setup.objects.push_back({name, centred(read_gaussians(object.gaussians))});
+    setup.objects.push_back({name, read_object(object.gaussians)});
     setup.poses.push_back(initial_pose(initial, name, data.initial));
   }
   setup.motion_file = initial.motion;

@@ -30,6 +30,10 @@ struct SceneSetup {
       object_tracks;  ///< estimated poses of the objects, NAME/rotation and NAME/translation; may be empty
 };
 
+/// An object's Gaussians, relative to the centroid of their means, whatever the file's are. Throws UserError or
+/// DataError naming the file.
+Gaussians read_object(const std::filesystem::path& file);
+
 /// The motion that data.initial names. Throws UserError naming what is wrong with that file.
 std::filesystem::path initial_motion_file(const DataSettings& data);
 

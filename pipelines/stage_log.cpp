@@ -12,8 +12,9 @@ namespace {
 std::string left_out_text(const StageResult& result, const Clip& clip) {
   std::string text;
   for (const LeftOutObject& object : result.left_out) {
-    text += ", " + object.term + " without " + clip.objects[static_cast<std::size_t>(object.object)].name + " in " +
-            std::to_string(object.evaluations) + " of " + std::to_string(result.iterations + 1) + " evaluations";
+    const std::string name = object.of_human ? "the human" : clip.objects[static_cast<std::size_t>(object.object)].name;
+    text += ", " + object.term + " without " + name + " in " + std::to_string(object.evaluations) + " of " +
+            std::to_string(result.iterations + 1) + " evaluations";
   }
   return text;
 }
@@ -55,7 +56,9 @@ std::string stage_text(const std::string& stage, const StageResult& result, cons
   std::string text = "stage " + stage + ": " + std::to_string(result.iterations) + " iterations in " +
                      rounded(result.seconds, 3) + " s, loss " + begin + " -> " + loss_text(result.loss, result.terms);
   if (result.rollbacks > 0) text += ", " + std::to_string(result.rollbacks) + " steps not taken";
-  return text + left_out_text(result, clip);
+  text += left_out_text(result, clip);
+  for (const LossNote& note : result.notes) text += ", " + note.term + ": " + note.text;
+  return text;
 }
 
 void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip) {
@@ -93,6 +96,12 @@ std::vector<std::string> GradientWatch::still_groups() const {
     if (!has_gradient) names.push_back(name);
   }
   return names;
+}
+
+void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage) {
+  for (const LossNote& note : notes) {
+    if (note.is_idle) log_warning("stage " + stage + ": the loss \"" + note.term + "\" moves nothing: " + note.text);
+  }
 }
 
 void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings) {

@@ -16,7 +16,7 @@ namespace hsi4d {
 /// A loss and its terms: "0.1234 (l1 0.1, ssim 0.2)".
 std::string loss_text(double loss, std::span<const LossValue> terms);
 
-/// What a stage did: iterations, time, loss before and after, steps not taken, objects that terms left out.
+/// What a stage did: iterations, time, loss before and after, steps not taken, what terms left out and noted.
 /// @param begin  loss_text of the first iteration
 std::string stage_text(const std::string& stage, const StageResult& result, const std::string& begin, const Clip& clip);
 
@@ -37,6 +37,9 @@ class GradientWatch {
  private:
   std::map<std::string, bool, std::less<>> has_gradient_;  // by group that was on
 };
+
+/// Every term of a stage that moves nothing by what it found: one warning, with that.
+void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage);
 
 /// Every term of a stage that is off: one warning, with the reason.
 void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings);

@@ -5,6 +5,7 @@
 #include "body/kinematics.h"
 #include "core/file.h"
 #include "core/rotation.h"
+#include "pipelines/contact_metrics.h"
 #include "pipelines/frame_start.h"
 #include "pipelines/gradient_table.h"
 #include "pipelines/penetration.h"
@@ -12,6 +13,8 @@
 namespace hsi4d {
 
 namespace {
+
+constexpr const char* kCopyFrame0 = "copy_frame_0";
 
 std::vector<FrameState> placed(const Clip& clip, const std::vector<SceneState>& states, Draw draw) {
   std::vector<FrameState> frames;
@@ -66,7 +69,7 @@ void add_errors(const Clip& clip, const std::vector<SceneState>& result, RunSumm
     start.push_back(given_start(clip, t));
     copy.push_back(clip.first);
   }
-  for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{"copy_frame_0", &copy}}) {
+  for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{kCopyFrame0, &copy}}) {
     summary.baselines.push_back(
         {name, errors_of(clip, *states, Draw::kAll), sequence_errors(placed(clip, *states, Draw::kAll), truth)});
   }
@@ -85,12 +88,16 @@ void add_image_errors(const std::vector<MetricValues>& errors, MetricValues& mea
   append(mean_errors(images), means);
 }
 
-/// Of frame 0 as it was given, and as every stage over it that moves the body left it.
-void add_first_penetration(const RunConfig& config, const Clip& clip, const RunProgress& progress,
-                           RunSummary& summary) {
-  const auto add = [&clip](const SceneState& state, MetricValues& values) {
-    append(penetration_values(penetration_by_frame(clip, {state}).front()), values);
-  };
+std::vector<SceneState> start_of(const Clip& clip) {
+  std::vector<SceneState> start;
+  for (Index t = 0; t < clip.frames(); ++t) start.push_back(given_start(clip, t));
+  return start;
+}
+
+/// Calls add(state, values) for frame 0 as it was given, and as every stage over it that moves the body left it.
+template <class F>
+void for_first_frames(const RunConfig& config, const Clip& clip, const RunProgress& progress, RunSummary& summary,
+                      const F& add) {
   for (Baseline& baseline : summary.baselines) {
     if (baseline.of_frame_0) add(clip.first, baseline.values);
   }
@@ -99,21 +106,11 @@ void add_first_penetration(const RunConfig& config, const Clip& clip, const RunP
   }
 }
 
-/// Of the start, of what every stage that moves the body left, and of the result's frames.
-void add_penetration(const RunConfig& config, const Clip& clip, const RunProgress& progress,
-                     const RefinementProgress& refinement, RunSummary& summary) {
-  summary.surface = clip.surface_file;
-  add_first_penetration(config, clip, progress, summary);
-  const auto add_all = [&](const std::vector<SceneState>& states, MetricValues& means,
-                           std::vector<FrameMetrics>& per_frame) {
-    const std::vector<Penetration> counts = penetration_by_frame(clip, states);
-    append(mean_penetration(counts), means);
-    for (FrameMetrics& frame : per_frame)
-      append(penetration_values(counts[static_cast<std::size_t>(frame.frame)]), frame.values);
-  };
-  std::vector<SceneState> start;
-  for (Index t = 0; t < clip.frames(); ++t) start.push_back(given_start(clip, t));
-  add_all(start, summary.baselines[0].values, summary.baselines[0].per_frame);
+/// Calls add_all(states, means, per_frame) for what every stage that moves the body in all frames left; per_frame is
+/// empty but for the last.
+template <class F>
+void for_stages(const RunConfig& config, const RunProgress& progress, const RefinementProgress& refinement,
+                RunSummary& summary, const F& add_all) {
   std::vector<FrameMetrics> none;
   const std::size_t first = progress.first_frame.size(), refined = first + progress.after_stage.size();
   for (std::size_t s = first; s < config.stages.size(); ++s) {
@@ -123,6 +120,55 @@ void add_penetration(const RunConfig& config, const Clip& clip, const RunProgres
     const bool is_last = s + 1 == config.stages.size();
     add_all(states, summary.metrics[s].values, is_last ? summary.per_frame : none);
   }
+}
+
+/// Of the start, of what every stage that moves the body left, and of the result's frames.
+void add_penetration(const RunConfig& config, const Clip& clip, const RunProgress& progress,
+                     const RefinementProgress& refinement, RunSummary& summary) {
+  summary.surface = clip.surface_file;
+  for_first_frames(config, clip, progress, summary, [&clip](const SceneState& state, MetricValues& values) {
+    append(penetration_values(penetration_by_frame(clip, {state}).front()), values);
+  });
+  const auto add_all = [&](const std::vector<SceneState>& states, MetricValues& means,
+                           std::vector<FrameMetrics>& per_frame) {
+    const std::vector<Penetration> counts = penetration_by_frame(clip, states);
+    append(mean_penetration(counts), means);
+    for (FrameMetrics& frame : per_frame)
+      append(penetration_values(counts[static_cast<std::size_t>(frame.frame)]), frame.values);
+  };
+  add_all(start_of(clip), summary.baselines[0].values, summary.baselines[0].per_frame);
+  for_stages(config, progress, refinement, summary, add_all);
+}
+
+/// Contact of the hands and sliding of the feet, which need no truth: of the baselines, of what every stage that moves
+/// the body left, and of the result's frames.
+void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& progress,
+                 const RefinementProgress& refinement, RunSummary& summary) {
+  std::vector<const Gaussians*> objects;
+  for (const ClipObject& object : clip.objects) objects.push_back(&object.gaussians);
+  const auto by_frame = [&](const std::vector<SceneState>& states) {
+    std::vector<MetricValues> all = contact_by_frame(clip.avatar, objects, states);
+    std::vector<std::vector<double>> joints;
+    for (const SceneState& state : states) joints.push_back(pose_joints(clip.avatar, state.body));
+    const std::vector<MetricValues> sliding = sliding_by_frame(joints, clip.frame_rate);
+    for (std::size_t t = 0; t < all.size(); ++t) append(sliding[t], all[t]);
+    return all;
+  };
+  const auto add_all = [&](const std::vector<SceneState>& states, MetricValues& means,
+                           std::vector<FrameMetrics>& per_frame) {
+    const std::vector<MetricValues> values = by_frame(states);
+    append(mean_after_first(values), means);
+    for (FrameMetrics& frame : per_frame) append(values[static_cast<std::size_t>(frame.frame)], frame.values);
+  };
+  for_first_frames(config, clip, progress, summary,
+                   [&](const SceneState& state, MetricValues& values) { append(by_frame({state}).front(), values); });
+  for (Baseline& baseline : summary.baselines) {
+    if (baseline.of_frame_0) continue;
+    const bool is_copy = baseline.name == kCopyFrame0;
+    add_all(is_copy ? std::vector(static_cast<std::size_t>(clip.frames()), clip.first) : start_of(clip),
+            baseline.values, baseline.per_frame);
+  }
+  for_stages(config, progress, refinement, summary, add_all);
 }
 
 }  // namespace
@@ -168,6 +214,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   add_image_errors(is_refined ? refinement.image_errors : progress.image_errors, summary.metrics.back().values,
                    summary.per_frame);
   add_image_errors(progress.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
+  add_contact(config, clip, progress, refinement, summary);
   if (clip.surface) add_penetration(config, clip, progress, refinement, summary);
   return summary;
 }

@@ -104,6 +104,27 @@ void append_track(const Track& more, Track& track) {
   append(more.camera_from_world, track.camera_from_world);
 }
 
+/// The file of an object's Gaussians in the config of a run; empty where it names none.
+fs::path object_path(const std::string& run, const std::string& name) {
+  const std::string file = RunPaths{run}.config();
+  if (!fs::exists(file)) return {};
+  const ConfigValue tree = parse_json_text(read_text_file(file), file);
+  const ConfigValue* const chain = find_member(tree, "chain");
+  const ConfigValue* place = chain == nullptr || chain->items.empty() ? &tree : &chain->items.front();
+  for (const std::string_view key : {std::string_view("data"), std::string_view("objects"), std::string_view(name)}) {
+    place = find_member(*place, key);
+    if (place == nullptr) return {};
+  }
+  const std::string path = string_member(*place, "gaussians");
+  return path.empty() ? fs::path() : fs::path(path_beside(file, path));
+}
+
+/// The folders that may be the dataset of a path: "data", and that of "data/truth".
+std::vector<fs::path> dataset_folders(const fs::path& path) {
+  const fs::path above = path.parent_path();
+  return {path, above.empty() ? fs::path(".") : above};
+}
+
 // ---- Time ----
 
 /// Between two of `count` values, at `place` frames.
@@ -149,6 +170,22 @@ FrameState state_at(const Track& track, const RestSkeleton& body, const std::vec
   if (!track.camera_from_world.empty())
     state.camera_from_world = at_place(
         track.frames(), place, [&track](std::size_t t) { return track.camera_from_world[t]; }, between_cameras);
+  return state;
+}
+
+/// Body and all objects of a track.
+SceneState all_at(const Track& track, double place) {
+  SceneState state;
+  state.body = at_place(
+      track.frames(), place, [&track](std::size_t t) { return track.motion.poses[t]; }, interpolated);
+  for (std::size_t o = 0; o < track.objects.size(); ++o) {
+    const auto pose_of = [&track, o](std::size_t t) {
+      const ObjectPose& at = track.object_poses[t][o];
+      return Rigid<double>{so3_exp(at.rotation), at.translation};
+    };
+    const Rigid<double> pose = at_place(track.frames(), place, pose_of, between_poses);
+    state.objects.push_back({so3_log(pose.rotation), pose.translation});
+  }
   return state;
 }
 
@@ -206,8 +243,8 @@ std::string avatar_of_track(const std::string& path) {
     const std::vector<fs::path> avatars = data_paths(path, "avatar");
     return !avatars.empty() && fs::exists(avatars.front()) ? avatars.front().string() : "";
   }
-  for (const fs::path& folder : {fs::path(path), fs::path(path).parent_path()}) {  // "data", "data/truth"
-    const fs::path avatar = dataset_inputs(folder.empty() ? "." : folder).avatar;
+  for (const fs::path& folder : dataset_folders(path)) {
+    const fs::path avatar = dataset_inputs(folder).avatar;
     if (fs::is_directory(path) && fs::exists(avatar)) return avatar.string();
   }
   return "";
@@ -229,6 +266,25 @@ Track read_joined_tracks(const std::vector<std::string>& paths) {
   return track;
 }
 
+std::vector<std::string> object_files_of_track(const std::string& path, const Track& track) {
+  const auto file_of = [&path](const std::string& name) -> fs::path {
+    if (is_run_folder(path)) return object_path(path, name);
+    if (!fs::is_directory(path)) return {};
+    for (const fs::path& folder : dataset_folders(path)) {
+      const DataSettings data = dataset_inputs(folder);
+      if (const ObjectSettings* const object = find_entry(data.objects, name)) return object->gaussians;
+    }
+    return {};
+  };
+  std::vector<std::string> files;
+  for (const std::string& name : track.objects) {
+    const fs::path file = file_of(name);
+    if (file.empty() || !fs::exists(file)) return {};
+    files.push_back(file.string());
+  }
+  return files;
+}
+
 AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, const Track& truth,
                       const RestSkeleton& truth_body) {
   const double estimate_rate = rate_of(estimate, truth), truth_rate = rate_of(truth, estimate);
@@ -246,6 +302,7 @@ AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, 
   for (Index k = 0; k < count; ++k) {
     const double seconds = static_cast<double>(k) / tracks.frame_rate;
     tracks.estimate.push_back(state_at(estimate, estimate_body, objects, seconds * estimate_rate));
+    tracks.states.push_back(all_at(estimate, seconds * estimate_rate));
     tracks.truth.push_back(state_at(truth, truth_body, true_objects, seconds * truth_rate));
   }
   return tracks;

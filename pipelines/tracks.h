@@ -52,6 +52,10 @@ std::vector<std::string> truths_of_run(const std::string& path);
 /// where they do not fit each other.
 Track read_joined_tracks(const std::vector<std::string>& paths);
 
+/// The files of a track's objects, in its order, by the config of a run folder or the dataset; none where one of them
+/// is not there.
+std::vector<std::string> object_files_of_track(const std::string& path, const Track& track);
+
 /// A skeleton in its rest pose.
 struct RestSkeleton {
   std::vector<int> parents;
@@ -62,6 +66,7 @@ struct RestSkeleton {
 struct AlignedTracks {
   double frame_rate = 0;  ///< frames a second of both
   std::vector<FrameState> estimate, truth;
+  std::vector<SceneState> states;  ///< the estimate's bodies and all of its objects; no cameras
 };
 
 /// Both tracks at the frames of the slower one, from the first frame that both have on, as long as both last. Between

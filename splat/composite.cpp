@@ -340,6 +340,7 @@ struct Composite {
   RenderCounters counters_before(const TileGrid& tiles, bool layered) const {
     RenderCounters result;
     result.times = counters->times;
+    result.channels = counters->channels;
     result.kept_bytes = kept.bytes();
     for (const detail::SplatLists* part : {&planned.still, &planned.moving}) {
       for (Index i = 0; i < part->count; ++i) {
@@ -517,6 +518,7 @@ Composited<S> record_composite(std::initializer_list<SplatSet<S>> sets, Var<S> b
                               image_shape<S>(channels - over, height, width)};
   const bool split = over < channels;
   auto counters = std::make_shared<RenderCounters>();
+  counters->channels = channels;
   Tape<S>& tape = inputs.front().owner();
   const Var<S> first = tape.record(Composite<S>{view, counters}, std::span<const Var<S>>(inputs),
                                    std::span<const Shape>(outputs).first(split ? 3 : 2), where);

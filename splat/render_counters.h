@@ -15,6 +15,7 @@ struct RenderTimes {
 
 /// What the last runs did.
 struct RenderCounters {
+  Index channels = 0;       ///< that were composited: three of colour, and what else was asked for
   Index visible = 0;        ///< Gaussians that reach a tile
   Index pairs = 0;          ///< (tile, Gaussian) that were looked at
   Index groups = 0;         ///< (block of 4×4 pixels, Gaussian) that may touch, of those with an adjoint or among them

@@ -79,7 +79,7 @@ LossTerm center_loss() {
         return mean_squared_distance(centres, in.object_center_target, settings, unit_px);
       });
   term.description.needs = LossNeeds::kObjects;
-  return term;
+  return reading(std::move(term), {kReadsObjectOpacity});
 }
 
 }  // namespace hsi4d

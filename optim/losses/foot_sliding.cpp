@@ -6,20 +6,20 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "optim/losses/list.h"
+#include "optim/standing_feet.h"
 
 namespace hsi4d {
 
 namespace {
 
 struct FootSlidingSettings {
-  double height = 0.05;  // metres
-  double speed = 0.5;    // metres a second
+  StandingRule rule;
 };
 
 void describe(ConfigFields& fields, FootSlidingSettings& settings) {
-  fields.number("height", settings.height, {.min = 0, .max = 10},
+  fields.number("height", settings.rule.height, {.min = 0, .max = 10},
                 "A foot stands while it is at most this much higher than in the first frame, metres");
-  fields.number("speed", settings.speed, {.above = 0, .max = 100},
+  fields.number("speed", settings.rule.speed, {.above = 0, .max = 100},
                 "and slower than this when the stage begins, metres a second");
 }
 
@@ -27,23 +27,20 @@ Vector3<double> joint_of(const PosedJoints& body, Index joint) {
   return Vector3<double>(body.joints.data() + 3 * joint);
 }
 
-bool stands(const MotionStart& motion, Index frame, Index joint, const FootSlidingSettings& settings) {
-  const Vector3<double> before = joint_of(motion.body_in(frame), joint),
-                        after = joint_of(motion.body_in(frame + 1), joint);
-  const double highest = joint_of(motion.first_body, joint)[2] + settings.height;
-  return before[2] <= highest && after[2] <= highest && (after - before).norm() * motion.frame_rate < settings.speed;
+bool stands(const MotionStart& motion, Index frame, Index joint, const StandingRule& rule) {
+  return foot_stands(joint_of(motion.body_in(frame), joint), joint_of(motion.body_in(frame + 1), joint),
+                     joint_of(motion.first_body, joint)[2], motion.frame_rate, rule);
 }
 
 /// The first frame that is followed by one that moves.
 Index first_pair(const MotionStart& motion) { return std::max<Index>(0, motion.still_frames - 1); }
 
 /// 1 for each coordinate of a joint that stands between such a frame and the next.
-std::vector<double> standing_weights(const MotionStart& motion, Index coordinates,
-                                     const FootSlidingSettings& settings) {
+std::vector<double> standing_weights(const MotionStart& motion, Index coordinates, const StandingRule& rule) {
   std::vector<double> weights;
   for (Index t = first_pair(motion); t + 1 < motion.frames(); ++t) {
     for (Index i = 0; i < coordinates; ++i)
-      weights.push_back(is_foot_joint(i / 3) && stands(motion, t, i / 3, settings) ? 1 : 0);
+      weights.push_back(is_foot_joint(i / 3) && stands(motion, t, i / 3, rule) ? 1 : 0);
   }
   return weights;
 }
@@ -57,7 +54,7 @@ LossTerm foot_sliding_loss() {
         if (!in.given(in.joints) || !in.motion || in.motion->frames() < 2) return decltype(in.joints){};
         const Index coordinates = in.joints.shape().cols, first = first_pair(*in.motion),
                     pairs = in.motion->frames() - 1 - first;
-        const std::vector<double> stand = standing_weights(*in.motion, coordinates, settings);
+        const std::vector<double> stand = standing_weights(*in.motion, coordinates, settings.rule);
         auto& tape = in.joints.owner();
         const auto weights = tape.constant("standing", shape_of(pairs, coordinates));
         const auto numbers = tape.write(weights);

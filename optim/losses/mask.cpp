@@ -1,5 +1,6 @@
-// L = mean over the pixels of (m̂ − m)², of the human and of each object: m̂ the rendered opacity Σ T α, occluders
-// included, m the mask of the frame; the sum over them is divided by their number.
+// L = Σ over the human and the O objects of v · mean over the pixels of (m̂ − m)², / (1 + O): m̂ the rendered opacity
+// Σ T α, occluders included, m the mask of the frame, v 1, or 0 where that shows nothing: a mask that is missing, or of
+// something out of sight, says nothing about the place.
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
 #include "optim/losses/list.h"
@@ -17,25 +18,49 @@ void describe(ConfigFields& fields, MaskSettings& settings) {
   fields.boolean("objects", settings.objects, "The objects' silhouettes count");
 }
 
+std::vector<std::string> opacities_of(const MaskSettings& settings) {
+  std::vector<std::string> inputs;
+  if (settings.human) inputs.emplace_back(kReadsHumanOpacity);
+  if (settings.objects) inputs.emplace_back(kReadsObjectOpacity);
+  return inputs;
+}
+
+/// What the frame does not show.
+/// @param seen  1 or 0 of each plane
+template <class S>
+LeftOut unseen(Var<S> seen, bool of_human) {
+  return {"mask",
+          "its mask is empty",
+          seen.shape().count(),
+          [=](Index object) { return !(seen.owner().value(seen).data[object] >= S(0.5)); },
+          of_human,
+          true};
+}
+
+/// Mean over planes and pixels, planes that are not seen being 0.
+template <class S>
+Var<S> silhouettes(const LossInputs<S>& in, Var<S> opacity, Var<S> masks, Var<S> seen, bool of_human) {
+  if (!in.given(opacity) || !in.given(masks) || !in.given(seen) || opacity.shape().planes == 0) return {};
+  if (in.left_out != nullptr) in.left_out->push_back(unseen(seen, of_human));
+  return l2(opacity, masks, seen);
+}
+
 }  // namespace
 
 LossTerm mask_loss() {
-  LossTerm term = reading(
-      make_loss_term<MaskSettings>("mask", "Difference of the rendered silhouettes and the frame's masks",
-                                   [](const auto& in, const MaskSettings& settings) {
-                                     decltype(in.human_mask) human, objects;
-                                     if (settings.human && in.given(in.human_opacity) && in.given(in.human_mask))
-                                       human = l2(in.human_opacity, in.human_mask);
-                                     if (settings.objects && in.given(in.object_opacity) && in.given(in.object_masks))
-                                       objects = l2(in.object_opacity, in.object_masks);
-                                     if (human.tape == nullptr) return objects;
-                                     if (objects.tape == nullptr) return human;
-                                     const auto count = static_cast<double>(in.object_masks.shape().planes);
-                                     return human * (1 / (1 + count)) + objects * (count / (1 + count));
-                                   }),
-      {kReadsHumanOpacity});
+  LossTerm term = make_loss_term<MaskSettings>(
+      "mask", "Difference of the rendered silhouettes and the frame's masks",
+      [](const auto& in, const MaskSettings& settings) {
+        decltype(in.human_mask) human, objects;
+        if (settings.human) human = silhouettes(in, in.human_opacity, in.human_mask, in.human_seen, true);
+        if (settings.objects) objects = silhouettes(in, in.object_opacity, in.object_masks, in.object_seen, false);
+        if (human.tape == nullptr) return objects;
+        if (objects.tape == nullptr) return human;
+        const auto count = static_cast<double>(in.object_masks.shape().planes);
+        return human * (1 / (1 + count)) + objects * (count / (1 + count));
+      });
   term.description.needs = LossNeeds::kBodyInImage;
-  return term;
+  return reading<MaskSettings>(std::move(term), opacities_of);
 }
 
 }  // namespace hsi4d

@@ -11,6 +11,8 @@
 #include "pipelines/body_files.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
+#include "pipelines/contact_metrics.h"
+#include "pipelines/scene_setup.h"
 #include "pipelines/tracks.h"
 
 namespace hsi4d::cli {
@@ -77,6 +79,25 @@ std::string avatar_for(const EvaluateOptions& options, const std::string& input,
                   "--avatar F.safetensors says it");
 }
 
+/// What needs no truth, by frame: sliding of the feet, and contact of the hands where avatar and objects are known.
+/// @param avatar  of whose body the poses are; empty: a body model's
+std::vector<MetricValues> contact_of(const std::string& input, const std::string& avatar, const Track& estimate,
+                                     const AlignedTracks& tracks) {
+  std::vector<std::vector<double>> joints;
+  for (const FrameState& state : tracks.estimate) joints.push_back(state.joints);
+  std::vector<MetricValues> by_frame = sliding_by_frame(joints, tracks.frame_rate);
+  const std::vector<std::string> files = object_files_of_track(input, estimate);
+  if (avatar.empty() || files.empty()) return by_frame;
+  std::vector<Gaussians> gaussians;
+  for (const std::string& file : files) gaussians.push_back(read_object(file));
+  std::vector<const Gaussians*> objects;
+  for (const Gaussians& object : gaussians) objects.push_back(&object);
+  const std::vector<MetricValues> contact = contact_by_frame(read_avatar(avatar), objects, tracks.states);
+  for (std::size_t t = 0; t < contact.size(); ++t)
+    by_frame[t].insert(by_frame[t].end(), contact[t].begin(), contact[t].end());
+  return by_frame;
+}
+
 Evaluation evaluated(const EvaluateOptions& options, const std::string& input) {
   const std::vector<std::string> truths = truths_of(options, input);
   Track estimate = read_track(input, {options.from_rate, options.person}), truth = read_joined_tracks(truths);
@@ -87,6 +108,14 @@ Evaluation evaluated(const EvaluateOptions& options, const std::string& input) {
   Evaluation result{input, joined(truths), std::ssize(tracks.truth), tracks.frame_rate, {}, {}};
   result.values = sequence_summary(tracks.estimate, tracks.truth, tracks.frame_rate);
   result.per_frame = sequence_errors(tracks.estimate, tracks.truth);
+  const std::vector<MetricValues> contact =
+      contact_of(input, options.body_model.empty() ? avatar : "", estimate, tracks);
+  const MetricValues means = mean_after_first(contact);
+  result.values.insert(result.values.end(), means.begin(), means.end());
+  for (FrameMetrics& frame : result.per_frame) {
+    const MetricValues& more = contact[static_cast<std::size_t>(frame.frame)];
+    frame.values.insert(frame.values.end(), more.begin(), more.end());
+  }
   for (const auto& [name, value] : result.values) {
     if (!std::isfinite(value)) throw DataError(input + ": " + name + " is not a finite number");
   }

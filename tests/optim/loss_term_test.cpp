@@ -47,7 +47,9 @@ std::vector<OperatorInput> all_inputs() {
           {"joints", shape_of(kFrames, 66)},
           {"joints_start", shape_of(kFrames, 66)},
           {"body_places", shape_of((kFrames - kStill) * kBodyRows, 3)},
-          {"object_places", shape_of((kFrames - kStill) * 2 * kObjectRows, 3)}};
+          {"object_places", shape_of((kFrames - kStill) * 2 * kObjectRows, 3)},
+          {"human_seen", kScalarShape, 0, 0, {1}},
+          {"object_seen", {kObjects, 1, 1, 1}, 0, 0, {1, 1, 0}}};
 }
 
 template <class S>
@@ -66,6 +68,8 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.object_masks = in[10];
   inputs.joints = in[11];
   inputs.joints_start = in[12];
+  inputs.human_seen = in[15];
+  inputs.object_seen = in[16];
   inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;
@@ -291,26 +295,125 @@ TEST_CASE("pose_prior prefers a body at ease to one that is not") {
   CHECK(body_loss("pose_prior", odd) > 2 * body_loss("pose_prior", pose));
 }
 
-TEST_CASE("mask compares the silhouettes of the human and of each object") {
+namespace {
+
+/// The human's and two objects' silhouettes, each of one value, and masks of another: differences 0.5, 0.2 and 0.4.
+struct Silhouettes {
   Tape<double> tape;
   LossInputs<double> inputs;
-  const auto leaf = [&tape](const char* name, Index planes, double value) {
-    const Var<double> var = tape.parameter(name, image_shape<double>(planes, 4, 5));
-    const Array<double> array = tape.write(var);
-    for (Index r = 0; r < array.total_rows(); ++r) std::fill_n(array.row(r), 5, value);
-    return var;
-  };
-  inputs.human_opacity = leaf("human", 1, 0.9);
-  inputs.human_mask = leaf("human mask", 1, 0.4);
-  const auto value = [&](const char* settings) {
+
+  Silhouettes() {
+    inputs.human_opacity = leaf("human", {0.9});
+    inputs.human_mask = leaf("human mask", {0.4});
+    inputs.human_seen = tape.constant("human seen", kScalarShape);
+    inputs.object_opacity = leaf("objects", {0.5, 0.7});
+    inputs.object_masks = leaf("object masks", {0.3, 0.3});
+    inputs.object_seen = tape.constant("objects seen", {2, 1, 1, 1});
+    see(true, true, true);
+  }
+  void see(bool human, bool first, bool second) {
+    tape.set(inputs.human_seen, {human ? 1.0 : 0.0});
+    tape.set(inputs.object_seen, {first ? 1.0 : 0.0, second ? 1.0 : 0.0});
+  }
+  double value(const std::string& settings = "{}") {
     const auto loss = record_term("mask", inputs, settings);
     tape.forward(loss);
+    tape.backward(loss);
     return tape.value(loss).scalar();
+  }
+  /// The gradient of every pixel of a plane, which is the same in all.
+  double slope(Var<double> opacity, Index plane) const {
+    const auto d = tape.gradient(opacity);
+    for (Index i = 0; i < 4; ++i) {
+      for (Index j = 0; j < 5; ++j) CHECK(d(plane, i, j) == d(plane, 0, 0));
+    }
+    return d(plane, 0, 0);
+  }
+  Var<double> leaf(const char* name, const std::vector<double>& values) {
+    const Var<double> var = tape.parameter(name, image_shape<double>(std::ssize(values), 4, 5));
+    const Array<double> array = tape.write(var);
+    for (Index p = 0; p < std::ssize(values); ++p) {
+      for (Index i = 0; i < 4; ++i) std::fill_n(&array(p, i, 0), 5, values[static_cast<std::size_t>(p)]);
+    }
+    return var;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("mask compares the silhouettes of the human and of each object") {
+  Silhouettes all;
+  CHECK(all.value() == Approx((0.25 + 0.04 + 0.16) / 3).epsilon(1e-13));
+  CHECK(all.value(R"({"human": false})") == Approx((0.04 + 0.16) / 2).epsilon(1e-13));
+  CHECK(all.value(R"({"objects": false})") == Approx(0.25).epsilon(1e-13));
+  all.inputs.object_opacity = all.inputs.object_masks = all.inputs.object_seen = {};
+  CHECK(all.value() == Approx(0.25).epsilon(1e-13));
+}
+
+TEST_CASE("mask leaves out what the frame does not show, and leaves the others as they are") {
+  Silhouettes some;
+  const auto slopes = [&some] {
+    return std::vector<double>{some.slope(some.inputs.human_opacity, 0), some.slope(some.inputs.object_opacity, 0),
+                               some.slope(some.inputs.object_opacity, 1)};
   };
-  CHECK(value("{}") == Approx(0.25).epsilon(1e-13));
-  inputs.object_opacity = leaf("objects", 2, 0.5);
-  inputs.object_masks = leaf("object masks", 2, 0.3);
-  CHECK(value("{}") == Approx((0.25 + 2 * 0.04) / 3).epsilon(1e-13));
-  CHECK(value(R"({"human": false})") == Approx(0.04).epsilon(1e-13));
-  CHECK(value(R"({"objects": false})") == Approx(0.25).epsilon(1e-13));
+  some.value();
+  const std::vector<double> all = slopes();
+  CHECK(all[0] == Approx(2 * 0.5 / 20 / 3));
+  some.see(true, true, false);
+  CHECK(some.value() == Approx((0.25 + 0.04) / 3).epsilon(1e-13));
+  CHECK(slopes() == std::vector<double>{all[0], all[1], 0});
+  some.see(false, true, true);
+  CHECK(some.value() == Approx((0.04 + 0.16) / 3).epsilon(1e-13));
+  CHECK(slopes() == std::vector<double>{0, all[1], all[2]});
+  some.see(false, false, false);
+  CHECK(some.value() == 0);
+  CHECK(slopes() == std::vector<double>{0, 0, 0});
+}
+
+TEST_CASE("mask tells what the frame does not show, of what counts") {
+  Silhouettes some;
+  std::vector<LeftOut> left_out;
+  some.inputs.left_out = &left_out;
+  some.see(false, true, false);
+  some.value();
+  REQUIRE(left_out.size() == 2);
+  for (const LeftOut& entry : left_out) {
+    CHECK(entry.term == "mask");
+    CHECK(entry.reason == "its mask is empty");
+    CHECK(entry.is_of_masks);
+  }
+  CHECK(left_out[0].of_human);
+  REQUIRE(left_out[0].objects == 1);
+  CHECK(left_out[0].is_left_out(0));
+  CHECK_FALSE(left_out[1].of_human);
+  REQUIRE(left_out[1].objects == 2);
+  CHECK_FALSE(left_out[1].is_left_out(0));
+  CHECK(left_out[1].is_left_out(1));
+  left_out.clear();
+  some.value(R"({"human": false})");
+  REQUIRE(left_out.size() == 1);
+  CHECK_FALSE(left_out[0].of_human);
+}
+
+TEST_CASE("a term reads the opacities that its settings say, while it is on") {
+  LossSettings mask = default_settings(term_named("mask").description);
+  const auto reads = [](const LossSettings& loss) {
+    return std::vector<bool>{reads_input(loss, kReadsHumanOpacity), reads_input(loss, kReadsObjectOpacity)};
+  };
+  const auto with = [&mask](const std::string& text) {
+    LossSettings changed = mask;
+    ConfigFields fields;
+    describe(fields, changed);
+    ConfigProblems problems;
+    read_config(load_config_text(text, "a.json", "", {}, problems), fields, problems);
+    problems.throw_if_any();
+    return changed;
+  };
+  CHECK(reads(mask) == std::vector<bool>{true, true});
+  CHECK(reads(with(R"({"human": false})")) == std::vector<bool>{false, true});
+  CHECK(reads(with(R"({"objects": false})")) == std::vector<bool>{true, false});
+  CHECK(reads(with(R"({"weight": 0})")) == std::vector<bool>{false, false});
+  CHECK(reads(default_settings(term_named("center").description)) == std::vector<bool>{false, true});
+  for (const char* name : {"photometric", "depth", "contact"})
+    CHECK(reads(default_settings(term_named(name).description)) == std::vector<bool>{false, false});
 }

@@ -131,8 +131,28 @@ TEST_CASE("of Gaussians at the same distance contact takes the same ones each ti
   }
 }
 
-TEST_CASE("contact is zero where no hand is near an object") {
+TEST_CASE("contact is zero where no hand is near an object, and tells in how many frames one is") {
   CHECK(motion_loss("contact", R"({"distance": 1e-9})", no_joint) == 0);
+  const auto note = [](const MotionStart& motion, const std::string& settings) {
+    std::vector<LossNote> notes;
+    Tape<double> tape;
+    LossInputs<double> inputs;
+    inputs.motion = std::shared_ptr<const MotionStart>(&motion, [](const MotionStart*) {});
+    inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+    inputs.notes = &notes;
+    inputs.body_points = [&](const auto& points) { return tape.parameter("hands", shape_of(std::ssize(points), 3)); };
+    inputs.object_points = [&](const auto& points) { return tape.parameter("them", shape_of(std::ssize(points), 3)); };
+    REQUIRE(record_term("contact", inputs, settings).tape != nullptr);
+    REQUIRE(notes.size() == 1);
+    CHECK(notes[0].term == "contact");
+    return std::pair{notes[0].text, notes[0].is_idle};
+  };
+  MotionOfTest apart;
+  for (auto& pose : apart.start.world_from_object[3]) pose.translation[2] += 5;  // one of the three that move
+  CHECK(note(apart.start, "{}") ==
+        std::pair<std::string, bool>{"hands are within 0.05 m of an object's Gaussian in 2 of 3 frames", false});
+  CHECK(note(apart.start, R"({"distance": 1e-9})") ==
+        std::pair<std::string, bool>{"no hand is within 1e-09 m of an object's Gaussian in any of 3 frames", true});
 }
 
 TEST_CASE("ground is the squared change of the height of the lowest points of the feet") {

@@ -36,6 +36,7 @@ FrameGraphSettings smooth_settings(RotationParameters rotations) {
   FrameGraphSettings settings;
   apply_quality(settings.render, Quality::kReference);
   settings.rotations = rotations;
+  settings.object_opacity = true;
   settings.background = {0.2, 0.4, 0.3};
   return settings;
 }
@@ -66,7 +67,7 @@ Var<S> loss_of(const FrameGraph<S>& graph) {
 }
 
 FrameTargets targets_for(const Image& image, const Image& weight) {
-  return {&image, &weight, {{14.5, 11.25, 1}, {6.5, 14.5, 1}}, {2.5, 3.5}};
+  return {&image, &weight, {{14.5, 11.25, 1}, {6.5, 14.5, 1}}, {2.5, 3.5}, nullptr, true, {&weight, &weight}};
 }
 
 bool holds_joints(const std::string& group) {
@@ -222,6 +223,7 @@ TEST_CASE("image, loss and every gradient have the same bits for any number of t
   Tape<float> tape;
   const ColorNet net = some_color_net(clip.avatar);
   FrameGraphSettings settings;
+  settings.object_opacity = true;
   settings.color_net = &net;
   settings.color_camera_gradient = true;
   FrameGraph<float> graph(tape, clip, clip.first.camera_from_world, settings);
@@ -268,6 +270,7 @@ TEST_CASE("gradients through the human's colours are stopped where the settings 
   const Image image = random_image(3, 20, 24, 3), weight = random_image(1, 20, 24, 4);
   const auto gradients = [&](const ColorNet* of, bool pose, bool camera) {
     FrameGraphSettings settings;
+    settings.object_opacity = true;
     settings.color_net = of;
     settings.color_pose_gradient = pose;
     settings.color_camera_gradient = camera;

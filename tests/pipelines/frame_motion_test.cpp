@@ -26,7 +26,7 @@ FrameGraphSettings settings_with_human(RotationParameters rotations = RotationPa
   FrameGraphSettings settings;
   apply_quality(settings.render, Quality::kReference);
   settings.rotations = rotations;
-  settings.human_opacity = true;
+  settings.human_opacity = settings.object_opacity = true;
   return settings;
 }
 
@@ -186,22 +186,72 @@ TEST_CASE("an object is drawn to the hand as the hand is to it", "[frame_graph]"
   CHECK(size > 1e-3);
 }
 
+TEST_CASE("a graph renders the opacities that are asked for, and no other", "[frame_graph]") {
+  const Clip clip = small_clip(kWidth, kHeight, 400);
+  for (const bool human : {false, true}) {
+    for (const bool objects : {false, true}) {
+      FrameGraphSettings settings;
+      settings.human_opacity = human;
+      settings.object_opacity = objects;
+      Tape<float> tape;
+      FrameGraph<float> graph(tape, clip, clip.first.camera_from_world, settings);
+      graph.set_state(clip.first);
+      const LossInputs<float>& in = graph.loss_inputs();
+      for (const Var<float> input : {in.human_opacity, in.human_mask, in.human_seen}) CHECK(in.given(input) == human);
+      for (const Var<float> input : {in.object_opacity, in.object_center_target, in.object_masks, in.object_seen})
+        CHECK(in.given(input) == objects);
+      CHECK(in.given(in.object_depth));
+      tape.forward(graph.rendered().image);
+      CHECK(graph.rendered().counters->channels == 3 + (human ? 1 : 0) + (objects ? 2 : 0));
+    }
+  }
+}
+
+TEST_CASE("an opacity that no term reads changes no bit of image, loss and gradients", "[frame_graph]") {
+  const Clip clip = small_clip(40, 36, 400, 600);
+  Image image(3, 36, 40);
+  for (float& value : image.data()) value = 0.5F;
+  const auto bits = [&](bool unread) {
+    FrameGraphSettings settings;
+    settings.human_opacity = settings.object_opacity = unread;
+    Tape<float> tape;
+    FrameGraph<float> graph(tape, clip, clip.first.camera_from_world, settings);
+    graph.set_state(clip.first);
+    const Image mask(1, 36, 40);
+    FrameTargets targets{&image, nullptr, {{14.5, 11.25, 1}, {6.5, 14.5, 1}}, {2.5, 3.5}, &mask, true, {&mask, &mask}};
+    graph.set_targets(targets);
+    const Var<float> loss = term_named("photometric").record(graph.loss_inputs());
+    for (const ParameterGroup<float>& group : graph.groups()) {
+      for (const Var<float> block : group.blocks) tape.unfreeze(block);
+    }
+    tape.forward(loss);
+    tape.backward(loss);
+    std::vector<float> numbers = {tape.value(loss).scalar()};
+    for (const ParameterGroup<float>& group : graph.groups()) {
+      for (const Var<float> block : group.blocks) {
+        const ConstArray<float> d = tape.gradient(block);
+        numbers.insert(numbers.end(), d.data, d.data + d.shape.count());
+      }
+    }
+    return numbers;
+  };
+  CHECK(bits(true) == bits(false));
+}
+
 TEST_CASE("planes of human and objects are what images show in which nothing else is white", "[frame_graph]") {
   const Clip clip = small_clip(kWidth, kHeight, 400);
-  const bool with_human = GENERATE(true, false);
+  const bool with_human = GENERATE(true, false), with_objects = GENERATE(true, false);
   FrameGraphSettings settings = settings_with_human();
   settings.human_opacity = with_human;
+  settings.object_opacity = with_objects;
   Tape<double> tape;
   FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);
   graph.set_state(clip.first);
   const LossInputs<double>& in = graph.loss_inputs();
-  CHECK(in.given(in.human_opacity) == with_human);
-  CHECK(in.given(in.human_mask) == with_human);
-  CHECK(in.given(in.object_masks) == with_human);
   const ParameterGroup<double>& objects = group_named(graph, "object_sh");
   REQUIRE(objects.blocks.size() == 2);
   paint(tape, group_named(graph, "scene_sh").blocks.front(), false);
-  for (int white = 0; white < (with_human ? 3 : 2); ++white) {
+  for (int white = with_objects ? 0 : 2; white < (with_human ? 3 : 2); ++white) {
     INFO("part " << white);
     for (int o = 0; o < 2; ++o) paint(tape, objects.blocks[static_cast<std::size_t>(o)], o == white);
     fill(group_named(graph, "human_colors").blocks.front(), white == 2 ? 1.0 : 0.0);

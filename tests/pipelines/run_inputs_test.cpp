@@ -57,7 +57,7 @@ std::vector<std::string> warnings_of(const RunConfig& config) {
   std::vector<std::string> warnings;
   const LogSink sink =
       log_to([&](LogLevel, std::string_view text) { warnings.emplace_back(text); }, LogLevel::kWarning);
-  check_frames(config.data, read_clip(config.data), has_loss(config, "center"));
+  check_frames(config.data, read_clip(config.data), losses_over_masks(config));
   return warnings;
 }
 

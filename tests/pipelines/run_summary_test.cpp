@@ -121,10 +121,11 @@ TEST_CASE("the table of errors has baselines, then stages, and marks the best") 
 }
 
 TEST_CASE("every metric of the contract is known") {
-  for (const char* name : {"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "world_mpjpe_image_mm", "world_mpjpe_depth_mm",
-                           "root_translation_mm", "object_translation_cm", "object_rotation_deg",
-                           "camera_translation_cm", "camera_rotation_deg", "psnr_db", "psnr_foreground_db", "ssim",
-                           "contact_share", "penetration_share", "penetration_depth_mm", "foot_sliding_mm", "jitter"}) {
+  for (const char* name :
+       {"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "world_mpjpe_image_mm", "world_mpjpe_depth_mm",
+        "root_translation_mm", "object_translation_cm", "object_rotation_deg", "camera_translation_cm",
+        "camera_rotation_deg", "psnr_db", "psnr_foreground_db", "ssim", "contact_share", "contact_distance_mm",
+        "penetration_share", "penetration_depth_mm", "foot_sliding_mm", "jitter"}) {
     INFO(name);
     CHECK(find_metric_facts(name) != nullptr);
   }

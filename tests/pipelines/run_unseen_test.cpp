@@ -226,6 +226,65 @@ TEST_CASE("masks that show nothing of the human are told with their frames", "[r
   CHECK(json_of("run/status.json")["state"] == "done");
 }
 
+TEST_CASE("an object or a human whose mask shows nothing in a frame is not drawn away by the loss mask", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  write_changed(dataset.file("config.json"), dataset.file("config.json"), [](nlohmann::ordered_json& config) {
+    config["stages"]["interaction"]["losses"]["mask"] = {{"weight", 1}};
+  });
+  CHECK(dataset.run("whole").empty());
+  const RunSummary whole = parse_summary(file_text("whole/summary.json"), "whole");
+  const auto error_in = [](const RunSummary& summary, std::size_t frame, const char* name) {
+    return number_in(summary.per_frame.at(frame - 1).values, name);
+  };
+  SECTION("an object") {
+    write_image(dataset.file("masks/watering_can/0002.png"), of_one_value(0));
+    CHECK(dataset.run("run") == Texts{dataset.file("masks/watering_can") +
+                                      ": the object is hidden in frame 2: no pixel reaches data.mask_threshold; "
+                                      "the losses \"center\", \"mask\" are off for it there"});
+    CHECK_THAT(file_text("run/log.txt"), Contains(", mask without watering_can in 11 of 11 evaluations\n"));
+    const double before = error_in(whole, 2, "object_translation_cm"),
+                 now = error_in(parse_summary(file_text("run/summary.json"), "run"), 2, "object_translation_cm");
+    INFO("object off by " << before << " cm with all masks, " << now << " cm without one");
+    CHECK(now < before + 0.5);
+  }
+  SECTION("the human") {
+    write_image(dataset.file("masks/human/0002.png"), of_one_value(0));
+    CHECK(dataset.run("run") ==
+          Texts{dataset.file("masks/human") + ": the human is hidden in frame 2: no pixel reaches data.mask_threshold; "
+                                              "the loss \"mask\" is off for it there"});
+    CHECK_THAT(file_text("run/log.txt"), Contains(", mask without the human in 11 of 11 evaluations\n"));
+    const double before = error_in(whole, 2, "root_translation_mm"),
+                 now = error_in(parse_summary(file_text("run/summary.json"), "run"), 2, "root_translation_mm");
+    INFO("root off by " << before << " mm with all masks, " << now << " mm without one");
+    CHECK(now < before + 15);
+  }
+}
+
+TEST_CASE("channels are rendered only for terms that are on and read them", "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  const auto channels = [&](const std::string& mask, const std::string& out, const Texts& overrides) {
+    write_changed(TinyDataset::folder() / "config.json", dataset.file("config.json"), [&](nlohmann::ordered_json& c) {
+      if (!mask.empty()) c["stages"]["interaction"]["losses"]["mask"] = nlohmann::ordered_json::parse(mask);
+    });
+    dataset.run(out, overrides);
+    std::vector<int> counts;
+    for (const nlohmann::json& line : metrics_of(out)) {
+      const int count = line.at("channels").get<int>();
+      if (line["stage"] == "camera") CHECK(count == 3);
+      if (line["stage"] == "interaction" && (counts.empty() || counts.back() != count)) counts.push_back(count);
+    }
+    return counts;
+  };
+  const std::string no_center = "stages.interaction.losses.center.weight=0";
+  CHECK(channels(R"({})", "both", {}) == std::vector<int>{5});
+  CHECK(channels(R"({"human": false})", "objects", {}) == std::vector<int>{4});
+  CHECK(channels(R"({"objects": false})", "human", {no_center}) == std::vector<int>{4});
+  CHECK(channels(R"({"weight": 0})", "center", {}) == std::vector<int>{4});
+  CHECK(channels("", "none", {no_center}) == std::vector<int>{3});
+}
+
 TEST_CASE("frames and masks with numbers that are not finite are refused before anything is written", "[run]") {
   const TemporaryFolder here;
   const Spoilt dataset;

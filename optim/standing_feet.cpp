@@ -1,0 +1,42 @@
+#include "optim/standing_feet.h"
+
+#include "core/check.h"
+#include "core/types.h"
+#include "optim/motion_start.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr double kMillimetres = 1000;
+
+Vector3<double> joint_of(std::span<const double> joints, Index joint) {
+  return Vector3<double>(joints.data() + 3 * joint);
+}
+
+}  // namespace
+
+bool foot_stands(const Vector3<double>& before, const Vector3<double>& after, double first_height, double frame_rate,
+                 const StandingRule& rule) {
+  const double highest = first_height + rule.height;
+  return before[2] <= highest && after[2] <= highest && (after - before).norm() * frame_rate < rule.speed;
+}
+
+std::optional<double> foot_sliding_mm(std::span<const double> before, std::span<const double> after,
+                                      std::span<const double> first, double frame_rate) {
+  HSI4D_CHECK_EQ(before.size(), after.size());
+  HSI4D_CHECK_EQ(before.size(), first.size());
+  double sum = 0;
+  Index standing = 0;
+  for (Index j = 0; j < static_cast<Index>(before.size()) / 3; ++j) {
+    if (!is_foot_joint(j)) continue;
+    const Vector3<double> from = joint_of(before, j), to = joint_of(after, j);
+    if (!foot_stands(from, to, joint_of(first, j)[2], frame_rate, {})) continue;
+    sum += (to - from).head<2>().norm();
+    ++standing;
+  }
+  if (standing == 0) return std::nullopt;
+  return kMillimetres * sum / static_cast<double>(standing) * frame_rate / kSlidingRate;
+}
+
+}  // namespace hsi4d
