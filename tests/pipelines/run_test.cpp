@@ -214,7 +214,7 @@ TEST_CASE("a run without truth has no errors against it, but images", "[run]") {
   const RunSummary summary = carry_out_tiny(config, "run");
   REQUIRE(summary.baselines.size() == 1);  // the image that the run was given
   CHECK(summary.baselines[0].name == "start");
-  CHECK(summary.baselines[0].values.size() == 5);  // of images, and of the surface
+  CHECK(summary.baselines[0].values.size() == 8);  // of images, the surface, contact and feet
   REQUIRE(summary.baselines[0].per_frame.size() == kTinyFrames - 1);
   CHECK(number_in(summary.baselines[0].per_frame[2].values, "psnr_db") > 10);
   for (const StageSummary& stage : summary.metrics) {
@@ -437,6 +437,7 @@ TEST_CASE("every shipped config has a test") {
     return file.starts_with("synthetic/") || (file.starts_with("sources/") && file.ends_with(".json"));
   });
   CHECK(files == std::set<std::string>{"avatar/fit.json", "avatar/views.json",  // avatar_fit_test.cpp
+                                       "bench/paper_scale.json",                // bench_stages_test.cpp
                                        "examples/robot.json",                   // above
                                        "sources/README.md"});
 }

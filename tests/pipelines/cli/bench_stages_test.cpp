@@ -1,0 +1,87 @@
+#include <map>
+#include <sstream>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/text.h"
+#include "pipelines/cli/bench_stages_command.h"
+#include "tests/support/program.h"
+#include "tests/support/temporary_folder.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+const std::string kConfig = std::string(HSI4D_SOURCE_DIR) + "/configs/bench/paper_scale.json";
+
+/// The shipped benchmark with little of everything.
+std::vector<std::string> small_bench() {
+  std::vector<std::string> words = {"bench",  "stages",     "--config", kConfig,     "--out",     "out",
+                                    "--json", "costs.json", "--plot",   "costs.svg", "--threads", "2"};
+  for (const char* setting :
+       {"synthetic.frames=3", "synthetic.size_px=48", "synthetic.scene_gaussians=3000",
+        "synthetic.avatar_gaussians=500", "synthetic.object_gaussians=200", "stages.camera.iterations=4",
+        "stages.interaction.iterations=34", "stages.refinement.iterations=6"}) {
+    words.insert(words.end(), {"--set", setting});
+  }
+  return words;
+}
+
+std::vector<nlohmann::json> lines_of(const std::string& file) {
+  std::istringstream text(read_text_file(file));
+  std::vector<nlohmann::json> lines;
+  for (std::string line; std::getline(text, line);) lines.push_back(nlohmann::json::parse(line));
+  return lines;
+}
+
+}  // namespace
+
+TEST_CASE("bench stages tells where the time of every stage goes", "[run]") {
+  const TemporaryFolder here;
+  const ProgramResult first = run_hsi4d(small_bench());
+  INFO(first.err);
+  REQUIRE(first.status == 0);
+  for (const char* part :
+       {"camera, ms an iteration", "d_ssim", "image_difference", "of composite:", "optimisation", "world MPJPE"})
+    CHECK_THAT(first.out, Contains(part));
+
+  std::map<std::string, nlohmann::json> stages;
+  std::map<std::string, double> of_parts;
+  const std::vector<nlohmann::json> lines = lines_of("costs.json");
+  for (const nlohmann::json& line : lines) {
+    if (line.contains("operator")) {
+      of_parts[line["stage"]] += line["forward_ms"].get<double>() + line["backward_ms"].get<double>();
+    } else if (line.contains("stage")) {
+      stages[line["stage"]] = line;
+    }
+  }
+  REQUIRE(stages.size() == 3);
+  CHECK(stages["camera"]["iterations"] == 2 * 4);
+  CHECK(stages["interaction"]["iterations"] == 2 * 34);
+  CHECK(stages["refinement"]["iterations"] == 6);
+  for (const auto& [name, stage] : stages) {
+    INFO(name);
+    CHECK(of_parts[name] > 0);
+    CHECK(of_parts[name] <= 1.5 * stage["ms"].get<double>());  // with the run that ends a stage, of six here
+    CHECK(stage["tape_bytes"] > 0);
+  }
+  CHECK(stages["camera"]["tiles_of_image"] == 9);
+  CHECK(stages["interaction"]["tiles"].get<double>() <= 9);
+  CHECK(stages["interaction"]["told_squares"].get<double>() <= 9);
+  CHECK_FALSE(stages["refinement"].contains("tiles"));
+  CHECK(lines.back()["peak_memory_bytes"] > 0);
+  CHECK_THAT(read_text_file("costs.svg"), Contains("<svg") && Contains("interaction") && Contains("</svg>"));
+
+  const ProgramResult again = run_hsi4d(small_bench());  // of the dataset that is there
+  REQUIRE(again.status == 0);
+  CHECK_THAT(again.out, Contains("out/run-2"));
+  std::vector<std::string> other = small_bench();
+  other.insert(other.end(), {"--set", "synthetic.seed=7"});
+  const ProgramResult refused = run_hsi4d(other);
+  CHECK(refused.status == 2);
+  CHECK_THAT(refused.err, Contains("the dataset was made with other settings than these"));
+}
