@@ -28,12 +28,6 @@ RunConfig demo_config(const DemoArguments& arguments, const std::vector<LossTerm
   return read_run_config(tree, descriptions_of(losses), problems, ConfigUse::kStages);
 }
 
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw UserError(folder.string() + ": the folder cannot be made: " + error.message());
-}
-
 void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, const DemoArguments& arguments,
                   const fs::path& dataset) {
   const InterruptWatch watch;
@@ -43,6 +37,26 @@ void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, 
                   dataset_sections(config, descriptions_of(losses)), config.body);
   });
 }
+
+/// Makes a folder, which goes again where nothing has been put into it.
+class FolderThatFills {
+ public:
+  explicit FolderThatFills(const fs::path& folder) : folder_(folder) {
+    std::error_code error;
+    is_new_ = fs::create_directories(folder_, error);
+    if (error) throw UserError(folder_.string() + ": the folder cannot be made: " + error.message());
+  }
+  ~FolderThatFills() {
+    std::error_code error;
+    if (is_new_ && fs::is_empty(folder_, error) && !error) fs::remove(folder_, error);
+  }
+  FolderThatFills(const FolderThatFills&) = delete;
+  FolderThatFills& operator=(const FolderThatFills&) = delete;
+
+ private:
+  fs::path folder_;
+  bool is_new_ = false;
+};
 
 /// The dataset that is gone on with must be the one that the config asks for.
 void check_dataset(const RunConfig& config, const fs::path& dataset) {
@@ -75,7 +89,7 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
       throw UserError(folder.string() +
                       ": holds a demo already; --resume goes on with it, another --out makes a new one");
     }
-    make_folder(folder);
+    const FolderThatFills guard(folder);
     make_dataset(config, losses, arguments, dataset);
   } else {
     check_dataset(config, dataset);
