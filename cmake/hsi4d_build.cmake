@@ -91,7 +91,7 @@ function(hsi4d_embed_report_assets)
 endfunction()
 
 # hsi4d_find_commit(OUT): the commit that is checked out, or "unknown" where the source is not the top of a git checkout.
-# A commit configures the build anew; changes that are not committed are not told.
+# A commit configures the build anew.
 function(hsi4d_find_commit out)
   set(${out} unknown PARENT_SCOPE)
   find_program(HSI4D_GIT git)
@@ -109,4 +109,17 @@ function(hsi4d_find_commit out)
       set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_MATCH_1})
     endif()
   endif()
+endfunction()
+
+# The commit in a header, looked at in every build: changes that are not committed are told by "-modified" behind it.
+function(hsi4d_embed_commit)
+  hsi4d_find_commit(commit)
+  set(header ${PROJECT_BINARY_DIR}/generated/commit/hsi4d_commit.h)
+  add_custom_target(hsi4d_commit BYPRODUCTS ${header} VERBATIM
+    COMMAND ${CMAKE_COMMAND} "-DGIT=$<$<BOOL:${HSI4D_GIT}>:${HSI4D_GIT}>" -DSOURCE=${PROJECT_SOURCE_DIR}
+                             -DCOMMIT=${commit} -DHEADER=${header} -P ${PROJECT_SOURCE_DIR}/cmake/write_commit.cmake)
+  add_dependencies(hsi4d_core hsi4d_commit)
+  set_property(SOURCE core/version.cpp APPEND PROPERTY COMPILE_DEFINITIONS HSI4D_VERSION="${PROJECT_VERSION}")
+  set_property(SOURCE core/version.cpp APPEND PROPERTY INCLUDE_DIRECTORIES ${PROJECT_BINARY_DIR}/generated/commit)
+  set_property(SOURCE core/version.cpp APPEND PROPERTY OBJECT_DEPENDS ${header})
 endfunction()

@@ -80,6 +80,15 @@ std::string follow_link(const std::string& path) {
   return error ? path : target.string();
 }
 
+/// A folder that is missing on the way to `path`, and those that it is in.
+void make_folders(const std::string& path, const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw UserError(path + ": cannot be written: the folder " + folder.string() +
+                    " cannot be made: " + error.message());
+}
+
 }  // namespace
 
 Bytes read_file(const std::string& path, int64_t max_bytes) { return read_up_to<Bytes>(path, kNoLimit, max_bytes); }
@@ -112,10 +121,15 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), target_(follow_li
   static std::atomic<int64_t> counter{0};
   const std::string stem = target_ + "." + std::to_string(::getpid()) + "-";
   int error = EEXIST;
+  bool has_made_folders = false;
   while (error == EEXIST) {
     temporary_ = stem + std::to_string(counter.fetch_add(1)) + ".tmp";
     const Descriptor file(::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     error = file.get() >= 0 ? 0 : errno;
+    if (error != ENOENT || has_made_folders) continue;
+    make_folders(path_, std::filesystem::path(target_).parent_path());
+    has_made_folders = true;
+    error = EEXIST;
   }
   if (error != 0) fail(path_, "cannot be written", error);
 }

@@ -46,8 +46,8 @@ std::string path_beside(const std::string& naming_file, const std::string& path)
 /// Safe against a killed program, not against a power cut: nothing is synced to the disk.
 class AtomicFile {
  public:
-  /// Makes the empty temporary file `<path>.<process>-<number>.tmp`.
-  /// Throws UserError naming the path: its folder is missing or not writable, or a folder or device has that name.
+  /// Makes the empty temporary file `<path>.<process>-<number>.tmp`, and folders that are missing on the way to it.
+  /// Throws UserError naming the path: its folder cannot be made or written to, or a folder or device has that name.
   explicit AtomicFile(const std::string& path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;

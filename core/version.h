@@ -6,7 +6,8 @@ namespace hsi4d {
 /// "major.minor.patch" of the library.
 const char* version();
 
-/// The commit that the build was configured from, twelve digits; "unknown" outside of a git checkout.
+/// The commit that was built, twelve digits, with "-modified" behind it where the sources were changed since; "unknown"
+/// outside of a git checkout.
 const char* git_commit();
 
 }  // namespace hsi4d

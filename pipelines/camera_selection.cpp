@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "core/check.h"
 #include "core/progress.h"
@@ -82,6 +83,8 @@ std::vector<double> first_joints(const SceneSetup& setup) {
 
 bool is_better(const CandidateView& a, const CandidateView& b) {
   if (a.visible != b.visible) return a.visible > b.visible;
+  const auto steps = [](const CandidateView& view) { return std::lround(view.cover.value_or(0) / kCoverStep); };
+  if (steps(a) != steps(b)) return steps(a) > steps(b);
   return std::fabs(a.elevation_deg) < std::fabs(b.elevation_deg);
 }
 
@@ -180,6 +183,16 @@ Index count_visible(const FirstFrame& frame, const std::vector<double>& joints, 
   return visible;
 }
 
+/// How much of the image something covers: mean of its opacity.
+double cover_of(const FirstFrame& frame, const Camera& camera, const CameraSelectionSettings& settings,
+                const RenderSettings& render) {
+  SceneView view;
+  view.camera = reduced(camera, settings.trial_px);
+  view.settings = render;
+  const std::vector<double> alpha = render_scene(frame.all, view).alpha;
+  return std::accumulate(alpha.begin(), alpha.end(), 0.0) / static_cast<double>(alpha.size());
+}
+
 }  // namespace
 
 Index count_visible(const SceneSetup& setup, const Camera& camera, const CameraSelectionSettings& settings,
@@ -204,6 +217,16 @@ CameraChoice select_camera(const SceneSetup& setup, const CameraSelectionSetting
     bar.step();
   }
   bar.finish();
+  const Index most =
+      std::max_element(choice.candidates.begin(), choice.candidates.end(), [](const auto& a, const auto& b) {
+        return a.visible < b.visible;
+      })->visible;
+  for (CandidateView& candidate : choice.candidates) {
+    if (observer.wants_stop()) throw Interrupted("interrupted while cameras were tried; nothing is written");
+    if (candidate.visible < most) continue;
+    choice.camera.camera_from_world = candidate.camera_from_world;
+    candidate.cover = cover_of(frame, choice.camera, settings, render);
+  }
   std::stable_sort(choice.candidates.begin(), choice.candidates.end(), is_better);
   if (choice.candidates.front().visible == 0)
     throw UserError("no joint of the human is to be seen from any of " + std::to_string(choice.candidates.size()) +

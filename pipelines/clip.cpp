@@ -53,6 +53,17 @@ bool covers(const Motion& motion, const FrameSource& frames) {
   return end <= (static_cast<double>(motion.poses.size()) - 0.5) / motion.frame_rate;
 }
 
+/// Tells of poses from a moment on that would be that of another frame of the video.
+void warn_of_rest(const Motion& motion, const fs::path& file, const FrameSource& frames) {
+  constexpr double kSameMoment = 1e-9;  // seconds
+  const double last = static_cast<double>(motion.poses.size() - 1) / motion.frame_rate,
+               end = static_cast<double>(frames.video_count()) / frames.video_rate();
+  if (last < end - kSameMoment) return;
+  log_warning(file.string() + ": holds " + std::to_string(motion.poses.size()) + " poses at " +
+              rounded(motion.frame_rate, 4) + " a second, the video has " + std::to_string(frames.video_count()) +
+              " frames at " + rounded(frames.video_rate(), 4) + "; poses after its end are not used");
+}
+
 /// Estimated poses of the clip's frames: those of the motion file when it has more than frame 0. It has a pose for each
 /// frame of the clip or of the video; or it says its rate and is as long.
 std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, const FrameSource& frames) {
@@ -60,6 +71,7 @@ std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, co
   if (count == 1) return {};
   if (count == frames.count() || count == frames.video_count() || !covers(motion, frames))
     return kept(motion.poses, frames, file.string(), "poses", ", or frame 0 alone");
+  warn_of_rest(motion, file, frames);
   std::vector<BodyPose> poses;
   for (Index t = 0; t < frames.count(); ++t)
     poses.push_back(pose_at(motion, static_cast<double>(frames.number(t)) / frames.video_rate()));
@@ -162,6 +174,11 @@ MaskSource open_masks(const fs::path& folder, const std::string& name, const Fra
   if (missing > 0)
     log_warning(masks.path().string() + ": has no mask for " + std::to_string(missing) + " of " +
                 std::to_string(frames.count()) + " frames; these count as empty");
+  const MaskSource::Count count = masks.count(frames);
+  if (count.unused > 0)
+    log_warning(masks.path().string() + ": holds " + std::to_string(count.all) + " masks, the video has " +
+                std::to_string(frames.video_count()) + " frames; " + std::to_string(count.unused) +
+                " of the masks belong to no frame and are not used");
   return masks;
 }
 

@@ -182,6 +182,12 @@ FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(
                     std::to_string(video_count_) + " frames; a clip needs at least 2");
 }
 
+bool FrameSource::has_name(const std::string& name) const {
+  if (!video_) return fs::exists(path_ / name);
+  const std::optional<Index> number = number_of(name);
+  return number && *number < video_count_ && name == four_digits(*number) + ".png";
+}
+
 std::string FrameSource::place(Index frame) const {
   return video_ ? frame_of(path_, number(frame)) : (path_ / names_[static_cast<std::size_t>(frame)]).string();
 }
@@ -210,6 +216,18 @@ Index MaskSource::missing(const FrameSource& frames) const {
   if (video_->reader.frames() >= needed) return 0;
   throw DataError(path_.string() + ": has " + std::to_string(video_->reader.frames()) +
                   " frames, the clip needs the first " + std::to_string(needed));
+}
+
+MaskSource::Count MaskSource::count(const FrameSource& frames) const {
+  if (video_) return {video_->reader.frames(), std::max<Index>(0, video_->reader.frames() - frames.video_count())};
+  Count count;
+  std::error_code ignored;  // single masks that cannot be read are told when they are
+  for (const fs::directory_entry& entry : fs::directory_iterator(path_, ignored)) {
+    if (entry.path().extension() != ".png") continue;
+    ++count.all;
+    count.unused += frames.has_name(entry.path().filename().string()) ? 0 : 1;
+  }
+  return count;
 }
 
 fs::path MaskSource::file(const FrameSource& frames, Index frame) const {

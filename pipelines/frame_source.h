@@ -40,6 +40,8 @@ class FrameSource {
   double video_rate() const { return video_rate_; }
   /// Names of frames: those of the files, or "0003.png" for frame 3 of a video. Masks have the same.
   const std::vector<std::string>& names() const { return names_; }
+  /// Whether a frame of the video, kept or not, has this name.
+  bool has_name(const std::string& name) const;
   /// Frames a second of the clip; 0: nobody says.
   double frame_rate() const { return frame_rate_; }
   /// The one file that holds all frames; empty for a folder.
@@ -71,6 +73,11 @@ class MaskSource {
 
   /// How many of the frames have no mask. Throws DataError naming a video that has too few frames.
   Index missing(const FrameSource& frames) const;
+  /// How many masks there are, and how many of these belong to no frame of the video, kept or not.
+  struct Count {
+    Index all = 0, unused = 0;
+  };
+  Count count(const FrameSource& frames) const;
   /// The folder or the video.
   const std::filesystem::path& path() const { return path_; }
   bool is_video() const { return video_ != nullptr; }

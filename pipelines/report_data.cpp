@@ -202,6 +202,9 @@ ReportData read_report_data(const std::string& run_folder) {
   if (!fs::exists(run_folder, error)) throw UserError(run_folder + ": there is no such run folder");
   if (!fs::is_directory(run_folder, error)) throw UserError(run_folder + ": is not a folder; give the folder of a run");
   const std::array members = {paths.status(), paths.config(), paths.summary(), paths.metrics()};
+  const fs::path inner = paths.folder / "run";  // of hsi4d demo
+  if (std::none_of(members.begin(), members.end(), is_file) && is_file(RunPaths{inner}.status()))
+    throw UserError(run_folder + ": holds no run; did you mean " + inner.generic_string() + "?");
   if (std::none_of(members.begin(), members.end(), is_file))
     throw UserError(run_folder +
                     ": holds no run: there is neither status.json nor config.resolved.json, summary.json "

@@ -159,7 +159,8 @@ std::string view3d_section(const ReportData& data) {
          layer("objects", "objects", "", true) + layer("body", "body", "#c2cce0", true) +
          layer("truth", "true body", "#40d98c", false) + layer("camera", "camera and its path", "#ffd94d", true) +
          layer("skeleton", "skeleton", "#59bfff", false) + layer("cut", "cut the front away", "", false) +
-         "<button id=\"view3d-follow\">through the camera</button><button id=\"view3d-reset\">reset</button></div>\n" +
+         "<span class=\"buttons\"><button id=\"view3d-follow\">through the camera</button><button "
+         "id=\"view3d-reset\">reset</button></span></div>\n" +
          "<p class=\"caption\">Drag to turn; drag with the right button, shift or two fingers to move; wheel (after a "
          "click) or pinch to come nearer. Of the scene there is a sample of its Gaussians, in the colours they have "
          "from "

@@ -66,16 +66,45 @@ std::string change_text(const MetricFacts& facts, double value, double start) {
          (is_ratio ? "\u00A0%" : "") + "</span>";
 }
 
-/// What the last stage left worse than the start: the run did harm there, and its reader is told first.
-std::string worse_message(const RunSummary& summary, const MetricValues& start) {
+bool is_worse(const MetricFacts& facts, const MetricValues& values, const MetricValues& start) {
+  const double* const value = find_metric(values, facts.name);
+  const double* const before = find_metric(start, facts.name);
+  return value != nullptr && before != nullptr && is_worse(facts, *value, *before);
+}
+
+bool is_better(const MetricFacts& facts, const MetricValues& values, const MetricValues& start) {
+  return is_worse(facts, start, values);
+}
+
+/// A body that sinks in less deep with more of it, or the other way round, is not worse: of the two numbers of
+/// penetration neither says much alone.
+bool is_redeemed(const MetricFacts& facts, const MetricValues& values, const MetricValues& start) {
+  constexpr std::string_view kShare = "penetration_share", kDepth = "penetration_depth_mm";
+  if (facts.name == kShare) return is_better(*find_metric_facts(kDepth), values, start);
+  if (facts.name == kDepth) return is_better(*find_metric_facts(kShare), values, start);
+  return false;
+}
+
+/// What the last stage left worse than a baseline: the run did harm there, and its reader is told first.
+/// @param name  of the baseline, for people
+/// @param skip  the metric that is left out; empty: none
+std::string worse_message(const RunSummary& summary, const MetricValues& baseline, const std::string& name,
+                          std::string_view skip = "") {
+  const MetricValues& values = summary.metrics.back().values;
   std::string worse;
   for (const MetricFacts& facts : metric_facts()) {
-    const double* const value = find_metric(summary.metrics.back().values, facts.name);
-    const double* const before = find_metric(start, facts.name);
-    if (value != nullptr && before != nullptr && is_worse(facts, *value, *before))
+    if (facts.name != skip && is_worse(facts, values, baseline) && !is_redeemed(facts, values, baseline))
       worse += (worse.empty() ? "" : "; ") + std::string(facts.label);
   }
-  return worse.empty() ? "" : "<p class=\"message\">Worse than the start: " + text_of(worse) + ".</p>\n";
+  return worse.empty() ? "" : "<p class=\"message\">Worse than " + name + ": " + text_of(worse) + ".</p>\n";
+}
+
+/// Against both baselines. What stands still does not tremble: of copy_frame_0 that is no merit.
+std::string worse_messages(const RunSummary& summary) {
+  const MetricValues *const start = baseline_values(summary, "start"), *const copy =
+                                                                           baseline_values(summary, "copy_frame_0");
+  return (start == nullptr ? "" : worse_message(summary, *start, "the start")) +
+         (copy == nullptr ? "" : worse_message(summary, *copy, "frame 0 copied", "jitter"));
 }
 
 /// The few numbers that a reader wants first: of the last stage, against the start.
@@ -97,7 +126,7 @@ std::string figures_section(const RunSummary& summary) {
              (before == nullptr || facts.better == 0 ? "" : change_text(facts, *value, *before)) + "</div></div>\n";
   }
   if (cards.empty()) return "";
-  return (start == nullptr ? "" : worse_message(summary, *start)) + "<div class=\"figures\">\n" + cards + "</div>\n";
+  return worse_messages(summary) + "<div class=\"figures\">\n" + cards + "</div>\n";
 }
 
 // ---- Errors ----

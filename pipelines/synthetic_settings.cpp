@@ -119,15 +119,11 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
   f.choice("kind", s.kind, kSyntheticKinds,
            "A clip in a scene, or views: pictures of the human alone in several poses, for `hsi4d avatar fit`");
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of textures, arrangement and noise");
-  f.integer("frames", s.frames, {.min = 1, .max = 100000}, "Frames of the clip");
+  f.integer("frames", s.frames, {.min = 2, .max = 100000}, "Frames of the clip");
   f.integer("clips", s.clips, {.min = 1, .max = 1000},
             "Clips of that many frames that follow one another, each with a camera of its own: a chain");
   f.rule({"clips", "kind"}, [&s]() -> std::string {
     return s.clips > 1 && s.kind == SyntheticKind::kViews ? "views are of no clip" : "";
-  });
-  f.rule({"frames", "clips"}, [&s]() -> std::string {
-    return s.clips > 1 && s.frames < 2 ? "a clip of a chain has two frames at least: the first is the last of another"
-                                       : "";
   });
   f.number("frame_rate", s.frame_rate, {.min = 1, .max = 1000},
            "Frames a second; a lower rate gives larger steps between frames");

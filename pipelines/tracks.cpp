@@ -215,6 +215,21 @@ double rate_of(const Track& track, const Track& other) {
 
 bool is_run_folder(const std::string& path) { return fs::exists(RunPaths{path}.status()); }
 
+void check_holds_track(const std::string& path, const std::string& member) {
+  std::error_code error;
+  if (!fs::exists(path, error)) throw UserError(path + ": there is no such file or folder");
+  if (!fs::is_directory(path, error) || is_run_folder(path)) return;
+  const fs::path folder = path;
+  if (fs::exists(folder / "truth", error) || fs::exists(folder / "initial.json", error)) return;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".npz") return;
+  }
+  const fs::path inner = folder / member;
+  const bool is_meant = member == "run" ? is_run_folder(inner.string()) : fs::exists(inner / "truth", error);
+  throw UserError(path + ": holds no run, dataset or motion" +
+                  (is_meant ? "; did you mean " + inner.generic_string() + "?" : ""));
+}
+
 Track read_track(const std::string& path, const TrackOptions& options) {
   if (!fs::exists(path)) throw UserError(path + ": there is no such file or folder");
   if (fs::is_directory(path)) {

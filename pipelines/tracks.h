@@ -34,6 +34,11 @@ struct TrackOptions {
 /// Whether a folder is one that `hsi4d run` writes.
 bool is_run_folder(const std::string& path);
 
+/// Throws UserError where a path holds nothing that could be read as a track: it is not there, or is a folder without
+/// run, dataset or motion. Then it names the folder `member` in it, where that is one.
+/// @param member  "run" or "dataset", which hsi4d demo makes
+void check_holds_track(const std::string& path, const std::string& member);
+
 /// Reads what a path holds: a run folder (motion.npz, objects.npz, cameras.json), a dataset with truth/, such a truth/
 /// itself, a motion (.npz), or a folder of SMPLer-X (read_pose_folder).
 ///

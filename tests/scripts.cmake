@@ -24,6 +24,11 @@ if(NOT HSI4D_SANITIZE)
   set_tests_properties(adding_a_loss PROPERTIES LABELS full TIMEOUT 3600)
 endif()
 
+add_test(NAME "the commit of a build"
+         COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/commit
+                                  -P ${CMAKE_CURRENT_SOURCE_DIR}/commit_test.cmake)
+set_tests_properties("the commit of a build" PROPERTIES LABELS quick)
+
 # Exporters of other programs' files, with NumPy and stand-ins for PyTorch and joblib.
 find_program(HSI4D_PYTHON python3 HINTS /usr/bin)  # the one that Debian's NumPy belongs to
 if(HSI4D_PYTHON)

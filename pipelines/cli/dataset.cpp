@@ -14,17 +14,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw UserError(folder.string() + ": the folder cannot be made: " + error.message());
-}
+/// Makes a folder, which goes again where nothing has been put into it.
+class FolderThatFills {
+ public:
+  explicit FolderThatFills(const fs::path& folder) : folder_(folder) {
+    std::error_code error;
+    is_new_ = fs::create_directories(folder_, error);
+    if (error) throw UserError(folder_.string() + ": the folder cannot be made: " + error.message());
+  }
+  ~FolderThatFills() {
+    std::error_code error;
+    if (is_new_ && fs::is_empty(folder_, error) && !error) fs::remove(folder_, error);
+  }
+  FolderThatFills(const FolderThatFills&) = delete;
+  FolderThatFills& operator=(const FolderThatFills&) = delete;
+
+ private:
+  fs::path folder_;
+  bool is_new_ = false;
+};
 
 }  // namespace
 
 void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, const fs::path& folder,
                   std::optional<int> threads, bool quiet) {
-  if (folder.has_parent_path()) make_folder(folder.parent_path());
+  const FolderThatFills above(folder.has_parent_path() ? folder.parent_path() : fs::path("."));
   const InterruptWatch watch;
   const int asked = run_threads(threads), chosen = asked > 0 ? asked : config.threads;
   with_threads(chosen > 0 ? chosen : thread_count(), [&] {

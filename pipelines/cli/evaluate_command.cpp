@@ -1,6 +1,9 @@
 #include "pipelines/cli/evaluate_command.h"
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <optional>
 
 #include "body/motion_edit.h"
 #include "core/check.h"
@@ -12,6 +15,8 @@
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/contact_metrics.h"
+#include "pipelines/json_text.h"
+#include "pipelines/run_folder.h"
 #include "pipelines/scene_setup.h"
 #include "pipelines/tracks.h"
 
@@ -99,6 +104,8 @@ std::vector<MetricValues> contact_of(const std::string& input, const std::string
 }
 
 Evaluation evaluated(const EvaluateOptions& options, const std::string& input) {
+  check_holds_track(input, "run");
+  if (!options.truth.empty()) check_holds_track(options.truth, "dataset");
   const std::vector<std::string> truths = truths_of(options, input);
   Track estimate = read_track(input, {options.from_rate, options.person}), truth = read_joined_tracks(truths);
   const std::string avatar = avatar_for(options, input, truths.front());
@@ -122,6 +129,30 @@ Evaluation evaluated(const EvaluateOptions& options, const std::string& input) {
   return result;
 }
 
+void remove_member(ConfigValue& object, std::string_view key) {
+  std::erase_if(object.members, [key](const ConfigMember& member) { return member.key == key; });
+}
+
+/// The config of a run without what may differ between repetitions: its name, its seeds, its threads.
+std::optional<std::string> config_without_seed(const std::string& run) {
+  const std::string file = RunPaths{run}.config();
+  if (!is_run_folder(run) || !std::filesystem::exists(file)) return std::nullopt;
+  ConfigValue tree = parse_json_text(read_text_file(file), file);
+  for (const char* const key : {"name", "seed", "threads"}) remove_member(tree, key);
+  for (ConfigMember& member : tree.members) {
+    if (member.key == "synthetic") remove_member(member.value, "seed");
+  }
+  return to_json(tree);
+}
+
+/// Whether a mean over the inputs says something: there is one, or they are runs of the same config.
+bool are_repetitions(const std::vector<std::string>& inputs) {
+  if (inputs.size() < 2) return true;
+  const std::optional<std::string> first = config_without_seed(inputs.front());
+  return first && std::all_of(inputs.begin() + 1, inputs.end(),
+                              [&first](const std::string& input) { return config_without_seed(input) == first; });
+}
+
 std::vector<Spread> spreads_of(const std::vector<Evaluation>& results) {
   std::vector<Spread> spreads;
   for (const MetricFacts& facts : metric_facts()) {
@@ -140,10 +171,10 @@ std::vector<Spread> spreads_of(const std::vector<Evaluation>& results) {
   return spreads;
 }
 
-std::string table_of(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads) {
+std::string table_of(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean) {
   std::vector<std::vector<std::string>> rows(1, {""});
   for (const Evaluation& result : results) rows[0].push_back(result.name);
-  if (results.size() > 1) rows[0].emplace_back("mean ± std");
+  if (has_mean) rows[0].emplace_back("mean ± std");
   for (const Spread& spread : spreads) {
     const MetricFacts& facts = *spread.facts;
     const std::string unit = facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]";
@@ -152,7 +183,7 @@ std::string table_of(const std::vector<Evaluation>& results, const std::vector<S
       const double* const value = find_metric(result.values, facts.name);
       row.push_back(value == nullptr ? "-" : fixed_number(*value, facts.decimals));
     }
-    if (results.size() > 1) {
+    if (has_mean) {
       row.push_back(fixed_number(spread.mean, facts.decimals) +
                     (spread.count > 1 ? " ± " + fixed_number(spread.deviation, facts.decimals) : ""));
     }
@@ -197,10 +228,11 @@ ConfigValue json_of(const Evaluation& result) {
   return object;
 }
 
-std::string json_text(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads) {
+std::string json_text(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean) {
   ConfigValue root = ConfigValue::make_object(), all = ConfigValue::make_array();
   for (const Evaluation& result : results) all.items.push_back(json_of(result));
   root.add("results", std::move(all));
+  if (!has_mean) return to_json(root);
   MetricValues means, deviations;
   for (const Spread& spread : spreads) {
     means.emplace_back(spread.facts->name, spread.mean);
@@ -225,8 +257,9 @@ std::string evaluate_command(const EvaluateOptions& options) {
   std::vector<Evaluation> results;
   for (const std::string& input : options.inputs) results.push_back(evaluated(options, input));
   const std::vector<Spread> spreads = spreads_of(results);
-  if (!options.json.empty()) write_text_file(options.json, json_text(results, spreads));
-  return table_of(results, spreads) + "\n" + frames_text(results);
+  const bool is_alike = are_repetitions(options.inputs);
+  if (!options.json.empty()) write_text_file(options.json, json_text(results, spreads, is_alike));
+  return table_of(results, spreads, is_alike && results.size() > 1) + "\n" + frames_text(results);
 }
 
 }  // namespace hsi4d::cli

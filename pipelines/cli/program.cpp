@@ -86,7 +86,7 @@ struct CommandLine {
   std::function<std::string()> run;
 
   explicit CommandLine(const std::vector<LossTerm>& terms) : losses(descriptions_of(terms)) {
-    app.set_version_flag("--version", std::string("hsi4d ") + version());
+    app.set_version_flag("--version", std::string("hsi4d ") + version() + " (" + git_commit() + ")");
     app.require_subcommand(1);
     app.failure_message(CLI::FailureMessage::simple);
 

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <vector>
 
 #include "core/camera_file.h"
 #include "core/check.h"
@@ -105,6 +106,16 @@ void check_no_input(const std::string& out, const std::string& where, const std:
   }
 }
 
-void check_writable(const std::string& path) { const AtomicFile trial(path); }
+void check_writable(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::vector<fs::path> missing;  // innermost first
+  std::error_code error;
+  for (fs::path folder = fs::path(path).parent_path(); !folder.empty() && !fs::exists(folder, error);
+       folder = folder.parent_path())
+    missing.push_back(folder);
+  { const AtomicFile trial(path); }
+  for (const fs::path& folder : missing)
+    fs::remove(folder, error);  // it is made again with the file, if it comes to that
+}
 
 }  // namespace hsi4d::cli

@@ -12,6 +12,7 @@
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/run_config.h"
+#include "pipelines/run_summary.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -31,11 +32,12 @@ void check_inputs(const DataSettings& data) {
 }
 
 std::string table_of(const CameraChoice& choice) {
-  std::vector<std::vector<std::string>> rows = {{"VISIBLE", "RADIUS [m]", "AZIMUTH [°]", "ELEVATION [°]"}};
+  std::vector<std::vector<std::string>> rows = {
+      {"VISIBLE", "COVERED [%]", "RADIUS [m]", "AZIMUTH [°]", "ELEVATION [°]"}};
   for (std::size_t i = 0; i < std::min(kMostTold, choice.candidates.size()); ++i) {
     const CandidateView& view = choice.candidates[i];
-    rows.push_back({std::to_string(view.visible) + " of 22", rounded(view.radius_m, 4), rounded(view.azimuth_deg, 4),
-                    rounded(view.elevation_deg, 4)});
+    rows.push_back({std::to_string(view.visible) + " of 22", view.cover ? fixed_number(100 * *view.cover, 0) : "-",
+                    rounded(view.radius_m, 4), rounded(view.azimuth_deg, 4), rounded(view.elevation_deg, 4)});
   }
   const std::size_t others = choice.candidates.size() - std::min(kMostTold, choice.candidates.size());
   return table(rows) + (others > 0 ? "and " + std::to_string(others) + " more candidates\n" : "");

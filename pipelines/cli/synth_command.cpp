@@ -27,9 +27,8 @@ std::string synth_command(const std::filesystem::path& config, const std::vector
            " views of " + size + " for hsi4d avatar fit\n";
   }
   const std::string clips = run.synthetic.clips == 1 ? "" : std::to_string(run.synthetic.clips) + " clips of ";
-  const std::string frames =
-      clips + std::to_string(run.synthetic.frames) + (run.synthetic.frames == 1 ? " frame" : " frames");
-  return out.generic_string() + ": " + frames + " of " + size + " with masks and truth\n";
+  return out.generic_string() + ": " + clips + std::to_string(run.synthetic.frames) + " frames of " + size +
+         " with masks and truth\n";
 }
 
 }  // namespace hsi4d::cli

@@ -1,5 +1,5 @@
 // The 3D view: what is shown in a frame, and the eye that turns around it.
-const colors3d = { body: [0.76, 0.8, 0.88, 1], truth: [0.25, 0.85, 0.55, 0.38], camera: [1, 0.85, 0.3, 1],
+const colors3d = { body: [0.76, 0.8, 0.88, 1], truth: [0.2, 0.9, 0.5, 0.5], camera: [1, 0.85, 0.3, 1],
   path: [1, 0.85, 0.3, 0.7], skeleton: [0.35, 0.75, 1, 1], grid: [0.5, 0.55, 0.6, 0.35] };
 
 // Where one looks from: around `target`, z up; or through the reconstructed camera.
@@ -96,6 +96,25 @@ const startView3d = async () => {
       projection: projectionOf(fx * s, fy * s, u, v, w, h) };
   };
 
+  // The true body is a veil over the other wherever it is: by depth the two would fight for each pixel. One layer of it,
+  // so its depths come first; then those of the body join them, for what is drawn behind.
+  const drawBodies = (camera, transforms, t) => {
+    if (shows("body")) drawMesh(camera, transforms, colors3d.body);
+    if (!shows("truth") || !hasTruth) return;
+    const truth = poseSkeleton(data, "truth", t).transforms;
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.colorMask(false, false, false, false);
+    drawMesh(camera, truth, colors3d.truth);
+    gl.colorMask(true, true, true, true);
+    gl.depthFunc(gl.LEQUAL);
+    drawMesh(camera, truth, colors3d.truth);
+    gl.depthFunc(gl.LESS);
+    if (!shows("body")) return;
+    gl.colorMask(false, false, false, false);
+    drawMesh(camera, transforms, colors3d.body);
+    gl.colorMask(true, true, true, true);
+  };
+
   const draw = t => {
     const camera = eyeCamera(t), body = poseSkeleton(data, "body", t);
     const worlds = [identity];
@@ -106,14 +125,12 @@ const startView3d = async () => {
     gl.enable(gl.DEPTH_TEST);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    if (shows("body") && drawMesh) drawMesh(camera, body.transforms, colors3d.body);
+    if (drawMesh) drawBodies(camera, body.transforms, t);
     if (!shows("scene")) drawLines(camera, grid, colors3d.grid);
     if (shows("camera") && !eye.follows) {
       drawLines(camera, path, colors3d.path);
       drawLines(camera, frustum(cameraOf(t), 0.4), colors3d.camera);
     }
-    if (shows("truth") && drawMesh && hasTruth)
-      drawMesh(camera, poseSkeleton(data, "truth", t).transforms, colors3d.truth);
     const cut = shows("cut") && !eye.follows ? Math.max(0.05, eye.distance - 0.9) : 0.05;
     drawSplats(camera, worlds, worlds.map((_, part) => shows(part === 0 ? "scene" : "objects")), cut);
     if (shows("skeleton")) {

@@ -95,9 +95,19 @@ TEST_CASE("writing follows a link and refuses what is no file") {
   REQUIRE(::mkfifo((folder / "pipe").c_str(), 0600) == 0);
   CHECK(message_of([&] { write_text_file(folder / "pipe", ""); }) ==
         folder / "pipe" + ": cannot be written: it is no file");
-  const std::string nowhere = folder / "no/where";
-  CHECK(message_of([&] { write_text_file(nowhere, ""); }) ==
-        nowhere + ": cannot be written: No such file or directory");
+  const std::string below_file = folder / "target/no/where";
+  CHECK(message_of([&] { write_text_file(below_file, ""); }) == below_file + ": cannot be written: Not a directory");
+}
+
+TEST_CASE("folders on the way to a file are made") {
+  const TemporaryFolder folder;
+  write_text_file(folder / "a/b/text", "text");
+  CHECK(read_text_file(folder / "a/b/text") == "text");
+  const std::string too_long = folder / ("f/" + std::string(300, 'x') + "/text");
+  CHECK(message_of([&] { write_text_file(too_long, ""); }) == too_long + ": cannot be written: File name too long");
+  const std::string denied = "/proc/nowhere/text";
+  CHECK(message_of([&] { write_text_file(denied, ""); }) ==
+        denied + ": cannot be written: the folder /proc/nowhere cannot be made: No such file or directory");
 }
 
 TEST_CASE("new files get the usual permissions") {

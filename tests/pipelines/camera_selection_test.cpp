@@ -1,5 +1,6 @@
 #include "pipelines/camera_selection.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -110,6 +111,20 @@ TEST_CASE("joints behind a wall are not counted, and the view with most of them 
     if (is_hidden) CHECK(view.visible < 20);
     if (is_hidden) CHECK(view.visible > 5);
   }
+}
+
+TEST_CASE("of views with as many joints one is taken whose image is covered") {
+  SceneSetup setup = standing();
+  setup.scene = {};
+  add_wall(setup.scene, {-6, 2, -2}, {8, 0, 0}, {0, 0, 8});  // behind the human as it is seen from +x
+  const CameraChoice choice = select_camera(setup, few_candidates(), {});
+  const CandidateView& best = choice.candidates.front();
+  REQUIRE(best.visible == 22);
+  CHECK(center_of(best.camera_from_world)[0] > 0);
+  CHECK(best.cover.value() > 0.9);
+  const auto is_empty = [](const CandidateView& view) { return view.visible == 22 && view.cover.value() < 0.7; };
+  CHECK(std::any_of(choice.candidates.begin(), choice.candidates.end(), is_empty));
+  for (const CandidateView& view : choice.candidates) CHECK(view.cover.has_value() == (view.visible == 22));
 }
 
 TEST_CASE("a human that nobody can see, or that lies, is told") {

@@ -6,10 +6,12 @@
 #include <catch2/catch.hpp>
 
 #include "body/motion_edit.h"
+#include "body/motion_io.h"
 #include "core/check.h"
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/npz.h"
+#include "core/video.h"
 #include "splat/io_ply.h"
 #include "splat/splat_file.h"
 #include "tests/pipelines/tiny_run.h"
@@ -199,6 +201,50 @@ TEST_CASE("masks that are missing are warned of, a missing folder is an error") 
                                              ": has no mask for 2 of 4 frames; these count as empty"});
   fs::remove_all(folder);
   CHECK(message_of([&] { dataset.read(); }) == folder.string() + ": there is no such folder of masks");
+}
+
+TEST_CASE("masks and poses beyond the video are warned of with both numbers") {
+  const CopiedDataset dataset;
+  std::vector<std::string> messages;
+  const LogSink sink = log_to([&](LogLevel, std::string_view text) { messages.emplace_back(text); });
+  const auto told = [&](const DataSettings& data) {
+    messages.clear();
+    read_clip(data);
+    return messages;
+  };
+  DataSettings data = dataset_inputs(dataset.path);
+  const fs::path human = dataset.path / "masks" / "human";
+  const std::string of_four = " masks, the video has 4 frames; ",
+                    unused = " of the masks belong to no frame and are not used";
+  fs::copy_file(human / "0003.png", human / "0004.png");
+  fs::copy_file(human / "0003.png", human / "a.png");
+  CHECK(told(data) == std::vector<std::string>{human.string() + ": holds 6" + of_four + "2" + unused});
+
+  const auto write_video = [&](const fs::path& path, Index frames) {
+    VideoWriter video(path.string(), kTinyPixels, kTinyPixels, {.frame_rate = 10});
+    for (Index t = 0; t < frames; ++t) video.add(Image(3, kTinyPixels, kTinyPixels));
+    video.commit();
+  };
+  fs::remove_all(human);
+  write_video(dataset.path / "masks/human.mp4", 5);
+  CHECK(told(data) ==
+        std::vector<std::string>{(dataset.path / "masks/human.mp4").string() + ": holds 5" + of_four + "1" + unused});
+
+  // A video of two frames, with four masks and four poses.
+  write_video(dataset.path / "masks/human.mp4", 2);
+  write_video(dataset.path / "short.mp4", 2);
+  data.frames = dataset.path / "short.mp4";
+  data.truth.clear();
+  const std::string motion = (dataset.path / "initial_motion.npz").string(),
+                    object = (dataset.path / "masks" / kTinyObject).string();
+  CHECK(told(data) == std::vector<std::string>{
+                          object + ": holds 4 masks, the video has 2 frames; 2" + unused,
+                          motion + ": holds 4 poses at 10 a second, the video has 2 frames at 10; poses after its end "
+                                   "are not used"});
+  Motion shorter = read_motion(motion);
+  shorter.poses.resize(3);
+  write_motion(motion, shorter);
+  CHECK(told(data).size() == 2);
 }
 
 TEST_CASE("every frame can be checked at once") {

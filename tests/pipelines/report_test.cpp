@@ -247,6 +247,27 @@ TEST_CASE("a report tells first what became worse than the start, in few digits"
   CHECK(count_of(page, "class=\"card figure harmed\"") == 1);  // PSNR has no card
 }
 
+TEST_CASE("a report compares with frame 0 copied too, and judges penetration by share and depth together") {
+  const TemporaryFolder here;
+  make_run("a", "a walk");
+  RunSummary summary = summary_named("a walk");
+  const auto page_of = [&](double share, double depth) {
+    summary.baselines[0].values = {{"mpjpe_mm", 60}, {"penetration_share", 0.004}, {"penetration_depth_mm", 13.3}};
+    summary.baselines[1].values = {{"mpjpe_mm", 15}, {"jitter", 0}};
+    summary.metrics[1].values = {
+        {"mpjpe_mm", 20}, {"penetration_share", share}, {"penetration_depth_mm", depth}, {"jitter", 9}};
+    here.write("a/summary.json", summary_json(summary));
+    return report_html("a");
+  };
+  const std::string page = page_of(0.005, 4.1);  // more of the body inside, but less deep
+  CHECK_THAT(page, Contains("<p class=\"message\">Worse than frame 0 copied: MPJPE.</p>"));  // which never trembles
+  CHECK_THAT(page, !Contains("Worse than the start"));
+  CHECK_THAT(page_of(0.003, 20), !Contains("Worse than the start"));
+  CHECK_THAT(page_of(0.005, 13.3), Contains("Worse than the start: penetration.</p>"));
+  CHECK_THAT(page_of(0.004, 15), Contains("Worse than the start: penetration depth.</p>"));
+  CHECK_THAT(page_of(0.005, 15), Contains("Worse than the start: penetration; penetration depth.</p>"));
+}
+
 TEST_CASE("the same run gives the same bytes, and reporting twice changes nothing") {
   const TemporaryFolder here;
   make_run("a", "a walk");
@@ -409,6 +430,8 @@ TEST_CASE("a folder that holds no run is the user's mistake") {
   CHECK_THROWS_MATCHES(write_report("a/notes.txt"), UserError,
                        Catch::Matchers::Message("a/notes.txt: is not a folder; give the folder of a run"));
   CHECK_FALSE(fs::exists("a/report.html"));
+  here.write("a/run/status.json", "{}");
+  CHECK_THROWS_WITH(write_report("a"), "a: holds no run; did you mean a/run?");
 }
 
 TEST_CASE("plots survive flat, single and extreme values") {

@@ -349,11 +349,11 @@ TEST_CASE("a dataset with all noise and faults is a function of its settings", "
 
 TEST_CASE("hsi4d synth makes a dataset, and refuses a folder in use") {
   const TemporaryFolder folder;
-  folder.write("config.json", R"({"synthetic": {"frames": 1, "size_px": 32, "scene_gaussians": 1000,
+  folder.write("config.json", R"({"synthetic": {"frames": 2, "size_px": 32, "scene_gaussians": 1000,
     "avatar_gaussians": 300, "object_gaussians": 100}})");
   const ProgramResult made = run_hsi4d({"synth", "config.json", "--out", "data"});
   CHECK(made.err.find("rror") == std::string::npos);
-  CHECK(made.out == "data: 1 frame of 32 x 32 pixels with masks and truth\n");
+  CHECK(made.out == "data: 2 frames of 32 x 32 pixels with masks and truth\n");
   REQUIRE(made.status == 0);
   CHECK(fs::exists("data/first_frame.png"));
   CHECK(fs::exists("data/video.mp4"));
@@ -361,7 +361,7 @@ TEST_CASE("hsi4d synth makes a dataset, and refuses a folder in use") {
   CHECK(again.status == 2);
   CHECK(again.out.empty());
   CHECK(again.err == (fs::canonical("data")).string() + ": the folder is not empty; name a new or empty one\n");
-  const ProgramResult wrong = run_hsi4d({"synth", "config.json", "--out", "new", "--set", "synthetic.frames=0"});
+  const ProgramResult wrong = run_hsi4d({"synth", "config.json", "--out", "new", "--set", "synthetic.frames=1"});
   CHECK(wrong.status == 2);
   CHECK(wrong.err.find("/synthetic/frames") != std::string::npos);
   CHECK_FALSE(fs::exists("new"));
@@ -434,4 +434,14 @@ TEST_CASE("a video that cannot be written is refused before anything is made") {
   CHECK(odd.err ==
         "config.json:1: /synthetic/video: mp4_420 has blocks of 2x2 pixels, which size_px 33 cannot be divided into; "
         "take an even size, or mp4\n");
+}
+
+TEST_CASE("a demo whose dataset cannot be made leaves no folder") {
+  const TemporaryFolder here;
+  here.write("bad.ply", "no Gaussians");
+  const ProgramResult failed =
+      run_hsi4d({"demo", "--quick", "--quiet", "--out", "demos/a", "--set", "synthetic.scene_file=bad.ply"});
+  CHECK(failed.status == 2);
+  CHECK(failed.err.find("bad.ply") != std::string::npos);
+  CHECK_FALSE(fs::exists("demos/a"));
 }

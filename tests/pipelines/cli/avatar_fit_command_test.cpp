@@ -175,7 +175,7 @@ TEST_CASE("hsi4d avatar fit looks where it writes before it learns, and replaces
 
   // Told before a picture is looked at: this one would be refused.
   write_image("views/images/0001.png", Image(3, 5, 5));
-  CHECK_THAT(refusal("nowhere/a.safetensors"), Contains("nowhere/a.safetensors: cannot be written"));
+  CHECK_THAT(refusal("views/mask.png/a.safetensors"), Contains("views/mask.png/a.safetensors: cannot be written"));
   CHECK_THROWS_WITH(fit("a.safetensors"), Contains("is 5x5 pixels"));
   CHECK_FALSE(fs::exists("a.safetensors"));
 }

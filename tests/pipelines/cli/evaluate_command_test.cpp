@@ -43,7 +43,11 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
   const TemporaryFolder here;
   carry_out_tiny(tiny_config({"name=one"}), "one");
   carry_out_tiny(tiny_config({"name=two", "stages.interaction.iterations=3"}), "two");
-  const nlohmann::json summary = json_of("one/summary.json"), both = evaluated({"one", "two"});
+  carry_out_tiny(tiny_config({"name=three", "seed=5", "stages.interaction.iterations=3"}), "three");
+  // As if by the config of "one" with another seed: a result that differs.
+  write_changed("one/config.resolved.json", "one/config.resolved.json", [](auto&) {});
+  write_changed("one/config.resolved.json", "three/config.resolved.json", [](auto& tree) { tree["seed"] = 5; });
+  const nlohmann::json summary = json_of("one/summary.json"), both = evaluated({"one", "three"});
   const nlohmann::json& one = both["results"][0];
   CHECK(one["name"] == "one");
   CHECK(one["frames"] == kTinyFrames);
@@ -66,7 +70,14 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
   CHECK(both["mean"]["mpjpe_mm"].get<double>() == Approx((a + b) / 2));
   CHECK(both["std"]["mpjpe_mm"].get<double>() == Approx(std::fabs(a - b) / std::sqrt(2)));
 
-  const ProgramResult table = run_hsi4d({"evaluate", "one", "two"});
+  const nlohmann::json apart = evaluated({"one", "two"});  // other iterations: a mean says nothing
+  CHECK(apart["results"].size() == 2);
+  CHECK_FALSE((apart.contains("mean") || apart.contains("std")));
+  CHECK_THAT(run_hsi4d({"evaluate", "one", "two"}).out, !Contains("mean"));
+  CHECK_THAT(run_hsi4d({"evaluate", "one", "three/motion.npz", "--truth", TinyDataset::folder().string()}).out,
+             !Contains("mean"));
+
+  const ProgramResult table = run_hsi4d({"evaluate", "one", "three"});
   CHECK(table.err.empty());
   CHECK_THAT(table.out, StartsWith("                         one") && Contains("mean ± std\nMPJPE [mm] ") &&
                             Contains("\n\none: frames 1 to 3 at 10 a second, against " + data("truth") + "\n"));
@@ -121,13 +132,20 @@ TEST_CASE("what evaluate cannot compare is told") {
   CHECK(refused({"none.npz", "--truth", truth}) == "none.npz: there is no such file or folder\n");
   CHECK(refused({motion, "--truth", "none"}) == "none: there is no such file or folder\n");
   here.write("note.txt", "text");
+  CHECK(refused({"none"}) == "none: there is no such file or folder\n");
+  CHECK(refused({"."}) == ".: holds no run, dataset or motion\n");
+  here.write("demo/run/status.json", "{}");
+  here.write("demo/dataset/truth/motion.npz", "");
+  CHECK(refused({"demo"}) == "demo: holds no run, dataset or motion; did you mean demo/run?\n");
+  CHECK(refused({motion, "--truth", "demo"}) == "demo: holds no run, dataset or motion; did you mean demo/dataset?\n");
   CHECK(refused({"note.txt", "--truth", truth}) ==
         "note.txt: is neither a folder of a run or dataset nor a motion (.npz)\n");
   here.write("bad.npz", "text");
   CHECK_THAT(refused({"bad.npz", "--truth", truth}), StartsWith("bad.npz: "));
   CHECK_THAT(refused({motion, "--truth", truth, "--from-rate", "-1"}),
              StartsWith("hsi4d evaluate: --from-rate: -1 is out of range; allowed: 0.01 to "));
-  CHECK_THAT(refused({motion, "--truth", truth, "--json", "no/e.json"}), Contains("no"));
+  CHECK_THAT(refused({motion, "--truth", truth, "--json", "note.txt/e.json"}),
+             Contains("note.txt/e.json: cannot be written"));
   CHECK_THAT(refused({motion, "--truth", motion, "--json", motion}), Contains("--json"));
   CHECK_THAT(refused({motion, "--truth", truth, "--avatar", "none.safetensors"}), Contains("none.safetensors"));
   const CopiedDataset dataset;

@@ -153,7 +153,7 @@ TEST_CASE("the program and every subcommand answer --version and --help") {
   const TemporaryFolder folder;
   const ProgramResult version_text = run_hsi4d({"--version"});
   CHECK(version_text.status == 0);
-  CHECK(version_text.out == std::string("hsi4d ") + version() + "\n");
+  CHECK(version_text.out == std::string("hsi4d ") + version() + " (" + git_commit() + ")\n");
   const ProgramResult help = run_hsi4d({"--help"});
   CHECK(help.status == 0);
   for (const char* command : {"run", "demo", "synth", "evaluate", "report", "render", "gradients", "pose", "motion",

@@ -65,7 +65,8 @@ TEST_CASE("what is wrong with the options is told to the letter") {
 TEST_CASE("a file that cannot be written is told before the work is done, and nothing is left behind") {
   const Files files;
   std::filesystem::create_directory("folder.npz");
-  for (const std::string out : {"missing/a.npz", "folder.npz"}) {
+  std::ofstream("file").put('x');
+  for (const std::string out : {"file/a.npz", "folder.npz"}) {
     INFO(out);
     NpzWriter npz;
     npz.add<double>("image", {1, 1, 3}, {0, 0, 0});
@@ -83,10 +84,14 @@ TEST_CASE("a file that cannot be written is told before the work is done, and no
     return std::distance(std::filesystem::directory_iterator("."), std::filesystem::directory_iterator());
   };
   const auto before = files_here();
-  cli::RenderOptions render = render_options("a.npz");
-  render.shared.scene = "missing.ply";
-  CHECK_THAT(fault([&] { cli::render_command(render); }), StartsWith("missing.ply: "));
-  CHECK(files_here() == before);
+  for (const std::string out : {"a.npz", "new/folder/a.npz"}) {
+    cli::RenderOptions render = render_options(out);
+    render.shared.scene = "missing.ply";
+    CHECK_THAT(fault([&] { cli::render_command(render); }), StartsWith("missing.ply: "));
+    CHECK(files_here() == before);
+  }
+  cli::render_command(render_options("new/folder/a.npz"));
+  CHECK(std::filesystem::exists("new/folder/a.npz"));
 }
 
 TEST_CASE("no file that is read is replaced by the result") {
