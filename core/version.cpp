@@ -1,7 +1,5 @@
 #include "core/version.h"
 
-#include "hsi4d_commit.h"
-
 namespace hsi4d {
 
 const char* version() { return HSI4D_VERSION; }

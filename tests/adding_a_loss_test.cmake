@@ -78,7 +78,7 @@ file(READ ${source}/docs/adding_a_loss.md doc)
 matched(name "${doc}" "Make `optim/losses/([a-z_]+)\\.cpp`:" "which file to make")
 matched(list_line "${doc}" "Add `(HSI4D_LOSS\\([a-z_]+\\))` to `optim/losses/list\\.h`" "which line to add")
 code_block(code "${doc}" cpp "Make `optim/losses/${name}.cpp`:")
-code_block(config "${doc}" json "Use it in a stage of a config:")
+code_block(config "${doc}" json "Use it in a stage of a config")
 file(WRITE ${source}/optim/losses/${name}.cpp "${code}")
 file(READ ${source}/optim/losses/list.h list)
 string(REGEX REPLACE "(HSI4D_LOSS\\([a-z_0-9]+\\))\n// clang-format on" "\\1 \\\\\n  ${list_line}\n// clang-format on"
