@@ -325,7 +325,11 @@ TEST_CASE("a folder of frames in another format is told, and numbers that leave 
         ": holds 0 .png files; a clip needs at least 2 frames; its 1 .JPG, 2 .jpg files are not read");
   }
   SECTION("a frame is missing, and the motion is of frame 0 alone") {
-    fs::remove(dataset.path / "frames/0002.png");
+    const auto remove_frame = [&](const std::string& name) {
+      for (const char* folder : {"frames/", "masks/human/", "masks/watering_can/"})
+        fs::remove(dataset.path / (folder + name));
+    };
+    remove_frame("0002.png");
     fs::remove_all(dataset.path / "truth");
     Motion motion = read_motion(dataset.file("initial_motion.npz"));
     motion.poses.resize(1);
@@ -335,7 +339,7 @@ TEST_CASE("a folder of frames in another format is told, and numbers that leave 
           Texts{dataset.file("frames") +
                 ": \"0001.png\" is followed by \"0003.png\"; frames count as equally far apart in time, so one seems "
                 "to be missing"});
-    fs::remove(dataset.path / "frames/0000.png");  // 1 and 3
+    remove_frame("0000.png");  // 1 and 3 are left
     CHECK(warnings_of([&] { read_clip(config.data); }).empty());
   }
 }
