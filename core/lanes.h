@@ -44,8 +44,8 @@ using LaneMask = decltype(T() < T());
 
 /// x in every lane.
 template <class T>
-T lane_constant(int x) {
-  if constexpr (std::is_constructible_v<T, int>) {
+T lane_constant(double x) {
+  if constexpr (std::is_constructible_v<T, double>) {
     return T(x);
   } else {
     return T{} + static_cast<std::decay_t<decltype(T{}[0])>>(x);

@@ -215,42 +215,71 @@ std::string cost_json(const RunCost& cost) {
   return text + all.dump() + "\n";
 }
 
-std::string cost_svg(const RunCost& cost, const std::string& title) {
-  constexpr double kLeft = 130, kWidth = 760, kBar = 26, kRow = 20, kTop = 44;
-  double longest = 0;
-  for (const StageCost& stage : cost.stages) longest = std::max(longest, stage.median_ms());
-  std::string body = line("<text x=\"12\" y=\"26\" font-size=\"16\">%s</text>\n", html_escape(title).c_str());
-  double y = kTop;
+namespace {
+
+constexpr double kLeft = 130, kWidth = 740, kBar = 26, kRow = 20;  // of the picture, its units
+
+/// The operators that get a colour, the costliest of all stages first.
+std::vector<std::string> costliest_parts(const RunCost& cost) {
+  constexpr std::size_t kColors = 8;
+  std::vector<CostPart> all;
   for (const StageCost& stage : cost.stages) {
-    const double whole = per_iteration(stage.sum.iteration_seconds, stage), scale = longest > 0 ? kWidth / longest : 0;
-    body += line("<text x=\"12\" y=\"%.0f\">%s</text>\n", y + 17, html_escape(stage.stage).c_str());
-    double x = kLeft;
-    std::vector<CostPart> parts = parts_of(stage);
-    std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
-    double row = y + kBar + 14, at = kLeft;
-    for (std::size_t i = 0; i < parts.size() && parts[i].ms() > 0; ++i) {
-      const double width = parts[i].ms() * scale;
-      body += line(
-          "<rect x=\"%.1f\" y=\"%.0f\" width=\"%.1f\" height=\"%.0f\" fill=\"%s\"><title>%s: %.2f ms</title></rect>\n",
-          x, y, width, kBar, part_color(i).c_str(), html_escape(parts[i].name).c_str(), parts[i].ms());
-      x += width;
-      if (parts[i].ms() < 0.02 * whole || i >= 8) continue;
-      const std::string label = parts[i].name + line(" %.2f", parts[i].ms());
-      const double length = 8.0 + 16 + 6.6 * static_cast<double>(label.size());
-      if (at + length > kLeft + kWidth) at = kLeft, row += kRow;
-      body += line(
-          "<rect x=\"%.1f\" y=\"%.0f\" width=\"10\" height=\"10\" fill=\"%s\"/><text x=\"%.1f\" y=\"%.0f\">%s</text>\n",
-          at, row - 9, part_color(i).c_str(), at + 14, row, html_escape(label).c_str());
-      at += length;
-    }
-    body += line("<text x=\"%.1f\" y=\"%.0f\">%.2f ms</text>\n", x + 6, y + 17, whole);
-    y = row + 30;
+    const std::vector<CostPart> parts = parts_of(stage);
+    all.insert(all.end(), parts.begin(), parts.end());
   }
-  return line(
-             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 980 %.0f\" font-family=\"sans-serif\" "
-             "font-size=\"12\" fill=\"#222\">\n<rect width=\"980\" height=\"%.0f\" fill=\"#fff\"/>\n",
-             y, y) +
-         body + "</svg>\n";
+  std::stable_sort(all.begin(), all.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
+  std::vector<std::string> names;
+  for (const CostPart& part : all) {
+    if (names.size() < kColors && std::find(names.begin(), names.end(), part.name) == names.end())
+      names.push_back(part.name);
+  }
+  return names;
+}
+
+std::string color_of(const std::string& name, const std::vector<std::string>& costliest) {
+  const auto place = std::find(costliest.begin(), costliest.end(), name);
+  return place == costliest.end() ? "#b5b5b5" : part_color(static_cast<std::size_t>(place - costliest.begin()));
+}
+
+/// The bar of a stage and the legend below it.
+/// @param y  its top; afterwards that of the next
+std::string stage_bar(const StageCost& stage, double scale, const std::vector<std::string>& costliest, double& y) {
+  const double whole = per_iteration(stage.sum.iteration_seconds, stage);
+  std::vector<CostPart> parts = parts_of(stage);
+  std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
+  std::string body = line("<text x=\"12\" y=\"%.0f\">%s</text>\n", y + 17, html_escape(stage.stage).c_str());
+  double x = kLeft, at = kLeft, row = y + kBar + 14;
+  for (const CostPart& part : parts) {
+    const std::string color = color_of(part.name, costliest), name = html_escape(part.name);
+    body += line("<rect x=\"%.1f\" y=\"%.0f\" width=\"%.1f\" height=\"%.0f\" fill=\"%s\">", x, y, part.ms() * scale,
+                 kBar, color.c_str()) +
+            line("<title>%s: %.2f ms</title></rect>\n", name.c_str(), part.ms());
+    x += part.ms() * scale;
+    if (part.ms() < 0.02 * whole) continue;
+    const double length = 30 + 6.8 * static_cast<double>(part.name.size() + 5);
+    if (at + length > kLeft + kWidth) at = kLeft, row += kRow;
+    body += line("<rect x=\"%.1f\" y=\"%.0f\" width=\"10\" height=\"10\" fill=\"%s\"/>", at, row - 9, color.c_str()) +
+            line("<text x=\"%.1f\" y=\"%.0f\">%s %.2f</text>\n", at + 14, row, name.c_str(), part.ms());
+    at += length;
+  }
+  body += line("<text x=\"%.1f\" y=\"%.0f\">%.2f ms</text>\n", x + 6, y + 17, whole);
+  y = row + 30;
+  return body;
+}
+
+}  // namespace
+
+std::string cost_svg(const RunCost& cost, const std::string& title) {
+  double longest = 0;
+  for (const StageCost& stage : cost.stages)
+    longest = std::max(longest, per_iteration(stage.sum.iteration_seconds, stage));
+  const std::vector<std::string> costliest = costliest_parts(cost);
+  std::string body = line("<text x=\"12\" y=\"26\" font-size=\"16\">%s</text>\n", html_escape(title).c_str());
+  double y = 44;
+  for (const StageCost& stage : cost.stages) body += stage_bar(stage, longest > 0 ? kWidth / longest : 0, costliest, y);
+  return line("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 980 %.0f\" font-family=\"sans-serif\" ", y) +
+         line("font-size=\"12\" fill=\"#222\">\n<rect width=\"980\" height=\"%.0f\" fill=\"#fff\"/>\n", y) + body +
+         "</svg>\n";
 }
 
 }  // namespace hsi4d

@@ -20,6 +20,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 #include <hwy/highway.h>
 
@@ -366,11 +367,27 @@ void backward(Index side, const CompositeScene<float>& scene, const BlockJob& jo
 
 // --- entry points ----------------------------------------------------------------------------------------------------
 
+/// Calls f with the number of channels as a constant where loops over them are worth unrolling, else with 0: colours,
+/// and colours with a depth, opacities of groups or both.
+template <class F>
+auto with_channels(Index channels, const F& f) {
+  switch (channels) {
+    case 3:
+      return f(std::integral_constant<int, 3>());
+    case 4:
+      return f(std::integral_constant<int, 4>());
+    case 5:
+      return f(std::integral_constant<int, 5>());
+    default:
+      return f(std::integral_constant<int, 0>());
+  }
+}
+
 BlockCounts forward_blocks(Index side, const CompositeScene<float>& scene, const BlockJob& job) {
-  return scene.channels == 3 ? forward<3>(side, scene, job) : forward<0>(side, scene, job);
+  return with_channels(scene.channels, [&](auto channels) { return forward<channels>(side, scene, job); });
 }
 void backward_blocks(Index side, const CompositeScene<float>& scene, const BlockJob& job, const BlockAdjoint& adjoint) {
-  scene.channels == 3 ? backward<3>(side, scene, job, adjoint) : backward<0>(side, scene, job, adjoint);
+  with_channels(scene.channels, [&](auto channels) { backward<channels>(side, scene, job, adjoint); });
 }
 void pack_list(Index side, const CompositeScene<float>& scene, const BlockJob& job, PackedBlocks& packed) {
   const Index chunks = block_chunks(static_cast<Index>(job.entries.size()));

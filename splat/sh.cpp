@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
+#include "core/lanes.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 #include "splat/sh_basis.h"
@@ -17,13 +19,30 @@ constexpr int kMostCoefficients = (kHighestShDegree + 1) * (kHighestShDegree + 1
 
 // --- colours ---------------------------------------------------------------------------------------------------------
 
-/// Direction from the camera's centre to a mean; (0, 0, 1) where they are the same point.
+/// From the camera's centre to eight means; (0, 0, 1) where they are the same point.
+struct ViewDirections {
+  WideLanes unit[3], length;
+  LaneMask<WideLanes> usable;
+};
+
+/// As direction_of: divided by the largest component first, so that nothing under- or overflows.
 template <class S>
-Direction<double, 3> view_direction(const Vector3<double>& center, const S* mean) {
-  const Vector3<double> m(static_cast<double>(mean[0]), static_cast<double>(mean[1]), static_cast<double>(mean[2]));
-  Direction<double, 3> direction = direction_of(Vector3<double>(m - center));
-  if (!direction.usable) direction.unit = Vector3<double>::UnitZ();
-  return direction;
+ViewDirections view_directions(const Vector3<double>& center, const S* means, Index count) {
+  const WideLanes zero{}, one = lane_constant<WideLanes>(1);
+  ViewDirections d{};
+  for (int i = 0; i < 3; ++i) d.unit[i] = load_wide(means + i, 3, count) - center[i];
+  const WideLanes largest = lane_max(lane_max(lane_abs(d.unit[0]), lane_abs(d.unit[1])), lane_abs(d.unit[2]));
+  d.usable = lane_finite(d.unit[0]) & lane_finite(d.unit[1]) & lane_finite(d.unit[2]) & (largest > zero);
+  const WideLanes scale = d.usable ? largest : one;
+  WideLanes square = zero;
+  for (WideLanes& x : d.unit) {
+    x = (d.usable ? x : zero) / scale;
+    square = square + x * x;
+  }
+  const WideLanes norm = d.usable ? lane_sqrt(square) : one, inverse = one / norm;
+  for (int i = 0; i < 3; ++i) d.unit[i] = d.usable ? d.unit[i] * inverse : (i == 2 ? one : zero);
+  d.length = norm * scale;
+  return d;
 }
 
 /// max(0, ½ + Σ Y sh) of a channel; NaN where the sum is not finite, also −∞, so that the Gaussian is not drawn.
@@ -35,9 +54,9 @@ S held_color(S sum) {
 
 /// ½ + Σ Y sh of a channel.
 template <class S>
-S color_sum(const S* basis, const S* sh, int coefficients, int channel) {
+S color_sum(const S (*basis)[kLanes], Index lane, const S* sh, int coefficients, int channel) {
   S sum = S(0.5);
-  for (int k = 0; k < coefficients; ++k) sum += basis[k] * sh[3 * k + channel];
+  for (int k = 0; k < coefficients; ++k) sum += basis[k][lane] * sh[3 * k + channel];
   return sum;
 }
 
@@ -63,21 +82,28 @@ struct ShColors {
     return a;
   }
 
+  /// What eight Gaussians are seen by; nothing to do at degree 0.
   struct Seen {
-    Direction<double, 3> direction;  // world
-    Vector3<S> local;                // in the object's axes
-    S basis[kMostCoefficients];
+    ViewDirections direction;  // world
+    Lanes<S> local[3];         // in the object's axes
+    alignas(kAlignment) S basis[kMostCoefficients][kLanes];
   };
 
-  /// What a Gaussian is seen by; nothing to do at degree 0.
-  Seen seen(const NodeIo<S>& io, const Vector3<double>& center, const Matrix3<double>& linear, Index n) const {
-    Seen s{{}, Vector3<S>(S(0), S(0), S(1)), {}};
+  void see(const NodeIo<S>& io, const Vector3<double>& center, const Matrix3<double>& linear, Index n, Index count,
+           Seen& s) const {
+    s.local[0] = s.local[1] = Lanes<S>{};
+    s.local[2] = lane_constant<Lanes<S>>(1);
     if (has_direction(io)) {
-      s.direction = view_direction(center, io.in(kMeans).row(n));
-      s.local = (linear.transpose() * s.direction.unit).template cast<S>();
+      s.direction = view_directions(center, io.in(kMeans).row(n), count);
+      for (int r = 0; r < 3; ++r) {
+        const WideLanes turned = linear(0, r) * s.direction.unit[0] + linear(1, r) * s.direction.unit[1] +
+                                 linear(2, r) * s.direction.unit[2];
+        s.local[r] = convert_lanes<Lanes<S>>(turned);
+      }
     }
-    sh_basis(degree, s.local[0], s.local[1], s.local[2], s.basis);
-    return s;
+    Lanes<S> basis[kMostCoefficients];
+    sh_basis(degree, s.local[0], s.local[1], s.local[2], basis);
+    for (int k = 0; k < coefficients(); ++k) std::memcpy(s.basis[k], &basis[k], sizeof basis[k]);
   }
 
   Vector3<double> center_of(const NodeIo<S>& io) const {
@@ -92,10 +118,13 @@ struct ShColors {
     const Matrix3<double> linear = linear_part(io);
     parallel_for(sh.shape.rows, kGrain, [&](Index begin, Index end) {
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) {
-          const Seen s = seen(io, center, linear, n);
-          for (int c = 0; c < 3; ++c) {
-            colors.row(n)[c] = held_color(color_sum(s.basis, sh.row(n), coefficients(), c));
+        Seen s{};
+        for (Index n = begin; n < end; n += kLanes) {
+          const Index count = std::min(kLanes, end - n);
+          see(io, center, linear, n, count, s);
+          for (Index i = 0; i < count; ++i) {
+            for (int c = 0; c < 3; ++c)
+              colors.row(n + i)[c] = held_color(color_sum(s.basis, i, sh.row(n + i), coefficients(), c));
           }
         }
       });
@@ -117,42 +146,20 @@ struct ShColors {
     constexpr Index kSums = 12;  // of d_m, and of d_A
     const std::span<double> partials = io.template scratch<double>(kSums * part.chunks());
     parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-      Vector3<double> sum_m = Vector3<double>::Zero();
-      Matrix3<double> sum_a = Matrix3<double>::Zero();
+      WideLanes sums[kSums] = {};
       on_best_isa([&] {
-        for (Index n = begin; n < end; ++n) {
-          const S* color = colors.row(n);
-          if (!std::isfinite(color[0] + color[1] + color[2])) continue;  // keeps 0·∞ out
-          S g[3];
-          for (int c = 0; c < 3; ++c) g[c] = color[c] > S(0) ? d_colors.row(n)[c] : S(0);
-          if (g[0] == S(0) && g[1] == S(0) && g[2] == S(0)) continue;
-          const Seen s = seen(io, center, linear, n);
-          if (d_sh) {
-            for (int k = 0; k < coefficients(); ++k) {
-              for (int c = 0; c < 3; ++c) d_sh.row(n)[3 * k + c] += s.basis[k] * g[c];
-            }
-          }
-          if (!wants_direction || !s.direction.usable) continue;
-          S d_basis[kMostCoefficients];
-          for (int k = 0; k < coefficients(); ++k) {
-            const S* of_k = sh.row(n) + 3 * k;
-            d_basis[k] = g[0] * of_k[0] + g[1] * of_k[1] + g[2] * of_k[2];
-          }
-          S d_local[3] = {};
-          sh_basis_adjoint(degree, s.local[0], s.local[1], s.local[2], d_basis, d_local);
-          const Vector3<double> d_l(static_cast<double>(d_local[0]), static_cast<double>(d_local[1]),
-                                    static_cast<double>(d_local[2]));
-          if (wants_transform) sum_a += s.direction.unit * d_l.transpose();
-          Vector3<double> d_m = Vector3<double>::Zero();
-          direction_adjoint(s.direction, Vector3<double>(linear * d_l), d_m);
-          sum_m += d_m;
-          for (int i = 0; i < 3 && d_means; ++i) d_means.row(n)[i] += static_cast<S>(d_m[i]);
+        Seen s{};
+        for (Index n = begin; n < end; n += kLanes) {
+          const Index count = std::min(kLanes, end - n);
+          Cotangents g{};
+          if (!load_cotangents(colors, d_colors, n, count, g)) continue;
+          see(io, center, linear, n, count, s);
+          if (d_sh) add_coefficients(s, g, n, count, d_sh);
+          if (wants_direction) add_directions(s, g, sh, linear, n, count, d_means, sums);
         }
       });
-      for (Index i = 0; i < 3; ++i) partials[static_cast<std::size_t>(i * part.chunks() + chunk)] = sum_m[i];
-      for (Index i = 0; i < 9; ++i) {
-        partials[static_cast<std::size_t>((3 + i) * part.chunks() + chunk)] = sum_a(i / 3, i % 3);
-      }
+      for (Index i = 0; i < kSums; ++i)
+        partials[static_cast<std::size_t>(i * part.chunks() + chunk)] = sum_of_lanes<double>(sums[i]);
     });
     const auto total = [&](Index i) { return pairwise_sum(partials.data() + i * part.chunks(), part.chunks()); };
     for (Index i = 0; i < 9 && wants_transform; ++i) {
@@ -163,6 +170,65 @@ struct ShColors {
     Vector6<double> d_delta = Vector6<double>::Zero();
     d_delta.head<3>() = inverse.transpose() * Vector3<double>(total(0), total(1), total(2));
     detail::add_camera_gradient(io.in(kXi), std::span<const double>(d_delta.data(), 6), 1, io.d_in(kXi));
+  }
+
+  /// Gradients of eight colours, 0 where there is none; a Gaussian whose colour is not finite has none.
+  struct Cotangents {
+    S of[kLanes][3];
+    bool any[kLanes];
+  };
+
+  /// False if there is nothing.
+  static bool load_cotangents(const ConstArray<S>& colors, const ConstArray<S>& d_colors, Index n, Index count,
+                              Cotangents& g) {
+    bool any = false;
+    for (Index i = 0; i < count; ++i) {
+      const S *const color = colors.row(n + i), *const d = d_colors.row(n + i);
+      const bool finite = std::isfinite(color[0] + color[1] + color[2]);
+      for (int c = 0; c < 3; ++c) g.of[i][c] = finite && color[c] > S(0) ? d[c] : S(0);
+      g.any[i] = g.of[i][0] != S(0) || g.of[i][1] != S(0) || g.of[i][2] != S(0);
+      any = any || g.any[i];
+    }
+    return any;
+  }
+
+  void add_coefficients(const Seen& s, const Cotangents& g, Index n, Index count, const Array<S>& d_sh) const {
+    for (Index i = 0; i < count; ++i) {
+      for (int k = 0; k < coefficients() && g.any[i]; ++k) {
+        for (int c = 0; c < 3; ++c) d_sh.row(n + i)[3 * k + c] += s.basis[k][i] * g.of[i][c];
+      }
+    }
+  }
+
+  /// @param sums  of d_m, and of d_A
+  void add_directions(const Seen& s, const Cotangents& g, const ConstArray<S>& sh, const Matrix3<double>& linear,
+                      Index n, Index count, const Array<S>& d_means, WideLanes* sums) const {
+    Lanes<S> d_basis[kMostCoefficients] = {}, d_local[3] = {};
+    LaneMask<WideLanes> counts{};
+    for (Index i = 0; i < count; ++i) {
+      counts[i] = g.any[i] && s.direction.usable[i] ? -1 : 0;
+      for (int k = 0; k < coefficients() && counts[i]; ++k) {
+        const S* of_k = sh.row(n + i) + 3 * k;
+        d_basis[k][i] = g.of[i][0] * of_k[0] + g.of[i][1] * of_k[1] + g.of[i][2] * of_k[2];
+      }
+    }
+    sh_basis_adjoint(degree, s.local[0], s.local[1], s.local[2], d_basis, d_local);
+    const WideLanes zero{};
+    WideLanes d_l[3], d_r[3], along = zero;
+    for (int i = 0; i < 3; ++i) d_l[i] = counts ? convert_lanes<WideLanes>(d_local[i]) : zero;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c)
+        sums[3 + 3 * r + c] = sums[3 + 3 * r + c] + (counts ? s.direction.unit[r] * d_l[c] : zero);
+      d_r[r] = linear(r, 0) * d_l[0] + linear(r, 1) * d_l[1] + linear(r, 2) * d_l[2];
+      along = along + s.direction.unit[r] * d_r[r];
+    }
+    // As direction_adjoint; nothing where the mean is too near for a direction.
+    counts = counts & (s.direction.length >= lane_constant<WideLanes>(smallest_length<double>()));
+    for (int i = 0; i < 3; ++i) {
+      const WideLanes d_m = counts ? (d_r[i] - s.direction.unit[i] * along) / s.direction.length : zero;
+      sums[i] = sums[i] + d_m;
+      if (d_means) add_lanes<S>(d_m, d_means.row(n) + i, 3, count);
+    }
   }
 
   /// Which channels are held at 0.
