@@ -212,9 +212,10 @@ std::string plot_svg(const Plot& plot) {
   }
   if (xs.empty()) return "<p class=\"nothing\">There is nothing to plot.</p>";
   if (plot.begins_at_zero && !plot.is_log) ys.add(0);
-  const Axis x = linear_axis(xs, 8, plot.has_whole_x, false);
+  Axis x = plot.is_log_x ? log_axis(xs) : linear_axis(xs, 8, plot.has_whole_x, false);
+  if (plot.is_log_x) x.ticks = plot.ticks_x;
   const Axis y = plot.is_log ? log_axis(ys) : linear_axis(ys, 5, false, true);
-  std::string svg = "<svg class=\"plot" + (plot.is_timed ? timed_attributes(plot, x) : "\"") +
+  std::string svg = "<svg class=\"plot" + (plot.is_timed ? timed_attributes(plot, x) : "\"") + plot.attributes +
                     " role=\"img\" viewBox=\"0 0 " + fixed_number(plot.width, 0) + " " + fixed_number(kHeight, 0) +
                     "\" aria-label=\"" + html_escape(plot.title) + "\">\n";
   append_axes(svg, plot, x, y);

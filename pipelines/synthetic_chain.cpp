@@ -16,18 +16,6 @@ namespace {
 constexpr std::array<double, 4> kTurnsDeg = {30, -30, 20, -20};  // of views from that of the first clip
 constexpr int kTrialPx = 128;                                    // size of the images in which joints are counted
 
-SceneSetup setup_in(const SyntheticSetting& filmed, const SyntheticClip& clip) {
-  SceneSetup setup;
-  setup.scene = filmed.scene;
-  setup.avatar = filmed.avatar;
-  setup.motion = clip.motion;
-  if (filmed.object.exists()) {
-    setup.objects.push_back({filmed.object.name, filmed.object.gaussians});
-    setup.poses.push_back({so3_log(clip.object.front().rotation), clip.object.front().translation});
-  }
-  return setup;
-}
-
 Vector3<double> pelvis_in(const Avatar& avatar, const BodyPose& pose) {
   return Vector3<double>(pose_joints(avatar, pose).data());
 }
@@ -47,7 +35,7 @@ Viewpoint turned_view(const Viewpoint& first, const Vector3<double>& moved, doub
 Viewpoint chosen_view(const SyntheticClip& clip, const ClipSettings& settings, const Vector3<double>& start,
                       const SyntheticSetting& filmed, Index index) {
   const SceneSetup setup = setup_in(filmed, clip);
-  const Viewpoint first = first_viewpoint(settings.motion);
+  const Viewpoint first = first_viewpoint(settings);
   Vector3<double> moved = pelvis_in(filmed.avatar, clip.motion.poses.front()) - start;
   moved[2] = 0;
   CameraSelectionSettings selection;
@@ -81,6 +69,18 @@ std::vector<T> part_of(const std::vector<T>& all, Index begin, Index count) {
 }  // namespace
 
 std::string clip_name(Index clip) { return "clip" + std::to_string(clip + 1); }
+
+SceneSetup setup_in(const SyntheticSetting& filmed, const SyntheticClip& clip) {
+  SceneSetup setup;
+  setup.scene = filmed.scene;
+  setup.avatar = filmed.avatar;
+  setup.motion = clip.motion;
+  if (filmed.object.exists()) {
+    setup.objects.push_back({filmed.object.name, filmed.object.gaussians});
+    setup.poses.push_back({so3_log(clip.object.front().rotation), clip.object.front().translation});
+  }
+  return setup;
+}
 
 std::vector<SyntheticClip> cut_into_clips(const SyntheticClip& whole, const ClipSettings& settings, Index clips,
                                           const SyntheticSetting& filmed) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "body/avatar.h"
+#include "pipelines/scene_setup.h"
 #include "pipelines/synthetic_motion.h"
 
 namespace hsi4d {
@@ -15,6 +16,9 @@ struct SyntheticSetting {
   const SyntheticObject& object;
   const Avatar& avatar;
 };
+
+/// What stands at the beginning of the clip, as a run would read it; the motion is the true one.
+SceneSetup setup_in(const SyntheticSetting& filmed, const SyntheticClip& clip);
 
 /// Cuts a clip of `clips` · (`frames` − 1) + 1 frames. The first one keeps its cameras. Those of each other begin 20 or
 /// 30 degrees beside, where most of the human is to be seen in its first frame (count_visible), and drift from there as

@@ -111,11 +111,21 @@ void hold_object(const Actor& actor, const ObjectPlace& at, const Vector3<double
 
 }  // namespace detail
 
-Viewpoint first_viewpoint(SyntheticMotionKind motion) {
+namespace {
+
+Viewpoint designed_viewpoint(SyntheticMotionKind motion) {
   if (motion == SyntheticMotionKind::kWalk) return {{0.5, -2.5, 1.4}, {0.02, 0.5, 0.85}, 1.2};
   if (motion == SyntheticMotionKind::kPush) return {{0.5, -3.5, 1.5}, {0, 0.35, 0.72}, 1.25};
   if (motion == SyntheticMotionKind::kWave) return {{0.45, -1.95, 1.4}, {0.05, 0.7, 0.9}, 1.15};
   return {{0.42, -1.56, 1.36}, {0.02, 0.72, 0.85}, 1.12};
+}
+
+}  // namespace
+
+Viewpoint first_viewpoint(const ClipSettings& settings) {
+  Viewpoint view = designed_viewpoint(settings.motion);
+  if (settings.camera_distance != 1) view.eye = view.target + settings.camera_distance * (view.eye - view.target);
+  return view;
 }
 
 Camera camera_at(const Viewpoint& view, double seconds, const ClipSettings& settings) {
@@ -138,8 +148,12 @@ Camera camera_at(const Viewpoint& view, double seconds, const ClipSettings& sett
 }
 
 ClipSettings clip_settings(const SyntheticSettings& settings) {
-  return {settings.clips * (settings.frames - 1) + 1, settings.frame_rate, settings.size_px, settings.camera_drift,
-          settings.motion};
+  return {settings.clips * (settings.frames - 1) + 1,
+          settings.frame_rate,
+          settings.size_px,
+          settings.camera_drift,
+          settings.motion,
+          settings.camera_distance};
 }
 
 Rigid<double> joint_frame(const BodyModel& body, const BodyPose& pose, int joint) {
@@ -173,7 +187,7 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
                                                      wrist_from_object(actor, start.figure.ground))
                                            : *moment.object);
     }
-    clip.cameras.push_back(camera_at(first_viewpoint(settings.motion), seconds, settings));
+    clip.cameras.push_back(camera_at(first_viewpoint(settings), seconds, settings));
   }
   Moment first = start;
   if (first.object) first.object = clip.object.front();

@@ -31,6 +31,7 @@ struct ClipSettings {
   int size_px = 256;        ///< width and height of a frame
   double camera_drift = 1;  ///< how far the camera moves: 0 stands, 1 as designed
   SyntheticMotionKind motion = SyntheticMotionKind::kPour;
+  double camera_distance = 1;  ///< of the camera from what it looks at first, of that as designed
 };
 
 /// The clip that the settings ask for; of several, which follow one another, all frames.
@@ -43,8 +44,8 @@ struct Viewpoint {
   double turn = 0;              ///< of its drift about z, radians; 0: that of one that looks along +y
 };
 
-/// Where the camera of a motion stands at first.
-Viewpoint first_viewpoint(SyntheticMotionKind motion);
+/// Where the camera stands at first: as its motion and its distance say.
+Viewpoint first_viewpoint(const ClipSettings& settings);
 
 /// The camera after so many seconds of drift.
 Camera camera_at(const Viewpoint& view, double seconds, const ClipSettings& settings);

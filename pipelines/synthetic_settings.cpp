@@ -162,6 +162,8 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
            "off by some hundredths");
   f.object("light", s.light, "How frames are lit beyond what is baked into the colours");
   f.number("camera_drift", s.camera_drift, {.min = 0, .max = 5}, "How far the camera moves; 0: it stands");
+  f.number("camera_distance", s.camera_distance, {.min = 0.2, .max = 5},
+           "How far the camera is from what it looks at, of the distance as designed; smaller: nearer");
   describe_noise(f, s);
   f.object("masks", s.masks, "Faults of the masks");
   f.object("faults", s.faults, "Faults of generated videos");

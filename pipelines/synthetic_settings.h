@@ -120,6 +120,7 @@ struct SyntheticSettings {
   double avatar_difference = 0;  ///< of the human in the video from the one in avatar.safetensors
   SyntheticLight light;
   double camera_drift = 1;
+  double camera_distance = 1;  ///< from where it looks, of that as designed
   double pose_noise_deg = 8;
   double pose_bias_deg = 0;
   double pose_drift_deg = 0;

@@ -18,6 +18,7 @@
 #include "pipelines/cli/avatar_command.h"
 #include "pipelines/cli/avatar_fit_command.h"
 #include "pipelines/cli/bench_command.h"
+#include "pipelines/cli/bench_scaling_command.h"
 #include "pipelines/cli/bench_stages_command.h"
 #include "pipelines/cli/command_words.h"
 #include "pipelines/cli/commands.h"
@@ -81,6 +82,7 @@ struct CommandLine {
   MotionOptions motion;
   BenchOptions bench;
   BenchStagesOptions bench_stages;
+  BenchScalingOptions bench_scaling;
   SelectCameraOptions select_camera;
   EvaluateOptions evaluate;
   std::function<std::string()> run;
@@ -288,35 +290,54 @@ struct CommandLine {
     CLI::App* command = app.add_subcommand("bench",
                                            "Measure the speed of the renderer, the body or a whole run, or the pixel "
                                            "filter: a table, and one JSON object a measurement");
-    command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter, stages")
+    command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter, stages, scaling")
         ->required()
-        ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter", "stages"}));
-    command->add_option("--workload", bench.workloads, "Only these; default: all; not of stages");
-    command->add_option("--threads", bench.threads, "Threads; default: 1, of stages what the config says")
+        ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter", "stages", "scaling"}));
+    command->add_option("--workload", bench.workloads, "Only these; default: all; not of stages and scaling");
+    command->add_option("--threads", bench.threads, "Threads; default: 1, of stages and scaling what the config says")
         ->check(CLI::Range(1, 1024));
     command
-        ->add_option("--repeats", bench.repeats, "Runs of each, of which the median is told; of all but pixel_filter")
+        ->add_option(
+            "--repeats", bench.repeats,
+            "Runs of each, of which the median is told; default: 9, of scaling 20; not of pixel_filter and stages")
         ->check(CLI::Range(1, 1000));
     command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
         ->check(CLI::Range(8.0, 2048.0));
     command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
-    command->add_option("--config", bench_stages.config, "Of stages: the config that is run")->type_name("F.json");
+    command->add_option("--config", bench_stages.config, "Of stages and scaling: the config that is run")
+        ->type_name("F.json");
     command->add_option("--out", bench_stages.out, "Of stages: folder of dataset and runs; default: runs/bench/CONFIG");
-    command->add_option("--plot", bench_stages.plot, "Of stages: file for a picture of an iteration's parts")
-        ->type_name("F.svg");
+    command->add_option("--plot", bench_stages.plot, "Of stages and scaling: file for a picture")->type_name("F.svg");
+    command
+        ->add_option("--axis", bench_scaling.axes,
+                     "Of scaling: scene, avatar, image or threads, with its values or without; default: all")
+        ->type_name("AXIS[=N,N...]");
     add_overrides(*command, bench_stages.overrides);
     command->callback([this, command, &terms] {
-      run = [this, command, &terms] {
-        if (topic == "stages") {
-          bench_stages.json = bench.json;
-          bench_stages.threads = command->count("--threads") > 0 ? bench.threads : 0;
-          return bench_stages_command(bench_stages, terms);
-        }
-        if (topic == "skinning") return bench_skinning_command(bench);
-        if (topic == "color_net") return bench_color_net_command(bench);
-        return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);
-      };
+      const int threads = command->count("--threads") > 0 ? bench.threads : 0;
+      if (command->count("--repeats") > 0) bench_scaling.repeats = bench.repeats;
+      run = [this, threads, &terms] { return run_bench(threads, terms); };
     });
+  }
+
+  /// @param threads  that were asked for; 0: none
+  std::string run_bench(int threads, const std::vector<LossTerm>& terms) {
+    if (topic == "stages") {
+      bench_stages.json = bench.json;
+      bench_stages.threads = threads;
+      return bench_stages_command(bench_stages, terms);
+    }
+    if (topic == "scaling") {
+      bench_scaling.config = bench_stages.config;
+      bench_scaling.overrides = bench_stages.overrides;
+      bench_scaling.threads = threads;
+      bench_scaling.json = bench.json;
+      bench_scaling.plot = bench_stages.plot;
+      return bench_scaling_command(bench_scaling, terms);
+    }
+    if (topic == "skinning") return bench_skinning_command(bench);
+    if (topic == "color_net") return bench_color_net_command(bench);
+    return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);
   }
 
   void add_check() {

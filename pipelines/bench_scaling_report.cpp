@@ -1,0 +1,193 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "core/simd.h"
+#include "core/text.h"
+#include "pipelines/bench_scaling.h"
+#include "pipelines/report_plots.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// As printf writes it.
+[[gnu::format(printf, 1, 2)]] std::string formatted(const char* format, ...) {
+  char text[512];
+  std::va_list numbers;
+  va_start(numbers, format);
+  std::vsnprintf(text, sizeof text, format, numbers);
+  va_end(numbers);
+  return text;
+}
+
+// --- table -----------------------------------------------------------------------------------------------------------
+
+std::string point_lines(const ScalingPoint& point) {
+  std::string text;
+  for (const ScalingCost& cost : point.stages) {
+    text += formatted("%10lld  %-14s %9.2f %9.2f %9.2f %9.2f %9.2f %9.2f %7lld %9lld %11lld\n",
+                      static_cast<long long>(point.value), cost.stage.c_str(), cost.ms, cost.first_ms, cost.prepare_ms,
+                      cost.forward_ms, cost.backward_ms, cost.other_ms(), static_cast<long long>(cost.tiles),
+                      static_cast<long long>(cost.pairs), static_cast<long long>(cost.fragments));
+  }
+  return text;
+}
+
+/// An exponent, or a dash.
+std::string exponent_text(const std::optional<double>& exponent) {
+  return exponent ? formatted("%.2f", *exponent + 0.0) : "-";
+}
+
+std::string fit_line(const ScalingFit& fit) {
+  return formatted("  %-14s %-10s %8s %8s  %s\n", fit.stage.c_str(), fit.quantity.c_str(),
+                   exponent_text(fit.expected).c_str(), exponent_text(fit.fitted).c_str(), fit.reason.c_str());
+}
+
+/// What all points of the axis share.
+std::string others_text(const ScalingResult& result) {
+  const ScalingPoint& first = result.points.front();
+  std::string text;
+  if (result.axis.name != "scene") text += formatted(", scene %lld", static_cast<long long>(first.scene_gaussians));
+  if (result.axis.name != "avatar") text += formatted(", human %lld", static_cast<long long>(first.avatar_gaussians));
+  text += formatted(", objects %lld Gaussians", static_cast<long long>(first.object_gaussians));
+  if (result.axis.name != "threads") text += formatted(", threads %d", first.threads);
+  return text;
+}
+
+// --- picture ---------------------------------------------------------------------------------------------------------
+
+constexpr double kPanelWidth = 460, kPanelHeight = 254;  // as plots are: 210 high for 380, enlarged
+constexpr double kTitle = 44, kHead = 60, kGap = 26;     // of the picture; above and beside each panel
+
+/// The fitted line, or that of the expected growth through the middle of what was measured.
+PlotLine growth_line(const std::vector<std::pair<double, double>>& measured, double exponent, double scale,
+                     const std::string& label, const std::string& color) {
+  PlotLine line{.label = label, .color = color, .points = {}};
+  for (const double x : {measured.front().first, measured.back().first})
+    line.points.emplace_back(x, scale * std::pow(x, exponent));
+  return line;
+}
+
+/// The scale with which scale · x^exponent goes through the mean of the logarithms.
+double scale_through(const std::vector<std::pair<double, double>>& measured, double exponent) {
+  double sum = 0;
+  for (const auto& [x, y] : measured) sum += std::log(y) - exponent * std::log(x);
+  return std::exp(sum / static_cast<double>(measured.size()));
+}
+
+void add_stage_lines(const ScalingResult& result, std::size_t s, const ScalingFit& fit, Plot& plot) {
+  const std::string color = part_color(s);
+  PlotLine dots{.label = fit.stage, .color = color, .points = {}, .has_dots = true, .opacity = 0};
+  for (const ScalingPoint& point : result.points)
+    dots.points.emplace_back(static_cast<double>(point.value), point.stages[s].ms);
+  plot.lines.push_back(dots);
+  if (fit.fitted) plot.lines.push_back(growth_line(dots.points, *fit.fitted, fit.scale, fit.stage + ", fitted", color));
+  if (!fit.expected || !fit.fitted) return;
+  PlotLine expected = growth_line(dots.points, *fit.expected, scale_through(dots.points, *fit.expected),
+                                  fit.stage + ", expected", color);
+  expected.is_dashed = true;
+  plot.lines.push_back(expected);
+}
+
+/// "camera  ~ n^0.62, expected 0.70" with the stage's colour before it.
+std::string legend_entry(double x, double y, std::size_t s, const ScalingFit& fit) {
+  std::string text = html_escape(fit.stage);
+  if (fit.fitted) text += ": exponent " + exponent_text(fit.fitted);
+  if (fit.fitted && fit.expected) text += ", expected " + exponent_text(fit.expected);
+  return formatted("<circle cx=\"%.0f\" cy=\"%.0f\" r=\"4\" fill=\"%s\"/>", x + 5, y - 4, part_color(s).c_str()) +
+         formatted("<text x=\"%.0f\" y=\"%.0f\">", x + 15, y) + text + "</text>\n";
+}
+
+std::string panel(const ScalingResult& result, double x, double y) {
+  Plot plot{.title = result.axis.label, .x_label = result.axis.label, .unit = "ms", .lines = {}};
+  plot.is_log = plot.is_log_x = true;
+  for (const ScalingPoint& point : result.points) plot.ticks_x.push_back(static_cast<double>(point.value));
+  plot.attributes =
+      formatted(" x=\"%.0f\" y=\"%.0f\" width=\"%.0f\" height=\"%.0f\"", x, y + kHead, kPanelWidth, kPanelHeight);
+  std::string head = formatted("<text x=\"%.0f\" y=\"%.0f\" font-weight=\"bold\">", x + 8, y + 12) +
+                     html_escape(result.axis.name) + "</text>\n";
+  std::size_t s = 0;
+  for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) {
+    if (fit.quantity != "ms") continue;
+    head += legend_entry(x + 8, y + 32 + 18 * static_cast<double>(s), s, fit);
+    add_stage_lines(result, s++, fit, plot);
+  }
+  return head + plot_svg(plot) + "\n";
+}
+
+constexpr const char* kStyle =
+    "<style>.plot text{font-size:11px;fill:#555}.plot .grid{stroke:#e4e4e4}.plot .axis{stroke:#888}"
+    ".plot polyline{fill:none;stroke-width:1.6}</style>\n";
+
+nlohmann::ordered_json json_of(const ScalingResult& result, const ScalingPoint& point, const ScalingCost& cost) {
+  return {{"axis", result.axis.name},
+          {"value", point.value},
+          {"stage", cost.stage},
+          {"threads", point.threads},
+          {"isa", isa_name(best_isa())},
+          {"scene_gaussians", point.scene_gaussians},
+          {"avatar_gaussians", point.avatar_gaussians},
+          {"object_gaussians", point.object_gaussians},
+          {"ms", cost.ms},
+          {"first_ms", cost.first_ms},
+          {"prepare_ms", cost.prepare_ms},
+          {"forward_ms", cost.forward_ms},
+          {"backward_ms", cost.backward_ms},
+          {"other_ms", cost.other_ms()},
+          {"channels", cost.channels},
+          {"tiles", cost.tiles},
+          {"pairs", cost.pairs},
+          {"fragments", cost.fragments},
+          {"peak_memory_bytes", point.peak_memory_bytes}};
+}
+
+}  // namespace
+
+std::string scaling_table(const std::vector<ScalingResult>& results) {
+  std::string text;
+  for (const ScalingResult& result : results) {
+    text += (text.empty() ? "" : "\n") + result.axis.name + ": " + result.axis.label + others_text(result) + "\n";
+    text += formatted("%10s  %-14s %9s %9s %9s %9s %9s %9s %7s %9s %11s\n", "", "stage", "median ms", "first ms",
+                      "prepare", "forward", "backward", "other", "tiles", "pairs", "fragments");
+    for (const ScalingPoint& point : result.points) text += point_lines(point);
+    text += formatted("  %-14s %-10s %8s %8s\n", "exponent of", "", "expected", "fitted");
+    for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) text += fit_line(fit);
+  }
+  return text;
+}
+
+std::string scaling_json(const std::vector<ScalingResult>& results) {
+  std::string text;
+  for (const ScalingResult& result : results) {
+    for (const ScalingPoint& point : result.points)
+      for (const ScalingCost& cost : point.stages) text += json_of(result, point, cost).dump() + "\n";
+    for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) {
+      nlohmann::ordered_json line = {{"axis", result.axis.name}, {"stage", fit.stage}, {"quantity", fit.quantity}};
+      if (fit.expected) line["expected"] = *fit.expected;
+      if (fit.fitted) line["fitted"] = *fit.fitted;
+      text += line.dump() + "\n";
+    }
+  }
+  return text;
+}
+
+std::string scaling_svg(const std::vector<ScalingResult>& results, const std::string& title) {
+  std::string body;
+  const double step_x = kPanelWidth + kGap, step_y = kHead + kPanelHeight + kGap;
+  for (std::size_t i = 0; i < results.size(); ++i)
+    body += panel(results[i], kGap + step_x * static_cast<double>(i % 2), kTitle + step_y * static_cast<double>(i / 2));
+  const double columns = results.size() < 2 ? 1 : 2, rows = std::ceil(static_cast<double>(results.size()) / 2);
+  const double width = kGap + columns * step_x, height = kTitle + rows * step_y;
+  return formatted("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" ", width, height) +
+         formatted("width=\"%.0f\" height=\"%.0f\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n", width,
+                   height) +
+         kStyle + formatted("<rect width=\"%.0f\" height=\"%.0f\" fill=\"#fff\"/>\n", width, height) +
+         formatted("<text x=\"%.0f\" y=\"26\" font-size=\"16\">", kGap + 8) + html_escape(title) + "</text>\n" + body +
+         "</svg>\n";
+}
+
+}  // namespace hsi4d
