@@ -5,7 +5,7 @@
 // four changes and the others are the config's.
 #pragma once
 
-#include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -31,13 +31,15 @@ const std::vector<ScalingAxis>& scaling_axes();
 /// what is no list of whole numbers, and for an axis named twice.
 std::vector<ScalingAxis> chosen_axes(const std::vector<std::string>& words);
 
-/// A stage of one point; times in milliseconds, medians of the iterations after the first kWarmIterations.
+/// A stage of one point; times in milliseconds, medians of the iterations after the first kWarmIterations, of all
+/// rounds.
 struct ScalingCost {
   std::string stage;
   bool moves_camera = false;  ///< every tile is composited, and all that stands is projected anew
   bool draws_all = false;     ///< human and objects too
-  double ms = 0;
-  double first_ms = 0;                                     ///< of the very first iteration
+  double ms = 0, min_ms = 0;
+  double processor_ms = 0;  ///< of all threads: what others do on the machine counts little
+  double first_ms = 0;      ///< of the very first iteration, the least of all rounds
   double prepare_ms = 0, forward_ms = 0, backward_ms = 0;  ///< of `composite`: up to its lists; pixels; their adjoint
   Index channels = 0, tiles = 0, pairs = 0, fragments = 0;
 
@@ -48,6 +50,9 @@ struct ScalingCost {
 /// Iterations before those that are measured: what stands is built in the first, memory is touched in both.
 inline constexpr int kWarmIterations = 2;
 
+/// How often all points are measured one after the other, so that a machine that gets slower or busier does so for all.
+inline constexpr int kScalingRounds = 3;
+
 /// One config that was measured.
 struct ScalingPoint {
   Index value = 0;
@@ -57,16 +62,19 @@ struct ScalingPoint {
   Index peak_memory_bytes = 0;  ///< of the process until then
 };
 
-/// Measures each stage of the config that draws a frame, in frame 1 of its generated clip, from frame 0's state; groups
-/// that move later than others move from the beginning on.
-/// @param config   with the section `synthetic`; config.threads 0: one a core
-/// @param repeats  iterations that are measured
+/// Measures each stage that draws a frame, in frame 1 of the generated clip, from frame 0's state; groups that move
+/// later than others move from the beginning on.
+/// @param configs   with the section `synthetic` and the same stages; config.threads 0: one a core
+/// @param repeats   iterations that are measured, of all rounds, or a few more
+/// @param measured  called kScalingRounds times a config
+/// @return          a point a config; without values
 /// Throws as run_stage; UserError when no stage draws a frame.
-ScalingPoint measure_scaling(const RunConfig& config, const std::vector<LossTerm>& losses, int repeats);
+std::vector<ScalingPoint> measure_scaling(const std::vector<RunConfig>& configs, const std::vector<LossTerm>& losses,
+                                          int repeats, const std::function<void()>& measured = {});
 
 /// How a count or a time grows along an axis: like value^exponent.
 struct ScalingFit {
-  std::string stage, quantity;     ///< "camera", "ms" or "pairs" or "fragments"
+  std::string stage, quantity;     ///< "camera"; "ms", "processor ms", "pairs" or "fragments"
   std::optional<double> expected;  ///< where it was thought about
   std::optional<double> fitted;    ///< least squares of the logarithms; none of fewer than two values, or of zeros
   double scale = 0;                ///< fitted: quantity = scale · value^fitted

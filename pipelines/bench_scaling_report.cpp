@@ -29,9 +29,10 @@ namespace {
 std::string point_lines(const ScalingPoint& point) {
   std::string text;
   for (const ScalingCost& cost : point.stages) {
-    text += formatted("%10lld  %-14s %9.2f %9.2f %9.2f %9.2f %9.2f %9.2f %7lld %9lld %11lld\n",
-                      static_cast<long long>(point.value), cost.stage.c_str(), cost.ms, cost.first_ms, cost.prepare_ms,
-                      cost.forward_ms, cost.backward_ms, cost.other_ms(), static_cast<long long>(cost.tiles),
+    text += formatted("%10lld  %-12s %8.2f %8.2f %8.2f %8.2f", static_cast<long long>(point.value), cost.stage.c_str(),
+                      cost.ms, cost.min_ms, cost.processor_ms, cost.first_ms) +
+            formatted(" %8.2f %8.2f %8.2f %8.2f %6lld %9lld %11lld\n", cost.prepare_ms, cost.forward_ms,
+                      cost.backward_ms, cost.other_ms(), static_cast<long long>(cost.tiles),
                       static_cast<long long>(cost.pairs), static_cast<long long>(cost.fragments));
   }
   return text;
@@ -43,7 +44,7 @@ std::string exponent_text(const std::optional<double>& exponent) {
 }
 
 std::string fit_line(const ScalingFit& fit) {
-  return formatted("  %-14s %-10s %8s %8s  %s\n", fit.stage.c_str(), fit.quantity.c_str(),
+  return formatted("%10s  %-12s %-12s %8s %8s  %s\n", "", fit.stage.c_str(), fit.quantity.c_str(),
                    exponent_text(fit.expected).c_str(), exponent_text(fit.fitted).c_str(), fit.reason.c_str());
 }
 
@@ -93,7 +94,7 @@ void add_stage_lines(const ScalingResult& result, std::size_t s, const ScalingFi
   plot.lines.push_back(expected);
 }
 
-/// "camera  ~ n^0.62, expected 0.70" with the stage's colour before it.
+/// "camera: exponent 0.62, expected 0.70" with the stage's colour before it.
 std::string legend_entry(double x, double y, std::size_t s, const ScalingFit& fit) {
   std::string text = html_escape(fit.stage);
   if (fit.fitted) text += ": exponent " + exponent_text(fit.fitted);
@@ -112,7 +113,7 @@ std::string panel(const ScalingResult& result, double x, double y) {
                      html_escape(result.axis.name) + "</text>\n";
   std::size_t s = 0;
   for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) {
-    if (fit.quantity != "ms") continue;
+    if (fit.quantity != "ms") continue;  // the rest is in the table
     head += legend_entry(x + 8, y + 32 + 18 * static_cast<double>(s), s, fit);
     add_stage_lines(result, s++, fit, plot);
   }
@@ -133,6 +134,8 @@ nlohmann::ordered_json json_of(const ScalingResult& result, const ScalingPoint& 
           {"avatar_gaussians", point.avatar_gaussians},
           {"object_gaussians", point.object_gaussians},
           {"ms", cost.ms},
+          {"min_ms", cost.min_ms},
+          {"processor_ms", cost.processor_ms},
           {"first_ms", cost.first_ms},
           {"prepare_ms", cost.prepare_ms},
           {"forward_ms", cost.forward_ms},
@@ -151,10 +154,10 @@ std::string scaling_table(const std::vector<ScalingResult>& results) {
   std::string text;
   for (const ScalingResult& result : results) {
     text += (text.empty() ? "" : "\n") + result.axis.name + ": " + result.axis.label + others_text(result) + "\n";
-    text += formatted("%10s  %-14s %9s %9s %9s %9s %9s %9s %7s %9s %11s\n", "", "stage", "median ms", "first ms",
-                      "prepare", "forward", "backward", "other", "tiles", "pairs", "fragments");
+    text += formatted("%10s  %-12s %8s %8s %8s %8s %8s %8s %8s %8s %6s %9s %11s\n", "", "stage", "ms", "least",
+                      "proc. ms", "first ms", "prepare", "forward", "backward", "other", "tiles", "pairs", "fragments");
     for (const ScalingPoint& point : result.points) text += point_lines(point);
-    text += formatted("  %-14s %-10s %8s %8s\n", "exponent of", "", "expected", "fitted");
+    text += formatted("%10s  %-12s %-12s %8s %8s\n", "", "exponent of", "", "expected", "fitted");
     for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) text += fit_line(fit);
   }
   return text;
@@ -186,8 +189,9 @@ std::string scaling_svg(const std::vector<ScalingResult>& results, const std::st
          formatted("width=\"%.0f\" height=\"%.0f\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n", width,
                    height) +
          kStyle + formatted("<rect width=\"%.0f\" height=\"%.0f\" fill=\"#fff\"/>\n", width, height) +
-         formatted("<text x=\"%.0f\" y=\"26\" font-size=\"16\">", kGap + 8) + html_escape(title) + "</text>\n" + body +
-         "</svg>\n";
+         formatted("<text x=\"%.0f\" y=\"26\" font-size=\"16\">", kGap + 8) + html_escape(title) + "</text>\n" +
+         formatted("<text x=\"%.0f\" y=\"26\" text-anchor=\"end\" fill=\"#555\">", width - kGap) +
+         (columns > 1 ? "dots: measured, lines: fitted, dashed: expected" : "") + "</text>\n" + body + "</svg>\n";
 }
 
 }  // namespace hsi4d

@@ -35,6 +35,12 @@ std::string coordinate(double value) { return fixed_number(value, 1); }
 /// A tick's number: as few digits as tell ticks apart.
 std::string tick_text(double value) { return rounded(value, 6); }
 
+/// Of an axis over counts: "500 k", "2 M".
+std::string count_text(double value) {
+  if (value < 1e4 || value >= 1e9) return tick_text(value);
+  return value < 1e6 ? tick_text(value / 1e3) + " k" : tick_text(value / 1e6) + " M";
+}
+
 /// False for what has no place on the axes: so large that differences overflow; on a logarithmic scale what is not
 /// above 0, or so far from 1 that ratios overflow.
 bool has_place(const Plot& plot, double y) { return plot.is_log ? y >= 1e-150 && y <= 1e150 : std::fabs(y) <= 1e300; }
@@ -132,7 +138,8 @@ void append_axes(std::string& svg, const Plot& plot, const Axis& x, const Axis& 
   }
   for (const double tick : x.ticks)
     svg += "<text class=\"tick\" text-anchor=\"middle\" x=\"" + coordinate(plot_x(plot, x, tick)) + "\" y=\"" +
-           coordinate(kHeight - kBottom + 15) + "\">" + tick_text(tick) + "</text>";
+           coordinate(kHeight - kBottom + 15) + "\">" + (plot.is_log_x ? count_text(tick) : tick_text(tick)) +
+           "</text>";
   svg += "<line class=\"axis\" x1=\"" + left + "\" x2=\"" + right + "\" y1=\"" + floor + "\" y2=\"" + floor + "\"/>";
   svg += "<text class=\"tick\" text-anchor=\"middle\" x=\"" + coordinate((kLeft + plot.width - kRight) / 2) +
          "\" y=\"" + coordinate(kHeight - 5) + "\">" + html_escape(plot.x_label) + "</text>\n";

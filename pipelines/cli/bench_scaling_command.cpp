@@ -31,34 +31,33 @@ RunConfig config_at(const BenchScalingOptions& options, const std::vector<LossTe
 }  // namespace
 
 std::string bench_scaling_command(const BenchScalingOptions& options, const std::vector<LossTerm>& losses) {
-  const std::vector<ScalingAxis> axes = chosen_axes(options.axes);
-  std::vector<std::vector<RunConfig>> configs;
-  std::map<PointKey, ScalingPoint> measured;
-  for (const ScalingAxis& axis : axes) {
-    configs.emplace_back();
+  std::vector<ScalingResult> results;
+  std::vector<RunConfig> configs;
+  std::map<PointKey, std::size_t> place_of;      // in configs
+  std::vector<std::vector<std::size_t>> places;  // by axis and value
+  for (const ScalingAxis& axis : chosen_axes(options.axes)) {
+    results.push_back({axis, {}});
+    places.emplace_back();
     for (const Index value : axis.values) {
-      configs.back().push_back(config_at(options, losses, axis, value));
-      measured[key_of(configs.back().back())];
+      RunConfig config = config_at(options, losses, axis, value);
+      const auto [entry, is_new] = place_of.emplace(key_of(config), configs.size());
+      if (is_new) configs.push_back(std::move(config));
+      places.back().push_back(entry->second);
     }
   }
   const Observer observer = observer_on_terminal(false);
-  Progress shown("points", std::ssize(measured), observer.progress, observer.progress_interval);
-  std::vector<ScalingResult> results;
-  for (std::size_t a = 0; a < axes.size(); ++a) {
-    results.push_back({axes[a], {}});
-    for (std::size_t p = 0; p < configs[a].size(); ++p) {
-      ScalingPoint& point = measured[key_of(configs[a][p])];
-      if (point.stages.empty()) {
-        point = measure_scaling(configs[a][p], losses, options.repeats);
-        shown.step();
-      }
-      results.back().points.push_back(point);
-      results.back().points.back().value = axes[a].values[p];
+  Progress shown("points", kScalingRounds * std::ssize(configs), observer.progress, observer.progress_interval);
+  const std::vector<ScalingPoint> points =
+      measure_scaling(configs, losses, options.repeats, [&shown] { shown.step(); });
+  shown.finish();
+  for (std::size_t a = 0; a < results.size(); ++a) {
+    for (std::size_t p = 0; p < places[a].size(); ++p) {
+      results[a].points.push_back(points[places[a][p]]);
+      results[a].points.back().value = results[a].axis.values[p];
     }
   }
-  shown.finish();
   if (!options.json.empty()) write_text_file(options.json, scaling_json(results));
-  const std::string title = "milliseconds an iteration, " + configs.front().front().name;
+  const std::string title = "milliseconds an iteration, " + configs.front().name;
   if (!options.plot.empty()) write_text_file(options.plot, scaling_svg(results, title));
   return scaling_table(results);
 }

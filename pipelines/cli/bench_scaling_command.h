@@ -14,7 +14,7 @@ struct BenchScalingOptions {
   std::vector<std::string> overrides;
   std::vector<std::string> axes;  ///< "scene", "scene=1000,2000"; empty: all
   int threads = 0;                ///< of all axes but `threads`; 0: what the config says
-  int repeats = 20;               ///< iterations of a stage that are measured
+  int repeats = 20;               ///< iterations of a stage that are measured, of all rounds
   std::string json;               ///< file for the measurements; empty: none
   std::string plot;               ///< file for the SVG; empty: none
 };

@@ -399,6 +399,45 @@ TEST_CASE("every shipped config of a generated dataset runs", "[run]") {
   CHECK(with_stages == std::set<std::string>{"alone", "chain", "disturbed", "faults", "full_size", "table", "walk"});
 }
 
+TEST_CASE("every shipped config of a benchmark runs", "[run]") {
+  const TemporaryFolder here;
+  std::set<std::string> with_stages;
+  for (const std::string& name : names_in(shipped_configs() / "bench")) {
+    if (!name.ends_with(".json")) continue;  // what empty_scene reads
+    const std::string stem = fs::path(name).stem().string();
+    if (check_shipped_config(shipped_configs() / "bench" / name, stem, true)) with_stages.insert(stem);
+  }
+  CHECK(with_stages == std::set<std::string>{"empty_scene", "near_human", "no_object", "paper_scale", "static_camera"});
+  const RunConfig usual =
+                      load_run_config(shipped_configs() / "bench/paper_scale.json", {}, descriptions_of(loss_terms())),
+                  still = load_run_config(shipped_configs() / "bench/static_camera.json", {},
+                                          descriptions_of(loss_terms()));
+  CHECK(still.stages.size() + 1 == usual.stages.size());
+  for (const auto& [name, stage] : still.stages) {  // written once more, as stages cannot be left out by extending
+    INFO(name);
+    CHECK(stage.iterations == find_entry(usual.stages, name)->iterations);
+    const auto names = [](const auto& entries) {
+      std::vector<std::string> all;
+      for (const auto& entry : entries) all.push_back(entry.first);
+      return all;
+    };
+    CHECK(names(stage.optimize) == names(find_entry(usual.stages, name)->optimize));
+    CHECK(names(stage.losses) == names(find_entry(usual.stages, name)->losses));
+  }
+  CHECK_FALSE(fs::exists("no_object/objects.npz"));
+  const std::string scene = read_text_file("empty_scene-dataset/scene.ply").substr(0, 200);
+  CHECK_THAT(scene, Contains("element vertex 1\n"));
+  const auto human_share = [](const char* dataset) {
+    const Image mask = read_image((fs::path(dataset) / "masks/human/0001.png").string());
+    double sum = 0;
+    for (int y = 0; y < mask.height(); ++y)
+      for (int x = 0; x < mask.width(); ++x) sum += mask.row(0, y)[x];
+    return sum / (mask.height() * mask.width());
+  };
+  CHECK(human_share("near_human-dataset") == Approx(0.5).margin(0.05));
+  CHECK(human_share("paper_scale-dataset") < 0.15);
+}
+
 TEST_CASE("every shipped clip of the accuracy table runs", "[run][release]") {
   const TemporaryFolder here;
   for (const std::string& name : names_in(shipped_configs() / "synthetic" / "clips")) {
@@ -431,13 +470,13 @@ TEST_CASE("every shipped config has a test") {
     const fs::path place = fs::relative(entry.path(), shipped_configs());
     if (entry.is_regular_file() && place.has_parent_path()) files.insert(place.generic_string());
   }
-  // Those at the top, of synthetic/ and of synthetic/clips/ are looked for by the tests above, those of sources/ by
-  // sources_test.cpp, and each of synthetic/ by synthetic_test.cpp too.
+  // Those at the top, of bench/, synthetic/ and synthetic/clips/ are looked for by the tests above, those of sources/
+  // by sources_test.cpp, and each of synthetic/ by synthetic_test.cpp too.
   std::erase_if(files, [](const std::string& file) {
-    return file.starts_with("synthetic/") || (file.starts_with("sources/") && file.ends_with(".json"));
+    return file.starts_with("synthetic/") || file.starts_with("bench/") ||
+           (file.starts_with("sources/") && file.ends_with(".json"));
   });
   CHECK(files == std::set<std::string>{"avatar/fit.json", "avatar/views.json",  // avatar_fit_test.cpp
-                                       "bench/paper_scale.json",                // bench_stages_test.cpp
                                        "examples/robot.json",                   // above
                                        "sources/README.md"});
 }

@@ -296,6 +296,25 @@ TEST_CASE("a motion refuses an object that it makes no sense with") {
   CHECK(synthetic_clip(body(), none, {2, 10, 64, 1, SyntheticMotionKind::kWave}).object.empty());
 }
 
+TEST_CASE("a nearer camera looks at the same place from the same side") {
+  const SyntheticObject can = synthetic_object(SyntheticObjectKind::kWateringCan, 600, 0);
+  ClipSettings settings{2, 10, 64, 1, SyntheticMotionKind::kWalk};
+  const SyntheticClip usual = synthetic_clip(body(), can, settings);
+  const Viewpoint from = first_viewpoint(settings);
+  settings.camera_distance = 0.5;
+  const SyntheticClip near = synthetic_clip(body(), can, settings);
+  const Vector3<double> eye = camera_center_world(near.cameras[0]);
+  CHECK((eye - from.target - 0.5 * (from.eye - from.target)).norm() < 1e-12);
+  CHECK((near.cameras[0].camera_from_world.rotation - usual.cameras[0].camera_from_world.rotation).norm() < 1e-12);
+  const Vector3<double> way = camera_center_world(near.cameras[1]) - eye,
+                        usual_way = camera_center_world(usual.cameras[1]) - camera_center_world(usual.cameras[0]);
+  CHECK((way - usual_way).norm() < 1e-12);  // it drifts as far
+  CHECK(near.cameras[0].fx == usual.cameras[0].fx);
+  SyntheticSettings described;
+  described.camera_distance = 0.36;
+  CHECK(clip_settings(described).camera_distance == 0.36);
+}
+
 TEST_CASE("the clip for the demo moves as much as it has to") {
   const SyntheticSettings settings = demo_clip();
   const SyntheticObject object = synthetic_object(settings);
