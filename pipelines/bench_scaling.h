@@ -74,7 +74,7 @@ std::vector<ScalingPoint> measure_scaling(const std::vector<RunConfig>& configs,
 
 /// How a count or a time grows along an axis: like value^exponent.
 struct ScalingFit {
-  std::string stage, quantity;     ///< "camera"; "ms", "processor ms", "pairs" or "fragments"
+  std::string stage, quantity;     ///< "camera"; "least ms", "processor ms", "pairs" or "fragments"
   std::optional<double> expected;  ///< where it was thought about
   std::optional<double> fitted;    ///< least squares of the logarithms; none of fewer than two values, or of zeros
   double scale = 0;                ///< fitted: quantity = scale · value^fitted
@@ -97,8 +97,8 @@ std::string scaling_table(const std::vector<ScalingResult>& results);
 /// "expected", "fitted"}.
 std::string scaling_json(const std::vector<ScalingResult>& results);
 
-/// Milliseconds over the values, both on logarithmic scales, a panel an axis, as an SVG file: what was measured as
-/// dots, the fit as a line, the expected growth dashed through the middle of the dots.
+/// Processor time over the values, over threads the least time, both on logarithmic scales, a panel an axis, as an SVG
+/// file: what was measured as dots, the fit as a line, the expected growth dashed through the middle of the dots.
 std::string scaling_svg(const std::vector<ScalingResult>& results, const std::string& title);
 
 }  // namespace hsi4d

@@ -83,8 +83,11 @@ double scale_through(const std::vector<std::pair<double, double>>& measured, dou
 void add_stage_lines(const ScalingResult& result, std::size_t s, const ScalingFit& fit, Plot& plot) {
   const std::string color = part_color(s);
   PlotLine dots{.label = fit.stage, .color = color, .points = {}, .has_dots = true, .opacity = 0};
-  for (const ScalingPoint& point : result.points)
-    dots.points.emplace_back(static_cast<double>(point.value), point.stages[s].ms);
+  for (const ScalingPoint& point : result.points) {
+    const ScalingCost& cost = point.stages[s];
+    dots.points.emplace_back(static_cast<double>(point.value),
+                             fit.quantity == "least ms" ? cost.min_ms : cost.processor_ms);
+  }
   plot.lines.push_back(dots);
   if (fit.fitted) plot.lines.push_back(growth_line(dots.points, *fit.fitted, fit.scale, fit.stage + ", fitted", color));
   if (!fit.expected || !fit.fitted) return;
@@ -103,17 +106,22 @@ std::string legend_entry(double x, double y, std::size_t s, const ScalingFit& fi
          formatted("<text x=\"%.0f\" y=\"%.0f\">", x + 15, y) + text + "</text>\n";
 }
 
+/// Of threads what people wait for, where these do not have to share the processor; of all else what does not depend on
+/// that.
+std::string drawn_quantity(const ScalingAxis& axis) { return axis.name == "threads" ? "least ms" : "processor ms"; }
+
 std::string panel(const ScalingResult& result, double x, double y) {
+  const std::string quantity = drawn_quantity(result.axis);
   Plot plot{.title = result.axis.label, .x_label = result.axis.label, .unit = "ms", .lines = {}};
   plot.is_log = plot.is_log_x = true;
   for (const ScalingPoint& point : result.points) plot.ticks_x.push_back(static_cast<double>(point.value));
   plot.attributes =
       formatted(" x=\"%.0f\" y=\"%.0f\" width=\"%.0f\" height=\"%.0f\"", x, y + kHead, kPanelWidth, kPanelHeight);
   std::string head = formatted("<text x=\"%.0f\" y=\"%.0f\" font-weight=\"bold\">", x + 8, y + 12) +
-                     html_escape(result.axis.name) + "</text>\n";
+                     html_escape(result.axis.name + ", " + quantity) + "</text>\n";
   std::size_t s = 0;
   for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) {
-    if (fit.quantity != "ms") continue;  // the rest is in the table
+    if (fit.quantity != quantity) continue;
     head += legend_entry(x + 8, y + 32 + 18 * static_cast<double>(s), s, fit);
     add_stage_lines(result, s++, fit, plot);
   }

@@ -57,7 +57,7 @@ std::string bench_scaling_command(const BenchScalingOptions& options, const std:
     }
   }
   if (!options.json.empty()) write_text_file(options.json, scaling_json(results));
-  const std::string title = "milliseconds an iteration, " + configs.front().name;
+  const std::string title = "time of an iteration, " + configs.front().name;
   if (!options.plot.empty()) write_text_file(options.plot, scaling_svg(results, title));
   return scaling_table(results);
 }

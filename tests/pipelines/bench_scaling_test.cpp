@@ -30,7 +30,8 @@ ScalingPoint made_up(Index value, double ms, Index pairs, Index fragments) {
   ScalingCost cost;
   cost.stage = "camera";
   cost.moves_camera = true;
-  cost.ms = ms;
+  cost.ms = 2 * ms;
+  cost.min_ms = ms;
   cost.processor_ms = std::sqrt(ms);
   cost.pairs = pairs;
   cost.fragments = fragments;
@@ -46,7 +47,7 @@ TEST_CASE("a power law is found again, and what was expected stands beside it") 
   for (const Index n : {100, 400, 1600}) points.push_back(made_up(n, 3 * std::pow(n, 0.5), 7 * n, n == 400 ? 0 : n));
   const std::vector<ScalingFit> fits = scaling_fits(axis, points);
   REQUIRE(fits.size() == 4);
-  CHECK(fits[0].quantity == "ms");
+  CHECK(fits[0].quantity == "least ms");
   CHECK(fits[0].fitted.value() == Approx(0.5));
   CHECK(fits[0].scale == Approx(3));
   CHECK(fits[0].expected.value() == 0.7);
@@ -144,7 +145,8 @@ TEST_CASE("scaling runs the stages that draw a frame and counts what they do") {
   CHECK(costs == 2 * 2 + 2);
   CHECK(fitted == 8);  // of one value nothing follows
   const std::string svg = scaling_svg(results, "small & quick");
-  CHECK_THAT(svg, Contains("<svg xmlns=") && Contains("small &amp; quick") && Contains("expected 0.70"));
+  CHECK_THAT(svg, Contains("<svg xmlns=") && Contains("small &amp; quick") && Contains("scene, processor ms") &&
+                      Contains("threads, least ms") && Contains("expected 0.70"));
   std::size_t dots = 0;
   for (std::size_t at = svg.find("<circle cx"); at != std::string::npos; at = svg.find("<circle cx", at + 1)) ++dots;
   CHECK(dots == (2 * 2 + 2) + 2 * 2);  // measured, and in the legends
