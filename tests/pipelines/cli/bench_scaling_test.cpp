@@ -1,4 +1,7 @@
+#include <sstream>
+
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
@@ -24,15 +27,25 @@ std::vector<std::string> small_scaling(const std::vector<std::string>& more) {
 
 TEST_CASE("bench scaling measures along axes and draws them", "[run]") {
   const TemporaryFolder here;
-  const ProgramResult result =
-      run_hsi4d(small_scaling({"--axis", "avatar=300,600", "--axis", "threads=1,2", "--threads", "2", "--repeats", "2",
-                               "--json", "m.json", "--plot", "m.svg"}));
+  const ProgramResult result = run_hsi4d(small_scaling({"--axis", "avatar=300", "--axis", "threads=1,2", "--threads",
+                                                        "2", "--repeats", "2", "--json", "m.json", "--plot", "m.svg"}));
   INFO(result.err);
   REQUIRE(result.status == 0);
-  CHECK_THAT(result.err, Contains("points 9/9"));  // one is on both axes
+  CHECK_THAT(result.err, Contains("points 6/6"));  // three times two: one is on both axes
   CHECK_THAT(result.out, Contains("avatar: Gaussians of the human, scene ") && Contains("threads 2\n") &&
                              Contains("threads: threads, scene "));
-  CHECK_THAT(file_text("m.json"), Contains("{\"axis\":\"avatar\",\"value\":600,\"stage\":\"camera\",\"threads\":2,"));
+  std::istringstream text(file_text("m.json"));
+  std::vector<nlohmann::json> costs;
+  for (std::string line; std::getline(text, line);) {
+    const nlohmann::json object = nlohmann::json::parse(line);
+    if (object.contains("ms") && object["stage"] == "interaction") costs.push_back(object);
+  }
+  REQUIRE(costs.size() == 3);
+  CHECK((costs[0]["axis"] == "avatar" && costs[0]["value"] == 300 && costs[0]["threads"] == 2));
+  CHECK(costs[1]["threads"] == 1);
+  CHECK(costs[2]["ms"] == costs[0]["ms"]);
+  CHECK(costs[1]["pairs"] == costs[2]["pairs"]);
+  CHECK(costs[1]["fragments"] == costs[2]["fragments"]);
   CHECK_THAT(file_text("m.svg"), Contains("<svg") && Contains("interaction") && Contains("</svg>"));
 }
 
