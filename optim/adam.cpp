@@ -91,7 +91,7 @@ double scheduled_rate(const ParameterGroupSettings& settings, Index iteration, I
 }
 
 // m̂ = Σ a_k g_k with a_k ∝ β1ᵏ, v̂ = Σ b_k g_k² with b_k ∝ β2ᵏ, so that m̂² ≤ v̂ Σ a_k²/b_k. Moments are the stage's own.
-double longest_way(const ParameterGroupSettings& settings, Index iterations, const OptimizerSettings& optimizer) {
+double longest_adam_way(const ParameterGroupSettings& settings, Index iterations, const OptimizerSettings& optimizer) {
   const double beta1 = optimizer.beta1, beta2 = optimizer.beta2;
   double way = 0, first_sum = 0, second_sum = 0, ratio_sum = 0;  // Σ β1ᵏ, Σ β2ᵏ, Σ (β1²/β2)ᵏ
   double first = 1, second = 1, ratio = 1;

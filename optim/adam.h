@@ -84,7 +84,7 @@ double scheduled_rate(const ParameterGroupSettings& settings, Index iteration, I
 
 /// How far one number of a group can get in a stage, whatever the gradients are: Σ lr_i |m̂/√v̂| at most, by
 /// Cauchy-Schwarz over the weights of the past gradients in m and v.
-double longest_way(const ParameterGroupSettings& settings, Index iterations, const OptimizerSettings& optimizer);
+double longest_adam_way(const ParameterGroupSettings& settings, Index iterations, const OptimizerSettings& optimizer);
 
 /// 1 − βᵗ without cancellation, β in [0, 1), t ≥ 1 (row F3).
 double bias_correction(double beta, Index steps);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "body/pose_prior.h"
+#include "optim/optimizer.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/frame_images.h"
 #include "pipelines/sequence_graph.h"

@@ -57,8 +57,7 @@ Gaussians selected(const Gaussians& gaussians, std::span<const Index> rows) {
   Gaussians out;
   out.sh_degree = gaussians.sh_degree;
   out.origin_world = gaussians.origin_world;
-  for (const Index n : rows)
-    HSI4D_CHECK(n >= 0 && n < gaussians.count(), "there is no Gaussian " + std::to_string(n));
+  for (const Index n : rows) HSI4D_CHECK(n >= 0 && n < gaussians.count(), "there is no Gaussian " + std::to_string(n));
   const auto copy = [rows](const std::vector<float>& from, std::vector<float>& to, Index width) {
     to.resize(rows.size() * static_cast<std::size_t>(width));
     constexpr Index kGrain = 4096;

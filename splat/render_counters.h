@@ -42,9 +42,9 @@ inline RenderTimes& RenderTimes::operator+=(const RenderTimes& other) {
 
 inline RenderCounters& RenderCounters::operator+=(const RenderCounters& other) {
   for (const auto count :
-       {&RenderCounters::gaussians, &RenderCounters::visible, &RenderCounters::pairs, &RenderCounters::groups, &RenderCounters::fragments,
-        &RenderCounters::tiles, &RenderCounters::reached, &RenderCounters::layers, &RenderCounters::told_squares,
-        &RenderCounters::adjoint_tiles, &RenderCounters::kept_bytes})
+       {&RenderCounters::gaussians, &RenderCounters::visible, &RenderCounters::pairs, &RenderCounters::groups,
+        &RenderCounters::fragments, &RenderCounters::tiles, &RenderCounters::reached, &RenderCounters::layers,
+        &RenderCounters::told_squares, &RenderCounters::adjoint_tiles, &RenderCounters::kept_bytes})
     this->*count += other.*count;
   times += other.times;
   return *this;
