@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "autodiff/inspect.h"
 #include "core/parallel.h"
@@ -87,6 +88,21 @@ double scheduled_rate(const ParameterGroupSettings& settings, Index iteration, I
   if (iterations <= 1 || settings.lr_final_share == 1) return settings.lr;
   return settings.lr *
          std::pow(settings.lr_final_share, static_cast<double>(iteration) / static_cast<double>(iterations - 1));
+}
+
+// m̂ = Σ a_k g_k with a_k ∝ β1ᵏ, v̂ = Σ b_k g_k² with b_k ∝ β2ᵏ, so that m̂² ≤ v̂ Σ a_k²/b_k. Moments are the stage's own.
+double longest_adam_way(const ParameterGroupSettings& settings, Index iterations, const OptimizerSettings& optimizer) {
+  const double beta1 = optimizer.beta1, beta2 = optimizer.beta2;
+  double way = 0, first_sum = 0, second_sum = 0, ratio_sum = 0;  // Σ β1ᵏ, Σ β2ᵏ, Σ (β1²/β2)ᵏ
+  double first = 1, second = 1, ratio = 1;
+  for (Index i = 0; i < iterations; ++i) {
+    if (!moves_in(settings, i)) continue;
+    first_sum += std::exchange(first, first * beta1);
+    second_sum += std::exchange(second, second * beta2);
+    ratio_sum += std::exchange(ratio, beta2 > 0 ? ratio * beta1 * beta1 / beta2 : 0.0);
+    way += scheduled_rate(settings, i, iterations) * std::sqrt(second_sum * ratio_sum) / first_sum;
+  }
+  return way;
 }
 
 double bias_correction(double beta, Index steps) { return -std::expm1(static_cast<double>(steps) * std::log(beta)); }

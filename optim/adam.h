@@ -82,6 +82,10 @@ bool moves_in(const ParameterGroupSettings& settings, Index iteration);
 /// Learning rate of iteration i of n: lr · share^(i/(n − 1)).
 double scheduled_rate(const ParameterGroupSettings& settings, Index iteration, Index iterations);
 
+/// How far one number of a group can get in a stage, whatever the gradients are: Σ lr_i |m̂/√v̂| at most, by
+/// Cauchy-Schwarz over the weights of the past gradients in m and v.
+double longest_adam_way(const ParameterGroupSettings& settings, Index iterations, const OptimizerSettings& optimizer);
+
 /// 1 − βᵗ without cancellation, β in [0, 1), t ≥ 1 (row F3).
 double bias_correction(double beta, Index steps);
 

@@ -8,6 +8,7 @@
 #include "core/stopwatch.h"
 #include "core/suggest.h"
 #include "core/text.h"
+#include "optim/optimizer.h"
 
 namespace hsi4d {
 
@@ -138,28 +139,29 @@ class StageRun {
         options_(options),
         groups_(named_groups(settings, available, options.name)),
         loss_(record_loss(settings, terms, inputs, options.name)),
-        adam_(tape, groups_, settings.optimizer) {
+        optimizer_(tape, groups_, settings.optimizer) {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
     for (const AdamGroup<S>& group : groups_) hold(group.parameters);
     for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
-    if (options.kept == nullptr) return;
+    if (options.kept == nullptr || optimizer_.adam() == nullptr) return;
     for (const AdamGroup<S>& group : groups_) {
       const auto kept = options.kept->find(group.parameters.name);
       if (kept != options.kept->end() && !kept->second.blocks.empty())
-        adam_.set_moments(group.parameters.name, kept->second);
+        optimizer_.adam()->set_moments(group.parameters.name, kept->second);
     }
   }
 
   StageResult run(const StageCallback& callback) {
     const auto start = Clock::now();
-    for (Index i = 0; i < settings_.iterations; ++i) iterate(i, callback);
+    Index iterations = 0;
+    while (iterations < settings_.iterations && !optimizer_.is_done()) iterate(iterations++, callback);
     evaluate_the_end();
     keep_moments();
-    return {settings_.iterations,
+    return {iterations,
             evaluated_loss(),
             loss_.values,
             std::move(loss_.off),
-            adam_.rollbacks() + undone_at_end_,
+            optimizer_.rollbacks() + undone_at_end_,
             seconds_since(start),
             times_,
             left_out_objects(),
@@ -183,7 +185,7 @@ class StageRun {
     read_terms();
     const auto differentiated = Clock::now();
     const double loss = evaluated_loss();
-    const StepReport step = adam_.step(i, settings_.iterations, loss);
+    const StepReport step = optimizer_.step(i, settings_.iterations, loss);
     if (step.rolled_back) note_rollback(*step.bad, i);
     if (!step.rolled_back) {
       offender_.clear();
@@ -209,7 +211,7 @@ class StageRun {
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       if (!groups_[g].parameters.are_axis_angles || !step.groups[g].moved) continue;
       for (const Var<S> block : groups_[g].parameters.blocks) {
-        for (const Index row : wrap_axis_angles(block)) adam_.clear_moments(block, row);
+        for (const Index row : wrap_axis_angles(block)) optimizer_.adam()->clear_moments(block, row);
       }
     }
   }
@@ -265,7 +267,7 @@ class StageRun {
 
   void note_rollback(const BadNumber& bad, Index iteration) {
     if (offender_.empty()) offender_ = bad.text() + first_bad_node();
-    if (adam_.rollbacks() <= settings_.optimizer.max_rollbacks) return;
+    if (optimizer_.rollbacks() <= settings_.optimizer.max_rollbacks) return;
     throw_diverged("iteration " + std::to_string(iteration));
   }
 
@@ -273,7 +275,7 @@ class StageRun {
     std::vector<std::string> values;
     for (const LossValue& term : loss_.values) values.push_back(term.name + " " + rounded(term.value, 6));
     throw StageDivergedError(message_of(options_.name, "given up in " + when + " after " +
-                                                           std::to_string(adam_.rollbacks()) +
+                                                           std::to_string(optimizer_.rollbacks()) +
                                                            " steps that had to be taken back (max_rollbacks is " +
                                                            std::to_string(settings_.optimizer.max_rollbacks) +
                                                            "): " + offender_ + "; terms: " + joined(values)));
@@ -305,7 +307,7 @@ class StageRun {
     read_terms();
     if (std::isfinite(evaluated_loss())) return;
     offender_ = "the loss is " + rounded(evaluated_loss(), 6) + first_bad_node();
-    if (adam_.undo()) {
+    if (optimizer_.adam() != nullptr && optimizer_.adam()->undo()) {
       ++undone_at_end_;
       tape_.forward(loss_.total);
       read_terms();
@@ -314,10 +316,10 @@ class StageRun {
   }
 
   void keep_moments() const {
-    if (options_.kept == nullptr) return;
+    if (options_.kept == nullptr || optimizer_.adam() == nullptr) return;
     for (const AdamGroup<S>& group : groups_) {
       const auto kept = options_.kept->find(group.parameters.name);
-      if (kept != options_.kept->end()) kept->second = adam_.moments(group.parameters.name);
+      if (kept != options_.kept->end()) kept->second = optimizer_.adam()->moments(group.parameters.name);
     }
   }
 
@@ -326,7 +328,7 @@ class StageRun {
   const StageOptions& options_;
   std::vector<AdamGroup<S>> groups_;
   RecordedLoss<S> loss_;
-  Adam<S> adam_;
+  Optimizer<S> optimizer_;
   Index undone_at_end_ = 0;
   std::vector<std::vector<Index>> left_out_;  // evaluations, by loss_.left_out and object
   std::vector<GradientShare> shares_;         // of this iteration

@@ -39,7 +39,8 @@ const char* words_of(LossNeeds needs) {
 }  // namespace
 
 void describe(ConfigFields& f, OptimizerSettings& s) {
-  f.choice("kind", s.kind, kOptimizerKinds, "The method");
+  f.choice("kind", s.kind, kOptimizerKinds,
+           "The method: Adam, or BFGS with a line search, for few numbers such as the camera's");
   f.number("beta1", s.beta1, {.min = 0, .below = 1}, "Decay of the first moment");
   f.number("beta2", s.beta2, {.min = 0, .below = 1}, "Decay of the second moment");
   f.number("eps", s.eps, {.min = 1e-30, .max = 1}, "Added to the root of the second moment");
@@ -85,6 +86,15 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
          "VPoser's weights (tools/export_vposer.py), whose latents a stage over the sequence moves; without, natural "
          "poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
+  f.rule({"optimizer", "optimize"}, [&s]() -> std::string {
+    if (s.optimizer.kind != OptimizerKind::kBfgs) return "";
+    for (const auto& [name, group] : s.optimize) {
+      if (group.from != 0 || group.until || group.every != 1 || group.lr_final_share != 1)
+        return "bfgs moves all numbers in every step: from, until, every and lr_final_share of \"" + name +
+               "\" have no meaning";
+    }
+    return "";
+  });
   f.rule({"draw", "over"}, [&s]() -> std::string {
     return s.over == StageScope::kSequence && s.draw != Draw::kAll ? "a stage over the sequence draws nothing" : "";
   });

@@ -13,11 +13,12 @@
 
 namespace hsi4d {
 
-enum class OptimizerKind { kAdam };
+enum class OptimizerKind { kAdam, kBfgs };
 
-inline constexpr std::array<ConfigChoice<OptimizerKind>, 1> kOptimizerKinds = {{{OptimizerKind::kAdam, "adam"}}};
+inline constexpr std::array<ConfigChoice<OptimizerKind>, 2> kOptimizerKinds = {
+    {{OptimizerKind::kAdam, "adam"}, {OptimizerKind::kBfgs, "bfgs"}}};
 
-/// How gradients become steps.
+/// How gradients become steps. beta1, beta2 and eps are Adam's.
 struct OptimizerSettings {
   OptimizerKind kind = OptimizerKind::kAdam;
   double beta1 = 0.9;

@@ -189,6 +189,7 @@ std::string cost_json(const RunCost& cost) {
                                     {"tape_bytes", sum.tape_bytes}};
     if (sum.tiles_of_image > 0)
       entry.update({{"tiles_of_image", sum.tiles_of_image},
+                    {"gaussians", per_iteration(sum.counters.gaussians, stage)},
                     {"tiles", per_iteration(sum.counters.tiles, stage)},
                     {"pairs", per_iteration(sum.counters.pairs, stage)},
                     {"fragments", per_iteration(sum.counters.fragments, stage)},

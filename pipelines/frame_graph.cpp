@@ -13,6 +13,7 @@
 #include "pipelines/motion_inputs.h"
 #include "pipelines/tape_image.h"
 #include "splat/camera_center.h"
+#include "splat/reachable.h"
 
 namespace hsi4d {
 
@@ -35,6 +36,16 @@ constexpr Index kJoints = kSmplxJoints;
 constexpr const char* kColorNet = "color_net";
 constexpr const char* kFeatures = "avatar_features";
 constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_scales", "opacity_logits", "sh"};
+
+/// What of the scene the camera may see; one Gaussian where that is nothing.
+Gaussians seen_scene(const Gaussians& scene, const SplatView& view, const Matrix6<double>& xi_from_update,
+                     const FrameGraphSettings& settings) {
+  if (!settings.camera_reach || !settings.skip.unseen_gaussians) return scene;
+  const Vector6<double> furthest = xi_from_update.cwiseAbs() * Vector6<double>::Constant(*settings.camera_reach);
+  std::vector<Index> rows = reachable_rows(scene, view, {furthest.head<3>().norm(), furthest.tail<3>().norm()});
+  if (rows.empty() && scene.count() > 0) rows.push_back(0);
+  return selected(scene, rows);
+}
 
 template <class S>
 void write_numbers(Tape<S>& tape, Var<S> leaf, const double* values) {
@@ -108,7 +119,7 @@ FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& 
   }
   const Vector3<float> background = settings.background.cast<float>();
   background_ = leaf("background", "background", 1, 3, background.data());
-  std::vector<Part> parts = {record_scene(clip)};
+  std::vector<Part> parts = {record_scene(seen_scene(clip.scene, view_, xi_from_update_, settings))};
   if (settings_.draw == Draw::kAll) {
     for (const ClipObject& object : clip.objects) parts.push_back(record_object(object));
     parts.push_back(record_human(clip.avatar));
@@ -166,9 +177,8 @@ GaussianVars<S> FrameGraph<S>::gaussian_leaves(const std::string& part, const st
 }
 
 template <class S>
-typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Clip& clip) {
-  const GaussianVars<S> vars = gaussian_leaves("scene", "scene", clip.scene);
-  return {standing_splats(vars, xi_, view_), clip.scene.count()};
+typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Gaussians& scene) {
+  return {standing_splats(gaussian_leaves("scene", "scene", scene), xi_, view_), scene.count()};
 }
 
 template <class S>

@@ -8,6 +8,7 @@
 // checked, by its group's name.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,9 @@ struct FrameGraphSettings {
   bool color_camera_gradient = false;   ///< and, by the direction of view, in the camera
   bool human_opacity = false;           ///< the losses read the human's opacity, which costs a channel of the render
   bool object_opacity = false;          ///< likewise of the objects, a channel each
+  /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
+  /// out, and the groups of the scene then hold the others alone. None: all are kept.
+  std::optional<double> camera_reach = {};
 };
 
 /// What a frame is compared with.
@@ -99,7 +103,7 @@ class FrameGraph {
   ParameterGroup<S>& add_to_group(const std::string& group, Var<S> leaf);
   Var<S> rotation_leaf(const std::string& group, const std::string& name, Index rows);
   GaussianVars<S> gaussian_leaves(const std::string& part, const std::string& name, const Gaussians& g);
-  Part record_scene(const Clip& clip);
+  Part record_scene(const Gaussians& scene);
   Part record_object(const ClipObject& object);
   Part record_human(const Avatar& avatar);
   HumanColors<S> record_color_net(const ColorNet& net);

@@ -321,6 +321,7 @@ class Reconstruction {
     totals.pairs += counters.pairs;
     totals.fragments += counters.fragments;
     for (const auto& [name, count] : {std::pair{"channels", counters.channels},
+                                      {"gaussians", counters.gaussians},
                                       {"tiles", counters.tiles},
                                       {"pairs", counters.pairs},
                                       {"groups", counters.groups},

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "body/pose_prior.h"
+#include "optim/optimizer.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/frame_images.h"
 #include "pipelines/sequence_graph.h"
@@ -84,6 +85,8 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
   settings.human_opacity = some_loss_reads(stage, kReadsHumanOpacity);
   settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
+  const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");
+  settings.camera_reach = camera != nullptr ? longest_way(*camera, stage.iterations, stage.optimizer) : 0;
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
   graph.set_state(state);
   if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));
@@ -133,7 +136,9 @@ StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>
 template <class S>
 Image render_state_in(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {
   Tape<S> tape;
-  FrameGraph<S> graph(tape, clip, state.camera_from_world, graph_settings(config, Draw::kAll, colors));
+  FrameGraphSettings settings = graph_settings(config, Draw::kAll, colors);
+  settings.camera_reach = 0;
+  FrameGraph<S> graph(tape, clip, state.camera_from_world, settings);
   graph.set_state(state);
   tape.forward(graph.rendered().image);
   return to_image(tape.value(graph.rendered().image));

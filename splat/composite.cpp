@@ -294,6 +294,7 @@ struct Composite {
       written_over = over;
     }
     *counters = counters_before(tiles, plan_rules(io).in_layers);
+    counters->gaussians = rows;
     counters->times.still_s = std::exchange(still_s, 0.0);
     Workspaces workspaces(tiles.count());
     const Index size = forward_memory(io, tiles.tile);

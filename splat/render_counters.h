@@ -16,6 +16,7 @@ struct RenderTimes {
 /// What the last runs did.
 struct RenderCounters {
   Index channels = 0;       ///< that were composited: three of colour, and what else was asked for
+  Index gaussians = 0;      ///< that the render was given
   Index visible = 0;        ///< Gaussians that reach a tile
   Index pairs = 0;          ///< (tile, Gaussian) that were looked at
   Index groups = 0;         ///< (block of 4×4 pixels, Gaussian) that may touch, of those with an adjoint or among them
@@ -41,9 +42,9 @@ inline RenderTimes& RenderTimes::operator+=(const RenderTimes& other) {
 
 inline RenderCounters& RenderCounters::operator+=(const RenderCounters& other) {
   for (const auto count :
-       {&RenderCounters::visible, &RenderCounters::pairs, &RenderCounters::groups, &RenderCounters::fragments,
-        &RenderCounters::tiles, &RenderCounters::reached, &RenderCounters::layers, &RenderCounters::told_squares,
-        &RenderCounters::adjoint_tiles, &RenderCounters::kept_bytes})
+       {&RenderCounters::gaussians, &RenderCounters::visible, &RenderCounters::pairs, &RenderCounters::groups,
+        &RenderCounters::fragments, &RenderCounters::tiles, &RenderCounters::reached, &RenderCounters::layers,
+        &RenderCounters::told_squares, &RenderCounters::adjoint_tiles, &RenderCounters::kept_bytes})
     this->*count += other.*count;
   times += other.times;
   return *this;

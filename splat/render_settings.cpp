@@ -52,6 +52,8 @@ void describe(ConfigFields& f, RenderSkips& s) {
             "backward pass");
   f.boolean("unchanged_pixels", s.unchanged_pixels,
             "Leave pixels out of the losses that are as they were in the iteration before");
+  f.boolean("unseen_gaussians", s.unseen_gaussians,
+            "Leave Gaussians of the scene out that the camera cannot see in a stage, however far it moves there");
   f.boolean("zero_cotangent", s.zero_cotangent, "Leave tiles out of the backward pass where the loss sees nothing");
 }
 

@@ -82,6 +82,9 @@ struct RenderSkips {
   /// Losses over pixels look again at those that were written, and give gradients to those that the adjoint reads. The
   /// same bits.
   bool unchanged_pixels = true;
+  /// Gaussians of the scene that the camera cannot see, however far a stage may move it, are left out of its tape. The
+  /// same image; sums over Gaussians are rounded otherwise.
+  bool unseen_gaussians = true;
 };
 
 /// What changes the result a little: config section `approx`.

@@ -85,6 +85,36 @@ void check_trace(double tolerance) {
 
 }  // namespace
 
+TEST_CASE("no number gets further in a stage than Adam is said to let it") {
+  ParameterGroupSettings settings;
+  settings.lr = 0.01;
+  const Index n = 60;
+  const auto furthest = [&](const auto& slope) {
+    Slopes<double> slopes(kScalarShape);
+    Adam<double> adam(slopes.tape, {slopes.group(settings)}, {});
+    for (Index i = 0; i < n; ++i) {
+      slopes.tape.write(slopes.slopes).data[0] = slope(i);
+      slopes.step(adam, i, n);
+    }
+    return std::fabs(slopes.numbers()[0]);
+  };
+  for (const double share : {1.0, 0.05}) {
+    settings.lr_final_share = share;
+    const double way = longest_adam_way(settings, n, {});
+    const double straight = furthest([](Index) { return 1.0; });
+    CHECK(straight <= way);
+    CHECK(straight > 0.6 * way);
+    // Growing slopes are what makes a step longer than the rate.
+    CHECK(furthest([](Index i) { return std::pow(1.1, static_cast<double>(i)); }) <= way);
+    CHECK(furthest([](Index i) { return i < 3 ? 1e-12 : 1.0; }) <= way);
+    for (int seed = 0; seed < 20; ++seed)
+      CHECK(furthest([seed](Index i) { return std::sin(static_cast<double>(seed * 37 + i * i)); }) <= way);
+  }
+  settings.from = 10;
+  settings.every = 5;
+  CHECK(longest_adam_way(settings, n, {}) < 0.011 * 10);
+}
+
 TEST_CASE("Adam is the textbook's") {
   check_trace<double>(1e-14);
   check_trace<float>(1e-6);

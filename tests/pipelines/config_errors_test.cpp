@@ -130,6 +130,10 @@ TEST_CASE("missing keys and contradictions") {
                     "never move"));
   CHECK_THAT(fault(R"({"render": {"quality": "fast", "compatibility": "inria"}})"),
              Equals("a.json:1: /render/quality: quality and compatibility set the same keys; write one of the two"));
+  CHECK_THAT(fault(stage(R"("iterations": 9, "optimizer": {"kind": "bfgs"},
+                            "optimize": {"root": {"lr": 0.1, "lr_final_share": 0.5}})")),
+             Contains("/stages/camera") && Contains("bfgs moves all numbers in every step: from, until, every and "
+                                                    "lr_final_share of \"root\" have no meaning"));
 }
 
 TEST_CASE("duplicate keys, numbers that are not finite, broken JSON") {

@@ -104,6 +104,16 @@ TEST_CASE("skips that are set in a config leave the result's bits, or nearly, an
   CHECK(on.counted("layers") < on.counted("tiles"));  // they are kept from one iteration to the next
 }
 
+TEST_CASE("Gaussians that the camera cannot see are left out, and the result is the same but for rounding", "[run]") {
+  const TemporaryFolder here;
+  const SkipRun on("on", {}), off("off", {"skip.unseen_gaussians=false"});
+  const double near = differences(on, off).back();
+  INFO("without those that cannot be seen " << near << " m or rad off");
+  CHECK(near <= 1e-5);
+  CHECK(on.counted("gaussians") < off.counted("gaussians"));
+  CHECK(on.counted("pairs") == off.counted("pairs"));
+}
+
 TEST_CASE("an approximation that a config sets changes the result a little, and its log names it", "[run]") {
   const TemporaryFolder here;
   const SkipRun on("on", {}), collapsed("collapsed", kCollapsed);

@@ -1,0 +1,173 @@
+#include "optim/quasi_newton.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autodiff/inspect.h"
+#include "core/check.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr double kArmijo = 1e-4;
+constexpr double kShortest = 0.1, kLongest = 0.5;  // of the length before, where a step was too long
+constexpr double kSmallestStep = 0.02;             // of the learning rates
+constexpr Index kSmallSteps = 2;  // in a row: after a long step H tells too little of the numbers that it hardly moved
+constexpr double kLeastCurvature = 1e-10;  // of |s| |y|
+
+/// Calls visit(number, column of its array) for all numbers, in order; the index runs over all groups.
+template <class S, class F>
+void for_numbers(const std::vector<AdamGroup<S>>& groups, const F& visit) {
+  Index i = 0;
+  for (const AdamGroup<S>& group : groups) {
+    for (const Var<S> block : group.parameters.blocks) {
+      const Shape& shape = block.shape();
+      for (Index r = 0; r < shape.planes * shape.rows; ++r) {
+        for (Index c = 0; c < shape.cols; ++c) visit(i++, group, block, r, c);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+double longest_quasi_newton_way(const ParameterGroupSettings& settings, Index iterations) {
+  return settings.lr * kLongestQuasiNewtonStep * static_cast<double>(iterations);
+}
+
+template <class S>
+QuasiNewton<S>::QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups) : tape_(tape), groups_(std::move(groups)) {
+  Index count = 0;
+  for (const AdamGroup<S>& group : groups_) {
+    reports_.push_back({group.parameters.name});
+    if (group.parameters.are_axis_angles || group.parameters.range) {
+      throw UserError("group \"" + group.parameters.name +
+                      "\": bfgs does not move numbers that are held in a range, or rotations as axis and angle; "
+                      "allowed: rotations \"6d\", or the optimizer adam");
+    }
+    for (const Var<S> block : group.parameters.blocks) count += tape.shape(block).count();
+  }
+  if (count > kMostQuasiNewtonNumbers) {
+    throw UserError("bfgs keeps a matrix of all pairs of the numbers that move: " + std::to_string(count) +
+                    " numbers, at most " + std::to_string(kMostQuasiNewtonNumbers) + " are allowed");
+  }
+  unit_.resize(count);
+  trial_.resize(count);
+  trial_gradient_.resize(count);
+  for_numbers(groups_, [&](Index i, const AdamGroup<S>& group, Var<S> block, Index r, Index c) {
+    unit_[i] = group.settings.lr;
+    trial_[i] = group.settings.lr > 0 ? static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i] : 0;
+  });
+}
+
+template <class S>
+StepReport QuasiNewton<S>::step(Index iteration, Index iterations, double loss) {
+  StepReport report;
+  report.bad = read_gradient(loss);
+  report.rolled_back = report.bad.has_value();
+  if (report.rolled_back) ++rollbacks_;
+  if (!report.rolled_back && (steps_ == 0 || loss <= loss_ + kArmijo * length_ * slope_)) {
+    accept(loss);
+    choose_direction();
+  } else if (steps_ > 0) {
+    shorten(report.rolled_back ? HUGE_VAL : loss);
+  }
+  if (steps_ > 0) {
+    if (iteration + 1 >= iterations) done_ = true;
+    place(done_ ? point_ : point_ + length_ * direction_);
+  }
+  for (GroupStep& group : reports_) group.moved = group.moved && !report.rolled_back;
+  report.rollbacks = rollbacks_;
+  report.groups = reports_;
+  return report;
+}
+
+template <class S>
+std::optional<BadNumber> QuasiNewton<S>::read_gradient(double loss) {
+  std::optional<BadNumber> bad;
+  if (!std::isfinite(loss)) bad.emplace().value = loss;
+  for (std::size_t g = 0; g < groups_.size(); ++g)
+    reports_[g] = {groups_[g].parameters.name, false, groups_[g].settings.lr, 0};
+  for_numbers(groups_, [&](Index i, const AdamGroup<S>& group, Var<S> block, Index r, Index c) {
+    trial_gradient_[i] = 0;
+    if (!tape_.has_gradient(block)) return;
+    const double value = static_cast<double>(tape_.gradient(block).row(r)[c]);
+    trial_gradient_[i] = value * unit_[i];
+    GroupStep& report = reports_[static_cast<std::size_t>(&group - groups_.data())];
+    report.moved = true;
+    report.gradient_norm = std::hypot(report.gradient_norm, value);
+    if (bad || std::fabs(value) <= kLargestGradient) return;
+    const Index rows = block.shape().rows;
+    bad = BadNumber{group.parameters.name, TapeInspector<S>(tape_).array_name(block.id), r / rows, r % rows, c, value};
+  });
+  return bad;
+}
+
+/// The trial becomes the point from which the next step goes.
+template <class S>
+void QuasiNewton<S>::accept(double loss) {
+  if (steps_ > 0) {
+    const VectorX s = trial_ - point_, y = trial_gradient_ - gradient_;
+    const double curvature = s.dot(y);
+    if (curvature > kLeastCurvature * s.norm() * y.norm()) {
+      const Index n = s.size();
+      if (steps_ == 1) inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) * (curvature / y.squaredNorm());
+      const VectorX hy = inverse_hessian_ * y;
+      inverse_hessian_ += s * s.transpose() * ((curvature + y.dot(hy)) / (curvature * curvature)) -
+                          (hy * s.transpose() + s * hy.transpose()) / curvature;
+    }
+  }
+  point_ = trial_;
+  gradient_ = trial_gradient_;
+  loss_ = loss;
+  ++steps_;
+}
+
+template <class S>
+void QuasiNewton<S>::choose_direction() {
+  const double steepest = gradient_.cwiseAbs().maxCoeff();
+  const Index n = gradient_.size();
+  if (steps_ == 1 && steepest > 0) inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) / steepest;
+  direction_ = steepest > 0 ? VectorX(-(inverse_hessian_ * gradient_)) : VectorX(VectorX::Zero(n));
+  slope_ = direction_.dot(gradient_);
+  if (!(slope_ < 0) && steepest > 0) {  // rounding has spoilt the matrix
+    inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) / steepest;
+    direction_ = -gradient_ / steepest;
+    slope_ = direction_.dot(gradient_);
+  }
+  length_ = 1;
+  const double longest = direction_.cwiseAbs().maxCoeff();
+  if (longest > kLongestQuasiNewtonStep) {
+    direction_ *= kLongestQuasiNewtonStep / longest;
+    slope_ *= kLongestQuasiNewtonStep / longest;
+  }
+  small_steps_ = longest >= kSmallestStep ? 0 : small_steps_ + 1;
+  done_ = small_steps_ >= kSmallSteps || !(longest > 0);
+}
+
+/// Nearer to the point: where the parabola through its loss and slope and the trial's loss is least.
+template <class S>
+void QuasiNewton<S>::shorten(double loss) {
+  const double least = -slope_ * length_ / (2 * (loss - loss_ - slope_ * length_));
+  length_ *= std::isfinite(loss) ? std::clamp(least, kShortest, kLongest) : kShortest;
+  done_ = !(length_ * direction_.cwiseAbs().maxCoeff() >= kSmallestStep);
+}
+
+template <class S>
+void QuasiNewton<S>::place(const VectorX& at) {
+  std::uint32_t written = 0;
+  Array<S> numbers;
+  for_numbers(groups_, [&](Index i, const AdamGroup<S>&, Var<S> block, Index r, Index c) {
+    if (!numbers || written != block.id) numbers = tape_.write(block);
+    written = block.id;
+    const auto value = static_cast<S>(at[i] * unit_[i]);
+    numbers.row(r)[c] = value;
+    trial_[i] = unit_[i] > 0 ? static_cast<double>(value) / unit_[i] : 0;  // as it was rounded
+  });
+}
+
+template class QuasiNewton<float>;
+template class QuasiNewton<double>;
+
+}  // namespace hsi4d

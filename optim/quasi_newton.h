@@ -1,0 +1,73 @@
+// BFGS with a line search, for few numbers: what a camera needs is found in a fifth of Adam's evaluations.
+//
+//   z = x/lr,   d = −H g,   z ← z + t d                                 t = 1, shortened until the loss falls enough
+//   s = z' − z,  y = g' − g,   H ← (I − s yᵀ/sᵀy) H (I − y sᵀ/sᵀy) + s sᵀ/sᵀy                  where sᵀy > 0
+//
+// [Nocedal and Wright 2006, Numerical Optimization, algorithm 6.1; the first H is the identity scaled so that no number
+// goes further than its learning rate, and after the first step (6.20), sᵀy/yᵀy; a step is taken that meets Armijo's
+// condition (3.4), else shortened by the parabola through what is known (3.57), to a tenth at least.] Everything is
+// computed in double. One evaluation of the loss is one iteration, so a step that was too long costs one.
+#pragma once
+
+#include "optim/adam.h"
+
+namespace hsi4d {
+
+/// The most numbers that a stage may move by BFGS: H has the square of that.
+inline constexpr Index kMostQuasiNewtonNumbers = 1024;
+
+/// No number goes further in one step than this many times its group's learning rate.
+inline constexpr double kLongestQuasiNewtonStep = 10;
+
+/// The optimiser of one stage. Steps are bitwise the same for any number of threads. Learning rates are the units in
+/// which numbers of different kinds compare and the length of the first step; the schedule (from, until, every,
+/// lr_final_share) has no meaning here.
+///
+/// A bad evaluation, as Adam has it, is a step that was too long.
+template <class S>
+class QuasiNewton {
+ public:
+  /// @param groups  leaves of `tape`, none of them twice. Throws UserError for more than kMostQuasiNewtonNumbers
+  ///                numbers, and for groups whose numbers are changed between steps (axis-angles, ranges).
+  QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups);
+  QuasiNewton(const QuasiNewton&) = delete;
+  QuasiNewton& operator=(const QuasiNewton&) = delete;
+
+  /// Moves the numbers to where the next evaluation is wanted, by the gradients of the tape's last backward; in the
+  /// last iteration, or where nothing is left to gain, to the best that were evaluated.
+  StepReport step(Index iteration, Index iterations, double loss);
+
+  /// No further evaluation is wanted: the next step, as the one before it, would move no number by a fiftieth of its
+  /// learning rate, or no step along the last direction makes the loss smaller.
+  bool is_done() const { return done_; }
+  Index rollbacks() const { return rollbacks_; }
+
+ private:
+  using VectorX = Eigen::VectorXd;
+
+  std::optional<BadNumber> read_gradient(double loss);
+  void accept(double loss);
+  void choose_direction();
+  void shorten(double loss);
+  void place(const VectorX& at);
+
+  Tape<S>& tape_;
+  std::vector<AdamGroup<S>> groups_;
+  std::vector<GroupStep> reports_;
+  VectorX unit_;                          // learning rates, by number
+  VectorX trial_, trial_gradient_;        // where the loss was just evaluated, in units; and the gradient by these
+  VectorX point_, gradient_, direction_;  // the best so far
+  Eigen::MatrixXd inverse_hessian_;
+  double loss_ = 0, slope_ = 0, length_ = 1;
+  Index steps_ = 0, rollbacks_ = 0;  // steps: accepted, the start among them
+  Index small_steps_ = 0;            // in a row
+  bool done_ = false;
+};
+
+extern template class QuasiNewton<float>;
+extern template class QuasiNewton<double>;
+
+/// How far one number of a group can get in a stage.
+double longest_quasi_newton_way(const ParameterGroupSettings& settings, Index iterations);
+
+}  // namespace hsi4d
