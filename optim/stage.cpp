@@ -193,7 +193,7 @@ class StageRun {
     times_.step += seconds_since(differentiated);
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
-              seconds_since(start), shares_});
+              seconds_since(start), tape_.counters(), shares_});
   }
 
   std::vector<GradientShare> shares_of_terms(Index iteration) {

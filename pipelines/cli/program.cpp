@@ -304,6 +304,7 @@ struct CommandLine {
     command->add_option("--out", bench_stages.out, "Of stages: folder of dataset and runs; default: runs/bench/CONFIG");
     command->add_option("--plot", bench_stages.plot, "Of stages: file for a picture of an iteration's parts")
         ->type_name("F.svg");
+    command->add_flag("--compare", bench_stages.compare, "Of stages: run again without skips, and tell the ratio");
     add_overrides(*command, bench_stages.overrides);
     command->callback([this, command, &terms] {
       run = [this, command, &terms] {
