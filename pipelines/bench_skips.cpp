@@ -17,10 +17,12 @@ struct StagePair {
   double ratio() const { return without.ms_each() / with.ms_each(); }
 };
 
-/// Stages of both runs, in order.
+/// Stages of both runs that draw, in order. In others all that is recorded moves, and what is recorded depends on where
+/// they begin.
 std::vector<StagePair> pairs_of(const RunCost& with, const RunCost& without) {
   std::vector<StagePair> pairs;
   for (const StageCost& stage : with.stages) {
+    if (stage.sum.tiles_of_image == 0) continue;
     const auto other = std::find_if(without.stages.begin(), without.stages.end(),
                                     [&stage](const StageCost& known) { return known.stage == stage.stage; });
     if (other != without.stages.end()) pairs.push_back({stage, *other});
