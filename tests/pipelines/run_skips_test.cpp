@@ -6,6 +6,7 @@
 
 #include "body/motion_io.h"
 #include "core/check.h"
+#include "pipelines/bench_skips.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/run_problems.h"
@@ -136,6 +137,18 @@ TEST_CASE("skips of the tape that are set in a config leave the result's bits an
   CHECK(on.counted("tiles", "camera") < unread.counted("tiles", "camera"));
   CHECK(on.counted("fragments", "camera") < unread.counted("fragments", "camera"));
   CHECK(on.counted("tiles") == unread.counted("tiles"));  // photometric reads every pixel
+}
+
+TEST_CASE("a config without skips has every one of the section off and few iterations") {
+  const RunConfig config = without_skips(tiny_config({"stages.interaction.optimize.transl.from=7"}), 3);
+  const nlohmann::json resolved = nlohmann::json::parse(resolved_config(config, descriptions_of(loss_terms())));
+  CHECK(resolved["skip"].size() == kAllOff.size());
+  for (const auto& [name, value] : resolved["skip"].items()) {
+    INFO(name);
+    CHECK(value == false);
+  }
+  for (const auto& [name, stage] : config.stages) CHECK(stage.iterations == 3);
+  CHECK(find_entry(config.stages[1].second.optimize, "transl")->from == 2);
 }
 
 TEST_CASE("an approximation that a config sets changes the result a little, and its log names it", "[run]") {
