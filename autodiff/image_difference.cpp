@@ -46,6 +46,8 @@ struct ImageDifference {
   static constexpr const char* kName = "image_difference";
   static constexpr bool kAssigns = true;
   Buffer<double> sums = {};  ///< [planes][rows of squares][squares of a row]
+  TileMask weighed = {};     ///< squares in which some weight is not 0
+  std::uint64_t weighed_version = 0;
 
   static const S* weights(const NodeIo<S>& io, Index plane, Index row) {
     if (io.inputs() <= kWeight) return nullptr;
@@ -53,6 +55,22 @@ struct ImageDifference {
     return &weight(weight.shape.planes == 1 ? 0 : plane, row, 0);
   }
   static bool wants_weight(const NodeIo<S>& io) { return io.inputs() > kWeight && io.wants(kWeight); }
+
+  /// Where all weights are 0, so are value and gradient, unless one asks for that of the weights.
+  const TileMask* looks_at(NodeIo<S>& io, int input) {
+    if (input != kA || io.inputs() <= kWeight || !io.is_leaf(kWeight) || io.wants(kWeight)) return nullptr;
+    if (weighed_version != io.version(kWeight)) weigh(io.in(kWeight));
+    weighed_version = io.version(kWeight);
+    return &weighed;
+  }
+  void weigh(const ConstArray<S>& weight) {
+    weighed.clear(weight.shape.rows, weight.shape.cols);
+    for (Index r = 0; r < weight.total_rows(); ++r) {
+      for (Index c = 0; c < weight.shape.cols; ++c) {
+        if (weight.row(r)[c] != S(0)) weighed.add(r % weight.shape.rows / kMaskSquare, c / kMaskSquare);
+      }
+    }
+  }
 
   /// Squares of `a` that have to be summed again; null: all.
   static const TileMask* to_sum(const NodeIo<S>& io) {
@@ -141,7 +159,7 @@ struct ImageDifference {
     }
   }
 
-  Index saved_bytes() const { return sums.capacity_bytes(); }
+  Index saved_bytes() const { return sums.capacity_bytes() + weighed.capacity_bytes(); }
 };
 
 }  // namespace

@@ -139,6 +139,13 @@ void Tape<S>::set_frozen(Var<S> var, bool frozen) {
 }
 
 template <class S>
+void Tape<S>::set_skips(const TapeSkips& skips) {
+  if (skips == skips_) return;
+  skips_ = skips;
+  ++structure_;
+}
+
+template <class S>
 void Tape<S>::rewind(const Mark& mark) {
   HSI4D_CHECK(mark.arrays <= arrays_.size() && (mark.arrays == 0 || arrays_[mark.arrays - 1].stamp == mark.stamp),
               "the mark is of a recording that was rewound");
@@ -187,7 +194,7 @@ template <class S>
 void Tape<S>::update_structure() {
   if (current_structure_ == structure_) return;
   for (ArrayRecord& array : arrays_) {
-    if (array.producer == kLeaf) array.needs_gradient = !array.frozen;
+    if (array.producer == kLeaf) array.needs_gradient = skips_.frozen_inputs ? !array.frozen : !array.constant;
   }
   for (NodeRecord& node : nodes_) {
     std::uint64_t wants = 0;
@@ -252,7 +259,28 @@ void Tape<S>::build(Plan& plan) {
     }
   }
   place_adjoints(plan);
+  find_sole_readers(plan);
   plan.structure = structure_;
+}
+
+template <class S>
+void Tape<S>::find_sole_readers(Plan& plan) {
+  readers_.assign(nodes_.size(), 0);
+  const auto count = [&](std::uint32_t id) {
+    if (arrays_[id].producer != kLeaf) ++readers_[arrays_[id].producer];
+  };
+  count(plan.result);
+  for (const std::uint32_t n : plan.forward_nodes) {
+    for (std::uint32_t i = 0; i < nodes_[n].edge_count; ++i) count(edges_[nodes_[n].first_edge + i]);
+  }
+  plan.sole_readers.clear();
+  for (const std::uint32_t n : plan.forward_nodes) {
+    if (nodes_[n].table->looks_at == nullptr) continue;
+    for (std::uint32_t i = 0; i < nodes_[n].edge_count; ++i) {
+      const std::uint32_t producer = arrays_[edges_[nodes_[n].first_edge + i]].producer;
+      if (producer != kLeaf && readers_[producer] == 1) plan.sole_readers.push_back({producer, n, static_cast<int>(i)});
+    }
+  }
 }
 
 /// Finds which node is the first to meet each adjoint, and lays the adjoints out: those that must be cleared, then

@@ -118,6 +118,10 @@ class NodeIo {
     array.changed = changed;
     array.read = read;
   }
+  /// True when input i is a leaf: up to date even before forward.
+  bool is_leaf(int i) const { return tape_->arrays_[input_ids_[i]].producer == Tape<S>::kLeaf; }
+  /// In forward: the squares of its outputs, images, outside of which nothing reads them; null: all have to be made.
+  const TileMask* needed() const { return needed_; }
   /// Adjoint of input i, to be added to, never overwritten (but see must_assign).
   Array<S> d_in(int i) const { return tape_->adjoint_view(input_ids_[i]); }
   /// True when nothing has been added to d_in(i) yet and its numbers are undefined: the operator then assigns what it
@@ -148,6 +152,7 @@ class NodeIo {
   std::uint32_t first_output_ = 0;
   std::uint64_t ran_before_ = 0;  // clock of the forward before this one; 0: there is none that counts
   std::uint64_t assign_mask_ = 0;
+  const TileMask* needed_ = nullptr;
 };
 
 /// The functions of an operator type, made from its members by Tape::record.
@@ -161,6 +166,7 @@ struct OperatorTable {
   void (*build_state)(void*, NodeIo<S>&);
   void (*add_signature)(void*, Signature&, NodeIo<S>&);  // null: no discrete choices
   Index (*saved_bytes)(const void*);                     // null: nothing saved
+  const TileMask* (*looks_at)(void*, NodeIo<S>&, int);   // null: at all of every input
   bool persistent_outputs;
   bool assigns;
 };
@@ -172,6 +178,34 @@ struct NodeStatistics {
   Index forward_runs = 0, forward_skips = 0, backward_runs = 0;
   double forward_ns = 0, backward_ns = 0;  ///< only while profiling
   Index value_bytes = 0, adjoint_bytes = 0, saved_bytes = 0;
+};
+
+/// What a tape does not compute because the result does not need it. With a skip off the result has the same bits, and
+/// takes longer: for who measures what it saves, or suspects it.
+struct TapeSkips {
+  /// Frozen leaves have no adjoint. Off: every leaf that is no constant has one.
+  bool frozen_inputs = true;
+  /// A node does not run again when its inputs are as they were. Off: forward runs every node each time, and what nodes
+  /// keep for inputs that stay is made anew.
+  bool unchanged_inputs = true;
+  /// Squares of an image that the one operator on the way to the result which reads it says it does not look at are not
+  /// made; they keep what they had. Off: all are.
+  bool unread_pixels = true;
+
+  bool operator==(const TapeSkips&) const = default;
+};
+
+/// What the last forward and the last backward did.
+struct TapeCounters {
+  Index forward_nodes = 0, backward_nodes = 0;  ///< that ran
+  Index adjoint_numbers = 0;                    ///< of the arrays with an adjoint, padding included
+
+  TapeCounters& operator+=(const TapeCounters& other) {
+    forward_nodes += other.forward_nodes;
+    backward_nodes += other.backward_nodes;
+    adjoint_numbers += other.adjoint_numbers;
+    return *this;
+  }
 };
 
 /// Reverse-mode tape of arrays; see the top of the file. S is float or double. Not copyable; not for use from two
@@ -212,6 +246,8 @@ class Tape {
   ///       key alone. It is built before forward whenever the key differs from the last one, or state was dropped.
   ///   `void add_signature(Signature&, NodeIo<S>&)`  its discrete choices in the last forward.
   ///   `Index saved_bytes() const`                   memory held between forward and backward, for statistics.
+  ///   `const TileMask* looks_at(NodeIo<S>&, int i)`  squares of input i, an image, on which forward and backward
+  ///       depend; null: all. Asked before forward, when only leaves are up to date.
   ///   `static constexpr bool kPersistentOutputs = true`  outputs are updated in place, not rewritten.
   ///   `static constexpr bool kAssigns = true`  its adjoint asks io.must_assign(i), and then assigns every number of
   ///       d_in(i): saves clearing that memory and reading it back.
@@ -268,6 +304,8 @@ class Tape {
   std::uint64_t signature(Var<S> result);
   /// Drops the state of every node that keeps some (start of a frame, rollback, resume): it is built anew from its key.
   void drop_state();
+  /// All are on unless this says so.
+  void set_skips(const TapeSkips& skips);
 
   // --- looking inside ----------------------------------------------------------------------------------------------
 
@@ -277,6 +315,7 @@ class Tape {
   void set_profiling(bool on) { profiling_ = on; }
   std::vector<NodeStatistics> statistics() const;
   void clear_statistics();
+  const TapeCounters& counters() const { return counters_; }
   /// Bytes held: values, operators and their saved buffers, adjoints, scratch.
   Index memory_bytes() const;
 
@@ -309,6 +348,8 @@ class Tape {
     std::uint64_t wants_mask = 0;  // which inputs needed a gradient when it ran
     std::uint64_t state_key = 0;
     bool state_valid = false;
+    const TileMask* needed = nullptr;                 // in the forward run at hand; see NodeIo::needed
+    std::uint64_t needed_key = 0, made_key = kWhole;  // of `needed`, and of what it was when it ran last
     Index forward_runs = 0, forward_skips = 0, backward_runs = 0;
     double forward_ns = 0, backward_ns = 0;
     Source where;
@@ -319,17 +360,23 @@ class Tape {
       std::uint32_t array;
       Index offset;
     };
+    struct Reader {
+      std::uint32_t producer, node;
+      int input;
+    };
     std::uint32_t result = 0;
     std::uint64_t structure = 0;
     std::uint64_t forward_at = 0;  // clock when forward finished; 0: never, or not since the structure changed
     std::vector<std::uint32_t> leaves, forward_nodes, backward_nodes;
     std::vector<std::uint64_t> assign_masks;  // of backward_nodes: which inputs they meet first, and assign
+    std::vector<Reader> sole_readers;         // that say what they look at, of nodes that nothing else reads
     std::vector<Slot> adjoints;
     Index adjoint_size = 0;
     Index cleared_size = 0;  // the adjoints that are added to from the start lie in front, and are cleared each time
   };
 
   static constexpr std::uint32_t kLeaf = ~std::uint32_t(0);
+  static constexpr std::uint64_t kWhole = 0;  // key of no mask
 
   std::uint32_t checked(Var<S> var) const;
   Array<S> view(std::uint32_t id) const { return {arrays_[id].value, arrays_[id].shape}; }
@@ -347,8 +394,10 @@ class Tape {
   void update_structure();
   Plan& plan_for(std::uint32_t result);
   void build(Plan& plan);
+  void find_sole_readers(Plan& plan);
   void place_adjoints(Plan& plan);
   void activate(const Plan& plan);
+  void tell_needed(const Plan& plan);
   void run_forward(Plan& plan);
   void run_backward(Plan& plan);
   void forward_node(NodeRecord& node);
@@ -365,6 +414,7 @@ class Tape {
   std::vector<std::uint32_t> edges_;  // input ids of all nodes
   std::vector<Plan> plans_;
   std::vector<std::uint8_t> reached_;   // scratch of build: the result depends on it
+  std::vector<std::uint32_t> readers_;  // scratch of find_sole_readers: by node
   std::vector<std::uint8_t> carries_;   // scratch of build: a gradient arrives at it
   std::vector<std::uint8_t> assigned_;  // scratch of place_adjoints
   Buffer<S> adjoints_;
@@ -377,6 +427,8 @@ class Tape {
   std::uint32_t next_stamp_ = 1;
   bool anomaly_ = false;
   bool profiling_ = false;
+  TapeSkips skips_;
+  TapeCounters counters_;
 };
 
 template <class S>
@@ -410,6 +462,9 @@ constexpr OperatorTable<S> make_operator_table() {
   }
   if constexpr (requires(const Op op) { op.saved_bytes(); }) {
     table.saved_bytes = [](const void* op) { return static_cast<const Op*>(op)->saved_bytes(); };
+  }
+  if constexpr (requires(Op op, NodeIo<S> io) { op.looks_at(io, 0); }) {
+    table.looks_at = [](void* op, NodeIo<S>& io, int i) { return static_cast<Op*>(op)->looks_at(io, i); };
   }
   if constexpr (requires { Op::kPersistentOutputs; }) table.persistent_outputs = Op::kPersistentOutputs;
   if constexpr (requires { Op::kAssigns; }) table.assigns = Op::kAssigns;

@@ -21,6 +21,17 @@ void clear_padding(const Array<S>& array) {
   }
 }
 
+/// Another number for another set of squares, and not 0.
+std::uint64_t key_of(const TileMask& mask) {
+  Signature key;
+  for (Index r = 0; r < mask.rows(); ++r) {
+    for (Index c = 0; c < mask.cols(); ++c) {
+      if (mask.has(r, c)) key.add(static_cast<std::uint64_t>(r * mask.cols() + c));
+    }
+  }
+  return key.value() | 1;
+}
+
 double nanoseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::nano>(Clock::now() - start).count();
 }
@@ -34,6 +45,7 @@ NodeIo<S> Tape<S>::io_of(const NodeRecord& node) {
   io.input_ids_ = edges_.data() + node.first_edge;
   io.input_count_ = node.edge_count;
   io.first_output_ = node.first_output;
+  io.needed_ = node.needed;
   return io;
 }
 
@@ -59,7 +71,8 @@ void Tape<S>::activate(const Plan& plan) {
 
 template <class S>
 bool Tape<S>::up_to_date(const NodeRecord& node) const {
-  if (node.ran_at == 0) return false;
+  if (node.ran_at == 0 || !skips_.unchanged_inputs) return false;
+  if (node.made_key != kWhole && node.made_key != node.needed_key) return false;
   const std::uint32_t* edge = edges_.data() + node.first_edge;
   for (std::uint32_t i = 0; i < node.edge_count; ++i) {
     if (arrays_[edge[i]].version > node.ran_at) return false;
@@ -86,6 +99,7 @@ void Tape<S>::forward_node(NodeRecord& node) {
   node.table->forward(node.op, io);
   scratch_.reset();
   node.ran_at = ++clock_;
+  node.made_key = node.needed_key;
   for (std::uint32_t j = 0; j < node.output_count; ++j) {
     ArrayRecord& output = arrays_[node.first_output + j];
     output.version_before = std::exchange(output.version, clock_);
@@ -106,8 +120,25 @@ void Tape<S>::backward_node(NodeRecord& node, std::uint64_t assign_mask) {
 }
 
 template <class S>
+void Tape<S>::tell_needed(const Plan& plan) {
+  for (const std::uint32_t n : plan.forward_nodes) {
+    nodes_[n].needed = nullptr;
+    nodes_[n].needed_key = kWhole;
+  }
+  if (!skips_.unread_pixels) return;
+  for (const auto& reader : plan.sole_readers) {
+    NodeIo<S> io = io_of(nodes_[reader.node]);
+    NodeRecord& producer = nodes_[reader.producer];
+    producer.needed = nodes_[reader.node].table->looks_at(nodes_[reader.node].op, io, reader.input);
+    if (producer.needed != nullptr) producer.needed_key = key_of(*producer.needed);
+  }
+}
+
+template <class S>
 void Tape<S>::run_forward(Plan& plan) {
   plan.forward_at = 0;
+  tell_needed(plan);
+  counters_.forward_nodes = 0;
   if (anomaly_) {
     for (const std::uint32_t leaf : plan.leaves) check_finite(leaf, nullptr, false);
   }
@@ -118,6 +149,7 @@ void Tape<S>::run_forward(Plan& plan) {
       continue;
     }
     forward_node(node);
+    ++counters_.forward_nodes;
     if (!anomaly_) continue;
     for (std::uint32_t j = 0; j < node.output_count; ++j) check_finite(node.first_output + j, &node, false);
   }
@@ -187,6 +219,8 @@ void Tape<S>::backward(Var<S> result, std::span<const S> cotangent) {
   const FlushDenormals flush;
   scratch_.reset();
   std::fill_n(adjoints_.data(), plan.cleared_size, S(0));
+  counters_.backward_nodes = std::ssize(plan.backward_nodes);
+  counters_.adjoint_numbers = plan.adjoint_size;
   if (!arrays_[id].needs_gradient) return;
   detail::copy_in(cotangent, adjoint_view(id));
   try {
@@ -260,6 +294,7 @@ void Tape<S>::check_finite(std::uint32_t id, const NodeRecord* node, bool adjoin
   template bool Tape<S>::up_to_date(const NodeRecord&) const;           \
   template void Tape<S>::forward_node(NodeRecord&);                     \
   template void Tape<S>::backward_node(NodeRecord&, std::uint64_t);     \
+  template void Tape<S>::tell_needed(const Plan&);                      \
   template void Tape<S>::run_forward(Plan&);                            \
   template void Tape<S>::run_backward(Plan&);                           \
   template void Tape<S>::invalidate(const std::vector<std::uint32_t>&); \

@@ -175,12 +175,15 @@ class StageRun {
     for (const AdamGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
     const auto set_up = Clock::now();
     tape_.forward(loss_.total);
+    const Index forward_nodes = tape_.counters().forward_nodes;  // before others run, for shares
     times_.forward += seconds_since(set_up);
     shares_.clear();
     if (settings_.gradient_shares > 0 && i % settings_.gradient_shares == 0) shares_ = shares_of_terms(i);
     const auto evaluated = Clock::now();
     tape_.backward(loss_.total);
     times_.backward += seconds_since(evaluated);
+    TapeCounters counters = tape_.counters();
+    counters.forward_nodes = forward_nodes;
     check_reached(i);
     read_terms();
     const auto differentiated = Clock::now();
@@ -195,7 +198,7 @@ class StageRun {
     times_.step += seconds_since(differentiated);
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
-              seconds_since(start), shares_});
+              seconds_since(start), counters, shares_});
   }
 
   std::vector<GradientShare> shares_of_terms(Index iteration) {

@@ -33,6 +33,7 @@ struct IterationReport {
   Index rollbacks = 0;                                  ///< so far
   std::string_view offender;                            ///< when rolled_back: the first number that was not finite
   double seconds = 0;                                   ///< of this iteration
+  TapeCounters tape = {};                               ///< of this iteration
   std::span<const GradientShare> gradient_shares = {};  ///< where the settings ask for them; empty in a bad evaluation
 };
 

@@ -77,7 +77,7 @@ std::string stage_line(const StageCost& cost, bool counts_allocations) {
   const double all = static_cast<double>(cost.sum.tiles_of_image);
   std::string text =
       line("%-16s %9lld %8.2f %8.2f %8.1f", cost.stage.c_str(), static_cast<long long>(cost.sum.iterations),
-           per_iteration(cost.sum.iteration_seconds, cost), cost.median_ms(), cost.sum.seconds);
+           cost.ms_each(), cost.median_ms(), cost.sum.seconds);
   text += all > 0 ? line(" %6.0f of %-6.0f %9.0f %11.0f", per_iteration(c.tiles, cost), all,
                          per_iteration(c.pairs, cost), per_iteration(c.fragments, cost))
                   : line(" %16s %9s %11s", "-", "-", "-");
@@ -121,6 +121,8 @@ std::string composite_line(const StageCost& cost) {
 
 }  // namespace
 
+double StageCost::ms_each() const { return per_iteration(sum.iteration_seconds, *this); }
+
 double StageCost::median_ms() const {
   if (ms_an_iteration.empty()) return 0;
   std::vector<double> sorted = ms_an_iteration;
@@ -147,6 +149,7 @@ void add_profile(const StageProfile& profile, std::vector<StageCost>& stages) {
   sum.times.backward += profile.times.backward;
   sum.times.step += profile.times.step;
   sum.counters += profile.counters;
+  sum.tape += profile.tape;
   sum.allocations += profile.allocations;
   sum.tiles_of_image = profile.tiles_of_image;
   sum.nodes = std::max(sum.nodes, profile.nodes);
@@ -182,10 +185,13 @@ std::string cost_json(const RunCost& cost) {
                                     {"isa", isa_name(best_isa())},
                                     {"frames", stage.frames},
                                     {"iterations", sum.iterations},
-                                    {"ms", per_iteration(sum.iteration_seconds, stage)},
+                                    {"ms", stage.ms_each()},
                                     {"median_ms", stage.median_ms()},
                                     {"seconds", sum.seconds},
                                     {"nodes", sum.nodes},
+                                    {"forward_nodes", per_iteration(sum.tape.forward_nodes, stage)},
+                                    {"backward_nodes", per_iteration(sum.tape.backward_nodes, stage)},
+                                    {"adjoint_numbers", per_iteration(sum.tape.adjoint_numbers, stage)},
                                     {"tape_bytes", sum.tape_bytes}};
     if (sum.tiles_of_image > 0)
       entry.update({{"tiles_of_image", sum.tiles_of_image},
@@ -245,7 +251,7 @@ std::string color_of(const std::string& name, const std::vector<std::string>& co
 /// The bar of a stage and the legend below it.
 /// @param y  its top; afterwards that of the next
 std::string stage_bar(const StageCost& stage, double scale, const std::vector<std::string>& costliest, double& y) {
-  const double whole = per_iteration(stage.sum.iteration_seconds, stage);
+  const double whole = stage.ms_each();
   std::vector<CostPart> parts = parts_of(stage);
   std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
   std::string body = line("<text x=\"12\" y=\"%.0f\">%s</text>\n", y + 17, html_escape(stage.stage).c_str());
@@ -272,8 +278,7 @@ std::string stage_bar(const StageCost& stage, double scale, const std::vector<st
 
 std::string cost_svg(const RunCost& cost, const std::string& title) {
   double longest = 0;
-  for (const StageCost& stage : cost.stages)
-    longest = std::max(longest, per_iteration(stage.sum.iteration_seconds, stage));
+  for (const StageCost& stage : cost.stages) longest = std::max(longest, stage.ms_each());
   const std::vector<std::string> costliest = costliest_parts(cost);
   std::string body = line("<text x=\"12\" y=\"26\" font-size=\"16\">%s</text>\n", html_escape(title).c_str());
   double y = 44;

@@ -15,7 +15,8 @@ struct StageCost {
   StageProfile sum;                     ///< counts and seconds of all of them; of tape_bytes and nodes the most
   std::vector<double> ms_an_iteration;  ///< by frame
 
-  double median_ms() const;
+  double ms_each() const;    ///< an iteration, on average
+  double median_ms() const;  ///< of the frames' averages
 };
 
 /// What a run took.

@@ -300,6 +300,10 @@ class Reconstruction {
     record.rolled_back = report.rolled_back;
     record.gradient_shares = report.gradient_shares;
     if (counters != nullptr) add_counters(*counters, *totals, record);
+    for (const auto& [name, count] : {std::pair{"forward_nodes", report.tape.forward_nodes},
+                                      {"backward_nodes", report.tape.backward_nodes},
+                                      {"adjoint_numbers", report.tape.adjoint_numbers}})
+      record.counters.emplace_back(name, static_cast<double>(count));
     folder_.append_metrics(record);
     show(report);
     stop_if_asked(frame.value_or(clip_.frames()));

@@ -14,7 +14,7 @@ namespace {
 
 FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const ColorState& colors) {
   return {config.render,
-          config.skip,
+          config.skip.render,
           config.approx,
           config.rotations,
           config.camera.increment,
@@ -82,6 +82,7 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   const auto& [name, stage] = task.config.stages[task.stage];
   StageProbe probe(task.watch);
   Tape<S> tape;
+  tape.set_skips(task.config.skip.tape);
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
   settings.human_opacity = some_loss_reads(stage, kReadsHumanOpacity);
   settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
@@ -118,6 +119,7 @@ StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>
   const auto& [name, stage] = task.config.stages[task.stage];
   StageProbe probe(task.watch);
   Tape<S> tape;
+  tape.set_skips(task.config.skip.tape);
   const bool moves_pose = find_entry(stage.optimize, kPoseLatents) != nullptr;
   const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
   const SequenceGraph<S> graph(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);

@@ -27,11 +27,24 @@ void without_places(ConfigValue& sources) {
 
 }  // namespace
 
+SkipSettings no_skips() {
+  return {{.static_tiles = false, .static_layer = false, .zero_cotangent = false, .unchanged_pixels = false},
+          {.frozen_inputs = false, .unchanged_inputs = false, .unread_pixels = false}};
+}
+
 void describe(ConfigFields& f, CameraSettings& s) {
   f.choice(
       "increment", s.increment, kCameraIncrements,
       "Frame of a camera's six numbers: its own (about its centre), the world's, or its own axes about the point at "
       "the scene's median depth, which keeps turning and moving apart");
+}
+
+void describe(ConfigFields& f, SkipSettings& s) {
+  describe(f, s.render);
+  f.boolean("frozen_inputs", s.tape.frozen_inputs, "Make no gradient of numbers that do not move");
+  f.boolean("unchanged_inputs", s.tape.unchanged_inputs,
+            "Do not compute again what depends on nothing that has moved since");
+  f.boolean("unread_pixels", s.tape.unread_pixels, "Do not render what the only loss that sees it has no weight for");
 }
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "autodiff/tape.h"
 #include "core/config.h"
 #include "optim/loss_description.h"
 #include "optim/stage_settings.h"
@@ -43,6 +44,15 @@ struct CameraSettings {
   CameraIncrement increment = CameraIncrement::kCamera;
 };
 
+/// What is not computed because the result does not need it: config section `skip`.
+struct SkipSettings {
+  RenderSkips render;
+  TapeSkips tape;
+};
+
+/// All of them off.
+SkipSettings no_skips();
+
 /// A whole run.
 struct RunConfig {
   std::string name;
@@ -61,13 +71,14 @@ struct RunConfig {
   ColorNetSettings color_net;
   SyntheticSettings synthetic;
   RenderSettings render;
-  RenderSkips skip;
+  SkipSettings skip;
   RenderApproximations approx;
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 
-/// Describes the section: every setting with its range.
+/// Describe the sections: every setting with its range.
 void describe(ConfigFields& fields, CameraSettings& settings);
+void describe(ConfigFields& fields, SkipSettings& settings);
 
 /// What a config is read for: the more is asked of it, the more can be wrong.
 enum class ConfigUse {

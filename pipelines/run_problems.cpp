@@ -236,8 +236,9 @@ void add_chain_problems(const std::vector<ChainClip>& chain, ConfigUse use, std:
 
 /// The setting that keeps static layers from being made, "skip.static_layer=false"; none: empty.
 std::string without_static_layers(const RunConfig& config) {
-  if (!config.skip.static_tiles) return "skip.static_tiles=false";
-  if (!config.skip.static_layer) return "skip.static_layer=false";
+  if (!config.skip.render.static_tiles) return "skip.static_tiles=false";
+  if (!config.skip.tape.frozen_inputs) return "skip.frozen_inputs=false";
+  if (!config.skip.render.static_layer) return "skip.static_layer=false";
   return config.precision == RunPrecision::kDouble ? "precision=double" : "";
 }
 
@@ -308,8 +309,14 @@ void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use,
 
 std::vector<RunNote> run_notes(const RunConfig& config) {
   std::vector<RunNote> notes;
-  if (!config.skip.static_tiles && config.skip.static_layer)
-    notes.push_back({LogLevel::kInfo, "skip.static_tiles=false switches skip.static_layer off too"});
+  const auto inform = [&notes](const char* text) { notes.push_back({LogLevel::kInfo, text}); };
+  const RenderSkips& render = config.skip.render;
+  if (!render.static_tiles && render.static_layer) inform("skip.static_tiles=false switches skip.static_layer off too");
+  if (render.static_tiles && !config.skip.tape.frozen_inputs) {
+    inform("skip.frozen_inputs=false switches skip.static_tiles and skip.static_layer off too");
+  } else if (render.static_tiles && !config.skip.tape.unchanged_inputs) {
+    inform("skip.unchanged_inputs=false has made anew in every iteration what skip.static_tiles keeps");
+  }
   if (!config.approx.collapse_suffix) return notes;
   const std::string off = without_static_layers(config);
   if (off.empty()) {

@@ -44,6 +44,7 @@ void StageProbe::iteration_ended(const IterationReport& report, const RenderCoun
   if (!is_on()) return;
   if (report.iteration >= report.iterations / 2) allocations_ += allocation_count() - before_;
   iteration_seconds_ += report.seconds;
+  tape_ += report.tape;
   if (counters != nullptr) counters_ += *counters;
 }
 
@@ -60,6 +61,7 @@ void StageProbe::stage_ended(const StageResult& result, StageProfile profile) co
   profile.operators = by_operator(result.nodes);
   profile.nodes = static_cast<Index>(result.nodes.size());
   profile.counters = counters_;
+  profile.tape = tape_;
   profile.allocations = allocations_;
   watch_->done(profile);
 }

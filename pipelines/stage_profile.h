@@ -31,6 +31,7 @@ struct StageProfile {
   std::vector<OperatorProfile> operators = {};
   Index nodes = 0;               ///< of the tape
   RenderCounters counters = {};  ///< sums over the iterations; none over the sequence
+  TapeCounters tape = {};        ///< sums over the iterations
   Index tiles_of_image = 0;      ///< in one image; 0: nothing was drawn
   std::int64_t allocations = 0;  ///< by the second half of the iterations, where they are counted
   Index tape_bytes = 0;
@@ -64,6 +65,7 @@ class StageProbe {
   const StageWatch* watch_;
   std::chrono::steady_clock::time_point start_;
   RenderCounters counters_;
+  TapeCounters tape_;
   double iteration_seconds_ = 0;
   std::int64_t allocations_ = 0, before_ = 0;
 };

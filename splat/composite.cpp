@@ -193,6 +193,12 @@ struct Composite {
     return detail::all_blocks(tiles.tile) & ~planned.plans[tile].blocks & ~settled[tile];
   }
 
+  /// Whether somebody reads the outputs of a tile.
+  static bool is_needed(const NodeIo<S>& io, const TileGrid& tiles, Index tile) {
+    const Index across = kMaskSquare / tiles.tile;  // tiles in a square
+    return io.needed() == nullptr || io.needed()->has(tile / tiles.cols / across, tile % tiles.cols / across);
+  }
+
   /// Brings the outputs of a tile up to date.
   TileCounts composite_tile(const NodeIo<S>& io, const TileGrid& tiles, Index tile, S* memory) {
     const std::uint32_t all = detail::all_blocks(tiles.tile);
@@ -293,7 +299,7 @@ struct Composite {
       written = io.out(kChannels).data;
       written_over = over;
     }
-    *counters = counters_before(tiles, plan_rules(io).in_layers);
+    *counters = counters_before(io, tiles);
     counters->gaussians = rows;
     counters->times.still_s = std::exchange(still_s, 0.0);
     Workspaces workspaces(tiles.count());
@@ -302,6 +308,7 @@ struct Composite {
     run_chunks(tiles.count(), [&](Index tile) {
       tile_counts[tile] = {kUntouched, 0};
       tile_last[tile] = {0, -1};
+      if (!is_needed(io, tiles, tile)) return;
       if (planned.plans[tile].entries.empty() && settled[tile] == detail::all_blocks(tiles.tile)) return;
       const Workspaces::Held held(workspaces);
       planned.merge(rows_of(io), view.settings, plan_rules(io), tile);
@@ -338,7 +345,8 @@ struct Composite {
   }
 
   /// What is known before the tiles are composited.
-  RenderCounters counters_before(const TileGrid& tiles, bool layered) const {
+  RenderCounters counters_before(const NodeIo<S>& io, const TileGrid& tiles) const {
+    const bool layered = plan_rules(io).in_layers;
     RenderCounters result;
     result.times = counters->times;
     result.channels = counters->channels;
@@ -350,6 +358,7 @@ struct Composite {
       }
     }
     for (Index tile = 0; tile < tiles.count(); ++tile) {
+      if (!is_needed(io, tiles, tile)) continue;
       const detail::TilePlan& plan = planned.plans[tile];
       const auto still = static_cast<Index>(planned.still.of_tile(tile).size());
       const bool moves = !plan.entries.empty(), restored = still > 0 && unsettled(tiles, tile) != 0;

@@ -5,6 +5,7 @@
 #include "core/file.h"
 #include "core/stopwatch.h"
 #include "pipelines/bench_measurement.h"
+#include "pipelines/bench_skips.h"
 #include "pipelines/bench_stages.h"
 #include "pipelines/cli/dataset.h"
 #include "pipelines/cli/heap_counter.h"
@@ -37,11 +38,14 @@ RunConfig measured_config(const BenchStagesOptions& options, const std::vector<L
   return config;
 }
 
-}  // namespace
+/// What a run took, and its table of errors.
+struct MeasuredRun {
+  RunCost cost;
+  std::string result;
+};
 
-std::string bench_stages_command(const BenchStagesOptions& options, const std::vector<LossTerm>& losses) {
-  const fs::path out = options.out.empty() ? fs::path("runs/bench") / options.config.stem() : fs::path(options.out);
-  const RunConfig config = measured_config(options, losses, out);
+MeasuredRun measured_run(const RunConfig& config, const BenchStagesOptions& options,
+                         const std::vector<LossTerm>& losses, const fs::path& out) {
   RunCost cost;
   const StageWatch watch{[&cost](const StageProfile& profile) { add_profile(profile, cost.stages); },
                          heap_allocation_counter()};
@@ -55,9 +59,25 @@ std::string bench_stages_command(const BenchStagesOptions& options, const std::v
   const RunSummary summary = run_on_terminal(config, losses, run, out.string());
   cost.seconds = seconds_since(start);
   cost.peak_memory_bytes = peak_memory_bytes();
-  if (!options.json.empty()) write_text_file(options.json, cost_json(cost));
-  if (!options.plot.empty()) write_text_file(options.plot, cost_svg(cost, "an iteration of " + config.name));
-  return cost_table(cost) + "\n" + result_text(summary, run.folder);
+  return {cost, result_text(summary, run.folder)};
+}
+
+}  // namespace
+
+std::string bench_stages_command(const BenchStagesOptions& options, const std::vector<LossTerm>& losses) {
+  const fs::path out = options.out.empty() ? fs::path("runs/bench") / options.config.stem() : fs::path(options.out);
+  const RunConfig config = measured_config(options, losses, out);
+  const MeasuredRun with = measured_run(config, options, losses, out);
+  std::string table = cost_table(with.cost) + "\n" + with.result;
+  std::string json = cost_json(with.cost);
+  if (options.compare) {
+    const RunCost without = measured_run(without_skips(config, kIterationsWithoutSkips), options, losses, out).cost;
+    table += "\n" + comparison_table(with.cost, without);
+    json += comparison_json(with.cost, without);
+  }
+  if (!options.json.empty()) write_text_file(options.json, json);
+  if (!options.plot.empty()) write_text_file(options.plot, cost_svg(with.cost, "an iteration of " + config.name));
+  return table;
 }
 
 }  // namespace hsi4d::cli

@@ -312,6 +312,7 @@ struct CommandLine {
         ->add_option("--axis", bench_scaling.axes,
                      "Of scaling: scene, avatar, image or threads, with its values or without; default: all")
         ->type_name("AXIS[=N,N...]");
+    command->add_flag("--compare", bench_stages.compare, "Of stages: run again without skips, and tell the ratio");
     add_overrides(*command, bench_stages.overrides);
     command->callback([this, command, &terms] {
       const int threads = command->count("--threads") > 0 ? bench.threads : 0;

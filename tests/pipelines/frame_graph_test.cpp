@@ -92,6 +92,24 @@ double smallest_joint_gradient(const Tape<double>& tape, const ParameterGroup<do
 
 }  // namespace
 
+TEST_CASE("a frame's graph moves Gaussians and points of the body only where a term asks for them", "[frame_graph]") {
+  const Clip clip = small_clip(16, 14, 300);
+  Tape<float> tape;
+  FrameGraph<float> graph(tape, clip, clip.first.camera_from_world, {});
+  graph.set_state(clip.first);
+  graph.give_motion(clip.first, {clip.first, clip.first});
+  const auto nodes = [&tape](const std::string& name) {
+    const std::vector<NodeStatistics> all = tape.statistics();
+    return std::count_if(all.begin(), all.end(), [&name](const NodeStatistics& node) { return node.name == name; });
+  };
+  CHECK(nodes("skin_frames") == 3);  // the human and two objects
+  CHECK(nodes("skin_points") == 0);
+  CHECK(nodes("blend_shapes") == 0);  // the avatar has its shape
+  const Var<float> points = graph.loss_inputs().body_points({{1, 17}, {1, 40}});
+  CHECK(points.shape() == shape_of(2, 3));  // and no others
+  CHECK(nodes("skin_points") == 1);
+}
+
 TEST_CASE("the gradient of the whole chain is right for every parameter", "[frame_graph][release]") {
   const RotationParameters rotations = GENERATE(RotationParameters::kSixD, RotationParameters::kAxisAngle);
   Clip clip = small_clip(16, 14, 5000);

@@ -36,7 +36,8 @@ double counted(const std::string& run, const char* counter) {
   return sum;
 }
 
-constexpr std::array kCounters = {"tiles", "pairs", "groups", "fragments", "layers", "adjoint_tiles"};
+constexpr std::array kCounters = {"tiles",         "pairs",         "groups",         "fragments",      "layers",
+                                  "adjoint_tiles", "forward_nodes", "backward_nodes", "adjoint_numbers"};
 
 }  // namespace
 

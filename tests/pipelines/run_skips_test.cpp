@@ -6,6 +6,7 @@
 
 #include "body/motion_io.h"
 #include "core/check.h"
+#include "pipelines/bench_skips.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/run_problems.h"
@@ -18,11 +19,16 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-const std::vector<std::string> kAllOff = {"skip.static_tiles=false", "skip.static_layer=false",
-                                          "skip.zero_cotangent=false", "skip.unchanged_pixels=false"};
-const std::vector<std::string> kTilesOnly = {"skip.static_layer=false", "skip.zero_cotangent=false"};
-const std::vector<std::string> kAllPixels = {"skip.static_layer=false", "skip.unchanged_pixels=false"};
-const std::vector<std::string> kAllButLayers = {"skip.static_layer=false"};
+const std::vector<std::string> kAllOff = {"skip.static_tiles=false",   "skip.static_layer=false",
+                                          "skip.zero_cotangent=false", "skip.unchanged_pixels=false",
+                                          "skip.frozen_inputs=false",  "skip.unchanged_inputs=false",
+                                          "skip.unread_pixels=false",  "skip.unseen_gaussians=false"};
+// Those that leave the bits: layers are off, and sums are over all Gaussians.
+const std::vector<std::string> kAllButLayers = {"skip.static_layer=false", "skip.unseen_gaussians=false"};
+const std::vector<std::string> kTilesOnly = {"skip.static_layer=false", "skip.unseen_gaussians=false",
+                                             "skip.zero_cotangent=false"};
+const std::vector<std::string> kAllPixels = {"skip.static_layer=false", "skip.unseen_gaussians=false",
+                                             "skip.unchanged_pixels=false"};
 const std::vector<std::string> kCollapsed = {"approx.collapse_suffix=true"};
 
 /// A run of the tiny clip in a folder; its result as bytes.
@@ -33,11 +39,11 @@ struct SkipRun {
     motion = file_text(folder + "/motion.npz");
     objects = file_text(folder + "/objects.npz");
   }
-  /// The sum of a counter over all lines of metrics.jsonl of the stage that draws what moves.
-  double counted(const char* counter) const {
+  /// The sum of a counter over all lines of metrics.jsonl of a stage, that which draws what moves.
+  double counted(const char* counter, const std::string& stage = "interaction") const {
     double sum = 0;
     for (const nlohmann::json& line : metrics_of(folder)) {
-      if (line["stage"] == "interaction") sum += line.at(counter).get<double>();
+      if (line["stage"] == stage) sum += line.at(counter).get<double>();
     }
     return sum;
   }
@@ -114,6 +120,50 @@ TEST_CASE("Gaussians that the camera cannot see are left out, and the result is 
   CHECK(on.counted("pairs") == off.counted("pairs"));
 }
 
+TEST_CASE("skips of the tape that are set in a config leave the result's bits and save what their counters say",
+          "[run]") {
+  const TemporaryFolder here;
+  // Static layers are off: without these skips there are none, and they leave nearly the same bits.
+  // Masks grow until they cover whole squares of pixels.
+  const auto run_with = [](const std::string& name, const std::string& setting) {
+    return SkipRun(name, {"skip.static_layer=false", "data.mask_margin_px=8", "stages.camera.iterations=4",
+                          "stages.interaction.iterations=5", setting});
+  };
+  const SkipRun on = run_with("on", "threads=1");
+  const auto without = [&](const std::string& skip) { return run_with(skip, "skip." + skip + "=false"); };
+  const SkipRun frozen = without("frozen_inputs"), unchanged = without("unchanged_inputs"),
+                unread = without("unread_pixels");
+  for (const SkipRun* run : {&frozen, &unchanged, &unread}) {
+    INFO(run->folder);
+    CHECK(run->motion == on.motion);
+    CHECK(run->objects == on.objects);
+    CHECK(file_text(run->folder + "/cameras.json") == file_text("on/cameras.json"));
+  }
+  for (const char* stage : {"camera", "interaction"}) {
+    INFO(stage);
+    CHECK(on.counted("adjoint_numbers", stage) < frozen.counted("adjoint_numbers", stage));
+    CHECK(on.counted("backward_nodes", stage) < frozen.counted("backward_nodes", stage));
+    CHECK(on.counted("forward_nodes", stage) < unchanged.counted("forward_nodes", stage));
+  }
+  CHECK(on.counted("tiles") < frozen.counted("tiles"));
+  CHECK(on.counted("tiles") < unchanged.counted("tiles"));
+  CHECK(on.counted("tiles", "camera") < unread.counted("tiles", "camera"));
+  CHECK(on.counted("fragments", "camera") < unread.counted("fragments", "camera"));
+  CHECK(on.counted("tiles") == unread.counted("tiles"));  // photometric reads every pixel
+}
+
+TEST_CASE("a config without skips has every one of the section off and few iterations") {
+  const RunConfig config = without_skips(tiny_config({"stages.interaction.optimize.transl.from=7"}), 3);
+  const nlohmann::json resolved = nlohmann::json::parse(resolved_config(config, descriptions_of(loss_terms())));
+  CHECK(resolved["skip"].size() == kAllOff.size());
+  for (const auto& [name, value] : resolved["skip"].items()) {
+    INFO(name);
+    CHECK(value == false);
+  }
+  for (const auto& [name, stage] : config.stages) CHECK(stage.iterations == 3);
+  CHECK(find_entry(config.stages[1].second.optimize, "transl")->from == 2);
+}
+
 TEST_CASE("an approximation that a config sets changes the result a little, and its log names it", "[run]") {
   const TemporaryFolder here;
   const SkipRun on("on", {}), collapsed("collapsed", kCollapsed);
@@ -145,6 +195,14 @@ TEST_CASE("what settings of skip and approx do to each other is told", "[run]") 
         Notes{off_too, nothing + "skip.static_tiles=false"});
   CHECK(notes_of({"approx.collapse_suffix=true", "precision=double"}) == Notes{nothing + "precision=double"});
   CHECK(notes_of({"skip.static_tiles=false"}) == Notes{off_too});
+  const std::string both_off =
+      "info: skip.frozen_inputs=false switches skip.static_tiles and skip.static_layer off too";
+  CHECK(notes_of({"skip.frozen_inputs=false"}) == Notes{both_off});
+  CHECK(notes_of({"skip.frozen_inputs=false", "approx.collapse_suffix=true"}) ==
+        Notes{both_off, nothing + "skip.frozen_inputs=false"});
+  CHECK(notes_of({"skip.unchanged_inputs=false"}) ==
+        Notes{"info: skip.unchanged_inputs=false has made anew in every iteration what skip.static_tiles keeps"});
+  CHECK(notes_of({"skip.unread_pixels=false"}).empty());
   CHECK(notes_of(kAllOff).empty());
 }
 

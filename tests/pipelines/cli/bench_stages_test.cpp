@@ -85,3 +85,32 @@ TEST_CASE("bench stages tells where the time of every stage goes", "[run]") {
   CHECK(refused.status == 2);
   CHECK_THAT(refused.err, Contains("the dataset was made with other settings than these"));
 }
+
+TEST_CASE("bench stages tells what all skips together save", "[run]") {
+  const TemporaryFolder here;
+  std::vector<std::string> words = small_bench();
+  words.emplace_back("--compare");
+  const ProgramResult result = run_hsi4d(words);
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  CHECK_THAT(result.out, Contains("with skips") && Contains("whole run"));
+  CHECK(std::filesystem::exists("out/run-2"));
+  std::map<std::string, nlohmann::json> compared;
+  for (const nlohmann::json& line : lines_of("costs.json")) {
+    if (line.contains("ratio")) compared[line.value("stage", "run")] = line;
+  }
+  REQUIRE(compared.size() == 3);  // the stage over the sequence draws nothing
+  for (const auto& [name, entry] : compared) CHECK(entry["ratio"] > 0);
+  CHECK(compared["run"]["seconds_without_skips"] > 0);
+  for (const char* stage : {"camera", "interaction"}) {
+    const nlohmann::json &with = compared[stage]["counters"], &without = compared[stage]["counters_without_skips"];
+    for (const auto& [counter, count] : with.items()) {
+      INFO(stage << ": " << counter);
+      CHECK(count <= without[counter]);
+    }
+    for (const char* counter : {"forward_nodes", "backward_nodes", "adjoint_numbers"})
+      CHECK(with[counter] < without[counter]);
+  }
+  const nlohmann::json& interaction = compared["interaction"];
+  CHECK(interaction["counters"]["fragments"] < interaction["counters_without_skips"]["fragments"]);
+}
