@@ -46,6 +46,7 @@ std::vector<std::pair<const char*, double>> counters_of(const StageCost& cost) {
   for (const auto& [name, count] : {std::pair{"forward_nodes", tape.forward_nodes},
                                     {"backward_nodes", tape.backward_nodes},
                                     {"adjoint_numbers", tape.adjoint_numbers},
+                                    {"gaussians", render.gaussians},
                                     {"tiles", render.tiles},
                                     {"adjoint_tiles", render.adjoint_tiles},
                                     {"pairs", render.pairs},

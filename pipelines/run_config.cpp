@@ -28,7 +28,11 @@ void without_places(ConfigValue& sources) {
 }  // namespace
 
 SkipSettings no_skips() {
-  return {{.static_tiles = false, .static_layer = false, .zero_cotangent = false, .unchanged_pixels = false},
+  return {{.static_tiles = false,
+           .static_layer = false,
+           .zero_cotangent = false,
+           .unchanged_pixels = false,
+           .unseen_gaussians = false},
           {.frozen_inputs = false, .unchanged_inputs = false, .unread_pixels = false}};
 }
 

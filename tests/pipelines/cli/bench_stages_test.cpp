@@ -66,7 +66,8 @@ TEST_CASE("bench stages tells where the time of every stage goes", "[run]") {
   for (const auto& [name, stage] : stages) {
     INFO(name);
     CHECK(of_parts[name] > 0);
-    CHECK(of_parts[name] <= 1.5 * stage["ms"].get<double>());  // with the run that ends a stage, of six here
+    // Whatever the clock does: the parts lie in the stage, with the run that ends it.
+    CHECK(of_parts[name] * stage["iterations"].get<double>() <= 1e3 * stage["seconds"].get<double>());
     CHECK(stage["tape_bytes"] > 0);
   }
   CHECK(stages["camera"]["tiles_of_image"] == 9);
