@@ -173,12 +173,12 @@ FrameState state_at(const Track& track, const RestSkeleton& body, const std::vec
   return state;
 }
 
-/// Body and all objects of a track.
+/// Body and all objects of a track, as far as they are known.
 SceneState all_at(const Track& track, double place) {
   SceneState state;
   state.body = at_place(
       track.frames(), place, [&track](std::size_t t) { return track.motion.poses[t]; }, interpolated);
-  for (std::size_t o = 0; o < track.objects.size(); ++o) {
+  for (std::size_t o = 0; o < track.objects.size() && !track.object_poses.empty(); ++o) {
     const auto pose_of = [&track, o](std::size_t t) {
       const ObjectPose& at = track.object_poses[t][o];
       return Rigid<double>{so3_exp(at.rotation), at.translation};
