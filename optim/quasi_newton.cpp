@@ -57,7 +57,7 @@ QuasiNewton<S>::QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups) : t
   trial_gradient_.resize(count);
   for_numbers(groups_, [&](Index i, const AdamGroup<S>& group, Var<S> block, Index r, Index c) {
     unit_[i] = group.settings.lr;
-    trial_[i] = group.settings.lr > 0 ? static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i] : 0;
+    trial_[i] = unit_[i] > 0 ? static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i] : 0;
   });
 }
 
@@ -159,11 +159,12 @@ void QuasiNewton<S>::place(const VectorX& at) {
   std::uint32_t written = 0;
   Array<S> numbers;
   for_numbers(groups_, [&](Index i, const AdamGroup<S>&, Var<S> block, Index r, Index c) {
+    if (!(unit_[i] > 0)) return;  // a rate of 0: it stays
     if (!numbers || written != block.id) numbers = tape_.write(block);
     written = block.id;
     const auto value = static_cast<S>(at[i] * unit_[i]);
     numbers.row(r)[c] = value;
-    trial_[i] = unit_[i] > 0 ? static_cast<double>(value) / unit_[i] : 0;  // as it was rounded
+    trial_[i] = static_cast<double>(value) / unit_[i];  // as it was rounded
   });
 }
 

@@ -125,6 +125,22 @@ TEST_CASE("an evaluation that is not finite shortens the step, and is told") {
   CHECK(tape.value(x).scalar() == Approx(0.5).epsilon(0.02));
 }
 
+TEST_CASE("a group with a learning rate of 0 keeps its numbers under bfgs") {
+  Tape<double> tape;
+  const Var<double> x = tape.parameter("x", kScalarShape), y = tape.parameter("y", kScalarShape);
+  tape.write(x).data[0] = 3;
+  tape.write(y).data[0] = 0.7;
+  const Var<double> loss = sum(square(x - 1.0)) + sum(square(y + x));
+  QuasiNewton<double> method(tape, {{{"x", {x}}, moving(0.1)}, {{"y", {y}}, moving(0)}});
+  for (Index i = 0; i < 30 && !method.is_done(); ++i) {
+    tape.forward(loss);
+    tape.backward(loss);
+    method.step(i, 30, tape.value(loss).scalar());
+  }
+  CHECK(tape.value(y).scalar() == 0.7);
+  CHECK(tape.value(x).scalar() == Approx(0.15).epsilon(0.05));  // ((1 − 0.7)/2)
+}
+
 TEST_CASE("no number moves further than bfgs is said to") {
   Valley<float> valley;
   const ParameterGroupSettings settings = moving(0.001);
