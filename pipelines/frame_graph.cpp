@@ -37,10 +37,10 @@ constexpr const char* kColorNet = "color_net";
 constexpr const char* kFeatures = "avatar_features";
 constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_scales", "opacity_logits", "sh"};
 
-/// What of the scene the camera may see; one Gaussian where that is nothing.
+/// What of the scene the camera may see that moves no further than settings.camera_reach; one Gaussian where that is
+/// nothing.
 Gaussians seen_scene(const Gaussians& scene, const SplatView& view, const Matrix6<double>& xi_from_update,
                      const FrameGraphSettings& settings) {
-  if (!settings.camera_reach || !settings.skip.unseen_gaussians) return scene;
   const Vector6<double> furthest = xi_from_update.cwiseAbs() * Vector6<double>::Constant(*settings.camera_reach);
   std::vector<Index> rows = reachable_rows(scene, view, {furthest.head<3>().norm(), furthest.tail<3>().norm()});
   if (rows.empty() && scene.count() > 0) rows.push_back(0);
@@ -119,7 +119,9 @@ FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& 
   }
   const Vector3<float> background = settings.background.cast<float>();
   background_ = leaf("background", "background", 1, 3, background.data());
-  std::vector<Part> parts = {record_scene(seen_scene(clip.scene, view_, xi_from_update_, settings))};
+  const bool is_part_seen = settings.camera_reach && settings.skip.unseen_gaussians;
+  std::vector<Part> parts = {is_part_seen ? record_scene(seen_scene(clip.scene, view_, xi_from_update_, settings))
+                                          : record_scene(clip.scene)};
   if (settings_.draw == Draw::kAll) {
     for (const ClipObject& object : clip.objects) parts.push_back(record_object(object));
     parts.push_back(record_human(clip.avatar));
