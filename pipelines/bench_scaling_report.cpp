@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 
 #include <nlohmann/json.hpp>
 
+#include "core/formatted.h"
 #include "core/simd.h"
 #include "core/text.h"
 #include "pipelines/bench_scaling.h"
@@ -13,16 +12,6 @@
 namespace hsi4d {
 
 namespace {
-
-/// As printf writes it.
-[[gnu::format(printf, 1, 2)]] std::string formatted(const char* format, ...) {
-  char text[512];
-  std::va_list numbers;
-  va_start(numbers, format);
-  std::vsnprintf(text, sizeof text, format, numbers);
-  va_end(numbers);
-  return text;
-}
 
 // --- table -----------------------------------------------------------------------------------------------------------
 

@@ -1,9 +1,10 @@
 #include "pipelines/bench_skips.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include <nlohmann/json.hpp>
+
+#include "core/formatted.h"
 
 namespace hsi4d {
 
@@ -57,19 +58,12 @@ std::vector<std::pair<const char*, double>> counters_of(const StageCost& cost) {
   return counters;
 }
 
-template <class... Numbers>
-std::string line(const char* format, Numbers... numbers) {
-  char text[256];
-  std::snprintf(text, sizeof text, format, numbers...);
-  return text;
-}
-
 std::string counter_lines(const StagePair& pair) {
   const auto with = counters_of(pair.with), without = counters_of(pair.without);
   std::string text;
   for (std::size_t i = 0; i < with.size(); ++i) {
     if (without[i].second > 0)
-      text += line("  %-18s %14.0f %14.0f\n", with[i].first, with[i].second, without[i].second);
+      text += formatted("  %-18s %14.0f %14.0f\n", with[i].first, with[i].second, without[i].second);
   }
   return text;
 }
@@ -86,14 +80,15 @@ RunConfig without_skips(RunConfig config, int iterations) {
 }
 
 std::string comparison_table(const RunCost& with, const RunCost& without) {
-  std::string text = line("%-20s %14s %14s %8s\n", "an iteration", "with skips", "without", "ratio");
+  std::string text = formatted("%-20s %14s %14s %8s\n", "an iteration", "with skips", "without", "ratio");
   for (const StagePair& pair : pairs_of(with, without)) {
-    text += line("%-20s %11.2f ms %11.2f ms %8.2f\n", pair.with.stage.c_str(), pair.with.ms_each(),
-                 pair.without.ms_each(), pair.ratio()) +
+    text += formatted("%-20s %11.2f ms %11.2f ms %8.2f\n", pair.with.stage.c_str(), pair.with.ms_each(),
+                      pair.without.ms_each(), pair.ratio()) +
             counter_lines(pair);
   }
   const double seconds = seconds_without(with, without);
-  return text + line("%-20s %12.1f s %12.1f s %8.2f\n", "whole run", with.seconds, seconds, seconds / with.seconds);
+  return text +
+         formatted("%-20s %12.1f s %12.1f s %8.2f\n", "whole run", with.seconds, seconds, seconds / with.seconds);
 }
 
 std::string comparison_json(const RunCost& with, const RunCost& without) {

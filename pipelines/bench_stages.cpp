@@ -1,10 +1,10 @@
 #include "pipelines/bench_stages.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include <nlohmann/json.hpp>
 
+#include "core/formatted.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 #include "pipelines/report_plots.h"
@@ -65,25 +65,18 @@ std::vector<CostPart> parts_of(const StageCost& cost) {
   return parts;
 }
 
-template <class... Numbers>
-std::string line(const char* format, Numbers... numbers) {
-  char text[512];
-  std::snprintf(text, sizeof text, format, numbers...);
-  return text;
-}
-
 std::string stage_line(const StageCost& cost, bool counts_allocations) {
   const RenderCounters& c = cost.sum.counters;
   const double all = static_cast<double>(cost.sum.tiles_of_image);
   std::string text =
-      line("%-16s %9lld %8.2f %8.2f %8.1f", cost.stage.c_str(), static_cast<long long>(cost.sum.iterations),
-           cost.ms_each(), cost.median_ms(), cost.sum.seconds);
-  text += all > 0 ? line(" %6.0f of %-6.0f %9.0f %11.0f", per_iteration(c.tiles, cost), all,
-                         per_iteration(c.pairs, cost), per_iteration(c.fragments, cost))
-                  : line(" %16s %9s %11s", "-", "-", "-");
-  text += counts_allocations ? line(" %8.2f", per_iteration(static_cast<Index>(cost.sum.allocations), cost))
-                             : line(" %8s", "-");
-  return text + line(" %7.1f\n", 1e-6 * static_cast<double>(cost.sum.tape_bytes));
+      formatted("%-16s %9lld %8.2f %8.2f %8.1f", cost.stage.c_str(), static_cast<long long>(cost.sum.iterations),
+                cost.ms_each(), cost.median_ms(), cost.sum.seconds);
+  text += all > 0 ? formatted(" %6.0f of %-6.0f %9.0f %11.0f", per_iteration(c.tiles, cost), all,
+                              per_iteration(c.pairs, cost), per_iteration(c.fragments, cost))
+                  : formatted(" %16s %9s %11s", "-", "-", "-");
+  text += counts_allocations ? formatted(" %8.2f", per_iteration(static_cast<Index>(cost.sum.allocations), cost))
+                             : formatted(" %8s", "-");
+  return text + formatted(" %7.1f\n", 1e-6 * static_cast<double>(cost.sum.tape_bytes));
 }
 
 std::string part_lines(const StageCost& cost) {
@@ -91,8 +84,8 @@ std::string part_lines(const StageCost& cost) {
   const double whole = per_iteration(cost.sum.times.forward + cost.sum.times.backward + cost.sum.times.step, cost);
   for (const CostPart& part : parts_of(cost)) {
     if (!(part.ms() > 0)) continue;
-    text += line("  %-26s %8.3f %8.3f %6.1f %%\n", part.name.c_str(), part.forward_ms, part.backward_ms,
-                 100 * part.ms() / whole);
+    text += formatted("  %-26s %8.3f %8.3f %6.1f %%\n", part.name.c_str(), part.forward_ms, part.backward_ms,
+                      100 * part.ms() / whole);
   }
   return text;
 }
@@ -115,7 +108,7 @@ std::vector<std::pair<std::string, double>> composite_steps(const StageCost& cos
 std::string composite_line(const StageCost& cost) {
   if (cost.sum.tiles_of_image == 0) return "";
   std::string text = "  of composite:";
-  for (const auto& [name, ms] : composite_steps(cost)) text += line(" %s %.2f", name.c_str(), ms);
+  for (const auto& [name, ms] : composite_steps(cost)) text += formatted(" %s %.2f", name.c_str(), ms);
   return text + "\n";
 }
 
@@ -164,16 +157,16 @@ double optimisation_seconds(const RunCost& cost) {
 }
 
 std::string cost_table(const RunCost& cost) {
-  std::string text = line("%-16s %9s %8s %8s %8s %16s %9s %11s %8s %7s\n", "stage", "iterat.", "ms each", "median",
-                          "all, s", "tiles", "pairs", "fragments", "allocat.", "tape MB");
+  std::string text = formatted("%-16s %9s %8s %8s %8s %16s %9s %11s %8s %7s\n", "stage", "iterat.", "ms each", "median",
+                               "all, s", "tiles", "pairs", "fragments", "allocat.", "tape MB");
   for (const StageCost& stage : cost.stages) text += stage_line(stage, cost.counts_allocations);
   for (const StageCost& stage : cost.stages) {
-    text += line("\n%-28s %8s %8s\n", (stage.stage + ", ms an iteration").c_str(), "forward", "back") +
+    text += formatted("\n%-28s %8s %8s\n", (stage.stage + ", ms an iteration").c_str(), "forward", "back") +
             part_lines(stage) + composite_line(stage);
   }
-  return text + line("\noptimisation %.1f s of %.1f s on %d threads (%s), at most %.0f MB\n",
-                     optimisation_seconds(cost), cost.seconds, thread_count(), isa_name(best_isa()),
-                     1e-6 * static_cast<double>(cost.peak_memory_bytes));
+  return text + formatted("\noptimisation %.1f s of %.1f s on %d threads (%s), at most %.0f MB\n",
+                          optimisation_seconds(cost), cost.seconds, thread_count(), isa_name(best_isa()),
+                          1e-6 * static_cast<double>(cost.peak_memory_bytes));
 }
 
 std::string cost_json(const RunCost& cost) {
@@ -254,22 +247,23 @@ std::string stage_bar(const StageCost& stage, double scale, const std::vector<st
   const double whole = stage.ms_each();
   std::vector<CostPart> parts = parts_of(stage);
   std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
-  std::string body = line("<text x=\"12\" y=\"%.0f\">%s</text>\n", y + 17, html_escape(stage.stage).c_str());
+  std::string body = formatted("<text x=\"12\" y=\"%.0f\">%s</text>\n", y + 17, html_escape(stage.stage).c_str());
   double x = kLeft, at = kLeft, row = y + kBar + 14;
   for (const CostPart& part : parts) {
     const std::string color = color_of(part.name, costliest), name = html_escape(part.name);
-    body += line("<rect x=\"%.1f\" y=\"%.0f\" width=\"%.1f\" height=\"%.0f\" fill=\"%s\">", x, y, part.ms() * scale,
-                 kBar, color.c_str()) +
-            line("<title>%s: %.2f ms</title></rect>\n", name.c_str(), part.ms());
+    body += formatted("<rect x=\"%.1f\" y=\"%.0f\" width=\"%.1f\" height=\"%.0f\" fill=\"%s\">", x, y,
+                      part.ms() * scale, kBar, color.c_str()) +
+            formatted("<title>%s: %.2f ms</title></rect>\n", name.c_str(), part.ms());
     x += part.ms() * scale;
     if (part.ms() < 0.02 * whole) continue;
     const double length = 30 + 6.8 * static_cast<double>(part.name.size() + 5);
     if (at + length > kLeft + kWidth) at = kLeft, row += kRow;
-    body += line("<rect x=\"%.1f\" y=\"%.0f\" width=\"10\" height=\"10\" fill=\"%s\"/>", at, row - 9, color.c_str()) +
-            line("<text x=\"%.1f\" y=\"%.0f\">%s %.2f</text>\n", at + 14, row, name.c_str(), part.ms());
+    body +=
+        formatted("<rect x=\"%.1f\" y=\"%.0f\" width=\"10\" height=\"10\" fill=\"%s\"/>", at, row - 9, color.c_str()) +
+        formatted("<text x=\"%.1f\" y=\"%.0f\">%s %.2f</text>\n", at + 14, row, name.c_str(), part.ms());
     at += length;
   }
-  body += line("<text x=\"%.1f\" y=\"%.0f\">%.2f ms</text>\n", x + 6, y + 17, whole);
+  body += formatted("<text x=\"%.1f\" y=\"%.0f\">%.2f ms</text>\n", x + 6, y + 17, whole);
   y = row + 30;
   return body;
 }
@@ -280,11 +274,12 @@ std::string cost_svg(const RunCost& cost, const std::string& title) {
   double longest = 0;
   for (const StageCost& stage : cost.stages) longest = std::max(longest, stage.ms_each());
   const std::vector<std::string> costliest = costliest_parts(cost);
-  std::string body = line("<text x=\"12\" y=\"26\" font-size=\"16\">%s</text>\n", html_escape(title).c_str());
+  std::string body = formatted("<text x=\"12\" y=\"26\" font-size=\"16\">%s</text>\n", html_escape(title).c_str());
   double y = 44;
   for (const StageCost& stage : cost.stages) body += stage_bar(stage, longest > 0 ? kWidth / longest : 0, costliest, y);
-  return line("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 980 %.0f\" font-family=\"sans-serif\" ", y) +
-         line("font-size=\"12\" fill=\"#222\">\n<rect width=\"980\" height=\"%.0f\" fill=\"#fff\"/>\n", y) + body +
+  return formatted("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 980 %.0f\" font-family=\"sans-serif\" ",
+                   y) +
+         formatted("font-size=\"12\" fill=\"#222\">\n<rect width=\"980\" height=\"%.0f\" fill=\"#fff\"/>\n", y) + body +
          "</svg>\n";
 }
 

@@ -1,12 +1,11 @@
 #include "pipelines/cli/bench_command.h"
 
 #include <algorithm>
-#include <cstdarg>
-#include <cstdio>
 
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/formatted.h"
 #include "core/simd.h"
 #include "pipelines/bench_color_net.h"
 #include "pipelines/bench_pixel_filter.h"
@@ -43,16 +42,6 @@ std::string json_line(const Measurement& m) {
   if (m.image_error) line["image_error"] = *m.image_error;
   if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
   return line.dump() + "\n";
-}
-
-/// As printf writes it.
-[[gnu::format(printf, 1, 2)]] std::string formatted(const char* format, ...) {
-  char text[256];
-  std::va_list numbers;
-  va_start(numbers, format);
-  std::vsnprintf(text, sizeof text, format, numbers);
-  va_end(numbers);
-  return text;
 }
 
 /// " 34.5" of a hundred, or nothing.
