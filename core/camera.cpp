@@ -1,5 +1,6 @@
 #include "core/camera.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -67,6 +68,19 @@ void check_distinct(const Vector3<double>& eye, const Vector3<double>& target, c
 }
 
 }  // namespace
+
+Camera reduced_camera(Camera camera, int longer) {
+  const double share = std::min(1.0, static_cast<double>(longer) / std::max(camera.width, camera.height));
+  const auto size = [share](int pixels) { return std::max(1, static_cast<int>(std::lround(share * pixels))); };
+  const int width = size(camera.width), height = size(camera.height);
+  camera.fx *= static_cast<double>(width) / camera.width;
+  camera.cx *= static_cast<double>(width) / camera.width;
+  camera.fy *= static_cast<double>(height) / camera.height;
+  camera.cy *= static_cast<double>(height) / camera.height;
+  camera.width = width;
+  camera.height = height;
+  return camera;
+}
 
 void check_camera(const Camera& camera, std::string_view name) {
   check_size(name, camera.width, camera.height);

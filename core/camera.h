@@ -29,6 +29,10 @@ inline constexpr double kRotationTolerance = 1e-4;
 /// @param name  starts the message: a file, with a JSON pointer perhaps
 void check_camera(const Camera& camera, std::string_view name = "camera");
 
+/// The camera at a size whose longer side is `longer` pixels, or as it is where that is smaller. Sizes are rounded to
+/// whole pixels, and fx and fy with them.
+Camera reduced_camera(Camera camera, int longer);
+
 /// The rigid transform in a 4×4 matrix [R t; 0 0 0 1].
 ///
 /// Throws UserError if a number is not finite or the last row is not 0 0 0 1; whether R is a rotation is check_camera's

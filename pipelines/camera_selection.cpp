@@ -54,20 +54,6 @@ std::vector<PixelPlace> joint_pixels(const std::vector<double>& joints, const Ca
   return pixels;
 }
 
-/// The camera at a size whose longer side is `longer` pixels, or as it is where that is smaller.
-Camera reduced(Camera camera, int longer) {
-  const double share = std::min(1.0, static_cast<double>(longer) / std::max(camera.width, camera.height));
-  const auto size = [share](int pixels) { return std::max(1, static_cast<int>(std::lround(share * pixels))); };
-  const int width = size(camera.width), height = size(camera.height);
-  camera.fx *= static_cast<double>(width) / camera.width;
-  camera.cx *= static_cast<double>(width) / camera.width;
-  camera.fy *= static_cast<double>(height) / camera.height;
-  camera.cy *= static_cast<double>(height) / camera.height;
-  camera.width = width;
-  camera.height = height;
-  return camera;
-}
-
 Camera camera_of(const CameraSelectionSettings& settings) {
   const double focal = settings.width / (2 * std::tan(settings.field_of_view_deg * kDegree / 2));
   return {settings.width, settings.height, focal, focal, settings.width / 2.0, settings.height / 2.0, {}};
@@ -169,7 +155,7 @@ namespace {
 Index count_visible(const FirstFrame& frame, const std::vector<double>& joints, const Camera& camera,
                     const CameraSelectionSettings& settings, const RenderSettings& render) {
   SceneView view;
-  view.camera = reduced(camera, settings.trial_px);
+  view.camera = reduced_camera(camera, settings.trial_px);
   view.settings = render;
   const std::vector<PixelPlace> pixels = joint_pixels(joints, view.camera);
   if (pixels.empty()) return 0;
@@ -187,7 +173,7 @@ Index count_visible(const FirstFrame& frame, const std::vector<double>& joints, 
 double cover_of(const FirstFrame& frame, const Camera& camera, const CameraSelectionSettings& settings,
                 const RenderSettings& render) {
   SceneView view;
-  view.camera = reduced(camera, settings.trial_px);
+  view.camera = reduced_camera(camera, settings.trial_px);
   view.settings = render;
   const std::vector<double> alpha = render_scene(frame.all, view).alpha;
   return std::accumulate(alpha.begin(), alpha.end(), 0.0) / static_cast<double>(alpha.size());
