@@ -11,26 +11,6 @@ namespace {
 
 constexpr int kA = 0, kB = 1, kWeight = 2;
 
-/// Columns [begin, end) of an image.
-struct Run {
-  Index begin, end;
-};
-
-/// Runs of neighbouring squares of a row of squares, as columns of pixels.
-///
-/// @param mask  null: all of them
-template <class Body>
-void for_runs(const TileMask* mask, Index square_row, Index cols, const Body& body) {
-  if (mask == nullptr) return body(Run{0, cols});
-  const Index squares = mask->cols();
-  for (Index c = 0; c < squares; ++c) {
-    if (!mask->has(square_row, c)) continue;
-    const Index first = c;
-    while (c < squares && mask->has(square_row, c)) ++c;
-    body(Run{first * kMaskSquare, std::min(c * kMaskSquare, cols)});
-  }
-}
-
 /// The sum of a square's 16 columns, always in this order.
 double column_sum(const double* columns) {
   double sums[kMaskSquare];
@@ -46,8 +26,7 @@ struct ImageDifference {
   static constexpr const char* kName = "image_difference";
   static constexpr bool kAssigns = true;
   Buffer<double> sums = {};  ///< [planes][rows of squares][squares of a row]
-  TileMask weighed = {};     ///< squares in which some weight is not 0
-  std::uint64_t weighed_version = 0;
+  WeighedSquares<S> weighed = {};
 
   static const S* weights(const NodeIo<S>& io, Index plane, Index row) {
     if (io.inputs() <= kWeight) return nullptr;
@@ -59,17 +38,7 @@ struct ImageDifference {
   /// Where all weights are 0, so are value and gradient, unless one asks for that of the weights.
   const TileMask* looks_at(NodeIo<S>& io, int input) {
     if (input != kA || io.inputs() <= kWeight || !io.is_leaf(kWeight) || io.wants(kWeight)) return nullptr;
-    if (weighed_version != io.version(kWeight)) weigh(io.in(kWeight));
-    weighed_version = io.version(kWeight);
-    return &weighed;
-  }
-  void weigh(const ConstArray<S>& weight) {
-    weighed.clear(weight.shape.rows, weight.shape.cols);
-    for (Index r = 0; r < weight.total_rows(); ++r) {
-      for (Index c = 0; c < weight.shape.cols; ++c) {
-        if (weight.row(r)[c] != S(0)) weighed.add(r % weight.shape.rows / kMaskSquare, c / kMaskSquare);
-      }
-    }
+    return &weighed.of(io.in(kWeight), io.version(kWeight));
   }
 
   /// Squares of `a` that have to be summed again; null: all.
@@ -93,7 +62,7 @@ struct ImageDifference {
       on_best_isa([&] {
         const Index plane = chunk / rows, square_row = chunk % rows;
         double* const mine = columns.data() + chunk * width;
-        for_runs(mask, square_row, a.shape.cols, [&](const Run& run) {
+        for_runs(mask, square_row, a.shape.cols, [&](const PixelRun& run) {
           const Index first = run.begin / kMaskSquare, end = mask_squares(run.end);
           std::fill_n(mine + run.begin, (end - first) * kMaskSquare, 0.0);
           const Index last_row = std::min((square_row + 1) * kMaskSquare, a.shape.rows);
@@ -106,7 +75,7 @@ struct ImageDifference {
     io.out().scalar() = static_cast<S>(pairwise_sum(sums.data(), sums.size()));
   }
 
-  static void add_row(const S* a, const S* b, const S* w, const Run& run, double* columns) {
+  static void add_row(const S* a, const S* b, const S* w, const PixelRun& run, double* columns) {
     if (w == nullptr) {
 #pragma GCC ivdep
       for (Index c = run.begin; c < run.end; ++c) columns[c] += static_cast<double>(F::value(a[c] - b[c]));
@@ -123,7 +92,7 @@ struct ImageDifference {
     run_chunks(mask_squares(shape.rows), [&](Index square_row) {
       on_best_isa([&] {
         const Index last_row = std::min((square_row + 1) * kMaskSquare, shape.rows);
-        for_runs(mask, square_row, shape.cols, [&](const Run& run) {
+        for_runs(mask, square_row, shape.cols, [&](const PixelRun& run) {
           for (Index plane = 0; plane < shape.planes; ++plane) {
             for (Index r = square_row * kMaskSquare; r < last_row; ++r) differentiate_row(io, plane, r, run);
           }
@@ -132,7 +101,7 @@ struct ImageDifference {
     });
   }
 
-  static void differentiate_row(const NodeIo<S>& io, Index plane, Index row, const Run& run) {
+  static void differentiate_row(const NodeIo<S>& io, Index plane, Index row, const PixelRun& run) {
     const S g = io.d_out().scalar();
     const S *const a = &io.in(kA)(plane, row, 0), *const b = &io.in(kB)(plane, row, 0);
     const S* const w = weights(io, plane, row);
@@ -149,7 +118,7 @@ struct ImageDifference {
   }
 
   template <class Term>
-  static void put(S* d, bool assign, const Run& run, const Term& term) {
+  static void put(S* d, bool assign, const PixelRun& run, const Term& term) {
     if (assign) {
 #pragma GCC ivdep
       for (Index c = run.begin; c < run.end; ++c) d[c] = term(c);

@@ -139,6 +139,20 @@ void Tape<S>::set_frozen(Var<S> var, bool frozen) {
 }
 
 template <class S>
+void Tape<S>::hold(Var<S> var) {
+  ArrayRecord& array = arrays_[checked(var)];
+  HSI4D_CHECK(array.producer != kLeaf, "leaf '" + array.name + "' can not be held, freeze it");
+  HSI4D_CHECK(array.version > 0, "'" + array.name + "' has not been computed, and can not be held");
+  if (std::exchange(array.held, true)) return;
+  ++structure_;
+}
+
+template <class S>
+void Tape<S>::release(Var<S> var) {
+  if (std::exchange(arrays_[checked(var)].held, false)) ++structure_;
+}
+
+template <class S>
 void Tape<S>::set_skips(const TapeSkips& skips) {
   if (skips == skips_) return;
   skips_ = skips;
@@ -205,7 +219,7 @@ void Tape<S>::update_structure() {
     node.wants_mask = wants;
     for (std::uint32_t j = 0; j < node.output_count; ++j) {
       ArrayRecord& output = arrays_[node.first_output + j];
-      output.needs_gradient = wants != 0 && !output.frozen;
+      output.needs_gradient = wants != 0 && !output.frozen && !output.held;
     }
   }
   current_structure_ = structure_;
@@ -238,7 +252,10 @@ void Tape<S>::build(Plan& plan) {
     const auto outputs = reached_.begin() + node.first_output;
     if (std::none_of(outputs, outputs + node.output_count, [](std::uint8_t hit) { return hit != 0; })) continue;
     plan.forward_nodes.push_back(static_cast<std::uint32_t>(n));
-    for (std::uint32_t i = 0; i < node.edge_count; ++i) reached_[edges_[node.first_edge + i]] = 1;
+    for (std::uint32_t i = 0; i < node.edge_count; ++i) {
+      const std::uint32_t input = edges_[node.first_edge + i];
+      if (!arrays_[input].held) reached_[input] = 1;
+    }
   }
   std::reverse(plan.forward_nodes.begin(), plan.forward_nodes.end());
   for (std::uint32_t id = 0; id < arrays_.size(); ++id) {

@@ -268,6 +268,13 @@ class Tape {
   void unfreeze(Var<S> var) { set_frozen(var, false); }
   bool frozen(Var<S> var) const { return arrays_[checked(var)].frozen; }
 
+  /// An operator's output stays as it is, whatever becomes of its inputs, and gives them no gradient: what only it
+  /// needs is not computed. Asked for by itself it is. Throws InternalError for a leaf, and before it was computed.
+  void hold(Var<S> var);
+  /// It follows its inputs again.
+  void release(Var<S> var);
+  bool held(Var<S> var) const { return arrays_[checked(var)].held; }
+
   Mark mark() const {
     const std::uint32_t stamp = arrays_.empty() ? 0 : arrays_.back().stamp;
     return {arrays_.size(), nodes_.size(), edges_.size(), stamp, arena_.position()};
@@ -335,6 +342,7 @@ class Tape {
     std::uint32_t stamp = 0;
     bool constant = false;  // a leaf that can not be unfrozen
     bool frozen = false;
+    bool held = false;
     bool needs_gradient = false;  // depends on an unfrozen parameter; of the current structure
     std::string name;
     Source where;

@@ -53,8 +53,8 @@ QuasiNewton<S>::QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups) : t
                     " numbers, at most " + std::to_string(kMostQuasiNewtonNumbers) + " are allowed");
   }
   unit_.resize(count);
-  trial_.resize(count);
-  trial_gradient_.resize(count);
+  for (VectorX* numbers : {&trial_, &trial_gradient_, &point_, &gradient_, &direction_, &moved_, &change_, &product_})
+    numbers->setZero(count);
   for_numbers(groups_, [&](Index i, const AdamGroup<S>& group, Var<S> block, Index r, Index c) {
     unit_[i] = group.settings.lr;
     trial_[i] = unit_[i] > 0 ? static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i] : 0;
@@ -75,7 +75,9 @@ StepReport QuasiNewton<S>::step(Index iteration, Index iterations, double loss) 
   }
   if (steps_ > 0) {
     if (iteration + 1 >= iterations) done_ = true;
-    place(done_ ? point_ : point_ + length_ * direction_);
+    trial_ = point_;
+    if (!done_) trial_ += length_ * direction_;
+    write_trial();
   }
   for (GroupStep& group : reports_) group.moved = group.moved && !report.rolled_back;
   report.rollbacks = rollbacks_;
@@ -108,14 +110,19 @@ std::optional<BadNumber> QuasiNewton<S>::read_gradient(double loss) {
 template <class S>
 void QuasiNewton<S>::accept(double loss) {
   if (steps_ > 0) {
-    const VectorX s = trial_ - point_, y = trial_gradient_ - gradient_;
-    const double curvature = s.dot(y);
-    if (curvature > kLeastCurvature * s.norm() * y.norm()) {
-      const Index n = s.size();
-      if (steps_ == 1) inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) * (curvature / y.squaredNorm());
-      const VectorX hy = inverse_hessian_ * y;
-      inverse_hessian_ += s * s.transpose() * ((curvature + y.dot(hy)) / (curvature * curvature)) -
-                          (hy * s.transpose() + s * hy.transpose()) / curvature;
+    moved_ = trial_ - point_;
+    change_ = trial_gradient_ - gradient_;
+    const double curvature = moved_.dot(change_);
+    if (curvature > kLeastCurvature * moved_.norm() * change_.norm()) {
+      const Index n = moved_.size();
+      if (steps_ == 1) inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) * (curvature / change_.squaredNorm());
+      auto h = inverse_hessian_.selfadjointView<Eigen::Lower>();
+      product_.noalias() = h * change_;
+      h.rankUpdate(moved_, (curvature + change_.dot(product_)) / (curvature * curvature));
+      for (Index j = 0; j < n; ++j) {  // − (H y sᵀ + s yᵀ H) / sᵀy; rankUpdate of two vectors would allocate
+        inverse_hessian_.col(j).tail(n - j) -=
+            product_[j] / curvature * moved_.tail(n - j) + moved_[j] / curvature * product_.tail(n - j);
+      }
     }
   }
   point_ = trial_;
@@ -129,7 +136,8 @@ void QuasiNewton<S>::choose_direction() {
   const double steepest = gradient_.cwiseAbs().maxCoeff();
   const Index n = gradient_.size();
   if (steps_ == 1 && steepest > 0) inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) / steepest;
-  direction_ = steepest > 0 ? VectorX(-(inverse_hessian_ * gradient_)) : VectorX(VectorX::Zero(n));
+  direction_.setZero();
+  if (steepest > 0) direction_.noalias() -= inverse_hessian_.selfadjointView<Eigen::Lower>() * gradient_;
   slope_ = direction_.dot(gradient_);
   if (!(slope_ < 0) && steepest > 0) {  // rounding has spoilt the matrix
     inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) / steepest;
@@ -155,14 +163,14 @@ void QuasiNewton<S>::shorten(double loss) {
 }
 
 template <class S>
-void QuasiNewton<S>::place(const VectorX& at) {
+void QuasiNewton<S>::write_trial() {
   std::uint32_t written = 0;
   Array<S> numbers;
   for_numbers(groups_, [&](Index i, const AdamGroup<S>&, Var<S> block, Index r, Index c) {
     if (!(unit_[i] > 0)) return;  // a rate of 0: it stays
     if (!numbers || written != block.id) numbers = tape_.write(block);
     written = block.id;
-    const auto value = static_cast<S>(at[i] * unit_[i]);
+    const auto value = static_cast<S>(trial_[i] * unit_[i]);
     numbers.row(r)[c] = value;
     trial_[i] = static_cast<double>(value) / unit_[i];  // as it was rounded
   });

@@ -19,7 +19,8 @@ inline constexpr Index kMostQuasiNewtonNumbers = 1024;
 /// No number goes further in one step than this many times its group's learning rate.
 inline constexpr double kLongestQuasiNewtonStep = 10;
 
-/// The optimiser of one stage. Steps are bitwise the same for any number of threads. Learning rates are the units in
+/// The optimiser of one stage. Steps are bitwise the same for any number of threads, and allocate nothing after the
+/// first two. Learning rates are the units in
 /// which numbers of different kinds compare and the length of the first step; the schedule (from, until, every,
 /// lr_final_share) has no meaning here.
 ///
@@ -49,7 +50,7 @@ class QuasiNewton {
   void accept(double loss);
   void choose_direction();
   void shorten(double loss);
-  void place(const VectorX& at);
+  void write_trial();
 
   Tape<S>& tape_;
   std::vector<AdamGroup<S>> groups_;
@@ -57,7 +58,8 @@ class QuasiNewton {
   VectorX unit_;                          // learning rates, by number
   VectorX trial_, trial_gradient_;        // where the loss was just evaluated, in units; and the gradient by these
   VectorX point_, gradient_, direction_;  // the best so far
-  Eigen::MatrixXd inverse_hessian_;
+  VectorX moved_, change_, product_;      // s, y, H y
+  Eigen::MatrixXd inverse_hessian_;       // H, its lower half
   double loss_ = 0, slope_ = 0, length_ = 1;
   Index steps_ = 0, rollbacks_ = 0;  // steps: accepted, the start among them
   Index small_steps_ = 0;            // in a row

@@ -1,7 +1,9 @@
 #include "optim/stage.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/inspect.h"
@@ -102,6 +104,11 @@ void set_frozen(Tape<S>& tape, const ParameterGroup<S>& group, bool frozen) {
   for (const Var<S> block : group.blocks) frozen ? tape.freeze(block) : tape.unfreeze(block);
 }
 
+template <class S>
+void release(Tape<S>& tape, const std::vector<HeldOutput>& outputs) {
+  for (const HeldOutput& held : outputs) tape.release(TapeInspector<S>(tape).handle(held.id));
+}
+
 /// The tape as it was: nothing recorded, parameters frozen or not as found.
 template <class S>
 class TapeGuard {
@@ -142,6 +149,7 @@ class StageRun {
         optimizer_(tape, groups_, settings.optimizer) {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
     for (const AdamGroup<S>& group : groups_) hold(group.parameters);
+    if (settings.plateau.iterations > 0) losses_.reserve(static_cast<std::size_t>(settings.iterations));
     for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
     if (options.kept == nullptr || optimizer_.adam() == nullptr) return;
     for (const AdamGroup<S>& group : groups_) {
@@ -154,7 +162,8 @@ class StageRun {
   StageResult run(const StageCallback& callback) {
     const auto start = Clock::now();
     Index iterations = 0;
-    while (iterations < settings_.iterations && !optimizer_.is_done()) iterate(iterations++, callback);
+    while (iterations < settings_.iterations && !optimizer_.is_done() && !is_on_plateau())
+      iterate(iterations++, callback);
     evaluate_the_end();
     keep_moments();
     return {iterations,
@@ -173,6 +182,7 @@ class StageRun {
   void iterate(Index i, const StageCallback& callback) {
     const auto start = Clock::now();
     for (const AdamGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
+    if (i > 0) hold_values(i);
     const auto set_up = Clock::now();
     tape_.forward(loss_.total);
     const Index forward_nodes = tape_.counters().forward_nodes;  // before others run, for shares
@@ -191,6 +201,7 @@ class StageRun {
     const StepReport step = optimizer_.step(i, settings_.iterations, loss);
     if (step.rolled_back) note_rollback(*step.bad, i);
     if (!step.rolled_back) {
+      if (settings_.plateau.iterations > 0) losses_.push_back(loss);
       offender_.clear();
       wrap_rotations(step);
       hold_ranges(step);
@@ -199,6 +210,17 @@ class StageRun {
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
               seconds_since(start), counters, shares_});
+  }
+
+  void hold_values(Index iteration) {
+    for (const HeldOutput& held : options_.held) {
+      const auto moves = [&](const AdamGroup<S>& group) {
+        return moves_in(group.settings, iteration) &&
+               std::find(held.groups.begin(), held.groups.end(), group.parameters.name) != held.groups.end();
+      };
+      const Var<S> value = TapeInspector<S>(tape_).handle(held.id);
+      std::any_of(groups_.begin(), groups_.end(), moves) ? tape_.release(value) : tape_.hold(value);
+    }
   }
 
   std::vector<GradientShare> shares_of_terms(Index iteration) {
@@ -227,6 +249,14 @@ class StageRun {
   static void hold(const ParameterGroup<S>& group) {
     if (!group.range) return;
     for (const Var<S> block : group.blocks) hold_in_range(block, *group.range);
+  }
+
+  bool is_on_plateau() const {
+    const std::ptrdiff_t count = settings_.plateau.iterations;
+    if (count == 0 || std::ssize(losses_) < 2 * count) return false;
+    const auto middle = losses_.end() - count;
+    const double now = std::accumulate(middle, losses_.end(), 0.0);
+    return !(now < (1 - settings_.plateau.gain) * std::accumulate(middle - count, middle, 0.0));
   }
 
   double evaluated_loss() const { return static_cast<double>(tape_.value(loss_.total).scalar()); }
@@ -335,6 +365,7 @@ class StageRun {
   Index undone_at_end_ = 0;
   std::vector<std::vector<Index>> left_out_;  // evaluations, by loss_.left_out and object
   std::vector<GradientShare> shares_;         // of this iteration
+  std::vector<double> losses_;                // of good evaluations, where a plateau ends the stage
   StageTimes times_;
   std::string offender_;  // of the last evaluation, if it was bad
 };
@@ -363,9 +394,11 @@ StageResult run_stage(Tape<S>& tape, const StageSettings& settings, std::span<co
   try {
     StageResult result = StageRun<S>(tape, settings, terms, inputs, available, options).run(callback);
     guard.restore();
+    release(tape, options.held);
     return result;
   } catch (...) {
     guard.restore();
+    release(tape, options.held);
     throw;
   }
 }

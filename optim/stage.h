@@ -68,6 +68,13 @@ struct StageResult {
   std::vector<NodeStatistics> nodes;    ///< of the tape, losses included, with StageOptions::profile
 };
 
+/// An operator's output that a stage computes in its first iteration and in those in which one of the groups moves, and
+/// holds in all others (Tape::hold).
+struct HeldOutput {
+  std::uint32_t id = 0;  ///< of its Var
+  std::vector<std::string> groups;
+};
+
 /// What the settings do not say.
 struct StageOptions {
   std::string name = "stage";  ///< what messages call it
@@ -75,6 +82,7 @@ struct StageOptions {
   /// All others start afresh.
   AdamState* kept = nullptr;
   bool profile = false;  ///< measure the time of every node
+  std::vector<HeldOutput> held = {};
 };
 
 /// A stage was given up: more evaluations than max_rollbacks were not finite. Not a bug: the message says which
@@ -96,7 +104,8 @@ void check_groups(const StageSettings& settings, const std::vector<std::string>&
 /// that, which changes no result. Rows of groups that are axis-angles are wrapped after each step. Numbers of named
 /// groups that have a range are held in it, after each step and before the first evaluation. A last forward run
 /// evaluates the parameters that are left; should they give a loss that is not finite, the last step is taken back. At
-/// the end (also by an exception) what was recorded is forgotten, and `available` is frozen or not as before.
+/// the end (also by an exception) what was recorded is forgotten, `available` is frozen or not as before, and nothing
+/// is held.
 ///
 /// @param tape       holds the inputs and the parameters
 /// @param settings   what moves and which terms count; a term without settings of its own takes its defaults

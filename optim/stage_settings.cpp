@@ -66,6 +66,12 @@ void describe(ConfigFields& f, ParameterGroupSettings& s) {
   });
 }
 
+void describe(ConfigFields& f, PlateauSettings& s) {
+  f.integer("iterations", s.iterations, {.min = 0, .max = kMostIterations},
+            "Iterations whose mean loss is compared with that of as many before; 0: the stage never ends early");
+  f.number("gain", s.gain, {.min = 0, .below = 1}, "Share by which the mean has to fall for the stage to go on");
+}
+
 void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescription>& losses) {
   f.integer("iterations", s.iterations, {.min = 1, .max = kMostIterations}, "Steps of the optimiser").required();
   f.choice(
@@ -86,6 +92,7 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
          "VPoser's weights (tools/export_vposer.py), whose latents a stage over the sequence moves; without, natural "
          "poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
+  f.object("plateau", s.plateau, "When the stage ends early, as its loss no longer falls");
   f.rule({"optimizer", "optimize"}, [&s]() -> std::string {
     if (s.optimizer.kind != OptimizerKind::kBfgs) return "";
     for (const auto& [name, group] : s.optimize) {

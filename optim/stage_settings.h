@@ -56,6 +56,13 @@ inline constexpr std::array<ConfigChoice<PixelWeight>, 4> kPixelWeights = {{{Pix
                                                                             {PixelWeight::kBackground, "background"},
                                                                             {PixelWeight::kForeground, "foreground"}}};
 
+/// When a stage ends before its iterations are over: when the mean loss of the last `iterations` is not below
+/// (1 − gain) times that of as many before.
+struct PlateauSettings {
+  int iterations = 0;  ///< 0: never
+  double gain = 0.01;
+};
+
 /// One stage of the method.
 struct StageSettings {
   int iterations = 0;
@@ -68,11 +75,13 @@ struct StageSettings {
   std::optional<PosePrior> pose_prior;         ///< with pose_weights, by prepare_losses; empty before
   std::filesystem::path pose_weights;          ///< over the sequence: VPoser's weights; empty: natural poses
   OptimizerSettings optimizer;
+  PlateauSettings plateau;
 };
 
 /// Describe the sections. `losses` are the terms that a stage may name.
 void describe(ConfigFields& fields, OptimizerSettings& settings);
 void describe(ConfigFields& fields, ParameterGroupSettings& settings);
+void describe(ConfigFields& fields, PlateauSettings& settings);
 void describe(ConfigFields& fields, StageSettings& settings, const std::vector<LossDescription>& losses);
 
 /// A loss of a stage that cannot be used.

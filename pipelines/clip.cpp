@@ -212,7 +212,6 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   auto video = std::make_shared<ClipVideo>(ClipVideo{{data.frames, {data.video_rate, data.frame_rate}}, {}});
   clip.frame_files = video->frames.names();
   clip.camera = read_camera(data.camera.string());
-  if (data.longest_side_px > 0) clip.camera = reduced_camera(clip.camera, data.longest_side_px);
   clip.scene = std::move(setup.scene);
   clip.avatar = std::move(setup.avatar);
   clip.objects = std::move(setup.objects);

@@ -6,9 +6,7 @@
 
 namespace hsi4d {
 
-namespace {
-constexpr int kLongestSide = 65536;  // pixels
-}
+namespace {}
 
 DataSettings dataset_inputs(const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
@@ -59,9 +57,6 @@ void describe(ConfigFields& f, DataSettings& s) {
       "surface", s.surface, {},
       "Mesh of what is solid in the scene (.obj, .ply, .glb), metres, world, by which penetration is measured; no loss "
       "reads it; empty: not measured");
-  f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
-            "Longest side of the images that are worked on: the camera's image, frames and masks are reduced to it where "
-            "they are larger; 0: as large as the camera's");
   f.number("mask_threshold", s.mask_threshold, {.above = 0, .max = 1}, "Coverage from which a pixel belongs to a mask");
   f.integer("mask_margin_px", s.mask_margin_px, {.min = 0, .max = 64},
             "Pixels by which masks grow before they keep the camera stage from what is not scene");

@@ -25,7 +25,6 @@ struct DataSettings {
   std::filesystem::path surface;  ///< a mesh of what is solid, to measure penetration by; empty: not measured
   double video_rate = 0;          ///< frames a second of the video; 0: what its file says
   double frame_rate = 0;          ///< frames a second that are kept; 0: all
-  int longest_side_px = 0;        ///< of what is worked on: larger frames and masks are reduced; 0: the camera's size
   double mask_threshold = 0.5;
   int mask_margin_px = 1;
 };

@@ -180,7 +180,9 @@ GaussianVars<S> FrameGraph<S>::gaussian_leaves(const std::string& part, const st
 
 template <class S>
 typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Gaussians& scene) {
-  return {standing_splats(gaussian_leaves("scene", "scene", scene), xi_, view_), scene.count()};
+  const SplatInputs<S> splats = standing_splats(gaussian_leaves("scene", "scene", scene), xi_, view_);
+  hold_colors(splats.colors, {"scene_sh"});
+  return {splats, scene.count()};
 }
 
 template <class S>
@@ -190,7 +192,9 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
   const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
   const Var<S> rotation = record_rotations(orient);
   objects_.push_back({orient, transl, rotation});
-  return {rigid_splats(vars, rotation, transl, xi_, view_), object.gaussians.count()};
+  const SplatInputs<S> splats = rigid_splats(vars, rotation, transl, xi_, view_);
+  hold_colors(splats.colors, {"object_sh"});
+  return {splats, object.gaussians.count()};
 }
 
 template <class S>
@@ -212,7 +216,15 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
   if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations_, skeleton_, avatar), n};
   HSI4D_CHECK_EQ(settings_.color_net->rows, n);
   const HumanColors<S> colors = record_color_net(*settings_.color_net);
-  return {skinned_splats(vars, rotations_, skeleton_, avatar, &colors), n};
+  const SplatInputs<S> splats = skinned_splats(vars, rotations_, skeleton_, avatar, &colors);
+  hold_colors(splats.colors, {kColorNet, kFeatures});
+  return {splats, n};
+}
+
+/// Colours that are computed anew only where one of the groups moves, if that is wanted.
+template <class S>
+void FrameGraph<S>::hold_colors(Var<S> colors, const std::vector<std::string>& groups) {
+  if (settings_.hold_colours) held_.push_back({colors.id, groups});
 }
 
 template <class S>

@@ -14,6 +14,7 @@
 
 #include "optim/loss_term.h"
 #include "optim/parameters.h"
+#include "optim/stage.h"
 #include "pipelines/clip.h"
 #include "pipelines/posed_splats.h"
 #include "pipelines/run_config.h"
@@ -27,6 +28,7 @@ struct FrameGraphSettings {
   RenderSettings render;
   RenderSkips skip = {};
   RenderApproximations approx = {};
+  bool hold_colours = false;  ///< colours change only where what makes them moves, see held()
   RotationParameters rotations = RotationParameters::kSixD;
   CameraIncrement increment = CameraIncrement::kCamera;
   Draw draw = Draw::kAll;
@@ -88,6 +90,8 @@ class FrameGraph {
   const LossInputs<S>& loss_inputs() const { return inputs_; }
   /// Everything that may move, all of it frozen.
   const std::vector<ParameterGroup<S>>& groups() const { return groups_; }
+  /// Colours, where settings.hold_colours says so.
+  const std::vector<HeldOutput>& held() const { return held_; }
 
  private:
   struct Part {  // rows of all Gaussians that belong together
@@ -107,6 +111,7 @@ class FrameGraph {
   Part record_object(const ClipObject& object);
   Part record_human(const Avatar& avatar);
   HumanColors<S> record_color_net(const ColorNet& net);
+  void hold_colors(Var<S> colors, const std::vector<std::string>& groups);
   Var<S> record_rotations(Var<S> parameters) const;
   void record_render(const std::vector<Part>& parts, std::size_t first_object);
   void record_human_inputs();
@@ -123,6 +128,7 @@ class FrameGraph {
   FrameGraphSettings settings_;
   SplatView view_;
   std::vector<ParameterGroup<S>> groups_;
+  std::vector<HeldOutput> held_;
   Matrix6<double> xi_from_update_;
   Var<S> camera_update_;  // the leaf: numbers in the frame of settings.increment
   Var<S> xi_, background_;

@@ -202,7 +202,8 @@ class Reconstruction {
   /// @param after  the state after each stage over frames
   void end_frame(Index index, const ClipFrame& frame, const std::vector<SceneState>& after,
                  std::chrono::steady_clock::time_point begin) {
-    write_images(index, frame, after.back(), progress_.colors, progress_.image_errors);
+    write_image(folder_.paths().frame_image(static_cast<int>(index), "target"), frame.target);
+    write_result(index, frame, after.back(), progress_.colors, progress_.image_errors);
     if (progress_.colors.net && moves_colors(config_))
       write_color_net(folder_.paths().frame_color_net(static_cast<int>(index)), *progress_.colors.net);
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
@@ -222,7 +223,7 @@ class Reconstruction {
     for (Index t = 1; t < clip_.frames(); ++t) {
       stop_if_asked(clip_.frames());
       const ClipFrame frame = read_frame(clip_, t);
-      write_images(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), refinement_.image_errors);
+      write_result(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), refinement_.image_errors);
     }
     refinement_.seconds = seconds_since(begin);
   }
@@ -337,13 +338,12 @@ class Reconstruction {
     }
   }
 
-  /// Writes the images of a frame and notes how far the result's is from the video's.
-  void write_images(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors,
+  /// Writes images of a frame's result and notes how far it is from the video.
+  void write_result(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors,
                     std::vector<MetricValues>& errors) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
     const Image image = render_state(config_, clip_, state, colors), foreground = foreground_of(frame);
-    write_image(paths.frame_image(number, "target"), frame.target);
     write_image(paths.frame_image(number, "render"), image);
     write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
     errors.push_back(image_errors(image, frame.target, &foreground));

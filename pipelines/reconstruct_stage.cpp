@@ -15,7 +15,8 @@ namespace {
 FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const ColorState& colors) {
   return {config.render,
           config.skip.render,
-          config.approx,
+          config.approx.render,
+          config.approx.hold_colours,
           config.rotations,
           config.camera.increment,
           draw,
@@ -40,12 +41,16 @@ std::vector<SceneState> seen_frames(std::span<const SceneState> done, const Scen
 }
 
 /// Empty where every pixel counts.
-Image pixel_weights(PixelWeight weight, const FrameTask& task, const DataSettings& data) {
-  if (weight == PixelWeight::kUnoccluded) return complement(task.covered);
-  if (weight == PixelWeight::kAll) return {};
+Image pixel_weights(const StageSettings& stage, const FrameTask& task, const RunConfig& config) {
+  const double share = stage.draw == Draw::kScene ? config.approx.camera_pixels : 1;
+  if (stage.weight == PixelWeight::kAll && share == 1) return {};
   Image covered(1, task.covered.height(), task.covered.width());
-  add_covered(task.frame, data, covered);
-  return weight == PixelWeight::kForeground ? covered : complement(covered);
+  if (stage.weight == PixelWeight::kUnoccluded) covered = task.covered;
+  if (stage.weight == PixelWeight::kBackground || stage.weight == PixelWeight::kForeground)
+    add_covered(task.frame, config.data, covered);
+  Image weight = stage.weight == PixelWeight::kForeground ? std::move(covered) : complement(covered);
+  if (share < 1) keep_share(share, task.index, weight);
+  return weight;
 }
 
 /// Frame 0 as the stages of a frame see it: as it was found, or, while it is looked for, as it was given.
@@ -59,7 +64,7 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   const SceneState& first = first_state(task, frame_task);
   FrameTargets targets;
   targets.image = &frame.target;
-  targets.weight = task.config.stages[task.stage].second.weight == PixelWeight::kAll ? nullptr : &weight;
+  targets.weight = weight.empty() ? nullptr : &weight;
   targets.human_mask = &frame.human_mask;
   targets.human_seen = mask_center(frame.human_mask, task.config.data.mask_threshold)[2] != 0;
   for (const Image& mask : frame.object_masks) {
@@ -91,19 +96,21 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
   graph.set_state(state);
   if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));
-  const Image weight = pixel_weights(stage.weight, frame, task.config.data);
+  const Image weight = pixel_weights(stage, frame, task.config);
   graph.set_targets(targets_of(task, frame, weight));
   LossInputs<S> inputs = graph.loss_inputs();
-  if (stage.weight == PixelWeight::kAll) inputs.weight = {};
-  const StageResult result = run_stage<S>(
-      tape, stage, task.losses, inputs, graph.groups(),
-      [&](const IterationReport& report) {
-        const RenderCounters& counters = *graph.rendered().counters;
-        probe.iteration_ended(report, &counters);
-        callback(report, counters);
-        probe.iteration_begins();
-      },
-      {.name = name + ", frame " + std::to_string(frame.index), .kept = &colors.moments, .profile = probe.is_on()});
+  if (weight.empty()) inputs.weight = {};
+  const StageResult result = run_stage<S>(tape, stage, task.losses, inputs, graph.groups(),
+                                          [&](const IterationReport& report) {
+                                            const RenderCounters& counters = *graph.rendered().counters;
+                                            probe.iteration_ended(report, &counters);
+                                            callback(report, counters);
+                                            probe.iteration_begins();
+                                          },
+                                          {.name = name + ", frame " + std::to_string(frame.index),
+                                           .kept = &colors.moments,
+                                           .profile = probe.is_on(),
+                                           .held = graph.held()});
   graph.read_state(stage.optimize, state);
   if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
   probe.stage_ended(result, {.stage = name,

@@ -92,6 +92,7 @@ void note_end(RunFolder& folder, RunState state, const std::string& message) noe
 
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
   Clip clip = read_clip(config.data);
+  if (config.approx.longest_side_px > 0) clip.camera = reduced_camera(clip.camera, config.approx.longest_side_px);
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});
   if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});

@@ -12,6 +12,7 @@ namespace hsi4d {
 namespace {
 
 constexpr int kMostThreads = 1024;
+constexpr int kLongestSide = 65536;  // pixels
 /// The largest whole number that every JSON tool keeps (RFC 8259, section 6).
 constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 
@@ -49,6 +50,19 @@ void describe(ConfigFields& f, SkipSettings& s) {
   f.boolean("unchanged_inputs", s.tape.unchanged_inputs,
             "Do not compute again what depends on nothing that has moved since");
   f.boolean("unread_pixels", s.tape.unread_pixels, "Do not render what the only loss that sees it has no weight for");
+}
+
+void describe(ConfigFields& f, ApproxSettings& s) {
+  describe(f, s.render);
+  f.boolean(
+      "hold_colours", s.hold_colours,
+      "Colours of harmonics stay as in the stage's first iteration, those of the color net as when it last moved");
+  f.number(
+      "camera_pixels", s.camera_pixels, {.above = 0, .max = 1},
+      "Share of the pixels that count in stages that draw the scene alone, in blocks of 32, others in every frame");
+  f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
+            "Longest side of the images that are worked on: the camera's image, frames and masks are reduced to it "
+            "where they are larger; 0: as large as the camera's");
 }
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {

@@ -53,6 +53,19 @@ struct SkipSettings {
 /// All of them off.
 SkipSettings no_skips();
 
+/// What changes the result a little: config section `approx`.
+struct ApproxSettings {
+  RenderApproximations render;
+  /// Colours of harmonics are those of the stage's first iteration, the color net's those of the last iteration in
+  /// which it moved; neither has a gradient in between.
+  bool hold_colours = false;
+  /// Share of the pixels, in blocks, that count in stages that draw the scene alone; others in every frame.
+  double camera_pixels = 1;
+  /// Longest side of the images that are worked on; the camera's image, frames and masks are reduced to it where they
+  /// are larger. 0: as large as the camera's.
+  int longest_side_px = 0;
+};
+
 /// A whole run.
 struct RunConfig {
   std::string name;
@@ -72,7 +85,7 @@ struct RunConfig {
   SyntheticSettings synthetic;
   RenderSettings render;
   SkipSettings skip;
-  RenderApproximations approx;
+  ApproxSettings approx;
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 

@@ -3,6 +3,7 @@
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/ssim.h"
+#include "autodiff/weighted_image.h"
 #include "optim/losses/list.h"
 
 namespace hsi4d {
@@ -33,7 +34,8 @@ LossTerm photometric_loss() {
       [](const auto& in, const PhotometricSettings& settings) {
         if (!in.given(in.rendered) || !in.given(in.target)) return decltype(in.rendered){};
         if (!in.given(in.weight)) return difference(in.rendered, in.target, settings.ssim_share);
-        return difference(in.rendered * in.weight, in.target * in.weight, settings.ssim_share);
+        return difference(weighted_image(in.rendered, in.weight), weighted_image(in.target, in.weight),
+                          settings.ssim_share);
       });
 }
 

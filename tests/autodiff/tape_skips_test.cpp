@@ -4,7 +4,9 @@
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
+#include "autodiff/ssim.h"
 #include "autodiff/tape.h"
+#include "autodiff/weighted_image.h"
 #include "tests/support/random_numbers.h"
 
 using namespace hsi4d;
@@ -48,6 +50,7 @@ struct DemandScene {
   Var<double> target = tape.constant("target", shape), weight = tape.parameter("weight", shape);
   Var<double> image = tape.record(ImageOnDemand{&squares}, {base, x}, shape, Source::current());
   Var<double> weighted = l2(image, target, weight), whole = l1(image, target), both = weighted + whole;
+  Var<double> similar = d_ssim(weighted_image(image, weight), weighted_image(target, weight));
 
   explicit DemandScene(bool skips) {
     tape.set_skips({.unread_pixels = skips});
@@ -151,6 +154,10 @@ TEST_CASE("squares of an image that its only reader does not look at are not mad
   for (DemandScene* scene : {&some, &all}) scene->tape.set(scene->x, {0.6});
   check_equal(&DemandScene::weighted, 1);
   check_equal(&DemandScene::whole, kSquares);
+  for (DemandScene* scene : {&some, &all}) scene->tape.set(scene->x, {0.4});
+  check_equal(&DemandScene::similar, 1);
+  for (DemandScene* scene : {&some, &all}) scene->weigh(kMaskSquare + 1, kCols);
+  check_equal(&DemandScene::similar, 10);
 }
 
 TEST_CASE("an image that somebody asks for is made whole") {

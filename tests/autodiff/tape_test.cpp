@@ -206,6 +206,53 @@ TEST_CASE("an intermediate can be frozen: no gradient flows behind it") {
   CHECK(tape.gradient(x).scalar() == 12);
 }
 
+TEST_CASE("what is held stays as it is, costs nothing, and follows its inputs again when it is released") {
+  Tape<double> tape;
+  const auto x = tape.parameter("x", kScalarShape), y = tape.parameter("y", kScalarShape);
+  const auto curved = exp(x);
+  const auto loss = square(curved * y);
+  CHECK_THROWS_AS(tape.hold(x), InternalError);
+  CHECK_THROWS_AS(tape.hold(curved), InternalError);  // not computed yet
+  const auto run = [&](double new_x, double new_y) {
+    tape.set(x, {new_x});
+    tape.set(y, {new_y});
+    tape.forward(loss);
+    tape.backward(loss);
+    return tape.value(loss).scalar();
+  };
+  const double e = std::exp(1.0);
+  CHECK(run(1, 1) == Approx(e * e).epsilon(1e-14));
+  tape.hold(curved);
+  CHECK(tape.held(curved));
+  CHECK_THROWS_AS(tape.backward(loss), StaleError);
+  CHECK(run(2, 3) == Approx(9 * e * e).epsilon(1e-14));
+  CHECK(tape.counters().forward_nodes == 2);
+  CHECK_FALSE(tape.has_gradient(x));
+  CHECK(tape.gradient(y).scalar() == Approx(2 * 3 * e * e).epsilon(1e-14));
+  tape.forward(curved);  // asked for by itself
+  CHECK(tape.value(curved).scalar() == Approx(e * e).epsilon(1e-14));
+  tape.hold(curved);
+  tape.release(curved);
+  CHECK_FALSE(tape.held(curved));
+  CHECK(run(0.5, 3) == Approx(9 * e).epsilon(1e-14));
+  CHECK(tape.gradient(x).scalar() == Approx(2 * 9 * e).epsilon(1e-14));
+}
+
+TEST_CASE("what is held is held by a tape without skips too") {
+  Tape<double> tape;
+  tape.set_skips({.frozen_inputs = false, .unchanged_inputs = false, .unread_pixels = false});
+  const auto x = tape.parameter("x", kScalarShape);
+  const auto held = exp(x), loss = held * x;
+  tape.set(x, {0.0});
+  tape.forward(loss);
+  tape.hold(held);
+  tape.set(x, {5.0});
+  tape.forward(loss);
+  tape.backward(loss);
+  CHECK(tape.value(loss).scalar() == 5);
+  CHECK(tape.gradient(x).scalar() == 1);
+}
+
 TEST_CASE("nothing runs backward behind a frozen array, and no NaN leaks from there (row C11)") {
   Counted c;
   const auto x = c.tape.parameter("x", kScalarShape);

@@ -9,6 +9,7 @@
 #include "autodiff/reduce.h"
 #include "core/check.h"
 #include "core/parallel.h"
+#include "tests/support/allocation_counter.h"
 
 using namespace hsi4d;
 using Catch::Matchers::Contains;
@@ -174,4 +175,27 @@ TEST_CASE("bfgs refuses what it cannot move") {
   AdamGroup<double> angles{{"global_orient", {few}}, moving(1)};
   angles.parameters.are_axis_angles = true;
   CHECK_THROWS_WITH((QuasiNewton<double>(tape, {angles})), Contains("group \"global_orient\": bfgs does not move"));
+}
+
+TEST_CASE("a steady step of bfgs allocates nothing") {
+  if (!test::allocations_are_counted()) {
+    WARN("skipped: sanitizers bring their own malloc");
+    return;
+  }
+  with_threads(1, [] {
+    Valley<double> valley;
+    QuasiNewton<double> method(valley.tape, {{{"x", {valley.x}}, moving(1e-6)}});  // short steps: it is not done soon
+    constexpr Index kSteps = 12;
+    Index i = 0;
+    const auto round = [&] {
+      for (Index k = 0; k < kSteps / 2; ++k) {
+        valley.tape.forward(valley.loss);
+        valley.tape.backward(valley.loss);
+        method.step(i++, kSteps + 1, valley.tape.value(valley.loss).scalar());
+      }
+    };
+    CHECK(test::steady_allocations(round) == 0);
+    CHECK(i == kSteps);
+    CHECK_FALSE(method.is_done());
+  });
 }

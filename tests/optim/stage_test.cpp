@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include <catch2/catch.hpp>
 
@@ -432,4 +433,49 @@ TEST_CASE("a steady iteration of a stage allocates nothing") {
     at_end = allocation_count();
   });
   CHECK(at_end == at_20);
+}
+
+TEST_CASE("a stage ends early when its loss no longer falls") {
+  Picture<double> whole, short_one;
+  StageSettings settings = usual_stage();
+  settings.optimize = {{"tint", moving(0.3)}};
+  std::vector<double> losses;
+  const auto note = [&](const IterationReport& report) { losses.push_back(report.loss); };
+  const StageResult all = run(whole, settings, note);
+  settings.plateau = {.iterations = 10, .gain = 0.02};
+  const StageResult early = run(short_one, settings);
+  CHECK(all.iterations == settings.iterations);
+  REQUIRE(early.iterations < settings.iterations);
+  REQUIRE(early.iterations >= 20);
+  const auto mean_from = [&](Index first) {
+    return std::accumulate(losses.begin() + first, losses.begin() + first + 10, 0.0) / 10;
+  };
+  // It is the first iteration in which this is so.
+  for (Index n = 20; n <= early.iterations; ++n)
+    CHECK((mean_from(n - 10) >= 0.98 * mean_from(n - 20)) == (n == early.iterations));
+  settings.plateau.gain = 0;  // while it falls at all
+  CHECK(run(short_one, settings).iterations > 0);
+}
+
+TEST_CASE("held outputs follow their inputs where a group moves that names them, and in the first iteration") {
+  Picture<double> picture;
+  StageSettings settings = usual_stage();
+  settings.iterations = 7;
+  settings.optimize[0].second.every = 3;
+  const Var<double> own = picture.base * 2.0;
+  picture.inputs.rendered = (own + picture.tint) * 0.1;
+  std::vector<double> seen, given;
+  const auto note = [&](const IterationReport&) {
+    seen.push_back(picture.tape.value(own)(0, 0, 0));
+    given.push_back(2 * picture.tape.value(picture.base)(0, 0, 0));  // after the step
+  };
+  run(picture, settings, note, {.held = {{own.id, {"base"}}}});
+  // base moves in iterations 0, 3 and 6; what an iteration sees was evaluated before its step.
+  CHECK(seen[0] == 0);
+  for (const std::size_t i : {1, 2}) CHECK(seen[i] == seen[0]);
+  CHECK(seen[3] == given[0]);
+  CHECK(seen[4] == seen[3]);
+  CHECK(seen[6] == given[3]);
+  CHECK(given[6] != given[3]);
+  CHECK_FALSE(picture.tape.held(own));
 }

@@ -95,11 +95,10 @@ TEST_CASE("a clip has what the dataset's files have") {
   }
 }
 
-TEST_CASE("frames, masks and the camera are reduced to the longest side that the config names") {
-  DataSettings data = dataset_inputs(TinyDataset::folder());
-  const Clip whole = read_clip(data);
-  data.longest_side_px = kTinyPixels / 2;
-  const Clip half = read_clip(data);
+TEST_CASE("frames and masks are reduced to the camera's size") {
+  const Clip whole = read_clip(dataset_inputs(TinyDataset::folder()));
+  Clip half = whole;
+  half.camera = reduced_camera(whole.camera, kTinyPixels / 2);
   CHECK(half.camera.width == kTinyPixels / 2);
   CHECK(half.camera.height == kTinyPixels / 2);
   const Vector3<double> point(0.3, -0.2, 2.5);  // is seen at the same place of the image
@@ -108,7 +107,8 @@ TEST_CASE("frames, masks and the camera are reduced to the longest side that the
   CHECK(coarse.object_masks.front().width() == kTinyPixels / 2);
   const auto mean_of_four = [](const Image& image, int c, int y, int x) {
     return (image(c, 2 * y, 2 * x) + image(c, 2 * y, 2 * x + 1) + image(c, 2 * y + 1, 2 * x) +
-            image(c, 2 * y + 1, 2 * x + 1)) / 4;
+            image(c, 2 * y + 1, 2 * x + 1)) /
+           4;
   };
   for (int y = 0; y < kTinyPixels / 2; ++y) {
     for (int x = 0; x < kTinyPixels / 2; ++x) {
@@ -117,8 +117,7 @@ TEST_CASE("frames, masks and the camera are reduced to the longest side that the
         REQUIRE(coarse.target(c, y, x) == Approx(mean_of_four(fine.target, c, y, x)).margin(1e-6));
     }
   }
-  data.longest_side_px = 10 * kTinyPixels;  // nothing is enlarged
-  CHECK(read_clip(data).camera.width == kTinyPixels);
+  CHECK(reduced_camera(whole.camera, 10 * kTinyPixels).width == kTinyPixels);  // nothing is enlarged
 }
 
 TEST_CASE("scene and objects may be in any format of Gaussians") {

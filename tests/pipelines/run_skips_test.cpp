@@ -5,7 +5,9 @@
 #include <catch2/catch.hpp>
 
 #include "body/motion_io.h"
+#include "core/camera_file.h"
 #include "core/check.h"
+#include "core/image_io.h"
 #include "pipelines/bench_skips.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/run_command.h"
@@ -34,8 +36,14 @@ const std::vector<std::string> kCollapsed = {"approx.collapse_suffix=true"};
 /// A run of the tiny clip in a folder; its result as bytes.
 struct SkipRun {
   std::string folder, motion, objects;
-  SkipRun(const std::string& name, const std::vector<std::string>& overrides) : folder(name) {
-    carry_out_tiny(tiny_config(overrides), folder);
+  /// @param change  of what --set cannot say
+  SkipRun(
+      const std::string& name, const std::vector<std::string>& overrides,
+      void (*change)(RunConfig&) = [](RunConfig&) {})
+      : folder(name) {
+    RunConfig config = tiny_config(overrides);
+    change(config);
+    carry_out_tiny(config, folder);
     motion = file_text(folder + "/motion.npz");
     objects = file_text(folder + "/objects.npz");
   }
@@ -175,6 +183,54 @@ TEST_CASE("an approximation that a config sets changes the result a little, and 
       "approx.collapse_suffix is on: images are near, each pixel within render.transmittance_stop, 0.0001";
   CHECK_THAT(file_text("collapsed/log.txt"), Contains(" info " + told + "\n"));
   CHECK_THAT(file_text("on/log.txt"), !Contains("collapse_suffix"));
+}
+
+TEST_CASE("colours that are held cost fewer operators and change the result a little", "[run]") {
+  const TemporaryFolder here;
+  const auto move_net = [](RunConfig& config) {
+    ParameterGroupSettings net;
+    net.lr = 1e-3;
+    net.every = 4;
+    config.stages.back().second.optimize.emplace_back("color_net", net);
+  };
+  const auto run_with = [&](const std::string& name, const std::string& held) {
+    return SkipRun(name, {"color_net.use=on", "approx.hold_colours=" + held}, move_net);
+  };
+  const SkipRun on = run_with("on", "true"), off = run_with("off", "false");
+  const double near = differences(on, off).back();
+  INFO("with held colours " << near << " m or rad off");
+  CHECK(near > 0);
+  CHECK(near <= 0.05);
+  for (const char* stage : {"camera", "interaction"}) {
+    INFO(stage);
+    CHECK(on.counted("forward_nodes", stage) < off.counted("forward_nodes", stage));
+    CHECK(on.counted("backward_nodes", stage) < off.counted("backward_nodes", stage));
+  }
+  CHECK_THAT(file_text("on/log.txt"), Contains(" info approx.hold_colours is on: "));
+}
+
+TEST_CASE("a camera that sees a share of the pixels renders fewer tiles and is found nearly as well", "[run]") {
+  const TemporaryFolder here;
+  const SkipRun part("part", {"approx.camera_pixels=0.5"}), all("all", {});
+  CHECK(part.counted("tiles", "camera") < all.counted("tiles", "camera"));
+  CHECK(part.counted("tiles") == Approx(all.counted("tiles")).epsilon(0.2));  // the other stage sees all
+  const auto error = [](const SkipRun& run) {
+    return nlohmann::json::parse(file_text(run.folder + "/summary.json"))["metrics"][0]["camera_translation_cm"]
+        .get<double>();
+  };
+  INFO("cm: " << error(part) << " of a half, " << error(all) << " of all");
+  CHECK(error(part) < 3 * error(all) + 0.5);
+  CHECK_THAT(file_text("part/log.txt"), Contains(" info approx.camera_pixels is on: "));
+}
+
+TEST_CASE("a run whose images are reduced writes smaller ones and finds nearly the same", "[run]") {
+  const TemporaryFolder here;
+  const std::string half = std::to_string(kTinyPixels / 2);
+  const SkipRun small("small", {"approx.longest_side_px=" + half}), all("all", {});
+  CHECK(read_image("small/frames/0002_render.png").width() == kTinyPixels / 2);
+  CHECK(read_cameras("small/cameras.json").at(1).width == kTinyPixels / 2);
+  CHECK(small.counted("fragments") < all.counted("fragments"));
+  CHECK(differences(small, all).back() < 0.3);
 }
 
 TEST_CASE("what settings of skip and approx do to each other is told", "[run]") {
