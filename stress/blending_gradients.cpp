@@ -8,8 +8,7 @@
 
 namespace hsi4d::stress {
 
-// --- B3
-// ---------------------------------------------------------------------------------------------------------------
+// --- B3 --------------------------------------------------------------------------------------------------------------
 
 /// A Gaussian at one pixel, its mean beside the centre, so opaque that a cap of 0.99 holds it, or hardly not.
 std::vector<StressFigure> cap_gradient(Remedy remedy) {
@@ -34,8 +33,7 @@ std::vector<StressFigure> cap_gradient(Remedy remedy) {
           {"relative error of d opacity just below the cap", std::abs(free / g - 1), 1e-6}};
 }
 
-// --- B6
-// ---------------------------------------------------------------------------------------------------------------
+// --- B6 --------------------------------------------------------------------------------------------------------------
 
 /// Gradients by the means against central differences of fourth order, with what tests use, and with the cuts of runs.
 std::vector<StressFigure> differences_across_cuts(Remedy remedy) {
@@ -67,8 +65,7 @@ std::vector<StressFigure> differences_across_cuts(Remedy remedy) {
            1e-5}};
 }
 
-// --- B13
-// --------------------------------------------------------------------------------------------------------------
+// --- B13 -------------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -165,8 +162,7 @@ std::vector<StressFigure> recomputed_alpha(Remedy remedy) {
           {"T recovered in front of the first, off 1", std::abs(recovered_transmittance(weights) - 1), 0}};
 }
 
-// --- B21
-// --------------------------------------------------------------------------------------------------------------
+// --- B21 -------------------------------------------------------------------------------------------------------------
 
 namespace {
 

@@ -11,8 +11,7 @@
 
 namespace hsi4d::stress {
 
-// --- B8
-// ---------------------------------------------------------------------------------------------------------------
+// --- B8 --------------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -111,8 +110,7 @@ std::vector<StressFigure> depth_sort(Remedy remedy) {
       {"colours changed by rows whose depth is NaN", changed(of_broken(broken), of_broken(broken.picked(sound))), 0}};
 }
 
-// --- B9
-// ---------------------------------------------------------------------------------------------------------------
+// --- B9 --------------------------------------------------------------------------------------------------------------
 
 std::vector<StressFigure> depth_keys(Remedy remedy) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -140,8 +138,7 @@ std::vector<StressFigure> depth_keys(Remedy remedy) {
   return {{"neighbours in the wrong order", disorder, 0}, {"types in which -0 is not 0", zeros, 0}};
 }
 
-// --- B10
-// --------------------------------------------------------------------------------------------------------------
+// --- B10 -------------------------------------------------------------------------------------------------------------
 
 std::vector<StressFigure> pair_counts(Remedy remedy) {
   // How far off the sum is that one would go on with; 0 where it is refused.

@@ -20,8 +20,7 @@
 
 namespace hsi4d::stress {
 
-// --- B14
-// --------------------------------------------------------------------------------------------------------------
+// --- B14 -------------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -89,12 +88,11 @@ std::vector<StressFigure> normalized_depth(Remedy remedy) {
   }
   return {{"depths and gradients that are not finite", broken, 0},
           {"relative error of the depth", depth_error, 1e-5},
-          {"error of d opacity in double, metres/opacity", gradient_error, 1e-6},
-          {"d opacity of weights that hardly are", phantom, 0}};
+          {"error of d opacity in double, times weight, m", gradient_error, 1e-6},
+          {"d opacity where the weight is below 1e-8", phantom, 0}};
 }
 
-// --- B15
-// --------------------------------------------------------------------------------------------------------------
+// --- B15 -------------------------------------------------------------------------------------------------------------
 
 std::vector<StressFigure> saturated_sigmoid(Remedy remedy) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -139,15 +137,14 @@ std::vector<StressFigure> saturated_sigmoid(Remedy remedy) {
           {"logits of opacities 0 and 1 that are not finite", not_finite(from_file), 0}};
 }
 
-// --- B17
-// --------------------------------------------------------------------------------------------------------------
+// --- B17 -------------------------------------------------------------------------------------------------------------
 
 namespace {
 
 /// eˣ by putting x into a float's exponent [Schraudolph 1999].
 float exponent_exp(float x) {
-  const float bits = std::max(12102203.0f * x + 1064866805.0f, 0.0f);
-  return std::bit_cast<float>(static_cast<std::int32_t>(bits));
+  const float bits = 12102203.0f * x + 1064866805.0f;
+  return std::bit_cast<float>(bits > 0 ? static_cast<std::int32_t>(bits) : 0);
 }
 
 /// 2ᵖ as the pixels of blocks compute it: alpha of a Gaussian whose log₂ opacity is p, at its centre.
@@ -183,7 +180,7 @@ Banding banding(const F& function, const G& exact, double lowest) {
 
 }  // namespace
 
-/// Of rows of pixels, and of blocks of pixels.
+/// Of rows of pixels, and of blocks of pixels. Below −87 the result is less than float's least normal number: 0.
 std::vector<StressFigure> quick_exponential(Remedy remedy) {
   const bool on = remedy == Remedy::kOn;
   const auto e = [on](float x) { return on ? vector_exp(x) : exponent_exp(x); };
@@ -201,8 +198,7 @@ std::vector<StressFigure> quick_exponential(Remedy remedy) {
           {"exponentials of NaN that are numbers", std::isnan(e(std::nanf(""))) ? 0.0 : 1.0, 0}};
 }
 
-// --- B18
-// --------------------------------------------------------------------------------------------------------------
+// --- B18 -------------------------------------------------------------------------------------------------------------
 
 std::vector<StressFigure> held_color(Remedy remedy) {
   const std::vector<double> wanted = {-0.1, 0, 0.1, -1e-5, 1e-5, 3};
@@ -231,8 +227,7 @@ std::vector<StressFigure> held_color(Remedy remedy) {
           {"colours whose power 1/2.2 is not a number", powers, 0}};
 }
 
-// --- B19
-// --------------------------------------------------------------------------------------------------------------
+// --- B19 -------------------------------------------------------------------------------------------------------------
 
 namespace {
 
