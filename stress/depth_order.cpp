@@ -1,4 +1,5 @@
 // Rows B about sorting and counting.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>

@@ -1,12 +1,10 @@
 // Rows B about what is composited: depth, opacity, colour, and the exponential.
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
 
 #include "autodiff/elementwise.h"
-#include "autodiff/reduce.h"
 #include "core/vector_exp.h"
 #include "splat/block_kernel.h"
 #include "splat/covariance.h"

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "splat/debug_pixel.h"
 #include "stress/blending_rows.h"
