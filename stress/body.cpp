@@ -1,12 +1,10 @@
 // Rows D: skinning, priors, contacts. Here skinning; the others are in body_robustness.cpp.
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include <Eigen/SVD>
 
-#include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
 #include "body/blend_shapes.h"
 #include "body/skinning.h"
@@ -110,7 +108,7 @@ std::vector<StressFigure> weight_sums(Remedy remedy) {
 
 using Frame = Matrix3<double>;
 
-/// Two bones that count alike: the first at rest, the second turned about x and shifted.
+/// Of two bones that count alike, the first at rest: the second, turned about x.
 Frame second_bone(double angle) { return axis_turn(Vector3<double>::UnitX(), angle); }
 
 /// A frame on these bones: the loss Σ c ∘ F', and its gradient by the second bone.

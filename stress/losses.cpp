@@ -2,12 +2,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
-#include "autodiff/reduce.h"
 #include "autodiff/ssim.h"
 #include "core/image.h"
 #include "core/parallel.h"

@@ -9,6 +9,7 @@
 #include "autodiff/map.h"
 #include "body/kinematics.h"
 #include "core/camera.h"
+#include "core/check.h"
 #include "core/quaternion.h"
 #include "core/random.h"
 #include "core/rotation.h"
