@@ -226,15 +226,6 @@ std::vector<StressFigure> beside_the_view(Remedy remedy) {
 
 namespace {
 
-/// The scene and its camera, `scale` times as large.
-Scene scaled(Scene scene, double scale) {
-  for (float& x : scene.gaussians.means) x = static_cast<float>(x * scale);
-  for (float& x : scene.gaussians.log_scales) x = static_cast<float>(x + std::log(scale));
-  scene.camera.camera_from_world.translation *= scale;
-  scene.settings.near *= scale;
-  return scene;
-}
-
 /// Scales are held at a millimetre or more, as inverses of scales are in some renderers.
 Scene with_least_scale(Scene scene) {
   for (float& x : scene.gaussians.log_scales) x = std::max(x, std::log(1e-3F));
@@ -308,20 +299,6 @@ std::vector<StressFigure> small_gaussians(Remedy remedy) {
 
 namespace {
 
-/// The scene and its camera moved: by its origin, or every mean by itself.
-Scene moved(Scene scene, const Vector3<double>& offset, Remedy remedy) {
-  scene.camera.camera_from_world.translation -= scene.camera.camera_from_world.rotation * offset;
-  if (remedy == Remedy::kOn) {
-    scene.gaussians.origin_world = offset;
-    return scene;
-  }
-  std::vector<float>& means = scene.gaussians.means;
-  for (std::size_t i = 0; i < means.size(); ++i) {
-    means[i] = static_cast<float>(means[i] + offset[static_cast<Index>(i % 3)]);
-  }
-  return scene;
-}
-
 /// Pixels that means are off, against R (p − c) in long double near the origin.
 double misplaced_px(const Scene& scene, const Scene& far, const Vector3<double>& offset, Remedy remedy) {
   TapedScene<float> taped(far);
@@ -355,15 +332,19 @@ double misplaced_px(const Scene& scene, const Scene& far, const Vector3<double>&
 
 std::vector<StressFigure> far_from_the_origin(Remedy remedy) {
   const Scene scene = random_scene(60, 23, 96, 64);
-  Scene wide = random_scene(60, 24, 1000, 750);
+  const Scene wide = random_scene(60, 24, 1000, 750);
   const Rendering here = render_scene<float>(scene);
   Largest image, gradient, pixels;
   for (const double far : {1e2, 1e3, 1e4, kFar}) {
     const Vector3<double> offset(far, -far, 0.5 * far);
-    const Rendering there = render_scene<float>(moved(scene, offset, remedy));
+    const auto moved = [&](const Scene& by) {
+      const Scene there = translated(by, offset);
+      return remedy == Remedy::kOn ? there : in_world(there);
+    };
+    const Rendering there = render_scene<float>(moved(scene));
     image.add(largest_difference(there.image, here.image));
     gradient.add(relative_l2(there.gradients(), here.gradients()));
-    pixels.add(misplaced_px(wide, moved(wide, offset, remedy), offset, remedy));
+    pixels.add(misplaced_px(wide, moved(wide), offset, remedy));
   }
   return {{"pixels off, f = 1000 px, up to 1000 km", pixels.value(), 2e-4},
           {"image, up to 1000 km", image.value(), 1e-4},

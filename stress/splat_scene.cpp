@@ -89,6 +89,29 @@ Scene random_scene(Index n, std::uint64_t seed, int width, int height) {
   return scene;
 }
 
+Scene scaled(Scene scene, double factor) {
+  for (float& x : scene.gaussians.means) x = static_cast<float>(x * factor);
+  for (float& x : scene.gaussians.log_scales) x = static_cast<float>(x + std::log(factor));
+  scene.camera.camera_from_world.translation *= factor;
+  scene.settings.near *= factor;
+  return scene;
+}
+
+Scene translated(Scene scene, const Vector3<double>& offset) {
+  scene.camera.camera_from_world.translation -= scene.camera.camera_from_world.rotation * offset;
+  scene.gaussians.origin_world += offset;
+  return scene;
+}
+
+Scene in_world(Scene scene) {
+  Gaussians& g = scene.gaussians;
+  for (std::size_t i = 0; i < g.means.size(); ++i) {
+    g.means[i] = static_cast<float>(g.means[i] + g.origin_world[static_cast<Index>(i % 3)]);
+  }
+  g.origin_world = Vector3<double>::Zero();
+  return scene;
+}
+
 template <class S>
 TapedScene<S>::TapedScene(const Scene& scene, const std::vector<double>& given_axes)
     : view{scene.camera, scene.gaussians.origin_world, scene.settings} {

@@ -33,6 +33,13 @@ Scene empty_scene(const Camera& camera);
 /// Gaussians of all shapes in a ball that fills the tilted camera's view; degree 3. Every number is a float.
 Scene random_scene(Index n, std::uint64_t seed, int width, int height);
 
+/// The scene and its camera, `factor` times as large.
+Scene scaled(Scene scene, double factor);
+/// The scene and its camera moved: by the origin of its means.
+Scene translated(Scene scene, const Vector3<double>& offset);
+/// The same Gaussians with the world's origin as theirs: what is lost in float is lost.
+Scene in_world(Scene scene);
+
 /// A scene on a tape.
 template <class S>
 struct TapedScene {
