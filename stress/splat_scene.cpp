@@ -8,6 +8,7 @@
 #include "splat/covariance.h"
 #include "splat/opacity.h"
 #include "splat/sh.h"
+#include "stress/measures.h"
 
 namespace hsi4d::stress {
 
@@ -182,6 +183,18 @@ Rendering render_scene(const Scene& scene, const std::vector<double>& axes) {
 
 template Rendering render_scene<float>(const Scene&, const std::vector<double>&);
 template Rendering render_scene<double>(const Scene&, const std::vector<double>&);
+
+double crop_difference(const Scene& whole, const Scene& part, int left, int top) {
+  const std::vector<double> image = render_scene<float>(whole).image, window = render_scene<float>(part).image;
+  const int width = part.camera.width, height = part.camera.height;
+  Largest difference;
+  for (int i = 0; i < 3 * width * height; ++i) {
+    const int col = i % width + left, row = i / width % height + top, plane = i / (width * height);
+    const int place = (plane * whole.camera.height + row) * whole.camera.width + col;
+    difference.add(std::abs(window[static_cast<std::size_t>(i)] - image[static_cast<std::size_t>(place)]));
+  }
+  return difference.value();
+}
 
 reference::Scene<double> reference_scene(const Scene& scene) {
   const Gaussians& g = scene.gaussians;

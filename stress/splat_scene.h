@@ -74,6 +74,9 @@ struct Rendering {
 template <class S>
 Rendering render_scene(const Scene& scene, const std::vector<double>& axes = {});
 
+/// The largest difference of the image of `part` and the window of the image of `whole` at (left, top), in float.
+double crop_difference(const Scene& whole, const Scene& part, int left, int top);
+
 /// The image and T of the brute-force renderer, laid out as in Rendering; without gradients.
 Rendering reference_rendering(const Scene& scene);
 
