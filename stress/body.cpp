@@ -13,7 +13,7 @@
 #include "splat/reference.h"
 #include "splat/render.h"
 #include "stress/body_rows.h"
-#include "stress/measures.h"
+#include "stress/rotation_measures.h"
 #include "stress/stress.h"
 
 namespace hsi4d {

@@ -15,7 +15,7 @@
 #include "core/rotation.h"
 #include "optim/stage.h"
 #include "stress/body_rows.h"
-#include "stress/measures.h"
+#include "stress/rotation_measures.h"
 
 namespace hsi4d::stress {
 

@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "splat/composite.h"
 #include "splat/splat_records.h"
+#include "stress/measures.h"
 
 namespace hsi4d::stress {
 
@@ -30,33 +31,8 @@ std::vector<double> numbers_of(const ConstArray<S>& a) {
   return result;
 }
 
-/// max |a − b|; infinite where either is not a number.
-inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  double worst = a.size() == b.size() ? 0 : std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
-    const double off = std::abs(a[i] - b[i]);
-    worst = off == off ? std::max(worst, off) : std::numeric_limits<double>::infinity();
-  }
-  return worst;
-}
-
 inline double largest_size(const std::vector<double>& a) {
   return largest_difference(a, std::vector<double>(a.size(), 0.0));
-}
-
-/// |a − b| / |b| (L2).
-inline double relative_l2(const std::vector<double>& a, const std::vector<double>& b) {
-  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
-  double difference = 0, size = 0;
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    difference += (a[i] - b[i]) * (a[i] - b[i]);
-    size += b[i] * b[i];
-  }
-  return std::sqrt(difference / size);
-}
-
-inline double not_finite(const std::vector<double>& a) {
-  return static_cast<double>(std::count_if(a.begin(), a.end(), [](double x) { return !std::isfinite(x); }));
 }
 
 /// How many numbers are not the same.

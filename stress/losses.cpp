@@ -11,7 +11,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "optim/metrics.h"
-#include "stress/measures.h"
+#include "stress/rotation_measures.h"
 #include "stress/stress.h"
 
 namespace hsi4d {

@@ -14,7 +14,7 @@
 #include "core/random.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
-#include "stress/measures.h"
+#include "stress/rotation_measures.h"
 #include "stress/rotation_rows.h"
 
 namespace hsi4d::stress {

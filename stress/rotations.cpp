@@ -9,7 +9,7 @@
 #include "autodiff/dual.h"
 #include "core/rotation.h"
 #include "core/stumpff.h"
-#include "stress/measures.h"
+#include "stress/rotation_measures.h"
 #include "stress/rotation_rows.h"
 #include "stress/stress.h"
 
