@@ -103,7 +103,7 @@ StressOutcome stress_command(const StressOptions& options) {
       }
     });
   };
-  options.threads > 0 ? with_threads(options.threads, run) : run();
+  options.threads.value_or(0) > 0 ? with_threads(*options.threads, run) : run();
   if (!options.json.empty()) write_text_file(options.json, json);
   const Index tried = std::ssize(cases) - exempt;
   outcome.text +=
