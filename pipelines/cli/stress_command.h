@@ -9,7 +9,7 @@ namespace hsi4d::cli {
 
 struct StressOptions {
   std::vector<std::string> rows;  ///< ids, or letters of groups; empty: all
-  std::optional<int> threads;     ///< 0: one a core
+  std::optional<int> threads;     ///< none or 0: one a core
   std::string json;               ///< path for one JSON object a row; empty: none
 };
 
