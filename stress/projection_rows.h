@@ -1,5 +1,6 @@
 // Rows A of the catalogue, a function each; the failures and remedies are told in stress/projection.cpp. Those about a
-// Gaussian's ellipse in the image are in projection_ellipse.cpp, those about camera and world in projection_world.cpp.
+// Gaussian's ellipse in the image are in projection_ellipse.cpp, those about camera and world in projection_world.cpp
+// and projection_turns.cpp.
 #pragma once
 
 #include <vector>
