@@ -56,6 +56,7 @@ struct CanonicalDirectionsOp {
         for (Index n = begin; n < end; ++n) {
           const S* d_v = d_directions.row(n);
           const Seen s = seen(transforms.row(n), points.row(n), center.data);
+          if (!s.direction.usable) continue;  // L may hold what is no number: 0 times it would reach the centre
           Vector3<double> d_w = Vector3<double>::Zero();
           direction_adjoint(
               s.direction,

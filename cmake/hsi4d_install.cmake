@@ -3,7 +3,7 @@ include(CMakePackageConfigHelpers)
 
 get_property(layers GLOBAL PROPERTY HSI4D_LAYERS)
 install(TARGETS ${layers} hsi4d_arithmetic EXPORT hsi4d_targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-foreach(folder core autodiff splat body optim pipelines)
+foreach(folder core autodiff splat body optim stress pipelines)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hsi4d FILES_MATCHING PATTERN "*.h")
 endforeach()
 install(TARGETS hsi4d RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

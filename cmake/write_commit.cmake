@@ -5,7 +5,7 @@ cmake_minimum_required(VERSION 3.25)
 
 set(HSI4D_COMMIT ${COMMIT})
 if(GIT AND NOT COMMIT STREQUAL unknown)
-  execute_process(COMMAND ${GIT} --no-optional-locks status --porcelain -- core autodiff splat body optim pipelines cmake
+  execute_process(COMMAND ${GIT} --no-optional-locks status --porcelain -- core autodiff splat body optim stress pipelines cmake
                           CMakeLists.txt configs/best.json configs/demo.json configs/demo_quick.json
                   WORKING_DIRECTORY ${SOURCE} RESULT_VARIABLE status OUTPUT_VARIABLE changes ERROR_QUIET)
   if(status EQUAL 0 AND NOT changes STREQUAL "")

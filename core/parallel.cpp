@@ -99,7 +99,9 @@ int thread_count() { return tbb::this_task_arena::max_concurrency(); }
 void with_threads(int threads, FunctionRef<void()> body) {
   HSI4D_CHECK(threads >= 1, "threads = " + std::to_string(threads));
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  tbb::task_arena arena(threads);
+  // Beyond what a scope around this one allows, TBB would get no workers and print a warning.
+  const std::size_t allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  tbb::task_arena arena(static_cast<int>(std::min(allowed, static_cast<std::size_t>(threads))));
   arena.execute([&] { body(); });
 }
 

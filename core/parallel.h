@@ -63,7 +63,8 @@ double parallel_sum(Index n, Index grain, F&& partial) {
 /// Number of threads that loops started from here may use.
 int thread_count();
 
-/// Runs `body` with at most `threads` threads (≥ 1, also more than the machine has). Exceptions pass through.
+/// Runs `body` on at most `threads` threads (≥ 1; not bounded by cores, but by a scope around). Exceptions pass
+/// through.
 void with_threads(int threads, FunctionRef<void()> body);
 
 /// Flushes denormal numbers to zero (results and inputs) while it lives; restores the thread's mode at the end.

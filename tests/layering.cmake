@@ -1,13 +1,14 @@
-# The rule of the layers, read from the #include lines: core ← autodiff ← {splat | body} ← optim ← pipelines.
+# The rule of the layers, read from the #include lines: core ← autodiff ← {splat | body} ← optim ← stress ← pipelines.
 
 # What each layer may include.
-set(layers core autodiff splat body optim pipelines)
+set(layers core autodiff splat body optim stress pipelines)
 set(may_include_core core)
 set(may_include_autodiff core autodiff)
 set(may_include_splat core autodiff splat)
 set(may_include_body core autodiff body)
 set(may_include_optim core autodiff splat body optim)
-set(may_include_pipelines core autodiff splat body optim pipelines)
+set(may_include_stress core autodiff splat body optim stress)
+set(may_include_pipelines core autodiff splat body optim stress pipelines)
 
 # Libraries that take seconds to compile: in source files only.
 set(not_in_headers "^(nlohmann|CLI)/")

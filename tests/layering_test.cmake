@@ -43,7 +43,7 @@ expect("siblings"
          "body/b.h:1: \"splat/a.h\" is not allowed: body may include core, autodiff, body")
 expect("tests from the library"
   FILES pipelines/a.cpp "#include \"tests/support/b.h\"\n" tests/support/b.h ""
-  ERRORS "pipelines/a.cpp:1: \"tests/support/b.h\" is not allowed: pipelines may include core, autodiff, splat, body, optim, pipelines")
+  ERRORS "pipelines/a.cpp:1: \"tests/support/b.h\" is not allowed: pipelines may include core, autodiff, splat, body, optim, stress, pipelines")
 expect("slow libraries in headers"
   FILES core/a.h "#include <nlohmann/json.hpp>\n" pipelines/cli/b.h "#include <CLI/CLI.hpp>\n"
   ERRORS "core/a.h:1: <nlohmann/json.hpp> is slow to compile and belongs in source files only"

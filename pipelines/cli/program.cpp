@@ -34,6 +34,7 @@
 #include "pipelines/cli/report_command.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/select_camera_command.h"
+#include "pipelines/cli/stress_command.h"
 #include "pipelines/cli/synth_command.h"
 
 namespace hsi4d::cli {
@@ -83,9 +84,11 @@ struct CommandLine {
   BenchOptions bench;
   BenchStagesOptions bench_stages;
   BenchScalingOptions bench_scaling;
+  StressOptions stress;
   SelectCameraOptions select_camera;
   EvaluateOptions evaluate;
   std::function<std::string()> run;
+  int status = kDone;  ///< that `run` leaves
 
   explicit CommandLine(const std::vector<LossTerm>& terms) : losses(descriptions_of(terms)) {
     app.set_version_flag("--version", std::string("hsi4d ") + version() + " (" + git_commit() + ")");
@@ -106,6 +109,7 @@ struct CommandLine {
     add_convert();
     add_info();
     add_bench(terms);
+    add_stress();
     add_check();
     add_schema();
     add_list();
@@ -284,6 +288,24 @@ struct CommandLine {
     command.add_option("--spz-sh-bits", o.spz_sh_bits, "Bits of harmonics in .spz, degree 1 and above; 8,8 without")
         ->type_name("A,B");
     command.callback([this] { run = [this] { return convert_command(convert); }; });
+  }
+
+  void add_stress() {
+    CLI::App* command = app.add_subcommand("stress",
+                                           "Try every known way to fail: a row each, with what was measured, what is "
+                                           "allowed, and what it would be without the remedy");
+    command->add_option("--row", stress.rows, "Only these: A1, or a letter for its group; default: all")
+        ->type_name("ID");
+    add_threads(*command, stress.threads);
+    command->add_option("--json", stress.json, "File for the figures, one JSON object a row")->type_name("F");
+    command->footer("Exit status: 1 when a row fails, or holds without its remedy too.");
+    command->callback([this] {
+      run = [this] {
+        StressOutcome outcome = stress_command(stress);
+        status = outcome.status;
+        return outcome.text;
+      };
+    });
   }
 
   void add_bench(const std::vector<LossTerm>& terms) {
@@ -506,15 +528,17 @@ CommandWords words_of(const CLI::App& command) {
   return words;
 }
 
-void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
+int run_commands(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
   CommandLine line(losses);
   check_words(argc, argv, words_of(line.app));
   try {
     line.app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    return print(line.app.help());  // of the subcommand, if one was named
+    print(line.app.help());  // of the subcommand, if one was named
+    return kDone;
   } catch (const CLI::CallForVersion& version_text) {
-    return print(std::string(version_text.what()) + "\n");
+    print(std::string(version_text.what()) + "\n");
+    return kDone;
   } catch (const CLI::ParseError& mistake) {
     std::string command = "hsi4d";
     for (auto chosen = line.app.get_subcommands(); !chosen.empty(); chosen = chosen.front()->get_subcommands())
@@ -522,6 +546,7 @@ void run_commands(int argc, const char* const* argv, const std::vector<LossTerm>
     throw UserError(command + ": " + mistake.what() + "; `" + command + " --help` explains its arguments");
   }
   print(line.run());
+  return line.status;
 }
 
 }  // namespace
@@ -536,8 +561,7 @@ int run_program(int argc, const char* const* argv, const std::vector<LossTerm>& 
         },
         LogLevel::kInfo);
     best_isa();  // before any kernel runs
-    run_commands(argc, argv, losses);
-    return kDone;
+    return run_commands(argc, argv, losses);
   } catch (...) {
     return complain(describe_failure(std::current_exception()));
   }

@@ -74,3 +74,21 @@ TEST_CASE("canonical directions are finite where there is none") {
   const Vector3<double> far = direction_of_one<float>(identity, {1e30F, 0, 0}, {0, 0, 0});
   CHECK(far == Vector3<double>(1, 0, 0));
 }
+
+TEST_CASE("a point whose transform is no number keeps the camera's gradient as it is without it") {
+  const auto d_center = [](double bad) {
+    Tape<double> tape;
+    const Var<double> t = tape.parameter("transforms", shape_of(2, 12)), p = tape.parameter("points", shape_of(2, 3)),
+                      c = tape.parameter("center", shape_of(1, 3));
+    tape.set(t, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, bad, 0, 0, 0, 0, bad, 0, 0, 0, 0, bad, 0});
+    tape.set(p, {1, 2, 3, 3, 2, 1});
+    const Var<double> v = canonical_directions(t, p, c);
+    tape.forward(v);
+    tape.backward(v, std::vector<double>{1, 2, 0, 2, 0, 1});
+    const ConstArray<double> d = tape.gradient(c);
+    return std::vector<double>(d.data, d.data + 3);
+  };
+  const std::vector<double> without = d_center(0);  // a singular one has no direction either
+  CHECK(d_center(std::nan("")) == without);
+  CHECK(d_center(HUGE_VAL) == without);
+}

@@ -79,7 +79,11 @@ TEST_CASE("F4: denormals are flushed inside a chunk on every thread, and only th
 TEST_CASE("the number of threads is bounded and nested loops keep it", "[parallel]") {
   with_threads(3, [] {
     CHECK(thread_count() == 3);
-    with_threads(1, [] { CHECK(thread_count() == 1); });
+    with_threads(1, [] {
+      CHECK(thread_count() == 1);
+      with_threads(16, [] { CHECK(thread_count() == 1); });  // no more than the scope around it
+    });
+    with_threads(16, [] { CHECK(thread_count() == 3); });
   });
   CHECK_THROWS_AS(with_threads(0, [] {}), std::logic_error);
 }

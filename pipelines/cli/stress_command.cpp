@@ -1,0 +1,117 @@
+#include "pipelines/cli/stress_command.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/file.h"
+#include "core/formatted.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "stress/stress.h"
+
+namespace hsi4d::cli {
+
+namespace {
+
+bool is_asked(const StressCase& row, const std::vector<std::string>& asked) {
+  const auto names_it = [&row](const std::string& name) {
+    return name == row.id || (name.size() == 1 && name[0] == row.id[0]);
+  };
+  return asked.empty() || std::any_of(asked.begin(), asked.end(), names_it);
+}
+
+std::vector<StressCase> asked_cases(const std::vector<std::string>& asked) {
+  const std::vector<StressCase> all = stress_cases();
+  for (const std::string& name : asked) {
+    if (std::any_of(all.begin(), all.end(), [&](const StressCase& row) { return is_asked(row, {name}); })) continue;
+    throw UserError("there is no row \"" + name + "\"; allowed: A1 to " + all.back().id +
+                    ", or a letter for its group");
+  }
+  std::vector<StressCase> some;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(some),
+               [&](const StressCase& row) { return is_asked(row, asked); });
+  return some;
+}
+
+const char* verdict(const StressResult& result) {
+  if (result.row->run == nullptr) return "exempt";
+  if (!result.holds()) return "FAILED";
+  return result.would_fail() ? "held" : "NO PROOF";  // it passes without its remedy too
+}
+
+std::string number(double value) { return std::isfinite(value) ? formatted("%.2g", value) : formatted("%g", value); }
+
+/// A line a figure: measured, allowed, and measured without the remedy.
+std::string lines_of(const StressResult& result) {
+  const StressCase& row = *result.row;
+  std::string text = formatted("%-4s %-8s %s\n", row.id, verdict(result), row.failure);
+  if (row.run == nullptr) return text + formatted("     %s\n", row.exempt);
+  for (std::size_t i = 0; i < result.with.size(); ++i) {
+    const StressFigure& figure = result.with[i];
+    const std::string without = i < result.without.size() ? number(result.without[i].measured) : "thrown";
+    text += formatted("     %-58s %9s of %9s   without %9s\n", figure.what.c_str(), number(figure.measured).c_str(),
+                      number(figure.allowed).c_str(), without.c_str());
+  }
+  if (!result.error.empty()) text += formatted("     thrown: %s\n", result.error.c_str());
+  if (!result.error_without.empty()) text += formatted("     thrown without: %s\n", result.error_without.c_str());
+  return text + formatted("     without: %s\n", row.remedy);
+}
+
+nlohmann::ordered_json json_of(const StressResult& result) {
+  const auto finite = [](double value) {
+    return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(formatted("%g", value));
+  };
+  nlohmann::ordered_json figures = nlohmann::json::array();
+  for (std::size_t i = 0; i < result.with.size(); ++i) {
+    nlohmann::ordered_json figure = {{"what", result.with[i].what},
+                                     {"measured", finite(result.with[i].measured)},
+                                     {"allowed", finite(result.with[i].allowed)}};
+    if (i < result.without.size()) figure["without_remedy"] = finite(result.without[i].measured);
+    figures.push_back(std::move(figure));
+  }
+  nlohmann::ordered_json line = {
+      {"row", result.row->id},        {"verdict", verdict(result)}, {"failure", result.row->failure},
+      {"remedy", result.row->remedy}, {"figures", figures},         {"seconds", result.seconds}};
+  if (!result.error.empty()) line["thrown"] = result.error;
+  if (!result.error_without.empty()) line["thrown_without_remedy"] = result.error_without;
+  if (result.row->run == nullptr) line["exempt"] = result.row->exempt;
+  return line;
+}
+
+}  // namespace
+
+StressOutcome stress_command(const StressOptions& options) {
+  const std::vector<StressCase> cases = asked_cases(options.rows);
+  std::string json;
+  StressOutcome outcome;
+  Index exempt = 0;
+  std::vector<std::string> failed;
+  const auto run = [&] {
+    run_stress(cases, [&](const StressResult& result) {
+      outcome.text += lines_of(result);
+      json += json_of(result).dump() + "\n";
+      if (result.row->run == nullptr) {
+        ++exempt;
+      } else if (!result.passed()) {
+        failed.push_back(result.row->id);
+        log_warning(std::string("row ") + result.row->id + ": " + verdict(result));
+      }
+    });
+  };
+  options.threads.value_or(0) > 0 ? with_threads(*options.threads, run) : run();
+  if (!options.json.empty()) write_text_file(options.json, json);
+  const Index tried = std::ssize(cases) - exempt;
+  outcome.text +=
+      formatted("%lld rows tried, %lld held, %lld failed%s; %lld exempt\n", static_cast<long long>(tried),
+                static_cast<long long>(tried - std::ssize(failed)), static_cast<long long>(std::ssize(failed)),
+                failed.empty() ? "" : (" (" + joined(failed) + ")").c_str(), static_cast<long long>(exempt));
+  if (!failed.empty()) outcome.status = kRowsFailed;
+  return outcome;
+}
+
+}  // namespace hsi4d::cli

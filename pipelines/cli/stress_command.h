@@ -1,0 +1,28 @@
+// `hsi4d stress`: every known way to fail, tried.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace hsi4d::cli {
+
+struct StressOptions {
+  std::vector<std::string> rows;  ///< ids, or letters of groups; empty: all
+  std::optional<int> threads;     ///< none or 0: one a core
+  std::string json;               ///< path for one JSON object a row; empty: none
+};
+
+/// What the command prints, and what it exits with.
+struct StressOutcome {
+  std::string text;  ///< a table; its last line is the summary
+  int status = 0;    ///< kRowsFailed when a row failed
+};
+
+/// Exit status of `hsi4d stress` when a row failed.
+inline constexpr int kRowsFailed = 1;
+
+/// Runs the rows. Throws UserError for one that is not known.
+StressOutcome stress_command(const StressOptions& options);
+
+}  // namespace hsi4d::cli

@@ -1,0 +1,347 @@
+// Rows E: losses.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "autodiff/difference.h"
+#include "autodiff/elementwise.h"
+#include "autodiff/ssim.h"
+#include "core/image.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "optim/metrics.h"
+#include "stress/rotation_measures.h"
+#include "stress/stress.h"
+
+namespace hsi4d {
+
+namespace {
+
+using namespace stress;
+
+// --- structural similarity
+
+/// A grey image.
+template <class S>
+struct Picture {
+  Index rows = 0, cols = 0;
+  std::vector<S> numbers;
+
+  S operator()(Index r, Index c) const {  // zeros outside
+    return r < 0 || c < 0 || r >= rows || c >= cols ? S(0) : numbers[static_cast<std::size_t>(r * cols + c)];
+  }
+};
+
+/// level + noise·uniform(−1, 1), rounded to float.
+Picture<float> flat_picture(double level, double noise, double scale, std::uint64_t stream) {
+  constexpr Index kRows = 19, kCols = 27;
+  Picture<float> picture{kRows, kCols, {}};
+  const Random random(5, stream);
+  for (std::uint64_t i = 0; i < kRows * kCols; ++i) {
+    picture.numbers.push_back(static_cast<float>(scale * (level + noise * random.uniform(i, -1, 1))));
+  }
+  return picture;
+}
+
+struct Similarity {
+  std::vector<double> map;  ///< ssim of every pixel
+  std::vector<double> d_x;  ///< of 1 − mean ssim
+};
+
+/// Mean and (co)variances under the window about a pixel.
+template <class S>
+struct Moments {
+  S mx = 0, my = 0, vx = 0, vy = 0, vxy = 0;
+};
+
+template <class S>
+std::array<S, 11> window_weights() {
+  std::array<double, 11> w;
+  double total = 0;
+  for (int i = 0; i < 11; ++i) total += w[static_cast<std::size_t>(i)] = std::exp(-(i - 5) * (i - 5) / 4.5);
+  std::array<S, 11> weights;
+  for (std::size_t i = 0; i < 11; ++i) weights[i] = static_cast<S>(w[i] / total);
+  return weights;
+}
+
+template <class Visit>
+void over_window(Index r, Index c, const Visit& visit) {
+  for (Index i = 0; i < 11; ++i) {
+    for (Index j = 0; j < 11; ++j)
+      visit(static_cast<std::size_t>(i), static_cast<std::size_t>(j), r + i - 5, c + j - 5);
+  }
+}
+
+/// @param by_squares  variances as E[x²] − E[x]²; else about the mean
+template <class S>
+Moments<S> window_moments(const Picture<S>& x, const Picture<S>& y, Index r, Index c, bool by_squares) {
+  static const std::array<S, 11> w = window_weights<S>();
+  Moments<S> m;
+  over_window(r, c, [&](std::size_t i, std::size_t j, Index row, Index col) {
+    m.mx += w[i] * w[j] * x(row, col);
+    m.my += w[i] * w[j] * y(row, col);
+  });
+  const S shift_x = by_squares ? S(0) : m.mx, shift_y = by_squares ? S(0) : m.my;
+  over_window(r, c, [&](std::size_t i, std::size_t j, Index row, Index col) {
+    const S a = x(row, col) - shift_x, b = y(row, col) - shift_y;
+    m.vx += w[i] * w[j] * a * a;
+    m.vy += w[i] * w[j] * b * b;
+    m.vxy += w[i] * w[j] * a * b;
+  });
+  if (!by_squares) return m;
+  m.vx -= m.mx * m.mx;
+  m.vy -= m.my * m.my;
+  m.vxy -= m.mx * m.my;
+  return m;
+}
+
+/// The definition, window by window; see autodiff/ssim.h.
+template <class S>
+Similarity similarity_by_windows(const Picture<S>& x, const Picture<S>& y, bool by_squares) {
+  static const std::array<S, 11> w = window_weights<S>();
+  const S c1 = S(1e-4), c2 = S(9e-4), count = static_cast<S>(x.numbers.size());
+  std::vector<S> d_x(x.numbers.size());
+  Similarity result;
+  for (Index r = 0; r < x.rows; ++r) {
+    for (Index c = 0; c < x.cols; ++c) {
+      const Moments<S> m = window_moments(x, y, r, c, by_squares);
+      const S a1 = 2 * m.mx * m.my + c1, a2 = 2 * m.vxy + c2;
+      const S b1 = m.mx * m.mx + m.my * m.my + c1, b2 = m.vx + m.vy + c2;
+      const S value = a1 * a2 / (b1 * b2);
+      result.map.push_back(static_cast<double>(value));
+      const S d_mean = 2 * m.my * a2 / (b1 * b2) - 2 * m.mx * value / b1;
+      over_window(r, c, [&](std::size_t i, std::size_t j, Index row, Index col) {
+        if (row < 0 || col < 0 || row >= x.rows || col >= x.cols) return;
+        const S d = d_mean - 2 * value / b2 * (x(row, col) - m.mx) + 2 * a1 / (b1 * b2) * (y(row, col) - m.my);
+        d_x[static_cast<std::size_t>(row * x.cols + col)] -= w[i] * w[j] * d / count;
+      });
+    }
+  }
+  result.d_x.assign(d_x.begin(), d_x.end());
+  return result;
+}
+
+std::vector<double> numbers_of(const ConstArray<float>& image) {
+  std::vector<double> numbers;
+  for (Index r = 0; r < image.total_rows(); ++r)
+    numbers.insert(numbers.end(), image.row(r), image.row(r) + image.shape.cols);
+  return numbers;
+}
+
+Var<float> put(Tape<float>& tape, const Picture<float>& picture) {
+  const Var<float> image = tape.parameter("image", image_shape<float>(1, picture.rows, picture.cols));
+  tape.set(image, picture.numbers);
+  return image;
+}
+
+Similarity similarity(const Picture<float>& x, const Picture<float>& y, double data_range = 1) {
+  Tape<float> tape;
+  const Var<float> image = put(tape, x), target = put(tape, y), map = put(tape, x);
+  ssim_map(tape.value(image), tape.value(target), tape.write(map), {data_range});
+  const Var<float> loss = d_ssim(image, target, {data_range});
+  tape.forward(loss);
+  tape.backward(loss);
+  return {numbers_of(tape.value(map)), numbers_of(tape.gradient(image))};
+}
+
+Picture<double> widened(const Picture<float>& x) { return {x.rows, x.cols, {x.numbers.begin(), x.numbers.end()}}; }
+
+double norm(const std::vector<double>& a) {
+  double sum = 0;
+  for (const double x : a) sum += x * x;
+  return std::sqrt(sum);
+}
+
+double difference_norm(std::vector<double> a, const std::vector<double>& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
+  return norm(a);
+}
+
+/// E1: flat images with little noise.
+std::vector<StressFigure> flat_areas(Remedy remedy) {
+  double error = 0, above = 0, gradient = 0, same = 0;
+  const auto computed = [remedy](const Picture<float>& x, const Picture<float>& y) {
+    return remedy == Remedy::kOn ? similarity(x, y) : similarity_by_windows(x, y, true);
+  };
+  for (const double level : {0.1, 0.6, 0.9}) {
+    for (const double noise : {0.0, 1e-7, 1e-4, 1e-2}) {
+      const Picture<float> x = flat_picture(level, noise, 1, 1), y = flat_picture(level + 0.01, noise, 1, 2);
+      const Similarity found = computed(x, y), truth = similarity_by_windows(widened(x), widened(y), false);
+      for (std::size_t i = 0; i < truth.map.size(); ++i) {
+        error = worst(error, std::abs(found.map[i] - truth.map[i]));
+        above = worst(above, found.map[i] - 1);
+      }
+      gradient = worst(gradient, difference_norm(found.d_x, truth.d_x) / norm(truth.d_x));
+      for (const double value : computed(x, x).map) same = worst(same, std::abs(value - 1));
+    }
+  }
+  return {{"error of a pixel's similarity", error, 1e-6},
+          {"similarity above 1", above, 1e-6},
+          {"1 - similarity of an image to itself", same, 0},
+          {"error of the gradient, share of its norm", gradient, 1e-4}};
+}
+
+/// E2: the same images in [0, 1] and in [0, 255].
+std::vector<StressFigure> data_ranges(Remedy remedy) {
+  double pixel = 0, mean = 0;
+  for (const double noise : {1e-3, 1e-2, 0.1}) {
+    const Similarity one = similarity(flat_picture(0.5, noise, 1, 3), flat_picture(0.5, noise, 1, 4));
+    const Similarity other =
+        similarity(flat_picture(0.5, noise, 255, 3), flat_picture(0.5, noise, 255, 4), remedy == Remedy::kOn ? 255 : 1);
+    double sum = 0;
+    for (std::size_t i = 0; i < one.map.size(); ++i) {
+      pixel = worst(pixel, std::abs(one.map[i] - other.map[i]));
+      sum += one.map[i] - other.map[i];
+    }
+    mean = worst(mean, std::abs(sum) / static_cast<double>(one.map.size()));
+  }
+  // A pixel's is right to 1e-6 in each of the two.
+  return {{"difference of mean similarities", mean, 1e-6}, {"difference of a pixel's", pixel, 2e-6}};
+}
+
+// --- logarithms
+
+/// −z log o − (1 − z) log(1 − o) of o = 1/(1 + e⁻ˣ) and its derivative, as they stand.
+std::array<float, 2> plain_cross_entropy(float x, float z) {
+  const float o = 1 / (1 + std::exp(-x)), d_o = o * (1 - o);
+  return {-z * std::log(o) - (1 - z) * std::log(1 - o), (-z / o + (1 - z) / (1 - o)) * d_o};
+}
+
+/// By operators: softplus(x) − x z.
+std::array<float, 2> taped_cross_entropy(float x, float z) {
+  Tape<float> tape;
+  const Var<float> logit = tape.parameter("x", kScalarShape);
+  tape.set(logit, {x});
+  const Var<float> loss = softplus(logit) - logit * static_cast<double>(z);
+  tape.forward(loss);
+  tape.backward(loss);
+  return {tape.value(loss).scalar(), tape.gradient(logit).scalar()};
+}
+
+Image grey_image(float value) {
+  Image image(1, 4, 5);
+  for (int r = 0; r < 4; ++r) {
+    for (int c = 0; c < 5; ++c) image(0, r, c) = value;
+  }
+  return image;
+}
+
+/// E3: opacities that are 0 and 1 to rounding, and images without a difference.
+std::vector<StressFigure> logarithms_of_zero(Remedy remedy) {
+  double value = 0, gradient = 0;
+  for (const float x : {-200.0f, -100.0f, -30.0f, -17.0f, -3.0f, 0.0f, 3.0f, 17.0f, 30.0f, 100.0f, 200.0f}) {
+    for (const float z : {0.0f, 1.0f}) {
+      const auto [loss, slope] = remedy == Remedy::kOn ? taped_cross_entropy(x, z) : plain_cross_entropy(x, z);
+      // log(1 + e^u), u > 0 where the target is missed
+      const long double u = z > 0.5f ? -static_cast<long double>(x) : static_cast<long double>(x);
+      const long double truth = std::max(u, 0.0L) + std::log1p(std::exp(-std::abs(u)));
+      const long double exact_slope = (z > 0.5f ? -1 : 1) / (1 + std::exp(-u));
+      value = worst(value, std::abs(static_cast<double>(loss - truth)) / std::max(1.0, static_cast<double>(truth)));
+      gradient = worst(gradient, std::abs(static_cast<double>(slope - exact_slope)));
+    }
+  }
+  const Image image = grey_image(0.25f);
+  const double psnr = remedy == Remedy::kOn ? psnr_db(image, image) : -10 * std::log10(0.0);
+  return {{"relative error of the cross entropy", value, 1e-6},
+          {"error of its gradient", gradient, 1e-6},
+          {"PSNR of equal images, dB", psnr, kLargestPsnrDb}};
+}
+
+/// E4: mean |a − b| and its gradient, where every third pair is equal.
+std::vector<StressFigure> equal_numbers(Remedy remedy) {
+  constexpr int kCount = 30;
+  std::vector<float> a, b, gradient(kCount);
+  for (int i = 0; i < kCount; ++i) {
+    a.push_back(0.1f * static_cast<float>(i));
+    b.push_back(a.back() + static_cast<float>(i % 3 - 1) * 1e-3f);
+  }
+  if (remedy == Remedy::kOn) {
+    Tape<float> tape;
+    const Var<float> x = tape.parameter("a", shape_of(1, kCount)), y = tape.constant("b", shape_of(1, kCount));
+    tape.set(x, a);
+    tape.set(y, b);
+    const Var<float> loss = l1(x, y);
+    tape.forward(loss);
+    tape.backward(loss);
+    std::copy_n(tape.gradient(x).data, kCount, gradient.begin());
+  } else {  // the derivative of √(d²)
+    for (std::size_t i = 0; i < kCount; ++i) {
+      const float d = a[i] - b[i];
+      gradient[i] = d / std::sqrt(d * d) / kCount;
+    }
+  }
+  double at_zero = 0, elsewhere = 0;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const double d = static_cast<double>(gradient[i]) * kCount;
+    if (i % 3 == 1) at_zero = worst(at_zero, std::abs(d));
+    if (i % 3 != 1) elsewhere = worst(elsewhere, std::abs(d - (i % 3 == 0 ? 1 : -1)));
+  }
+  return {{"gradient where both are equal", at_zero, 0}, {"error of the gradient elsewhere", elsewhere, 1e-6}};
+}
+
+/// A mean of floats in floats, each thread of `threads` its share.
+float plain_mean(const std::vector<float>& numbers, std::size_t threads) {
+  float total = 0;
+  for (std::size_t t = 0; t < threads; ++t) {
+    float sum = 0;
+    for (std::size_t i = t * numbers.size() / threads; i < (t + 1) * numbers.size() / threads; ++i) sum += numbers[i];
+    total += sum;
+  }
+  return total / static_cast<float>(numbers.size());
+}
+
+/// E5: means over two million numbers, on 1 and on 16 threads.
+std::vector<StressFigure> long_means(Remedy remedy) {
+  constexpr Index kRows = 1080, kCols = 1920;
+  const Random random(9, random_stream("stress.E5"));
+  std::vector<float> numbers(static_cast<std::size_t>(kRows * kCols));
+  long double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    numbers[i] = 0.3f + 0.5f * random.uniform<float>(i);
+    sum += numbers[i];
+    squares += static_cast<long double>(numbers[i]) * numbers[i];
+  }
+  const auto count = static_cast<long double>(numbers.size());
+  Tape<float> tape;
+  const Var<float> x = tape.parameter("x", image_shape<float>(1, kRows, kCols));
+  const Var<float> zero = tape.constant("zero", kScalarShape), first = l1(x, zero), second = l2(x, zero);
+  std::vector<float> squared(numbers);
+  for (float& v : squared) v *= v;
+  const auto means = [&](int threads) {
+    std::array<float, 2> result{};
+    if (remedy == Remedy::kOff) {
+      return std::array{plain_mean(numbers, static_cast<std::size_t>(threads)),
+                        plain_mean(squared, static_cast<std::size_t>(threads))};
+    }
+    with_threads(threads, [&] {
+      tape.set(x, numbers);
+      tape.forward(first);
+      tape.forward(second);
+      result = {tape.value(first).scalar(), tape.value(second).scalar()};
+    });
+    return result;
+  };
+  const std::array<float, 2> one = means(1), many = means(16);
+  const double error = worst(relative(one[0], sum / count), relative(one[1], squares / count));
+  const double threads =
+      worst(std::abs(static_cast<double>(one[0] - many[0])), std::abs(static_cast<double>(one[1] - many[1])));
+  return {{"relative error of the mean", error, 1e-7}, {"difference of 1 and 16 threads", threads, 0}};
+}
+
+}  // namespace
+
+std::span<const StressCase> loss_cases() {
+  static constexpr std::array kCases = {
+      StressCase{"E1", "variances as E[x^2] - E[x]^2: similarity above 1", "central moments of sum and difference",
+                 flat_areas},
+      StressCase{"E2", "constants for [0, 1] used with [0, 255]", "the range is an argument", data_ranges},
+      StressCase{"E3", "logarithms of 0: PSNR, cross entropy", "from logits; a mean square held at 1e-10",
+                 logarithms_of_zero},
+      StressCase{"E4", "the gradient of |x| at 0", "it is 0", equal_numbers},
+      StressCase{"E5", "a mean over millions of terms in float", "double partial sums in fixed order", long_means},
+  };
+  return kCases;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,59 @@
+// How far apart two sets of numbers are: what figures of the stress suite are made of. What is not a number counts as
+// infinitely far.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/types.h"
+
+namespace hsi4d::stress {
+
+/// The largest of some magnitudes; infinity if one of them is not a number.
+class Largest {
+ public:
+  void add(double magnitude) {
+    value_ = std::isnan(magnitude) ? std::numeric_limits<double>::infinity() : std::max(value_, magnitude);
+  }
+  double value() const { return value_; }
+
+ private:
+  double value_ = 0;
+};
+
+/// The largest |a − b|.
+inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  Largest largest;
+  if (a.size() != b.size()) largest.add(std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) largest.add(std::abs(a[i] - b[i]));
+  return largest.value();
+}
+
+/// |a − b| / |b| (L2); |a| where b is zero.
+inline double relative_l2(const std::vector<double>& a, const std::vector<double>& b) {
+  double difference = a.size() == b.size() ? 0.0 : std::numeric_limits<double>::infinity(), size = 0;
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
+    difference += (a[i] - b[i]) * (a[i] - b[i]);
+    size += b[i] * b[i];
+  }
+  const double ratio = std::sqrt(difference) / (size > 0 ? std::sqrt(size) : 1);
+  return std::isnan(ratio) ? std::numeric_limits<double>::infinity() : ratio;
+}
+
+/// How many numbers are not equal.
+inline double unequal(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
+  double count = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) count += a[i] == b[i] ? 0 : 1;
+  return count;
+}
+
+/// How many numbers are infinite or none.
+template <class Numbers>
+double not_finite(const Numbers& numbers) {
+  return static_cast<double>(std::count_if(numbers.begin(), numbers.end(), [](auto x) { return !std::isfinite(x); }));
+}
+
+}  // namespace hsi4d::stress

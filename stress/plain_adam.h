@@ -1,0 +1,26 @@
+// Adam as the textbook has it, number by number: in long double it is the truth, in float what goes wrong without a
+// look at the gradient and without flushing.
+#pragma once
+
+#include <cmath>
+
+namespace hsi4d::stress {
+
+/// One parameter. [Kingma and Ba 2015, algorithm 1; eps added to the root]
+template <class S>
+struct PlainAdam {
+  S lr;
+  S beta1 = S(0.9), beta2 = S(0.999), eps = S(1e-8);
+  S x = 0, m = 0, v = 0;
+  int t = 0;
+
+  void step(S g) {
+    ++t;
+    m = beta1 * m + (1 - beta1) * g;
+    v = beta2 * v + (1 - beta2) * g * g;
+    const S m_hat = m / (1 - std::pow(beta1, S(t))), v_hat = v / (1 - std::pow(beta2, S(t)));
+    x -= lr * m_hat / (std::sqrt(v_hat) + eps);
+  }
+};
+
+}  // namespace hsi4d::stress

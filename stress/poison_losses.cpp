@@ -1,0 +1,215 @@
+// Rows P9, P10: loss terms. What does not count is not looked at; what makes a loss into no number moves nothing.
+#include <algorithm>
+#include <cmath>
+
+#include "stress/loss_inputs.h"
+#include "stress/moving.h"
+#include "stress/poison.h"
+
+namespace hsi4d::stress {
+
+namespace {
+
+const LossTerm& term_named(const std::string& name) {
+  return *std::find_if(loss_terms().begin(), loss_terms().end(),
+                       [&](const LossTerm& term) { return term.description.name == name; });
+}
+
+/// A term and all that it may read.
+template <class S>
+struct TermOnTape {
+  Tape<S> tape;
+  LossLeaves<S> made = loss_leaves(tape);
+  Var<S> loss;
+
+  explicit TermOnTape(const LossTerm& term) : loss(term.record(made.inputs)) {}
+  void run() {
+    tape.forward(loss);
+    tape.backward(loss);
+  }
+  /// The loss, and the gradients of all that may move.
+  std::vector<double> results() const {
+    std::vector<double> all = numbers_of<S>(tape.value(loss));
+    for (const Var<S> leaf : made.leaves) {
+      if (!tape.has_gradient(leaf)) continue;
+      const std::vector<double> d = numbers_of<S>(tape.gradient(leaf));
+      all.insert(all.end(), d.begin(), d.end());
+    }
+    return all;
+  }
+};
+
+/// Sum of w |a − b| over pixels, plainly.
+template <class S>
+std::vector<double> plainly_weighted(const TermOnTape<S>& term) {
+  const ConstArray<S> a = term.tape.value(term.made.inputs.rendered), b = term.tape.value(term.made.inputs.target),
+                      w = term.tape.value(term.made.inputs.weight);
+  double sum = 0;
+  for (Index r = 0; r < a.total_rows(); ++r) {
+    for (Index c = 0; c < a.shape.cols; ++c)
+      sum += static_cast<double>(w.row(r % kLossHeight)[c]) * std::abs(static_cast<double>(a.row(r)[c] - b.row(r)[c]));
+  }
+  return {sum};
+}
+
+/// Results that poison changes in pixels which do not count.
+struct Unheard {
+  double pixels = 0, objects = 0;
+};
+
+template <class S>
+double changed_by_pixels(Remedy remedy) {
+  TermOnTape<S> term(term_named("photometric"));
+  Tape<S>& tape = term.tape;
+  tape.freeze(term.made.inputs.weight);
+  const Array<S> weight = tape.write(term.made.inputs.weight);
+  for (Index r = 0; r < kLossHeight; ++r) std::fill_n(weight.row(r), 8, S(0));
+  const auto results = [&] {
+    term.run();
+    return remedy == Remedy::kOn ? term.results() : plainly_weighted(term);
+  };
+  const std::vector<double> before = results();
+  double changed = 0;
+  for (const Var<S> image : {term.made.inputs.rendered, term.made.inputs.target}) {
+    for (const S poison : kPoison<S>) {
+      const S good = std::exchange(tape.write(image)(1, 6, 3), poison);
+      const std::vector<double> after = results();
+      for (std::size_t i = 0; i < after.size(); ++i) changed += after[i] == before[i] ? 0 : 1;
+      tape.write(image)(1, 6, 3) = good;
+    }
+  }
+  return changed;
+}
+
+/// The second object is not in the frame.
+template <class S>
+double changed_by_objects(Remedy remedy) {
+  TermOnTape<S> term(term_named("center"));
+  Tape<S>& tape = term.tape;
+  const LossInputs<S>& in = term.made.inputs;
+  const Var<S> opacity = in.object_opacity, target = in.object_center_target;
+  tape.write(target)(1, 2) = 0;
+  const auto results = [&]() -> std::vector<double> {
+    term.run();
+    if (remedy == Remedy::kOn) {  // the gradients of the first object
+      std::vector<double> d = numbers_of<S>(tape.gradient(opacity));
+      d.resize(static_cast<std::size_t>(kLossHeight * kLossWidth));
+      d.push_back(static_cast<double>(tape.value(term.loss).scalar()));
+      return d;
+    }
+    double mass[kLossObjects] = {};
+    for (Index r = 0; r < kLossObjects * kLossHeight; ++r) {
+      for (Index c = 0; c < kLossWidth; ++c)
+        mass[r / kLossHeight] += static_cast<double>(tape.value(opacity).row(r)[c]) * static_cast<double>(c);
+    }
+    return {1 * mass[0] + 0 * mass[1]};
+  };
+  const std::vector<double> before = results();
+  double changed = 0;
+  for (const S poison : kPoison<S>) {
+    const S good = std::exchange(tape.write(opacity)(1, 6, 3), poison);
+    const std::vector<double> after = results();
+    for (std::size_t i = 0; i < after.size(); ++i) changed += after[i] == before[i] ? 0 : 1;
+    tape.write(opacity)(1, 6, 3) = good;
+  }
+  return changed;
+}
+
+/// What steps with one poisoned number do.
+struct Steps {
+  double tried = 0, bad = 0;
+  double lost = 0;    ///< other parameters that are no numbers after it
+  double moved = 0;   ///< bad evaluations that moved something
+  double errors = 0;  ///< of the program
+};
+
+template <class S>
+std::vector<double> all_numbers(const TermOnTape<S>& term) {
+  std::vector<double> all;
+  for (const Var<S> leaf : term.made.leaves) {
+    const std::vector<double> numbers = numbers_of<S>(term.tape.value(leaf));
+    all.insert(all.end(), numbers.begin(), numbers.end());
+  }
+  return all;
+}
+
+bool all_finite(const std::vector<double>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
+}
+
+double not_finite(const std::vector<double>& numbers) {
+  return static_cast<double>(std::count_if(numbers.begin(), numbers.end(), [](double x) { return !std::isfinite(x); }));
+}
+
+/// One step of a term's inputs; without the remedy, of Adam's first step as it is without a look at the gradient.
+template <class S>
+void step(TermOnTape<S>& term, Remedy remedy, Steps& steps) {
+  const std::vector<double> before = all_numbers(term);
+  term.run();
+  const bool is_bad = !all_finite(term.results());
+  steps.bad += is_bad ? 1 : 0;
+  constexpr double kRate = 1e-6;
+  if (remedy == Remedy::kOn) {
+    Adam<S> adam(term.tape, {moving_at(term.made.leaves, kRate)}, {});
+    adam.step(0, 1, static_cast<double>(term.tape.value(term.loss).scalar()));
+  } else {
+    for (const Var<S> leaf : term.made.leaves) {
+      if (!term.tape.has_gradient(leaf)) continue;
+      std::vector<double> x = numbers_of<S>(term.tape.value(leaf)), d = numbers_of<S>(term.tape.gradient(leaf));
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] -= kRate * d[i] / (std::sqrt(d[i] * d[i]) + 1e-8);
+      set_numbers(term.tape, leaf, x);
+    }
+  }
+  const std::vector<double> after = all_numbers(term);
+  steps.lost += std::max(0.0, not_finite(after) - not_finite(before));
+  double moved = 0;
+  for (std::size_t i = 0; i < after.size(); ++i) moved += same_bits(after[i], before[i]) ? 0 : 1;
+  steps.moved += is_bad && moved > 0 ? 1 : 0;
+}
+
+template <class S>
+void try_term(const LossTerm& of, Remedy remedy, Steps& steps) {
+  TermOnTape<S> term(of);
+  term.run();
+  std::vector<std::vector<double>> good;
+  for (const Var<S> leaf : term.made.leaves) good.push_back(numbers_of<S>(term.tape.value(leaf)));
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    const Var<S> leaf = term.made.leaves[i];
+    if (!term.tape.has_gradient(leaf)) continue;  // the term does not read it
+    for (const Index row : {Index(0), term.tape.value(leaf).total_rows() - 1}) {
+      for (const S poison : kPoison<S>) {
+        term.tape.write(leaf).row(row)[0] = poison;
+        steps.tried += 1;
+        try {
+          step(term, remedy, steps);
+        } catch (const std::exception&) {
+          steps.errors += 1;
+        }
+        for (std::size_t k = 0; k < good.size(); ++k) set_numbers(term.tape, term.made.leaves[k], good[k]);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<StressFigure> poisoned_masks(Remedy remedy) {
+  return {{"results changed by pixels of weight 0",
+           changed_by_pixels<float>(remedy) + changed_by_pixels<double>(remedy), 0},
+          {"results changed by an object out of sight",
+           changed_by_objects<float>(remedy) + changed_by_objects<double>(remedy), 0}};
+}
+
+std::vector<StressFigure> poisoned_losses(Remedy remedy) {
+  Steps steps;
+  for (const LossTerm& term : loss_terms()) {
+    try_term<float>(term, remedy, steps);
+    try_term<double>(term, remedy, steps);
+  }
+  return {{"parameters lost by steps with a poisoned input", steps.lost, 0},
+          {"bad evaluations that moved something", steps.moved, 0},
+          {"errors", steps.errors, 0},
+          {"share of poisoned inputs that leave all finite", 1 - steps.bad / steps.tried, 0.9}};
+}
+
+}  // namespace hsi4d::stress

@@ -1,0 +1,237 @@
+// Rows P5, P6: a Gaussian with a number that is none is not drawn: image and gradients of the others have the bits that
+// they have without it.
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "stress/poison.h"
+
+namespace hsi4d::stress {
+
+namespace {
+
+constexpr Index kRows = 40;
+
+/// What a render is made of, and what becomes of it.
+template <class S>
+struct Drawing {
+  Tape<S>& tape;
+  Vars<S> inputs;  ///< that have a gradient
+  Vars<S> images = {};
+  Var<S> loss = {};
+
+  void look_at(const Vars<S>& seen) {
+    images = seen;
+    RandomSequence random(79);
+    for (const Var<S> image : images) {
+      const Var<S> weight = tape.constant("weight", image.shape());
+      std::vector<double> numbers;
+      for (Index i = 0; i < image.shape().count(); ++i) numbers.push_back(random.uniform(-1, 1));
+      set_numbers(tape, weight, numbers);
+      const Var<S> term = sum(image * weight);
+      loss = loss.tape == nullptr ? term : loss + term;
+    }
+  }
+  void run() {
+    tape.forward(loss);
+    tape.backward(loss);
+  }
+  std::vector<double> pixels() const {
+    std::vector<double> all;
+    for (const Var<S> image : images) {
+      const std::vector<double> numbers = numbers_of<S>(tape.value(image));
+      all.insert(all.end(), numbers.begin(), numbers.end());
+    }
+    return all;
+  }
+  /// Of all inputs; those of a row left out.
+  std::vector<double> gradients(Index without) const {
+    std::vector<double> all;
+    for (const Var<S> input : inputs) {
+      const ConstArray<S> d = tape.gradient(input);
+      for (Index r = 0; r < d.shape.rows; ++r) {
+        if (r == without && d.shape.rows == kRows) continue;
+        for (Index c = 0; c < d.shape.cols; ++c) all.push_back(static_cast<double>(d(r, c)));
+      }
+    }
+    return all;
+  }
+  /// Numbers of a row's gradients that are not 0.
+  double own_gradients(Index row) const {
+    double count = 0;
+    for (const Var<S> input : inputs) {
+      const ConstArray<S> d = tape.gradient(input);
+      for (Index c = 0; c < d.shape.cols && d.shape.rows == kRows; ++c) count += d(row, c) == S(0) ? 0 : 1;
+    }
+    return count;
+  }
+};
+
+struct Changes {
+  double pixels = 0, gradients = 0, not_finite = 0;
+};
+
+double different(const std::vector<double>& a, const std::vector<double>& b) {
+  double count = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) count += same_bits(a[i], b[i]) ? 0 : 1;
+  return count;
+}
+
+double not_finite(const std::vector<double>& numbers) {
+  return static_cast<double>(std::count_if(numbers.begin(), numbers.end(), [](double x) { return !std::isfinite(x); }));
+}
+
+/// An input that is poisoned, and what of it leaves the Gaussian out.
+template <class S>
+struct PoisonedPlace {
+  Var<S> input;
+  bool infinite_is_bad = true;      ///< NaN is bad everywhere
+  bool gradients_overflow = false;  ///< at huge numbers: sums of them are beyond the largest
+};
+
+/// One number in place of another.
+template <class S>
+void try_number(Drawing<S>& drawing, const PoisonedPlace<S>& place, Index row, S poison,
+                const std::array<std::vector<double>, 2>& without, Changes& changes) {
+  const Index col = row % place.input.shape().cols;
+  const S good = std::exchange(drawing.tape.write(place.input)(row, col), poison);
+  drawing.run();
+  drawing.tape.write(place.input)(row, col) = good;
+  if (std::isnan(poison) || (std::isinf(poison) && place.infinite_is_bad)) {
+    changes.pixels += different(drawing.pixels(), without[0]);
+    changes.gradients += different(drawing.gradients(row), without[1]) + drawing.own_gradients(row);
+  } else {
+    changes.not_finite += not_finite(drawing.pixels());
+    if (std::abs(poison) <= 1 || !place.gradients_overflow) changes.not_finite += not_finite(drawing.gradients(row));
+  }
+}
+
+/// @param left_out  the numbers [kRows,·] of `means` or the like that take a Gaussian away without harm
+template <class S>
+void try_poison(Drawing<S>& drawing, const std::vector<PoisonedPlace<S>>& places, Var<S> taken,
+                const std::vector<double>& left_out, Changes& changes) {
+  const Index cols = taken.shape().cols;
+  for (const Index row : {Index(0), Index(17), kRows - 1}) {
+    S* const numbers = drawing.tape.write(taken).row(row);
+    const std::vector<S> good(numbers, numbers + cols);
+    for (Index c = 0; c < cols; ++c) numbers[c] = static_cast<S>(left_out[static_cast<std::size_t>(row * cols + c)]);
+    drawing.run();
+    const std::array without = {drawing.pixels(), drawing.gradients(row)};
+    std::copy(good.begin(), good.end(), drawing.tape.write(taken).row(row));
+    for (const PoisonedPlace<S>& place : places) {
+      for (const S poison : kPoison<S>) try_number(drawing, place, row, poison, without, changes);
+    }
+  }
+}
+
+/// Gaussians given in the image.
+struct Flat {
+  std::vector<double> means, factors, depths, opacities, features;
+
+  Flat() {
+    RandomSequence random(80);
+    for (Index n = 0; n < kRows; ++n) {
+      means.insert(means.end(), {random.uniform(0, 32), random.uniform(0, 24)});
+      for (int i = 0; i < 6; ++i) factors.push_back(random.uniform(-3, 3));
+      depths.push_back(random.uniform(1, 5));
+      opacities.push_back(random.uniform(0.2, 0.95));
+      for (int i = 0; i < 3; ++i) features.push_back(random.uniform(0, 1));
+    }
+  }
+};
+
+template <class S>
+void try_composite(Changes& changes) {
+  const Flat flat;
+  Tape<S> tape;
+  const auto leaf = [&](Index cols, const std::vector<double>& numbers) {
+    const Var<S> var = tape.parameter("input", shape_of(std::ssize(numbers) / cols, cols));
+    set_numbers(tape, var, numbers);
+    return var;
+  };
+  const Var<S> means = leaf(2, flat.means), factors = leaf(6, flat.factors), opacities = leaf(1, flat.opacities),
+               features = leaf(3, flat.features), background = leaf(3, {0.2, 0.3, 0.4}),
+               depths = tape.constant("depths", shape_of(kRows, 1)), rest = tape.constant("rest", shape_of(kRows, 1)),
+               means_rest = tape.constant("rest", shape_of(kRows, 2));
+  set_numbers(tape, depths, flat.depths);
+  const Composited<S> out = composite(SplatSet<S>{{means, factors, depths, rest, means_rest}, opacities, features},
+                                      view_of({32, 24, 1, {}, {}, {}, {}, {}}), background);
+  Drawing<S> drawing{tape, {means, factors, opacities, features, background}};
+  drawing.look_at({out.channels, out.transmittance});
+  try_poison<S>(drawing, {{means}, {factors}, {depths}, {means_rest}, {opacities}, {features, true, true}}, factors,
+                std::vector<double>(6 * kRows, 0), changes);
+}
+
+template <class S>
+void try_render(Changes& changes) {
+  const SmallScene scene = small_scene(kRows, 32, 24, 81);
+  TapedScene<S> taped(scene);
+  Drawing<S> drawing{taped.tape, taped.leaves()};
+  drawing.look_at({taped.rendered.image, taped.rendered.transmittance});
+  std::vector<double> behind = scene.means;
+  for (std::size_t i = 2; i < behind.size(); i += 3) behind[i] *= -1;
+  try_poison<S>(
+      drawing, {{taped.means}, {taped.quats}, {taped.log_scales, false}, {taped.logits, false}, {taped.sh, true, true}},
+      taped.means, behind, changes);
+}
+
+/// Pixels of which a Gaussian is left out by a factor of 0 in place of a gate: Σ weight · valid · colour.
+Changes masked_by_product() {
+  const Flat flat;
+  const auto image = [&flat](Index bad, double poison, bool is_there) {
+    std::vector<double> pixels;
+    for (int y = 0; y < 24; ++y) {
+      for (int x = 0; x < 32; ++x) {
+        double sum = 0, t = 1;
+        for (Index n = 0; n < kRows; ++n) {
+          if (n == bad && !is_there) continue;
+          const double* const mean = flat.means.data() + 2 * n;
+          const double color = n == bad ? poison : flat.features[static_cast<std::size_t>(3 * n)];
+          const double dx = x + 0.5 - mean[0], dy = y + 0.5 - mean[1], valid = std::isfinite(color) ? 1 : 0;
+          const double alpha =
+              valid * flat.opacities[static_cast<std::size_t>(n)] * std::exp(-0.5 * (dx * dx + dy * dy) / 4);
+          sum += t * alpha * color;
+          t *= 1 - alpha;
+        }
+        pixels.push_back(sum);
+      }
+    }
+    return pixels;
+  };
+  Changes changes;
+  for (const double poison : kPoison<double>) {
+    if (!std::isfinite(poison)) changes.pixels += different(image(17, poison, true), image(17, poison, false));
+  }
+  return changes;
+}
+
+template <class F>
+std::vector<StressFigure> figures_of(Remedy remedy, const F& measure) {
+  Changes changes;
+  if (remedy == Remedy::kOff) {
+    changes = masked_by_product();
+  } else {
+    measure(changes);
+  }
+  return {{"pixels that differ from those without the Gaussian", changes.pixels, 0},
+          {"gradients that do, or are not 0 for it", changes.gradients, 0},
+          {"numbers that are not finite where inputs are", changes.not_finite, 0}};
+}
+
+}  // namespace
+
+std::vector<StressFigure> poisoned_composite(Remedy remedy) {
+  return figures_of(remedy, [](Changes& changes) {
+    try_composite<float>(changes);
+    try_composite<double>(changes);
+  });
+}
+
+std::vector<StressFigure> poisoned_render(Remedy remedy) {
+  return figures_of(remedy, [](Changes& changes) {
+    try_render<float>(changes);
+    try_render<double>(changes);
+  });
+}
+
+}  // namespace hsi4d::stress

@@ -1,0 +1,131 @@
+// A few Gaussians before a camera on a tape, rendered: for rows that take a whole render.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "autodiff/elementwise.h"
+#include "autodiff/reduce.h"
+#include "core/random.h"
+#include "splat/covariance.h"
+#include "splat/opacity.h"
+#include "splat/render.h"
+#include "splat/sh.h"
+
+namespace hsi4d::stress {
+
+/// Gaussians as numbers, harmonics of degree 1; the camera is at the origin and looks along z.
+struct SmallScene {
+  int width = 0, height = 0;
+  Index count = 0;
+  std::vector<double> means, quats, log_scales, logits, sh;
+};
+
+/// Gaussians all over the image, 2 to 5 m away, from 2 to 10 pixels wide. Every number is a float.
+inline SmallScene small_scene(Index count, int width, int height, std::uint64_t seed) {
+  SmallScene scene{width, height, count, {}, {}, {}, {}, {}};
+  RandomSequence random(seed);
+  const auto add = [&](std::vector<double>& to, double low, double high) {
+    to.push_back(static_cast<double>(static_cast<float>(random.uniform(low, high))));
+  };
+  for (Index n = 0; n < count; ++n) {
+    const double z = random.uniform(2, 5);
+    const double half = 0.5 * z, aspect = static_cast<double>(height) / width;
+    add(scene.means, -half, half);
+    add(scene.means, -half * aspect, half * aspect);
+    add(scene.means, z, z + 1e-3);
+    for (int i = 0; i < 4; ++i) add(scene.quats, -1, 1);
+    const double pixel = z / width;
+    for (int i = 0; i < 3; ++i) add(scene.log_scales, std::log(pixel), std::log(5 * pixel));
+    add(scene.logits, -1, 3);
+    for (int i = 0; i < 12; ++i) add(scene.sh, i < 3 ? -1 : -0.2, i < 3 ? 1.5 : 0.2);
+  }
+  return scene;
+}
+
+inline SplatView view_of(const SmallScene& scene) {
+  SplatView view;
+  view.camera = {scene.width,
+                 scene.height,
+                 static_cast<double>(scene.width),
+                 static_cast<double>(scene.width),
+                 0.5 * scene.width,
+                 0.5 * scene.height,
+                 {}};
+  return view;
+}
+
+/// Row-major numbers of an array, without padding.
+template <class S>
+std::vector<double> numbers_of(const ConstArray<S>& array) {
+  std::vector<double> all;
+  for (Index r = 0; r < array.total_rows(); ++r) {
+    for (Index c = 0; c < array.shape.cols; ++c) all.push_back(static_cast<double>(array.row(r)[c]));
+  }
+  return all;
+}
+
+template <class S>
+void set_numbers(Tape<S>& tape, Var<S> leaf, const std::vector<double>& numbers) {
+  tape.set(leaf, std::vector<S>(numbers.begin(), numbers.end()));
+}
+
+/// |a − b| / |b|, L2.
+inline double relative_l2(const std::vector<double>& a, const std::vector<double>& b) {
+  double difference = 0, size = 0;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    difference += (a[i] - b[i]) * (a[i] - b[i]);
+    size += b[i] * b[i];
+  }
+  return std::sqrt(difference) / std::sqrt(size);
+}
+
+inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double worst = 0;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    const double off = std::abs(a[i] - b[i]);
+    worst = off <= worst ? worst : off;  // what is not a number stays
+  }
+  return worst;
+}
+
+/// The scene on a tape.
+template <class S>
+struct TapedScene {
+  Tape<S> tape;
+  SplatView view;
+  Var<S> means, quats, log_scales, logits, sh, xi, background;
+  Rendered<S> rendered;
+
+  explicit TapedScene(const SmallScene& scene) : view(view_of(scene)) {
+    const auto leaf = [&](const char* name, const std::vector<double>& numbers) {
+      const Var<S> var = tape.parameter(name, shape_of(scene.count, std::ssize(numbers) / scene.count));
+      set_numbers(tape, var, numbers);
+      return var;
+    };
+    means = leaf("means", scene.means);
+    quats = leaf("quats", scene.quats);
+    log_scales = leaf("log_scales", scene.log_scales);
+    logits = leaf("logits", scene.logits);
+    sh = leaf("sh", scene.sh);
+    xi = tape.parameter("xi", shape_of(1, 6));
+    background = tape.parameter("background", shape_of(1, 3));
+    set_numbers(tape, background, {0.2, 0.3, 0.4});
+    rendered =
+        render<S>({means, gaussian_axes(quats, log_scales), gaussian_opacities(logits), sh_colors(sh, means, xi, view)},
+                  xi, background, view);
+  }
+
+  std::vector<Var<S>> leaves() const { return {means, quats, log_scales, logits, sh, xi, background}; }
+  std::vector<double> value(Var<S> of) const { return numbers_of<S>(tape.value(of)); }
+  std::vector<double> gradient(Var<S> of) const { return numbers_of<S>(tape.gradient(of)); }
+};
+
+/// The image of a scene, in double.
+inline std::vector<double> exact_image(const SmallScene& scene) {
+  TapedScene<double> taped(scene);
+  taped.tape.forward(taped.rendered.image);
+  return taped.value(taped.rendered.image);
+}
+
+}  // namespace hsi4d::stress

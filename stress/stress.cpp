@@ -1,0 +1,59 @@
+#include "stress/stress.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+
+#include "core/stopwatch.h"
+
+namespace hsi4d {
+
+namespace {
+
+std::vector<StressFigure> tried(const StressCase& row, Remedy remedy, std::string& error) {
+  try {
+    return row.run(remedy);
+  } catch (const std::exception& thrown) {
+    error = thrown.what();
+    return {};
+  }
+}
+
+bool all_hold(const std::vector<StressFigure>& figures) {
+  return std::all_of(figures.begin(), figures.end(), [](const StressFigure& figure) { return figure.holds(); });
+}
+
+}  // namespace
+
+bool StressResult::holds() const { return error.empty() && !with.empty() && all_hold(with); }
+
+bool StressResult::would_fail() const { return !error_without.empty() || !all_hold(without); }
+
+std::vector<StressCase> stress_cases() {
+  std::vector<StressCase> all;
+  for (const auto cases : {projection_cases, blending_cases, rotation_cases, body_cases, loss_cases, arithmetic_cases,
+                           poison_cases, metamorphic_cases, long_run_cases}) {
+    const std::span<const StressCase> group = cases();
+    all.insert(all.end(), group.begin(), group.end());
+  }
+  return all;
+}
+
+std::vector<StressResult> run_stress(std::span<const StressCase> cases,
+                                     const std::function<void(const StressResult&)>& done) {
+  std::vector<StressResult> results;
+  for (const StressCase& row : cases) {
+    const auto begin = std::chrono::steady_clock::now();
+    StressResult result{&row, {}, {}, {}, {}, 0};
+    if (row.run != nullptr) {
+      result.with = tried(row, Remedy::kOn, result.error);
+      result.without = tried(row, Remedy::kOff, result.error_without);
+    }
+    result.seconds = seconds_since(begin);
+    if (done) done(result);
+    results.push_back(std::move(result));
+  }
+  return results;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,74 @@
+// The stress suite: every way in which such software is known to go wrong, tried out. A case is one row of the
+// catalogue (docs/numerics/failures.md): it measures how far off the program is on inputs that bring the failure about,
+// and the same of a computation without the row's remedy, which has to be further off than is allowed. A case that
+// passes both ways would prove nothing.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+
+namespace hsi4d {
+
+/// Whether what is tried is the program's own way, or one without the row's remedy.
+enum class Remedy { kOn, kOff };
+
+/// One figure of a case. It holds when measured ≤ allowed; what is not a number does not hold.
+struct StressFigure {
+  std::string what;  ///< with its unit: "relative error of det"
+  double measured = 0;
+  double allowed = 0;
+
+  bool holds() const { return measured <= allowed; }
+};
+
+/// One row of the catalogue.
+struct StressCase {
+  const char* id;       ///< "A1"
+  const char* failure;  ///< what goes wrong, in a few words
+  const char* remedy;   ///< what is switched off without it
+  /// The figures, the same ones in the same order for both. Deterministic; seconds at most. What it throws counts as a
+  /// figure that does not hold.
+  std::vector<StressFigure> (*run)(Remedy);
+  const char* exempt = "";  ///< why this row cannot apply here; then `run` is null
+};
+
+/// What became of a case.
+struct StressResult {
+  const StressCase* row = nullptr;
+  std::vector<StressFigure> with, without;  ///< the remedy
+  std::string error, error_without;         ///< what was thrown
+  double seconds = 0;
+
+  /// The program's own way holds.
+  bool holds() const;
+  /// Without the remedy some figure does not hold.
+  bool would_fail() const;
+  bool passed() const { return holds() && would_fail(); }
+};
+
+/// All cases, in the order of the catalogue: rows A1 to F16, then those beyond it (poison, metamorphic, long runs).
+std::vector<StressCase> stress_cases();
+
+/// Runs cases in order.
+/// @param done  called after each of them; may be empty
+std::vector<StressResult> run_stress(std::span<const StressCase> cases,
+                                     const std::function<void(const StressResult&)>& done = {});
+
+// --- the cases, by file
+// ------------------------------------------------------------------------------------------------
+
+std::span<const StressCase> projection_cases();   ///< A: projection, covariance
+std::span<const StressCase> blending_cases();     ///< B: alpha, blending, sorting
+std::span<const StressCase> rotation_cases();     ///< C
+std::span<const StressCase> body_cases();         ///< D: skinning, priors, contacts
+std::span<const StressCase> loss_cases();         ///< E
+std::span<const StressCase> arithmetic_cases();   ///< F: tape, Adam, arithmetic, determinism, build
+std::span<const StressCase> poison_cases();       ///< P: what is not a number, in every slot of every operator
+std::span<const StressCase> metamorphic_cases();  ///< R: relations that a render has to keep
+std::span<const StressCase> long_run_cases();     ///< L: 10,000 steps
+
+}  // namespace hsi4d

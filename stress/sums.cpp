@@ -1,0 +1,152 @@
+// Rows F6 to F8: sums that follow the threads, sums over many pixels, and numbers of few bits.
+#include <array>
+#include <cmath>
+
+#include "autodiff/difference.h"
+#include "stress/arithmetic.h"
+#include "stress/moving.h"
+#include "stress/small_scene.h"
+#include "stress/thread_order.h"
+
+namespace hsi4d::stress {
+
+namespace {
+
+/// A scene fitted to the image of another, with an offset of all colours, after fifty steps.
+std::vector<double> fitted(int threads, Remedy remedy) {
+  std::vector<double> all;
+  with_threads(threads, [&] {
+    const SmallScene scene = small_scene(80, 40, 30, 6);
+    TapedScene<float> taped(scene);
+    const Var<float> offset = taped.tape.parameter("offset", kScalarShape);
+    const Var<float> image = taped.rendered.image, target = taped.tape.constant("target", image.shape());
+    set_numbers(taped.tape, target, exact_image(small_scene(80, 40, 30, 7)));
+    const Var<float> loss = l2(remedy == Remedy::kOn ? image + offset : offset_by_threads(image, offset), target);
+    std::vector<Var<float>> leaves = taped.leaves();
+    leaves.push_back(offset);
+    Adam<float> adam(taped.tape, {moving_at(leaves, 0.01)}, {});
+    for (int step = 0; step < 50; ++step) {
+      taped.tape.forward(loss);
+      taped.tape.backward(loss);
+      adam.step(step, 50, static_cast<double>(taped.tape.value(loss).scalar()));
+    }
+    for (const Var<float> leaf : leaves) {
+      const std::vector<double> numbers = taped.value(leaf);
+      all.insert(all.end(), numbers.begin(), numbers.end());
+    }
+  });
+  return all;
+}
+
+/// One round Gaussian over most of a large image.
+struct WideGaussian {
+  static constexpr int kWidth = 2048, kHeight = 1024;
+  static constexpr double kX = 900, kY = 560, kSigma = 800, kOpacity = 0.7;
+
+  static double cotangent(Index pixel) {  // no sum cancels
+    const auto x = static_cast<double>(pixel % kWidth) / kWidth;
+    return static_cast<double>(static_cast<float>(0.25 + x * x));
+  }
+};
+
+/// Gradients by colour, opacity and mean.
+using WideGradients = std::array<std::vector<double>, 3>;
+
+template <class S>
+WideGradients wide_gradients() {
+  using G = WideGaussian;
+  Tape<S> tape;
+  const auto leaf = [&](const char* name, const std::vector<double>& numbers) {
+    const Var<S> var = tape.parameter(name, shape_of(1, std::ssize(numbers)));
+    set_numbers(tape, var, numbers);
+    return var;
+  };
+  const Var<S> means = leaf("means", {G::kX, G::kY}), opacity = leaf("opacity", {static_cast<float>(G::kOpacity)}),
+               colour = leaf("colour", {static_cast<float>(0.8)});
+  const Projected<S> projected{means, leaf("factors", {G::kSigma, 0, 0, 0, G::kSigma, 0}), leaf("depths", {2}),
+                               tape.constant("rest", shape_of(1, 1)), tape.constant("rest", shape_of(1, 2))};
+  SplatView view = view_of({G::kWidth, G::kHeight, 1, {}, {}, {}, {}, {}});
+  const Composited<S> out = composite(SplatSet<S>{projected, opacity, colour}, view);
+  std::vector<S> cotangent(static_cast<std::size_t>(G::kWidth) * G::kHeight);
+  for (std::size_t i = 0; i < cotangent.size(); ++i) cotangent[i] = static_cast<S>(G::cotangent(static_cast<Index>(i)));
+  tape.forward(out.channels);
+  tape.backward(out.channels, cotangent);
+  return {numbers_of<S>(tape.gradient(colour)), numbers_of<S>(tape.gradient(opacity)),
+          numbers_of<S>(tape.gradient(means))};
+}
+
+/// The same sums pixel by pixel in float.
+WideGradients naive_wide_gradients() {
+  using G = WideGaussian;
+  constexpr float kVariance = static_cast<float>(G::kSigma * G::kSigma + kBlur);
+  constexpr auto kColour = 0.8f, kOpacity = static_cast<float>(G::kOpacity);
+  float colour = 0, opacity = 0, x = 0, y = 0;
+  for (Index pixel = 0; pixel < Index(G::kWidth) * G::kHeight; ++pixel) {
+    const float dx = static_cast<float>(pixel % G::kWidth) + 0.5f - static_cast<float>(G::kX);
+    const float dy = static_cast<float>(pixel / G::kWidth) + 0.5f - static_cast<float>(G::kY);
+    const float g = std::exp(-0.5f * (dx * dx + dy * dy) / kVariance);
+    const auto d = static_cast<float>(G::cotangent(pixel));
+    if (kOpacity * g < static_cast<float>(kAlphaMin)) continue;
+    colour += d * kOpacity * g;
+    opacity += d * kColour * g;
+    x += d * kColour * kOpacity * g * dx / kVariance;
+    y += d * kColour * kOpacity * g * dy / kVariance;
+  }
+  return {{{static_cast<double>(colour)},
+           {static_cast<double>(opacity)},
+           {static_cast<double>(x), static_cast<double>(y)}}};
+}
+
+/// The number with 11 bits of significand, as half precision keeps it.
+double halved(double x) {
+  int exponent = 0;
+  const double significand = std::frexp(x, &exponent);
+  return std::ldexp(std::nearbyint(significand * 2048) / 2048, exponent);
+}
+
+}  // namespace
+
+std::vector<StressFigure> sums_by_threads(Remedy remedy) {
+  const std::vector<double> first = fitted(1, remedy);
+  double different = 0, moved = 0;
+  for (const int threads : {2, 3, 16}) {
+    const std::vector<double> other = fitted(threads, remedy);
+    for (std::size_t i = 0; i < first.size(); ++i) different += first[i] == other[i] ? 0 : 1;
+  }
+  for (const double x : first) moved += x != 0 ? 1 : 0;
+  return {{"parameters that differ on 2, 3 or 16 threads", different, 0},
+          {"share of parameters without a value", 1 - moved / static_cast<double>(first.size()), 0.01}};
+}
+
+std::vector<StressFigure> sums_over_pixels(Remedy remedy) {
+  const WideGradients exact = wide_gradients<double>();
+  const WideGradients computed = remedy == Remedy::kOn ? wide_gradients<float>() : naive_wide_gradients();
+  return {{"gradient by colour over 2 million pixels, relative", relative_l2(computed[0], exact[0]), 1e-6},
+          {"gradient by opacity, relative", relative_l2(computed[1], exact[1]), 1e-6},
+          {"gradient by the mean, relative", relative_l2(computed[2], exact[2]), 1e-6}};
+}
+
+std::vector<StressFigure> half_precision(Remedy remedy) {
+  const SmallScene scene = small_scene(120, 64, 48, 8);
+  SmallScene kept = scene;
+  if (remedy == Remedy::kOff) {
+    for (auto* numbers : {&kept.means, &kept.quats, &kept.log_scales, &kept.logits, &kept.sh}) {
+      for (double& x : *numbers) x = halved(x);
+    }
+  }
+  const auto run = [](auto& taped) {
+    const auto loss = mean(square(taped.rendered.image));
+    taped.tape.forward(loss);
+    taped.tape.backward(loss);
+  };
+  TapedScene<double> exact(scene);
+  TapedScene<float> computed(kept);
+  run(exact);
+  run(computed);
+  return {{"error of the image, of 1",
+           largest_difference(computed.value(computed.rendered.image), exact.value(exact.rendered.image)), 1e-4},
+          {"gradient by means, relative", relative_l2(computed.gradient(computed.means), exact.gradient(exact.means)),
+           1e-4}};
+}
+
+}  // namespace hsi4d::stress
