@@ -14,7 +14,7 @@ namespace hsi4d {
 
 namespace {
 
-constexpr int kSide = 192;                      // pixels
+constexpr int kSide = 128;                      // pixels
 constexpr double kShOfConstant = 0.2820947918;  // Y of degree 0
 constexpr std::uint64_t kShSeed = 21;
 
@@ -89,23 +89,23 @@ ParetoScene cloud_scene(Cloud cloud, double size, std::uint64_t seed) {
 
 // --- scenes ----------------------------------------------------------------------------------------------------------
 
-ParetoScene sparse(double size) { return cloud_scene({.count = 1000, .pixels = 1.2}, size, 31); }
+ParetoScene sparse(double size) { return cloud_scene({.count = 500, .pixels = 1.2}, size, 31); }
 
 ParetoScene dense(double size) {
-  return cloud_scene({.count = 5000, .pixels = 6, .least_opacity = 0.02, .most_opacity = 0.3}, size, 32);
+  return cloud_scene({.count = 2500, .pixels = 6, .least_opacity = 0.02, .most_opacity = 0.3}, size, 32);
 }
 
 ParetoScene opaque(double size) {
-  return cloud_scene({.count = 3000, .pixels = 6, .least_opacity = 0.9, .most_opacity = 0.9999}, size, 33);
+  return cloud_scene({.count = 1500, .pixels = 6, .least_opacity = 0.9, .most_opacity = 0.9999}, size, 33);
 }
 
 ParetoScene needles(double size) {
-  return cloud_scene({.count = 2000, .pixels = 25, .shape = {1, 0.01, 0.01}}, size, 34);
+  return cloud_scene({.count = 1000, .pixels = 25, .shape = {1, 0.01, 0.01}}, size, 34);
 }
 
 /// The trunk of the figure fills the image.
 ParetoScene avatar_close_up(double size) {
-  const Workload w = avatar_workload({static_cast<int>(std::lround(kSide * size)), scaled(5000, size), 0});
+  const Workload w = avatar_workload({static_cast<int>(std::lround(kSide * size)), scaled(2500, size), 0});
   Camera camera = w.view.camera;
   camera.fx = camera.fy = 3.0 * camera.width;
   camera.cy += 0.12 * camera.fy;
@@ -114,7 +114,7 @@ ParetoScene avatar_close_up(double size) {
 
 ParetoScene avatar_in_scene(double size) {
   const Workload w =
-      avatar_in_scene_workload({static_cast<int>(std::lround(kSide * size)), scaled(2000, size), scaled(5000, size)});
+      avatar_in_scene_workload({static_cast<int>(std::lround(kSide * size)), scaled(1000, size), scaled(2500, size)});
   return {"", gaussians_of(w), w.view.camera};
 }
 

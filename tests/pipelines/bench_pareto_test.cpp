@@ -97,14 +97,14 @@ TEST_CASE("the default comes first and no setting occurs twice") {
 
 TEST_CASE("the brute-force renderer has no error against itself") {
   const ParetoScene scene = pareto_scene("avatar_in_scene", 0.1);
-  REQUIRE(scene.camera.width == 19);
-  REQUIRE(scene.gaussians.count() == 70);
+  REQUIRE(scene.camera.width == 13);
+  REQUIRE(scene.gaussians.count() == 35);
   SceneView view;
   view.camera = scene.camera;
   view.settings.alpha_min = view.settings.transmittance_stop = 0;
   view.precision = Precision::kReference;
   // The cotangent of the squared difference from a grey image: two ways to the same numbers.
-  const std::vector<double> grey(3 * 19 * 19, 0.5);
+  const std::vector<double> grey(3 * 13 * 13, 0.5);
   const SceneGradients one = scene_gradients(scene.gaussians, view, grey);
   std::vector<double> cotangent(grey.size());
   for (std::size_t i = 0; i < grey.size(); ++i)
@@ -166,7 +166,7 @@ TEST_CASE("every scene is drawn with fewer errors the fewer cuts there are") {
     CHECK(std::count(line.begin(), line.end(), ',') == commas + std::count(line.begin(), line.end(), '"') / 2 - 1);
   CHECK(objects == rows.size());
 
-  CHECK_THAT(pareto_table(rows), Contains("needles: 80 Gaussians, 1444 pixels\n") && Contains("quality accurate"));
+  CHECK_THAT(pareto_table(rows), Contains("needles: 40 Gaussians, 676 pixels\n") && Contains("quality accurate"));
   CHECK_THAT(pareto_front_table(rows), Contains("front, all scenes") && Contains("front, avatar_in_scene\n"));
   const std::string svg = pareto_svg(rows);
   CHECK_THAT(svg, Contains("<svg xmlns=") && Contains("image, RMS, avatar_in_scene") && Contains("class=\"name\"") &&
