@@ -15,6 +15,7 @@ namespace hsi4d::cli {
 namespace {
 
 constexpr const char* kTrackedLike = "avatar_in_scene";  // what is reconstructed looks like it
+constexpr double kMostTrackedTime = 4;                   // of the default's: settings beyond are not reconstructed with
 
 std::vector<ParetoScene> chosen_scenes(const BenchParetoOptions& options) {
   std::vector<ParetoScene> scenes;
@@ -41,18 +42,24 @@ std::vector<ParetoSetting> chosen_settings(const std::vector<std::string>& knobs
   return chosen;
 }
 
-/// The presets, and what is on a front of the scene that is most like what is reconstructed.
+/// The presets, and what is on a front of the scene that is most like what is reconstructed, as far as it does not take
+/// too long. The default comes first.
 std::vector<ParetoSetting> tracked_settings(const std::vector<ParetoRow>& rows,
                                             const std::vector<ParetoSetting>& measured) {
   const auto is_like = [](const ParetoRow& row) { return row.scene == kTrackedLike; };
   const bool has_like = std::any_of(rows.begin(), rows.end(), is_like);
   const std::vector<ParetoPoint> points = pareto_points(rows, has_like ? kTrackedLike : "");
-  std::vector<std::string> names;
+  std::vector<std::string> names, slow;
+  for (const ParetoPoint& point : points)
+    if (point.time_ratio > kMostTrackedTime) slow.push_back(point.name());
+  const auto has = [](const std::vector<std::string>& all, const std::string& name) {
+    return std::find(all.begin(), all.end(), name) != all.end();
+  };
   for (double ParetoPoint::*error : {&ParetoPoint::image_rms, &ParetoPoint::gradient})
     for (const std::size_t i : pareto_front(times_and_errors(points, error))) names.push_back(points[i].name());
   std::vector<ParetoSetting> tracked;
   for (const ParetoSetting& setting : measured)
-    if (setting.knob == "quality" || std::find(names.begin(), names.end(), setting.name()) != names.end())
+    if ((setting.knob == "quality" || has(names, setting.name())) && !has(slow, setting.name()))
       tracked.push_back(setting);
   return tracked;
 }

@@ -22,8 +22,9 @@ struct BenchParetoOptions {
   std::string json, csv, plot;                      ///< files; empty: none
 };
 
-/// Measures, and reconstructs with the presets and with what is on the front of avatar_in_scene. Names and the config
-/// are looked at before anything is measured. Returns tables.
+/// Measures, and reconstructs with the presets and with what is on the front of avatar_in_scene, but for what takes
+/// more than four times as long as the default. Names and the config are looked at before anything is measured. Returns
+/// tables.
 std::string bench_pareto_command(const BenchParetoOptions& options, const std::vector<LossTerm>& losses);
 
 }  // namespace hsi4d::cli
