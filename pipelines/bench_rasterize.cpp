@@ -20,12 +20,12 @@ namespace {
 
 struct NamedWorkload {
   const char* name;
-  Workload (*make)();
+  Workload (*make)(const WorkloadSize&);
 };
 constexpr std::array<NamedWorkload, 4> kWorkloads = {{{"avatar", avatar_workload},
                                                       {"scene", scene_workload},
                                                       {"avatar_in_scene", avatar_in_scene_workload},
-                                                      {"small", small_workload}}};
+                                                      {"small", [](const WorkloadSize&) { return small_workload(); }}}};
 
 /// A workload on a tape, projected once: what is measured starts at the image plane.
 struct Recorded {
@@ -123,7 +123,7 @@ void bench_rasterize(const RasterizeBench& options, const std::function<void(con
   for (const NamedWorkload& named : kWorkloads) {
     const auto& wanted = options.workloads;
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), named.name) == wanted.end()) continue;
-    const Workload workload = named.make();
+    const Workload workload = named.make({});
     with_threads(options.threads, [&] {
       bench_workload(workload, options, report);
       if (workload.moving_begin > 0 && workload.moving_begin < workload.count) {

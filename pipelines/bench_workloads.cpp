@@ -91,6 +91,9 @@ Made on_capsule(const Capsule& capsule, RandomSequence& random, double size) {
 
 constexpr double kFigureSize = 0.0046, kScenePixels = 2.4;  // chosen for 6.5 and 71 million fragments
 
+/// How much larger `count` Gaussians are that cover what `usual` cover.
+double enlarged(Index count, Index usual) { return std::sqrt(static_cast<double>(usual) / static_cast<double>(count)); }
+
 /// @param scale  of the figure and its distance, so that it looks the same
 void append_figure(Workload& w, Index count, double scale) {
   const Vector3<double> pelvis(0, -0.05, 2.05);
@@ -102,7 +105,7 @@ void append_figure(Workload& w, Index count, double scale) {
   for (const Capsule& c : capsules()) {
     wanted += static_cast<double>(count) * c.radius * ((c.to - c.from).norm() + 2 * c.radius) / area;
     for (; made < static_cast<Index>(std::lround(wanted)); ++made) {
-      Made g = on_capsule(c, random, kFigureSize);
+      Made g = on_capsule(c, random, kFigureSize * enlarged(count, WorkloadSize().figure));
       g.mean = (g.mean + pelvis) * scale;
       g.scales *= scale;
       append(w, g);
@@ -112,8 +115,10 @@ void append_figure(Workload& w, Index count, double scale) {
 
 // --- scene -----------------------------------------------------------------------------------------------------------
 
-/// Gaussians spread over the view and beyond its border, nearer ones rarer, sizes in pixels.
-void append_scene(Workload& w, Index count, double pixels) {
+/// Gaussians spread over the view and beyond its border, nearer ones rarer.
+void append_scene(Workload& w, Index count) {
+  const WorkloadSize usual;
+  const double pixels = kScenePixels * enlarged(count, usual.scene) * w.view.camera.fx / usual.side_px;
   RandomSequence random(12);
   for (Index n = 0; n < count; ++n) {
     const double z = 2 * std::pow(6.0, std::sqrt(random.uniform())), focal = w.view.camera.fx;
@@ -131,24 +136,24 @@ void append_scene(Workload& w, Index count, double pixels) {
 
 }  // namespace
 
-Workload avatar_workload() {
-  Workload w{.name = "avatar", .view = square_view(1024)};
-  append_figure(w, 50000, 1);
+Workload avatar_workload(const WorkloadSize& size) {
+  Workload w{.name = "avatar", .view = square_view(size.side_px)};
+  append_figure(w, size.figure, 1);
   w.moving_begin = 0;
   return w;
 }
 
-Workload scene_workload() {
-  Workload w{.name = "scene", .view = square_view(1024)};
-  append_scene(w, 500000, kScenePixels);
+Workload scene_workload(const WorkloadSize& size) {
+  Workload w{.name = "scene", .view = square_view(size.side_px)};
+  append_scene(w, size.scene);
   w.moving_begin = w.count;
   return w;
 }
 
-Workload avatar_in_scene_workload() {
-  Workload w = scene_workload();
+Workload avatar_in_scene_workload(const WorkloadSize& size) {
+  Workload w = scene_workload(size);
   w.name = "avatar_in_scene";
-  append_figure(w, 50000, 1.27);  // 2.6 m away: some of the scene is in front
+  append_figure(w, size.figure, 1.27);  // 2.6 m away: some of the scene is in front
   return w;
 }
 

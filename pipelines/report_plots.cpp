@@ -146,11 +146,14 @@ void append_axes(std::string& svg, const Plot& plot, const Axis& x, const Axis& 
 }
 
 void append_line(std::string& svg, const Plot& plot, const PlotLine& line, const Axis& x, const Axis& y) {
-  std::string points, dots;
+  std::string points, dots, name;
   for (const auto& [px, py] : line.points) {
     if (!has_place(plot, py)) continue;
     const std::string at_x = coordinate(plot_x(plot, x, px)), at_y = coordinate(plot_y(y, py));
     points += (points.empty() ? "" : " ") + at_x + "," + at_y;
+    if (line.is_named)
+      name = "<text class=\"name\" x=\"" + coordinate(plot_x(plot, x, px) + 5) + "\" y=\"" +
+             coordinate(plot_y(y, py) - 4) + "\">" + html_escape(line.label) + "</text>";
     if (line.has_dots)
       dots += "<circle cx=\"" + at_x + "\" cy=\"" + at_y + "\" r=\"3\" style=\"fill:" + line.color + "\"><title>" +
               html_escape(line.label) + ", " + html_escape(plot.x_label) + " " + tick_text(px) + ": " +
@@ -161,7 +164,7 @@ void append_line(std::string& svg, const Plot& plot, const PlotLine& line, const
   svg += "<polyline points=\"" + points + "\" style=\"stroke:" + line.color;
   if (line.opacity < 1) svg += ";opacity:" + fixed_number(line.opacity, 2);
   if (line.is_dashed) svg += ";stroke-dasharray:5 4";
-  svg += "\"><title>" + html_escape(line.label) + "</title></polyline>" + dots + "\n";
+  svg += "\"><title>" + html_escape(line.label) + "</title></polyline>" + dots + name + "\n";
 }
 
 /// The rest of the class, and where which frame is: from which to which, and at which x these are.

@@ -18,6 +18,7 @@
 #include "pipelines/cli/avatar_command.h"
 #include "pipelines/cli/avatar_fit_command.h"
 #include "pipelines/cli/bench_command.h"
+#include "pipelines/cli/bench_pareto_command.h"
 #include "pipelines/cli/bench_scaling_command.h"
 #include "pipelines/cli/bench_stages_command.h"
 #include "pipelines/cli/command_words.h"
@@ -85,6 +86,7 @@ struct CommandLine {
   BenchStagesOptions bench_stages;
   BenchScalingOptions bench_scaling;
   StressOptions stress;
+  BenchParetoOptions bench_pareto;
   SelectCameraOptions select_camera;
   EvaluateOptions evaluate;
   std::function<std::string()> run;
@@ -310,11 +312,11 @@ struct CommandLine {
 
   void add_bench(const std::vector<LossTerm>& terms) {
     CLI::App* command = app.add_subcommand("bench",
-                                           "Measure the speed of the renderer, the body or a whole run, or the pixel "
-                                           "filter: a table, and one JSON object a measurement");
-    command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter, stages, scaling")
+                                           "Measure the speed of the renderer, the body or a whole run, time against "
+                                           "error, or the pixel filter: a table, and one JSON object a measurement");
+    command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter, stages, scaling, pareto")
         ->required()
-        ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter", "stages", "scaling"}));
+        ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter", "stages", "scaling", "pareto"}));
     command->add_option("--workload", bench.workloads, "Only these; default: all; not of stages and scaling");
     command->add_option("--threads", bench.threads, "Threads; default: 1, of stages and scaling what the config says")
         ->check(CLI::Range(1, 1024));
@@ -326,10 +328,14 @@ struct CommandLine {
     command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
         ->check(CLI::Range(8.0, 2048.0));
     command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
-    command->add_option("--config", bench_stages.config, "Of stages and scaling: the config that is run")
+    command->add_option("--config", bench_stages.config, "Of stages, scaling and pareto: the config that is run")
         ->type_name("F.json");
-    command->add_option("--out", bench_stages.out, "Of stages: folder of dataset and runs; default: runs/bench/CONFIG");
-    command->add_option("--plot", bench_stages.plot, "Of stages and scaling: file for a picture")->type_name("F.svg");
+    command->add_option("--out", bench_stages.out,
+                        "Of stages: folder of dataset and runs; default: runs/bench/CONFIG. Of pareto: folder that is "
+                        "made for those of the reconstructions and removed again; default: runs/bench/pareto");
+    command->add_option("--plot", bench_stages.plot, "Of stages, scaling and pareto: file for a picture")
+        ->type_name("F.svg");
+    add_bench_pareto(*command);
     command
         ->add_option("--axis", bench_scaling.axes,
                      "Of scaling: scene, avatar, image or threads, with its values or without; default: all")
@@ -339,8 +345,26 @@ struct CommandLine {
     command->callback([this, command, &terms] {
       const int threads = command->count("--threads") > 0 ? bench.threads : 0;
       if (command->count("--repeats") > 0) bench_scaling.repeats = bench.repeats;
+      if (command->count("--config") > 0) bench_pareto.config = bench_stages.config;
+      if (command->count("--out") > 0) bench_pareto.out = bench_stages.out;
       run = [this, threads, &terms] { return run_bench(threads, terms); };
     });
+  }
+
+  void add_bench_pareto(CLI::App& command) {
+    BenchParetoOptions& o = bench_pareto;
+    command.add_option("--csv", o.csv, "Of pareto: file for the measurements, a line each")->type_name("F.csv");
+    command
+        .add_option(
+            "--scene", o.scene_file,
+            std::string("Of pareto: Gaussians to measure too, instead of all that are made up unless --workload "
+                        "names some; ") +
+                kSplatFormats)
+        ->type_name("F.ply");
+    command.add_option("--knob", o.knobs, "Of pareto: only these and the default; default: all");
+    command
+        .add_option("--seeds", o.seeds, "Of pareto: reconstructions of each setting; default: 5; 0 leaves these out")
+        ->check(CLI::Range(0, 100));
   }
 
   /// @param threads  that were asked for; 0: none
@@ -357,6 +381,15 @@ struct CommandLine {
       bench_scaling.json = bench.json;
       bench_scaling.plot = bench_stages.plot;
       return bench_scaling_command(bench_scaling, terms);
+    }
+    if (topic == "pareto") {
+      bench_pareto.scenes = bench.workloads;
+      bench_pareto.overrides = bench_stages.overrides;
+      bench_pareto.threads = bench.threads;
+      bench_pareto.repeats = bench.repeats;
+      bench_pareto.json = bench.json;
+      bench_pareto.plot = bench_stages.plot;
+      return bench_pareto_command(bench_pareto, terms);
     }
     if (topic == "skinning") return bench_skinning_command(bench);
     if (topic == "color_net") return bench_color_net_command(bench);

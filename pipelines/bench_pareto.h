@@ -1,0 +1,180 @@
+// `hsi4d bench pareto`: run time against error of the renderer, setting by setting.
+//
+// Every scene is drawn, and a fixed random cotangent taken back, under every setting: times beside the default's,
+// errors beside the brute-force renderer in double without a cut (alpha_min 0, transmittance_stop 0). What no other
+// setting beats in both time and error is the front.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "pipelines/scene_render.h"
+#include "splat/gaussians.h"
+
+namespace hsi4d {
+
+// --- what is measured ------------------------------------------------------------------------------------------------
+
+/// Gaussians and a camera that sees them, or does not.
+struct ParetoScene {
+  std::string name;
+  Gaussians gaussians;
+  Camera camera;
+  bool is_extreme = false;  ///< nothing to see, or everything on one spot: presets alone, and in no front
+};
+
+/// The names of the made-up scenes.
+std::vector<std::string> pareto_scene_names();
+
+/// A made-up scene: the same bits every time.
+/// @param size  1: as it is measured; less: so much smaller image sides, and Gaussians by its square
+/// Throws UserError naming the known ones for another name.
+ParetoScene pareto_scene(const std::string& name, double size = 1);
+
+/// The Gaussians of a file, seen from obliquely above (z up) at 1.3 times the extent of most of them. Of more than
+/// kMostParetoGaussians so many are kept, and enlarged to cover as much. Throws as read_splats, and UserError when the
+/// file has no Gaussians.
+ParetoScene pareto_scene_of(const std::string& file);
+
+inline constexpr Index kMostParetoGaussians = 8000;
+
+/// The model whose numbers a setting's are compared with: its own without cuts, or the one without a cap of alpha too.
+enum class ParetoModel { kOwn, kUncapped };
+
+/// The renderer with one or a few knobs turned.
+struct ParetoSetting {
+  std::string knob;   ///< "alpha_min"; "quality" for presets, "product" for more than one knob
+  std::string value;  ///< "1/512"; "default" is what times are told of
+  RenderSettings settings;
+  Precision precision = Precision::kFloat;  ///< never kReference
+  ParetoModel model = ParetoModel::kOwn;
+
+  std::string name() const { return knob + " " + value; }
+};
+
+/// All settings, the default first.
+const std::vector<ParetoSetting>& pareto_settings();
+
+/// The knobs of these settings, each once.
+std::vector<std::string> pareto_knobs();
+
+// --- errors ----------------------------------------------------------------------------------------------------------
+
+/// Of an image whose white is 1. All 0 where there is no difference, and of an image without pixels.
+struct ImageError {
+  double rms = 0, max = 0, p999 = 0;
+  double bias = 0;  ///< mean of the signed difference
+
+  /// −20 log₁₀ rms; none where there is no difference.
+  std::optional<double> psnr_db() const;
+};
+
+/// Of a class of derivatives: g against the true t. All 0 where both are 0.
+struct GradientError {
+  double relative_l2 = 0;       ///< |g − t| / |t|
+  double one_minus_cosine = 0;  ///< 1 − g·t / (|g| |t|)
+  double bias = 0;              ///< (g − t)·t / |t|²: how much too long along the truth
+};
+
+/// In the order in which errors are told.
+inline constexpr std::array<const char*, 6> kGradientClasses = {"means",          "quats", "log_scales",
+                                                                "opacity_logits", "sh",    "camera"};
+
+using GradientErrors = std::array<GradientError, kGradientClasses.size()>;
+
+/// Throws InternalError when the two have different counts of numbers, as all of these.
+ImageError image_error(std::span<const double> image, std::span<const double> truth);
+GradientError gradient_error(std::span<const double> gradient, std::span<const double> truth);
+GradientErrors gradient_errors(const SceneGradients& gradients, const SceneGradients& truth);
+
+// --- measurements ----------------------------------------------------------------------------------------------------
+
+/// Seconds of repeated runs.
+struct RunTimes {
+  double median_s = 0, least_s = 0;
+};
+
+/// One scene under one setting.
+struct ParetoRow {
+  std::string scene;
+  bool is_extreme = false;
+  std::string knob, value;
+  ParetoModel model = ParetoModel::kOwn;
+  Index gaussians = 0, pixels = 0, fragments = 0, pairs = 0;
+  int repeats = 0;
+  RunTimes forward = {}, backward = {};  ///< of a kept tape: from the numbers to the image, and back to them
+  double forward_ratio = 1;              ///< of medians, to the default's that ran in turns with it
+  double backward_ratio = 1;             ///< likewise
+  double time_ratio = 1;                 ///< of forward and backward together
+  ImageError image = {};
+  GradientErrors gradients = {};
+
+  std::string name() const { return knob + " " + value; }
+  bool is_preset() const { return knob == "quality"; }
+  /// The largest relative L2 of the classes.
+  double worst_gradient() const;
+};
+
+struct ParetoBench {
+  std::vector<ParetoScene> scenes;
+  std::vector<ParetoSetting> settings;
+  int repeats = 9;
+  int threads = 1;
+};
+
+/// How many rows measure_pareto makes.
+Index pareto_row_count(const ParetoBench& bench);
+
+/// Measures. On one thread times are those that the processor gave.
+/// @param told  after every row; may be empty
+std::vector<ParetoRow> measure_pareto(const ParetoBench& bench, const std::function<void(const ParetoRow&)>& told = {});
+
+// --- the front -------------------------------------------------------------------------------------------------------
+
+/// Something that takes time and has an error.
+struct TimeAndError {
+  double time = 0, error = 0;
+};
+
+/// Which of the points no other one beats: that is as fast and as good, and better in one of the two. Ascending in
+/// time; of equal points the first.
+std::vector<std::size_t> pareto_front(const std::vector<TimeAndError>& points);
+
+/// A setting over the scenes that have it, extreme ones left out.
+struct ParetoPoint {
+  std::string knob, value;
+  double time_ratio = 1;                      ///< geometric mean
+  double image_rms = 0, worst_image_rms = 0;  ///< median and largest
+  double gradient = 0, worst_gradient = 0;    ///< of ParetoRow::worst_gradient()
+
+  std::string name() const { return knob + " " + value; }
+  bool is_preset() const { return knob == "quality"; }
+};
+
+/// The settings of the rows in their order, those that are compared with another model than their own left out.
+/// @param scene  of this one alone; empty: all
+std::vector<ParetoPoint> pareto_points(const std::vector<ParetoRow>& rows, const std::string& scene = "");
+
+/// The points by what they have of a quantity.
+std::vector<TimeAndError> times_and_errors(const std::vector<ParetoPoint>& points, double ParetoPoint::*error);
+
+// --- text ------------------------------------------------------------------------------------------------------------
+
+/// A table a scene.
+std::string pareto_table(const std::vector<ParetoRow>& rows);
+/// Fronts over all scenes and of avatar_in_scene, by image and by gradient; presets beside them.
+std::string pareto_front_table(const std::vector<ParetoRow>& rows);
+/// A head line, and a line a row. No PSNR where there is no difference.
+std::string pareto_csv(const std::vector<ParetoRow>& rows);
+/// One JSON object a line.
+std::string pareto_json(const std::vector<ParetoRow>& rows);
+/// Time against each error, a column for all scenes and one for avatar_in_scene, as an SVG file: dots by knob, the
+/// front as a line, presets named.
+std::string pareto_svg(const std::vector<ParetoRow>& rows);
+
+}  // namespace hsi4d

@@ -1,0 +1,192 @@
+#include "pipelines/bench_pareto.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "pipelines/reference_render.h"
+
+using namespace hsi4d;
+using Catch::Matchers::Contains;
+
+namespace {
+
+std::vector<ParetoSetting> settings_named(const std::vector<std::string>& names) {
+  std::vector<ParetoSetting> chosen;
+  for (const ParetoSetting& setting : pareto_settings())
+    if (std::find(names.begin(), names.end(), setting.name()) != names.end()) chosen.push_back(setting);
+  return chosen;
+}
+
+ParetoRow made_up(const std::string& scene, const std::string& value, double time, double rms, double gradient) {
+  ParetoRow row{.scene = scene, .knob = "alpha_min", .value = value};
+  row.time_ratio = time;
+  row.image.rms = rms;
+  row.gradients[3].relative_l2 = gradient;
+  return row;
+}
+
+}  // namespace
+
+TEST_CASE("the front is what nothing beats in both time and error") {
+  const std::vector<TimeAndError> points = {{2, 0.1},   {1, 0.5}, {3, 0.1}, {1, 0.6},
+                                            {1.5, 0.5}, {2, 0.1}, {4, 0},   {0.5, 9}};
+  CHECK(pareto_front(points) == std::vector<std::size_t>{7, 1, 0, 6});
+  CHECK(pareto_front({}).empty());
+  CHECK(pareto_front({{1, 1}, {1, 1}}) == std::vector<std::size_t>{0});
+}
+
+TEST_CASE("a point is a setting over the scenes that are not extreme") {
+  std::vector<ParetoRow> rows = {made_up("a", "x", 1, 1e-3, 0.1), made_up("b", "x", 4, 4e-3, 0.4),
+                                 made_up("c", "x", 2, 2e-3, 0.2), made_up("a", "y", 3, 0, 0),
+                                 made_up("d", "x", 100, 1, 1),    made_up("a", "z", 0.5, 1, 1)};
+  rows[4].is_extreme = true;
+  rows[5].model = ParetoModel::kUncapped;
+  const std::vector<ParetoPoint> points = pareto_points(rows);
+  REQUIRE(points.size() == 2);
+  CHECK(points[0].name() == "alpha_min x");
+  CHECK(points[0].time_ratio == Approx(2));
+  CHECK(points[0].image_rms == 2e-3);
+  CHECK(points[0].worst_image_rms == 4e-3);
+  CHECK(points[0].gradient == 0.2);
+  CHECK(points[0].worst_gradient == 0.4);
+  CHECK(points[1].time_ratio == Approx(3));
+  REQUIRE(pareto_points(rows, "b").size() == 1);
+  CHECK(pareto_points(rows, "b")[0].time_ratio == Approx(4));
+}
+
+TEST_CASE("errors of known differences") {
+  const std::vector<double> truth = {0, 1, 0, 1}, image = {0, 1, 0.5, 0.9};
+  const ImageError error = image_error(image, truth);
+  CHECK(error.rms == Approx(std::sqrt(0.26 / 4)));
+  CHECK(error.max == Approx(0.5));
+  CHECK(error.p999 == Approx(0.1));  // of four numbers the third
+  CHECK(error.bias == Approx(0.1));
+  CHECK(error.psnr_db().value() == Approx(-10 * std::log10(0.065)));
+  CHECK_FALSE(image_error(truth, truth).psnr_db());
+  CHECK_THROWS_AS(image_error(truth, std::vector<double>{1}), InternalError);
+
+  const std::vector<double> t = {3, 4}, longer = {6, 8}, across = {-4, 3}, opposite = {-3, -4}, zero = {0, 0};
+  CHECK(gradient_error(longer, t).relative_l2 == Approx(1));
+  CHECK(gradient_error(longer, t).one_minus_cosine == Approx(0).margin(1e-15));
+  CHECK(gradient_error(longer, t).bias == Approx(1));
+  CHECK(gradient_error(across, t).relative_l2 == Approx(std::sqrt(2.0)));
+  CHECK(gradient_error(across, t).one_minus_cosine == Approx(1));
+  CHECK(gradient_error(across, t).bias == Approx(-1));
+  CHECK(gradient_error(opposite, t).one_minus_cosine == Approx(2));
+  CHECK(gradient_error(zero, t).relative_l2 == Approx(1));
+  CHECK(std::isinf(gradient_error(t, zero).relative_l2));
+  CHECK(gradient_error(zero, zero).relative_l2 == 0);
+  const std::vector<double> near = {3, 4 + 1e-9};  // 1 − cos is far below what 1 − x can hold
+  CHECK(gradient_error(near, t).one_minus_cosine == Approx(0.5 * std::pow(0.6e-9 / 5, 2)).epsilon(1e-3));
+}
+
+TEST_CASE("the default comes first and no setting occurs twice") {
+  const std::vector<ParetoSetting>& all = pareto_settings();
+  CHECK(all.front().name() == "quality default");
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) CHECK(all[i].name() != all[k].name());
+  const std::vector<std::string> knobs = pareto_knobs();
+  CHECK(knobs.size() == 10);
+  CHECK(pareto_scene_names().size() == 8);
+}
+
+TEST_CASE("the brute-force renderer has no error against itself") {
+  const ParetoScene scene = pareto_scene("avatar_in_scene", 0.1);
+  REQUIRE(scene.camera.width == 13);
+  REQUIRE(scene.gaussians.count() == 35);
+  SceneView view;
+  view.camera = scene.camera;
+  view.settings.alpha_min = view.settings.transmittance_stop = 0;
+  view.precision = Precision::kReference;
+  // The cotangent of the squared difference from a grey image: two ways to the same numbers.
+  const std::vector<double> grey(3 * 13 * 13, 0.5);
+  const SceneGradients one = scene_gradients(scene.gaussians, view, grey);
+  std::vector<double> cotangent(grey.size());
+  for (std::size_t i = 0; i < grey.size(); ++i)
+    cotangent[i] = 2 * (one.rendered.image[i] - grey[i]) / static_cast<double>(grey.size());
+  const SceneGradients other =
+      adjoint_reference(scene.gaussians, view, [&cotangent](SceneGradients&) { return cotangent; });
+  CHECK(image_error(other.rendered.image, one.rendered.image).max == 0);
+  CHECK(*std::max_element(one.rendered.image.begin(), one.rendered.image.end()) > 0.1);
+  for (const GradientError& error : gradient_errors(other, one)) CHECK(error.relative_l2 == 0);
+  const auto too_few = [](SceneGradients&) { return std::vector<double>(3); };
+  CHECK_THROWS_AS(adjoint_reference(scene.gaussians, view, too_few), InternalError);
+}
+
+TEST_CASE("every scene is drawn with fewer errors the fewer cuts there are") {
+  const std::vector<ParetoSetting> settings =
+      settings_named({"quality default", "quality fast", "quality accurate", "quality reference", "precision double",
+                      "transmittance_stop 1e-2 inclusive"});
+  REQUIRE(settings.size() == 6);
+  ParetoBench bench{{}, settings, 1, 1};
+  for (const std::string& name : pareto_scene_names())
+    bench.scenes.push_back(pareto_scene(name, name == "stack" ? 0.05 : 0.2));
+  Index told = 0;
+  const std::vector<ParetoRow> rows = measure_pareto(bench, [&told](const ParetoRow&) { ++told; });
+  CHECK(told == pareto_row_count(bench));
+  CHECK(told == 6 * 6 + 2 * 4);
+  for (const ParetoRow& row : rows) {
+    INFO(row.scene << ", " << row.name());
+    CHECK(row.is_extreme == (row.scene == "empty" || row.scene == "stack"));
+    CHECK(row.repeats == 1);
+    CHECK(row.forward.least_s > 0);
+    CHECK(row.time_ratio > 0);
+    if (row.scene == "empty") {
+      CHECK(row.image.max == 0);
+      CHECK(row.worst_gradient() == 0);
+      continue;
+    }
+    CHECK(row.fragments > 0);
+    CHECK(row.pairs > 0);
+    if (row.value == "reference") CHECK((row.image.max < 1e-4 && row.worst_gradient() < 1e-3));
+    if (row.value == "fast" && row.scene != "stack") CHECK(row.image.max > 1e-4);
+  }
+  CHECK(rows.front().time_ratio == 1);
+
+  std::istringstream lines(pareto_json(rows));
+  std::size_t objects = 0;
+  for (std::string line; std::getline(lines, line); ++objects) {
+    const nlohmann::json object = nlohmann::json::parse(line);
+    CHECK(object["gradients"].size() == kGradientClasses.size());
+    CHECK(object.contains("psnr_db") == (object["image_rms"] > 0));
+  }
+  CHECK(objects == rows.size());
+
+  std::istringstream csv(pareto_csv(rows));
+  std::string head, line;
+  std::getline(csv, head);
+  const auto commas = std::count(head.begin(), head.end(), ',');
+  CHECK(commas == 20 + 18);
+  for (objects = 0; std::getline(csv, line); ++objects)
+    CHECK(std::count(line.begin(), line.end(), ',') == commas + std::count(line.begin(), line.end(), '"') / 2 - 1);
+  CHECK(objects == rows.size());
+
+  CHECK_THAT(pareto_table(rows), Contains("needles: 40 Gaussians, 676 pixels\n") && Contains("quality accurate"));
+  CHECK_THAT(pareto_front_table(rows), Contains("front, all scenes") && Contains("front, avatar_in_scene\n"));
+  const std::string svg = pareto_svg(rows);
+  CHECK_THAT(svg, Contains("<svg xmlns=") && Contains("image, RMS, avatar_in_scene") && Contains("class=\"name\"") &&
+                      Contains(">accurate</text>") && !Contains("nothing to plot"));
+}
+
+TEST_CASE("the cap is compared with no cap") {
+  ParetoScene scene = pareto_scene("opaque", 0.2);
+  for (float& logit : scene.gaussians.opacity_logits) logit = 9;  // 0.9999
+  for (float& log_scale : scene.gaussians.log_scales) log_scale += 1;
+  const ParetoBench bench{{scene}, settings_named({"alpha_cap 0.99", "alpha_cap 1"}), 1, 1};
+  const std::vector<ParetoRow> rows = measure_pareto(bench);
+  REQUIRE(rows.size() == 2);
+  CHECK(rows[0].model == ParetoModel::kUncapped);
+  CHECK(rows[0].image.rms > 1.2 * rows[1].image.rms);
+  CHECK(pareto_points(rows).empty());
+}
+
+TEST_CASE("an unknown scene of the benchmark is told with what is known") {
+  CHECK_THROWS_WITH(pareto_scene("needle"),
+                    "hsi4d bench pareto: no workload \"needle\"; known: sparse, dense, opaque, needles, "
+                    "avatar_close_up, avatar_in_scene, empty, stack; did you mean \"needles\"?");
+}
