@@ -151,9 +151,13 @@ void append_line(std::string& svg, const Plot& plot, const PlotLine& line, const
     if (!has_place(plot, py)) continue;
     const std::string at_x = coordinate(plot_x(plot, x, px)), at_y = coordinate(plot_y(y, py));
     points += (points.empty() ? "" : " ") + at_x + "," + at_y;
-    if (line.is_named)
-      name = "<text class=\"name\" x=\"" + coordinate(plot_x(plot, x, px) + 5) + "\" y=\"" +
-             coordinate(plot_y(y, py) - 4) + "\">" + html_escape(line.label) + "</text>";
+    if (line.is_named) {
+      const double at = plot_x(plot, x, px);
+      const bool is_right = at > 0.75 * plot.width;  // where the label would not fit beside it
+      name = std::string("<text class=\"name\"") + (is_right ? " text-anchor=\"end\"" : "") + " x=\"" +
+             coordinate(is_right ? at - 5 : at + 5) + "\" y=\"" + coordinate(plot_y(y, py) - 4) + "\">" +
+             html_escape(line.label) + "</text>";
+    }
     if (line.has_dots)
       dots += "<circle cx=\"" + at_x + "\" cy=\"" + at_y + "\" r=\"3\" style=\"fill:" + line.color + "\"><title>" +
               html_escape(line.label) + ", " + html_escape(plot.x_label) + " " + tick_text(px) + ": " +
