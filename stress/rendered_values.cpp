@@ -71,7 +71,8 @@ std::vector<StressFigure> normalized_depth(Remedy remedy) {
   for (const double opacity : {0.0, 1e-30, 1e-9, 1e-8, 1e-4, 0.5, 1.0}) {
     const PixelDepth computed = on ? program_depth<float>(opacity) : divided_depth<float>(opacity);
     const PixelDepth precise = on ? program_depth<double>(opacity) : divided_depth<double>(opacity);
-    broken += not_finite(std::vector<double>{computed.depth}) + not_finite(computed.d_opacities) + not_finite(computed.others);
+    broken += not_finite(std::vector<double>{computed.depth}) + not_finite(computed.d_opacities) +
+              not_finite(computed.others);
     const double weight = opacity * (2 - opacity);
     if (!(weight > 0)) continue;
     const double expected = (opacity * kDepths[0] + (1 - opacity) * opacity * kDepths[1]) / weight;

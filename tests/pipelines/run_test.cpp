@@ -408,8 +408,8 @@ TEST_CASE("every shipped config of a benchmark runs", "[run]") {
     const std::string stem = fs::path(name).stem().string();
     if (check_shipped_config(shipped_configs() / "bench" / name, stem, true)) with_stages.insert(stem);
   }
-  CHECK(with_stages ==
-        std::set<std::string>{"empty_scene", "fast_scale", "near_human", "no_object", "paper_scale", "static_camera"});
+  CHECK(with_stages == std::set<std::string>{"empty_scene", "fast_scale", "near_human", "no_object", "paper_scale",
+                                             "pareto_tracking", "static_camera"});
   const RunConfig usual =
                       load_run_config(shipped_configs() / "bench/paper_scale.json", {}, descriptions_of(loss_terms())),
                   still = load_run_config(shipped_configs() / "bench/static_camera.json", {},

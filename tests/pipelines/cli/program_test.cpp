@@ -183,8 +183,7 @@ TEST_CASE("mistakes on the command line end with 2 and one message") {
   };
   const std::string commands =
       "run, demo, synth, select-camera, evaluate, report, render, gradients, avatar, pose, motion, convert, info, "
-      "bench, check, "
-      "schema, list";
+      "bench, stress, check, schema, list";
   CHECK(mistake({"chek"}) == "hsi4d: there is no command \"chek\"; known: " + commands + "; did you mean \"check\"?\n");
   CHECK(mistake({"frobnicate"}) == "hsi4d: there is no command \"frobnicate\"; known: " + commands + "\n");
   CHECK(mistake({}) == "hsi4d: give a command: " + commands + "; `hsi4d --help` explains them\n");
