@@ -148,7 +148,11 @@ class StageRun {
         loss_(record_loss(settings, terms, inputs, options.name)),
         optimizer_(tape, groups_, settings.optimizer) {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
-    for (const AdamGroup<S>& group : groups_) hold(group.parameters);
+    for (const AdamGroup<S>& group : groups_) {
+      hold(group.parameters);
+      first_of_all_ = std::max(first_of_all_, static_cast<Index>(group.settings.from));
+    }
+    held_ = reached_outputs(options.held);
     if (settings.plateau.iterations > 0) losses_.reserve(static_cast<std::size_t>(settings.iterations));
     for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
     if (options.kept == nullptr || optimizer_.adam() == nullptr) return;
@@ -182,7 +186,7 @@ class StageRun {
   void iterate(Index i, const StageCallback& callback) {
     const auto start = Clock::now();
     for (const AdamGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
-    if (i > 0) hold_values(i);
+    hold_values(i);
     const auto set_up = Clock::now();
     tape_.forward(loss_.total);
     const Index forward_nodes = tape_.counters().forward_nodes;  // before others run, for shares
@@ -201,7 +205,7 @@ class StageRun {
     const StepReport step = optimizer_.step(i, settings_.iterations, loss);
     if (step.rolled_back) note_rollback(*step.bad, i);
     if (!step.rolled_back) {
-      if (settings_.plateau.iterations > 0) losses_.push_back(loss);
+      if (settings_.plateau.iterations > 0 && i >= first_of_all_) losses_.push_back(loss);
       offender_.clear();
       wrap_rotations(step);
       hold_ranges(step);
@@ -212,15 +216,43 @@ class StageRun {
               seconds_since(start), counters, shares_});
   }
 
-  void hold_values(Index iteration) {
-    for (const HeldOutput& held : options_.held) {
-      const auto moves = [&](const AdamGroup<S>& group) {
-        return moves_in(group.settings, iteration) &&
-               std::find(held.groups.begin(), held.groups.end(), group.parameters.name) != held.groups.end();
-      };
-      const Var<S> value = TapeInspector<S>(tape_).handle(held.id);
-      std::any_of(groups_.begin(), groups_.end(), moves) ? tape_.release(value) : tape_.hold(value);
+  /// Held outputs that the loss depends on; what it does not is never computed.
+  std::vector<HeldOutput> reached_outputs(const std::vector<HeldOutput>& asked) {
+    TapeInspector<S> inspector(tape_);
+    std::vector<std::uint32_t> reached;
+    for (const auto node : inspector.nodes_of(loss_.total)) {
+      for (const auto output : inspector.outputs(node)) reached.push_back(output);
     }
+    std::vector<HeldOutput> held = asked;
+    std::erase_if(held, [&](const HeldOutput& output) {
+      return std::find(reached.begin(), reached.end(), output.id) == reached.end();
+    });
+    return held;
+  }
+
+  bool is_moved(const HeldOutput& held, Index iteration) const {
+    return std::any_of(groups_.begin(), groups_.end(), [&](const AdamGroup<S>& group) {
+      return moves_in(group.settings, iteration) &&
+             std::find(held.groups.begin(), held.groups.end(), group.parameters.name) != held.groups.end();
+    });
+  }
+
+  /// Follows its inputs where a group moves that it waits for. Made anew and held at the first iteration, after each
+  /// such step (a bad one has to show), and after a bad evaluation, whose numbers it may hold.
+  void hold_values(Index iteration) {
+    for (const HeldOutput& held : held_) {
+      const Var<S> value = TapeInspector<S>(tape_).handle(held.id);
+      if (is_moved(held, iteration)) {
+        tape_.release(value);
+      } else if (iteration == 0 || is_moved(held, iteration - 1) || !offender_.empty()) {
+        make_and_hold(value);
+      }
+    }
+  }
+  void make_and_hold(Var<S> value) {
+    tape_.release(value);
+    tape_.forward(value);
+    tape_.hold(value);
   }
 
   std::vector<GradientShare> shares_of_terms(Index iteration) {
@@ -251,12 +283,14 @@ class StageRun {
     for (const Var<S> block : group.blocks) hold_in_range(block, *group.range);
   }
 
+  /// Only losses count after which every group has begun to move.
   bool is_on_plateau() const {
     const std::ptrdiff_t count = settings_.plateau.iterations;
     if (count == 0 || std::ssize(losses_) < 2 * count) return false;
     const auto middle = losses_.end() - count;
     const double now = std::accumulate(middle, losses_.end(), 0.0);
-    return !(now < (1 - settings_.plateau.gain) * std::accumulate(middle - count, middle, 0.0));
+    const double before = std::accumulate(middle - count, middle, 0.0);
+    return !(now < before - settings_.plateau.gain * std::fabs(before));
   }
 
   double evaluated_loss() const { return static_cast<double>(tape_.value(loss_.total).scalar()); }
@@ -335,17 +369,23 @@ class StageRun {
   /// The parameters that are left must not be those of a step into the void.
   void evaluate_the_end() {
     const auto start = Clock::now();
-    tape_.forward(loss_.total);
+    forward_of_all();
     times_.forward += seconds_since(start);
     read_terms();
     if (std::isfinite(evaluated_loss())) return;
     offender_ = "the loss is " + rounded(evaluated_loss(), 6) + first_bad_node();
     if (optimizer_.adam() != nullptr && optimizer_.adam()->undo()) {
       ++undone_at_end_;
-      tape_.forward(loss_.total);
+      forward_of_all();
       read_terms();
     }
     if (!std::isfinite(evaluated_loss())) throw_diverged("the last iteration");
+  }
+
+  /// With held outputs as the parameters now are.
+  void forward_of_all() {
+    for (const HeldOutput& held : held_) make_and_hold(TapeInspector<S>(tape_).handle(held.id));
+    tape_.forward(loss_.total);
   }
 
   void keep_moments() const {
@@ -365,7 +405,9 @@ class StageRun {
   Index undone_at_end_ = 0;
   std::vector<std::vector<Index>> left_out_;  // evaluations, by loss_.left_out and object
   std::vector<GradientShare> shares_;         // of this iteration
-  std::vector<double> losses_;                // of good evaluations, where a plateau ends the stage
+  std::vector<HeldOutput> held_;
+  std::vector<double> losses_;  // of good evaluations, where a plateau ends the stage
+  Index first_of_all_ = 0;      // the first iteration in which all groups may move
   StageTimes times_;
   std::string offender_;  // of the last evaluation, if it was bad
 };

@@ -68,8 +68,8 @@ struct StageResult {
   std::vector<NodeStatistics> nodes;    ///< of the tape, losses included, with StageOptions::profile
 };
 
-/// An operator's output that a stage computes in its first iteration and in those in which one of the groups moves, and
-/// holds in all others (Tape::hold).
+/// An operator's output that follows its inputs in iterations in which one of the groups moves, and is held in all
+/// others (Tape::hold), as it is when the stage begins or after such a step.
 struct HeldOutput {
   std::uint32_t id = 0;  ///< of its Var
   std::vector<std::string> groups;

@@ -57,7 +57,7 @@ inline constexpr std::array<ConfigChoice<PixelWeight>, 4> kPixelWeights = {{{Pix
                                                                             {PixelWeight::kForeground, "foreground"}}};
 
 /// When a stage ends before its iterations are over: when the mean loss of the last `iterations` is not below
-/// (1 − gain) times that of as many before.
+/// that of as many before by `gain` of it. Losses count from the iteration on in which every group has begun to move.
 struct PlateauSettings {
   int iterations = 0;  ///< 0: never
   double gain = 0.01;

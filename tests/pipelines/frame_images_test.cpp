@@ -34,6 +34,12 @@ TEST_CASE("a share of the pixels is kept in whole blocks, spread evenly, others 
       kept_before = weight;
     }
   }
+  for (int frame = 0; frame < 10; ++frame) {  // one block: it stays, or there would be nothing to see
+    Image small(1, 30, 30);
+    std::ranges::fill(small.data(), 0.5F);
+    keep_share(0.1, frame, small);
+    CHECK(small(0, 3, 3) == 0.5F);
+  }
   Image all(1, 40, 40);
   std::ranges::fill(all.data(), 1.0F);
   keep_share(1, 5, all);
