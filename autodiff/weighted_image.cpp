@@ -1,5 +1,7 @@
 #include "autodiff/weighted_image.h"
 
+#include <algorithm>
+
 #include "core/parallel.h"
 #include "core/simd.h"
 

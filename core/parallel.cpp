@@ -1,5 +1,6 @@
 #include "core/parallel.h"
 
+#include <algorithm>
 #include <exception>
 #include <mutex>
 #include <string>

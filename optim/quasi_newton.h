@@ -20,9 +20,8 @@ inline constexpr Index kMostQuasiNewtonNumbers = 1024;
 inline constexpr double kLongestQuasiNewtonStep = 10;
 
 /// The optimiser of one stage. Steps are bitwise the same for any number of threads, and allocate nothing after the
-/// first two. Learning rates are the units in
-/// which numbers of different kinds compare and the length of the first step; the schedule (from, until, every,
-/// lr_final_share) has no meaning here.
+/// first two. Learning rates are the units in which numbers of different kinds compare and the length of the first
+/// step; the schedule (from, until, every, lr_final_share) has no meaning here.
 ///
 /// A bad evaluation, as Adam has it, is a step that was too long.
 template <class S>

@@ -6,8 +6,6 @@
 
 namespace hsi4d {
 
-namespace {}
-
 DataSettings dataset_inputs(const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
   const fs::path base = fs::absolute(folder).lexically_normal();
