@@ -12,6 +12,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "pipelines/cli/failure.h"
 #include "stress/stress.h"
 
 namespace hsi4d::cli {

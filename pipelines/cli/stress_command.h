@@ -19,9 +19,6 @@ struct StressOutcome {
   int status = 0;    ///< kRowsFailed when a row failed
 };
 
-/// Exit status of `hsi4d stress` when a row failed.
-inline constexpr int kRowsFailed = 1;
-
 /// Runs the rows. Throws UserError for one that is not known.
 StressOutcome stress_command(const StressOptions& options);
 
