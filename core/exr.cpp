@@ -81,8 +81,8 @@ std::string box_text(const Box2i& box) {
 int64_t width_of(const Box2i& box) { return int64_t{box.max.x} - box.min.x + 1; }
 int64_t height_of(const Box2i& box) { return int64_t{box.max.y} - box.min.y + 1; }
 
-void check_window(const std::string& name, const char* what, const Box2i& box, int64_t channels,
-                  int64_t file_bytes, const ImageLimits& limits) {
+void check_window(const std::string& name, const char* what, const Box2i& box, int64_t channels, int64_t file_bytes,
+                  const ImageLimits& limits) {
   const int64_t width = width_of(box), height = height_of(box);
   if (width < 1 || height < 1) fail(name, std::string("its ") + what + " " + box_text(box) + " is empty");
   check_image_size(name, channels, height, width, limits);

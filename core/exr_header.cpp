@@ -17,12 +17,30 @@ struct FixedType {
   uint32_t bytes;
 };
 
-constexpr std::array<FixedType, 24> kFixedTypes = {
-    {{"box2i", 16},    {"box2f", 16}, {"chromaticities", 32}, {"compression", 1}, {"deepImageState", 1},
-     {"double", 8},    {"envmap", 1}, {"float", 4},           {"int", 4},         {"keycode", 28},
-     {"lineOrder", 1}, {"m33f", 36},  {"m33d", 72},           {"m44f", 64},       {"m44d", 128},
-     {"rational", 8},  {"tiledesc", 9}, {"timecode", 8},      {"v2i", 8},         {"v2f", 8},
-     {"v2d", 16},      {"v3i", 12},   {"v3f", 12},            {"v3d", 24}}};
+constexpr std::array<FixedType, 24> kFixedTypes = {{{"box2i", 16},
+                                                    {"box2f", 16},
+                                                    {"chromaticities", 32},
+                                                    {"compression", 1},
+                                                    {"deepImageState", 1},
+                                                    {"double", 8},
+                                                    {"envmap", 1},
+                                                    {"float", 4},
+                                                    {"int", 4},
+                                                    {"keycode", 28},
+                                                    {"lineOrder", 1},
+                                                    {"m33f", 36},
+                                                    {"m33d", 72},
+                                                    {"m44f", 64},
+                                                    {"m44d", 128},
+                                                    {"rational", 8},
+                                                    {"tiledesc", 9},
+                                                    {"timecode", 8},
+                                                    {"v2i", 8},
+                                                    {"v2f", 8},
+                                                    {"v2d", 16},
+                                                    {"v3i", 12},
+                                                    {"v3f", 12},
+                                                    {"v3d", 24}}};
 
 class AttributeWalk {
  public:
@@ -52,8 +70,8 @@ class AttributeWalk {
 
   /// What OpenEXR will read, which must not be beyond `end`.
   size_t own_length(std::string_view type, uint32_t size, size_t end) {
-    const auto* const fixed =
-        std::find_if(kFixedTypes.begin(), kFixedTypes.end(), [&](const FixedType& known) { return known.name == type; });
+    const auto* const fixed = std::find_if(kFixedTypes.begin(), kFixedTypes.end(),
+                                           [&](const FixedType& known) { return known.name == type; });
     if (fixed != kFixedTypes.end()) return fixed->bytes;
     const size_t begin = at_;
     if (type == "chlist") {

@@ -1,7 +1,8 @@
 // Archives of arrays without their checksums, which stop nearly every mutation: a list of members, of which a whole
 // archive is made again before the reader sees it.
 //
-//   'L', and again and again: length of the name (1 byte), name, length of the content (2 bytes, little-endian), content
+//   'L', and again and again: length of the name (1 byte), name, length of the content (2 bytes, little-endian),
+//   content
 #pragma once
 
 #include <algorithm>
@@ -33,7 +34,8 @@ inline std::vector<test::ZipMember> members_of(std::span<const uint8_t> archive)
   };
   std::vector<test::ZipMember> members;
   for (std::size_t at = 0; at + 30 <= archive.size() && number(at, 4) == 0x04034b50;) {
-    const std::size_t size = number(at + 18, 4), name = at + 30, content = name + number(at + 26, 2) + number(at + 28, 2);
+    const std::size_t size = number(at + 18, 4), name = at + 30,
+                      content = name + number(at + 26, 2) + number(at + 28, 2);
     HSI4D_CHECK(number(at + 8, 2) == 0 && (number(at + 6, 2) & 8U) == 0, "a member that is not stored");
     members.push_back({std::string(archive.begin() + static_cast<std::ptrdiff_t>(name),
                                    archive.begin() + static_cast<std::ptrdiff_t>(name + number(at + 26, 2))),

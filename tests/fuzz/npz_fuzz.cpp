@@ -12,7 +12,8 @@ std::vector<Bytes> corpus() {
   mixed.add<float>("weights", {2, 3}, {1, 2, 3, 4, 5, 6});
   mixed.add_text("gender", "neutral");
   mixed.add<int64_t>("parents", {40}, std::vector<int64_t>(40, 7));
-  return {small.encode(), list_of(mixed.encode()), mixed.encode(NpzPacking::stored), mixed.encode(NpzPacking::deflated), NpzWriter().encode()};
+  return {small.encode(), list_of(mixed.encode()), mixed.encode(NpzPacking::stored), mixed.encode(NpzPacking::deflated),
+          NpzWriter().encode()};
 }
 
 bool accepts(std::span<const uint8_t> file) {

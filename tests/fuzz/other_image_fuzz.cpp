@@ -32,7 +32,8 @@ Bytes tiff() {
       file.push_back(static_cast<uint8_t>(part >> 8));
     }
   };
-  for (const auto& [tag, value] : {std::pair{256, 3}, {257, 2}, {258, 8}, {259, 1}, {262, 1}, {273, 8}, {277, 1}, {278, 2}, {279, 6}})
+  for (const auto& [tag, value] :
+       {std::pair{256, 3}, {257, 2}, {258, 8}, {259, 1}, {262, 1}, {273, 8}, {277, 1}, {278, 2}, {279, 6}})
     add(tag, 3, value);
   file.resize(file.size() + 4);
   return file;

@@ -6,12 +6,14 @@ namespace hsi4d::fuzz {
 
 namespace {
 
-const std::string kConfig = R"({"name": "a", "seed": 3, "data": {"scene": "a.ply"}, "stages": {"camera": {"iterations": 3}}})";
+const std::string kConfig =
+    R"({"name": "a", "seed": 3, "data": {"scene": "a.ply"}, "stages": {"camera": {"iterations": 3}}})";
 
 Scratch& scratch() {
   static Scratch made(
       {{"config.resolved.json", bytes_of(kConfig)},
-       {"metrics.jsonl", bytes_of("{\"frame\": 1, \"stage\": \"a\", \"iteration\": 0}\n{\"frame\": 2, \"stage\": \"a\"}\n")},
+       {"metrics.jsonl",
+        bytes_of("{\"frame\": 1, \"stage\": \"a\", \"iteration\": 0}\n{\"frame\": 2, \"stage\": \"a\"}\n")},
        {"status.json", bytes_of(R"({"state": "interrupted", "started": "now"})")}});
   return made;
 }

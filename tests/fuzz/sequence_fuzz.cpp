@@ -29,9 +29,7 @@ Bytes two_frames() {
 
 }  // namespace
 
-std::vector<Bytes> corpus() {
-  return {list_of(one_frame()), list_of(two_frames()), one_frame()};
-}
+std::vector<Bytes> corpus() { return {list_of(one_frame()), list_of(two_frames()), one_frame()}; }
 
 bool accepts(std::span<const uint8_t> file) {
   return is_read([&] {

@@ -9,7 +9,8 @@ namespace {
 
 std::vector<test::ZipMember> small_body(bool whole) {
   std::vector<test::ZipMember> members;
-  const auto add = [&]<class T>(const std::string& name, std::initializer_list<int64_t> shape, const std::vector<T>& numbers) {
+  const auto add = [&]<class T>(const std::string& name, std::initializer_list<int64_t> shape,
+                                const std::vector<T>& numbers) {
     members.push_back({name + ".npy", encode_npy<T>(std::span(shape.begin(), shape.size()), numbers)});
   };
   const auto add_sixteenths = [&](const std::string& name, std::initializer_list<int64_t> shape) {

@@ -31,8 +31,7 @@ Bytes objects() {
 }
 
 Scratch& scratch() {
-  static Scratch made(
-      {{"motion.npz", motion()}, {"objects.npz", objects()}, {"cameras.json", bytes_of(kCameras)}});
+  static Scratch made({{"motion.npz", motion()}, {"objects.npz", objects()}, {"cameras.json", bytes_of(kCameras)}});
   return made;
 }
 
