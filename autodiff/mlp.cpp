@@ -26,7 +26,6 @@ constexpr Index kChunkRows = 16 * kMlpBlock;
 /// Four rows of four floats, transposed.
 struct FourByFour {
   typedef float Four __attribute__((vector_size(16)));
-  typedef std::int32_t Order __attribute__((vector_size(16)));
 
   static void move(const float* from, Index from_step, float* to, Index to_step) {
     Four a, b, c, d;
@@ -34,14 +33,12 @@ struct FourByFour {
     std::memcpy(&b, from + from_step, sizeof b);
     std::memcpy(&c, from + 2 * from_step, sizeof c);
     std::memcpy(&d, from + 3 * from_step, sizeof d);
-    const Four ab_low = __builtin_shuffle(a, b, Order{0, 4, 1, 5}),
-               ab_high = __builtin_shuffle(a, b, Order{2, 6, 3, 7});
-    const Four cd_low = __builtin_shuffle(c, d, Order{0, 4, 1, 5}),
-               cd_high = __builtin_shuffle(c, d, Order{2, 6, 3, 7});
-    a = __builtin_shuffle(ab_low, cd_low, Order{0, 1, 4, 5});
-    b = __builtin_shuffle(ab_low, cd_low, Order{2, 3, 6, 7});
-    c = __builtin_shuffle(ab_high, cd_high, Order{0, 1, 4, 5});
-    d = __builtin_shuffle(ab_high, cd_high, Order{2, 3, 6, 7});
+    const Four ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5), ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Four cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5), cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+    b = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+    c = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+    d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
     std::memcpy(to, &a, sizeof a);
     std::memcpy(to + to_step, &b, sizeof b);
     std::memcpy(to + 2 * to_step, &c, sizeof c);
