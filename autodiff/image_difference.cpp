@@ -111,11 +111,15 @@ struct ImageDifference {
     for (const int i : {kA, kB}) {
       if (!io.wants(i)) continue;
       const S sign = i == kA ? g : -g;
-      put(&io.d_in(i)(plane, row, 0), io.must_assign(i), run, [&](Index c) {
-        const S d = a[c] - b[c], slope = F::derivative(d);
-        if (w == nullptr) return sign * slope;
-        return counts(w[c], F::value(d)) ? sign * w[c] * slope : S(0);
-      });
+      if (w == nullptr) {
+        put(&io.d_in(i)(plane, row, 0), io.must_assign(i), run,
+            [=](Index c) { return sign * F::derivative(a[c] - b[c]); });
+      } else {
+        put(&io.d_in(i)(plane, row, 0), io.must_assign(i), run, [=](Index c) {
+          const S d = a[c] - b[c], slope = F::derivative(d);
+          return sign * w[c] * (counts(w[c], F::value(d)) ? slope : S(0));
+        });
+      }
     }
     if (!wants_weight(io)) return;
     const bool is_shared = io.in(kWeight).shape.planes == 1;
