@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "autodiff/dual.h"
 #include "autodiff/mlp_kernel.h"
 #include "core/parallel.h"
 #include "core/simd.h"
@@ -98,12 +99,7 @@ void store_block(const S* block, Index first, Index count, bool assigns, const A
 
 // --- the output function ---------------------------------------------------------------------------------------------
 
-/// σ(z), and d_z = d_y σ'(z) with σ' = e/(1 + e)², e = exp(−|z|), which is right where 1 − σ is rounded away.
-template <class S>
-S sigmoid_of(S z) {
-  const S e = vector_exp(-std::fabs(z));
-  return (z < 0 ? e : S(1)) / (S(1) + e);
-}
+/// σ' = e/(1 + e)², e = exp(−|z|), of d_z = d_y σ'(z), which is right where 1 − σ is rounded away.
 template <class S>
 S sigmoid_slope(S z) {
   const S e = vector_exp(-std::fabs(z)), over = S(1) / (S(1) + e);
@@ -185,7 +181,7 @@ struct MlpOp {
           net.kernels.linear(net.steps[static_cast<std::size_t>(layers - 1)], x, next);
           add_offset(io, first, count, next);
           if (output == MlpOutput::kSigmoid) {
-            for (Index i = 0; i < outputs() * kMlpBlock; ++i) next[i] = sigmoid_of(next[i]);
+            for (Index i = 0; i < outputs() * kMlpBlock; ++i) next[i] = sigmoid(next[i]);
           }
           store_block(next, first, count, true, y);
         }

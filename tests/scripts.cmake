@@ -5,7 +5,10 @@ add_test(NAME layering
 add_test(NAME test_names
   COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/test_names
                            -P ${CMAKE_CURRENT_SOURCE_DIR}/test_names_test.cmake)
-set_tests_properties(layering test_names PROPERTIES LABELS quick TIMEOUT 300)
+add_test(NAME gradient_audit
+  COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/gradient_audit
+                           -P ${CMAKE_CURRENT_SOURCE_DIR}/gradient_audit_test.cmake)
+set_tests_properties(layering test_names gradient_audit PROPERTIES LABELS quick TIMEOUT 300)
 
 if(NOT HSI4D_SANITIZE)  # sanitized libraries are not installed
   add_test(NAME install

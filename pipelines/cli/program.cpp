@@ -300,6 +300,12 @@ struct CommandLine {
         ->type_name("ID");
     add_threads(*command, stress.threads);
     command->add_option("--json", stress.json, "File for the figures, one JSON object a row")->type_name("F");
+    command->add_flag("--functions", stress.functions,
+                      "Instead: how far off exponentials, sigmoid, sines, rotations and harmonics are, in units in "
+                      "the last place, on each instruction set");
+    command->add_option("--points", stress.points, "Of --functions: arguments a row, 1000 or more")
+        ->check(CLI::Range(Index(1000), Index(1) << 30))
+        ->type_name("N");
     command->footer("Exit status: 1 when a row fails, or holds without its remedy too.");
     command->callback([this] {
       run = [this] {
