@@ -22,10 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The poses of data.motion, laid on frame 0, or else those of the initial state; empty: none.
-std::vector<BodyPose> estimate_of(const DataSettings& data, const SceneSetup& setup, const FrameSource& frames) {
+std::vector<BodyPose> estimate_of(const DataSettings& data, const SceneSetup& setup, const Avatar& avatar,
+                                  const FrameSource& frames) {
   if (data.motion.empty()) return estimated_poses(setup.motion, setup.motion_file, frames);
-  const Vector3<double> pelvis_rest = pelvis_of(setup.avatar.joints);
-  return laid_on(read_estimate(data.motion, setup.avatar, frames), setup.motion.poses.front(), pelvis_rest,
+  return laid_on(read_estimate(data.motion, avatar, frames), setup.motion.poses.front(), pelvis_of(avatar.joints),
                  data.motion_align);
 }
 
@@ -174,7 +174,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   video->masks.push_back(open_masks(data.masks, kHumanMasks, video->frames));
   for (const std::string& name : names) video->masks.push_back(open_masks(data.masks, name, video->frames));
   clip.video = video;
-  clip.estimate = estimate_of(data, setup, video->frames);
+  clip.estimate = estimate_of(data, setup, clip.avatar, video->frames);
   clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
   clip.first.body = setup.motion.poses.front();
   clip.frame_rate = rate_of(video->frames, setup);

@@ -26,10 +26,17 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-/// Whether the stand-ins can be run here; tells where not.
-bool has_python() {
+/// A Python with NumPy, the first one of PATH or Debian's; empty, and told, where there is none.
+std::string python() {
   setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
-  if (std::system("python3 -c 'import numpy' 2> /dev/null") == 0) return true;
+  for (const char* const program : {"python3", "/usr/bin/python3"}) {
+    if (std::system((std::string(program) + " -c 'import numpy' 2> /dev/null").c_str()) == 0) return program;
+  }
+  return "";
+}
+
+bool has_python() {
+  if (!python().empty()) return true;
   WARN("skipped: there is no python3 with NumPy");
   return false;
 }
@@ -73,7 +80,11 @@ struct Services {
   }
 
   nlohmann::json& part(const std::string& name) { return config["sources"][name]; }
-  void set(const std::string& name, const Names& command) { part(name)["command"] = command; }
+  /// @param command  a stand-in and its arguments
+  void set(const std::string& name, const Names& command) {
+    part(name)["command"] = {python()};
+    add(name, command);
+  }
   void add(const std::string& name, const Names& words) {
     for (const std::string& word : words) part(name)["command"].push_back(word);
   }
@@ -117,9 +128,9 @@ TEST_CASE("a run has video and masks and poses made by services", "[run]") {
   Services services;
   const ProgramResult plan = services.run("run", {"--dry-run"});
   INFO(plan.err);
-  CHECK_THAT(plan.out, Contains("would run " + stand_in("video.py")) &&
-                           Contains("would then run " + stand_in("masks.py")) &&
-                           Contains("would then run " + stand_in("poses.py")));
+  CHECK_THAT(plan.out, Contains("would run " + python() + ", " + stand_in("video.py")) &&
+                           Contains("would then run " + python() + ", " + stand_in("masks.py")) &&
+                           Contains("would then run " + python() + ", " + stand_in("poses.py")));
   CHECK_FALSE(fs::exists("generated"));
   const ProgramResult result = services.run("run");
   INFO(result.err);
@@ -127,7 +138,7 @@ TEST_CASE("a run has video and masks and poses made by services", "[run]") {
   CHECK(made(".npz").size() == 1);
   CHECK(made(".npz.json").size() == 1);
   CHECK(temporaries_in("generated").empty());
-  CHECK_THAT(file_text("run/log.txt"), Contains("motion: runs " + stand_in("poses.py")));
+  CHECK_THAT(file_text("run/log.txt"), Contains("motion: runs " + python() + ", " + stand_in("poses.py")));
 
   // The estimate is laid on frame 0: what the run begins with is the truth but for the noise.
   DataSettings inputs = dataset_inputs(TinyDataset::folder());
@@ -180,7 +191,7 @@ TEST_CASE("a service that could not now is asked again", "[run]") {
   services.part("masks")["command"] = nlohmann::json::array();
   services.config["data"]["masks"] = data("masks");
   services.part("motion")["command"] = nlohmann::json::array();
-  const std::string program = "/sources/video: " + stand_in("video.py");
+  const std::string program = "/sources/video: " + python();
   SECTION("and then it can") {
     services.add("video", {"--fail", "75", "--fail-first", "2", "--count", "count.txt"});
     const ProgramResult result = services.run("run");
@@ -255,7 +266,7 @@ TEST_CASE("poses that do not fit the video are refused and kept", "[run]") {
   const ProgramResult result = services.run("run");
   CHECK(result.status == 2);
   CHECK_THAT(result.err,
-             Contains("/sources/motion: " + stand_in("poses.py") + " wrote what cannot be used, kept as ") &&
+             Contains("/sources/motion: " + python() + " wrote what cannot be used, kept as ") &&
                  Contains("holds 3 poses, the video has 4 frames; allowed: that many; it printed nothing\n"));
   CHECK(made(".refused.npz").size() == 1);
   services.config["data"]["motion"] = data("truth/motion.npz");
