@@ -304,7 +304,7 @@ std::string run_program(const Job& job) {
         throw UserError(retry == 1 ? failure.what()
                                    : std::string(failure.what()) + "\nIt was run " + std::to_string(retry) + " times.");
       }
-      log_warning(std::string(failure.what()) + "\nIt is run again in " + duration_text(wait) + ", " +
+      log_warning(std::string(failure.what()) + "\nIt is run again in " + number_text(wait) + " s, " +
                   std::to_string(retry) + " of " + std::to_string(job.settings.retries));
     }
     std::error_code ignored;
