@@ -99,6 +99,18 @@ function(hsi4d_embed_report_assets)
   target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/report_assets.cpp)
 endfunction()
 
+# Style, body and script of a study's page, likewise.
+function(hsi4d_embed_study_assets)
+  set(folder ${PROJECT_SOURCE_DIR}/pipelines/study_assets)
+  foreach(kind css html js)
+    string(TOUPPER ${kind} name)
+    file(READ ${folder}/study.${kind} HSI4D_STUDY_${name})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/study.${kind})
+  endforeach()
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/study_assets.cpp.in ${PROJECT_BINARY_DIR}/generated/study_assets.cpp @ONLY)
+  target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/study_assets.cpp)
+endfunction()
+
 # hsi4d_find_commit(OUT): the commit that is checked out, or "unknown" where the source is not the top of a git checkout.
 # A commit configures the build anew.
 function(hsi4d_find_commit out)

@@ -21,7 +21,10 @@ constexpr const char* kSourcesFolder = "generated";  // beside a config
 void without_places(ConfigValue& sources) {
   std::erase_if(sources.members, [](const ConfigMember& member) { return member.key == "folder"; });
   for (ConfigMember& member : sources.members) {
-    std::erase_if(member.value.members, [](const ConfigMember& setting) { return setting.key == "timeout_s"; });
+    const std::vector<std::string>& trying = settings_of_trying();
+    std::erase_if(member.value.members, [&trying](const ConfigMember& setting) {
+      return std::find(trying.begin(), trying.end(), setting.key) != trying.end();
+    });
   }
 }
 
@@ -78,7 +81,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");
   f.object("start", s.start, "Where the stages of a frame begin");
   f.object("data", s.data, "The files that the run reads");
-  f.object("sources", s.sources, "Programs outside that make the video and the masks of `data`");
+  f.object("sources", s.sources, "Programs outside that make the video, the masks and the estimated motion of `data`");
   f.list("chain", s.chain, "Clips that follow one another, each from the last state of the one before");
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
   f.object("color_net", s.color_net, "How the human's colours follow its pose");

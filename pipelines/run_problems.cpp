@@ -135,7 +135,7 @@ void add_name_problems(const DataSettings& data, const std::string& in, std::vec
   }
 }
 
-/// What is wrong with the programs that make video and masks.
+/// What is wrong with the programs that make video, masks and motion.
 void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   struct Program {
     const char* name;
@@ -147,7 +147,8 @@ void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found
   const SourceSettings& sources = config.sources;
   for (const Program& program :
        {Program{"video", sources.video.command, video_placeholders(), config.data.frames, "frames"},
-        Program{"masks", sources.masks.command, mask_placeholders(), config.data.masks, "masks"}}) {
+        Program{"masks", sources.masks.command, mask_placeholders(), config.data.masks, "masks"},
+        Program{"motion", sources.motion.command, motion_placeholders(), config.data.motion, "motion"}}) {
     const std::string section = std::string("/sources/") + program.name, key = std::string("/data/") + program.key;
     for (CommandFault& fault : command_faults(program.command, program.placeholders))
       found.push_back({section + fault.pointer, std::move(fault.text), {section + "/command"}});

@@ -36,6 +36,7 @@
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/select_camera_command.h"
 #include "pipelines/cli/stress_command.h"
+#include "pipelines/cli/study_command.h"
 #include "pipelines/cli/synth_command.h"
 
 namespace hsi4d::cli {
@@ -89,6 +90,7 @@ struct CommandLine {
   BenchParetoOptions bench_pareto;
   SelectCameraOptions select_camera;
   EvaluateOptions evaluate;
+  StudyOptions study;
   std::function<std::string()> run;
   int status = kDone;  ///< that `run` leaves
 
@@ -103,6 +105,7 @@ struct CommandLine {
     add_select_camera();
     add_evaluate();
     add_report();
+    add_study();
     add_render();
     add_gradients();
     add_avatar(terms);
@@ -203,6 +206,37 @@ struct CommandLine {
     CLI::App* report = app.add_subcommand("report", "Write report.html of runs, and print their errors");
     report->add_option("RUN", runs, "Folders of runs")->required();
     report->callback([this] { run = [this] { return report_command(runs); }; });
+  }
+
+  void add_study() {
+    StudyOptions& o = study;
+    CLI::App* command =
+        app.add_subcommand("study", "Make a page on which people choose between videos, or tell what they chose");
+    command->add_option("RUNS", o.runs, "A and B: two folders of runs, or of folders of runs with the same names")
+        ->expected(0, 2)
+        ->option_text("A B");
+    command->add_option("--out", o.out, "Where the page goes: a new or empty folder; the key goes beside it")
+        ->type_name("DIR");
+    command
+        ->add_option("--texts", o.texts,
+                     "What happens in the videos, {\"NAME\": \"text\"}; default: sources.prompt of the runs' configs")
+        ->type_name("F.json");
+    command->add_option("--pairs", o.pairs, "Pairs that a person is shown")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1000));
+    command->add_option("--seed", o.seed, "Seed of the names of videos and pairs")
+        ->capture_default_str()
+        ->check(WholeNumber())
+        ->type_name("N");
+    command->add_flag("--embed", o.embed, "One file: the videos are in the page");
+    command->add_flag("--quiet", o.quiet, "No progress on stderr");
+    command
+        ->add_option("--answers", o.answers, "Files that people saved, or folders of them; A and B are then left out")
+        ->type_name("F.json");
+    command->add_option("--key", o.key, "Of answers: the study's key")->type_name("F.json");
+    command->add_option("--csv", o.csv, "Of answers: file for them, a line each")->type_name("F");
+    command->add_option("--json", o.json, "Of answers: file for all numbers")->type_name("F");
+    command->callback([this] { run = [this] { return study_command(study); }; });
   }
 
   void add_info() {
