@@ -166,9 +166,14 @@ std::vector<Combination> combinations_of(const SweepFile& sweep) {
     if (all.size() == before) empty.push_back(i);
   }
   rules.tell_unused(sweep, problems);
+  if (problems.empty()) {
+    for (const std::size_t i : empty) {
+      const SweepRule& rule = sweep.blocks[i].rules.back();
+      problems.add(rule.origin, rule.pointer,
+                   "no run is left" + (sweep.blocks.size() > 1 ? " of block " + std::to_string(i) : ""));
+    }
+  }
   problems.throw_if_any();
-  for (const std::size_t i : empty)
-    throw UserError("/blocks/" + std::to_string(i) + ": skip and only leave no run of this block");
   return all;
 }
 
@@ -265,7 +270,7 @@ class Planner {
       if (is_made) lay_into_config(tree, "synthetic.seed", seed, {}, problems);
     }
     RunConfig config = read_run_config(tree, losses_, problems, is_made ? ConfigUse::kStages : ConfigUse::kRun);
-    if (is_made) check_generated(config);
+    if (is_made) check_generated(c.block->base, config);
     config.name = sweep_.name + ": " + sweep_label(c.run);
     c.run.config = resolved_config(config, losses_);
     const std::string identity = to_json(identity_of(parse_json_text(c.run.config, "config"), is_made));
@@ -275,10 +280,11 @@ class Planner {
     if (is_made) c.run.dataset = text_hash(synthetic_settings_json(config.synthetic, config.body));
   }
 
-  static void check_generated(const RunConfig& config) {
+  static void check_generated(const fs::path& base, const RunConfig& config) {
+    const std::string name = base.generic_string();
     if (config.synthetic.kind == SyntheticKind::kViews)
-      throw UserError("/synthetic/kind: \"views\" are for hsi4d avatar fit; a run needs a clip");
-    if (config.stages.empty()) throw UserError("/stages: a run needs at least one stage");
+      throw UserError(name + ": /synthetic/kind: \"views\" are for hsi4d avatar fit; a run needs a clip");
+    if (config.stages.empty()) throw UserError(name + ": /stages: a run needs at least one stage");
   }
 
   void note(const std::string& problem, std::size_t run) {

@@ -9,6 +9,7 @@
 
 #include "core/text.h"
 #include "pipelines/report_plots.h"
+#include "pipelines/sweep_tables.h"
 
 namespace hsi4d {
 namespace {
@@ -156,8 +157,7 @@ std::string difference_plot(const SweepResults& results, const MetricFacts& metr
   for (const SweepGroup& group : results.groups) {
     const auto paired = group.is_reference ? std::nullopt : paired_difference(results, group, metric);
     if (!paired) continue;
-    const bool is_clear = metric.better != 0 && paired->interval && !paired->interval->contains(0);
-    const std::string color = !is_clear                                       ? "var(--start)"
+    const std::string color = !is_clear(*paired, metric)                      ? "var(--start)"
                               : paired->statistics.mean * metric.better > 0 ? "var(--good)"
                                                                               : "var(--bad)";
     rows.push_back({group.label, paired->differences, paired->statistics.mean, paired->interval, color});

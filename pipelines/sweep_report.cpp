@@ -121,7 +121,7 @@ std::string sweep_page(const SweepResults& results) {
     const std::string reference = reference_text(results.plan);
     page += plots_section(results, "Differences to " + reference,
                           "Dots are pairs of runs, the mark their mean, the bar its 95 % interval; coloured where that "
-                          "does not contain 0.",
+                          "does not contain 0 and there are at least six pairs.",
                           [&](const MetricFacts& metric) { return difference_plot(results, metric); });
     page += axes_sections(results);
     page += plots_section(results, "Runs by metric",

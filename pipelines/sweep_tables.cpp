@@ -31,7 +31,7 @@ std::string difference_text(const PairedDifference& paired, const MetricFacts& f
 }
 
 SweepCell::Mark mark_of(const PairedDifference& paired, const MetricFacts& facts) {
-  if (facts.better == 0 || !paired.interval || paired.interval->contains(0)) return SweepCell::Mark::kNone;
+  if (!is_clear(paired, facts)) return SweepCell::Mark::kNone;
   return paired.statistics.mean * facts.better > 0 ? SweepCell::Mark::kBetter : SweepCell::Mark::kWorse;
 }
 
@@ -104,6 +104,11 @@ std::string mark_word(const SweepCell& cell) {
 }
 
 }  // namespace
+
+bool is_clear(const PairedDifference& paired, const MetricFacts& metric) {
+  return metric.better != 0 && paired.differences.size() >= kFewestPairs && paired.interval &&
+         !paired.interval->contains(0);
+}
 
 std::string metric_heading(const MetricFacts& facts) {
   return std::string(facts.label) + (facts.unit.empty() ? "" : ", " + std::string(facts.unit)) +
@@ -181,7 +186,8 @@ SweepTable difference_table(const SweepResults& results) {
   table.caption = "Run by run with the same clip and seed, " +
                   (fewest == most ? std::to_string(most) : std::to_string(fewest) + " to " + std::to_string(most)) +
                   " pairs a row: mean [95 % interval of the mean by the bootstrap, 10,000 samples]; marked where the "
-                  "interval does not contain 0";
+                  "interval does not contain 0 and there are at least " +
+                  std::to_string(kFewestPairs) + " pairs";
   return table;
 }
 

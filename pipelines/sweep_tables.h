@@ -30,8 +30,14 @@ struct SweepTable {
 /// @param clip  of this clip alone; null: of all
 SweepTable mean_table(const SweepResults& results, const std::string* clip = nullptr);
 
-/// Differences to what groups are compared with, with their intervals; marked where the interval does not contain 0.
-/// Without rows where nothing is compared.
+/// Fewest pairs of which an interval says something: signs of fewer agree by chance too often (of six in 2 · 2⁻⁶ = 3 %).
+inline constexpr std::size_t kFewestPairs = 6;
+
+/// True where the interval of at least kFewestPairs differences does not contain 0, of a metric that has a better side.
+bool is_clear(const PairedDifference& paired, const MetricFacts& metric);
+
+/// Differences to what groups are compared with, with their intervals; marked where they are clear. Without rows where
+/// nothing is compared.
 SweepTable difference_table(const SweepResults& results);
 
 /// What runs are compared with, for people: "whole"; empty: with nothing.
