@@ -69,6 +69,17 @@ std::string state_in(const RunPaths& paths) {
 
 }  // namespace
 
+std::string SweepPaths::frozen_plan(const SweepPlan& plan) const {
+  return (folder / "plans" / (text_hash(sweep_plan_json(plan)) + ".json")).string();
+}
+
+fs::path sweep_folder_of(const fs::path& plan) {
+  const fs::path whole = fs::absolute(plan).lexically_normal();
+  const bool is_frozen = whole.parent_path().filename() == "plans";
+  if (is_frozen) return whole.parent_path().parent_path();
+  return plan.has_parent_path() ? plan.parent_path() : fs::path(".");
+}
+
 bool is_sweep_folder(const std::string& folder) {
   const SweepPaths paths{folder};
   std::error_code error;
@@ -99,12 +110,14 @@ void write_sweep_plan(const SweepPaths& paths, const SweepPlan& plan, bool resum
   for (const SweepRun& run : plan.runs) {
     if (!run.config.empty() && !fs::exists(paths.config(run.id))) write_text_file(paths.config(run.id), run.config);
   }
-  write_text_file(paths.plan(), sweep_plan_json(plan));  // last: with it the folder is whole
   std::error_code error;
   for (const char* const name : {"attempts", "logs", "runs"}) {
     fs::create_directories(paths.folder / name, error);
     if (error) throw UserError((paths.folder / name).string() + ": the folder cannot be made: " + error.message());
   }
+  const std::string text = sweep_plan_json(plan);
+  write_text_file(paths.frozen_plan(plan), text);
+  write_text_file(paths.plan(), text);  // last: with it the folder is whole
 }
 
 std::string_view sweep_run_state_name(SweepRunState state) {

@@ -20,6 +20,8 @@ struct SweepPaths {
   std::filesystem::path folder;
 
   std::string plan() const { return (folder / "sweep.json").string(); }
+  /// A plan as it was when runs were started by it: theirs are its indices, also once sweep.json is that of an edited file.
+  std::string frozen_plan(const SweepPlan& plan) const;
   std::string log() const { return (folder / "sweep.log").string(); }
   std::string config(const std::string& id) const { return (folder / "configs" / (id + ".json")).string(); }
   std::string run(const std::string& id) const { return (folder / "runs" / id).string(); }
@@ -34,11 +36,14 @@ struct SweepPaths {
 /// True for a folder that holds a sweep.
 bool is_sweep_folder(const std::string& folder);
 
+/// The folder of a plan's file: its own, or of one of plans/ that above.
+std::filesystem::path sweep_folder_of(const std::filesystem::path& plan);
+
 /// The plan that a folder holds. Throws UserError where there is none, DataError where it is damaged.
 SweepPlan read_sweep_plan(const SweepPaths& paths);
 
-/// Writes the plan and the configs of its runs, in which those that are there already stay as they are. Throws UserError
-/// naming the folder: it holds a sweep and `resume` is false, something else, or cannot be written.
+/// Writes the plan, a copy of it that stays, and the configs of its runs, of which those that are there already stay as
+/// they are. Throws UserError naming the folder: it holds a sweep and `resume` is false, something else, or cannot be written.
 void write_sweep_plan(const SweepPaths& paths, const SweepPlan& plan, bool resume);
 
 /// What write_sweep_plan would refuse, without writing anything.

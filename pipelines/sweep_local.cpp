@@ -22,7 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::milliseconds kLook{50};  // between looks at what has ended
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kLook{50};           // between looks at what has ended
+constexpr std::chrono::milliseconds kBetweenTries{500};  // between looks at what other launchers compute
 constexpr double kBetweenReports = 1;           // seconds
 constexpr int kInterruptedStatus = 130;
 constexpr int kBugStatus = 3;
@@ -67,8 +70,9 @@ class Launcher {
       : paths_(paths),
         plan_(plan),
         launch_(launch),
+        frozen_plan_(paths.frozen_plan(plan)),
         jobs_(static_cast<std::size_t>(sweep_jobs(plan, launch))),
-        begin_(std::chrono::steady_clock::now()) {}
+        begin_(Clock::now()) {}
 
   SweepOutcome run() {
     for (const std::size_t index : distinct_runs(plan_)) {
@@ -152,7 +156,7 @@ class Launcher {
 
   void report(bool is_finished) {
     if (!launch_.progress) return;
-    const double now = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+    const double now = std::chrono::duration<double>(Clock::now() - begin_).count();
     if (!is_finished && now - last_report_ < kBetweenReports && last_report_ > 0) return;
     last_report_ = now;
     ProgressState state;
@@ -177,6 +181,8 @@ class Launcher {
   }
 
   void start_what_fits() {
+    if (running_.size() == running_before_ && Clock::now() < next_try_) return;  // nothing has changed since
+    next_try_ = Clock::now() + kBetweenTries;
     for (auto it = waiting_.begin(); it != waiting_.end() && running_.size() < jobs_ && has_memory_for_one();) {
       const std::size_t index = *it;
       if (is_claimed(paths_, id_of(index)) || waits_for_dataset(index)) {
@@ -190,12 +196,13 @@ class Launcher {
         start(index);
       }
     }
+    running_before_ = running_.size();
   }
 
   void start(std::size_t index) {
     const std::string output = paths_.printed(id_of(index));
     running_.emplace_back(index, size_of(output),
-                          std::vector<std::string>{launch_.program, "run-one", paths_.plan(), std::to_string(index),
+                          std::vector<std::string>{launch_.program, "run-one", frozen_plan_, std::to_string(index),
                                                    "--out", paths_.folder.string(), "--threads",
                                                    std::to_string(sweep_threads(plan_, launch_)), "--parent",
                                                    std::to_string(::getpid())},
@@ -293,14 +300,17 @@ class Launcher {
   const SweepPaths& paths_;
   const SweepPlan& plan_;
   const SweepLaunch& launch_;
+  std::string frozen_plan_;
   std::size_t jobs_, total_ = 0;
-  std::chrono::steady_clock::time_point begin_;
+  Clock::time_point begin_;
   double last_report_ = 0, known_peak_mb_ = 0, seconds_sum_ = 0;
   std::size_t seconds_count_ = 0;
   std::deque<std::size_t> waiting_;
   std::list<Running> running_;
   SweepOutcome outcome_;
   bool is_stopping_ = false;
+  Clock::time_point next_try_;
+  std::size_t running_before_ = 0;
 };
 
 }  // namespace

@@ -57,7 +57,8 @@ Interval extent_of(const std::vector<RangeRow>& rows, bool has_zero) {
     }
   }
   if (has_zero) add(0);
-  const double span = all.high - all.low, room = span > 0 ? 0.05 * span : std::max(1e-9, 0.05 * std::fabs(all.low));
+  const double span = all.high - all.low, size = std::max(std::fabs(all.low), std::fabs(all.high));
+  const double room = span > 1e-12 * size ? 0.05 * span : size > 0 ? 0.05 * size : 1;
   return {all.low - room, all.high + room};
 }
 

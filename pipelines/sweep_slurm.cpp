@@ -47,13 +47,14 @@ std::string setting_of_slurm(const std::string& name) {
   return "";
 }
 
-/// Indices that earlier arrays of this folder have still to compute. Jobs that Slurm does not know any more have ended.
-std::set<std::size_t> queued_runs(const fs::path& folder) {
-  std::set<std::size_t> queued;
+/// Ids of runs that earlier arrays of this folder have still to compute. Jobs that Slurm does not know any more have
+/// ended.
+std::set<std::string> queued_runs(const fs::path& folder) {
+  std::set<std::string> queued;
   const std::string file = (folder / "jobs.txt").string();
   if (!fs::exists(file)) return queued;
   std::istringstream jobs(read_text_file(file));
-  for (std::string job; std::getline(jobs, job);) {
+  for (std::string job, plan_file; jobs >> job >> plan_file;) {
     std::string told;
     try {
       told = run_process({"squeue", "--noheader", "--array", "--jobs", job, "--format", "%K"});
@@ -62,10 +63,12 @@ std::set<std::size_t> queued_runs(const fs::path& folder) {
     } catch (const UserError&) {
       continue;
     }
+    const std::string plan_path = (folder.parent_path() / "plans" / plan_file).string();
+    const SweepPlan plan = parse_sweep_plan(read_text_file(plan_path), plan_path);
     std::istringstream indices(told);
     for (std::string index; indices >> index;) {
-      if (std::all_of(index.begin(), index.end(), [](char c) { return c >= '0' && c <= '9'; }))
-        queued.insert(std::stoul(index));
+      const bool is_number = std::all_of(index.begin(), index.end(), [](char c) { return c >= '0' && c <= '9'; });
+      if (is_number && std::stoul(index) < plan.runs.size()) queued.insert(plan.runs[std::stoul(index)].id);
     }
   }
   return queued;
@@ -126,11 +129,11 @@ std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan&
 SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std::string& program, int jobs,
                        int threads) {
   const fs::path folder = slurm_folder(paths);
-  const std::set<std::size_t> queued = queued_runs(folder);
+  const std::set<std::string> queued = queued_runs(folder);
   SlurmJobs submitted;
   for (const std::size_t index : distinct_runs(plan)) {
     if (sweep_run_state(paths, plan.runs[index].id) == SweepRunState::kDone) continue;
-    if (queued.contains(index)) {
+    if (queued.contains(plan.runs[index].id)) {
       ++submitted.queued;
     } else {
       submitted.runs.push_back(index);
@@ -139,14 +142,15 @@ SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std
   if (submitted.runs.empty()) return submitted;
   check_array_size(submitted.runs);
   const std::string whole = fs::absolute(paths.folder).lexically_normal().string();
+  const std::string plan_file = fs::path(paths.frozen_plan(plan)).filename().string();
   const std::string run_script = (folder / "run.sh").string(), results_script = (folder / "results.sh").string();
   write_text_file(run_script, std::string(kScriptHead) + "exec " + quoted(program) + " run-one " +
-                                  quoted(whole + "/sweep.json") + " \"$SLURM_ARRAY_TASK_ID\" --out " + quoted(whole) +
+                                  quoted(whole + "/plans/" + plan_file) + " \"$SLURM_ARRAY_TASK_ID\" --out " + quoted(whole) +
                                   " --threads " + std::to_string(threads) + " --requeue\n");
   write_text_file(results_script, std::string(kScriptHead) + "exec " + quoted(program) + " report " + quoted(whole) + "\n");
   submitted.array = submit(array_options(paths, plan, submitted.runs, jobs, threads), run_script);
   const std::string known = (folder / "jobs.txt").string();
-  write_text_file(known, (fs::exists(known) ? read_text_file(known) : "") + submitted.array + "\n");
+  write_text_file(known, (fs::exists(known) ? read_text_file(known) : "") + submitted.array + " " + plan_file + "\n");
   std::vector<std::string> options = {"--job-name=" + plan.name + "-results", "--dependency=afterany:" + submitted.array,
                                       "--output=" + without_patterns(folder.string()) + "/results_%j.txt", "--requeue"};
   if (!plan.slurm.partition.empty()) options.push_back("--partition=" + plan.slurm.partition);

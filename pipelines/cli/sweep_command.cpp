@@ -8,6 +8,7 @@
 #include "core/background_program.h"
 #include "core/check.h"
 #include "core/config_file.h"
+#include "core/file.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/suggest.h"
@@ -44,10 +45,10 @@ PlacedPlan read_plan(const std::string& sweep, const std::string& out, const std
   const ConfigValue tree = load_config(file, {}, problems);
   PlacedPlan placed;
   if (is_sweep_plan(tree)) {
-    placed.paths.folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+    placed.paths.folder = sweep_folder_of(file);
     if (!out.empty() && !fs::equivalent(out, placed.paths.folder))
       throw UserError("hsi4d sweep: " + file.string() + " is the plan of its own folder; --out names another one");
-    placed.plan = read_sweep_plan(placed.paths);
+    placed.plan = parse_sweep_plan(read_text_file(file.string()), file.string());
     placed.is_in_folder = true;
     return placed;
   }
@@ -163,7 +164,7 @@ std::string sweep_command(const SweepArguments& arguments, const std::vector<Los
   PlacedPlan placed = read_plan(arguments.sweep, arguments.out, losses);
   check_sweep_folder(placed.paths, arguments.resume || arguments.dry_run);
   if (arguments.dry_run) return plan_text(placed);
-  if (!placed.is_in_folder) write_sweep_plan(placed.paths, placed.plan, arguments.resume);
+  write_sweep_plan(placed.paths, placed.plan, arguments.resume);
   if (arguments.launcher == "slurm") return slurm_sweep(arguments, placed);
   return local_sweep(arguments, placed, status);
 }
