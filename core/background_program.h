@@ -44,8 +44,8 @@ class BackgroundProgram {
   std::chrono::steady_clock::time_point begin_;
 };
 
-/// Asks the system to end this process as politely as SIGTERM does when the process `parent`, which has started it, ends,
-/// however it ends. Ends at once if that is gone already.
+/// Asks the system to end this process as politely as SIGTERM does when the process `parent`, which has started it,
+/// ends, however it ends. Ends at once if that is gone already.
 void end_with_parent(int parent);
 
 /// Memory that programs can still have, MB: what the kernel has to give, or a container's limit where that is lower; 0

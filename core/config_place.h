@@ -8,8 +8,9 @@
 
 namespace hsi4d {
 
-/// The keys of a dotted path ("stages.camera.iterations"), or of a JSON pointer (RFC 6901, "/stages/camera/iterations"),
-/// as messages write settings; none where a key is empty or there are more than configs are deep.
+/// The keys of a dotted path ("stages.camera.iterations"), or of a JSON pointer (RFC 6901,
+/// "/stages/camera/iterations"), as messages write settings; none where a key is empty or there are more than configs
+/// are deep.
 std::vector<std::string> config_keys(const std::string& path);
 
 /// The place that `keys` name in a tree. Objects on the way that are not there are made, marked as ConfigMember tells.

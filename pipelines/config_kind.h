@@ -17,7 +17,8 @@ enum class ConfigKind {
 /// `stages`, `data` and `synthetic` of a run. What has none of these is of a run.
 ConfigKind config_kind(const ConfigValue& tree);
 
-/// Throws UserError, "FILE: is a config of `hsi4d avatar fit` …" or "… of `hsi4d sweep` …", when a tree is of the other kind than `wanted`.
+/// Throws UserError, "FILE: is a config of `hsi4d avatar fit` …" or "… of `hsi4d sweep` …", when a tree is of the other
+/// kind than `wanted`.
 void require_kind(const ConfigValue& tree, ConfigKind wanted, const std::filesystem::path& file);
 
 }  // namespace hsi4d

@@ -19,7 +19,7 @@ using Strings = std::vector<std::string>;
 constexpr std::int64_t kMostSeeds = 100000;
 
 const Strings kBlockKeys = {"name", "base", "set", "clips", "seeds", "ablations", "grid", "zip", "skip", "only"};
-const Strings kFileKeys = {"name", "base", "set",  "clips",  "seeds",   "ablations", "grid", "zip",
+const Strings kFileKeys = {"name", "base", "set",    "clips",   "seeds",   "ablations", "grid", "zip",
                            "skip", "only", "blocks", "compare", "threads", "memory_mb", "slurm"};
 
 void describe(ConfigFields& f, SweepSlurm& s) {
@@ -151,9 +151,8 @@ class Reader {
                                           std::int64_t most) {
     std::int64_t number = -1;
     const char* const end = value.text.data() + value.text.size();
-    const bool is_whole = value.kind == Kind::kNumber &&
-                          std::from_chars(value.text.data(), end, number).ptr == end && number >= least &&
-                          number <= most;
+    const bool is_whole = value.kind == Kind::kNumber && std::from_chars(value.text.data(), end, number).ptr == end &&
+                          number >= least && number <= most;
     if (is_whole) return number;
     add(value.origin, pointer,
         shown(value) + " is not a seed; allowed: " + std::to_string(least) +
@@ -325,9 +324,9 @@ class Reader {
     block.name.clear();
     const auto member = [&tree](const char* key) { return find_member(tree, key); };
     const auto at = [&in](const char* key) { return child_pointer(in, key); };
-    if (const ConfigValue* const name = member("name");
-        name != nullptr && expect(*name, Kind::kString, at("name"), "a string") &&
-        has_name(name->origin, name->text, at("name")))
+    if (const ConfigValue* const name = member("name"); name != nullptr &&
+                                                        expect(*name, Kind::kString, at("name"), "a string") &&
+                                                        has_name(name->origin, name->text, at("name")))
       block.name = name->text;
     ConfigFields fields;
     fields.path("base", block.base, {.must_exist = true, .may_be_empty = false}, "The config that all runs begin with");

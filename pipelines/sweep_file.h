@@ -80,8 +80,8 @@ struct SweepFile {
 };
 
 /// Reads a sweep's file as far as it can be told without the configs that it names. Throws one UserError with every
-/// problem: unknown keys, values of a wrong kind, empty or unequal lists, names that occur twice, settings that two axes
-/// name, rules about what is no axis.
+/// problem: unknown keys, values of a wrong kind, empty or unequal lists, names that occur twice, settings that two
+/// axes name, rules about what is no axis.
 /// @param tree  what load_config made of it
 /// @param file  whose name the sweep has where it does not say one
 SweepFile read_sweep_file(const ConfigValue& tree, const std::filesystem::path& file, ConfigProblems& problems);

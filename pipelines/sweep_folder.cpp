@@ -99,8 +99,7 @@ void check_sweep_folder(const SweepPaths& paths, bool resume) {
   const std::string folder = paths.folder.string();
   std::error_code error;
   if (!fs::exists(paths.folder, error) || fs::is_empty(paths.folder, error)) return;
-  if (!is_sweep_folder(folder))
-    throw UserError(folder + ": holds something that is no sweep; choose another folder");
+  if (!is_sweep_folder(folder)) throw UserError(folder + ": holds something that is no sweep; choose another folder");
   if (!resume)
     throw UserError(folder + ": holds a sweep already; --resume goes on with it, another --out makes a new one");
 }
@@ -144,6 +143,21 @@ SweepRunState sweep_run_state(const SweepPaths& paths, const std::string& id) {
   const std::vector<SweepAttempt> attempts = read_attempts(paths, id);
   if (attempts.empty()) return SweepRunState::kNew;
   return attempts.back().event == "failed" ? SweepRunState::kFailed : SweepRunState::kStarted;
+}
+
+std::string sweep_run_progress(const SweepPaths& paths, const SweepRun& run) {
+  std::string told = !run.dataset.empty() && fs::exists(paths.dataset(run.dataset)) ? "dataset\n" : "";
+  std::vector<std::string> checkpoints;
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(paths.run(run.id), error), end; !error && it != end; it.increment(error)) {
+    if (it->path().parent_path().filename() != "checkpoint") continue;
+    const auto written = it->last_write_time(error);
+    if (!error) checkpoints.push_back(it->path().string() + " " + std::to_string(written.time_since_epoch().count()));
+    error.clear();
+  }
+  std::sort(checkpoints.begin(), checkpoints.end());
+  for (const std::string& checkpoint : checkpoints) told += checkpoint + "\n";
+  return told;
 }
 
 const ProgramIdentity& this_program() {

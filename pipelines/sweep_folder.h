@@ -20,7 +20,8 @@ struct SweepPaths {
   std::filesystem::path folder;
 
   std::string plan() const { return (folder / "sweep.json").string(); }
-  /// A plan as it was when runs were started by it: theirs are its indices, also once sweep.json is that of an edited file.
+  /// A plan as it was when runs were started by it: theirs are its indices, also once sweep.json is that of an edited
+  /// file.
   std::string frozen_plan(const SweepPlan& plan) const;
   std::string log() const { return (folder / "sweep.log").string(); }
   std::string config(const std::string& id) const { return (folder / "configs" / (id + ".json")).string(); }
@@ -43,7 +44,8 @@ std::filesystem::path sweep_folder_of(const std::filesystem::path& plan);
 SweepPlan read_sweep_plan(const SweepPaths& paths);
 
 /// Writes the plan, a copy of it that stays, and the configs of its runs, of which those that are there already stay as
-/// they are. Throws UserError naming the folder: it holds a sweep and `resume` is false, something else, or cannot be written.
+/// they are. Throws UserError naming the folder: it holds a sweep and `resume` is false, something else, or cannot be
+/// written.
 void write_sweep_plan(const SweepPaths& paths, const SweepPlan& plan, bool resume);
 
 /// What write_sweep_plan would refuse, without writing anything.
@@ -57,6 +59,10 @@ std::string_view sweep_run_state_name(SweepRunState state);
 
 /// How a run stands: done where its status says so and its summary is whole.
 SweepRunState sweep_run_state(const SweepPaths& paths, const std::string& id);
+
+/// How far a run is that is not done: what its checkpoints are told by, other after every frame that is finished; of
+/// its dataset, whether it is there.
+std::string sweep_run_progress(const SweepPaths& paths, const SweepRun& run);
 
 /// The program that computes: what a result is told by.
 struct ProgramIdentity {

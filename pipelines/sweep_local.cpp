@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kLook{50};           // between looks at what has ended
 constexpr std::chrono::milliseconds kBetweenTries{500};  // between looks at what other launchers compute
-constexpr double kBetweenReports = 1;           // seconds
+constexpr double kBetweenReports = 1;                    // seconds
 constexpr int kInterruptedStatus = 130;
 constexpr int kBugStatus = 3;
 constexpr std::int64_t kEndOfOutput = 4096;  // bytes
@@ -139,8 +139,7 @@ class Launcher {
   double seconds_left() const {
     double mean = seconds_count_ > 0 ? seconds_sum_ / static_cast<double>(seconds_count_) : 0, left = 0;
     for (const Running& run : running_) {
-      const double share =
-          told_share(end_of_printed(paths_.printed(id_of(run.index)), run.printed_before));
+      const double share = told_share(end_of_printed(paths_.printed(id_of(run.index)), run.printed_before));
       const double seconds = run.program.seconds();
       if (share > 0 && seconds_count_ == 0) mean = std::max(mean, seconds / share);
       left += share > 0 ? seconds * (1 / share - 1) : std::max(0.0, mean - seconds);
@@ -201,12 +200,12 @@ class Launcher {
 
   void start(std::size_t index) {
     const std::string output = paths_.printed(id_of(index));
-    running_.emplace_back(index, size_of(output),
-                          std::vector<std::string>{launch_.program, "run-one", frozen_plan_, std::to_string(index),
-                                                   "--out", paths_.folder.string(), "--threads",
-                                                   std::to_string(sweep_threads(plan_, launch_)), "--parent",
-                                                   std::to_string(::getpid())},
-                          output);
+    running_.emplace_back(
+        index, size_of(output),
+        std::vector<std::string>{launch_.program, "run-one", frozen_plan_, std::to_string(index), "--out",
+                                 paths_.folder.string(), "--threads", std::to_string(sweep_threads(plan_, launch_)),
+                                 "--parent", std::to_string(::getpid())},
+        output);
   }
 
   // ---- Ends ----
@@ -263,7 +262,8 @@ class Launcher {
     const std::string printed = end_of_printed(paths_.printed(id_of(run.index)), run.printed_before);
     if (end.signal != 0)
       return "was ended by signal " + std::to_string(end.signal) +
-             (end.signal == SIGKILL ? ", most often for want of memory (it had " + rounded(end.peak_mb, 3) + " MB)" : "") +
+             (end.signal == SIGKILL ? ", most often for want of memory (it had " + rounded(end.peak_mb, 3) + " MB)"
+                                    : "") +
              end_of_output(printed);
     const std::vector<SweepAttempt> attempts = read_attempts(paths_, id_of(run.index));
     if (!attempts.empty() && !attempts.back().message.empty()) return attempts.back().message;

@@ -12,10 +12,10 @@ namespace hsi4d {
 
 /// How the runs of a sweep are started.
 struct SweepLaunch {
-  std::string program;    ///< hsi4d, whose run-one is started
-  int jobs = 0;           ///< the most runs at once; 0: as many as there are threads for
-  int threads = 1;        ///< of all runs together
-  double memory_mb = 0;   ///< that all runs together may take; 0: no limit
+  std::string program;     ///< hsi4d, whose run-one is started
+  int jobs = 0;            ///< the most runs at once; 0: as many as there are threads for
+  int threads = 1;         ///< of all runs together
+  double memory_mb = 0;    ///< that all runs together may take; 0: no limit
   bool fail_fast = false;  ///< nothing is started after a failure, and what runs is interrupted
   std::function<void(const std::string&)> tell = {};  ///< a line about a run, as soon as there is something to say
   ProgressSink progress = {};                         ///< of the whole sweep, now and then

@@ -128,10 +128,9 @@ class Rules {
   bool keeps(const Combination& combination) {
     bool has_only = false, is_chosen = false, is_skipped = false;
     for (const SweepRule& rule : combination.block->rules) {
-      const bool applies =
-          std::all_of(rule.values.begin(), rule.values.end(), [&](const SweepSetting& wanted) {
-            return has_sweep_axis(*combination.block, wanted.key);
-          });
+      const bool applies = std::all_of(rule.values.begin(), rule.values.end(), [&](const SweepSetting& wanted) {
+        return has_sweep_axis(*combination.block, wanted.key);
+      });
       if (!applies) continue;
       const bool is_match = matches(combination.run, rule);
       if (is_match) used_.insert(rule.pointer);
@@ -261,7 +260,8 @@ class Planner {
     if (c.clip != nullptr) tree = with_clip(std::move(tree), tree_of(c.clip->config));
     ConfigProblems problems;
     for (const auto* layer : c.layers) {
-      for (const SweepSetting& setting : *layer) lay_into_config(tree, setting.key, setting.value, setting.origin, problems);
+      for (const SweepSetting& setting : *layer)
+        lay_into_config(tree, setting.key, setting.value, setting.origin, problems);
     }
     const bool is_made = is_generated(tree);
     if (c.seed) {
@@ -315,9 +315,9 @@ class Planner {
   std::vector<std::pair<std::string, std::string>> reference(const SweepPlan& plan) const {
     std::vector<std::pair<std::string, std::string>> compare;
     for (const SweepSetting& setting : sweep_.compare) {
-      compare.emplace_back(is_named_axis(setting.key) ? setting.key : sweep_key(setting.key),
-                           is_named_axis(setting.key) ? sweep_name_text(setting.value)
-                                                      : sweep_value_text(setting.value));
+      compare.emplace_back(
+          is_named_axis(setting.key) ? setting.key : sweep_key(setting.key),
+          is_named_axis(setting.key) ? sweep_name_text(setting.value) : sweep_value_text(setting.value));
       const auto has_it = [&](const SweepRun& run) {
         return value_on_axis(run, compare.back().first) == compare.back().second;
       };

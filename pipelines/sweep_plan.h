@@ -17,8 +17,8 @@ struct SweepRun {
   std::string id;  ///< of its run folder: a hash of the resolved config without what changes no result
   std::string block, clip, ablation, seed;
   std::vector<std::pair<std::string, std::string>> values;  ///< of grid and zip: key and JSON text
-  std::string dataset;                                      ///< id of the generated dataset; empty: the config names data
-  std::string config;  ///< its text, resolved; empty in a plan that was read from a folder
+  std::string dataset;  ///< id of the generated dataset; empty: the config names data
+  std::string config;   ///< its text, resolved; empty in a plan that was read from a folder
 };
 
 /// A sweep, ready to be carried out.

@@ -64,9 +64,8 @@ SweepSlurm slurm_of(const ConfigValue& tree) {
 }
 
 bool is_id(const std::string& text) {
-  return text.size() == 16 && std::all_of(text.begin(), text.end(), [](char c) {
-           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
-         });
+  return text.size() == 16 &&
+         std::all_of(text.begin(), text.end(), [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
 }
 
 SweepRun run_of(const ConfigValue& object, const std::string& in) {

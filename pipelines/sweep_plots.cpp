@@ -96,11 +96,14 @@ std::string row_svg(const RangeRow& row, const Across& across, double y, const s
   std::string svg = "<g><title>" + html_escape(tip) + "</title><text x=\"" + coordinate(across.left - 8) + "\" y=\"" +
                     coordinate(y + 4) + "\" text-anchor=\"end\">" + html_escape(fitted(row.label)) + "</text>";
   const std::string stroke = "stroke=\"" + row.color + "\"";
-  if (row.range) svg += line_svg(across(row.range->low), y, across(row.range->high), y, stroke + " stroke-width=\"5\" opacity=\"0.35\"");
+  if (row.range)
+    svg += line_svg(across(row.range->low), y, across(row.range->high), y,
+                    stroke + " stroke-width=\"5\" opacity=\"0.35\"");
   for (const double value : row.points)
-    svg += "<circle cx=\"" + coordinate(across(value)) + "\" cy=\"" + coordinate(y) + "\" r=\"2.6\" fill=\"" + row.color +
-           "\" opacity=\"0.75\"/>";
-  return svg + line_svg(across(row.middle), y - 7, across(row.middle), y + 7, stroke + " stroke-width=\"2.4\"") + "</g>\n";
+    svg += "<circle cx=\"" + coordinate(across(value)) + "\" cy=\"" + coordinate(y) + "\" r=\"2.6\" fill=\"" +
+           row.color + "\" opacity=\"0.75\"/>";
+  return svg + line_svg(across(row.middle), y - 7, across(row.middle), y + 7, stroke + " stroke-width=\"2.4\"") +
+         "</g>\n";
 }
 
 std::optional<double> number_of_value(const std::string& json) {
@@ -150,7 +153,9 @@ std::string mean_plot(const SweepResults& results, const MetricFacts& metric) {
     if (mean.count > 1) row.range = Interval{mean.mean - mean.deviation, mean.mean + mean.deviation};
     rows.push_back(std::move(row));
   }
-  return rows.empty() ? "" : range_plot_svg(std::string(metric.label), std::string(metric.unit), rows, false, metric.decimals);
+  return rows.empty()
+             ? ""
+             : range_plot_svg(std::string(metric.label), std::string(metric.unit), rows, false, metric.decimals);
 }
 
 std::string difference_plot(const SweepResults& results, const MetricFacts& metric) {
@@ -158,12 +163,14 @@ std::string difference_plot(const SweepResults& results, const MetricFacts& metr
   for (const SweepGroup& group : results.groups) {
     const auto paired = group.is_reference ? std::nullopt : paired_difference(results, group, metric);
     if (!paired) continue;
-    const std::string color = !is_clear(*paired, metric)                      ? "var(--start)"
+    const std::string color = !is_clear(*paired, metric)                    ? "var(--start)"
                               : paired->statistics.mean * metric.better > 0 ? "var(--good)"
-                                                                              : "var(--bad)";
+                                                                            : "var(--bad)";
     rows.push_back({group.label, paired->differences, paired->statistics.mean, paired->interval, color});
   }
-  return rows.empty() ? "" : range_plot_svg(std::string(metric.label), std::string(metric.unit), rows, true, metric.decimals);
+  return rows.empty()
+             ? ""
+             : range_plot_svg(std::string(metric.label), std::string(metric.unit), rows, true, metric.decimals);
 }
 
 std::vector<std::string> number_axes(const SweepPlan& plan) {
@@ -182,7 +189,8 @@ std::string axis_plot(const SweepResults& results, const std::string& key, const
   std::vector<std::pair<std::string, std::vector<std::pair<double, double>>>> lines;
   for (const SweepGroup& group : results.groups) {
     const SweepRun& run = results.plan.runs[group.rows.front()];
-    const auto has = std::find_if(run.values.begin(), run.values.end(), [&key](const auto& v) { return v.first == key; });
+    const auto has =
+        std::find_if(run.values.begin(), run.values.end(), [&key](const auto& v) { return v.first == key; });
     const auto number = has == run.values.end() ? std::nullopt : number_of_value(has->second);
     const SampleStatistics mean = group_statistics(results, group, metric);
     if (!number || mean.count == 0) continue;

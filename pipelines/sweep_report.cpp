@@ -71,8 +71,7 @@ std::string header_section(const SweepResults& results) {
                      html_escape(progress_text(results)) + "</dd></div><div><dt>time of all</dt><dd>" +
                      duration_text(seconds) + "</dd></div>";
   const std::string reference = reference_text(results.plan);
-  if (!reference.empty())
-    text += "<div><dt>compared with</dt><dd>" + html_escape(reference) + "</dd></div>";
+  if (!reference.empty()) text += "<div><dt>compared with</dt><dd>" + html_escape(reference) + "</dd></div>";
   return text + "</dl>\n";
 }
 
@@ -89,8 +88,9 @@ std::string runs_section(const SweepResults& results) {
     const bool is_done = row.state == SweepRunState::kDone;
     text += "<tr><td>" + (is_done ? "<a href=\"runs/" + run.id + "/report.html\">" + label + "</a>" : label) +
             "</td><td>" + std::to_string(row.index) + "</td><td>" + std::string(sweep_run_state_name(row.state)) +
-            "</td><td>" + std::to_string(row.starts) + "</td><td>" + (seconds != nullptr ? fixed_number(*seconds, 1) : "") +
-            "</td><td>" + (row.peak_mb > 0 ? fixed_number(row.peak_mb, 0) : "") + "</td><td>" +
+            "</td><td>" + std::to_string(row.starts) + "</td><td>" +
+            (seconds != nullptr ? fixed_number(*seconds, 1) : "") + "</td><td>" +
+            (row.peak_mb > 0 ? fixed_number(row.peak_mb, 0) : "") + "</td><td>" +
             html_escape(last.program.version + (last.program.git.empty() ? "" : " (" + last.program.git + ")")) +
             "</td><td>" + html_escape(last.host) + "</td></tr>\n";
     if (!is_done && !last.message.empty())

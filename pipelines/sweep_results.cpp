@@ -74,7 +74,9 @@ SweepRow read_row(const SweepPaths& paths, std::size_t index, const SweepRun& ru
 std::vector<SweepGroup> groups_of(const SweepPlan& plan) {
   std::vector<SweepGroup> groups;
   for (std::size_t i = 0; i < plan.runs.size(); ++i) {
-    const auto like = [&](const SweepGroup& group) { return is_repetition(plan.runs[group.rows.front()], plan.runs[i]); };
+    const auto like = [&](const SweepGroup& group) {
+      return is_repetition(plan.runs[group.rows.front()], plan.runs[i]);
+    };
     auto group = std::find_if(groups.begin(), groups.end(), like);
     if (group == groups.end()) {
       const bool is_compared_with = !plan.compare.empty() && is_reference(plan, plan.runs[i]);

@@ -50,8 +50,8 @@ const MetricFacts& seconds_facts();
 /// Reads how the runs of a folder stand. Errors as read_sweep_plan.
 SweepResults read_sweep_results(const SweepPaths& paths);
 
-/// A metric of a group over its seeds: of each seed the mean over the clips, of those seeds of which all the group's clips
-/// have it.
+/// A metric of a group over its seeds: of each seed the mean over the clips, of those seeds of which all the group's
+/// clips have it.
 /// @param clip  the runs of this clip alone; null: all
 SampleStatistics group_statistics(const SweepResults& results, const SweepGroup& group, const MetricFacts& metric,
                                   const std::string* clip = nullptr);

@@ -30,9 +30,7 @@ double peak_mb() {
   return ::getrusage(RUSAGE_SELF, &used) == 0 ? static_cast<double>(used.ru_maxrss) / 1024 : 0;
 }
 
-RunSummary summary_in(const RunPaths& paths) {
-  return parse_summary(read_text_file(paths.summary()), paths.summary());
-}
+RunSummary summary_in(const RunPaths& paths) { return parse_summary(read_text_file(paths.summary()), paths.summary()); }
 
 /// A run that was killed between its results and its report gets the report now.
 void complete_report(const RunPaths& paths) {

@@ -16,8 +16,8 @@ struct SweepRunResult {
   bool was_done = false;  ///< before
 };
 
-/// Carries out a run, or goes on with it; takes what is there where it is done. A dataset that it needs is made, or waited
-/// for where another process makes it. Every start and every end is noted in the run's attempts.
+/// Carries out a run, or goes on with it; takes what is there where it is done. A dataset that it needs is made, or
+/// waited for where another process makes it. Every start and every end is noted in the run's attempts.
 /// @param threads   0: what the plan says, or one a core
 /// @param observer  shown what is computed; `stop_requested` ends it with its state saved
 /// Throws as carry_out, also what is wrong with the run's files.

@@ -145,13 +145,15 @@ SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std
   const std::string plan_file = fs::path(paths.frozen_plan(plan)).filename().string();
   const std::string run_script = (folder / "run.sh").string(), results_script = (folder / "results.sh").string();
   write_text_file(run_script, std::string(kScriptHead) + "exec " + quoted(program) + " run-one " +
-                                  quoted(whole + "/plans/" + plan_file) + " \"$SLURM_ARRAY_TASK_ID\" --out " + quoted(whole) +
-                                  " --threads " + std::to_string(threads) + " --requeue\n");
-  write_text_file(results_script, std::string(kScriptHead) + "exec " + quoted(program) + " report " + quoted(whole) + "\n");
+                                  quoted(whole + "/plans/" + plan_file) + " \"$SLURM_ARRAY_TASK_ID\" --out " +
+                                  quoted(whole) + " --threads " + std::to_string(threads) + " --requeue\n");
+  write_text_file(results_script,
+                  std::string(kScriptHead) + "exec " + quoted(program) + " report " + quoted(whole) + "\n");
   submitted.array = submit(array_options(paths, plan, submitted.runs, jobs, threads), run_script);
   const std::string known = (folder / "jobs.txt").string();
   write_text_file(known, (fs::exists(known) ? read_text_file(known) : "") + submitted.array + " " + plan_file + "\n");
-  std::vector<std::string> options = {"--job-name=" + plan.name + "-results", "--dependency=afterany:" + submitted.array,
+  std::vector<std::string> options = {"--job-name=" + plan.name + "-results",
+                                      "--dependency=afterany:" + submitted.array,
                                       "--output=" + without_patterns(folder.string()) + "/results_%j.txt", "--requeue"};
   if (!plan.slurm.partition.empty()) options.push_back("--partition=" + plan.slurm.partition);
   options.insert(options.end(), plan.slurm.options.begin(), plan.slurm.options.end());

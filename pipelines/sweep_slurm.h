@@ -24,11 +24,12 @@ std::string array_text(const std::vector<std::size_t>& indices);
 std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan& plan,
                                        const std::vector<std::size_t>& runs, int jobs, int threads);
 
-/// Submits the runs of a plan that are neither done nor in the queue already. A run is put into the queue again when its
-/// time is up (its state saved before) or its node is lost, and then goes on.
+/// Submits the runs of a plan that are neither done nor in the queue already. A run is put into the queue again when
+/// its time is up (its state saved before) or its node is lost, and then goes on.
 /// @param program  hsi4d, at the place where the nodes have it
 /// Throws UserError with what Slurm says.
-SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std::string& program, int jobs, int threads);
+SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std::string& program, int jobs,
+                       int threads);
 
 /// Puts the job that this process is into the queue again. Throws UserError outside of a job, or with what Slurm says.
 void requeue_this_job();

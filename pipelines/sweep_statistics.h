@@ -28,8 +28,9 @@ struct Interval {
 /// [Hyndman and Fan 1996, type 7]. Throws InternalError for none.
 double quantile(std::span<const double> sorted, double share);
 
-/// The interval of the mean of `values` by the bootstrap: means of samples of the same size drawn with replacement, cut off
-/// at both ends to `confidence` (percentile method).                                     [Efron and Tibshirani 1993, §13.3]
+/// The interval of the mean of `values` by the bootstrap: means of samples of the same size drawn with replacement, cut
+/// off at both ends to `confidence` (percentile method).                                     [Efron and Tibshirani
+/// 1993, §13.3]
 ///
 /// The same values give the same bits. Of few values it is narrower than it should be: of three, a mean of them that a
 /// repetition would not reach is possible.

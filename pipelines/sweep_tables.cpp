@@ -112,7 +112,9 @@ bool is_clear(const PairedDifference& paired, const MetricFacts& metric) {
 
 std::string metric_heading(const MetricFacts& facts) {
   return std::string(facts.label) + (facts.unit.empty() ? "" : ", " + std::string(facts.unit)) +
-         (facts.better < 0 ? " ↓" : facts.better > 0 ? " ↑" : "");
+         (facts.better < 0   ? " ↓"
+          : facts.better > 0 ? " ↑"
+                             : "");
 }
 
 std::string reference_text(const SweepPlan& plan) {
@@ -144,8 +146,8 @@ SweepTable mean_table(const SweepResults& results, const std::string* clip) {
   const std::size_t seeds = most_seeds(results, clip);
   table.caption = seeds > 1 ? "Mean ± standard deviation over " + std::to_string(seeds) + " seeds" : "One seed";
   if (clip == nullptr && results.clips.size() > 1)
-    table.caption += "; of each seed the mean over " + std::to_string(results.clips.size()) +
-                     " clips, where all of them are done";
+    table.caption +=
+        "; of each seed the mean over " + std::to_string(results.clips.size()) + " clips, where all of them are done";
   for (const SweepGroup& group : results.groups)
     table.rows.push_back({group.label, std::vector<SweepCell>(results.metrics.size())});
   for (std::size_t m = 0; m < results.metrics.size(); ++m) {
@@ -174,7 +176,8 @@ SweepTable difference_table(const SweepResults& results) {
     std::size_t pairs = 0;
     for (const MetricFacts* const metric : results.metrics) {
       const auto paired = paired_difference(results, group, *metric);
-      row.cells.push_back(paired ? SweepCell{difference_text(*paired, *metric), mark_of(*paired, *metric)} : SweepCell{});
+      row.cells.push_back(paired ? SweepCell{difference_text(*paired, *metric), mark_of(*paired, *metric)}
+                                 : SweepCell{});
       if (paired) pairs = std::max(pairs, paired->statistics.count);
     }
     if (pairs == 0) continue;
@@ -238,15 +241,16 @@ std::string sweep_csv(const SweepResults& results) {
   const Strings keys = value_keys(results.plan);
   Strings head = {"index", "run", "block", "clip", "ablation", "seed"};
   head.insert(head.end(), keys.begin(), keys.end());
-  for (const char* const name : {"state", "starts", "version", "git", "program", "host", "peak_mb"}) head.push_back(name);
+  for (const char* const name : {"state", "starts", "version", "git", "program", "host", "peak_mb"})
+    head.push_back(name);
   for (const MetricFacts* const metric : results.metrics) head.push_back(std::string(metric->name));
   std::string text = csv_line(head);
   for (const SweepRow& row : results.rows) {
     const SweepRun& run = results.plan.runs[row.index];
     Strings words = {std::to_string(row.index), run.id, run.block, run.clip, run.ablation, run.seed};
     for (const std::string& key : keys) {
-      const auto has = std::find_if(run.values.begin(), run.values.end(),
-                                    [&key](const auto& value) { return value.first == key; });
+      const auto has =
+          std::find_if(run.values.begin(), run.values.end(), [&key](const auto& value) { return value.first == key; });
       words.push_back(has == run.values.end() ? "" : has->second);
     }
     const SweepAttempt last = row.last.value_or(SweepAttempt{});

@@ -30,7 +30,8 @@ struct SweepTable {
 /// @param clip  of this clip alone; null: of all
 SweepTable mean_table(const SweepResults& results, const std::string* clip = nullptr);
 
-/// Fewest pairs of which an interval says something: signs of fewer agree by chance too often (of six in 2 · 2⁻⁶ = 3 %).
+/// Fewest pairs of which an interval says something: signs of fewer agree by chance too often (of six in 2 · 2⁻⁶ = 3
+/// %).
 inline constexpr std::size_t kFewestPairs = 6;
 
 /// True where the interval of at least kFewestPairs differences does not contain 0, of a metric that has a better side.

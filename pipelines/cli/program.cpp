@@ -223,11 +223,11 @@ struct CommandLine {
         ->check(WholeNumber(std::numeric_limits<int>::max()))
         ->type_name("N");
     add_threads(*command, a.threads);
-    command
-        ->add_option("--memory", a.memory_mb, "Memory for all runs together, MB; default: 90 % of what is free")
+    command->add_option("--memory", a.memory_mb, "Memory for all runs together, MB; default: 90 % of what is free")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
-    command->add_flag("--fail-fast", a.fail_fast, "Stop at the first run that fails, the others with their state saved");
+    command->add_flag("--fail-fast", a.fail_fast,
+                      "Stop at the first run that fails, the others with their state saved");
     command->add_flag("--resume", a.resume, "Go on with the sweep in the folder; runs that are done stay");
     command->add_flag("--dry-run", a.dry_run, "Check every combination, print the table of runs, write nothing");
     command->callback([this, &terms] { run = [this, &terms] { return sweep_command(sweep, terms, status); }; });

@@ -1,9 +1,11 @@
 #include "pipelines/cli/sweep_command.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <set>
+#include <thread>
 
 #include "core/background_program.h"
 #include "core/check.h"
@@ -65,8 +67,8 @@ std::string plan_text(const PlacedPlan& placed) {
   std::size_t done = 0;
   for (std::size_t i = 0; i < plan.runs.size(); ++i) {
     const SweepRun& run = plan.runs[i];
-    const auto same = std::find_if(plan.runs.begin(), plan.runs.end(),
-                                   [&run](const SweepRun& other) { return other.id == run.id; });
+    const auto same =
+        std::find_if(plan.runs.begin(), plan.runs.end(), [&run](const SweepRun& other) { return other.id == run.id; });
     const auto first = static_cast<std::size_t>(same - plan.runs.begin());
     const SweepRunState state = sweep_run_state(placed.paths, run.id);
     if (first == i && state == SweepRunState::kDone) ++done;
@@ -94,8 +96,7 @@ void warn_of_other_programs(const PlacedPlan& placed) {
   if (others == 0) return;
   log_warning(placed.paths.folder.string() + ": " + count_text(static_cast<std::int64_t>(others), "run") +
               (others == 1 ? " was" : " were") + " computed or begun by another build of hsi4d, " + example +
-              ", than this one, " + this_program().version + " (" + this_program().git +
-              "); results.csv tells which");
+              ", than this one, " + this_program().version + " (" + this_program().git + "); results.csv tells which");
 }
 
 std::string failures_text(const SweepPlan& plan, const SweepOutcome& outcome) {
@@ -106,6 +107,15 @@ std::string failures_text(const SweepPlan& plan, const SweepOutcome& outcome) {
   if (!outcome.not_started.empty())
     text += count_text(std::ssize(outcome.not_started), "run") + " not computed, after the failure\n";
   return text;
+}
+
+/// Puts this job of Slurm into the queue again, and waits for Slurm to end it: not to be taken for one that has ended
+/// by itself.
+void requeue_and_wait() {
+  constexpr int kMostSeconds = 60;
+  requeue_this_job();
+  for (int i = 0; i < kMostSeconds && !InterruptWatch::requested(); ++i)
+    std::this_thread::sleep_for(std::chrono::seconds(1));
 }
 
 std::string local_sweep(const SweepArguments& arguments, const PlacedPlan& placed, int& status) {
@@ -182,13 +192,19 @@ std::string run_one_command(const RunOneArguments& arguments, const std::vector<
   Observer observer = observer_on_terminal(false);
   observer.stop_requested = [] { return InterruptWatch::requested() || TimeLimitWatch::requested(); };
   const auto index = static_cast<std::size_t>(arguments.index);
+  const SweepRun& run = placed.plan.runs[index];
+  const std::string before = sweep_run_progress(placed.paths, run);
   try {
     const SweepRunResult result =
         run_one(placed.paths, placed.plan, index, losses, run_threads(arguments.threads), observer);
-    return result_text(result.summary, placed.paths.run(placed.plan.runs[index].id));
+    return result_text(result.summary, placed.paths.run(run.id));
   } catch (const Interrupted& stop) {
     const bool is_requeued = arguments.requeue && TimeLimitWatch::requested() && !InterruptWatch::requested();
-    if (is_requeued) requeue_this_job();
+    if (is_requeued && sweep_run_progress(placed.paths, run) == before)
+      throw UserError(
+          "the time of the job was over before a frame was finished, and would be again: give the runs more (" +
+          std::string(stop.what()) + ")");
+    if (is_requeued) requeue_and_wait();
     throw Interrupted(std::string(stop.what()) +
                       (is_requeued ? "; the job is in the queue again" : "; the same command goes on"));
   }

@@ -3,10 +3,10 @@
 
 #include <catch2/catch.hpp>
 
+#include "optim/loss_term.h"
 #include "pipelines/sweep_plan.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
-#include "optim/loss_term.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;

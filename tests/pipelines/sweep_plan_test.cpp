@@ -33,7 +33,9 @@ std::string refused(const Json& more) {
 }
 
 /// The value at a place of a run's config.
-Json at(const SweepRun& run, const std::string& pointer) { return Json::parse(run.config).at(Json::json_pointer(pointer)); }
+Json at(const SweepRun& run, const std::string& pointer) {
+  return Json::parse(run.config).at(Json::json_pointer(pointer));
+}
 
 const std::vector<std::string> kNone;
 
@@ -42,7 +44,7 @@ const std::vector<std::string> kNone;
 TEST_CASE("a sweep without axes is its base") {
   const TemporaryFolder here;
   write_tiny_base();
-  const SweepPlan plan = plan_of({});
+  const SweepPlan plan = plan_of(Json::object());
   REQUIRE(plan.runs.size() == 1);
   CHECK(plan.name == "tiny");
   CHECK(sweep_label(plan.runs[0]) == "the only run");
@@ -124,7 +126,8 @@ TEST_CASE("blocks follow one another and take over what they do not have") {
                  {{"name", "sharp"}, {"seeds", 2}, {"set", {{"render.blur", 0.1}}}}}}});
   CHECK(labels_of(plan) == std::vector<std::string>{"plain, seed 7", "off, seed 7", "steps, iterations 2, seed 7",
                                                     "steps, iterations 3, seed 7", "sharp, plain, seed 0",
-                                                    "sharp, plain, seed 1", "sharp, off, seed 0", "sharp, off, seed 1"});
+                                                    "sharp, plain, seed 1", "sharp, off, seed 0",
+                                                    "sharp, off, seed 1"});
   CHECK(at(plan.runs[0], "/render/blur") == 0.3);
   CHECK(at(plan.runs[2], "/render/blur") == 0.3);
   CHECK(at(plan.runs[4], "/render/blur") == 0.1);
@@ -156,10 +159,10 @@ TEST_CASE("of a clip's config its data is taken") {
   CHECK(at(plan.runs[0], "/synthetic/seed") == 5);
   CHECK(at(plan.runs[0], "/synthetic/size_px") == 256);  // not the base's
   CHECK(at(plan.runs[0], "/stages/camera/iterations") == 8);
-  const SweepPlan real = plan_of({{"seeds", 2},
-                                  {"clips",
-                                   {{"x", tiny_config_file()},
-                                    {"y", {{"config", tiny_config_file()}, {"set", {{"data.mask_margin_px", 2}}}}}}}});
+  const SweepPlan real = plan_of(
+      {{"seeds", 2},
+       {"clips",
+        {{"x", tiny_config_file()}, {"y", {{"config", tiny_config_file()}, {"set", {{"data.mask_margin_px", 2}}}}}}}});
   CHECK(labels_of(real) == std::vector<std::string>{"x, seed 0", "x, seed 1", "y, seed 0", "y, seed 1"});
   CHECK(real.runs[0].dataset.empty());
   CHECK(at(real.runs[0], "/data/scene") == (TinyDataset::folder() / "scene.ply").string());
@@ -179,7 +182,8 @@ TEST_CASE("mistakes of a sweep's file are told with their place") {
   CHECK(refused({{"grid", Json::object()}}) == "sweep.json:4: /grid: is empty; name something, or leave it out");
   CHECK(refused({{"grid", {{"render.blur", {0.1, 0.10}}}}}) ==
         "sweep.json:7: /grid/render.blur: 0.1 is in the list twice");
-  CHECK(refused({{"grid", {{"render.blur", 1}}}}) == "sweep.json:5: /grid/render.blur: 1 is a number, not a list of values");
+  CHECK(refused({{"grid", {{"render.blur", 1}}}}) ==
+        "sweep.json:5: /grid/render.blur: 1 is a number, not a list of values");
   CHECK(refused({{"blocks", {{{"name", "x"}}, {{"name", "x"}}}}}) ==
         "sweep.json:9: /blocks/1/name: \"x\" is the name of another block too");
   CHECK(refused({{"seeds", {1, 1}}}) == "sweep.json:6: /seeds/1: 1 is in the list twice");
@@ -205,13 +209,16 @@ TEST_CASE("mistakes of a sweep's file are told with their place") {
 TEST_CASE("mistakes of combinations are told with the runs that they are in") {
   const TemporaryFolder here;
   write_tiny_base();
-  CHECK(refused({{"set", {{"rendr.blur", 1}}}, {"seeds", 2}}) == "sweep.json:5: /rendr: unknown key; did you mean \"render\"?");
-  CHECK(refused({{"set", {{"stages.camra.iterations", 1}}}}) ==
-        "sweep.json:5: /stages/camra: no such entry in the config; an object in its place, {...}, adds one; did you mean "
-        "\"camera\"?");
-  CHECK(refused({{"seeds", 2}, {"grid", {{"render.blur", {0.1, -1, 0.2}}}}}) ==
-        "sweep.json:8: /render/blur: -1 is out of range; allowed: 0 to 100\n  in 2 of 6 runs, the first of them 2 (blur "
-        "-1, seed 0)");
+  CHECK(refused({{"set", {{"rendr.blur", 1}}}, {"seeds", 2}}) ==
+        "sweep.json:5: /rendr: unknown key; did you mean \"render\"?");
+  CHECK(
+      refused({{"set", {{"stages.camra.iterations", 1}}}}) ==
+      "sweep.json:5: /stages/camra: no such entry in the config; an object in its place, {...}, adds one; did you mean "
+      "\"camera\"?");
+  CHECK(
+      refused({{"seeds", 2}, {"grid", {{"render.blur", {0.1, -1, 0.2}}}}}) ==
+      "sweep.json:8: /render/blur: -1 is out of range; allowed: 0 to 100\n  in 2 of 6 runs, the first of them 2 (blur "
+      "-1, seed 0)");
   CHECK_THAT(refused({{"ablations", {{"none", {{"stages.camera", nullptr}, {"stages.interaction", nullptr}}}}}}),
              Contains("base.json: /stages: a run needs at least one stage"));
 }

@@ -22,7 +22,8 @@ class MadeSweep {
       for (const char* clip : {"a", "b"}) {
         for (const char* seed : {"0", "1", "2"}) {
           SweepRun run;
-          run.id = std::string(15 - std::to_string(plan_.runs.size()).size(), '0') + "f" + std::to_string(plan_.runs.size());
+          run.id =
+              std::string(15 - std::to_string(plan_.runs.size()).size(), '0') + "f" + std::to_string(plan_.runs.size());
           run.ablation = ablation;
           run.clip = clip;
           run.seed = seed;
@@ -40,7 +41,8 @@ class MadeSweep {
     here_.write(run.status(), R"({"state": "done"})");
     here_.write(run.summary(), R"({"name": "x", "frames": 4, "seconds": 2, "truth": true, "metrics": [
       {"stage": "interaction", "seconds": 1, "iterations": 5, "mpjpe_mm": 99},
-      {"stage": "refinement", "seconds": 1, "iterations": 5, "mpjpe_mm": )" + std::to_string(mpjpe) + R"(}],
+      {"stage": "refinement", "seconds": 1, "iterations": 5, "mpjpe_mm": )" +
+                                   std::to_string(mpjpe) + R"(}],
       "baselines": {}, "per_frame": [], "baselines_per_frame": {}})");
   }
 

@@ -88,7 +88,9 @@ void check_kills(const std::string& out, const std::string& whole, int kills, st
   int killed = 0;
   for (int i = 0; i < kills; ++i) {
     const int before = files_in(out);
-    const int until = before + 1 + static_cast<int>(random.below(static_cast<std::uint64_t>(std::max(1, (all - before) / (kills - i)))));
+    const int until =
+        before + 1 +
+        static_cast<int>(random.below(static_cast<std::uint64_t>(std::max(1, (all - before) / (kills - i)))));
     RunningProgram program(sweep_words(out));
     const bool was_killed = program.signal_at(SIGKILL, [&] { return files_in(out) >= until; });
     INFO(program.text());
@@ -112,8 +114,9 @@ TEST_CASE("a sweep is computed, recognised and reported", "[release]") {
   write_sweep({{"seeds", 1}, {"ablations", {{"plain", Json::object()}, {"less", {{"stages.camera.iterations", 2}}}}}});
   const ProgramResult dry = run_hsi4d({"sweep", "sweep.json", "--out", "out", "--dry-run"});
   CHECK(dry.status == 0);
-  CHECK_THAT(dry.out, Contains("plain, seed 0  new\n") &&
-                          Contains("sweep tiny: 2 combinations, 2 runs, 0 done; 1 dataset to be generated; folder out\n"));
+  CHECK_THAT(dry.out,
+             Contains("plain, seed 0  new\n") &&
+                 Contains("sweep tiny: 2 combinations, 2 runs, 0 done; 1 dataset to be generated; folder out\n"));
   CHECK_FALSE(fs::exists("out"));
   const ProgramResult first = run_sweep("out", false);
   INFO(first.err);
@@ -131,7 +134,8 @@ TEST_CASE("a sweep is computed, recognised and reported", "[release]") {
   CHECK(one.status == 0);
   CHECK_THAT(one.out, Contains("report: out/runs/" + ids_of("out")[1] + "/report.html\n"));
   CHECK(run_hsi4d({"run-one", "out", "2"}).err == "hsi4d run-one: there is no run 2 in out; allowed: 0 to 1\n");
-  for (const std::string& id : ids_of("out")) CHECK(events_of("out", id) == std::map<std::string, int>{{"start", 1}, {"done", 1}});
+  for (const std::string& id : ids_of("out"))
+    CHECK(events_of("out", id) == std::map<std::string, int>{{"start", 1}, {"done", 1}});
   CHECK(run_hsi4d({"report", "out"}).out == first.out);
 }
 

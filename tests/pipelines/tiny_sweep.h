@@ -11,8 +11,8 @@ namespace hsi4d::test {
 /// Writes base.json into the current folder: kTinyStages and a dataset to be generated for them.
 inline void write_tiny_base(int frames = kTinyFrames) {
   nlohmann::ordered_json base = nlohmann::ordered_json::parse(kTinyStages);
-  base["synthetic"] = {{"frames", frames},           {"size_px", kTinyPixels},   {"video", "png"},
-                       {"scene_gaussians", 1500},    {"avatar_gaussians", 500},  {"object_gaussians", 150}};
+  base["synthetic"] = {{"frames", frames},        {"size_px", kTinyPixels},  {"video", "png"},
+                       {"scene_gaussians", 1500}, {"avatar_gaussians", 500}, {"object_gaussians", 150}};
   std::ofstream("base.json") << base.dump(2);
 }
 
@@ -38,7 +38,8 @@ inline std::map<std::string, int> events_of(const std::filesystem::path& sweep, 
 /// The ids of a sweep's runs, by index.
 inline std::vector<std::string> ids_of(const std::filesystem::path& sweep) {
   std::vector<std::string> ids;
-  for (const auto& run : json_of(sweep / "sweep.json")["runs"]) ids.push_back(run["id"]);
+  const nlohmann::json plan = json_of(sweep / "sweep.json");
+  for (const auto& run : plan["runs"]) ids.push_back(run["id"]);
   return ids;
 }
 

@@ -151,11 +151,20 @@ def lost_node():
 
 def time_limit():
     """A run that needs more time than it has saves its state, is queued again and goes on."""
-    more = {"stages.interaction.iterations": 4000}
-    sweep = write_sweep("limit", seeds=1, ablations={"whole": {}}, set=more, slurm={"time": "00:01:00", "grace_s": 20})
+    clip = folder / "clip.json"
+    clip.write_text(json.dumps({"synthetic": {"frames": 60, "size_px": 128, "scene_gaussians": 4000, "avatar_gaussians": 2000}}))
+    run(program, "synth", clip, "--out", folder / "clip")
+    sweep = write_sweep("limit", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
+                        set={"stages.interaction.iterations": 50}, slurm={"time": "00:01:00", "grace_s": 20})
     print(run(program, "sweep", sweep, "--out", folder / "limit", "--launcher", "slurm").strip())
     wait_for("a run of more than its time", queue_is_empty, 580)
     check_once(folder / "limit")
+    limit = write_sweep("hopeless", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
+                        set={"stages.interaction.iterations": 1000000}, slurm={"time": "00:01:00", "grace_s": 20})
+    run(program, "sweep", limit, "--out", folder / "hopeless", "--launcher", "slurm")
+    wait_for("a run that cannot finish a frame in its time", queue_is_empty, 200)
+    told = "".join(f.read_text() for f in (folder / "hopeless" / "slurm").glob("*_0.txt"))
+    assert "before a frame was finished, and would be again" in told, told
     kinds = [a["event"] for a in attempts(folder / "limit", ids(folder / "limit")[0])]
     assert kinds.count("interrupted") >= 1 and kinds[-1] == "done", kinds
     print("the run's attempts: " + ", ".join(kinds))
