@@ -11,6 +11,7 @@ namespace {
 using Strings = std::vector<std::string>;
 
 std::string with_sign(const std::string& number) {
+  if (number.find_first_of("123456789") == std::string::npos) return number;
   if (number.starts_with("-")) return "−" + number.substr(1);
   return "+" + number;
 }
