@@ -12,7 +12,6 @@ namespace hsi4d {
 namespace {
 
 constexpr int kMostThreads = 1024;
-constexpr int kLongestSide = 65536;  // pixels
 /// The largest whole number that every JSON tool keeps (RFC 8259, section 6).
 constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 
@@ -55,10 +54,10 @@ void describe(ConfigFields& f, SkipSettings& s) {
 void describe(ConfigFields& f, ApproxSettings& s) {
   describe(f, s.render);
   f.boolean(
-      "hold_colours", s.hold_colours,
+      "hold_colors", s.hold_colors,
       "Colours of harmonics stay as in the stage's first iteration, those of the color net as when it last moved");
   f.number(
-      "camera_pixels", s.camera_pixels, {.above = 0, .max = 1},
+      "camera_pixel_share", s.camera_pixel_share, {.above = 0, .max = 1},
       "Share of the pixels that count in stages that draw the scene alone, in blocks of 32, others in every frame");
   f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
             "Longest side of the images that are worked on: the camera's image, frames and masks are reduced to it "

@@ -317,13 +317,13 @@ std::vector<RunNote> run_notes(const RunConfig& config) {
   } else if (render.static_tiles && !config.skip.tape.unchanged_inputs) {
     inform("skip.unchanged_inputs=false has made anew in every iteration what skip.static_tiles keeps");
   }
-  if (config.approx.hold_colours) inform("approx.hold_colours is on: colours do not follow every change of the view");
+  if (config.approx.hold_colors) inform("approx.hold_colors is on: colours do not follow every change of the view");
   if (config.approx.longest_side_px > 0) {
     notes.push_back({LogLevel::kInfo, "approx.longest_side_px is on: images, cameras.json and PSNR are of at most " +
                                           std::to_string(config.approx.longest_side_px) + " pixels"});
   }
-  if (config.approx.camera_pixels < 1) {
-    inform("approx.camera_pixels is on: stages that draw the scene alone see a part of the pixels in each frame");
+  if (config.approx.camera_pixel_share < 1) {
+    inform("approx.camera_pixel_share is on: stages that draw the scene alone see a part of the pixels in each frame");
   }
   if (!config.approx.render.collapse_suffix) return notes;
   const std::string off = without_static_layers(config);

@@ -398,6 +398,8 @@ struct CommandLine {
   void add_bench_pareto(CLI::App& command) {
     BenchParetoOptions& o = bench_pareto;
     command.add_option("--csv", o.csv, "Of pareto: file for the measurements, a line each")->type_name("F.csv");
+    command.add_option("--front", o.front, "Of pareto: file for a picture of what settings are chosen by, two panels")
+        ->type_name("F.svg");
     command
         .add_option(
             "--scene", o.scene_file,
