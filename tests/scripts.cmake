@@ -46,6 +46,14 @@ else()
   message(STATUS "There is no python3: the exporters and services in tools/ are not tested")
 endif()
 
+# Sweeps on a cluster of Slurm on this machine: it says so where Slurm is missing (tools/slurm-local install installs it).
+if(HSI4D_PYTHON AND NOT HSI4D_SANITIZE)
+  add_test(NAME "sweeps by Slurm"
+           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/slurm_sweep_test.py ${PROJECT_SOURCE_DIR}/tools
+                   $<TARGET_FILE:hsi4d> ${PROJECT_SOURCE_DIR}/configs)
+  set_tests_properties("sweeps by Slurm" PROPERTIES LABELS full SKIP_RETURN_CODE 77 TIMEOUT 1500)
+endif()
+
 # The report and a study in a browser; they say so where playwright-core or Chromium is missing (tools/test_report installs them).
 find_program(HSI4D_NODE node)
 if(HSI4D_SANITIZE)  # the pages are the same, and the program takes longer to make one

@@ -37,6 +37,7 @@
 #include "pipelines/cli/select_camera_command.h"
 #include "pipelines/cli/stress_command.h"
 #include "pipelines/cli/study_command.h"
+#include "pipelines/cli/sweep_command.h"
 #include "pipelines/cli/synth_command.h"
 
 namespace hsi4d::cli {
@@ -91,6 +92,8 @@ struct CommandLine {
   SelectCameraOptions select_camera;
   EvaluateOptions evaluate;
   StudyOptions study;
+  SweepArguments sweep;
+  RunOneArguments run_one;
   std::function<std::string()> run;
   int status = kDone;  ///< that `run` leaves
 
@@ -106,6 +109,8 @@ struct CommandLine {
     add_evaluate();
     add_report();
     add_study();
+    add_sweep(terms);
+    add_run_one(terms);
     add_render();
     add_gradients();
     add_avatar(terms);
@@ -203,8 +208,8 @@ struct CommandLine {
   }
 
   void add_report() {
-    CLI::App* report = app.add_subcommand("report", "Write report.html of runs, and print their errors");
-    report->add_option("RUN", runs, "Folders of runs")->required();
+    CLI::App* report = app.add_subcommand("report", "Write report.html of runs and sweeps, and print their errors");
+    report->add_option("RUN", runs, "Folders of runs or sweeps")->required();
     report->callback([this] { run = [this] { return report_command(runs); }; });
   }
 
@@ -237,6 +242,45 @@ struct CommandLine {
     command->add_option("--csv", o.csv, "Of answers: file for them, a line each")->type_name("F");
     command->add_option("--json", o.json, "Of answers: file for all numbers")->type_name("F");
     command->callback([this] { run = [this] { return study_command(study); }; });
+  }
+
+  void add_sweep(const std::vector<LossTerm>& terms) {
+    SweepArguments& a = sweep;
+    CLI::App* command = app.add_subcommand("sweep", "Many runs from one file: ablations, grids, clips, seeds");
+    command->add_option("SWEEP", a.sweep, "The sweep's file, or the folder of one that is to go on")->required();
+    command->add_option("--out", a.out, "The sweep's folder; default: runs/NAME with the sweep's name")
+        ->type_name("DIR");
+    command->add_option("--launcher", a.launcher, "local: processes here; slurm: a job array")
+        ->type_name("local|slurm")
+        ->capture_default_str();
+    command->add_option("--jobs", a.jobs, "The most runs at once; default: as many as there are threads for")
+        ->check(WholeNumber(std::numeric_limits<int>::max()))
+        ->type_name("N");
+    add_threads(*command, a.threads);
+    command->add_option("--memory", a.memory_mb, "Memory for all runs together, MB; default: 90 % of what is free")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("MB");
+    command->add_flag("--fail-fast", a.fail_fast,
+                      "Stop at the first run that fails, the others with their state saved");
+    command->add_flag("--resume", a.resume, "Go on with the sweep in the folder; runs that are done stay");
+    command->add_flag("--dry-run", a.dry_run, "Check every combination, print the table of runs, write nothing");
+    command->callback([this, &terms] { run = [this, &terms] { return sweep_command(sweep, terms, status); }; });
+  }
+
+  void add_run_one(const std::vector<LossTerm>& terms) {
+    RunOneArguments& a = run_one;
+    CLI::App* command = app.add_subcommand("run-one", "One run of a sweep, by its index in the table of --dry-run");
+    command->add_option("SWEEP", a.sweep, "The sweep's file, or its folder")->required();
+    command->add_option("INDEX", a.index, "From 0")->check(WholeNumber())->required();
+    command->add_option("--out", a.out, "The sweep's folder; default: runs/NAME with the sweep's name")
+        ->type_name("DIR");
+    add_threads(*command, a.threads);
+    command->add_option("--parent", a.parent, "End, with the state saved, when this process does")
+        ->check(WholeNumber(std::numeric_limits<int>::max()))
+        ->type_name("PROCESS");
+    command->add_flag("--requeue", a.requeue,
+                      "On SIGUSR1 save the state and put this job of Slurm into the queue again");
+    command->callback([this, &terms] { run = [this, &terms] { return run_one_command(run_one, terms); }; });
   }
 
   void add_info() {
