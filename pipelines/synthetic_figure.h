@@ -43,6 +43,7 @@ struct FigureFoot {
   double yaw_deg = 0;     ///< direction of the toes, as a heading
   double pitch_deg = 0;   ///< the heel is raised about the ball of the foot
   bool flat_toes = true;  ///< the toes stay level when the heel is raised
+  bool about_ankle = false;  ///< the pitch is about the ankle, which stays over `place`
 };
 
 /// Where a hand is to be.

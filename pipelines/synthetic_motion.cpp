@@ -50,7 +50,8 @@ ScenePlan plan_of(const Moment& first, const SyntheticObject& object, SyntheticM
   ScenePlan plan;
   plan.middle = is_walking(motion) ? Vector2<double>(0, 0.6) : first.figure.ground.place;
   plan.seen_from_y = is_walking(motion) ? -1.4 : 0.2;
-  const bool stands = motion == SyntheticMotionKind::kPour || motion == SyntheticMotionKind::kLift;
+  const bool stands =
+      motion == SyntheticMotionKind::kPour || (motion == SyntheticMotionKind::kLift && !object.is_heavy);
   plan.has_table = stands && !object.on_floor;
   plan.has_stand = stands && object.on_floor;
   if (!stands) return plan;
@@ -95,10 +96,15 @@ Matrix3<double> grasp_on(const Ground& ground, const HandGrip& grip, int side) {
 
 void hold_object(const Actor& actor, const ObjectPlace& at, const Vector3<double>& away, double curl_deg,
                  Moment& moment) {
+  hold_object(actor, actor.object.hands, at, away, curl_deg, moment);
+}
+
+void hold_object(const Actor& actor, const HandGrips& grips, const ObjectPlace& at, const Vector3<double>& away,
+                 double curl_deg, Moment& moment) {
   const Ground& ground = moment.figure.ground;
   for (const int side : {kLeft, kRight}) {
     const auto i = static_cast<std::size_t>(side);
-    const auto& grip = actor.object.hands[i];
+    const auto& grip = grips[i];
     if (!grip) continue;
     const Matrix turn = so3_exp(Vector(ground.direction(at.turn_deg) * kDegree)) * grasp_on(ground, *grip, side);
     const Vector beside = moment.object->rotation * Vector(grip->point - at.pivot) + ground.direction(away);
@@ -113,7 +119,22 @@ void hold_object(const Actor& actor, const ObjectPlace& at, const Vector3<double
 
 namespace {
 
-Viewpoint designed_viewpoint(SyntheticMotionKind motion) {
+/// Before a place: a little from the right and from above, as for other motions.
+Viewpoint view_of_place(const ScenePlace& place) {
+  const PlaceView& view = place.view;
+  const Matrix turn = so3_exp(Vector(0, 0, view.turn_deg * kDegree));
+  Viewpoint result;
+  result.focal = 1.12;
+  result.target = Vector(place.ground.place[0] + view.left, place.ground.place[1], 0.82 + view.up);
+  result.eye = result.target + view.distance * (turn * Vector(0.4, -2.3, 0.5));
+  result.turn = view.turn_deg * kDegree;
+  return result;
+}
+
+Viewpoint designed_viewpoint(const ClipSettings& settings) {
+  const SyntheticMotionKind motion = settings.motion;
+  if (settings.place != nullptr) return view_of_place(*settings.place);
+  if (motion == SyntheticMotionKind::kRoll) return {{0.5, -2.5, 1.3}, {0.0, 0.55, 0.72}, 1.2};
   if (motion == SyntheticMotionKind::kWalk) return {{0.5, -2.5, 1.4}, {0.02, 0.5, 0.85}, 1.2};
   if (motion == SyntheticMotionKind::kPush) return {{0.5, -3.5, 1.5}, {0, 0.35, 0.72}, 1.25};
   if (motion == SyntheticMotionKind::kWave) return {{0.45, -1.95, 1.4}, {0.05, 0.7, 0.9}, 1.15};
@@ -123,7 +144,7 @@ Viewpoint designed_viewpoint(SyntheticMotionKind motion) {
 }  // namespace
 
 Viewpoint first_viewpoint(const ClipSettings& settings) {
-  Viewpoint view = designed_viewpoint(settings.motion);
+  Viewpoint view = designed_viewpoint(settings);
   if (settings.camera_distance != 1) view.eye = view.target + settings.camera_distance * (view.eye - view.target);
   return view;
 }
@@ -153,7 +174,8 @@ ClipSettings clip_settings(const SyntheticSettings& settings) {
           settings.size_px,
           settings.camera_drift,
           settings.motion,
-          settings.camera_distance};
+          settings.camera_distance,
+          find_place(settings.scene, settings.motion, settings.place)};
 }
 
 Rigid<double> joint_frame(const BodyModel& body, const BodyPose& pose, int joint) {
@@ -167,12 +189,42 @@ Rigid<double> joint_frame(const BodyModel& body, const BodyPose& pose, int joint
   return frame;
 }
 
+namespace {
+
+/// The function that makes a motion.
+auto moments_of(SyntheticMotionKind motion) -> Moment (*)(const Actor&, double) {
+  switch (motion) {
+    case SyntheticMotionKind::kWalk:
+    case SyntheticMotionKind::kPush:
+      return detail::walking_moment;
+    case SyntheticMotionKind::kSitOn:
+    case SyntheticMotionKind::kLeanOn:
+    case SyntheticMotionKind::kReach:
+    case SyntheticMotionKind::kWipe:
+    case SyntheticMotionKind::kWater:
+      return detail::placed_moment;
+    case SyntheticMotionKind::kRun:
+    case SyntheticMotionKind::kSlide:
+    case SyntheticMotionKind::kPlay:
+    case SyntheticMotionKind::kRoll:
+      return detail::flowing_moment;
+    default:
+      return detail::keyed_moment;
+  }
+}
+
+}  // namespace
+
 SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& object, const ClipSettings& settings) {
   HSI4D_CHECK_EQ(body.joint_count(), kSmplxJoints);
   HSI4D_CHECK(settings.frames > 0 && settings.frame_rate > 0 && settings.size_px > 0, "a clip needs frames");
   check_object(object, settings.motion);
-  const Actor actor{figure_sizes(body), object, settings.motion};
-  const auto moment_at = is_walking(settings.motion) ? detail::walking_moment : detail::keyed_moment;
+  if (use_of(settings.motion) && settings.place == nullptr)
+    throw UserError("the motion " +
+                    std::string(choice_name<SyntheticMotionKind>(kSyntheticMotionKinds, settings.motion)) +
+                    " needs a place: " + place_names_of(settings.motion));
+  const Actor actor{figure_sizes(body), object, settings.motion, settings.place};
+  const auto moment_at = moments_of(settings.motion);
   const int wrist = smplx_joint("right_wrist");
   const Moment start = moment_at(actor, 0);
   SyntheticClip clip;
@@ -192,6 +244,10 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
   Moment first = start;
   if (first.object) first.object = clip.object.front();
   clip.plan = plan_of(first, object, settings.motion);
+  if (settings.place != nullptr) {
+    clip.plan.place = settings.place;
+    clip.plan.seen_from_y = settings.place->ground.place[1] - 1.4;
+  }
   return clip;
 }
 
@@ -209,6 +265,24 @@ const char* motion_summary(SyntheticMotionKind motion) {
       return "sits down on it, leans back and swivels";
     case SyntheticMotionKind::kLean:
       return "leans on its back; without one, on the knees";
+    case SyntheticMotionKind::kSitOn:
+      return "sits down on a seat of the scene and looks around";
+    case SyntheticMotionKind::kLeanOn:
+      return "leans on a counter or a ladder";
+    case SyntheticMotionKind::kRun:
+      return "runs on a treadmill";
+    case SyntheticMotionKind::kSlide:
+      return "slides down a slide";
+    case SyntheticMotionKind::kReach:
+      return "takes things from a shelf";
+    case SyntheticMotionKind::kWipe:
+      return "wipes a car";
+    case SyntheticMotionKind::kPlay:
+      return "sits and plays it";
+    case SyntheticMotionKind::kWater:
+      return "waters flowers with it";
+    case SyntheticMotionKind::kRoll:
+      return "sits on it and rolls backwards";
     case SyntheticMotionKind::kWave:
       break;
   }
