@@ -42,8 +42,8 @@ void make_bar(SceneKit& kit) {
   for (int i = 0; i < 12; ++i)  // panelling
     kit.board(Point(-2.3 + 0.42 * i, kBarRoom.back - 0.02, 0.5), Point(0.19, 0.015, 0.42), kit.varied(wood, 0.08), 0.8);
   kit.board(Point(0, kBarRoom.back - 0.03, 0.95), Point(kBarRoom.half_width, 0.03, 0.03), wood * 1.2, 0.8);
-  add_shelves(kit, {{-0.95, kBarRoom.back - 0.12}, 0}, {1.8, 2.2, 0.3, 5, true}, wood * 0.9);
-  add_shelves(kit, {{1.15, kBarRoom.back - 0.12}, 0}, {1.8, 2.2, 0.3, 5, true}, wood * 0.9);
+  add_shelves(kit, {{-0.95, kBarRoom.back - 0.33}, 0}, {1.8, 2.2, 0.3, 5, true}, wood * 0.9);
+  add_shelves(kit, {{1.15, kBarRoom.back - 0.33}, 0}, {1.8, 2.2, 0.3, 5, true}, wood * 0.9);
   add_counter(kit, counter_front(), {kCounterLength, kCounterDepth, bar_place().height}, wood * 1.05,
               Rgb(0.55, 0.3, 0.15));
   const Piece counter(kit, counter_front());

@@ -11,9 +11,6 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 const Rgb kSteel(0.62, 0.63, 0.66), kIron(0.13, 0.13, 0.14);
 
-/// |x|^e with the sign of x.
-double signed_power(double x, double e) { return std::copysign(std::pow(std::abs(x), e), x); }
-
 /// Cloth: a fine weave and darker seams at the edges.
 Paint woven(const SceneKit& kit, const Rgb& cloth) {
   return [&kit, cloth](double u, double v) {
@@ -58,15 +55,12 @@ void Piece::panel(const Point& corner, const Point& edge_u, const Point& edge_v,
 }
 
 void Piece::cushion(const Point& center, const Point& half, const Paint& paint, double detail) const {
-  constexpr double kRound = 0.45;
   const Ground ground = ground_;
-  kit.model.add({[=](double u, double v) {
+  kit.model.add({[=](double u, double v) {  // |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1
                    const double a = 2 * kPi * u, b = kPi * (v - 0.5);
-                   const double ring = std::pow(std::max(0.0, std::cos(b)), kRound);
-                   const Point p(half.x() * ring * signed_power(std::cos(a), kRound),
-                                 -half.y() * ring * signed_power(std::sin(a), kRound),
-                                 half.z() * signed_power(std::sin(b), kRound));
-                   return ground.point(center + p);
+                   const Point d(std::cos(b) * std::cos(a), -std::cos(b) * std::sin(a), std::sin(b));
+                   const double n = std::pow(d.x(), 4) + std::pow(d.y(), 4) + std::pow(d.z(), 4);
+                   return ground.point(center + (d * std::pow(n, -0.25)).cwiseProduct(half));
                  },
                  paint, detail, 0, {}});
 }

@@ -9,8 +9,8 @@ namespace hsi4d::detail {
 namespace {
 
 constexpr RoomSize kGymRoom{2.8, 3.4, 2.9};
-const Ground kSecondMill{{-2.0, 2.5}, 66};
-const Ground kRack{{0.95, 3.1}, 0};
+const Ground kSecondMill{{2.0, 2.2}, 66};
+const Ground kRack{{0.6, 3.15}, 0};
 
 void add_mirrors(SceneKit& kit) {
   for (int i = 0; i < 3; ++i) {  // the room behind, blurred
@@ -105,9 +105,9 @@ void make_gym(SceneKit& kit) {
   add_treadmill(kit, mill);
   mill.ground = kSecondMill;
   add_treadmill(kit, mill);
-  add_ball(kit, Point(1.75, 1.75, 0.33), 0.33, Rgb(0.2, 0.5, 0.75));
+  add_ball(kit, Point(-2.0, 2.75, 0.33), 0.33, Rgb(0.2, 0.5, 0.75));
   for (int i = 0; i < 3; ++i) {
-    const Point foot(1.1 + 0.27 * i, 2.2, 0.1);
+    const Point foot(-1.75 + 0.27 * i, 1.75, 0.1);
     add_ball(kit, foot, 0.1, i == 1 ? Rgb(0.75, 0.25, 0.2) : Rgb(0.13, 0.13, 0.15));
     kit.model.add_tube(
         [foot](double v) {
@@ -120,9 +120,9 @@ void make_gym(SceneKit& kit) {
 
 double gym_light(const ScenePlan& plan, const Point& p, const Point& normal) {
   static const std::array<FloorShade, 4> shades = {{{{-0.7, 2}, {0.4, 0.9}, 66, 0.3},
-                                                    {{-2.0, 2.5}, {0.4, 0.9}, 66, 0.3},
+                                                    {{2.0, 2.2}, {0.4, 0.9}, 66, 0.3},
                                                     {{0.95, 3.1}, {1.1, 0.2}, 0, 0.4},
-                                                    {{1.75, 1.75}, {0.2, 0.2}, 0, 0.4}}};
+                                                    {{-2.0, 2.75}, {0.2, 0.2}, 0, 0.4}}};
   return faced_light(normal) * room_corner_light(kGymRoom, p) * support_shadow(plan, p) * floor_shades(shades, p);
 }
 

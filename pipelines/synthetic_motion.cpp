@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "body/kinematics.h"
 #include "body/motion_edit.h"
@@ -146,13 +148,18 @@ Viewpoint designed_viewpoint(const ClipSettings& settings) {
 Viewpoint first_viewpoint(const ClipSettings& settings) {
   Viewpoint view = designed_viewpoint(settings);
   if (settings.camera_distance != 1) view.eye = view.target + settings.camera_distance * (view.eye - view.target);
+  const ClipVariation& varied = settings.variation;
+  if (varied.turn == 0) return view;
+  view.eye = view.target + varied.distance * (so3_exp(Vector(0, 0, varied.turn)) * Vector(view.eye - view.target));
+  view.eye[2] += varied.up;
+  view.turn += varied.turn;
   return view;
 }
 
 Camera camera_at(const Viewpoint& view, double seconds, const ClipSettings& settings) {
   constexpr double kFastest = 0.142;  // metres a second
   constexpr double kSwing = 0.4;      // radians a second: it comes back after 8 seconds
-  const double way = settings.camera_drift * kFastest / kSwing * std::sin(kSwing * seconds);
+  const double way = settings.camera_drift * settings.variation.drift * kFastest / kSwing * std::sin(kSwing * seconds);
   Vector of_eye(-0.94, 0.26, 0.22), of_target(0.12, 0, -0.04);
   if (view.turn != 0) {
     const Matrix turn = so3_exp(Vector(0, 0, view.turn));
@@ -175,7 +182,8 @@ ClipSettings clip_settings(const SyntheticSettings& settings) {
           settings.camera_drift,
           settings.motion,
           settings.camera_distance,
-          find_place(settings.scene, settings.motion, settings.place)};
+          find_place(settings.scene, settings.motion, settings.place),
+          clip_variation(settings)};
 }
 
 Rigid<double> joint_frame(const BodyModel& body, const BodyPose& pose, int joint) {
@@ -213,6 +221,45 @@ auto moments_of(SyntheticMotionKind motion) -> Moment (*)(const Actor&, double) 
   }
 }
 
+/// Body and object at one moment.
+struct ClipState {
+  BodyPose pose;
+  std::optional<Rigid<double>> object;
+};
+
+ClipState state_of(const BodyModel& body, const Actor& actor, const Moment& moment,
+                   Moment (*moment_at)(const Actor&, double)) {
+  ClipState state{posed_figure(body, moment.figure), moment.object};
+  if (moment.object && moment.in_hand) {
+    state.object = compose(joint_frame(body, state.pose, smplx_joint("right_wrist")),
+                           wrist_from_object(actor, moment_at(actor, 0).figure.ground));
+  }
+  return state;
+}
+
+/// Where what happens is moved to: along a place as far as that leaves, or about the middle of where it happens.
+Rigid<double> start_moved(const ClipSettings& settings, const Ground& ground) {
+  const ClipVariation& varied = settings.variation;
+  Rigid<double> moved;
+  if (settings.place != nullptr) {
+    moved.translation = ground.direction({varied.aside * room_of(*settings.place), 0, 0});
+    return moved;
+  }
+  const Vector middle(ground.place[0], ground.place[1], 0);
+  moved.rotation = so3_exp(Vector(0, 0, varied.heading_deg * kDegree));
+  moved.translation = middle - moved.rotation * middle + Vector(0.07 * varied.aside, 0, 0);
+  return moved;
+}
+
+void move_start(const Rigid<double>& moved, SyntheticClip& clip) {
+  clip.motion = transformed(clip.motion, moved, *clip.motion.pelvis_rest);
+  for (Rigid<double>& place : clip.object) place = compose(moved, place);
+  ScenePlan& plan = clip.plan;
+  plan.support = transform_point(moved, plan.support);
+  plan.support_turn += so3_log(moved.rotation)[2];
+  plan.middle = transform_point(moved, Vector(plan.middle[0], plan.middle[1], 0)).head<2>();
+}
+
 }  // namespace
 
 SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& object, const ClipSettings& settings) {
@@ -225,29 +272,27 @@ SyntheticClip synthetic_clip(const BodyModel& body, const SyntheticObject& objec
                     " needs a place: " + place_names_of(settings.motion));
   const Actor actor{figure_sizes(body), object, settings.motion, settings.place};
   const auto moment_at = moments_of(settings.motion);
-  const int wrist = smplx_joint("right_wrist");
-  const Moment start = moment_at(actor, 0);
+  const ClipVariation& varied = settings.variation;
+  const Rigid<double> moved = start_moved(settings, moment_at(actor, 0).figure.ground);
+  const auto state_at = [&](double seconds) { return state_of(body, actor, moment_at(actor, seconds), moment_at); };
   SyntheticClip clip;
   clip.motion.frame_rate = settings.frame_rate;
   clip.motion.pelvis_rest = pelvis_of(body.joints);
   for (Index frame = 0; frame < settings.frames; ++frame) {
     const double seconds = double(frame) / settings.frame_rate;
-    const Moment moment = moment_at(actor, seconds);
-    clip.motion.poses.push_back(posed_figure(body, moment.figure));
-    if (moment.object) {
-      clip.object.push_back(moment.in_hand ? compose(joint_frame(body, clip.motion.poses.back(), wrist),
-                                                     wrist_from_object(actor, start.figure.ground))
-                                           : *moment.object);
-    }
+    auto [pose, place] = state_at(varied.begin + varied.speed * seconds);
+    clip.motion.poses.push_back(std::move(pose));
+    if (place) clip.object.push_back(*place);
     clip.cameras.push_back(camera_at(first_viewpoint(settings), seconds, settings));
   }
-  Moment first = start;
-  if (first.object) first.object = clip.object.front();
+  Moment first = moment_at(actor, 0);
+  if (first.object) first.object = state_at(0).object;
   clip.plan = plan_of(first, object, settings.motion);
   if (settings.place != nullptr) {
     clip.plan.place = settings.place;
     clip.plan.seen_from_y = settings.place->ground.place[1] - 1.4;
   }
+  if (varied.aside != 0 || varied.heading_deg != 0) move_start(moved, clip);
   return clip;
 }
 

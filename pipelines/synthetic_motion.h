@@ -20,6 +20,7 @@
 #include "pipelines/synthetic_figure.h"
 #include "pipelines/synthetic_object.h"
 #include "pipelines/synthetic_scene.h"
+#include "pipelines/synthetic_variation.h"
 
 namespace hsi4d {
 
@@ -34,6 +35,7 @@ struct ClipSettings {
   SyntheticMotionKind motion = SyntheticMotionKind::kPour;
   double camera_distance = 1;  ///< of the camera from what it looks at first, of that as designed
   const ScenePlace* place = nullptr;  ///< where it is done, of motions that need one
+  ClipVariation variation = {};
 };
 
 /// The clip that the settings ask for; of several, which follow one another, all frames.

@@ -54,10 +54,10 @@ void add_shopping_cart(SurfaceModel& model) {
   const Rgb red(0.82, 0.16, 0.14);
   const double back = -0.42, front = 0.46, high = 0.96, low = 0.5, wide = 0.27, narrow = 0.2;
   // the basket: narrower in front and below
-  const auto rim = [&](double x, double side) {
+  const auto rim = [=](double x, double side) {
     return Point(x, side * (wide + (narrow - wide) * (x - back) / (front - back)), high - 0.05 * (x - back));
   };
-  const auto floor = [&](double x, double side) {
+  const auto floor = [=](double x, double side) {
     return Point(0.94 * x - 0.01, 0.85 * rim(x, side).y(), low + 0.04 * (front - x));
   };
   for (const double side : {-1.0, 1.0}) {

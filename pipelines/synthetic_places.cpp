@@ -27,12 +27,12 @@ const std::vector<ScenePlace> kGym = {
 const std::vector<ScenePlace> kBar = {
     {"bar", Use::kRest, ground(-0.02, 1.9, 78), 1.08, 0.36, 0, 1, {6, 1.15, 0, 0}}};
 const std::vector<ScenePlace> kPlayground = {
-    {"slide", Use::kSlide, ground(-0.55, 1.6, -52), 1.4, 2.1, 0, 0.56, {0, 1.6, 0.5, -0.05}}};
+    {"slide", Use::kSlide, ground(-0.55, 1.6, -52), 1.4, 2.1, 0, 0.56, {0, 1.45, 0.5, 0}}};
 const std::vector<ScenePlace> kGreenhouse = {
-    {"chair", Use::kSeat, ground(-0.55, 1.6, 14), 0.46, 0.42, 0, 0.46, {8, 1.15, 0.05, -0.1}},
+    {"chair", Use::kSeat, ground(-0.5, 1.62, 46), 0.46, 0.42, 0, 0.46, {8, 1.15, 0.05, -0.1}},
     {"flowers", Use::kFlowers, ground(0.15, 1.42, 112), 0.35, 0.78, 0, 1.1, {-4, 1.2, 0.25, 0}}};
 const std::vector<ScenePlace> kCafe = {
-    {"chair", Use::kSeat, ground(-0.35, 1.5, 22), 0.46, 0.42, 0, 0.46, {4, 1.15, 0.15, -0.1}}};
+    {"chair", Use::kSeat, ground(-0.3, 1.55, 42), 0.46, 0.42, 0, 0.46, {4, 1.15, 0.15, -0.1}}};
 const std::vector<ScenePlace> kStore = {
     {"shelf", Use::kShelf, ground(0.1, 1.3, 128), 1.2, 0.42, 0, 1.5, {-4, 1.15, 0.15, 0}}};
 const std::vector<ScenePlace> kGarden = {
@@ -118,6 +118,23 @@ std::string place_problem(SyntheticSceneKind scene, SyntheticMotionKind motion, 
   const std::string what = name.empty() ? "nothing" : "no \"" + name + "\"";
   return "the scene " + of_scene + " has " + what + " for the motion " + of_motion + "; there are " +
          place_names_of(motion);
+}
+
+double room_of(const ScenePlace& place) {
+  switch (place.use) {
+    case Use::kSeat:
+      return std::max(0.0, 0.5 * (place.width - 0.5)) * 0.4;
+    case Use::kRest:
+      return place.rise > 0 ? 0 : 0.1;
+    case Use::kShelf:
+    case Use::kPanel:
+    case Use::kFlowers:
+      return 0.1;
+    case Use::kBelt:
+    case Use::kSlide:
+      break;
+  }
+  return 0;
 }
 
 double slide_height(const ScenePlace& slide, double behind) {

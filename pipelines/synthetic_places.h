@@ -55,6 +55,9 @@ const ScenePlace* find_place(SyntheticSceneKind scene, SyntheticMotionKind motio
 /// What is wrong with a place for a motion in a scene, or nothing.
 std::string place_problem(SyntheticSceneKind scene, SyntheticMotionKind motion, const std::string& name);
 
+/// How far aside of its middle the place can be acted at, metres.
+double room_of(const ScenePlace& place);
+
 /// Height of a slide's chute so far behind its end, metres: level, then a slope up to the place's height at its reach.
 double slide_height(const ScenePlace& slide, double behind);
 

@@ -7,6 +7,7 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "pipelines/synthetic_kit.h"
+#include "pipelines/synthetic_variation.h"
 #include "splat/splat_file.h"
 #include "splat/transform.h"
 
@@ -63,20 +64,29 @@ Gaussians support_alone(Index most, const ScenePlan& plan, std::uint64_t seed) {
       seed);
 }
 
-}  // namespace
-
-Gaussians synthetic_scene(SyntheticSceneKind kind, Index most, const ScenePlan& plan, std::uint64_t seed) {
-  const SceneMaker& maker = maker_of(kind);
+Gaussians made_scene(const SyntheticSettings& settings, const ScenePlan& plan) {
+  const auto seed = static_cast<std::uint64_t>(settings.seed);
+  const SceneMaker& maker = maker_of(settings.scene);
   SceneKit kit(plan, seed);
   maker.make(kit);
   kit.add_support();
-  return kit.model.covered(
-      most, [&](const auto& p, const auto& normal) { return maker.light(plan, p, normal); }, seed);
+  const Light light = [&](const auto& p, const auto& normal) { return maker.light(plan, p, normal); };
+  return kit.model.covered(settings.scene_gaussians, from_another_side(light, settings), seed);
+}
+
+}  // namespace
+
+Gaussians synthetic_scene(SyntheticSceneKind kind, Index most, const ScenePlan& plan, std::uint64_t seed) {
+  SyntheticSettings settings;
+  settings.scene = kind;
+  settings.scene_gaussians = most;
+  settings.seed = static_cast<std::int64_t>(seed);
+  return synthetic_scene(settings, plan);
 }
 
 Gaussians synthetic_scene(const SyntheticSettings& settings, const ScenePlan& plan) {
   const auto seed = static_cast<std::uint64_t>(settings.seed);
-  if (settings.scene_file.empty()) return synthetic_scene(settings.scene, settings.scene_gaussians, plan, seed);
+  if (settings.scene_file.empty()) return made_scene(settings, plan);
   const SplatFile file = read_splats(settings.scene_file.string());
   if (file.gaussians.count() == 0)
     throw DataError(settings.scene_file.string() + ": holds no Gaussians that can be used");

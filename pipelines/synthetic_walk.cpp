@@ -47,7 +47,7 @@ struct Path {
 
 Path path_of(const Actor& actor) {
   if (actor.motion == SyntheticMotionKind::kPush) {
-    if (actor.object.is_long) return {{-0.05, 0.35}, 1.05, 18, 0.45};
+    if (actor.object.is_long) return {{-0.05, 0.6}, 1.05, 28, 0.45};
     return {{0, 0.25}, 0.65, 45, 0.42};
   }
   return {{0, 0.75}, 0.6, 62, 0.445};
