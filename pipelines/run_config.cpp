@@ -152,8 +152,8 @@ void drop_files(ConfigValue& data) {
 
 ConfigValue without_data(ConfigValue tree) {
   std::erase_if(tree.members, [](const ConfigMember& member) {
-    return member.key == "synthetic" || member.key == "instance" || member.key == "threads" || member.key == "camera_selection" ||
-           (member.key == "chain" && member.value.items.empty());
+    return member.key == "synthetic" || member.key == "instance" || member.key == "threads" ||
+           member.key == "camera_selection" || (member.key == "chain" && member.value.items.empty());
   });
   for (ConfigMember& member : tree.members) {
     std::vector<ConfigMember>& own = member.value.members;

@@ -35,7 +35,8 @@ void add_lamp_over(SceneKit& kit, const Point& at) {
 void make_bar(SceneKit& kit) {
   add_room(kit, kBarRoom, Rgb(0.42, 0.2, 0.15), Rgb(0.35, 0.28, 0.22));
   add_floor(kit, kBarRoom.half_width, kBarRoom.back, [&kit](const Point& p) {
-    const bool is_dark = (static_cast<int>(std::floor(p.x() / 0.32)) + static_cast<int>(std::floor(p.y() / 0.32))) % 2 != 0;
+    const bool is_dark =
+        (static_cast<int>(std::floor(p.x() / 0.32)) + static_cast<int>(std::floor(p.y() / 0.32))) % 2 != 0;
     return Rgb((is_dark ? Rgb(0.27, 0.2, 0.17) : Rgb(0.72, 0.63, 0.5)) * (1 + 0.1 * kit.rough(p * 6)));
   });
   const Rgb wood(0.4, 0.22, 0.12);
@@ -53,7 +54,8 @@ void make_bar(SceneKit& kit) {
         foot, [](double v) { return Vector2<double>(0.03 + 0.006 * v, 0.12 * v); },
         [](double, double v) { return v < 0.75 ? Rgb(0.9, 0.62, 0.16) : Rgb(0.96, 0.94, 0.88); }, 3);
   }
-  for (const double x : {-2.0, -1.35, -0.75}) add_stool(kit, Point(x, 1.95 + 0.1 * std::sin(5 * x), 0), 0.74, Rgb(0.62, 0.12, 0.12));
+  for (const double x : {-2.0, -1.35, -0.75})
+    add_stool(kit, Point(x, 1.95 + 0.1 * std::sin(5 * x), 0), 0.74, Rgb(0.62, 0.12, 0.12));
   for (const double x : {-1.6, 0.55, 1.5}) add_lamp_over(kit, Point(x, 1.75, 1.95));
 }
 

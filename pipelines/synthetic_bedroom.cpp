@@ -197,9 +197,7 @@ void add_bunting(SceneKit& kit) {
   }
 }
 
-bool is_at(const ScenePlan& plan, std::string_view place) {
-  return plan.place != nullptr && place == plan.place->name;
-}
+bool is_at(const ScenePlan& plan, std::string_view place) { return plan.place != nullptr && place == plan.place->name; }
 
 /// A window seat in place of the wardrobe.
 void add_window_seat(SceneKit& kit) {
@@ -208,13 +206,15 @@ void add_window_seat(SceneKit& kit) {
   const double half = place.width / 2, deep = kWall - edge.y(), top = place.height;
   const Rgb white(0.93, 0.92, 0.88);
   kit.add_window(edge.x() - half + 0.1, edge.x() + half - 0.1, top + 0.09, 1.95);
-  kit.box(Point(edge.x(), edge.y() + deep / 2, top - 0.025), Point(half + 0.06, deep / 2 + 0.02, 0.025), plain(white), 2);
-  kit.box(Point(edge.x(), edge.y() + deep / 2 + 0.04, top / 2 - 0.02), Point(half, deep / 2 - 0.05, top / 2 - 0.03),
-          [white](double u, double v) {
-            const double rim = std::min(std::abs(std::remainder(u * 3, 1.0)) / 3, std::min(v, 1 - v) * 0.5);
-            return rim < 0.02 ? Rgb(white * 0.75) : Rgb(white * 0.95);
-          },
-          1.5);
+  kit.box(Point(edge.x(), edge.y() + deep / 2, top - 0.025), Point(half + 0.06, deep / 2 + 0.02, 0.025), plain(white),
+          2);
+  kit.box(
+      Point(edge.x(), edge.y() + deep / 2 + 0.04, top / 2 - 0.02), Point(half, deep / 2 - 0.05, top / 2 - 0.03),
+      [white](double u, double v) {
+        const double rim = std::min(std::abs(std::remainder(u * 3, 1.0)) / 3, std::min(v, 1 - v) * 0.5);
+        return rim < 0.02 ? Rgb(white * 0.75) : Rgb(white * 0.95);
+      },
+      1.5);
   for (const double side : {-1.0, 1.0})
     kit.add_curtain(edge.x() + side * half - 0.13, edge.x() + side * half + 0.13, top, 2.15, Rgb(0.72, 0.35, 0.3),
                     Rgb(0.86, 0.62, 0.3));

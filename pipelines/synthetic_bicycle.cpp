@@ -42,16 +42,21 @@ void make_bicycle(SceneKit& kit) {
   add_tree(kit, Point(0.3, 5.0, 0), 1.2);
   add_hedge(kit, -5, -0.6, 4.6, 0.5, 0.9);
   for (int i = 0; i < 5; ++i)
-    add_bush(kit, Point(1.2 + 0.75 * i, 4.5 + 0.2 * std::sin(3.0 * i), 0.3), Point(0.5, 0.4, 0.42), kit.varied(Rgb(0.3, 0.46, 0.18), 0.15), 0.25, 0.6);
+    add_bush(kit, Point(1.2 + 0.75 * i, 4.5 + 0.2 * std::sin(3.0 * i), 0.3), Point(0.5, 0.4, 0.42),
+             kit.varied(Rgb(0.3, 0.46, 0.18), 0.15), 0.25, 0.6);
   const Point lamp(1.9, 2.9, 0);
   kit.tube(lamp, lamp + Point(0, 0, 2.7), 0.04, Rgb(0.14, 0.16, 0.15), 1.2);
   kit.model.add_revolution(
-      lamp + Point(0, 0, 2.7), [](double v) { return Vector2<double>(0.12 + 0.06 * v - 0.18 * ramp(0.7, 1, v), 0.34 * v); },
+      lamp + Point(0, 0, 2.7),
+      [](double v) { return Vector2<double>(0.12 + 0.06 * v - 0.18 * ramp(0.7, 1, v), 0.34 * v); },
       [](double, double v) { return v < 0.7 ? Rgb(0.95, 0.93, 0.8) : Rgb(0.14, 0.16, 0.15); }, 1.5);
   const Point bin(-1.62, 1.95, 0);
   kit.model.add_revolution(
       bin, [](double v) { return Vector2<double>(0.17 + 0.02 * v, 0.12 + 0.6 * v); },
-      [](double u, double) { return std::abs(std::remainder(u * 16, 1.0)) < 0.3 ? Rgb(0.2, 0.35, 0.25) : Rgb(0.1, 0.17, 0.13); }, 1.5);
+      [](double u, double) {
+        return std::abs(std::remainder(u * 16, 1.0)) < 0.3 ? Rgb(0.2, 0.35, 0.25) : Rgb(0.1, 0.17, 0.13);
+      },
+      1.5);
 }
 
 double bicycle_light(const ScenePlan& plan, const Point& p, const Point& normal) {

@@ -35,49 +35,55 @@ void add_front(SceneKit& kit) {
   kit.model.add_rectangle(Point(0.95, kFront + 0.03, 0), Point(0.95, 0, 0), Point(0, 0, 2.2), inside, 1, 0.1);
   const Rgb green(0.13, 0.33, 0.27);
   const auto bar = [&](double x0, double x1, double z0, double z1) {
-    kit.box(Point((x0 + x1) / 2, kFront - 0.01, (z0 + z1) / 2), Point((x1 - x0) / 2, 0.03, (z1 - z0) / 2), plain(green), 1.2);
+    kit.box(Point((x0 + x1) / 2, kFront - 0.01, (z0 + z1) / 2), Point((x1 - x0) / 2, 0.03, (z1 - z0) / 2), plain(green),
+            1.2);
   };
   for (const double x : {-2.22, -1.3, -0.4, 0.5, 0.95, 1.9}) bar(x - 0.035, x + 0.035, x > 0.6 ? 0.0 : 0.5, 2.24);
   bar(-2.25, 0.55, 0.45, 0.55);
   bar(-2.25, 1.95, 2.2, 2.28);
   bar(0.95, 1.9, 0.0, 0.5);
-  kit.box(Point(-0.2, kFront - 0.04, 2.92), Point(1.5, 0.03, 0.17),
-          [](double u, double v) {  // CAFE
-            constexpr std::array<std::array<int, 7>, 4> kLetters = {{{14, 17, 16, 16, 16, 17, 14},
-                                                                     {14, 17, 17, 31, 17, 17, 17},
-                                                                     {31, 16, 16, 30, 16, 16, 16},
-                                                                     {31, 16, 16, 30, 16, 16, 31}}};
-            const double x = (u - 0.22) / 0.56 * 23, y = (1 - v) * 11 - 2;
-            const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
-            if (column < 0 || column > 22 || row < 0 || row > 6 || column % 6 > 4) return Rgb(0.13, 0.33, 0.27);
-            const int line = kLetters[static_cast<std::size_t>(column / 6)][static_cast<std::size_t>(row)];
-            return (line >> (4 - column % 6) & 1) != 0 ? Rgb(0.97, 0.88, 0.6) : Rgb(0.13, 0.33, 0.27);
-          },
-          3);
+  kit.box(
+      Point(-0.2, kFront - 0.04, 2.92), Point(1.5, 0.03, 0.17),
+      [](double u, double v) {  // CAFE
+        constexpr std::array<std::array<int, 7>, 4> kLetters = {{{14, 17, 16, 16, 16, 17, 14},
+                                                                 {14, 17, 17, 31, 17, 17, 17},
+                                                                 {31, 16, 16, 30, 16, 16, 16},
+                                                                 {31, 16, 16, 30, 16, 16, 31}}};
+        const double x = (u - 0.22) / 0.56 * 23, y = (1 - v) * 11 - 2;
+        const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
+        if (column < 0 || column > 22 || row < 0 || row > 6 || column % 6 > 4) return Rgb(0.13, 0.33, 0.27);
+        const int line = kLetters[static_cast<std::size_t>(column / 6)][static_cast<std::size_t>(row)];
+        return (line >> (4 - column % 6) & 1) != 0 ? Rgb(0.97, 0.88, 0.6) : Rgb(0.13, 0.33, 0.27);
+      },
+      3);
   const Paint stripes = [](double u, double) {
     return std::abs(std::remainder(u * 9, 1.0)) < 0.25 ? Rgb(0.8, 0.22, 0.2) : Rgb(0.96, 0.94, 0.88);
   };
   kit.model.add_rectangle(Point(-2.35, kFront - 0.85, 2.3), Point(4.4, 0, 0), Point(0, 0.85, 0.4), stripes, 1.2);
   kit.model.add_rectangle(Point(-2.35, kFront - 0.85, 2.14), Point(4.4, 0, 0), Point(0, 0, 0.17), stripes, 1.2);
-  kit.model.add_rectangle(Point(kLeft, kFront + 3, 0), Point(0, -3, 0), Point(0, 0, kTop), plain(Rgb(0.78, 0.7, 0.56)), 0.1);
+  kit.model.add_rectangle(Point(kLeft, kFront + 3, 0), Point(0, -3, 0), Point(0, 0, kTop), plain(Rgb(0.78, 0.7, 0.56)),
+                          0.1);
 }
 
 void add_parasol(SceneKit& kit, const Point& foot) {
   kit.tube(foot, foot + Point(0, 0, 2.3), 0.022, Rgb(0.8, 0.78, 0.74), 1.2);
   kit.model.add_revolution(
       foot + Point(0, 0, 1.95), [](double v) { return Vector2<double>(1.05 * (1 - v) + 1e-4, 0.38 * v); },
-      [](double u, double) { return static_cast<int>(u * 8) % 2 == 0 ? Rgb(0.93, 0.88, 0.74) : Rgb(0.2, 0.42, 0.4); }, 1.2);
+      [](double u, double) { return static_cast<int>(u * 8) % 2 == 0 ? Rgb(0.93, 0.88, 0.74) : Rgb(0.2, 0.42, 0.4); },
+      1.2);
 }
 
 void add_menu(SceneKit& kit, const Ground& ground) {
   const Piece piece(kit, ground);
-  piece.panel({-0.25, 0, 0.05}, {0.5, 0, 0}, {0, -0.18, 0.85},
-              [](double u, double v) {
-                if (std::min({u, 1 - u, v, 1 - v}) < 0.06) return Rgb(0.6, 0.42, 0.25);
-                const bool is_line = std::abs(std::remainder(v * 8, 1.0)) < 0.16 && u > 0.2 && u < 0.55 + 0.3 * std::sin(17 * v);
-                return is_line ? Rgb(0.9, 0.9, 0.88) : Rgb(0.12, 0.14, 0.13);
-              },
-              3);
+  piece.panel(
+      {-0.25, 0, 0.05}, {0.5, 0, 0}, {0, -0.18, 0.85},
+      [](double u, double v) {
+        if (std::min({u, 1 - u, v, 1 - v}) < 0.06) return Rgb(0.6, 0.42, 0.25);
+        const bool is_line =
+            std::abs(std::remainder(v * 8, 1.0)) < 0.16 && u > 0.2 && u < 0.55 + 0.3 * std::sin(17 * v);
+        return is_line ? Rgb(0.9, 0.9, 0.88) : Rgb(0.12, 0.14, 0.13);
+      },
+      3);
 }
 
 }  // namespace
@@ -85,7 +91,8 @@ void add_menu(SceneKit& kit, const Ground& ground) {
 void make_cafe(SceneKit& kit) {
   add_sky(kit);
   add_floor(kit, 5, kFront, [&kit](const Point& p) {
-    const double row = std::floor(p.y() / 0.11), x = p.x() / 0.13 + 0.5 * row + 0.2 * kit.noise(Point(p.x() * 2, row, 1));
+    const double row = std::floor(p.y() / 0.11),
+                 x = p.x() / 0.13 + 0.5 * row + 0.2 * kit.noise(Point(p.x() * 2, row, 1));
     const double fx = x - std::floor(x), fy = p.y() / 0.11 - row, rim = std::min({fx, 1 - fx, fy, 1 - fy});
     const double tone = kit.noise(Point(std::floor(x) * 2.3, row * 3.1, 6));
     const Rgb stone = mixed(Rgb(0.52, 0.5, 0.48), Rgb(0.7, 0.66, 0.6), 0.5 + 0.6 * tone);
@@ -96,8 +103,10 @@ void make_cafe(SceneKit& kit) {
   add_chair(kit, place.ground, place.height, Rgb(0.55, 0.3, 0.17));
   add_round_table(kit, place.ground.point({0.72, -0.1, 0}), 0.36, 0.72, Rgb(0.9, 0.88, 0.84));
   const Point cup = place.ground.point({0.62, 0.0, 0.72});
-  kit.model.add_revolution(cup, [](double v) { return Vector2<double>(0.07, 0.008 * v); }, plain(Rgb(0.95, 0.95, 0.93)), 3);
-  kit.model.add_revolution(cup, [](double v) { return Vector2<double>(0.028 + 0.015 * v, 0.075 * v); }, plain(Rgb(0.97, 0.97, 0.95)), 3);
+  kit.model.add_revolution(
+      cup, [](double v) { return Vector2<double>(0.07, 0.008 * v); }, plain(Rgb(0.95, 0.95, 0.93)), 3);
+  kit.model.add_revolution(
+      cup, [](double v) { return Vector2<double>(0.028 + 0.015 * v, 0.075 * v); }, plain(Rgb(0.97, 0.97, 0.95)), 3);
   add_round_table(kit, Point(-1.75, 2.1, 0), 0.34, 0.72, Rgb(0.9, 0.88, 0.84));
   add_chair(kit, {{-2.0, 1.75}, 150}, 0.46, Rgb(0.5, 0.27, 0.16));
   add_chair(kit, {{-1.4, 2.2}, -60}, 0.46, Rgb(0.5, 0.27, 0.16));

@@ -18,8 +18,8 @@ double out_of(int side) { return side == kLeft ? 1 : -1; }
 double wrapped(double x) { return x - std::floor(x); }
 
 // A jog on a belt.
-constexpr double kPace = 0.92;   // seconds of two steps
-constexpr double kStance = 0.4;  // share of them that a foot is on the belt
+constexpr double kPace = 0.92;       // seconds of two steps
+constexpr double kStance = 0.4;      // share of them that a foot is on the belt
 constexpr double kBeltSpeed = 1.05;  // metres a second
 
 /// A foot at a phase of its cycle, 0 when it lands.
@@ -61,8 +61,8 @@ Moment running_moment(const Actor& actor, double seconds) {
     const double ahead = -out_of(side) * swing;  // arms against legs
     const double up = actor.sizes.shoulder + place.height - 0.055;
     FigureHand& hand = figure.hands[i];
-    hand.wrist = place.ground.point({out_of(side) * (0.19 - 0.04 * std::max(0.0, ahead)), 0.24 + 0.15 * ahead,
-                                     up - 0.26 + 0.09 * ahead});
+    hand.wrist = place.ground.point(
+        {out_of(side) * (0.19 - 0.04 * std::max(0.0, ahead)), 0.24 + 0.15 * ahead, up - 0.26 + 0.09 * ahead});
     hand.elbow = place.ground.direction({0.35 * out_of(side), -0.9, -0.35});
     hand.local = {0, 0, 0};
     hand.shared = true;
@@ -85,9 +85,7 @@ double slid(const ScenePlace& place, double t) {
 Moment sliding_moment(const Actor& actor, double seconds) {
   const ScenePlace& place = *actor.place;
   const double t = time_in_clip(seconds, kSlideLength), behind = slid(place, t);
-  const auto surface = [&](double b) {
-    return b < 0 ? slide_height(place, 0) - 0.9 * -b : slide_height(place, b);
-  };
+  const auto surface = [&](double b) { return b < 0 ? slide_height(place, 0) - 0.9 * -b : slide_height(place, b); };
   const auto slope = [&](double b) {  // degrees down, over what one sits on
     return std::atan((surface(b + 0.15) - surface(b - 0.25)) / 0.4) / kDegree;
   };
@@ -151,8 +149,8 @@ Moment playing_moment(const Actor& actor, double seconds) {
   const ObjectPlace at{waist, {-0.13, -0.11 + 0.004 * sway, place.height + 0.3}, {-12, -66 + 1.5 * sway, 12}};
   moment.object = object_on(figure.ground, at);
   for (const int side : {kLeft, kRight})
-    figure.hands[static_cast<std::size_t>(side)].elbow = figure.ground.direction(
-        side == kLeft ? Vector(0.55, -0.3, -0.8) : Vector(-0.8, -0.5, -0.25));
+    figure.hands[static_cast<std::size_t>(side)].elbow =
+        figure.ground.direction(side == kLeft ? Vector(0.55, -0.3, -0.8) : Vector(-0.8, -0.5, -0.25));
   hold_object(actor, grips, at, Vector::Zero(), 0, moment);
   figure.hands[kLeft].curl_deg = 44;
   figure.hands[kRight].curl_deg = 24;

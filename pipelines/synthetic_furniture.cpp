@@ -62,7 +62,10 @@ void Piece::cushion(const Point& center, const Point& half, const Paint& paint, 
                    const double n = std::pow(d.x(), 4) + std::pow(d.y(), 4) + std::pow(d.z(), 4);
                    return ground.point(center + (d * std::pow(n, -0.25)).cwiseProduct(half));
                  },
-                 paint, detail, 0, {}});
+                 paint,
+                 detail,
+                 0,
+                 {}});
 }
 
 void Piece::ring(const Point& center, double radius, double thick, const Rgb& color, double detail) const {
@@ -82,7 +85,10 @@ void Piece::disc(const Point& center, double radius, double side, const Paint& p
                    const double angle = 2 * kPi * u * side, r = radius * v;
                    return ground.point(center + Point(0, r * std::cos(angle), r * std::sin(angle)));
                  },
-                 paint, detail, 0, {}});
+                 paint,
+                 detail,
+                 0,
+                 {}});
 }
 
 void add_sofa(SceneKit& kit, const Ground& ground, const SofaSize& size, const Rgb& cloth) {
@@ -239,11 +245,12 @@ void add_treadmill(SceneKit& kit, const ScenePlace& place) {
   }
   piece.box({0, 0.72, h + 0.04}, {half + 0.05, 0.13, 0.1}, dark, 1.5);
   piece.box({0, place.reach + 0.05, 1.3}, {half + 0.1, 0.05, 0.1}, dark, 2);
-  piece.panel({half - 0.08, place.reach - 0.005, 1.25}, {-2 * half + 0.16, 0, 0}, {0, 0.02, 0.12},
-              [](double u, double v) {
-                return std::abs(v - 0.5 - 0.3 * std::sin(9 * u)) < 0.1 ? Rgb(0.4, 0.95, 0.6) : Rgb(0.1, 0.2, 0.3);
-              },
-              3);
+  piece.panel(
+      {half - 0.08, place.reach - 0.005, 1.25}, {-2 * half + 0.16, 0, 0}, {0, 0.02, 0.12},
+      [](double u, double v) {
+        return std::abs(v - 0.5 - 0.3 * std::sin(9 * u)) < 0.1 ? Rgb(0.4, 0.95, 0.6) : Rgb(0.1, 0.2, 0.3);
+      },
+      3);
 }
 
 void add_slide(SceneKit& kit, const ScenePlace& place) {

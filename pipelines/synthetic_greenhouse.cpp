@@ -19,7 +19,8 @@ void add_ribs(SceneKit& kit) {
     const double x = -kHalf + 2 * kHalf * i / 8;
     kit.tube(Point(x, kBack, 0.5), Point(x, kBack, roof(x)), 0.024, kWhite, 1.2);
   }
-  for (const double z : {0.5, 1.3, kEaves}) kit.tube(Point(-kHalf, kBack, z), Point(kHalf, kBack, z), 0.024, kWhite, 1.2);
+  for (const double z : {0.5, 1.3, kEaves})
+    kit.tube(Point(-kHalf, kBack, z), Point(kHalf, kBack, z), 0.024, kWhite, 1.2);
   for (int j = 0; j <= 4; ++j) {
     const double y = kBack - 0.95 * j;
     for (const double side : {-1.0, 1.0}) {
@@ -60,7 +61,8 @@ void add_pot(SceneKit& kit, const Point& foot, double size, int kind) {
 void make_greenhouse(SceneKit& kit) {
   add_sky(kit);
   add_floor(kit, kHalf, kBack, [&kit](const Point& p) {
-    const double row = std::floor(p.y() / 0.12), x = p.x() / 0.24 + 0.5 * row, fx = x - std::floor(x), fy = p.y() / 0.12 - row;
+    const double row = std::floor(p.y() / 0.12), x = p.x() / 0.24 + 0.5 * row, fx = x - std::floor(x),
+                 fy = p.y() / 0.12 - row;
     if (std::min({fx * 0.24, (1 - fx) * 0.24, fy * 0.12, (1 - fy) * 0.12}) < 0.008) return Rgb(0.6, 0.56, 0.5);
     const double tone = kit.noise(Point(std::floor(x) * 3.7, row * 2.3, 4));
     return mixed(Rgb(0.62, 0.42, 0.33), Rgb(0.75, 0.58, 0.46), 0.5 + 0.7 * tone);
@@ -70,25 +72,30 @@ void make_greenhouse(SceneKit& kit) {
   add_ribs(kit);
   const Rgb bench(0.7, 0.6, 0.46);
   kit.board(Point(-0.7, kBack - 0.4, 0.68), Point(1.75, 0.28, 0.025), bench, 1);
-  for (const double x : {-2.3, -0.7, 0.9}) kit.board(Point(x, kBack - 0.25, 0.33), Point(0.03, 0.05, 0.33), bench * 0.85, 1);
-  for (int i = 0; i < 8; ++i) add_pot(kit, Point(-2.25 + 0.44 * i, kBack - 0.42, 0.705), 0.85 + 0.2 * kit.random.uniform(), i);
+  for (const double x : {-2.3, -0.7, 0.9})
+    kit.board(Point(x, kBack - 0.25, 0.33), Point(0.03, 0.05, 0.33), bench * 0.85, 1);
+  for (int i = 0; i < 8; ++i)
+    add_pot(kit, Point(-2.25 + 0.44 * i, kBack - 0.42, 0.705), 0.85 + 0.2 * kit.random.uniform(), i);
   for (int i = 0; i < 3; ++i) add_pot(kit, Point(-2.1, 1.5 + 0.45 * i, 0), 1.2 + 0.3 * (i % 2), i);
   const ScenePlace& place = flowers_place();
   const Piece bed(kit, place.ground);
   for (const double side : {-1.0, 1.0}) {
-    bed.board({0, place.reach + side * 0.3, place.height / 2}, {0.62, 0.02, place.height / 2}, Rgb(0.6, 0.44, 0.29), 1.5);
+    bed.board({0, place.reach + side * 0.3, place.height / 2}, {0.62, 0.02, place.height / 2}, Rgb(0.6, 0.44, 0.29),
+              1.5);
     bed.board({side * 0.62, place.reach, place.height / 2}, {0.02, 0.3, place.height / 2}, Rgb(0.6, 0.44, 0.29), 1.5);
   }
-  bed.panel({-0.6, place.reach - 0.3, place.height - 0.05}, {1.2, 0, 0}, {0, 0.6, 0}, kit.mottled(Rgb(0.3, 0.21, 0.15), 0.3, 0.05, 1.2, 0.6), 1);
+  bed.panel({-0.6, place.reach - 0.3, place.height - 0.05}, {1.2, 0, 0}, {0, 0.6, 0},
+            kit.mottled(Rgb(0.3, 0.21, 0.15), 0.3, 0.05, 1.2, 0.6), 1);
   for (int i = 0; i < 22; ++i)
-    add_flower(kit, bed.at({-0.54 + 0.05 * i, place.reach + 0.25 * std::sin(4.1 * i), place.height - 0.04}), 0.26 + 0.1 * kit.random.uniform());
+    add_flower(kit, bed.at({-0.54 + 0.05 * i, place.reach + 0.25 * std::sin(4.1 * i), place.height - 0.04}),
+               0.26 + 0.1 * kit.random.uniform());
   for (const double x : {-1.5, 1.35}) {  // hanging baskets
     kit.tube(Point(x, 2.3, 2.05), Point(x, 2.3, 2.6), 0.006, Rgb(0.3, 0.3, 0.3), 1);
     add_bush(kit, Point(x, 2.3, 1.95), Point(0.24, 0.24, 0.18), Rgb(0.35, 0.56, 0.24), 0.3, 1.2);
   }
   kit.add_plant(Point(1.95, 2.75, 0), 1.2);
-  add_chair(kit, places_of(SyntheticSceneKind::kGreenhouse)[0].ground, places_of(SyntheticSceneKind::kGreenhouse)[0].height,
-            Rgb(0.93, 0.93, 0.9));
+  add_chair(kit, places_of(SyntheticSceneKind::kGreenhouse)[0].ground,
+            places_of(SyntheticSceneKind::kGreenhouse)[0].height, Rgb(0.93, 0.93, 0.9));
 }
 
 double greenhouse_light(const ScenePlan& plan, const Point& p, const Point& normal) {

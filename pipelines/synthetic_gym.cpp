@@ -1,5 +1,5 @@
-// The gym: a rubber floor, mirrors over a rack of dumbbells, wall bars, a treadmill beside another, a ball, kettlebells.
-// 6 × 5 × 3 m.
+// The gym: a rubber floor, mirrors over a rack of dumbbells, wall bars, a treadmill beside another, a ball,
+// kettlebells. 6 × 5 × 3 m.
 #include <array>
 #include <cmath>
 
@@ -20,8 +20,8 @@ void add_mirrors(SceneKit& kit) {
       const Rgb room = v < 0.3 ? Rgb(0.34, 0.35, 0.38) : mixed(Rgb(0.56, 0.6, 0.64), Rgb(0.8, 0.83, 0.85), v);
       return Rgb(room * (1 + 0.3 * shine));
     };
-    kit.model.add_rectangle(Point(0.85 * i, kGymRoom.back - 0.02, 0.55), Point(0.83, 0, 0), Point(0, 0, 1.55),
-                            mirror, 0.9, 0.12);
+    kit.model.add_rectangle(Point(0.85 * i, kGymRoom.back - 0.02, 0.55), Point(0.83, 0, 0), Point(0, 0, 1.55), mirror,
+                            0.9, 0.12);
   }
 }
 
@@ -52,8 +52,7 @@ void add_dumbbells(SceneKit& kit) {
 void add_wall_bars(SceneKit& kit) {
   const Rgb wood(0.82, 0.63, 0.4);
   const double y = kGymRoom.back - 0.1;
-  for (const double x : {-1.6, -0.75})
-    kit.board(Point(x, y, 1.2), Point(0.03, 0.05, 1.2), wood * 0.9, 1);
+  for (const double x : {-1.6, -0.75}) kit.board(Point(x, y, 1.2), Point(0.03, 0.05, 1.2), wood * 0.9, 1);
   for (int i = 0; i < 11; ++i)
     kit.tube(Point(-1.6, y - 0.04, 0.2 + 0.2 * i), Point(-0.75, y - 0.04, 0.2 + 0.2 * i), 0.02, wood, 1.4);
 }
@@ -95,8 +94,8 @@ void make_gym(SceneKit& kit) {
     const Rgb base = is_seam ? Rgb(0.16, 0.17, 0.18) : Rgb(0.29, 0.3, 0.32);
     return speck > 0.6 ? Rgb(0.3, 0.5, 0.7) : speck < -0.65 ? Rgb(0.6, 0.6, 0.62) : base;
   });
-  kit.model.add_rectangle(Point(-kGymRoom.half_width, kGymRoom.back - 0.01, 1.15), Point(1.0, 0, 0),
-                          Point(0, 0, 0.18), plain(Rgb(0.85, 0.27, 0.16)), 0.6);
+  kit.model.add_rectangle(Point(-kGymRoom.half_width, kGymRoom.back - 0.01, 1.15), Point(1.0, 0, 0), Point(0, 0, 0.18),
+                          plain(Rgb(0.85, 0.27, 0.16)), 0.6);
   add_mirrors(kit);
   add_dumbbells(kit);
   add_wall_bars(kit);

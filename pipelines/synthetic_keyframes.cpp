@@ -57,9 +57,7 @@ KeyPose key_at(const std::vector<KeyPose>& keys, double t) {
   return keys.back();
 }
 
-FigureFoot planted_foot(double left, double forward, double toes) {
-  return {Vector(left, forward, 0), toes, 0, true};
-}
+FigureFoot planted_foot(double left, double forward, double toes) { return {Vector(left, forward, 0), toes, 0, true}; }
 
 FigureTarget keyed_figure(const Actor& actor, const KeyedMotion& motion, const KeyPose& key) {
   const Ground& ground = motion.ground;

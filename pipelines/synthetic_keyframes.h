@@ -13,7 +13,7 @@ namespace hsi4d::detail {
 struct HandKey {
   Vector3<double> wrist = {0, 0, 0};  ///< against where it hangs
   Vector3<double> turn = {0, 0, 0};   ///< against the forearm
-  double curl = 22;          ///< of every finger joint
+  double curl = 22;                   ///< of every finger joint
 };
 
 /// The state at one moment, in the person's frame: (left, forward, up) from the place between the feet, metres;
@@ -27,7 +27,7 @@ struct KeyPose {
   Vector3<double> object = {0, 0, 0};       ///< the object's grip
   Vector3<double> object_turn = {0, 0, 0};  ///< about (left, forward, up)
   Vector3<double> away = {0, 0, 0};         ///< of the holding hands from their grips
-  double grip = 60;                ///< curl of the holding hands
+  double grip = 60;                         ///< curl of the holding hands
   HandKey left = {}, right = {};
 };
 
@@ -36,8 +36,8 @@ struct KeyedMotion {
   std::vector<KeyPose> keys;
   Ground ground;
   std::array<FigureFoot, 2> feet;  ///< place: left, forward, up; yaw against the heading
-  bool hands_hang = true;    ///< wrists of free hands are relative to where they hang; else to the ground
-  bool shares_turn = true;   ///< forearms take half of what free wrists turn about them
+  bool hands_hang = true;          ///< wrists of free hands are relative to where they hang; else to the ground
+  bool shares_turn = true;         ///< forearms take half of what free wrists turn about them
   std::array<Vector3<double>, 2> elbows = {Vector3<double>(0.65, -0.5, -0.6), Vector3<double>(-0.65, -0.6, -0.25)};
 };
 

@@ -171,8 +171,7 @@ void add_place(SceneKit& kit) {
   const std::string_view name = place.name;
   const Rgb cloth(0.5, 0.27, 0.18);
   if (name == "sofa") add_sofa(kit, place.ground, {place.width, place.height, place.reach, 0.86}, cloth);
-  if (name == "sofa_back")
-    add_sofa_from_behind(kit, place.ground, {place.width, 0.43, 0.5, place.height}, cloth);
+  if (name == "sofa_back") add_sofa_from_behind(kit, place.ground, {place.width, 0.43, 0.5, place.height}, cloth);
   if (name == "table")
     add_dining_table(kit, place.ground, {place.width, place.reach, place.height}, Rgb(0.72, 0.5, 0.3));
 }

@@ -33,7 +33,7 @@ struct ClipSettings {
   int size_px = 256;        ///< width and height of a frame
   double camera_drift = 1;  ///< how far the camera moves: 0 stands, 1 as designed
   SyntheticMotionKind motion = SyntheticMotionKind::kPour;
-  double camera_distance = 1;  ///< of the camera from what it looks at first, of that as designed
+  double camera_distance = 1;         ///< of the camera from what it looks at first, of that as designed
   const ScenePlace* place = nullptr;  ///< where it is done, of motions that need one
   ClipVariation variation = {};
 };

@@ -26,8 +26,8 @@ void add_drum(SurfaceModel& model, const Point& center, double radius, double ha
   };
   model.add({[=](double u, double v) { return at(u, radius, half_width * (1 - 2 * v)); }, plain(rim), 1, 0, {}});
   for (const double side : {-1.0, 1.0})
-    model.add({[=](double u, double v) { return at(side > 0 ? 1 - u : u, radius * v, side * half_width); }, face, 1, 0,
-               {}});
+    model.add(
+        {[=](double u, double v) { return at(side > 0 ? 1 - u : u, radius * v, side * half_width); }, face, 1, 0, {}});
 }
 
 }  // namespace
@@ -105,16 +105,18 @@ void add_shopping_cart(SurfaceModel& model) {
 void add_mower(SurfaceModel& model) {
   const Rgb green(0.16, 0.5, 0.2), yellow(0.95, 0.78, 0.15), iron(0.18, 0.18, 0.19);
   model.add_box(
-      Point(0.02, 0, 0.165), Point(0.3, 0.24, 0.065), 0, [&](int face) { return plain(face == 5 ? green : green * 0.85); },
-      1.2);
+      Point(0.02, 0, 0.165), Point(0.3, 0.24, 0.065), 0,
+      [&](int face) { return plain(face == 5 ? green : green * 0.85); }, 1.2);
   model.add_revolution(
       Point(0.05, 0, 0.22), [](double v) { return Vector2<double>(0.13 - 0.02 * v, 0.12 * v); },
       [iron](double u, double v) {
-        return std::abs(std::remainder(v * 5, 1.0)) < 0.2 ? Rgb(0.45, 0.45, 0.46) : Rgb(iron * (1 + 0.2 * std::sin(40 * u)));
+        return std::abs(std::remainder(v * 5, 1.0)) < 0.2 ? Rgb(0.45, 0.45, 0.46)
+                                                          : Rgb(iron * (1 + 0.2 * std::sin(40 * u)));
       },
       1);
   model.add_revolution(
-      Point(0.05, 0, 0.34), [](double v) { return Vector2<double>(0.12 * (1 - v * v) + 1e-4, 0.05 * v); }, plain(yellow), 1);
+      Point(0.05, 0, 0.34), [](double v) { return Vector2<double>(0.12 * (1 - v * v) + 1e-4, 0.05 * v); },
+      plain(yellow), 1);
   model.add_box(
       Point(0.2, 0.12, 0.28), Point(0.06, 0.06, 0.05), 0, [&](int) { return plain(Rgb(0.7, 0.12, 0.1)); }, 0.8);
   const Paint wheel = [](double u, double v) {

@@ -15,20 +15,24 @@ const ScenePlace& sofa_place() { return places_of(SyntheticSceneKind::kRoom)[0];
 
 void add_wide_window(SceneKit& kit) {
   const double y = kRoomSize.back - 0.03, left = -1.5, width = 2.1, low = 0.95, high = 2.15;
-  kit.model.add_rectangle(Point(left, y, low), Point(width, 0, 0), Point(0, 0, high - low),
-                          [&kit](double u, double v) {  // a lawn, trees and the sky
-                            const double tree = 0.45 + 0.2 * kit.noise(Point(u * 6, 1, 2)) + 0.08 * kit.noise(Point(u * 20, 4, 2));
-                            if (v < 0.18) return Rgb(0.5, 0.66, 0.34);
-                            if (v < tree) return Rgb(Rgb(0.28, 0.45, 0.22) * (1 + 0.4 * kit.noise(Point(u * 25, v * 20, 3))));
-                            return mixed(Rgb(0.93, 0.96, 0.98), Rgb(0.62, 0.8, 0.95), v);
-                          },
-                          1.3);
+  kit.model.add_rectangle(
+      Point(left, y, low), Point(width, 0, 0), Point(0, 0, high - low),
+      [&kit](double u, double v) {  // a lawn, trees and the sky
+        const double tree = 0.45 + 0.2 * kit.noise(Point(u * 6, 1, 2)) + 0.08 * kit.noise(Point(u * 20, 4, 2));
+        if (v < 0.18) return Rgb(0.5, 0.66, 0.34);
+        if (v < tree) return Rgb(Rgb(0.28, 0.45, 0.22) * (1 + 0.4 * kit.noise(Point(u * 25, v * 20, 3))));
+        return mixed(Rgb(0.93, 0.96, 0.98), Rgb(0.62, 0.8, 0.95), v);
+      },
+      1.3);
   const Rgb white(0.96, 0.96, 0.95);
   for (int i = 0; i <= 3; ++i)
-    kit.box(Point(left + width * i / 3, y - 0.03, (low + high) / 2), Point(0.03, 0.03, (high - low) / 2 + 0.04), plain(white), 1);
-  for (const double z : {low, high}) kit.box(Point(left + width / 2, y - 0.03, z), Point(width / 2 + 0.03, 0.04, 0.035), plain(white), 1);
+    kit.box(Point(left + width * i / 3, y - 0.03, (low + high) / 2), Point(0.03, 0.03, (high - low) / 2 + 0.04),
+            plain(white), 1);
+  for (const double z : {low, high})
+    kit.box(Point(left + width / 2, y - 0.03, z), Point(width / 2 + 0.03, 0.04, 0.035), plain(white), 1);
   for (int i = 0; i < 5; ++i)  // blinds half drawn
-    kit.box(Point(left + width / 2, y - 0.07, high - 0.05 - 0.06 * i), Point(width / 2, 0.008, 0.022), plain(Rgb(0.85, 0.8, 0.7)), 1);
+    kit.box(Point(left + width / 2, y - 0.07, high - 0.05 - 0.06 * i), Point(width / 2, 0.008, 0.022),
+            plain(Rgb(0.85, 0.8, 0.7)), 1);
 }
 
 void add_piano(SceneKit& kit) {
@@ -80,19 +84,22 @@ void make_room(SceneKit& kit) {
   kit.model.add_revolution(
       lamp, [](double v) { return Vector2<double>(0.15 * (1 - 0.9 * v), 0.03 * v); }, plain(Rgb(0.2, 0.2, 0.2)), 1.2);
   kit.model.add_revolution(
-      lamp + Point(0, 0, 1.42), [](double v) { return Vector2<double>(0.22 - 0.07 * v, 0.3 * v); }, plain(Rgb(0.99, 0.94, 0.8)), 1.3);
-  kit.add_framed(1.0, 1.65, 1.45, 2.0, 0.03, Rgb(0.2, 0.18, 0.16),
-                 [](double u, double v) {
-                   const double r = std::hypot(u - 0.4, v - 0.55);
-                   if (r < 0.22) return Rgb(0.85, 0.4, 0.25);
-                   return v < 0.35 + 0.1 * std::sin(5 * u) ? Rgb(0.25, 0.38, 0.45) : Rgb(0.92, 0.87, 0.75);
-                 },
-                 2, kWall - kRoomSize.back + 0.03);
+      lamp + Point(0, 0, 1.42), [](double v) { return Vector2<double>(0.22 - 0.07 * v, 0.3 * v); },
+      plain(Rgb(0.99, 0.94, 0.8)), 1.3);
+  kit.add_framed(
+      1.0, 1.65, 1.45, 2.0, 0.03, Rgb(0.2, 0.18, 0.16),
+      [](double u, double v) {
+        const double r = std::hypot(u - 0.4, v - 0.55);
+        if (r < 0.22) return Rgb(0.85, 0.4, 0.25);
+        return v < 0.35 + 0.1 * std::sin(5 * u) ? Rgb(0.25, 0.38, 0.45) : Rgb(0.92, 0.87, 0.75);
+      },
+      2, kWall - kRoomSize.back + 0.03);
   kit.add_plant(Point(-2.0, 1.35, 0), 0.9);
 }
 
 double room_light(const ScenePlan& plan, const Point& p, const Point& normal) {
-  static const std::array<FloorShade, 2> shades = {{{{-0.15, 1.95}, {0.95, 0.42}, 0, 0.45}, {{1.55, 2.2}, {0.65, 0.4}, -14, 0.4}}};
+  static const std::array<FloorShade, 2> shades = {
+      {{{-0.15, 1.95}, {0.95, 0.42}, 0, 0.45}, {{1.55, 2.2}, {0.65, 0.4}, -14, 0.4}}};
   return faced_light(normal) * room_corner_light(kRoomSize, p) * support_shadow(plan, p) * floor_shades(shades, p);
 }
 

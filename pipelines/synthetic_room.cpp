@@ -15,7 +15,9 @@ constexpr double kDeep = 0.1;  // share of the detail where no camera looks
 Paint packages(const SceneKit& kit, double shift, double length) {
   return [&kit, shift, length](double u, double v) {
     const double x = u * length / 0.115 + shift, column = std::floor(x), inside = x - column;
-    const auto pick = [&](double salt) { return 0.5 + 0.5 * kit.noise(Point(column * 7.31 + salt, shift, salt * 3.1)); };
+    const auto pick = [&](double salt) {
+      return 0.5 + 0.5 * kit.noise(Point(column * 7.31 + salt, shift, salt * 3.1));
+    };
     const double high = 0.62 + 0.36 * pick(1.7);
     if (v > high || inside < 0.05) return Rgb(0.2, 0.19, 0.18);
     const double hue = std::fmod(7.7 * pick(5.1) + 3 * pick(9.2), 1.0) * 6;
@@ -64,11 +66,12 @@ void add_shelves(SceneKit& kit, const Ground& ground, const ShelfSize& size, con
     const Paint goods = size.has_bottles ? bottles(kit, shift, size.width) : packages(kit, shift, size.width);
     piece.panel({-w + 0.02, front, z + 0.014}, {2 * w - 0.04, 0, 0}, {0, 0, step - 0.03}, goods, 4);
     if (!size.has_bottles) {
-      piece.panel({-w, 0.002, z - 0.03}, {2 * w, 0, 0}, {0, 0, 0.045},
-                  [](double u, double) {
-                    return std::abs(std::remainder(u * 9, 1.0)) < 0.18 ? Rgb(0.97, 0.9, 0.4) : Rgb(0.86, 0.86, 0.86);
-                  },
-                  2.5);
+      piece.panel(
+          {-w, 0.002, z - 0.03}, {2 * w, 0, 0}, {0, 0, 0.045},
+          [](double u, double) {
+            return std::abs(std::remainder(u * 9, 1.0)) < 0.18 ? Rgb(0.97, 0.9, 0.4) : Rgb(0.86, 0.86, 0.86);
+          },
+          2.5);
     }
   }
 }
@@ -103,8 +106,8 @@ void add_floor(SceneKit& kit, double half_width, double back, const std::functio
 
 double room_corner_light(const RoomSize& room, const Point& p) {
   double light = 1;
-  for (const double distance : {p.x() + room.half_width, room.half_width - p.x(), room.back - p.y(), p.z(),
-                                room.height - p.z()})
+  for (const double distance :
+       {p.x() + room.half_width, room.half_width - p.x(), room.back - p.y(), p.z(), room.height - p.z()})
     light *= 1 - 0.2 * std::exp(-std::max(0.0, distance) / 0.35);
   return std::min(1.0, light / (1 - 0.2));
 }

@@ -32,10 +32,10 @@ const std::array<SceneMaker, 14> kMakers = {{
      detail::gym_light},
     {SyntheticSceneKind::kBar, "a bar with shelves of bottles, a counter, stools and lamps", detail::make_bar,
      detail::bar_light},
-    {SyntheticSceneKind::kPlayground, "a playground with a slide, a swing, a seesaw, sand and trees", detail::make_playground,
-     detail::playground_light},
-    {SyntheticSceneKind::kGreenhouse, "a greenhouse with benches of pots, a bed of flowers and a chair", detail::make_greenhouse,
-     detail::greenhouse_light},
+    {SyntheticSceneKind::kPlayground, "a playground with a slide, a swing, a seesaw, sand and trees",
+     detail::make_playground, detail::playground_light},
+    {SyntheticSceneKind::kGreenhouse, "a greenhouse with benches of pots, a bed of flowers and a chair",
+     detail::make_greenhouse, detail::greenhouse_light},
     {SyntheticSceneKind::kCafe, "a street cafe with chairs, round tables, a parasol and an awning", detail::make_cafe,
      detail::cafe_light},
     {SyntheticSceneKind::kStore, "a store with shelves full of packages and a fridge", detail::make_store,
@@ -44,8 +44,7 @@ const std::array<SceneMaker, 14> kMakers = {{
      detail::bicycle_light},
     {SyntheticSceneKind::kRoom, "a room with a grey sofa, a wide window, a piano and a round rug", detail::make_room,
      detail::room_light},
-    {SyntheticSceneKind::kTruck, "a street with a pickup truck before houses", detail::make_truck,
-     detail::truck_light},
+    {SyntheticSceneKind::kTruck, "a street with a pickup truck before houses", detail::make_truck, detail::truck_light},
 }};
 
 const SceneMaker& maker_of(SyntheticSceneKind kind) {

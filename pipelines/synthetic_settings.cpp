@@ -170,9 +170,10 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
            std::string(choice_name<SyntheticObjectKind>(kSyntheticObjectKinds, s.object)) + "; it goes with " +
            object_names_of(s.motion);
   });
-  f.string("place", s.place,
-           "Place of the scene where a motion is done that needs one; empty: the first there. `hsi4d list scenes` tells "
-           "them");
+  f.string(
+      "place", s.place,
+      "Place of the scene where a motion is done that needs one; empty: the first there. `hsi4d list scenes` tells "
+      "them");
   f.rule({"place", "motion", "scene"}, [&s] { return place_problem(s.scene, s.motion, s.place); });
   f.number("variation", s.variation, {.min = 0, .max = 1},
            "How far the seed changes when and how fast it is done, camera, start, clothes and light: 0 not at all");

@@ -54,13 +54,14 @@ void make_store(SceneKit& kit) {
   add_shelves(kit, {{-0.4, kStoreRoom.back - 0.42}, 0}, {2.2, 1.95, 0.4, 5}, frame);
   add_shelves(kit, {{1.9, kStoreRoom.back - 0.42}, 0}, {2.1, 1.95, 0.4, 5}, frame);
   add_fridge(kit);
-  kit.box(Point(0.7, kStoreRoom.back - 0.05, 2.45), Point(2.2, 0.04, 0.24),
-          [](double u, double v) {
-            const double x = std::abs(std::remainder(u * 6, 1.0));
-            if (v < 0.12 || v > 0.88) return Rgb(0.97, 0.85, 0.25);
-            return std::hypot(x * 2.2, (v - 0.5)) < 0.25 ? Rgb(0.97, 0.95, 0.9) : Rgb(0.16, 0.52, 0.34);
-          },
-          1.2);
+  kit.box(
+      Point(0.7, kStoreRoom.back - 0.05, 2.45), Point(2.2, 0.04, 0.24),
+      [](double u, double v) {
+        const double x = std::abs(std::remainder(u * 6, 1.0));
+        if (v < 0.12 || v > 0.88) return Rgb(0.97, 0.85, 0.25);
+        return std::hypot(x * 2.2, (v - 0.5)) < 0.25 ? Rgb(0.97, 0.95, 0.9) : Rgb(0.16, 0.52, 0.34);
+      },
+      1.2);
   for (const double x : {-1.4, 1.2})
     kit.model.add_rectangle(Point(x - 0.6, 0.6, kStoreRoom.height - 0.02), Point(1.2, 0, 0), Point(0, 0.2, 0),
                             plain(Rgb(1, 1, 1)), 0.4);
@@ -74,7 +75,8 @@ void make_store(SceneKit& kit) {
 double store_light(const ScenePlan& plan, const Point& p, const Point& normal) {
   static const std::array<FloorShade, 2> shades = {
       {{{-0.4, kStoreRoom.back - 0.2}, {1.1, 0.2}, 0, 0.35}, {{1.9, kStoreRoom.back - 0.2}, {1.1, 0.2}, 0, 0.35}}};
-  double light = faced_light(normal) * room_corner_light(kStoreRoom, p) * support_shadow(plan, p) * floor_shades(shades, p);
+  double light =
+      faced_light(normal) * room_corner_light(kStoreRoom, p) * support_shadow(plan, p) * floor_shades(shades, p);
   if (plan.place != nullptr && p.z() < 0.03) {
     const Vector2<double> middle = shelf_front().point({0, -0.2, 0}).head<2>();
     light *= shadow(p, middle, {0.75, 0.2}, shelf_front().heading_deg * 3.14159265 / 180, 0.35);

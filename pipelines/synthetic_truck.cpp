@@ -23,7 +23,8 @@ Ground truck_side() {
 }
 
 void add_houses(SceneKit& kit) {
-  const std::array<Rgb, 4> walls = {Rgb(0.72, 0.45, 0.36), Rgb(0.85, 0.78, 0.62), Rgb(0.6, 0.66, 0.7), Rgb(0.8, 0.6, 0.45)};
+  const std::array<Rgb, 4> walls = {Rgb(0.72, 0.45, 0.36), Rgb(0.85, 0.78, 0.62), Rgb(0.6, 0.66, 0.7),
+                                    Rgb(0.8, 0.6, 0.45)};
   for (int i = 0; i < 4; ++i) {
     const double left = -6 + 3 * i, high = 3.4 + 0.35 * ((i * 7) % 3);
     const Rgb wall = walls[static_cast<std::size_t>(i)];
@@ -41,7 +42,8 @@ void add_houses(SceneKit& kit) {
       return Rgb(wall * course * (1 + 0.1 * kit.rough(Point(x * 3, z * 3, 2 + i))));
     };
     kit.model.add_rectangle(Point(left, kStreet, 0.12), Point(3, 0, 0), Point(0, 0, high), front, 0.4);
-    kit.model.add_rectangle(Point(left, kStreet - 0.05, high), Point(3, 0, 0), Point(0, 0.6, 0.45), plain(Rgb(0.4, 0.25, 0.2)), 0.2);
+    kit.model.add_rectangle(Point(left, kStreet - 0.05, high), Point(3, 0, 0), Point(0, 0.6, 0.45),
+                            plain(Rgb(0.4, 0.25, 0.2)), 0.2);
   }
 }
 
@@ -64,18 +66,24 @@ void make_truck(SceneKit& kit) {
   kit.model.add_revolution(
       bucket, [](double v) { return Vector2<double>(0.11 + 0.03 * v, 0.26 * v); }, plain(Rgb(0.85, 0.2, 0.2)), 2);
   kit.model.add_revolution(
-      bucket + Point(0, 0, 0.24), [](double v) { return Vector2<double>(0.13 * (1 - v) + 1e-4, 0.07 * std::sin(1.57 * v)); },
-      [&kit](double u, double v) { return Rgb(Rgb(0.95, 0.97, 0.98) * (1 + 0.1 * kit.noise(Point(u * 12, v * 6, 3)))); }, 2);
+      bucket + Point(0, 0, 0.24),
+      [](double v) { return Vector2<double>(0.13 * (1 - v) + 1e-4, 0.07 * std::sin(1.57 * v)); },
+      [&kit](double u, double v) {
+        return Rgb(Rgb(0.95, 0.97, 0.98) * (1 + 0.1 * kit.noise(Point(u * 12, v * 6, 3))));
+      },
+      2);
   const Point hydrant(-2.0, 4.1, 0);
   kit.model.add_revolution(
-      hydrant, [](double v) { return Vector2<double>(v < 0.75 ? 0.1 : 0.4 * (1 - v) + 1e-3, 0.65 * v); }, plain(Rgb(0.85, 0.22, 0.16)), 1.5);
+      hydrant, [](double v) { return Vector2<double>(v < 0.75 ? 0.1 : 0.4 * (1 - v) + 1e-3, 0.65 * v); },
+      plain(Rgb(0.85, 0.22, 0.16)), 1.5);
 }
 
 double truck_light(const ScenePlan& plan, const Point& p, const Point& normal) {
   if (p.y() > 7) return 1;
   const Ground side = truck_side();
   const Point middle = side.point({0, -0.84, 0});
-  const std::array<FloorShade, 2> shades = {{{{middle.x(), middle.y()}, {2.25, 0.85}, side.heading_deg, 0.55}, {{-0.9, 1.2}, {0.1, 0.1}, 0, 0.3}}};
+  const std::array<FloorShade, 2> shades = {
+      {{{middle.x(), middle.y()}, {2.25, 0.85}, side.heading_deg, 0.55}, {{-0.9, 1.2}, {0.1, 0.1}, 0, 0.3}}};
   return sun_light(normal) * support_shadow(plan, p) * floor_shades(shades, p);
 }
 

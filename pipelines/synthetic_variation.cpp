@@ -18,7 +18,20 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 /// What is drawn for each part; a number in [-1, 1] times the variation.
 enum Draw : std::uint64_t {
-  kSpeed, kBegin, kTurn, kDistance, kUp, kDrift, kDirection, kAside, kHeading, kShirt, kTrousers, kShade, kSun, kBright
+  kSpeed,
+  kBegin,
+  kTurn,
+  kDistance,
+  kUp,
+  kDrift,
+  kDirection,
+  kAside,
+  kHeading,
+  kShirt,
+  kTrousers,
+  kShade,
+  kSun,
+  kBright
 };
 
 class Draws {
@@ -44,7 +57,8 @@ int joint_of(const Avatar& avatar, std::size_t gaussian) {
 }
 
 Garment garment_of(const std::string& joint) {
-  for (const char* name : {"spine1", "spine2", "spine3", "left_collar", "right_collar", "left_shoulder", "right_shoulder"})
+  for (const char* name :
+       {"spine1", "spine2", "spine3", "left_collar", "right_collar", "left_shoulder", "right_shoulder"})
     if (joint == name) return Garment::kShirt;
   for (const char* name : {"pelvis", "left_hip", "right_hip", "left_knee", "right_knee"})
     if (joint == name) return Garment::kTrousers;
@@ -83,7 +97,8 @@ Avatar in_other_clothes(const Avatar& avatar, const SyntheticSettings& settings)
   Avatar result = avatar;
   for (std::size_t i = 0; i < static_cast<std::size_t>(avatar.count()); ++i) {
     const Garment garment = garment_of(avatar.joint_names[static_cast<std::size_t>(joint_of(avatar, i))]);
-    const Vector color(double(avatar.colors[3 * i]), double(avatar.colors[3 * i + 1]), double(avatar.colors[3 * i + 2]));
+    const Vector color(double(avatar.colors[3 * i]), double(avatar.colors[3 * i + 1]),
+                       double(avatar.colors[3 * i + 2]));
     if (garment == Garment::kNone || is_skin(color)) continue;
     const Vector other = garment == Garment::kShirt ? Vector(shirt * color) : Vector(trousers.cwiseProduct(color));
     for (std::size_t c = 0; c < 3; ++c)

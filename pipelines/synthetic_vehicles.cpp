@@ -17,8 +17,8 @@ void add_wheel(const Piece& piece, const Point& center, double radius, double ha
     const double angle = 2 * kPi * u;
     return ground.point(center + Point(r * std::cos(angle), forward, r * std::sin(angle)));
   };
-  piece.kit.model.add({[=](double u, double v) { return around(u, radius, half_width * (1 - 2 * v)); },
-                       plain(kRubber), 1, 0, {}});
+  piece.kit.model.add(
+      {[=](double u, double v) { return around(u, radius, half_width * (1 - 2 * v)); }, plain(kRubber), 1, 0, {}});
   const Paint face = [](double u, double v) {
     if (v > 0.62) return std::abs(std::remainder(u * 40, 1.0)) < 0.1 ? Rgb(0.13, 0.13, 0.14) : kRubber;
     if (v > 0.54) return kChrome;
@@ -61,7 +61,9 @@ void add_pickup(SceneKit& kit, const Ground& ground, const Rgb& paint) {
   };
   piece.painted(
       {0, -kWide, (kLow + kWaist) / 2}, {kHalf, kWide, (kWaist - kLow) / 2},
-      [&](int face) { return face == 2 ? door : face == 5 ? plain(paint * 1.08) : plain(paint * 0.85); }, 1.5);
+      [&](int face) { return face == 2   ? door
+                             : face == 5 ? plain(paint * 1.08)
+                                         : plain(paint * 0.85); }, 1.5);
   // hood, to negative left; cab; bed
   piece.painted(
       {-1.45, -kWide, 1.1}, {0.78, kWide - 0.05, 0.09},
@@ -76,13 +78,14 @@ void add_pickup(SceneKit& kit, const Ground& ground, const Rgb& paint) {
   for (const double forward : {-0.03, -2 * kWide + 0.03})  // walls of the bed
     piece.box({1.55, forward, 1.12}, {0.68, 0.03, 0.1}, paint * 1.02, 1.2);
   piece.box({2.22, -kWide, 1.12}, {0.025, kWide, 0.1}, paint * 0.95, 1);
-  piece.panel({-2.26, -0.1, 0.55}, {0, -2 * kWide + 0.2, 0}, {0, 0, 0.42},
-              [](double u, double v) {
-                if (std::hypot((u - 0.12) * 2, v - 0.6) < 0.2 || std::hypot((u - 0.88) * 2, v - 0.6) < 0.2)
-                  return Rgb(0.96, 0.95, 0.85);
-                return std::abs(std::remainder(v * 5, 1.0)) < 0.25 ? kChrome : Rgb(0.15, 0.15, 0.17);
-              },
-              1.2);
+  piece.panel(
+      {-2.26, -0.1, 0.55}, {0, -2 * kWide + 0.2, 0}, {0, 0, 0.42},
+      [](double u, double v) {
+        if (std::hypot((u - 0.12) * 2, v - 0.6) < 0.2 || std::hypot((u - 0.88) * 2, v - 0.6) < 0.2)
+          return Rgb(0.96, 0.95, 0.85);
+        return std::abs(std::remainder(v * 5, 1.0)) < 0.25 ? kChrome : Rgb(0.15, 0.15, 0.17);
+      },
+      1.2);
   for (const double left : {-2.3, 2.3}) piece.box({left, -kWide, 0.48}, {0.06, kWide + 0.02, 0.08}, kChrome, 1);
   for (const double left : {-1.38, 1.38})
     for (const double forward : {-0.1, -2 * kWide + 0.1}) add_wheel(piece, {left, forward, 0.36}, 0.36, 0.115);

@@ -446,7 +446,8 @@ TEST_CASE("every instance of AnyInteraction has a stand-in that runs", "[run][re
   for (const std::string& name : names_in(shipped_configs() / "anyinteraction")) {
     if (!name.ends_with(".json") || name == "base.json") continue;
     const std::string stem = fs::path(name).stem().string();
-    const RunConfig config = load_run_config(shipped_configs() / "anyinteraction" / name, {}, descriptions_of(loss_terms()));
+    const RunConfig config =
+        load_run_config(shipped_configs() / "anyinteraction" / name, {}, descriptions_of(loss_terms()));
     INFO(stem);
     CHECK(config.name == stem);
     CHECK(config.instance.folder.filename() == stem);
@@ -463,12 +464,14 @@ TEST_CASE("every instance of AnyInteraction has a stand-in that runs", "[run][re
   CHECK(scenes.size() == 12);
   CHECK(objects.size() == 8);   // seven, and none
   CHECK(prompts.size() == 19);  // two chairs, two cans, two guitars
-  const RunConfig base = load_run_config(shipped_configs() / "anyinteraction/base.json", {}, descriptions_of(loss_terms())),
+  const RunConfig base = load_run_config(shipped_configs() / "anyinteraction/base.json", {},
+                                         descriptions_of(loss_terms())),
                   paper = load_run_config(shipped_configs() / "paper.json", {}, descriptions_of(loss_terms()));
   RunConfig without = paper;
   std::erase_if(without.stages, [](const auto& stage) { return stage.first == "refinement"; });
   without.synthetic = base.synthetic;
-  CHECK(resolved_config(base, descriptions_of(loss_terms())) == resolved_config(without, descriptions_of(loss_terms())));
+  CHECK(resolved_config(base, descriptions_of(loss_terms())) ==
+        resolved_config(without, descriptions_of(loss_terms())));
 }
 
 TEST_CASE("where the data of an instance is there it is the run's") {
@@ -527,12 +530,11 @@ TEST_CASE("every shipped config has a test") {
     const fs::path place = fs::relative(entry.path(), shipped_configs());
     if (entry.is_regular_file() && place.has_parent_path()) files.insert(place.generic_string());
   }
-  // Those at the top, of ablations/, anyinteraction/, bench/, synthetic/ and synthetic/clips/ are looked for by the tests above, those of sources/
-  // by sources_test.cpp, and each of synthetic/ by synthetic_test.cpp too.
+  // Those at the top, of ablations/, anyinteraction/, bench/, synthetic/ and synthetic/clips/ are looked for by the
+  // tests above, those of sources/ by sources_test.cpp, and each of synthetic/ by synthetic_test.cpp too.
   std::erase_if(files, [](const std::string& file) {
     return file.starts_with("synthetic/") || file.starts_with("bench/") || file.starts_with("anyinteraction/") ||
-           file.starts_with("ablations/") ||
-           (file.starts_with("sources/") && file.ends_with(".json"));
+           file.starts_with("ablations/") || (file.starts_with("sources/") && file.ends_with(".json"));
   });
   CHECK(files == std::set<std::string>{"avatar/fit.json", "avatar/views.json",  // avatar_fit_test.cpp
                                        "examples/robot.json",                   // above

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
 #include <numbers>
+#include <optional>
 
 #include <catch2/catch.hpp>
 

@@ -142,11 +142,12 @@ TEST_CASE("list tells losses and settings") {
   CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 2 * (1 + 13) + 3);
   CHECK_THAT(cli::list_command("scenes", test_losses()),
              Contains("\nscene      garden         a lawn with a path") &&
-                 Contains("\nmotion     push           walks in a circle, pushing it") && Contains("  office_chair\n") &&
-                 Contains("\nobject     vase ") && Contains("  bed, windowsill, ladder\n"));
+                 Contains("\nmotion     push           walks in a circle, pushing it") &&
+                 Contains("  office_chair\n") && Contains("\nobject     vase ") &&
+                 Contains("  bed, windowsill, ladder\n"));
   CHECK(cli::instance_rows("nowhere", test_losses()).empty());
-  const auto rows = cli::instance_rows(std::string(HSI4D_SOURCE_DIR) + "/configs/anyinteraction",
-                                       descriptions_of(loss_terms()));
+  const auto rows =
+      cli::instance_rows(std::string(HSI4D_SOURCE_DIR) + "/configs/anyinteraction", descriptions_of(loss_terms()));
   REQUIRE(rows.size() == 22);
   CHECK(rows[0] == std::vector<std::string>{"bar_bar", "The person is leaning on the bar.", "static", "stand-in"});
   const TemporaryFolder folder;
