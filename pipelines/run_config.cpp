@@ -80,6 +80,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("camera", s.camera, "How cameras are optimised");
   f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");
   f.object("start", s.start, "Where the stages of a frame begin");
+  f.object("instance", s.instance, "The instance of a benchmark that the config is about");
   f.object("data", s.data, "The files that the run reads");
   f.object("sources", s.sources, "Programs outside that make the video, the masks and the estimated motion of `data`");
   f.list("chain", s.chain, "Clips that follow one another, each from the last state of the one before");
@@ -103,6 +104,7 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
   // They run first wherever they are written: a file that extends another one can only append stages.
   std::stable_partition(config.stages.begin(), config.stages.end(),
                         [](const auto& entry) { return entry.second.over == StageScope::kFirst; });
+  take_instance_data(config.instance, config.data);
   if (problems.empty()) lay_over_data(tree, config.chain, problems);
   add_run_problems(tree, config, use, problems);
   problems.throw_if_any();
@@ -152,8 +154,8 @@ void drop_files(ConfigValue& data) {
 
 ConfigValue without_data(ConfigValue tree) {
   std::erase_if(tree.members, [](const ConfigMember& member) {
-    return member.key == "synthetic" || member.key == "threads" || member.key == "camera_selection" ||
-           (member.key == "chain" && member.value.items.empty());
+    return member.key == "synthetic" || member.key == "instance" || member.key == "threads" ||
+           member.key == "camera_selection" || (member.key == "chain" && member.value.items.empty());
   });
   for (ConfigMember& member : tree.members) {
     std::vector<ConfigMember>& own = member.value.members;

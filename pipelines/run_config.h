@@ -17,6 +17,7 @@
 #include "pipelines/color_net_settings.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/frame_start.h"
+#include "pipelines/instance_settings.h"
 #include "pipelines/source_settings.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/render_settings.h"
@@ -77,6 +78,7 @@ struct RunConfig {
   CameraSettings camera;
   CameraSelectionSettings camera_selection;
   StartSettings start;
+  InstanceSettings instance;
   DataSettings data;
   SourceSettings sources;
   std::vector<ChainClip> chain;  ///< clips that follow one another, each with its whole data; empty: one clip

@@ -25,6 +25,7 @@
 #include "pipelines/synthetic_object.h"
 #include "pipelines/synthetic_render.h"
 #include "pipelines/synthetic_scene.h"
+#include "pipelines/synthetic_variation.h"
 #include "splat/io_ply.h"
 
 namespace hsi4d {
@@ -258,7 +259,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   AvatarSettings avatar_settings;
   avatar_settings.gaussians = settings.avatar_gaussians;
   avatar_settings.seed = seed;
-  const Avatar avatar = surface_avatar(body, avatar_settings);
+  const Avatar avatar = in_other_clothes(surface_avatar(body, avatar_settings), settings);
   const SyntheticObject object = synthetic_object(settings);
   const ClipSettings whole_settings = clip_settings(settings);
   const SyntheticClip whole = synthetic_clip(body, object, whole_settings);

@@ -4,8 +4,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string_view>
 
-#include "pipelines/synthetic_kit.h"
+#include "pipelines/synthetic_furniture.h"
 
 namespace hsi4d::detail {
 namespace {
@@ -196,6 +197,29 @@ void add_bunting(SceneKit& kit) {
   }
 }
 
+bool is_at(const ScenePlan& plan, std::string_view place) { return plan.place != nullptr && place == plan.place->name; }
+
+/// A window seat in place of the wardrobe.
+void add_window_seat(SceneKit& kit) {
+  const ScenePlace& place = *kit.plan.place;
+  const Point edge = place.ground.point({0, 0, 0});
+  const double half = place.width / 2, deep = kWall - edge.y(), top = place.height;
+  const Rgb white(0.93, 0.92, 0.88);
+  kit.add_window(edge.x() - half + 0.1, edge.x() + half - 0.1, top + 0.09, 1.95);
+  kit.box(Point(edge.x(), edge.y() + deep / 2, top - 0.025), Point(half + 0.06, deep / 2 + 0.02, 0.025), plain(white),
+          2);
+  kit.box(
+      Point(edge.x(), edge.y() + deep / 2 + 0.04, top / 2 - 0.02), Point(half, deep / 2 - 0.05, top / 2 - 0.03),
+      [white](double u, double v) {
+        const double rim = std::min(std::abs(std::remainder(u * 3, 1.0)) / 3, std::min(v, 1 - v) * 0.5);
+        return rim < 0.02 ? Rgb(white * 0.75) : Rgb(white * 0.95);
+      },
+      1.5);
+  for (const double side : {-1.0, 1.0})
+    kit.add_curtain(edge.x() + side * half - 0.13, edge.x() + side * half + 0.13, top, 2.15, Rgb(0.72, 0.35, 0.3),
+                    Rgb(0.86, 0.62, 0.3));
+}
+
 }  // namespace
 
 void make_bedroom(SceneKit& kit) {
@@ -203,7 +227,13 @@ void make_bedroom(SceneKit& kit) {
   add_bedroom_walls(kit);
   add_bed(kit);
   add_posters(kit);
-  add_wardrobe(kit);
+  if (is_at(kit.plan, "windowsill")) {
+    add_window_seat(kit);
+  } else if (is_at(kit.plan, "ladder")) {
+    add_step_ladder(kit, *kit.plan.place);
+  } else {
+    add_wardrobe(kit);
+  }
   add_lamp(kit);
   add_bunting(kit);
   kit.add_plant(Point(0.12, 1.6, 0), 0.55);

@@ -5,6 +5,7 @@
 
 #include "core/random.h"
 #include "pipelines/synthetic_surface.h"
+#include "pipelines/synthetic_variation.h"
 
 namespace hsi4d {
 namespace {
@@ -56,7 +57,7 @@ Avatar filmed_avatar(const BodyModel& body, const Avatar& tracked, const Synthet
   AvatarSettings other;
   other.gaussians = static_cast<Index>(std::lround(double(settings.avatar_gaussians) * (1 + 0.4 * difference)));
   other.seed = random.bits(0) >> 11U;
-  Avatar avatar = surface_avatar(body, other);
+  Avatar avatar = in_other_clothes(surface_avatar(body, other), settings);
   const SmoothNoise stains(seed, "synthetic.stains");
   for (std::size_t i = 0; i < static_cast<std::size_t>(avatar.count()); ++i) {
     const float* m = avatar.means.data() + 3 * i;

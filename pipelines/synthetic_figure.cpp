@@ -126,7 +126,8 @@ void pose_foot(Figure& figure, const FigureFoot& foot, double ankle_height, int 
   const Matrix flat = about_z(foot.yaw_deg) * so3_exp(Vector(90 * kDegree, 0, 0));
   const Matrix turn = flat * so3_exp(Vector(foot.pitch_deg * kDegree, 0, 0));
   const Vector to_ball = figure.offset(ball_joint);
-  const Vector ankle = foot.place + Vector(0, 0, ankle_height) + (flat - turn) * to_ball;
+  Vector ankle = foot.place + Vector(0, 0, ankle_height) + (flat - turn) * to_ball;
+  if (foot.about_ankle) ankle = foot.place + Vector(0, 0, ankle_height);
   figure.reach(smplx_joint(name + "hip"), smplx_joint(name + "knee"), ankle_joint, ankle, Vector(0, 0, 1),
                flat * Vector(0, 0, 1));
   figure.set_world(ankle_joint, turn);

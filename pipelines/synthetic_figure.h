@@ -39,10 +39,11 @@ FigureSizes figure_sizes(const BodyModel& body);
 
 /// Where a foot is to be.
 struct FigureFoot {
-  Vector3<double> place;  ///< world: the point of the floor below the ankle of a flat foot; z: how high the sole is
-  double yaw_deg = 0;     ///< direction of the toes, as a heading
-  double pitch_deg = 0;   ///< the heel is raised about the ball of the foot
-  bool flat_toes = true;  ///< the toes stay level when the heel is raised
+  Vector3<double> place;     ///< world: the point of the floor below the ankle of a flat foot; z: how high the sole is
+  double yaw_deg = 0;        ///< direction of the toes, as a heading
+  double pitch_deg = 0;      ///< the heel is raised about the ball of the foot
+  bool flat_toes = true;     ///< the toes stay level when the heel is raised
+  bool about_ankle = false;  ///< the pitch is about the ankle, which stays over `place`
 };
 
 /// Where a hand is to be.

@@ -1,6 +1,6 @@
 // Motions on the spot, from keyframes: pour, lift, sit, lean, wave.
 //
-// Between two keys everything accelerates, goes on and brakes. Before an effort there is a key that goes the other way
+// Before an effort there is a key that goes the other way
 // (the knees give before something is lifted, the trunk leans forward before one sits).
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include "core/quaternion.h"
 #include "core/rotation.h"
-#include "pipelines/synthetic_moment.h"
+#include "pipelines/synthetic_keyframes.h"
 #include "pipelines/synthetic_motion.h"
 
 namespace hsi4d::detail {
@@ -20,89 +20,13 @@ using Vector = Vector3<double>;
 constexpr double kPi = std::numbers::pi;
 constexpr double kDegree = kPi / 180;
 
-/// A hand that holds nothing, in the person's frame; rotations as vectors in degrees.
-struct HandKey {
-  Vector wrist = {0, 0, 0};  ///< against where it hangs
-  Vector turn = {0, 0, 0};   ///< against the forearm
-  double curl = 22;          ///< of every finger joint
-};
-
-/// The state at one moment, in the person's frame: (left, forward, up) from the place between the feet, metres;
-/// rotations are vectors in degrees, those of the body as in FigureTarget.
-struct KeyPose {
-  double seconds = 0;
-  Vector pelvis = {0, 0, 0};  ///< up is relative to standing
-  Vector pelvis_turn = {0, 0, 0};
-  Vector spine = {0, 0, 0};
-  Vector head = {0, 0, 0};
-  Vector object = {0, 0, 0};       ///< the object's grip
-  Vector object_turn = {0, 0, 0};  ///< about (left, forward, up)
-  Vector away = {0, 0, 0};         ///< of the holding hands from their grips
-  double grip = 60;                ///< curl of the holding hands
-  HandKey left = {}, right = {};
-};
-
-/// A motion as keys, and what is the same in all of them.
-struct KeyedMotion {
-  std::vector<KeyPose> keys;
-  Ground ground;
-  std::array<FigureFoot, 2> feet;  ///< place: left, forward, up; yaw against the heading
-  bool hands_hang = true;          ///< wrists of free hands are relative to where they hang; else to the ground
-};
-
-/// From 0 to 1: constant acceleration, constant speed (1.25 of the mean), constant braking.
-double eased(double x) {
-  constexpr double kRamp = 0.2, kSpeed = 1 / (1 - kRamp);
-  if (x < kRamp) return kSpeed * x * x / (2 * kRamp);
-  if (x > 1 - kRamp) return 1 - kSpeed * (1 - x) * (1 - x) / (2 * kRamp);
-  return kSpeed * (x - kRamp / 2);
-}
-
-Vector slerped(const Vector& a, const Vector& b, double part) {
-  const Vector4<double> q0 = quaternion_exp(Vector(a * kDegree)), q1 = quaternion_exp(Vector(b * kDegree));
-  return quaternion_log(slerp(q0, q1, part)) / kDegree;
-}
-
-HandKey between(const HandKey& a, const HandKey& b, double part) {
-  return {a.wrist + (b.wrist - a.wrist) * part, slerped(a.turn, b.turn, part), a.curl + (b.curl - a.curl) * part};
-}
-
-/// Between two keys: positions on a line, rotations along the shortest arc.
-KeyPose between(const KeyPose& a, const KeyPose& b, double part) {
-  KeyPose pose = a;
-  pose.seconds = a.seconds + (b.seconds - a.seconds) * part;
-  for (Vector KeyPose::*member : {&KeyPose::pelvis, &KeyPose::object, &KeyPose::away})
-    pose.*member = a.*member + (b.*member - a.*member) * part;
-  for (Vector KeyPose::*member : {&KeyPose::pelvis_turn, &KeyPose::spine, &KeyPose::head, &KeyPose::object_turn})
-    pose.*member = slerped(a.*member, b.*member, part);
-  pose.grip = a.grip + (b.grip - a.grip) * part;
-  pose.left = between(a.left, b.left, part);
-  pose.right = between(a.right, b.right, part);
-  return pose;
-}
-
-/// Where the clip is that runs forwards and backwards.
-double time_in_clip(double seconds) {
-  return kClipSeconds - std::abs(std::remainder(seconds - kClipSeconds, 2 * kClipSeconds));
-}
-
-KeyPose key_at(const std::vector<KeyPose>& keys, double t) {
-  for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
-    const KeyPose &a = keys[i], &b = keys[i + 1];
-    if (t <= b.seconds) return between(a, b, eased(std::max(0.0, t - a.seconds) / (b.seconds - a.seconds)));
-  }
-  return keys.back();
-}
-
-FigureFoot foot(double left, double forward, double toes) { return {Vector(left, forward, 0), toes, 0, true}; }
-
 const Ground kBesideTable{{0.22, 0.8}, -58};
 
 KeyedMotion pour_motion() {
   KeyedMotion motion;
   motion.ground = kBesideTable;
-  motion.feet = {foot(0.15, 0.08, 14), foot(-0.15, -0.08, -16)};
-  motion.hands_hang = false;
+  motion.feet = {planted_foot(0.15, 0.08, 14), planted_foot(-0.15, -0.08, -16)};
+  motion.hands_hang = motion.shares_turn = false;
   motion.keys = {{.seconds = 0,
                   .pelvis = {-0.02, 0.07, -0.12},
                   .pelvis_turn = {14, -6, 0},
@@ -158,7 +82,7 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
   const Vector there(left, 0.52, begin), begin_turn(0, 0, stoop > 0.5 ? 0.0 : 40 * across);
   KeyedMotion motion;
   motion.ground = kBesideTable;
-  motion.feet = {foot(0.15, 0.06, 12), foot(-0.15, -0.05, -14)};
+  motion.feet = {planted_foot(0.15, 0.06, 12), planted_foot(-0.15, -0.05, -14)};
   motion.keys = {{.seconds = 0,
                   .pelvis = {-0.01, 0.03, -0.05 - 0.04 * stoop},
                   .pelvis_turn = {7, -3, 0},
@@ -217,6 +141,52 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
   return motion;
 }
 
+/// A bar from the floor, with a straight back, until one stands.
+/// @param begin  height of the bar on the floor
+KeyedMotion heavy_lift_motion(const FigureSizes& sizes, double begin) {
+  const double hangs = sizes.shoulder - 0.975 * sizes.arm - 0.09;
+  const Vector floor(0, 0.2, begin);
+  KeyedMotion motion;
+  motion.ground = {{0, 0.7}, -28};
+  motion.feet = {planted_foot(0.15, 0, 14), planted_foot(-0.15, 0, -14)};
+  motion.keys = {{.seconds = 0,
+                  .pelvis = {0, -0.24, -0.36},
+                  .pelvis_turn = {34, 0, 0},
+                  .spine = {24, 0, 0},
+                  .head = {-22, 0, 0},
+                  .object = floor,
+                  .grip = 62},
+                 {.seconds = 0.35,  // the hips go down before the bar comes up
+                  .pelvis = {0, -0.25, -0.39},
+                  .pelvis_turn = {32, 0, 0},
+                  .spine = {22, 0, 0},
+                  .head = {-24, 0, 0},
+                  .object = floor,
+                  .grip = 66},
+                 {.seconds = 1.2,
+                  .pelvis = {0, -0.17, -0.16},
+                  .pelvis_turn = {26, 0, 0},
+                  .spine = {16, 0, 0},
+                  .head = {-16, 0, 0},
+                  .object = {0, 0.2, 0.5 * (begin + hangs) + 0.02},
+                  .grip = 66},
+                 {.seconds = 2.1,
+                  .pelvis = {0, 0.01, -0.012},
+                  .pelvis_turn = {-1, 0, 0},
+                  .spine = {0, 0, 0},
+                  .head = {0, 0, 0},
+                  .object = {0, 0.2, hangs},
+                  .grip = 66},
+                 {.seconds = kClipSeconds,  // leans back a little under the weight
+                  .pelvis = {0, 0.03, -0.014},
+                  .pelvis_turn = {-3, 0, 0},
+                  .spine = {-4, 0, 0},
+                  .head = {2, 4, 0},
+                  .object = {0, 0.2, hangs + 0.015},
+                  .grip = 66}};
+  return motion;
+}
+
 /// The object is the seat. @param seat  of the pelvis when it sits, against standing
 KeyedMotion sit_motion(double seat, double chair_grip) {
   const Vector chair(0, -0.41, chair_grip);  // the middle of its seat
@@ -224,7 +194,7 @@ KeyedMotion sit_motion(double seat, double chair_grip) {
                 right_leans = {{0.03, 0.12, -0.04}, {25, 0, 0}, 20};
   KeyedMotion motion;
   motion.ground = {{0.05, 0.55}, -40};
-  motion.feet = {foot(0.13, 0.03, 9), foot(-0.13, -0.01, -11)};
+  motion.feet = {planted_foot(0.13, 0.03, 9), planted_foot(-0.13, -0.01, -11)};
   const auto on_thigh = [&](double left, double forward, double up) {
     return HandKey{{left, forward, up}, {45, 0, 0}, 24};
   };
@@ -276,7 +246,7 @@ KeyedMotion sit_motion(double seat, double chair_grip) {
 KeyedMotion lean_motion(bool on_chair, double chair_grip) {
   KeyedMotion motion;
   motion.ground = {{0.3, 0.75}, on_chair ? -62.0 : -35.0};
-  motion.feet = {foot(0.14, 0.07, 12), foot(-0.14, -0.07, -14)};
+  motion.feet = {planted_foot(0.14, 0.07, 12), planted_foot(-0.14, -0.07, -14)};
   const double far = 0.44;
   const auto on_knee = [&](double left, double forward, double up) {
     return HandKey{{left, forward, up}, {50, 0, 0}, 26};
@@ -330,7 +300,7 @@ KeyedMotion lean_motion(bool on_chair, double chair_grip) {
 KeyedMotion wave_motion(const Vector& carried) {
   KeyedMotion motion;
   motion.ground = {{0.1, 0.7}, -20};
-  motion.feet = {foot(0.12, 0.03, 10), foot(-0.12, -0.02, -12)};
+  motion.feet = {planted_foot(0.12, 0.03, 10), planted_foot(-0.12, -0.02, -12)};
   motion.keys = {{.seconds = 0, .pelvis = {0, 0, -0.012}, .spine = {2, 0, 0}, .object = carried},
                  {.seconds = 0.25,  // the weight goes to the other leg
                   .pelvis = {-0.02, 0, -0.016},
@@ -388,6 +358,7 @@ KeyedMotion motion_of(const Actor& actor) {
   const double ground_to_grip = object.above_ground + object.grip.z();
   switch (actor.motion) {
     case SyntheticMotionKind::kLift: {
+      if (object.is_heavy) return heavy_lift_motion(actor.sizes, ground_to_grip);
       const bool two_hands = object.hands[kLeft] && object.hands[kRight];
       return lift_motion(object.on_floor ? ground_to_grip + 0.03 : 0.92, two_hands);
     }
@@ -406,32 +377,16 @@ KeyedMotion motion_of(const Actor& actor) {
 
 Moment keyed_moment(const Actor& actor, double seconds) {
   const KeyedMotion motion = motion_of(actor);
-  const double t = time_in_clip(seconds);
+  const double t = time_in_clip(seconds, kClipSeconds);
   const KeyPose key = key_at(motion.keys, t);
   const Ground& ground = motion.ground;
   Moment moment;
   FigureTarget& figure = moment.figure;
-  figure.ground = ground;
-  figure.pelvis = key.pelvis;
-  figure.pelvis_turn = key.pelvis_turn;
-  figure.spine = key.spine;
-  figure.head = key.head;
-  figure.collars = {Vector(0, -4, -6), Vector(0, 8, 5)};
+  figure = keyed_figure(actor, motion, key);
   for (const int side : {kLeft, kRight}) {
     const auto i = static_cast<std::size_t>(side);
-    const double out = side == kLeft ? 1 : -1;
-    figure.feet[i] = motion.feet[i];
-    figure.feet[i].place = ground.point(motion.feet[i].place);
-    figure.feet[i].yaw_deg += ground.heading_deg;
-    const HandKey& hand = side == kLeft ? key.left : key.right;
-    const Vector from = motion.hands_hang ? hanging_wrist(actor.sizes, side) : Vector(0, 0, 0);
-    figure.hands[i].wrist = ground.point(from + hand.wrist);
-    figure.hands[i].local = hand.turn;
-    figure.hands[i].shared = motion.hands_hang;
-    figure.hands[i].curl_deg = hand.curl;
-    figure.hands[i].elbow = ground.direction({0.65 * out, side == kLeft ? -0.5 : -0.6, side == kLeft ? -0.6 : -0.25});
     if (actor.motion == SyntheticMotionKind::kLift && actor.object.hands[i])
-      figure.hands[i].elbow = ground.direction({0.9 * out, -0.2, -0.3});
+      figure.hands[i].elbow = ground.direction({side == kLeft ? 0.9 : -0.9, -0.2, -0.3});
   }
   if (actor.motion == SyntheticMotionKind::kWave) wave_hand(actor, ground, t, figure.hands[kLeft]);
   if (!actor.object.exists()) return moment;
@@ -439,7 +394,8 @@ Moment keyed_moment(const Actor& actor, double seconds) {
   const ObjectPlace at{actor.object.grip + (sits ? Vector(kChairBack, 0, 0) : Vector(0, 0, 0)), key.object,
                        key.object_turn};
   moment.object = object_on(ground, at);
-  moment.in_hand = !sits && actor.motion != SyntheticMotionKind::kLean && key.away.norm() == 0;
+  const bool is_free = sits || actor.motion == SyntheticMotionKind::kLean || actor.object.is_heavy;
+  moment.in_hand = !is_free && key.away.norm() == 0;
   if (!sits) hold_object(actor, at, key.away, key.grip, moment);
   return moment;
 }

@@ -100,5 +100,23 @@ void make_garden(SceneKit& kit);
 double garden_light(const ScenePlan& plan, const Point& p, const Point& normal);
 void make_terrace(SceneKit& kit);
 double terrace_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_gym(SceneKit& kit);
+double gym_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_bar(SceneKit& kit);
+double bar_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_playground(SceneKit& kit);
+double playground_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_greenhouse(SceneKit& kit);
+double greenhouse_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_cafe(SceneKit& kit);
+double cafe_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_store(SceneKit& kit);
+double store_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_bicycle(SceneKit& kit);
+double bicycle_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_room(SceneKit& kit);
+double room_light(const ScenePlan& plan, const Point& p, const Point& normal);
+void make_truck(SceneKit& kit);
+double truck_light(const ScenePlan& plan, const Point& p, const Point& normal);
 
 }  // namespace hsi4d::detail

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
+#include <string_view>
 
-#include "pipelines/synthetic_kit.h"
+#include "pipelines/synthetic_furniture.h"
 
 namespace hsi4d::detail {
 namespace {
@@ -162,6 +164,18 @@ void add_bookcase(SceneKit& kit) {
     add_books(kit, kLeft + kBoard + 0.01, kRight - kBoard - 0.01, front, i * kStep + kBoard, kStep - kBoard);
 }
 
+/// What the person acts at.
+void add_place(SceneKit& kit) {
+  if (kit.plan.place == nullptr) return;
+  const ScenePlace& place = *kit.plan.place;
+  const std::string_view name = place.name;
+  const Rgb cloth(0.5, 0.27, 0.18);
+  if (name == "sofa") add_sofa(kit, place.ground, {place.width, place.height, place.reach, 0.86}, cloth);
+  if (name == "sofa_back") add_sofa_from_behind(kit, place.ground, {place.width, 0.43, 0.5, place.height}, cloth);
+  if (name == "table")
+    add_dining_table(kit, place.ground, {place.width, place.reach, place.height}, Rgb(0.72, 0.5, 0.3));
+}
+
 }  // namespace
 
 void make_living_room(SceneKit& kit) {
@@ -178,12 +192,19 @@ void make_living_room(SceneKit& kit) {
   add_pictures(kit);
   add_bookcase(kit);
   kit.add_plant(Point(-1.44, 1.45, 0));
+  add_place(kit);
 }
 
 double living_room_light(const ScenePlan& plan, const Point& p, const Point& normal) {
   double light = faced_light(normal) * corner_light(p) * support_shadow(plan, p);
   if (p.z() < 0.02)
     light *= shadow(p, {1.22, 1.82}, {0.5, 0.15}, 0, 0.35) * shadow(p, {-1.5, 1.45}, {0.15, 0.15}, 0, 0.45);
+  if (p.z() < 0.02 && plan.place != nullptr) {
+    const ScenePlace& place = *plan.place;
+    const Point middle = place.ground.point({0, -0.5 * place.reach - 0.1, 0});
+    light *= shadow(p, middle.head<2>(), {place.width / 2 + 0.1, place.reach / 2 + 0.15},
+                    place.ground.heading_deg * std::numbers::pi / 180, 0.4);
+  }
   return light;
 }
 

@@ -3,7 +3,8 @@
 //
 // pour, lift, sit, lean and wave are keyframes (synthetic_keys.cpp): kClipSeconds long, then backwards, and forwards
 // again, for as many frames as are wanted. walk and push go around in a circle from footstep to footstep
-// (synthetic_walk.cpp) and never end.
+// (synthetic_walk.cpp) and never end. sit_on, lean_on, reach, wipe and water are keyframes at a place of the scene
+// (synthetic_place_keys.cpp), run, slide, play and roll functions of time (synthetic_flow.cpp).
 //
 // Seven steps of `pour` at 10 frames a second are the lift alone, at rest at both ends: between two of them the root
 // moves at most 4 cm, a joint turns at most 12 degrees, the object moves at most 5 cm and the camera 1.5 cm and 0.4
@@ -19,6 +20,7 @@
 #include "pipelines/synthetic_figure.h"
 #include "pipelines/synthetic_object.h"
 #include "pipelines/synthetic_scene.h"
+#include "pipelines/synthetic_variation.h"
 
 namespace hsi4d {
 
@@ -31,7 +33,9 @@ struct ClipSettings {
   int size_px = 256;        ///< width and height of a frame
   double camera_drift = 1;  ///< how far the camera moves: 0 stands, 1 as designed
   SyntheticMotionKind motion = SyntheticMotionKind::kPour;
-  double camera_distance = 1;  ///< of the camera from what it looks at first, of that as designed
+  double camera_distance = 1;         ///< of the camera from what it looks at first, of that as designed
+  const ScenePlace* place = nullptr;  ///< where it is done, of motions that need one
+  ClipVariation variation = {};
 };
 
 /// The clip that the settings ask for; of several, which follow one another, all frames.

@@ -8,6 +8,7 @@
 #include "core/rotation.h"
 #include "pipelines/clip.h"
 #include "pipelines/synthetic_kit.h"
+#include "pipelines/synthetic_object_shapes.h"
 #include "splat/splat_file.h"
 #include "splat/transform.h"
 
@@ -239,6 +240,15 @@ struct Hold {
   bool on_floor;
 };
 
+/// Both hands over a bar that runs along y: thumbs inwards. @param fingers  where stretched ones would point
+Hold held_bar(const Point& middle, double half, const Point& fingers, const Point& carried) {
+  return {middle,
+          {HandGrip{middle + Point(0, half, 0), -Point::UnitY(), fingers},
+           HandGrip{middle - Point(0, half, 0), Point::UnitY(), fingers}},
+          carried,
+          true};
+}
+
 Hold hold_of(SyntheticObjectKind kind) {
   const double inward = 15 * kDegree;
   const auto handle = [&](const Point& grip, double forward) {  // runs along x: the hand points down over it
@@ -268,6 +278,14 @@ Hold hold_of(SyntheticObjectKind kind) {
               Point(0, 0.44, 0.935),
               true};
     }
+    case SyntheticObjectKind::kBarbell:
+      return held_bar(Point(0, 0, kBarbellHeight), 0.26, -Point::UnitZ(), Point(0, 0.2, 0.8));
+    case SyntheticObjectKind::kShoppingCart:
+      return held_bar(Point(kCartHandle[0], 0, kCartHandle[1]), 0.17, Point(0.9, 0, -std::sqrt(1 - 0.81)),
+                      Point(0, 0.42, kCartHandle[1]));
+    case SyntheticObjectKind::kMower:
+      return held_bar(Point(kMowerHandle[0], 0, kMowerHandle[1]), 0.15, Point(0.9, 0, -std::sqrt(1 - 0.81)),
+                      Point(0, 0.42, kMowerHandle[1]));
     case SyntheticObjectKind::kWateringCan:
     case SyntheticObjectKind::kNone:
       break;
@@ -287,6 +305,12 @@ void add_kind(SurfaceModel& model, SyntheticObjectKind kind) {
       return add_guitar(model);
     case SyntheticObjectKind::kOfficeChair:
       return add_office_chair(model);
+    case SyntheticObjectKind::kBarbell:
+      return add_barbell(model);
+    case SyntheticObjectKind::kShoppingCart:
+      return add_shopping_cart(model);
+    case SyntheticObjectKind::kMower:
+      return add_mower(model);
     case SyntheticObjectKind::kNone:
       break;
   }
@@ -304,7 +328,7 @@ Point moved_to_centroid(Gaussians& gaussians) {
 }
 
 /// The object of Gaussians that stand on z = 0 and are held as `hold` says.
-SyntheticObject object_of(std::string name, Gaussians gaussians, const Hold& hold) {
+SyntheticObject object_of(std::string name, Gaussians gaussians, const Hold& hold, SyntheticObjectKind kind) {
   SyntheticObject object;
   object.name = std::move(name);
   object.gaussians = std::move(gaussians);
@@ -316,6 +340,8 @@ SyntheticObject object_of(std::string name, Gaussians gaussians, const Hold& hol
   object.above_ground = centroid.z();
   object.carried = hold.carried;
   object.on_floor = hold.on_floor;
+  object.is_heavy = kind == SyntheticObjectKind::kBarbell;
+  object.is_long = kind == SyntheticObjectKind::kShoppingCart || kind == SyntheticObjectKind::kMower;
   return object;
 }
 
@@ -359,7 +385,7 @@ SyntheticObject object_of_file(const SyntheticSettings& settings) {
   for (auto& hand : hold.hands)
     if (hand) hand->point += grip - hold.grip;
   hold.grip = grip;
-  SyntheticObject object = object_of(name, std::move(gaussians), hold);
+  SyntheticObject object = object_of(name, std::move(gaussians), hold, settings.object);
   object.has_normals = false;
   return object;
 }
@@ -375,7 +401,7 @@ SyntheticObject synthetic_object(SyntheticObjectKind kind, Index most, std::uint
   return object_of(none.name,
                    model.covered(
                        most, [](const Point&, const Point& normal) { return faced_light(normal); }, seed),
-                   hold_of(kind));
+                   hold_of(kind), kind);
 }
 
 SyntheticObject synthetic_object(const SyntheticSettings& settings) {
@@ -395,6 +421,12 @@ const char* object_summary(SyntheticObjectKind kind) {
       return "a guitar, held by its neck";
     case SyntheticObjectKind::kOfficeChair:
       return "an office chair on castors";
+    case SyntheticObjectKind::kBarbell:
+      return "a barbell with four plates, held in both hands";
+    case SyntheticObjectKind::kShoppingCart:
+      return "a shopping cart, pushed by its handle";
+    case SyntheticObjectKind::kMower:
+      return "a lawn mower with a bag, pushed by its handle";
     case SyntheticObjectKind::kNone:
       break;
   }

@@ -30,6 +30,8 @@ struct SyntheticObject {
   Vector3<double> carried{0, 0, 0};  ///< where its grip is when it is carried: left, forward, up of the person, metres
   bool has_normals = true;           ///< the third axis of each Gaussian is its outward normal, as of made ones
   bool on_floor = false;             ///< it stands on the floor, not on a table
+  bool is_long = false;              ///< it is pushed along a wider circle
+  bool is_heavy = false;             ///< a weight, lifted with both hands from where it lies; needs no stand
 
   bool exists() const { return gaussians.count() > 0; }
 };

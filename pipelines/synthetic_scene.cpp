@@ -7,6 +7,7 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "pipelines/synthetic_kit.h"
+#include "pipelines/synthetic_variation.h"
 #include "splat/splat_file.h"
 #include "splat/transform.h"
 
@@ -16,7 +17,7 @@ namespace {
 using detail::SceneKit;
 using detail::SceneMaker;
 
-const std::array<SceneMaker, 5> kMakers = {{
+const std::array<SceneMaker, 14> kMakers = {{
     {SyntheticSceneKind::kLivingRoom, "a room with a bookcase, a window, pictures and a rug", detail::make_living_room,
      detail::living_room_light},
     {SyntheticSceneKind::kKitchen, "a tiled kitchen with cupboards, a stove, a sink and shelves", detail::make_kitchen,
@@ -27,6 +28,23 @@ const std::array<SceneMaker, 5> kMakers = {{
      detail::garden_light},
     {SyntheticSceneKind::kTerrace, "a paved terrace before a brick house, with planters and a bench",
      detail::make_terrace, detail::terrace_light},
+    {SyntheticSceneKind::kGym, "a gym with mirrors, dumbbells, wall bars and treadmills", detail::make_gym,
+     detail::gym_light},
+    {SyntheticSceneKind::kBar, "a bar with shelves of bottles, a counter, stools and lamps", detail::make_bar,
+     detail::bar_light},
+    {SyntheticSceneKind::kPlayground, "a playground with a slide, a swing, a seesaw, sand and trees",
+     detail::make_playground, detail::playground_light},
+    {SyntheticSceneKind::kGreenhouse, "a greenhouse with benches of pots, a bed of flowers and a chair",
+     detail::make_greenhouse, detail::greenhouse_light},
+    {SyntheticSceneKind::kCafe, "a street cafe with chairs, round tables, a parasol and an awning", detail::make_cafe,
+     detail::cafe_light},
+    {SyntheticSceneKind::kStore, "a store with shelves full of packages and a fridge", detail::make_store,
+     detail::store_light},
+    {SyntheticSceneKind::kBicycle, "a park with a bench, a bicycle at its end, a path and trees", detail::make_bicycle,
+     detail::bicycle_light},
+    {SyntheticSceneKind::kRoom, "a room with a grey sofa, a wide window, a piano and a round rug", detail::make_room,
+     detail::room_light},
+    {SyntheticSceneKind::kTruck, "a street with a pickup truck before houses", detail::make_truck, detail::truck_light},
 }};
 
 const SceneMaker& maker_of(SyntheticSceneKind kind) {
@@ -45,20 +63,29 @@ Gaussians support_alone(Index most, const ScenePlan& plan, std::uint64_t seed) {
       seed);
 }
 
-}  // namespace
-
-Gaussians synthetic_scene(SyntheticSceneKind kind, Index most, const ScenePlan& plan, std::uint64_t seed) {
-  const SceneMaker& maker = maker_of(kind);
+Gaussians made_scene(const SyntheticSettings& settings, const ScenePlan& plan) {
+  const auto seed = static_cast<std::uint64_t>(settings.seed);
+  const SceneMaker& maker = maker_of(settings.scene);
   SceneKit kit(plan, seed);
   maker.make(kit);
   kit.add_support();
-  return kit.model.covered(
-      most, [&](const auto& p, const auto& normal) { return maker.light(plan, p, normal); }, seed);
+  const Light light = [&](const auto& p, const auto& normal) { return maker.light(plan, p, normal); };
+  return kit.model.covered(settings.scene_gaussians, from_another_side(light, settings), seed);
+}
+
+}  // namespace
+
+Gaussians synthetic_scene(SyntheticSceneKind kind, Index most, const ScenePlan& plan, std::uint64_t seed) {
+  SyntheticSettings settings;
+  settings.scene = kind;
+  settings.scene_gaussians = most;
+  settings.seed = static_cast<std::int64_t>(seed);
+  return synthetic_scene(settings, plan);
 }
 
 Gaussians synthetic_scene(const SyntheticSettings& settings, const ScenePlan& plan) {
   const auto seed = static_cast<std::uint64_t>(settings.seed);
-  if (settings.scene_file.empty()) return synthetic_scene(settings.scene, settings.scene_gaussians, plan, seed);
+  if (settings.scene_file.empty()) return made_scene(settings, plan);
   const SplatFile file = read_splats(settings.scene_file.string());
   if (file.gaussians.count() == 0)
     throw DataError(settings.scene_file.string() + ": holds no Gaussians that can be used");

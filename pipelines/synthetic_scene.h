@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "optim/mesh_file.h"
+#include "pipelines/synthetic_places.h"
 #include "pipelines/synthetic_settings.h"
 #include "splat/gaussians.h"
 
@@ -17,6 +18,7 @@ struct ScenePlan {
   bool has_stand = false;                      ///< it is a stand on the floor
   Vector2<double> middle{0, 0.6};              ///< where the person acts
   double seen_from_y = 0.2;                    ///< the cameras see the floor from here on
+  const ScenePlace* place = nullptr;           ///< of the scene, which the person acts at; none: in the middle
 };
 
 /// The scene with what the plan asks for. The light is baked into the colours; some surfaces shine a little (spherical

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/text.h"
+#include "pipelines/synthetic_places.h"
 
 namespace hsi4d {
 namespace {
@@ -63,12 +64,17 @@ void describe_files(ConfigFields& f, SyntheticSettings& s) {
 const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion) {
   using Object = SyntheticObjectKind;
   static const std::vector<Object> on_table = {Object::kWateringCan, Object::kBox, Object::kVase};
-  static const std::vector<Object> lifted = {Object::kWateringCan, Object::kBox, Object::kVase, Object::kGuitar};
+  static const std::vector<Object> lifted = {Object::kWateringCan, Object::kBox, Object::kVase, Object::kGuitar,
+                                             Object::kBarbell};
   static const std::vector<Object> carried = {Object::kWateringCan, Object::kBox, Object::kVase, Object::kGuitar,
                                               Object::kNone};
   static const std::vector<Object> in_one_hand = {Object::kWateringCan, Object::kBox, Object::kGuitar, Object::kNone};
+  static const std::vector<Object> pushed = {Object::kOfficeChair, Object::kShoppingCart, Object::kMower};
   static const std::vector<Object> chair = {Object::kOfficeChair};
   static const std::vector<Object> chair_or_none = {Object::kOfficeChair, Object::kNone};
+  static const std::vector<Object> guitar = {Object::kGuitar};
+  static const std::vector<Object> can = {Object::kWateringCan};
+  static const std::vector<Object> none = {Object::kNone};
   switch (motion) {
     case SyntheticMotionKind::kPour:
       return on_table;
@@ -81,10 +87,23 @@ const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion) {
     case SyntheticMotionKind::kLean:
       return chair_or_none;
     case SyntheticMotionKind::kPush:
+      return pushed;
     case SyntheticMotionKind::kSit:
+    case SyntheticMotionKind::kRoll:
+      return chair;
+    case SyntheticMotionKind::kPlay:
+      return guitar;
+    case SyntheticMotionKind::kWater:
+      return can;
+    case SyntheticMotionKind::kSitOn:
+    case SyntheticMotionKind::kLeanOn:
+    case SyntheticMotionKind::kRun:
+    case SyntheticMotionKind::kSlide:
+    case SyntheticMotionKind::kReach:
+    case SyntheticMotionKind::kWipe:
       break;
   }
-  return chair;
+  return none;
 }
 
 std::string object_names_of(SyntheticMotionKind motion) {
@@ -151,6 +170,13 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
            std::string(choice_name<SyntheticObjectKind>(kSyntheticObjectKinds, s.object)) + "; it goes with " +
            object_names_of(s.motion);
   });
+  f.string(
+      "place", s.place,
+      "Place of the scene where a motion is done that needs one; empty: the first there. `hsi4d list scenes` tells "
+      "them");
+  f.rule({"place", "motion", "scene"}, [&s] { return place_problem(s.scene, s.motion, s.place); });
+  f.number("variation", s.variation, {.min = 0, .max = 1},
+           "How far the seed changes when and how fast it is done, camera, start, clothes and light: 0 not at all");
   describe_files(f, s);
   f.integer("scene_gaussians", s.scene_gaussians, {.min = kFewestSceneGaussians, .max = 20000000},
             "Gaussians of the scene, at most; a few percent fewer are made");

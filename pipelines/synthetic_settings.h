@@ -14,37 +14,100 @@
 namespace hsi4d {
 
 /// Where it happens.
-enum class SyntheticSceneKind { kLivingRoom, kKitchen, kBedroom, kGarden, kTerrace };
+enum class SyntheticSceneKind {
+  kLivingRoom,
+  kKitchen,
+  kBedroom,
+  kGarden,
+  kTerrace,
+  kGym,
+  kBar,
+  kPlayground,
+  kGreenhouse,
+  kCafe,
+  kStore,
+  kBicycle,
+  kRoom,
+  kTruck
+};
 
-inline constexpr std::array<ConfigChoice<SyntheticSceneKind>, 5> kSyntheticSceneKinds = {
+inline constexpr std::array<ConfigChoice<SyntheticSceneKind>, 14> kSyntheticSceneKinds = {
     {{SyntheticSceneKind::kLivingRoom, "living_room"},
      {SyntheticSceneKind::kKitchen, "kitchen"},
      {SyntheticSceneKind::kBedroom, "bedroom"},
      {SyntheticSceneKind::kGarden, "garden"},
-     {SyntheticSceneKind::kTerrace, "terrace"}}};
+     {SyntheticSceneKind::kTerrace, "terrace"},
+     {SyntheticSceneKind::kGym, "gym"},
+     {SyntheticSceneKind::kBar, "bar"},
+     {SyntheticSceneKind::kPlayground, "playground"},
+     {SyntheticSceneKind::kGreenhouse, "greenhouse"},
+     {SyntheticSceneKind::kCafe, "cafe"},
+     {SyntheticSceneKind::kStore, "store"},
+     {SyntheticSceneKind::kBicycle, "bicycle"},
+     {SyntheticSceneKind::kRoom, "room"},
+     {SyntheticSceneKind::kTruck, "truck"}}};
 
 /// What is used.
-enum class SyntheticObjectKind { kWateringCan, kBox, kVase, kGuitar, kOfficeChair, kNone };
+enum class SyntheticObjectKind {
+  kWateringCan,
+  kBox,
+  kVase,
+  kGuitar,
+  kOfficeChair,
+  kBarbell,
+  kShoppingCart,
+  kMower,
+  kNone
+};
 
-inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 6> kSyntheticObjectKinds = {
+inline constexpr std::array<ConfigChoice<SyntheticObjectKind>, 9> kSyntheticObjectKinds = {
     {{SyntheticObjectKind::kWateringCan, "watering_can"},
      {SyntheticObjectKind::kBox, "box"},
      {SyntheticObjectKind::kVase, "vase"},
      {SyntheticObjectKind::kGuitar, "guitar"},
      {SyntheticObjectKind::kOfficeChair, "office_chair"},
+     {SyntheticObjectKind::kBarbell, "barbell"},
+     {SyntheticObjectKind::kShoppingCart, "shopping_cart"},
+     {SyntheticObjectKind::kMower, "mower"},
      {SyntheticObjectKind::kNone, "none"}}};
 
 /// What is done.
-enum class SyntheticMotionKind { kPour, kLift, kWalk, kPush, kSit, kLean, kWave };
+enum class SyntheticMotionKind {
+  kPour,
+  kLift,
+  kWalk,
+  kPush,
+  kSit,
+  kLean,
+  kWave,
+  kSitOn,
+  kLeanOn,
+  kRun,
+  kSlide,
+  kReach,
+  kWipe,
+  kPlay,
+  kWater,
+  kRoll
+};
 
-inline constexpr std::array<ConfigChoice<SyntheticMotionKind>, 7> kSyntheticMotionKinds = {
+inline constexpr std::array<ConfigChoice<SyntheticMotionKind>, 16> kSyntheticMotionKinds = {
     {{SyntheticMotionKind::kPour, "pour"},
      {SyntheticMotionKind::kLift, "lift"},
      {SyntheticMotionKind::kWalk, "walk"},
      {SyntheticMotionKind::kPush, "push"},
      {SyntheticMotionKind::kSit, "sit"},
      {SyntheticMotionKind::kLean, "lean"},
-     {SyntheticMotionKind::kWave, "wave"}}};
+     {SyntheticMotionKind::kWave, "wave"},
+     {SyntheticMotionKind::kSitOn, "sit_on"},
+     {SyntheticMotionKind::kLeanOn, "lean_on"},
+     {SyntheticMotionKind::kRun, "run"},
+     {SyntheticMotionKind::kSlide, "slide"},
+     {SyntheticMotionKind::kReach, "reach"},
+     {SyntheticMotionKind::kWipe, "wipe"},
+     {SyntheticMotionKind::kPlay, "play"},
+     {SyntheticMotionKind::kWater, "water"},
+     {SyntheticMotionKind::kRoll, "roll"}}};
 
 /// The objects that a motion makes sense with.
 const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion);
@@ -106,6 +169,8 @@ struct SyntheticSettings {
   SyntheticSceneKind scene = SyntheticSceneKind::kLivingRoom;
   SyntheticObjectKind object = SyntheticObjectKind::kWateringCan;
   SyntheticMotionKind motion = SyntheticMotionKind::kPour;
+  std::string place;     ///< of the scene, where the motion is done; empty: the first that it can be done at
+  double variation = 0;  ///< how far the seed changes timing, camera, start and appearance
   std::filesystem::path scene_file;     ///< stands in for the scene
   std::array<double, 3> scene_place{};  ///< of the file, where the person acts; metres after scene_scale
   double scene_turn_deg = 0;            ///< about z

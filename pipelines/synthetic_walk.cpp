@@ -45,8 +45,11 @@ struct Path {
   }
 };
 
-Path path_of(SyntheticMotionKind motion) {
-  if (motion == SyntheticMotionKind::kPush) return {{0, 0.25}, 0.65, 45, 0.42};
+Path path_of(const Actor& actor) {
+  if (actor.motion == SyntheticMotionKind::kPush) {
+    if (actor.object.is_long) return {{-0.05, 0.6}, 1.05, 28, 0.45};
+    return {{0, 0.25}, 0.65, 45, 0.42};
+  }
   return {{0, 0.75}, 0.6, 62, 0.445};
 }
 
@@ -105,7 +108,7 @@ void swing_arm(const Actor& actor, const Ground& ground, int side, double degree
 
 Moment walking_moment(const Actor& actor, double seconds) {
   const bool pushes = actor.motion == SyntheticMotionKind::kPush;
-  const Path path = path_of(actor.motion);
+  const Path path = path_of(actor);
   const double pace = path.pace(seconds), lands = pace * stride(seconds);
   const double stands = pace * std::cos(kPi * (seconds - middle_time(1)) / kStep);  // 1 when the left foot carries
   const double lean = pushes ? 1 : 0;

@@ -7,6 +7,7 @@
 #include "core/config_file.h"
 #include "core/suggest.h"
 #include "pipelines/avatar_fit.h"
+#include "pipelines/cli/instances.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/config_kind.h"
 #include "pipelines/frame_graph.h"
@@ -15,6 +16,7 @@
 #include "pipelines/sequence_graph.h"
 #include "pipelines/sweep_plan.h"
 #include "pipelines/synthetic_motion.h"
+#include "pipelines/synthetic_places.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -96,14 +98,19 @@ std::string list_stages() {
   return table(rows);
 }
 
-/// What synthetic.scene, synthetic.motion and synthetic.object can be.
-std::string list_scenes() {
-  std::vector<std::vector<std::string>> rows = {{"SYNTHETIC", "", "WHAT", "OBJECTS"}};
-  for (const auto& kind : kSyntheticSceneKinds) rows.push_back({"scene", kind.name, scene_summary(kind.value), ""});
+/// What synthetic.scene, synthetic.motion and synthetic.object can be, and the instances of the benchmark.
+std::string list_scenes(const std::vector<LossDescription>& losses) {
+  std::vector<std::vector<std::string>> rows = {{"SYNTHETIC", "", "WHAT", "PLACES, OBJECTS"}};
+  for (const auto& kind : kSyntheticSceneKinds)
+    rows.push_back({"scene", kind.name, scene_summary(kind.value), place_names_of(kind.value)});
   for (const auto& kind : kSyntheticMotionKinds)
     rows.push_back({"motion", kind.name, motion_summary(kind.value), object_names_of(kind.value)});
   for (const auto& kind : kSyntheticObjectKinds) rows.push_back({"object", kind.name, object_summary(kind.value), ""});
-  return table(rows);
+  const std::vector<std::vector<std::string>> instances = instance_rows(instance_folder(), losses);
+  if (instances.empty()) return table(rows);
+  std::vector<std::vector<std::string>> found = {{"INSTANCE", "PROMPT", "OBJECT", "DATA"}};
+  found.insert(found.end(), instances.begin(), instances.end());
+  return table(rows) + "\n" + table(found);
 }
 
 /// A sweep has no settings of its own to override, and many configs.
@@ -146,7 +153,7 @@ std::vector<std::string> list_topics() { return {"losses", "stages", "scenes", "
 std::string list_command(const std::string& topic, const std::vector<LossDescription>& losses) {
   if (topic == "losses") return list_losses(losses);
   if (topic == "stages") return list_stages();
-  if (topic == "scenes") return list_scenes();
+  if (topic == "scenes") return list_scenes(losses);
   if (topic == "settings") return settings_table(run_config_settings(losses));
   if (topic == "avatar_fit") return settings_table(avatar_fit_settings(losses));
   throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + joined(list_topics()) +

@@ -440,6 +440,64 @@ TEST_CASE("every shipped config of a benchmark runs", "[run]") {
   CHECK(human_share("paper_scale-dataset") < 0.15);
 }
 
+TEST_CASE("every instance of AnyInteraction has a stand-in that runs", "[run][release]") {
+  const TemporaryFolder here;
+  std::set<std::string> names, scenes, objects, prompts;
+  for (const std::string& name : names_in(shipped_configs() / "anyinteraction")) {
+    if (!name.ends_with(".json") || name == "base.json") continue;
+    const std::string stem = fs::path(name).stem().string();
+    const RunConfig config =
+        load_run_config(shipped_configs() / "anyinteraction" / name, {}, descriptions_of(loss_terms()));
+    INFO(stem);
+    CHECK(config.name == stem);
+    CHECK(config.instance.folder.filename() == stem);
+    CHECK(config.synthetic.variation == 1);
+    const std::string object(choice_name<SyntheticObjectKind>(kSyntheticObjectKinds, config.synthetic.object));
+    CHECK(config.instance.object == (object == "none" ? "static" : object));
+    names.insert(stem);
+    scenes.insert(config.instance.scene);
+    objects.insert(config.instance.object);
+    prompts.insert(config.instance.prompt);
+    check_small_run(config, stem, true);
+  }
+  CHECK(names.size() == 22);
+  CHECK(scenes.size() == 12);
+  CHECK(objects.size() == 8);   // seven, and none
+  CHECK(prompts.size() == 19);  // two chairs, two cans, two guitars
+  const RunConfig base = load_run_config(shipped_configs() / "anyinteraction/base.json", {},
+                                         descriptions_of(loss_terms())),
+                  paper = load_run_config(shipped_configs() / "paper.json", {}, descriptions_of(loss_terms()));
+  RunConfig without = paper;
+  std::erase_if(without.stages, [](const auto& stage) { return stage.first == "refinement"; });
+  without.synthetic = base.synthetic;
+  CHECK(resolved_config(base, descriptions_of(loss_terms())) ==
+        resolved_config(without, descriptions_of(loss_terms())));
+}
+
+TEST_CASE("where the data of an instance is there it is the run's") {
+  const TemporaryFolder here;
+  fs::copy(TinyDataset::folder(), "data", fs::copy_options::recursive);
+  here.write("one.json", R"({"instance": {"folder": "data"}})");
+  const RunConfig config = load_run_config("one.json", {}, descriptions_of(loss_terms()));
+  CHECK(config.data.scene.filename() == "scene.ply");
+  CHECK(config.data.objects.size() == 1);
+  here.write("two.json", R"({"instance": {"folder": "data"}, "data": {"camera": "one.json"}})");
+  CHECK(load_run_config("two.json", {}, descriptions_of(loss_terms())).data.camera.filename() == "one.json");
+  here.write("three.json", R"({"instance": {"folder": "nowhere"}})");
+  CHECK(load_run_config("three.json", {}, descriptions_of(loss_terms())).data.scene.empty());
+}
+
+TEST_CASE("every shipped ablation runs", "[run][release]") {
+  const TemporaryFolder here;
+  int count = 0;
+  for (const std::string& name : names_in(shipped_configs() / "ablations")) {
+    if (!name.ends_with(".json")) continue;
+    CHECK(check_shipped_config(shipped_configs() / "ablations" / name, fs::path(name).stem().string(), false));
+    ++count;
+  }
+  CHECK(count == 19);
+}
+
 TEST_CASE("every shipped clip of the accuracy table runs", "[run][release]") {
   const TemporaryFolder here;
   for (const std::string& name : names_in(shipped_configs() / "synthetic" / "clips")) {
@@ -472,11 +530,11 @@ TEST_CASE("every shipped config has a test") {
     const fs::path place = fs::relative(entry.path(), shipped_configs());
     if (entry.is_regular_file() && place.has_parent_path()) files.insert(place.generic_string());
   }
-  // Those at the top, of bench/, synthetic/ and synthetic/clips/ are looked for by the tests above, those of sources/
-  // by sources_test.cpp, and each of synthetic/ by synthetic_test.cpp too.
+  // Those at the top, of ablations/, anyinteraction/, bench/, synthetic/ and synthetic/clips/ are looked for by the
+  // tests above, those of sources/ by sources_test.cpp, and each of synthetic/ by synthetic_test.cpp too.
   std::erase_if(files, [](const std::string& file) {
-    return file.starts_with("synthetic/") || file.starts_with("bench/") ||
-           file.starts_with("sweeps/") ||  // sweep_configs_test.cpp
+    return file.starts_with("synthetic/") || file.starts_with("bench/") || file.starts_with("anyinteraction/") ||
+           file.starts_with("ablations/") || file.starts_with("sweeps/") ||  // sweep_configs_test.cpp
            (file.starts_with("sources/") && file.ends_with(".json"));
   });
   CHECK(files == std::set<std::string>{"avatar/fit.json", "avatar/views.json",  // avatar_fit_test.cpp

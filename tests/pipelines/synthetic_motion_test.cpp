@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numbers>
+#include <optional>
 
 #include <catch2/catch.hpp>
 
@@ -11,6 +12,7 @@
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "core/rotation.h"
+#include "optim/mesh_distance.h"
 #include "pipelines/synthetic.h"
 #include "pipelines/synthetic_faults.h"
 #include "pipelines/synthetic_render.h"
@@ -41,15 +43,45 @@ std::string pair_name(SyntheticMotionKind motion, SyntheticObjectKind object) {
          std::string(choice_name<SyntheticObjectKind>(kSyntheticObjectKinds, object));
 }
 
-/// Calls visit(name, motion, object, clip) for every motion with each of its objects: 4 s at 15 frames a second.
+/// What can be done where: a motion with one of its objects, at a place of a scene or at none.
+struct Act {
+  std::string name;
+  SyntheticMotionKind motion;
+  SyntheticObjectKind object;
+  const ScenePlace* place;
+  SyntheticSceneKind scene;
+};
+
+std::vector<Act> all_acts() {
+  std::vector<Act> acts;
+  for (const auto& motion : kSyntheticMotionKinds)
+    for (const SyntheticObjectKind object : objects_of(motion.value)) {
+      const std::string name = pair_name(motion.value, object);
+      const std::optional<PlaceUse> use = use_of(motion.value);
+      if (!use) acts.push_back({name, motion.value, object, nullptr, SyntheticSceneKind::kLivingRoom});
+      for (const auto& scene : kSyntheticSceneKinds)
+        for (const ScenePlace& place : places_of(scene.value))
+          if (use == place.use)
+            acts.push_back({name + " at " + scene.name + "/" + place.name, motion.value, object, &place, scene.value});
+    }
+  return acts;
+}
+
+/// Calls visit(name, motion, object, clip) for every motion with each of its objects at each of its places: 5 s at 15
+/// frames a second.
 template <class F>
 void for_all_clips(const F& visit) {
-  for (const auto& motion : kSyntheticMotionKinds)
-    for (const SyntheticObjectKind kind : objects_of(motion.value)) {
-      const SyntheticObject object = synthetic_object(kind, 600, 0);
-      visit(pair_name(motion.value, kind), motion.value, object,
-            synthetic_clip(body(), object, {60, 15, 64, 1, motion.value}));
-    }
+  for (const Act& act : all_acts()) {
+    const SyntheticObject object = synthetic_object(act.object, 600, 0);
+    ClipSettings settings{75, 15, 64, 1, act.motion};
+    settings.place = act.place;
+    visit(act.name, act.motion, object, synthetic_clip(body(), object, settings));
+  }
+}
+
+/// Feet follow the belt or go along on the slide.
+bool has_moving_ground(SyntheticMotionKind motion) {
+  return motion == SyntheticMotionKind::kRun || motion == SyntheticMotionKind::kSlide;
 }
 
 /// Joints of all frames.
@@ -145,6 +177,7 @@ TEST_CASE("the clip keeps its feet on the floor, its object in reach, and runs o
 TEST_CASE("planted feet stay where they are in every motion") {
   for_all_clips([](const std::string& name, SyntheticMotionKind motion, const auto&, const SyntheticClip& clip) {
     INFO(name);
+    if (has_moving_ground(motion)) return;
     const auto joints = joints_of(clip);
     for (const char* foot : {"left_foot", "right_foot"}) {
       INFO(foot);
@@ -168,7 +201,8 @@ TEST_CASE("planted feet stay where they are in every motion") {
       }
       CHECK(worst < 0.005);
       CHECK(lowest > ground - 0.001);
-      const bool walks = motion == SyntheticMotionKind::kWalk || motion == SyntheticMotionKind::kPush;
+      const bool walks = motion == SyntheticMotionKind::kWalk || motion == SyntheticMotionKind::kPush ||
+                         motion == SyntheticMotionKind::kRoll;
       CHECK(steps >= (walks ? 2 : 0));
       CHECK((walks ? highest > ground + 0.02 : steps == 0));
     }
@@ -214,7 +248,9 @@ TEST_CASE("steps are as long as those of people") {
 TEST_CASE("hands are at the object that they hold") {
   for_all_clips([](const std::string& name, SyntheticMotionKind motion, const SyntheticObject& object,
                    const SyntheticClip& clip) {
-    if (!object.exists() || motion == SyntheticMotionKind::kSit) return;
+    const bool holds = motion != SyntheticMotionKind::kSit && motion != SyntheticMotionKind::kRoll &&
+                       motion != SyntheticMotionKind::kPlay;
+    if (!object.exists() || !holds) return;
     INFO(name);
     const FigureSizes sizes = figure_sizes(body());
     for (std::size_t t = 0; t < clip.object.size(); ++t) {
@@ -286,6 +322,59 @@ TEST_CASE("nothing goes through the floor and nothing moves faster than people d
         CHECK(root * 15 < 1.1);
         CHECK(thing * 15 < 1.6);
       });
+}
+
+TEST_CASE("feet on a treadmill go with its belt") {
+  const ScenePlace& place = places_of(SyntheticSceneKind::kGym)[0];
+  ClipSettings settings{60, 30, 64, 1, SyntheticMotionKind::kRun};
+  settings.place = &place;
+  const SyntheticClip clip = synthetic_clip(body(), synthetic_object(SyntheticObjectKind::kNone, 60, 0), settings);
+  const auto joints = joints_of(clip);
+  const Vector ahead = place.ground.direction({0, 1, 0});
+  for (const char* foot : {"left_foot", "right_foot"}) {
+    const auto joint = static_cast<std::size_t>(smplx_joint(foot));
+    double lowest = 1;
+    for (const auto& frame : joints) lowest = std::min(lowest, row(frame, joint).z());
+    int on_belt = 0;
+    for (std::size_t t = 1; t < joints.size(); ++t) {
+      const Vector before = row(joints[t - 1], joint), at = row(joints[t], joint);
+      if (before.z() > lowest + 0.001 || at.z() > lowest + 0.001) continue;
+      ++on_belt;
+      const Vector way = (at - before) * 30;
+      CHECK(dot(way, ahead) == Approx(-1.05).margin(0.02));
+      CHECK((way - ahead * dot(way, ahead)).norm() < 0.02);
+    }
+    CHECK(on_belt > 12);
+  }
+}
+
+TEST_CASE("nobody goes through what is solid at a place") {
+  for (const Act& act : all_acts()) {
+    if (act.place == nullptr) continue;
+    INFO(act.name);
+    const SyntheticObject object = synthetic_object(act.object, 600, 0);
+    ClipSettings settings{26, 5, 64, 1, act.motion};
+    settings.place = act.place;
+    const SyntheticClip clip = synthetic_clip(body(), object, settings);
+    SyntheticSettings of_scene;
+    of_scene.scene = act.scene;
+    const MeshDistance solids(synthetic_solids(of_scene, clip.plan), 0.1);
+    double deepest = 0;
+    std::size_t where = 0, frame = 0;
+    for (std::size_t t = 0; t < clip.motion.poses.size(); t += 5) {
+      const std::vector<double> vertices = pose_vertices(body(), clip.motion.poses[t]);
+      for (std::size_t i = 0; i < vertices.size(); i += 12) {
+        const double deep = -solids.at({vertices[i], vertices[i + 1], vertices[i + 2]});
+        if (deep > deepest) {
+          deepest = deep;
+          where = i / 3;
+          frame = t;
+        }
+      }
+    }
+    INFO("vertex " << where << " in frame " << frame);
+    CHECK(deepest < 0.06);
+  }
 }
 
 TEST_CASE("a motion refuses an object that it makes no sense with") {

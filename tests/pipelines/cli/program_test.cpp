@@ -9,6 +9,7 @@
 #include "core/version.h"
 #include "optim/loss_term.h"
 #include "pipelines/cli/commands.h"
+#include "pipelines/cli/instances.h"
 #include "pipelines/run_config.h"
 #include "tests/support/program.h"
 #include "tests/support/test_losses.h"
@@ -140,9 +141,15 @@ TEST_CASE("list tells losses and settings") {
                          Contains("\nframe        all    body_pose        21 joints of the body\n"));
   CHECK(std::count(stages.begin(), stages.end(), '\n') == 1 + 2 * (1 + 13) + 3);
   CHECK_THAT(cli::list_command("scenes", test_losses()),
-             Contains("\nscene      garden        a lawn with a path") &&
-                 Contains("\nmotion     push          walks in a circle, pushing it") && Contains("  office_chair\n") &&
-                 Contains("\nobject     vase "));
+             Contains("\nscene      garden         a lawn with a path") &&
+                 Contains("\nmotion     push           walks in a circle, pushing it") &&
+                 Contains("  office_chair\n") && Contains("\nobject     vase ") &&
+                 Contains("  bed, windowsill, ladder\n"));
+  CHECK(cli::instance_rows("nowhere", test_losses()).empty());
+  const auto rows =
+      cli::instance_rows(std::string(HSI4D_SOURCE_DIR) + "/configs/anyinteraction", descriptions_of(loss_terms()));
+  REQUIRE(rows.size() == 22);
+  CHECK(rows[0] == std::vector<std::string>{"bar_bar", "The person is leaning on the bar.", "static", "stand-in"});
   const TemporaryFolder folder;
   const ProgramResult result = run_hsi4d({"list", "losses"});
   CHECK(result.status == 0);
