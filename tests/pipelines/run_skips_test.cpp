@@ -118,6 +118,18 @@ TEST_CASE("skips that are set in a config leave the result's bits, or nearly, an
   CHECK(on.counted("layers") < on.counted("tiles"));  // they are kept from one iteration to the next
 }
 
+TEST_CASE("the backward pass leaves tiles out in which the loss sees nothing", "[run]") {
+  const TemporaryFolder here;
+  const auto run_with = [](const std::string& name, const std::string& skipped) {
+    return SkipRun(name, {"skip.zero_cotangent=" + skipped, "skip.unread_pixels=false", "render.tile=8",
+                          "stages.camera.weight=foreground"});
+  };
+  const SkipRun on = run_with("on", "true"), off = run_with("off", "false");
+  CHECK(on.motion == off.motion);
+  CHECK(on.objects == off.objects);
+  CHECK(on.counted("adjoint_tiles", "camera") < off.counted("adjoint_tiles", "camera"));
+}
+
 TEST_CASE("Gaussians that the camera cannot see are left out, and the result is the same but for rounding", "[run]") {
   const TemporaryFolder here;
   const SkipRun on("on", {}), off("off", {"skip.unseen_gaussians=false"});
