@@ -16,6 +16,13 @@ Var<S> mean_over(const Var<S> (&inputs)[K], const F& f, const Source& where) {
   return sum_over(inputs, f, where) * Operand<S>(1.0 / static_cast<double>(count), where);
 }
 
+/// w term, 0 where it does not count.
+template <class W, class T>
+auto weighted(W w, T term) {
+  using S = decltype(value_of(term));
+  return w * select(detail::counts(value_of(w), value_of(term)), term, S(0));
+}
+
 /// Mean of F over images.
 template <class F, class S>
 Var<S> image_mean(Var<S> a, Var<S> b, Var<S> weight, const Source& where) {
@@ -36,7 +43,7 @@ template <class S>
 Var<S> l1(Var<S> a, Var<S> b, Var<S> weight, Source where) {
   if (detail::are_images(a, b, weight)) return image_mean<detail::AbsoluteDifference>(a, b, weight, where);
   return mean_over(
-      {a, b, weight}, [](auto x, auto y, auto w) { return w * abs(x - y); }, where);
+      {a, b, weight}, [](auto x, auto y, auto w) { return weighted(w, abs(x - y)); }, where);
 }
 
 template <class S>
@@ -50,7 +57,7 @@ template <class S>
 Var<S> l2(Var<S> a, Var<S> b, Var<S> weight, Source where) {
   if (detail::are_images(a, b, weight)) return image_mean<detail::SquaredDifference>(a, b, weight, where);
   return mean_over(
-      {a, b, weight}, [](auto x, auto y, auto w) { return w * square(x - y); }, where);
+      {a, b, weight}, [](auto x, auto y, auto w) { return weighted(w, square(x - y)); }, where);
 }
 
 template <class S>

@@ -1,7 +1,8 @@
 // How far two arrays are apart: L1, L2, Huber and Charbonnier means.
 //
 // Each is a mean over the broadcast elements of `a` and `b`. With `weight` (broadcast, for example a mask [1,H,W] over
-// an image [C,H,W]) each element's term is multiplied by it; the mean is still over all elements.
+// an image [C,H,W]) each element's term is multiplied by it; the mean is still over all elements. What has weight 0 is
+// not looked at: a term there that is infinite or no number counts as 0 and has no gradient.
 #pragma once
 
 #include "autodiff/tape.h"

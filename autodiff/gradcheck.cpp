@@ -45,6 +45,7 @@ struct Probe {
   std::function<double()> value;
   std::function<std::uint64_t()> choices;
   GradcheckFailure place;  // filled but for the entry
+  int input = -1;          // of the operator
 };
 
 class Checker {
@@ -57,6 +58,7 @@ class Checker {
     const double scale = std::max(root_mean_square(probe.x), 1e-3);
     const double typical = root_mean_square(probe.gradient);
     const Index count = probe.x.shape.count();
+    report_.arrays.push_back({probe.place.node, probe.place.array, probe.input, 0, 0, 0});
     for (Index k = 0; k < std::min(count, options_.entries); ++k) {
       const Index entry =
           count <= options_.entries
@@ -115,6 +117,7 @@ class Checker {
 
   void check_entry(const Probe& probe, Index entry, std::uint64_t choices, double scale, double typical) {
     ++report_.entries;
+    ++report_.arrays.back().entries;
     const Index cols = probe.x.shape.cols;
     double* x = probe.x.row(entry / cols) + entry % cols;
     const double computed = probe.gradient.row(entry / cols)[entry % cols];
@@ -125,10 +128,7 @@ class Checker {
       return std::isfinite(error) ? error : HUGE_VAL;
     };
     double expected = 0;
-    if (!difference(probe, x, step, choices, expected)) {
-      ++report_.kinks;
-      return;
-    }
+    if (!difference(probe, x, step, choices, expected)) return add_kink();
     double error = error_of(expected);
     // Further opinions, with a longer step (less rounding) and a shorter one (less curvature, no kink); where that one
     // differs by more than allowed the difference is no judge.
@@ -142,14 +142,17 @@ class Checker {
       const double disagreement =
           std::fabs(expected - other) / std::max({std::fabs(expected), std::fabs(other), typical, 1e-30});
       if (error_of(other) < error) error = error_of(other);
-      if (error > options_.tolerance && (!smooth || disagreement > 0.1 * error)) {
-        ++report_.kinks;
-        return;
-      }
+      if (error > options_.tolerance && (!smooth || disagreement > 0.1 * error)) return add_kink();
       expected = other;
     }
     report_.worst_error = std::max(report_.worst_error, error);
+    report_.arrays.back().worst_error = std::max(report_.arrays.back().worst_error, error);
     if (error > options_.tolerance) fail_at(probe.place, probe.x.shape, entry, expected, computed);
+  }
+
+  void add_kink() {
+    ++report_.kinks;
+    ++report_.arrays.back().kinks;
   }
 
   const GradcheckOptions& options_;
@@ -227,6 +230,7 @@ void check_node(TapeInspector<double>& inspect, std::uint32_t n, std::uint64_t s
     };
     probe.choices = [&] { return inspect.signature(n); };
     probe.place = {inspect.operator_name(n), inspect.source(n), inspect.array_name(*id)};
+    probe.input = static_cast<int>(id - inputs.begin());
     checker.check(probe);
   }
   inspect.forward(n);

@@ -36,9 +36,19 @@ struct GradcheckFailure {
   double expected = 0, computed = 0;
 };
 
+/// What was found of one array: an input of an operator by itself, or a leaf through the whole tape.
+struct GradcheckArray {
+  std::string node;  ///< as GradcheckFailure's
+  std::string array;
+  int input = -1;  ///< which of the operator's inputs; −1: a leaf through the whole tape
+  Index entries = 0, kinks = 0;
+  double worst_error = 0;
+};
+
 struct GradcheckReport {
   Index entries = 0, kinks = 0;
   double worst_error = 0;  ///< relative, over the entries that are no kinks
+  std::vector<GradcheckArray> arrays;
   std::vector<GradcheckFailure> failures;
   bool too_many_kinks = false;
 

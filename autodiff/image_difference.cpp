@@ -81,11 +81,14 @@ struct ImageDifference {
       for (Index c = run.begin; c < run.end; ++c) columns[c] += static_cast<double>(F::value(a[c] - b[c]));
     } else {
 #pragma GCC ivdep
-      for (Index c = run.begin; c < run.end; ++c) columns[c] += static_cast<double>(w[c] * F::value(a[c] - b[c]));
+      for (Index c = run.begin; c < run.end; ++c)
+        columns[c] += static_cast<double>(weighted(w[c], F::value(a[c] - b[c])));
     }
   }
 
-  // d_a = g w f'(a − b) = −d_b,  d_w = g f(a − b)
+  static S weighted(S w, S term) { return w * (counts(w, term) ? term : S(0)); }
+
+  // d_a = g w f'(a − b) = −d_b,  d_w = g f(a − b); 0 where the term does not count
   void backward(NodeIo<S>& io) {
     const Shape shape = io.in(kA).shape;
     const TileMask* const mask = to_differentiate(io);
@@ -108,13 +111,23 @@ struct ImageDifference {
     for (const int i : {kA, kB}) {
       if (!io.wants(i)) continue;
       const S sign = i == kA ? g : -g;
-      put(&io.d_in(i)(plane, row, 0), io.must_assign(i), run,
-          [&](Index c) { return (w == nullptr ? sign : sign * w[c]) * F::derivative(a[c] - b[c]); });
+      if (w == nullptr) {
+        put(&io.d_in(i)(plane, row, 0), io.must_assign(i), run,
+            [=](Index c) { return sign * F::derivative(a[c] - b[c]); });
+      } else {
+        put(&io.d_in(i)(plane, row, 0), io.must_assign(i), run, [=](Index c) {
+          const S d = a[c] - b[c], slope = F::derivative(d);
+          return sign * w[c] * (counts(w[c], F::value(d)) ? slope : S(0));
+        });
+      }
     }
     if (!wants_weight(io)) return;
     const bool is_shared = io.in(kWeight).shape.planes == 1;
     put(&io.d_in(kWeight)(is_shared ? 0 : plane, row, 0), io.must_assign(kWeight) && (plane == 0 || !is_shared), run,
-        [&](Index c) { return g * F::value(a[c] - b[c]); });
+        [&](Index c) {
+          const S term = F::value(a[c] - b[c]);
+          return counts(w[c], term) ? g * term : S(0);
+        });
   }
 
   template <class Term>

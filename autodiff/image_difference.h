@@ -41,7 +41,13 @@ struct SquaredDifference {
   }
 };
 
-/// Σ w f(a − b) over all numbers, in double, in an order that does not depend on what changed.
+/// Whether a term counts that has weight w: what has weight 0 is not looked at, so it may be infinite or no number.
+template <class S>
+bool counts(S w, S term) {
+  return (w != S(0)) | (term - term == S(0));  // no branch: loops over it are vector code
+}
+
+/// Σ w f(a − b) over all numbers that count, in double, in an order that does not depend on what changed.
 ///
 /// @param a, b    [C,H,W]
 /// @param weight  [1,H,W], [C,H,W] or none

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "autodiff/dual.h"
 #include "autodiff/mlp_kernel.h"
 #include "core/parallel.h"
 #include "core/simd.h"
@@ -26,7 +27,6 @@ constexpr Index kChunkRows = 16 * kMlpBlock;
 /// Four rows of four floats, transposed.
 struct FourByFour {
   typedef float Four __attribute__((vector_size(16)));
-  typedef std::int32_t Order __attribute__((vector_size(16)));
 
   static void move(const float* from, Index from_step, float* to, Index to_step) {
     Four a, b, c, d;
@@ -34,14 +34,12 @@ struct FourByFour {
     std::memcpy(&b, from + from_step, sizeof b);
     std::memcpy(&c, from + 2 * from_step, sizeof c);
     std::memcpy(&d, from + 3 * from_step, sizeof d);
-    const Four ab_low = __builtin_shuffle(a, b, Order{0, 4, 1, 5}),
-               ab_high = __builtin_shuffle(a, b, Order{2, 6, 3, 7});
-    const Four cd_low = __builtin_shuffle(c, d, Order{0, 4, 1, 5}),
-               cd_high = __builtin_shuffle(c, d, Order{2, 6, 3, 7});
-    a = __builtin_shuffle(ab_low, cd_low, Order{0, 1, 4, 5});
-    b = __builtin_shuffle(ab_low, cd_low, Order{2, 3, 6, 7});
-    c = __builtin_shuffle(ab_high, cd_high, Order{0, 1, 4, 5});
-    d = __builtin_shuffle(ab_high, cd_high, Order{2, 3, 6, 7});
+    const Four ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5), ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Four cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5), cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+    b = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+    c = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+    d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
     std::memcpy(to, &a, sizeof a);
     std::memcpy(to + to_step, &b, sizeof b);
     std::memcpy(to + 2 * to_step, &c, sizeof c);
@@ -101,12 +99,7 @@ void store_block(const S* block, Index first, Index count, bool assigns, const A
 
 // --- the output function ---------------------------------------------------------------------------------------------
 
-/// σ(z), and d_z = d_y σ'(z) with σ' = e/(1 + e)², e = exp(−|z|), which is right where 1 − σ is rounded away.
-template <class S>
-S sigmoid_of(S z) {
-  const S e = vector_exp(-std::fabs(z));
-  return (z < 0 ? e : S(1)) / (S(1) + e);
-}
+/// σ' = e/(1 + e)², e = exp(−|z|), of d_z = d_y σ'(z), which is right where 1 − σ is rounded away.
 template <class S>
 S sigmoid_slope(S z) {
   const S e = vector_exp(-std::fabs(z)), over = S(1) / (S(1) + e);
@@ -188,7 +181,7 @@ struct MlpOp {
           net.kernels.linear(net.steps[static_cast<std::size_t>(layers - 1)], x, next);
           add_offset(io, first, count, next);
           if (output == MlpOutput::kSigmoid) {
-            for (Index i = 0; i < outputs() * kMlpBlock; ++i) next[i] = sigmoid_of(next[i]);
+            for (Index i = 0; i < outputs() * kMlpBlock; ++i) next[i] = sigmoid(next[i]);
           }
           store_block(next, first, count, true, y);
         }

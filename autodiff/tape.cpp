@@ -142,6 +142,8 @@ template <class S>
 void Tape<S>::hold(Var<S> var) {
   ArrayRecord& array = arrays_[checked(var)];
   HSI4D_CHECK(array.producer != kLeaf, "leaf '" + array.name + "' can not be held, freeze it");
+  HSI4D_CHECK(nodes_[array.producer].output_count == 1,
+              "'" + array.name + "' is one output of several, and can not be held");
   HSI4D_CHECK(array.version > 0, "'" + array.name + "' has not been computed, and can not be held");
   if (std::exchange(array.held, true)) return;
   ++structure_;

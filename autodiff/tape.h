@@ -268,8 +268,9 @@ class Tape {
   void unfreeze(Var<S> var) { set_frozen(var, false); }
   bool frozen(Var<S> var) const { return arrays_[checked(var)].frozen; }
 
-  /// An operator's output stays as it is, whatever becomes of its inputs, and gives them no gradient: what only it
-  /// needs is not computed. Asked for by itself it is. Throws InternalError for a leaf, and before it was computed.
+  /// An operator's only output stays as it is, whatever becomes of its inputs, and gives them no gradient: what only it
+  /// needs is not computed. Asked for by itself it is. Throws InternalError for a leaf, one output of several, and
+  /// before it was computed.
   void hold(Var<S> var);
   /// It follows its inputs again.
   void release(Var<S> var);

@@ -20,11 +20,12 @@ target_compile_features(hsi4d_arithmetic INTERFACE cxx_std_20)
 # Warnings: ours alone, never those of a project that uses us. (-Wrestrict misfires on std::string in g++ 12, PR 105651; -Wmaybe-uninitialized
 # on std::regex under sanitizers.)
 if(HSI4D_SANITIZE)
-  set(hsi4d_sanitizer_warnings -Wno-maybe-uninitialized)
+  set(hsi4d_sanitizer_warnings $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
 add_library(hsi4d_warnings INTERFACE)
 target_compile_options(hsi4d_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion
-                                                -Wno-sign-conversion -Wno-psabi -Wno-restrict
+                                                -Wno-sign-conversion -Wno-psabi $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
+                                                $<$<CXX_COMPILER_ID:Clang>:-Wno-unknown-pragmas>
                                                 ${hsi4d_sanitizer_warnings}
                                                 $<$<BOOL:${HSI4D_WARNINGS_AS_ERRORS}>:-Werror>)
 
@@ -34,6 +35,14 @@ if(HSI4D_SANITIZE)
   add_compile_options(-fsanitize=${HSI4D_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
                       -fno-sanitize=null,alignment,vptr,object-size)
   add_link_options(-fsanitize=${HSI4D_SANITIZE})
+endif()
+
+# What libFuzzer steers by is in every layer: each reads files, or is read with.
+if(HSI4D_BUILD_FUZZERS)
+  if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+    message(FATAL_ERROR "HSI4D_BUILD_FUZZERS needs clang: -DCMAKE_CXX_COMPILER=clang++")
+  endif()
+  add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
 
 # hsi4d_add_layer(NAME [DEPENDS layer...] [LINK target...] [PRIVATE_LINK target...])
@@ -88,6 +97,18 @@ function(hsi4d_embed_report_assets)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/report.css)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/report_assets.cpp.in ${PROJECT_BINARY_DIR}/generated/report_assets.cpp @ONLY)
   target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/report_assets.cpp)
+endfunction()
+
+# Style, body and script of a study's page, likewise.
+function(hsi4d_embed_study_assets)
+  set(folder ${PROJECT_SOURCE_DIR}/pipelines/study_assets)
+  foreach(kind css html js)
+    string(TOUPPER ${kind} name)
+    file(READ ${folder}/study.${kind} HSI4D_STUDY_${name})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/study.${kind})
+  endforeach()
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/study_assets.cpp.in ${PROJECT_BINARY_DIR}/generated/study_assets.cpp @ONLY)
+  target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/study_assets.cpp)
 endfunction()
 
 # hsi4d_find_commit(OUT): the commit that is checked out, or "unknown" where the source is not the top of a git checkout.

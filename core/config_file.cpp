@@ -1,13 +1,13 @@
 #include "core/config_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <iterator>
 #include <optional>
 
 #include "core/check.h"
 #include "core/config_parse.h"
+#include "core/config_place.h"
 #include "core/file_kind.h"
 #include "core/suggest.h"
 
@@ -157,24 +157,6 @@ class Loader {
   bool broken_ = false;
 };
 
-/// The keys of a dotted path, or of a JSON pointer (RFC 6901), as messages write settings.
-std::vector<std::string> split_path(const std::string& path) {
-  const bool is_pointer = path.starts_with('/');
-  std::vector<std::string> parts(1);
-  for (size_t i = is_pointer ? 1 : 0; i < path.size(); ++i) {
-    const char c = path[i], next = i + 1 < path.size() ? path[i + 1] : '\0';
-    if (is_pointer && c == '~' && (next == '0' || next == '1')) {
-      parts.back() += next == '0' ? '~' : '/';
-      ++i;
-    } else if (c == (is_pointer ? '/' : '.')) {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
-
 /// The value of an override: JSON, or else the text itself.
 std::optional<ConfigValue> override_value(const std::string& text, const SourcePtr& source) {
   ConfigValue value;
@@ -192,41 +174,12 @@ void forget_lines(ConfigValue& value) {
   }
 }
 
-/// One step down a dotted path: the place that `part` names in `node`, made if it is a new key of an object.
-ConfigValue* step_down(ConfigValue& node, const std::string& part, const std::string& pointer,
-                       const ConfigOrigin& origin, ConfigProblems& problems) {
-  if (node.kind == Kind::kArray) {
-    std::size_t index = 0;
-    const auto end = std::from_chars(part.data(), part.data() + part.size(), index);
-    if (end.ec == std::errc() && end.ptr == part.data() + part.size() && index < node.items.size())
-      return &node.items[index];
-    problems.add(origin, pointer,
-                 part + " is not an index of this array; allowed: 0 to " +
-                     std::to_string(static_cast<std::ptrdiff_t>(node.items.size()) - 1));
-    return nullptr;
-  }
-  if (node.kind != Kind::kObject) {
-    problems.add(origin, pointer, shown(node) + " is " + kind_name(node) + " and has no key \"" + part + "\"");
-    return nullptr;
-  }
-  for (ConfigMember& member : node.members) {
-    if (member.key == part) return &member.value;
-  }
-  ConfigValue made = ConfigValue::make_object();
-  made.origin = origin;
-  ConfigValue& placed = node.add(part, std::move(made));
-  node.members.back().key_origin = origin;
-  node.members.back().made_by_set = true;
-  return &placed;
-}
-
 void apply_override(ConfigValue& tree, const std::string& text, int order, ConfigProblems& problems) {
   const SourcePtr source = make_source("--set " + text, fs::path(), order, true);
   const ConfigOrigin origin{source, 0, 0, 0};
   const std::size_t equals = text.find('=');
-  const std::vector<std::string> parts = split_path(text.substr(0, equals));
-  const bool has_empty = std::any_of(parts.begin(), parts.end(), [](const std::string& part) { return part.empty(); });
-  if (equals == std::string::npos || has_empty || parts.size() > kDeepestConfig) {
+  const std::vector<std::string> keys = config_keys(text.substr(0, equals));
+  if (equals == std::string::npos || keys.empty()) {
     problems.add(origin, "",
                  "write --set KEY=VALUE with dots between nested keys, for example --set render.blur=0.1 or --set "
                  "/render/blur=0.1");
@@ -238,15 +191,10 @@ void apply_override(ConfigValue& tree, const std::string& text, int order, Confi
     return;
   }
   forget_lines(*value);
-  ConfigValue* node = &tree;
-  std::string pointer;
-  for (const std::string& part : parts) {
-    node = step_down(*node, part, pointer, origin, problems);
-    if (!node) return;
-    pointer = child_pointer(pointer, part);
-  }
-  *node = std::move(*value);
-  node->origin = origin;
+  ConfigValue* const place = config_place(tree, keys, origin, problems);
+  if (place == nullptr) return;
+  *place = std::move(*value);
+  place->origin = origin;
 }
 
 ConfigValue with_overrides(ConfigValue tree, const std::vector<std::string>& overrides, ConfigProblems& problems) {

@@ -106,6 +106,8 @@ void append_json(std::string& out, const ConfigValue& value, int indent) {
 
 }  // namespace
 
+ConfigValue ConfigValue::make_null() { return {}; }
+
 ConfigValue ConfigValue::make_boolean(bool value) {
   ConfigValue made;
   made.kind = Kind::kBoolean;
@@ -140,6 +142,8 @@ ConfigValue ConfigValue::make_string(std::string_view value) {
   made.text = value;
   return made;
 }
+
+ConfigValue ConfigValue::make_array() { return make_array(std::vector<ConfigValue>()); }
 
 ConfigValue ConfigValue::make_array(std::vector<ConfigValue> values) {
   ConfigValue made;

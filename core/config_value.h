@@ -46,14 +46,15 @@ struct ConfigValue {
   std::vector<ConfigMember> members;
   ConfigOrigin origin;
 
-  static ConfigValue make_null() { return {}; }
+  static ConfigValue make_null();  // not here: clang would want ConfigMember's size
   static ConfigValue make_boolean(bool value);
   /// Shortest text that reads back as the same number. Throws InternalError when it is not finite: JSON cannot hold it.
   static ConfigValue make_number(double value);
   static ConfigValue make_number(float value);
   static ConfigValue make_integer(std::int64_t value);
   static ConfigValue make_string(std::string_view value);
-  static ConfigValue make_array(std::vector<ConfigValue> values = {});
+  static ConfigValue make_array();
+  static ConfigValue make_array(std::vector<ConfigValue> values);
   static ConfigValue make_object();
   /// Appends a member to an object; the key must be new.
   ConfigValue& add(std::string_view key, ConfigValue value);

@@ -146,7 +146,10 @@ class Reader {
     }
     const std::string hint = did_you_mean(member.key, present);
     problems_.add(member.key_origin, child_pointer(pointer, member.key),
-                  "no such entry in the config, and --set adds none" + (hint.empty() ? listed(present) : hint));
+                  std::string(member.key_origin.source && member.key_origin.source->is_command_line
+                                  ? "no such entry in the config, and --set adds none"
+                                  : "no such entry in the config; an object in its place, {...}, adds one") +
+                      (hint.empty() ? listed(present) : hint));
   }
 
   void check_rules(const ConfigValue& value, const ConfigFields& fields, const std::vector<std::string>& wrong,

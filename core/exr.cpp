@@ -18,6 +18,8 @@
 #include <half.h>
 
 #include "core/check.h"
+#include "core/exr_header.h"
+#include "core/png.h"
 #include "core/text.h"
 
 namespace hsi4d {
@@ -70,46 +72,6 @@ class MemoryOutput : public exr::OStream {
 
 [[noreturn]] void fail(const std::string& name, const std::string& reason) { throw DataError(name + ": " + reason); }
 
-/// Walks over the headers' attributes, each a name, a type, a size and as many bytes. OpenEXR takes the size on its
-/// word, up to 2 GB.
-class AttributeWalk {
- public:
-  AttributeWalk(std::span<const uint8_t> content, const std::string& name) : content_(content), name_(name) {}
-
-  void check() {
-    skip(4);  // magic number
-    const bool many_parts = (number() & 0x1000) != 0;
-    do {
-      while (skip_text() > 0) {
-        skip_text();
-        skip(number());
-      }
-    } while (many_parts && at_ < content_.size() && content_[at_] != 0);
-  }
-
- private:
-  void skip(size_t bytes) {
-    if (bytes > content_.size() - at_) fail(name_, "ends within its OpenEXR header");
-    at_ += bytes;
-  }
-  uint32_t number() {
-    skip(4);
-    uint32_t value;
-    std::memcpy(&value, content_.data() + at_ - 4, 4);
-    return value;
-  }
-  size_t skip_text() {
-    const size_t begin = at_;
-    do skip(1);
-    while (content_[at_ - 1] != 0);
-    return at_ - 1 - begin;
-  }
-
-  std::span<const uint8_t> content_;
-  const std::string& name_;
-  size_t at_ = 0;
-};
-
 std::string box_text(const Box2i& box) {
   std::ostringstream text;
   text << '(' << box.min.x << ',' << box.min.y << ")-(" << box.max.x << ',' << box.max.y << ')';
@@ -119,15 +81,17 @@ std::string box_text(const Box2i& box) {
 int64_t width_of(const Box2i& box) { return int64_t{box.max.x} - box.min.x + 1; }
 int64_t height_of(const Box2i& box) { return int64_t{box.max.y} - box.min.y + 1; }
 
-void check_window(const std::string& name, const char* what, const Box2i& box, int64_t channels,
+void check_window(const std::string& name, const char* what, const Box2i& box, int64_t channels, int64_t file_bytes,
                   const ImageLimits& limits) {
   const int64_t width = width_of(box), height = height_of(box);
   if (width < 1 || height < 1) fail(name, std::string("its ") + what + " " + box_text(box) + " is empty");
   check_image_size(name, channels, height, width, limits);
+  check_packed_size(name, height, width, file_bytes);
 }
 
 /// What can be read, and fits in memory.
-void check_header(const std::string& name, const exr::MultiPartInputFile& file, const ImageLimits& limits) {
+void check_header(const std::string& name, const exr::MultiPartInputFile& file, int64_t file_bytes,
+                  const ImageLimits& limits) {
   if (file.parts() != 1) {
     fail(name, "has " + std::to_string(file.parts()) + " parts; files of one part are read");
   }
@@ -142,8 +106,8 @@ void check_header(const std::string& name, const exr::MultiPartInputFile& file, 
     }
   }
   if (channels == 0) fail(name, "has no channels");
-  check_window(name, "data window", header.dataWindow(), channels, limits);
-  check_window(name, "display window", header.displayWindow(), channels, limits);
+  check_window(name, "data window", header.dataWindow(), channels, file_bytes, limits);
+  check_window(name, "display window", header.displayWindow(), channels, file_bytes, limits);
   if (!header.dataWindow().intersects(header.displayWindow())) {
     fail(name, "its data window " + box_text(header.dataWindow()) + " lies outside of its display window " +
                    box_text(header.displayWindow()));
@@ -246,12 +210,12 @@ Layers read_layers(const std::string& path, const ImageLimits& limits) {
 }
 
 Layers decode_layers(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
-  AttributeWalk(file, name).check();
+  check_exr_attributes(file, name);
   try {
     MemoryInput stream(file, name);
     // One thread: callers decode several frames at a time. A damaged chunk table is an error, not to be guessed.
     exr::MultiPartInputFile input(stream, 0, false);
-    check_header(name, input, limits);
+    check_header(name, input, std::ssize(file), limits);
     return read_part(input, name);
   } catch (const DataError&) {
     throw;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <string_view>
 
@@ -56,11 +57,12 @@ Image read_as(OIIO::ImageInput& input, const std::string& name, OIIO::TypeDesc t
   return image;
 }
 
-Image read_opened(OIIO::ImageInput& input, const std::string& name, const ImageLimits& limits) {
+Image read_opened(OIIO::ImageInput& input, const std::string& name, int64_t file_bytes, const ImageLimits& limits) {
   const OIIO::ImageSpec& spec = input.spec();
   if (spec.deep || spec.depth > 1) fail(name, "holds deep or volume data, which is not read");
   if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1) fail(name, "has no pixels");
   check_image_size(name, spec.nchannels, spec.height, spec.width, limits);
+  check_packed_size(name, spec.height, spec.width, file_bytes);
   if (spec.format == OIIO::TypeDesc::UINT8) return read_as<uint8_t>(input, name, OIIO::TypeDesc::UINT8, 255.0f);
   if (spec.format == OIIO::TypeDesc::UINT16) return read_as<uint16_t>(input, name, OIIO::TypeDesc::UINT16, 65535.0f);
   return read_as<float>(input, name, OIIO::TypeDesc::FLOAT, 1.0f);
@@ -97,7 +99,7 @@ Image decode_jpeg(std::span<const uint8_t> file, const std::string& name, const 
   if (!input->set_ioproxy(&reader) || !input->open(name, spec)) {
     fail(name, "cannot be decoded: " + error_of(input.get()));
   }
-  return read_opened(*input, name, limits);
+  return read_opened(*input, name, std::ssize(file), limits);
 }
 
 Image decode_exr(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
@@ -113,7 +115,10 @@ Image read_other(const std::string& path, const ImageLimits& limits) {
   options.attribute("oiio:UnassociatedAlpha", 1);
   const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &options);
   if (!input) fail(path, "cannot be decoded: " + error_of(nullptr));
-  return read_opened(*input, path, limits);
+  std::error_code error;
+  const auto file_bytes = std::filesystem::file_size(path, error);
+  if (error) fail(path, "has no length: " + error.message());
+  return read_opened(*input, path, static_cast<int64_t>(file_bytes), limits);
 }
 
 std::string ending_of(const std::string& path) {

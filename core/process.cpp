@@ -191,7 +191,9 @@ void ChildProcess::end() {
 std::string ChildProcess::result() {
   std::string text = content_of(output_);
   if (WIFEXITED(status_) && WEXITSTATUS(status_) == 0) return text;
-  throw UserError(command_.front() + ": " + fate_of(status_) + end_of_output(text));
+  const std::string message = command_.front() + ": " + fate_of(status_) + end_of_output(text);
+  if (WIFEXITED(status_)) throw ProgramFailedError(message, WEXITSTATUS(status_));
+  throw UserError(message);
 }
 
 std::string end_of_output(const std::string& text) {

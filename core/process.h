@@ -18,6 +18,16 @@ class ProgramNotStartedError : public UserError {
   using UserError::UserError;
 };
 
+/// A program ended by itself with another status than 0.
+class ProgramFailedError : public UserError {
+ public:
+  ProgramFailedError(const std::string& message, int status) : UserError(message), status_(status) {}
+  int status() const { return status_; }
+
+ private:
+  int status_;
+};
+
 /// Where a program's standard output goes: collected for `finish`, or read as it comes.
 enum class ChildOutput { kCollected, kRead };
 
@@ -48,8 +58,8 @@ class ChildProcess {
 
   /// Closes its standard input and waits for its end.
   /// @return  what it printed on standard error, and on standard output where that is collected
-  /// Throws UserError with the program's name, its exit status or signal, and the end of what it printed, unless it
-  /// ended with status 0.
+  /// Throws ProgramFailedError with the program's name, its exit status and the end of what it printed, unless that is
+  /// 0; UserError with the signal that ended it.
   std::string finish();
 
   /// As finish, within limits: see run_process.

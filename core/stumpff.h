@@ -100,7 +100,7 @@ void add_doubled(const Stumpff<S>& half, Stumpff<S>& c) {
 /// c1 and c2 alone (the others are left 0): all that the value of a rotation needs.
 ///
 /// @param x  squared angle in radians², ≥ 0
-/// @return   c1 within 4 ulp for t ≤ 2.5, c2 for t ≤ 5; around their zeros (π, 2π, …) within one rounding error of 1
+/// @return   c1 within 5 ulp for t ≤ 2.5, c2 for t ≤ π; up to their zeros (π, 2π) within a ulp of c1(0) = 1, c2(0) = ½
 template <class S>
 Stumpff<S> stumpff_12(const S& x) {
   if (!(detail::real_part(x) < kStumpffSines)) return detail::stumpff_from_sines(x);
@@ -110,7 +110,7 @@ Stumpff<S> stumpff_12(const S& x) {
 /// c1 … c5.
 ///
 /// @param x  squared angle in radians², ≥ 0
-/// @return   c3, c4, c5 within 4 ulp everywhere, c1 and c2 as stumpff_12
+/// @return   c3, c4, c5 within 5 ulp up to a whole turn, c1 and c2 as stumpff_12 (docs/numerics/functions.md)
 /// Derivatives with respect to x: d_c1(), d_c2(), d_c3() of the result.
 template <class S>
 Stumpff<S> stumpff(const S& x) {

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nanoflann.hpp>
+#include <utility>
+#include <vector>
 
 #include "core/check.h"
 
@@ -26,13 +27,17 @@ struct Centres {
 
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Centres>, Centres, 3>;
 
-/// The first of the centres that are at this squared distance, which is the least: trees have an order of their own.
-Index first_at(const Tree& tree, const Vector3<double>& place, double squared) {
+/// Trees bound distances with rounding of their own, which may leave out what is exactly as far as the nearest: what is
+/// within so much more of its squared distance is looked at.
+constexpr double kRounding = 1e-9;
+
+/// The nearest centre, the first of equally near ones: trees have an order of their own.
+Index first_nearest(const Tree& tree, const Vector3<double>& place, std::uint32_t nearest, double squared) {
   std::vector<std::pair<std::uint32_t, double>> found;
-  tree.radiusSearch(place.data(), std::nextafter(squared, HUGE_VAL), found, {});
-  std::uint32_t first = std::numeric_limits<std::uint32_t>::max();
-  for (const auto& item : found) first = std::min(first, item.first);
-  return static_cast<Index>(first);
+  tree.radiusSearch(place.data(), std::nextafter(squared * (1 + kRounding), HUGE_VAL), found, {});
+  std::pair<double, std::uint32_t> first = {squared, nearest};
+  for (const auto& [row, distance] : found) first = std::min(first, {distance, row});
+  return static_cast<Index>(first.second);
 }
 
 }  // namespace
@@ -64,7 +69,7 @@ std::optional<NearestGaussian> ObjectCentres::nearest(const Vector3<double>& pla
     double squared = 0;
     if (tree.knnSearch(local.data(), 1, &found, &squared) == 0 || !(squared < least)) continue;
     least = squared;
-    nearest = NearestGaussian{static_cast<Index>(o), first_at(tree, local, squared), std::sqrt(squared)};
+    nearest = NearestGaussian{static_cast<Index>(o), first_nearest(tree, local, found, squared), std::sqrt(squared)};
   }
   return nearest;
 }

@@ -33,7 +33,7 @@ void for_numbers(const std::vector<AdamGroup<S>>& groups, const F& visit) {
 }  // namespace
 
 double longest_quasi_newton_way(const ParameterGroupSettings& settings, Index iterations) {
-  return settings.lr * kLongestQuasiNewtonStep * static_cast<double>(iterations);
+  return settings.lr * std::min(kLongestQuasiNewtonWay, kLongestQuasiNewtonStep * static_cast<double>(iterations));
 }
 
 template <class S>
@@ -59,6 +59,7 @@ QuasiNewton<S>::QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups) : t
     unit_[i] = group.settings.lr;
     trial_[i] = unit_[i] > 0 ? static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i] : 0;
   });
+  start_ = trial_;
 }
 
 template <class S>
@@ -151,7 +152,22 @@ void QuasiNewton<S>::choose_direction() {
     slope_ *= kLongestQuasiNewtonStep / longest;
   }
   small_steps_ = longest >= kSmallestStep ? 0 : small_steps_ + 1;
-  done_ = small_steps_ >= kSmallSteps || !(longest > 0);
+  stay_within_reach();
+  done_ = small_steps_ >= kSmallSteps || !(direction_.cwiseAbs().maxCoeff() > 0);
+}
+
+/// Shortens the direction to where the first number has gone as far as it may.
+template <class S>
+void QuasiNewton<S>::stay_within_reach() {
+  constexpr double kWay = kLongestQuasiNewtonWay * (1 - 1e-6);  // numbers are rounded when they are written
+  double share = 1;
+  for (Index i = 0; i < direction_.size(); ++i) {
+    if (direction_[i] == 0) continue;
+    const double left = std::copysign(kWay, direction_[i]) - (point_[i] - start_[i]);
+    share = std::min(share, std::max(0.0, left / direction_[i]));
+  }
+  direction_ *= share;
+  slope_ *= share;
 }
 
 /// Nearer to the point: where the parabola through its loss and slope and the trial's loss is least.

@@ -19,6 +19,10 @@ inline constexpr Index kMostQuasiNewtonNumbers = 1024;
 /// No number goes further in one step than this many times its group's learning rate.
 inline constexpr double kLongestQuasiNewtonStep = 10;
 
+/// No number gets further from its start in a stage than this many times its group's learning rate: what of a scene a
+/// camera may come to see is known from it before the stage begins.
+inline constexpr double kLongestQuasiNewtonWay = 40;
+
 /// The optimiser of one stage. Steps are bitwise the same for any number of threads, and allocate nothing after the
 /// first two. Learning rates are the units in which numbers of different kinds compare and the length of the first
 /// step; the schedule (from, until, every, lr_final_share) has no meaning here.
@@ -48,13 +52,14 @@ class QuasiNewton {
   std::optional<BadNumber> read_gradient(double loss);
   void accept(double loss);
   void choose_direction();
+  void stay_within_reach();
   void shorten(double loss);
   void write_trial();
 
   Tape<S>& tape_;
   std::vector<AdamGroup<S>> groups_;
   std::vector<GroupStep> reports_;
-  VectorX unit_;                          // learning rates, by number
+  VectorX unit_, start_;                  // learning rates, by number; and where the stage began, in units
   VectorX trial_, trial_gradient_;        // where the loss was just evaluated, in units; and the gradient by these
   VectorX point_, gradient_, direction_;  // the best so far
   VectorX moved_, change_, product_;      // s, y, H y

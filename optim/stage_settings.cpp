@@ -83,6 +83,9 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
       "weight", s.weight, kPixelWeights,
       "Pixels that count in weighted losses: all, those that no human or object has covered in any frame so far, those "
       "that the frame's masks leave, or those that they cover");
+  f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
+            "Longest side of the images that the stage works on, which are reduced to it where the run's are larger; "
+            "0: those of the run. Coarse to fine is two stages");
   f.map("optimize", s.optimize, "What moves: parameter groups by name");
   f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
   f.integer("gradient_shares", s.gradient_shares, {.min = 0, .max = kMostIterations},
@@ -108,6 +111,9 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   f.rule({"weight", "over"}, [&s]() -> std::string {
     return s.over == StageScope::kSequence && s.weight != PixelWeight::kAll ? "a stage over the sequence draws nothing"
                                                                             : "";
+  });
+  f.rule({"longest_side_px", "over"}, [&s]() -> std::string {
+    return s.over == StageScope::kSequence && s.longest_side_px != 0 ? "a stage over the sequence draws nothing" : "";
   });
   f.rule({"pose_weights", "over"}, [&s]() -> std::string {
     return s.over != StageScope::kSequence && !s.pose_weights.empty() ? "only a stage over the sequence has latents"

@@ -63,12 +63,15 @@ struct PlateauSettings {
   double gain = 0.01;
 };
 
+inline constexpr int kLongestSide = 65536;  ///< of images, pixels
+
 /// One stage of the method.
 struct StageSettings {
   int iterations = 0;
   StageScope over = StageScope::kFrame;
   Draw draw = Draw::kAll;
   PixelWeight weight = PixelWeight::kAll;
+  int longest_side_px = 0;                     ///< of the images that the stage sees, at most; 0: the run's
   ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
   ConfigMap<LossSettings> losses;              ///< by loss term
   int gradient_shares = 0;                     ///< every so many iterations (optim/gradient_shares.h); 0: never

@@ -177,4 +177,7 @@ std::string pareto_json(const std::vector<ParetoRow>& rows);
 /// front as a line, presets named.
 std::string pareto_svg(const std::vector<ParetoRow>& rows);
 
+/// Two of its panels: the errors of image and gradient of the scene by which settings are chosen.
+std::string pareto_front_svg(const std::vector<ParetoRow>& rows);
+
 }  // namespace hsi4d

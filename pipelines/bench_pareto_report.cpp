@@ -142,6 +142,8 @@ constexpr std::array<PlottedError, 8> kPlotted = {
       [](const ParetoRow& r) { return largest(r.gradients, &GradientError::one_minus_cosine); }},
      {"gradient, |bias|, worst class", [](const ParetoRow& r) { return largest(r.gradients, &GradientError::bias); }}}};
 
+constexpr std::size_t kImageError = 0, kGradientError = 4;  // of these, what settings are chosen by
+
 /// The points with this error as their image's: pareto_points takes medians of it.
 std::vector<ParetoPoint> points_of(std::vector<ParetoRow> rows, const std::string& scene, const PlottedError& error) {
   for (ParetoRow& row : rows) row.image.rms = error.of(row);
@@ -162,22 +164,37 @@ Plot plot_of(const std::vector<ParetoPoint>& points, const std::string& title) {
   return plot;
 }
 
+/// Presets are dark and products pale; the other knobs have the colours that there are.
+std::string knob_color(const std::string& knob) {
+  if (knob == "quality") return "#111";
+  if (knob == "product") return "#b3b8bd";
+  std::size_t place = 0;
+  for (const std::string& other : pareto_knobs()) {
+    if (other == knob) break;
+    place += other != "quality" && other != "product" ? 1 : 0;
+  }
+  return part_color(place);
+}
+
 /// Dots by knob, presets named, the front as a line. Points without error have no place on a logarithmic axis.
 void add_points(const std::vector<ParetoPoint>& points, Plot& plot) {
   PlotLine front{.label = "front", .color = "#999", .points = {}};
   for (const std::size_t i : pareto_front(times_and_errors(points, &ParetoPoint::image_rms)))
     front.points.emplace_back(points[i].time_ratio, points[i].image_rms);
   plot.lines.push_back(std::move(front));
-  const std::vector<std::string> knobs = pareto_knobs();
-  for (const ParetoPoint& point : points) {
-    const auto knob = static_cast<std::size_t>(std::find(knobs.begin(), knobs.end(), point.knob) - knobs.begin());
+  const auto add = [&plot](const ParetoPoint& point) {
     plot.lines.push_back({.label = point.is_preset() ? point.value : point.name(),
-                          .color = part_color(knob),
+                          .color = knob_color(point.knob),
                           .points = {{point.time_ratio, point.image_rms}},
                           .has_dots = true,
                           .opacity = 0,
-                          .is_named = point.is_preset()});
-  }
+                          .is_named = point.is_preset(),
+                          .name_is_below = point.value == "default"});
+  };
+  for (const ParetoPoint& point : points)
+    if (!point.is_preset()) add(point);
+  for (const ParetoPoint& point : points)  // on top of the others
+    if (point.is_preset()) add(point);
 }
 
 std::string panel(const std::vector<ParetoRow>& rows, const std::string& scene, const PlottedError& error, double x,
@@ -197,9 +214,8 @@ std::string panel(const std::vector<ParetoRow>& rows, const std::string& scene, 
 std::string legend(double y) {
   std::string text;
   double x = kGap + 8;
-  std::size_t i = 0;
   for (const std::string& knob : pareto_knobs()) {
-    text += formatted("<circle cx=\"%.0f\" cy=\"%.0f\" r=\"4\" fill=\"%s\"/>", x + 5, y - 4, part_color(i++).c_str()) +
+    text += formatted("<circle cx=\"%.0f\" cy=\"%.0f\" r=\"4\" fill=\"%s\"/>", x + 5, y - 4, knob_color(knob).c_str()) +
             formatted("<text x=\"%.0f\" y=\"%.0f\">", x + 13, y) + html_escape(knob) + "</text>\n";
     x += 28 + 6.6 * static_cast<double>(knob.size());
   }
@@ -220,6 +236,20 @@ std::vector<std::string> columns_of(const std::vector<ParetoRow>& rows) {
   if (scenes.size() < 2) return scenes;
   const bool has_chosen = std::find(scenes.begin(), scenes.end(), kChosenScene) != scenes.end();
   return has_chosen ? std::vector<std::string>{"", kChosenScene} : std::vector<std::string>{""};
+}
+
+double left_of(std::size_t column) { return kGap + (kPanelWidth + kGap) * static_cast<double>(column); }
+double top_of(std::size_t row) { return kTitle + (kHead + kPanelHeight + kGap) * static_cast<double>(row); }
+
+/// Panels in two columns, with a title and what colours mean.
+std::string picture(const std::string& panels, std::size_t rows) {
+  const double width = left_of(2), height = top_of(rows);
+  return formatted("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" ", width, height) +
+         formatted("width=\"%.0f\" height=\"%.0f\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n", width,
+                   height) +
+         kStyle + formatted("<rect width=\"%.0f\" height=\"%.0f\" fill=\"#fff\"/>\n", width, height) +
+         formatted("<text x=\"%.0f\" y=\"26\" font-size=\"16\">", kGap + 8) +
+         "time against error, forward and backward; line: the front</text>\n" + legend(48) + panels + "</svg>\n";
 }
 
 }  // namespace
@@ -282,20 +312,18 @@ std::string pareto_json(const std::vector<ParetoRow>& rows) {
 
 std::string pareto_svg(const std::vector<ParetoRow>& rows) {
   const std::vector<std::string> columns = columns_of(rows);
-  const double step_x = kPanelWidth + kGap, step_y = kHead + kPanelHeight + kGap;
   std::string body;
   for (std::size_t r = 0; r < kPlotted.size(); ++r)
     for (std::size_t c = 0; c < columns.size(); ++c)
-      body += panel(rows, columns[c], kPlotted[r], kGap + step_x * static_cast<double>(c),
-                    kTitle + step_y * static_cast<double>(r));
-  const double width = kGap + step_x * static_cast<double>(std::max<std::size_t>(columns.size(), 2)),
-               height = kTitle + step_y * static_cast<double>(kPlotted.size());
-  return formatted("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" ", width, height) +
-         formatted("width=\"%.0f\" height=\"%.0f\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n", width,
-                   height) +
-         kStyle + formatted("<rect width=\"%.0f\" height=\"%.0f\" fill=\"#fff\"/>\n", width, height) +
-         formatted("<text x=\"%.0f\" y=\"26\" font-size=\"16\">", kGap + 8) +
-         "time against error, forward and backward; line: the front</text>\n" + legend(48) + body + "</svg>\n";
+      body += panel(rows, columns[c], kPlotted[r], left_of(c), top_of(r));
+  return picture(body, kPlotted.size());
+}
+
+std::string pareto_front_svg(const std::vector<ParetoRow>& rows) {
+  const std::string scene = columns_of(rows).empty() ? "" : columns_of(rows).back();
+  return picture(panel(rows, scene, kPlotted[kImageError], left_of(0), top_of(0)) +
+                     panel(rows, scene, kPlotted[kGradientError], left_of(1), top_of(0)),
+                 1);
 }
 
 }  // namespace hsi4d

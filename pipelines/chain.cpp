@@ -45,7 +45,8 @@ ClipFacts check_clip(const RunConfig& chain, std::size_t index) {
   facts.name = chain.chain[index].name;
   facts.motion = setup.motion;
   facts.object_tracks = setup.object_tracks;
-  const Clip clip = make_clip(data, std::move(setup));
+  Clip clip = make_clip(data, std::move(setup));
+  set_image_size(clip, chain);
   check_start(chain.start, clip);
   if (index == 0) check_first_view(clip, data.camera.string());
   check_frames(data, clip, losses_over_masks(chain));

@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "pipelines/body_files.h"
 #include "pipelines/penetration.h"
+#include "pipelines/pose_estimate.h"
 #include "pipelines/run_problems.h"
 
 namespace hsi4d {
@@ -20,62 +21,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Those of the video's frames that the clip keeps, of a file that has all of them, or those alone.
-/// @param what     "poses"
-/// @param or_else  what is allowed too: ", or ..."
-template <class T>
-std::vector<T> kept(std::vector<T> all, const FrameSource& frames, const std::string& file, const char* what,
-                    const char* or_else = "") {
-  if (std::ssize(all) == frames.count()) return all;
-  if (std::ssize(all) != frames.video_count())
-    throw DataError(
-        file + ": holds " + std::to_string(all.size()) + " " + what + ", the video has " +
-        std::to_string(frames.video_count()) + " frames" +
-        (frames.count() == frames.video_count() ? "" : ", of which the clip keeps " + std::to_string(frames.count())) +
-        "; allowed: that many" + (frames.count() == frames.video_count() ? "" : ", of either") + or_else);
-  std::vector<T> some;
-  for (Index t = 0; t < frames.count(); ++t) some.push_back(std::move(all[static_cast<std::size_t>(frames.number(t))]));
-  return some;
-}
-
-/// The pose at a moment of a motion, in seconds.
-BodyPose pose_at(const Motion& motion, double seconds) {
-  const double place = std::min(seconds * motion.frame_rate, static_cast<double>(motion.poses.size() - 1));
-  const auto before = static_cast<std::size_t>(place);
-  if (before + 1 == motion.poses.size()) return motion.poses.back();
-  return interpolated(motion.poses[before], motion.poses[before + 1], place - static_cast<double>(before));
-}
-
-/// Whether a motion of another rate than the video's goes on to the clip's last frame, but for half a frame of its own.
-bool covers(const Motion& motion, const FrameSource& frames) {
-  if (!motion.says_frame_rate || frames.video_rate() == 0) return false;
-  const double end = static_cast<double>(frames.number(frames.count() - 1)) / frames.video_rate();
-  return end <= (static_cast<double>(motion.poses.size()) - 0.5) / motion.frame_rate;
-}
-
-/// Tells of poses from a moment on that would be that of another frame of the video.
-void warn_of_rest(const Motion& motion, const fs::path& file, const FrameSource& frames) {
-  constexpr double kSameMoment = 1e-9;  // seconds
-  const double last = static_cast<double>(motion.poses.size() - 1) / motion.frame_rate,
-               end = static_cast<double>(frames.video_count()) / frames.video_rate();
-  if (last < end - kSameMoment) return;
-  log_warning(file.string() + ": holds " + std::to_string(motion.poses.size()) + " poses at " +
-              rounded(motion.frame_rate, 4) + " a second, the video has " + std::to_string(frames.video_count()) +
-              " frames at " + rounded(frames.video_rate(), 4) + "; poses after its end are not used");
-}
-
-/// Estimated poses of the clip's frames: those of the motion file when it has more than frame 0. It has a pose for each
-/// frame of the clip or of the video; or it says its rate and is as long.
-std::vector<BodyPose> estimate_of(const Motion& motion, const fs::path& file, const FrameSource& frames) {
-  const Index count = std::ssize(motion.poses);
-  if (count == 1) return {};
-  if (count == frames.count() || count == frames.video_count() || !covers(motion, frames))
-    return kept(motion.poses, frames, file.string(), "poses", ", or frame 0 alone");
-  warn_of_rest(motion, file, frames);
-  std::vector<BodyPose> poses;
-  for (Index t = 0; t < frames.count(); ++t)
-    poses.push_back(pose_at(motion, static_cast<double>(frames.number(t)) / frames.video_rate()));
-  return poses;
+/// The poses of data.motion, laid on frame 0, or else those of the initial state; empty: none.
+std::vector<BodyPose> estimate_of(const DataSettings& data, const SceneSetup& setup, const Avatar& avatar,
+                                  const FrameSource& frames) {
+  if (data.motion.empty()) return estimated_poses(setup.motion, setup.motion_file, frames);
+  return laid_on(read_estimate(data.motion, avatar, frames), setup.motion.poses.front(), pelvis_of(avatar.joints),
+                 data.motion_align);
 }
 
 /// As estimate_of, of the objects.
@@ -83,7 +34,7 @@ std::vector<std::vector<ObjectPose>> object_estimate_of(const fs::path& file, co
   if (file.empty() || clip.objects.empty()) return {};
   std::vector<std::string> names;
   for (const ClipObject& object : clip.objects) names.push_back(object.name);
-  return kept(read_object_tracks(file.string(), names), clip.video->frames, file.string(), "frames");
+  return kept_frames(read_object_tracks(file.string(), names), clip.video->frames, file.string(), "frames");
 }
 
 /// The rate of the clip: that of its video, if it is known, or else of the motion.
@@ -99,11 +50,12 @@ std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std
                                    const FrameSource& frames) {
   const auto file = [&folder](const char* name) { return (folder / name).string(); };
   const std::vector<BodyPose> bodies =
-      kept(read_motion_for(file("motion.npz"), avatar).poses, frames, file("motion.npz"), "poses");
-  const std::vector<Camera> cameras = kept(read_cameras(file("cameras.json")), frames, file("cameras.json"), "cameras");
+      kept_frames(read_motion_for(file("motion.npz"), avatar).poses, frames, file("motion.npz"), "poses");
+  const std::vector<Camera> cameras =
+      kept_frames(read_cameras(file("cameras.json")), frames, file("cameras.json"), "cameras");
   std::vector<std::vector<ObjectPose>> objects(bodies.size());
   if (!names.empty())
-    objects = kept(read_object_tracks(file("objects.npz"), names), frames, file("objects.npz"), "frames");
+    objects = kept_frames(read_object_tracks(file("objects.npz"), names), frames, file("objects.npz"), "frames");
   std::vector<SceneState> truth(bodies.size());
   for (std::size_t t = 0; t < truth.size(); ++t) truth[t] = {cameras[t].camera_from_world, objects[t], bodies[t]};
   return truth;
@@ -222,7 +174,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   video->masks.push_back(open_masks(data.masks, kHumanMasks, video->frames));
   for (const std::string& name : names) video->masks.push_back(open_masks(data.masks, name, video->frames));
   clip.video = video;
-  clip.estimate = estimate_of(setup.motion, setup.motion_file, video->frames);
+  clip.estimate = estimate_of(data, setup, clip.avatar, video->frames);
   clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
   clip.first.body = setup.motion.poses.front();
   clip.frame_rate = rate_of(video->frames, setup);
@@ -239,6 +191,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
                 {"/data/camera", data.camera},
                 {"/data/initial", data.initial},
                 {"/data/initial: /motion", setup.motion_file}};
+  if (!data.motion.empty()) clip.files.push_back({"/data/motion", data.motion});
   if (!setup.object_tracks.empty()) clip.files.push_back({"/data/initial: /object_tracks", setup.object_tracks});
   for (const auto& [name, object] : data.objects)
     clip.files.push_back({"/data/objects/" + name + "/gaussians", object.gaussians});
@@ -247,6 +200,12 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
     if (masks.is_video()) clip.files.push_back({"masks/" + masks.path().filename().string(), masks.path()});
   }
   return clip;
+}
+
+ClipFrame reduced_frame(const ClipFrame& frame, const Camera& camera) {
+  ClipFrame result = {reduced(frame.target, camera), reduced(frame.human_mask, camera), {}};
+  for (const Image& mask : frame.object_masks) result.object_masks.push_back(reduced(mask, camera));
+  return result;
 }
 
 bool fits_camera(const Image& frame, const Camera& camera) {

@@ -57,6 +57,9 @@ struct ClipFrame {
   std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
 };
 
+/// The frame in the size of a camera: means of its pixels.
+ClipFrame reduced_frame(const ClipFrame& frame, const Camera& camera);
+
 /// The folder of the human's masks, in data.masks beside those of the objects.
 inline constexpr const char* kHumanMasks = "human";
 

@@ -49,6 +49,13 @@ void describe(ConfigFields& f, DataSettings& s) {
            "Frames a second that are kept, the nearest ones; estimated poses are resampled to it; 0: all");
   f.path("camera", s.camera, {.must_exist = true}, "Camera of frame 0 (.json)");
   f.path("initial", s.initial, {.must_exist = true}, "State of frame 0 and estimated poses (.json)");
+  f.path(
+      "motion", s.motion, {.must_exist = true},
+      "Motion (.npz) that was estimated from the video, in place of the poses of `initial` after frame 0; none: those");
+  f.choice(
+      "motion_align", s.motion_align, kMotionAligns,
+      "How it is laid on the human of frame 0: moved and turned about the vertical (heading), moved and turned as a "
+      "whole (rotation), or as it is (none)");
   f.path("truth", s.truth, {},
          "Folder with motion.npz, objects.npz, cameras.json to compare the result with; empty, or not there: none");
   f.path(

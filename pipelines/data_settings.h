@@ -1,6 +1,7 @@
 // Config section `data`: the files that a run reads.
 #pragma once
 
+#include <array>
 #include <filesystem>
 
 #include "core/config.h"
@@ -12,6 +13,12 @@ struct ObjectSettings {
   std::filesystem::path gaussians;
 };
 
+/// How an estimated motion is laid on the human of frame 0.
+enum class MotionAlign { kHeading, kRotation, kNone };
+
+inline constexpr std::array<ConfigChoice<MotionAlign>, 3> kMotionAligns = {
+    {{MotionAlign::kHeading, "heading"}, {MotionAlign::kRotation, "rotation"}, {MotionAlign::kNone, "none"}}};
+
 /// The inputs of a run. Relative paths are relative to the file that names them.
 struct DataSettings {
   std::filesystem::path scene;
@@ -21,6 +28,8 @@ struct DataSettings {
   std::filesystem::path masks;
   std::filesystem::path camera;
   std::filesystem::path initial;
+  std::filesystem::path motion;  ///< poses estimated from the video; empty: those of `initial`, if it has some
+  MotionAlign motion_align = MotionAlign::kHeading;
   std::filesystem::path truth;
   std::filesystem::path surface;  ///< a mesh of what is solid, to measure penetration by; empty: not measured
   double video_rate = 0;          ///< frames a second of the video; 0: what its file says

@@ -97,13 +97,18 @@ std::vector<std::string> parameter_group_names(Draw draw) {
   return names;
 }
 
+Camera camera_of_size(const Clip& clip, int longest_side_px) {
+  return longest_side_px > 0 ? reduced_camera(clip.camera, longest_side_px) : clip.camera;
+}
+
 template <class S>
 FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
                           const FrameGraphSettings& settings)
     : tape_(tape),
       clip_(clip),
       settings_(settings),
-      view_{clip.camera, clip.scene.origin_world, settings.render, settings.skip, settings.approx} {
+      view_{camera_of_size(clip, settings.longest_side_px), clip.scene.origin_world, settings.render, settings.skip,
+            settings.approx} {
   // Objects and the body are recorded in the world, and one render has one origin: the scene's must be zero until they
   // are recorded relative to it.
   HSI4D_CHECK(clip.scene.origin_world.isZero(0), "what moves is placed in the world, not relative to an origin");
@@ -224,7 +229,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
 /// Colours that are computed anew only where one of the groups moves, if that is wanted.
 template <class S>
 void FrameGraph<S>::hold_colors(Var<S> colors, const std::vector<std::string>& groups) {
-  if (settings_.hold_colours) held_.push_back({colors.id, groups});
+  if (settings_.hold_colors) held_.push_back({colors.id, groups});
 }
 
 template <class S>

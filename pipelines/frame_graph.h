@@ -28,7 +28,7 @@ struct FrameGraphSettings {
   RenderSettings render;
   RenderSkips skip = {};
   RenderApproximations approx = {};
-  bool hold_colours = false;  ///< colours change only where what makes them moves, see held()
+  bool hold_colors = false;  ///< colours change only where what makes them moves, see held()
   RotationParameters rotations = RotationParameters::kSixD;
   CameraIncrement increment = CameraIncrement::kCamera;
   Draw draw = Draw::kAll;
@@ -41,7 +41,11 @@ struct FrameGraphSettings {
   /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
   /// out, and the groups of the scene then hold the others alone. None: all are kept.
   std::optional<double> camera_reach = {};
+  int longest_side_px = 0;  ///< of the image, at most; 0: as large as the clip's camera has it
 };
+
+/// The camera of images of a clip that are at most so large; 0: the clip's.
+Camera camera_of_size(const Clip& clip, int longest_side_px);
 
 /// What a frame is compared with.
 struct FrameTargets {
@@ -90,7 +94,7 @@ class FrameGraph {
   const LossInputs<S>& loss_inputs() const { return inputs_; }
   /// Everything that may move, all of it frozen.
   const std::vector<ParameterGroup<S>>& groups() const { return groups_; }
-  /// Colours, where settings.hold_colours says so.
+  /// Colours, where settings.hold_colors says so.
   const std::vector<HeldOutput>& held() const { return held_; }
 
  private:

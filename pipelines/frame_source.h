@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/check.h"
 #include "core/image.h"
 #include "core/types.h"
 
@@ -91,5 +92,25 @@ class MaskSource {
   std::filesystem::path path_;
   std::shared_ptr<detail::OpenVideo> video_;  // null: a folder
 };
+
+/// Those of the video's frames that the clip keeps, of a file that has all of them, or those alone.
+/// @param file     what messages call it
+/// @param what     "poses"
+/// @param or_else  what is allowed too: ", or ..."
+/// Throws DataError for another number of them.
+template <class T>
+std::vector<T> kept_frames(std::vector<T> all, const FrameSource& frames, const std::string& file, const char* what,
+                           const char* or_else = "") {
+  if (std::ssize(all) == frames.count()) return all;
+  if (std::ssize(all) != frames.video_count())
+    throw DataError(
+        file + ": holds " + std::to_string(all.size()) + " " + what + ", the video has " +
+        std::to_string(frames.video_count()) + " frames" +
+        (frames.count() == frames.video_count() ? "" : ", of which the clip keeps " + std::to_string(frames.count())) +
+        "; allowed: that many" + (frames.count() == frames.video_count() ? "" : ", of either") + or_else);
+  std::vector<T> some;
+  for (Index t = 0; t < frames.count(); ++t) some.push_back(std::move(all[static_cast<std::size_t>(frames.number(t))]));
+  return some;
+}
 
 }  // namespace hsi4d

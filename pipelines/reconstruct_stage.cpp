@@ -16,7 +16,7 @@ FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const Colo
   return {config.render,
           config.skip.render,
           config.approx.render,
-          config.approx.hold_colours,
+          config.approx.hold_colors,
           config.rotations,
           config.camera.increment,
           draw,
@@ -42,7 +42,7 @@ std::vector<SceneState> seen_frames(std::span<const SceneState> done, const Scen
 
 /// Empty where every pixel counts.
 Image pixel_weights(const StageSettings& stage, const FrameTask& task, const RunConfig& config) {
-  const double share = stage.draw == Draw::kScene ? config.approx.camera_pixels : 1;
+  const double share = stage.draw == Draw::kScene ? config.approx.camera_pixel_share : 1;
   if (stage.weight == PixelWeight::kAll && share == 1) return {};
   Image covered(1, task.covered.height(), task.covered.width());
   if (stage.weight == PixelWeight::kUnoccluded) covered = task.covered;
@@ -81,14 +81,22 @@ Index tiles_in_image(const Camera& camera, int tile) {
   return Index{(camera.width + tile - 1) / tile} * ((camera.height + tile - 1) / tile);
 }
 
+/// Covered where a part of a pixel is.
+Image reduced_cover(const Image& covered, const Camera& camera) {
+  Image result = resize_area(covered, camera.height, camera.width);
+  for (float& x : result.data()) x = x > 0 ? 1 : 0;
+  return result;
+}
+
 template <class S>
-StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
                                const FrameStageCallback& callback) {
   const auto& [name, stage] = task.config.stages[task.stage];
   StageProbe probe(task.watch);
   Tape<S> tape;
   tape.set_skips(task.config.skip.tape);
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
+  settings.longest_side_px = stage.longest_side_px;
   settings.human_opacity = some_loss_reads(stage, kReadsHumanOpacity);
   settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
   const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");
@@ -115,9 +123,22 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
   probe.stage_ended(result, {.stage = name,
                              .frame = frame.index,
-                             .tiles_of_image = tiles_in_image(task.clip.camera, task.config.render.tile),
+                             .tiles_of_image = tiles_in_image(camera_of_size(task.clip, stage.longest_side_px),
+                                                              task.config.render.tile),
                              .tape_bytes = tape.memory_bytes()});
   return result;
+}
+
+/// In images of the size that the stage asks for.
+template <class S>
+StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+                               const FrameStageCallback& callback) {
+  const Camera camera = camera_of_size(task.clip, task.config.stages[task.stage].second.longest_side_px);
+  if (camera.width == task.clip.camera.width && camera.height == task.clip.camera.height)
+    return run_stage_on_frame<S>(task, frame, state, colors, callback);
+  const ClipFrame small = reduced_frame(frame.frame, camera);
+  const Image covered = reduced_cover(frame.covered, camera);
+  return run_stage_on_frame<S>(task, {frame.index, small, covered, frame.done}, state, colors, callback);
 }
 
 template <class S>

@@ -155,8 +155,8 @@ void append_line(std::string& svg, const Plot& plot, const PlotLine& line, const
       const double at = plot_x(plot, x, px);
       const bool is_right = at > 0.75 * plot.width;  // where the label would not fit beside it
       name = std::string("<text class=\"name\"") + (is_right ? " text-anchor=\"end\"" : "") + " x=\"" +
-             coordinate(is_right ? at - 5 : at + 5) + "\" y=\"" + coordinate(plot_y(y, py) - 4) + "\">" +
-             html_escape(line.label) + "</text>";
+             coordinate(is_right ? at - 5 : at + 5) + "\" y=\"" +
+             coordinate(plot_y(y, py) + (line.name_is_below ? 11 : -4)) + "\">" + html_escape(line.label) + "</text>";
     }
     if (line.has_dots)
       dots += "<circle cx=\"" + at_x + "\" cy=\"" + at_y + "\" r=\"3\" style=\"fill:" + line.color + "\"><title>" +

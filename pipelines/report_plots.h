@@ -17,7 +17,8 @@ struct PlotLine {
   bool is_dashed = false;
   bool has_dots = false;  ///< a dot with a tooltip at every point
   double opacity = 1;     ///< of the line; 0: dots alone
-  bool is_named = false;  ///< its label stands beside its last point
+  bool is_named = false;  ///< its label stands beside its last point, above or
+  bool name_is_below = false;
 };
 
 struct Plot {

@@ -90,9 +90,13 @@ void note_end(RunFolder& folder, RunState state, const std::string& message) noe
   }
 }
 
+void set_image_size(Clip& clip, const RunConfig& config) {
+  if (config.approx.longest_side_px > 0) clip.camera = reduced_camera(clip.camera, config.approx.longest_side_px);
+}
+
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
   Clip clip = read_clip(config.data);
-  if (config.approx.longest_side_px > 0) clip.camera = reduced_camera(clip.camera, config.approx.longest_side_px);
+  set_image_size(clip, config);
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});
   if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});

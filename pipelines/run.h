@@ -20,6 +20,9 @@ struct RunOptions {
 /// is still what is thrown.
 void note_end(RunFolder& folder, RunState state, const std::string& message) noexcept;
 
+/// The images of a run are of at most approx.longest_side_px pixels: the camera of its clip becomes one of these.
+void set_image_size(Clip& clip, const RunConfig& config);
+
 /// The clip of a run, and in `files` all that is read of it, the files that stages and body name included.
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses);
 

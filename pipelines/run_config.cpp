@@ -12,7 +12,6 @@ namespace hsi4d {
 namespace {
 
 constexpr int kMostThreads = 1024;
-constexpr int kLongestSide = 65536;  // pixels
 /// The largest whole number that every JSON tool keeps (RFC 8259, section 6).
 constexpr std::int64_t kLargestSeed = (std::int64_t{1} << 53) - 1;
 
@@ -22,7 +21,10 @@ constexpr const char* kSourcesFolder = "generated";  // beside a config
 void without_places(ConfigValue& sources) {
   std::erase_if(sources.members, [](const ConfigMember& member) { return member.key == "folder"; });
   for (ConfigMember& member : sources.members) {
-    std::erase_if(member.value.members, [](const ConfigMember& setting) { return setting.key == "timeout_s"; });
+    const std::vector<std::string>& trying = settings_of_trying();
+    std::erase_if(member.value.members, [&trying](const ConfigMember& setting) {
+      return std::find(trying.begin(), trying.end(), setting.key) != trying.end();
+    });
   }
 }
 
@@ -55,10 +57,10 @@ void describe(ConfigFields& f, SkipSettings& s) {
 void describe(ConfigFields& f, ApproxSettings& s) {
   describe(f, s.render);
   f.boolean(
-      "hold_colours", s.hold_colours,
+      "hold_colors", s.hold_colors,
       "Colours of harmonics stay as in the stage's first iteration, those of the color net as when it last moved");
   f.number(
-      "camera_pixels", s.camera_pixels, {.above = 0, .max = 1},
+      "camera_pixel_share", s.camera_pixel_share, {.above = 0, .max = 1},
       "Share of the pixels that count in stages that draw the scene alone, in blocks of 32, others in every frame");
   f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
             "Longest side of the images that are worked on: the camera's image, frames and masks are reduced to it "
@@ -80,7 +82,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("start", s.start, "Where the stages of a frame begin");
   f.object("instance", s.instance, "The instance of a benchmark that the config is about");
   f.object("data", s.data, "The files that the run reads");
-  f.object("sources", s.sources, "Programs outside that make the video and the masks of `data`");
+  f.object("sources", s.sources, "Programs outside that make the video, the masks and the estimated motion of `data`");
   f.list("chain", s.chain, "Clips that follow one another, each from the last state of the one before");
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
   f.object("color_net", s.color_net, "How the human's colours follow its pose");

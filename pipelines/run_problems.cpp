@@ -135,7 +135,7 @@ void add_name_problems(const DataSettings& data, const std::string& in, std::vec
   }
 }
 
-/// What is wrong with the programs that make video and masks.
+/// What is wrong with the programs that make video, masks and motion.
 void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   struct Program {
     const char* name;
@@ -147,7 +147,8 @@ void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found
   const SourceSettings& sources = config.sources;
   for (const Program& program :
        {Program{"video", sources.video.command, video_placeholders(), config.data.frames, "frames"},
-        Program{"masks", sources.masks.command, mask_placeholders(), config.data.masks, "masks"}}) {
+        Program{"masks", sources.masks.command, mask_placeholders(), config.data.masks, "masks"},
+        Program{"motion", sources.motion.command, motion_placeholders(), config.data.motion, "motion"}}) {
     const std::string section = std::string("/sources/") + program.name, key = std::string("/data/") + program.key;
     for (CommandFault& fault : command_faults(program.command, program.placeholders))
       found.push_back({section + fault.pointer, std::move(fault.text), {section + "/command"}});
@@ -317,13 +318,13 @@ std::vector<RunNote> run_notes(const RunConfig& config) {
   } else if (render.static_tiles && !config.skip.tape.unchanged_inputs) {
     inform("skip.unchanged_inputs=false has made anew in every iteration what skip.static_tiles keeps");
   }
-  if (config.approx.hold_colours) inform("approx.hold_colours is on: colours do not follow every change of the view");
+  if (config.approx.hold_colors) inform("approx.hold_colors is on: colours do not follow every change of the view");
   if (config.approx.longest_side_px > 0) {
     notes.push_back({LogLevel::kInfo, "approx.longest_side_px is on: images, cameras.json and PSNR are of at most " +
                                           std::to_string(config.approx.longest_side_px) + " pixels"});
   }
-  if (config.approx.camera_pixels < 1) {
-    inform("approx.camera_pixels is on: stages that draw the scene alone see a part of the pixels in each frame");
+  if (config.approx.camera_pixel_share < 1) {
+    inform("approx.camera_pixel_share is on: stages that draw the scene alone see a part of the pixels in each frame");
   }
   if (!config.approx.render.collapse_suffix) return notes;
   const std::string off = without_static_layers(config);

@@ -46,7 +46,8 @@ fs::path output_of_work(const fs::path& work) {
   const bool is_number =
       number.size() > 1 && std::all_of(number.begin() + 1, number.end(), [](char c) { return c >= '0' && c <= '9'; });
   const std::string name = numbered.stem().string();
-  if (work.extension() != ".tmp" || !is_number || !(name.starts_with("video-") || name.starts_with("masks-")))
+  if (work.extension() != ".tmp" || !is_number ||
+      !(name.starts_with("video-") || name.starts_with("masks-") || name.starts_with("motion-")))
     return {};
   return work.parent_path() / name;
 }

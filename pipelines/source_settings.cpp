@@ -13,6 +13,7 @@ namespace hsi4d {
 namespace {
 
 constexpr double kLongestTimeout = 7 * 24 * 3600.0;  // seconds
+constexpr int kMostRetries = 100;
 
 /// "{first_frame}, {prompt}".
 std::string in_braces(const std::vector<std::string>& names) {
@@ -50,37 +51,44 @@ std::string replaced(const std::string& argument, const std::function<std::strin
   return text;
 }
 
-void describe_command(ConfigFields& f, std::vector<std::string>& command, double& timeout_s,
-                      const std::vector<std::string>& known) {
-  f.strings("command", command,
+void describe_program(ConfigFields& f, ProgramSettings& s, const std::vector<std::string>& known) {
+  f.strings("command", s.command,
             "The program and its arguments, which no shell reads; replaced in them: " + in_braces(known) +
                 "; none: the files of `data` are read");
-  f.number("timeout_s", timeout_s, {.min = 0, .max = kLongestTimeout},
+  f.number("timeout_s", s.timeout_s, {.min = 0, .max = kLongestTimeout},
            "Seconds after which the program is ended; 0: it takes as long as it takes");
+  f.integer("retries", s.retries, {.min = 0, .max = kMostRetries}, "How often it is run again after a failure");
+  f.number("retry_wait_s", s.retry_wait_s, {.min = 0, .max = kLongestTimeout},
+           "Seconds before it is run again, each time twice as many");
+  f.choice("retry_on", s.retry_on, kRetryOns,
+           "Which failures these are: exit status " + std::to_string(kTryAgainStatus) +
+               " (temporary), or other statuses than " + std::to_string(kAskedWronglyStatus) +
+               ", signals, time that is over and a missing output too (any)");
 }
 
 }  // namespace
 
 bool has_sources(const SourceSettings& sources) {
-  return !sources.video.command.empty() || !sources.masks.command.empty();
+  return !sources.video.command.empty() || !sources.masks.command.empty() || !sources.motion.command.empty();
 }
 
 void describe(ConfigFields& f, VideoSourceSettings& s) {
-  describe_command(f, s.command, s.timeout_s, video_placeholders());
+  describe_program(f, s, video_placeholders());
   f.choice("output", s.output, kVideoOutputs,
            "What {out} is to be: a video file with this ending, or a folder of .png files (frames)");
   f.integer("frames", s.frames, {.min = 0, .max = 1000000}, "Frames that the video must have; 0: any number");
 }
 
-void describe(ConfigFields& f, MaskSourceSettings& s) {
-  describe_command(f, s.command, s.timeout_s, mask_placeholders());
-}
-
 void describe(ConfigFields& f, SourceSettings& s) {
-  f.path("folder", s.folder, {}, "Where videos and masks are kept; none: generated/ beside the config");
+  const auto with = [](const std::vector<std::string>& known) {
+    return [known](ConfigFields& fields, ProgramSettings& program) { describe_program(fields, program, known); };
+  };
+  f.path("folder", s.folder, {}, "Where videos, masks and motions are kept; none: generated/ beside the config");
   f.string("prompt", s.prompt, "What happens in the video, for {prompt}");
   f.object("video", s.video, "The program that makes the video of an image and a text");
-  f.object("masks", s.masks, "The program that makes the masks of the video");
+  f.object("masks", s.masks, "The program that makes the masks of the video", with(mask_placeholders()));
+  f.object("motion", s.motion, "The program that estimates the human's poses in the video",
+           with(motion_placeholders()));
 }
 
 const std::vector<std::string>& video_placeholders() {
@@ -90,6 +98,16 @@ const std::vector<std::string>& video_placeholders() {
 
 const std::vector<std::string>& mask_placeholders() {
   static const std::vector<std::string> names = {"video", "objects", "first_masks", "prompt", "out"};
+  return names;
+}
+
+const std::vector<std::string>& motion_placeholders() {
+  static const std::vector<std::string> names = {"video", "video_rate", "camera", "prompt", "out"};
+  return names;
+}
+
+const std::vector<std::string>& settings_of_trying() {
+  static const std::vector<std::string> names = {"timeout_s", "retries", "retry_wait_s", "retry_on"};
   return names;
 }
 

@@ -1,5 +1,5 @@
-// Config section `sources`: programs outside that make the video and the masks of a run, an image-to-video model and a
-// segmenter.
+// Config section `sources`: programs outside that make the video, the masks and the estimated motion of a run: an
+// image-to-video model, a segmenter, a pose estimator. docs/services.md tells them what is expected of them.
 //
 // A command is a list of arguments, the program first; no shell reads them. In any argument stand for themselves all
 // characters but placeholders, {word}, which are replaced; {{word}} is {word}.
@@ -24,18 +24,30 @@ inline constexpr std::array<ConfigChoice<VideoOutput>, 5> kVideoOutputs = {{{Vid
                                                                             {VideoOutput::kWebm, "webm"},
                                                                             {VideoOutput::kFrames, "frames"}}};
 
-/// The program that makes the video of the first frame.
-struct VideoSourceSettings {
+/// Exit status by which a program says that it could not now and may be asked again (EX_TEMPFAIL of sysexits.h).
+inline constexpr int kTryAgainStatus = 75;
+/// Exit status by which a program says that it was asked wrongly: asking again will not help.
+inline constexpr int kAskedWronglyStatus = 2;
+
+/// After which failures a program is run again.
+enum class RetryOn { kTemporary, kAny };
+
+inline constexpr std::array<ConfigChoice<RetryOn>, 2> kRetryOns = {
+    {{RetryOn::kTemporary, "temporary"}, {RetryOn::kAny, "any"}}};
+
+/// A program that makes something.
+struct ProgramSettings {
   std::vector<std::string> command;  ///< empty: none
-  double timeout_s = 7200;           ///< 0: as long as it takes
-  VideoOutput output = VideoOutput::kMp4;
-  Index frames = 0;  ///< that the video must have; 0: any number
+  double timeout_s = 7200;           ///< of each time it is run; 0: as long as it takes
+  int retries = 2;                   ///< how often it is run again after a failure
+  double retry_wait_s = 10;          ///< before the first of them; twice as long before each of the others
+  RetryOn retry_on = RetryOn::kTemporary;
 };
 
-/// The program that makes the masks of the video.
-struct MaskSourceSettings {
-  std::vector<std::string> command;  ///< empty: none
-  double timeout_s = 7200;           ///< 0: as long as it takes
+/// The program that makes the video of the first frame.
+struct VideoSourceSettings : ProgramSettings {
+  VideoOutput output = VideoOutput::kMp4;
+  Index frames = 0;  ///< that the video must have; 0: any number
 };
 
 /// Config section `sources`.
@@ -43,7 +55,8 @@ struct SourceSettings {
   std::filesystem::path folder;  ///< of what was made; empty: "generated" beside the config
   std::string prompt;            ///< what happens in the video
   VideoSourceSettings video;
-  MaskSourceSettings masks;
+  ProgramSettings masks;   ///< of the video
+  ProgramSettings motion;  ///< poses of the human in the video
 };
 
 /// Whether some program makes a part of the data.
@@ -51,12 +64,15 @@ bool has_sources(const SourceSettings& sources);
 
 /// Describe the sections: every setting with its range.
 void describe(ConfigFields& fields, VideoSourceSettings& settings);
-void describe(ConfigFields& fields, MaskSourceSettings& settings);
 void describe(ConfigFields& fields, SourceSettings& settings);
+
+/// Settings of a program that its output does not depend on.
+const std::vector<std::string>& settings_of_trying();
 
 /// Placeholders that commands may have.
 const std::vector<std::string>& video_placeholders();
 const std::vector<std::string>& mask_placeholders();
+const std::vector<std::string>& motion_placeholders();
 
 /// The placeholders of an argument, without braces, in order.
 std::vector<std::string> placeholders_in(const std::string& argument);

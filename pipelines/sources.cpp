@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <thread>
 
 #include "core/camera_file.h"
 #include "core/check.h"
@@ -16,6 +17,7 @@
 #include "pipelines/camera_selection.h"
 #include "pipelines/clip.h"
 #include "pipelines/input_hashes.h"
+#include "pipelines/pose_estimate.h"
 #include "pipelines/scene_render.h"
 #include "pipelines/source_lock.h"
 #include "splat/render_settings.h"
@@ -115,6 +117,17 @@ std::string video_hashes(const FrameSource& frames, const fs::path& path) {
 
 FrameSource frames_of(const DataSettings& data) { return {data.frames, {data.video_rate, data.frame_rate}}; }
 
+SourceOutput motion_output(const RunConfig& config, const DataSettings& data) {
+  const std::vector<std::string>& command = config.sources.motion.command;
+  const FrameSource frames = frames_of(data);
+  ConfigValue record = command_record(config, command);
+  record.add("video", ConfigValue::make_string(video_hashes(frames, data.frames)));
+  if (uses_placeholder(command, "camera"))
+    record.add("camera", ConfigValue::make_string(input_hashes({{"camera", data.camera}})));
+  if (uses_placeholder(command, "video_rate")) record.add("video_rate", ConfigValue::make_number(frames.video_rate()));
+  return output_of(config, "motion", command, record, ".npz");
+}
+
 SourceOutput mask_output(const RunConfig& config, const DataSettings& data) {
   const std::vector<std::string>& command = config.sources.masks.command;
   ConfigValue record = command_record(config, command);
@@ -169,6 +182,10 @@ void check_masks(const DataSettings& data, const fs::path& folder) {
   }
 }
 
+void check_motion(const DataSettings& data, const fs::path& file) {
+  read_estimate(file, read_avatar(data.avatar.string()), frames_of(data));
+}
+
 // ---- Making it ----
 
 /// A folder that is removed at the end.
@@ -219,31 +236,99 @@ std::string with_replaced(std::string text, const std::string& from, const std::
   return text;
 }
 
-/// Runs the program, looks at what it wrote, and gives that its name.
-template <class Check>
-void make(const SourceOutput& output, const fs::path& out, const std::vector<std::string>& command,
-          const ProcessLimits& limits, Check check) {
-  const std::string section = "/sources/" + output.what + ": ";
-  log_info(output.what + ": runs " + joined(command));
-  const auto begin = std::chrono::steady_clock::now();
+/// A program with what it needs to make one output.
+struct Job {
+  const SourceOutput& output;
+  const ProgramSettings& settings;
+  std::vector<std::string> command;  ///< filled in
+  fs::path out;                      ///< where it writes
+  const Observer& observer;
+
+  std::string section() const { return "/sources/" + output.what + ": "; }
+};
+
+/// A program failed in a way after which it may be run again.
+class Failed : public UserError {
+ public:
+  using UserError::UserError;
+};
+
+/// Runs the program once. @return  what it printed
+/// Throws Failed, or UserError where running it again would not help; Interrupted.
+std::string run_once(const Job& job) {
+  const bool on_any = job.settings.retry_on == RetryOn::kAny;
   std::optional<std::string> said;
   try {
-    said = run_process(command, limits);
-  } catch (const UserError& error) {
-    throw UserError(section + error.what());
+    said = run_process(job.command, {job.settings.timeout_s, job.observer.stop_requested});
+  } catch (const ProgramNotStartedError& error) {
+    throw UserError(job.section() + error.what());
+  } catch (const ProgramFailedError& error) {
+    const bool is_temporary = error.status() == kTryAgainStatus;
+    if (is_temporary || (on_any && error.status() != kAskedWronglyStatus)) throw Failed(job.section() + error.what());
+    throw UserError(job.section() + error.what());
+  } catch (const UserError& error) {  // its time is over, or a signal
+    if (on_any) throw Failed(job.section() + error.what());
+    throw UserError(job.section() + error.what());
   }
   if (!said)
-    throw Interrupted("interrupted while " + command.front() + " made the " + output.what + "; nothing is left of it");
-  if (!fs::exists(out))
-    throw UserError(section + command.front() + ": ended with status 0 and wrote nothing at {out}, " + out.string() +
-                    end_of_output(*said));
+    throw Interrupted("interrupted while " + job.command.front() + " made the " + job.output.what +
+                      "; nothing is left of it");
+  if (fs::exists(job.out)) return *said;
+  const std::string message = job.section() + job.command.front() +
+                              ": ended with status 0 and wrote nothing at {out}, " + job.out.string() +
+                              end_of_output(*said);
+  if (on_any) throw Failed(message);
+  throw UserError(message);
+}
+
+void wait_before_retry(const Job& job, double seconds) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::milliseconds kLook{50};
+  for (const Clock::time_point begin = Clock::now();
+       std::chrono::duration<double>(Clock::now() - begin).count() < seconds;) {
+    if (job.observer.wants_stop())
+      throw Interrupted("interrupted before " + job.command.front() + " was run again; nothing is left of the " +
+                        job.output.what);
+    std::this_thread::sleep_for(kLook);
+  }
+}
+
+/// Runs the program, again where that may help. @return  what it printed
+std::string run_program(const Job& job) {
+  double wait = job.settings.retry_wait_s;
+  for (int retry = 1;; ++retry, wait *= 2) {
+    try {
+      return run_once(job);
+    } catch (const Failed& failure) {
+      if (retry > job.settings.retries) {
+        throw UserError(retry == 1 ? failure.what()
+                                   : std::string(failure.what()) + "\nIt was run " + std::to_string(retry) + " times.");
+      }
+      log_warning(std::string(failure.what()) + "\nIt is run again in " + number_text(wait) + " s, " +
+                  std::to_string(retry) + " of " + std::to_string(job.settings.retries));
+    }
+    std::error_code ignored;
+    fs::remove_all(job.out, ignored);
+    wait_before_retry(job, wait);
+  }
+}
+
+/// Runs the program, looks at what it wrote, and gives that its name.
+template <class Check>
+void make(const Job& job, Check check) {
+  const SourceOutput& output = job.output;
+  const std::vector<std::string>& command = job.command;
+  const fs::path& out = job.out;
+  log_info(output.what + ": runs " + joined(command));
+  const auto begin = std::chrono::steady_clock::now();
+  const std::string said = run_program(job);
   const std::string fault = fault_of([&] { check(out); });
   if (!fault.empty()) {
     fs::path refused = output.path;
     refused.replace_filename(output.path.stem().string() + ".refused" + output.path.extension().string());
     put(out, refused);
-    throw DataError(section + command.front() + " wrote what cannot be used, kept as " + refused.string() + ": " +
-                    with_replaced(fault, out.string(), refused.string()) + end_of_output(*said));
+    throw DataError(job.section() + command.front() + " wrote what cannot be used, kept as " + refused.string() + ": " +
+                    with_replaced(fault, out.string(), refused.string()) + end_of_output(said));
   }
   // The record first: only with both is it there, and the program may cost something.
   write_text_file(record_file(output).string(), output.record);
@@ -258,10 +343,9 @@ void make_video(const RunConfig& config, const SourceOutput& output, const Obser
                  out = work.member("video" + ending_of(config.sources.video.output));
   const bool has_first_frame = uses_placeholder(output.command, "first_frame");
   if (has_first_frame) write_image(first.string(), first_frame_image(config));
-  make(output, out,
-       filled_in(output.command,
-                 {{"first_frame", first.string()}, {"prompt", config.sources.prompt}, {"out", out.string()}}),
-       {config.sources.video.timeout_s, observer.stop_requested},
+  const std::vector<std::string> command = filled_in(
+      output.command, {{"first_frame", first.string()}, {"prompt", config.sources.prompt}, {"out", out.string()}});
+  make(Job{output, config.sources.video, command, out, observer},
        [&config](const fs::path& made) { check_video(config, made); });
   if (has_first_frame) put(first, config.sources.folder / (output.path.stem().string() + ".first_frame.png"));
 }
@@ -281,14 +365,27 @@ void make_masks(const RunConfig& config, const DataSettings& data, const SourceO
   for (const std::string& name : masked_names(data)) names += (names.empty() ? "" : ",") + name;
   const fs::path first = work.member("first_masks");
   if (uses_placeholder(output.command, "first_masks")) write_first_masks(config, first);
-  make(output, out,
-       filled_in(output.command, {{"video", data.frames.string()},
-                                  {"first_masks", first.string()},
-                                  {"objects", names},
-                                  {"prompt", config.sources.prompt},
-                                  {"out", out.string()}}),
-       {config.sources.masks.timeout_s, observer.stop_requested},
+  const std::vector<std::string> command = filled_in(output.command, {{"video", data.frames.string()},
+                                                                      {"first_masks", first.string()},
+                                                                      {"objects", names},
+                                                                      {"prompt", config.sources.prompt},
+                                                                      {"out", out.string()}});
+  make(Job{output, config.sources.masks, command, out, observer},
        [&data](const fs::path& made) { check_masks(data, made); });
+}
+
+void make_motion(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
+                 const Observer& observer) {
+  const WorkFolder work(work_folder_of(output.path));
+  const fs::path out = work.member("motion.npz");
+  const std::vector<std::string> command =
+      filled_in(output.command, {{"video", data.frames.string()},
+                                 {"video_rate", number_text(frames_of(data).video_rate())},
+                                 {"camera", data.camera.string()},
+                                 {"prompt", config.sources.prompt},
+                                 {"out", out.string()}});
+  make(Job{output, config.sources.motion, command, out, observer},
+       [&data](const fs::path& made) { check_motion(data, made); });
 }
 
 /// Makes what is not there; by one process at a time, and the others have it then.
@@ -309,13 +406,23 @@ fs::path made(const Plan& plan, const Observer& observer, const Make& make_it) {
 std::vector<SourceOutput> planned_sources(const RunConfig& config) {
   std::vector<SourceOutput> outputs;
   DataSettings data = config.data;
+  bool has_video = true;
   if (!config.sources.video.command.empty()) {
     outputs.push_back(video_output(config));
-    if (!outputs.back().is_there) return outputs;
-    data.frames = outputs.back().path;
+    has_video = outputs.back().is_there;
+    take_output(outputs.back(), data);
   }
-  if (!config.sources.masks.command.empty()) outputs.push_back(mask_output(config, data));
+  const auto plan = [&](const std::string& what, const std::vector<std::string>& command, const auto& output) {
+    if (!command.empty())
+      outputs.push_back(has_video ? output(config, data) : SourceOutput{what, command, {}, "", false});
+  };
+  plan("masks", config.sources.masks.command, mask_output);
+  plan("motion", config.sources.motion.command, motion_output);
   return outputs;
+}
+
+void take_output(const SourceOutput& output, DataSettings& data) {
+  (output.what == "video" ? data.frames : output.what == "masks" ? data.masks : data.motion) = output.path;
 }
 
 DataSettings make_sources(const RunConfig& config, const Observer& observer) {
@@ -327,6 +434,10 @@ DataSettings make_sources(const RunConfig& config, const Observer& observer) {
   if (!config.sources.masks.command.empty()) {
     data.masks = made([&] { return mask_output(config, data); }, observer,
                       [&](const SourceOutput& masks) { make_masks(config, data, masks, observer); });
+  }
+  if (!config.sources.motion.command.empty()) {
+    data.motion = made([&] { return motion_output(config, data); }, observer,
+                       [&](const SourceOutput& motion) { make_motion(config, data, motion, observer); });
   }
   return data;
 }

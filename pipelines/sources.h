@@ -1,10 +1,13 @@
-// Video and masks that programs outside make, as config section `sources` says.
+// Video, masks and estimated motion that programs outside make, as config section `sources` says; docs/services.md is
+// what they are told.
 //
 //   FOLDER/video-KEY.mp4         what the video's program wrote, once it was found to be right
 //   FOLDER/video-KEY.mp4.json    what it was made of: command, prompt, inputs. KEY is the hash of this text
 //   FOLDER/video-KEY.first_frame.png
 //   FOLDER/masks-KEY/            likewise: human/, NAME/, or human.mp4, ...
 //   FOLDER/masks-KEY.json
+//   FOLDER/motion-KEY.npz        likewise
+//   FOLDER/motion-KEY.npz.json
 //
 // What is there, made of the same, is not made again.
 #pragma once
@@ -20,22 +23,25 @@ namespace hsi4d {
 
 /// One thing that a program makes.
 struct SourceOutput {
-  std::string what;                  ///< "video" or "masks"
+  std::string what;                  ///< "video", "masks" or "motion"
   std::vector<std::string> command;  ///< as in the config
-  std::filesystem::path path;        ///< where it is, or will be
+  std::filesystem::path path;        ///< where it is, or will be; empty: not known before the video is there
   std::string record;                ///< what it is made of, JSON
   bool is_there = false;             ///< made before, of the same
 };
 
-/// What the programs would make, in order; nothing is run. The masks are left out as long as the video that they are
-/// made of is not there.
+/// What the programs would make, in order; nothing is run.
 /// Throws UserError or DataError naming an input that is missing.
 std::vector<SourceOutput> planned_sources(const RunConfig& config);
 
-/// The inputs of a run, with the video and masks that programs make, made now where they are not there yet.
+/// Gives what a program made its place in the inputs of a run.
+void take_output(const SourceOutput& output, DataSettings& data);
+
+/// The inputs of a run, with the video, masks and motion that programs make, made now where they are not there yet.
 ///
 /// The program's output goes to a temporary folder, is looked at (frames and their sizes, masks of the human and of
-/// each object), and gets its name. What is not right is kept under another name, since it may have cost something.
+/// each object, poses of all frames), and gets its name. What is not right is kept under another name, since it may
+/// have cost something. A program that fails is run again as its settings say.
 ///
 /// Throws UserError naming the section, the program, and the end of what it printed: it cannot be run, fails, takes
 /// longer than timeout_s, writes nothing; DataError for what it writes; Interrupted when asked to stop, with nothing

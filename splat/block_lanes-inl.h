@@ -68,7 +68,7 @@ HWY_INLINE void keep_bits(M m, int part, std::uint16_t* to) {
 #endif
 
 /// 2ᵖ for p ≥ −126, 1 at 0, monotone, by a minimax polynomial of degree 5 of p − ⌊p⌋: it is off by 8e-8, with rounding
-/// by 1.8e-7 or 2.9 ulp at most. If exact, of degree 6, 2e-9, of what is left of p by rounding it: 1e-7, 1.2 ulp, and
+/// by 1.8e-7 or 3.1 ulp at most. If exact, of degree 6, 2e-9, of what is left of p by rounding it: 1e-7, 1.2 ulp, and
 /// near p = 0, where 1 − 2ᵖ matters, half an ulp; and 0 for p < −126.
 template <bool kExact>
 HWY_INLINE V exp2_of(V p) {

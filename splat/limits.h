@@ -18,8 +18,9 @@ inline constexpr double kAlphaMin = 1.0 / 255;
 inline constexpr double kAlphaMinAccurate = 1e-5;
 
 /// Compositing of a pixel ends when the transmittance falls below this (stability B4).
-inline constexpr double kTransmittanceStop = 1e-4;
-inline constexpr double kTransmittanceStopFast = 1e-3;
+inline constexpr double kTransmittanceStop = 1e-3;
+inline constexpr double kTransmittanceStopFast = 1e-2;
+inline constexpr double kTransmittanceStopCompatible = 1e-4;
 inline constexpr double kTransmittanceStopAccurate = 1e-7;
 
 /// No gradient flows through a normalised depth where Σ w is at or below this: 1/Σ w, on its way back through the

@@ -34,7 +34,7 @@ void apply_compatibility(RenderSettings& settings, Compatibility compatibility) 
   const bool inria = compatibility == Compatibility::kInria;
   settings.alpha_cap = kAlphaCapCompatible;
   settings.alpha_min = kAlphaMin;
-  settings.transmittance_stop = kTransmittanceStop;
+  settings.transmittance_stop = kTransmittanceStopCompatible;
   settings.stop_rule = StopRule::kExclusive;
   settings.stop_when = inria ? StopWhen::kBelow : StopWhen::kAtOrBelow;
   settings.cap_gradient = inria ? CapGradient::kPass : CapGradient::kZero;

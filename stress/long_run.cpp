@@ -189,7 +189,7 @@ std::span<const StressCase> long_run_cases() {
       StressCase{"L2", "moments that fade for thousands of steps become denormal", "denormals are flushed",
                  without_denormals},
       StressCase{"L3", "10,000 steps end elsewhere on other threads",
-                 "partitions that the number of threads does not change", on_any_threads},
+                 "partitions that the number of threads does not change", on_any_threads, "", true},
   };
   return kCases;
 }

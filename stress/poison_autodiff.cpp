@@ -118,6 +118,15 @@ struct Arrays {
     all.push_back(to_scalar(of_images<S>(1, 24, 16, [](V a, V b) { return l1(a, b); })));
     all.push_back(to_scalar(of_images<S>(1, 24, 16, [](V a, V b) { return l2(a, b); })));
     all.push_back(of_images<S>(1, 24, 16, [](V a, V b) { return weighted_image(a, b); }));
+    for (const Index height : {8, 24}) {  // as arrays, and as images with squares
+      const PoisonInput image{image_shape<S>(1, height, 16), {}, 0, 1};
+      const auto weighted = [&](auto f) {
+        all.push_back(
+            {{image, image, image}, [f](const Vars<S>& in) { return Vars<S>{f(in[0], in[1], in[2])}; }, {shared}});
+      };
+      weighted([](V a, V b, V w) { return l1(a, b, w); });
+      weighted([](V a, V b, V w) { return l2(a, b, w); });
+    }
     all.push_back(to_scalar(of_images<S>(1, 40, 16, [](V a, V b) { return d_ssim(a, b); })));
     all.back().reach = 10;  // two windows of 11
     all.push_back({{{{image_shape<S>(4, 8, 16)}, units_of(8), 0, 1}},

@@ -75,6 +75,9 @@ struct Skeletons {
                    [dense](const Vars<S>& in) { return Vars<S>{skin_points(dense, in[0], in[1])}; }});
     all.push_back(
         {{joints}, [sparse](const Vars<S>& in) { return Vars<S>{blend_transforms(sparse, in[0])}; }, {joint_of}});
+    all.push_back({{{shape_of(kJoints, 12), shared}},
+                   [dense](const Vars<S>& in) { return Vars<S>{blend_transforms(dense, in[0])}; },
+                   {shared}});
     all.push_back({{joints, points, {shape_of(kPoints, 9), joint_of}},
                    [sparse](const Vars<S>& in) {
                      const SkinnedFrames<S> skinned = skin_frames(sparse, in[0], in[1], in[2]);
@@ -139,6 +142,14 @@ struct BodyNets {
                    [vposer](const Vars<S>& in) { return Vars<S>{vposer_encode(vposer, in[0])}; }});
     std::vector<double> values(static_cast<std::size_t>(3 * kPoints * 9 * 2));
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = 0.01 * std::sin(static_cast<double>(i));
+    const Directions<S> shapes(DirectionSource{values, kPoints, 18, {0}, 18});
+    all.push_back({{{shape_of(1, 18), shared}},
+                   [shapes](const Vars<S>& in) {
+                     const std::array<BlendTerm<S>, 1> terms = {{{shapes, in[0]}}};
+                     static const std::vector<double> rest(static_cast<std::size_t>(3 * kPoints), 0.3);
+                     return Vars<S>{blend_shapes(rest, std::span<const BlendTerm<S>>(terms))};
+                   },
+                   {shared}});
     const PoseDirections<S> directions(values, kPoints, 1, 2, 0);
     all.push_back({{{shape_of(2, 9), shared}, {shape_of(kPoints, 3)}},
                    [directions](const Vars<S>& in) { return Vars<S>{pose_correctives(directions, in[0], in[1])}; }});

@@ -57,20 +57,14 @@ struct Unheard {
   double pixels = 0, objects = 0;
 };
 
-template <class S>
-double changed_by_pixels(Remedy remedy) {
-  TermOnTape<S> term(term_named("photometric"));
-  Tape<S>& tape = term.tape;
-  tape.freeze(term.made.inputs.weight);
-  const Array<S> weight = tape.write(term.made.inputs.weight);
-  for (Index r = 0; r < kLossHeight; ++r) std::fill_n(weight.row(r), 8, S(0));
-  const auto results = [&] {
-    term.run();
-    return remedy == Remedy::kOn ? term.results() : plainly_weighted(term);
-  };
+/// Poison in some images of a term at a pixel of plane 1 that does not count.
+///
+/// @param results  of the term
+template <class S, class F>
+double changed_at_pixel(Tape<S>& tape, const std::vector<Var<S>>& images, const F& results) {
   const std::vector<double> before = results();
   double changed = 0;
-  for (const Var<S> image : {term.made.inputs.rendered, term.made.inputs.target}) {
+  for (const Var<S> image : images) {
     for (const S poison : kPoison<S>) {
       const S good = std::exchange(tape.write(image)(1, 6, 3), poison);
       const std::vector<double> after = results();
@@ -79,6 +73,41 @@ double changed_by_pixels(Remedy remedy) {
     }
   }
   return changed;
+}
+
+template <class S>
+double changed_by_pixels(const char* name, Remedy remedy) {
+  TermOnTape<S> term(term_named(name));
+  const LossInputs<S>& in = term.made.inputs;
+  term.tape.freeze(in.weight);
+  const Array<S> weight = term.tape.write(in.weight);
+  for (Index r = 0; r < kLossHeight; ++r) std::fill_n(weight.row(r), 8, S(0));
+  return changed_at_pixel<S>(term.tape, {in.rendered, in.target}, [&] {
+    term.run();
+    return remedy == Remedy::kOn ? term.results() : plainly_weighted(term);
+  });
+}
+
+/// The second object's mask shows nothing of it.
+template <class S>
+double changed_by_masks(Remedy remedy) {
+  TermOnTape<S> term(term_named("mask"));
+  const LossInputs<S>& in = term.made.inputs;
+  term.tape.freeze(in.object_seen);
+  term.tape.write(in.object_seen)(1, 0, 0) = 0;
+  return changed_at_pixel<S>(term.tape, {in.object_opacity, in.object_masks}, [&]() -> std::vector<double> {
+    term.run();
+    if (remedy == Remedy::kOn) return term.results();
+    double sum = 0;
+    for (const Var<S> image : {in.object_opacity, in.object_masks}) {
+      const ConstArray<S> numbers = term.tape.value(image);
+      for (Index r = 0; r < kLossObjects * kLossHeight; ++r) {
+        const double seen = r < kLossHeight ? 1 : 0;
+        for (Index c = 0; c < kLossWidth; ++c) sum += seen * static_cast<double>(numbers.row(r)[c]);
+      }
+    }
+    return {sum};
+  });
 }
 
 /// The second object is not in the frame.
@@ -194,8 +223,12 @@ void try_term(const LossTerm& of, Remedy remedy, Steps& steps) {
 }  // namespace
 
 std::vector<StressFigure> poisoned_masks(Remedy remedy) {
-  return {{"results changed by pixels of weight 0",
-           changed_by_pixels<float>(remedy) + changed_by_pixels<double>(remedy), 0},
+  double pixels = 0;
+  for (const char* name : {"photometric", "masked_l2"})
+    pixels += changed_by_pixels<float>(name, remedy) + changed_by_pixels<double>(name, remedy);
+  return {{"results changed by pixels of weight 0", pixels, 0},
+          {"results changed by masks that show nothing",
+           changed_by_masks<float>(remedy) + changed_by_masks<double>(remedy), 0},
           {"results changed by an object out of sight",
            changed_by_objects<float>(remedy) + changed_by_objects<double>(remedy), 0}};
 }

@@ -162,17 +162,29 @@ void try_composite(Changes& changes) {
                 std::vector<double>(6 * kRows, 0), changes);
 }
 
+/// @param with_depth  and opacities of groups beside the image; a Gaussian 3e38 m away is drawn, and gradients by its
+///                    depth are beyond the largest number
 template <class S>
-void try_render(Changes& changes) {
+void try_render(bool with_depth, Changes& changes) {
   const SmallScene scene = small_scene(kRows, 32, 24, 81);
-  TapedScene<S> taped(scene);
+  RenderRequest request;
+  request.depth = with_depth;
+  if (with_depth) request.groups = {{0, kRows / 2}, {kRows / 4, kRows}};
+  TapedScene<S> taped(scene, request);
   Drawing<S> drawing{taped.tape, taped.leaves()};
-  drawing.look_at({taped.rendered.image, taped.rendered.transmittance});
+  const Rendered<S>& out = taped.rendered;
+  Vars<S> seen = {out.image, out.transmittance};
+  if (with_depth) seen.insert(seen.end(), {out.depth, out.group_opacity});
+  drawing.look_at(seen);
   std::vector<double> behind = scene.means;
   for (std::size_t i = 2; i < behind.size(); i += 3) behind[i] *= -1;
-  try_poison<S>(
-      drawing, {{taped.means}, {taped.quats}, {taped.log_scales, false}, {taped.logits, false}, {taped.sh, true, true}},
-      taped.means, behind, changes);
+  try_poison<S>(drawing,
+                {{taped.means, true, with_depth},
+                 {taped.quats},
+                 {taped.log_scales, false},
+                 {taped.logits, false},
+                 {taped.sh, true, true}},
+                taped.means, behind, changes);
 }
 
 /// Pixels of which a Gaussian is left out by a factor of 0 in place of a gate: Σ weight · valid · colour.
@@ -229,8 +241,10 @@ std::vector<StressFigure> poisoned_composite(Remedy remedy) {
 
 std::vector<StressFigure> poisoned_render(Remedy remedy) {
   return figures_of(remedy, [](Changes& changes) {
-    try_render<float>(changes);
-    try_render<double>(changes);
+    for (const bool with_depth : {false, true}) {
+      try_render<float>(with_depth, changes);
+      try_render<double>(with_depth, changes);
+    }
   });
 }
 

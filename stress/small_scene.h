@@ -97,7 +97,7 @@ struct TapedScene {
   Var<S> means, quats, log_scales, logits, sh, xi, background;
   Rendered<S> rendered;
 
-  explicit TapedScene(const SmallScene& scene) : view(view_of(scene)) {
+  explicit TapedScene(const SmallScene& scene, const RenderRequest& request = {}) : view(view_of(scene)) {
     const auto leaf = [&](const char* name, const std::vector<double>& numbers) {
       const Var<S> var = tape.parameter(name, shape_of(scene.count, std::ssize(numbers) / scene.count));
       set_numbers(tape, var, numbers);
@@ -113,7 +113,7 @@ struct TapedScene {
     set_numbers(tape, background, {0.2, 0.3, 0.4});
     rendered =
         render<S>({means, gaussian_axes(quats, log_scales), gaussian_opacities(logits), sh_colors(sh, means, xi, view)},
-                  xi, background, view);
+                  xi, background, view, request);
   }
 
   std::vector<Var<S>> leaves() const { return {means, quats, log_scales, logits, sh, xi, background}; }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <exception>
 
+#include "core/parallel.h"
 #include "core/stopwatch.h"
 
 namespace hsi4d {
@@ -40,15 +41,16 @@ std::vector<StressCase> stress_cases() {
 }
 
 std::vector<StressResult> run_stress(std::span<const StressCase> cases,
-                                     const std::function<void(const StressResult&)>& done) {
+                                     const std::function<void(const StressResult&)>& done, int threads) {
   std::vector<StressResult> results;
   for (const StressCase& row : cases) {
     const auto begin = std::chrono::steady_clock::now();
     StressResult result{&row, {}, {}, {}, {}, 0};
-    if (row.run != nullptr) {
+    const auto run = [&] {
       result.with = tried(row, Remedy::kOn, result.error);
       result.without = tried(row, Remedy::kOff, result.error_without);
-    }
+    };
+    if (row.run != nullptr) threads > 0 && !row.own_threads ? with_threads(threads, run) : run();
     result.seconds = seconds_since(begin);
     if (done) done(result);
     results.push_back(std::move(result));

@@ -33,7 +33,8 @@ struct StressCase {
   /// The figures, the same ones in the same order for both. Deterministic; seconds at most. What it throws counts as a
   /// figure that does not hold.
   std::vector<StressFigure> (*run)(Remedy);
-  const char* exempt = "";  ///< why this row cannot apply here; then `run` is null
+  const char* exempt = "";   ///< why this row cannot apply here; then `run` is null
+  bool own_threads = false;  ///< it compares numbers of threads, so it runs beside any limit
 };
 
 /// What became of a case.
@@ -54,9 +55,10 @@ struct StressResult {
 std::vector<StressCase> stress_cases();
 
 /// Runs cases in order.
-/// @param done  called after each of them; may be empty
+/// @param done     called after each of them; may be empty
+/// @param threads  at most so many for all but those which compare numbers of them; 0: one a core
 std::vector<StressResult> run_stress(std::span<const StressCase> cases,
-                                     const std::function<void(const StressResult&)>& done = {});
+                                     const std::function<void(const StressResult&)>& done = {}, int threads = 0);
 
 // --- the cases, by file
 // ------------------------------------------------------------------------------------------------

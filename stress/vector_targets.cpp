@@ -27,14 +27,20 @@ class HeldTargets {
   std::int64_t before_;
 };
 
+const char* name_of(std::int64_t target) {
+  if (target == HWY_AVX3) return isa_name(Isa::kAvx512);
+  if (target == HWY_AVX2) return isa_name(Isa::kAvx2);
+  return target == HWY_STATIC_TARGET ? isa_name(Isa::kBaseline) : hwy::TargetName(target);
+}
+
 }  // namespace
 
-Index on_every_vector_target(FunctionRef<void()> f) {
+Index on_every_vector_target(FunctionRef<void(const char*)> f) {
   const HeldTargets held;
   const auto targets = hwy::SupportedAndGeneratedTargets();
   for (const std::int64_t target : targets) {
     hold(target);
-    f();
+    f(name_of(target));
   }
   return static_cast<Index>(targets.size());
 }

@@ -5,7 +5,10 @@ add_test(NAME layering
 add_test(NAME test_names
   COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/test_names
                            -P ${CMAKE_CURRENT_SOURCE_DIR}/test_names_test.cmake)
-set_tests_properties(layering test_names PROPERTIES LABELS quick TIMEOUT 300)
+add_test(NAME gradient_audit
+  COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/gradient_audit
+                           -P ${CMAKE_CURRENT_SOURCE_DIR}/gradient_audit_test.cmake)
+set_tests_properties(layering test_names gradient_audit PROPERTIES LABELS quick TIMEOUT 300)
 
 if(NOT HSI4D_SANITIZE)  # sanitized libraries are not installed
   add_test(NAME install
@@ -35,19 +38,34 @@ if(HSI4D_PYTHON)
   add_test(NAME "exporters of VPoser, WHAM, GVHMR and TRAM"
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/exporters_test.py ${PROJECT_SOURCE_DIR}/tools
                    $<TARGET_FILE:hsi4d>)
-  set_tests_properties("exporters of VPoser, WHAM, GVHMR and TRAM" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+  add_test(NAME "services for video, masks and poses"
+           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
+  set_tests_properties("exporters of VPoser, WHAM, GVHMR and TRAM" "services for video, masks and poses"
+                       PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
 else()
-  message(STATUS "There is no python3: the exporters in tools/ are not tested")
+  message(STATUS "There is no python3: the exporters and services in tools/ are not tested")
 endif()
 
-# The report in a browser; it says so where playwright-core or Chromium is missing (tools/test_report installs them).
+# Sweeps on a cluster of Slurm on this machine: it says so where Slurm is missing (tools/slurm-local install installs it).
+if(HSI4D_PYTHON AND NOT HSI4D_SANITIZE)
+  add_test(NAME "sweeps by Slurm"
+           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/slurm_sweep_test.py ${PROJECT_SOURCE_DIR}/tools
+                   $<TARGET_FILE:hsi4d> ${PROJECT_SOURCE_DIR}/configs)
+  set_tests_properties("sweeps by Slurm" PROPERTIES LABELS full SKIP_RETURN_CODE 77 TIMEOUT 1500)
+endif()
+
+# The report and a study in a browser; they say so where playwright-core or Chromium is missing (tools/test_report installs them).
 find_program(HSI4D_NODE node)
 if(HSI4D_SANITIZE)  # the pages are the same, and the program takes longer to make one
 elseif(HSI4D_NODE)
   add_test(NAME "the report in a browser"
            COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/report_browser_test.mjs $<TARGET_FILE:hsi4d>
                    ${PROJECT_SOURCE_DIR}/build/report_browser/node_modules)
-  set_tests_properties("the report in a browser" PROPERTIES LABELS quick SKIP_RETURN_CODE 77 TIMEOUT 600)
+  add_test(NAME "a study in a browser"
+           COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/study_browser_test.mjs $<TARGET_FILE:hsi4d>
+                   ${PROJECT_SOURCE_DIR}/build/report_browser/node_modules)
+  set_tests_properties("the report in a browser" "a study in a browser"
+                       PROPERTIES LABELS quick SKIP_RETURN_CODE 77 TIMEOUT 600)
 else()
-  message(STATUS "There is no node: the report is not tested in a browser")
+  message(STATUS "There is no node: the report and a study are not tested in a browser")
 endif()

@@ -19,7 +19,7 @@ struct BenchParetoOptions {
   std::vector<std::string> overrides;                                   ///< of the config
   int seeds = 5;                                    ///< of the reconstructions; 0: these are left out
   std::filesystem::path out = "runs/bench/pareto";  ///< folder of their datasets
-  std::string json, csv, plot;                      ///< files; empty: none
+  std::string json, csv, plot, front;               ///< files; empty: none
 };
 
 /// Measures, and reconstructs with the presets and with what is on the front of avatar_in_scene, but for what takes

@@ -14,6 +14,7 @@
 #include "pipelines/run_config.h"
 #include "pipelines/run_problems.h"
 #include "pipelines/sequence_graph.h"
+#include "pipelines/sweep_plan.h"
 #include "pipelines/synthetic_motion.h"
 #include "pipelines/synthetic_places.h"
 
@@ -112,12 +113,24 @@ std::string list_scenes(const std::vector<LossDescription>& losses) {
   return table(rows) + "\n" + table(found);
 }
 
+/// A sweep has no settings of its own to override, and many configs.
+std::string check_sweep(const std::filesystem::path& file, const std::vector<std::string>& overrides, bool print_config,
+                        const std::vector<LossDescription>& losses) {
+  const std::string name = file.generic_string();
+  if (!overrides.empty() || print_config)
+    throw UserError(name + ": is a sweep, which --set and --print-config are not for; hsi4d sweep " + name +
+                    " --dry-run prints its runs");
+  const SweepPlan plan = plan_sweep(file, losses);
+  return name + ": OK, a sweep of " + count_text(std::ssize(distinct_runs(plan)), "run") + "\n";
+}
+
 }  // namespace
 
 std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           bool print_config, const std::vector<LossDescription>& losses) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(config, overrides, problems);
+  if (config_kind(tree) == ConfigKind::kSweep) return check_sweep(config, overrides, print_config, losses);
   if (config_kind(tree) == ConfigKind::kAvatarFit) {
     const AvatarFitSettings fit = read_avatar_fit(tree, config, losses, problems, false);
     return print_config ? resolved_avatar_fit(fit, losses) : fit_summary(config, fit);

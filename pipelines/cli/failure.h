@@ -8,7 +8,7 @@ namespace hsi4d::cli {
 
 /// Exit statuses, which other programs rely on.
 inline constexpr int kDone = 0;
-inline constexpr int kRowsFailed = 1;  ///< of `hsi4d stress`
+inline constexpr int kRowsFailed = 1;  ///< of `hsi4d stress`, or bounds broken of its functions
 inline constexpr int kUserMistake = 2;
 inline constexpr int kOurBug = 3;
 inline constexpr int kInterrupted = 130;

@@ -7,11 +7,14 @@ namespace hsi4d::cli {
 namespace {
 
 volatile std::sig_atomic_t interrupt_requested = 0;
+volatile std::sig_atomic_t time_is_up = 0;
 
 extern "C" void note_interrupt(int signal) {
   interrupt_requested = 1;
   std::signal(signal, SIG_DFL);  // the next one is not asked twice
 }
+
+extern "C" void note_time_limit(int) { time_is_up = 1; }
 
 /// A signal that whoever started the program wants ignored (a job of a script's in the background, nohup) stays so.
 void watch(int signal) {
@@ -36,5 +39,14 @@ InterruptWatch::~InterruptWatch() {
 }
 
 bool InterruptWatch::requested() { return interrupt_requested != 0; }
+
+TimeLimitWatch::TimeLimitWatch() {
+  time_is_up = 0;
+  std::signal(SIGUSR1, note_time_limit);
+}
+
+TimeLimitWatch::~TimeLimitWatch() { std::signal(SIGUSR1, SIG_DFL); }
+
+bool TimeLimitWatch::requested() { return time_is_up != 0; }
 
 }  // namespace hsi4d::cli

@@ -16,4 +16,17 @@ class InterruptWatch {
   static bool requested();
 };
 
+/// While it lives, SIGUSR1 is noted instead of ending the program: Slurm sends it before a job's time is over. One at a
+/// time.
+class TimeLimitWatch {
+ public:
+  TimeLimitWatch();
+  ~TimeLimitWatch();
+  TimeLimitWatch(const TimeLimitWatch&) = delete;
+  TimeLimitWatch& operator=(const TimeLimitWatch&) = delete;
+
+  /// True once the signal has come.
+  static bool requested();
+};
+
 }  // namespace hsi4d::cli

@@ -36,6 +36,8 @@
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/select_camera_command.h"
 #include "pipelines/cli/stress_command.h"
+#include "pipelines/cli/study_command.h"
+#include "pipelines/cli/sweep_command.h"
 #include "pipelines/cli/synth_command.h"
 
 namespace hsi4d::cli {
@@ -89,6 +91,9 @@ struct CommandLine {
   BenchParetoOptions bench_pareto;
   SelectCameraOptions select_camera;
   EvaluateOptions evaluate;
+  StudyOptions study;
+  SweepArguments sweep;
+  RunOneArguments run_one;
   std::function<std::string()> run;
   int status = kDone;  ///< that `run` leaves
 
@@ -103,6 +108,9 @@ struct CommandLine {
     add_select_camera();
     add_evaluate();
     add_report();
+    add_study();
+    add_sweep(terms);
+    add_run_one(terms);
     add_render();
     add_gradients();
     add_avatar(terms);
@@ -200,9 +208,79 @@ struct CommandLine {
   }
 
   void add_report() {
-    CLI::App* report = app.add_subcommand("report", "Write report.html of runs, and print their errors");
-    report->add_option("RUN", runs, "Folders of runs")->required();
+    CLI::App* report = app.add_subcommand("report", "Write report.html of runs and sweeps, and print their errors");
+    report->add_option("RUN", runs, "Folders of runs or sweeps")->required();
     report->callback([this] { run = [this] { return report_command(runs); }; });
+  }
+
+  void add_study() {
+    StudyOptions& o = study;
+    CLI::App* command =
+        app.add_subcommand("study", "Make a page on which people choose between videos, or tell what they chose");
+    command->add_option("RUNS", o.runs, "A and B: two folders of runs, or of folders of runs with the same names")
+        ->expected(0, 2)
+        ->option_text("A B");
+    command->add_option("--out", o.out, "Where the page goes: a new or empty folder; the key goes beside it")
+        ->type_name("DIR");
+    command
+        ->add_option("--texts", o.texts,
+                     "What happens in the videos, {\"NAME\": \"text\"}; default: sources.prompt of the runs' configs")
+        ->type_name("F.json");
+    command->add_option("--pairs", o.pairs, "Pairs that a person is shown")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1000));
+    command->add_option("--seed", o.seed, "Seed of the names of videos and pairs")
+        ->capture_default_str()
+        ->check(WholeNumber())
+        ->type_name("N");
+    command->add_flag("--embed", o.embed, "One file: the videos are in the page");
+    command->add_flag("--quiet", o.quiet, "No progress on stderr");
+    command
+        ->add_option("--answers", o.answers, "Files that people saved, or folders of them; A and B are then left out")
+        ->type_name("F.json");
+    command->add_option("--key", o.key, "Of answers: the study's key")->type_name("F.json");
+    command->add_option("--csv", o.csv, "Of answers: file for them, a line each")->type_name("F");
+    command->add_option("--json", o.json, "Of answers: file for all numbers")->type_name("F");
+    command->callback([this] { run = [this] { return study_command(study); }; });
+  }
+
+  void add_sweep(const std::vector<LossTerm>& terms) {
+    SweepArguments& a = sweep;
+    CLI::App* command = app.add_subcommand("sweep", "Many runs from one file: ablations, grids, clips, seeds");
+    command->add_option("SWEEP", a.sweep, "The sweep's file, or the folder of one that is to go on")->required();
+    command->add_option("--out", a.out, "The sweep's folder; default: runs/NAME with the sweep's name")
+        ->type_name("DIR");
+    command->add_option("--launcher", a.launcher, "local: processes here; slurm: a job array")
+        ->type_name("local|slurm")
+        ->capture_default_str();
+    command->add_option("--jobs", a.jobs, "The most runs at once; default: as many as there are threads for")
+        ->check(WholeNumber(std::numeric_limits<int>::max()))
+        ->type_name("N");
+    add_threads(*command, a.threads);
+    command->add_option("--memory", a.memory_mb, "Memory for all runs together, MB; default: 90 % of what is free")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("MB");
+    command->add_flag("--fail-fast", a.fail_fast,
+                      "Stop at the first run that fails, the others with their state saved");
+    command->add_flag("--resume", a.resume, "Go on with the sweep in the folder; runs that are done stay");
+    command->add_flag("--dry-run", a.dry_run, "Check every combination, print the table of runs, write nothing");
+    command->callback([this, &terms] { run = [this, &terms] { return sweep_command(sweep, terms, status); }; });
+  }
+
+  void add_run_one(const std::vector<LossTerm>& terms) {
+    RunOneArguments& a = run_one;
+    CLI::App* command = app.add_subcommand("run-one", "One run of a sweep, by its index in the table of --dry-run");
+    command->add_option("SWEEP", a.sweep, "The sweep's file, or its folder")->required();
+    command->add_option("INDEX", a.index, "From 0")->check(WholeNumber())->required();
+    command->add_option("--out", a.out, "The sweep's folder; default: runs/NAME with the sweep's name")
+        ->type_name("DIR");
+    add_threads(*command, a.threads);
+    command->add_option("--parent", a.parent, "End, with the state saved, when this process does")
+        ->check(WholeNumber(std::numeric_limits<int>::max()))
+        ->type_name("PROCESS");
+    command->add_flag("--requeue", a.requeue,
+                      "On SIGUSR1 save the state and put this job of Slurm into the queue again");
+    command->callback([this, &terms] { run = [this, &terms] { return run_one_command(run_one, terms); }; });
   }
 
   void add_info() {
@@ -300,6 +378,12 @@ struct CommandLine {
         ->type_name("ID");
     add_threads(*command, stress.threads);
     command->add_option("--json", stress.json, "File for the figures, one JSON object a row")->type_name("F");
+    command->add_flag("--functions", stress.functions,
+                      "Instead: how far off exponentials, sigmoid, sines, rotations and harmonics are, in units in "
+                      "the last place, on each instruction set");
+    command->add_option("--points", stress.points, "Of --functions: arguments a row, 1000 or more")
+        ->check(CLI::Range(Index(1000), Index(1) << 30))
+        ->type_name("N");
     command->footer("Exit status: 1 when a row fails, or holds without its remedy too.");
     command->callback([this] {
       run = [this] {
@@ -354,6 +438,8 @@ struct CommandLine {
   void add_bench_pareto(CLI::App& command) {
     BenchParetoOptions& o = bench_pareto;
     command.add_option("--csv", o.csv, "Of pareto: file for the measurements, a line each")->type_name("F.csv");
+    command.add_option("--front", o.front, "Of pareto: file for a picture of what settings are chosen by, two panels")
+        ->type_name("F.svg");
     command
         .add_option(
             "--scene", o.scene_file,

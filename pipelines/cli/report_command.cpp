@@ -6,12 +6,17 @@
 #include "pipelines/report_data.h"
 #include "pipelines/report_page.h"
 #include "pipelines/run_folder.h"
+#include "pipelines/sweep_report.h"
 
 namespace hsi4d::cli {
 
 std::string report_command(const std::vector<std::string>& runs) {
   std::string text;
   for (const std::string& run : runs) {
+    if (is_sweep_folder(run)) {
+      text += (text.empty() ? "" : "\n") + write_sweep_results({run});
+      continue;
+    }
     if (is_chain_folder(run)) {
       text += (text.empty() ? "" : "\n") + write_chain_report(run) + "\n";
       continue;

@@ -61,13 +61,13 @@ std::string stages_text(const RunConfig& config) {
 /// Takes over into `config.data` what programs outside have made already.
 /// @return  what they would be run for; empty: nothing is left to make
 std::string sources_plan(RunConfig& config) {
-  std::string text, masks = config.sources.masks.command.empty() ? "" : "masks";
+  std::string text;
   for (const SourceOutput& output : planned_sources(config)) {
-    if (output.what == "masks") masks.clear();
-    (output.what == "video" ? config.data.frames : config.data.masks) = output.path;
-    if (!output.is_there) text += "  would run " + joined(output.command) + "\n    for " + output.path.string() + "\n";
+    take_output(output, config.data);
+    if (output.is_there) continue;
+    text += output.path.empty() ? "  would then run " + joined(output.command) + "\n"
+                                : "  would run " + joined(output.command) + "\n    for " + output.path.string() + "\n";
   }
-  if (!masks.empty()) text += "  would then run " + joined(config.sources.masks.command) + "\n";
   return text;
 }
 

@@ -10,9 +10,9 @@
 #include "core/file.h"
 #include "core/formatted.h"
 #include "core/log.h"
-#include "core/parallel.h"
 #include "core/text.h"
 #include "pipelines/cli/failure.h"
+#include "stress/functions.h"
 #include "stress/stress.h"
 
 namespace hsi4d::cli {
@@ -84,27 +84,62 @@ nlohmann::ordered_json json_of(const StressResult& result) {
   return line;
 }
 
+// --- functions -------------------------------------------------------------------------------------------------------
+
+const char* unit_name(ErrorUnit unit) { return unit == ErrorUnit::kUlp ? "ulp" : "ulp of largest"; }
+
+nlohmann::ordered_json json_of(const FunctionErrors& row) {
+  return {
+      {"function", row.function}, {"precision", row.precision}, {"argument", row.argument},    {"from", row.low},
+      {"to", row.high},           {"instruction_set", row.isa}, {"unit", unit_name(row.unit)}, {"points", row.tried},
+      {"largest", row.worst},     {"mean", row.mean},           {"largest_at", row.worst_at},  {"bound", row.bound},
+      {"holds", row.holds()}};
+}
+
+StressOutcome function_table(const StressOptions& options) {
+  if (!options.rows.empty()) throw UserError("--functions is a table of its own: --row says nothing to it");
+  StressOutcome outcome;
+  std::string json;
+  Index failed = 0;
+  const std::vector<FunctionErrors> table = function_errors(options.points);
+  outcome.text = formatted("%-34s %-6s %-22s %-8s %8s %8s %8s %13s %6s\n", "function", "", "range", "set", "points",
+                           "largest", "mean", "at", "bound");
+  for (const FunctionErrors& row : table) {
+    const std::string range = row.argument + formatted(" in [%.5g, %.5g]", row.low, row.high);
+    outcome.text +=
+        formatted("%-34s %-6s %-22s %-8s %8lld %8.2f %8.3f %13.6g %6.3g %s%s\n", row.function.c_str(),
+                  row.precision.c_str(), range.c_str(), row.isa.c_str(), static_cast<long long>(row.tried), row.worst,
+                  row.mean, row.worst_at, row.bound, unit_name(row.unit), row.holds() ? "" : "  FAILED");
+    json += json_of(row).dump() + "\n";
+    failed += row.holds() ? 0 : 1;
+  }
+  if (!options.json.empty()) write_text_file(options.json, json);
+  outcome.text += formatted("%lld rows tried, %lld within their bounds\n", static_cast<long long>(std::ssize(table)),
+                            static_cast<long long>(std::ssize(table) - failed));
+  if (failed > 0) outcome.status = kRowsFailed;
+  return outcome;
+}
+
 }  // namespace
 
 StressOutcome stress_command(const StressOptions& options) {
+  if (options.functions) return function_table(options);
   const std::vector<StressCase> cases = asked_cases(options.rows);
   std::string json;
   StressOutcome outcome;
   Index exempt = 0;
   std::vector<std::string> failed;
-  const auto run = [&] {
-    run_stress(cases, [&](const StressResult& result) {
-      outcome.text += lines_of(result);
-      json += json_of(result).dump() + "\n";
-      if (result.row->run == nullptr) {
-        ++exempt;
-      } else if (!result.passed()) {
-        failed.push_back(result.row->id);
-        log_warning(std::string("row ") + result.row->id + ": " + verdict(result));
-      }
-    });
+  const auto tell = [&](const StressResult& result) {
+    outcome.text += lines_of(result);
+    json += json_of(result).dump() + "\n";
+    if (result.row->run == nullptr) {
+      ++exempt;
+    } else if (!result.passed()) {
+      failed.push_back(result.row->id);
+      log_warning(std::string("row ") + result.row->id + ": " + verdict(result));
+    }
   };
-  options.threads.value_or(0) > 0 ? with_threads(*options.threads, run) : run();
+  run_stress(cases, tell, options.threads.value_or(0));
   if (!options.json.empty()) write_text_file(options.json, json);
   const Index tried = std::ssize(cases) - exempt;
   outcome.text +=

@@ -1,9 +1,11 @@
-// `hsi4d stress`: every known way to fail, tried.
+// `hsi4d stress`: every known way to fail, tried; or the errors of the functions that all else is made of.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "core/types.h"
 
 namespace hsi4d::cli {
 
@@ -11,6 +13,8 @@ struct StressOptions {
   std::vector<std::string> rows;  ///< ids, or letters of groups; empty: all
   std::optional<int> threads;     ///< none or 0: one a core
   std::string json;               ///< path for one JSON object a row; empty: none
+  bool functions = false;         ///< the table of stress/functions.h instead
+  Index points = 100'000;         ///< arguments a row of it
 };
 
 /// What the command prints, and what it exits with.
@@ -19,7 +23,7 @@ struct StressOutcome {
   int status = 0;    ///< kRowsFailed when a row failed
 };
 
-/// Runs the rows. Throws UserError for one that is not known.
+/// Runs the rows. Throws UserError for one that is not known, and for rows beside `functions`.
 StressOutcome stress_command(const StressOptions& options);
 
 }  // namespace hsi4d::cli

@@ -1,6 +1,7 @@
 #include "autodiff/difference.h"
 
 #include <cmath>
+#include <limits>
 
 #include "autodiff/complex_step.h"
 #include "tests/support/operator_check.h"
@@ -37,6 +38,24 @@ TEST_CASE("difference measures pass the operator checks", "[parallel]") {
                  {.tolerance = 1e-5});
 }
 
+TEST_CASE("differences of images with squares pass the operator checks", "[parallel]") {
+  const OperatorCheck few{.entries = 24};
+  const Shape image = image_shape<double>(3, 18, 35), weight = image_shape<double>(1, 18, 35);
+  const std::vector<OperatorInput> images = {{"a", image}, {"b", image}};
+  const std::vector<OperatorInput> masked = {{"a", image}, {"b", image}, {"weight", weight, 0, 1}};
+  const std::vector<OperatorInput> weighted = {{"a", image}, {"b", image}, {"weight", image, 0, 1}};
+  check_operator(
+      "l1", images, [](const auto& in) { return l1(in[0], in[1]); }, few);
+  check_operator(
+      "l2", images, [](const auto& in) { return l2(in[0], in[1]); }, few);
+  for (const auto& inputs : {masked, weighted}) {
+    check_operator(
+        "masked l1", inputs, [](const auto& in) { return l1(in[0], in[1], in[2]); }, few);
+    check_operator(
+        "masked l2", inputs, [](const auto& in) { return l2(in[0], in[1], in[2]); }, few);
+  }
+}
+
 TEST_CASE("difference measures have their textbook values") {
   CHECK(value(3, 1.5, [](auto a, auto b) { return l1(a, b); }) == 1.5);
   CHECK(value(3, 1.5, [](auto a, auto b) { return l2(a, b); }) == 2.25);
@@ -58,6 +77,50 @@ TEST_CASE("the mean is over all elements, also those that the mask leaves out") 
   const auto d = l2(a, b, mask);
   tape.forward(d);
   CHECK(tape.value(d).scalar() == Approx(4.0 * 3 / (3 * 5 * 7)).epsilon(1e-15));
+}
+
+namespace {
+
+/// l1 or l2 of images of which one pixel has weight 0 and holds `poison`: the value, and the gradients of both images.
+template <class S>
+std::vector<S> with_unread(Index height, bool squared, S poison) {
+  Tape<S> tape;
+  const Shape image = image_shape<S>(2, height, 20);
+  const Var<S> a = tape.parameter("a", image), b = tape.parameter("b", image),
+               weight = tape.parameter("weight", image_shape<S>(1, height, 20));
+  tape.freeze(weight);
+  for (const Var<S> var : {a, b, weight}) {
+    const Array<S> x = tape.write(var);
+    for (Index r = 0; r < x.total_rows(); ++r) {
+      for (Index c = 0; c < x.shape.cols; ++c)
+        x.row(r)[c] = static_cast<S>(std::sin(0.7 * static_cast<double>(r * 20 + c)));
+    }
+  }
+  tape.write(weight)(2, 3) = 0;
+  tape.write(b)(1, 2, 3) = poison;
+  const Var<S> mean = squared ? l2(a, b, weight) : l1(a, b, weight);
+  tape.forward(mean);
+  tape.backward(mean);
+  std::vector<S> all = {tape.value(mean).scalar()};
+  for (const Var<S> var : {a, b}) {
+    const ConstArray<S> d = tape.gradient(var);
+    for (Index r = 0; r < d.total_rows(); ++r) all.insert(all.end(), d.row(r), d.row(r) + d.shape.cols);
+  }
+  return all;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("a pixel of weight 0 is not looked at, whatever is there", "", float, double) {
+  using Limits = std::numeric_limits<TestType>;
+  for (const Index height : {5, 18}) {  // as arrays, and as images with squares
+    for (const bool squared : {false, true}) {
+      const std::vector<TestType> clean = with_unread<TestType>(height, squared, TestType(0.25));
+      CHECK(std::all_of(clean.begin(), clean.end(), [](TestType x) { return std::isfinite(x); }));
+      for (const TestType poison : {Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(), Limits::max()})
+        CHECK(with_unread<TestType>(height, squared, poison) == clean);
+    }
+  }
 }
 
 TEST_CASE("dual numbers agree with complex step on the same lambda") {

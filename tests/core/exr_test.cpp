@@ -1,5 +1,6 @@
 #include "core/exr.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <ImfChannelList.h>
@@ -205,6 +206,32 @@ TEST_CASE("subsampled, deep and multi-part files are refused by what they are") 
     file.writePixels(8);
   }
   CHECK_THROWS_WITH(read_layers(folder / "deep.exr"), Contains("holds deep data, which is not read"));
+}
+
+TEST_CASE("an attribute of a layer file has the length of its type") {
+  const Bytes file = encode_layers("v.exr", view_layers(4, 4));
+  const auto with_size = [&](const std::string& type, uint8_t size) {
+    Bytes other = file;
+    const std::string wanted = type + '\0';
+    const auto at = std::search(other.begin(), other.end(), wanted.begin(), wanted.end());
+    REQUIRE(at != other.end());
+    at[static_cast<std::ptrdiff_t>(wanted.size())] = size;
+    return other;
+  };
+  CHECK_THROWS_WITH(decode_layers(with_size("box2i", 15), "v.exr"),
+                    "v.exr: its attribute \"dataWindow\" has 15 bytes, which is not the length of a box2i");
+  CHECK_THROWS_WITH(decode_layers(with_size("chlist", 1), "v.exr"),
+                    "v.exr: its attribute \"channels\" has 1 bytes, which is not the length of a chlist");
+}
+
+TEST_CASE("a layer file that claims more pixels than it can hold is refused before memory is taken") {
+  Bytes file = encode_layers("v.exr", view_layers(4, 4));
+  const std::string window = std::string("dataWindow\0box2i\0", 17);
+  const auto at = std::search(file.begin(), file.end(), window.begin(), window.end());
+  REQUIRE(at != file.end());
+  const auto right = at + static_cast<std::ptrdiff_t>(window.size()) + 4 + 8;
+  right[1] = right[5] = 0x20;  // 8192 and more to each side
+  CHECK_THROWS_WITH(decode_layers(file, "v.exr"), Contains("v.exr: its header claims 8196 x 8196 pixels, more than "));
 }
 
 TEST_CASE("a damaged layer file is an error with a reason") {

@@ -38,6 +38,24 @@ TEST_CASE("a program that fails is told with its status and what it printed") {
       Message("hsi4d-no-such-program: cannot be run: No such file or directory; is it installed, and in PATH?"));
 }
 
+TEST_CASE("the status of a program that fails is known as a number and a signal is none") {
+  int status = -1;
+  try {
+    run_process({"sh", "-c", "exit 75"});
+  } catch (const ProgramFailedError& error) {
+    status = error.status();
+  }
+  CHECK(status == 75);
+  bool is_status = false;
+  try {
+    run_process({"sh", "-c", "kill -9 $$"});
+  } catch (const ProgramFailedError&) {
+    is_status = true;
+  } catch (const UserError&) {
+  }
+  CHECK_FALSE(is_status);
+}
+
 TEST_CASE("a program that stops reading is no signal to us") {
   ChildProcess child({"sh", "-c", "echo enough; exit 4"});
   const std::vector<uint8_t> part(1000000, 'x');

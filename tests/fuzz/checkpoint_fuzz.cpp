@@ -1,7 +1,7 @@
 #include <limits>
 
 #include "optim/checkpoint.h"
-#include "tests/fuzz/fuzz.h"
+#include "tests/fuzz/archive_list.h"
 
 namespace hsi4d::fuzz {
 
@@ -17,12 +17,12 @@ std::vector<Bytes> corpus() {
   full.set("frame", std::vector<std::int64_t>{7});
   full.set("stage", std::string("interaction"));
   store_moments({{"color_net", {3, {{{1, 2}, {3, 4}}, {{5}, {6}}}}}}, "adam", full);
-  return {small.encode(kHash), full.encode(kHash)};
+  return {list_of(small.encode(kHash)), list_of(full.encode(kHash)), full.encode(kHash)};
 }
 
 bool accepts(std::span<const uint8_t> file) {
   return is_read([&] {
-    const Checkpoint checkpoint = decode_checkpoint(file, "fuzz.npz", kHash);
+    const Checkpoint checkpoint = decode_checkpoint(archive_of(file), "fuzz.npz", kHash);
     for (const std::string& name : checkpoint.names()) is_read([&] { checkpoint.doubles(name); });
     is_read([&] { stored_moments(checkpoint, "adam"); });
   });

@@ -1,16 +1,18 @@
-// Runs a fuzz target as an ordinary test: NAME [MUTATIONS [SEED [trace]]], or writes the corpus for libFuzzer:
-// NAME corpus FOLDER.
-// Every corpus file as it is, cut at every length and with every byte flipped, then random mutations.
-// "trace" prints each step before it is run, to find one that crashes.
+// Runs a fuzz target as an ordinary test: NAME [MUTATIONS [SEED [trace]]].
+// The files of regressions/NAME, which once were findings; every corpus file as it is, cut at every length and with
+// every byte flipped (of large ones at a thousand places); then random mutations. "trace" prints each step before it is
+// run, to find one that crashes. NAME try FILE... runs files of yours.
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <iterator>
 #include <string>
 #include <string_view>
 
+#include "tests/fuzz/allocations.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace hsi4d::fuzz {
@@ -32,6 +34,13 @@ class Random {
   uint64_t state_;
 };
 
+/// An allocation of more bytes is a finding: no file here is as large, nor unpacks to as much, and OpenImageIO takes 64
+/// MiB at once for any image of the kinds that are its own.
+constexpr std::size_t kLargestAllocation = std::size_t{96} << 20;
+
+/// Places of a corpus file at which it is cut and flipped: all of a small one, evenly chosen ones of a larger one.
+constexpr size_t kMostPlaces = 1000;
+
 struct Tally {
   int64_t taken = 0;
   int64_t refused = 0;
@@ -47,22 +56,43 @@ class Driver {
       std::fflush(stdout);
     }
     try {
+      forget_allocations();
       const bool taken = accepts(file);
+      if (largest_allocation() > kLargestAllocation)
+        found(file, "takes " + std::to_string(largest_allocation()) + " bytes at once");
       ++(taken ? tally_.taken : tally_.refused);
       return taken;
     } catch (const std::exception& error) {
-      std::printf("step %lld: an error of another kind: %s\n", static_cast<long long>(tally_.taken + tally_.refused),
-                  error.what());
-      write_file("fuzz_finding.bin", file);
-      std::exit(1);
+      found(file, std::string("an error of another kind: ") + error.what());
     }
   }
   const Tally& tally() const { return tally_; }
 
  private:
+  [[noreturn]] void found(const Bytes& file, const std::string& what) const {
+    std::printf("step %lld: %s; the file is fuzz_finding.bin\n", static_cast<long long>(tally_.taken + tally_.refused),
+                what.c_str());
+    write_file("fuzz_finding.bin", file);
+    std::exit(1);
+  }
+
   bool trace_;
   Tally tally_;
 };
+
+/// The files that once were findings; their names are printed first, so that one that crashes is known.
+void run_regressions(Driver& driver, const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> paths;
+  if (std::filesystem::is_directory(folder)) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) paths.push_back(entry.path());
+  }
+  std::sort(paths.begin(), paths.end());
+  for (const std::filesystem::path& path : paths) {
+    std::printf("%s\n", path.filename().c_str());
+    std::fflush(stdout);
+    driver.run(read_file(path.string()));
+  }
+}
 
 void mutate_once(Bytes& file, const std::vector<Bytes>& files, Random& random) {
   static constexpr uint64_t kTelling[] = {0, 1, 0x7f, 0x80, 0xff, 0x7fff, 0xffff, 0x7fffffff, 0xffffffff, ~uint64_t{0}};
@@ -106,14 +136,17 @@ void mutate_once(Bytes& file, const std::vector<Bytes>& files, Random& random) {
 int run_all(int64_t mutations, uint64_t seed, bool trace) {
   const std::vector<Bytes> files = corpus();
   Driver driver(trace);
+  run_regressions(driver, HSI4D_FUZZ_REGRESSIONS);
   for (size_t i = 0; i < files.size(); ++i) {
     if (driver.run(files[i])) continue;
     std::printf("corpus file %zu is refused\n", i);
     return 1;
   }
   for (const Bytes& file : files) {
-    for (size_t length = 0; length < file.size(); ++length) driver.run(Bytes(file.begin(), file.begin() + length));
-    for (size_t at = 0; at < file.size(); ++at) {
+    const size_t step = file.size() / kMostPlaces + 1;
+    for (size_t length = 0; length < file.size(); length += step)
+      driver.run(Bytes(file.begin(), file.begin() + length));
+    for (size_t at = 0; at < file.size(); at += step) {
       Bytes flipped = file;
       flipped[at] ^= 0xff;
       driver.run(flipped);
@@ -130,9 +163,10 @@ int run_all(int64_t mutations, uint64_t seed, bool trace) {
   return 0;
 }
 
-int write_corpus(const std::string& folder) {
-  int number = 0;
-  for (const Bytes& file : corpus()) write_file(folder + "/corpus" + std::to_string(number++), file);
+int run_files(int count, char** paths) {
+  Driver driver(false);
+  for (int i = 0; i < count; ++i)
+    std::printf("%s: %s\n", paths[i], driver.run(read_file(paths[i])) ? "taken" : "refused");
   return 0;
 }
 
@@ -153,7 +187,7 @@ T number_or(int argc, char** argv, int i, T otherwise) {
 }  // namespace hsi4d::fuzz
 
 int main(int argc, char** argv) {
-  if (argc == 3 && std::string_view(argv[1]) == "corpus") return hsi4d::fuzz::write_corpus(argv[2]);
+  if (argc > 2 && std::string_view(argv[1]) == "try") return hsi4d::fuzz::run_files(argc - 2, argv + 2);
   const int64_t mutations = hsi4d::fuzz::number_or<int64_t>(argc, argv, 1, 2000);
   const uint64_t seed = hsi4d::fuzz::number_or<uint64_t>(argc, argv, 2, 1);
   return hsi4d::fuzz::run_all(mutations, seed, argc > 3 && std::string_view(argv[3]) == "trace");

@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/file.h"
 
+extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv);
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 namespace hsi4d::fuzz {

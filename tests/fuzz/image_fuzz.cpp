@@ -50,7 +50,7 @@ std::vector<Bytes> corpus() {
 }
 
 bool accepts(std::span<const uint8_t> file) {
-  const ImageLimits limits{.max_side = 256, .max_bytes = int64_t{4} << 20};
+  const ImageLimits limits{.max_bytes = int64_t{32} << 20};  // what takes long to clear is no finding
   if (is_png(file)) is_read([&] { decode_image(repaired_png(file), "fuzz", limits); });
   return is_read([&] { decode_image(file, "fuzz", limits); });
 }

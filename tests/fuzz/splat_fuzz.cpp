@@ -20,8 +20,8 @@ std::vector<Bytes> corpus() {
 }
 
 bool accepts(std::span<const uint8_t> file) {
-  return is_read([&] { check_scene(decode_splats(file, "fuzz.splat")); }) |
-         is_read([&] { check_scene(decode_splats(file, "fuzz.bin")); });
+  const bool is_splat = is_read([&] { check_scene(decode_splats(file, "fuzz.splat")); });
+  return is_read([&] { check_scene(decode_splats(file, "fuzz.bin")); }) || is_splat;
 }
 
 }  // namespace hsi4d::fuzz

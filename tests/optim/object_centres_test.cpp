@@ -5,7 +5,9 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/random.h"
 #include "core/rotation.h"
+#include "tests/support/seeds.h"
 
 using namespace hsi4d;
 
@@ -49,6 +51,30 @@ TEST_CASE("of centres that are equally near the first of the first object is tak
   REQUIRE(found);
   CHECK(found->object == 0);
   CHECK(found->row == 1);
+}
+
+TEST_CASE("rounding in the tree loses no centre") {
+  RandomSequence random(test::fresh_seed());
+  const std::vector<Rigid<double>> poses = {{Matrix3<double>::Identity(), Vector3<double>::Zero()}};
+  for (int round = 0; round < 400; ++round) {
+    std::vector<float> means(3 * 30);  // a corner of eight centres and more is often the nearest, as seen from outside
+    for (float& x : means) x = 0.05F * std::round(static_cast<float>(1.2 * random.normal()));
+    const Gaussians object = centres(means);
+    const ObjectCentres objects({&object});
+    for (int k = 0; k < 500; ++k) {
+      const Vector3<double> place = 0.3 * Vector3<double>(random.normal(), random.normal(), random.normal());
+      const auto distance = [&](Index row) {
+        return (Vector3<float>(means.data() + 3 * row).cast<double>() - place).norm();
+      };
+      double least = HUGE_VAL;
+      for (Index i = 0; i < object.count(); ++i) least = std::min(least, distance(i));
+      const auto found = objects.nearest(place, poses, 10);
+      REQUIRE(found);
+      REQUIRE(found->row >= 0);
+      REQUIRE(found->row < object.count());
+      REQUIRE(distance(found->row) <= (1 + 1e-12) * least);
+    }
+  }
 }
 
 TEST_CASE("without objects nothing is near") { CHECK_FALSE(ObjectCentres({}).nearest({0, 0, 0}, {}, 1)); }

@@ -171,6 +171,9 @@ TEST_CASE("every scene is drawn with fewer errors the fewer cuts there are") {
   const std::string svg = pareto_svg(rows);
   CHECK_THAT(svg, Contains("<svg xmlns=") && Contains("image, RMS, avatar_in_scene") && Contains("class=\"name\"") &&
                       Contains(">accurate</text>") && !Contains("nothing to plot"));
+  CHECK_THAT(pareto_front_svg(rows), Contains("image, RMS, avatar_in_scene") &&
+                                         Contains("gradient, relative L2, worst class, avatar_in_scene") &&
+                                         Contains(">default</text>") && !Contains("median of all scenes"));
 }
 
 TEST_CASE("the cap is compared with no cap") {

@@ -4,44 +4,14 @@
 //
 // Exit status 77 (skipped) without playwright-core or Chromium. CHROMIUM names another Chromium than that in PATH.
 import { execFileSync } from 'node:child_process';
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
-import { createRequire } from 'node:module';
-import { delimiter, join, resolve } from 'node:path';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { join, resolve } from 'node:path';
 import { tmpdir } from 'node:os';
 import { pathToFileURL } from 'node:url';
+import { chromiumOf, check, end } from '../support/browser.mjs';
 
 const [program, modules = '.'] = process.argv.slice(2).map((path) => resolve(path));
-
-function skip(reason) {
-  console.log(`skipped: ${reason}; tools/test_report installs it`);
-  process.exit(77);
-}
-
-function findPlaywright() {
-  const require = createRequire(import.meta.url);
-  const paths = [modules, ...(process.env.NODE_PATH ?? '').split(delimiter).filter(Boolean)];
-  try {
-    return require(require.resolve('playwright-core', { paths }));
-  } catch {
-    return skip('there is no playwright-core');
-  }
-}
-
-function findChromium() {
-  const folders = process.env.PATH.split(delimiter);
-  const places = ['chromium', 'chromium-browser', 'google-chrome'].flatMap((name) => folders.map((f) => join(f, name)));
-  return [process.env.CHROMIUM, ...places].find((path) => path && existsSync(path)) ?? skip('there is no Chromium');
-}
-
-const { chromium } = findPlaywright();
-const executablePath = findChromium();
-
-const began = Date.now();
-let failures = 0;
-function check(what, holds, detail = '') {
-  console.log(`${((Date.now() - began) / 1000).toFixed(1).padStart(5)} s  ${holds ? 'ok    ' : 'FAILED'} ${what}${detail === '' ? '' : `: ${detail}`}`);
-  if (!holds) ++failures;
-}
+const { chromium, executablePath } = chromiumOf(modules);
 
 // A run of a second or two: what it finds does not matter here.
 function makeReport(folder) {
@@ -295,5 +265,4 @@ try {
 } finally {
   rmSync(folder, { recursive: true });
 }
-console.log(failures === 0 ? 'all hold' : `${failures} failed`);
-process.exit(failures === 0 ? 0 : 1);
+end();

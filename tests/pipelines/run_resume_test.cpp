@@ -81,6 +81,29 @@ TEST_CASE("a run that was stopped anywhere and resumed has the bits of one that 
   }
 }
 
+TEST_CASE("a run with approximations that was stopped and resumed has the bits of one that never was", "[run]") {
+  const TemporaryFolder here;
+  RunConfig config = tiny_config();
+  config.color_net.use = ColorNetUse::kOn;
+  ParameterGroupSettings net;
+  net.lr = 1e-3;
+  net.every = 4;
+  config.stages.back().second.optimize.emplace_back("color_net", net);
+  config.approx.render.collapse_suffix = true;
+  config.approx.longest_side_px = kTinyPixels / 2;
+  config.approx.hold_colors = true;
+  config.approx.camera_pixel_share = 0.5;
+  carry_out_tiny(config, "whole");
+  for (const int last : {kPerFrame + 3, 2 * kPerFrame + 11}) {
+    INFO("stopped after iteration " << last);
+    const std::string run = "stopped" + std::to_string(last);
+    int count = 0;
+    CHECK_THROWS_AS(carry_out_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted);
+    carry_out_tiny(config, run, 2, true);
+    CHECK(differences("whole", run) == kNone);
+  }
+}
+
 TEST_CASE("a run can be stopped and resumed again and again", "[run]") {
   const TemporaryFolder here;
   const RunConfig config = tiny_config();

@@ -180,7 +180,7 @@ TEST_CASE("an approximation that a config sets changes the result a little, and 
   CHECK(collapsed.motion != on.motion);
   CHECK(near <= 0.05);  // 0.004 to 0.023 by avatar: an angle that few pixels tell
   const std::string told =
-      "approx.collapse_suffix is on: images are near, each pixel within render.transmittance_stop, 0.0001";
+      "approx.collapse_suffix is on: images are near, each pixel within render.transmittance_stop, 0.001";
   CHECK_THAT(file_text("collapsed/log.txt"), Contains(" info " + told + "\n"));
   CHECK_THAT(file_text("on/log.txt"), !Contains("collapse_suffix"));
 }
@@ -194,7 +194,7 @@ TEST_CASE("colours that are held cost fewer operators and change the result a li
     config.stages.back().second.optimize.emplace_back("color_net", net);
   };
   const auto run_with = [&](const std::string& name, const std::string& held) {
-    return SkipRun(name, {"color_net.use=on", "approx.hold_colours=" + held}, move_net);
+    return SkipRun(name, {"color_net.use=on", "approx.hold_colors=" + held}, move_net);
   };
   const SkipRun on = run_with("on", "true"), off = run_with("off", "false");
   const double near = differences(on, off).back();
@@ -206,12 +206,12 @@ TEST_CASE("colours that are held cost fewer operators and change the result a li
     CHECK(on.counted("forward_nodes", stage) < off.counted("forward_nodes", stage));
     CHECK(on.counted("backward_nodes", stage) < off.counted("backward_nodes", stage));
   }
-  CHECK_THAT(file_text("on/log.txt"), Contains(" info approx.hold_colours is on: "));
+  CHECK_THAT(file_text("on/log.txt"), Contains(" info approx.hold_colors is on: "));
 }
 
 TEST_CASE("a camera that sees a share of the pixels renders fewer tiles and is found nearly as well", "[run]") {
   const TemporaryFolder here;
-  const SkipRun part("part", {"approx.camera_pixels=0.5"}), all("all", {});
+  const SkipRun part("part", {"approx.camera_pixel_share=0.5"}), all("all", {});
   CHECK(part.counted("tiles", "camera") < all.counted("tiles", "camera"));
   CHECK(part.counted("tiles") == Approx(all.counted("tiles")).epsilon(0.2));  // the other stage sees all
   const auto error = [](const SkipRun& run) {
@@ -220,7 +220,15 @@ TEST_CASE("a camera that sees a share of the pixels renders fewer tiles and is f
   };
   INFO("cm: " << error(part) << " of a half, " << error(all) << " of all");
   CHECK(error(part) < 3 * error(all) + 0.5);
-  CHECK_THAT(file_text("part/log.txt"), Contains(" info approx.camera_pixels is on: "));
+  CHECK_THAT(file_text("part/log.txt"), Contains(" info approx.camera_pixel_share is on: "));
+  // Whatever else says which pixels count; the weights of what a stage fits to are 0 or 1, and fewer are 1.
+  for (const char* const weight : {"all", "background", "foreground"}) {
+    INFO(weight);
+    const std::string set = "stages.camera.weight=" + std::string(weight);
+    const SkipRun fewer("fewer_" + std::string(weight), {"approx.camera_pixel_share=0.5", set});
+    const SkipRun full("full_" + std::string(weight), {set});
+    CHECK(fewer.counted("tiles", "camera") < full.counted("tiles", "camera"));
+  }
 }
 
 TEST_CASE("a run whose images are reduced writes smaller ones and finds nearly the same", "[run]") {
@@ -243,8 +251,8 @@ TEST_CASE("what settings of skip and approx do to each other is told", "[run]") 
   CHECK(notes_of({}).empty());
   CHECK(notes_of({"skip.zero_cotangent=false"}).empty());
   CHECK(notes_of({"skip.static_layer=false"}).empty());
-  CHECK(notes_of(kCollapsed) == Notes{on + "0.0001"});
-  CHECK(notes_of({"approx.collapse_suffix=true", "render.quality=fast"}) == Notes{on + "0.001"});
+  CHECK(notes_of(kCollapsed) == Notes{on + "0.001"});
+  CHECK(notes_of({"approx.collapse_suffix=true", "render.quality=fast"}) == Notes{on + "0.01"});
   CHECK(notes_of({"approx.collapse_suffix=true", "skip.static_layer=false"}) ==
         Notes{nothing + "skip.static_layer=false"});
   CHECK(notes_of({"approx.collapse_suffix=true", "skip.static_tiles=false"}) ==
@@ -279,4 +287,22 @@ TEST_CASE("check, a dry run and a run's log have what is to be known of skip and
   CHECK_THAT(cli::run_command(arguments, loss_terms()), Contains("  note: " + text));
   carry_out_tiny(tiny_config(overrides), "run");
   CHECK_THAT(file_text("run/log.txt"), Contains(" warning " + text));
+}
+
+TEST_CASE("a stage may work on smaller images than the run", "[run]") {
+  const TemporaryFolder here;
+  const auto run_with = [](const std::string& name, int side) {
+    return SkipRun(name, {"stages.camera.longest_side_px=" + std::to_string(side),
+                          "stages.interaction.longest_side_px=" + std::to_string(side)});
+  };
+  const SkipRun all("all", {}), same = run_with("same", 10 * kTinyPixels), small = run_with("small", kTinyPixels / 2);
+  CHECK(same.motion == all.motion);
+  CHECK(read_image("small/frames/0002_render.png").width() == kTinyPixels);
+  CHECK(read_cameras("small/cameras.json").at(1).width == kTinyPixels);
+  for (const char* const stage : {"camera", "interaction"}) {
+    INFO(stage);
+    CHECK(small.counted("fragments", stage) < 0.5 * all.counted("fragments", stage));
+  }
+  CHECK(differences(small, all).back() > 0);
+  CHECK(differences(small, all).back() < 0.3);
 }

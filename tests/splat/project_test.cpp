@@ -142,7 +142,7 @@ TEST_CASE("far from the world's origin nothing is lost in float [A10]") {
   }
 }
 
-TEST_CASE("depths and their rest make the depth in double") {
+TEST_CASE("means and depths and their rests make those in double") {
   const Camera camera = tilted_camera({40, 30});
   const std::vector<double> mean = {0.25, 0.375, -0.125};
   Run<float> fast(view_of_camera(camera), mean, kAxes, kNoUpdate);
@@ -152,6 +152,12 @@ TEST_CASE("depths and their rest make the depth in double") {
   CHECK(depth + rest == Approx(exact.value(exact.projected.depths)[0]).epsilon(1e-14));
   CHECK(depth == static_cast<double>(static_cast<float>(exact.value(exact.projected.depths)[0])));
   CHECK(exact.value(exact.projected.depth_rest)[0] == 0);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double px = fast.value(fast.projected.means_px)[i], px_rest = fast.value(fast.projected.means_rest)[i];
+    CHECK(px_rest != 0);
+    CHECK(px + px_rest == Approx(exact.value(exact.projected.means_px)[i]).epsilon(1e-13));
+    CHECK(exact.value(exact.projected.means_rest)[i] == 0);
+  }
 }
 
 TEST_CASE("Gaussians that are not drawn are zeros without a gradient") {

@@ -7,6 +7,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/parallel.h"
+
 using namespace hsi4d;
 
 namespace {
@@ -72,6 +74,25 @@ TEST_CASE("a case passes where it holds and would not without its remedy") {
   CHECK_FALSE(thrown.holds());
   CHECK(thrown.error == "broken");
   CHECK_FALSE(result_of(+[](Remedy) { return Figures{}; }).holds());
+}
+
+TEST_CASE("rows that compare numbers of threads run beside a limit, all others within it") {
+  const StressCase limited{"Z1", "", "", [](Remedy) {
+                             double threads = 0;
+                             with_threads(3, [&] { threads = thread_count(); });
+                             return std::vector<StressFigure>{{"", threads, 3}};
+                           }};
+  StressCase own = limited;
+  own.own_threads = true;
+  const std::array cases = {limited, own};
+  const std::vector<StressResult> results = run_stress(cases, {}, 1);
+  CHECK(results[0].with[0].measured == 1);
+  CHECK(results[1].with[0].measured == 3);
+  std::vector<std::string> ids;
+  for (const StressCase& row : stress_cases()) {
+    if (row.own_threads) ids.emplace_back(row.id);
+  }
+  CHECK(ids == std::vector<std::string>{"F6", "R9", "L3"});
 }
 
 TEST_CASE("rows A hold, and would not without their remedies") { check_group(projection_cases()); }

@@ -266,8 +266,8 @@ double relative_difference(const std::vector<double>& a, const std::vector<doubl
   return difference == 0 ? 0 : std::sqrt(difference / std::max(size, 1e-300));
 }
 
-void check_recorded(Recorded<double>& r, const std::vector<double>& cotangent, const OperatorCheck& options,
-                    std::uint64_t seed) {
+void check_recorded(const std::string& name, Recorded<double>& r, const std::vector<double>& cotangent,
+                    const OperatorCheck& options, std::uint64_t seed) {
   GradcheckOptions gradcheck_options;
   gradcheck_options.tolerance = options.tolerance;
   gradcheck_options.kink_share = options.kink_share;
@@ -278,6 +278,7 @@ void check_recorded(Recorded<double>& r, const std::vector<double>& cotangent, c
   INFO(report.text());
   CHECK(report.ok());
   CHECK(report.entries > 0);
+  record_differences(name, report);
 
   check_bookkeeping(r, cotangent, options.freeze_tolerance, seed);
 }
@@ -291,8 +292,8 @@ void check_recorded_in_float(Recorded<float>& r, const std::vector<double>& cota
 }
 
 // Gradients of several cotangents are compared as one, for that of a single number may cancel.
-void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vector<double>& cotangent,
-                 double tolerance) {
+void check_float(const std::string& name, Recorded<double>& exact, Recorded<float>& fast,
+                 const std::vector<double>& cotangent, double tolerance) {
   constexpr int kCotangents = 4;
   std::vector<std::vector<double>> expected, computed;
   std::mt19937_64 random(cotangent.size());
@@ -312,7 +313,12 @@ void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vect
   CHECK(relative_difference({value.begin(), value.end()}, numbers<double>(exact.tape.value(exact.out))) <= tolerance);
   for (std::size_t i = 0; i < computed.size(); ++i) {
     INFO("float gradient of input " << i);
-    CHECK(relative_difference(computed[i], expected[i]) <= tolerance);
+    const double error = relative_difference(computed[i], expected[i]);
+    CHECK(error <= tolerance);
+    const bool is_read = std::any_of(expected[i].begin(), expected[i].end(), [](double d) { return d != 0; });
+    if (is_read)
+      record_gradient({name, "", -1, TapeInspector<double>(exact.tape).array_name(exact.in[i].id), "double", error,
+                       std::ssize(expected[i])});
   }
 }
 

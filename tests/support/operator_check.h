@@ -16,6 +16,7 @@
 #include "autodiff/gradcheck.h"
 #include "autodiff/inspect.h"
 #include "autodiff/tape.h"
+#include "tests/support/gradient_record.h"
 
 namespace hsi4d::test {
 
@@ -70,8 +71,8 @@ std::vector<double> random_numbers(const OperatorInput& input, std::mt19937_64& 
 using Values = std::vector<std::vector<double>>;
 
 /// Checks that do not depend on how the operator is recorded, in double.
-void check_recorded(Recorded<double>& r, const std::vector<double>& cotangent, const OperatorCheck& options,
-                    std::uint64_t seed);
+void check_recorded(const std::string& name, Recorded<double>& r, const std::vector<double>& cotangent,
+                    const OperatorCheck& options, std::uint64_t seed);
 /// Those of them that are no differences, in float.
 void check_recorded_in_float(Recorded<float>& r, const std::vector<double>& cotangent, const OperatorCheck& options,
                              std::uint64_t seed);
@@ -91,8 +92,8 @@ void record(Recorded<S>& r, const std::vector<OperatorInput>& inputs, const Valu
 }
 
 /// Values and gradients in float against double.
-void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vector<double>& cotangent,
-                 double tolerance);
+void check_float(const std::string& name, Recorded<double>& exact, Recorded<float>& fast,
+                 const std::vector<double>& cotangent, double tolerance);
 
 }  // namespace detail
 
@@ -106,6 +107,7 @@ void check_float(Recorded<double>& exact, Recorded<float>& fast, const std::vect
 /// 6. every number of the outputs is written (they are filled with NaN first), and the inputs are not;
 /// 7. x0 → x1 → x0 gives the same bits, also when state that nodes keep is dropped in between;
 /// 8. float agrees with double, and 2 to 7 hold in float too.
+/// What 1 and 8 find goes into the audit of gradients where one is made (gradient_record.h).
 template <class F>
 void check_operator(const std::string& name, const std::vector<OperatorInput>& inputs, const F& f,
                     const OperatorCheck& options = {}) {
@@ -117,11 +119,12 @@ void check_operator(const std::string& name, const std::vector<OperatorInput>& i
     detail::Recorded<double> exact;
     detail::record(exact, inputs, values, f);
     const std::vector<double> cotangent = detail::random_numbers({"cotangent", exact.out.shape()}, random);
-    detail::check_recorded(exact, cotangent, options, seed);
+    detail::check_recorded(name, exact, cotangent, options, seed);
     detail::Recorded<float> fast;
     detail::record(fast, inputs, values, f);
-    detail::check_float(exact, fast, cotangent, options.float_tolerance);
+    detail::check_float(name, exact, fast, cotangent, options.float_tolerance);
     detail::check_recorded_in_float(fast, cotangent, options, seed);
+    record_float_errors(name, exact.tape, exact.out, fast.tape, fast.out);
   }
 }
 

@@ -163,8 +163,8 @@ TEST_CASE("the program and every subcommand answer --version and --help") {
   CHECK(version_text.out == std::string("hsi4d ") + version() + " (" + git_commit() + ")\n");
   const ProgramResult help = run_hsi4d({"--help"});
   CHECK(help.status == 0);
-  for (const char* command : {"run", "demo", "synth", "evaluate", "report", "render", "gradients", "pose", "motion",
-                              "convert", "info", "avatar", "check", "schema", "list"}) {
+  for (const char* command : {"run", "demo", "synth", "evaluate", "report", "study", "sweep", "run-one", "render",
+                              "gradients", "pose", "motion", "convert", "info", "avatar", "check", "schema", "list"}) {
     CHECK_THAT(help.out, Contains(command));
     const ProgramResult own = run_hsi4d({command, "--help"});
     CHECK(own.status == 0);
@@ -189,7 +189,9 @@ TEST_CASE("mistakes on the command line end with 2 and one message") {
     return result.err;
   };
   const std::string commands =
-      "run, demo, synth, select-camera, evaluate, report, render, gradients, avatar, pose, motion, convert, info, "
+      "run, demo, synth, select-camera, evaluate, report, study, sweep, run-one, render, gradients, avatar, pose, "
+      "motion, "
+      "convert, info, "
       "bench, stress, check, schema, list";
   CHECK(mistake({"chek"}) == "hsi4d: there is no command \"chek\"; known: " + commands + "; did you mean \"check\"?\n");
   CHECK(mistake({"frobnicate"}) == "hsi4d: there is no command \"frobnicate\"; known: " + commands + "\n");

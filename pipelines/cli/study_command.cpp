@@ -1,0 +1,99 @@
+#include "pipelines/cli/study_command.h"
+
+#include "core/check.h"
+#include "core/file.h"
+#include "core/progress.h"
+#include "pipelines/cli/interrupt.h"
+#include "pipelines/cli/scene_options.h"
+#include "pipelines/cli/terminal.h"
+#include "pipelines/cli/text.h"
+#include "pipelines/run_summary.h"
+#include "pipelines/study.h"
+#include "pipelines/study_results.h"
+
+namespace hsi4d::cli {
+
+namespace {
+
+const std::string kCommand = "hsi4d study: ";
+
+/// Throws where an option that belongs to the other of the two uses is given.
+void check_absent(const std::vector<std::pair<std::string, bool>>& options, const std::string& without) {
+  for (const auto& [name, is_given] : options) {
+    if (is_given) throw UserError(kCommand + name + " " + without);
+  }
+}
+
+std::string notes_text(const std::vector<std::string>& notes) {
+  std::string text;
+  for (const std::string& note : notes) text += "note: " + note + "\n";
+  return text;
+}
+
+std::string make_page(const StudyOptions& o) {
+  check_absent({{"--key", !o.key.empty()}, {"--csv", !o.csv.empty()}, {"--json", !o.json.empty()}}, "is for --answers");
+  if (o.runs.size() != 2)
+    throw UserError(kCommand + "compares two runs, or two folders of runs: A and B (" + std::to_string(o.runs.size()) +
+                    " given); --answers tells what people chose");
+  if (o.out.empty()) throw UserError(kCommand + "--out says where the page goes: a new or empty folder");
+  const InterruptWatch watch;
+  const Study study =
+      make_study({o.runs[0], o.runs[1], o.out, o.texts, o.pairs, o.seed, o.embed}, observer_on_terminal(o.quiet));
+  return study.page.generic_string() + ": " + count_text(std::ssize(study.key.pairs), "pair") +
+         ", of which a person is shown " + std::to_string(study.key.shown_pairs()) +
+         (o.embed ? "; one file" : "; goes with videos/") + "\n" + study.key_file.generic_string() +
+         ": the key, which tells A from B: keep it, do not hand it out\n" + notes_text(study.notes);
+}
+
+std::string percent(double share) { return fixed_number(100 * share, 1); }
+
+std::string interval_text(const ShareInterval& interval) {
+  return percent(interval.low) + " to " + percent(interval.high);
+}
+
+std::string shares_table(const std::vector<StudyShare>& shares) {
+  std::vector<std::vector<std::string>> rows = {
+      {"question", "persons", "answers", "prefer A [%]", "95 % of answers", "95 % over persons", "chose left [%]"}};
+  for (const StudyShare& share : shares) {
+    rows.push_back({std::string(kStudyQuestions[share.question].id), std::to_string(share.persons),
+                    std::to_string(share.all.answers), percent(share.all.share()), interval_text(share.wilson),
+                    share.bootstrap ? interval_text(*share.bootstrap) : "-",
+                    percent(static_cast<double>(share.prefer_left) / static_cast<double>(share.all.answers))});
+  }
+  return table(rows);
+}
+
+std::string tell_results(const StudyOptions& o) {
+  check_absent({{"--out", !o.out.empty()}, {"--texts", !o.texts.empty()}, {"--embed", o.embed}},
+               "is for making a study, not for --answers");
+  if (!o.runs.empty())
+    throw UserError(kCommand + "--answers are read without A and B, which the key knows; found " + o.runs.front());
+  if (o.key.empty())
+    throw UserError(kCommand +
+                    "--key says which video is whose: the file that was made beside the study's folder, "
+                    "DIR-key.json");
+  std::vector<std::string> inputs = o.answers;
+  inputs.push_back(o.key);
+  for (const auto& [name, file] : {std::pair{"--csv", o.csv}, {"--json", o.json}}) {
+    if (file.empty()) continue;
+    check_no_input(file, kCommand + name, inputs);
+    check_writable(file);
+  }
+  const StudyKey key = read_study_key(o.key);
+  const StudyAnswers answers = read_study_answers(o.answers, key);
+  const std::vector<StudyShare> shares = study_shares(answers);
+  if (shares.empty()) throw UserError(kCommand + "the files hold no answer");
+  if (!o.csv.empty()) write_text_file(o.csv, study_answers_csv(key, answers));
+  if (!o.json.empty()) write_text_file(o.json, study_results_json(key, answers, shares));
+  return shares_table(shares) + "\nA: " + key.a + "\nB: " + key.b + "\n" +
+         count_text(std::ssize(answers.persons), "person") + ", " + count_text(std::ssize(key.pairs), "pair") + "\n" +
+         notes_text(answers.notes);
+}
+
+}  // namespace
+
+std::string study_command(const StudyOptions& options) {
+  return options.answers.empty() ? make_page(options) : tell_results(options);
+}
+
+}  // namespace hsi4d::cli

@@ -1,0 +1,213 @@
+#include "pipelines/cli/sweep_command.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <set>
+#include <thread>
+
+#include "core/background_program.h"
+#include "core/check.h"
+#include "core/config_file.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/suggest.h"
+#include "core/text.h"
+#include "pipelines/cli/failure.h"
+#include "pipelines/cli/interrupt.h"
+#include "pipelines/cli/run_command.h"
+#include "pipelines/cli/terminal.h"
+#include "pipelines/cli/text.h"
+#include "pipelines/sweep_local.h"
+#include "pipelines/sweep_report.h"
+#include "pipelines/sweep_run.h"
+#include "pipelines/sweep_slurm.h"
+
+namespace hsi4d::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMemoryShare = 0.9;  // of what is free, for all runs together
+
+/// A plan and the folder that it is for.
+struct PlacedPlan {
+  SweepPlan plan;
+  SweepPaths paths;
+  bool is_in_folder = false;  ///< it was read from there
+};
+
+PlacedPlan read_plan(const std::string& sweep, const std::string& out, const std::vector<LossTerm>& losses) {
+  const fs::path file = fs::is_directory(sweep) ? fs::path(sweep) / "sweep.json" : fs::path(sweep);
+  if (fs::is_directory(sweep) && !is_sweep_folder(sweep)) throw UserError(sweep + ": is a folder, and holds no sweep");
+  ConfigProblems problems;
+  const ConfigValue tree = load_config(file, {}, problems);
+  PlacedPlan placed;
+  if (is_sweep_plan(tree)) {
+    placed.paths.folder = sweep_folder_of(file);
+    if (!out.empty() && !fs::equivalent(out, placed.paths.folder))
+      throw UserError("hsi4d sweep: " + file.string() + " is the plan of its own folder; --out names another one");
+    placed.plan = parse_sweep_plan(read_text_file(file.string()), file.string());
+    placed.is_in_folder = true;
+    return placed;
+  }
+  placed.plan = plan_sweep(file, descriptions_of(losses));
+  placed.paths.folder = out.empty() ? fs::path("runs") / placed.plan.name : fs::path(out);
+  return placed;
+}
+
+/// The runs as a table, with how each stands.
+std::string plan_text(const PlacedPlan& placed) {
+  const SweepPlan& plan = placed.plan;
+  std::vector<std::vector<std::string>> rows = {{"INDEX", "RUN", "", "STATE"}};
+  std::set<std::string> datasets;
+  std::size_t done = 0;
+  for (std::size_t i = 0; i < plan.runs.size(); ++i) {
+    const SweepRun& run = plan.runs[i];
+    const auto same =
+        std::find_if(plan.runs.begin(), plan.runs.end(), [&run](const SweepRun& other) { return other.id == run.id; });
+    const auto first = static_cast<std::size_t>(same - plan.runs.begin());
+    const SweepRunState state = sweep_run_state(placed.paths, run.id);
+    if (first == i && state == SweepRunState::kDone) ++done;
+    if (!run.dataset.empty() && !fs::exists(placed.paths.dataset(run.dataset))) datasets.insert(run.dataset);
+    rows.push_back({std::to_string(i), run.id, sweep_label(run),
+                    first == i ? std::string(sweep_run_state_name(state)) : "as " + std::to_string(first)});
+  }
+  const std::size_t runs = distinct_runs(plan).size();
+  std::string text = table(rows) + "\nsweep " + plan.name + ": " + count_text(std::ssize(plan.runs), "combination") +
+                     ", " + count_text(static_cast<std::int64_t>(runs), "run") + ", " + std::to_string(done) + " done";
+  if (!datasets.empty()) text += "; " + count_text(std::ssize(datasets), "dataset") + " to be generated";
+  return text + "; folder " + placed.paths.folder.string() + "\n";
+}
+
+/// Warns where results are there that another program has computed.
+void warn_of_other_programs(const PlacedPlan& placed) {
+  std::size_t others = 0;
+  std::string example;
+  for (const std::size_t i : distinct_runs(placed.plan)) {
+    const std::vector<SweepAttempt> attempts = read_attempts(placed.paths, placed.plan.runs[i].id);
+    if (attempts.empty() || attempts.back().program.hash == this_program().hash) continue;
+    ++others;
+    example = attempts.back().program.version + " (" + attempts.back().program.git + ")";
+  }
+  if (others == 0) return;
+  log_warning(placed.paths.folder.string() + ": " + count_text(static_cast<std::int64_t>(others), "run") +
+              (others == 1 ? " was" : " were") + " computed or begun by another build of hsi4d, " + example +
+              ", than this one, " + this_program().version + " (" + this_program().git + "); results.csv tells which");
+}
+
+std::string failures_text(const SweepPlan& plan, const SweepOutcome& outcome) {
+  std::string text;
+  for (const SweepFailure& failure : outcome.failures)
+    text += "failed: run " + std::to_string(failure.index) + ", " + sweep_label(plan.runs[failure.index]) + ": " +
+            failure.message + "\n";
+  if (!outcome.not_started.empty())
+    text += count_text(std::ssize(outcome.not_started), "run") + " not computed, after the failure\n";
+  return text;
+}
+
+/// Puts this job of Slurm into the queue again, and waits for Slurm to end it: not to be taken for one that has ended
+/// by itself.
+void requeue_and_wait() {
+  constexpr int kMostSeconds = 60;
+  requeue_this_job();
+  for (int i = 0; i < kMostSeconds && !InterruptWatch::requested(); ++i)
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+}
+
+std::string local_sweep(const SweepArguments& arguments, const PlacedPlan& placed, int& status) {
+  const InterruptWatch watch;
+  const Observer observer = observer_on_terminal(false);
+  const bool is_terminal = stderr_is_terminal();
+  const LogSink log = log_to_file(placed.paths.log());
+  warn_of_other_programs(placed);
+  SweepLaunch launch;
+  launch.program = "/proc/self/exe";  // this very file, also after another build has taken its name
+  launch.jobs = arguments.jobs;
+  const int threads = run_threads(arguments.threads);
+  launch.threads = threads > 0 ? threads : thread_count();
+  launch.memory_mb = arguments.memory_mb > 0 ? arguments.memory_mb : kMemoryShare * available_memory_mb();
+  launch.fail_fast = arguments.fail_fast;
+  launch.stop_requested = observer.stop_requested;
+  if (is_terminal) launch.progress = observer.progress;
+  launch.tell = [&](const std::string& line) {
+    log.write(LogLevel::kInfo, line);
+    std::fprintf(stderr, "%s%s\n", is_terminal ? "\r\x1b[K" : "", line.c_str());
+  };
+  SweepOutcome outcome;
+  try {
+    outcome = run_sweep_locally(placed.paths, placed.plan, launch);
+  } catch (const Interrupted& stop) {
+    log.write(LogLevel::kInfo, stop.what());
+    throw Interrupted(std::string(stop.what()) + "; hsi4d sweep " + placed.paths.folder.string() + " --resume goes on");
+  }
+  for (const SweepFailure& failure : outcome.failures)
+    status = std::max(status, failure.is_our_bug ? kOurBug : kUserMistake);
+  return write_sweep_results(placed.paths) + failures_text(placed.plan, outcome);
+}
+
+std::string slurm_sweep(const SweepArguments& arguments, const PlacedPlan& placed) {
+  warn_of_other_programs(placed);
+  const int asked = run_threads(arguments.threads);
+  const int threads = asked > 0 ? asked : std::max(1, placed.plan.threads);
+  const std::string program = fs::read_symlink("/proc/self/exe").string();
+  const SlurmJobs jobs = submit_sweep(placed.paths, placed.plan, program, arguments.jobs, threads);
+  const std::string folder = placed.paths.folder.string();
+  const std::string queued =
+      jobs.queued > 0 ? count_text(static_cast<std::int64_t>(jobs.queued), "run") + " in the queue already\n" : "";
+  if (jobs.array.empty()) return queued + "nothing is left to submit; hsi4d report " + folder + " tells the results\n";
+  return queued + "submitted " + count_text(std::ssize(jobs.runs), "run") + " as job " + jobs.array +
+         ", the results as job " + jobs.results + "; squeue --jobs " + jobs.array + "," + jobs.results +
+         " tells how they stand, hsi4d report " + folder + " what is there\n";
+}
+
+}  // namespace
+
+std::string sweep_command(const SweepArguments& arguments, const std::vector<LossTerm>& losses, int& status) {
+  const std::vector<std::string> launchers = {"local", "slurm"};
+  if (std::find(launchers.begin(), launchers.end(), arguments.launcher) == launchers.end())
+    throw UserError("hsi4d sweep: --launcher: there is no launcher \"" + arguments.launcher +
+                    "\"; known: " + joined(launchers) + did_you_mean(arguments.launcher, launchers));
+  PlacedPlan placed = read_plan(arguments.sweep, arguments.out, losses);
+  check_sweep_folder(placed.paths, arguments.resume || arguments.dry_run);
+  if (arguments.dry_run) return plan_text(placed);
+  write_sweep_plan(placed.paths, placed.plan, arguments.resume);
+  if (arguments.launcher == "slurm") return slurm_sweep(arguments, placed);
+  return local_sweep(arguments, placed, status);
+}
+
+std::string run_one_command(const RunOneArguments& arguments, const std::vector<LossTerm>& losses) {
+  if (arguments.parent > 0) end_with_parent(arguments.parent);
+  const InterruptWatch watch;
+  const TimeLimitWatch time_limit;
+  const PlacedPlan placed = read_plan(arguments.sweep, arguments.out, losses);
+  const auto count = std::ssize(placed.plan.runs);
+  if (arguments.index >= count)
+    throw UserError("hsi4d run-one: there is no run " + std::to_string(arguments.index) + " in " + arguments.sweep +
+                    "; allowed: 0 to " + std::to_string(count - 1));
+  if (!placed.is_in_folder) write_sweep_plan(placed.paths, placed.plan, true);
+  Observer observer = observer_on_terminal(false);
+  observer.stop_requested = [] { return InterruptWatch::requested() || TimeLimitWatch::requested(); };
+  const auto index = static_cast<std::size_t>(arguments.index);
+  const SweepRun& run = placed.plan.runs[index];
+  const std::string before = sweep_run_progress(placed.paths, run);
+  try {
+    const SweepRunResult result =
+        run_one(placed.paths, placed.plan, index, losses, run_threads(arguments.threads), observer);
+    return result_text(result.summary, placed.paths.run(run.id));
+  } catch (const Interrupted& stop) {
+    const bool is_requeued = arguments.requeue && TimeLimitWatch::requested() && !InterruptWatch::requested();
+    if (is_requeued && sweep_run_progress(placed.paths, run) == before)
+      throw UserError(
+          "the time of the job was over before a frame was finished, and would be again: give the runs more (" +
+          std::string(stop.what()) + ")");
+    if (is_requeued) requeue_and_wait();
+    throw Interrupted(std::string(stop.what()) +
+                      (is_requeued ? "; the job is in the queue again" : "; the same command goes on"));
+  }
+}
+
+}  // namespace hsi4d::cli

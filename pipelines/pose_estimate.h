@@ -1,0 +1,41 @@
+// Poses of the human that another program has estimated from a video.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "body/avatar.h"
+#include "body/motion_io.h"
+#include "pipelines/data_settings.h"
+#include "pipelines/frame_source.h"
+
+namespace hsi4d {
+
+/// Estimated poses of the clip's frames: those of the motion when it has more than frame 0, else none. It has a pose
+/// for each frame that the clip keeps, or each of the video, or a rate of its own, at which it reaches to the clip's
+/// end.
+///
+/// @param file  what messages call it
+/// Throws DataError for another number of poses.
+std::vector<BodyPose> estimated_poses(const Motion& motion, const std::filesystem::path& file,
+                                      const FrameSource& frames);
+
+/// Reads an estimate for the body of an avatar: a pose for each frame of the clip. Throws as read_motion and
+/// estimated_poses, for a motion of one pose too.
+std::vector<BodyPose> read_estimate(const std::filesystem::path& file, const Avatar& avatar, const FrameSource& frames);
+
+/// Moves an estimate so that its frame 0 stands where the human of frame 0 does, as an estimator's world is not the
+/// scene's.
+///
+///   x ↦ R x + c with   R = R_z(θ), θ that which brings R_z(θ) E nearest to F   (heading)
+///                      R = F Eᵀ                                              (rotation)
+///
+/// E and F are the root's rotations of the estimate and of `first` in frame 0, and c puts the one's pelvis on the
+/// other's. `heading` keeps what the estimator knows of the vertical; both worlds have z up. Frame 0 becomes `first`,
+/// bit for bit, which is exact.
+///
+/// @param pelvis_rest  of the body that all poses are of, metres
+std::vector<BodyPose> laid_on(std::vector<BodyPose> estimate, const BodyPose& first, const Vector3<double>& pelvis_rest,
+                              MotionAlign align);
+
+}  // namespace hsi4d

@@ -1,0 +1,311 @@
+// What a person does with the page: a welcome, the pairs one after the other, and the answers as a file.
+//
+// Which pairs, their order and their sides follow from study and person alone, so that a reload shows the same. What is
+// kept in the browser are the person, what was chosen, and for each pair the seconds it was looked at and how often its
+// videos were played.
+(() => {
+"use strict";
+
+const get = id => document.getElementById(id);
+const study = JSON.parse(get("study-data").textContent);
+const kSides = ["left", "right"];
+const videos = kSides.map(get);
+
+// ---- Chance ----
+
+// Numbers in [0, 1) that follow from a text: FNV-1a for the start, then a counter that is mixed.
+function randomNumbers(text) {
+  let state = 0x811c9dc5;
+  for (const byte of new TextEncoder().encode(text)) state = Math.imul(state ^ byte, 0x01000193);
+  return () => {
+    state = (state + 0x9e3779b9) | 0;
+    let mixed = Math.imul(state ^ (state >>> 16), 0x21f0aaad);
+    mixed = Math.imul(mixed ^ (mixed >>> 15), 0x735a2d97);
+    return ((mixed ^ (mixed >>> 15)) >>> 0) / 2 ** 32;
+  };
+}
+
+function shuffled(items, random) {
+  const result = [...items];
+  for (let i = result.length - 1; i > 0; --i) {
+    const j = Math.floor(random() * (i + 1));
+    [result[i], result[j]] = [result[j], result[i]];
+  }
+  return result;
+}
+
+// The pairs of a person in order, each with the video on either side.
+function trialsOf(person) {
+  const random = randomNumbers(study.study + "\n" + person);
+  return shuffled(study.pairs, random).slice(0, study.shown).map(pair => {
+    const [left, right] = shuffled(pair.videos, random);
+    return { pair, left, right };
+  });
+}
+
+function newPerson() {
+  return [...crypto.getRandomValues(new Uint8Array(8))].map(byte => byte.toString(16).padStart(2, "0")).join("");
+}
+
+// ---- What is kept ----
+
+const givenPerson = new URLSearchParams(location.search).get("person") ?? "";  // of a page opened as index.html?person=NAME
+const place = "hsi4d study " + study.study + (givenPerson ? " of " + givenPerson : "");
+
+const fresh = () => ({ person: givenPerson || newPerson(), begun: "", finished: "", at: -1, pairs: {} });
+
+function restored() {
+  try {
+    const kept = JSON.parse(localStorage.getItem(place));
+    if (kept !== null) return kept;
+    localStorage.setItem(place, "null");  // whether it can be written
+  } catch {
+    get("unkept").hidden = false;
+  }
+  return fresh();
+}
+
+let state = restored();
+let trials = trialsOf(state.person);
+
+function keep() {
+  try {
+    localStorage.setItem(place, JSON.stringify(state));
+  } catch {
+    get("unkept").hidden = false;
+  }
+}
+
+const recordOf = trial => (state.pairs[trial.pair.id] ??= { chosen: {}, seconds: 0, plays: 0 });
+const openQuestion = trial => trial.pair.questions.find(id => !(id in recordOf(trial).chosen));
+
+// ---- The videos of a pair ----
+
+const urls = new Map();  // of videos that are in the page
+
+function urlOf(name) {
+  const embedded = study.embedded[name];
+  if (embedded === undefined) return "videos/" + name + ".mp4";
+  if (!urls.has(name)) {
+    const bytes = Uint8Array.from(atob(embedded), letter => letter.charCodeAt(0));
+    urls.set(name, URL.createObjectURL(new Blob([bytes], { type: "video/mp4" })));
+  }
+  return urls.get(name);
+}
+
+let playing = false;
+
+function showPlaying(value) {
+  playing = value;
+  get("play").textContent = playing ? "Pause" : "Play";
+}
+
+function play() {
+  showPlaying(true);
+  for (const video of videos) {
+    // Refused where a browser plays nothing unasked: the button then does.
+    if (!video.ended) video.play().catch(() => { if (!video.error && video.paused) pause(); });
+  }
+}
+
+function pause() {
+  showPlaying(false);
+  for (const video of videos) video.pause();
+}
+
+function playFromStart() {
+  for (const video of videos) video.currentTime = 0;
+  play();
+}
+
+function showVideos(trial) {
+  pause();
+  get("broken").hidden = true;
+  kSides.forEach((side, i) => {
+    videos[i].src = urlOf(trial[side]);
+    videos[i].load();
+  });
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play();
+}
+
+for (const video of videos) {
+  // The shorter one waits for the longer one, then both begin again.
+  video.addEventListener("ended", () => {
+    if (!playing || !videos.every(other => other.ended)) return;
+    ++recordOf(trials[state.at]).plays;
+    playFromStart();
+  });
+  video.addEventListener("loadedmetadata", () => {
+    video.style.setProperty("--shape", video.videoWidth + " / " + video.videoHeight);
+  });
+  video.addEventListener("error", () => {
+    get("broken").textContent = "A video cannot be played in this browser. Please tell whoever asked you, or try another browser.";
+    get("broken").hidden = false;
+    pause();
+  });
+}
+
+// ---- The pages ----
+
+function count(number, one) {
+  return number + " " + one + (number === 1 ? "" : "s");
+}
+
+function showSection(name) {
+  for (const id of ["welcome", "trial", "end"]) get(id).hidden = id !== name;
+  if (name !== "trial") pause();
+  scrollTo(0, 0);
+  get(name).querySelector("h1").focus({ preventScroll: true });
+}
+
+function element(name, properties, children = []) {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...children);
+  return made;
+}
+
+function fieldOf(trial, id) {
+  const choice = (side, i) => element("label", {}, [
+    element("input", { type: "radio", name: id, value: side, checked: recordOf(trial).chosen[id] === side }),
+    "Video " + (i + 1)]);
+  return element("fieldset", { id: "question-" + id }, [
+    element("legend", { textContent: study.questions[id] }),
+    element("div", { className: "choices" }, kSides.map(choice))]);
+}
+
+function markOpen(trial) {
+  const open = openQuestion(trial);
+  for (const id of trial.pair.questions) get("question-" + id).classList.toggle("open", id === open);
+  if (open === undefined) get("missing").textContent = "";
+}
+
+function showTrial() {
+  const trial = trials[state.at];
+  get("place").textContent = "Pair " + (state.at + 1) + " of " + trials.length;
+  get("progress").max = trials.length;
+  get("progress").value = trials.filter(other => openQuestion(other) === undefined).length;
+  get("task").hidden = trial.pair.text === "";
+  get("text").textContent = trial.pair.text;
+  get("questions").replaceChildren(...trial.pair.questions.map(id => fieldOf(trial, id)));
+  get("missing").textContent = "";
+  get("back").disabled = state.at === 0;
+  get("next").textContent = state.at + 1 < trials.length ? "Next" : "Finish";
+  markOpen(trial);
+  showSection("trial");
+  showVideos(trial);
+}
+
+function showEnd() {
+  get("answers").value = answersText();
+  get("another").hidden = givenPerson !== "";
+  get("saved").textContent = "";
+  showSection("end");
+}
+
+function show() {
+  if (state.at < 0) showSection("welcome");
+  else if (state.at < trials.length) showTrial();
+  else showEnd();
+}
+
+// ---- What the person does ----
+
+function choose(id, side) {
+  const trial = trials[state.at];
+  recordOf(trial).chosen[id] = side;
+  get("question-" + id).querySelector("[value=" + side + "]").checked = true;
+  markOpen(trial);
+  keep();
+}
+
+function goTo(at) {
+  state.at = at;
+  keep();
+  show();
+}
+
+function next() {
+  const trial = trials[state.at], open = openQuestion(trial);
+  if (open !== undefined) {
+    get("missing").textContent = trial.pair.questions.length > 1 ? "Please answer both questions." : "Please answer the question.";
+    get("question-" + open).querySelector("input").focus();
+    return;
+  }
+  if (state.at + 1 === trials.length) state.finished = new Date().toISOString();
+  goTo(state.at + 1);
+}
+
+// 1 and 2 answer the question that the focus is in, else the first open one, else the last.
+function chooseByKey(side) {
+  const { pair } = trials[state.at];
+  const focused = document.activeElement.type === "radio" ? document.activeElement.name : undefined;
+  choose(focused ?? openQuestion(trials[state.at]) ?? pair.questions.at(-1), side);
+}
+
+function onKey(event) {
+  if (get("trial").hidden || event.ctrlKey || event.altKey || event.metaKey) return;
+  const onButton = document.activeElement.tagName === "BUTTON";
+  if (event.key === "1") chooseByKey("left");
+  else if (event.key === "2") chooseByKey("right");
+  else if (event.key === "0") playFromStart();
+  else if (event.key === "Enter" && !onButton) next();
+  else if (event.key === " " && !onButton && document.activeElement.type !== "radio") playing ? pause() : play();
+  else return;
+  event.preventDefault();
+}
+
+// ---- The answers ----
+
+function answersText() {
+  const answers = trials.map(trial => {
+    const { chosen, seconds, plays } = recordOf(trial);
+    const names = Object.fromEntries(trial.pair.questions.map(id => [id, trial[chosen[id]]]));
+    return { pair: trial.pair.id, left: trial.left, right: trial.right, chosen: names, seconds: Math.round(seconds), plays };
+  });
+  const { person, begun, finished } = state;
+  return JSON.stringify({ format: "hsi4d study answers", version: 1, study: study.study, person, begun, finished, answers }, null, 2) + "\n";
+}
+
+function save() {
+  const url = URL.createObjectURL(new Blob([answersText()], { type: "application/json" }));
+  const name = "answers-" + study.study + "-" + state.person.replace(/[^A-Za-z0-9_-]/g, "_") + ".json";
+  element("a", { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 60_000);
+  get("saved").textContent = "Saved as " + name;
+}
+
+function beginAnew() {
+  if (!confirm("Have these answers been saved? They are removed from this browser.")) return;
+  state = fresh();
+  trials = trialsOf(state.person);
+  keep();
+  show();
+}
+
+// ---- The start ----
+
+setInterval(() => {
+  if (get("trial").hidden || document.visibilityState !== "visible") return;
+  ++recordOf(trials[state.at]).seconds;
+  keep();
+}, 1000);
+
+const most = Math.max(...study.pairs.map(pair => pair.questions.length));
+get("shown").textContent = count(trials.length, "pair");
+get("asked").textContent = most === 1 ? "one question" : "two questions";
+get("begin").addEventListener("click", () => {
+  state.begun = new Date().toISOString();
+  goTo(0);
+});
+get("questions").addEventListener("change", event => choose(event.target.name, event.target.value));
+get("questions").addEventListener("submit", event => event.preventDefault());
+get("play").addEventListener("click", () => playing ? pause() : play());
+get("again").addEventListener("click", playFromStart);
+get("back").addEventListener("click", () => goTo(state.at - 1));
+get("next").addEventListener("click", next);
+get("save").addEventListener("click", save);
+get("review").addEventListener("click", () => goTo(trials.length - 1));
+get("another").addEventListener("click", beginAnew);
+document.addEventListener("keydown", onKey);
+show();
+})();

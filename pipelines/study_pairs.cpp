@@ -1,0 +1,131 @@
+#include "pipelines/study_pairs.h"
+
+#include <algorithm>
+#include <map>
+
+#include "core/check.h"
+#include "core/config_value.h"
+#include "core/file.h"
+#include "core/suggest.h"
+#include "core/text.h"
+#include "pipelines/json_text.h"
+#include "pipelines/run_folder.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Runs = std::map<std::string, fs::path>;
+
+bool has_preview(const fs::path& folder) { return fs::is_regular_file(RunPaths{folder}.preview()); }
+
+void collect(const fs::path& folder, const std::string& name, Runs& runs) {
+  if (has_preview(folder)) {
+    runs[name] = folder;
+    return;
+  }
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.is_directory(error))
+      collect(entry.path(), (name.empty() ? "" : name + "/") + entry.path().filename().string(), runs);
+  }
+}
+
+/// By names relative to the folder; "" where it is a run itself.
+Runs runs_in(const std::string& folder) {
+  if (!fs::is_directory(folder)) throw UserError(folder + ": there is no such folder");
+  Runs runs;
+  collect(folder, "", runs);
+  if (runs.empty())
+    throw UserError(folder +
+                    ": holds no run with a preview.mp4, in it or in its folders; a run that has come to its "
+                    "end has one where ffmpeg is installed");
+  return runs;
+}
+
+/// What happens in a run, as its config says.
+std::string prompt_of(const fs::path& run) {
+  const std::string file = RunPaths{run}.config();
+  if (!fs::exists(file)) return "";
+  const ConfigValue config = parse_json_text(read_text_file(file), file);
+  const ConfigValue* const sources = find_member(config, "sources");
+  return sources == nullptr ? "" : string_member(*sources, "prompt");
+}
+
+std::string text_of_both(const StudyRuns& pair) {
+  const std::string a = prompt_of(pair.a), b = prompt_of(pair.b);
+  if (!a.empty() && !b.empty() && a != b)
+    throw UserError(pair.a.string() + ", " + pair.b.string() + ": were made of different texts, " + json_string(a) +
+                    " and " + json_string(b) + "; --texts says what both are to be compared with");
+  return a.empty() ? b : a;
+}
+
+void take_texts(const std::string& file, std::vector<StudyRuns>& pairs) {
+  const ConfigValue root = parse_json_text(read_text_file(file), file);
+  check_kind(root, ConfigValue::Kind::kObject, "");
+  std::vector<std::string> names;
+  for (const StudyRuns& pair : pairs) names.push_back(pair.name);
+  for (const ConfigMember& member : root.members) {
+    const std::string pointer = child_pointer("", member.key);
+    check_kind(member.value, ConfigValue::Kind::kString, pointer);
+    const auto at = std::find(names.begin(), names.end(), member.key);
+    if (at == names.end())
+      fail_at(member.value, pointer,
+              "there is no such pair" + did_you_mean(member.key, names) + "; there are " + joined(names));
+    pairs[static_cast<std::size_t>(at - names.begin())].text = member.value.text;
+  }
+}
+
+/// Those of `runs` that `others` has not, told.
+void tell_unmatched(const std::string& folder, const Runs& runs, const std::string& other, const Runs& others,
+                    std::vector<std::string>& notes) {
+  std::vector<std::string> names;
+  for (const auto& [name, run] : runs) {
+    if (!others.contains(name)) names.push_back(name);
+  }
+  if (!names.empty()) notes.push_back(other + " lacks what " + folder + " has, which is left out: " + joined(names));
+}
+
+std::vector<StudyRuns> matched(const std::string& a, const std::string& b, std::vector<std::string>& notes) {
+  const Runs first = runs_in(a), second = runs_in(b);
+  const bool is_run = first.contains(""), is_other_run = second.contains("");
+  if (is_run != is_other_run)
+    throw UserError((is_run ? a : b) + " is one run, " + (is_run ? b : a) +
+                    " a folder of runs; a study compares two runs, or runs of the same names in two folders");
+  std::vector<StudyRuns> pairs;
+  for (const auto& [name, run] : first) {
+    const auto other = second.find(name);
+    if (other != second.end()) pairs.push_back({is_run ? "pair" : name, run, other->second, ""});
+  }
+  if (pairs.empty())
+    throw UserError(a + ", " + b + ": no run is in both by the same name; the first has " + first.begin()->first +
+                    (first.size() > 1 ? ", ..." : "") + ", the second " + second.begin()->first +
+                    (second.size() > 1 ? ", ..." : ""));
+  tell_unmatched(a, first, b, second, notes);
+  tell_unmatched(b, second, a, first, notes);
+  return pairs;
+}
+
+}  // namespace
+
+std::vector<StudyRuns> study_runs(const std::string& a, const std::string& b, const std::string& texts,
+                                  std::vector<std::string>& notes) {
+  std::vector<StudyRuns> pairs = matched(a, b, notes);
+  for (const StudyRuns& pair : pairs) {
+    if (fs::equivalent(pair.a, pair.b))
+      throw UserError(pair.a.string() + ", " + pair.b.string() + ": are the same run; there is nothing to choose");
+  }
+  if (!texts.empty()) take_texts(texts, pairs);
+  std::vector<std::string> silent;
+  for (StudyRuns& pair : pairs) {
+    if (pair.text.empty()) pair.text = text_of_both(pair);
+    if (pair.text.empty()) silent.push_back(pair.name);
+  }
+  if (!silent.empty())
+    notes.push_back("no text is known of " + joined(silent) +
+                    ": agreement with it is not asked; sources.prompt of a run's config says it, or --texts");
+  return pairs;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,105 @@
+// A sweep's file: which runs there are to be, as blocks of axes, before they are put together. (docs/sweeps.md)
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/config_value.h"
+
+namespace hsi4d {
+
+/// A setting that is laid over a config.
+struct SweepSetting {
+  std::string key;  ///< as written; lay_into_config takes it
+  ConfigValue value;
+  ConfigOrigin origin;  ///< of the key
+};
+
+/// What is reconstructed.
+struct SweepClip {
+  std::string name;
+  std::filesystem::path config;
+  ConfigOrigin origin;
+  std::vector<SweepSetting> set;
+};
+
+/// An ablation or a seed: settings with a name.
+struct SweepVariant {
+  std::string name;
+  std::vector<SweepSetting> set;
+  std::optional<std::int64_t> seed = {};  ///< of a seed that is a number
+};
+
+/// An axis of a grid, or lists that are zipped.
+struct SweepAxis {
+  std::vector<std::string> keys;                  ///< one of a grid
+  std::vector<std::vector<SweepSetting>> points;  ///< a setting a key
+};
+
+/// An entry of `skip` or `only`.
+struct SweepRule {
+  std::vector<SweepSetting> values;  ///< key: block, clip, ablation, seed or that of an axis
+  bool is_skip = true;
+  std::string pointer;
+  ConfigOrigin origin;
+};
+
+/// A part of a sweep, with what it takes over from the file.
+struct SweepBlock {
+  std::string name;  ///< empty: it has none
+  std::filesystem::path base;
+  std::vector<SweepSetting> set;
+  std::vector<SweepClip> clips;         ///< empty: what the base says
+  std::vector<SweepVariant> ablations;  ///< empty: none
+  std::vector<SweepAxis> grid, zip;
+  std::vector<SweepVariant> seeds;  ///< empty: what the base says
+  std::vector<SweepRule> rules;
+};
+
+/// How a sweep's runs are started by Slurm.
+struct SweepSlurm {
+  std::string time;                  ///< as sbatch takes it; empty: the partition's
+  int memory_mb = 0;                 ///< 0: memory_mb of the sweep, or what the partition gives
+  int at_once = 0;                   ///< 0: as many as there is room for
+  std::string partition;             ///< empty: the default one
+  int grace_s = 120;                 ///< before the end of its time a run saves its state
+  std::vector<std::string> options;  ///< more of sbatch
+};
+
+/// A sweep's file, read.
+struct SweepFile {
+  std::string name;
+  std::vector<SweepBlock> blocks;
+  std::vector<SweepSetting> compare;  ///< what the others are compared with; empty: not said
+  int threads = 0;                    ///< of each run; 0: not said
+  double memory_mb = 0;               ///< of each run; 0: not said
+  SweepSlurm slurm;
+};
+
+/// Reads a sweep's file as far as it can be told without the configs that it names. Throws one UserError with every
+/// problem: unknown keys, values of a wrong kind, empty or unequal lists, names that occur twice, settings that two
+/// axes name, rules about what is no axis.
+/// @param tree  what load_config made of it
+/// @param file  whose name the sweep has where it does not say one
+SweepFile read_sweep_file(const ConfigValue& tree, const std::filesystem::path& file, ConfigProblems& problems);
+
+/// Adds what is wrong with a sweep's axes as they stand beside each other: settings that two of them name, rules and
+/// comparisons of what is no axis.
+void check_sweep_axes(const SweepFile& sweep, ConfigProblems& problems);
+
+/// Whether a block has an axis of that name: block, clip, ablation, seed, or the key of a setting.
+bool has_sweep_axis(const SweepBlock& block, const std::string& key);
+
+/// A key in one spelling, "stages.camera.iterations": two that name one place are then equal.
+std::string sweep_key(const std::string& key);
+
+/// A value as text that equal values have in common: JSON on a line, numbers in their shortest form.
+std::string sweep_value_text(const ConfigValue& value);
+
+/// The same of a name: without quotes, a number as it is.
+std::string sweep_name_text(const ConfigValue& value);
+
+}  // namespace hsi4d

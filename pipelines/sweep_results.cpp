@@ -1,0 +1,181 @@
+#include "pipelines/sweep_results.h"
+
+#include <algorithm>
+#include <map>
+
+#include "core/file.h"
+
+namespace hsi4d {
+namespace {
+
+/// A run without clip and seed.
+SweepRun without_repetition(SweepRun run) {
+  run.clip.clear();
+  run.seed.clear();
+  return run;
+}
+
+bool is_repetition(const SweepRun& a, const SweepRun& b) {
+  return a.block == b.block && a.ablation == b.ablation && a.values == b.values;
+}
+
+/// The value of a run on an axis that runs are compared by; null: it has none.
+const std::string* find_value(const SweepRun& run, const std::string& axis) {
+  if (axis == "ablation") return run.ablation.empty() ? nullptr : &run.ablation;
+  if (axis == "block") return run.block.empty() ? nullptr : &run.block;
+  for (const auto& [key, value] : run.values) {
+    if (key == axis) return &value;
+  }
+  return nullptr;
+}
+
+bool is_compared_by(const SweepPlan& plan, const std::string& axis) {
+  return std::any_of(plan.compare.begin(), plan.compare.end(),
+                     [&axis](const auto& wanted) { return wanted.first == axis; });
+}
+
+/// Whether others are compared with this run.
+bool is_reference(const SweepPlan& plan, const SweepRun& run) {
+  return std::all_of(plan.compare.begin(), plan.compare.end(), [&run](const auto& wanted) {
+    const std::string* const value = find_value(run, wanted.first);
+    return value != nullptr && *value == wanted.second;
+  });
+}
+
+bool is_partner(const SweepPlan& plan, const SweepRun& run, const SweepRun& other) {
+  if (other.clip != run.clip || other.seed != run.seed || !is_reference(plan, other)) return false;
+  if (!other.ablation.empty() && !is_compared_by(plan, "ablation") && other.ablation != run.ablation) return false;
+  return std::all_of(other.values.begin(), other.values.end(), [&](const auto& value) {
+    if (is_compared_by(plan, value.first)) return true;
+    const std::string* const own = find_value(run, value.first);
+    return own != nullptr && *own == value.second;
+  });
+}
+
+SweepRow read_row(const SweepPaths& paths, std::size_t index, const SweepRun& run) {
+  SweepRow row;
+  row.index = index;
+  row.state = sweep_run_state(paths, run.id);
+  for (SweepAttempt& attempt : read_attempts(paths, run.id)) {
+    row.starts += attempt.event == "start" ? 1 : 0;
+    row.peak_mb = std::max(row.peak_mb, attempt.peak_mb);
+    row.last = std::move(attempt);
+  }
+  if (row.state != SweepRunState::kDone) return row;
+  const std::string file = RunPaths{paths.run(run.id)}.summary();
+  const RunSummary summary = parse_summary(read_text_file(file), file);
+  for (const auto& [name, value] : summary.metrics.back().values) {
+    if (find_metric_facts(name) != nullptr) row.values.emplace_back(name, value);
+  }
+  row.values.emplace_back(seconds_facts().name, summary.seconds);
+  return row;
+}
+
+std::vector<SweepGroup> groups_of(const SweepPlan& plan) {
+  std::vector<SweepGroup> groups;
+  for (std::size_t i = 0; i < plan.runs.size(); ++i) {
+    const auto like = [&](const SweepGroup& group) {
+      return is_repetition(plan.runs[group.rows.front()], plan.runs[i]);
+    };
+    auto group = std::find_if(groups.begin(), groups.end(), like);
+    if (group == groups.end()) {
+      const bool is_compared_with = !plan.compare.empty() && is_reference(plan, plan.runs[i]);
+      groups.push_back({sweep_label(without_repetition(plan.runs[i])), {}, is_compared_with});
+      group = groups.end() - 1;
+    }
+    group->rows.push_back(i);
+  }
+  if (groups.size() == 1) groups.front().label = "all runs";
+  return groups;
+}
+
+std::vector<const MetricFacts*> metrics_of(const std::vector<SweepRow>& rows) {
+  std::vector<const MetricFacts*> metrics;
+  const auto add = [&](const MetricFacts& facts) {
+    if (std::any_of(rows.begin(), rows.end(),
+                    [&](const SweepRow& row) { return find_metric(row.values, facts.name) != nullptr; }))
+      metrics.push_back(&facts);
+  };
+  for (const MetricFacts& facts : metric_facts()) add(facts);
+  add(seconds_facts());
+  return metrics;
+}
+
+}  // namespace
+
+std::size_t SweepResults::count(SweepRunState state) const {
+  return static_cast<std::size_t>(
+      std::count_if(rows.begin(), rows.end(), [state](const SweepRow& row) { return row.state == state; }));
+}
+
+const MetricFacts& seconds_facts() {
+  static const MetricFacts facts{"seconds", "time", "s", "Time of the run on the clock", 1, -1};
+  return facts;
+}
+
+SweepResults read_sweep_results(const SweepPaths& paths) {
+  SweepResults results;
+  results.plan = read_sweep_plan(paths);
+  for (std::size_t i = 0; i < results.plan.runs.size(); ++i) {
+    results.rows.push_back(read_row(paths, i, results.plan.runs[i]));
+    const std::string& clip = results.plan.runs[i].clip;
+    if (std::find(results.clips.begin(), results.clips.end(), clip) == results.clips.end())
+      results.clips.push_back(clip);
+  }
+  results.groups = groups_of(results.plan);
+  results.metrics = metrics_of(results.rows);
+  return results;
+}
+
+SampleStatistics group_statistics(const SweepResults& results, const SweepGroup& group, const MetricFacts& metric,
+                                  const std::string* clip) {
+  struct Seed {
+    double sum = 0;
+    std::size_t runs = 0, measured = 0;
+  };
+  std::map<std::string, Seed> seeds;
+  for (const std::size_t i : group.rows) {
+    if (clip != nullptr && results.plan.runs[i].clip != *clip) continue;
+    Seed& seed = seeds[results.plan.runs[i].seed];
+    ++seed.runs;
+    if (const double* const value = find_metric(results.rows[i].values, metric.name)) {
+      seed.sum += *value;
+      ++seed.measured;
+    }
+  }
+  std::vector<double> means;
+  for (const auto& [name, seed] : seeds) {
+    if (seed.measured == seed.runs) means.push_back(seed.sum / static_cast<double>(seed.runs));
+  }
+  return sample_statistics(means);
+}
+
+std::optional<std::size_t> partner_of(const SweepPlan& plan, std::size_t index) {
+  const SweepRun& run = plan.runs[index];
+  if (plan.compare.empty() || is_reference(plan, run)) return std::nullopt;
+  std::optional<std::size_t> found;
+  for (std::size_t i = 0; i < plan.runs.size(); ++i) {
+    if (!is_partner(plan, run, plan.runs[i])) continue;
+    if (plan.runs[i].block == run.block) return i;
+    if (!found) found = i;
+  }
+  return found;
+}
+
+std::optional<PairedDifference> paired_difference(const SweepResults& results, const SweepGroup& group,
+                                                  const MetricFacts& metric) {
+  PairedDifference paired;
+  for (const std::size_t i : group.rows) {
+    const std::optional<std::size_t> partner = partner_of(results.plan, i);
+    if (!partner) continue;
+    const double* const value = find_metric(results.rows[i].values, metric.name);
+    const double* const other = find_metric(results.rows[*partner].values, metric.name);
+    if (value != nullptr && other != nullptr) paired.differences.push_back(*value - *other);
+  }
+  if (paired.differences.empty()) return std::nullopt;
+  paired.statistics = sample_statistics(paired.differences);
+  paired.interval = bootstrap_interval(paired.differences);
+  return paired;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,56 @@
+#include "core/background_program.h"
+
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+#include "core/process.h"
+#include "tests/support/temporary_folder.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+
+namespace {
+
+ProgramEnd wait_for(BackgroundProgram& program) {
+  while (true) {
+    if (const auto end = program.ended()) return *end;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a background program's output is appended, and its end told") {
+  const TemporaryFolder here;
+  here.write("out.txt", "before\n");
+  BackgroundProgram program({"sh", "-c", "echo out; echo err >&2; cat; exit 7"}, "out.txt");
+  const ProgramEnd end = wait_for(program);
+  CHECK(end.status == 7);
+  CHECK(end.signal == 0);
+  CHECK(end.peak_mb > 0);
+  CHECK(file_text("out.txt") == "before\nout\nerr\n");
+  CHECK(program.ended()->status == 7);
+}
+
+TEST_CASE("a background program gets signals, and goes with its owner") {
+  const TemporaryFolder here;
+  BackgroundProgram program({"sleep", "60"}, "out.txt");
+  CHECK_FALSE(program.ended());
+  program.send(SIGTERM);
+  CHECK(wait_for(program).signal == SIGTERM);
+  const auto begin = std::chrono::steady_clock::now();
+  { const BackgroundProgram killed({"sleep", "60"}, "out.txt"); }
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
+}
+
+TEST_CASE("a background program that cannot be started is told") {
+  const TemporaryFolder here;
+  CHECK_THROWS_AS(BackgroundProgram({"no-such-program-here"}, "out.txt"), ProgramNotStartedError);
+  CHECK_THROWS_WITH(BackgroundProgram({"true"}, "nowhere/out.txt"),
+                    Catch::Matchers::StartsWith("nowhere/out.txt: cannot be written: "));
+  CHECK(available_memory_mb() > 0);
+}

@@ -1,0 +1,44 @@
+#include "pipelines/cli/stress_command.h"
+
+#include <sstream>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/check.h"
+#include "core/file.h"
+#include "tests/temporary_folder.h"
+
+using namespace hsi4d;
+using namespace hsi4d::cli;
+
+TEST_CASE("stress tells rows, and those not known are refused with what is allowed") {
+  const StressOutcome outcome = stress_command({.rows = {"E2"}, .threads = 1, .json = {}});
+  CHECK(outcome.status == 0);
+  CHECK(outcome.text.find("1 rows tried, 1 held, 0 failed; 0 exempt\n") != std::string::npos);
+  CHECK_THROWS_WITH(stress_command({.rows = {"Z1"}, .threads = {}, .json = {}}),
+                    "there is no row \"Z1\"; allowed: A1 to L3, or a letter for its group");
+}
+
+TEST_CASE("stress --functions tells a line for each function, range and instruction set, and writes them as JSON") {
+  const TemporaryFolder folder;
+  StressOptions options{.rows = {}, .threads = {}, .json = folder / "functions.jsonl"};
+  options.functions = true;
+  options.points = 1000;
+  const StressOutcome outcome = stress_command(options);
+  CHECK(outcome.status == 0);
+  std::istringstream lines(read_text_file(options.json));
+  std::string line;
+  int rows = 0;
+  for (; std::getline(lines, line); ++rows) {
+    const nlohmann::json row = nlohmann::json::parse(line);
+    CHECK(row["holds"] == true);
+    CHECK(row["largest"].get<double>() <= row["bound"].get<double>());
+    CHECK(outcome.text.find(row["function"].get<std::string>()) != std::string::npos);
+  }
+  CHECK(rows > 30);
+  const std::string count = std::to_string(rows);
+  CHECK(outcome.text.find(count + " rows tried, " + count + " within their bounds\n") != std::string::npos);
+  options.rows = {"A1"};
+  CHECK_THROWS_WITH(stress_command(options), "--functions is a table of its own: --row says nothing to it");
+}

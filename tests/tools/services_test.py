@@ -1,0 +1,173 @@
+"""The programs in tools/services: they compile, explain themselves, and tell what they would run; KLING's is used with a
+stand-in of the service on this machine.
+
+    python3 tests/tools/services_test.py TOOLS        # the folder tools/
+
+Exit status 77 (skipped) without ffmpeg, with which videos are made and looked at.
+"""
+
+import base64
+import hashlib
+import hmac
+import http.server
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+
+services = pathlib.Path(sys.argv[1]).resolve() / "services"
+PROGRAMS = ["kling.py", "wan.py", "sam2_masks.py", "poses.py", "stand_in/video.py", "stand_in/masks.py", "stand_in/poses.py"]
+
+if shutil.which("ffmpeg") is None or shutil.which("ffprobe") is None:
+    print("skipped: there is no ffmpeg")
+    sys.exit(77)
+
+
+def run(program, *arguments, **more):
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **more}
+    command = [sys.executable, str(services / program), *map(str, arguments)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+
+
+def check(result, status, *words):
+    told = result.stdout + result.stderr
+    assert result.returncode == status, (result.args, result.returncode, told)
+    assert "Traceback" not in told, told
+    for word in words:
+        assert word in told, (word, told)
+
+
+def picture(path, size, frames=1):
+    subprocess.run(["ffmpeg", "-v", "error", "-f", "lavfi", "-i", f"testsrc2=size={size}:rate=10", "-frames:v",
+                    str(frames), str(path)], check=True)
+
+
+def size_of(path):
+    asked = ["ffprobe", "-v", "error", "-show_entries", "stream=width,height", "-of", "csv=p=0", str(path)]
+    return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_programs():
+    for program in PROGRAMS:
+        check(run(program, "--help"), 0, "usage:", "--out")
+        check(run(program), 2, "required")
+        assert os.access(services / program, os.X_OK), program
+
+
+def test_dry_runs(folder):
+    picture(folder / "image.png", "64x48")
+    (folder / "wan").mkdir()
+    image = folder / "image.png"
+    check(run("wan.py", "--folder", folder / "wan", "--image", image, "--prompt", "p", "--out", "o.mp4", "--dry-run"), 2,
+          "generate.py: there is no such program")
+    (folder / "wan" / "generate.py").touch()
+    check(run("wan.py", "--folder", folder / "wan", "--image", image, "--prompt", "it's", "--out", "o.mp4", "--dry-run"), 0,
+          "in " + str(folder / "wan"), "--task i2v-14B", """--prompt 'it'"'"'s'""")
+    (folder / "masks").mkdir()
+    shutil.copy(image, folder / "masks" / "human.png")
+    (folder / "frames").mkdir()
+    shutil.copy(image, folder / "frames" / "0000.png")
+    mask = ["--video", folder / "frames", "--first", folder / "masks", "--out", folder / "out", "--dry-run"]
+    check(run("sam2_masks.py", "--objects", "human", *mask), 0, "follows human through")
+    check(run("sam2_masks.py", "--objects", "human,can", *mask), 2, "can.png: there is no such mask")
+    pose = ["--folder", folder / "wan", "--video", folder / "frames", "--out", folder / "m.npz", "--dry-run"]
+    check(run("poses.py", "--estimator", "gvhmr", "--rate", 10, *pose), 0, "ffmpeg", "tools/demo/demo.py", "--static_cam",
+          "hmr4d_results.pt", "--fps 10.0")
+    check(run("poses.py", "--estimator", "wham", "--rate", 10, "--moving", "--person", 1, *pose), 0, "wham_output.pkl",
+          "--person 1")
+    check(run("poses.py", "--estimator", "wham", "--rate", 0, *pose), 2, "data.video_rate")
+
+
+class StandIn(http.server.BaseHTTPRequestHandler):
+    """KLING as its description has it: a task is accepted, is looked at twice, and has a video."""
+
+    tasks, looks, requests, refuse = {}, {}, [], []
+
+    def log_message(self, *_):
+        pass
+
+    def answer(self, status, content, kind="application/json"):
+        body = content if isinstance(content, bytes) else json.dumps(content).encode()
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def is_signed(self):
+        head, claims, signature = self.headers["Authorization"].removeprefix("Bearer ").split(".")
+        expected = hmac.new(b"secret", f"{head}.{claims}".encode(), hashlib.sha256).digest()
+        issuer = json.loads(base64.urlsafe_b64decode(claims + "=="))["iss"]
+        return issuer == "access" and base64.urlsafe_b64encode(expected).rstrip(b"=").decode() == signature
+
+    def do_POST(self):
+        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        StandIn.requests.append(body)
+        if not self.is_signed():
+            return self.answer(401, {"code": 1000, "message": "signature"})
+        if StandIn.refuse:
+            return self.answer(*StandIn.refuse.pop(0))
+        name = f"task{len(StandIn.requests)}"
+        StandIn.tasks[name] = "failed" if body["prompt"] == "forbidden" else "succeed"
+        self.answer(200, {"code": 0, "data": {"task_id": name, "task_status": "submitted"}})
+
+    def do_GET(self):
+        if self.path == "/video.mp4":
+            return self.answer(200, StandIn.video, "video/mp4")
+        name = self.path.rsplit("/", 1)[1]
+        StandIn.looks[name] = StandIn.looks.get(name, 0) + 1
+        if StandIn.looks[name] < 3:
+            return self.answer(200, {"code": 0, "data": {"task_id": name, "task_status": "processing"}})
+        url = f"http://127.0.0.1:{self.server.server_port}/video.mp4"
+        self.answer(200, {"code": 0, "data": {"task_id": name, "task_status": StandIn.tasks[name],
+                                              "task_result": {"videos": [{"url": url}]}}})
+
+
+def test_kling(folder):
+    image, out, tasks = folder / "image.png", folder / "made.mp4", folder / "tasks"
+    picture(folder / "large.mp4", "128x96", 5)
+    StandIn.video = (folder / "large.mp4").read_bytes()
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), StandIn)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    keys = {"KLING_ACCESS_KEY": "access", "KLING_SECRET_KEY": "secret"}
+
+    def kling(prompt, *more, **environment):
+        url = f"http://127.0.0.1:{server.server_port}"
+        return run("kling.py", "--image", image, "--prompt", prompt, "--out", out, "--url", url, "--poll", 0.05, "--tasks",
+                   tasks, *more, **{**keys, **environment})
+
+    check(kling("sits", KLING_ACCESS_KEY=""), 2, "have to be in the environment")
+    check(kling("sits", "--dry-run"), 0, "POST", '"prompt": "sits"')
+    assert not StandIn.requests
+    check(kling("sits"), 0)
+    assert size_of(out) == "64,48", size_of(out)  # of the image: what was made is larger
+    assert base64.b64decode(StandIn.requests[0]["image"]) == image.read_bytes()
+    assert not list(tasks.iterdir())
+    check(kling("sits", KLING_SECRET_KEY="wrong"), 1, "answers 401")
+    StandIn.refuse = [(429, {"code": 1302, "message": "too many"}), (503, {}), (200, {"code": 1102, "message": "no credit"})]
+    check(kling("sits"), 75, "answers 429")
+    check(kling("sits"), 75, "answers 503")
+    check(kling("sits"), 1, "no credit")
+    check(kling("forbidden"), 1, "has failed")
+    # A task that is paid for is gone on with: this one was accepted before the run was ended.
+    paid = len(StandIn.requests)
+    StandIn.tasks["paid"] = "succeed"
+    body = StandIn.requests[0]
+    name = hashlib.sha256(json.dumps(body).encode()).hexdigest()[:16] + ".task"
+    (tasks / name).write_text("paid\n")
+    check(kling("sits"), 0)
+    assert len(StandIn.requests) == paid and StandIn.looks["paid"] == 3
+    server.shutdown()
+    server.server_close()
+    check(kling("sits"), 75, "no connection")
+
+
+with tempfile.TemporaryDirectory() as temporary:
+    test_programs()
+    test_dry_runs(pathlib.Path(temporary))
+    test_kling(pathlib.Path(temporary))
+print("all hold")

@@ -1,0 +1,182 @@
+"""A sweep on a cluster of Slurm with two nodes on this machine, one of which is lost in the middle.
+
+    python3 tests/tools/slurm_sweep_test.py TOOLS HSI4D CONFIGS [--keep DIR]
+
+Exit status 77 (skipped, and said so) without Slurm, munge or root; tools/slurm-local install installs them.
+"""
+
+import csv
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+tools, program, configs = (pathlib.Path(p).resolve() for p in sys.argv[1:4])
+missing = [p for p in ("munged", "slurmctld", "slurmd", "sbatch") if shutil.which(p) is None]
+if missing or os.geteuid() != 0:
+    print("skipped: " + (f"there is no {', '.join(missing)} (tools/slurm-local install)" if missing else "not root"))
+    sys.exit(77)
+
+folder = pathlib.Path(sys.argv[5] if "--keep" in sys.argv else tempfile.mkdtemp(prefix="hsi4d_slurm_"))
+cluster = folder / "cluster"
+environment = {**os.environ, "SLURM_CONF": str(cluster / "slurm.conf")}
+
+
+def run(*words, check=True):
+    done = subprocess.run([str(w) for w in words], env=environment, capture_output=True, text=True)
+    if check and done.returncode != 0:
+        raise SystemExit(f"{' '.join(map(str, words))} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def local(*words):
+    return run(tools / "slurm-local", *words, cluster)
+
+
+def wait_for(what, condition, seconds):
+    begin = time.monotonic()
+    while not condition():
+        if time.monotonic() - begin > seconds:
+            raise SystemExit(f"{what}: not within {seconds} s\n" + run("squeue") + run("sinfo", "-N"))
+        time.sleep(0.5)
+    print(f"{what}: after {time.monotonic() - begin:.0f} s", flush=True)
+
+
+def attempts(sweep, run_id):
+    file = sweep / "attempts" / f"{run_id}.jsonl"
+    return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def events(sweep, event):
+    return [a for run_id in ids(sweep) for a in attempts(sweep, run_id) if a["event"] == event]
+
+
+def ids(sweep):
+    return [entry["id"] for entry in json.loads((sweep / "sweep.json").read_text())["runs"]]
+
+
+def without_times(value):
+    if isinstance(value, dict):
+        return {key: without_times(entry) for key, entry in value.items() if key != "seconds"}
+    return [without_times(entry) for entry in value] if isinstance(value, list) else value
+
+
+def result(folder):
+    """All of a run that must be the same wherever it was computed."""
+    found = {str(f.relative_to(folder)): f.read_bytes() for f in sorted((folder / "frames").iterdir())}
+    for name in ("motion.npz", "objects.npz", "cameras.json", "body.glb", "view3d.safetensors", "color_net.safetensors"):
+        if (folder / name).exists():
+            found[name] = (folder / name).read_bytes()
+    found["metrics.jsonl"] = [without_times(json.loads(line)) for line in (folder / "metrics.jsonl").open()]
+    found["summary.json"] = without_times(json.loads((folder / "summary.json").read_text()))
+    return found
+
+
+def check_same(sweep, other):
+    assert ids(sweep) == ids(other)
+    for run_id in ids(sweep):
+        here, there = result(sweep / "runs" / run_id), result(other / "runs" / run_id)
+        assert here.keys() == there.keys(), (run_id, here.keys() ^ there.keys())
+        different = [name for name in here if here[name] != there[name]]
+        assert not different, (run_id, different)
+    print(f"{len(ids(sweep))} runs have the same bits in {sweep.name} and {other.name}", flush=True)
+
+
+def check_once(sweep):
+    for run_id in ids(sweep):
+        done = [a for a in attempts(sweep, run_id) if a["event"] == "done"]
+        assert len(done) == 1, (run_id, attempts(sweep, run_id))
+        assert json.loads((sweep / "runs" / run_id / "status.json").read_text())["state"] == "done"
+    with (sweep / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["run"] for row in rows] == ids(sweep) and all(row["state"] == "done" for row in rows)
+    assert len(list((sweep / "runs").iterdir())) == len(set(ids(sweep)))
+    print(f"{sweep.name}: every result once; starts {[len([a for a in attempts(sweep, i) if a['event'] == 'start']) for i in ids(sweep)]}")
+
+
+def queue_is_empty():
+    return run("squeue", "--noheader").strip() == ""
+
+
+def write_sweep(name, **more):
+    smoke = json.loads((configs / "sweeps" / "smoke.json").read_text())
+    for key in ("base", "clips"):
+        value = smoke[key]
+        smoke[key] = {k: str(configs / "sweeps" / v) for k, v in value.items()} if isinstance(value, dict) else str(configs / "sweeps" / value)
+    smoke.update({"name": name, **more})
+    smoke["set"].update(more.get("set", {}))
+    path = folder / f"{name}.json"
+    path.write_text(json.dumps(smoke, indent=2))
+    return path
+
+
+def smoke_is_the_same():
+    sweep = write_sweep("smoke")
+    run(program, "sweep", sweep, "--out", folder / "smoke_local")
+    print(run(program, "sweep", sweep, "--out", folder / "smoke_slurm", "--launcher", "slurm").strip())
+    wait_for("the smoke sweep", queue_is_empty, 300)
+    check_once(folder / "smoke_slurm")
+    check_same(folder / "smoke_local", folder / "smoke_slurm")
+
+
+def lost_node():
+    """Twelve runs; when both nodes compute, node2 is gone with all that it does."""
+    sweep = write_sweep("lost", seeds=6, slurm={"at_once": 4})
+    run(program, "sweep", sweep, "--out", folder / "lost_local")
+    print(run(program, "sweep", sweep, "--out", folder / "lost", "--launcher", "slurm").strip())
+
+    def is_computing():
+        on_node2 = run("squeue", "--noheader", "--states=R", "--nodelist=node2", "--format=%i").split()
+        begun = [f for f in (folder / "lost" / "runs").glob("*/metrics.jsonl") if f.stat().st_size > 20000]
+        return len(on_node2) > 0 and len(begun) > 2
+
+    wait_for("both nodes compute", is_computing, 200)
+    interrupted = run("squeue", "--noheader", "--states=R", "--nodelist=node2", "--format=%i").split()
+    local("kill-node", "node2")
+    print(f"node2 is gone, with the runs {interrupted}", flush=True)
+    done = len(events(folder / "lost", "done"))
+    wait_for("the rest", queue_is_empty, 500)
+    assert len(events(folder / "lost", "done")) == 12 and done < 12
+    check_once(folder / "lost")
+    starts = len(events(folder / "lost", "start"))
+    assert 12 < starts <= 12 + len(interrupted), starts
+    check_same(folder / "lost_local", folder / "lost")
+    assert "nothing is left" in run(program, "sweep", sweep, "--out", folder / "lost", "--launcher", "slurm", "--resume")
+    local("start-node", "node2")
+
+
+def time_limit():
+    """A run that needs more time than it has saves its state, is queued again and goes on."""
+    clip = folder / "clip.json"
+    clip.write_text(json.dumps({"synthetic": {"frames": 60, "size_px": 128, "scene_gaussians": 4000, "avatar_gaussians": 2000}}))
+    run(program, "synth", clip, "--out", folder / "clip")
+    sweep = write_sweep("limit", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
+                        set={"stages.interaction.iterations": 50}, slurm={"time": "00:01:00", "grace_s": 20})
+    print(run(program, "sweep", sweep, "--out", folder / "limit", "--launcher", "slurm").strip())
+    wait_for("a run of more than its time", queue_is_empty, 580)
+    check_once(folder / "limit")
+    limit = write_sweep("hopeless", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
+                        set={"stages.interaction.iterations": 1000000}, slurm={"time": "00:01:00", "grace_s": 20})
+    run(program, "sweep", limit, "--out", folder / "hopeless", "--launcher", "slurm")
+    wait_for("a run that cannot finish a frame in its time", queue_is_empty, 200)
+    told = "".join(f.read_text() for f in (folder / "hopeless" / "slurm").glob("*_0.txt"))
+    assert "before a frame was finished, and would be again" in told, told
+    kinds = [a["event"] for a in attempts(folder / "limit", ids(folder / "limit")[0])]
+    assert kinds.count("interrupted") >= 1 and kinds[-1] == "done", kinds
+    print("the run's attempts: " + ", ".join(kinds))
+
+
+try:
+    print(local("start").strip())
+    smoke_is_the_same()
+    lost_node()
+    time_limit()
+    print("passed")
+finally:
+    local("stop")
+    if "--keep" not in sys.argv:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+"""Makes masks of a video by SAM 2 (github.com/facebookresearch/sam2), for /sources/masks of a config.
+
+    "command": ["/home/me/sam2/bin/python", "tools/services/sam2_masks.py", "--video", "{video}",
+                "--objects", "{objects}", "--first", "{first_masks}", "--out", "{out}"]
+
+To be run by the Python in which sam2 is installed. What of the human and of each object is seen in frame 0 is given to
+it as masks, which it follows through the video. Writes OUT/NAME/NNNN.png, 255 where NAME is seen. Its arguments are
+checked by a dry run only; the model itself was not run.
+"""
+
+import pathlib
+import tempfile
+
+import service
+
+
+def jpeg_frames(video, folder):
+    """SAM 2 reads a folder of JPEG files whose names are numbers."""
+    source = ["-i", str(video)]
+    if pathlib.Path(video).is_dir():
+        source = ["-pattern_type", "glob", "-i", str(pathlib.Path(video) / "*.png")]
+    service.run(["ffmpeg", "-v", "error", *source, "-fps_mode", "passthrough", "-q:v", "2", "-start_number", "0",
+                 pathlib.Path(folder) / "%05d.jpg"])
+
+
+def main():
+    parser = service.Parser(__doc__)
+    parser.add_argument("--video", required=True, help="a video, or a folder of PNG frames")
+    parser.add_argument("--objects", required=True, help="names apart by commas")
+    parser.add_argument("--first", required=True, help="folder with NAME.png, the masks of frame 0")
+    parser.add_argument("--out", required=True, help="folder to write")
+    parser.add_argument("--model", default="facebook/sam2-hiera-large", help="name of the weights at Hugging Face")
+    parser.add_argument("--device", default="cuda")
+    a = parser.parse_args()
+
+    names = a.objects.split(",")
+    service.need(a.video, "video")
+    first = {name: service.need(pathlib.Path(a.first) / f"{name}.png", "mask") for name in names}
+    if a.dry_run:
+        print(f"{a.model} on {a.device}: follows {', '.join(names)} through {a.video} into {a.out}")
+        return
+    try:
+        import numpy as np
+        import torch
+        from PIL import Image
+        from sam2.sam2_video_predictor import SAM2VideoPredictor
+    except ImportError as missing:
+        service.fail(f"Python's module {missing.name} is not there; run this by the Python of SAM 2", service.ASKED_WRONGLY)
+
+    files = service.frame_names(a.video)
+    with tempfile.TemporaryDirectory() as folder:
+        jpeg_frames(a.video, folder)
+        predictor = SAM2VideoPredictor.from_pretrained(a.model, device=a.device)
+        with torch.inference_mode(), torch.autocast(a.device, dtype=torch.bfloat16):
+            state = predictor.init_state(folder)
+            for number, name in enumerate(names):
+                (pathlib.Path(a.out) / name).mkdir(parents=True, exist_ok=True)
+                image = Image.open(first[name]).convert("L").resize((state["video_width"], state["video_height"]))
+                predictor.add_new_mask(state, frame_idx=0, obj_id=number, mask=np.asarray(image) >= 128)
+            for frame, numbers, logits in predictor.propagate_in_video(state):
+                for number, logit in zip(numbers, logits):
+                    seen = (logit[0] > 0).cpu().numpy().astype(np.uint8) * 255
+                    Image.fromarray(seen).save(pathlib.Path(a.out) / names[number] / files[frame])
+
+
+if __name__ == "__main__":
+    main()
