@@ -33,11 +33,11 @@ void add_lamp_over(SceneKit& kit, const Point& at) {
 }  // namespace
 
 void make_bar(SceneKit& kit) {
-  add_room(kit, kBarRoom, Rgb(0.42, 0.2, 0.15), Rgb(0.35, 0.28, 0.22));
+  add_room(kit, kBarRoom, Rgb(0.55, 0.34, 0.3), Rgb(0.62, 0.57, 0.52));
   add_floor(kit, kBarRoom.half_width, kBarRoom.back, [&kit](const Point& p) {
     const bool is_dark =
         (static_cast<int>(std::floor(p.x() / 0.32)) + static_cast<int>(std::floor(p.y() / 0.32))) % 2 != 0;
-    return Rgb((is_dark ? Rgb(0.27, 0.2, 0.17) : Rgb(0.72, 0.63, 0.5)) * (1 + 0.1 * kit.rough(p * 6)));
+    return Rgb((is_dark ? Rgb(0.36, 0.3, 0.27) : Rgb(0.72, 0.63, 0.5)) * (1 + 0.1 * kit.rough(p * 6)));
   });
   const Rgb wood(0.4, 0.22, 0.12);
   for (int i = 0; i < 12; ++i)  // panelling
@@ -64,7 +64,7 @@ double bar_light(const ScenePlan& plan, const Point& p, const Point& normal) {
       {{{0.5, 2.2}, {0.75, 0.33}, bar_place().ground.heading_deg + 180, 0.45}}};
   double glow = 0;
   for (const double x : {-1.6, 0.55, 1.5}) glow += 0.3 * std::exp(-(p - Point(x, 1.75, 1.6)).squaredNorm() / 0.9);
-  return (0.92 * faced_light(normal) + glow) * room_corner_light(kBarRoom, p) * support_shadow(plan, p) *
+  return (0.98 * faced_light(normal) + glow) * room_corner_light(kBarRoom, p) * support_shadow(plan, p) *
          floor_shades(shades, p);
 }
 

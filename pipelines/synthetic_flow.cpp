@@ -72,7 +72,7 @@ Moment running_moment(const Actor& actor, double seconds) {
 }
 
 // Down a slide: sits at the top, pushes off, slides, and sits at the end.
-constexpr double kSlideLength = 5, kPushOff = 0.7, kStopped = 3.9;  // seconds
+constexpr double kSlideLength = 5, kPushOff = 0.7, kStopped = 4.2;  // seconds
 
 /// How far behind the slide's end the pelvis is: slow at first, then faster, then braking.
 double slid(const ScenePlace& place, double t) {

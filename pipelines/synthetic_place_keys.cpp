@@ -32,9 +32,9 @@ Seat seat_of(const Actor& actor) {
   const double height = actor.place->height;
   Seat seat{};
   seat.high = std::clamp((height - 0.47) / 0.3, 0.0, 1.0);
-  seat.edge = 0.13 + 0.11 * seat.high;
-  seat.pelvis = -seat.edge - 0.21 + 0.08 * seat.high;
-  seat.down = height + kSeatToPelvis - actor.sizes.standing;
+  seat.edge = 0.13 + 0.07 * seat.high;
+  seat.pelvis = -seat.edge - 0.21 + 0.19 * seat.high;
+  seat.down = height + kSeatToPelvis + 0.04 * seat.high - actor.sizes.standing;
   return seat;
 }
 

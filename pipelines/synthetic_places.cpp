@@ -20,7 +20,7 @@ const std::vector<ScenePlace> kBedroom = {
     {"ladder", Use::kRest, ground(0.72, 1.42, 90), 1.18, 0.36, 0.3, 0.5, {0, 1.15, 0.1, 0}}};
 const std::vector<ScenePlace> kLivingRoom = {
     {"sofa", Use::kSeat, ground(-0.3, 1.18, 4), 0.43, 0.5, 0, 1.3, {6, 1.1, 0, -0.12}},
-    {"sofa_back", Use::kSeat, ground(-0.3, 1.15, 14), 0.76, 0.16, 0, 1.5, {10, 1.2, 0, -0.1}},
+    {"sofa_back", Use::kSeat, ground(-0.3, 1.15, 14), 0.72, 0.16, 0, 1.5, {10, 1.2, 0, -0.1}},
     {"table", Use::kSeat, ground(-0.25, 1.2, -16), 0.68, 0.6, 0, 1.3, {-6, 1.18, 0, -0.1}}};
 const std::vector<ScenePlace> kGym = {
     {"treadmill", Use::kBelt, ground(-0.7, 2, 66), 0.17, 0.62, 0, 0.52, {-4, 1.3, -0.1, 0.1}}};
@@ -38,12 +38,18 @@ const std::vector<ScenePlace> kStore = {
 const std::vector<ScenePlace> kGarden = {
     {"flowers", Use::kFlowers, ground(-0.55, 1.32, 122), 0.05, 0.78, 0, 1.1, {0, 1.15, 0.2, 0}}};
 const std::vector<ScenePlace> kBicycle = {
-    {"bench", Use::kSeat, ground(-0.2, 1.7, 4), 0.45, 0.4, 0, 1.6, {8, 1.3, 0.25, -0.05}}};
+    {"bench", Use::kSeat, ground(-0.2, 1.7, 4), 0.45, 0.4, 0, 1.6, {8, 1.42, 0.42, -0.05}}};
 const std::vector<ScenePlace> kRoom = {
     {"sofa", Use::kSeat, ground(-0.15, 1.6, 0), 0.43, 0.5, 0, 1.5, {-8, 1.15, 0, -0.1}}};
 const std::vector<ScenePlace> kTruck = {
     {"car", Use::kPanel, ground(-0.35, 1.4, 158), 1.36, 0.5, 0, 1, {6, 1.35, 0.3, 0.05}}};
 // clang-format on
+
+/// One plays only where one sits with bent knees.
+bool suits(const ScenePlace& place, SyntheticMotionKind motion) {
+  constexpr double kHighSeat = 0.6;
+  return use_of(motion) == place.use && (motion != SyntheticMotionKind::kPlay || place.height < kHighSeat);
+}
 
 }  // namespace
 
@@ -103,10 +109,8 @@ std::optional<PlaceUse> use_of(SyntheticMotionKind motion) {
 }
 
 const ScenePlace* find_place(SyntheticSceneKind scene, SyntheticMotionKind motion, const std::string& name) {
-  const std::optional<PlaceUse> use = use_of(motion);
-  if (!use) return nullptr;
   for (const ScenePlace& place : places_of(scene))
-    if (place.use == *use && (name.empty() || name == place.name)) return &place;
+    if (suits(place, motion) && (name.empty() || name == place.name)) return &place;
   return nullptr;
 }
 
@@ -157,7 +161,7 @@ std::string place_names_of(SyntheticMotionKind motion) {
   std::vector<std::string> names;
   for (const auto& scene : kSyntheticSceneKinds)
     for (const ScenePlace& place : places_of(scene.value))
-      if (use_of(motion) == place.use) names.push_back(std::string(scene.name) + "/" + place.name);
+      if (suits(place, motion)) names.push_back(std::string(scene.name) + "/" + place.name);
   return joined(names);
 }
 

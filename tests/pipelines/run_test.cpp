@@ -440,7 +440,7 @@ TEST_CASE("every shipped config of a benchmark runs", "[run]") {
   CHECK(human_share("paper_scale-dataset") < 0.15);
 }
 
-TEST_CASE("every instance of AnyInteraction has a stand-in that runs", "[run][release]") {
+TEST_CASE("every instance of AnyInteraction has a stand-in that runs", "[run][full]") {
   const TemporaryFolder here;
   std::set<std::string> names, scenes, objects, prompts;
   for (const std::string& name : names_in(shipped_configs() / "anyinteraction")) {
@@ -487,7 +487,7 @@ TEST_CASE("where the data of an instance is there it is the run's") {
   CHECK(load_run_config("three.json", {}, descriptions_of(loss_terms())).data.scene.empty());
 }
 
-TEST_CASE("every shipped ablation runs", "[run][release]") {
+TEST_CASE("every shipped ablation runs", "[run][full]") {
   const TemporaryFolder here;
   int count = 0;
   for (const std::string& name : names_in(shipped_configs() / "ablations")) {

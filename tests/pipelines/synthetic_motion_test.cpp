@@ -61,7 +61,7 @@ std::vector<Act> all_acts() {
       if (!use) acts.push_back({name, motion.value, object, nullptr, SyntheticSceneKind::kLivingRoom});
       for (const auto& scene : kSyntheticSceneKinds)
         for (const ScenePlace& place : places_of(scene.value))
-          if (use == place.use)
+          if (find_place(scene.value, motion.value, place.name) != nullptr)
             acts.push_back({name + " at " + scene.name + "/" + place.name, motion.value, object, &place, scene.value});
     }
   return acts;
@@ -287,7 +287,10 @@ TEST_CASE("joints stay within their ranges but for a few degrees") {
       }
     }
     INFO(where << "; " << beyond << " of " << all << " beyond");
-    CHECK(worst < (motion == SyntheticMotionKind::kPour ? 75 : 25));  // the wrist over a tilted handle
+    const double allowed = motion == SyntheticMotionKind::kPour    ? 75  // the wrist over a tilted handle
+                           : motion == SyntheticMotionKind::kWater ? 60
+                                                                   : 25;
+    CHECK(worst < allowed);
     CHECK(beyond < 0.05 * all);
   });
 }
@@ -380,7 +383,7 @@ TEST_CASE("nobody goes through what is solid at a place") {
 TEST_CASE("a motion refuses an object that it makes no sense with") {
   const SyntheticObject none = synthetic_object(SyntheticObjectKind::kNone, 600, 0);
   CHECK_THROWS_MATCHES(synthetic_clip(body(), none, {2, 10, 64, 1, SyntheticMotionKind::kPush}), UserError,
-                       Catch::Matchers::Message("the motion push needs an object: office_chair"));
+                       Catch::Matchers::Message("the motion push needs an object: office_chair, shopping_cart, mower"));
   CHECK_NOTHROW(synthetic_clip(body(), none, {2, 10, 64, 1, SyntheticMotionKind::kWave}));
   CHECK(synthetic_clip(body(), none, {2, 10, 64, 1, SyntheticMotionKind::kWave}).object.empty());
 }

@@ -190,3 +190,18 @@ TEST_CASE("an object file stands in for the object and is held where the setting
       Catch::Matchers::Message("human.ply: an object is called by its file's name, and masks of \"human\" are those of "
                                "the person; rename the file"));
 }
+
+TEST_CASE("a motion is done at a place that the scene has") {
+  using Scene = SyntheticSceneKind;
+  using Motion = SyntheticMotionKind;
+  CHECK(find_place(Scene::kBedroom, Motion::kSitOn, "")->name == std::string("bed"));
+  CHECK(find_place(Scene::kBedroom, Motion::kSitOn, "windowsill")->height > 0.5);
+  CHECK(find_place(Scene::kBedroom, Motion::kWave, "") == nullptr);
+  CHECK(place_problem(Scene::kBedroom, Motion::kWave, "") == "");
+  CHECK(place_problem(Scene::kBedroom, Motion::kWave, "bed") == "the motion wave is done at no place; leave it empty");
+  CHECK(place_problem(Scene::kBar, Motion::kLeanOn, "ladder") ==
+        "the scene bar has no \"ladder\" for the motion lean_on; there are bedroom/ladder, bar/bar");
+  CHECK(place_problem(Scene::kKitchen, Motion::kSlide, "") ==
+        "the scene kitchen has nothing for the motion slide; there are playground/slide");
+  CHECK(place_names_of(Scene::kLivingRoom) == "sofa, sofa_back, table");
+}
