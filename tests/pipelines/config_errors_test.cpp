@@ -30,7 +30,8 @@ std::string fault(const std::string& text, const std::vector<std::string>& overr
 }
 
 const std::string kSections =
-    "name, seed, threads, precision, rotations, background, camera, camera_selection, start, data, sources, chain, "
+    "name, seed, threads, precision, rotations, background, camera, camera_selection, start, instance, data, sources, "
+    "chain, "
     "body, "
     "color_net, "
     "synthetic, render, "
