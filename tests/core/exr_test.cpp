@@ -230,8 +230,8 @@ TEST_CASE("a layer file that claims more pixels than it can hold is refused befo
   const auto at = std::search(file.begin(), file.end(), window.begin(), window.end());
   REQUIRE(at != file.end());
   const auto right = at + static_cast<std::ptrdiff_t>(window.size()) + 4 + 8;
-  right[2] = 0x40;  // 4194304 more to the right; more lines than the file has room for end its table of them
-  CHECK_THROWS_WITH(decode_layers(file, "v.exr"), Contains("v.exr: its header claims 4194308 x 4 pixels, more than "));
+  right[1] = right[5] = 0x20;  // 8192 and more to each side, of which the table of lines alone is longer than the file
+  CHECK_THROWS_WITH(decode_layers(file, "v.exr"), "v.exr: cannot be read as OpenEXR: the file ends early");
 }
 
 TEST_CASE("a damaged layer file is an error with a reason") {
