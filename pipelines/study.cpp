@@ -1,6 +1,8 @@
 #include "pipelines/study.h"
 
 #include <algorithm>
+#include <chrono>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -118,8 +120,11 @@ class NewFolder {
     if (is_kept_) return;
     std::error_code ignored;
     fs::remove(study_key_file(path_), ignored);
-    fs::remove_all(path_, ignored);
-    if (was_there_) fs::create_directories(path_, ignored);
+    if (!was_there_) {
+      fs::remove_all(path_, ignored);
+      return;
+    }
+    for (const fs::directory_entry& entry : fs::directory_iterator(path_, ignored)) fs::remove_all(entry, ignored);
   }
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;
@@ -133,6 +138,10 @@ class NewFolder {
   bool was_there_, is_kept_ = false;
 };
 
+/// When every file of a video says that it was made: 2020.
+const fs::file_time_type kTimeOfVideos =
+    std::chrono::file_clock::from_sys(std::chrono::sys_seconds(std::chrono::sys_days(std::chrono::year(2020) / 1 / 1)));
+
 /// Makes one video, under a name that follows from seed, place and content and tells none of them.
 std::string add_video(const fs::path& run, const std::string& place, const NewFolder& folder, VideoForm& form,
                       const Observer& observer) {
@@ -141,6 +150,8 @@ std::string add_video(const fs::path& run, const std::string& place, const NewFo
   const std::string name = text_hash(place + "\n" + read_text_file(unnamed.string()));
   std::error_code error;
   fs::rename(unnamed, folder.video(name), error);
+  // All of one time: the older of a pair would else be A's.
+  if (!error) fs::last_write_time(folder.video(name), kTimeOfVideos, error);
   if (error) throw UserError(folder.video(name).string() + ": cannot be written: " + error.message());
   return name;
 }
@@ -178,7 +189,8 @@ std::map<std::string, Bytes> embedded_videos(const StudyKey& key, const NewFolde
 }  // namespace
 
 fs::path study_key_file(const fs::path& folder) {
-  const fs::path clean = folder.lexically_normal();
+  fs::path clean = folder.lexically_normal();
+  if (clean == "." || *std::prev(clean.end()) == "..") clean = fs::absolute(folder).lexically_normal();
   const fs::path named = clean.has_filename() ? clean : clean.parent_path();  // without a '/' at its end
   return named.string() + "-key.json";
 }

@@ -235,16 +235,17 @@ function next() {
   goTo(state.at + 1);
 }
 
-// 1 and 2 answer the question that the focus is in, else the first open one, else the last.
+// 1 and 2 answer the first open question, else the one that the focus is in, else the last.
 function chooseByKey(side) {
   const { pair } = trials[state.at];
   const focused = document.activeElement.type === "radio" ? document.activeElement.name : undefined;
-  choose(focused ?? openQuestion(trials[state.at]) ?? pair.questions.at(-1), side);
+  choose(openQuestion(trials[state.at]) ?? focused ?? pair.questions.at(-1), side);
 }
 
 function onKey(event) {
   if (get("trial").hidden || event.ctrlKey || event.altKey || event.metaKey) return;
   const onButton = document.activeElement.tagName === "BUTTON";
+  if (event.repeat && "012Enter".includes(event.key)) return event.preventDefault();
   if (event.key === "1") chooseByKey("left");
   else if (event.key === "2") chooseByKey("right");
   else if (event.key === "0") playFromStart();

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
@@ -138,6 +139,18 @@ TEST_CASE("a study has the reconstructions of runs by name, and tells nobody who
   CHECK_FALSE(fs::exists("again/videos"));
   REQUIRE(study({"a", "b", "--out", "other", "--seed", "1"}).status == 0);
   CHECK(json_of("other-key.json")["study"] != key["study"]);
+
+  std::set<fs::file_time_type> times;  // which of two was made first is not told either
+  for (const auto& entry : fs::directory_iterator("page/videos")) times.insert(fs::last_write_time(entry));
+  CHECK(times.size() == 1);
+}
+
+TEST_CASE("the key of a study is beside its folder, however that is named, and not in it") {
+  const TemporaryFolder here;
+  const std::string at_hand = fs::current_path().string();
+  for (const char* const folder : {".", "./", "page/.."}) CHECK(study_key_file(folder) == at_hand + "-key.json");
+  CHECK(study_key_file("..") == fs::path(at_hand).parent_path().string() + "-key.json");
+  for (const char* const folder : {"page", "page/", "./page/."}) CHECK(study_key_file(folder) == "page-key.json");
 }
 
 TEST_CASE("a study of two runs has one pair, and images of a run are better than its preview") {
