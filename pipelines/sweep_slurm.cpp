@@ -60,7 +60,8 @@ std::set<std::string> queued_runs(const fs::path& folder) {
       told = run_process({"squeue", "--noheader", "--array", "--jobs", job, "--format", "%K"});
     } catch (const ProgramNotStartedError&) {
       throw;
-    } catch (const UserError&) {
+    } catch (const UserError& failure) {
+      if (std::string(failure.what()).find("Invalid job id") == std::string::npos) throw;
       continue;
     }
     const std::string plan_path = (folder.parent_path() / "plans" / plan_file).string();

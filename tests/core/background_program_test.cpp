@@ -36,6 +36,15 @@ TEST_CASE("a background program's output is appended, and its end told") {
   CHECK(program.ended()->status == 7);
 }
 
+TEST_CASE("a background program can be interrupted though its owner ignores that") {
+  const TemporaryFolder here;
+  const auto before = std::signal(SIGINT, SIG_IGN);
+  BackgroundProgram program({"sleep", "30"}, "out.txt");
+  program.send(SIGINT);
+  CHECK(wait_for(program).signal == SIGINT);
+  std::signal(SIGINT, before);
+}
+
 TEST_CASE("a background program gets signals, and goes with its owner") {
   const TemporaryFolder here;
   BackgroundProgram program({"sleep", "60"}, "out.txt");
