@@ -155,9 +155,9 @@ def time_limit():
     clip.write_text(json.dumps({"synthetic": {"frames": 60, "size_px": 128, "scene_gaussians": 4000, "avatar_gaussians": 2000}}))
     run(program, "synth", clip, "--out", folder / "clip")
     sweep = write_sweep("limit", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
-                        set={"stages.interaction.iterations": 50}, slurm={"time": "00:01:00", "grace_s": 20})
+                        set={"stages.interaction.iterations": 150}, slurm={"time": "00:01:00", "grace_s": 35})
     print(run(program, "sweep", sweep, "--out", folder / "limit", "--launcher", "slurm").strip())
-    wait_for("a run of more than its time", queue_is_empty, 580)
+    wait_for("a run of more than its time", queue_is_empty, 900)
     check_once(folder / "limit")
     limit = write_sweep("hopeless", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
                         set={"stages.interaction.iterations": 1000000}, slurm={"time": "00:01:00", "grace_s": 20})
