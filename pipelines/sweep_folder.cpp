@@ -67,6 +67,18 @@ std::string state_in(const RunPaths& paths) {
   }
 }
 
+/// True for a folder that holds nothing but what write_sweep_plan writes before the plan: whoever wrote it was killed.
+bool is_begun_sweep(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    const bool is_own = name == "configs" || name == "attempts" || name == "logs" || name == "runs" ||
+                        name == "plans" || name.ends_with(".tmp");
+    if (!is_own) return false;
+  }
+  return !error;
+}
+
 }  // namespace
 
 std::string SweepPaths::frozen_plan(const SweepPlan& plan) const {
@@ -99,7 +111,8 @@ void check_sweep_folder(const SweepPaths& paths, bool resume) {
   const std::string folder = paths.folder.string();
   std::error_code error;
   if (!fs::exists(paths.folder, error) || fs::is_empty(paths.folder, error)) return;
-  if (!is_sweep_folder(folder)) throw UserError(folder + ": holds something that is no sweep; choose another folder");
+  if (!is_sweep_folder(folder) && !is_begun_sweep(paths.folder))
+    throw UserError(folder + ": holds something that is no sweep; choose another folder");
   if (!resume)
     throw UserError(folder + ": holds a sweep already; --resume goes on with it, another --out makes a new one");
 }
@@ -143,6 +156,10 @@ SweepRunState sweep_run_state(const SweepPaths& paths, const std::string& id) {
   const std::vector<SweepAttempt> attempts = read_attempts(paths, id);
   if (attempts.empty()) return SweepRunState::kNew;
   return attempts.back().event == "failed" ? SweepRunState::kFailed : SweepRunState::kStarted;
+}
+
+bool is_sweep_run_whole(const SweepPaths& paths, const std::string& id) {
+  return sweep_run_state(paths, id) == SweepRunState::kDone && fs::exists(RunPaths{paths.run(id)}.report());
 }
 
 std::string sweep_run_progress(const SweepPaths& paths, const SweepRun& run) {

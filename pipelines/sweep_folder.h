@@ -60,6 +60,9 @@ std::string_view sweep_run_state_name(SweepRunState state);
 /// How a run stands: done where its status says so and its summary is whole.
 SweepRunState sweep_run_state(const SweepPaths& paths, const std::string& id);
 
+/// True for a run that is done and has its report: nobody needs to start it again. A kill may come between the two.
+bool is_sweep_run_whole(const SweepPaths& paths, const std::string& id);
+
 /// How far a run is that is not done: what its checkpoints are told by, other after every frame that is finished; of
 /// its dataset, whether it is there.
 std::string sweep_run_progress(const SweepPaths& paths, const SweepRun& run);

@@ -77,7 +77,7 @@ class Launcher {
   SweepOutcome run() {
     for (const std::size_t index : distinct_runs(plan_)) {
       ++total_;
-      if (sweep_run_state(paths_, id_of(index)) == SweepRunState::kDone) {
+      if (is_sweep_run_whole(paths_, id_of(index))) {
         ++outcome_.done_before;
       } else {
         waiting_.push_back(index);
@@ -186,7 +186,7 @@ class Launcher {
       const std::size_t index = *it;
       if (is_claimed(paths_, id_of(index)) || waits_for_dataset(index)) {
         ++it;
-      } else if (sweep_run_state(paths_, id_of(index)) == SweepRunState::kDone) {  // since we looked
+      } else if (is_sweep_run_whole(paths_, id_of(index))) {  // since we looked
         it = waiting_.erase(it);
         ++outcome_.by_others;
         tell_end(index, "was done by another launcher");

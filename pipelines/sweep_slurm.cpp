@@ -133,7 +133,7 @@ SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std
   const std::set<std::string> queued = queued_runs(folder);
   SlurmJobs submitted;
   for (const std::size_t index : distinct_runs(plan)) {
-    if (sweep_run_state(paths, plan.runs[index].id) == SweepRunState::kDone) continue;
+    if (is_sweep_run_whole(paths, plan.runs[index].id)) continue;
     if (queued.contains(plan.runs[index].id)) {
       ++submitted.queued;
     } else {

@@ -130,6 +130,10 @@ TEST_CASE("a sweep is computed, recognised and reported", "[release]") {
   CHECK(again.status == 0);
   CHECK(again.err == "2 of 2 runs are done already\n");
   CHECK(again.out == first.out);
+  const fs::path report = fs::path(SweepPaths{"out"}.run(ids_of("out")[0])) / "report.html";
+  fs::remove(report);  // killed after its results, before its report
+  CHECK(run_sweep("out").status == 0);
+  CHECK(fs::exists(report));
   const ProgramResult one = run_hsi4d({"run-one", "out", "1"});
   CHECK(one.status == 0);
   CHECK_THAT(one.out, Contains("report: out/runs/" + ids_of("out")[1] + "/report.html\n"));
@@ -137,6 +141,16 @@ TEST_CASE("a sweep is computed, recognised and reported", "[release]") {
   for (const std::string& id : ids_of("out"))
     CHECK(events_of("out", id) == std::map<std::string, int>{{"start", 1}, {"done", 1}});
   CHECK(run_hsi4d({"report", "out"}).out == first.out);
+}
+
+TEST_CASE("a sweep that is killed before its plan is written goes on") {
+  const TemporaryFolder here;
+  here.write("out/configs/left.json.tmp", "{");
+  here.write("out/plans/left.json", "{}");
+  CHECK_NOTHROW(check_sweep_folder({"out"}, true));
+  CHECK_THROWS_WITH(check_sweep_folder({"out"}, false), Contains("holds a sweep already"));
+  here.write("out/notes.txt", "mine");
+  CHECK_THROWS_WITH(check_sweep_folder({"out"}, true), "out: holds something that is no sweep; choose another folder");
 }
 
 TEST_CASE("a run that fails does not keep the others from being computed", "[release]") {

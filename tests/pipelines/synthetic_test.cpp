@@ -295,7 +295,7 @@ TEST_CASE("every scene with motion and object makes a dataset") {
     const fs::path made = motion.name;
     CHECK(mean_of(read_image((made / "frames/0001.png").string())) > 0.2);
     const double human = mean_of(read_image((made / "masks/human/0001.png").string()));
-    CHECK(human > 0.01);
+    CHECK(human > (settings.motion == SyntheticMotionKind::kSlide ? 0.01 : 0.02));  // which lies, seen from its feet
     CHECK(human < 0.35);
     const bool has_object = settings.object != SyntheticObjectKind::kNone;
     CHECK(fs::exists(made / "objects") == has_object);
