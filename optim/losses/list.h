@@ -5,19 +5,20 @@
 #include "optim/loss_term.h"
 
 // clang-format off
-#define HSI4D_LOSSES       \
-  HSI4D_LOSS(photometric)  \
-  HSI4D_LOSS(masked_l2)    \
-  HSI4D_LOSS(center)       \
-  HSI4D_LOSS(depth)        \
-  HSI4D_LOSS(mask)         \
-  HSI4D_LOSS(fit)          \
-  HSI4D_LOSS(contact)      \
-  HSI4D_LOSS(smooth)       \
-  HSI4D_LOSS(ground)       \
-  HSI4D_LOSS(foot_sliding) \
-  HSI4D_LOSS(penetration)  \
-  HSI4D_LOSS(joint_limits) \
+#define HSI4D_LOSSES        \
+  HSI4D_LOSS(photometric)   \
+  HSI4D_LOSS(masked_l2)     \
+  HSI4D_LOSS(center)        \
+  HSI4D_LOSS(depth)         \
+  HSI4D_LOSS(mask)          \
+  HSI4D_LOSS(fit)           \
+  HSI4D_LOSS(contact)       \
+  HSI4D_LOSS(smooth)        \
+  HSI4D_LOSS(object_smooth) \
+  HSI4D_LOSS(ground)        \
+  HSI4D_LOSS(foot_sliding)  \
+  HSI4D_LOSS(penetration)   \
+  HSI4D_LOSS(joint_limits)  \
   HSI4D_LOSS(pose_prior)
 // clang-format on
 

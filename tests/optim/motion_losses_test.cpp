@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include "core/parallel.h"
 #include "tests/support/loss_terms.h"
@@ -58,6 +59,53 @@ TEST_CASE("smooth is the mean over adjacent frames of the squared differences of
   CHECK(motion_loss("smooth", "{}", speeding) == Approx(3 * (0.09 + 0.25 + 0.49) / 3).epsilon(1e-13));
   CHECK(motion_loss("smooth", R"({"order": 2})", speeding) == Approx(3 * 0.04).epsilon(1e-13));
   CHECK(std::fabs(motion_loss("smooth", R"({"order": 3})", speeding)) < 1e-28);
+}
+
+TEST_CASE("object_smooth is the mean square of the differences of what lies furthest on the objects") {
+  // Objects stand, but for steps of 1 cm a frame of the first: places that are off by x in frame t, of all points.
+  const auto loss_of = [](const std::string& settings, const std::function<double(Index frame)>& x) {
+    Tape<double> tape;
+    LossInputs<double> inputs;
+    inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
+    std::set<std::pair<Index, Index>> chosen;
+    inputs.object_points = [&](const std::vector<ObjectPoint>& points) {
+      const Var<double> var = tape.parameter("object", shape_of(std::ssize(points), 3));
+      for (Index i = 0; i < std::ssize(points); ++i) {
+        const ObjectPoint& p = points[static_cast<std::size_t>(i)];
+        chosen.insert({p.object, p.row});
+        const Vector3<double> place = motion_of_test().start.place(p) + Vector3<double>(0, x(p.frame), 0);
+        std::copy_n(place.data(), 3, tape.write(var).row(i));
+      }
+      return var;
+    };
+    const Var<double> loss = record_term("object_smooth", inputs, settings);
+    REQUIRE(loss.tape != nullptr);
+    tape.forward(loss);
+    for (const auto& [object, row] : chosen) {  // each is the first or last along some axis
+      const std::vector<float>& means = motion_of_test().objects[static_cast<std::size_t>(object)].means;
+      bool is_outermost = false;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        int below = 0, above = 0;
+        for (std::size_t n = axis; n < means.size(); n += 3) {
+          below += means[n] < means[3 * static_cast<std::size_t>(row) + axis] ? 1 : 0;
+          above += means[n] > means[3 * static_cast<std::size_t>(row) + axis] ? 1 : 0;
+        }
+        is_outermost |= below == 0 || above == 0;
+      }
+      CHECK(is_outermost);
+    }
+    return tape.value(loss).scalar();
+  };
+  const auto none = [](Index) { return 0.0; };
+  const auto kick = [](Index t) { return t == 3 ? 0.1 : 0; };
+  // By default changes of steps, of frames 0 to 4: none of the even motion, 0.1, −0.2, 0.1 of a kick in frame 3.
+  CHECK(loss_of("{}", none) < 1e-15);
+  CHECK(loss_of("{}", kick) == Approx((0.01 + 0.04 + 0.01) / 3).epsilon(1e-6));
+  // Steps between frames 1 and 4: 1 cm of the first object of two, and 0.1 twice.
+  CHECK(loss_of(R"({"order": 1})", none) == Approx(1e-4 / 2).epsilon(1e-6));
+  CHECK(loss_of(R"({"order": 1})", kick) == Approx(1e-4 / 2 + 2 * 0.01 / 3).epsilon(1e-6));
+  // Changes of changes of steps, of frames 0 to 4: of a kick −0.3 and 0.3.
+  CHECK(loss_of(R"({"order": 3})", kick) == Approx(0.09).epsilon(1e-6));
 }
 
 TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain search") {

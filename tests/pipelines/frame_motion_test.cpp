@@ -75,6 +75,7 @@ Var<double> motion_and_mask_loss(const LossInputs<double>& inputs, std::map<std:
                                      {"fit", 3.0},
                                      {"contact", 10.0},
                                      {"smooth", 2.0},
+                                     {"object_smooth", 2.0},
                                      {"ground", 5.0},
                                      {"foot_sliding", 5.0},
                                      {"joint_limits", 1.0}}) {
