@@ -10,9 +10,10 @@ namespace hsi4d {
 
 /// How a program ended.
 struct ProgramEnd {
-  int status = 0;      ///< exit status, where no signal ended it
-  int signal = 0;      ///< that ended it; 0: none
-  double peak_mb = 0;  ///< the most memory that it had
+  int status = 0;        ///< exit status, where no signal ended it
+  int signal = 0;        ///< that ended it; 0: none
+  bool is_known = true;  ///< false: it is gone, and the system has been asked not to tell how (SIGCHLD ignored)
+  double peak_mb = 0;    ///< the most memory that it had; where that is less than we had, as far as we have looked
 };
 
 /// A program with a process group of its own, so that what the terminal sends to us (Ctrl-C) is for us to pass on. It
@@ -34,12 +35,14 @@ class BackgroundProgram {
   /// Sends a signal to it, if it still runs.
   void send(int signal) const;
   /// The most memory that it has had so far, MB; 0 where the system does not tell.
-  double peak_mb() const;
+  double peak_mb();
   /// Since it was started.
   double seconds() const;
 
  private:
   int pid_ = -1;
+  double peak_mb_ = 0;      // as far as we have looked
+  double our_peak_mb_ = 0;  // of this process, when it started the program
   std::optional<ProgramEnd> end_;
   std::chrono::steady_clock::time_point begin_;
 };
@@ -47,9 +50,5 @@ class BackgroundProgram {
 /// Asks the system to end this process as politely as SIGTERM does when the process `parent`, which has started it,
 /// ends, however it ends. Ends at once if that is gone already.
 void end_with_parent(int parent);
-
-/// Memory that programs can still have, MB: what the kernel has to give, or a container's limit where that is lower; 0
-/// where the system does not tell.
-double available_memory_mb();
 
 }  // namespace hsi4d

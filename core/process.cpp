@@ -8,7 +8,6 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <limits>
-#include <spawn.h>
 #include <sstream>
 #include <sys/mman.h>
 #include <sys/socket.h>
@@ -17,10 +16,9 @@
 #include <unistd.h>
 
 #include "core/check.h"
+#include "core/spawn.h"
 #include "core/system_message.h"
 #include "core/text.h"
-
-extern char** environ;  // POSIX asks programs to declare it
 
 namespace hsi4d {
 
@@ -50,37 +48,9 @@ std::string fate_of(int status) {
   return "ended with status " + std::to_string(WEXITSTATUS(status));
 }
 
-/// The same at a number that is none of the standard ones, which a child gets others at.
-int beyond_standard(int descriptor) {
-  if (descriptor < 0 || descriptor > 2) return descriptor;
-  const int moved = fcntl(descriptor, F_DUPFD_CLOEXEC, 3);
-  close(descriptor);
-  return moved;
-}
-
 void wait_for(pid_t pid, int* status) {
   while (waitpid(pid, status, 0) < 0 && errno == EINTR) {
   }
-}
-
-/// Starts the program with its standard descriptors; 0, or an error number.
-int spawn(const std::vector<std::string>& command, int input, int output, int error_output, pid_t& pid) {
-  std::vector<char*> arguments;
-  for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, input, 0);
-  posix_spawn_file_actions_adddup2(&actions, output, 1);
-  posix_spawn_file_actions_adddup2(&actions, error_output, 2);
-  // A group of its own: what the terminal sends to us (Ctrl-C) is for us to pass on.
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-  const int error = posix_spawnp(&pid, command.front().c_str(), &actions, &attributes, arguments.data(), environ);
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  return error;
 }
 
 }  // namespace
@@ -98,7 +68,7 @@ ChildProcess::ChildProcess(std::vector<std::string> command, ChildOutput output)
   for (int* const end : {&ends[0], &ends[1], &pipe_ends[0], &pipe_ends[1]}) *end = beyond_standard(*end);
   input_ = ends[0];
   stream_ = pipe_ends[0];
-  if (error == 0) error = spawn(command_, ends[1], is_read ? pipe_ends[1] : output_, output_, pid_);
+  if (error == 0) error = spawn_program(command_, {ends[1], is_read ? pipe_ends[1] : output_, output_}, pid_);
   close_if_open(ends[1]);
   close_if_open(pipe_ends[1]);
   if (error == 0) return;

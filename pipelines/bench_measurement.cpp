@@ -1,17 +1,12 @@
 #include "pipelines/bench_measurement.h"
 
 #include <algorithm>
-#include <sys/resource.h>
 
+#include "core/memory.h"
 #include "pipelines/bench_workloads.h"
 #include "splat/render_counters.h"
 
 namespace hsi4d {
-
-Index peak_memory_bytes() {
-  rusage usage{};
-  return getrusage(RUSAGE_SELF, &usage) == 0 ? static_cast<Index>(usage.ru_maxrss) * 1024 : 0;
-}
 
 Index Measurement::work() const {
   return unit == WorkUnit::kGaussians ? gaussians : unit == WorkUnit::kPairs ? pairs : fragments;

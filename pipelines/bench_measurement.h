@@ -39,9 +39,6 @@ struct Measurement {
   std::optional<double> peak_share() const;
 };
 
-/// Resident memory of the process at its most, so far; 0 where the system does not say.
-Index peak_memory_bytes();
-
 /// The measurement of a step of a workload.
 /// @param seconds  of each run, in any order, at least one
 Measurement measured(const Workload& workload, const RenderCounters& counters, int threads, const std::string& step,

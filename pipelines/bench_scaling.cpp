@@ -4,6 +4,7 @@
 #include <ctime>
 
 #include "core/check.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "pipelines/bench_measurement.h"
 #include "pipelines/frame_images.h"

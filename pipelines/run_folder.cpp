@@ -5,14 +5,15 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <fcntl.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include "core/check.h"
 #include "core/config_value.h"
+#include "core/disk.h"
 #include "core/file.h"
+#include "core/file_lock.h"
+#include "core/host.h"
 #include "core/system_message.h"
 #include "core/text.h"
 #include "core/version.h"
@@ -28,20 +29,6 @@ using Kind = ConfigValue::Kind;
 
 constexpr std::array kStates = {RunState::kRunning, RunState::kDone, RunState::kFailed, RunState::kInterrupted};
 constexpr size_t kMostDifferences = 8;  // told of a config that differs
-
-std::string now_text() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  ::gmtime_r(&now, &parts);
-  std::array<char, 32> buffer;
-  return {buffer.data(), std::strftime(buffer.data(), buffer.size(), "%Y-%m-%dT%H:%M:%SZ", &parts)};
-}
-
-std::string host_name() {
-  std::array<char, 256> buffer{};
-  if (::gethostname(buffer.data(), buffer.size() - 1) != 0) return "unknown";
-  return buffer.data();
-}
 
 std::string busy_message(const std::string& folder) {
   return folder + ": another process is writing this run; wait for it, or choose another folder";
@@ -229,25 +216,26 @@ std::string RunPaths::frame_image(int frame, std::string_view kind) const {
   return (folder / "frames" / (four_digits(frame) + "_" + std::string(kind) + ".png")).string();
 }
 
-/// The lock on a run folder: released by the system too when the process ends, however it ends.
+/// The lock on a run folder.
 struct RunFolder::Lock {
-  explicit Lock(const RunPaths& paths) : descriptor(::open(paths.lock().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+  explicit Lock(const RunPaths& paths) : lock(opened(paths)) {
     const std::string folder = paths.folder.string();
-    if (descriptor < 0) throw UserError(folder + ": cannot be written: " + system_message(errno));
-    if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) return;
-    const int error = errno;
-    if (error == EWOULDBLOCK) {
-      ::close(descriptor);
-      throw UserError(busy_message(folder));
-    }
-    log_warning(folder + ": this file system has no locks (" + system_message(error) +
-                "): two runs that write this folder would not notice each other");
+    const FileLock::State state = lock.take();
+    if (state == FileLock::State::kBusy) throw UserError(busy_message(folder));
+    if (state == FileLock::State::kNoLocks)
+      log_warning(folder +
+                  ": this file system has no locks: two runs that write this folder would not notice each other");
   }
-  ~Lock() { ::close(descriptor); }
-  Lock(const Lock&) = delete;
-  Lock& operator=(const Lock&) = delete;
 
-  int descriptor;
+  static FileLock opened(const RunPaths& paths) {
+    try {
+      return FileLock(paths.lock());
+    } catch (const UserError& error) {  // of the folder, which the user knows
+      throw UserError(paths.folder.string() + std::string(error.what()).substr(paths.lock().size()));
+    }
+  }
+
+  FileLock lock;
 };
 
 /// metrics.jsonl, open for appending.
@@ -318,17 +306,9 @@ void make_folder(const fs::path& folder) {
 }
 
 /// Removes what writers left half done that were killed; only under the lock.
-void remove_temporaries(const fs::path& folder) {
-  for (const std::string& name : names_in(folder)) {
-    std::error_code error;
-    if (name.ends_with(".tmp")) fs::remove(folder / name, error);
-  }
-}
-
 void remove_all_temporaries(const RunPaths& paths) {
-  for (const fs::path& folder : {paths.folder, fs::path(paths.frames()), fs::path(paths.checkpoint())}) {
-    if (fs::exists(folder)) remove_temporaries(folder);  // a chain has frames in its clips alone
-  }
+  for (const std::string& folder : {paths.folder.string(), paths.frames(), paths.checkpoint()})
+    remove_temporary_files(folder);  // a chain has frames in its clips alone
 }
 
 }  // namespace
@@ -348,7 +328,7 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
   lock_ = std::make_unique<Lock>(paths_);
   const Found found = look_at_folder(paths_);  // as it is now that nobody else writes
   check_resumable(paths_, found, identity_.config, resume);
-  started_ = now_text();
+  started_ = utc_now_text();
   if (found.is_run) {
     resumed_from_ = found_state(found.status);
     resumed_ = started_;
@@ -371,6 +351,8 @@ RunFolder::~RunFolder() = default;
 void RunFolder::set_state(RunState state, std::string_view message) {
   state_ = state;
   message_ = message;
+  // So that after a power cut no run is taken for done whose files are not whole.
+  if (state == RunState::kDone) sync_to_disk(paths_.folder.string());
   write_status();
   // An encoder that outlived a run that was killed may have made its file after we came.
   if (state != RunState::kRunning) remove_all_temporaries(paths_);
@@ -395,7 +377,7 @@ void RunFolder::write_status() {
   add_text("precision", identity_.precision);
   add_text("started", started_);
   if (!resumed_.empty()) add_text("resumed", resumed_);
-  add_text("updated", now_text());
+  add_text("updated", utc_now_text());
   write_text_file(paths_.status(), to_json(status));
 }
 
@@ -415,12 +397,6 @@ void RunFolder::truncate_metrics_after(int frame) {
 
 void RunFolder::write_summary(const RunSummary& summary) { write_text_file(paths_.summary(), summary_json(summary)); }
 
-bool is_run_locked(const std::string& path) {
-  const int descriptor = ::open(RunPaths{path}.lock().c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return false;
-  const bool locked = ::flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-  ::close(descriptor);
-  return locked;
-}
+bool is_run_locked(const std::string& path) { return is_file_locked(RunPaths{path}.lock()); }
 
 }  // namespace hsi4d

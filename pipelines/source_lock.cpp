@@ -1,18 +1,11 @@
 #include "pipelines/source_lock.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <chrono>
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <thread>
 #include <unistd.h>
 #include <vector>
 
 #include "core/check.h"
 #include "core/log.h"
-#include "core/system_message.h"
 #include "pipelines/observer.h"
 
 namespace hsi4d {
@@ -21,22 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::milliseconds kBetweenTries{50};
-
 fs::path lock_file(const fs::path& output) {
   return output.parent_path() / ("." + output.filename().string() + ".lock");
-}
-
-enum class Lock { kHeld, kBusy, kGone, kNone };
-
-/// Takes an open file, at once or not. kGone: whoever had it has removed it; kNone: this file system has no locks.
-Lock try_lock(const fs::path& file, int descriptor) {
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) return errno == EWOULDBLOCK ? Lock::kBusy : Lock::kNone;
-  struct stat held {
-  }, there{};
-  const bool is_same = ::fstat(descriptor, &held) == 0 && ::stat(file.c_str(), &there) == 0 &&
-                       held.st_ino == there.st_ino && held.st_dev == there.st_dev;
-  return is_same ? Lock::kHeld : Lock::kGone;
 }
 
 /// The output that a work folder is of, "a/video-KEY.mp4" of "a/video-KEY.mp4.123.tmp"; empty: it is none.
@@ -55,44 +34,48 @@ fs::path output_of_work(const fs::path& work) {
 /// Removes a work folder if no process makes its output.
 void sweep(const fs::path& work, const fs::path& output) {
   const fs::path file = lock_file(output);
-  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-  if (descriptor < 0) return;
   std::error_code ignored;
-  if (try_lock(file, descriptor) == Lock::kHeld) {
+  try {
+    FileLock lock(file.string());
+    if (lock.take() != FileLock::State::kHeld || !lock.is_in_place()) return;
     fs::remove_all(work, ignored);
     fs::remove(file, ignored);
+  } catch (const UserError&) {  // a folder that we cannot write to: it stays
   }
-  ::close(descriptor);
+}
+
+/// The lock that is held, or that there are none; waits.
+FileLock lock_of(const fs::path& output, const std::function<bool()>& stop) {
+  const std::string file = lock_file(output).string();
+  while (true) {
+    FileLock lock(file);
+    const auto tell = [&] { log_info(output.string() + ": another process makes it; waits for that"); };
+    const FileLock::State state = lock.wait(stop, tell);
+    if (state == FileLock::State::kBusy) throw Interrupted("interrupted while another process made " + output.string());
+    if (state == FileLock::State::kNoLocks) {
+      log_warning(file + ": this file system has no locks: two runs that make this output would both do so");
+      return lock;
+    }
+    if (lock.is_in_place()) return lock;  // else whoever had it has removed it
+  }
+}
+
+/// The folder that an output is in, made.
+const fs::path& with_folder(const fs::path& output) {
+  std::error_code error;
+  fs::create_directories(output.parent_path(), error);
+  if (error) throw UserError(output.parent_path().string() + ": the folder cannot be made: " + error.message());
+  return output;
 }
 
 }  // namespace
 
-SourceLock::SourceLock(const fs::path& output, const std::function<bool()>& stop) : file_(lock_file(output)) {
-  std::error_code error;
-  fs::create_directories(output.parent_path(), error);
-  if (error) throw UserError(output.parent_path().string() + ": the folder cannot be made: " + error.message());
-  for (bool has_told = false;;) {
-    descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (descriptor_ < 0) throw UserError(file_.string() + ": cannot be written: " + system_message(errno));
-    const Lock lock = try_lock(file_, descriptor_);
-    if (lock == Lock::kHeld) return;
-    if (lock == Lock::kNone) {
-      log_warning(file_.string() + ": this file system has no locks: two runs that make this output would both do so");
-      return;
-    }
-    ::close(descriptor_);
-    if (lock == Lock::kGone) continue;
-    if (!has_told) log_info(output.string() + ": another process makes it; waits for that");
-    has_told = true;
-    if (stop && stop()) throw Interrupted("interrupted while another process made " + output.string());
-    std::this_thread::sleep_for(kBetweenTries);
-  }
-}
+SourceLock::SourceLock(const fs::path& output, const std::function<bool()>& stop)
+    : file_(lock_file(output)), lock_(lock_of(with_folder(output), stop)) {}
 
 SourceLock::~SourceLock() {
   std::error_code ignored;
   fs::remove(file_, ignored);  // while it is held: whoever opened it finds that it is gone
-  ::close(descriptor_);
 }
 
 fs::path work_folder_of(const fs::path& output) { return output.string() + "." + std::to_string(::getpid()) + ".tmp"; }

@@ -5,6 +5,8 @@
 #include <functional>
 #include <string>
 
+#include "core/file_lock.h"
+
 namespace hsi4d {
 
 /// The right to make one output, held by a lock beside it, ".NAME.lock", which the system releases when the process
@@ -23,7 +25,7 @@ class SourceLock {
 
  private:
   std::filesystem::path file_;
-  int descriptor_ = -1;
+  FileLock lock_;
 };
 
 /// The folder in which this process makes an output, "NAME.PID.tmp" beside it.

@@ -30,31 +30,47 @@ class AxisChecks {
     if (told_.insert(std::to_string(origin.offset) + pointer + text).second) problems_.add(origin, pointer, text);
   }
 
-  /// A setting that two axes name: one of them would not count.
+  /// A setting that two axes name, or of which one names a part: one of them would not count.
   void refuse_shared_keys(const SweepBlock& block) {
-    std::vector<std::pair<std::string, std::string>> named;  // key, who
-    const auto name_key = [&](const SweepSetting& setting, const std::string& who) {
-      const std::string key = sweep_key(setting.key);
-      for (const auto& [other, by] : named) {
-        if (other == key && by != who)
-          return add(setting.origin, "", key + " is set by " + by + " and by " + who + "; one of them would not count");
-      }
-      named.emplace_back(key, who);
-    };
+    named_.clear();
     for (const auto* axes : {&block.grid, &block.zip}) {
       for (std::size_t i = 0; i < axes->size(); ++i) {
         const std::string who =
             axes == &block.grid ? "grid" : "zip" + (block.zip.size() > 1 ? " " + std::to_string(i) : "");
-        for (const SweepSetting& setting : (*axes)[i].points.front()) name_key(setting, who);
+        for (const SweepSetting& setting : (*axes)[i].points.front()) name_key(setting, who, i);
       }
     }
     for (const auto* variants : {&block.ablations, &block.seeds}) {
       const std::string who = variants == &block.ablations ? "ablations" : "seeds";
       for (const SweepVariant& variant : *variants) {
-        for (const SweepSetting& setting : variant.set) name_key(setting, who);
-        if (variant.seed) name_key({"seed", {}, {}}, who);
+        for (const SweepSetting& setting : variant.set) name_key(setting, who, 0);
+        if (!variant.seed) continue;
+        name_key({"seed", {}, {}}, who, 0);
+        name_key({"synthetic.seed", {}, {}}, who, 0);
       }
     }
+  }
+
+  /// @param axis  which one of the grid: each is one of its own
+  void name_key(const SweepSetting& setting, const std::string& who, std::size_t axis) {
+    const std::string key = sweep_key(setting.key);
+    for (const Named& other : named_) {
+      if ((other.who == who && other.axis == axis) || !(is_within(key, other.key) || is_within(other.key, key)))
+        continue;
+      // Seeds that are numbers have no place of their own.
+      const ConfigOrigin& origin = setting.origin.source == nullptr ? other.origin : setting.origin;
+      if (other.key == key)
+        return add(origin, "", key + " is set by " + other.who + " and by " + who + "; one of them would not count");
+      return add(origin, "",
+                 other.key + " is set by " + other.who + " and " + key + " by " + who +
+                     "; one is a part of the other, and would not count");
+    }
+    named_.push_back({key, who, axis, setting.origin});
+  }
+
+  /// "stages.camera.iterations" is within "stages.camera", and within itself.
+  static bool is_within(const std::string& key, const std::string& whole) {
+    return key.starts_with(whole) && (key.size() == whole.size() || key[whole.size()] == '.');
   }
 
   // ---- What rules and `compare` are about ----
@@ -107,9 +123,17 @@ class AxisChecks {
     }
   }
 
+  /// A key that an axis names.
+  struct Named {
+    std::string key, who;
+    std::size_t axis;
+    ConfigOrigin origin;
+  };
+
   const SweepFile& sweep_;
   ConfigProblems& problems_;
   std::set<std::string> told_;
+  std::vector<Named> named_;  // of a block
 };
 
 }  // namespace

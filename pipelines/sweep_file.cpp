@@ -32,11 +32,29 @@ void describe(ConfigFields& f, SweepSlurm& s) {
   f.strings("options", s.options, "More options of sbatch");
 }
 
-void describe(ConfigFields& f, SweepFile& s) {
-  f.integer("threads", s.threads, {.min = 0, .max = 1024}, "Threads of a run; 0: the cores are shared out");
-  f.number("memory_mb", s.memory_mb, {.min = 0}, "What a run takes at most, MB; 0: not known");
-  f.object("slurm", s.slurm, "How Slurm starts the runs",
-           [](ConfigFields& fields, SweepSlurm& slurm) { describe(fields, slurm); });
+/// Seconds of a time as sbatch takes it: MINUTES, MINUTES:SECONDS, HOURS:MINUTES:SECONDS, DAYS-HOURS and so on; 0 for
+/// what is none of these, or none at all.
+std::int64_t slurm_seconds(const std::string& time) {
+  constexpr std::int64_t kMinute = 60, kHour = 3600, kDay = 86400;
+  const std::size_t dash = time.find('-');
+  const bool has_days = dash != std::string::npos;
+  std::vector<std::int64_t> numbers;
+  std::string part;
+  for (const char c : time + ":") {
+    if (c >= '0' && c <= '9') {
+      part += c;
+      continue;
+    }
+    if (part.empty() || part.size() > 9 || (c != ':' && c != '-')) return 0;
+    numbers.push_back(std::stoll(part));
+    part.clear();
+  }
+  const std::vector<std::int64_t> units = has_days              ? std::vector{kDay, kHour, kMinute, std::int64_t{1}}
+                                          : numbers.size() == 3 ? std::vector{kHour, kMinute, std::int64_t{1}}
+                                                                : std::vector{kMinute, std::int64_t{1}};
+  std::int64_t seconds = 0;
+  for (std::size_t i = 0; i < std::min(numbers.size(), units.size()); ++i) seconds += numbers[i] * units[i];
+  return seconds;
 }
 
 bool is_name(const std::string& text) {
@@ -67,6 +85,7 @@ class Reader {
     ConfigFields fields;
     describe(fields, sweep);
     read_config(with_members(tree, {"threads", "memory_mb", "slurm"}), fields, problems_);
+    check_slurm(tree, sweep.slurm);
     if (const ConfigValue* const compare = find_member(tree, "compare")) sweep.compare = settings(*compare, "/compare");
     read_blocks(tree, whole, sweep);
     check_sweep_axes(sweep, problems_);
@@ -247,6 +266,10 @@ class Reader {
         add(setting.value.origin, place, "has no values; give some, or leave it out");
         continue;
       }
+      if (sweep_key(setting.key) == "seed") {
+        add(setting.origin, place, "seeds are an axis of their own: write \"seeds\": [0, 1] beside the grid");
+        continue;
+      }
       SweepAxis axis{{setting.key}, {}};
       for (const ConfigValue& value : setting.value.items) axis.points.push_back({{setting.key, value, value.origin}});
       all.push_back(std::move(axis));
@@ -322,6 +345,8 @@ class Reader {
   SweepBlock read_block(const ConfigValue& tree, const std::string& in, const SweepBlock& above) {
     SweepBlock block = above;
     block.name.clear();
+    block.pointer = in;
+    block.origin = tree.origin;
     const auto member = [&tree](const char* key) { return find_member(tree, key); };
     const auto at = [&in](const char* key) { return child_pointer(in, key); };
     if (const ConfigValue* const name = member("name"); name != nullptr &&
@@ -368,6 +393,23 @@ class Reader {
     }
   }
 
+  void check_slurm(const ConfigValue& tree, const SweepSlurm& slurm) {
+    const auto at = [&tree](const std::string& pointer) { return origin_at(tree, pointer); };
+    const std::int64_t seconds = slurm_seconds(slurm.time);
+    if (seconds > 0 && slurm.grace_s >= seconds)
+      add(at("/slurm/grace_s"), "/slurm/grace_s",
+          std::to_string(slurm.grace_s) + " s before the end of its time a run would save its state, and it has " +
+              std::to_string(seconds) + " s (/slurm/time); give it more, or a shorter grace_s");
+    for (std::size_t i = 0; i < slurm.options.size(); ++i) {
+      const std::string place = "/slurm/options/" + std::to_string(i);
+      if (!slurm.options[i].starts_with("-"))
+        add(at(place), place,
+            json_string(slurm.options[i]) +
+                " is no option of sbatch, which begin with '-'; a value belongs to its "
+                "option: --account=hsi");
+    }
+  }
+
   void refuse_missing_base(const ConfigValue& tree, const SweepFile& sweep) {
     if (!problems_.empty()) return;
     for (const SweepBlock& block : sweep.blocks) {
@@ -380,6 +422,13 @@ class Reader {
 };
 
 }  // namespace
+
+void describe(ConfigFields& f, SweepFile& s) {
+  f.integer("threads", s.threads, {.min = 0, .max = 1024}, "Threads of a run; 0: the cores are shared out");
+  f.number("memory_mb", s.memory_mb, {.min = 0}, "What a run takes at most, MB; 0: not known");
+  f.object("slurm", s.slurm, "How Slurm starts the runs",
+           [](ConfigFields& fields, SweepSlurm& slurm) { describe(fields, slurm); });
+}
 
 SweepFile read_sweep_file(const ConfigValue& tree, const std::filesystem::path& file, ConfigProblems& problems) {
   SweepFile sweep = Reader(problems).read(tree, file);

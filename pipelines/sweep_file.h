@@ -57,6 +57,8 @@ struct SweepBlock {
   std::vector<SweepAxis> grid, zip;
   std::vector<SweepVariant> seeds;  ///< empty: what the base says
   std::vector<SweepRule> rules;
+  std::string pointer;  ///< of the block; empty: it is the file itself
+  ConfigOrigin origin;
 };
 
 /// How a sweep's runs are started by Slurm.
@@ -78,6 +80,14 @@ struct SweepFile {
   double memory_mb = 0;               ///< of each run; 0: not said
   SweepSlurm slurm;
 };
+
+class ConfigFields;
+
+/// Describes the settings of a sweep's file that are no axes.
+void describe(ConfigFields& fields, SweepFile& sweep);
+
+/// The JSON Schema of sweeps' files, for editors.
+std::string sweep_schema();
 
 /// Reads a sweep's file as far as it can be told without the configs that it names. Throws one UserError with every
 /// problem: unknown keys, values of a wrong kind, empty or unequal lists, names that occur twice, settings that two

@@ -1,18 +1,16 @@
 #include "pipelines/sweep_folder.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <ctime>
-#include <fcntl.h>
-#include <sys/file.h>
-#include <thread>
+#include <cstdlib>
 #include <unistd.h>
 
 #include "core/check.h"
+#include "core/disk.h"
 #include "core/file.h"
+#include "core/host.h"
 #include "core/log.h"
 #include "core/system_message.h"
 #include "core/version.h"
@@ -26,24 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kBetweenTries{200};
-
-std::string now_text() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  ::gmtime_r(&now, &parts);
-  std::array<char, 32> buffer{};
-  return {buffer.data(), std::strftime(buffer.data(), buffer.size(), "%Y-%m-%dT%H:%M:%SZ", &parts)};
-}
-
-std::string host_name() {
-  std::array<char, 256> buffer{};
-  return ::gethostname(buffer.data(), buffer.size() - 1) == 0 ? buffer.data() : "unknown";
-}
-
-/// Opens the file of attempts. −1: it is not there, or cannot be written.
-int open_attempts(const std::string& file, int flags) {
-  return ::open(file.c_str(), O_RDWR | O_APPEND | O_CLOEXEC | flags, 0666);
-}
+constexpr std::chrono::milliseconds kShortly{20};  // others look whether a run is claimed for less than that
+constexpr int kShortTries = 5;
 
 double number_member(const ConfigValue& object, std::string_view key) {
   const ConfigValue* const member = find_member(object, key);
@@ -67,13 +49,53 @@ std::string state_in(const RunPaths& paths) {
   }
 }
 
+/// Makes a folder with those that it is in.
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw UserError(folder.string() + ": the folder cannot be made: " + error.message());
+}
+
+/// The file of the lock on a sweep's folder, which is there.
+std::string placed_lock(const SweepPaths& paths) {
+  make_folder(paths.folder);
+  return paths.lock();
+}
+
+/// The file of a run's attempts, whose folder is there.
+std::string placed_attempts(const SweepPaths& paths, const std::string& id) {
+  const std::string file = paths.attempts(id);
+  make_folder(fs::path(file).parent_path());
+  return file;
+}
+
+void warn_without_locks(FileLock::State state, const std::string& file) {
+  if (state == FileLock::State::kNoLocks)
+    log_warning(file +
+                ": this file system has no locks: two processes that compute this run would not notice each other");
+}
+
+/// Whether the config that a folder has of a run is that of the run.
+bool has_config(const SweepPaths& paths, const SweepRun& run) {
+  const std::string file = paths.config(run.id);
+  if (!fs::exists(file)) return false;
+  const std::string text = read_text_file(file);
+  try {
+    if (text == run.config || sweep_run_id(text, file, !run.dataset.empty()) == run.id) return true;
+    log_warning(file + ": has other settings than the run; it is written anew");
+  } catch (const DataError& damage) {
+    log_warning(std::string(damage.what()) + "; the file is written anew");
+  }
+  return false;
+}
+
 /// True for a folder that holds nothing but what write_sweep_plan writes before the plan: whoever wrote it was killed.
 bool is_begun_sweep(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename().string();
     const bool is_own = name == "configs" || name == "attempts" || name == "logs" || name == "runs" ||
-                        name == "plans" || name.ends_with(".tmp");
+                        name == "plans" || name == ".lock" || name.ends_with(".tmp");
     if (!is_own) return false;
   }
   return !error;
@@ -111,25 +133,30 @@ void check_sweep_folder(const SweepPaths& paths, bool resume) {
   const std::string folder = paths.folder.string();
   std::error_code error;
   if (!fs::exists(paths.folder, error) || fs::is_empty(paths.folder, error)) return;
-  if (!is_sweep_folder(folder) && !is_begun_sweep(paths.folder))
+  if (!is_begun_sweep(paths.folder) && !is_sweep_folder(folder))  // in this order: it may become whole meanwhile
     throw UserError(folder + ": holds something that is no sweep; choose another folder");
   if (!resume)
     throw UserError(folder + ": holds a sweep already; --resume goes on with it, another --out makes a new one");
 }
 
+SweepFolderLock::SweepFolderLock(const SweepPaths& paths) : lock_(placed_lock(paths)) {
+  if (lock_.wait({}, {}) != FileLock::State::kHeld) return;  // without locks nobody knows what is still being written
+  for (const char* const name : {"", "plans", "configs", "slurm"})
+    remove_temporary_files((paths.folder / name).string());
+}
+
 void write_sweep_plan(const SweepPaths& paths, const SweepPlan& plan, bool resume) {
   check_sweep_folder(paths, resume);
+  const SweepFolderLock lock(paths);
+  check_sweep_folder(paths, resume || !is_sweep_folder(paths.folder.string()));  // as it is now that nobody else writes
+  for (const char* const name : {"configs", "plans", "attempts", "logs", "runs"}) make_folder(paths.folder / name);
   for (const SweepRun& run : plan.runs) {
-    if (!run.config.empty() && !fs::exists(paths.config(run.id))) write_text_file(paths.config(run.id), run.config);
-  }
-  std::error_code error;
-  for (const char* const name : {"attempts", "logs", "runs"}) {
-    fs::create_directories(paths.folder / name, error);
-    if (error) throw UserError((paths.folder / name).string() + ": the folder cannot be made: " + error.message());
+    if (!run.config.empty() && !has_config(paths, run)) write_text_file(paths.config(run.id), run.config);
   }
   const std::string text = sweep_plan_json(plan);
   write_text_file(paths.frozen_plan(plan), text);
   write_text_file(paths.plan(), text);  // last: with it the folder is whole
+  for (const std::string& file : {paths.frozen_plan(plan), paths.plan()}) sync_to_disk(file);
 }
 
 std::string_view sweep_run_state_name(SweepRunState state) {
@@ -148,18 +175,20 @@ std::string_view sweep_run_state_name(SweepRunState state) {
 
 SweepRunState sweep_run_state(const SweepPaths& paths, const std::string& id) {
   const RunPaths run{paths.run(id)};
-  if (fs::exists(run.status())) {
-    const std::string state = state_in(run);
-    if (state == run_state_name(RunState::kDone) && has_whole_summary(run)) return SweepRunState::kDone;
-    if (state != run_state_name(RunState::kFailed)) return SweepRunState::kStarted;
-  }
+  const bool has_status = fs::exists(run.status());
+  const std::string state = has_status ? state_in(run) : "";
+  if (state == run_state_name(RunState::kDone) && has_whole_summary(run)) return SweepRunState::kDone;
   const std::vector<SweepAttempt> attempts = read_attempts(paths, id);
-  if (attempts.empty()) return SweepRunState::kNew;
-  return attempts.back().event == "failed" ? SweepRunState::kFailed : SweepRunState::kStarted;
+  const bool has_failed =
+      attempts.empty() ? state == run_state_name(RunState::kFailed) : attempts.back().event == "failed";
+  if (has_failed) return SweepRunState::kFailed;
+  return has_status || !attempts.empty() ? SweepRunState::kStarted : SweepRunState::kNew;
 }
 
 bool is_sweep_run_whole(const SweepPaths& paths, const std::string& id) {
-  return sweep_run_state(paths, id) == SweepRunState::kDone && fs::exists(RunPaths{paths.run(id)}.report());
+  if (sweep_run_state(paths, id) != SweepRunState::kDone || !fs::exists(RunPaths{paths.run(id)}.report())) return false;
+  const std::vector<SweepAttempt> attempts = read_attempts(paths, id);
+  return attempts.empty() || attempts.back().event == "done";
 }
 
 std::string sweep_run_progress(const SweepPaths& paths, const SweepRun& run) {
@@ -214,33 +243,26 @@ std::vector<SweepAttempt> read_attempts(const SweepPaths& paths, const std::stri
 }
 
 SweepClaim::SweepClaim(const SweepPaths& paths, const std::string& id, const std::function<bool()>& stop_requested)
-    : file_(paths.attempts(id)) {
-  std::error_code error;
-  fs::create_directories(fs::path(file_).parent_path(), error);
-  descriptor_ = open_attempts(file_, O_CREAT);
-  if (descriptor_ < 0) throw UserError(file_ + ": cannot be written: " + system_message(errno));
-  for (bool has_told = false; ::flock(descriptor_, LOCK_EX | LOCK_NB) != 0;) {
-    if (errno != EWOULDBLOCK) {
-      log_warning(file_ + ": this file system has no locks (" + system_message(errno) +
-                  "): two processes that compute this run would not notice each other");
-      return;
-    }
-    if (!has_told) log_info("run " + id + ": another process computes it; waits for that");
-    has_told = true;
-    if (stop_requested && stop_requested()) {
-      ::close(descriptor_);
-      throw Interrupted("interrupted while another process computed run " + id);
-    }
-    std::this_thread::sleep_for(kBetweenTries);
-  }
+    : SweepClaim(placed_attempts(paths, id)) {
+  const auto tell = [&] { log_info("run " + id + ": another process computes it; waits for that"); };
+  const FileLock::State state = lock_.wait(stop_requested, tell, kBetweenTries);
+  if (state == FileLock::State::kBusy) throw Interrupted("interrupted while another process computed run " + id);
+  warn_without_locks(state, file_);
 }
 
-SweepClaim::~SweepClaim() { ::close(descriptor_); }
+std::optional<SweepClaim> SweepClaim::try_claim(const SweepPaths& paths, const std::string& id) {
+  SweepClaim claim(placed_attempts(paths, id));
+  int tries = 0;
+  const FileLock::State state = claim.lock_.wait([&tries] { return ++tries >= kShortTries; }, {}, kShortly);
+  if (state == FileLock::State::kBusy) return std::nullopt;
+  warn_without_locks(state, claim.file_);
+  return claim;
+}
 
 void SweepClaim::note(const std::string& event, const std::string& message, double seconds, double peak_mb) {
   ConfigValue line = ConfigValue::make_object();
   line.add("event", ConfigValue::make_string(event));
-  line.add("time", ConfigValue::make_string(now_text()));
+  line.add("time", ConfigValue::make_string(utc_now_text()));
   line.add("host", ConfigValue::make_string(host_name()));
   line.add("process", ConfigValue::make_integer(::getpid()));
   if (const char* const job = std::getenv("SLURM_JOB_ID")) line.add("slurm_job", ConfigValue::make_string(job));
@@ -253,18 +275,12 @@ void SweepClaim::note(const std::string& event, const std::string& message, doub
   if (!message.empty()) line.add("message", ConfigValue::make_string(message));
   std::string text = to_json_line(line) + "\n";
   char last = '\n';
-  const off_t size = ::lseek(descriptor_, 0, SEEK_END);
-  if (size > 0 && ::pread(descriptor_, &last, 1, size - 1) == 1 && last != '\n') text.insert(text.begin(), '\n');
-  if (::write(descriptor_, text.data(), text.size()) != static_cast<ssize_t>(text.size()))
+  const off_t size = ::lseek(lock_.descriptor(), 0, SEEK_END);
+  if (size > 0 && ::pread(lock_.descriptor(), &last, 1, size - 1) == 1 && last != '\n') text.insert(text.begin(), '\n');
+  if (::write(lock_.descriptor(), text.data(), text.size()) != static_cast<ssize_t>(text.size()))
     throw UserError(file_ + ": cannot be written: " + system_message(errno));
 }
 
-bool is_claimed(const SweepPaths& paths, const std::string& id) {
-  const int descriptor = open_attempts(paths.attempts(id), 0);
-  if (descriptor < 0) return false;
-  const bool is_taken = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-  ::close(descriptor);
-  return is_taken;
-}
+bool is_claimed(const SweepPaths& paths, const std::string& id) { return is_file_locked(paths.attempts(id)); }
 
 }  // namespace hsi4d

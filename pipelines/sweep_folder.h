@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/file_lock.h"
 #include "pipelines/run_folder.h"
 #include "pipelines/sweep_plan.h"
 
@@ -24,6 +25,7 @@ struct SweepPaths {
   /// file.
   std::string frozen_plan(const SweepPlan& plan) const;
   std::string log() const { return (folder / "sweep.log").string(); }
+  std::string lock() const { return (folder / ".lock").string(); }
   std::string config(const std::string& id) const { return (folder / "configs" / (id + ".json")).string(); }
   std::string run(const std::string& id) const { return (folder / "runs" / id).string(); }
   std::string dataset(const std::string& id) const { return (folder / "data" / id).string(); }
@@ -43,9 +45,21 @@ std::filesystem::path sweep_folder_of(const std::filesystem::path& plan);
 /// The plan that a folder holds. Throws UserError where there is none, DataError where it is damaged.
 SweepPlan read_sweep_plan(const SweepPaths& paths);
 
+/// The right to write the files of a sweep's folder itself: its plans, configs and results, not those of its runs. Held
+/// for the moment, and waited for. Where it is taken, what others have left half done that were killed is removed.
+class SweepFolderLock {
+ public:
+  /// Throws UserError where the folder cannot be made or written to.
+  explicit SweepFolderLock(const SweepPaths& paths);
+
+ private:
+  FileLock lock_;
+};
+
 /// Writes the plan, a copy of it that stays, and the configs of its runs, of which those that are there already stay as
-/// they are. Throws UserError naming the folder: it holds a sweep and `resume` is false, something else, or cannot be
-/// written.
+/// they are, unless they are damaged or of other settings than the run's. The plans are on the disk when this returns;
+/// configs that a power cut damages are found out. Throws UserError naming the folder: it holds a sweep and `resume` is
+/// false, something else, or cannot be written.
 void write_sweep_plan(const SweepPaths& paths, const SweepPlan& plan, bool resume);
 
 /// What write_sweep_plan would refuse, without writing anything.
@@ -57,10 +71,11 @@ enum class SweepRunState { kNew, kStarted, kFailed, kDone };
 /// "new", "started", "failed" or "done".
 std::string_view sweep_run_state_name(SweepRunState state);
 
-/// How a run stands: done where its status says so and its summary is whole.
+/// How a run stands: done where its status says so and its summary is whole; else as its last attempt tells.
 SweepRunState sweep_run_state(const SweepPaths& paths, const std::string& id);
 
-/// True for a run that is done and has its report: nobody needs to start it again. A kill may come between the two.
+/// True for a run that is done, has its report, and whose attempts tell of its end: nobody needs to start it again. A
+/// kill may come between any two of these.
 bool is_sweep_run_whole(const SweepPaths& paths, const std::string& id);
 
 /// How far a run is that is not done: what its checkpoints are told by, other after every frame that is finished; of
@@ -91,16 +106,18 @@ class SweepClaim {
  public:
   /// Waits until no other process has it. Throws Interrupted when asked to stop, UserError where it cannot be written.
   SweepClaim(const SweepPaths& paths, const std::string& id, const std::function<bool()>& stop_requested);
-  ~SweepClaim();
-  SweepClaim(const SweepClaim&) = delete;
-  SweepClaim& operator=(const SweepClaim&) = delete;
+
+  /// Without waiting: nothing where another process has it.
+  static std::optional<SweepClaim> try_claim(const SweepPaths& paths, const std::string& id);
 
   /// Appends a line, with the time, host, process and program.
   void note(const std::string& event, const std::string& message = "", double seconds = 0, double peak_mb = 0);
 
  private:
+  explicit SweepClaim(const std::string& file) : file_(file), lock_(file) {}
+
   std::string file_;
-  int descriptor_ = -1;
+  FileLock lock_;
 };
 
 /// True while some process has the claim on a run.

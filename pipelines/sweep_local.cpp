@@ -9,12 +9,14 @@
 #include <optional>
 #include <thread>
 #include <unistd.h>
+#include <utility>
 
 #include "core/background_program.h"
 #include "core/check.h"
 #include "core/file.h"
 #include "core/process.h"
 #include "core/text.h"
+#include "pipelines/exit_status.h"
 #include "pipelines/observer.h"
 
 namespace hsi4d {
@@ -27,18 +29,19 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kLook{50};           // between looks at what has ended
 constexpr std::chrono::milliseconds kBetweenTries{500};  // between looks at what other launchers compute
 constexpr double kBetweenReports = 1;                    // seconds
-constexpr int kInterruptedStatus = 130;
-constexpr int kBugStatus = 3;
-constexpr std::int64_t kEndOfOutput = 4096;  // bytes
+constexpr std::int64_t kEndOfOutput = 4096;              // bytes
+constexpr int kInterruptSignal = SIGINT;  // not SIGTERM, which they get when we are killed: a second one would end them
 
 /// A run that is being computed.
 struct Running {
   std::size_t index;
   std::int64_t printed_before;  ///< bytes of its file of output that are of earlier attempts
+  std::size_t noted_before;     ///< lines of its attempts that are
   BackgroundProgram program;
 
-  Running(std::size_t run, std::int64_t before, const std::vector<std::string>& command, const std::string& output)
-      : index(run), printed_before(before), program(command, output) {}
+  Running(std::size_t run, std::int64_t printed, std::size_t noted, const std::vector<std::string>& command,
+          const std::string& output)
+      : index(run), printed_before(printed), noted_before(noted), program(command, output) {}
 };
 
 std::int64_t size_of(const std::string& file) {
@@ -86,14 +89,11 @@ class Launcher {
     }
     if (outcome_.done_before > 0)
       tell(std::to_string(outcome_.done_before) + " of " + std::to_string(total_) + " runs are done already");
-    while (true) {
-      collect_ended();
-      if (launch_.stop_requested && launch_.stop_requested()) stop();
-      if (launch_.fail_fast && !outcome_.failures.empty()) return give_up();
-      start_what_fits();
-      report(false);
-      if (running_.empty() && waiting_.empty()) break;
-      std::this_thread::sleep_for(kLook);
+    try {
+      while (go_on()) std::this_thread::sleep_for(kLook);
+    } catch (...) {
+      interrupt_all();  // with their state saved, whatever has happened here
+      throw;
     }
     report(true);
     return std::move(outcome_);
@@ -106,12 +106,25 @@ class Launcher {
     if (launch_.tell) launch_.tell(line);
   }
 
+  /// One look at everything. False once there is nothing more to do.
+  bool go_on() {
+    collect_ended();
+    if (launch_.stop_requested && launch_.stop_requested()) stop();
+    if (launch_.fail_fast && !outcome_.failures.empty()) {
+      give_up();
+      return false;
+    }
+    start_what_fits();
+    report(false);
+    return !(running_.empty() && waiting_.empty());
+  }
+
   // ---- Memory and time, as far as they are known ----
 
   void learn_from(const std::vector<SweepAttempt>& attempts) {
     for (const SweepAttempt& attempt : attempts) {
       known_peak_mb_ = std::max(known_peak_mb_, attempt.peak_mb);
-      if (attempt.event == "done") note_seconds(attempt.seconds);
+      if (attempt.event == "done" && attempt.seconds > 0) note_seconds(attempt.seconds);
     }
   }
 
@@ -124,15 +137,25 @@ class Launcher {
   double needed_mb() const { return std::max(plan_.memory_mb, known_peak_mb_); }
 
   bool has_memory_for_one() {
-    if (launch_.memory_mb <= 0 || running_.empty()) return true;
+    if (launch_.memory_mb <= 0) return true;
+    if (running_.empty()) {
+      if (needed_mb() > launch_.memory_mb) warn_of_memory();
+      return true;
+    }
     double taken = 0;
-    for (const Running& run : running_) {
+    for (Running& run : running_) {
       const double peak = run.program.peak_mb();
       known_peak_mb_ = std::max(known_peak_mb_, peak);
       taken += std::max(plan_.memory_mb, peak);
     }
     taken = std::max(taken, needed_mb() * static_cast<double>(running_.size()));
     return taken + needed_mb() <= launch_.memory_mb;
+  }
+
+  void warn_of_memory() {
+    if (std::exchange(has_warned_of_memory_, true)) return;
+    tell("a run takes up to " + rounded(needed_mb(), 3) + " MB, and there are " + rounded(launch_.memory_mb, 3) +
+         " MB for all together: one at a time is computed, and may end for want of memory");
   }
 
   /// Seconds until all is done; negative: not known.
@@ -200,12 +223,17 @@ class Launcher {
 
   void start(std::size_t index) {
     const std::string output = paths_.printed(id_of(index));
-    running_.emplace_back(
-        index, size_of(output),
-        std::vector<std::string>{launch_.program, "run-one", frozen_plan_, std::to_string(index), "--out",
-                                 paths_.folder.string(), "--threads", std::to_string(sweep_threads(plan_, launch_)),
-                                 "--parent", std::to_string(::getpid())},
-        output);
+    try {
+      running_.emplace_back(
+          index, size_of(output), read_attempts(paths_, id_of(index)).size(),
+          std::vector<std::string>{launch_.program, "run-one", frozen_plan_, std::to_string(index), "--out",
+                                   paths_.folder.string(), "--threads", std::to_string(sweep_threads(plan_, launch_)),
+                                   "--parent", std::to_string(::getpid())},
+          output);
+    } catch (const UserError& problem) {  // of this run alone: the others go on
+      note_attempt(index, problem.what(), 0, 0);
+      add_failure({index, problem.what(), false});
+    }
   }
 
   // ---- Ends ----
@@ -224,22 +252,44 @@ class Launcher {
 
   void note_end(const Running& run, const ProgramEnd& end) {
     known_peak_mb_ = std::max(known_peak_mb_, end.peak_mb);
-    if (end.signal == 0 && end.status == 0) {
-      ++outcome_.computed;
-      note_seconds(run.program.seconds());
-      tell_end(run.index, "done in " + duration_text(run.program.seconds()) + ", " + rounded(end.peak_mb, 3) + " MB" +
-                              main_error(run.index));
-      return;
-    }
-    if (is_stopping_ && end.status == kInterruptedStatus) return;
-    SweepFailure failure{run.index, failure_text(run, end), end.status == kBugStatus};
-    tell_end(run.index, "failed: " + failure.message);
+    const bool has_ended_itself = end.signal == 0;
+    if (has_ended_itself && end.status == exit_status::kElsewhere) return waiting_.push_back(run.index);
+    if (has_ended_itself && end.status == exit_status::kDone && is_sweep_run_whole(paths_, id_of(run.index)))
+      return note_done(run, end);
+    const bool is_interrupted =
+        has_ended_itself ? end.status == exit_status::kInterrupted : end.signal == kInterruptSignal;
+    if (is_stopping_ && is_interrupted) return interrupted_.push_back(run.index);
+    const std::vector<SweepAttempt> attempts = read_attempts(paths_, id_of(run.index));
+    const bool has_noted = attempts.size() > run.noted_before && attempts.back().event == "failed";
+    const std::string message = has_noted ? attempts.back().message : failure_text(run, end);
+    if (!has_noted) note_attempt(run.index, message, run.program.seconds(), end.peak_mb);
+    add_failure({run.index, message, end.status == exit_status::kOurBug});
+  }
+
+  void note_done(const Running& run, const ProgramEnd& end) {
+    ++outcome_.computed;
+    note_seconds(run.program.seconds());
+    tell_end(run.index, "done in " + duration_text(run.program.seconds()) +
+                            (end.peak_mb > 0 ? ", " + rounded(end.peak_mb, 3) + " MB" : "") + main_error(run.index));
+  }
+
+  void add_failure(SweepFailure failure) {
     outcome_.failures.push_back(std::move(failure));
+    tell_end(outcome_.failures.back().index, "failed: " + outcome_.failures.back().message);
+  }
+
+  /// Notes the end of a run that could not do so itself, unless another process has gone on with it since.
+  void note_attempt(std::size_t index, const std::string& message, double seconds, double peak_mb) const {
+    try {
+      std::optional<SweepClaim> claim = SweepClaim::try_claim(paths_, id_of(index));
+      if (claim) claim->note("failed", message, seconds, peak_mb);
+    } catch (const UserError&) {  // a full disk, perhaps: it is told all the same
+    }
   }
 
   /// "5/24 LABEL: WHAT; 3:10 left".
   void tell_end(std::size_t index, const std::string& what) {
-    const std::size_t done = ended() + (what.starts_with("failed") ? 1 : 0);
+    const std::size_t done = ended();
     const double left = seconds_left();
     tell(std::to_string(done) + "/" + std::to_string(total_) + " run " + std::to_string(index) + ", " +
          label_of(index) + ": " + what + (left >= 0 && done < total_ ? "; " + duration_text(left) + " left" : ""));
@@ -248,7 +298,7 @@ class Launcher {
   /// The first error of its last stage that has one, ", world MPJPE 31.2 mm".
   std::string main_error(std::size_t index) const {
     const std::string file = RunPaths{paths_.run(id_of(index))}.summary();
-    const RunSummary summary = parse_summary(read_text_file(file), file);
+    const RunSummary summary = parse_summary(read_text_file(file), file);  // whole: looked at before
     for (const char* const name : {"world_mpjpe_mm", "psnr_db", "camera_translation_cm"}) {
       const MetricFacts* const facts = find_metric_facts(name);
       if (const double* const value = find_metric(summary.metrics.back().values, name))
@@ -259,15 +309,14 @@ class Launcher {
   }
 
   std::string failure_text(const Running& run, const ProgramEnd& end) const {
-    const std::string printed = end_of_printed(paths_.printed(id_of(run.index)), run.printed_before);
-    if (end.signal != 0)
-      return "was ended by signal " + std::to_string(end.signal) +
-             (end.signal == SIGKILL ? ", most often for want of memory (it had " + rounded(end.peak_mb, 3) + " MB)"
-                                    : "") +
-             end_of_output(printed);
-    const std::vector<SweepAttempt> attempts = read_attempts(paths_, id_of(run.index));
-    if (!attempts.empty() && !attempts.back().message.empty()) return attempts.back().message;
-    return "ended with status " + std::to_string(end.status) + end_of_output(printed);
+    const std::string printed = end_of_output(end_of_printed(paths_.printed(id_of(run.index)), run.printed_before));
+    if (!end.is_known) return "ended without results, and the system does not tell how" + printed;
+    if (end.signal == SIGKILL)
+      return "was ended by signal 9, most often for want of memory (it had " + rounded(end.peak_mb, 3) + " MB)" +
+             printed;
+    if (end.signal != 0) return "was ended by signal " + std::to_string(end.signal) + printed;
+    if (end.status == exit_status::kDone) return "ended as if it were done, and its results are not whole" + printed;
+    return "ended with status " + std::to_string(end.status) + printed;
   }
 
   // ---- Stopping ----
@@ -275,7 +324,7 @@ class Launcher {
   /// Interrupts what is running and waits until it has saved its state.
   void interrupt_all() {
     is_stopping_ = true;
-    for (const Running& run : running_) run.program.send(SIGINT);
+    for (const Running& run : running_) run.program.send(kInterruptSignal);
     while (!running_.empty()) {
       collect_ended();
       std::this_thread::sleep_for(kLook);
@@ -289,12 +338,10 @@ class Launcher {
                       " runs have ended, others have saved their state");
   }
 
-  SweepOutcome give_up() {
-    for (const Running& run : running_) outcome_.not_started.push_back(run.index);
+  void give_up() {
     interrupt_all();
-    outcome_.not_started.insert(outcome_.not_started.end(), waiting_.begin(), waiting_.end());
-    report(true);
-    return std::move(outcome_);
+    for (const auto& indices : {interrupted_, std::vector(waiting_.begin(), waiting_.end())})
+      outcome_.not_done.insert(outcome_.not_done.end(), indices.begin(), indices.end());
   }
 
   const SweepPaths& paths_;
@@ -308,7 +355,8 @@ class Launcher {
   std::deque<std::size_t> waiting_;
   std::list<Running> running_;
   SweepOutcome outcome_;
-  bool is_stopping_ = false;
+  bool is_stopping_ = false, has_warned_of_memory_ = false;
+  std::vector<std::size_t> interrupted_;
   Clock::time_point next_try_;
   std::size_t running_before_ = 0;
 };

@@ -214,6 +214,23 @@ ConfigValue with_clip(ConfigValue base, const ConfigValue& clip) {
   return merged(std::move(base), std::move(over));
 }
 
+/// Settings as text, for comparisons.
+std::string settings_text(const std::vector<SweepSetting>& settings) {
+  std::string text;
+  for (const SweepSetting& setting : settings)
+    text += sweep_key(setting.key) + " " + sweep_value_text(setting.value) + "\n";
+  return text;
+}
+
+/// What a combination is made of beside its clip, its seed and the values that it is told by.
+std::string recipe_of(const Combination& c) {
+  std::string text = c.block->base.string() + "\n" + settings_text(c.block->set);
+  for (const SweepVariant& ablation : c.block->ablations) {
+    if (ablation.name == c.run.ablation) text += settings_text(ablation.set);
+  }
+  return text;
+}
+
 /// What two configs have in common that give the same result.
 ConfigValue identity_of(ConfigValue tree, bool is_made) {
   std::erase_if(tree.members, [&](const ConfigMember& member) {
@@ -221,6 +238,10 @@ ConfigValue identity_of(ConfigValue tree, bool is_made) {
            (member.key == "synthetic" && !is_made);
   });
   return tree;
+}
+
+std::string identity_text(const std::string& config, const std::string& name, bool is_made) {
+  return to_json(identity_of(parse_json_text(config, name), is_made));
 }
 
 class Planner {
@@ -236,9 +257,10 @@ class Planner {
       } catch (const UserError& problem) {
         note(problem.what(), plan.runs.size());
       }
-      plan.runs.push_back(std::move(combination.run));
+      plan.runs.push_back(combination.run);
     }
     throw_if_any(plan);
+    refuse_mixed_blocks(all, plan);
     plan.compare = reference(plan);
     return plan;
   }
@@ -273,7 +295,7 @@ class Planner {
     if (is_made) check_generated(c.block->base, config);
     config.name = sweep_.name + ": " + sweep_label(c.run);
     c.run.config = resolved_config(config, losses_);
-    const std::string identity = to_json(identity_of(parse_json_text(c.run.config, "config"), is_made));
+    const std::string identity = identity_text(c.run.config, "config", is_made);
     c.run.id = text_hash(identity);
     const auto [same, is_new] = identities_.emplace(c.run.id, identity);
     HSI4D_CHECK(same->second == identity, "two configs have the hash " + c.run.id);
@@ -311,6 +333,35 @@ class Planner {
     if (!text.empty()) throw UserError(text);
   }
 
+  /// Runs of blocks without names that are called the same are one row of the results: they must be made in one way.
+  void refuse_mixed_blocks(const std::vector<Combination>& all, const SweepPlan& plan) const {
+    std::map<std::string, std::pair<const Combination*, std::string>> rows, runs;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      SweepRun row = plan.runs[i];
+      const std::string label = sweep_label(row);
+      row.clip.clear();
+      row.seed.clear();
+      const auto first = runs.emplace(whole_label(plan.runs[i]), std::pair(&all[i], plan.runs[i].id)).first;
+      const auto of_row = rows.emplace(whole_label(row), std::pair(&all[i], recipe_of(all[i]))).first;
+      const bool is_same = first->second.second == plan.runs[i].id && of_row->second.second == recipe_of(all[i]);
+      if (is_same) continue;
+      const SweepBlock& other =
+          first->second.second != plan.runs[i].id ? *first->second.first->block : *of_row->second.first->block;
+      ConfigProblems problems;
+      problems.add(all[i].block->origin, all[i].block->pointer,
+                   "run " + std::to_string(i) + " (" + label + ") would be taken for one of " + other.pointer +
+                       ", which has other settings; give the blocks a \"name\"");
+      problems.throw_if_any();
+    }
+  }
+
+  /// As sweep_label, with all values in full.
+  static std::string whole_label(const SweepRun& run) {
+    std::string text = run.block + "\n" + run.clip + "\n" + run.ablation + "\n" + run.seed;
+    for (const auto& [key, value] : run.values) text += "\n" + key + " " + value;
+    return text;
+  }
+
   /// What the others are compared with.
   std::vector<std::pair<std::string, std::string>> reference(const SweepPlan& plan) const {
     std::vector<std::pair<std::string, std::string>> compare;
@@ -328,15 +379,33 @@ class Planner {
         problems.throw_if_any();
       }
     }
-    if (!compare.empty()) return compare;
-    for (const bool must_be_empty : {true, false}) {
-      for (const SweepBlock& block : sweep_.blocks) {
-        for (const SweepVariant& ablation : block.ablations) {
-          if (ablation.set.empty() || !must_be_empty) return {{"ablation", ablation.name}};
-        }
+    if (!compare.empty()) {
+      refuse_no_pair(plan, compare);
+      return compare;
+    }
+    for (const SweepBlock& block : sweep_.blocks) {
+      for (const SweepVariant& ablation : block.ablations) {
+        const auto has_it = [&](const SweepRun& run) { return run.ablation == ablation.name; };
+        if (ablation.set.empty() && std::any_of(plan.runs.begin(), plan.runs.end(), has_it))
+          return {{"ablation", ablation.name}};
       }
     }
-    return plan.runs.front().values;
+    const SweepRun& first = plan.runs.front();
+    if (!first.ablation.empty()) compare.emplace_back("ablation", first.ablation);
+    compare.insert(compare.end(), first.values.begin(), first.values.end());
+    return compare;
+  }
+
+  /// Each of the values is some run's; one must have them all.
+  void refuse_no_pair(const SweepPlan& plan, const std::vector<std::pair<std::string, std::string>>& compare) const {
+    const auto has_all = [&compare](const SweepRun& run) {
+      return std::all_of(compare.begin(), compare.end(),
+                         [&run](const auto& wanted) { return value_on_axis(run, wanted.first) == wanted.second; });
+    };
+    if (std::any_of(plan.runs.begin(), plan.runs.end(), has_all)) return;
+    ConfigProblems problems;
+    problems.add(sweep_.compare.front().origin, "/compare", "no run has all of these values");
+    problems.throw_if_any();
   }
 
   const SweepFile& sweep_;
@@ -390,6 +459,10 @@ SweepPlan plan_sweep(const fs::path& file, const std::vector<LossDescription>& l
   require_kind(tree, ConfigKind::kSweep, file);
   const SweepFile sweep = read_sweep_file(tree, file, problems);
   return Planner(sweep, losses).plan();
+}
+
+std::string sweep_run_id(const std::string& text, const std::string& name, bool is_made) {
+  return text_hash(identity_text(text, name, is_made));
 }
 
 std::vector<std::size_t> distinct_runs(const SweepPlan& plan) {

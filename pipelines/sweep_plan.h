@@ -41,6 +41,13 @@ std::string short_sweep_key(const std::string& key);
 /// the file, its configs and its combinations, with the runs that it is in.
 SweepPlan plan_sweep(const std::filesystem::path& file, const std::vector<LossDescription>& losses);
 
+/// The id of the run that has a config: a hash of what changes its result.
+/// @param text     the resolved config
+/// @param name     what messages call it: its file
+/// @param is_made  its dataset is generated
+/// Throws DataError for text that is no JSON.
+std::string sweep_run_id(const std::string& text, const std::string& name, bool is_made);
+
 /// The runs of the plan without those whose id another one before has: indices.
 std::vector<std::size_t> distinct_runs(const SweepPlan& plan);
 

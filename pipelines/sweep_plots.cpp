@@ -147,7 +147,7 @@ std::string mean_plot(const SweepResults& results, const MetricFacts& metric) {
     for (const std::size_t i : group.rows) {
       if (const double* const value = find_metric(results.rows[i].values, metric.name)) row.points.push_back(*value);
     }
-    const SampleStatistics mean = group_statistics(results, group, metric);
+    const SampleStatistics mean = group_statistics(results, group, metric).sample;
     if (mean.count == 0) continue;
     row.middle = mean.mean;
     if (mean.count > 1) row.range = Interval{mean.mean - mean.deviation, mean.mean + mean.deviation};
@@ -192,7 +192,7 @@ std::string axis_plot(const SweepResults& results, const std::string& key, const
     const auto has =
         std::find_if(run.values.begin(), run.values.end(), [&key](const auto& v) { return v.first == key; });
     const auto number = has == run.values.end() ? std::nullopt : number_of_value(has->second);
-    const SampleStatistics mean = group_statistics(results, group, metric);
+    const SampleStatistics mean = group_statistics(results, group, metric).sample;
     if (!number || mean.count == 0) continue;
     const std::string label = label_beside(run, key);
     auto line = std::find_if(lines.begin(), lines.end(), [&label](const auto& other) { return other.first == label; });

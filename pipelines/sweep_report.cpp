@@ -135,6 +135,7 @@ std::string sweep_page(const SweepResults& results) {
 }
 
 std::string write_sweep_results(const SweepPaths& paths) {
+  const SweepFolderLock lock(paths);
   const SweepResults results = read_sweep_results(paths);
   const std::string markdown = sweep_markdown(results);
   write_text_file(paths.csv(), sweep_csv(results));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "core/file.h"
 
@@ -52,15 +53,23 @@ bool is_partner(const SweepPlan& plan, const SweepRun& run, const SweepRun& othe
   });
 }
 
+constexpr const char* kLostText =
+    "its process ended without a word: it was killed, for want of memory perhaps, or its machine is gone";
+
 SweepRow read_row(const SweepPaths& paths, std::size_t index, const SweepRun& run) {
   SweepRow row;
   row.index = index;
   row.state = sweep_run_state(paths, run.id);
+  std::set<std::string> programs;
   for (SweepAttempt& attempt : read_attempts(paths, run.id)) {
     row.starts += attempt.event == "start" ? 1 : 0;
+    if (attempt.event == "start") programs.insert(attempt.program.hash);
     row.peak_mb = std::max(row.peak_mb, attempt.peak_mb);
     row.last = std::move(attempt);
   }
+  row.programs = programs.size();
+  if (row.state == SweepRunState::kStarted && row.last && row.last->event == "start" && !is_claimed(paths, run.id))
+    row.last->message = kLostText;
   if (row.state != SweepRunState::kDone) return row;
   const std::string file = RunPaths{paths.run(run.id)}.summary();
   const RunSummary summary = parse_summary(read_text_file(file), file);
@@ -83,7 +92,8 @@ std::vector<SweepGroup> groups_of(const SweepPlan& plan) {
       groups.push_back({sweep_label(without_repetition(plan.runs[i])), {}, is_compared_with});
       group = groups.end() - 1;
     }
-    group->rows.push_back(i);
+    const auto is_same = [&](std::size_t row) { return plan.runs[row].id == plan.runs[i].id; };
+    if (std::none_of(group->rows.begin(), group->rows.end(), is_same)) group->rows.push_back(i);
   }
   if (groups.size() == 1) groups.front().label = "all runs";
   return groups;
@@ -127,27 +137,31 @@ SweepResults read_sweep_results(const SweepPaths& paths) {
   return results;
 }
 
-SampleStatistics group_statistics(const SweepResults& results, const SweepGroup& group, const MetricFacts& metric,
-                                  const std::string* clip) {
-  struct Seed {
-    double sum = 0;
-    std::size_t runs = 0, measured = 0;
-  };
-  std::map<std::string, Seed> seeds;
+GroupStatistics group_statistics(const SweepResults& results, const SweepGroup& group, const MetricFacts& metric,
+                                 const std::string* clip) {
+  std::set<std::string> clips;
+  std::map<std::string, std::map<std::string, double>> values;  // of seeds, of clips
   for (const std::size_t i : group.rows) {
-    if (clip != nullptr && results.plan.runs[i].clip != *clip) continue;
-    Seed& seed = seeds[results.plan.runs[i].seed];
-    ++seed.runs;
-    if (const double* const value = find_metric(results.rows[i].values, metric.name)) {
-      seed.sum += *value;
-      ++seed.measured;
-    }
+    const SweepRun& run = results.plan.runs[i];
+    if (clip != nullptr && run.clip != *clip) continue;
+    clips.insert(run.clip);
+    if (const double* const value = find_metric(results.rows[i].values, metric.name))
+      values[run.seed].emplace(run.clip, *value);
   }
+  GroupStatistics statistics;
   std::vector<double> means;
-  for (const auto& [name, seed] : seeds) {
-    if (seed.measured == seed.runs) means.push_back(seed.sum / static_cast<double>(seed.runs));
+  for (const auto& [seed, of_clips] : values) {
+    if (of_clips.size() != clips.size()) continue;
+    double sum = 0;
+    for (const auto& [name, value] : of_clips) {
+      sum += value;
+      statistics.clip_seeds.emplace_back(name, seed);
+    }
+    means.push_back(sum / static_cast<double>(clips.size()));
   }
-  return sample_statistics(means);
+  statistics.sample = sample_statistics(means);
+  std::sort(statistics.clip_seeds.begin(), statistics.clip_seeds.end());
+  return statistics;
 }
 
 std::optional<std::size_t> partner_of(const SweepPlan& plan, std::size_t index) {

@@ -17,6 +17,7 @@ struct SweepRow {
   SweepRunState state = SweepRunState::kNew;
   MetricValues values;  ///< of its last stage, and `seconds` of the run; empty unless it is done
   std::size_t starts = 0;
+  std::size_t programs = 0;          ///< builds of hsi4d that have computed at it
   std::optional<SweepAttempt> last;  ///< what was noted last
   double peak_mb = 0;                ///< the most of all attempts; 0: not known
 };
@@ -24,8 +25,8 @@ struct SweepRow {
 /// Runs that differ in clip and seed alone.
 struct SweepGroup {
   std::string label;
-  std::vector<std::size_t> rows;
-  bool is_reference = false;  ///< others are compared with it
+  std::vector<std::size_t> rows;  ///< each run once, also where several combinations come to it
+  bool is_reference = false;      ///< others are compared with it
 };
 
 /// Differences of a metric, each between two runs of the same clip and seed.
@@ -50,11 +51,17 @@ const MetricFacts& seconds_facts();
 /// Reads how the runs of a folder stand. Errors as read_sweep_plan.
 SweepResults read_sweep_results(const SweepPaths& paths);
 
+/// A metric of a group.
+struct GroupStatistics {
+  SampleStatistics sample;                                      ///< over the seeds
+  std::vector<std::pair<std::string, std::string>> clip_seeds;  ///< the runs that count, sorted
+};
+
 /// A metric of a group over its seeds: of each seed the mean over the clips, of those seeds of which all the group's
 /// clips have it.
 /// @param clip  the runs of this clip alone; null: all
-SampleStatistics group_statistics(const SweepResults& results, const SweepGroup& group, const MetricFacts& metric,
-                                  const std::string* clip = nullptr);
+GroupStatistics group_statistics(const SweepResults& results, const SweepGroup& group, const MetricFacts& metric,
+                                 const std::string* clip = nullptr);
 
 /// A metric of a group less that of what it is compared with, run by run; nothing where there is no pair.
 std::optional<PairedDifference> paired_difference(const SweepResults& results, const SweepGroup& group,

@@ -4,11 +4,12 @@
 #include <chrono>
 #include <exception>
 #include <filesystem>
-#include <sys/resource.h>
 
 #include "core/check.h"
+#include "core/config_file.h"
+#include "core/disk.h"
 #include "core/file.h"
-#include "core/log.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "pipelines/chain.h"
 #include "pipelines/chain_report.h"
@@ -24,23 +25,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The most memory that this process has had, MB.
-double peak_mb() {
-  rusage used{};
-  return ::getrusage(RUSAGE_SELF, &used) == 0 ? static_cast<double>(used.ru_maxrss) / 1024 : 0;
-}
-
 RunSummary summary_in(const RunPaths& paths) { return parse_summary(read_text_file(paths.summary()), paths.summary()); }
 
-/// A run that was killed between its results and its report gets the report now.
-void complete_report(const RunPaths& paths) {
-  if (fs::exists(paths.report())) return;
-  const std::string folder = paths.folder.string();
-  if (is_chain_folder(folder)) {
-    write_chain_report(folder);
-  } else {
-    write_report(folder);
+/// A run that was killed between its results and its report, or before its end was noted, gets what is missing now.
+void complete_end(const SweepPaths& paths, const std::string& id, SweepClaim& claim) {
+  const RunPaths run{paths.run(id)};
+  const std::string folder = run.folder.string();
+  if (!fs::exists(run.report())) {
+    remove_temporary_files(folder);  // of the report: all else was written before
+    if (is_chain_folder(folder)) {
+      write_chain_report(folder);
+    } else {
+      write_report(folder);
+    }
   }
+  const std::vector<SweepAttempt> attempts = read_attempts(paths, id);
+  if (!attempts.empty() && attempts.back().event != "done") claim.note("done", "its end was not noted at the time");
 }
 
 /// Folders of datasets that were being made by processes that are gone. Called while nobody else makes this dataset.
@@ -66,9 +66,18 @@ void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, 
                 dataset_sections(config, descriptions_of(losses)), config.body);
 }
 
+/// What a dataset's config says of data; what it says beside that is of the run that it was made for.
+RunConfig data_of(const fs::path& dataset, const std::vector<LossTerm>& losses) {
+  ConfigProblems problems;
+  ConfigValue tree = load_config(dataset / "config.json", {}, problems);
+  std::erase_if(tree.members,
+                [](const ConfigMember& section) { return section.key != "data" && section.key != "chain"; });
+  return read_run_config(tree, descriptions_of(losses), problems);
+}
+
 /// Names the files of a dataset in a run's config. How masks are read is the run's own.
 void take_over_data(const fs::path& dataset, const std::vector<LossTerm>& losses, RunConfig& config) {
-  RunConfig of_dataset = load_run_config(dataset / "config.json", {}, descriptions_of(losses));
+  RunConfig of_dataset = data_of(dataset, losses);
   const DataSettings own = config.data;
   const auto with_own_masks = [&own](DataSettings data) {
     data.mask_threshold = own.mask_threshold;
@@ -78,6 +87,16 @@ void take_over_data(const fs::path& dataset, const std::vector<LossTerm>& losses
   config.data = with_own_masks(of_dataset.data);
   config.chain = std::move(of_dataset.chain);
   for (ChainClip& clip : config.chain) clip.data = with_own_masks(clip.data);
+}
+
+/// The config of a run, which must be its own: by hand, or by a disk, it may have become another one.
+RunConfig config_of(const SweepPaths& paths, const SweepRun& run, const std::vector<LossTerm>& losses) {
+  const std::string file = paths.config(run.id);
+  const bool is_made = !run.dataset.empty();
+  if (sweep_run_id(read_text_file(file), file, is_made) != run.id)
+    throw UserError(file + ": has other settings than the run; hsi4d sweep SWEEP.json --out " + paths.folder.string() +
+                    " --resume writes it anew");
+  return load_run_config(file, {}, descriptions_of(losses), is_made ? ConfigUse::kStages : ConfigUse::kRun);
 }
 
 /// The name that a run has got, also where its sweep would call it otherwise by now: a run is resumed under its name.
@@ -92,8 +111,7 @@ void keep_name(const RunPaths& paths, RunConfig& config) {
 
 RunSummary compute(const SweepPaths& paths, const SweepRun& run, const std::vector<LossTerm>& losses, int threads,
                    const Observer& observer) {
-  RunConfig config = load_run_config(paths.config(run.id), {}, descriptions_of(losses),
-                                     run.dataset.empty() ? ConfigUse::kRun : ConfigUse::kStages);
+  RunConfig config = config_of(paths, run, losses);
   RunOptions options{paths.run(run.id), true, threads, observer};
   keep_name({options.folder}, config);
   if (!run.dataset.empty()) {
@@ -106,32 +124,38 @@ RunSummary compute(const SweepPaths& paths, const SweepRun& run, const std::vect
 
 }  // namespace
 
-SweepRunResult run_one(const SweepPaths& paths, const SweepPlan& plan, std::size_t index,
+SweepRunResult run_one(const SweepPaths& paths, const SweepPlan& plan, std::size_t index, SweepClaim& claim,
                        const std::vector<LossTerm>& losses, int threads, const Observer& observer) {
   const SweepRun& run = plan.runs.at(index);
-  SweepClaim claim(paths, run.id, observer.stop_requested);
   if (sweep_run_state(paths, run.id) == SweepRunState::kDone) {
-    complete_report({paths.run(run.id)});
+    complete_end(paths, run.id, claim);
     return {summary_in({paths.run(run.id)}), true};
   }
   const auto begin = std::chrono::steady_clock::now();
   const auto note = [&](const char* event, const std::string& message) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    claim.note(event, message, seconds, peak_mb());
+    claim.note(event, message, seconds, static_cast<double>(peak_memory_bytes()) / kBytesPerMb);
+  };
+  const auto note_end = [&](const char* event, const char* message) {
+    try {
+      note(event, message);
+    } catch (const UserError&) {  // a full disk, perhaps: what has happened is told all the same
+    }
   };
   claim.note("start");
+  SweepRunResult result;
   try {
     const int asked = threads > 0 ? threads : plan.threads;
-    SweepRunResult result{compute(paths, run, losses, asked > 0 ? asked : thread_count(), observer)};
-    note("done", "");
-    return result;
+    result.summary = compute(paths, run, losses, asked > 0 ? asked : thread_count(), observer);
   } catch (const Interrupted& stop) {
-    note("interrupted", stop.what());
+    note_end("interrupted", stop.what());
     throw;
   } catch (const std::exception& failure) {
-    note("failed", failure.what());
+    note_end("failed", failure.what());
     throw;
   }
+  note("done", "");
+  return result;
 }
 
 }  // namespace hsi4d

@@ -18,10 +18,11 @@ struct SweepRunResult {
 
 /// Carries out a run, or goes on with it; takes what is there where it is done. A dataset that it needs is made, or
 /// waited for where another process makes it. Every start and every end is noted in the run's attempts.
+/// @param claim     the right to compute this run
 /// @param threads   0: what the plan says, or one a core
 /// @param observer  shown what is computed; `stop_requested` ends it with its state saved
 /// Throws as carry_out, also what is wrong with the run's files.
-SweepRunResult run_one(const SweepPaths& paths, const SweepPlan& plan, std::size_t index,
+SweepRunResult run_one(const SweepPaths& paths, const SweepPlan& plan, std::size_t index, SweepClaim& claim,
                        const std::vector<LossTerm>& losses, int threads, const Observer& observer);
 
 }  // namespace hsi4d

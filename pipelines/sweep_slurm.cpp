@@ -1,13 +1,16 @@
 #include "pipelines/sweep_slurm.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <map>
 #include <set>
 #include <sstream>
 
 #include "core/check.h"
 #include "core/file.h"
 #include "core/process.h"
+#include "optim/checkpoint.h"
 
 namespace hsi4d {
 namespace {
@@ -47,29 +50,75 @@ std::string setting_of_slurm(const std::string& name) {
   return "";
 }
 
-/// Ids of runs that earlier arrays of this folder have still to compute. Jobs that Slurm does not know any more have
-/// ended.
-std::set<std::string> queued_runs(const fs::path& folder) {
-  std::set<std::string> queued;
-  const std::string file = (folder / "jobs.txt").string();
-  if (!fs::exists(file)) return queued;
-  std::istringstream jobs(read_text_file(file));
-  for (std::string job, plan_file; jobs >> job >> plan_file;) {
-    std::string told;
-    try {
-      told = run_process({"squeue", "--noheader", "--array", "--jobs", job, "--format", "%K"});
-    } catch (const ProgramNotStartedError&) {
-      throw;
-    } catch (const UserError& failure) {
-      if (std::string(failure.what()).find("Invalid job id") == std::string::npos) throw;
-      continue;
+/// What of a sweep is in the queue.
+struct QueuedJobs {
+  std::set<std::string> runs;    ///< ids of those that arrays have still to compute
+  std::set<std::string> arrays;  ///< of these arrays
+  bool has_results = false;      ///< the job for the results
+};
+
+constexpr const char* kResultsMark = "results";
+
+/// The comment that a job of a sweep's folder has.
+std::string job_comment(const fs::path& folder, const std::string& what) {
+  return "hsi4d:" + text_hash(folder.string()) + ":" + what;
+}
+
+bool is_number(const std::string& text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// Adds a run of an array, which has its indices from a plan of the folder.
+void add_run(const fs::path& folder, const std::string& plan_file, const std::string& index, QueuedJobs& queued,
+             std::map<std::string, SweepPlan>& plans) {
+  if (!is_number(index)) return;
+  auto plan = plans.find(plan_file);
+  if (plan == plans.end()) {
+    const std::string path = (folder.parent_path() / "plans" / plan_file).string();
+    plan = plans.emplace(plan_file, parse_sweep_plan(read_text_file(path), path)).first;
+  }
+  const std::size_t run = std::stoul(index);
+  if (run < plan->second.runs.size()) queued.runs.insert(plan->second.runs[run].id);
+}
+
+/// What squeue tells of a job, a line each; empty for one that Slurm does not know any more: it has ended.
+std::string told_of_job(const std::string& job) {
+  try {
+    return run_process({"squeue", "--noheader", "--array", "--jobs", job, "--format", "%K"});
+  } catch (const ProgramNotStartedError&) {
+    throw;
+  } catch (const UserError& failure) {
+    if (std::string(failure.what()).find("Invalid job id") == std::string::npos) throw;
+    return "";
+  }
+}
+
+QueuedJobs queued_jobs(const fs::path& folder) {
+  QueuedJobs queued;
+  std::map<std::string, SweepPlan> plans;
+  const std::string mark = job_comment(folder, "");
+  std::istringstream all(run_process({"squeue", "--noheader", "--array", "--me", "--format", "%F %K %k"}));
+  for (std::string line; std::getline(all, line);) {
+    std::istringstream words(line);
+    std::string job, index, comment;
+    words >> job >> index >> comment;
+    if (!comment.starts_with(mark)) continue;
+    const std::string what = comment.substr(mark.size());
+    if (what == kResultsMark) {
+      queued.has_results = true;
+    } else {
+      queued.arrays.insert(job);
+      add_run(folder, what, index, queued, plans);
     }
-    const std::string plan_path = (folder.parent_path() / "plans" / plan_file).string();
-    const SweepPlan plan = parse_sweep_plan(read_text_file(plan_path), plan_path);
-    std::istringstream indices(told);
+  }
+  const std::string file = (folder / "jobs.txt").string();  // of jobs that were given another comment
+  std::istringstream jobs(fs::exists(file) ? read_text_file(file) : "");
+  for (std::string job, plan_file; jobs >> job >> plan_file;) {
+    if (queued.arrays.contains(job)) continue;
+    std::istringstream indices(told_of_job(job));
     for (std::string index; indices >> index;) {
-      const bool is_number = std::all_of(index.begin(), index.end(), [](char c) { return c >= '0' && c <= '9'; });
-      if (is_number && std::stoul(index) < plan.runs.size()) queued.insert(plan.runs[std::stoul(index)].id);
+      queued.arrays.insert(job);
+      add_run(folder, plan_file, index, queued, plans);
     }
   }
   return queued;
@@ -92,6 +141,41 @@ std::string submit(std::vector<std::string> options, const std::string& script) 
   return id.substr(0, id.find(';'));  // of several clusters the name follows
 }
 
+/// The script that a sweep's folder has under a name, written.
+std::string script(const SweepPaths& paths, const std::string& name, const std::string& command) {
+  const std::string file = (slurm_folder(paths) / name).string();
+  write_text_file(file, std::string(kScriptHead) + "exec " + command + "\n");
+  return file;
+}
+
+std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const std::vector<std::size_t>& runs,
+                         const std::string& program, int jobs, int threads) {
+  const std::string whole = slurm_folder(paths).parent_path().string();
+  const std::string plan_file = fs::path(paths.frozen_plan(plan)).filename().string();
+  const std::string command = quoted(program) + " run-one " + quoted(whole + "/plans/" + plan_file) +
+                              " \"$SLURM_ARRAY_TASK_ID\" --out " + quoted(whole) + " --threads " +
+                              std::to_string(threads) + " --requeue";
+  const std::string job = submit(array_options(paths, plan, runs, jobs, threads), script(paths, "run.sh", command));
+  const std::string known = (slurm_folder(paths) / "jobs.txt").string();
+  write_text_file(known, (fs::exists(known) ? read_text_file(known) : "") + job + " " + plan_file + "\n");
+  return job;
+}
+
+/// Submits the job that writes the results once these arrays have ended.
+std::string submit_results(const SweepPaths& paths, const SweepPlan& plan, const std::set<std::string>& arrays,
+                           const std::string& program) {
+  const fs::path folder = slurm_folder(paths);
+  std::string after;
+  for (const std::string& array : arrays) after += ":" + array;
+  std::vector<std::string> options = {"--job-name=" + plan.name + "-results",
+                                      "--comment=" + job_comment(folder, kResultsMark), "--dependency=afterany" + after,
+                                      "--output=" + without_patterns(folder.string()) + "/results_%j.txt", "--requeue"};
+  if (!plan.slurm.partition.empty()) options.push_back("--partition=" + plan.slurm.partition);
+  options.insert(options.end(), plan.slurm.options.begin(), plan.slurm.options.end());
+  return submit(std::move(options),
+                script(paths, "results.sh", quoted(program) + " report " + quoted(folder.parent_path().string())));
+}
+
 }  // namespace
 
 std::string array_text(const std::vector<std::size_t>& indices) {
@@ -112,6 +196,7 @@ std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan&
   const int at_once = jobs > 0 ? jobs : slurm.at_once;
   std::vector<std::string> options = {
       "--job-name=" + plan.name,
+      "--comment=" + job_comment(slurm_folder(paths), fs::path(paths.frozen_plan(plan)).filename().string()),
       "--array=" + array_text(runs) + (at_once > 0 ? "%" + std::to_string(at_once) : ""),
       "--output=" + without_patterns(slurm_folder(paths).string()) + "/%A_%a.txt",
       "--open-mode=append",
@@ -120,7 +205,7 @@ std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan&
       "--cpus-per-task=" + std::to_string(threads),
       "--signal=B:USR1@" + std::to_string(slurm.grace_s)};
   const double memory = slurm.memory_mb > 0 ? slurm.memory_mb : plan.memory_mb;
-  if (memory > 0) options.push_back("--mem=" + std::to_string(static_cast<long>(memory)) + "M");
+  if (memory > 0) options.push_back("--mem=" + std::to_string(static_cast<long>(std::ceil(memory))) + "M");
   if (!slurm.time.empty()) options.push_back("--time=" + slurm.time);
   if (!slurm.partition.empty()) options.push_back("--partition=" + slurm.partition);
   options.insert(options.end(), slurm.options.begin(), slurm.options.end());
@@ -129,36 +214,26 @@ std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan&
 
 SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std::string& program, int jobs,
                        int threads) {
+  const SweepFolderLock lock(paths);  // nobody else submits
   const fs::path folder = slurm_folder(paths);
-  const std::set<std::string> queued = queued_runs(folder);
+  const QueuedJobs queued = queued_jobs(folder);
   SlurmJobs submitted;
   for (const std::size_t index : distinct_runs(plan)) {
     if (is_sweep_run_whole(paths, plan.runs[index].id)) continue;
-    if (queued.contains(plan.runs[index].id)) {
+    if (queued.runs.contains(plan.runs[index].id)) {
       ++submitted.queued;
     } else {
       submitted.runs.push_back(index);
     }
   }
-  if (submitted.runs.empty()) return submitted;
-  check_array_size(submitted.runs);
-  const std::string whole = fs::absolute(paths.folder).lexically_normal().string();
-  const std::string plan_file = fs::path(paths.frozen_plan(plan)).filename().string();
-  const std::string run_script = (folder / "run.sh").string(), results_script = (folder / "results.sh").string();
-  write_text_file(run_script, std::string(kScriptHead) + "exec " + quoted(program) + " run-one " +
-                                  quoted(whole + "/plans/" + plan_file) + " \"$SLURM_ARRAY_TASK_ID\" --out " +
-                                  quoted(whole) + " --threads " + std::to_string(threads) + " --requeue\n");
-  write_text_file(results_script,
-                  std::string(kScriptHead) + "exec " + quoted(program) + " report " + quoted(whole) + "\n");
-  submitted.array = submit(array_options(paths, plan, submitted.runs, jobs, threads), run_script);
-  const std::string known = (folder / "jobs.txt").string();
-  write_text_file(known, (fs::exists(known) ? read_text_file(known) : "") + submitted.array + " " + plan_file + "\n");
-  std::vector<std::string> options = {"--job-name=" + plan.name + "-results",
-                                      "--dependency=afterany:" + submitted.array,
-                                      "--output=" + without_patterns(folder.string()) + "/results_%j.txt", "--requeue"};
-  if (!plan.slurm.partition.empty()) options.push_back("--partition=" + plan.slurm.partition);
-  options.insert(options.end(), plan.slurm.options.begin(), plan.slurm.options.end());
-  submitted.results = submit(std::move(options), results_script);
+  std::set<std::string> arrays = queued.arrays;
+  if (!submitted.runs.empty()) {
+    check_array_size(submitted.runs);
+    submitted.array = submit_array(paths, plan, submitted.runs, program, jobs, threads);
+    arrays.insert(submitted.array);
+  }
+  const bool has_results_of_all = queued.has_results && submitted.array.empty();
+  if (!arrays.empty() && !has_results_of_all) submitted.results = submit_results(paths, plan, arrays, program);
   return submitted;
 }
 

@@ -12,7 +12,7 @@ namespace hsi4d {
 struct SlurmJobs {
   std::vector<std::size_t> runs;  ///< indices that the array computes
   std::size_t queued = 0;         ///< runs that an earlier array of this folder has still to compute
-  std::string array, results;     ///< ids of the jobs; empty: nothing was left to submit
+  std::string array, results;     ///< ids of the jobs that were submitted; empty: none
 };
 
 /// Indices as --array takes them: {0, 1, 2, 5} is "0-2,5".
@@ -24,7 +24,9 @@ std::string array_text(const std::vector<std::size_t>& indices);
 std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan& plan,
                                        const std::vector<std::size_t>& runs, int jobs, int threads);
 
-/// Submits the runs of a plan that are neither done nor in the queue already. A run is put into the queue again when
+/// Submits the runs of a plan that are neither done nor in the queue already, and the job for the results where none is
+/// in the queue. What is in the queue is told by the comments of its jobs and by jobs.txt, so that nothing is submitted
+/// twice after a kill at any moment. A run is put into the queue again when
 /// its time is up (its state saved before) or its node is lost, and then goes on.
 /// @param program  hsi4d, at the place where the nodes have it
 /// Throws UserError with what Slurm says.

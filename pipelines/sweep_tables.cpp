@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "core/text.h"
 
@@ -36,32 +38,54 @@ SweepCell::Mark mark_of(const PairedDifference& paired, const MetricFacts& facts
   return paired.statistics.mean * facts.better > 0 ? SweepCell::Mark::kBetter : SweepCell::Mark::kWorse;
 }
 
-/// Marks the best mean of a column, as it is shown, unless all are the same.
-void mark_best(const std::vector<SampleStatistics>& means, const MetricFacts& facts, std::size_t column,
-               SweepTable& table) {
-  if (facts.better == 0) return;
-  const double scale = std::pow(10, facts.decimals);
-  std::vector<double> shown;
-  for (const SampleStatistics& mean : means) {
-    if (mean.count > 0) shown.push_back(std::round(mean.mean * scale) * facts.better);
-  }
-  if (shown.size() < 2) return;
-  const auto [low, high] = std::minmax_element(shown.begin(), shown.end());
-  if (*low == *high) return;
+/// The rows whose means are of the same clips and seeds, of which there are the most: only these can be compared.
+std::vector<std::size_t> comparable_rows(const std::vector<GroupStatistics>& means) {
+  std::map<std::vector<std::pair<std::string, std::string>>, std::vector<std::size_t>> rows;
   for (std::size_t row = 0; row < means.size(); ++row) {
-    if (means[row].count > 0 && std::round(means[row].mean * scale) * facts.better == *high)
-      table.rows[row].cells[column].mark = SweepCell::Mark::kBest;
+    if (means[row].sample.count > 0) rows[means[row].clip_seeds].push_back(row);
   }
-}
-
-std::size_t most_seeds(const SweepResults& results, const std::string* clip) {
-  std::size_t most = 0;
-  for (const SweepGroup& group : results.groups) {
-    for (const MetricFacts* const metric : results.metrics)
-      most = std::max(most, group_statistics(results, group, *metric, clip).count);
+  std::vector<std::size_t> most;
+  for (const auto& [runs, of_these] : rows) {
+    const bool has_more = of_these.size() > most.size();
+    const bool is_larger = of_these.size() == most.size() && runs.size() > means[most.front()].clip_seeds.size();
+    if (has_more || is_larger) most = of_these;
   }
   return most;
 }
+
+/// Marks the best mean of a column, as it is shown, of those that can be compared, unless all are the same.
+void mark_best(const std::vector<GroupStatistics>& means, const MetricFacts& facts, std::size_t column,
+               SweepTable& table) {
+  if (facts.better == 0) return;
+  const double scale = std::pow(10, facts.decimals);
+  const auto shown = [&](std::size_t row) { return std::round(means[row].sample.mean * scale) * facts.better; };
+  const std::vector<std::size_t> rows = comparable_rows(means);
+  if (rows.size() < 2) return;
+  const auto is_worse = [&](std::size_t a, std::size_t b) { return shown(a) < shown(b); };
+  const auto [low, high] = std::minmax_element(rows.begin(), rows.end(), is_worse);
+  if (shown(*low) == shown(*high)) return;
+  for (const std::size_t row : rows) {
+    if (shown(row) == shown(*high)) table.rows[row].cells[column].mark = SweepCell::Mark::kBest;
+  }
+}
+
+/// "3", or "2 to 3" where not all metrics have the same.
+std::string count_range(const std::set<std::size_t>& counts) {
+  if (counts.empty()) return "";
+  const std::string most = std::to_string(*counts.rbegin());
+  return counts.size() == 1 ? most : std::to_string(*counts.begin()) + " to " + most;
+}
+
+/// How many seeds, and clips, the means of a row are of.
+struct RowCounts {
+  std::set<std::size_t> seeds, clips;
+
+  void add(const GroupStatistics& mean) {
+    if (mean.sample.count == 0) return;
+    seeds.insert(mean.sample.count);
+    clips.insert(mean.clip_seeds.size() / mean.sample.count);
+  }
+};
 
 std::string csv_text(const std::string& text) {
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
@@ -98,6 +122,13 @@ std::string unfinished_text(const SweepResults& results) {
             std::string(sweep_run_state_name(row.state)) + (message.empty() ? "" : ", " + message) + "\n";
   }
   return text;
+}
+
+/// Text in a cell of a Markdown table, where | begins the next one.
+std::string in_cell(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);
+  return out;
 }
 
 std::string mark_word(const SweepCell& cell) {
@@ -144,20 +175,30 @@ std::string progress_text(const SweepResults& results) {
 SweepTable mean_table(const SweepResults& results, const std::string* clip) {
   SweepTable table;
   table.title = clip == nullptr ? "Means" : *clip;
-  const std::size_t seeds = most_seeds(results, clip);
-  table.caption = seeds > 1 ? "Mean ± standard deviation over " + std::to_string(seeds) + " seeds" : "One seed";
-  if (clip == nullptr && results.clips.size() > 1)
-    table.caption +=
-        "; of each seed the mean over " + std::to_string(results.clips.size()) + " clips, where all of them are done";
+  const bool has_clips = clip == nullptr && results.clips.size() > 1;
+  table.caption = "Mean ± standard deviation over the seeds";
+  if (has_clips) table.caption += "; of each seed the mean over the clips, where all of them are done";
+  table.caption += "; the best is marked of rows that are of the same clips and seeds";
+  table.columns.emplace_back("seeds");
+  if (has_clips) table.columns.emplace_back("clips");
+  const std::size_t counts_end = table.columns.size();
+  for (const MetricFacts* const facts : results.metrics) table.columns.push_back(metric_heading(*facts));
   for (const SweepGroup& group : results.groups)
-    table.rows.push_back({group.label, std::vector<SweepCell>(results.metrics.size())});
+    table.rows.push_back({group.label, std::vector<SweepCell>(table.columns.size())});
+  std::vector<RowCounts> counts(table.rows.size());
   for (std::size_t m = 0; m < results.metrics.size(); ++m) {
     const MetricFacts& facts = *results.metrics[m];
-    table.columns.push_back(metric_heading(facts));
-    std::vector<SampleStatistics> means;
+    std::vector<GroupStatistics> means;
     for (const SweepGroup& group : results.groups) means.push_back(group_statistics(results, group, facts, clip));
-    for (std::size_t row = 0; row < means.size(); ++row) table.rows[row].cells[m].text = mean_text(means[row], facts);
-    mark_best(means, facts, m, table);
+    for (std::size_t row = 0; row < means.size(); ++row) {
+      table.rows[row].cells[counts_end + m].text = mean_text(means[row].sample, facts);
+      counts[row].add(means[row]);
+    }
+    mark_best(means, facts, counts_end + m, table);
+  }
+  for (std::size_t row = 0; row < counts.size(); ++row) {
+    table.rows[row].cells[0].text = count_range(counts[row].seeds);
+    if (has_clips) table.rows[row].cells[1].text = count_range(counts[row].clips);
   }
   if (clip != nullptr) {  // groups that do not have this clip
     std::erase_if(table.rows, [](const SweepTable::Row& row) {
@@ -170,28 +211,26 @@ SweepTable mean_table(const SweepResults& results, const std::string* clip) {
 SweepTable difference_table(const SweepResults& results) {
   SweepTable table;
   table.title = "Differences to " + reference_text(results.plan);
-  std::size_t fewest = 0, most = 0;
+  table.caption =
+      "Run by run with the same clip and seed: mean [95 % interval of the mean by the bootstrap, 10,000 samples]; "
+      "marked where the interval does not contain 0 and there are at least " +
+      std::to_string(kFewestPairs) + " pairs";
+  table.columns.emplace_back("pairs");
+  for (const MetricFacts* const metric : results.metrics) table.columns.push_back(metric_heading(*metric));
   for (const SweepGroup& group : results.groups) {
     if (group.is_reference) continue;
-    SweepTable::Row row{group.label, {}};
-    std::size_t pairs = 0;
+    SweepTable::Row row{group.label, {SweepCell{}}};
+    std::set<std::size_t> pairs;
     for (const MetricFacts* const metric : results.metrics) {
       const auto paired = paired_difference(results, group, *metric);
       row.cells.push_back(paired ? SweepCell{difference_text(*paired, *metric), mark_of(*paired, *metric)}
                                  : SweepCell{});
-      if (paired) pairs = std::max(pairs, paired->statistics.count);
+      if (paired) pairs.insert(paired->statistics.count);
     }
-    if (pairs == 0) continue;
-    fewest = table.rows.empty() ? pairs : std::min(fewest, pairs);
-    most = std::max(most, pairs);
+    if (pairs.empty()) continue;
+    row.cells.front().text = count_range(pairs);
     table.rows.push_back(std::move(row));
   }
-  for (const MetricFacts* const metric : results.metrics) table.columns.push_back(metric_heading(*metric));
-  table.caption = "Run by run with the same clip and seed, " +
-                  (fewest == most ? std::to_string(most) : std::to_string(fewest) + " to " + std::to_string(most)) +
-                  " pairs a row: mean [95 % interval of the mean by the bootstrap, 10,000 samples]; marked where the "
-                  "interval does not contain 0 and there are at least " +
-                  std::to_string(kFewestPairs) + " pairs";
   return table;
 }
 
@@ -200,7 +239,7 @@ std::string markdown_of(const SweepTable& table) {
   std::vector<Strings> lines = {{""}};
   lines[0].insert(lines[0].end(), table.columns.begin(), table.columns.end());
   for (const SweepTable::Row& row : table.rows) {
-    lines.push_back({row.label});
+    lines.push_back({in_cell(row.label)});
     for (const SweepCell& cell : row.cells) lines.back().push_back(mark_word(cell));
   }
   std::vector<std::size_t> widths(lines[0].size(), 1);
@@ -242,7 +281,7 @@ std::string sweep_csv(const SweepResults& results) {
   const Strings keys = value_keys(results.plan);
   Strings head = {"index", "run", "block", "clip", "ablation", "seed"};
   head.insert(head.end(), keys.begin(), keys.end());
-  for (const char* const name : {"state", "starts", "version", "git", "program", "host", "peak_mb"})
+  for (const char* const name : {"state", "starts", "programs", "version", "git", "program", "host", "peak_mb"})
     head.push_back(name);
   for (const MetricFacts* const metric : results.metrics) head.push_back(std::string(metric->name));
   std::string text = csv_line(head);
@@ -255,9 +294,9 @@ std::string sweep_csv(const SweepResults& results) {
       words.push_back(has == run.values.end() ? "" : has->second);
     }
     const SweepAttempt last = row.last.value_or(SweepAttempt{});
-    for (const std::string& word :
-         {std::string(sweep_run_state_name(row.state)), std::to_string(row.starts), last.program.version,
-          last.program.git, last.program.hash, last.host, row.peak_mb > 0 ? number_text(row.peak_mb) : ""})
+    for (const std::string& word : {std::string(sweep_run_state_name(row.state)), std::to_string(row.starts),
+                                    std::to_string(row.programs), last.program.version, last.program.git,
+                                    last.program.hash, last.host, row.peak_mb > 0 ? number_text(row.peak_mb) : ""})
       words.push_back(word);
     for (const MetricFacts* const metric : results.metrics) {
       const double* const value = find_metric(row.values, metric->name);

@@ -3,8 +3,8 @@
 #include <chrono>
 
 #include "core/file.h"
+#include "core/memory.h"
 #include "core/stopwatch.h"
-#include "pipelines/bench_measurement.h"
 #include "pipelines/bench_skips.h"
 #include "pipelines/bench_stages.h"
 #include "pipelines/cli/dataset.h"

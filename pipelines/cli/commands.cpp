@@ -139,11 +139,12 @@ std::string check_command(const std::filesystem::path& config, const std::vector
   return print_config ? resolved_config(run, losses) : summary(config, run);
 }
 
-std::vector<std::string> schema_kinds() { return {"run", "avatar_fit"}; }
+std::vector<std::string> schema_kinds() { return {"run", "avatar_fit", "sweep"}; }
 
 std::string schema_command(const std::string& kind, const std::vector<LossDescription>& losses) {
   if (kind == "run") return run_config_schema(losses);
   if (kind == "avatar_fit") return avatar_fit_schema(losses);
+  if (kind == "sweep") return sweep_schema();
   throw UserError("hsi4d schema: there are no configs of \"" + kind + "\"; known: " + joined(schema_kinds()) +
                   did_you_mean(kind, schema_kinds()));
 }

@@ -14,7 +14,8 @@ namespace hsi4d::cli {
 std::string check_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                           bool print_config, const std::vector<LossDescription>& losses);
 
-/// `hsi4d schema [KIND]`: the JSON Schema of configs of `hsi4d run` ("run") or `hsi4d avatar fit` ("avatar_fit").
+/// `hsi4d schema [KIND]`: the JSON Schema of configs of `hsi4d run` ("run"), `hsi4d avatar fit` ("avatar_fit") or
+/// `hsi4d sweep` ("sweep").
 /// Throws UserError for another kind.
 std::string schema_command(const std::string& kind, const std::vector<LossDescription>& losses);
 /// Its kinds.

@@ -1,17 +1,14 @@
-// How the program ends: its exit statuses, and what it says of an exception.
+// How the program ends: its exit status, and what it says of an exception.
 #pragma once
 
 #include <exception>
 #include <string>
 
+#include "pipelines/exit_status.h"
+
 namespace hsi4d::cli {
 
-/// Exit statuses, which other programs rely on.
-inline constexpr int kDone = 0;
-inline constexpr int kRowsFailed = 1;  ///< of `hsi4d stress`, or bounds broken of its functions
-inline constexpr int kUserMistake = 2;
-inline constexpr int kOurBug = 3;
-inline constexpr int kInterrupted = 130;
+using namespace exit_status;
 
 /// What the program says of an exception that ended a command, and the status it exits with.
 struct Failure {

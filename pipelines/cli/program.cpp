@@ -2,6 +2,7 @@
 #include "pipelines/cli/program.h"
 
 #include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <functional>
 #include <limits>
@@ -280,7 +281,7 @@ struct CommandLine {
         ->type_name("PROCESS");
     command->add_flag("--requeue", a.requeue,
                       "On SIGUSR1 save the state and put this job of Slurm into the queue again");
-    command->callback([this, &terms] { run = [this, &terms] { return run_one_command(run_one, terms); }; });
+    command->callback([this, &terms] { run = [this, &terms] { return run_one_command(run_one, terms, status); }; });
   }
 
   void add_info() {
@@ -679,7 +680,8 @@ int run_program(int argc, const char* const* argv, const std::vector<LossTerm>& 
                        static_cast<int>(message.size()), message.data());
         },
         LogLevel::kInfo);
-    best_isa();  // before any kernel runs
+    std::signal(SIGCHLD, SIG_DFL);  // whoever has started us may have it ignored: no program's end would be told us
+    best_isa();                     // before any kernel runs
     return run_commands(argc, argv, losses);
   } catch (...) {
     return complain(describe_failure(std::current_exception()));

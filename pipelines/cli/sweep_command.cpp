@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <thread>
 
@@ -12,6 +13,7 @@
 #include "core/config_file.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "core/suggest.h"
 #include "core/text.h"
@@ -48,7 +50,8 @@ PlacedPlan read_plan(const std::string& sweep, const std::string& out, const std
   PlacedPlan placed;
   if (is_sweep_plan(tree)) {
     placed.paths.folder = sweep_folder_of(file);
-    if (!out.empty() && !fs::equivalent(out, placed.paths.folder))
+    std::error_code error;  // a folder that is not there is another one
+    if (!out.empty() && !fs::equivalent(out, placed.paths.folder, error))
       throw UserError("hsi4d sweep: " + file.string() + " is the plan of its own folder; --out names another one");
     placed.plan = parse_sweep_plan(read_text_file(file.string()), file.string());
     placed.is_in_folder = true;
@@ -83,15 +86,19 @@ std::string plan_text(const PlacedPlan& placed) {
   return text + "; folder " + placed.paths.folder.string() + "\n";
 }
 
-/// Warns where results are there that another program has computed.
-void warn_of_other_programs(const PlacedPlan& placed) {
+/// Warns where results are there that another program has computed or begun.
+/// @param runs  their indices
+void warn_of_other_programs(const PlacedPlan& placed, const std::vector<std::size_t>& runs) {
   std::size_t others = 0;
   std::string example;
-  for (const std::size_t i : distinct_runs(placed.plan)) {
+  for (const std::size_t i : runs) {
     const std::vector<SweepAttempt> attempts = read_attempts(placed.paths, placed.plan.runs[i].id);
-    if (attempts.empty() || attempts.back().program.hash == this_program().hash) continue;
+    const auto other = std::find_if(attempts.begin(), attempts.end(), [](const SweepAttempt& attempt) {
+      return attempt.program.hash != this_program().hash;
+    });
+    if (other == attempts.end()) continue;
     ++others;
-    example = attempts.back().program.version + " (" + attempts.back().program.git + ")";
+    example = other->program.version + " (" + other->program.git + ")";
   }
   if (others == 0) return;
   log_warning(placed.paths.folder.string() + ": " + count_text(static_cast<std::int64_t>(others), "run") +
@@ -104,8 +111,8 @@ std::string failures_text(const SweepPlan& plan, const SweepOutcome& outcome) {
   for (const SweepFailure& failure : outcome.failures)
     text += "failed: run " + std::to_string(failure.index) + ", " + sweep_label(plan.runs[failure.index]) + ": " +
             failure.message + "\n";
-  if (!outcome.not_started.empty())
-    text += count_text(std::ssize(outcome.not_started), "run") + " not computed, after the failure\n";
+  if (!outcome.not_done.empty())
+    text += count_text(std::ssize(outcome.not_done), "run") + " not computed, after the failure\n";
   return text;
 }
 
@@ -123,7 +130,7 @@ std::string local_sweep(const SweepArguments& arguments, const PlacedPlan& place
   const Observer observer = observer_on_terminal(false);
   const bool is_terminal = stderr_is_terminal();
   const LogSink log = log_to_file(placed.paths.log());
-  warn_of_other_programs(placed);
+  warn_of_other_programs(placed, distinct_runs(placed.plan));
   SweepLaunch launch;
   launch.program = "/proc/self/exe";  // this very file, also after another build has taken its name
   launch.jobs = arguments.jobs;
@@ -146,22 +153,78 @@ std::string local_sweep(const SweepArguments& arguments, const PlacedPlan& place
   }
   for (const SweepFailure& failure : outcome.failures)
     status = std::max(status, failure.is_our_bug ? kOurBug : kUserMistake);
-  return write_sweep_results(placed.paths) + failures_text(placed.plan, outcome);
+  try {
+    return write_sweep_results(placed.paths) + failures_text(placed.plan, outcome);
+  } catch (const std::exception& problem) {  // a full disk, perhaps
+    const std::string failures = failures_text(placed.plan, outcome);
+    if (failures.empty()) throw;
+    throw UserError(failures + problem.what());
+  }
+}
+
+/// The file of this program, as nodes are to start it.
+std::string program_file() {
+  const std::string program = fs::read_symlink("/proc/self/exe").string();
+  if (!fs::exists(program))
+    throw UserError(program + ": the program's file has been replaced since it was started; start it again");
+  return program;
+}
+
+void refuse_local_options(const SweepArguments& arguments) {
+  if (arguments.fail_fast)
+    throw UserError("hsi4d sweep: --fail-fast is of the launcher \"local\"; of Slurm, scancel ends what runs");
+  if (arguments.memory_mb > 0)
+    throw UserError(
+        "hsi4d sweep: --memory is of the launcher \"local\"; of Slurm, memory_mb of the sweep's file is "
+        "what a run gets");
 }
 
 std::string slurm_sweep(const SweepArguments& arguments, const PlacedPlan& placed) {
-  warn_of_other_programs(placed);
+  warn_of_other_programs(placed, distinct_runs(placed.plan));
   const int asked = run_threads(arguments.threads);
   const int threads = asked > 0 ? asked : std::max(1, placed.plan.threads);
-  const std::string program = fs::read_symlink("/proc/self/exe").string();
-  const SlurmJobs jobs = submit_sweep(placed.paths, placed.plan, program, arguments.jobs, threads);
+  const SlurmJobs jobs = submit_sweep(placed.paths, placed.plan, program_file(), arguments.jobs, threads);
   const std::string folder = placed.paths.folder.string();
   const std::string queued =
       jobs.queued > 0 ? count_text(static_cast<std::int64_t>(jobs.queued), "run") + " in the queue already\n" : "";
+  if (jobs.array.empty() && !jobs.results.empty())
+    return queued + "submitted the results as job " + jobs.results + "\n";
   if (jobs.array.empty()) return queued + "nothing is left to submit; hsi4d report " + folder + " tells the results\n";
   return queued + "submitted " + count_text(std::ssize(jobs.runs), "run") + " as job " + jobs.array +
          ", the results as job " + jobs.results + "; squeue --jobs " + jobs.array + "," + jobs.results +
          " tells how they stand, hsi4d report " + folder + " what is there\n";
+}
+
+/// The right to compute a run. A launcher does not wait for it, and gets nothing: it has others to start.
+std::optional<SweepClaim> claim_of(const RunOneArguments& arguments, const PlacedPlan& placed, std::size_t index,
+                                   const Observer& observer) {
+  const std::string& id = placed.plan.runs[index].id;
+  if (arguments.parent > 0) return SweepClaim::try_claim(placed.paths, id);
+  return SweepClaim(placed.paths, id, observer.stop_requested);
+}
+
+/// Carries out a run that is ours.
+std::string claimed_run(const RunOneArguments& arguments, const PlacedPlan& placed, std::size_t index,
+                        SweepClaim& claim, const std::vector<LossTerm>& losses, const Observer& observer) {
+  const SweepRun& run = placed.plan.runs[index];
+  const std::string before = sweep_run_progress(placed.paths, run);
+  try {
+    const SweepRunResult result =
+        run_one(placed.paths, placed.plan, index, claim, losses, run_threads(arguments.threads), observer);
+    return result_text(result.summary, placed.paths.run(run.id));
+  } catch (const Interrupted& stop) {
+    const bool is_requeued = arguments.requeue && TimeLimitWatch::requested() && !InterruptWatch::requested();
+    if (!is_requeued) throw Interrupted(std::string(stop.what()) + "; the same command goes on");
+    if (sweep_run_progress(placed.paths, run) == before) {
+      const std::string problem =
+          "the time of the job was over before a frame was finished, and would be again: give the runs more (" +
+          std::string(stop.what()) + ")";
+      claim.note("failed", problem);
+      throw UserError(problem);
+    }
+    requeue_and_wait();
+    throw Interrupted(std::string(stop.what()) + "; the job is in the queue again");
+  }
 }
 
 }  // namespace
@@ -171,6 +234,7 @@ std::string sweep_command(const SweepArguments& arguments, const std::vector<Los
   if (std::find(launchers.begin(), launchers.end(), arguments.launcher) == launchers.end())
     throw UserError("hsi4d sweep: --launcher: there is no launcher \"" + arguments.launcher +
                     "\"; known: " + joined(launchers) + did_you_mean(arguments.launcher, launchers));
+  if (arguments.launcher == "slurm") refuse_local_options(arguments);
   PlacedPlan placed = read_plan(arguments.sweep, arguments.out, losses);
   check_sweep_folder(placed.paths, arguments.resume || arguments.dry_run);
   if (arguments.dry_run) return plan_text(placed);
@@ -179,7 +243,7 @@ std::string sweep_command(const SweepArguments& arguments, const std::vector<Los
   return local_sweep(arguments, placed, status);
 }
 
-std::string run_one_command(const RunOneArguments& arguments, const std::vector<LossTerm>& losses) {
+std::string run_one_command(const RunOneArguments& arguments, const std::vector<LossTerm>& losses, int& status) {
   if (arguments.parent > 0) end_with_parent(arguments.parent);
   const InterruptWatch watch;
   const TimeLimitWatch time_limit;
@@ -192,22 +256,13 @@ std::string run_one_command(const RunOneArguments& arguments, const std::vector<
   Observer observer = observer_on_terminal(false);
   observer.stop_requested = [] { return InterruptWatch::requested() || TimeLimitWatch::requested(); };
   const auto index = static_cast<std::size_t>(arguments.index);
-  const SweepRun& run = placed.plan.runs[index];
-  const std::string before = sweep_run_progress(placed.paths, run);
-  try {
-    const SweepRunResult result =
-        run_one(placed.paths, placed.plan, index, losses, run_threads(arguments.threads), observer);
-    return result_text(result.summary, placed.paths.run(run.id));
-  } catch (const Interrupted& stop) {
-    const bool is_requeued = arguments.requeue && TimeLimitWatch::requested() && !InterruptWatch::requested();
-    if (is_requeued && sweep_run_progress(placed.paths, run) == before)
-      throw UserError(
-          "the time of the job was over before a frame was finished, and would be again: give the runs more (" +
-          std::string(stop.what()) + ")");
-    if (is_requeued) requeue_and_wait();
-    throw Interrupted(std::string(stop.what()) +
-                      (is_requeued ? "; the job is in the queue again" : "; the same command goes on"));
+  std::optional<SweepClaim> claim = claim_of(arguments, placed, index, observer);
+  if (!claim) {
+    status = kElsewhere;
+    return "";
   }
+  if (arguments.parent == 0) warn_of_other_programs(placed, {index});  // a launcher has told it of all runs
+  return claimed_run(arguments, placed, index, *claim, losses, observer);
 }
 
 }  // namespace hsi4d::cli

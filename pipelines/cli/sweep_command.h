@@ -36,6 +36,7 @@ struct RunOneArguments {
 std::string sweep_command(const SweepArguments& arguments, const std::vector<LossTerm>& losses, int& status);
 
 /// Carries out one run of a sweep. Returns its table of errors.
-std::string run_one_command(const RunOneArguments& arguments, const std::vector<LossTerm>& losses);
+/// @param status  receives the exit status where another process computes the run and nobody waits for that
+std::string run_one_command(const RunOneArguments& arguments, const std::vector<LossTerm>& losses, int& status);
 
 }  // namespace hsi4d::cli

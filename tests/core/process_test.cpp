@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <signal.h>
@@ -15,6 +16,13 @@
 using namespace hsi4d;
 using Catch::Matchers::Message;
 using hsi4d::test::TemporaryFolder;
+
+TEST_CASE("a child does at a signal what is usual though its parent ignores it") {
+  const auto before = std::signal(SIGINT, SIG_IGN);
+  CHECK_THROWS_WITH(run_process({"sh", "-c", "kill -INT $$; echo ignored"}),
+                    "sh: was ended by signal 2; it printed nothing");
+  std::signal(SIGINT, before);
+}
 
 TEST_CASE("what a program prints comes back, and arguments are not those of a shell") {
   CHECK(run_process({"printf", "%s|", "a b", "$HOME", "\"; rm x"}) == "a b|$HOME|\"; rm x|");

@@ -1,12 +1,15 @@
 // The schema that editors use against the reader: what one refuses, so does the other.
 #include <cmath>
+#include <filesystem>
 #include <regex>
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
+#include "core/config_file.h"
 #include "pipelines/run_config.h"
+#include "pipelines/sweep_file.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_losses.h"
 
@@ -53,7 +56,8 @@ bool validates(const json& value, const json& schema) {
       "propertyNames", "items",    "enum",        "minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum",
       "multipleOf",    "minItems", "maxItems"};
   for (const auto& [keyword, content] : schema.items()) {
-    if (keyword != "pattern" && std::find(known.begin(), known.end(), keyword) == known.end())
+    if (keyword != "pattern" && keyword != "anyOf" && keyword != "required" &&
+        std::find(known.begin(), known.end(), keyword) == known.end())
       throw std::runtime_error("a keyword that this test does not know: " + keyword);
   }
   if (schema.contains("type") && !type_fits(value, schema["type"])) return false;
@@ -63,6 +67,13 @@ bool validates(const json& value, const json& schema) {
       !std::regex_match(value.get<std::string>(), std::regex(schema["pattern"].get<std::string>())))
     return false;
   if (!number_fits(value, schema)) return false;
+  const json any = schema.value("anyOf", json::array());
+  if (!any.empty() && std::none_of(any.begin(), any.end(), [&](const json& one) { return validates(value, one); }))
+    return false;
+  for (const json& key : schema.value("required", json::array())) {
+    if (!value.contains(key.get<std::string>())) return false;
+  }
+  if (value.is_array() && value.size() < schema.value("minItems", std::size_t{0})) return false;
   for (std::size_t i = 0; value.is_array() && schema.contains("items") && i < value.size(); ++i) {
     if (!validates(value[i], schema["items"])) return false;
   }
@@ -158,4 +169,49 @@ TEST_CASE("every setting in the schema is described") {
     for (const auto& [key, child] : node.items()) check(child, where + "/" + key);
   };
   check(json::parse(run_config_schema(test_losses())), "");
+}
+
+TEST_CASE("the schema of sweeps accepts those that are shipped and refuses what their reader does") {
+  const json schema = json::parse(sweep_schema());
+  CHECK(schema["title"] == "hsi4d sweep");
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(HSI4D_SOURCE_DIR "/configs/sweeps")) {
+    if (entry.path().extension() != ".json") continue;
+    INFO(entry.path());
+    CHECK(validates(json::parse(file_text(entry.path())), schema));
+    ++count;
+  }
+  CHECK(count > 0);
+  const TemporaryFolder here;
+  here.write("base.json", "{}");
+  const auto reads = [&here](const std::string& text) {
+    try {
+      ConfigProblems problems;
+      const ConfigValue tree = load_config(here.write("sweep.json", text), {}, problems);
+      read_sweep_file(tree, "sweep.json", problems);
+      return true;
+    } catch (const UserError&) {
+      return false;
+    }
+  };
+  const std::string base = R"({"base": "base.json", )";
+  for (const std::string more :
+       {R"("seeds": 3})", R"("seeds": [0, 7]})", R"("seeds": {"a": {"seed": 1}}})", R"("clips": ["base.json"]})",
+        R"("clips": {"a": "base.json", "b": {"config": "base.json", "set": {"render.blur": 1}}}})",
+        R"("zip": [{"a": [1]}, {"b": [null, {}]}]})", R"("slurm": {"time": "1:00:00", "options": ["--nice"]}})",
+        R"("blocks": [{}, {"name": "x", "grid": {"a": [1]}}], "compare": {"a": 1}})",
+        R"("ablations": {"whole": {}, "no": {"stages.camera": null}}, "skip": [{"ablation": "no"}]})"}) {
+    INFO(more);
+    CHECK(validates(json::parse(base + more), schema));
+    CHECK(reads(base + more));
+  }
+  for (const std::string more :
+       {R"("sedes": 3})", R"("seeds": 0})", R"("seeds": [-1]})", R"("seeds": true})", R"("clips": [{}]})",
+        R"("clips": {"a b": "base.json"}})", R"("clips": {"a": {"set": {}}}})", R"("grid": {"a": 1}})",
+        R"("grid": {"a": []}})", R"("zip": [[1]]})", R"("slurm": {"grace_s": 0}})", R"("blocks": [{"threads": 1}]})",
+        R"("ablations": {"a": 1}})", R"("skip": {"seed": 1}})", R"("name": "a b"})", R"("memory_mb": -1})"}) {
+    INFO(more);
+    CHECK_FALSE(validates(json::parse(base + more), schema));
+    CHECK_FALSE(reads(base + more));
+  }
 }

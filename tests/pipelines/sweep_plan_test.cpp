@@ -175,8 +175,8 @@ TEST_CASE("mistakes of a sweep's file are told with their place") {
   write_tiny_base();
   CHECK(refused({{"blocks", {{{"gird", {{"seed", {1}}}}}}}}) ==
         "sweep.json:6: /blocks/0/gird: unknown key; did you mean \"grid\"?");
-  CHECK(refused({{"zip", {{"render.blur", {0.1, 0.2}}, {"seed", {1, 2, 3}}}}}) ==
-        "sweep.json:4: /zip: lists that are zipped have one length, and these have 2 (render.blur), 3 (seed)");
+  CHECK(refused({{"zip", {{"render.blur", {0.1, 0.2}}, {"threads", {1, 2, 3}}}}}) ==
+        "sweep.json:4: /zip: lists that are zipped have one length, and these have 2 (render.blur), 3 (threads)");
   CHECK(refused({{"grid", {{"render.blur", Json::array()}}}}) ==
         "sweep.json:5: /grid/render.blur: has no values; give some, or leave it out");
   CHECK(refused({{"grid", Json::object()}}) == "sweep.json:4: /grid: is empty; name something, or leave it out");
@@ -194,8 +194,30 @@ TEST_CASE("mistakes of a sweep's file are told with their place") {
   CHECK(refused({{"skip", {{{"sed", 7}}}}, {"seeds", 3}}) ==
         "sweep.json:6: /skip/0/sed: is no axis of this sweep; did you mean \"seed\"?");
   CHECK(refused({{"skip", {{{"seed", {0, 1}}}}}, {"seeds", 2}}) == "sweep.json:5: /skip/0: no run is left");
-  CHECK(refused({{"grid", {{"seed", {1, 2}}}}, {"ablations", {{"a", {{"/seed", 3}}}}}}) ==
-        "sweep.json:12: seed is set by grid and by ablations; one of them would not count");
+  CHECK(refused({{"grid", {{"render.blur", {1, 2}}}}, {"ablations", {{"a", {{"/render/blur", 3}}}}}}) ==
+        "sweep.json:12: render.blur is set by grid and by ablations; one of them would not count");
+  CHECK(refused({{"grid", {{"stages.camera", {nullptr, Json::object()}}}},
+                 {"ablations", {{"a", {{"stages.camera.iterations", 3}}}}}}) ==
+        "sweep.json:12: stages.camera is set by grid and stages.camera.iterations by ablations; one is a part of the "
+        "other, and would not count");
+  CHECK(refused({{"grid", {{"render", {{{"blur", 1}}, {{"blur", 2}}}}, {"render.blur", {1, 2}}}}}) ==
+        "sweep.json:14: render is set by grid and render.blur by grid; one is a part of the other, and would not "
+        "count");
+  CHECK(refused({{"seeds", 2}, {"grid", {{"synthetic.seed", {1, 2}}}}}) ==
+        "sweep.json:7: synthetic.seed is set by grid and by seeds; one of them would not count");
+  CHECK(refused({{"grid", {{"seed", {1, 2}}}}}) ==
+        "sweep.json:5: /grid/seed: seeds are an axis of their own: write \"seeds\": [0, 1] beside the grid");
+  CHECK(refused({{"grid", {{"render.blur", {1, 2}}}},
+                 {"ablations", {{"a", Json::object()}, {"b", {{"seed", 1}}}}},
+                 {"skip", {{{"ablation", "b"}, {"render.blur", 2}}}},
+                 {"compare", {{"ablation", "b"}, {"render.blur", 2}}}}) ==
+        "sweep.json:23: /compare: no run has all of these values");
+  CHECK(refused({{"slurm", {{"time", "0-00:02"}}}}) ==
+        "sweep.json:4: /slurm/grace_s: 120 s before the end of its time a run would save its state, and it has 120 s "
+        "(/slurm/time); give it more, or a shorter grace_s");
+  CHECK(refused({{"slurm", {{"time", "2:30"}, {"grace_s", 149}, {"options", {"--account", "hsi"}}}}}) ==
+        "sweep.json:9: /slurm/options/1: \"hsi\" is no option of sbatch, which begin with '-'; a value belongs to its "
+        "option: --account=hsi");
   CHECK(refused({{"ablations", {{"a", Json::object()}}}, {"compare", {{"ablation", "b"}}}}) ==
         "sweep.json:8: /compare/ablation: no run has \"b\" there");
   CHECK(refused({{"base", "bsae.json"}}) == "sweep.json:3: /base: \"bsae.json\" does not exist (looked for bsae.json)");
@@ -204,6 +226,36 @@ TEST_CASE("mistakes of a sweep's file are told with their place") {
                     "twice.json:3: /ablations/a: written twice, first in line 2; keep one of them");
   CHECK_THROWS_WITH(plan_sweep("base.json", descriptions_of(loss_terms())),
                     "base.json: is no sweep: it has no \"base\"; docs/sweeps.md tells what one looks like");
+}
+
+TEST_CASE("blocks whose runs would be taken for one another need names") {
+  const TemporaryFolder here;
+  write_tiny_base();
+  const Json sharp = {{"set", {{"render.blur", 0.1}}}};
+  CHECK(
+      refused({{"seeds", 1}, {"blocks", {Json::object(), sharp}}}) ==
+      "sweep.json:7: /blocks/1: run 1 (seed 0) would be taken for one of /blocks/0, which has other settings; give the "
+      "blocks a \"name\"");
+  Json other_seeds = sharp;
+  other_seeds["seeds"] = {5};
+  CHECK_THAT(refused({{"seeds", 1}, {"blocks", {Json::object(), other_seeds}}}),
+             Contains("run 1 (seed 5) would be taken for one of /blocks/0"));
+  other_seeds["name"] = "sharp";
+  CHECK(plan_of({{"seeds", 1}, {"blocks", {Json::object(), other_seeds}}}).runs.size() == 2);
+  CHECK(plan_of({{"blocks", {{{"seeds", 2}}, {{"seeds", {1, 2}}}}}}).runs.size() == 4);  // made in one way
+}
+
+TEST_CASE("runs are compared with the first ablation that changes nothing, or the first combination") {
+  const TemporaryFolder here;
+  write_tiny_base();
+  using Pairs = std::vector<std::pair<std::string, std::string>>;
+  const Json blur = {{"a", {{"color_net.use", "off"}}}, {"b", {{"stages.camera.iterations", 3}}}};
+  CHECK(plan_of({{"ablations", blur}, {"grid", {{"render.blur", {0.3, 0.1}}}}}).compare ==
+        Pairs{{"ablation", "a"}, {"render.blur", "0.3"}});
+  Json with_whole = blur;
+  with_whole["whole"] = Json::object();
+  CHECK(plan_of({{"ablations", with_whole}}).compare == Pairs{{"ablation", "whole"}});
+  CHECK(plan_of({{"ablations", with_whole}, {"skip", {{{"ablation", "whole"}}}}}).compare == Pairs{{"ablation", "a"}});
 }
 
 TEST_CASE("mistakes of combinations are told with the runs that they are in") {

@@ -4,63 +4,13 @@
 
 #include "pipelines/sweep_report.h"
 #include "pipelines/sweep_tables.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/pipelines/made_sweep.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
 
 namespace {
-
-/// A sweep whose runs have made-up results: ablations plain and other, clips a and b, seeds 0 to 2.
-class MadeSweep {
- public:
-  MadeSweep() {
-    plan_.name = "made";
-    plan_.compare = {{"ablation", "plain"}};
-    for (const char* ablation : {"plain", "other"}) {
-      for (const char* clip : {"a", "b"}) {
-        for (const char* seed : {"0", "1", "2"}) {
-          SweepRun run;
-          run.id =
-              std::string(15 - std::to_string(plan_.runs.size()).size(), '0') + "f" + std::to_string(plan_.runs.size());
-          run.ablation = ablation;
-          run.clip = clip;
-          run.seed = seed;
-          run.config = "{}";
-          plan_.runs.push_back(run);
-        }
-      }
-    }
-    write_sweep_plan(paths_, plan_, false);
-  }
-
-  /// A run that is done with this error.
-  void finish(std::size_t index, double mpjpe) {
-    const RunPaths run{paths_.run(plan_.runs[index].id)};
-    here_.write(run.status(), R"({"state": "done"})");
-    here_.write(run.summary(), R"({"name": "x", "frames": 4, "seconds": 2, "truth": true, "metrics": [
-      {"stage": "interaction", "seconds": 1, "iterations": 5, "mpjpe_mm": 99},
-      {"stage": "refinement", "seconds": 1, "iterations": 5, "mpjpe_mm": )" +
-                                   std::to_string(mpjpe) + R"(}],
-      "baselines": {}, "per_frame": [], "baselines_per_frame": {}})");
-  }
-
-  void finish_all() {
-    // plain: seeds 0, 1, 2 of clip a, then of b; other: 1, 2, 6 more in clip a, 3 more in b.
-    const double errors[] = {10, 20, 30, 40, 50, 60, 11, 22, 36, 43, 53, 63};
-    for (std::size_t i = 0; i < 12; ++i) finish(i, errors[i]);
-  }
-
-  SweepResults read() const { return read_sweep_results(paths_); }
-  const SweepPaths& paths() const { return paths_; }
-  const SweepPlan& plan() const { return plan_; }
-
- private:
-  TemporaryFolder here_;
-  SweepPaths paths_{"made"};
-  SweepPlan plan_;
-};
 
 const MetricFacts& mpjpe() { return *find_metric_facts("mpjpe_mm"); }
 
@@ -74,11 +24,11 @@ TEST_CASE("means are over seeds, of each seed over its clips") {
   CHECK(results.groups[0].label == "plain");
   CHECK(results.groups[0].is_reference);
   CHECK_FALSE(results.groups[1].is_reference);
-  const SampleStatistics plain = group_statistics(results, results.groups[0], mpjpe());
+  const SampleStatistics plain = group_statistics(results, results.groups[0], mpjpe()).sample;
   CHECK(plain.count == 3);  // 25, 35, 45
   CHECK(plain.mean == Approx(35));
   CHECK(plain.deviation == Approx(10));
-  const SampleStatistics other = group_statistics(results, results.groups[1], mpjpe(), &results.clips[0]);
+  const SampleStatistics other = group_statistics(results, results.groups[1], mpjpe(), &results.clips[0]).sample;
   CHECK(other.mean == Approx(23));  // 11, 22, 36
   CHECK(other.deviation == Approx(std::sqrt((144 + 1 + 169) / 2.0)));
   CHECK(results.metrics.size() == 2);  // and the time
@@ -102,8 +52,10 @@ TEST_CASE("differences are between runs of the same clip and seed") {
   CHECK(paired->interval->high < 4.7);
   const SweepTable table = difference_table(results);
   REQUIRE(table.rows.size() == 1);
-  CHECK(table.rows[0].cells[0].mark == SweepCell::Mark::kWorse);
-  CHECK_THAT(table.rows[0].cells[0].text, Contains("+3.0 [+"));
+  CHECK(table.columns[0] == "pairs");
+  CHECK(table.rows[0].cells[0].text == "6");
+  CHECK(table.rows[0].cells[1].mark == SweepCell::Mark::kWorse);
+  CHECK_THAT(table.rows[0].cells[1].text, Contains("+3.0 [+"));
 }
 
 TEST_CASE("a sweep that is not complete tells what is there") {
@@ -112,14 +64,107 @@ TEST_CASE("a sweep that is not complete tells what is there") {
   SweepClaim(sweep.paths(), sweep.plan().runs[7].id, {}).note("failed", "no scene", 1);
   const SweepResults results = sweep.read();
   CHECK(progress_text(results) == "12 runs: 4 done, 1 failed, 7 new");
-  CHECK(group_statistics(results, results.groups[0], mpjpe()).count == 1);  // of seed 0 alone both clips are done
-  CHECK(group_statistics(results, results.groups[0], mpjpe()).mean == Approx(11.5));
-  CHECK(group_statistics(results, results.groups[1], mpjpe()).count == 0);
+  CHECK(group_statistics(results, results.groups[0], mpjpe()).sample.count ==
+        1);  // of seed 0 alone both clips are done
+  CHECK(group_statistics(results, results.groups[0], mpjpe()).sample.mean == Approx(11.5));
+  CHECK(group_statistics(results, results.groups[1], mpjpe()).sample.count == 0);
   CHECK(paired_difference(results, results.groups[1], mpjpe())->differences == std::vector<double>{6});
   const std::string text = sweep_markdown(results);
   CHECK_THAT(text, Contains("- run 7, a, other, seed 1: failed, no scene\n"));
-  CHECK_THAT(sweep_csv(results), Contains("\n6,00000000000000f6,,a,other,0,done,0,,,,,,16,2\n"));
+  CHECK_THAT(sweep_csv(results), Contains("\n6,00000000000000f6,,a,other,0,done,0,0,,,,,,16,2\n"));
   CHECK_THAT(sweep_page(results), Contains("<p class=\"message\">no scene</p>"));
+}
+
+TEST_CASE("the best is marked among means of the same runs alone") {
+  MadeSweep sweep;
+  sweep.finish_all();
+  const auto table = [&sweep] { return mean_table(sweep.read()); };
+  CHECK(table().columns == std::vector<std::string>{"seeds", "clips", "MPJPE, mm ↓", "time, s ↓"});
+  CHECK(table().rows[0].cells[2].mark == SweepCell::Mark::kBest);
+  CHECK(table().rows[0].cells[0].text == "3");
+  CHECK(table().rows[0].cells[1].text == "2");
+  std::filesystem::remove_all(sweep.paths().run(sweep.id(11)));  // of "other" the worst one is missing now
+  CHECK(table().rows[1].cells[0].text == "2");
+  for (const auto& row : table().rows) CHECK(row.cells[2].mark == SweepCell::Mark::kNone);
+}
+
+TEST_CASE("of a seed that lacks a clip there is no mean") {
+  MadeSweep sweep([](SweepPlan& plan) {
+    std::erase_if(plan.runs,
+                  [](const SweepRun& run) { return run.clip == "b" && run.seed == "2" && run.ablation == "plain"; });
+  });
+  for (std::size_t i = 0; i < sweep.plan().runs.size(); ++i) sweep.finish(i, 10);
+  const SweepResults results = sweep.read();
+  CHECK(group_statistics(results, results.groups[0], mpjpe()).sample.count == 2);
+  CHECK(group_statistics(results, results.groups[0], mpjpe()).clip_seeds.size() == 4);
+  CHECK(group_statistics(results, results.groups[1], mpjpe()).sample.count == 3);
+}
+
+TEST_CASE("a run that two combinations come to counts once") {
+  MadeSweep sweep([](SweepPlan& plan) {
+    const std::vector<SweepRun> runs = plan.runs;
+    plan.runs.insert(plan.runs.end(), runs.begin(), runs.end());
+  });
+  sweep.finish_all();
+  const SweepResults results = sweep.read();
+  CHECK(results.rows.size() == 24);
+  CHECK(paired_difference(results, results.groups[1], mpjpe())->differences.size() == 6);
+  CHECK(group_statistics(results, results.groups[0], mpjpe()).sample.count == 3);
+}
+
+TEST_CASE("labels with bars stay in their cells") {
+  MadeSweep sweep([](SweepPlan& plan) { plan.runs[0].values = {{"data.frames", "\"a|b\""}}; });
+  sweep.finish_all();
+  CHECK_THAT(sweep_markdown(sweep.read()), Contains("| plain, frames a\\|b"));
+}
+
+TEST_CASE("a run whose process is gone without a word is told") {
+  MadeSweep sweep;
+  { SweepClaim(sweep.paths(), sweep.id(0), {}).note("start"); }
+  const SweepClaim computing(sweep.paths(), sweep.id(1), {});
+  SweepClaim other = *SweepClaim::try_claim(sweep.paths(), sweep.id(2));
+  other.note("start");
+  const SweepResults results = sweep.read();
+  CHECK(results.rows[0].last->message ==
+        "its process ended without a word: it was killed, for want of memory perhaps, or its machine is gone");
+  CHECK(results.rows[2].last->message.empty());
+  CHECK(results.rows[0].programs == 1);
+  CHECK_FALSE(SweepClaim::try_claim(sweep.paths(), sweep.id(1)));
+}
+
+TEST_CASE("how a run stands is what happened last") {
+  MadeSweep sweep;
+  const std::string id = sweep.id(0);
+  const auto note = [&](const char* event) { SweepClaim(sweep.paths(), id, {}).note(event); };
+  const auto set_status = [&](const char* state) {
+    sweep.here().write(RunPaths{sweep.paths().run(id)}.status(), R"({"state": ")" + std::string(state) + "\"}");
+  };
+  CHECK(sweep_run_state(sweep.paths(), id) == SweepRunState::kNew);
+  set_status("failed");
+  CHECK(sweep_run_state(sweep.paths(), id) == SweepRunState::kFailed);
+  note("start");
+  CHECK(sweep_run_state(sweep.paths(), id) == SweepRunState::kStarted);
+  set_status("running");
+  note("failed");  // by its launcher: a signal ended it
+  CHECK(sweep_run_state(sweep.paths(), id) == SweepRunState::kFailed);
+  sweep.finish(0, 10);
+  CHECK(sweep_run_state(sweep.paths(), id) == SweepRunState::kDone);
+  sweep.here().write(RunPaths{sweep.paths().run(id)}.report(), "");
+  CHECK_FALSE(is_sweep_run_whole(sweep.paths(), id));  // killed before its end was noted
+  note("done");
+  CHECK(is_sweep_run_whole(sweep.paths(), id));
+}
+
+TEST_CASE("what killed writers have left in a sweep's folder goes when its lock is taken") {
+  MadeSweep sweep;
+  for (const char* name : {"made/sweep.json.1-0.tmp", "made/configs/a.json.1-1.tmp", "made/plans/b.json.1-2.tmp"})
+    sweep.here().write(name, "{");
+  sweep.here().write("made/runs/x/summary.json.1-3.tmp", "{");  // of a run: for whoever computes it
+  write_sweep_results(sweep.paths());
+  CHECK_FALSE(std::filesystem::exists("made/sweep.json.1-0.tmp"));
+  CHECK_FALSE(std::filesystem::exists("made/configs/a.json.1-1.tmp"));
+  CHECK_FALSE(std::filesystem::exists("made/plans/b.json.1-2.tmp"));
+  CHECK(std::filesystem::exists("made/runs/x/summary.json.1-3.tmp"));
 }
 
 TEST_CASE("a run with a damaged summary is not done") {

@@ -1,7 +1,6 @@
 // Sweeps by the program: launched, killed at moments that nobody chose, gone on with.
 #include <algorithm>
 #include <csignal>
-#include <thread>
 
 #include <catch2/catch.hpp>
 
@@ -15,6 +14,7 @@
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
@@ -33,6 +33,7 @@ ProgramResult run_sweep(const std::string& out, bool resume = true) { return run
 /// Processes that compute runs of a sweep, by what its attempts tell of the last start.
 std::vector<pid_t> processes_of(const std::string& sweep) {
   std::vector<pid_t> processes;
+  if (!fs::exists(SweepPaths{sweep}.plan())) return processes;
   for (const std::string& id : ids_of(sweep)) {
     std::istringstream text(file_text(SweepPaths{sweep}.attempts(id)));
     Json last;
@@ -61,9 +62,9 @@ void check_complete(const std::string& sweep, const std::string& whole) {
     INFO("run " << id << "\n" << file_text(SweepPaths{sweep}.attempts(id)));
     const fs::path run = fs::path(sweep) / "runs" / id;
     CHECK(sweep_run_state({sweep}, id) == SweepRunState::kDone);
-    CHECK(events_of(sweep, id)["done"] <= 1);  // a kill may come between the end of a run and its note
+    CHECK(events_of(sweep, id)["done"] == 1);
     CHECK(events_of(sweep, id)["failed"] == 0);
-    CHECK(times_done(run) <= 1);
+    CHECK(times_done(run) <= 1);  // a kill may come between the report and the last line of the log
     CHECK(fs::exists(run / "report.html"));
     CHECK(differing_results(run, fs::path(whole) / "runs" / id) == kNone);
   }
@@ -81,7 +82,8 @@ int files_in(const std::string& sweep) {
   return files;
 }
 
-/// Kills a sweep `kills` times at random moments, every second time with all that it computes, and goes on with it.
+/// Kills a sweep `kills` times at random moments, every second time with all that it computes, and goes on with it. A
+/// kill may come too late, when all is computed; the first one is within the first half.
 void check_kills(const std::string& out, const std::string& whole, int kills, std::uint64_t seed) {
   const int all = files_in(whole);
   RandomSequence random(seed);
@@ -99,7 +101,7 @@ void check_kills(const std::string& out, const std::string& whole, int kills, st
       for (const pid_t process : processes_of(out)) ::kill(process, SIGKILL);
     }
   }
-  CHECK(killed == kills);
+  CHECK(killed >= 1);
   const ProgramResult last = run_sweep(out);
   INFO(last.err);
   CHECK(last.status == 0);
@@ -145,6 +147,7 @@ TEST_CASE("a sweep is computed, recognised and reported", "[release]") {
 
 TEST_CASE("a sweep that is killed before its plan is written goes on") {
   const TemporaryFolder here;
+  here.write("out/.lock", "");
   here.write("out/configs/left.json.tmp", "{");
   here.write("out/plans/left.json", "{}");
   CHECK_NOTHROW(check_sweep_folder({"out"}, true));
@@ -177,7 +180,9 @@ TEST_CASE("a sweep that is interrupted saves the state of its runs", "[release]"
   write_tiny_base();
   write_sweep({{"seeds", 2}, {"set", {{"stages.interaction.iterations", 60}}}});
   RunningProgram program(sweep_words("out", false));
-  REQUIRE(program.signal_at(SIGINT, [] { return fs::exists("out/sweep.json") && processes_of("out").size() == 2; }));
+  const bool was_interrupted = program.signal_at(SIGINT, [] { return !processes_of("out").empty(); });
+  INFO(program.text());
+  REQUIRE(was_interrupted);
   CHECK(program.result() == 130);
   CHECK_THAT(program.text(), Contains("hsi4d sweep out --resume goes on\n"));
   for (const std::string& id : ids_of("out")) CHECK_FALSE(is_claimed({"out"}, id));
@@ -185,14 +190,78 @@ TEST_CASE("a sweep that is interrupted saves the state of its runs", "[release]"
   for (const std::string& id : ids_of("out")) CHECK(events_of("out", id)["done"] == 1);
 }
 
+TEST_CASE("a run that was killed at its very end is completed", "[release]") {
+  const TemporaryFolder here;
+  write_tiny_base(2);
+  write_sweep({{"set", {{"stages.camera.iterations", 1}, {"stages.interaction.iterations", 1}}}});
+  REQUIRE(run_sweep("out", false).status == 0);
+  const SweepPaths paths{"out"};
+  const std::string id = ids_of("out")[0];
+  const RunPaths run{paths.run(id)};
+  const std::string attempts = file_text(paths.attempts(id)), status = file_text(run.status());
+  const std::string start = attempts.substr(0, attempts.find('\n') + 1);
+  // Before its end was noted; while the report was written; before its state was; with a line of the attempts cut.
+  here.write(paths.attempts(id), start);
+  CHECK(run_sweep("out").status == 0);
+  CHECK(events_of("out", id) == std::map<std::string, int>{{"start", 1}, {"done", 1}});
+  fs::rename(run.report(), run.report() + ".1-2.tmp");
+  CHECK(run_sweep("out").status == 0);
+  CHECK(fs::exists(run.report()));
+  CHECK(temporaries_in("out") == kNone);
+  CHECK(events_of("out", id) == std::map<std::string, int>{{"start", 1}, {"done", 1}});
+  here.write(paths.attempts(id), start + attempts.substr(0, 20));
+  here.write(run.status(), std::string(status).replace(status.find("done"), 4, "running"));
+  fs::remove(run.report());
+  const ProgramResult last = run_sweep("out");
+  INFO(last.err);
+  CHECK(last.status == 0);
+  CHECK(events_of("out", id) == std::map<std::string, int>{{"start", 2}, {"done", 1}});
+  CHECK(sweep_run_state(paths, id) == SweepRunState::kDone);
+}
+
+TEST_CASE("a damaged config of a run is written anew, and another one refused", "[release]") {
+  const TemporaryFolder here;
+  write_tiny_base(2);
+  write_sweep({{"set", {{"stages.camera.iterations", 1}, {"stages.interaction.iterations", 1}}}});
+  REQUIRE(run_hsi4d({"sweep", "sweep.json", "--out", "out"}).status == 0);
+  const std::string id = ids_of("out")[0], config = SweepPaths{"out"}.config(id), text = file_text(config);
+  fs::remove_all(SweepPaths{"out"}.run(id));
+  const std::string other = std::string(text).replace(text.find("0.13"), 4, "0.14");
+  here.write(config, other);
+  CHECK(run_hsi4d({"run-one", "out", "0"}).err ==
+        config + ": has other settings than the run; hsi4d sweep SWEEP.json --out out --resume writes it anew\n");
+  for (const std::string& damaged : {std::string(), text.substr(0, 99), other}) {
+    here.write(config, damaged);
+    const ProgramResult result = run_sweep("out");
+    INFO(result.err);
+    CHECK(result.status == 0);
+    CHECK_THAT(result.err, Contains("anew"));
+    CHECK(file_text(config) == text);
+  }
+}
+
+TEST_CASE("options that Slurm's launcher would pass over are refused") {
+  const TemporaryFolder here;
+  write_tiny_base(2);
+  write_sweep({{"seeds", 1}});
+  CHECK(run_hsi4d({"sweep", "sweep.json", "--launcher", "slurm", "--fail-fast"}).err ==
+        "hsi4d sweep: --fail-fast is of the launcher \"local\"; of Slurm, scancel ends what runs\n");
+  CHECK(run_hsi4d({"sweep", "sweep.json", "--launcher", "slurm", "--memory", "9"}).err ==
+        "hsi4d sweep: --memory is of the launcher \"local\"; of Slurm, memory_mb of the sweep's file is what a run "
+        "gets\n");
+  CHECK_FALSE(fs::exists("runs"));
+}
+
 TEST_CASE("two launchers share a sweep", "[release]") {
   const TemporaryFolder here;
   write_tiny_base(2);
   write_sweep({{"seeds", 4}});
   RunningProgram other(sweep_words("out"));
-  while (!fs::exists("out/sweep.json")) std::this_thread::yield();
-  CHECK(run_sweep("out").status == 0);
-  while (other.is_running()) ::usleep(1000);
+  while (other.is_running() && !fs::exists("out/sweep.json")) ::usleep(1000);
+  const ProgramResult one = run_sweep("out");
+  INFO(one.err);
+  CHECK(one.status == 0);
+  while (other.is_running()) ::usleep(1000);  // it ends by itself, or the time of the test does
   CHECK(other.result() == 0);
   for (const std::string& id : ids_of("out"))
     CHECK(events_of("out", id) == std::map<std::string, int>{{"start", 1}, {"done", 1}});
@@ -223,8 +292,10 @@ TEST_CASE("what Slurm is asked for") {
   plan.slurm.time = "01:00:00";
   plan.slurm.at_once = 5;
   plan.slurm.options = {"--account=x"};
-  CHECK(array_options({"/a b/50%"}, plan, {0, 1}, 0, 3) ==
-        std::vector<std::string>{"--job-name=tiny", "--array=0-1%5", "--output=/a b/50%%/slurm/%A_%a.txt",
-                                 "--open-mode=append", "--requeue", "--ntasks=1", "--cpus-per-task=3",
-                                 "--signal=B:USR1@120", "--mem=700M", "--time=01:00:00", "--account=x"});
+  std::vector<std::string> options = array_options({"/a b/50%"}, plan, {0, 1}, 0, 3);
+  CHECK_THAT(options.at(1), Contains("--comment=hsi4d:") && EndsWith(".json"));
+  options.erase(options.begin() + 1);
+  CHECK(options == std::vector<std::string>{"--job-name=tiny", "--array=0-1%5", "--output=/a b/50%%/slurm/%A_%a.txt",
+                                            "--open-mode=append", "--requeue", "--ntasks=1", "--cpus-per-task=3",
+                                            "--signal=B:USR1@120", "--mem=700M", "--time=01:00:00", "--account=x"});
 }

@@ -5,6 +5,7 @@
 Exit status 77 (skipped, and said so) without Slurm, munge or root; tools/slurm-local install installs them.
 """
 
+import argparse
 import csv
 import json
 import os
@@ -15,13 +16,18 @@ import sys
 import tempfile
 import time
 
-tools, program, configs = (pathlib.Path(p).resolve() for p in sys.argv[1:4])
+parser = argparse.ArgumentParser()
+for word in ("tools", "program", "configs"):
+    parser.add_argument(word, type=lambda text: pathlib.Path(text).resolve())
+parser.add_argument("--keep", type=pathlib.Path, metavar="DIR")
+arguments = parser.parse_args()
+tools, program, configs = arguments.tools, arguments.program, arguments.configs
 missing = [p for p in ("munged", "slurmctld", "slurmd", "sbatch") if shutil.which(p) is None]
 if missing or os.geteuid() != 0:
     print("skipped: " + (f"there is no {', '.join(missing)} (tools/slurm-local install)" if missing else "not root"))
     sys.exit(77)
 
-folder = pathlib.Path(sys.argv[5] if "--keep" in sys.argv else tempfile.mkdtemp(prefix="hsi4d_slurm_"))
+folder = arguments.keep or pathlib.Path(tempfile.mkdtemp(prefix="hsi4d_slurm_"))
 cluster = folder / "cluster"
 environment = {**os.environ, "SLURM_CONF": str(cluster / "slurm.conf")}
 
@@ -165,6 +171,8 @@ def time_limit():
     wait_for("a run that cannot finish a frame in its time", queue_is_empty, 200)
     told = "".join(f.read_text() for f in (folder / "hopeless" / "slurm").glob("*_0.txt"))
     assert "before a frame was finished, and would be again" in told, told
+    noted = attempts(folder / "hopeless", ids(folder / "hopeless")[0])[-1]
+    assert noted["event"] == "failed" and noted["message"] in told, noted
     kinds = [a["event"] for a in attempts(folder / "limit", ids(folder / "limit")[0])]
     assert kinds.count("interrupted") >= 1 and kinds[-1] == "done", kinds
     print("the run's attempts: " + ", ".join(kinds))
@@ -178,5 +186,5 @@ try:
     print("passed")
 finally:
     local("stop")
-    if "--keep" not in sys.argv:
+    if not arguments.keep:
         shutil.rmtree(folder, ignore_errors=True)
