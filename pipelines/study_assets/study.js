@@ -56,6 +56,7 @@ const fresh = () => ({ person: givenPerson || newPerson(), begun: "", finished: 
 
 let isKept = true;  // whether the browser keeps what is answered
 let kept = null;    // what it keeps as far as this window knows, JSON
+const ownWindow = newPerson();  // in what it keeps: two windows never write the same
 
 // A browser may refuse the storage as a whole, or to write into it. Returns what `act` does.
 function storing(act) {
@@ -89,7 +90,7 @@ function takeOver() {
 function keep() {
   const isOurs = storing(() => {
     if ((localStorage.getItem(place) ?? "null") !== kept) return false;
-    const next = JSON.stringify(state);
+    const next = JSON.stringify({ ...state, window: ownWindow });
     localStorage.setItem(place, next);
     kept = next;
     sessionStorage.setItem(place, state.person);  // of this window: a reload is the same person
