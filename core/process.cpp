@@ -1,5 +1,6 @@
 #include "core/process.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -7,6 +8,7 @@
 #include <cstdlib>
 #include <fcntl.h>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <sstream>
 #include <sys/mman.h>
@@ -53,6 +55,24 @@ void wait_for(pid_t pid, int* status) {
   }
 }
 
+/// Whether a process group has a member that runs: one that is dead and that nobody has waited for yet does not count.
+bool is_alive(pid_t group) {
+  if (kill(-group, 0) != 0) return false;
+  std::error_code error;
+  std::filesystem::directory_iterator it("/proc", error);
+  if (error) return true;
+  for (const std::filesystem::directory_iterator end; !error && it != end; it.increment(error)) {
+    std::ifstream file(it->path() / "stat");
+    std::string text;
+    if (!std::getline(file, text)) continue;
+    std::istringstream fields(text.substr(std::min(text.rfind(')'), text.size() - 1) + 1));  // after "PID (NAME)"
+    char state = 0;
+    pid_t parent = 0, own_group = 0;
+    if (fields >> state >> parent >> own_group && own_group == group && state != 'Z') return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 ChildProcess::ChildProcess(std::vector<std::string> command, ChildOutput output) : command_(std::move(command)) {
@@ -84,7 +104,7 @@ ChildProcess::~ChildProcess() {
   close_if_open(input_);
   close_if_open(stream_);
   if (pid_ > 0) {
-    kill(pid_, SIGKILL);
+    kill(-pid_, SIGKILL);
     wait_for(pid_, nullptr);
   }
   close_if_open(output_);
@@ -115,8 +135,10 @@ std::string ChildProcess::finish() {
   HSI4D_CHECK(pid_ > 0, "the program's end was waited for before");
   close_if_open(input_);
   close_if_open(stream_);
-  wait_for(pid_, &status_);
-  pid_ = -1;
+  siginfo_t ended{};
+  while (waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
+  }
+  end();
   return result();
 }
 
@@ -125,9 +147,10 @@ std::optional<std::string> ChildProcess::finish(const ProcessLimits& limits) {
   close_if_open(input_);
   close_if_open(stream_);
   const double seconds = limits.seconds > 0 ? limits.seconds : std::numeric_limits<double>::infinity();
-  if (has_ended_within(seconds, limits.stop_requested)) return result();
-  const bool is_stopped = limits.stop_requested && limits.stop_requested();
+  const bool has_ended = has_ended_within(seconds, limits.stop_requested);
+  const bool is_stopped = !has_ended && limits.stop_requested && limits.stop_requested();
   end();
+  if (has_ended) return result();
   if (is_stopped) return std::nullopt;
   throw UserError(command_.front() + ": was ended after " + number_text(limits.seconds) +
                   " seconds, which is all the time it has" + end_of_output(content_of(output_)));
@@ -136,11 +159,9 @@ std::optional<std::string> ChildProcess::finish(const ProcessLimits& limits) {
 bool ChildProcess::has_ended_within(double seconds, const std::function<bool()>& stop_requested) {
   using Clock = std::chrono::steady_clock;
   for (const Clock::time_point begin = Clock::now();;) {
-    const pid_t ended = waitpid(pid_, &status_, WNOHANG);
-    if (ended == pid_) {
-      pid_ = -1;
+    siginfo_t ended{};
+    if (waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 && ended.si_pid == pid_)
       return true;
-    }
     if (stop_requested && stop_requested()) return false;
     if (std::chrono::duration<double>(Clock::now() - begin).count() > seconds) return false;
     std::this_thread::sleep_for(kLook);
@@ -148,13 +169,21 @@ bool ChildProcess::has_ended_within(double seconds, const std::function<bool()>&
 }
 
 void ChildProcess::end() {
+  using Clock = std::chrono::steady_clock;
   const pid_t group = pid_;
+  bool is_waited_for = false;
+  // The group has its number for as long as it has a member, and the program is one until it is waited for.
   kill(-group, SIGTERM);
-  if (!has_ended_within(kSecondsToGo, {})) {
-    kill(-group, SIGKILL);
-    wait_for(pid_, nullptr);
+  for (const Clock::time_point begin = Clock::now();;) {
+    is_waited_for = is_waited_for || waitpid(group, &status_, WNOHANG) == group;
+    if (is_waited_for && !is_alive(group)) break;
+    if (std::chrono::duration<double>(Clock::now() - begin).count() > kSecondsToGo) {
+      kill(-group, SIGKILL);
+      if (!is_waited_for) wait_for(group, &status_);
+      break;
+    }
+    std::this_thread::sleep_for(kLook);
   }
-  kill(-group, SIGKILL);  // what it has left behind
   pid_ = -1;
 }
 

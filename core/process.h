@@ -56,7 +56,8 @@ class ChildProcess {
   /// Reads its standard output, where that is read: as many bytes as are asked for, or fewer at its end.
   std::size_t read(std::span<uint8_t> bytes);
 
-  /// Closes its standard input and waits for its end.
+  /// Closes its standard input and waits for its end. What it has started in its process group and left behind is ended
+  /// then: asked to (SIGTERM), and killed two seconds later where it does not go.
   /// @return  what it printed on standard error, and on standard output where that is collected
   /// Throws ProgramFailedError with the program's name, its exit status and the end of what it printed, unless that is
   /// 0; UserError with the signal that ended it.
@@ -66,9 +67,9 @@ class ChildProcess {
   std::optional<std::string> finish(const ProcessLimits& limits);
 
  private:
-  /// Waits until `seconds` are over. @return  whether it has ended
+  /// Waits until `seconds` are over. @return  whether it has ended; it is still to be waited for
   bool has_ended_within(double seconds, const std::function<bool()>& stop_requested);
-  /// Ends it with its group.
+  /// Ends it with its group, or what is left of that where it has ended: SIGTERM, SIGKILL two seconds later.
   void end();
   /// Its end is known: what it printed, or what is thrown of it.
   std::string result();
@@ -86,8 +87,8 @@ std::string end_of_output(const std::string& text);
 /// where there is none that can be executed.
 std::string find_program(const std::string& name);
 
-/// Runs a program to its end, or to that of its time. It is ended with all that it has started in its process group:
-/// asked to (SIGTERM), and killed where it does not go.
+/// Runs a program to its end, or to that of its time. It is ended with all that it has started in its process group, as
+/// after ChildProcess::finish; what has made a session of its own (setsid) goes on.
 /// @return  as `finish`; nothing when it was asked to stop
 /// Throws as `finish`; UserError with the program's name and the end of what it printed when its time is over.
 std::optional<std::string> run_process(std::vector<std::string> command, const ProcessLimits& limits);

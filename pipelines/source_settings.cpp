@@ -59,7 +59,7 @@ void describe_program(ConfigFields& f, ProgramSettings& s, const std::vector<std
            "Seconds after which the program is ended; 0: it takes as long as it takes");
   f.integer("retries", s.retries, {.min = 0, .max = kMostRetries}, "How often it is run again after a failure");
   f.number("retry_wait_s", s.retry_wait_s, {.min = 0, .max = kLongestTimeout},
-           "Seconds before it is run again, each time twice as many");
+           "Seconds before it is run again, each time twice as many, at most an hour");
   f.choice("retry_on", s.retry_on, kRetryOns,
            "Which failures these are: exit status " + std::to_string(kTryAgainStatus) +
                " (temporary), or other statuses than " + std::to_string(kAskedWronglyStatus) +

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <optional>
 #include <thread>
 
@@ -13,14 +14,12 @@
 #include "core/process.h"
 #include "core/progress.h"
 #include "core/text.h"
-#include "optim/checkpoint.h"
 #include "pipelines/camera_selection.h"
 #include "pipelines/clip.h"
-#include "pipelines/input_hashes.h"
 #include "pipelines/pose_estimate.h"
 #include "pipelines/scene_render.h"
 #include "pipelines/source_lock.h"
-#include "splat/render_settings.h"
+#include "pipelines/source_record.h"
 #include "splat/sh_basis.h"
 
 namespace hsi4d {
@@ -28,6 +27,8 @@ namespace hsi4d {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kLongestDoubled = 3600.0;  // seconds that a wait may become by being doubled
 
 // ---- The first frame ----
 
@@ -41,100 +42,6 @@ void paint(Gaussians& gaussians, Index begin, Index end) {
   const auto white = static_cast<float>(0.5 / kShC0);
   for (Index i = 0; i < gaussians.count(); ++i)
     std::fill_n(gaussians.sh.begin() + 3 * i, 3, i >= begin && i < end ? white : -white);
-}
-
-// ---- What it is made of ----
-
-ConfigValue strings(const std::vector<std::string>& texts) {
-  ConfigValue array = ConfigValue::make_array();
-  for (const std::string& text : texts) array.items.push_back(ConfigValue::make_string(text));
-  return array;
-}
-
-std::vector<std::string> masked_names(const DataSettings& data) {
-  std::vector<std::string> names = {kHumanMasks};
-  for (const auto& [name, object] : data.objects) names.push_back(name);
-  return names;
-}
-
-/// What the first frame shows, and how.
-ConfigValue first_frame_record(const RunConfig& config) {
-  const DataSettings& data = config.data;
-  std::vector<ClipFile> files = {{"scene", data.scene},
-                                 {"avatar", data.avatar},
-                                 {"camera", data.camera},
-                                 {"initial", data.initial},
-                                 {"motion", initial_motion_file(data)}};
-  for (const auto& [name, object] : data.objects) files.push_back({"object " + name, object.gaussians});
-  ConfigValue record = ConfigValue::make_object();
-  record.add("files", ConfigValue::make_string(input_hashes(files)));
-  ConfigValue background = ConfigValue::make_array();
-  for (const double value : config.background) background.items.push_back(ConfigValue::make_number(value));
-  record.add("background", std::move(background));
-  RenderSettings render = config.render;  // a description binds to something that it could change
-  ConfigFields fields;
-  describe(fields, render);
-  record.add("render", write_config(fields));
-  return record;
-}
-
-ConfigValue command_record(const RunConfig& config, const std::vector<std::string>& command) {
-  ConfigValue record = ConfigValue::make_object();
-  record.add("command", strings(command));
-  if (uses_placeholder(command, "prompt")) record.add("prompt", ConfigValue::make_string(config.sources.prompt));
-  return record;
-}
-
-std::string ending_of(VideoOutput output) {
-  return output == VideoOutput::kFrames ? "" : "." + std::string(choice_name<VideoOutput>(kVideoOutputs, output));
-}
-
-fs::path record_file(const SourceOutput& output) { return output.path.string() + ".json"; }
-
-SourceOutput output_of(const RunConfig& config, const std::string& what, const std::vector<std::string>& command,
-                       const ConfigValue& record, const std::string& ending) {
-  SourceOutput output{what, command, {}, to_json(record), false};
-  output.path = config.sources.folder / (what + "-" + text_hash(output.record) + ending);
-  const fs::path made_of = record_file(output);
-  output.is_there = fs::exists(output.path) && fs::exists(made_of) && read_text_file(made_of.string()) == output.record;
-  return output;
-}
-
-SourceOutput video_output(const RunConfig& config) {
-  const VideoSourceSettings& video = config.sources.video;
-  ConfigValue record = command_record(config, video.command);
-  if (uses_placeholder(video.command, "first_frame")) record.add("first_frame", first_frame_record(config));
-  return output_of(config, "video", video.command, record, ending_of(video.output));
-}
-
-/// The content of a video, a file or a folder of frames.
-std::string video_hashes(const FrameSource& frames, const fs::path& path) {
-  if (!frames.file().empty()) return input_hashes({{"video", path}});
-  std::vector<ClipFile> files;
-  for (const std::string& name : frames.names()) files.push_back({name, path / name});
-  return input_hashes(files);
-}
-
-FrameSource frames_of(const DataSettings& data) { return {data.frames, {data.video_rate, data.frame_rate}}; }
-
-SourceOutput motion_output(const RunConfig& config, const DataSettings& data) {
-  const std::vector<std::string>& command = config.sources.motion.command;
-  const FrameSource frames = frames_of(data);
-  ConfigValue record = command_record(config, command);
-  record.add("video", ConfigValue::make_string(video_hashes(frames, data.frames)));
-  if (uses_placeholder(command, "camera"))
-    record.add("camera", ConfigValue::make_string(input_hashes({{"camera", data.camera}})));
-  if (uses_placeholder(command, "video_rate")) record.add("video_rate", ConfigValue::make_number(frames.video_rate()));
-  return output_of(config, "motion", command, record, ".npz");
-}
-
-SourceOutput mask_output(const RunConfig& config, const DataSettings& data) {
-  const std::vector<std::string>& command = config.sources.masks.command;
-  ConfigValue record = command_record(config, command);
-  record.add("video", ConfigValue::make_string(video_hashes(frames_of(data), data.frames)));
-  record.add("masks_of", strings(masked_names(data)));
-  if (uses_placeholder(command, "first_masks")) record.add("first_masks", first_frame_record(config));
-  return output_of(config, "masks", command, record, "");
 }
 
 // ---- What was made ----
@@ -169,13 +76,10 @@ void check_masks(const DataSettings& data, const fs::path& folder) {
   const Image frame = frames.read(0);
   for (const std::string& name : masked_names(data)) {
     const MaskSource masks(folder, name);
-    const Index missing = masks.missing(frames);
-    if (missing == frames.count())
-      throw DataError(name + " has no mask of any frame; their names are those of the frames, " +
-                      frames.names().front() + " to " + frames.names().back());
+    check_has_all(masks, frames, name);
     for (Index t = 0; t < frames.count(); ++t) {
       const Image mask = masks.read(frames, t);
-      if (mask.width() == 0 || (mask.width() == frame.width() && mask.height() == frame.height())) continue;
+      if (mask.width() == frame.width() && mask.height() == frame.height()) continue;
       throw DataError("the mask of " + name + " in frame " + std::to_string(frames.number(t)) + " is " +
                       size_text(mask) + " pixels, the video's frame " + size_text(frame));
     }
@@ -215,6 +119,15 @@ void put(const fs::path& from, const fs::path& to) {
   if (fs::is_directory(to)) fs::remove_all(to, error);
   fs::rename(from, to, error);
   if (error) throw UserError(to.string() + ": cannot be written: " + error.message());
+}
+
+/// Where an output is kept that cannot be used: "video-KEY.refused.mp4", or ".refused2.mp4" beside an earlier one.
+fs::path refused_file(const fs::path& output) {
+  for (int number = 1;; ++number) {
+    const std::string word = ".refused" + (number == 1 ? "" : std::to_string(number));
+    const fs::path file = output.parent_path() / (output.stem().string() + word + output.extension().string());
+    if (!fs::exists(file)) return file;
+  }
 }
 
 /// What a check of files throws; empty: nothing.
@@ -295,8 +208,8 @@ void wait_before_retry(const Job& job, double seconds) {
 
 /// Runs the program, again where that may help. @return  what it printed
 std::string run_program(const Job& job) {
-  double wait = job.settings.retry_wait_s;
-  for (int retry = 1;; ++retry, wait *= 2) {
+  for (int retry = 1;; ++retry) {
+    const double wait = seconds_before_retry(job.settings, retry);
     try {
       return run_once(job);
     } catch (const Failed& failure) {
@@ -324,8 +237,7 @@ void make(const Job& job, Check check) {
   const std::string said = run_program(job);
   const std::string fault = fault_of([&] { check(out); });
   if (!fault.empty()) {
-    fs::path refused = output.path;
-    refused.replace_filename(output.path.stem().string() + ".refused" + output.path.extension().string());
+    const fs::path refused = refused_file(output.path);
     put(out, refused);
     throw DataError(job.section() + command.front() + " wrote what cannot be used, kept as " + refused.string() + ": " +
                     with_replaced(fault, out.string(), refused.string()) + end_of_output(said));
@@ -335,6 +247,11 @@ void make(const Job& job, Check check) {
   put(out, output.path);
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
   log_info(output.what + ": " + output.path.string() + ", made in " + duration_text(taken.count()));
+}
+
+/// Where the first frame is kept that a video was made of.
+fs::path first_frame_file(const SourceOutput& video) {
+  return video.path.parent_path() / (video.path.stem().string() + ".first_frame.png");
 }
 
 void make_video(const RunConfig& config, const SourceOutput& output, const Observer& observer) {
@@ -347,7 +264,7 @@ void make_video(const RunConfig& config, const SourceOutput& output, const Obser
       output.command, {{"first_frame", first.string()}, {"prompt", config.sources.prompt}, {"out", out.string()}});
   make(Job{output, config.sources.video, command, out, observer},
        [&config](const fs::path& made) { check_video(config, made); });
-  if (has_first_frame) put(first, config.sources.folder / (output.path.stem().string() + ".first_frame.png"));
+  if (has_first_frame) put(first, first_frame_file(output));
 }
 
 void write_first_masks(const RunConfig& config, const fs::path& folder) {
@@ -388,6 +305,22 @@ void make_motion(const RunConfig& config, const DataSettings& data, const Source
        [&data](const fs::path& made) { check_motion(data, made); });
 }
 
+/// The program has changed a file that its command names, a log most likely: the output is called as the next run looks
+/// for it.
+void rename_to(const SourceOutput& output, const SourceOutput& now) {
+  log_warning(
+      "/sources/" + output.what + "/command: " + joined(files_of_command(now.command)) +
+      ": what of these the program has changed is taken as it is now; a file that it writes is better not named "
+      "in its command, as each change makes the " +
+      output.what + " be made again");
+  write_text_file(record_file(now).string(), now.record);
+  put(output.path, now.path);
+  const fs::path seen = first_frame_file(output);
+  if (fs::exists(seen)) put(seen, first_frame_file(now));
+  std::error_code ignored;
+  fs::remove(record_file(output), ignored);
+}
+
 /// Makes what is not there; by one process at a time, and the others have it then.
 /// @param plan  the output as it is now
 template <class Plan, class Make>
@@ -397,11 +330,18 @@ fs::path made(const Plan& plan, const Observer& observer, const Make& make_it) {
   sweep_work_folders(output.path.parent_path());
   const SourceLock lock(output.path, observer.stop_requested);
   output = plan();
-  if (!output.is_there) make_it(output);
-  return output.path;
+  if (output.is_there) return output.path;
+  make_it(output);
+  const SourceOutput now = plan();
+  if (now.path != output.path) rename_to(output, now);
+  return now.path;
 }
 
 }  // namespace
+
+double seconds_before_retry(const ProgramSettings& settings, int retry) {
+  return std::min(std::ldexp(settings.retry_wait_s, retry - 1), std::max(kLongestDoubled, settings.retry_wait_s));
+}
 
 std::vector<SourceOutput> planned_sources(const RunConfig& config) {
   std::vector<SourceOutput> outputs;

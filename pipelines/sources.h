@@ -2,7 +2,7 @@
 // what they are told.
 //
 //   FOLDER/video-KEY.mp4         what the video's program wrote, once it was found to be right
-//   FOLDER/video-KEY.mp4.json    what it was made of: command, prompt, inputs. KEY is the hash of this text
+//   FOLDER/video-KEY.mp4.json    what it was made of (pipelines/source_record.h). KEY is the hash of this text
 //   FOLDER/video-KEY.first_frame.png
 //   FOLDER/masks-KEY/            likewise: human/, NAME/, or human.mp4, ...
 //   FOLDER/masks-KEY.json
@@ -18,20 +18,12 @@
 
 #include "pipelines/observer.h"
 #include "pipelines/run_config.h"
+#include "pipelines/source_record.h"
 
 namespace hsi4d {
 
-/// One thing that a program makes.
-struct SourceOutput {
-  std::string what;                  ///< "video", "masks" or "motion"
-  std::vector<std::string> command;  ///< as in the config
-  std::filesystem::path path;        ///< where it is, or will be; empty: not known before the video is there
-  std::string record;                ///< what it is made of, JSON
-  bool is_there = false;             ///< made before, of the same
-};
-
 /// What the programs would make, in order; nothing is run.
-/// Throws UserError or DataError naming an input that is missing.
+/// Throws as video_output, mask_output and motion_output.
 std::vector<SourceOutput> planned_sources(const RunConfig& config);
 
 /// Gives what a program made its place in the inputs of a run.
@@ -47,6 +39,11 @@ void take_output(const SourceOutput& output, DataSettings& data);
 /// longer than timeout_s, writes nothing; DataError for what it writes; Interrupted when asked to stop, with nothing
 /// left. Throws as read_scene_setup, where the first frame is rendered.
 DataSettings make_sources(const RunConfig& config, const Observer& observer);
+
+/// How long it is waited before a program is run again: retry_wait_s, each time twice as long, but never more than an
+/// hour, or than retry_wait_s where that is more.
+/// @param retry  1 before it is run for the second time
+double seconds_before_retry(const ProgramSettings& settings, int retry);
 
 /// Coverage of the human and then of each object in I_0, what hides them taken away, [1,H,W] each.
 std::vector<Image> first_masks(const RunConfig& config);

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <random>
 
 #include "core/check.h"
 #include "core/config_value.h"
@@ -38,8 +39,8 @@ class ShownFrames {
  public:
   explicit ShownFrames(const fs::path& run)
       : run_{run}, preview_(run_.preview()), is_run_(is_run_folder(run.string())) {
-    if (is_run_ && has_all_renders()) return;
-    has_renders_ = false;
+    has_renders_ = is_run_ && has_all_renders();
+    if (has_renders_) return;
     const Image first = preview_.read(0);
     if (is_run_ && first.width() % kPreviewPanels != 0)
       throw DataError(preview_.path() + ": is " + std::to_string(first.width()) + " pixels wide, which is no row of " +
@@ -47,6 +48,8 @@ class ShownFrames {
   }
 
   Index count() const { return preview_.frames(); }
+  /// Whether they are images without loss, and not frames of a video that was compressed.
+  bool are_images() const { return has_renders_; }
   double frame_rate() const { return preview_.frame_rate() > 0 ? preview_.frame_rate() : kUsualRate; }
   const std::string& path() const { return preview_.path(); }
 
@@ -67,13 +70,14 @@ class ShownFrames {
 
   RunPaths run_;
   VideoReader preview_;
-  bool is_run_ = false, has_renders_ = true;
+  bool is_run_ = false, has_renders_ = false;
 };
 
 /// How a video looks beside the other: what should be the same of both.
 struct VideoForm {
   int width = 0, height = 0;
   double seconds = 0, frame_rate = 0;
+  bool is_of_images = false;  ///< and not of a video, which is compressed a second time
 };
 
 std::string form_text(const VideoForm& form) {
@@ -85,7 +89,7 @@ VideoForm encode(const fs::path& run, const fs::path& out, const Observer& obser
   ShownFrames frames(run);
   const Image first = frames.read(0);
   VideoForm form{first.width(), first.height(), static_cast<double>(frames.count()) / frames.frame_rate(),
-                 frames.frame_rate()};
+                 frames.frame_rate(), frames.are_images()};
   VideoWriter video(out.string(), form.width, form.height, {.frame_rate = form.frame_rate, .quality = kStudyQuality});
   for (Index t = 0; t < frames.count(); ++t) {
     if (observer.wants_stop()) throw Interrupted("interrupted; nothing is left of the study");
@@ -142,12 +146,25 @@ class NewFolder {
 const fs::file_time_type kTimeOfVideos =
     std::chrono::file_clock::from_sys(std::chrono::sys_seconds(std::chrono::sys_days(std::chrono::year(2020) / 1 / 1)));
 
-/// Makes one video, under a name that follows from seed, place and content and tells none of them.
-std::string add_video(const fs::path& run, const std::string& place, const NewFolder& folder, VideoForm& form,
-                      const Observer& observer) {
+/// Sixteen random hexadecimal digits, by the system's generator.
+std::string random_digits() {
+  std::random_device device;
+  std::string digits;
+  for (int i = 0; i < 16; ++i) digits += "0123456789abcdef"[device() % 16];
+  return digits;
+}
+
+/// A name that tells nothing of what it stands for: random, or with a seed the hash of seed and content.
+std::string name_of(const StudySettings& settings, const std::string& content) {
+  return settings.seed ? text_hash(std::to_string(*settings.seed) + "\n" + content) : random_digits();
+}
+
+/// Makes one video of a pair's side, "a" or "b".
+std::string add_video(const StudySettings& settings, const fs::path& run, const std::string& place,
+                      const NewFolder& folder, VideoForm& form, const Observer& observer) {
   const fs::path unnamed = folder.video("unnamed");
   form = encode(run, unnamed, observer);
-  const std::string name = text_hash(place + "\n" + read_text_file(unnamed.string()));
+  const std::string name = name_of(settings, place + "\n" + read_text_file(unnamed.string()));
   std::error_code error;
   fs::rename(unnamed, folder.video(name), error);
   // All of one time: the older of a pair would else be A's.
@@ -156,22 +173,42 @@ std::string add_video(const fs::path& run, const std::string& place, const NewFo
   return name;
 }
 
-void tell_forms(const std::string& name, const VideoForm& a, const VideoForm& b, std::vector<std::string>& notes) {
-  if (a.width == b.width && a.height == b.height && a.frame_rate == b.frame_rate && a.seconds == b.seconds) return;
-  notes.push_back(name + ": the videos differ in form, which may decide the choice: A has " + form_text(a) + ", B " +
-                  form_text(b));
+bool are_alike(const VideoForm& a, const VideoForm& b) {
+  return a.width == b.width && a.height == b.height && a.frame_rate == b.frame_rate && a.seconds == b.seconds;
 }
 
-StudyPair make_pair(const StudySettings& settings, const StudyRuns& runs, const NewFolder& folder,
-                    std::vector<std::string>& notes, Progress& progress, const Observer& observer) {
-  const std::string place = std::to_string(settings.seed) + "\n" + runs.name + "\n";
-  StudyPair pair{text_hash("pair\n" + place), runs.name, runs.text, "", ""};
+/// The videos of a pair as they came.
+struct PairForms {
+  std::string name;
   VideoForm a, b;
-  pair.a = add_video(runs.a, "a\n" + place, folder, a, observer);
+};
+
+/// What people may choose by that is not the method's.
+void tell_forms(const std::vector<PairForms>& pairs, std::vector<std::string>& notes) {
+  std::vector<std::string> a_finer, b_finer;
+  for (const PairForms& pair : pairs) {
+    if (!are_alike(pair.a, pair.b))
+      notes.push_back(pair.name + ": the videos differ in form, which may decide the choice: A has " +
+                      form_text(pair.a) + ", B " + form_text(pair.b));
+    if (pair.a.is_of_images != pair.b.is_of_images) (pair.a.is_of_images ? a_finer : b_finer).push_back(pair.name);
+  }
+  const auto tell = [&notes](const std::string& finer, const std::string& other, const auto& names) {
+    if (names.empty()) return;
+    notes.push_back(finer + " is made of images and " + other +
+                    " of a video, which is thereby compressed twice and may look worse for that: " + joined(names));
+  };
+  tell("A", "B", a_finer);
+  tell("B", "A", b_finer);
+}
+
+StudyPair make_pair(const StudySettings& settings, const StudyRuns& runs, const NewFolder& folder, PairForms& forms,
+                    Progress& progress, const Observer& observer) {
+  StudyPair pair{name_of(settings, "pair\n" + runs.name), runs.name, runs.text, "", ""};
+  forms.name = runs.name;
+  pair.a = add_video(settings, runs.a, "a\n" + runs.name, folder, forms.a, observer);
   progress.step();
-  pair.b = add_video(runs.b, "b\n" + place, folder, b, observer);
+  pair.b = add_video(settings, runs.b, "b\n" + runs.name, folder, forms.b, observer);
   progress.step();
-  tell_forms(pair.name, a, b, notes);
   return pair;
 }
 
@@ -197,7 +234,8 @@ fs::path study_key_file(const fs::path& folder) {
 
 Study make_study(const StudySettings& settings, const Observer& observer) {
   check_is_new(settings);
-  Study study{{"", settings.a, settings.b, settings.pairs_per_person, {}},
+  const std::string salt = settings.seed ? "" : random_digits() + random_digits();
+  Study study{{"", settings.a, settings.b, salt, settings.pairs_per_person, {}},
               settings.out / "index.html",
               study_key_file(settings.out),
               {}};
@@ -205,8 +243,10 @@ Study make_study(const StudySettings& settings, const Observer& observer) {
   NewFolder folder(settings.out);
   {
     Progress progress("study", 2 * std::ssize(runs), observer.progress, observer.progress_interval);
-    for (const StudyRuns& pair : runs)
-      study.key.pairs.push_back(make_pair(settings, pair, folder, study.notes, progress, observer));
+    std::vector<PairForms> forms(runs.size());
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      study.key.pairs.push_back(make_pair(settings, runs[i], folder, forms[i], progress, observer));
+    tell_forms(forms, study.notes);
   }
   study.key.study = study_id(study.key);
   const std::map<std::string, Bytes> videos =

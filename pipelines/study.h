@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,9 +20,9 @@ struct StudySettings {
   std::string a, b;           ///< run folders, or folders of runs with the same names
   std::filesystem::path out;  ///< a new or empty folder
   std::string texts;          ///< JSON file {"NAME": "what was to happen"}; empty: as the runs' configs say
-  Index pairs_per_person = 10;
-  std::uint64_t seed = 0;  ///< of the names of videos and pairs
-  bool embed = false;      ///< videos go into the page
+  Index pairs_per_person = kPairsPerPerson;
+  std::optional<std::uint64_t> seed;  ///< of the names of videos and pairs; without it they are random
+  bool embed = false;                 ///< videos go into the page
 };
 
 /// A study that was made.
@@ -36,7 +37,9 @@ std::filesystem::path study_key_file(const std::filesystem::path& folder);
 
 /// Makes a study. Of a run of hsi4d its reconstruction is shown: frames/NNNN_render.png where all of them are there,
 /// else that part of preview.mp4; of any other folder preview.mp4 as it is. Videos are encoded alike and anew, so that
-/// neither their form nor their metadata tell where they come from. The key comes before the page, the page last.
+/// neither their form nor their metadata tell where they come from. Names of videos and pairs are random; with a seed
+/// they follow from it and from the runs, so that the same study can be made again, and someone who has the runs and
+/// guesses the seed can tell A from B. The key comes before the page, the page last.
 ///
 /// Throws as study_runs; UserError where `out` is not a new or empty folder, or its key is there; UserError or
 /// DataError of reading and writing videos; Interrupted when asked to stop, with nothing left.

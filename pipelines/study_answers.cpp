@@ -4,10 +4,13 @@
 #include <filesystem>
 #include <map>
 #include <set>
+#include <tuple>
+#include <utility>
 
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
+#include "core/text.h"
 #include "pipelines/json_text.h"
 #include "pipelines/study_json.h"
 
@@ -18,21 +21,25 @@ namespace {
 namespace fs = std::filesystem;
 using Kind = ConfigValue::Kind;
 
-std::vector<std::string> files_of(const std::vector<std::string>& paths) {
-  std::vector<std::string> files;
-  for (const std::string& path : paths) {
-    if (!fs::is_directory(path)) {
-      files.push_back(path);
-      continue;
-    }
-    const std::size_t before = files.size();
-    for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
-      if (entry.path().extension() == ".json") files.push_back(entry.path().string());
-    }
-    if (files.size() == before) throw UserError(path + ": the folder holds no .json file");
-    std::sort(files.begin() + static_cast<std::ptrdiff_t>(before), files.end());
+bool is_json(const fs::path& file) {
+  std::string ending = file.extension().string();
+  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return ending == ".json";
+}
+
+/// The files in a folder, by name: those that are read, and the names of others.
+std::pair<std::vector<std::string>, std::vector<std::string>> files_in(const std::string& folder) {
+  std::vector<std::string> files, others;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.is_directory()) continue;
+    if (is_json(entry.path()))
+      files.push_back(entry.path().string());
+    else
+      others.push_back(entry.path().filename().string());
   }
-  return files;
+  std::sort(files.begin(), files.end());
+  std::sort(others.begin(), others.end());
+  return {files, others};
 }
 
 const ConfigValue& needed_string(const ConfigValue& object, std::string_view name, const std::string& pointer) {
@@ -55,6 +62,7 @@ class AnswerReader {
     answer.a_is_left = video("left", pair) == pair.a;
     if ((video("right", pair) == pair.a) == answer.a_is_left) fail("right", "is the video that is left, too");
     answer.seconds = number_of(needed(entry_, "seconds", pointer_), at("seconds"));
+    answer.plays = number_of(needed(entry_, "plays", pointer_), at("plays"));
     return choices(answer, pair);
   }
 
@@ -114,7 +122,8 @@ StudyPerson read_person(const std::string& file, const StudyKey& key) {
   if (study.text != key.study)
     fail_at(study, "/study",
             "answers to another study, " + json_string(study.text) + "; the key is of " + json_string(key.study));
-  StudyPerson person{needed_text(root, "person", ""), file, needed_text(root, "finished", ""), {}};
+  StudyPerson person{
+      needed_text(root, "person", ""), file, needed_text(root, "begun", ""), needed_text(root, "finished", ""), {}};
   if (person.person.empty()) fail_at(*find_member(root, "person"), "/person", "is empty");
   std::set<std::size_t> pairs;
   const ConfigValue& answers = needed_array(root, "answers", "");
@@ -134,9 +143,22 @@ std::size_t pairs_answered(const StudyPerson& person) {
   return pairs.size();
 }
 
-/// Whether `x` was finished before `y`; one without a date comes last.
-bool is_earlier(const StudyPerson& x, const StudyPerson& y) {
-  return !x.finished.empty() && (y.finished.empty() || x.finished < y.finished);
+/// Whether `x` counts and not `y`, of the same person. An order of all files: which is read first does not matter.
+bool counts_before(const StudyPerson& x, const StudyPerson& y) {
+  const auto rank = [](const StudyPerson& person) {
+    return std::tuple(person.finished.empty(), person.begun.empty(), person.begun);
+  };
+  if (rank(x) != rank(y)) return rank(x) < rank(y);
+  if (x.finished != y.finished) return x.finished > y.finished;
+  if (x.answers.size() != y.answers.size()) return x.answers.size() > y.answers.size();
+  return x.file < y.file;
+}
+
+/// Why `other` counts alone of the two.
+std::string why_counts(const StudyPerson& other, const StudyPerson& person) {
+  if (person.begun == other.begun && person.finished != other.finished) return "was finished later";
+  if (person.begun == other.begun) return "has as many answers or more";
+  return person.finished.empty() && !other.finished.empty() ? "was finished" : "was begun first";
 }
 
 void tell_unfinished(const StudyKey& key, StudyAnswers& answers) {
@@ -151,27 +173,40 @@ void tell_unfinished(const StudyKey& key, StudyAnswers& answers) {
 
 }  // namespace
 
+std::vector<std::string> study_answer_files(const std::vector<std::string>& paths, std::vector<std::string>* notes) {
+  std::vector<std::string> files;
+  for (const std::string& path : paths) {
+    if (!fs::is_directory(path)) {
+      files.push_back(path);
+      continue;
+    }
+    const auto [found, others] = files_in(path);
+    if (found.empty()) throw UserError(path + ": the folder holds no .json file");
+    if (notes != nullptr && !others.empty())
+      notes->push_back(path + ": holds other files, which are not read: " + joined(others));
+    files.insert(files.end(), found.begin(), found.end());
+  }
+  return files;
+}
+
 StudyAnswers read_study_answers(const std::vector<std::string>& paths, const StudyKey& key) {
   StudyAnswers answers;
-  std::map<std::string, std::string> contents;   // file by content
-  std::map<std::string, std::size_t> by_person;  // index into persons
-  for (const std::string& file : files_of(paths)) {
+  std::map<std::string, std::string> contents;  // file by content
+  std::map<std::string, StudyPerson> by_person;
+  for (const std::string& file : study_answer_files(paths, &answers.notes)) {
     const auto [same, is_new] = contents.try_emplace(read_text_file(file), file);
     if (!is_new) {
       answers.notes.push_back(file + ": is the same as " + same->second + " and counts once");
       continue;
     }
     StudyPerson person = read_person(file, key);
-    const auto [known, is_first] = by_person.try_emplace(person.person, answers.persons.size());
-    if (is_first) {
-      answers.persons.push_back(std::move(person));
-      continue;
-    }
-    StudyPerson& other = answers.persons[known->second];
-    if (is_earlier(person, other)) std::swap(person, other);
-    answers.notes.push_back(person.file + ": is of the same person as " + other.file +
-                            ", which was finished first and counts alone");
+    const auto [known, is_first] = by_person.try_emplace(person.person, person);
+    if (is_first) continue;
+    if (counts_before(person, known->second)) std::swap(person, known->second);
+    answers.notes.push_back(person.file + ": is of the same person as " + known->second.file + ", which " +
+                            why_counts(known->second, person) + " and counts alone");
   }
+  for (auto& [id, person] : by_person) answers.persons.push_back(std::move(person));
   tell_unfinished(key, answers);
   return answers;
 }

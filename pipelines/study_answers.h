@@ -20,6 +20,7 @@ struct StudyAnswer {
   bool prefers_a = false;
   bool a_is_left = false;
   double seconds = 0;  ///< that the pair was looked at
+  double plays = 0;    ///< how often its videos were played to their end
 
   bool prefers_left() const { return prefers_a == a_is_left; }
 };
@@ -28,22 +29,30 @@ struct StudyAnswer {
 struct StudyPerson {
   std::string person;
   std::string file;
-  std::string finished;  ///< date and time as the page writes it, UTC; empty: not known
+  std::string begun;     ///< date and time as the page writes it, UTC; empty: not known
+  std::string finished;  ///< likewise; empty: saved before the last pair
   std::vector<StudyAnswer> answers;
 };
 
 struct StudyAnswers {
-  std::vector<StudyPerson> persons;  ///< in the order of their files
+  std::vector<StudyPerson> persons;  ///< by their ids
   std::vector<std::string> notes;    ///< files that do not count and why, persons who answered less than was asked
 };
 
-/// Reads answers to a study. What is the same file again counts once; of several files of one person the one that was
-/// finished first counts.
+/// The files that `paths` stand for: files themselves, and of folders all that end in .json, whatever its case, by
+/// name.
+/// @param notes  receives a sentence for a folder that holds other files; null: none
+/// Throws UserError for a folder without such files.
+std::vector<std::string> study_answer_files(const std::vector<std::string>& paths, std::vector<std::string>* notes);
+
+/// Reads answers to a study. What is the same file again counts once. Of several files of one person, those of the time
+/// count that was begun first (of the times that came to an end, where one did), and of these the one that was finished
+/// last: a person may go back and save again.
 ///
-/// @param files  JSON files, or folders of which all .json files are read
+/// @param paths  as for study_answer_files
 /// Throws UserError naming a file that cannot be read, or a folder without files; DataError naming file and position:
 /// no answers, answers to another study, pairs, videos or questions that the study has not, a pair or question that is
 /// answered twice, or a question left out.
-StudyAnswers read_study_answers(const std::vector<std::string>& files, const StudyKey& key);
+StudyAnswers read_study_answers(const std::vector<std::string>& paths, const StudyKey& key);
 
 }  // namespace hsi4d

@@ -19,6 +19,7 @@ ConfigValue tree_of(const StudyKey& key) {
   ConfigValue root = study_file(kFormat, key.study), pairs = ConfigValue::make_array();
   root.add("a", ConfigValue::make_string(key.a));
   root.add("b", ConfigValue::make_string(key.b));
+  if (!key.salt.empty()) root.add("salt", ConfigValue::make_string(key.salt));
   root.add("pairs_per_person", ConfigValue::make_integer(key.pairs_per_person));
   for (const StudyPair& pair : key.pairs) {
     ConfigValue entry = ConfigValue::make_object();
@@ -51,6 +52,7 @@ StudyKey read_study_key(const std::string& file) {
   key.study = needed_text(root, "study", "");
   key.a = needed_text(root, "a", "");
   key.b = needed_text(root, "b", "");
+  key.salt = string_member(root, "salt");
   key.pairs_per_person = whole_number_of(needed(root, "pairs_per_person", ""), "/pairs_per_person");
   const ConfigValue& pairs = needed_array(root, "pairs", "");
   std::set<std::string> seen;  // ids and videos

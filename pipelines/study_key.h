@@ -1,7 +1,8 @@
 // What a forced-choice study compares, and which of its videos is whose: the key that the page does not have.
 //
 //   KEY.json   {"format": "hsi4d study key", "version": 1, "study": ID, "a": "runs/best", "b": "runs/other",
-//               "pairs_per_person": 10, "pairs": [{"id": ..., "name": ..., "text": ..., "a": VIDEO, "b": VIDEO}]}
+//               "salt": HEX, "pairs_per_person": 10, "pairs": [{"id": ..., "name": ..., "text": ..., "a": VIDEO, "b":
+//               VIDEO}]}
 //
 // A person is shown some of the pairs, each with its two videos left and right by chance, and chooses one of them by
 // each question.  [method.md, §7]
@@ -37,10 +38,14 @@ struct StudyPair {
   bool asks(const StudyQuestion& question) const { return !question.needs_text || !text.empty(); }
 };
 
+/// Pairs that a person is shown unless another number is asked for.  [method.md, §7]
+inline constexpr Index kPairsPerPerson = 10;
+
 struct StudyKey {
   std::string study;  ///< hash of everything else
   std::string a, b;   ///< where the videos come from
-  Index pairs_per_person = 10;
+  std::string salt;   ///< random digits, so that `study`, which the page has, tells nothing of the rest; empty: none
+  Index pairs_per_person = kPairsPerPerson;
   std::vector<StudyPair> pairs;
 
   /// The pairs that one person is shown.

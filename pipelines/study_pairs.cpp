@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
+#include <utility>
 
 #include "core/check.h"
 #include "core/config_value.h"
@@ -20,23 +22,35 @@ using Runs = std::map<std::string, fs::path>;
 
 bool has_preview(const fs::path& folder) { return fs::is_regular_file(RunPaths{folder}.preview()); }
 
-void collect(const fs::path& folder, const std::string& name, Runs& runs) {
+/// The folders in a folder by name, links last: what two names lead to is then known by its own.
+std::vector<fs::path> folders_in(const fs::path& folder) {
+  std::vector<fs::path> folders;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.is_directory(error)) folders.push_back(entry.path());
+  }
+  const auto place = [](const fs::path& path) { return std::pair(fs::is_symlink(path), path); };
+  std::sort(folders.begin(), folders.end(), [&](const fs::path& x, const fs::path& y) { return place(x) < place(y); });
+  return folders;
+}
+
+/// @param seen  folders that were looked into, without links; none is a second time
+void collect(const fs::path& folder, const std::string& name, std::set<fs::path>& seen, Runs& runs) {
+  if (!seen.insert(fs::canonical(folder)).second) return;
   if (has_preview(folder)) {
     runs[name] = folder;
     return;
   }
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (entry.is_directory(error))
-      collect(entry.path(), (name.empty() ? "" : name + "/") + entry.path().filename().string(), runs);
-  }
+  for (const fs::path& inner : folders_in(folder))
+    collect(inner, (name.empty() ? "" : name + "/") + inner.filename().string(), seen, runs);
 }
 
 /// By names relative to the folder; "" where it is a run itself.
 Runs runs_in(const std::string& folder) {
   if (!fs::is_directory(folder)) throw UserError(folder + ": there is no such folder");
   Runs runs;
-  collect(folder, "", runs);
+  std::set<fs::path> seen;
+  collect(folder, "", seen, runs);
   if (runs.empty())
     throw UserError(folder +
                     ": holds no run with a preview.mp4, in it or in its folders; a run that has come to its "

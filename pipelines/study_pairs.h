@@ -16,7 +16,8 @@ struct StudyRuns {
 
 /// The runs of A and B, matched by name, in the order of names.
 ///
-/// A run is a folder with preview.mp4; other folders are looked into, at any depth.
+/// A run is a folder with preview.mp4; other folders are looked into, at any depth, through links too. A folder that
+/// has several names counts once, by its own rather than a link's.
 ///
 /// @param a, b   runs, or folders of runs
 /// @param texts  a JSON file {"NAME": "what was to happen"}, which wins against sources.prompt of the runs' configs;

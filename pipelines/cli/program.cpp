@@ -40,6 +40,7 @@
 #include "pipelines/cli/study_command.h"
 #include "pipelines/cli/sweep_command.h"
 #include "pipelines/cli/synth_command.h"
+#include "pipelines/study_key.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -227,11 +228,10 @@ struct CommandLine {
         ->add_option("--texts", o.texts,
                      "What happens in the videos, {\"NAME\": \"text\"}; default: sources.prompt of the runs' configs")
         ->type_name("F.json");
-    command->add_option("--pairs", o.pairs, "Pairs that a person is shown")
-        ->capture_default_str()
-        ->check(CLI::Range(1, 1000));
-    command->add_option("--seed", o.seed, "Seed of the names of videos and pairs")
-        ->capture_default_str()
+    command->add_option("--pairs", o.pairs, "Pairs that a person is shown; default: " + std::to_string(kPairsPerPerson))
+        ->check(CLI::Range(1, 1000))
+        ->type_name("N");
+    command->add_option("--seed", o.seed, "Names of videos and pairs follow from it; default: they are random")
         ->check(WholeNumber())
         ->type_name("N");
     command->add_flag("--embed", o.embed, "One file: the videos are in the page");

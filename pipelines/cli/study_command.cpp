@@ -1,5 +1,7 @@
 #include "pipelines/cli/study_command.h"
 
+#include <filesystem>
+
 #include "core/check.h"
 #include "core/file.h"
 #include "core/progress.h"
@@ -14,6 +16,8 @@
 namespace hsi4d::cli {
 
 namespace {
+
+namespace fs = std::filesystem;
 
 const std::string kCommand = "hsi4d study: ";
 
@@ -38,7 +42,8 @@ std::string make_page(const StudyOptions& o) {
   if (o.out.empty()) throw UserError(kCommand + "--out says where the page goes: a new or empty folder");
   const InterruptWatch watch;
   const Study study =
-      make_study({o.runs[0], o.runs[1], o.out, o.texts, o.pairs, o.seed, o.embed}, observer_on_terminal(o.quiet));
+      make_study({o.runs[0], o.runs[1], o.out, o.texts, o.pairs.value_or(kPairsPerPerson), o.seed, o.embed},
+                 observer_on_terminal(o.quiet));
   return study.page.generic_string() + ": " + count_text(std::ssize(study.key.pairs), "pair") +
          ", of which a person is shown " + std::to_string(study.key.shown_pairs()) +
          (o.embed ? "; one file" : "; goes with videos/") + "\n" + study.key_file.generic_string() +
@@ -52,19 +57,38 @@ std::string interval_text(const ShareInterval& interval) {
 }
 
 std::string shares_table(const std::vector<StudyShare>& shares) {
-  std::vector<std::vector<std::string>> rows = {
-      {"question", "persons", "answers", "prefer A [%]", "95 % of answers", "95 % over persons", "chose left [%]"}};
+  std::vector<std::vector<std::string>> rows = {{"question", "persons", "answers", "prefer A [%]", "95 % of answers",
+                                                 "95 % over persons", "Student's t", "chose left [%]"}};
   for (const StudyShare& share : shares) {
     rows.push_back({std::string(kStudyQuestions[share.question].id), std::to_string(share.persons),
                     std::to_string(share.all.answers), percent(share.all.share()), interval_text(share.wilson),
                     share.bootstrap ? interval_text(*share.bootstrap) : "-",
+                    share.student ? interval_text(*share.student) : "-",
                     percent(static_cast<double>(share.prefer_left) / static_cast<double>(share.all.answers))});
   }
   return table(rows);
 }
 
+/// The files that are written are none of those that are read, nor the same.
+void check_outputs(const StudyOptions& o) {
+  std::vector<std::string> inputs = study_answer_files(o.answers, nullptr);
+  inputs.push_back(o.key);
+  for (const auto& [name, file] : {std::pair{"--csv", o.csv}, {"--json", o.json}}) {
+    if (file.empty()) continue;
+    check_no_input(file, kCommand + name, inputs);
+    check_writable(file);
+  }
+  const auto place = [](const std::string& file) { return fs::weakly_canonical(fs::absolute(file)); };
+  if (!o.csv.empty() && !o.json.empty() && place(o.csv) == place(o.json))
+    throw UserError(kCommand + "--csv and --json are the same file, " + o.json);
+}
+
 std::string tell_results(const StudyOptions& o) {
-  check_absent({{"--out", !o.out.empty()}, {"--texts", !o.texts.empty()}, {"--embed", o.embed}},
+  check_absent({{"--out", !o.out.empty()},
+                {"--texts", !o.texts.empty()},
+                {"--embed", o.embed},
+                {"--pairs", o.pairs.has_value()},
+                {"--seed", o.seed.has_value()}},
                "is for making a study, not for --answers");
   if (!o.runs.empty())
     throw UserError(kCommand + "--answers are read without A and B, which the key knows; found " + o.runs.front());
@@ -72,13 +96,7 @@ std::string tell_results(const StudyOptions& o) {
     throw UserError(kCommand +
                     "--key says which video is whose: the file that was made beside the study's folder, "
                     "DIR-key.json");
-  std::vector<std::string> inputs = o.answers;
-  inputs.push_back(o.key);
-  for (const auto& [name, file] : {std::pair{"--csv", o.csv}, {"--json", o.json}}) {
-    if (file.empty()) continue;
-    check_no_input(file, kCommand + name, inputs);
-    check_writable(file);
-  }
+  check_outputs(o);
   const StudyKey key = read_study_key(o.key);
   const StudyAnswers answers = read_study_answers(o.answers, key);
   const std::vector<StudyShare> shares = study_shares(answers);
@@ -87,7 +105,7 @@ std::string tell_results(const StudyOptions& o) {
   if (!o.json.empty()) write_text_file(o.json, study_results_json(key, answers, shares));
   return shares_table(shares) + "\nA: " + key.a + "\nB: " + key.b + "\n" +
          count_text(std::ssize(answers.persons), "person") + ", " + count_text(std::ssize(key.pairs), "pair") + "\n" +
-         notes_text(answers.notes);
+         notes_text(study_cautions(shares)) + notes_text(answers.notes);
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ struct StudyOptions {
   std::vector<std::string> runs;      ///< A B
   std::string out;                    ///< --out DIR
   std::string texts;                  ///< --texts F.json
-  int pairs = 10;                     ///< --pairs N, that a person is shown
-  std::uint64_t seed = 0;             ///< --seed N
+  std::optional<int> pairs;           ///< --pairs N, that a person is shown
+  std::optional<std::uint64_t> seed;  ///< --seed N
   bool embed = false, quiet = false;  ///< --embed, --quiet
   std::vector<std::string> answers;   ///< --answers F.json...
   std::string key;                    ///< --key F.json

@@ -2,7 +2,7 @@
 //
 // Which pairs, their order and their sides follow from study and person alone, so that a reload shows the same. What is
 // kept in the browser are the person, what was chosen, and for each pair the seconds it was looked at and how often its
-// videos were played.
+// videos were played. Nothing can be chosen before both videos are there.
 (() => {
 "use strict";
 
@@ -52,32 +52,62 @@ function newPerson() {
 const givenPerson = new URLSearchParams(location.search).get("person") ?? "";  // of a page opened as index.html?person=NAME
 const place = "hsi4d study " + study.study + (givenPerson ? " of " + givenPerson : "");
 
-const fresh = () => ({ person: givenPerson || newPerson(), begun: "", finished: "", at: -1, pairs: {} });
+const fresh = () => ({ person: givenPerson || newPerson(), begun: "", finished: "", saved: true, at: -1, pairs: {} });
 
-function restored() {
+let isKept = true;  // whether the browser keeps what is answered
+let kept = null;    // what it keeps as far as this window knows, JSON
+const ownWindow = newPerson();  // in what it keeps: two windows never write the same
+
+// A browser may refuse the storage as a whole, or to write into it. Returns what `act` does.
+function storing(act) {
   try {
-    const kept = JSON.parse(localStorage.getItem(place));
-    if (kept !== null) return kept;
-    localStorage.setItem(place, "null");  // whether it can be written
+    return act();
   } catch {
+    isKept = false;
     get("unkept").hidden = false;
+    return null;
   }
-  return fresh();
 }
 
-let state = restored();
+function restored() {
+  return storing(() => {
+    kept = localStorage.getItem(place) ?? "null";
+    localStorage.setItem(place, kept);  // whether it can be written
+    return JSON.parse(kept);
+  });
+}
+
+let state = restored() ?? fresh();
 let trials = trialsOf(state.person);
 
+// Goes on with what another window has written since.
+function takeOver() {
+  state = restored() ?? state;
+  trials = trialsOf(state.person);
+}
+
+// Keeps the state, unless another window has written its own: one of them goes on. Returns whether this one does.
 function keep() {
-  try {
-    localStorage.setItem(place, JSON.stringify(state));
-  } catch {
-    get("unkept").hidden = false;
-  }
+  const isOurs = storing(() => {
+    if ((localStorage.getItem(place) ?? "null") !== kept) return false;
+    const next = JSON.stringify({ ...state, window: ownWindow });
+    localStorage.setItem(place, next);
+    kept = next;
+    sessionStorage.setItem(place, state.person);  // of this window: a reload is the same person
+    return true;
+  });
+  if (isOurs === false) showSection("elsewhere");
+  return isOurs !== false;
+}
+
+// Whether the answers that were found may be somebody else's: those of a tab that has been closed.
+function areOfUnknown() {
+  return state.at >= 0 && givenPerson === "" && storing(() => sessionStorage.getItem(place)) !== state.person;
 }
 
 const recordOf = trial => (state.pairs[trial.pair.id] ??= { chosen: {}, seconds: 0, plays: 0 });
 const openQuestion = trial => trial.pair.questions.find(id => !(id in recordOf(trial).chosen));
+const answered = () => trials.filter(trial => openQuestion(trial) === undefined);
 
 // ---- The videos of a pair ----
 
@@ -93,18 +123,21 @@ function urlOf(name) {
   return urls.get(name);
 }
 
+const loaded = new Set();  // the videos of the pair that can be played
 let playing = false;
+
+const areLoaded = () => loaded.size === videos.length;
 
 function showPlaying(value) {
   playing = value;
-  get("play").textContent = playing ? "Pause" : "Play";
+  get("play").textContent = get("broken").hidden ? playing ? "Pause" : "Play" : "Try again";
 }
 
 function play() {
   showPlaying(true);
   for (const video of videos) {
     // Refused where a browser plays nothing unasked: the button then does.
-    if (!video.ended) video.play().catch(() => { if (!video.error && video.paused) pause(); });
+    if (!video.ended) video.play().catch(error => { if (error.name === "NotAllowedError" && playing) pause(); });
   }
 }
 
@@ -118,17 +151,39 @@ function playFromStart() {
   play();
 }
 
+// Choosing is possible when both videos are there.
+function showLoaded() {
+  for (const field of get("questions").querySelectorAll("fieldset")) field.disabled = !areLoaded();
+  get("loading").hidden = areLoaded() || !get("broken").hidden;
+  get("again").disabled = !areLoaded();
+}
+
 function showVideos(trial) {
-  pause();
+  loaded.clear();
   get("broken").hidden = true;
+  pause();
+  showLoaded();
   kSides.forEach((side, i) => {
     videos[i].src = urlOf(trial[side]);
     videos[i].load();
   });
+  // To be asked to play is what makes some browsers load a video; the first one then waits for the other.
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play();
 }
 
+function playOrPause() {
+  if (!get("broken").hidden) showVideos(trials[state.at]);
+  else if (playing) pause();
+  else play();
+}
+
 for (const video of videos) {
+  video.addEventListener("loadeddata", () => {
+    loaded.add(video);
+    showLoaded();
+    if (areLoaded()) playing && playFromStart();
+    else video.pause();
+  });
   // The shorter one waits for the longer one, then both begin again.
   video.addEventListener("ended", () => {
     if (!playing || !videos.every(other => other.ended)) return;
@@ -139,9 +194,10 @@ for (const video of videos) {
     video.style.setProperty("--shape", video.videoWidth + " / " + video.videoHeight);
   });
   video.addEventListener("error", () => {
-    get("broken").textContent = "A video cannot be played in this browser. Please tell whoever asked you, or try another browser.";
+    loaded.delete(video);
     get("broken").hidden = false;
     pause();
+    showLoaded();
   });
 }
 
@@ -152,7 +208,7 @@ function count(number, one) {
 }
 
 function showSection(name) {
-  for (const id of ["welcome", "trial", "end"]) get(id).hidden = id !== name;
+  for (const id of ["welcome", "return", "elsewhere", "trial", "end"]) get(id).hidden = id !== name;
   if (name !== "trial") pause();
   scrollTo(0, 0);
   get(name).querySelector("h1").focus({ preventScroll: true });
@@ -174,6 +230,7 @@ function fieldOf(trial, id) {
 }
 
 function markOpen(trial) {
+  get("stop").disabled = answered().length === 0;
   const open = openQuestion(trial);
   for (const id of trial.pair.questions) get("question-" + id).classList.toggle("open", id === open);
   if (open === undefined) get("missing").textContent = "";
@@ -183,7 +240,7 @@ function showTrial() {
   const trial = trials[state.at];
   get("place").textContent = "Pair " + (state.at + 1) + " of " + trials.length;
   get("progress").max = trials.length;
-  get("progress").value = trials.filter(other => openQuestion(other) === undefined).length;
+  get("progress").value = answered().length;
   get("task").hidden = trial.pair.text === "";
   get("text").textContent = trial.pair.text;
   get("questions").replaceChildren(...trial.pair.questions.map(id => fieldOf(trial, id)));
@@ -196,10 +253,17 @@ function showTrial() {
 }
 
 function showEnd() {
+  const left = trials.length - answered().length;
+  get("done").textContent = left === 0 ? "All pairs are answered." : answered().length + " of " + count(trials.length, "pair") + " are answered.";
   get("answers").value = answersText();
   get("another").hidden = givenPerson !== "";
   get("saved").textContent = "";
   showSection("end");
+}
+
+function showReturn() {
+  get("returned").textContent = answered().length + " of " + count(trials.length, "pair");
+  showSection("return");
 }
 
 function show() {
@@ -211,7 +275,9 @@ function show() {
 // ---- What the person does ----
 
 function choose(id, side) {
+  if (!areLoaded()) return;
   const trial = trials[state.at];
+  state.saved = false;
   recordOf(trial).chosen[id] = side;
   get("question-" + id).querySelector("[value=" + side + "]").checked = true;
   markOpen(trial);
@@ -220,12 +286,12 @@ function choose(id, side) {
 
 function goTo(at) {
   state.at = at;
-  keep();
-  show();
+  if (keep()) show();
 }
 
 function next() {
   const trial = trials[state.at], open = openQuestion(trial);
+  if (open !== undefined && !areLoaded()) return;
   if (open !== undefined) {
     get("missing").textContent = trial.pair.questions.length > 1 ? "Please answer both questions." : "Please answer the question.";
     get("question-" + open).querySelector("input").focus();
@@ -233,6 +299,12 @@ function next() {
   }
   if (state.at + 1 === trials.length) state.finished = new Date().toISOString();
   goTo(state.at + 1);
+}
+
+// To the first pair that is not answered, or the last one.
+function review() {
+  const open = trials.findIndex(trial => openQuestion(trial) !== undefined);
+  goTo(open < 0 ? trials.length - 1 : open);
 }
 
 // 1 and 2 answer the first open question, else the one that the focus is in, else the last.
@@ -248,9 +320,9 @@ function onKey(event) {
   if (event.repeat && "012Enter".includes(event.key)) return event.preventDefault();
   if (event.key === "1") chooseByKey("left");
   else if (event.key === "2") chooseByKey("right");
-  else if (event.key === "0") playFromStart();
+  else if (event.key === "0") areLoaded() && playFromStart();
   else if (event.key === "Enter" && !onButton) next();
-  else if (event.key === " " && !onButton && document.activeElement.type !== "radio") playing ? pause() : play();
+  else if (event.key === " " && !onButton && document.activeElement.type !== "radio") playOrPause();
   else return;
   event.preventDefault();
 }
@@ -258,35 +330,37 @@ function onKey(event) {
 // ---- The answers ----
 
 function answersText() {
-  const answers = trials.map(trial => {
+  const answers = answered().map(trial => {
     const { chosen, seconds, plays } = recordOf(trial);
     const names = Object.fromEntries(trial.pair.questions.map(id => [id, trial[chosen[id]]]));
     return { pair: trial.pair.id, left: trial.left, right: trial.right, chosen: names, seconds: Math.round(seconds), plays };
   });
-  const { person, begun, finished } = state;
+  const { person, begun } = state;
+  const finished = answers.length === trials.length ? state.finished : "";
   return JSON.stringify({ format: "hsi4d study answers", version: 1, study: study.study, person, begun, finished, answers }, null, 2) + "\n";
 }
 
 function save() {
   const url = URL.createObjectURL(new Blob([answersText()], { type: "application/json" }));
-  const name = "answers-" + study.study + "-" + state.person.replace(/[^A-Za-z0-9_-]/g, "_") + ".json";
+  const name = "answers-" + study.study + "-" + state.person.replace(/[^A-Za-z0-9_-]/g, "_").slice(0, 60) + ".json";
   element("a", { href: url, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(url), 60_000);
   get("saved").textContent = "Saved as " + name;
+  state.saved = true;
+  keep();
 }
 
 function beginAnew() {
-  if (!confirm("Have these answers been saved? They are removed from this browser.")) return;
+  if (answered().length > 0 && !confirm("Have these answers been saved? They are removed from this browser.")) return;
   state = fresh();
   trials = trialsOf(state.person);
-  keep();
-  show();
+  if (keep()) show();
 }
 
 // ---- The start ----
 
 setInterval(() => {
-  if (get("trial").hidden || document.visibilityState !== "visible") return;
+  if (get("trial").hidden || document.visibilityState !== "visible" || !areLoaded()) return;
   ++recordOf(trials[state.at]).seconds;
   keep();
 }, 1000);
@@ -300,13 +374,27 @@ get("begin").addEventListener("click", () => {
 });
 get("questions").addEventListener("change", event => choose(event.target.name, event.target.value));
 get("questions").addEventListener("submit", event => event.preventDefault());
-get("play").addEventListener("click", () => playing ? pause() : play());
+get("play").addEventListener("click", playOrPause);
 get("again").addEventListener("click", playFromStart);
 get("back").addEventListener("click", () => goTo(state.at - 1));
 get("next").addEventListener("click", next);
 get("save").addEventListener("click", save);
-get("review").addEventListener("click", () => goTo(trials.length - 1));
+get("stop").addEventListener("click", () => goTo(trials.length));
+get("review").addEventListener("click", review);
 get("another").addEventListener("click", beginAnew);
+get("not-me").addEventListener("click", () => {
+  takeOver();
+  beginAnew();
+});
+get("go-on").addEventListener("click", () => {
+  takeOver();
+  goTo(state.at);
+});
+get("here").addEventListener("click", () => location.reload());
 document.addEventListener("keydown", onKey);
-show();
+addEventListener("beforeunload", event => {
+  if (!state.saved && (!isKept || !get("end").hidden)) event.preventDefault();
+});
+if (areOfUnknown()) showReturn();
+else show();
 })();

@@ -102,22 +102,68 @@ TEST_CASE("programs are found as commands would start them") {
   CHECK(find_program("./").empty());
 }
 
+namespace {
+
+/// Whether a process whose number is in a file has ended: it is gone, or dead and not collected by init.
+bool has_ended(const char* file) {
+  int process = 0;
+  std::ifstream(file) >> process;
+  REQUIRE(process > 0);
+  if (kill(process, 0) != 0) return true;
+  std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
+  std::string number, name, state;
+  stat >> number >> name >> state;
+  return state.empty() || state == "Z";
+}
+
+/// The same after at most two seconds, in which a killed process goes.
+bool ends(const char* file) {
+  for (int i = 0; i < 100 && !has_ended(file); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  return has_ended(file);
+}
+
+}  // namespace
+
+TEST_CASE("what a program has started in its group is ended when the program has ended") {
+  const TemporaryFolder here;
+  const std::string leaves = "sleep 60 & echo $! > child.txt; echo done";
+  SECTION("by itself") { CHECK(run_process({"sh", "-c", leaves}) == "done\n"); }
+  SECTION("by itself within limits") { CHECK(run_process({"sh", "-c", leaves}, ProcessLimits{}) == "done\n"); }
+  SECTION("by a failure") { CHECK_THROWS_AS(run_process({"sh", "-c", leaves + "; exit 3"}), ProgramFailedError); }
+  SECTION("and does not go when it is asked to") {
+    run_process({"sh", "-c",
+                 "(trap '' TERM; : > deaf; while :; do sleep 0.05; done) & echo $! > child.txt; "
+                 "while ! test -e deaf; do sleep 0.01; done"});
+  }
+  SECTION("after that nobody waited for") {
+    ChildProcess child({"sh", "-c", leaves + "; : > ready; wait"});
+    for (int i = 0; i < 2000 && !std::filesystem::exists("ready"); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    REQUIRE(std::filesystem::exists("ready"));
+  }
+  CHECK(ends("child.txt"));
+}
+
+TEST_CASE("what a program has started has time to go after the program itself has gone") {
+  const TemporaryFolder here;
+  const std::string child =
+      "(trap 'sleep 0.1; echo tidy > tidied; exit' TERM; : > ready; while :; do sleep 0.05; done)";
+  const std::string waits = " while ! test -e ready; do sleep 0.01; done";
+  SECTION("by itself") { run_process({"sh", "-c", child + " &" + waits}); }
+  SECTION("when it was asked to") {
+    CHECK_FALSE(run_process({"sh", "-c", child + " & wait"},
+                            {.seconds = 0, .stop_requested = [] { return std::filesystem::exists("ready"); }}));
+  }
+  CHECK(std::filesystem::exists("tidied"));
+}
+
 TEST_CASE("a program that takes too long is ended with all that it has started") {
   const TemporaryFolder here;
   const auto begin = std::chrono::steady_clock::now();
   CHECK_THROWS_MATCHES(run_process({"sh", "-c", "echo begun; sleep 60 & echo $! > child.txt; wait"}, {.seconds = 0.3}),
                        UserError, Message("sh: was ended after 0.3 seconds, which is all the time it has:\nbegun"));
   CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(20));
-  int child = 0;
-  std::ifstream("child.txt") >> child;
-  REQUIRE(child > 0);
-  for (int i = 0; i < 100 && kill(child, 0) == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  const bool is_gone = kill(child, 0) != 0;
-  std::ifstream stat("/proc/" + std::to_string(child) + "/stat");  // gone, or dead and not yet collected by init
-  std::string number, name, state;
-  stat >> number >> name >> state;
-  CHECK((is_gone || state == "Z"));
-
+  CHECK(ends("child.txt"));
   CHECK(run_process({"sh", "-c", "echo done"}, ProcessLimits{.seconds = 30}) == "done\n");
   CHECK_THROWS_MATCHES(run_process({"sh", "-c", "echo why >&2; exit 4"}, ProcessLimits{}), UserError,
                        Message("sh: ended with status 4:\nwhy"));

@@ -253,6 +253,104 @@ TEST_CASE("a run makes its video and masks by programs, once for what they are m
   CHECK(temporaries_in("generated").empty());
 }
 
+TEST_CASE("what was made before is held to what is asked for now", "[run]") {
+  Workshop workshop;
+  const ProgramResult first = Workshop::run("first");
+  INFO(first.err);
+  REQUIRE(first.status == 0);
+  const std::string video = fs::absolute(made_file("video", ".json").replace_extension()).string();
+  SECTION("the number of frames") {
+    workshop.config["sources"]["video"]["frames"] = 5;
+    workshop.write();
+    CHECK(Workshop::refusal() == "/sources/video/frames: asks for 5 frames; " + video +
+                                     ", which the same command has made before, has 4; remove that to have it made "
+                                     "again\n");
+    CHECK_THAT(Workshop::run("run", {"--dry-run"}).err, StartsWith("/sources/video/frames: asks for 5 frames; "));
+    CHECK(lines_of("film.txt").size() == 1);
+    CHECK(Workshop::run("right", {"--set", "sources.video.frames=4"}).status == 0);
+  }
+  SECTION("a mask of every frame") {
+    const fs::path masks = fs::absolute(made_file("masks", ".json").replace_extension());
+    fs::remove(masks / "human" / "0002.png");
+    CHECK(Workshop::refusal() ==
+          "/sources/masks: " + masks.string() +
+              ", made before: human has no mask of 1 of 4 frames, the first 0002.png; where nothing of it is seen a "
+              "mask is black; remove that folder to have it made again\n");
+    CHECK(lines_of("mask.txt").size() == 1);
+  }
+}
+
+TEST_CASE("programs and the files that their commands name count by their content", "[run]") {
+  Workshop workshop;
+  workshop.config["sources"].erase("masks");
+  workshop.config["data"]["masks"] = (TinyDataset::folder() / "masks").string();
+  auto& command = workshop.config["sources"]["video"]["command"];
+  command.push_back("--steps=steps.txt");
+  std::ofstream("steps.txt") << "30";
+  workshop.write();
+  const auto is_made_anew = [] {
+    return Workshop::run("dry", {"--dry-run"}).out.find("would run ./film, ") != std::string::npos;
+  };
+  REQUIRE(Workshop::run("first").status == 0);
+  CHECK_FALSE(is_made_anew());
+  CHECK_THAT(file_text(made_file("video", ".json")), Contains(" ./film\\n") && Contains(" steps.txt\\n"));
+  std::ofstream("steps.txt") << "50";
+  CHECK(is_made_anew());
+  std::ofstream("steps.txt") << "30";
+  CHECK_FALSE(is_made_anew());
+  const std::string film = file_text("film");
+  std::ofstream("film") << film << "# better";
+  CHECK(is_made_anew());
+
+  // A log that is named in the command is taken as the program leaves it: what was paid for is found again.
+  Workshop::script(
+      "film", "echo \"$2\" | tee -a film.txt >> log.txt; cp -r " + TinyDataset::folder().string() + "/frames \"$3\"");
+  command.push_back("log.txt");
+  workshop.write();
+  std::ofstream("log.txt") << "begins\n";
+  const ProgramResult logged = Workshop::run("logged");
+  CHECK(logged.status == 0);
+  CHECK_THAT(logged.err, Contains("/sources/video/command: ./film, steps.txt, log.txt: what of these the program has "
+                                  "changed is taken as it is now; "));
+  CHECK_FALSE(is_made_anew());
+  CHECK(temporaries_in("generated").empty());
+}
+
+TEST_CASE("files of a command are its program by path and whole arguments") {
+  const TemporaryFolder here;
+  for (const char* const name : {"tool", "a.json", "b=c", "{x}"}) std::ofstream(name) << name;
+  fs::create_directory("folder");
+  CHECK(files_of_command({"tool", "--in=a.json", "a.json", "b=c", "{x}", "folder", "none", "--a"}) ==
+        Names{"a.json", "b=c"});
+  CHECK(files_of_command({"./tool", "./tool"}) == Names{"./tool"});
+  // A large file counts by its size and its ends.
+  {
+    std::ofstream large("large", std::ios::binary);
+    large.seekp((65 << 20) - 1);
+    large << "z";
+  }
+  const std::string before = command_hashes({"run", "large"});
+  const auto change = [](std::streamoff at) {
+    std::fstream file("large", std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(at);
+    file << "y";
+  };
+  change((65 << 20) - 1);
+  const std::string after = command_hashes({"run", "large"});
+  CHECK(after != before);
+  change(0);
+  CHECK(command_hashes({"run", "large"}) != after);
+}
+
+TEST_CASE("waits before a program is run again are doubled up to an hour") {
+  ProgramSettings settings;
+  CHECK(seconds_before_retry(settings, 1) == 10);
+  CHECK(seconds_before_retry(settings, 3) == 40);
+  CHECK(seconds_before_retry(settings, 100) == 3600);
+  settings.retry_wait_s = 7200;
+  CHECK(seconds_before_retry(settings, 5) == 7200);
+}
+
 TEST_CASE("masks alone can be made of a video that is there", "[run]") {
   Workshop workshop;
   workshop.config["sources"].erase("video");
@@ -330,6 +428,15 @@ TEST_CASE("programs that fail are told with the end of what they print", "[run]"
                                  "for f in *; do mv $f mask_$f; done");
     CHECK_THAT(Workshop::refusal(),
                Contains("human has no mask of any frame; their names are those of the frames, 0000.png to 0003.png"));
+  }
+  SECTION("a mask of one frame") {
+    Workshop::script("mask", "cp -r " + TinyDataset::folder().string() + "/masks \"$3\"; rm \"$3/human/0001.png\"");
+    CHECK_THAT(Workshop::refusal(),
+               Contains("human has no mask of 1 of 4 frames, the first 0001.png; where nothing of it is seen a mask is "
+                        "black"));
+    CHECK(Workshop::run("run").status == 2);  // and what was refused before is kept
+    CHECK(made() ==
+          Names{"masks-KEY.refused", "masks-KEY.refused2", "video-KEY", "video-KEY.first_frame.png", "video-KEY.json"});
   }
   SECTION("sizes of masks") {
     write_image("small.png", Image(1, 24, 24));

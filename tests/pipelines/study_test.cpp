@@ -16,6 +16,7 @@ using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
 using Catch::Matchers::Matches;
+using Catch::Matchers::StartsWith;
 namespace fs = std::filesystem;
 using Names = std::vector<std::string>;
 
@@ -108,7 +109,7 @@ TEST_CASE("a study has the reconstructions of runs by name, and tells nobody who
   const TemporaryFolder here;
   two_methods();
   own_run("a/only", 0.1F, "");
-  const ProgramResult made = study({"a", "b", "--out", "page/"});
+  const ProgramResult made = study({"a", "b", "--out", "page/", "--seed", "0"});
   INFO(made.err);
   REQUIRE(made.status == 0);
   CHECK(made.out ==
@@ -134,7 +135,7 @@ TEST_CASE("a study has the reconstructions of runs by name, and tells nobody who
   CHECK_THAT(page, Contains("A person walks.") && !Contains("http"));
 
   // The same again, and in one file; another seed gives other names.
-  REQUIRE(study({"a", "b", "--out", "again", "--embed"}).status == 0);
+  REQUIRE(study({"a", "b", "--out", "again", "--embed", "--seed", "0"}).status == 0);
   CHECK(file_text("again-key.json") == file_text("page-key.json"));
   CHECK_FALSE(fs::exists("again/videos"));
   REQUIRE(study({"a", "b", "--out", "other", "--seed", "1"}).status == 0);
@@ -143,6 +144,33 @@ TEST_CASE("a study has the reconstructions of runs by name, and tells nobody who
   std::set<fs::file_time_type> times;  // which of two was made first is not told either
   for (const auto& entry : fs::directory_iterator("page/videos")) times.insert(fs::last_write_time(entry));
   CHECK(times.size() == 1);
+}
+
+TEST_CASE("names of a study without a seed follow from nothing that people could have") {
+  const TemporaryFolder here;
+  two_methods();
+  std::set<std::string> names;
+  for (const char* const page : {"one", "two"}) {
+    REQUIRE(study({"a", "b", "--out", page}).status == 0);
+    const nlohmann::json key = json_of(std::string(page) + "-key.json");
+    names.insert({key["study"], key["salt"]});
+    for (const nlohmann::json& pair : key["pairs"]) names.insert({pair["id"], pair["a"], pair["b"]});
+    CHECK(key["salt"].get<std::string>().size() == 32);
+    CHECK_THAT(file_text(fs::path(page) / "index.html"), !Contains(key["salt"].get<std::string>()));
+    CHECK(read_study_key(std::string(page) + "-key.json").pairs.size() == 2);
+  }
+  CHECK(names.size() == 2 * (2 + 2 * 3));
+}
+
+TEST_CASE("a run that has several names is compared once") {
+  const TemporaryFolder here;
+  two_methods();
+  fs::create_directory_symlink("walk", "a/latest");
+  fs::create_directory_symlink("walk", "b/latest");
+  fs::create_directory_symlink("..", "a/deep/up");
+  const ProgramResult made = study({"a", "b", "--out", "page"});
+  INFO(made.err);
+  CHECK_THAT(made.out, StartsWith("page/index.html: 2 pairs, ") && !Contains("left out"));
 }
 
 TEST_CASE("the key of a study is beside its folder, however that is named, and not in it") {
@@ -166,14 +194,18 @@ TEST_CASE("a study of two runs has one pair, and images of a run are better than
     CHECK_THAT(made.out,
                Contains("1 pair, of which a person is shown 1;") &&
                    Contains("note: pair: the videos differ in form, which may decide the choice: A has 32x32 pixels, "
-                            "0.2 s at 10 frames a second, B 16x16 pixels, 0.2 s at 30 frames a second\n"));
+                            "0.2 s at 10 frames a second, B 16x16 pixels, 0.2 s at 30 frames a second\n"
+                            "note: A is made of images and B of a video, which is thereby compressed twice and may "
+                            "look worse for that: pair\n"));
     const nlohmann::json pair = json_of("page-key.json")["pairs"][0];
     CHECK(pair["text"] == "sits down");
     CHECK(grey_of("page/videos/" + pair["a"].get<std::string>() + ".mp4") == Approx(0.9).margin(0.02));
     CHECK(grey_of("page/videos/" + pair["b"].get<std::string>() + ".mp4") == Approx(0.6).margin(0.02));
   }
   SECTION("one is missing") {
-    REQUIRE(study({"a", "b", "--out", "page", "--texts", "texts.json"}).status == 0);
+    const ProgramResult made = study({"a", "b", "--out", "page", "--texts", "texts.json"});
+    REQUIRE(made.status == 0);
+    CHECK_THAT(made.out, !Contains("compressed twice"));
     const nlohmann::json pair = json_of("page-key.json")["pairs"][0];
     CHECK(grey_of("page/videos/" + pair["a"].get<std::string>() + ".mp4") == Approx(0.2).margin(0.02));
   }
@@ -223,32 +255,87 @@ TEST_CASE("answers of a study are counted once for each person") {
   write("in/1.json", answers_of(key, "one", true));
   write("in/2.json", answers_of(key, "two", false));
   fs::copy("in/1.json", "in/3.json");
-  nlohmann::json late = answers_of(key, "two", true);
-  late["finished"] = "2026-01-02T10:05:00Z";
-  write("in/0.json", late);  // read first, finished last
+  nlohmann::json corrected = answers_of(key, "two", true);  // two went back and saved again
+  corrected["finished"] = "2026-01-02T10:05:00Z";
+  write("in/0.json", corrected);
+  nlohmann::json again = answers_of(key, "one", false);  // one took part a second time
+  again["begun"] = "2026-01-03T10:00:00Z";
+  again["finished"] = "2026-01-03T10:05:00Z";
+  write("in/4.JSON", again);
+  std::ofstream("in/list.txt") << "none";
   nlohmann::json half = answers_of(key, "three", true);
   half["answers"].erase(1);
+  half["finished"] = "";
   write("half.json", half);
-  const ProgramResult told = run_hsi4d(
-      {"study", "--answers", "in", "half.json", "--key", "page-key.json", "--json", "o.json", "--csv", "o.csv"});
+  const Names reads = {"study", "--key", "page-key.json", "--json", "o.json", "--csv", "o.csv", "--answers"};
+  const auto tell = [&reads](const Names& files) {
+    Names words = reads;
+    words.insert(words.end(), files.begin(), files.end());
+    return run_hsi4d(words);
+  };
+  const ProgramResult told = tell({"in", "half.json"});
   INFO(told.err);
   REQUIRE(told.status == 0);
   CHECK(told.out ==
-        "question  persons  answers  prefer A [%]  95 % of answers  95 % over persons  chose left [%]\n"
-        "quality   3        5        60.0          23.1 to 88.2     0.0 to 100.0       60.0\n"
-        "text      2        2        100.0         34.2 to 100.0    100.0 to 100.0     100.0\n"
+        "question  persons  answers  prefer A [%]  95 % of answers  95 % over persons  Student's t     chose left [%]\n"
+        "quality   3        5        100.0         56.6 to 100.0    100.0 to 100.0     100.0 to 100.0  100.0\n"
+        "text      2        2        100.0         34.2 to 100.0    100.0 to 100.0     100.0 to 100.0  100.0\n"
         "\nA: a\nB: b\n3 persons, 2 pairs\n"
-        "note: in/0.json: is of the same person as in/2.json, which was finished first and counts alone\n"
+        "note: quality: 3 persons: of fewer than 10 both intervals over persons are rough, the bootstrap's is too "
+        "narrow; Student's t is the one to quote\n"
+        "note: text: 2 persons: of fewer than 10 both intervals over persons are rough, the bootstrap's is too narrow; "
+        "Student's t is the one to quote\n"
+        "note: in: holds other files, which are not read: list.txt\n"
+        "note: in/2.json: is of the same person as in/0.json, which was finished later and counts alone\n"
         "note: in/3.json: is the same as in/1.json and counts once\n"
+        "note: in/4.JSON: is of the same person as in/1.json, which was begun first and counts alone\n"
         "note: half.json: answers 1 of the 2 pairs that a person is shown; these count\n");
   const nlohmann::json numbers = json_of("o.json");
   CHECK(numbers["persons"] == 3);
-  CHECK(numbers["questions"][0]["prefer_a"] == 3);
+  CHECK(numbers["questions"][0]["prefer_a"] == 5);
   CHECK(numbers["questions"][0]["pairs"][0]["name"] == "deep/sit");
   CHECK(numbers["questions"][0]["pairs"][0]["answers"] == 3);
   CHECK(numbers["questions"][1]["bootstrap"] == nlohmann::json({1, 1}));
-  CHECK(numbers["notes"].size() == 3);
-  CHECK_THAT(file_text("o.csv"), Contains("two,deep/sit,quality,B,A,7\n"));
+  CHECK(numbers["questions"][1]["student_t"] == nlohmann::json({1, 1}));
+  CHECK(numbers["notes"].size() == 7);
+  const std::string lines = file_text("o.csv");
+  CHECK_THAT(lines, Contains("two,deep/sit,quality,A,A,7,2\n"));
+  // In any order of the files, and of a person who has not come to the end.
+  REQUIRE(tell({"half.json", "in/4.JSON", "in/2.json", "in/1.json", "in/0.json"}).status == 0);
+  CHECK(file_text("o.csv") == lines);
+  nlohmann::json first = again;
+  first["begun"] = "2025-12-31T10:00:00Z";
+  first["finished"] = "";
+  write("first.json", first);
+  REQUIRE(tell({"first.json", "half.json", "in"}).status == 0);
+  CHECK(file_text("o.csv") == lines);
+}
+
+TEST_CASE("what is written of a study replaces nothing that was read") {
+  const TemporaryFolder here;
+  two_methods();
+  REQUIRE(study({"a", "b", "--out", "page"}).status == 0);
+  fs::create_directory("in");
+  write("in/1.json", answers_of(json_of("page-key.json"), "one", true));
+  const std::string before = file_text("in/1.json");
+  const auto refusal = [](const Names& more) {
+    Names words = {"--answers", "in", "--key", "page-key.json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return refused(words);
+  };
+  CHECK(refusal({"--json", "in/1.json"}) ==
+        "hsi4d study: --json: in/1.json is the file that is read, in/1.json, which would be replaced; give another "
+        "name\n");
+  CHECK(
+      refusal({"--csv", "in/../in/1.json"}) ==
+      "hsi4d study: --csv: in/../in/1.json is the file that is read, in/1.json, which would be replaced; give another "
+      "name\n");
+  CHECK(refusal({"--csv", "o.txt", "--json", "in/../o.txt"}) ==
+        "hsi4d study: --csv and --json are the same file, in/../o.txt\n");
+  CHECK(refusal({"--seed", "3"}) == "hsi4d study: --seed is for making a study, not for --answers\n");
+  CHECK(refusal({"--pairs", "3"}) == "hsi4d study: --pairs is for making a study, not for --answers\n");
+  CHECK(file_text("in/1.json") == before);
+  CHECK_FALSE(fs::exists("o.txt"));
 }
 
 TEST_CASE("answers that do not belong to the study are refused with their file") {

@@ -13,7 +13,9 @@ import http.server
 import json
 import os
 import pathlib
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -66,7 +68,7 @@ def test_dry_runs(folder):
           "generate.py: there is no such program")
     (folder / "wan" / "generate.py").touch()
     check(run("wan.py", "--folder", folder / "wan", "--image", image, "--prompt", "it's", "--out", "o.mp4", "--dry-run"), 0,
-          "in " + str(folder / "wan"), "--task i2v-14B", """--prompt 'it'"'"'s'""")
+          "in " + str(folder / "wan"), "--task i2v-14B", """'--prompt=it'"'"'s'""")
     (folder / "masks").mkdir()
     shutil.copy(image, folder / "masks" / "human.png")
     (folder / "frames").mkdir()
@@ -82,10 +84,103 @@ def test_dry_runs(folder):
     check(run("poses.py", "--estimator", "wham", "--rate", 0, *pose), 2, "data.video_rate")
 
 
+def test_names(folder):
+    """Paths and prompts that mean something else to the programs that are run."""
+    image = folder / "image.png"
+    (folder / "bin").mkdir()
+    (folder / "bin" / "python").symlink_to(sys.executable)
+    wan = ["--folder", folder / "wan", "--image", image, "--out", "o.mp4", "--dry-run"]
+    told = run("wan.py", *wan, "--prompt=-x 3 steps", "--python", os.path.relpath(folder / "bin" / "python"))
+    check(told, 0, str(folder / "bin" / "python") + " generate.py", "'--prompt=-x 3 steps'")
+    check(run("wan.py", *wan, "--prompt=p", "--python", "python3"), 0, ": python3 generate.py")
+    pose = ["--folder", folder / "wan", "--video", folder / "frames", "--out", folder / "m.npz", "--rate", 10, "--dry-run"]
+    check(run("poses.py", "--estimator", "wham", *pose, "--python", os.path.relpath(folder / "bin" / "python")), 0,
+          str(folder / "bin" / "python") + " demo.py", str(folder / "bin" / "python") + " " + str(services.parent / "export_motion.py"))
+    # A folder whose name is a pattern.
+    odd = folder / "take [1]*"
+    odd.mkdir()
+    for number in range(3):
+        shutil.copy(image, odd / f"{number:04d}.png")
+    code = f"import service, sys; print(service.as_video({str(odd)!r}, 10, {str(folder)!r})); print(len(service.frame_names(sys.argv[1])))"
+    made = subprocess.run([sys.executable, "-c", code, str(folder / "video.mp4")], cwd=services, capture_output=True, text=True,
+                          check=False, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"})
+    assert made.stdout.split() == [str(folder / "video.mp4"), "3"], (made.stdout, made.stderr)
+
+
+def test_fit(folder):
+    """A video of the image's shape is scaled, another one is refused; without ffprobe that is told."""
+    image, out = folder / "image.png", folder / "fitted.mp4"
+
+    def fit(video, more="", **environment):
+        code = f"import service; service.fit_video({str(video)!r}, {str(image)!r}, {str(out)!r}{more})"
+        return subprocess.run([sys.executable, "-c", code], cwd=services, capture_output=True, text=True, check=False,
+                              env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **environment})
+
+    picture(folder / "near.mp4", "130x96")
+    check(fit(folder / "near.mp4"), 0)
+    assert size_of(out) == "64,48", size_of(out)
+    picture(folder / "wide.mp4", "132x96")
+    check(fit(folder / "wide.mp4"), 1, "the model's video is 132x96, the first frame 64x48: their shapes differ by 3.1 %, at most 2 %")
+    check(fit(folder / "wide.mp4", ", 0.035"), 0)
+    check(fit(folder / "near.mp4", PATH=str(folder)), 2, "ffprobe: cannot be run")
+    check(fit(image.parent / "nothing.mp4"), 1, "is no video that ffprobe can read")
+
+
+def test_end(folder):
+    """A service that is asked to end leaves nothing."""
+    (folder / "tmp").mkdir()
+    (folder / "wan" / "generate.py").write_text("import time; print('begun', flush=True); time.sleep(600)")
+    process = subprocess.Popen([sys.executable, str(services / "wan.py"), "--folder", str(folder / "wan"), "--image",
+                                str(folder / "image.png"), "--prompt=p", "--out", str(folder / "o.mp4")],
+                               stderr=subprocess.PIPE, text=True,
+                               env={**os.environ, "TMPDIR": str(folder / "tmp"), "PYTHONDONTWRITEBYTECODE": "1"})
+    assert process.stderr.readline() == "begun\n"
+    assert len(list((folder / "tmp").iterdir())) == 1
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60) == 143, process.returncode
+    process.stderr.close()
+    assert not list((folder / "tmp").iterdir())
+
+
+def test_example(folder):
+    """The script of docs/services.md, with programs in the place of ssh and scp that stay on this machine."""
+    page = (services.parent.parent / "docs" / "services.md").read_text(encoding="utf-8")
+    script = re.search(r"```sh\n(.*?)```", page, re.S).group(1)
+    here = folder / "example"
+    (here / "bin").mkdir(parents=True)
+    (here / "model").mkdir()
+    (here / "remote").mkdir()
+
+    def program(path, text):
+        path.write_text("#!/bin/sh\n" + text)
+        path.chmod(0o755)
+
+    program(here / "service", script.removeprefix("#!/bin/sh\n"))
+    program(here / "bin" / "ssh", f'test -e "{here}/down" && exit 255\ncd "{here}" && shift && exec sh -c "$*"\n')
+    program(here / "bin" / "scp", f'test -e "{here}/down" && exit 255\nexec cp "${{1#gpu:}}" "${{2#gpu:}}"\n')
+    program(here / "model" / "generate", 'test -e wrong && exit 3\ncat "$1" > "$3" && printf %s "$2" >> "$3"\n')
+    (here / "in.png").write_text("image ")
+    environment = {**os.environ, "PATH": f"{here / 'bin'}:{os.environ['PATH']}", "TMPDIR": str(here / "remote")}
+
+    def example(prompt):
+        return subprocess.run([str(here / "service"), "in.png", prompt, "out.mp4"], cwd=here, env=environment, capture_output=True,
+                              text=True, check=False)
+
+    prompt = """it's "quoted" $HOME `id` ; \\ -x"""
+    check(example(prompt), 0)
+    assert (here / "out.mp4").read_text() == "image " + prompt, (here / "out.mp4").read_text()
+    assert not list((here / "remote").iterdir())
+    (here / "model" / "wrong").touch()
+    check(example("p"), 3)  # the model's own status, which is no reason to try again
+    assert not list((here / "remote").iterdir())
+    (here / "down").touch()
+    check(example("p"), 75)
+
+
 class StandIn(http.server.BaseHTTPRequestHandler):
     """KLING as its description has it: a task is accepted, is looked at twice, and has a video."""
 
-    tasks, looks, requests, refuse = {}, {}, [], []
+    tasks, looks, requests, refuse, breaks = {}, {}, [], [], []
 
     def log_message(self, *_):
         pass
@@ -116,9 +211,17 @@ class StandIn(http.server.BaseHTTPRequestHandler):
         self.answer(200, {"code": 0, "data": {"task_id": name, "task_status": "submitted"}})
 
     def do_GET(self):
+        if self.path == "/video.mp4" and StandIn.breaks:
+            StandIn.breaks.pop()
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(StandIn.video)))
+            self.end_headers()
+            return self.wfile.write(StandIn.video[:100])
         if self.path == "/video.mp4":
             return self.answer(200, StandIn.video, "video/mp4")
         name = self.path.rsplit("/", 1)[1]
+        if name not in StandIn.tasks:
+            return self.answer(404, {"code": 1203, "message": "no such task"})
         StandIn.looks[name] = StandIn.looks.get(name, 0) + 1
         if StandIn.looks[name] < 3:
             return self.answer(200, {"code": 0, "data": {"task_id": name, "task_status": "processing"}})
@@ -161,6 +264,16 @@ def test_kling(folder):
     (tasks / name).write_text("paid\n")
     check(kling("sits"), 0)
     assert len(StandIn.requests) == paid and StandIn.looks["paid"] == 3
+    # An answer that breaks off is no video; the next time the same task is asked for.
+    StandIn.breaks = [True]
+    check(kling("breaks"), 75, "no connection")
+    assert len(StandIn.requests) == paid + 1 and [path.suffix for path in tasks.iterdir()] == [".task"]
+    check(kling("breaks"), 0)
+    assert len(StandIn.requests) == paid + 1 and not list(tasks.iterdir())
+    # A task that the service no longer knows is told, forgotten, and asked for anew.
+    (tasks / name).write_text("lost\n")
+    check(kling("sits"), 0, "task lost, which was paid for, is gone, and a new one is asked for: the service answers 404")
+    assert len(StandIn.requests) == paid + 2 and not list(tasks.iterdir())
     server.shutdown()
     server.server_close()
     check(kling("sits"), 75, "no connection")
@@ -169,5 +282,9 @@ def test_kling(folder):
 with tempfile.TemporaryDirectory() as temporary:
     test_programs()
     test_dry_runs(pathlib.Path(temporary))
+    test_names(pathlib.Path(temporary))
+    test_fit(pathlib.Path(temporary))
+    test_end(pathlib.Path(temporary))
+    test_example(pathlib.Path(temporary))
     test_kling(pathlib.Path(temporary))
 print("all hold")

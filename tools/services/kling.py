@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Makes a video of an image by KLING's service, for /sources/video of a config.
 
-    "command": ["tools/services/kling.py", "--image", "{first_frame}", "--prompt", "{prompt}", "--out", "{out}",
+    "command": ["tools/services/kling.py", "--image", "{first_frame}", "--prompt={prompt}", "--out", "{out}",
                 "--tasks", "generated/tasks"]
 
 The account's keys are in the environment, KLING_ACCESS_KEY and KLING_SECRET_KEY. A task costs money when it is
 accepted; with --tasks its number is kept in a file there until its video has arrived, so that after a lost connection or
-a run that was ended the same request goes on with the task that is paid for.
+a run that was ended the same request goes on with the task that is paid for. One that the service no longer knows (it
+keeps videos for a while) is told of and asked for anew.
 
 Exit status 75 (hsi4d tries again): no connection, too many requests, the service's own errors. Written after the public
 description of the service (POST and GET /v1/videos/image2video) and tried against a stand-in of it only.
@@ -15,9 +16,11 @@ description of the service (POST and GET /v1/videos/image2video) and tried again
 import base64
 import hashlib
 import hmac
+import http.client
 import json
 import os
 import pathlib
+import sys
 import tempfile
 import time
 import urllib.error
@@ -59,15 +62,21 @@ class Kling:
         return told["data"]
 
 
+class Gone(Exception):
+    """The service does not know what it is asked for, or no more."""
+
+
 def fetched(request):
     try:
         with urllib.request.urlopen(request, timeout=120) as answer:
             return answer.read()
     except urllib.error.HTTPError as error:
         told = error.read(400).decode(errors="replace")
+        if error.code in (404, 410):
+            raise Gone(f"the service answers {error.code}: {told}") from error
         is_temporary = error.code == 429 or error.code >= 500
         service.fail(f"the service answers {error.code}: {told}", service.TRY_AGAIN if is_temporary else service.FAILED)
-    except OSError as error:
+    except (OSError, http.client.HTTPException) as error:  # the latter: an answer that breaks off
         service.fail(f"no connection: {error}", service.TRY_AGAIN)
 
 
@@ -82,10 +91,44 @@ def waited(kling, task, seconds):
         time.sleep(seconds)
 
 
+class KeptTask:
+    """The number of a task that is paid for, in a file until its video has arrived; in no file without a folder."""
+
+    def __init__(self, folder, body):
+        self.file = None
+        if folder:
+            name = hashlib.sha256(json.dumps(body).encode()).hexdigest()[:16] + ".task"
+            self.file = pathlib.Path(folder) / name
+            self.file.parent.mkdir(parents=True, exist_ok=True)
+
+    def read(self):
+        return self.file.read_text(encoding="utf-8").strip() if self.file and self.file.exists() else ""
+
+    def write(self, task):
+        """In one step: half a number would be another task."""
+        if self.file:
+            new = self.file.with_suffix(f".{os.getpid()}.tmp")
+            new.write_text(task + "\n", encoding="utf-8")
+            os.replace(new, self.file)
+
+    def forget(self):
+        if self.file:
+            self.file.unlink(missing_ok=True)
+
+
+def video_of(kling, task, kept, seconds):
+    """What a task has made, MP4. Raises Gone."""
+    url = waited(kling, task, seconds)
+    if url is None:
+        kept.forget()
+        service.fail(f"task {task} has failed")
+    return fetched(urllib.request.Request(url))
+
+
 def main():
     parser = service.Parser(__doc__)
     parser.add_argument("--image", required=True, help="the first frame, a PNG file")
-    parser.add_argument("--prompt", required=True)
+    parser.add_argument("--prompt", required=True, help="as --prompt=TEXT, which may then begin with a -")
     parser.add_argument("--out", required=True, help="the video to write, an MP4 file")
     parser.add_argument("--model", default="kling-v1-6")
     parser.add_argument("--mode", default="std", choices=["std", "pro"])
@@ -103,26 +146,27 @@ def main():
         print(f"POST {a.url}/v1/videos/image2video " + json.dumps({**body, "image": f"{len(image)} characters"}))
         return
     kling = Kling(a.url)
-    kept = None
-    if a.tasks:
-        kept = pathlib.Path(a.tasks) / (hashlib.sha256(json.dumps(body).encode()).hexdigest()[:16] + ".task")
-        kept.parent.mkdir(parents=True, exist_ok=True)
-    task = kept.read_text().strip() if kept and kept.exists() else ""
-    if not task:
-        task = kling.ask(body=body)["task_id"]
-        if kept:
-            kept.write_text(task + "\n")
-    url = waited(kling, task, a.poll)
-    if url is None:
-        if kept:
-            kept.unlink()
-        service.fail(f"task {task} has failed")
+    kept = KeptTask(a.tasks, body)
+    task = kept.read()
+    video = None
+    if task:
+        try:
+            video = video_of(kling, task, kept, a.poll)
+        except Gone as error:
+            kept.forget()
+            print(f"kling.py: task {task}, which was paid for, is gone, and a new one is asked for: {error}", file=sys.stderr)
+    if video is None:
+        try:
+            task = kling.ask(body=body)["task_id"]
+            kept.write(task)
+            video = video_of(kling, task, kept, a.poll)
+        except Gone as error:
+            service.fail(str(error))
     with tempfile.TemporaryDirectory() as folder:
-        video = pathlib.Path(folder) / "video.mp4"
-        video.write_bytes(fetched(urllib.request.Request(url)))
-        service.fit_video(video, a.image, a.out)
-    if kept:
-        kept.unlink()
+        made = pathlib.Path(folder) / "video.mp4"
+        made.write_bytes(video)
+        service.fit_video(made, a.image, a.out)
+    kept.forget()
 
 
 if __name__ == "__main__":

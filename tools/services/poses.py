@@ -43,7 +43,7 @@ def main():
     parser.add_argument("--python", default=sys.executable, help="the Python of the estimator's environment")
     a = parser.parse_args()
 
-    folder = service.need(a.folder, "folder")
+    folder, python = service.need(a.folder, "folder"), service.program(a.python)
     video = service.need(a.video, "video")
     if a.rate <= 0:
         service.fail("--rate: nobody says how many frames a second the video has; data.video_rate does", service.ASKED_WRONGLY)
@@ -51,11 +51,11 @@ def main():
         work = pathlib.Path(work)
         video = service.as_video(video, a.rate, work, a.dry_run)
         command, result = {"gvhmr": gvhmr, "wham": wham}[a.estimator](video, work / "result", a.moving)
-        service.run([a.python, *command], folder, a.dry_run)
+        service.run([python, *command], folder, a.dry_run)
         person = [] if a.person is None else ["--person", a.person]
         if not a.dry_run and not result.exists():
             service.fail(f"the estimator wrote nothing at {result}; does it see a person?")
-        service.run([a.python, EXPORT, result, pathlib.Path(a.out).resolve(), "--fps", a.rate, *person], None, a.dry_run)
+        service.run([python, EXPORT, result, pathlib.Path(a.out).resolve(), "--fps", a.rate, *person], None, a.dry_run)
 
 
 if __name__ == "__main__":

@@ -17,11 +17,9 @@ import service
 
 def jpeg_frames(video, folder):
     """SAM 2 reads a folder of JPEG files whose names are numbers."""
-    source = ["-i", str(video)]
-    if pathlib.Path(video).is_dir():
-        source = ["-pattern_type", "glob", "-i", str(pathlib.Path(video) / "*.png")]
-    service.run(["ffmpeg", "-v", "error", *source, "-fps_mode", "passthrough", "-q:v", "2", "-start_number", "0",
-                 pathlib.Path(folder) / "%05d.jpg"])
+    words, place = service.input_of(video)
+    service.run(["ffmpeg", "-v", "error", *words, "-fps_mode", "passthrough", "-q:v", "2", "-start_number", "0",
+                 pathlib.Path(folder).resolve() / "%05d.jpg"], place)
 
 
 def main():
@@ -35,7 +33,7 @@ def main():
     a = parser.parse_args()
 
     names = a.objects.split(",")
-    service.need(a.video, "video")
+    a.video = service.need(a.video, "video")
     first = {name: service.need(pathlib.Path(a.first) / f"{name}.png", "mask") for name in names}
     if a.dry_run:
         print(f"{a.model} on {a.device}: follows {', '.join(names)} through {a.video} into {a.out}")

@@ -4,9 +4,11 @@ A service is a program that hsi4d runs for a part of its inputs; docs/services.m
 """
 
 import argparse
+import os
 import pathlib
 import shlex
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -20,6 +22,8 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, text):
         super().__init__(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
         self.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
+        # hsi4d asks by SIGTERM to end: as an exception, so that what is temporary is removed.
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
 
 
 def fail(message, status=FAILED):
@@ -58,21 +62,35 @@ def png_size(path):
     return struct.unpack(">II", head[16:24])
 
 
+def probed(video, *words):
+    """What ffprobe tells of the first stream of a video, as numbers; those that it does not know are left out."""
+    command = ["ffprobe", "-v", "error", *words, "-select_streams", "v:0", "-of", "csv=p=0", "-i", str(video)]
+    try:
+        told = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip().split(",")
+    except OSError as error:
+        fail(f"ffprobe: cannot be run: {error.strerror}", ASKED_WRONGLY)
+    return [int(number) for number in told if number.isdigit()]
+
+
 def video_size(path):
     """Width and height of a video."""
-    asked = ["ffprobe", "-v", "error", "-select_streams", "v:0", "-show_entries", "stream=width,height", "-of", "csv=p=0"]
-    told = subprocess.run([*asked, str(path)], capture_output=True, text=True, check=False).stdout.strip().split(",")
-    if len(told) < 2 or not all(number.isdigit() for number in told[:2]):
+    told = probed(path, "-show_entries", "stream=width,height")
+    if len(told) < 2 or 0 in told:
         fail(f"{path}: is no video that ffprobe can read")
-    return int(told[0]), int(told[1])
+    return told[0], told[1]
 
 
-def fit_video(video, image, out):
-    """Writes a video at `out` whose frames are as large as the image: what a model wrote, in another size, is scaled."""
-    size = png_size(image)
-    if video_size(video) == size:
+def fit_video(video, image, out, most_stretch=0.02):
+    """Writes a video at `out` whose frames are as large as the image: what a model wrote, in another size, is scaled.
+    Fails where that would stretch it by more than `most_stretch`: the model has then shown something else."""
+    size, found = png_size(image), video_size(video)
+    if found == size:
         shutil.copyfile(video, out)
         return
+    stretch = size[0] * found[1] / (size[1] * found[0])
+    if max(stretch, 1 / stretch) > 1 + most_stretch:
+        fail(f"the model's video is {found[0]}x{found[1]}, the first frame {size[0]}x{size[1]}: their shapes differ by "
+             f"{100 * (max(stretch, 1 / stretch) - 1):.1f} %, at most {100 * most_stretch:g} % are scaled away")
     scale = f"scale={size[0]}:{size[1]}:flags=lanczos"
     run(["ffmpeg", "-v", "error", "-y", "-i", video, "-an", "-vf", scale, "-crf", "12", "-pix_fmt", "yuv444p", out])
 
@@ -81,20 +99,31 @@ def frame_names(video):
     """The names that masks of a video have: those of a folder's frames, or numbers. Counted by ffprobe."""
     if pathlib.Path(video).is_dir():
         return sorted(path.name for path in pathlib.Path(video).glob("*.png"))
-    asked = ["ffprobe", "-v", "error", "-count_frames", "-select_streams", "v:0", "-show_entries", "stream=nb_read_frames"]
-    told = subprocess.run([*asked, "-of", "csv=p=0", str(video)], capture_output=True, text=True, check=False)
-    count = told.stdout.strip().strip(",")
-    if not count.isdigit():
+    told = probed(video, "-count_frames", "-show_entries", "stream=nb_read_frames")
+    if not told:
         fail(f"{video}: is no video that ffprobe can read")
-    return [f"{number:04d}.png" for number in range(int(count))]
+    return [f"{number:04d}.png" for number in range(told[0])]
+
+
+def input_of(video):
+    """ffmpeg's words for a video or a folder of PNG frames, and the folder to run it in: in a pattern any name of the
+    folder itself would have a meaning."""
+    if pathlib.Path(video).is_dir():
+        return ["-pattern_type", "glob", "-i", "*.png"], video
+    return ["-i", str(video)], None
 
 
 def as_video(video, rate, folder, dry_run=False):
     """The video as one file: itself, or one made of a folder's frames."""
     if pathlib.Path(video).is_file():
         return pathlib.Path(video)
-    made = pathlib.Path(folder) / "video.mp4"
-    images = str(pathlib.Path(video) / "*.png")
-    run(["ffmpeg", "-v", "error", "-y", "-framerate", rate, "-pattern_type", "glob", "-i", images, "-crf", "10",
-         "-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", made], dry_run=dry_run)
+    made = pathlib.Path(folder).resolve() / "video.mp4"
+    words, place = input_of(video)
+    run(["ffmpeg", "-v", "error", "-y", "-framerate", rate, *words, "-crf", "10", "-pix_fmt", "yuv420p",
+         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", made], place, dry_run)
     return made
+
+
+def program(name):
+    """A program to be run in another folder: a path is that of this folder. Links stay: an environment's Python is one."""
+    return os.path.abspath(name) if "/" in name else name

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Stands in for an image-to-video model: a video of the first frame that stands still, or a clip that is there.
 
-    stand_in/video.py --image {first_frame} --prompt {prompt} --out {out} [--frames N] [--rate HZ] [--clip PATH]
+    stand_in/video.py --image {first_frame} --prompt={prompt} --out {out} [--frames N] [--rate HZ] [--clip PATH]
 
 --out is an .mp4 file (made by ffmpeg), or a folder of PNG files.
 """
