@@ -94,6 +94,7 @@ using GradientErrors = std::array<GradientError, kGradientClasses.size()>;
 /// Throws InternalError when the two have different counts of numbers, as all of these.
 ImageError image_error(std::span<const double> image, std::span<const double> truth);
 GradientError gradient_error(std::span<const double> gradient, std::span<const double> truth);
+/// No error in a class that truly has no derivatives but for rounding (quaternions of balls), and none in float either.
 GradientErrors gradient_errors(const SceneGradients& gradients, const SceneGradients& truth);
 
 // --- measurements ----------------------------------------------------------------------------------------------------

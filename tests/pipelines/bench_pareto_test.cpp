@@ -89,6 +89,21 @@ TEST_CASE("errors of known differences") {
   CHECK(gradient_error(near, t).one_minus_cosine == Approx(0.5 * std::pow(0.6e-9 / 5, 2)).epsilon(1e-3));
 }
 
+TEST_CASE("a class of gradients that is rounding alone has no error") {
+  SceneGradients truth, other;
+  truth.means = other.means = {3, 4};
+  truth.quats = {1e-14, 0};
+  other.quats = {0, -1e-6};
+  CHECK(gradient_errors(other, truth)[1].relative_l2 == 0);
+  other.quats = {0, -1e-3};  // more than rounding
+  CHECK(gradient_errors(other, truth)[1].relative_l2 == Approx(1e11));
+  truth.quats = {1e-9, 0};  // small, and there
+  other.quats = {2e-9, 0};
+  CHECK(gradient_errors(other, truth)[1].relative_l2 == Approx(1));
+  other.quats = {};
+  CHECK_THROWS_AS(gradient_errors(other, truth), InternalError);
+}
+
 TEST_CASE("the default comes first and no setting occurs twice") {
   const std::vector<ParetoSetting>& all = pareto_settings();
   CHECK(all.front().name() == "quality default");
