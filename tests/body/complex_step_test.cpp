@@ -218,6 +218,22 @@ TEST_CASE("functions of poses have the gradients of complex steps") {
         return y;
       },
       {.tolerance = 1e-11});
+  // Its last operator is turn_rows, by which the pose at ease is put before.
+  check_complex_step(
+      {{"latents", shape_of(1, 63)}}, [](const Vars& in) { return natural_decode(in[0]); },
+      [](const ComplexInputs& in) {
+        constexpr double kRadians = 3.14159265358979323846 / 180;
+        Complexes y;
+        for (std::size_t j = 0; j < 21; ++j) {
+          const NaturalJoint& joint = natural_joints()[j];
+          Vector3<Complex> w = vector_at(in[0], j);
+          for (int i = 0; i < 3; ++i) w[i] *= joint.spread[i] * kRadians;
+          const Matrix3<double> ease = so3_exp(Vector3<double>(Vector3<double>(joint.ease) * kRadians));
+          const Matrix3<Complex> r = ease.cast<Complex>() * so3_exp(w);
+          for (int i = 0; i < 9; ++i) y.push_back(r(i / 3, i % 3));
+        }
+        return y;
+      });
   check_complex_step(
       {{"transforms", shape_of(6, 12)}, {"points", shape_of(6, 3), 2, 3}, {"center", shape_of(1, 3)}},
       [](const Vars& in) { return canonical_directions(in[0], in[1], in[2]); },
