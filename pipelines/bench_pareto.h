@@ -37,9 +37,13 @@ std::vector<std::string> pareto_scene_names();
 ParetoScene pareto_scene(const std::string& name, double size = 1);
 
 /// The Gaussians of a file, seen from obliquely above (z up) at 1.3 times the extent of most of them. Of more than
-/// kMostParetoGaussians so many are kept, and enlarged to cover as much. Throws as read_splats, and UserError when the
-/// file has no Gaussians.
+/// kMostParetoGaussians so many are kept, and enlarged to cover as much. It has the file's name, without folders.
+/// Throws as read_splats, and UserError when the file has no Gaussians.
 ParetoScene pareto_scene_of(const std::string& file);
+
+/// The scenes of files; of a folder, of all files of Gaussians in it by their endings, in the order of their names. Two
+/// files of one name are told apart by their paths. Throws UserError for a folder without any, and as pareto_scene_of.
+std::vector<ParetoScene> pareto_scenes_of(const std::vector<std::string>& paths);
 
 inline constexpr Index kMostParetoGaussians = 8000;
 
@@ -90,6 +94,7 @@ using GradientErrors = std::array<GradientError, kGradientClasses.size()>;
 /// Throws InternalError when the two have different counts of numbers, as all of these.
 ImageError image_error(std::span<const double> image, std::span<const double> truth);
 GradientError gradient_error(std::span<const double> gradient, std::span<const double> truth);
+/// No error in a class that truly has no derivatives but for rounding (quaternions of balls), and none in float either.
 GradientErrors gradient_errors(const SceneGradients& gradients, const SceneGradients& truth);
 
 // --- measurements ----------------------------------------------------------------------------------------------------

@@ -79,6 +79,14 @@ constexpr const char* kChosenScene = "avatar_in_scene";
 /// A number in CSV; nothing where it is none.
 std::string csv_number(double value) { return std::isfinite(value) ? formatted("%.9g", value) : ""; }
 
+/// A text in CSV.
+std::string csv_text(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
 nlohmann::ordered_json json_of(const ParetoRow& row) {
   nlohmann::ordered_json line = {{"scene", row.scene},
                                  {"knob", row.knob},
@@ -287,7 +295,7 @@ std::string pareto_csv(const std::vector<ParetoRow>& rows) {
     for (const char* part : {"relative_l2", "one_minus_cosine", "bias"}) text += std::string(",") + name + "_" + part;
   text += "\n";
   for (const ParetoRow& row : rows) {
-    text += row.scene + "," + row.knob + ",\"" + row.value + "\"," + model_name(row.model);
+    text += csv_text(row.scene) + "," + row.knob + ",\"" + row.value + "\"," + model_name(row.model);
     for (const Index count : {row.gaussians, row.pixels, row.fragments, row.pairs, static_cast<Index>(row.repeats)})
       text += "," + std::to_string(count);
     for (const double value : {1e3 * row.forward.median_s, 1e3 * row.forward.least_s, 1e3 * row.backward.median_s,

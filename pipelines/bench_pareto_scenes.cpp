@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 
 #include "core/check.h"
 #include "core/random.h"
@@ -155,7 +156,19 @@ constexpr std::array<NamedScene, 8> kScenes = {{{"sparse", sparse},
                                                 {"empty", empty},
                                                 {"stack", stack}}};
 
-// --- a file ----------------------------------------------------------------------------------------------------------
+// --- files -----------------------------------------------------------------------------------------------------------
+
+/// The file, or a folder's files of Gaussians.
+std::vector<std::string> splat_files(const std::string& path) {
+  namespace fs = std::filesystem;
+  if (!fs::is_directory(path)) return {path};
+  std::vector<std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path))
+    if (entry.is_regular_file() && has_splat_ending(entry.path().string())) files.push_back(entry.path().string());
+  if (files.empty()) throw UserError(path + ": has no files of Gaussians; they are read from " + kSplatFormats);
+  std::sort(files.begin(), files.end());
+  return files;
+}
 
 /// The share `part` of the values, sorted, along an axis.
 double quantile(const Gaussians& g, int axis, double part) {
@@ -187,7 +200,7 @@ ParetoScene pareto_scene(const std::string& name, double size) {
 
 ParetoScene pareto_scene_of(const std::string& file) {
   ParetoScene scene;
-  scene.name = "file";
+  scene.name = std::filesystem::path(file).filename().string();
   const Gaussians all = read_splats(file).gaussians;
   if (all.count() == 0) throw UserError(file + ": has no Gaussians, of which hsi4d bench pareto needs one or more");
   std::vector<Index> rows;
@@ -206,6 +219,19 @@ ParetoScene pareto_scene_of(const std::string& file) {
   scene.camera = square_camera(kSide);
   scene.camera.camera_from_world = look_at(middle + extent * Vector3<double>(0.5, -1.1, 0.4), middle);
   return scene;
+}
+
+std::vector<ParetoScene> pareto_scenes_of(const std::vector<std::string>& paths) {
+  std::vector<ParetoScene> scenes;
+  for (const std::string& path : paths) {
+    for (const std::string& file : splat_files(path)) {
+      ParetoScene scene = pareto_scene_of(file);
+      const auto has_name = [&scene](const ParetoScene& other) { return other.name == scene.name; };
+      if (std::any_of(scenes.begin(), scenes.end(), has_name)) scene.name = file;
+      scenes.push_back(std::move(scene));
+    }
+  }
+  return scenes;
 }
 
 }  // namespace hsi4d

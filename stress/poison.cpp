@@ -21,8 +21,17 @@ std::span<const StressCase> poison_cases() {
                  poisoned_masks},
       StressCase{"P10", "a loss that is no number moves the parameters", "gradients are looked at before a step",
                  poisoned_losses},
+      StressCase{"P11", "a bad point makes others bad: distances", kRemedy, poisoned_distances},
   };
   return kCases;
+}
+
+stress::OperatorNames stress::poisoned_operators() {
+  OperatorNames names;
+  for (const auto add :
+       {add_autodiff_operators, add_splat_operators, add_render_operators, add_body_operators, add_optim_operators})
+    add(names);
+  return names;
 }
 
 }  // namespace hsi4d

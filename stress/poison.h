@@ -7,17 +7,20 @@
 // they draw nothing of a bad row: their gradients stay finite then.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <exception>
 #include <functional>
 #include <limits>
+#include <set>
 #include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
 
 #include "autodiff/elementwise.h"
+#include "autodiff/inspect.h"
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "core/check.h"
@@ -67,6 +70,26 @@ struct PoisonedOperator {
   Index reach = 0;                   ///< units as near as this do have to do with each other
 };
 
+/// Operators by the names that they have on tapes.
+using OperatorNames = std::set<std::string>;
+
+/// Adds the operators between poisoned arrays and outputs each of whose inputs depends on a poisoned one.
+template <class S>
+void add_poisoned_operators(Tape<S>& tape, const Vars<S>& poisoned, const Vars<S>& outputs, OperatorNames& names) {
+  TapeInspector<S> inspect(tape);
+  std::set<std::uint32_t> bad;
+  for (const Var<S> var : poisoned) bad.insert(var.id);
+  for (const Var<S> output : outputs) {
+    for (const std::uint32_t node : inspect.nodes_of(output)) {
+      const std::vector<std::uint32_t> inputs = inspect.inputs(node), results = inspect.outputs(node);
+      const auto count =
+          std::count_if(inputs.begin(), inputs.end(), [&bad](std::uint32_t id) { return bad.contains(id); });
+      if (count > 0) bad.insert(results.begin(), results.end());
+      if (count > 0 && count == std::ssize(inputs)) names.insert(inspect.operator_name(node));
+    }
+  }
+}
+
 /// What leaked.
 struct Leaks {
   double tried = 0;
@@ -111,6 +134,7 @@ class PoisonTrial {
       taken.push_back(remedy == Remedy::kOff && !is_shared(input) ? selected_by_product(var) : var);
     }
     outputs_ = op.record(taken);
+    add_poisoned_operators(tape_, inputs_, outputs_, operators_);
     for (Var<S>& output : outputs_) {
       if (remedy == Remedy::kOff) output = selected_by_product(output);
       const Var<S> weight = tape_.constant("weight", output.shape());
@@ -137,6 +161,8 @@ class PoisonTrial {
     }
     return found;
   }
+
+  const OperatorNames& operators() const { return operators_; }
 
  private:
   bool is_shared(const PoisonInput& input) const { return input.unit && input.unit(0) == kSharedUnit; }
@@ -199,6 +225,7 @@ class PoisonTrial {
   const PoisonedOperator<S>& op_;
   Tape<S> tape_;
   Vars<S> inputs_, outputs_;
+  OperatorNames operators_;
   Var<S> loss_;
   std::vector<std::vector<double>> values_, gradients_;
 };
@@ -222,6 +249,13 @@ std::vector<StressFigure> family_leaks(const F& make, Remedy remedy) {
           {"internal errors", all.errors, 0}};
 }
 
+/// Adds the operators of a family.
+template <class F>
+void add_family_operators(const F& make, OperatorNames& names) {
+  for (const PoisonedOperator<double>& op : make.template operator()<double>())
+    names.merge(OperatorNames(PoisonTrial<double>(op, Remedy::kOn).operators()));
+}
+
 // The families, by file.
 std::vector<StressFigure> poisoned_elements(Remedy remedy);   ///< poison_autodiff.cpp
 std::vector<StressFigure> poisoned_arrays(Remedy remedy);     ///< likewise
@@ -233,5 +267,16 @@ std::vector<StressFigure> poisoned_skeletons(Remedy remedy);  ///< poison_body.c
 std::vector<StressFigure> poisoned_body_nets(Remedy remedy);  ///< likewise
 std::vector<StressFigure> poisoned_masks(Remedy remedy);      ///< poison_losses.cpp
 std::vector<StressFigure> poisoned_losses(Remedy remedy);     ///< likewise
+std::vector<StressFigure> poisoned_distances(Remedy remedy);  ///< poison_optim.cpp
+
+// Adds the operators of a file's families whose every input is poisoned.
+void add_autodiff_operators(OperatorNames& names);
+void add_splat_operators(OperatorNames& names);
+void add_render_operators(OperatorNames& names);
+void add_body_operators(OperatorNames& names);
+void add_optim_operators(OperatorNames& names);
+
+/// All of them.
+OperatorNames poisoned_operators();
 
 }  // namespace hsi4d::stress

@@ -56,6 +56,7 @@ struct Elements {
     one(-1, 1, [](V x) { return leaky_relu(x, 0.01); });
     one(-1, 1, [](V x) { return clamp(x, -0.5, 0.5); });
     one(-1, 1, [](V x) { return -x; });
+    one(-1, 1, [](V x) { return stop_gradient(x) * x; });
     one(0.1, 1, [](V x) { return 1.0 / x + 2.0 * x; });
     one(-1, 1, [](V x) {
       return map({x}, [](auto y) {
@@ -115,6 +116,12 @@ struct Arrays {
     two([](V a, V b) { return l2(a, b); });
     two([](V a, V b) { return huber(a, b, 0.3); });
     two([](V a, V b) { return charbonnier(a, b, 0.1); });
+    two([](V a, V b) {
+      return sum_over({a, b}, [](auto x, auto y) {
+        using namespace hsi4d;
+        return x * exp(-y);
+      });
+    });
     all.push_back(to_scalar(of_images<S>(1, 24, 16, [](V a, V b) { return l1(a, b); })));
     all.push_back(to_scalar(of_images<S>(1, 24, 16, [](V a, V b) { return l2(a, b); })));
     all.push_back(of_images<S>(1, 24, 16, [](V a, V b) { return weighted_image(a, b); }));
@@ -131,6 +138,9 @@ struct Arrays {
     all.back().reach = 10;  // two windows of 11
     all.push_back({{{{image_shape<S>(4, 8, 16)}, units_of(8), 0, 1}},
                    [](const Vars<S>& in) { return Vars<S>{centroids(in[0])}; }});
+    all.push_back({{{image_shape<S>(4, 8, 16), {}, 0, 1}},
+                   [](const Vars<S>& in) { return Vars<S>{slice_planes(in[0], 1, 2)}; },
+                   {[](Index row) { return row + 8; }}});
     return all;
   }
 };
@@ -183,5 +193,11 @@ struct Networks {
 std::vector<StressFigure> poisoned_elements(Remedy remedy) { return family_leaks(Elements(), remedy); }
 std::vector<StressFigure> poisoned_arrays(Remedy remedy) { return family_leaks(Arrays(), remedy); }
 std::vector<StressFigure> poisoned_networks(Remedy remedy) { return family_leaks(Networks(), remedy); }
+
+void add_autodiff_operators(OperatorNames& names) {
+  add_family_operators(Elements(), names);
+  add_family_operators(Arrays(), names);
+  add_family_operators(Networks(), names);
+}
 
 }  // namespace hsi4d::stress

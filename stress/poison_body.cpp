@@ -131,6 +131,8 @@ struct BodyNets {
     const Index poses = kFrames * kPoseJoints;
     all.push_back({{rotations(20)}, [](const Vars<S>& in) { return Vars<S>{rotation_offsets(in[0])}; }});
     all.push_back(
+        {{{shape_of(20, 3)}}, [](const Vars<S>& in) { return Vars<S>{rotation_offsets_from_axis_angle(in[0])}; }});
+    all.push_back(
         {{{shape_of(kFrames, 63)}}, [](const Vars<S>& in) { return Vars<S>{natural_decode(in[0])}; }, {frames}});
     all.push_back({{rotations(poses, frames)}, [](const Vars<S>& in) { return Vars<S>{natural_encode(in[0])}; }});
     all.push_back({{rotations(poses)}, [](const Vars<S>& in) { return Vars<S>{joint_limit_excess(in[0])}; }});
@@ -166,5 +168,10 @@ struct BodyNets {
 
 std::vector<StressFigure> poisoned_skeletons(Remedy remedy) { return family_leaks(Skeletons(), remedy); }
 std::vector<StressFigure> poisoned_body_nets(Remedy remedy) { return family_leaks(BodyNets(), remedy); }
+
+void add_body_operators(OperatorNames& names) {
+  add_family_operators(Skeletons(), names);
+  add_family_operators(BodyNets(), names);
+}
 
 }  // namespace hsi4d::stress

@@ -69,6 +69,7 @@ struct Drawing {
 
 struct Changes {
   double pixels = 0, gradients = 0, not_finite = 0;
+  double kept = 0;  ///< results that are others after a bad number has gone
 };
 
 double different(const std::vector<double>& a, const std::vector<double>& b) {
@@ -124,6 +125,25 @@ void try_poison(Drawing<S>& drawing, const std::vector<PoisonedPlace<S>>& places
   }
 }
 
+/// What all Gaussians share may spoil everything while it is bad, and nothing afterwards.
+template <class S>
+void try_shared(Drawing<S>& drawing, const Vars<S>& places, Changes& changes) {
+  drawing.run();
+  const std::array good = {drawing.pixels(), drawing.gradients(-1)};
+  for (const Var<S> place : places) {
+    for (const S poison : kPoison<S>) {
+      const S before = std::exchange(drawing.tape.write(place)(0, 1), poison);
+      try {
+        drawing.run();
+      } catch (const UserError&) {  // a camera that makes no sense: told
+      }
+      drawing.tape.write(place)(0, 1) = before;
+      drawing.run();
+      changes.kept += different(drawing.pixels(), good[0]) + different(drawing.gradients(-1), good[1]);
+    }
+  }
+}
+
 /// Gaussians given in the image.
 struct Flat {
   std::vector<double> means, factors, depths, opacities, features;
@@ -140,26 +160,68 @@ struct Flat {
   }
 };
 
+/// They on a tape, composited.
 template <class S>
-void try_composite(Changes& changes) {
-  const Flat flat;
+struct FlatDrawing {
   Tape<S> tape;
+  Drawing<S> drawing{tape, {}};
+  Var<S> means, factors, depths, depth_rest, means_rest, opacities, features, background;
+
+  FlatDrawing();
+  Vars<S> poisoned() const { return {means, factors, depths, depth_rest, means_rest, opacities, features, background}; }
+};
+
+template <class S>
+FlatDrawing<S>::FlatDrawing() {
+  const Flat flat;
   const auto leaf = [&](Index cols, const std::vector<double>& numbers) {
     const Var<S> var = tape.parameter("input", shape_of(std::ssize(numbers) / cols, cols));
     set_numbers(tape, var, numbers);
     return var;
   };
-  const Var<S> means = leaf(2, flat.means), factors = leaf(6, flat.factors), opacities = leaf(1, flat.opacities),
-               features = leaf(3, flat.features), background = leaf(3, {0.2, 0.3, 0.4}),
-               depths = tape.constant("depths", shape_of(kRows, 1)), rest = tape.constant("rest", shape_of(kRows, 1)),
-               means_rest = tape.constant("rest", shape_of(kRows, 2));
+  means = leaf(2, flat.means);
+  factors = leaf(6, flat.factors);
+  opacities = leaf(1, flat.opacities);
+  features = leaf(3, flat.features);
+  background = leaf(3, {0.2, 0.3, 0.4});
+  depths = tape.constant("depths", shape_of(kRows, 1));
+  depth_rest = tape.constant("rest", shape_of(kRows, 1));
+  means_rest = tape.constant("rest", shape_of(kRows, 2));
   set_numbers(tape, depths, flat.depths);
-  const Composited<S> out = composite(SplatSet<S>{{means, factors, depths, rest, means_rest}, opacities, features},
-                                      view_of({32, 24, 1, {}, {}, {}, {}, {}}), background);
-  Drawing<S> drawing{tape, {means, factors, opacities, features, background}};
+  const Composited<S> out =
+      composite(SplatSet<S>{{means, factors, depths, depth_rest, means_rest}, opacities, features},
+                view_of({32, 24, 1, {}, {}, {}, {}, {}}), background);
+  drawing.inputs = {means, factors, opacities, features, background};
   drawing.look_at({out.channels, out.transmittance});
-  try_poison<S>(drawing, {{means}, {factors}, {depths}, {means_rest}, {opacities}, {features, true, true}}, factors,
-                std::vector<double>(6 * kRows, 0), changes);
+}
+
+template <class S>
+void try_composite(Changes& changes) {
+  FlatDrawing<S> flat;
+  try_poison<S>(flat.drawing,
+                {{flat.means},
+                 {flat.factors},
+                 {flat.depths},
+                 {flat.depth_rest},
+                 {flat.means_rest},
+                 {flat.opacities},
+                 {flat.features, true, true}},
+                flat.factors, std::vector<double>(6 * kRows, 0), changes);
+  try_shared<S>(flat.drawing, {flat.background}, changes);
+}
+
+RenderRequest with_all(bool with_depth) {
+  RenderRequest request;
+  request.depth = with_depth;
+  if (with_depth) request.groups = {{0, kRows / 2}, {kRows / 4, kRows}};
+  return request;
+}
+
+template <class S>
+Vars<S> all_images(const Rendered<S>& out, bool with_depth) {
+  Vars<S> seen = {out.image, out.transmittance};
+  if (with_depth) seen.insert(seen.end(), {out.depth, out.group_opacity});
+  return seen;
 }
 
 /// @param with_depth  and opacities of groups beside the image; a Gaussian 3e38 m away is drawn, and gradients by its
@@ -167,15 +229,9 @@ void try_composite(Changes& changes) {
 template <class S>
 void try_render(bool with_depth, Changes& changes) {
   const SmallScene scene = small_scene(kRows, 32, 24, 81);
-  RenderRequest request;
-  request.depth = with_depth;
-  if (with_depth) request.groups = {{0, kRows / 2}, {kRows / 4, kRows}};
-  TapedScene<S> taped(scene, request);
+  TapedScene<S> taped(scene, with_all(with_depth));
   Drawing<S> drawing{taped.tape, taped.leaves()};
-  const Rendered<S>& out = taped.rendered;
-  Vars<S> seen = {out.image, out.transmittance};
-  if (with_depth) seen.insert(seen.end(), {out.depth, out.group_opacity});
-  drawing.look_at(seen);
+  drawing.look_at(all_images(taped.rendered, with_depth));
   std::vector<double> behind = scene.means;
   for (std::size_t i = 2; i < behind.size(); i += 3) behind[i] *= -1;
   try_poison<S>(drawing,
@@ -185,6 +241,7 @@ void try_render(bool with_depth, Changes& changes) {
                  {taped.logits, false},
                  {taped.sh, true, true}},
                 taped.means, behind, changes);
+  try_shared<S>(drawing, {taped.xi, taped.background}, changes);
 }
 
 /// Pixels of which a Gaussian is left out by a factor of 0 in place of a gate: Σ weight · valid · colour.
@@ -227,7 +284,8 @@ std::vector<StressFigure> figures_of(Remedy remedy, const F& measure) {
   }
   return {{"pixels that differ from those without the Gaussian", changes.pixels, 0},
           {"gradients that do, or are not 0 for it", changes.gradients, 0},
-          {"numbers that are not finite where inputs are", changes.not_finite, 0}};
+          {"numbers that are not finite where inputs are", changes.not_finite, 0},
+          {"results that differ when what all share is good again", changes.kept, 0}};
 }
 
 }  // namespace
@@ -246,6 +304,13 @@ std::vector<StressFigure> poisoned_render(Remedy remedy) {
       try_render<double>(with_depth, changes);
     }
   });
+}
+
+void add_render_operators(OperatorNames& names) {
+  FlatDrawing<double> flat;
+  add_poisoned_operators<double>(flat.tape, flat.poisoned(), flat.drawing.images, names);
+  TapedScene<double> taped(small_scene(kRows, 32, 24, 81), with_all(true));
+  add_poisoned_operators<double>(taped.tape, taped.leaves(), all_images(taped.rendered, true), names);
 }
 
 }  // namespace hsi4d::stress

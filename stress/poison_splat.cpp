@@ -56,4 +56,6 @@ struct Splats {
 
 std::vector<StressFigure> poisoned_splats(Remedy remedy) { return family_leaks(Splats(), remedy); }
 
+void add_splat_operators(OperatorNames& names) { add_family_operators(Splats(), names); }
+
 }  // namespace hsi4d::stress

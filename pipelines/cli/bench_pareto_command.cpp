@@ -19,10 +19,10 @@ constexpr double kMostTrackedTime = 4;                   // of the default's: se
 
 std::vector<ParetoScene> chosen_scenes(const BenchParetoOptions& options) {
   std::vector<ParetoScene> scenes;
-  const bool wants_all = options.scenes.empty() && options.scene_file.empty();
+  const bool wants_all = options.scenes.empty() && options.scene_files.empty();
   for (const std::string& name : wants_all ? pareto_scene_names() : options.scenes)
     scenes.push_back(pareto_scene(name));
-  if (!options.scene_file.empty()) scenes.push_back(pareto_scene_of(options.scene_file));
+  for (ParetoScene& scene : pareto_scenes_of(options.scene_files)) scenes.push_back(std::move(scene));
   return scenes;
 }
 

@@ -10,9 +10,9 @@
 namespace hsi4d::cli {
 
 struct BenchParetoOptions {
-  std::vector<std::string> scenes;  ///< by name; empty: all, or none where there is a file
-  std::string scene_file;           ///< Gaussians of a file as one more scene; empty: none
-  std::vector<std::string> knobs;   ///< empty: all
+  std::vector<std::string> scenes;       ///< by name; empty: all, or none where there are files
+  std::vector<std::string> scene_files;  ///< files of Gaussians and folders of such files, a scene each
+  std::vector<std::string> knobs;        ///< empty: all
   int threads = 1;
   int repeats = 9;
   std::filesystem::path config = "configs/bench/pareto_tracking.json";  ///< of the reconstructions

@@ -443,11 +443,11 @@ struct CommandLine {
         ->type_name("F.svg");
     command
         .add_option(
-            "--scene", o.scene_file,
-            std::string("Of pareto: Gaussians to measure too, instead of all that are made up unless --workload "
-                        "names some; ") +
+            "--scene", o.scene_files,
+            std::string("Of pareto: Gaussians of a file to measure too, or of all files in a folder, instead of all "
+                        "that are made up unless --workload names some; ") +
                 kSplatFormats)
-        ->type_name("F.ply");
+        ->type_name("F.ply|DIR");
     command.add_option("--knob", o.knobs, "Of pareto: only these and the default; default: all");
     command
         .add_option("--seeds", o.seeds, "Of pareto: reconstructions of each setting; default: 5; 0 leaves these out")

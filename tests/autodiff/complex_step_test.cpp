@@ -16,6 +16,7 @@
 #include "autodiff/weighted_image.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
+#include "tests/support/complex_formulas.h"
 #include "tests/support/complex_step_check.h"
 
 using namespace hsi4d;
@@ -100,36 +101,6 @@ Complexes image_mean(const ComplexInputs& in, const F& f) {
     sum += in.size() > 2 ? in[2][i % in[2].size()] * term : term;
   }
   return {sum / static_cast<double>(in[0].size())};
-}
-
-/// 1 − mean ssim, by its definition.
-Complexes plain_d_ssim(const Complexes& x, const Complexes& y, int height, int width) {
-  std::array<double, 11> window{};
-  double total = 0;
-  for (int i = 0; i < 11; ++i) total += window[static_cast<std::size_t>(i)] = std::exp(-(i - 5) * (i - 5) / 4.5);
-  const auto filtered = [&](int r, int c, const auto& value) {
-    Complex sum = 0;
-    for (int i = std::max(0, r - 5); i < std::min(height, r + 6); ++i) {
-      for (int j = std::max(0, c - 5); j < std::min(width, c + 6); ++j) {
-        const double w = window[static_cast<std::size_t>(i - r + 5)] * window[static_cast<std::size_t>(j - c + 5)];
-        sum += w / (total * total) * value(static_cast<std::size_t>(i * width + j));
-      }
-    }
-    return sum;
-  };
-  Complex sum = 0;
-  for (int r = 0; r < height; ++r) {
-    for (int c = 0; c < width; ++c) {
-      const Complex mx = filtered(r, c, [&](std::size_t i) { return x[i]; });
-      const Complex my = filtered(r, c, [&](std::size_t i) { return y[i]; });
-      const Complex vx = filtered(r, c, [&](std::size_t i) { return x[i] * x[i]; }) - mx * mx;
-      const Complex vy = filtered(r, c, [&](std::size_t i) { return y[i] * y[i]; }) - my * my;
-      const Complex vxy = filtered(r, c, [&](std::size_t i) { return x[i] * y[i]; }) - mx * my;
-      constexpr double kC1 = 1e-4, kC2 = 9e-4;
-      sum += (2.0 * mx * my + kC1) * (2.0 * vxy + kC2) / ((mx * mx + my * my + kC1) * (vx + vy + kC2));
-    }
-  }
-  return {1.0 - sum / static_cast<double>(height * width)};
 }
 
 }  // namespace

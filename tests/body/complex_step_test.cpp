@@ -7,6 +7,7 @@
 #include "body/natural_pose.h"
 #include "body/skinning.h"
 #include "core/rotation.h"
+#include "tests/support/complex_formulas.h"
 #include "tests/support/complex_step_check.h"
 #include "tests/support/random_numbers.h"
 
@@ -99,28 +100,6 @@ std::array<Complexes, 2> plain_chain(const ComplexInputs& in, const std::vector<
     }
   }
   return out;
-}
-
-/// Σ (angle beyond its range)² of a rotation: twist about the bone, swing across it.
-Complex plain_excess(const Matrix3<Complex>& rotation, const NaturalJoint& joint) {
-  const Vector4<Complex> q = quaternion_from_matrix(rotation);
-  const int k = joint.twist_axis, i = (k + 1) % 3, j = (k + 2) % 3;
-  const Complex w = q[0], s = q[1 + k], u_i = q[1 + i], u_j = q[1 + j];
-  const Complex n = std::sqrt(w * w + s * s), m = std::sqrt(u_i * u_i + u_j * u_j);
-  const Complex ratio = 2.0 * hsi4d::detail::angle_of(m, n) / m;
-  Vector3<Complex> angles;
-  angles[k] = 2.0 * hsi4d::detail::angle_of(s, w);
-  angles[i] = ratio * (w * u_i - s * u_j) / n;
-  angles[j] = ratio * (w * u_j + s * u_i) / n;
-  Complex sum = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    constexpr double kRadians = 3.14159265358979323846 / 180;
-    const Complex x = angles[axis];
-    const double low = joint.low[axis] * kRadians, high = joint.high[axis] * kRadians;
-    const Complex beyond = x.real() > high ? x - high : x.real() < low ? x - low : 0;
-    sum += beyond * beyond;
-  }
-  return sum;
 }
 
 }  // namespace
@@ -239,6 +218,22 @@ TEST_CASE("functions of poses have the gradients of complex steps") {
         return y;
       },
       {.tolerance = 1e-11});
+  // Its last operator is turn_rows, by which the pose at ease is put before.
+  check_complex_step(
+      {{"latents", shape_of(1, 63)}}, [](const Vars& in) { return natural_decode(in[0]); },
+      [](const ComplexInputs& in) {
+        constexpr double kRadians = 3.14159265358979323846 / 180;
+        Complexes y;
+        for (std::size_t j = 0; j < 21; ++j) {
+          const NaturalJoint& joint = natural_joints()[j];
+          Vector3<Complex> w = vector_at(in[0], j);
+          for (int i = 0; i < 3; ++i) w[i] *= joint.spread[i] * kRadians;
+          const Matrix3<double> ease = so3_exp(Vector3<double>(Vector3<double>(joint.ease) * kRadians));
+          const Matrix3<Complex> r = ease.cast<Complex>() * so3_exp(w);
+          for (int i = 0; i < 9; ++i) y.push_back(r(i / 3, i % 3));
+        }
+        return y;
+      });
   check_complex_step(
       {{"transforms", shape_of(6, 12)}, {"points", shape_of(6, 3), 2, 3}, {"center", shape_of(1, 3)}},
       [](const Vars& in) { return canonical_directions(in[0], in[1], in[2]); },

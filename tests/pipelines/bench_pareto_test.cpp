@@ -8,9 +8,13 @@
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
+#include "core/file.h"
 #include "pipelines/reference_render.h"
+#include "splat/io_ply.h"
+#include "tests/support/temporary_folder.h"
 
 using namespace hsi4d;
+using namespace hsi4d::test;
 using Catch::Matchers::Contains;
 
 namespace {
@@ -83,6 +87,21 @@ TEST_CASE("errors of known differences") {
   CHECK(gradient_error(zero, zero).relative_l2 == 0);
   const std::vector<double> near = {3, 4 + 1e-9};  // 1 − cos is far below what 1 − x can hold
   CHECK(gradient_error(near, t).one_minus_cosine == Approx(0.5 * std::pow(0.6e-9 / 5, 2)).epsilon(1e-3));
+}
+
+TEST_CASE("a class of gradients that is rounding alone has no error") {
+  SceneGradients truth, other;
+  truth.means = other.means = {3, 4};
+  truth.quats = {1e-14, 0};
+  other.quats = {0, -1e-6};
+  CHECK(gradient_errors(other, truth)[1].relative_l2 == 0);
+  other.quats = {0, -1e-3};  // more than rounding
+  CHECK(gradient_errors(other, truth)[1].relative_l2 == Approx(1e11));
+  truth.quats = {1e-9, 0};  // small, and there
+  other.quats = {2e-9, 0};
+  CHECK(gradient_errors(other, truth)[1].relative_l2 == Approx(1));
+  other.quats = {};
+  CHECK_THROWS_AS(gradient_errors(other, truth), InternalError);
 }
 
 TEST_CASE("the default comes first and no setting occurs twice") {
@@ -176,6 +195,34 @@ TEST_CASE("every scene is drawn with fewer errors the fewer cuts there are") {
                                          Contains(">default</text>") && !Contains("median of all scenes"));
 }
 
+namespace {
+
+/// That the preset `accurate` keeps what it promises.
+void check_accurate(const std::vector<ParetoScene>& scenes) {
+  ParetoBench bench{scenes, settings_named({"quality accurate"}), 1, 2};
+  for (const ParetoRow& row : measure_pareto(bench)) {
+    INFO(row.scene << ": " << row.image.psnr_db().value_or(1000) << " dB, gradient " << row.worst_gradient());
+    CHECK(row.image.rms <= 1e-5);  // 100 dB
+    CHECK(row.worst_gradient() <= 1e-3);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("accurate has 100 dB and gradients to 1e-3 in every scene that is not extreme", "[full]") {
+  std::vector<ParetoScene> scenes;
+  for (const std::string& name : pareto_scene_names()) {
+    scenes.push_back(pareto_scene(name));
+    if (scenes.back().is_extreme) scenes.pop_back();
+  }
+  REQUIRE(scenes.size() == 6);
+  check_accurate(scenes);
+}
+
+TEST_CASE("accurate has 100 dB and gradients to 1e-3 in a scene of the benchmark") {
+  check_accurate({pareto_scene("avatar_in_scene", 0.4)});
+}
+
 TEST_CASE("the cap is compared with no cap") {
   ParetoScene scene = pareto_scene("opaque", 0.2);
   for (float& logit : scene.gaussians.opacity_logits) logit = 9;  // 0.9999
@@ -186,6 +233,35 @@ TEST_CASE("the cap is compared with no cap") {
   CHECK(rows[0].model == ParetoModel::kUncapped);
   CHECK(rows[0].image.rms > 1.2 * rows[1].image.rms);
   CHECK(pareto_points(rows).empty());
+}
+
+TEST_CASE("scenes of the benchmark are files, or all that a folder has") {
+  const TemporaryFolder here;
+  Gaussians g;
+  g.means = {0, 0, 0};
+  g.quats = {1, 0, 0, 0};
+  g.log_scales = {-1, -1, -1};
+  g.opacity_logits = {1};
+  g.sh = {0.5f, 0, 0};
+  for (const char* name : {"b/two.ply", "b/one, or more.ply", "b/c/two.ply"}) write_ply(name, g);
+  write_text_file("b/notes.txt", "none");
+  const auto names_of = [](const std::vector<std::string>& paths) {
+    std::vector<std::string> names;
+    for (const ParetoScene& scene : pareto_scenes_of(paths)) {
+      CHECK(scene.gaussians.count() == 1);
+      names.push_back(scene.name);
+    }
+    return names;
+  };
+  CHECK(names_of({}).empty());
+  CHECK(names_of({"b"}) == std::vector<std::string>{"one, or more.ply", "two.ply"});
+  CHECK(names_of({"b/c", "b"}) == std::vector<std::string>{"two.ply", "one, or more.ply", "b/two.ply"});
+  write_text_file("d/notes.txt", "none");
+  CHECK_THROWS_WITH(pareto_scenes_of({"d"}),
+                    "d: has no files of Gaussians; they are read from .ply (INRIA's and compressed), .splat, .spz");
+  CHECK_THROWS_AS(pareto_scenes_of({"none.ply"}), UserError);
+  ParetoRow row = made_up("one, or more.ply", "x", 1, 1e-3, 0.1);
+  CHECK_THAT(pareto_csv({row}), Contains("\n\"one, or more.ply\",alpha_min,\"x\",own,"));
 }
 
 TEST_CASE("an unknown scene of the benchmark is told with what is known") {

@@ -22,10 +22,12 @@ using ComplexInputs = std::vector<Complexes>;
 struct ComplexStepCheck {
   double tolerance = 1e-12;        ///< of values and gradients, relative L2
   double value_tolerance = 1e-12;  ///< of values; larger where the operator computes an approximation
+  std::string loss = {};           ///< of a loss term: its name; all inputs that it has no gradient in count as 0
 };
 
 /// Checks in double that the operator has the formula's value and, with a random cotangent, its gradient by complex
-/// steps, for every input; both go to the audit of gradients under the name of the operator that makes the result.
+/// steps, for every input; both go to the audit of gradients under the name of the operator that makes the result, or
+/// of the loss term.
 ///
 /// @param record  Vars of the inputs to the result
 /// @param formula the same of complex numbers, analytic in all inputs

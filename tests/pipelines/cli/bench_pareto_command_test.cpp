@@ -37,8 +37,8 @@ TEST_CASE("bench pareto measures the Gaussians of a file and writes tables and a
   INFO(result.err);
   REQUIRE(result.status == 0);
   CHECK_THAT(result.err, Contains("settings 5/5"));
-  CHECK_THAT(result.out, Contains("file: 3 Gaussians, 16384 pixels\n") && Contains("tile 8") &&
-                             Contains("front, file\n") && !Contains("reconstruction"));
+  CHECK_THAT(result.out, Contains("few.ply: 3 Gaussians, 16384 pixels\n") && Contains("tile 8") &&
+                             Contains("front, few.ply\n") && !Contains("reconstruction"));
   std::istringstream text(file_text("m.json"));
   std::vector<nlohmann::json> rows;
   for (std::string line; std::getline(text, line);) rows.push_back(nlohmann::json::parse(line));
@@ -49,7 +49,7 @@ TEST_CASE("bench pareto measures the Gaussians of a file and writes tables and a
   CHECK(rows[3]["value"] == "reference");
   CHECK(rows[3]["psnr_db"] > 120);
   CHECK(rows[4]["knob"] == "tile");
-  CHECK_THAT(file_text("m.csv"), Contains("\nfile,tile,\"8\",own,3,16384,"));
+  CHECK_THAT(file_text("m.csv"), Contains("\nfew.ply,tile,\"8\",own,3,16384,"));
   CHECK_THAT(file_text("m.svg"), Contains("<svg") && Contains(">accurate</text>") && Contains("</svg>"));
 }
 
