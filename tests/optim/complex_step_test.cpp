@@ -87,6 +87,15 @@ std::function<V(const std::vector<BodyPoint>&)> points_of(V places) {
   };
 }
 
+/// The same of the objects.
+std::function<V(const std::vector<ObjectPoint>&)> object_points_of(V places) {
+  return [places](const std::vector<ObjectPoint>& points) {
+    std::vector<std::uint32_t> rows;
+    for (const ObjectPoint& p : points) rows.push_back(static_cast<std::uint32_t>(object_row(p)));
+    return gather_rows(places, rows);
+  };
+}
+
 const OperatorInput kBodyPlaces = {"body_places", shape_of(kMoving* kBodyRows, 3)};
 
 /// Trilinear between the nodes of a grid, where the numbers are floats; nothing where one is not known.
@@ -187,11 +196,7 @@ TEST_CASE("loss terms of objects have the gradients of complex steps") {
       [](Inputs& given, const Vars& in) {
         given.joints = in[0];
         given.body_points = points_of(in[1]);
-        given.object_points = [places = in[2]](const std::vector<ObjectPoint>& points) {
-          std::vector<std::uint32_t> rows;
-          for (const ObjectPoint& p : points) rows.push_back(static_cast<std::uint32_t>(object_row(p)));
-          return gather_rows(places, rows);
-        };
+        given.object_points = object_points_of(in[2]);
       },
       [&motion](const ComplexInputs& in) {
         Complex total = 0;
@@ -217,6 +222,40 @@ TEST_CASE("loss terms of objects have the gradients of complex steps") {
           if (pairs > 0) total += sum / pairs / static_cast<double>(kMoving);
         }
         return total;
+      });
+}
+
+TEST_CASE("a loss term of the objects' motion has the gradients of complex steps") {
+  const MotionStart& motion = motion_of_test().start;
+  std::vector<std::pair<Index, Index>> furthest;  // object, row
+  for (const Index object : {0, 1}) {
+    const std::vector<float>& means = motion.objects[static_cast<std::size_t>(object)]->means;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::vector<std::pair<float, Index>> along;
+      for (Index row = 0; row < kObjectRows; ++row)
+        along.emplace_back(means[static_cast<std::size_t>(3 * row) + axis], row);
+      std::sort(along.begin(), along.end());
+      furthest.emplace_back(object, along.front().second);
+      furthest.emplace_back(object, along.back().second);
+    }
+  }
+  check_loss(
+      "object_smooth", {{"object_places", shape_of(kMoving * 2 * kObjectRows, 3)}},
+      [](Inputs& given, const Vars& in) { given.object_points = object_points_of(in[0]); },
+      [&](const ComplexInputs& in) {
+        const auto place = [&](const ObjectPoint& p, int i) {
+          return p.frame < kStill ? Complex(motion.place(p)[i])
+                                  : in[0][3 * object_row(p) + static_cast<std::size_t>(i)];
+        };
+        Complex sum = 0;
+        for (Index t = kStill; t < kFrames; ++t) {
+          for (const auto& [object, row] : furthest) {
+            for (int i = 0; i < 3; ++i)
+              sum += square(place({t, object, row}, i) - 2.0 * place({t - 1, object, row}, i) +
+                            place({t - 2, object, row}, i));
+          }
+        }
+        return sum / static_cast<double>(furthest.size() * kMoving);
       });
 }
 
