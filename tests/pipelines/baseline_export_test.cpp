@@ -40,7 +40,7 @@ TEST_CASE("voxels are those whose centres are in the solid") {
   CHECK(occupied > 100);
 }
 
-TEST_CASE("what TRUMANS LINGO and CHOIS start from is written") {
+TEST_CASE("what TRUMANS LINGO and CHOIS start from is written", "[release]") {
   const TemporaryFolder here;
   const std::string data = TinyDataset::folder().string();
   EvaluationSettings settings;

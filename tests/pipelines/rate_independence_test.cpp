@@ -69,8 +69,8 @@ TEST_CASE("metrics of one motion at 10 30 60 and 120 frames a second are alike")
   for (const char* name : {"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "root_translation_mm", "foot_sliding_mm",
                            "jitter", "acceleration_error", "contact_share", "object_rotation_deg"})
     REQUIRE(find_metric(expected, name) != nullptr);
-  CHECK(*find_metric(expected, "jitter") > 1);
-  CHECK(*find_metric(expected, "acceleration_error") > 0.1);
+  CHECK(*find_metric(expected, "jitter") > 0.5);
+  CHECK(*find_metric(expected, "acceleration_error") > 0.03);
   CHECK(*find_metric(expected, "foot_sliding_mm") == Approx(20).epsilon(0.1));
   CHECK(*find_metric(expected, "contact_share") == Approx(0.5));
   for (const double rate : {10.0, 30.0, 60.0}) {
