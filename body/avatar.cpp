@@ -2,6 +2,7 @@
 
 #include "body/file_contents.h"
 #include "core/finite_numbers.h"
+#include "core/gather.h"
 #include "core/npz.h"
 
 namespace hsi4d {
@@ -108,6 +109,21 @@ void check_sizes(const Avatar& avatar) {
   if (!avatar.color_net) return;
   check_sizes(*avatar.color_net);
   HSI4D_CHECK_EQ(avatar.color_net->rows, avatar.count());
+}
+
+Avatar selected(const Avatar& avatar, std::span<const Index> rows) {
+  check_sizes(avatar);
+  Avatar out = avatar;
+  out.means = gathered(avatar.means, rows, 3);
+  out.quats = gathered(avatar.quats, rows, 4);
+  out.log_scales = gathered(avatar.log_scales, rows, 3);
+  out.opacity_logits = gathered(avatar.opacity_logits, rows, 1);
+  out.colors = gathered(avatar.colors, rows, 3);
+  out.weights.vertices = std::ssize(rows);
+  out.weights.indices = gathered(avatar.weights.indices, rows, avatar.weights.per_vertex);
+  out.weights.weights = gathered(avatar.weights.weights, rows, avatar.weights.per_vertex);
+  if (avatar.color_net) out.color_net = selected(*avatar.color_net, rows);
+  return out;
 }
 
 Avatar avatar_of(const Safetensors& file) {

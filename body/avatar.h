@@ -60,6 +60,10 @@ std::vector<double> pose_joints(const Avatar& avatar, const BodyPose& pose);
 /// Throws InternalError when the sizes of the members do not fit each other.
 void check_sizes(const Avatar& avatar);
 
+/// The Gaussians of these rows on the same skeleton, its color net's features of them alone. Throws InternalError for a
+/// row that is not there.
+Avatar selected(const Avatar& avatar, std::span<const Index> rows);
+
 /// Version of avatar files that is written; older ones are read, newer ones refused.
 inline constexpr int kAvatarVersion = 2;
 

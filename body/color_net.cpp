@@ -8,6 +8,7 @@
 #include "autodiff/matrix.h"
 #include "body/pose_layout.h"
 #include "core/finite_numbers.h"
+#include "core/gather.h"
 #include "core/random.h"
 
 namespace hsi4d {
@@ -138,6 +139,13 @@ ColorNet new_color_net(std::span<const float> means, Index joints, const ColorNe
   }
   for (double& f : net.features) f = static_cast<float>(f);  // a file keeps them as they are
   return net;
+}
+
+ColorNet selected(const ColorNet& net, std::span<const Index> rows) {
+  ColorNet out = net;
+  out.rows = std::ssize(rows);
+  out.features = gathered(net.features, rows, net.features_per_row);
+  return out;
 }
 
 void check_sizes(const ColorNet& net) {

@@ -69,6 +69,9 @@ ColorNet new_color_net(std::span<const float> means, Index joints, const ColorNe
 /// Throws InternalError when the sizes do not fit each other.
 void check_sizes(const ColorNet& net);
 
+/// The same network with the features of these rows. Throws InternalError for a row that is not there.
+ColorNet selected(const ColorNet& net, std::span<const Index> rows);
+
 /// A color net on a tape.
 template <class S>
 struct ColorNetVars {

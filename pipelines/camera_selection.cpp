@@ -23,16 +23,6 @@ constexpr double kHalf = 0.5;  // transmittance at which a surface is
 
 Vector joint(const std::vector<double>& joints, Index j) { return Vector(joints.data() + 3 * j); }
 
-PosedGaussians placed(const Gaussians& object, const ObjectPose& pose) {
-  PosedGaussians posed{object, {}};
-  const Matrix3<double> r = so3_exp(pose.rotation);
-  for (Index n = 0; n < object.count(); ++n) {
-    for (int row = 0; row < 3; ++row)
-      posed.transforms.insert(posed.transforms.end(), {r(row, 0), r(row, 1), r(row, 2), pose.translation[row]});
-  }
-  return posed;
-}
-
 /// Depth at which the transmittance of a pixel falls below ½; none where it does not.
 std::optional<double> surface_depth(const PixelTrace& trace) {
   for (const PixelSplat& splat : trace.composited) {
@@ -144,7 +134,7 @@ FirstFrame first_frame(const SceneSetup& setup, const Vector& camera_center) {
   frame.human = posed_avatar(setup.avatar, setup.motion.poses.front(), &camera_center);
   std::vector<PosedGaussians> parts = {{setup.scene, {}}};
   for (std::size_t o = 0; o < setup.objects.size(); ++o)
-    parts.push_back(placed(setup.objects[o].gaussians, setup.poses[o]));
+    parts.push_back(posed_object(setup.objects[o].gaussians, setup.poses[o]));
   parts.push_back(frame.human);
   frame.all = concatenated(parts);
   return frame;

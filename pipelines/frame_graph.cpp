@@ -128,8 +128,7 @@ FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& 
   std::vector<Part> parts = {is_part_seen ? record_scene(seen_scene(clip.scene, view_, xi_from_update_, settings))
                                           : record_scene(clip.scene)};
   if (settings_.draw == Draw::kAll) {
-    for (const ClipObject& object : clip.objects) parts.push_back(record_object(object));
-    parts.push_back(record_human(clip.avatar));
+    record_moving(parts);
   }
   record_render(parts, 1);
   for (const std::string& name : parameter_group_names(settings_.draw)) {  // without objects some have no leaves
@@ -191,6 +190,17 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Gaussians& scene)
 }
 
 template <class S>
+void FrameGraph<S>::record_moving(std::vector<Part>& parts) {
+  const std::optional<SeenRows>& seen = settings_.seen;
+  for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
+    const ClipObject& object = clip_.objects[o];
+    parts.push_back(seen ? record_object({object.name, selected(object.gaussians, seen->objects[o])})
+                         : record_object(object));
+  }
+  parts.push_back(seen ? record_human(selected(clip_.avatar, seen->human)) : record_human(clip_.avatar));
+}
+
+template <class S>
 typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& object) {
   const GaussianVars<S> vars = gaussian_leaves("object", object.name, object.gaussians);
   const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
@@ -219,8 +229,9 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
   rotations_ = record_rotations(concat_rows<S>(joint_rotations_));
   skeleton_ = kinematic_chain(rotations_, transl_, avatar.parents, avatar.joints);
   if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations_, skeleton_, avatar), n};
-  HSI4D_CHECK_EQ(settings_.color_net->rows, n);
-  const HumanColors<S> colors = record_color_net(*settings_.color_net);
+  const HumanColors<S> colors =
+      record_color_net(settings_.seen ? selected(*settings_.color_net, settings_.seen->human) : *settings_.color_net);
+  HSI4D_CHECK_EQ(colors.net.features.shape().rows, n);
   const SplatInputs<S> splats = skinned_splats(vars, rotations_, skeleton_, avatar, &colors);
   hold_colors(splats.colors, {kColorNet, kFeatures});
   return {splats, n};

@@ -18,6 +18,7 @@
 #include "pipelines/clip.h"
 #include "pipelines/posed_splats.h"
 #include "pipelines/run_config.h"
+#include "pipelines/seen_rows.h"
 #include "pipelines/state.h"
 #include "splat/render.h"
 
@@ -42,6 +43,9 @@ struct FrameGraphSettings {
   /// out, and the groups of the scene then hold the others alone. None: all are kept.
   std::optional<double> camera_reach = {};
   int longest_side_px = 0;  ///< of the image, at most; 0: as large as the clip's camera has it
+  /// What is drawn of objects and human; the groups of their Gaussians then hold that alone, and `object_depth` is its
+  /// mean. None: all of it.
+  std::optional<SeenRows> seen = {};
 };
 
 /// The camera of images of a clip that are at most so large; 0: the clip's.
@@ -112,6 +116,7 @@ class FrameGraph {
   Var<S> rotation_leaf(const std::string& group, const std::string& name, Index rows);
   GaussianVars<S> gaussian_leaves(const std::string& part, const std::string& name, const Gaussians& g);
   Part record_scene(const Gaussians& scene);
+  void record_moving(std::vector<Part>& parts);
   Part record_object(const ClipObject& object);
   Part record_human(const Avatar& avatar);
   HumanColors<S> record_color_net(const ColorNet& net);

@@ -5,6 +5,7 @@
 #include "autodiff/rotations.h"
 #include "body/canonical_directions.h"
 #include "core/check.h"
+#include "core/rotation.h"
 #include "splat/sh.h"
 
 namespace hsi4d {
@@ -70,6 +71,16 @@ std::vector<double> blended_transforms(const Avatar& avatar, const BodyPose& pos
 PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose, const Vector3<double>* center_world) {
   PosedGaussians posed{rest_gaussians(avatar), blended_transforms(avatar, pose)};
   if (avatar.color_net) posed.gaussians.sh = harmonics_of(net_colors(avatar, pose, posed.transforms, center_world));
+  return posed;
+}
+
+PosedGaussians posed_object(const Gaussians& object, const ObjectPose& pose) {
+  PosedGaussians posed{object, {}};
+  const Matrix3<double> r = so3_exp(pose.rotation);
+  for (Index n = 0; n < object.count(); ++n) {
+    for (int row = 0; row < 3; ++row)
+      posed.transforms.insert(posed.transforms.end(), {r(row, 0), r(row, 1), r(row, 2), pose.translation[row]});
+  }
   return posed;
 }
 

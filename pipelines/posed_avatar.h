@@ -1,8 +1,9 @@
-// An avatar in a pose, as Gaussians to render.
+// An avatar or an object in a pose, as Gaussians to render.
 #pragma once
 
 #include "body/avatar.h"
 #include "pipelines/scene_render.h"
+#include "pipelines/state.h"
 
 namespace hsi4d {
 
@@ -20,6 +21,9 @@ std::vector<double> blended_transforms(const Avatar& avatar, const BodyPose& pos
 /// @param center_world  the camera's centre, metres, of which only a color net with a direction of view knows
 /// Throws InternalError when pose and avatar differ in their joints, or that centre is needed and null.
 PosedGaussians posed_avatar(const Avatar& avatar, const BodyPose& pose, const Vector3<double>* center_world = nullptr);
+
+/// An object's Gaussians, which are relative to the centroid of their means, in the world.
+PosedGaussians posed_object(const Gaussians& object, const ObjectPose& pose);
 
 /// All rows of `parts`, one part after the other; identity transforms where a part has none and another has some.
 /// Errors as those of concatenated in splat/gaussians.h.

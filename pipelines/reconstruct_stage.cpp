@@ -6,6 +6,7 @@
 #include "optim/optimizer.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/frame_images.h"
+#include "pipelines/posed_avatar.h"
 #include "pipelines/sequence_graph.h"
 
 namespace hsi4d {
@@ -58,6 +59,29 @@ const SceneState& first_state(const StageTask& task, const FrameTask& frame) {
   return frame.done.empty() ? task.clip.first : frame.done.front();
 }
 
+/// What a stage draws of objects and human, where approx.seen_within_deg asks for less than all. What the stage needs
+/// wholly is kept: objects for their mean depth, the human for features that move.
+std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& state) {
+  const auto& stage = task.config.stages[task.stage].second;
+  const double within_deg = task.config.approx.seen_within_deg;
+  if (within_deg == 0 || stage.draw == Draw::kScene) return {};
+  const Clip& clip = task.clip;
+  Lookout lookout{camera_of_size(clip, stage.longest_side_px), task.config.render, within_deg};
+  lookout.camera.camera_from_world = state.camera_from_world;
+  const bool needs_objects = find_entry(stage.losses, "depth") != nullptr;
+  const bool needs_human = find_entry(stage.optimize, "avatar_features") != nullptr;
+  SeenRows rows;
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    const Gaussians& object = clip.objects[o].gaussians;
+    rows.objects.push_back(needs_objects ? all_rows(object.count())
+                                         : seen_rows(posed_object(object, state.objects[o]), lookout));
+  }
+  const Avatar& avatar = clip.avatar;
+  rows.human = needs_human ? all_rows(avatar.count())
+                           : seen_rows({rest_gaussians(avatar), blended_transforms(avatar, state.body)}, lookout);
+  return rows;
+}
+
 FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, const Image& weight) {
   const Clip& clip = task.clip;
   const ClipFrame& frame = frame_task.frame;
@@ -101,6 +125,7 @@ StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, Sc
   settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
   const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");
   settings.camera_reach = camera != nullptr ? longest_way(*camera, stage.iterations, stage.optimizer) : 0;
+  settings.seen = rows_to_draw(task, state);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
   graph.set_state(state);
   if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));

@@ -65,6 +65,9 @@ void describe(ConfigFields& f, ApproxSettings& s) {
   f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
             "Longest side of the images that are worked on: the camera's image, frames and masks are reduced to it "
             "where they are larger; 0: as large as the camera's");
+  f.number("seen_within_deg", s.seen_within_deg, {.min = 0, .max = 90},
+           "Gaussians of human and objects that their own others hide when a stage of a frame begins, from the camera "
+           "and from so many degrees around, are left out of the stage; 0: all are drawn");
 }
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {

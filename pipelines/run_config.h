@@ -65,6 +65,9 @@ struct ApproxSettings {
   /// Longest side of the images that are worked on; the camera's image, frames and masks are reduced to it where they
   /// are larger. 0: as large as the camera's.
   int longest_side_px = 0;
+  /// Degrees, in (0, 90]: Gaussians of human and objects that their own others hide when a stage of a frame begins,
+  /// from the camera and from this far around, are left out of the stage (seen_rows). 0: all are drawn.
+  double seen_within_deg = 0;
 };
 
 /// A whole run.

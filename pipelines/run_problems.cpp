@@ -323,6 +323,8 @@ std::vector<RunNote> run_notes(const RunConfig& config) {
     notes.push_back({LogLevel::kInfo, "approx.longest_side_px is on: images, cameras.json and PSNR are of at most " +
                                           std::to_string(config.approx.longest_side_px) + " pixels"});
   }
+  if (config.approx.seen_within_deg > 0)
+    inform("approx.seen_within_deg is on: Gaussians that are behind a human's or an object's own surface are left out");
   if (config.approx.camera_pixel_share < 1) {
     inform("approx.camera_pixel_share is on: stages that draw the scene alone see a part of the pixels in each frame");
   }

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/check.h"
-#include "core/parallel.h"
+#include "core/gather.h"
 #include "splat/limits.h"
 
 namespace hsi4d {
@@ -57,20 +57,11 @@ Gaussians selected(const Gaussians& gaussians, std::span<const Index> rows) {
   Gaussians out;
   out.sh_degree = gaussians.sh_degree;
   out.origin_world = gaussians.origin_world;
-  for (const Index n : rows) HSI4D_CHECK(n >= 0 && n < gaussians.count(), "there is no Gaussian " + std::to_string(n));
-  const auto copy = [rows](const std::vector<float>& from, std::vector<float>& to, Index width) {
-    to.resize(rows.size() * static_cast<std::size_t>(width));
-    constexpr Index kGrain = 4096;
-    parallel_for(static_cast<Index>(rows.size()), kGrain, [&](Index begin, Index end) {
-      for (Index i = begin; i < end; ++i)
-        std::copy_n(from.begin() + rows[static_cast<std::size_t>(i)] * width, width, to.begin() + i * width);
-    });
-  };
-  copy(gaussians.means, out.means, 3);
-  copy(gaussians.quats, out.quats, 4);
-  copy(gaussians.log_scales, out.log_scales, 3);
-  copy(gaussians.opacity_logits, out.opacity_logits, 1);
-  copy(gaussians.sh, out.sh, 3 * Index{gaussians.sh_coefficients()});
+  out.means = gathered(gaussians.means, rows, 3);
+  out.quats = gathered(gaussians.quats, rows, 4);
+  out.log_scales = gathered(gaussians.log_scales, rows, 3);
+  out.opacity_logits = gathered(gaussians.opacity_logits, rows, 1);
+  out.sh = gathered(gaussians.sh, rows, 3 * Index{gaussians.sh_coefficients()});
   return out;
 }
 

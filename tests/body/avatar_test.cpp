@@ -243,6 +243,36 @@ TEST_CASE("an avatar is a function of the settings, and its seed counts") {
   CHECK_THROWS_AS(surface_avatar(BodyModel{}), InternalError);
 }
 
+TEST_CASE("selected Gaussians of an avatar keep what is theirs") {
+  Avatar whole = small_avatar();
+  whole.color_net = new_color_net(whole.means, whole.joint_count(), {});
+  const std::vector<Index> rows = {7, 3, whole.count() - 1};
+  const Avatar part = selected(whole, rows);
+  check_sizes(part);
+  CHECK(part.parents == whole.parents);
+  CHECK(part.color_net->layers == whole.color_net->layers);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto from = static_cast<std::size_t>(rows[i]);
+    const auto k = static_cast<std::size_t>(whole.weights.per_vertex);
+    const auto f = static_cast<std::size_t>(whole.color_net->features_per_row);
+    const auto is_row = [&](const auto& a, const auto& b, std::size_t width) {
+      return std::equal(a.begin() + static_cast<std::ptrdiff_t>(i * width),
+                        a.begin() + static_cast<std::ptrdiff_t>((i + 1) * width),
+                        b.begin() + static_cast<std::ptrdiff_t>(from * width));
+    };
+    CHECK(is_row(part.means, whole.means, 3));
+    CHECK(is_row(part.quats, whole.quats, 4));
+    CHECK(is_row(part.log_scales, whole.log_scales, 3));
+    CHECK(is_row(part.opacity_logits, whole.opacity_logits, 1));
+    CHECK(is_row(part.colors, whole.colors, 3));
+    CHECK(is_row(part.weights.indices, whole.weights.indices, k));
+    CHECK(is_row(part.weights.weights, whole.weights.weights, k));
+    CHECK(is_row(part.color_net->features, whole.color_net->features, f));
+  }
+  const std::vector<Index> beyond = {whole.count()};
+  CHECK_THROWS_AS(selected(whole, beyond), InternalError);
+}
+
 TEST_CASE("avatar files round-trip") {
   const TemporaryFolder folder;
   const std::string path = folder / "a.safetensors";

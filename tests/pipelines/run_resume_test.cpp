@@ -93,6 +93,7 @@ TEST_CASE("a run with approximations that was stopped and resumed has the bits o
   config.approx.longest_side_px = kTinyPixels / 2;
   config.approx.hold_colors = true;
   config.approx.camera_pixel_share = 0.5;
+  config.approx.seen_within_deg = 10;
   carry_out_tiny(config, "whole");
   for (const int last : {kPerFrame + 3, 2 * kPerFrame + 11}) {
     INFO("stopped after iteration " << last);

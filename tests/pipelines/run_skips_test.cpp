@@ -243,6 +243,22 @@ TEST_CASE("a camera that sees a share of the pixels renders fewer tiles and is f
   }
 }
 
+TEST_CASE("what human and objects hide of themselves is left out and the result is near", "[run]") {
+  const TemporaryFolder here;
+  const std::string no_depth = "stages.interaction.losses.depth=null";
+  const SkipRun part("part", {"approx.seen_within_deg=10", no_depth}), all("all", {no_depth});
+  CHECK(part.counted("pairs") < 0.9 * all.counted("pairs"));
+  CHECK(part.counted("pairs", "camera") == all.counted("pairs", "camera"));
+  const double near = differences(part, all).back();
+  INFO("without what is hidden " << near << " m or rad off");
+  CHECK(near > 0);
+  CHECK(near <= 0.05);
+  CHECK_THAT(file_text("part/log.txt"), Contains(" info approx.seen_within_deg is on: "));
+  // A stage that needs the mean depth of the objects' Gaussians draws all of them.
+  const SkipRun depth("depth", {"approx.seen_within_deg=10"});
+  CHECK(depth.counted("pairs") > part.counted("pairs"));
+}
+
 TEST_CASE("a run whose images are reduced writes smaller ones and finds nearly the same", "[run]") {
   const TemporaryFolder here;
   const std::string half = std::to_string(kTinyPixels / 2);
