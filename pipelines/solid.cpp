@@ -51,6 +51,27 @@ std::vector<Point> places_around(double distance) {
   return places;
 }
 
+/// Discs turned to the side from which more of the places see them: a ray that slips between two discs of the near side
+/// sees the far side's back, which one place alone would take for its front. Those that none sees are left out.
+std::vector<SurfaceDisc> facing_most(const std::vector<SurfaceDisc>& discs, const std::vector<Point>& places) {
+  std::vector<double> votes(discs.size(), 0);
+  for (const Point& place : places) {
+    std::size_t i = 0;
+    for (const SurfaceDisc& seen : facing(discs, {place})) {  // in the order of `discs`
+      while (discs[i].center != seen.center) ++i;
+      votes[i] += dot(seen.normal, discs[i].normal);
+      ++i;
+    }
+  }
+  std::vector<SurfaceDisc> turned;
+  for (std::size_t i = 0; i < discs.size(); ++i) {
+    if (votes[i] == 0) continue;
+    turned.push_back(discs[i]);
+    if (votes[i] < 0) turned.back().normal = -turned.back().normal;
+  }
+  return turned;
+}
+
 }  // namespace
 
 Solid mesh_solid(const std::string& path) {
@@ -72,7 +93,7 @@ Solid gaussian_solid(const Gaussians& scene, const std::vector<Point>& free_plac
 Solid object_solid(const Gaussians& object, const std::string& name) {
   const double radius = radius_of(object);
   std::vector<SurfaceDisc> discs =
-      facing(at_most(surface_discs(object), kMostDiscs), places_around(kViewDistance * radius));
+      facing_most(at_most(surface_discs(object), kMostDiscs), places_around(kViewDistance * radius));
   if (discs.empty()) return {};
   double widest = 0;
   for (const SurfaceDisc& disc : discs) widest = std::max(widest, disc.width);
