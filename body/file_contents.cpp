@@ -18,7 +18,7 @@ struct Contents {
 const Contents kContents[] = {
     {"a body model", {"v_template", "shapedirs"}},
     {"an avatar", {"weight_indices"}, {"log_scales"}},
-    {"a motion", {"poses", "root_orient", "pose_body"}},
+    {"a motion", {"poses", "root_orient", "pose_body", "human_pose", "human_orient", "pose_world"}},
     {"parameters of smplx", {"global_orient", "body_pose", "transl"}},
     {"the weights of VPoser", {"decoder_net.0.weight", "vp_model.decoder_net.0.weight"}},
     {"a run's checkpoint", {"config_hash"}},

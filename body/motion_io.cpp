@@ -1,6 +1,7 @@
 #include "body/motion_io.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -15,18 +16,25 @@ namespace hsi4d {
 
 namespace {
 
+/// Names that an array has in one file or another: of AMASS and smplx, of the data sets of TRUMANS and LINGO (human_*,
+/// transl_aligned), of WHAM (*_world).
+constexpr const char* kTranslationNames[] = {"trans", "transl", "human_transl", "transl_aligned", "trans_world"};
+constexpr const char* kPosesNames[] = {"poses", "pose_world"};
+constexpr const char* kRateNames[] = {"mocap_frame_rate", "mocap_framerate", "frame_rate", "fps"};
+
 /// A run of joints that files keep in an array of its own.
 struct Part {
-  const char* name;  // of AMASS; also what is written
-  const char* also;  // another name that is read
+  std::array<const char*, 3> names;  // the first is AMASS's and what is written
   std::size_t joint, joints;
   bool needed;
 };
 
 constexpr Part kParts[] = {
-    {"root_orient", "global_orient", 0, 1, true}, {"pose_body", "body_pose", 1, kBodyJoints - 1, true},
-    {"pose_jaw", "jaw_pose", 22, 1, false},       {"pose_eye", "eye_pose", 23, 2, false},
-    {"pose_hand", "hand_pose", 25, 30, false},
+    {{"root_orient", "global_orient", "human_orient"}, 0, 1, true},
+    {{"pose_body", "body_pose", "human_pose"}, 1, kBodyJoints - 1, true},
+    {{"pose_jaw", "jaw_pose", nullptr}, 22, 1, false},
+    {{"pose_eye", "eye_pose", nullptr}, 23, 2, false},
+    {{"pose_hand", "hand_pose", nullptr}, 25, 30, false},
 };
 
 /// Halves of a part, as SMPL-X names its parameters. Read where the whole part is not there.
@@ -99,9 +107,13 @@ const NpyArray* find(const Npz& file, const char* name) {
   return file.has(name) || is_skipped ? &file.array(name) : nullptr;
 }
 
-const NpyArray* find(const Npz& file, const char* name, const char* also) {
-  const NpyArray* array = find(file, name);
-  return array != nullptr ? array : find(file, also);
+/// The first that is there of several names.
+const NpyArray* find_first(const Npz& file, std::span<const char* const> names) {
+  for (const char* const name : names) {
+    const NpyArray* const array = name == nullptr ? nullptr : find(file, name);
+    if (array != nullptr) return array;
+  }
+  return nullptr;
 }
 
 void put_joints(const Rows& rows, std::size_t from, std::size_t to, std::size_t joints, Motion& motion) {
@@ -131,8 +143,17 @@ Model read_whole_poses(const NpyArray& array, std::optional<Model> named, Motion
   throw DataError(array.source() + ": has shape " + shape_text(shape) + "; allowed: " + allowed);
 }
 
+/// [T,3 J], or [T,J,3], which are the same numbers.
+Rows rows_of_joints(const NpyArray& array, int64_t frames, int64_t joints) {
+  const std::vector<int64_t> by_joint = {frames, joints, 3};
+  if (array.shape() != by_joint) return rows_of(array, frames, 3 * joints);
+  Rows rows{array.as<double>(), static_cast<std::size_t>(3 * joints)};
+  require_in_range(array, rows.numbers, kBodyNumbers);
+  return rows;
+}
+
 void read_joints(const NpyArray& array, std::size_t first, std::size_t joints, Motion& motion) {
-  const Rows rows = rows_of(array, static_cast<int64_t>(motion.poses.size()), static_cast<int64_t>(3 * joints));
+  const Rows rows = rows_of_joints(array, static_cast<int64_t>(motion.poses.size()), static_cast<int64_t>(joints));
   put_joints(rows, 0, first, joints, motion);
 }
 
@@ -147,11 +168,11 @@ void read_halves(const Npz& file, const Part& part, Motion& motion) {
 
 void read_parts(const Npz& file, Motion& motion) {
   for (const Part& part : kParts) {
-    const NpyArray* array = find(file, part.name, part.also);
+    const NpyArray* array = find_first(file, part.names);
     if (array != nullptr) {
       read_joints(*array, part.joint, part.joints, motion);
     } else if (part.needed) {
-      throw DataError(file.source() + ": there is neither 'poses' nor '" + part.name + "'");
+      throw DataError(file.source() + ": there is neither 'poses' nor '" + part.names[0] + "'");
     } else {
       read_halves(file, part, motion);
     }
@@ -159,7 +180,7 @@ void read_parts(const Npz& file, Motion& motion) {
 }
 
 double read_frame_rate(const Npz& file) {
-  const NpyArray* array = find(file, "mocap_frame_rate", "mocap_framerate");
+  const NpyArray* array = find_first(file, kRateNames);
   if (array == nullptr) return Motion{}.frame_rate;
   const double rate = array->scalar<double>();
   if (!(rate >= kSlowestMotion && rate <= kFastestMotion)) {
@@ -246,13 +267,13 @@ Motion converted(Motion motion, Model model) {
 
 Motion motion_of(const Npz& file) {
   refuse_other_contents(file, {"a motion", "parameters of smplx"});
-  const NpyArray* trans = find(file, "trans", "transl");
+  const NpyArray* trans = find_first(file, kTranslationNames);
   if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'");
   const int64_t frames = trans->require_shape({-1, 3}).shape()[0];
   if (frames == 0) throw DataError(trans->source() + ": holds no frame");
   const Rows places = rows_of(*trans, frames, 3, kPlaces);
   Motion motion;
-  motion.says_frame_rate = find(file, "mocap_frame_rate", "mocap_framerate") != nullptr;
+  motion.says_frame_rate = find_first(file, kRateNames) != nullptr;
   motion.frame_rate = read_frame_rate(file);
   motion.betas = read_betas(file, frames);
   motion.gender = read_text(file, "gender").value_or(motion.gender);
@@ -260,7 +281,7 @@ Motion motion_of(const Npz& file) {
   motion.poses.assign(static_cast<std::size_t>(frames), rest_pose(kSmplxJoints));
   const std::optional<Model> named = read_model(file);
   Model model = named.value_or(Model::kSmplx);
-  if (const NpyArray* poses = find(file, "poses"); poses != nullptr) {
+  if (const NpyArray* poses = find_first(file, kPosesNames); poses != nullptr) {
     model = read_whole_poses(*poses, named, motion);
   } else {
     read_parts(file, motion);
@@ -300,7 +321,7 @@ void write_motion(const std::string& path, const Motion& motion) {
   const int64_t frames = static_cast<int64_t>(motion.poses.size());
   file.add<double>("trans", {frames, 3}, trans);
   add_joints(file, "poses", motion, 0, static_cast<std::size_t>(kSmplxJoints));
-  for (const Part& part : kParts) add_joints(file, part.name, motion, part.joint, part.joints);
+  for (const Part& part : kParts) add_joints(file, part.names[0], motion, part.joint, part.joints);
   std::vector<double> betas = motion.betas;
   betas.resize(std::max<std::size_t>(betas.size(), 10));
   file.add<double>("betas", {static_cast<int64_t>(betas.size())}, betas);

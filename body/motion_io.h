@@ -40,6 +40,10 @@ inline constexpr double kSlowestMotion = 0.01, kFastestMotion = 1e5;
 /// where neither is there. `betas` is [B], [1,B] or [T,B], of which the mean is taken; `gender` a text. `pelvis_rest`
 /// [3] is Motion::pelvis_rest.
 ///
+/// Other names are read too, each as the one that it stands for: `human_transl` and `transl_aligned`, `human_orient`,
+/// `human_pose` (the data sets of TRUMANS and LINGO), `trans_world` and `pose_world` (WHAM, SMPL); `frame_rate` and
+/// `fps`. Parts may be [T,J,3].
+///
 /// A text `surface_model_type`, "smplx", "smplh" or "smpl" (in any spelling, or with more after it), says of what model
 /// 156 or 66 numbers and parts are; without it parts are of SMPL-X. What is not becomes a motion of the neutral SMPL-X
 /// of mean shape: its pelvis is put where that of the file's model is (`pelvis_rest`, else of the neutral model of mean

@@ -16,8 +16,11 @@ using Kind = ConfigValue::Kind;
 /// Counters of a stage: sums over the clips, where errors are means.
 bool is_counter(const std::string& name) { return find_metric_facts(name) == nullptr; }
 
-/// Depth is of what is inside: clips count by it.
-constexpr std::string_view kShareInside = "penetration_share", kDepthInside = "penetration_depth_mm";
+/// Depth is of what is inside: clips count by its share. The name of that, for a depth; else "".
+std::string_view share_of_depth(const std::string& name) {
+  if (name == "penetration_depth_mm") return "penetration_share";
+  return name == "object_penetration_depth_mm" ? "object_penetration_share" : "";
+}
 
 /// Numbers of the clips, weighted by their frames.
 struct WeightedValues {
@@ -29,7 +32,7 @@ struct WeightedValues {
 
   void add(const MetricValues& values, double frames) {
     for (const auto& [name, value] : values) {
-      const double* const share = name == kDepthInside ? find_metric(values, kShareInside) : nullptr;
+      const double* const share = find_metric(values, share_of_depth(name));
       const double weight = share == nullptr ? frames : frames * *share;
       auto at = std::find_if(entries.begin(), entries.end(), [&](const Entry& entry) { return entry.name == name; });
       if (at == entries.end()) at = entries.insert(at, {name, 0, 0});
@@ -116,7 +119,7 @@ void append_frames(const std::vector<FrameMetrics>& frames, int begin, std::vect
 /// Means over frames take the place of those that were weighted clip by clip.
 void take_over(const MetricValues& means, MetricValues& values) {
   for (const auto& [name, mean] : means) {
-    if (name == kDepthInside) continue;
+    if (!share_of_depth(name).empty()) continue;
     const auto at = std::find_if(values.begin(), values.end(), [&](const auto& entry) { return entry.first == name; });
     if (at != values.end()) at->second = mean;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "body/kinematics.h"
+#include "core/check.h"
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "optim/motion_start.h"
@@ -24,11 +25,11 @@ std::vector<Rigid<double>> poses_of(const SceneState& state) {
   return poses;
 }
 
-bool is_a_hand_joint_near(const PosedJoints& body, const ObjectCentres& centres,
+bool is_a_hand_joint_near(std::span<const double> joints, const ObjectCentres& centres,
                           std::span<const Rigid<double>> world_from_object) {
-  for (Index j = 0; j < static_cast<Index>(body.joints.size()) / 3; ++j) {
+  for (Index j = 0; j < std::ssize(joints) / 3; ++j) {
     if (is_hand_joint(j) &&
-        centres.nearest(Vector3<double>(body.joints.data() + 3 * j), world_from_object, kContactDistance))
+        centres.nearest(Vector3<double>(joints.data() + 3 * j), world_from_object, kContactDistance))
       return true;
   }
   return false;
@@ -63,7 +64,7 @@ std::vector<MetricValues> contact_by_frame(const Avatar& avatar, const std::vect
     motion.avatar = &avatar;
     motion.first_body = pose_skeleton(avatar, states[t].body);
     const std::vector<Rigid<double>> poses = poses_of(states[t]);
-    by_frame[t].emplace_back("contact_share", is_a_hand_joint_near(motion.first_body, centres, poses) ? 1 : 0);
+    by_frame[t].emplace_back("contact_share", is_a_hand_joint_near(motion.first_body.joints, centres, poses) ? 1 : 0);
     double sum = 0;
     Index count = 0;
     for (const double distance : hand_distances(motion, hands, centres, poses)) {
@@ -73,6 +74,18 @@ std::vector<MetricValues> contact_by_frame(const Avatar& avatar, const std::vect
     }
     if (count > 0) by_frame[t].emplace_back("contact_distance_mm", kMillimetres * sum / static_cast<double>(count));
   }
+  return by_frame;
+}
+
+std::vector<MetricValues> contact_share_by_frame(const std::vector<std::vector<double>>& joints,
+                                                 const std::vector<const Gaussians*>& objects,
+                                                 const std::vector<SceneState>& states) {
+  HSI4D_CHECK_EQ(joints.size(), states.size());
+  std::vector<MetricValues> by_frame(states.size());
+  if (objects.empty()) return by_frame;
+  const ObjectCentres centres(objects);
+  for (std::size_t t = 0; t < states.size(); ++t)
+    by_frame[t].emplace_back("contact_share", is_a_hand_joint_near(joints[t], centres, poses_of(states[t])) ? 1 : 0);
   return by_frame;
 }
 

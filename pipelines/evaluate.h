@@ -8,6 +8,7 @@
 
 #include "core/image.h"
 #include "core/rigid.h"
+#include "optim/object_points.h"
 #include "pipelines/run_summary.h"
 
 namespace hsi4d {
@@ -20,10 +21,12 @@ struct FrameState {
 };
 
 /// The errors of one frame: mpjpe_mm, pa_mpjpe_mm, world_mpjpe_mm and its parts in the true camera's view where that is
-/// known, root_translation_mm; object_translation_cm, object_rotation_deg (means over the objects);
-/// camera_translation_cm, camera_rotation_deg. Throws InternalError when the two have different counts of joints or
-/// objects.
-MetricValues frame_errors(const FrameState& estimate, const FrameState& truth);
+/// known, root_translation_mm; object_translation_cm, object_rotation_deg and, where points of the objects are given,
+/// object_add_cm and object_add_s_cm (means over the objects); camera_translation_cm, camera_rotation_deg.
+/// Throws InternalError when the two have different counts of joints or objects.
+///
+/// @param points  of the objects, in their order; null: not known
+MetricValues frame_errors(const FrameState& estimate, const FrameState& truth, const ObjectPoints* points = nullptr);
 
 /// psnr_db, ssim, and psnr_foreground_db where a foreground is given and not empty.
 ///
@@ -31,15 +34,25 @@ MetricValues frame_errors(const FrameState& estimate, const FrameState& truth);
 /// @param foreground     [1,H,W] weights, or null
 MetricValues image_errors(const Image& image, const Image& target, const Image* foreground = nullptr);
 
-/// frame_errors of frames 1 to T; frame 0 is given. Throws InternalError when the lengths differ.
-std::vector<FrameMetrics> sequence_errors(std::span<const FrameState> estimate, std::span<const FrameState> truth);
+/// frame_errors of frames 1 to T, with the acceleration_error of those of them that have a frame on either side; frame
+/// 0 is given. Throws InternalError when the lengths differ.
+/// @param rate    frames a second
+/// @param points  as frame_errors
+std::vector<FrameMetrics> sequence_errors(std::span<const FrameState> estimate, std::span<const FrameState> truth,
+                                          double rate, const ObjectPoints* points = nullptr);
 
 /// The mean of each metric over the frames that have it, in the order of their first appearance.
 MetricValues mean_errors(std::span<const FrameMetrics> per_frame);
 
 /// mean_errors of sequence_errors, and `jitter` of the estimate (frame 0 included, as the motion continues it; only for
 /// four frames or more, all with a body).
+/// @param rate    frames a second
+/// @param points  as frame_errors
+MetricValues sequence_summary(std::span<const FrameState> estimate, std::span<const FrameState> truth, double rate,
+                              const ObjectPoints* points = nullptr);
+
+/// `jitter` of a motion, where it has four frames or more, all with a body; else nothing.
 /// @param rate  frames a second
-MetricValues sequence_summary(std::span<const FrameState> estimate, std::span<const FrameState> truth, double rate);
+MetricValues motion_jitter(std::span<const FrameState> states, double rate);
 
 }  // namespace hsi4d

@@ -22,8 +22,14 @@ std::vector<FrameState> placed(const Clip& clip, const std::vector<SceneState>& 
   return frames;
 }
 
-MetricValues errors_of(const Clip& clip, const std::vector<SceneState>& states, Draw draw) {
-  return sequence_summary(placed(clip, states, draw), placed(clip, *clip.truth, draw), clip.frame_rate);
+std::vector<const Gaussians*> objects_of(const Clip& clip) {
+  std::vector<const Gaussians*> objects;
+  for (const ClipObject& object : clip.objects) objects.push_back(&object.gaussians);
+  return objects;
+}
+
+MetricValues errors_of(const Clip& clip, const std::vector<SceneState>& states, Draw draw, const ObjectPoints& points) {
+  return sequence_summary(placed(clip, states, draw), placed(clip, *clip.truth, draw), clip.frame_rate, &points);
 }
 
 /// Time and work of a stage beside its errors.
@@ -41,7 +47,8 @@ StageSummary summarize_stage(const std::string& name, MetricValues errors, const
 /// Errors of the first frame.
 MetricValues first_frame_errors(const Clip& clip, const SceneState& state, Draw draw) {
   if (!clip.truth) return {};
-  return frame_errors(placed(clip.avatar, state, draw), placed(clip.avatar, clip.truth->front(), draw));
+  const ObjectPoints points(objects_of(clip));
+  return frame_errors(placed(clip.avatar, state, draw), placed(clip.avatar, clip.truth->front(), draw), &points);
 }
 
 void append(const MetricValues& more, MetricValues& values) { values.insert(values.end(), more.begin(), more.end()); }
@@ -62,7 +69,8 @@ void add_first_frame(const RunConfig& config, const Clip& clip, const RunProgres
 }
 
 /// Baselines and errors by frame, against the clip's truth.
-void add_errors(const Clip& clip, const std::vector<SceneState>& result, RunSummary& summary) {
+void add_errors(const Clip& clip, const std::vector<SceneState>& result, const ObjectPoints& points,
+                RunSummary& summary) {
   const std::vector<FrameState> truth = placed(clip, *clip.truth, Draw::kAll);
   std::vector<SceneState> start, copy;
   for (Index t = 0; t < clip.frames(); ++t) {
@@ -70,10 +78,10 @@ void add_errors(const Clip& clip, const std::vector<SceneState>& result, RunSumm
     copy.push_back(clip.first);
   }
   for (const auto& [name, states] : {std::pair{"start", &start}, std::pair{kCopyFrame0, &copy}}) {
-    summary.baselines.push_back(
-        {name, errors_of(clip, *states, Draw::kAll), sequence_errors(placed(clip, *states, Draw::kAll), truth)});
+    summary.baselines.push_back({name, errors_of(clip, *states, Draw::kAll, points),
+                                 sequence_errors(placed(clip, *states, Draw::kAll), truth, clip.frame_rate, &points)});
   }
-  summary.per_frame = sequence_errors(placed(clip, result, Draw::kAll), truth);
+  summary.per_frame = sequence_errors(placed(clip, result, Draw::kAll), truth, clip.frame_rate, &points);
 }
 
 /// Adds errors of images, which need no truth, to means and frames.
@@ -140,12 +148,38 @@ void add_penetration(const RunConfig& config, const Clip& clip, const RunProgres
   for_stages(config, progress, refinement, summary, add_all);
 }
 
-/// Contact of the hands and sliding of the feet, which need no truth: of the baselines, of what every stage that moves
-/// the body left, and of the result's frames.
+/// How much of the body is inside of the objects, by what their Gaussians show.
+class ObjectPenetration {
+ public:
+  explicit ObjectPenetration(const Clip& clip) : clip_(clip) {
+    for (const ClipObject& object : clip.objects)
+      distances_.push_back(object_solid(object.gaussians, object.name).distance);
+    is_known_ = std::any_of(distances_.begin(), distances_.end(), [](const auto& distance) { return !!distance; });
+  }
+
+  /// Nothing where no object has a surface.
+  std::vector<Penetration> by_frame(const std::vector<SceneState>& states) const {
+    std::vector<Penetration> counts;
+    for (std::size_t t = 0; is_known_ && t < states.size(); ++t) {
+      std::vector<Rigid<double>> poses;
+      for (const ObjectPose& pose : states[t].objects) poses.push_back({so3_exp(pose.rotation), pose.translation});
+      counts.push_back(penetration_of(distances_, poses, measured_points(clip_.avatar, states[t].body)));
+    }
+    return counts;
+  }
+
+ private:
+  const Clip& clip_;
+  std::vector<SignedDistance> distances_;
+  bool is_known_ = false;
+};
+
+/// Contact of the hands, what is inside of objects and sliding of the feet, which need no truth: of the baselines, of
+/// what every stage that moves the body left, and of the result's frames.
 void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& progress,
                  const RefinementProgress& refinement, RunSummary& summary) {
-  std::vector<const Gaussians*> objects;
-  for (const ClipObject& object : clip.objects) objects.push_back(&object.gaussians);
+  const std::vector<const Gaussians*> objects = objects_of(clip);
+  const ObjectPenetration inside(clip);
   const auto by_frame = [&](const std::vector<SceneState>& states) {
     std::vector<MetricValues> all = contact_by_frame(clip.avatar, objects, states);
     std::vector<std::vector<double>> joints;
@@ -158,10 +192,19 @@ void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& p
                            std::vector<FrameMetrics>& per_frame) {
     const std::vector<MetricValues> values = by_frame(states);
     append(mean_after_first(values), means);
-    for (FrameMetrics& frame : per_frame) append(values[static_cast<std::size_t>(frame.frame)], frame.values);
+    const std::vector<Penetration> counts = inside.by_frame(states);
+    if (!counts.empty()) append(object_penetration_values(sum_after_first(counts)), means);
+    for (FrameMetrics& frame : per_frame) {
+      const auto t = static_cast<std::size_t>(frame.frame);
+      append(values[t], frame.values);
+      if (!counts.empty()) append(object_penetration_values(counts[t]), frame.values);
+    }
   };
-  for_first_frames(config, clip, progress, summary,
-                   [&](const SceneState& state, MetricValues& values) { append(by_frame({state}).front(), values); });
+  for_first_frames(config, clip, progress, summary, [&](const SceneState& state, MetricValues& values) {
+    append(by_frame({state}).front(), values);
+    const std::vector<Penetration> counts = inside.by_frame({state});
+    if (!counts.empty()) append(object_penetration_values(counts.front()), values);
+  });
   for (Baseline& baseline : summary.baselines) {
     if (baseline.of_frame_0) continue;
     const bool is_copy = baseline.name == kCopyFrame0;
@@ -192,13 +235,14 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   summary.seconds = progress.seconds + refinement.seconds;
   summary.has_truth = clip.truth.has_value();
   summary.start = summarize_start(progress.start);
+  const ObjectPoints points(objects_of(clip));
   const auto add_stage = [&](const std::vector<SceneState>& states, const StageTotals& totals) {
     const auto& [name, stage] = config.stages[summary.metrics.size()];
     summary.metrics.push_back(
-        summarize_stage(name, clip.truth ? errors_of(clip, states, stage.draw) : MetricValues{}, totals));
+        summarize_stage(name, clip.truth ? errors_of(clip, states, stage.draw, points) : MetricValues{}, totals));
   };
   if (clip.truth) {
-    add_errors(clip, result_of(progress, refinement), summary);
+    add_errors(clip, result_of(progress, refinement), points, summary);
   } else {
     summary.baselines = {{"start", {}, {}}};
   }

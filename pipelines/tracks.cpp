@@ -18,6 +18,7 @@
 #include "pipelines/data_settings.h"
 #include "pipelines/json_text.h"
 #include "pipelines/run_folder.h"
+#include "pipelines/scene_setup.h"
 
 namespace hsi4d {
 
@@ -68,7 +69,37 @@ Track read_track_folder(const fs::path& folder, const std::string& name) {
 Track read_pose_track(const std::string& path, const TrackOptions& options) {
   PoseFolder folder = read_pose_folder(path, options.frame_rate.value_or(kPoseFolderRate), options.person);
   if (folder.filled > 0) log_warning(path + ": frames without a file, interpolated: " + std::to_string(folder.filled));
-  return {path, std::move(folder.motion), {}, {}, {}};
+  return {path, std::move(folder.motion), {}, {}, {}, {}};
+}
+
+/// A motion (.npz), with its objects, z up.
+Track read_motion_track(const std::string& path, const TrackOptions& options) {
+  Track track;
+  track.name = path;
+  track.motion = read_motion_aloud(path);
+  if (options.frame_rate) {
+    track.motion.frame_rate = *options.frame_rate;
+    track.motion.says_frame_rate = true;
+  }
+  if (options.objects.empty()) {
+    ForeignObjects found = read_motion_objects(path, options.object_name);
+    track.objects = std::move(found.names);
+    track.object_poses = std::move(found.poses);
+    if (!track.objects.empty()) check_count(path, track.object_poses.size(), "poses of objects", track);
+  } else {
+    track.objects = object_names(options.objects);
+    track.object_poses = read_object_tracks(options.objects, track.objects);
+    check_count(options.objects, track.object_poses.size(), "frames", track);
+  }
+  const UpFinding finding = find_up(path, track.motion, options.up);
+  track.world = finding.words;
+  if (finding.up == UpAxis::kY) {
+    track.motion = transformed(track.motion, z_up_from_y_up(), track.motion.pelvis_rest.value_or(kSmplxPelvis));
+    for (std::vector<ObjectPose>& poses : track.object_poses) {
+      for (ObjectPose& pose : poses) pose = turned_z_up(pose);
+    }
+  }
+  return track;
 }
 
 /// A path in section `data` of the config of a run, or of each clip of a chain; empty where it is not given.
@@ -89,6 +120,15 @@ std::vector<fs::path> data_paths(const std::string& run, std::string_view key) {
     for (const ConfigValue& clip : chain->items) add_of(clip);
   }
   return paths;
+}
+
+/// A path in section `data` that all clips of a run have; empty where they do not, or it is not there.
+fs::path common_data_path(const std::string& run, std::string_view key) {
+  const std::vector<fs::path> paths = data_paths(run, key);
+  const bool is_common = !paths.empty() && std::all_of(paths.begin(), paths.end(), [&paths](const fs::path& path) {
+    return path == paths.front();
+  });
+  return is_common && fs::exists(paths.front()) ? paths.front() : fs::path();
 }
 
 /// Puts a track behind another whose last frame is its first.
@@ -173,19 +213,26 @@ FrameState state_at(const Track& track, const RestSkeleton& body, const std::vec
   return state;
 }
 
-/// Body and all objects of a track, as far as they are known.
-SceneState all_at(const Track& track, double place) {
-  SceneState state;
-  state.body = at_place(
-      track.frames(), place, [&track](std::size_t t) { return track.motion.poses[t]; }, interpolated);
+/// All objects of a track.
+std::vector<ObjectPose> objects_at(const Track& track, double place) {
+  std::vector<ObjectPose> objects;
   for (std::size_t o = 0; o < track.objects.size() && !track.object_poses.empty(); ++o) {
     const auto pose_of = [&track, o](std::size_t t) {
       const ObjectPose& at = track.object_poses[t][o];
       return Rigid<double>{so3_exp(at.rotation), at.translation};
     };
     const Rigid<double> pose = at_place(track.frames(), place, pose_of, between_poses);
-    state.objects.push_back({so3_log(pose.rotation), pose.translation});
+    objects.push_back({so3_log(pose.rotation), pose.translation});
   }
+  return objects;
+}
+
+/// Body and all objects of a track, as far as they are known.
+SceneState all_at(const Track& track, double place) {
+  SceneState state;
+  state.body = at_place(
+      track.frames(), place, [&track](std::size_t t) { return track.motion.poses[t]; }, interpolated);
+  state.objects = objects_at(track, place);
   return state;
 }
 
@@ -209,6 +256,30 @@ double rate_of(const Track& track, const Track& other) {
   if (track.frames() == other.frames() && other.motion.says_frame_rate) return other.motion.frame_rate;
   throw UserError(track.name + ": says no frame rate, and has " + std::to_string(track.frames()) + " frames where " +
                   other.name + " has " + std::to_string(other.frames()) + "; --from-rate says it");
+}
+
+/// The rate to compare at: that of the slower track, or a slower one.
+double compared_rate(double slower, std::optional<double> wanted, const std::string& name) {
+  if (!wanted) return slower;
+  if (*wanted > slower)
+    throw UserError("--frame-rate: " + number_text(*wanted) + " is above the " + number_text(slower) +
+                    " frames a second of " + name + ", and what is between frames is not known; allowed: up to " +
+                    number_text(slower));
+  return *wanted;
+}
+
+/// Moments at a rate from 0 to `end` seconds.
+Index count_of_moments(double end, double rate) { return static_cast<Index>(std::floor(end * rate + kSameMoment)) + 1; }
+
+/// A path of the dataset that a path is in; empty where there is none.
+template <class F>
+std::string dataset_path(const std::string& path, const F& of) {
+  if (!fs::is_directory(path)) return "";
+  for (const fs::path& folder : dataset_folders(path)) {
+    const fs::path found = of(dataset_inputs(folder));
+    if (!found.empty() && fs::exists(found)) return found.string();
+  }
+  return "";
 }
 
 }  // namespace
@@ -243,14 +314,7 @@ Track read_track(const std::string& path, const TrackOptions& options) {
     return read_pose_track(path, options);
   }
   if (!path.ends_with(".npz")) throw UserError(path + ": is neither a folder of a run or dataset nor a motion (.npz)");
-  Track track;
-  track.name = path;
-  track.motion = read_motion_aloud(path);
-  if (options.frame_rate) {
-    track.motion.frame_rate = *options.frame_rate;
-    track.motion.says_frame_rate = true;
-  }
-  return track;
+  return read_motion_track(path, options);
 }
 
 std::string avatar_of_track(const std::string& path) {
@@ -300,17 +364,91 @@ std::vector<std::string> object_files_of_track(const std::string& path, const Tr
   return files;
 }
 
+std::vector<std::string> object_names_of_track(const std::string& path) {
+  std::vector<std::string> names;
+  if (!is_run_folder(path)) {
+    if (!fs::is_directory(path)) return names;
+    for (const fs::path& folder : dataset_folders(path)) {
+      for (const auto& [name, object] : dataset_inputs(folder).objects) names.push_back(name);
+      if (!names.empty()) break;
+    }
+    return names;
+  }
+  const std::string file = RunPaths{path}.config();
+  if (!fs::exists(file)) return names;
+  const ConfigValue tree = parse_json_text(read_text_file(file), file);
+  const ConfigValue* const chain = find_member(tree, "chain");
+  const ConfigValue& clip = chain == nullptr || chain->items.empty() ? tree : chain->items.front();
+  const ConfigValue* const data = find_member(clip, "data");
+  const ConfigValue* const objects = data == nullptr ? nullptr : find_member(*data, "objects");
+  if (objects == nullptr) return names;
+  for (const ConfigMember& member : objects->members) names.push_back(member.key);
+  return names;
+}
+
+std::string surface_of_track(const std::string& path) {
+  if (is_run_folder(path)) return common_data_path(path, "surface").string();
+  return dataset_path(path, [](const DataSettings& data) { return data.surface; });
+}
+
+std::string scene_of_track(const std::string& path) {
+  if (is_run_folder(path)) return common_data_path(path, "scene").string();
+  return dataset_path(path, [](const DataSettings& data) { return data.scene; });
+}
+
+std::string initial_of_track(const std::string& path) {
+  DataSettings data;
+  if (is_run_folder(path)) {
+    const std::vector<fs::path> paths = data_paths(path, "initial");
+    if (!paths.empty()) data.initial = paths.front();
+  } else {
+    data.initial = dataset_path(path, [](const DataSettings& inputs) { return inputs.initial; });
+  }
+  return !data.initial.empty() && fs::exists(data.initial) ? initial_motion_file(data).string() : "";
+}
+
+std::vector<SceneState> object_states(const Track& track, double frame_rate, Index count) {
+  std::vector<SceneState> states;
+  if (track.object_poses.empty()) return states;
+  for (Index k = 0; k < count; ++k) {
+    SceneState state;
+    state.objects = objects_at(track, static_cast<double>(k) / frame_rate * track.motion.frame_rate);
+    states.push_back(std::move(state));
+  }
+  return states;
+}
+
+AlignedTracks by_itself(const Track& track, const RestSkeleton& body, std::optional<double> frame_rate) {
+  if (!track.motion.says_frame_rate) throw UserError(track.name + ": says no frame rate; --from-rate says it");
+  AlignedTracks tracks;
+  tracks.frame_rate = compared_rate(track.motion.frame_rate, frame_rate, track.name);
+  const Index count =
+      count_of_moments(static_cast<double>(track.frames() - 1) / track.motion.frame_rate, tracks.frame_rate);
+  if (count < 2)
+    throw UserError(track.name + ": has " + std::to_string(track.frames()) +
+                    " frames; what is measured is of the frames after the first");
+  std::vector<std::size_t> objects(track.object_poses.empty() ? 0 : track.objects.size());
+  std::iota(objects.begin(), objects.end(), std::size_t{0});
+  for (Index k = 0; k < count; ++k) {
+    const double place = static_cast<double>(k) / tracks.frame_rate * track.motion.frame_rate;
+    tracks.estimate.push_back(state_at(track, body, objects, place));
+    tracks.states.push_back(all_at(track, place));
+  }
+  return tracks;
+}
+
 AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, const Track& truth,
-                      const RestSkeleton& truth_body) {
+                      const RestSkeleton& truth_body, std::optional<double> frame_rate) {
   const double estimate_rate = rate_of(estimate, truth), truth_rate = rate_of(truth, estimate);
   const std::vector<std::size_t> objects = places_of(estimate, truth);
   std::vector<std::size_t> true_objects(objects.size());
   std::iota(true_objects.begin(), true_objects.end(), std::size_t{0});
   AlignedTracks tracks;
-  tracks.frame_rate = std::min(estimate_rate, truth_rate);
+  tracks.frame_rate =
+      compared_rate(std::min(estimate_rate, truth_rate), frame_rate, estimate.name + " or " + truth.name);
   const double end = std::min(static_cast<double>(estimate.frames() - 1) / estimate_rate,
                               static_cast<double>(truth.frames() - 1) / truth_rate);
-  const auto count = static_cast<Index>(std::floor(end * tracks.frame_rate + kSameMoment)) + 1;
+  const Index count = count_of_moments(end, tracks.frame_rate);
   if (count < 2)
     throw UserError(estimate.name + ": has " + std::to_string(estimate.frames()) + " frames and " + truth.name + " " +
                     std::to_string(truth.frames()) + "; errors are those of the frames after the first that both have");

@@ -10,6 +10,7 @@
 #include "body/motion_io.h"
 #include "core/rigid.h"
 #include "pipelines/evaluate.h"
+#include "pipelines/foreign_motion.h"
 #include "pipelines/state.h"
 
 namespace hsi4d {
@@ -21,14 +22,18 @@ struct Track {
   std::vector<std::string> objects;                   ///< names, in the order of object_poses
   std::vector<std::vector<ObjectPose>> object_poses;  ///< [frame][object]; empty: none are known
   std::vector<Rigid<double>> camera_from_world;       ///< by frame; empty: none are known
+  std::string world;  ///< what was found of its world, for people; empty: nothing to say
 
   Index frames() const { return std::ssize(motion.poses); }
 };
 
 /// How motions of other programs are read.
 struct TrackOptions {
-  std::optional<double> frame_rate;  ///< frames a second of a motion, instead of what it says
-  int person = 0;                    ///< of a folder of SMPLer-X
+  std::optional<double> frame_rate = {};  ///< frames a second of a motion, instead of what it says
+  int person = 0;                         ///< of a folder of SMPLer-X
+  std::optional<UpAxis> up = {};          ///< of a motion's world; none: find_up says it
+  std::string objects = {};               ///< a file of object poses beside a motion; empty: what it holds itself
+  std::string object_name = "object";     ///< what an object without a name is called
 };
 
 /// Whether a folder is one that `hsi4d run` writes.
@@ -40,7 +45,8 @@ bool is_run_folder(const std::string& path);
 void check_holds_track(const std::string& path, const std::string& member);
 
 /// Reads what a path holds: a run folder (motion.npz, objects.npz, cameras.json), a dataset with truth/, such a truth/
-/// itself, a motion (.npz), or a folder of SMPLer-X (read_pose_folder).
+/// itself, a motion (.npz), or a folder of SMPLer-X (read_pose_folder). A motion whose world has y up is turned to z
+/// up, its objects with it.
 ///
 /// Throws UserError naming the path for anything else, a run that has not come to its end, and a dataset without truth;
 /// UserError and DataError of the readers; DataError where counts of frames differ.
@@ -61,6 +67,17 @@ Track read_joined_tracks(const std::vector<std::string>& paths);
 /// is not there.
 std::vector<std::string> object_files_of_track(const std::string& path, const Track& track);
 
+/// The names of the objects of a run folder's config, or of a dataset.
+std::vector<std::string> object_names_of_track(const std::string& path);
+
+/// The mesh of what is solid, and the scene's Gaussians, that belong to a run folder or a dataset; of a chain only
+/// where all clips have the same. Empty where there is none.
+std::string surface_of_track(const std::string& path);
+std::string scene_of_track(const std::string& path);
+
+/// The motion that begins with the state of frame 0 of a dataset or run; empty where there is none.
+std::string initial_of_track(const std::string& path);
+
 /// A skeleton in its rest pose.
 struct RestSkeleton {
   std::vector<int> parents;
@@ -79,9 +96,18 @@ struct AlignedTracks {
 /// track that does not say its rate has the other's if it has as many frames.
 ///
 /// @param estimate_body, truth_body  whose joints are compared
-/// Throws UserError naming the track whose rate nobody knows, and where fewer than two frames are left; DataError where
-/// the estimate has not the truth's objects, or a pose has another number of joints than the body.
+/// @param frame_rate                 frames a second to compare at; none: those of the slower one
+/// Throws UserError naming the track whose rate nobody knows, where fewer than two frames are left, and for a frame
+/// rate above that of the slower one; DataError where the estimate has not the truth's objects, or a pose has another
+/// number of joints than the body.
 AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, const Track& truth,
-                      const RestSkeleton& truth_body);
+                      const RestSkeleton& truth_body, std::optional<double> frame_rate = {});
+
+/// The poses of a track's objects at `count` moments, 1/frame_rate seconds apart from its first frame on; no bodies, no
+/// cameras. Nothing where it has no objects.
+std::vector<SceneState> object_states(const Track& track, double frame_rate, Index count);
+
+/// A track without a truth, with all of its objects; as aligned.
+AlignedTracks by_itself(const Track& track, const RestSkeleton& body, std::optional<double> frame_rate = {});
 
 }  // namespace hsi4d

@@ -38,9 +38,11 @@ if(HSI4D_PYTHON)
   add_test(NAME "exporters of VPoser, WHAM, GVHMR and TRAM"
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/exporters_test.py ${PROJECT_SOURCE_DIR}/tools
                    $<TARGET_FILE:hsi4d>)
+  add_test(NAME "embeddings by CLIP"
+           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/clip_embeddings_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "services for video, masks and poses"
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
-  set_tests_properties("exporters of VPoser, WHAM, GVHMR and TRAM" "services for video, masks and poses"
+  set_tests_properties("exporters of VPoser, WHAM, GVHMR and TRAM" "services for video, masks and poses" "embeddings by CLIP"
                        PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
 else()
   message(STATUS "There is no python3: the exporters and services in tools/ are not tested")

@@ -4,8 +4,9 @@
     tools/export_motion.py wham_output.pkl motion.npz --person 0 --fps 30            # WHAM
     tools/export_motion.py hmr4d_results.pt motion.npz --fps 30                      # GVHMR
     tools/export_motion.py results/clip/hps/hps_track_0.npy motion.npz --fps 30      # TRAM, beside results/clip/camera.npy
+    tools/export_motion.py output__demo-21__0.pkl motion.npz --from lingo --fps 30   # LINGO, or TRUMANS, which writes the same
 
-The motion is in the estimator's world, turned so that z is up, for a body of SMPL-X; rotations as axis-angle, metres.
+The motion is in the world of whatever made it, turned so that z is up, for a body of SMPL-X; rotations as axis-angle, metres.
 With --in-camera it is in the camera's frame of every frame (x right, y down, z forward) and not turned.
 
 | estimator | body   | its world                                                            |
@@ -15,13 +16,17 @@ With --in-camera it is in the camera's frame of every frame (x right, y down, z 
 | TRAM      | SMPL   | y up where its camera.npy has world_cam_R and world_cam_T, aligned   |
 |           |        | with an estimate of gravity. Older versions have the first camera's  |
 |           |        | world alone, y down: z is then up only as far as it was level        |
+| LINGO,    | SMPL-X | y up; a dictionary of transl, global_orient and body_pose, at 30     |
+| TRUMANS   |        | frames a second (10 that are made, interpolated). Hands are flat     |
 
 A body turns about its pelvis, so turning a motion needs the pelvis of the estimator's body at rest: by default that of
 the neutral body of mean shape; --pelvis x,y,z for another. SMPL's pelvis stands elsewhere than SMPL-X's; the translation
 is corrected, so that the pelvis stays where the estimator has it; the file says where it stands at rest (pelvis_rest)
 where that is known. Frames that an estimator left out are interpolated.
 
-Needs Python with NumPy, and joblib for WHAM or PyTorch for GVHMR and TRAM. The inputs are pickles, which can run code
+Needs Python with NumPy, and joblib for WHAM or PyTorch for GVHMR and TRAM (for LINGO where its arrays are tensors).
+CHOIS writes no such file: save trans, root_orient, pose_body, obj_rot_mat and obj_com_pos of its results with
+numpy.savez, which hsi4d reads as it is. The inputs are pickles, which can run code
 when they are read: only read files whose origin you trust.
 """
 
@@ -177,7 +182,20 @@ def read_tram(np, path, arguments):
     return pose, trans, betas, frames, False, "y up" if is_level else "y down"
 
 
-READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram}
+def read_lingo(np, path, arguments):
+    if arguments.in_camera:
+        fail(f"{path}: is in the world of its scene; there is no camera")
+    with open(path, "rb") as file:
+        one = __import__("pickle").load(file)
+    root = array(np, need(one, "global_orient", path), f"{path}: global_orient", 3)
+    body = array(np, need(one, "body_pose", path), f"{path}: body_pose", 63)
+    trans = array(np, need(one, "transl", path), f"{path}: transl", 3)
+    if not len(root) == len(body) == len(trans):
+        fail(f"{path}: global_orient has {len(root)} frames, body_pose {len(body)}, transl {len(trans)}")
+    return np.concatenate([root, body], axis=1), trans, np.zeros((1, 10)), range(len(root)), True, "y up"
+
+
+READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram, "lingo": read_lingo}
 ENDINGS = {".pkl": "wham", ".pickle": "wham", ".pt": "gvhmr", ".npy": "tram"}
 
 

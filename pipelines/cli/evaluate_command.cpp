@@ -4,33 +4,22 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <span>
 
-#include "body/motion_edit.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
-#include "core/log.h"
 #include "core/text.h"
-#include "pipelines/body_files.h"
+#include "optim/motion_metrics.h"
+#include "pipelines/baseline_export.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/contact_metrics.h"
 #include "pipelines/json_text.h"
+#include "pipelines/published.h"
 #include "pipelines/run_folder.h"
-#include "pipelines/scene_setup.h"
-#include "pipelines/tracks.h"
 
 namespace hsi4d::cli {
 namespace {
-
-/// What one input came to.
-struct Evaluation {
-  std::string name, truth;
-  Index frames = 0;
-  double frame_rate = 0;
-  MetricValues values;
-  std::vector<FrameMetrics> per_frame;
-};
 
 /// A metric over the inputs that have it.
 struct Spread {
@@ -38,96 +27,6 @@ struct Spread {
   double mean = 0, deviation = 0;  ///< the sample's standard deviation
   std::size_t count = 0;
 };
-
-/// One path, or of a chain that of each clip.
-std::vector<std::string> truths_of(const EvaluateOptions& options, const std::string& input) {
-  if (!options.truth.empty()) return {options.truth};
-  if (!is_run_folder(input))
-    throw UserError("hsi4d evaluate: " + input +
-                    ": --truth says what it is compared with: a dataset of hsi4d synth, or a motion");
-  std::vector<std::string> truths = truths_of_run(input);
-  if (truths.empty())
-    throw UserError("hsi4d evaluate: " + input +
-                    ": the run's config names no truth that is there (of a chain: of each clip); --truth says what it "
-                    "is compared with");
-  return truths;
-}
-
-/// The skeleton of an avatar; the motions are moved to stand on it.
-RestSkeleton put_on_avatar(const std::string& file, Track& track) {
-  const Avatar avatar = read_avatar(file);
-  track.motion = for_body(track.motion, avatar);
-  return {avatar.parents, avatar.joints};
-}
-
-/// The skeleton of a body model in the motion's own shape.
-RestSkeleton put_on_model(const std::string& file, Track& track) {
-  const SmplxModel model = read_model_for(file, track.name, track.motion.betas);
-  const BodyModel body = rest_body(model, std::span(track.motion.betas).first(static_cast<std::size_t>(model.betas)));
-  track.motion = for_body(track.motion, body);
-  return {body.parents, body.joints};
-}
-
-RestSkeleton put_on_body(const EvaluateOptions& options, const std::string& avatar, Track& track) {
-  return options.body_model.empty() ? put_on_avatar(avatar, track) : put_on_model(options.body_model, track);
-}
-
-/// The avatar of whose body the joints are, where no model is named.
-std::string avatar_for(const EvaluateOptions& options, const std::string& input, const std::string& truth) {
-  if (!options.body_model.empty() || !options.avatar.empty()) return options.avatar;
-  for (const std::string& path : {input, truth}) {
-    const std::string avatar = avatar_of_track(path);
-    if (!avatar.empty()) return avatar;
-  }
-  throw UserError("hsi4d evaluate: " + input + ", " + truth +
-                  ": neither says of what body it is, and errors are those of its joints; --body-model M.npz or "
-                  "--avatar F.safetensors says it");
-}
-
-/// What needs no truth, by frame: sliding of the feet, and contact of the hands where avatar and objects are known.
-/// @param avatar  of whose body the poses are; empty: a body model's
-std::vector<MetricValues> contact_of(const std::string& input, const std::string& avatar, const Track& estimate,
-                                     const AlignedTracks& tracks) {
-  std::vector<std::vector<double>> joints;
-  for (const FrameState& state : tracks.estimate) joints.push_back(state.joints);
-  std::vector<MetricValues> by_frame = sliding_by_frame(joints, tracks.frame_rate);
-  const std::vector<std::string> files = object_files_of_track(input, estimate);
-  if (avatar.empty() || files.empty()) return by_frame;
-  std::vector<Gaussians> gaussians;
-  for (const std::string& file : files) gaussians.push_back(read_object(file));
-  std::vector<const Gaussians*> objects;
-  for (const Gaussians& object : gaussians) objects.push_back(&object);
-  const std::vector<MetricValues> contact = contact_by_frame(read_avatar(avatar), objects, tracks.states);
-  for (std::size_t t = 0; t < contact.size(); ++t)
-    by_frame[t].insert(by_frame[t].end(), contact[t].begin(), contact[t].end());
-  return by_frame;
-}
-
-Evaluation evaluated(const EvaluateOptions& options, const std::string& input) {
-  check_holds_track(input, "run");
-  if (!options.truth.empty()) check_holds_track(options.truth, "dataset");
-  const std::vector<std::string> truths = truths_of(options, input);
-  Track estimate = read_track(input, {options.from_rate, options.person}), truth = read_joined_tracks(truths);
-  const std::string avatar = avatar_for(options, input, truths.front());
-  const RestSkeleton estimate_body = put_on_body(options, avatar, estimate),
-                     truth_body = put_on_body(options, avatar, truth);
-  const AlignedTracks tracks = aligned(estimate, estimate_body, truth, truth_body);
-  Evaluation result{input, joined(truths), std::ssize(tracks.truth), tracks.frame_rate, {}, {}};
-  result.values = sequence_summary(tracks.estimate, tracks.truth, tracks.frame_rate);
-  result.per_frame = sequence_errors(tracks.estimate, tracks.truth);
-  const std::vector<MetricValues> contact =
-      contact_of(input, options.body_model.empty() ? avatar : "", estimate, tracks);
-  const MetricValues means = mean_after_first(contact);
-  result.values.insert(result.values.end(), means.begin(), means.end());
-  for (FrameMetrics& frame : result.per_frame) {
-    const MetricValues& more = contact[static_cast<std::size_t>(frame.frame)];
-    frame.values.insert(frame.values.end(), more.begin(), more.end());
-  }
-  for (const auto& [name, value] : result.values) {
-    if (!std::isfinite(value)) throw DataError(input + ": " + name + " is not a finite number");
-  }
-  return result;
-}
 
 void remove_member(ConfigValue& object, std::string_view key) {
   std::erase_if(object.members, [key](const ConfigMember& member) { return member.key == key; });
@@ -171,14 +70,27 @@ std::vector<Spread> spreads_of(const std::vector<Evaluation>& results) {
   return spreads;
 }
 
-std::string table_of(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean) {
-  std::vector<std::vector<std::string>> rows(1, {""});
+/// How far repetitions are apart.
+struct Diversity {
+  const MetricFacts* facts;
+  double value;
+};
+
+/// Rows of text, of which the first is the header.
+using Rows = std::vector<std::vector<std::string>>;
+
+std::string label_of(const MetricFacts& facts) {
+  return std::string(facts.label) + (facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]");
+}
+
+std::string table_of(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean,
+                     const std::vector<Diversity>& diversity) {
+  Rows rows(1, {""});
   for (const Evaluation& result : results) rows[0].push_back(result.name);
   if (has_mean) rows[0].emplace_back("mean ± std");
   for (const Spread& spread : spreads) {
     const MetricFacts& facts = *spread.facts;
-    const std::string unit = facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]";
-    std::vector<std::string> row = {std::string(facts.label) + unit};
+    std::vector<std::string> row = {label_of(facts)};
     for (const Evaluation& result : results) {
       const double* const value = find_metric(result.values, facts.name);
       row.push_back(value == nullptr ? "-" : fixed_number(*value, facts.decimals));
@@ -189,14 +101,47 @@ std::string table_of(const std::vector<Evaluation>& results, const std::vector<S
     }
     rows.push_back(std::move(row));
   }
+  for (const auto& [facts, value] : diversity) {
+    std::vector<std::string> row = {label_of(*facts)};
+    row.resize(results.size() + 1, "-");
+    row.push_back(fixed_number(value, facts->decimals));
+    rows.push_back(std::move(row));
+  }
   return table(rows);
+}
+
+/// The paper's figures that some input has a metric for, beside ours.
+std::string published_text(const std::vector<Evaluation>& results) {
+  Rows rows(1, {"beside the paper", "its clips"});
+  for (const Evaluation& result : results) rows[0].push_back(result.name);
+  for (const char* const column : {"ZeroHSI", "others, as published there"}) rows[0].emplace_back(column);
+  for (const PublishedFigure& figure : published_figures()) {
+    std::vector<std::string> row = {std::string(figure.label), figure.is_dynamic ? "dynamic" : "static"};
+    bool is_measured = false;
+    for (const Evaluation& result : results) {
+      const double* const own = own_figure(figure, result.values);
+      is_measured = is_measured || own != nullptr;
+      row.push_back(own == nullptr ? "-" : fixed_number(*own, figure.decimals));
+    }
+    const std::string others = other_figures_text(figure);
+    row.push_back(fixed_number(figure.value, figure.decimals));
+    row.push_back(others.empty() ? "-" : others);
+    if (is_measured) rows.push_back(std::move(row));
+  }
+  if (rows.size() == 1) return "";
+  return "\n" + table(rows) + "Published: " + std::string(kPublishedSource) +
+         ".\nThey are of other clips, which are not public: the order of magnitude can be compared.\n";
 }
 
 std::string frames_text(const std::vector<Evaluation>& results) {
   std::string text;
   for (const Evaluation& result : results)
     text += result.name + ": frames 1 to " + std::to_string(result.frames - 1) + " at " +
-            short_number(result.frame_rate) + " a second, against " + result.truth + "\n";
+            short_number(result.frame_rate) + " a second" + (result.truth.empty() ? "" : ", against " + result.truth) +
+            "\n";
+  for (const Evaluation& result : results) {
+    for (const std::string& note : result.notes) text += result.name + ": " + note + "\n";
+  }
   return text;
 }
 
@@ -213,7 +158,8 @@ ConfigValue object_of(const MetricValues& values) {
 ConfigValue json_of(const Evaluation& result) {
   ConfigValue object = ConfigValue::make_object();
   object.add("name", ConfigValue::make_string(result.name));
-  object.add("truth", ConfigValue::make_string(result.truth));
+  if (!result.truth.empty()) object.add("truth", ConfigValue::make_string(result.truth));
+  if (!result.surface.empty()) object.add("surface", ConfigValue::make_string(result.surface));
   object.add("frames", ConfigValue::make_integer(result.frames));
   object.add("frame_rate", ConfigValue::make_number(result.frame_rate));
   add_numbers(object, result.values);
@@ -228,38 +174,150 @@ ConfigValue json_of(const Evaluation& result) {
   return object;
 }
 
-std::string json_text(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean) {
+ConfigValue published_json() {
+  ConfigValue array = ConfigValue::make_array();
+  for (const PublishedFigure& figure : published_figures()) {
+    ConfigValue object = ConfigValue::make_object();
+    object.add("label", ConfigValue::make_string(figure.label));
+    object.add("clips", ConfigValue::make_string(figure.is_dynamic ? "dynamic" : "static"));
+    if (!figure.metric.empty()) object.add("metric", ConfigValue::make_string(figure.metric));
+    ConfigValue methods = ConfigValue::make_object();
+    methods.add("ZeroHSI", ConfigValue::make_number(figure.value));
+    for (const OtherFigure& other : figure.others) methods.add(other.method, ConfigValue::make_number(other.value));
+    object.add("published", std::move(methods));
+    array.items.push_back(std::move(object));
+  }
+  return array;
+}
+
+std::string json_text(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean,
+                      const std::vector<Diversity>& diversity) {
   ConfigValue root = ConfigValue::make_object(), all = ConfigValue::make_array();
   for (const Evaluation& result : results) all.items.push_back(json_of(result));
   root.add("results", std::move(all));
-  if (!has_mean) return to_json(root);
-  MetricValues means, deviations;
-  for (const Spread& spread : spreads) {
-    means.emplace_back(spread.facts->name, spread.mean);
-    if (spread.count > 1) deviations.emplace_back(spread.facts->name, spread.deviation);
+  if (has_mean) {
+    MetricValues means, deviations;
+    for (const Spread& spread : spreads) {
+      means.emplace_back(spread.facts->name, spread.mean);
+      if (spread.count > 1) deviations.emplace_back(spread.facts->name, spread.deviation);
+    }
+    for (const auto& [facts, value] : diversity) means.emplace_back(facts->name, value);
+    root.add("mean", object_of(means));
+    root.add("std", object_of(deviations));
   }
-  root.add("mean", object_of(means));
-  root.add("std", object_of(deviations));
+  ConfigValue published = ConfigValue::make_object();
+  published.add("source", ConfigValue::make_string(kPublishedSource));
+  published.add("figures", published_json());
+  root.add("published", std::move(published));
   return to_json(root);
+}
+
+/// The mean distance over all pairs of repetitions, in the world and of poses alone.
+std::vector<Diversity> diversity_of(const std::vector<Evaluation>& results) {
+  std::vector<std::vector<std::span<const double>>> motions;
+  for (const Evaluation& result : results) {
+    if (result.frame_rate != results.front().frame_rate ||
+        result.joints.front().size() != results.front().joints.front().size())
+      return {};
+    motions.emplace_back(result.joints.begin() + 1, result.joints.end());
+  }
+  std::vector<Diversity> diversity;
+  for (const auto& [name, is_of_poses] : {std::pair{"diversity_mm", false}, {"diversity_pose_mm", true}}) {
+    const std::optional<double> value = pairwise_distance_mm(motions, is_of_poses);
+    if (value) diversity.push_back({find_metric_facts(name), *value});
+  }
+  return diversity;
+}
+
+// ---- Options ----
+
+std::optional<UpAxis> parse_up(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  if (text == "y") return UpAxis::kY;
+  if (text == "z") return UpAxis::kZ;
+  throw UserError("hsi4d evaluate: --up: \"" + text + "\" is not known; allowed: y, z");
+}
+
+MotionAlign parse_align(const std::string& text) {
+  std::vector<std::string> known;
+  for (const auto& choice : kMotionAligns) {
+    if (choice.name == text) return choice.value;
+    known.emplace_back(choice.name);
+  }
+  throw UserError("hsi4d evaluate: --align: \"" + text + "\" is not known; allowed: " + joined(known));
+}
+
+std::vector<std::pair<std::string, std::string>> parse_object_surfaces(const std::vector<std::string>& texts) {
+  std::vector<std::pair<std::string, std::string>> surfaces;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+      throw UserError("hsi4d evaluate: --object-surface: \"" + text + "\"; allowed: NAME=FILE");
+    surfaces.emplace_back(text.substr(0, equals), text.substr(equals + 1));
+  }
+  return surfaces;
+}
+
+EvaluationSettings settings_of(const EvaluateOptions& options) {
+  EvaluationSettings settings = options.settings;
+  settings.up = parse_up(options.up);
+  settings.align = parse_align(options.align);
+  settings.object_surfaces = parse_object_surfaces(options.object_surfaces);
+  if (!settings.body_model.empty() && !settings.avatar.empty())
+    throw UserError("hsi4d evaluate: --body-model and --avatar both say of what body the joints are; give one");
+  if (!settings.surface.empty() + !settings.occupancy.empty() + !settings.scene.empty() > 1)
+    throw UserError("hsi4d evaluate: --surface, --occupancy and --scene each say what is solid; give one");
+  check_rate(settings.from_rate, "hsi4d evaluate: --from-rate");
+  check_rate(settings.frame_rate, "hsi4d evaluate: --frame-rate");
+  if (!options.clips.empty() && options.clips.size() != options.inputs.size())
+    throw UserError("hsi4d evaluate: --clip: " + count_text(std::ssize(options.clips), "file") + " for " +
+                    count_text(std::ssize(options.inputs), "input") + "; allowed: one for each, in their order");
+  return settings;
+}
+
+/// The embeddings of an input: what is given, or clip.npz in a run's folder.
+std::string clip_of(const EvaluateOptions& options, std::size_t index) {
+  if (!options.clips.empty()) return options.clips[index];
+  const std::filesystem::path file = std::filesystem::path(options.inputs[index]) / "clip.npz";
+  return is_run_folder(options.inputs[index]) && std::filesystem::exists(file) ? file.string() : "";
+}
+
+void check_outputs(const EvaluateOptions& options) {
+  if (options.json.empty()) return;
+  const EvaluationSettings& s = options.settings;
+  check_no_input(options.json, "hsi4d evaluate: --json",
+                 {s.truth, s.data, s.body_model, s.avatar, s.surface, s.occupancy, s.scene, s.objects});
+  check_no_input(options.json, "hsi4d evaluate: --json", options.inputs);
+  check_no_input(options.json, "hsi4d evaluate: --json", options.clips);
+  check_writable(options.json);
+}
+
+/// What was exported, a line an input.
+std::string exported(const EvaluateOptions& options, const EvaluationSettings& settings) {
+  std::string text;
+  if (options.export_folder.empty()) return text;
+  const std::filesystem::path folder = options.export_folder;
+  for (std::size_t i = 0; i < options.inputs.size(); ++i) {
+    const std::filesystem::path own = options.inputs.size() == 1 ? folder : folder / std::to_string(i);
+    text += export_for_baselines(settings, options.inputs[i], own.string()) + "\n";
+  }
+  return text;
 }
 
 }  // namespace
 
 std::string evaluate_command(const EvaluateOptions& options) {
-  if (!options.body_model.empty() && !options.avatar.empty())
-    throw UserError("hsi4d evaluate: --body-model and --avatar both say of what body the joints are; give one");
-  check_rate(options.from_rate, "hsi4d evaluate: --from-rate");
-  if (!options.json.empty()) {
-    check_no_input(options.json, "hsi4d evaluate: --json", {options.truth, options.body_model, options.avatar});
-    check_no_input(options.json, "hsi4d evaluate: --json", options.inputs);
-    check_writable(options.json);
-  }
+  const EvaluationSettings settings = settings_of(options);
+  check_outputs(options);
   std::vector<Evaluation> results;
-  for (const std::string& input : options.inputs) results.push_back(evaluated(options, input));
+  for (std::size_t i = 0; i < options.inputs.size(); ++i)
+    results.push_back(evaluate(settings, options.inputs[i], clip_of(options, i)));
   const std::vector<Spread> spreads = spreads_of(results);
   const bool is_alike = are_repetitions(options.inputs);
-  if (!options.json.empty()) write_text_file(options.json, json_text(results, spreads, is_alike));
-  return table_of(results, spreads, is_alike && results.size() > 1) + "\n" + frames_text(results);
+  const std::vector<Diversity> diversity = is_alike ? diversity_of(results) : std::vector<Diversity>();
+  if (!options.json.empty()) write_text_file(options.json, json_text(results, spreads, is_alike, diversity));
+  return table_of(results, spreads, is_alike && results.size() > 1, diversity) + "\n" + frames_text(results) +
+         published_text(results) + exported(options, settings);
 }
 
 }  // namespace hsi4d::cli

@@ -1,24 +1,27 @@
-// `hsi4d evaluate`: errors of runs and motions against the truth.
+// `hsi4d evaluate`: errors of runs and motions against the truth, and what of them needs none.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
+
+#include "pipelines/evaluation.h"
 
 namespace hsi4d::cli {
 
 struct EvaluateOptions {
-  std::vector<std::string> inputs;  ///< folders of runs, motions (.npz), folders of SMPLer-X
-  std::string truth;                ///< --truth PATH; empty: what the run's config names
-  std::string body_model;           ///< --body-model M.npz
-  std::string avatar;               ///< --avatar F.safetensors
-  std::optional<double> from_rate;  ///< --from-rate HZ: of motions, instead of what they say
-  int person = 0;                   ///< --person N, of a folder of SMPLer-X
-  std::string json;                 ///< --json F; empty: none
+  std::vector<std::string> inputs;           ///< folders of runs, motions (.npz), folders of SMPLer-X
+  EvaluationSettings settings;               ///< --truth, --data, --body-model, ...
+  std::vector<std::string> object_surfaces;  ///< --object-surface NAME=F
+  std::string align = "none";                ///< --align none|heading|rotation
+  std::string up;                            ///< --up y|z; empty: to be found
+  std::vector<std::string> clips;            ///< --clip F.npz, one for each input; none: RUN/clip.npz where it is there
+  std::string json;                          ///< --json F; empty: none
+  std::string export_folder;                 ///< --export DIR; empty: none
 };
 
 /// A table with a row for each metric of summary.json that can be measured, and a column for each input; for several
-/// their mean and standard deviation too. Writes the JSON file.
+/// repetitions their mean, standard deviation and diversity too. Then what was taken for the truth, the scene and the
+/// world of each, and the paper's figures beside ours. Writes the JSON file, and what other methods start from.
 ///
 /// Throws UserError or DataError with one message for whatever is wrong with options and files.
 std::string evaluate_command(const EvaluateOptions& options);

@@ -182,31 +182,68 @@ struct CommandLine {
 
   void add_evaluate() {
     EvaluateOptions& o = evaluate;
+    EvaluationSettings& s = o.settings;
     CLI::App* command =
-        app.add_subcommand("evaluate", "Errors of runs and motions against the truth, by summary.json's names");
+        app.add_subcommand("evaluate", "Errors of runs and motions against the truth, and what of them needs none");
     command
         ->add_option("RUN", o.inputs,
                      "Folders of runs, motions by AMASS's or SMPL-X's names (.npz), folders of SMPLer-X's files")
         ->required();
     command
         ->add_option(
-            "--truth", o.truth,
+            "--truth", s.truth,
             "What they are compared with: a dataset of hsi4d synth, a run, a motion; for runs what their config "
             "names, without")
         ->type_name("PATH");
     command
-        ->add_option("--body-model", o.body_model,
+        ->add_option("--data", s.data, "A dataset or run in whose scene the motions are, with its objects and avatar")
+        ->type_name("PATH");
+    command
+        ->add_option("--body-model", s.body_model,
                      "A SMPL-X file: joints are those of this body, each motion's in its own shape")
         ->type_name("M.npz");
     command
-        ->add_option("--avatar", o.avatar,
+        ->add_option("--avatar", s.avatar,
                      "Joints are those of this avatar; without either, of the avatar of the run or dataset")
         ->type_name("F.safetensors");
-    command->add_option("--from-rate", o.from_rate, "Frames a second of the motions, instead of what they say")
+    add_evaluate_scene(*command);
+    command->add_option("--from-rate", s.from_rate, "Frames a second of the motions, instead of what they say")
         ->type_name("HZ");
-    command->add_option("--person", o.person, "Which person of a folder, from 0")->check(WholeNumber())->type_name("N");
+    command->add_option("--frame-rate", s.frame_rate, "Frames a second to measure at, instead of the slower ones")
+        ->type_name("HZ");
+    command->add_option("--up", o.up, "Which axis of motions is up, y or z, instead of what is found")
+        ->type_name("AXIS");
+    command
+        ->add_option("--align", o.align,
+                     "How a motion is laid on frame 0 of the truth or the data: none, heading or rotation")
+        ->type_name("HOW");
+    command->add_option("--person", s.person, "Which person of a folder, from 0")->check(WholeNumber())->type_name("N");
+    command
+        ->add_option("--clip", o.clips,
+                     "Embeddings by CLIP, a file for each RUN; without, clip.npz in a run's folder where it is there")
+        ->type_name("F.npz")
+        ->allow_extra_args(false);
     command->add_option("--json", o.json, "Write all numbers into a file, those of each frame too")->type_name("F");
+    command
+        ->add_option("--export", o.export_folder,
+                     "Write trajectories and initial states there, for TRUMANS, LINGO and CHOIS to start from")
+        ->type_name("DIR");
     command->callback([this] { run = [this] { return evaluate_command(evaluate); }; });
+  }
+
+  /// What is solid, and where objects are.
+  void add_evaluate_scene(CLI::App& command) {
+    EvaluationSettings& s = evaluate.settings;
+    command.add_option("--surface", s.surface, "A mesh of what is solid (.obj, .ply, .glb)")->type_name("F");
+    command.add_option("--occupancy", s.occupancy, "A grid of voxels instead, free or occupied")->type_name("F.npz");
+    command.add_option("--scene", s.scene, "Gaussians instead, of what they show")->type_name("F.ply");
+    command.add_option("--objects", s.objects, "Poses of objects beside a motion, as a run's objects.npz")
+        ->type_name("F.npz");
+    command
+        .add_option("--object-surface", evaluate.object_surfaces,
+                    "A mesh of an object, instead of what its Gaussians show; may be given several times")
+        ->type_name("NAME=F")
+        ->allow_extra_args(false);
   }
 
   void add_report() {

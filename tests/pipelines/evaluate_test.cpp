@@ -47,6 +47,21 @@ TEST_CASE("the errors of a frame have the names and units of the summary") {
   for (const auto& [name, number] : errors) CHECK(find_metric_facts(name) != nullptr);
 }
 
+TEST_CASE("points of the objects give ADD and ADD-S as means over the objects") {
+  const FrameState truth = state_at(0);
+  FrameState estimate = state_at(0);
+  estimate.world_from_object[0].translation[2] += 0.03;
+  Gaussians pair;
+  pair.means = {0.5F, 0, 0, -0.5F, 0, 0};
+  pair.opacity_logits = {0, 0};
+  const ObjectPoints points({&pair});
+  CHECK(value(frame_errors(estimate, truth, &points), "object_add_cm") == Approx(3));
+  CHECK(value(frame_errors(estimate, truth, &points), "object_add_s_cm") == Approx(3));
+  CHECK(find_metric(frame_errors(estimate, truth), "object_add_cm") == nullptr);
+  const ObjectPoints two({&pair, &pair});
+  CHECK_THROWS_AS(frame_errors(estimate, truth, &two), InternalError);
+}
+
 TEST_CASE("what is absent is not measured") {
   FrameState estimate = state_at(0), truth = state_at(0);
   estimate.joints.clear();
@@ -65,7 +80,7 @@ TEST_CASE("means over a sequence leave out frame 0, which is given") {
     truth.push_back(state_at(0));
     estimate.push_back(state_at(t == 0 ? 100 : t * 0.01));
   }
-  const std::vector<FrameMetrics> per_frame = sequence_errors(estimate, truth);
+  const std::vector<FrameMetrics> per_frame = sequence_errors(estimate, truth, 10);
   REQUIRE(per_frame.size() == 4);
   CHECK(per_frame[0].frame == 1);
   CHECK(value(per_frame[3].values, "root_translation_mm") == Approx(40));
@@ -73,9 +88,12 @@ TEST_CASE("means over a sequence leave out frame 0, which is given") {
   const MetricValues means = sequence_summary(estimate, truth, 10);
   CHECK(value(means, "root_translation_mm") == Approx(25));
   CHECK(value(means, "jitter") == Approx(0).margin(1e-9));  // a constant speed from frame 0 on
+  CHECK(value(means, "acceleration_error") == Approx(0).margin(1e-9));
+  CHECK(find_metric(per_frame[3].values, "acceleration_error") == nullptr);  // there is no frame after it
+  CHECK(value(per_frame[0].values, "acceleration_error") > 1000);            // of frame 0, 100 m away
   const std::vector<FrameState> three(estimate.begin(), estimate.begin() + 3);
   CHECK(find_metric(sequence_summary(three, std::span(truth).first(3), 10), "jitter") == nullptr);
-  CHECK_THROWS_AS(sequence_errors(three, truth), InternalError);
+  CHECK_THROWS_AS(sequence_errors(three, truth, 10), InternalError);
 }
 
 TEST_CASE("a metric that some frames lack is averaged over those that have it") {

@@ -70,7 +70,7 @@ TEST_CASE("tracks of different rates are compared at the moments of the slower o
           is_estimate_dense ? aligned(dense, body, sparse, body) : aligned(sparse, body, dense, body);
       CHECK(both.frame_rate == slow);
       CHECK(std::ssize(both.truth) == std::min<Index>(12, static_cast<Index>(30 / fast * slow + 1e-9) + 1));
-      const std::vector<FrameMetrics> errors = sequence_errors(both.estimate, both.truth);
+      const std::vector<FrameMetrics> errors = sequence_errors(both.estimate, both.truth, both.frame_rate);
       for (const auto& [name, value] : errors.back().values) {
         INFO(name);
         CHECK(value < (name == "camera_translation_cm" || name.ends_with("mm") ? 1e-6 : 1e-5));
@@ -92,9 +92,10 @@ TEST_CASE("what one of two tracks does not have is not measured") {
     return names;
   };
   using Names = std::vector<std::string>;
-  const Names of_body = {"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "root_translation_mm", "jitter"};
+  const Names of_body = {"mpjpe_mm",           "pa_mpjpe_mm", "world_mpjpe_mm", "root_translation_mm",
+                         "acceleration_error", "jitter"};
   CHECK(names_of(track, truth) == Names{"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "world_mpjpe_image_mm",
-                                        "world_mpjpe_depth_mm", "root_translation_mm", "jitter"});
+                                        "world_mpjpe_depth_mm", "root_translation_mm", "acceleration_error", "jitter"});
   CHECK(names_of(truth, track) == of_body);
   CHECK(names_of(track, track) == of_body);
 

@@ -130,6 +130,27 @@ def wham():
     refused("frame 2 has a number that is not finite", "export_motion.py", "bad.pkl", "w.npz")
 
 
+def lingo():
+    one = {
+        "transl": rng.normal(size=(6, 3)),
+        "global_orient": tensor(rng.normal(size=(6, 3)) * 0.5),
+        "body_pose": rng.normal(size=(6, 63)) * 0.3,
+        "scene_name": "room",
+        "raw_text": ["sit down"],
+    }
+    save("output__demo__0.pkl", one)
+    assert "6 frames, lingo" in export("export_motion.py", "output__demo__0.pkl", "n.npz", "--from", "lingo")
+    out = np.load("n.npz")
+    close(out["trans"] + em.SMPLX_PELVIS, (one["transl"] + em.SMPLX_PELVIS) @ Z_UP.T)
+    close(em.matrix_of_vector(np, out["root_orient"]), Z_UP @ em.matrix_of_vector(np, one["global_orient"].array))
+    close(out["pose_body"], one["body_pose"])
+    close(out["pelvis_rest"], em.SMPLX_PELVIS, 0)
+    reads("n.npz")
+    refused("there is no camera", "export_motion.py", "output__demo__0.pkl", "n.npz", "--from", "lingo", "--in-camera")
+    save("short.pkl", {**one, "transl": one["transl"][:5]})
+    refused("global_orient has 6 frames, body_pose 6, transl 5", "export_motion.py", "short.pkl", "n.npz", "--from", "lingo")
+
+
 def tram():
     turns = em.matrix_of_vector(np, rng.normal(size=(6, 3)) * 0.2)
     places = rng.normal(size=(6, 3))
@@ -198,7 +219,7 @@ def vposer():
 
 folder = tempfile.TemporaryDirectory()
 os.chdir(folder.name)
-for test in (rotations, gvhmr, wham, tram, vposer):
+for test in (rotations, gvhmr, wham, lingo, tram, vposer):
     test()
     print(test.__name__, "passed")
 refused("there is no such file", "export_motion.py", "nowhere.pkl", "w.npz")

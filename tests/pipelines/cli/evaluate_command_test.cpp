@@ -4,7 +4,11 @@
 
 #include <catch2/catch.hpp>
 
+#include "body/motion_edit.h"
 #include "body/motion_io.h"
+#include "core/npz.h"
+#include "core/rotation.h"
+#include "tests/optim/meshes.h"
 #include "tests/pipelines/tiny_run.h"
 #include "tests/support/procedural_file.h"
 #include "tests/support/program.h"
@@ -59,8 +63,15 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
     CHECK(one[name].get<double>() == Approx(value.get<double>()).margin(1e-9));
     ++count;
   }
-  for (const char* name : {"contact_share", "foot_sliding_mm"}) CHECK(one.contains(name));
-  CHECK(count == 13 + (one.contains("contact_distance_mm") ? 1 : 0));
+  for (const char* name :
+       {"contact_share", "foot_sliding_mm", "penetration_share", "penetration_depth_mm", "object_penetration_share",
+        "object_add_cm", "object_add_s_cm", "acceleration_error", "psnr_db", "psnr_foreground_db", "ssim"})
+    CHECK(one.contains(name));
+  for (const auto& [name, value] : summary["metrics"].back().items()) {
+    INFO(name);
+    CHECK((find_metric_facts(name) == nullptr || one.contains(name)));
+  }
+  CHECK(count == 23 + (one.contains("contact_distance_mm") ? 1 : 0));
   CHECK(one["per_frame"].size() == kTinyFrames - 1);
   CHECK(one["per_frame"][0]["frame"] == 1);
   CHECK(one["per_frame"][2]["mpjpe_mm"].get<double>() ==
@@ -80,7 +91,16 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
   const ProgramResult table = run_hsi4d({"evaluate", "one", "three"});
   CHECK(table.err.empty());
   CHECK_THAT(table.out, StartsWith("                         one") && Contains("mean ± std\nMPJPE [mm] ") &&
-                            Contains("\n\none: frames 1 to 3 at 10 a second, against " + data("truth") + "\n"));
+                            Contains("\n\none: frames 1 to 3 at 10 a second, against " + data("truth") + "\n") &&
+                            Contains("one: penetration by the mesh " + data("truth/surface.ply") +
+                                     ", of 500 points of the body\n") &&
+                            Contains("\ndiversity [mm] ") && Contains("0.835    CHOIS 0.687, LINGO 0.699\n"));
+  // Two repetitions: one pair.
+  CHECK(both["mean"]["diversity_mm"].get<double>() > 0);
+  CHECK_FALSE(one.contains("diversity_mm"));
+  CHECK(both["published"]["figures"][0]["published"]["TRUMANS"] == 0.046);
+  const nlohmann::json alike = evaluated({"one", "one"});
+  CHECK(alike["mean"]["diversity_mm"] == 0);
   CHECK_THAT(run_hsi4d({"evaluate", "one"}).out, !Contains("mean"));
 
   SECTION("a motion has what is known of its body, on the dataset's avatar") {
@@ -89,6 +109,12 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
       CHECK(motion["results"][0][name] == one[name]);
     for (const char* name : {"object_translation_cm", "camera_rotation_deg"})
       CHECK_FALSE(motion["results"][0].contains(name));
+    CHECK(motion["results"][0]["penetration_share"] == one["penetration_share"]);
+    // With the poses of its object beside it, that too.
+    const nlohmann::json with_object =
+        evaluated({"one/motion.npz", "--objects", "one/objects.npz", "--truth", TinyDataset::folder().string()});
+    for (const char* name : {"object_translation_cm", "object_add_s_cm", "contact_share", "object_penetration_share"})
+      CHECK(with_object["results"][0][name].get<double>() == Approx(one[name].get<double>()).margin(1e-9));
     CHECK(motion["std"].empty());
     // Thirty frames a second have the same places at the moments of the truth.
     const nlohmann::json fast = evaluated({"one/motion_30fps.npz", "--truth", data("truth")});
@@ -117,9 +143,12 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
     CHECK(refused({"one"}) == "one: the run has no motion.npz; it has not come to its end\n");
     write_changed("two/config.resolved.json", "two/config.resolved.json",
                   [](auto& tree) { tree["data"]["truth"] = ""; });
-    CHECK(refused({"two"}) ==
-          "hsi4d evaluate: two: the run's config names no truth that is there (of a chain: of each clip); --truth says "
-          "what it is compared with\n");
+    const nlohmann::json alone = evaluated({"two"})["results"][0];  // what needs no truth
+    CHECK_FALSE((alone.contains("truth") || alone.contains("mpjpe_mm")));
+    for (const char* name : {"jitter", "foot_sliding_mm", "contact_share", "penetration_share", "psnr_db"})
+      CHECK(alone.contains(name));
+    CHECK_THAT(run_hsi4d({"evaluate", "two"}).out,
+               Contains("two: there is no truth: errors are not measured (--truth names one)\n"));
     CHECK(evaluated({"two", "--truth", data("truth")})["results"][0]["mpjpe_mm"] == b);
   }
 }
@@ -128,7 +157,8 @@ TEST_CASE("what evaluate cannot compare is told") {
   const TemporaryFolder here;
   const std::string motion = data("initial_motion.npz"), truth = TinyDataset::folder().string();
   CHECK(refused({motion}) == "hsi4d evaluate: " + motion +
-                                 ": --truth says what it is compared with: a dataset of hsi4d synth, or a motion\n");
+                                 ": does not say of what body it is, and errors are those of its joints; --body-model "
+                                 "M.npz or --avatar F.safetensors says it\n");
   CHECK(refused({"none.npz", "--truth", truth}) == "none.npz: there is no such file or folder\n");
   CHECK(refused({motion, "--truth", "none"}) == "none: there is no such file or folder\n");
   here.write("note.txt", "text");
@@ -160,4 +190,114 @@ TEST_CASE("what evaluate cannot compare is told") {
   CHECK_THAT(refused({motion, "--truth", dataset.path.string()}),
              Contains("objects.npz: holds 4 frames, the motion beside it has 5 frames"));
   CHECK(refused({}).find("RUN") != std::string::npos);
+  CHECK(refused({motion, "--truth", truth, "--up", "x"}) ==
+        "hsi4d evaluate: --up: \"x\" is not known; allowed: y, z\n");
+  CHECK(refused({motion, "--truth", truth, "--align", "all"}) ==
+        "hsi4d evaluate: --align: \"all\" is not known; allowed: heading, rotation, none\n");
+  CHECK(refused({motion, "--truth", truth, "--object-surface", "can"}) ==
+        "hsi4d evaluate: --object-surface: \"can\"; allowed: NAME=FILE\n");
+  CHECK(refused({motion, "--truth", truth, "--surface", "a.ply", "--occupancy", "b.npz"}) ==
+        "hsi4d evaluate: --surface, --occupancy and --scene each say what is solid; give one\n");
+  CHECK(refused({motion, "--truth", truth, "--clip", "a.npz", "--clip", "b.npz"}) ==
+        "hsi4d evaluate: --clip: 2 files for 1 input; allowed: one for each, in their order\n");
+  CHECK(refused({truth, "--truth", truth, "--frame-rate", "25"}) ==
+        "--frame-rate: 25 is above the 10 frames a second of " + truth + " or " + truth +
+            ", and what is between frames is not known; allowed: up to 10\n");
+  CHECK(refused({truth, "--truth", truth, "--object-surface", "vase=a.ply"}) ==
+        "hsi4d evaluate: --object-surface: " + truth + " has no object \"vase\"; there is watering_can\n");
+}
+
+TEST_CASE("what is solid is told by a mesh, by voxels or by Gaussians", "[run]") {
+  const TemporaryFolder here;
+  const std::string truth = TinyDataset::folder().string();
+  // Solid is all below 0.5 m, which the legs are in.
+  write_mesh("half.ply", box_mesh({-20, -20, -20}, {20, 20, 0.5}));
+  NpzWriter file;
+  std::vector<std::uint8_t> voxels;
+  for (int i = 0; i < 60 * 60; ++i) {
+    for (int k = 0; k < 30; ++k) voxels.push_back(k < 15 ? 1 : 0);
+  }
+  file.add<std::uint8_t>("occupancy", {60, 60, 30}, voxels);  // of 10 cm, from 1 m below the ground
+  file.add<double>("origin", {3}, {-3, -3, -1});
+  file.add_scalar("voxel_size", 0.1);
+  file.write("half.npz");
+  const nlohmann::json mesh = evaluated({truth, "--surface", "half.ply"})["results"][0];
+  const nlohmann::json grid = evaluated({truth, "--occupancy", "half.npz"})["results"][0];
+  CHECK(mesh["surface"] == "the mesh half.ply");
+  CHECK(grid["surface"] == "the occupancy grid half.npz");
+  CHECK(mesh["penetration_share"].get<double>() > 0.1);
+  CHECK(mesh["penetration_share"].get<double>() < 0.5);
+  CHECK(grid["penetration_share"].get<double>() == Approx(mesh["penetration_share"].get<double>()).margin(1e-9));
+  CHECK(grid["penetration_depth_mm"].get<double>() == Approx(mesh["penetration_depth_mm"].get<double>()).margin(1e-3));
+  const ProgramResult shown = run_hsi4d({"evaluate", truth, "--scene", data("scene.ply")});
+  CHECK_THAT(shown.out, Contains("penetration by the Gaussians of " + data("scene.ply")));
+  // An object's mesh instead of its Gaussians: one that is all around the body.
+  write_mesh("around.ply", box_mesh({-9, -9, -9}, {9, 9, 9}));
+  const nlohmann::json inside = evaluated({truth, "--object-surface", "watering_can=around.ply"})["results"][0];
+  CHECK(inside["object_penetration_share"] == 1);
+  // A body by its vertices.
+  procedural_file().write("body.npz");
+  const nlohmann::json model = evaluated({truth, "--surface", "half.ply", "--body-model", "body.npz"})["results"][0];
+  CHECK(model["penetration_share"].get<double>() == Approx(mesh["penetration_share"].get<double>()).margin(0.1));
+  CHECK(model.contains("contact_share"));
+}
+
+TEST_CASE("embeddings by CLIP are scored, given or in a run's folder") {
+  const TemporaryFolder here;
+  const std::string truth = TinyDataset::folder().string();
+  NpzWriter file;
+  file.add<double>("image_embeddings", {3, 2}, {2, 0, 3, 4, 0, 7});
+  file.add<double>("text_embedding", {2}, {5, 0});
+  file.add_text("model", "ViT-B/32");
+  file.write("e.npz");
+  const nlohmann::json given = evaluated({truth, "--clip", "e.npz"})["results"][0];
+  CHECK(given["clip_score"].get<double>() == Approx(160.0 / 3));
+  CHECK(given["clip_consistency"].get<double>() == Approx(70));
+  const ProgramResult told = run_hsi4d({"evaluate", truth, "--clip", "e.npz"});
+  CHECK_THAT(told.out,
+             Contains("CLIP by e.npz, 3 frames, ViT-B/32\n") && Contains("\nCLIP score ") && Contains("24.01"));
+  CHECK_FALSE(evaluated({truth})["results"][0].contains("clip_score"));
+  fs::create_directory("run");
+  for (const char* name : {"motion.npz", "objects.npz", "cameras.json"})
+    fs::copy_file(TinyDataset::folder() / "truth" / name, fs::path("run") / name);
+  here.write("run/status.json", "{}");
+  fs::copy_file("e.npz", "run/clip.npz");
+  const nlohmann::json found = evaluated({"run", "--data", truth})["results"][0];
+  CHECK(found["clip_score"] == given["clip_score"]);
+  CHECK_FALSE(found.contains("mpjpe_mm"));
+}
+
+TEST_CASE("a motion of another world is laid on frame 0") {
+  const TemporaryFolder here;
+  const std::string truth = TinyDataset::folder().string();
+  Motion motion = read_motion(data("truth/motion.npz"));
+  const Rigid<double> elsewhere{so3_exp(Vector3<double>(0, 0, 1)), {7, -5, 0.2}};
+  write_motion("moved.npz", transformed(motion, elsewhere, motion.pelvis_rest.value_or(kSmplxPelvis)));
+  const auto error = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), "moved.npz");
+    return evaluated(more)["results"][0]["world_mpjpe_mm"].get<double>();
+  };
+  CHECK(error({"--truth", truth}) > 5000);
+  CHECK(error({"--truth", truth, "--align", "heading"}) < 1e-6);
+  CHECK(error({"--truth", truth, "--align", "rotation"}) < 1e-6);
+  // Without a truth on the dataset's own first frame.
+  const nlohmann::json alone = evaluated({"moved.npz", "--data", truth, "--align", "heading"})["results"][0];
+  CHECK(alone["foot_sliding_mm"].get<double>() >= 0);
+  CHECK(refused({"moved.npz", "--avatar", data("avatar.safetensors"), "--align", "heading"}) ==
+        "hsi4d evaluate: --align: moved.npz: there is no frame 0 to lay it on; --truth or --data has one\n");
+  CHECK(refused({truth, "--truth", truth, "--align", "heading"}) ==
+        "hsi4d evaluate: --align moves the body alone, and " + truth + " has objects too\n");
+}
+
+TEST_CASE("trajectories are exported beside the numbers") {
+  const TemporaryFolder here;
+  const std::string truth = TinyDataset::folder().string();
+  const ProgramResult result = run_hsi4d({"evaluate", truth, "--data", truth, "--export", "out"});
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  CHECK_THAT(result.out, Contains("\nout: 10 frames at 30 a second, for TRUMANS, LINGO and CHOIS; grids of "));
+  CHECK(fs::exists("out/lingo/input.json"));
+  CHECK(run_hsi4d({"evaluate", truth, truth, "--export", "two"}).status == 0);
+  CHECK(fs::exists("two/0/trajectory.npz"));
+  CHECK(fs::exists("two/1/trajectory.npz"));
 }

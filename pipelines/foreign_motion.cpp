@@ -1,0 +1,118 @@
+#include "pipelines/foreign_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/motion_edit.h"
+#include "core/check.h"
+#include "core/npz.h"
+#include "core/rotation.h"
+#include "core/text.h"
+
+namespace hsi4d {
+namespace {
+
+constexpr double kLargestShear = 1e-3;  // of R Rᵀ − I
+
+/// The mean over frames of where the body's own up points.
+Vector3<double> mean_upright(const Motion& motion) {
+  Vector3<double> sum = Vector3<double>::Zero();
+  for (const BodyPose& pose : motion.poses)
+    sum += so3_exp(Vector3<double>(pose.axis_angle.data())) * Vector3<double>(0, 1, 0);
+  return sum / static_cast<double>(motion.poses.size());
+}
+
+const NpyArray* first_of(const Npz& file, std::initializer_list<const char*> names) {
+  for (const char* const name : names) {
+    if (file.has(name)) return &file.array(name);
+  }
+  return nullptr;
+}
+
+void require_finite(const NpyArray& array, const std::vector<double>& numbers, std::size_t width) {
+  const auto bad = std::find_if(numbers.begin(), numbers.end(), [](double x) { return !std::isfinite(x); });
+  if (bad != numbers.end())
+    throw DataError(array.source() + ": frame " +
+                    std::to_string(static_cast<std::size_t>(bad - numbers.begin()) / width) +
+                    " has a number that is not finite");
+}
+
+std::vector<double> numbers_of(const NpyArray& array, const std::vector<std::vector<std::int64_t>>& allowed,
+                               std::size_t width) {
+  if (std::find(allowed.begin(), allowed.end(), array.shape()) == allowed.end())
+    throw DataError(array.source() + ": has shape " + shape_text(array.shape()) + "; " + shape_text(allowed.front()) +
+                    " is needed");
+  std::vector<double> numbers = array.as<double>();
+  require_finite(array, numbers, width);
+  return numbers;
+}
+
+Vector3<double> rotation_vector(const NpyArray& array, const double* rows, std::size_t frame) {
+  Matrix3<double> rotation;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) rotation(r, c) = rows[3 * r + c];
+  }
+  const double shear = (rotation * rotation.transpose() - Matrix3<double>::Identity()).cwiseAbs().maxCoeff();
+  const Vector3<double> x = rotation.row(0), y = rotation.row(1), z = rotation.row(2);
+  if (!(shear <= kLargestShear) || dot(cross(x, y), z) < 0)
+    throw DataError(array.source() + ": frame " + std::to_string(frame) + " is no rotation");
+  return so3_log(rotation);
+}
+
+/// One object, as CHOIS has it.
+std::vector<std::vector<ObjectPose>> read_unnamed(const NpyArray& rotations, const NpyArray& places) {
+  const std::int64_t frames = rotations.shape().empty() ? 0 : rotations.shape()[0];
+  const std::vector<double> matrices = numbers_of(rotations, {{frames, 3, 3}}, 9);
+  const std::vector<double> centres = numbers_of(places, {{frames, 3}, {frames, 3, 1}}, 3);
+  std::vector<std::vector<ObjectPose>> poses;
+  for (std::size_t t = 0; t < static_cast<std::size_t>(frames); ++t)
+    poses.push_back(
+        {{rotation_vector(rotations, matrices.data() + 9 * t, t), Vector3<double>(centres.data() + 3 * t)}});
+  return poses;
+}
+
+}  // namespace
+
+UpFinding find_up(const std::string& path, const Motion& motion, std::optional<UpAxis> wanted) {
+  if (wanted) return {*wanted, *wanted == UpAxis::kY ? "y is up, as --up says: turned" : ""};
+  const Npz file = Npz::read(path);
+  if (file.has("mocap_frame_rate") || file.has("mocap_framerate")) return {};
+  const Vector3<double> up = mean_upright(motion);
+  const double least = kUprightShare * up.norm();
+  if (up[1] >= least && up.norm() > 0) return {UpAxis::kY, "y is up, by the posture: turned (--up z if it is not)"};
+  if (up[2] >= least && up.norm() > 0) return {UpAxis::kZ, "z is up, by the posture"};
+  if (up[1] <= -least && up.norm() > 0)
+    throw DataError(path +
+                    ": y points down, by the posture, as in a camera's frame; a motion in the world is needed (--up z "
+                    "or y says that it is one)");
+  return {UpAxis::kZ, "z is taken for up: the posture does not tell (--up y if y is)"};
+}
+
+ObjectPose turned_z_up(const ObjectPose& pose) {
+  const Matrix3<double> turn = z_up_from_y_up().rotation;
+  return {so3_log(Matrix3<double>(turn * so3_exp(pose.rotation))), turn * pose.translation};
+}
+
+ForeignObjects read_motion_objects(const std::string& path, const std::string& unnamed) {
+  const std::string ending = "/rotation";
+  const Npz file = Npz::read(path);
+  ForeignObjects objects;
+  for (const std::string& name : file.names()) {
+    if (name.ends_with(ending)) objects.names.push_back(name.substr(0, name.size() - ending.size()));
+  }
+  if (!objects.names.empty()) {
+    objects.poses = read_object_tracks(path, objects.names);
+    return objects;
+  }
+  const NpyArray* const rotations = first_of(file, {"obj_rot_mat", "obj_rot"});
+  const NpyArray* const places = first_of(file, {"obj_com_pos", "window_obj_com_pos", "obj_trans"});
+  if (rotations == nullptr && places == nullptr) return objects;
+  if (rotations == nullptr || places == nullptr)
+    throw DataError(file.source() + ": has '" +
+                    (rotations == nullptr ? "obj_com_pos' but no 'obj_rot_mat'" : "obj_rot_mat' but no 'obj_com_pos'"));
+  objects.names = {unnamed};
+  objects.poses = read_unnamed(*rotations, *places);
+  return objects;
+}
+
+}  // namespace hsi4d
