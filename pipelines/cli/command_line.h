@@ -5,11 +5,10 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <CLI/CLI.hpp>
 
 #include "optim/loss_term.h"
 #include "pipelines/cli/avatar_command.h"
@@ -36,17 +35,20 @@
 #include "pipelines/cli/sweep_command.h"
 #include "pipelines/cli/synth_command.h"
 
+namespace CLI {
+class App;
+class Option;
+class Validator;
+}  // namespace CLI
+
 namespace hsi4d::cli {
 
 /// Refuses what is no whole number from 0 on, in words.
-class WholeNumber : public CLI::Validator {
- public:
-  explicit WholeNumber(std::int64_t most = std::numeric_limits<std::int64_t>::max());
-};
+CLI::Validator whole_number(std::int64_t most = std::numeric_limits<std::int64_t>::max());
 
 /// The subcommands with their arguments; `run` is what the chosen one does.
 struct CommandLine {
-  CLI::App app{"4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d"};
+  std::unique_ptr<CLI::App> app;
   std::string config, topic, file, out, kind = "run";
   std::vector<std::string> overrides, runs;
   bool print_config = false, quiet = false, json = false;
@@ -73,6 +75,9 @@ struct CommandLine {
   int status = kDone;  ///< that `run` leaves
 
   explicit CommandLine(const std::vector<LossTerm>& terms);
+  ~CommandLine();
+  CommandLine(const CommandLine&) = delete;
+  CommandLine& operator=(const CommandLine&) = delete;
 
  private:
   // command_line_runs.cpp

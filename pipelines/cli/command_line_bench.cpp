@@ -1,13 +1,15 @@
 // Commands that measure the program itself.
+#include <CLI/CLI.hpp>
+
 #include "core/text.h"
 #include "pipelines/cli/command_line.h"
 
 namespace hsi4d::cli {
 
 void CommandLine::add_stress() {
-  CLI::App* command = app.add_subcommand("stress",
-                                         "Try every known way to fail: a row each, with what was measured, what is "
-                                         "allowed, and what it would be without the remedy");
+  CLI::App* command = app->add_subcommand("stress",
+                                          "Try every known way to fail: a row each, with what was measured, what is "
+                                          "allowed, and what it would be without the remedy");
   command->add_option("--row", stress.rows, "Only these: A1, or a letter for its group; default: all")->type_name("ID");
   add_threads(*command, stress.threads);
   command->add_option("--json", stress.json, "File for the figures, one JSON object a row")->type_name("F");
@@ -28,9 +30,9 @@ void CommandLine::add_stress() {
 }
 
 void CommandLine::add_bench(const std::vector<LossTerm>& terms) {
-  CLI::App* command = app.add_subcommand("bench",
-                                         "Measure the speed of the renderer, the body or a whole run, time against "
-                                         "error, or the pixel filter: a table, and one JSON object a measurement");
+  CLI::App* command = app->add_subcommand("bench",
+                                          "Measure the speed of the renderer, the body or a whole run, time against "
+                                          "error, or the pixel filter: a table, and one JSON object a measurement");
   command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter, stages, scaling, pareto")
       ->required()
       ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter", "stages", "scaling", "pareto"}));

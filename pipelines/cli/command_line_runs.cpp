@@ -1,4 +1,6 @@
 // Commands that make, judge and compare runs.
+#include <CLI/CLI.hpp>
+
 #include "pipelines/cli/command_line.h"
 #include "pipelines/study_key.h"
 
@@ -6,14 +8,14 @@ namespace hsi4d::cli {
 
 void CommandLine::add_run(const std::vector<LossTerm>& terms) {
   RunArguments& a = run_arguments;
-  CLI::App* command = app.add_subcommand("run", "Reconstruct a clip as a config says, into a run folder");
+  CLI::App* command = app->add_subcommand("run", "Reconstruct a clip as a config says, into a run folder");
   command->add_option("CONFIG", a.config, "The config file")->required();
   add_overrides(*command, a.overrides);
   command->add_option("--out", a.out,
                       "The run folder; default: the first free runs/NAME, runs/NAME-2, ... with the config's name");
   command->add_flag("--resume", a.resume, "Go on with the run in the folder; the result has the same bits");
   add_threads(*command, a.threads);
-  command->add_option("--seed", a.seed, "Seed, instead of the config's")->check(WholeNumber())->type_name("N");
+  command->add_option("--seed", a.seed, "Seed, instead of the config's")->check(whole_number())->type_name("N");
   command->add_flag("--dry-run", a.dry_run, "Check config and inputs, tell what would be done, write nothing");
   command->add_flag("--print-config", a.print_config, "Print the config with every default filled in, and stop");
   command->callback([this, &terms] { run = [this, &terms] { return run_command(run_arguments, terms); }; });
@@ -21,7 +23,7 @@ void CommandLine::add_run(const std::vector<LossTerm>& terms) {
 
 void CommandLine::add_demo(const std::vector<LossTerm>& terms) {
   DemoArguments& a = demo_arguments;
-  CLI::App* command = app.add_subcommand("demo", "The method on a generated scene with ground truth");
+  CLI::App* command = app->add_subcommand("demo", "The method on a generated scene with ground truth");
   command->add_flag("--quick", a.quick, "256x256 pixels and 8 frames: less than a minute");
   command->add_option("--out", a.out, "Folder of dataset and run; default: the first free runs/demo, runs/demo-2, ...");
   add_overrides(*command, a.overrides);
@@ -32,7 +34,7 @@ void CommandLine::add_demo(const std::vector<LossTerm>& terms) {
 }
 
 void CommandLine::add_synth() {
-  CLI::App* synth = app.add_subcommand("synth", "Make a dataset with exact ground truth");
+  CLI::App* synth = app->add_subcommand("synth", "Make a dataset with exact ground truth");
   synth->add_option("CONFIG", config, "A config; section synthetic says what is made, the rest goes along")->required();
   synth->add_option("--out", out, "Where to: a new or empty folder")->type_name("DIR")->required();
   add_overrides(*synth, overrides);
@@ -42,7 +44,7 @@ void CommandLine::add_synth() {
 
 void CommandLine::add_select_camera() {
   SelectCameraOptions& o = select_camera;
-  CLI::App* command = app.add_subcommand("select-camera", "Choose the camera of a clip's first frame");
+  CLI::App* command = app->add_subcommand("select-camera", "Choose the camera of a clip's first frame");
   command
       ->add_option("CONFIG", o.config,
                    "A config with scene, avatar and initial state; section camera_selection says how")
@@ -58,7 +60,7 @@ void CommandLine::add_evaluate() {
   EvaluateOptions& o = evaluate;
   EvaluationSettings& s = o.settings;
   CLI::App* command =
-      app.add_subcommand("evaluate", "Errors of runs and motions against the truth, and what of them needs none");
+      app->add_subcommand("evaluate", "Errors of runs and motions against the truth, and what of them needs none");
   command
       ->add_option("RUN", o.inputs,
                    "Folders of runs, motions by AMASS's or SMPL-X's names (.npz), folders of SMPLer-X's files")
@@ -88,7 +90,7 @@ void CommandLine::add_evaluate() {
       ->add_option("--align", o.align,
                    "How a motion is laid on frame 0 of the truth or the data: none, heading or rotation")
       ->type_name("HOW");
-  command->add_option("--person", s.person, "Which person of a folder, from 0")->check(WholeNumber())->type_name("N");
+  command->add_option("--person", s.person, "Which person of a folder, from 0")->check(whole_number())->type_name("N");
   command
       ->add_option("--clip", o.clips,
                    "Embeddings by CLIP, a file for each RUN; without, clip.npz in a run's folder where it is there")
@@ -117,7 +119,7 @@ void CommandLine::add_evaluate_scene(CLI::App& command) {
 }
 
 void CommandLine::add_report() {
-  CLI::App* report = app.add_subcommand("report", "Write report.html of runs and sweeps, and print their errors");
+  CLI::App* report = app->add_subcommand("report", "Write report.html of runs and sweeps, and print their errors");
   report->add_option("RUN", runs, "Folders of runs or sweeps")->required();
   report->callback([this] { run = [this] { return report_command(runs); }; });
 }
@@ -125,7 +127,7 @@ void CommandLine::add_report() {
 void CommandLine::add_study() {
   StudyOptions& o = study;
   CLI::App* command =
-      app.add_subcommand("study", "Make a page on which people choose between videos, or tell what they chose");
+      app->add_subcommand("study", "Make a page on which people choose between videos, or tell what they chose");
   command->add_option("RUNS", o.runs, "A and B: two folders of runs, or of folders of runs with the same names")
       ->expected(0, 2)
       ->option_text("A B");
@@ -139,7 +141,7 @@ void CommandLine::add_study() {
       ->check(CLI::Range(1, 1000))
       ->type_name("N");
   command->add_option("--seed", o.seed, "Names of videos and pairs follow from it; default: they are random")
-      ->check(WholeNumber())
+      ->check(whole_number())
       ->type_name("N");
   command->add_flag("--embed", o.embed, "One file: the videos are in the page");
   command->add_flag("--quiet", o.quiet, "No progress on stderr");
@@ -153,14 +155,14 @@ void CommandLine::add_study() {
 
 void CommandLine::add_sweep(const std::vector<LossTerm>& terms) {
   SweepArguments& a = sweep;
-  CLI::App* command = app.add_subcommand("sweep", "Many runs from one file: ablations, grids, clips, seeds");
+  CLI::App* command = app->add_subcommand("sweep", "Many runs from one file: ablations, grids, clips, seeds");
   command->add_option("SWEEP", a.sweep, "The sweep's file, or the folder of one that is to go on")->required();
   command->add_option("--out", a.out, "The sweep's folder; default: runs/NAME with the sweep's name")->type_name("DIR");
   command->add_option("--launcher", a.launcher, "local: processes here; slurm: a job array")
       ->type_name("local|slurm")
       ->capture_default_str();
   command->add_option("--jobs", a.jobs, "The most runs at once; default: as many as there are threads for")
-      ->check(WholeNumber(std::numeric_limits<int>::max()))
+      ->check(whole_number(std::numeric_limits<int>::max()))
       ->type_name("N");
   add_threads(*command, a.threads);
   command->add_option("--memory", a.memory_mb, "Memory for all runs together, MB; default: 90 % of what is free")
@@ -174,13 +176,13 @@ void CommandLine::add_sweep(const std::vector<LossTerm>& terms) {
 
 void CommandLine::add_run_one(const std::vector<LossTerm>& terms) {
   RunOneArguments& a = run_one;
-  CLI::App* command = app.add_subcommand("run-one", "One run of a sweep, by its index in the table of --dry-run");
+  CLI::App* command = app->add_subcommand("run-one", "One run of a sweep, by its index in the table of --dry-run");
   command->add_option("SWEEP", a.sweep, "The sweep's file, or its folder")->required();
-  command->add_option("INDEX", a.index, "From 0")->check(WholeNumber())->required();
+  command->add_option("INDEX", a.index, "From 0")->check(whole_number())->required();
   command->add_option("--out", a.out, "The sweep's folder; default: runs/NAME with the sweep's name")->type_name("DIR");
   add_threads(*command, a.threads);
   command->add_option("--parent", a.parent, "End, with the state saved, when this process does")
-      ->check(WholeNumber(std::numeric_limits<int>::max()))
+      ->check(whole_number(std::numeric_limits<int>::max()))
       ->type_name("PROCESS");
   command->add_flag("--requeue", a.requeue, "On SIGUSR1 save the state and put this job of Slurm into the queue again");
   command->callback([this, &terms] { run = [this, &terms] { return run_one_command(run_one, terms, status); }; });

@@ -1,11 +1,13 @@
 // Commands on files: of Gaussians, bodies, motions, avatars.
+#include <CLI/CLI.hpp>
+
 #include "core/text.h"
 #include "pipelines/cli/command_line.h"
 
 namespace hsi4d::cli {
 
 void CommandLine::add_info() {
-  CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
+  CLI::App* info = app->add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
   info->add_option("FILE", file,
                    "A .ply, .splat, .spz, .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg or .exr file")
       ->required();
@@ -15,7 +17,7 @@ void CommandLine::add_info() {
 
 void CommandLine::add_avatar(const std::vector<LossTerm>& terms) {
   AvatarOptions& o = avatar;
-  CLI::App& command = *app.add_subcommand("avatar", "Make, import, learn or describe the Gaussians of a body");
+  CLI::App& command = *app->add_subcommand("avatar", "Make, import, learn or describe the Gaussians of a body");
   command.require_subcommand(1);
   const auto add_body = [&o](CLI::App& sub) {
     sub.add_option("--betas", o.betas, "Shape of the body model: the first betas; the mean shape without")
@@ -40,7 +42,7 @@ void CommandLine::add_avatar(const std::vector<LossTerm>& terms) {
       ->type_name("X");
   make.add_option("--seed", o.settings.seed, "Seed of the places")
       ->capture_default_str()
-      ->check(WholeNumber())
+      ->check(whole_number())
       ->type_name("N");
   add_body(make);
   make.callback([this] { run = [this] { return avatar_make_command(avatar); }; });
@@ -69,7 +71,7 @@ void CommandLine::add_avatar(const std::vector<LossTerm>& terms) {
 
 void CommandLine::add_convert() {
   ConvertOptions& o = convert;
-  CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: .ply, .splat, .spz");
+  CLI::App& command = *app->add_subcommand("convert", "Convert Gaussians between formats: .ply, .splat, .spz");
   command.add_option("IN", o.in, "Gaussians: .ply (INRIA's or compressed), .splat or .spz")->required();
   command.add_option("OUT", o.out, "Where to; the ending says how: .ply, .compressed.ply, .splat or .spz")->required();
   command.add_option("--scale", o.scale, "Multiply lengths, about the origin, first")->type_name("S");
@@ -89,7 +91,7 @@ void CommandLine::add_convert() {
 }
 
 void CommandLine::add_render() {
-  CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image: a scene, objects, a body");
+  CLI::App& command = *app->add_subcommand("render", "Render Gaussians to an image: a scene, objects, a body");
   add_scene(command, render.shared);
   add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
       ->type_name("F.{ply,splat,spz}");
@@ -99,7 +101,7 @@ void CommandLine::add_render() {
       ->type_name("O.npz");
   command.add_option("--motion", render.motion, "Motion of a body that is drawn too")->type_name("M.npz");
   command.add_option("--frame", render.frame, "Frame of motion and objects, from 0")
-      ->check(WholeNumber())
+      ->check(whole_number())
       ->type_name("I");
   command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.safetensors");
   command
@@ -117,7 +119,7 @@ void CommandLine::add_render() {
 }
 
 void CommandLine::add_gradients() {
-  CLI::App& command = *app.add_subcommand("gradients", "Differentiate the difference of a render from an image");
+  CLI::App& command = *app->add_subcommand("gradients", "Differentiate the difference of a render from an image");
   add_scene(command, gradients.shared)->required();
   command.add_option("--target", gradients.target, "The image to compare with")
       ->type_name("F.{exr,png,npz}")
@@ -134,7 +136,7 @@ void CommandLine::add_gradients() {
 }
 
 void CommandLine::add_pose() {
-  CLI::App& command = *app.add_subcommand("pose", "Pose an SMPL-X body: vertices and joints of every frame");
+  CLI::App& command = *app->add_subcommand("pose", "Pose an SMPL-X body: vertices and joints of every frame");
   command.add_option("--body-model", pose.body_model, "The body, a SMPL-X file")->type_name("M.npz")->required();
   command
       .add_option("--params", pose.params,
@@ -157,7 +159,7 @@ void CommandLine::add_pose() {
 }
 
 void CommandLine::add_motion() {
-  CLI::App& command = *app.add_subcommand("motion", "Change a motion of a body: frame rate, up axis, format");
+  CLI::App& command = *app->add_subcommand("motion", "Change a motion of a body: frame rate, up axis, format");
   command.add_option("IN", motion.in, "A motion by AMASS's or SMPL-X's names (.npz), or a folder of SMPLer-X's files")
       ->required();
   command.add_option("OUT", motion.out, "A motion (.npz), or the body in motion (.glb)")->required();
@@ -173,7 +175,7 @@ void CommandLine::add_motion() {
                   "GLB shows; without, the mean SMPL-X pelvis, and the program's own body")
       ->type_name("M.npz");
   command.add_option("--person", motion.person, "Which person of a folder, from 0")
-      ->check(WholeNumber(std::numeric_limits<int>::max()))
+      ->check(whole_number(std::numeric_limits<int>::max()))
       ->type_name("N");
   command.callback([this] { run = [this] { return motion_command(motion); }; });
 }
@@ -184,7 +186,7 @@ CLI::Option* CommandLine::add_scene(CLI::App& command, SceneOptions& options) {
       ->type_name("C.json")
       ->required();
   command.add_option("--camera-frame", options.camera_frame, "Which camera of a file with several, from 0")
-      ->check(WholeNumber())
+      ->check(whole_number())
       ->type_name("I");
   command.add_option("--background", options.background, "Colour behind everything; black without")->type_name("r,g,b");
   command.add_option("--precision", options.precision, "float, double, or reference: brute force in double")

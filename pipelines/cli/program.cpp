@@ -3,6 +3,8 @@
 #include <csignal>
 #include <cstdio>
 
+#include <CLI/CLI.hpp>
+
 #include "core/check.h"
 #include "core/log.h"
 #include "core/simd.h"
@@ -36,18 +38,18 @@ CommandWords words_of(const CLI::App& command) {
 
 int run_commands(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
   CommandLine line(losses);
-  check_words(argc, argv, words_of(line.app));
+  check_words(argc, argv, words_of(*line.app));
   try {
-    line.app.parse(argc, argv);
+    line.app->parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    print(line.app.help());  // of the subcommand, if one was named
+    print(line.app->help());  // of the subcommand, if one was named
     return kDone;
   } catch (const CLI::CallForVersion& version_text) {
     print(std::string(version_text.what()) + "\n");
     return kDone;
   } catch (const CLI::ParseError& mistake) {
     std::string command = "hsi4d";
-    for (auto chosen = line.app.get_subcommands(); !chosen.empty(); chosen = chosen.front()->get_subcommands())
+    for (auto chosen = line.app->get_subcommands(); !chosen.empty(); chosen = chosen.front()->get_subcommands())
       command += " " + chosen.front()->get_name();
     throw UserError(command + ": " + mistake.what() + "; `" + command + " --help` explains its arguments");
   }

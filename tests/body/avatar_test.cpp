@@ -246,7 +246,7 @@ TEST_CASE("an avatar is a function of the settings, and its seed counts") {
 TEST_CASE("selected Gaussians of an avatar keep what is theirs") {
   Avatar whole = small_avatar();
   whole.color_net = new_color_net(whole.means, whole.joint_count(), {});
-  const std::vector<Index> rows = {7, 3, whole.count() - 1};
+  const std::vector<Index> rows = {1, 0, 1};
   const Avatar part = selected(whole, rows);
   check_sizes(part);
   CHECK(part.parents == whole.parents);

