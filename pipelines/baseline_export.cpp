@@ -17,6 +17,7 @@
 #include "optim/object_centres.h"
 #include "pipelines/json_text.h"
 #include "pipelines/run_folder.h"
+#include "pipelines/run_prompt.h"
 #include "pipelines/run_results.h"
 
 namespace hsi4d {
@@ -47,14 +48,6 @@ Point joint_of(const std::vector<double>& joints, Index j) { return Point(joints
 /// x, z, −y of z up are x, y, z of y up: (x, y, z) → (x, z, −y).
 Point y_up(const Point& place) { return {place[0], place[2], -place[1]}; }
 
-std::string prompt_of(const std::string& run) {
-  const std::string file = RunPaths{run}.config();
-  if (!is_run_folder(run) || !fs::exists(file)) return "";
-  const ConfigValue tree = parse_json_text(read_text_file(file), file);
-  const ConfigValue* const sources = find_member(tree, "sources");
-  return sources == nullptr ? "" : string_member(*sources, "prompt");
-}
-
 /// For a body of SMPL-X: of the person's shape where it has one, else of the mean one, with the pelvis where it is.
 Motion for_smplx(const Motion& motion) {
   const bool has_shape = std::any_of(motion.betas.begin(), motion.betas.end(), [](double beta) { return beta != 0; });
@@ -69,7 +62,7 @@ Exported exported(const MotionInScene& in, const std::string& input) {
   out.motion = for_smplx(out.motion);
   out.names = in.track.objects;
   out.states = object_states(in.track, kExportedRate, std::ssize(out.motion.poses));
-  out.text = prompt_of(input);
+  out.text = run_prompt(input);
   return out;
 }
 

@@ -5,6 +5,7 @@
 
 #include "body/motion_edit.h"
 #include "core/check.h"
+#include "core/config_value.h"
 #include "core/npz.h"
 #include "core/rotation.h"
 #include "core/text.h"
@@ -93,6 +94,16 @@ ObjectPose turned_z_up(const ObjectPose& pose) {
   return {so3_log(Matrix3<double>(turn * so3_exp(pose.rotation))), turn * pose.translation};
 }
 
+/// Files are called by objects' names.
+void check_object_name(const std::string& name, const std::string& path) {
+  const bool is_fit = !name.empty() && name != "." && name != ".." &&
+                      std::none_of(name.begin(), name.end(),
+                                   [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; });
+  if (!is_fit)
+    throw DataError(path + ": has an object called " + json_string(name) +
+                    "; allowed are names that a file may have, without / and \\");
+}
+
 ForeignObjects read_motion_objects(const std::string& path, const std::string& unnamed) {
   const std::string ending = "/rotation";
   const Npz file = Npz::read(path);
@@ -100,6 +111,7 @@ ForeignObjects read_motion_objects(const std::string& path, const std::string& u
   for (const std::string& name : file.names()) {
     if (name.ends_with(ending)) objects.names.push_back(name.substr(0, name.size() - ending.size()));
   }
+  for (const std::string& name : objects.names) check_object_name(name, path);
   if (!objects.names.empty()) {
     objects.poses = read_object_tracks(path, objects.names);
     return objects;

@@ -56,7 +56,7 @@ class ShownFrames {
   Image read(Index t) {
     if (has_renders_) return take_channels(read_image(run_.frame_image(static_cast<int>(t), "render")), 0, 3);
     const Image frame = preview_.read(t);
-    const int width = frame.width() / kPreviewPanels;
+    const auto width = static_cast<int>(frame.width() / kPreviewPanels);
     return is_run_ ? crop(frame, 0, kResultPanel * width, frame.height(), width) : frame;
   }
 

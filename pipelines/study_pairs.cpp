@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "pipelines/json_text.h"
 #include "pipelines/run_folder.h"
+#include "pipelines/run_prompt.h"
 
 namespace hsi4d {
 
@@ -58,17 +59,8 @@ Runs runs_in(const std::string& folder) {
   return runs;
 }
 
-/// What happens in a run, as its config says.
-std::string prompt_of(const fs::path& run) {
-  const std::string file = RunPaths{run}.config();
-  if (!fs::exists(file)) return "";
-  const ConfigValue config = parse_json_text(read_text_file(file), file);
-  const ConfigValue* const sources = find_member(config, "sources");
-  return sources == nullptr ? "" : string_member(*sources, "prompt");
-}
-
 std::string text_of_both(const StudyRuns& pair) {
-  const std::string a = prompt_of(pair.a), b = prompt_of(pair.b);
+  const std::string a = run_prompt(pair.a), b = run_prompt(pair.b);
   if (!a.empty() && !b.empty() && a != b)
     throw UserError(pair.a.string() + ", " + pair.b.string() + ": were made of different texts, " + json_string(a) +
                     " and " + json_string(b) + "; --texts says what both are to be compared with");

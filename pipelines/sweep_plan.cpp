@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using Kind = ConfigValue::Kind;
 
 /// Sections of a clip's config that say what is reconstructed, not how.
-constexpr std::array kClipSections = {"data", "chain", "sources", "body", "synthetic"};
+constexpr std::array kClipSections = {"instance", "data", "chain", "sources", "body", "synthetic"};
 /// Settings of section `data` that say how.
 constexpr std::array kMaskSettings = {"mask_threshold", "mask_margin_px"};
 
@@ -276,6 +276,12 @@ class Planner {
     return trees_.emplace(file, std::move(tree)).first->second;
   }
 
+  /// Whether the instance that the config is about has its data in place.
+  bool has_own_data(const ConfigValue& tree) const {
+    ConfigProblems ignored;  // told when the whole is read
+    return has_data(read_run_config(tree, losses_, ignored, ConfigUse::kSettings).instance);
+  }
+
   /// Makes the config of a combination, and its names.
   void complete(Combination& c) {
     ConfigValue tree = tree_of(c.block->base);
@@ -285,7 +291,7 @@ class Planner {
       for (const SweepSetting& setting : *layer)
         lay_into_config(tree, setting.key, setting.value, setting.origin, problems);
     }
-    const bool is_made = is_generated(tree);
+    const bool is_made = is_generated(tree) && !has_own_data(tree);
     if (c.seed) {
       const ConfigValue seed = ConfigValue::make_integer(*c.seed);
       lay_into_config(tree, "seed", seed, {}, problems);

@@ -282,7 +282,28 @@ std::string clip_of(const EvaluateOptions& options, std::size_t index) {
   return is_run_folder(options.inputs[index]) && std::filesystem::exists(file) ? file.string() : "";
 }
 
+/// Refuses to write exports over what somebody has made: into an input, or a folder of something else.
+void check_export(const EvaluateOptions& options) {
+  namespace fs = std::filesystem;
+  if (options.export_folder.empty()) return;
+  const auto whole = [](const std::string& path) { return fs::weakly_canonical(path).string() + "/"; };
+  const std::string folder = whole(options.export_folder);
+  std::vector<std::string> given = options.inputs;
+  given.insert(given.end(), {options.settings.truth, options.settings.data});
+  for (const std::string& input : given) {
+    if (!input.empty() && fs::is_directory(input) && folder.starts_with(whole(input)))
+      throw UserError("hsi4d evaluate: --export: " + options.export_folder + " is in " + input +
+                      ", which is read; choose another folder");
+  }
+  for (const char* const name : {"status.json", "summary.json", "initial.json", "config.json"}) {
+    if (fs::exists(fs::path(options.export_folder) / name))
+      throw UserError("hsi4d evaluate: --export: " + options.export_folder + " holds something else, with a " + name +
+                      "; choose another folder");
+  }
+}
+
 void check_outputs(const EvaluateOptions& options) {
+  check_export(options);
   if (options.json.empty()) return;
   const EvaluationSettings& s = options.settings;
   check_no_input(options.json, "hsi4d evaluate: --json",

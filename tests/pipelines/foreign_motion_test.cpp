@@ -155,3 +155,15 @@ TEST_CASE("objects in a motion's file turn with its world") {
   CHECK(objects.names == std::vector<std::string>{"box"});
   CHECK(objects.poses[0][0].translation == Vector3<double>(4, 5, 6));
 }
+
+TEST_CASE("objects of a motion have names that files may have") {
+  const TemporaryFolder here;
+  for (const std::string name : {"../x", "/x", "a/b", "..", ""}) {
+    INFO(name);
+    NpzWriter file;
+    file.add<double>(name + "/rotation", {1, 3}, {0, 0, 0});
+    file.add<double>(name + "/translation", {1, 3}, {0, 0, 0});
+    file.write("m.npz");
+    CHECK_THROWS_WITH(read_motion_objects("m.npz", "object"), Contains("m.npz: has an object called \"" + name + "\""));
+  }
+}

@@ -495,7 +495,19 @@ TEST_CASE("every shipped ablation runs", "[run][full]") {
     CHECK(check_shipped_config(shipped_configs() / "ablations" / name, fs::path(name).stem().string(), false));
     ++count;
   }
-  CHECK(count == 19);
+  CHECK(count == 20);
+}
+
+TEST_CASE("the ablation of the refinement is the best config without it") {
+  const auto read = [](const fs::path& file) {
+    return load_run_config(shipped_configs() / file, {}, descriptions_of(loss_terms()), ConfigUse::kStages);
+  };
+  RunConfig without = read("best.json");
+  const RunConfig ablation = read("ablations/no_refinement.json");
+  std::erase_if(without.stages, [](const auto& stage) { return stage.first == "refinement"; });
+  without.name = ablation.name;
+  CHECK(resolved_config(ablation, descriptions_of(loss_terms())) ==
+        resolved_config(without, descriptions_of(loss_terms())));
 }
 
 TEST_CASE("every shipped clip of the accuracy table runs", "[run][release]") {

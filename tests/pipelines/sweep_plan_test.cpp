@@ -11,6 +11,7 @@ using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
 using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -294,4 +295,20 @@ TEST_CASE("a plan is read as it was written") {
   std::string damaged = text;
   damaged.replace(damaged.find(plan.runs[0].id), 16, "../../etc/passwd");
   CHECK_THROWS_WITH(parse_sweep_plan(damaged, "p.json"), Contains("/runs/0/id: \"../../etc/passwd\" is not the name"));
+}
+
+TEST_CASE("a clip whose instance has its data in place is that data") {
+  const TemporaryFolder here;
+  write_tiny_base();
+  here.write("clip.json",
+             R"({"instance": {"folder": "there", "prompt": "A person walks."}, "synthetic": {"frames": 3}})");
+  const Json sweep = {{"clips", {{"a", "clip.json"}}}};
+  const SweepPlan made = plan_of(sweep);
+  CHECK(made.runs[0].dataset.size() == 16);
+  CHECK(at(made.runs[0], "/instance/prompt") == "A person walks.");
+  fs::copy(TinyDataset::folder(), "there", fs::copy_options::recursive);
+  const SweepPlan given = plan_of(sweep);
+  CHECK(given.runs[0].dataset.empty());
+  CHECK(given.runs[0].id != made.runs[0].id);
+  CHECK_THAT(at(given.runs[0], "/data/scene").get<std::string>(), Contains("there/scene.ply"));
 }

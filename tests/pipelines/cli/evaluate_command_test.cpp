@@ -298,6 +298,13 @@ TEST_CASE("trajectories are exported beside the numbers") {
   CHECK_THAT(result.out, Contains("\nout: 10 frames at 30 a second, for TRUMANS, LINGO and CHOIS; grids of "));
   CHECK(fs::exists("out/lingo/input.json"));
   CHECK(run_hsi4d({"evaluate", truth, truth, "--export", "two"}).status == 0);
+  // Not over what somebody has made.
+  const ProgramResult within = run_hsi4d({"evaluate", truth, "--data", truth, "--export", truth + "/exports"});
+  CHECK(within.err ==
+        "hsi4d evaluate: --export: " + truth + "/exports is in " + truth + ", which is read; choose another folder\n");
+  here.write("mine/summary.json", "{}");
+  CHECK(run_hsi4d({"evaluate", truth, "--data", truth, "--export", "mine"}).err ==
+        "hsi4d evaluate: --export: mine holds something else, with a summary.json; choose another folder\n");
   CHECK(fs::exists("two/0/trajectory.npz"));
   CHECK(fs::exists("two/1/trajectory.npz"));
 }
