@@ -1,6 +1,7 @@
 // L = mean over adjacent frames, some of which move, over the objects, and over six places on each, of |Δᵏ x|², m²:
 // Δ x = x_{t+1} − x_t with `order` 1; 2 asks for steps that are alike, 3 for their changes to be. The places are the
 // centres of the object's Gaussians that lie furthest along each of its axes, so that a turn counts as a move does.
+// With `free` what exceeds that alone, of the squares.
 #include <algorithm>
 #include <cmath>
 
@@ -25,7 +26,7 @@ void describe(ConfigFields& fields, ObjectSmoothSettings& settings) {
                 "What costs nothing: metres a second with order 1, metres a second squared with 2, and so on");
 }
 
-/// The Gaussians that lie furthest along an object's axes, to both sides, each once.
+/// The Gaussians that lie furthest along an object's axes, to both sides: six, of which some may be the same.
 std::vector<Index> outermost(const Gaussians& object) {
   std::vector<Index> rows;
   for (Index axis = 0; axis < 3; ++axis) {
@@ -42,10 +43,14 @@ std::vector<Index> outermost(const Gaussians& object) {
 
 /// The outermost Gaussians of all objects in frames [begin, end), frame by frame.
 std::vector<ObjectPoint> outermost_points(const MotionStart& motion, Index begin, Index end) {
-  std::vector<ObjectPoint> points;
+  std::vector<ObjectPoint> of_frame, points;
+  for (Index o = 0; o < std::ssize(motion.objects); ++o) {
+    for (const Index row : outermost(*motion.objects[static_cast<std::size_t>(o)])) of_frame.push_back({0, o, row});
+  }
   for (Index t = begin; t < end; ++t) {
-    for (Index o = 0; o < std::ssize(motion.objects); ++o) {
-      for (const Index row : outermost(*motion.objects[static_cast<std::size_t>(o)])) points.push_back({t, o, row});
+    for (ObjectPoint point : of_frame) {
+      point.frame = t;
+      points.push_back(point);
     }
   }
   return points;
