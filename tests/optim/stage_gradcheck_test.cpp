@@ -38,7 +38,7 @@ struct Picture {
   StageGradcheck check(const std::vector<std::string>& names, const std::vector<std::string>& losses,
                        std::span<const LossTerm> terms = loss_terms(), const StageGradcheckOptions& options = {}) {
     StageSettings settings;
-    for (const std::string& name : names) settings.optimize.emplace_back(name, ParameterGroupSettings{.lr = 0.1});
+    for (const std::string& name : names) settings.optimize.emplace_back(name, ParameterGroupSettings{});
     for (const std::string& loss : losses) {
       LossSettings chosen;
       chosen.weight = 0.5;
