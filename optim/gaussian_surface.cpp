@@ -10,6 +10,7 @@
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/quaternion.h"
+#include "core/random.h"
 
 namespace hsi4d {
 
@@ -32,6 +33,7 @@ constexpr double kMostCells = 256;
 constexpr Index kGrain = 256;
 /// Discs that one has to have about it, not to float.
 constexpr std::size_t kSupport = 2;
+constexpr std::uint64_t kThinning = 1;  // seed
 
 /// Discs, as nanoflann reads them.
 struct Centers {
@@ -299,9 +301,12 @@ std::vector<SurfaceDisc> without_floaters(const std::vector<SurfaceDisc>& discs)
 std::vector<SurfaceDisc> thinned(const std::vector<SurfaceDisc>& discs, std::size_t most) {
   if (discs.size() <= most) return discs;
   const double wider = std::sqrt(static_cast<double>(discs.size()) / static_cast<double>(most));
+  std::vector<Index> rows = Random(kThinning, 0).permutation(0, std::ssize(discs));
+  rows.resize(most);
+  std::sort(rows.begin(), rows.end());
   std::vector<SurfaceDisc> chosen;
-  for (std::size_t i = 0; i < most; ++i) {
-    chosen.push_back(discs[i * discs.size() / most]);
+  for (const Index row : rows) {
+    chosen.push_back(discs[static_cast<std::size_t>(row)]);
     chosen.back().width *= wider;
     chosen.back().narrow *= wider;
   }

@@ -304,11 +304,6 @@ Solid solid_of_object(const std::vector<std::string>& folders, std::size_t index
 
 void measure_objects(const std::vector<std::string>& folders, const std::vector<std::vector<double>>& points,
                      Measurement& m) {
-  for (const auto& [name, file] : m.settings.object_surfaces) {
-    if (std::find(m.estimate.objects.begin(), m.estimate.objects.end(), name) == m.estimate.objects.end())
-      throw UserError("hsi4d evaluate: --object-surface: " + m.input + " has no object \"" + name + "\"" +
-                      (m.estimate.objects.empty() ? "" : "; there is " + joined(m.estimate.objects)));
-  }
   if (m.estimate.object_poses.empty()) return;
   std::vector<SignedDistance> distances;
   std::vector<std::string> sources;
@@ -356,6 +351,14 @@ void measure_clip(const std::string& file, Evaluation& result) {
   result.notes.push_back(std::move(note));
 }
 
+void check_object_surfaces(const Measurement& m) {
+  for (const auto& [name, file] : m.settings.object_surfaces) {
+    if (std::find(m.estimate.objects.begin(), m.estimate.objects.end(), name) == m.estimate.objects.end())
+      throw UserError("hsi4d evaluate: --object-surface: " + m.input + " has no object \"" + name + "\"" +
+                      (m.estimate.objects.empty() ? "" : "; there is " + joined(m.estimate.objects)));
+  }
+}
+
 void note_world(const Track& track, Measurement& m, const std::string& before) {
   if (!track.world.empty()) m.result.notes.push_back(before + track.world);
 }
@@ -383,6 +386,7 @@ void take_estimate(const std::optional<Rigid<double>>& begin, const std::vector<
   if (m.estimate.objects_stay)
     m.result.notes.push_back("the objects of " + m.settings.objects + " are in the scene's world, z up");
   lay_on(begin, m);
+  check_object_surfaces(m);
   place_objects(folders, m, m.estimate);
 }
 

