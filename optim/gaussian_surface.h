@@ -39,9 +39,9 @@ std::vector<SurfaceDisc> surface_discs(const Gaussians& gaussians);
 /// Discs but those that float alone: at least two others have their centres within kReach widths of a disc's.
 std::vector<SurfaceDisc> without_floaters(const std::vector<SurfaceDisc>& discs);
 
-/// At most so many discs, in their order, chosen at random (the same each time: every so-manieth of a file that is
-/// sorted would be stripes), and wider by the square root of how many one stands for, so that together they cover what
-/// all did.
+/// At most so many discs, in their order, chosen at random but the same each time (one in every ten of a sorted file
+/// would be stripes), and wider by the square root of how many one stands for, so that together they cover what all
+/// did.
 std::vector<SurfaceDisc> thinned(const std::vector<SurfaceDisc>& discs, std::size_t most);
 
 /// Discs that some viewpoint sees, turned to the side of the first that does. What is farther than 6.4 m along an axis
