@@ -224,6 +224,7 @@ void measure_scene(const ParetoScene& scene, const ParetoBench& bench, const std
     const KeptScene& kept = is_usual ? usual : other;
     ParetoRow row{.scene = scene.name, .is_extreme = scene.is_extreme, .knob = setting.knob, .value = setting.value};
     row.model = setting.model;
+    row.threads = bench.threads;
     measure_times(kept, usual, bench.repeats, row);
     row.gaussians = scene.gaussians.count();
     row.pixels = static_cast<Index>(scene.camera.width) * scene.camera.height;

@@ -111,6 +111,7 @@ struct ParetoRow {
   std::string knob, value;
   ParetoModel model = ParetoModel::kOwn;
   Index gaussians = 0, pixels = 0, fragments = 0, pairs = 0;
+  int threads = 1;
   int repeats = 0;
   RunTimes forward = {}, backward = {};  ///< of a kept tape: from the numbers to the image, and back to them
   double forward_ratio = 1;              ///< of medians, to the default's that ran in turns with it

@@ -123,6 +123,10 @@ double StageCost::median_ms() const {
   return sorted[sorted.size() / 2];
 }
 
+double StageCost::min_ms() const {
+  return ms_an_iteration.empty() ? 0 : *std::min_element(ms_an_iteration.begin(), ms_an_iteration.end());
+}
+
 void add_profile(const StageProfile& profile, std::vector<StageCost>& stages) {
   const auto is_it = [&profile](const StageCost& known) { return known.stage == profile.stage; };
   auto place = std::find_if(stages.begin(), stages.end(), is_it);
@@ -173,13 +177,16 @@ std::string cost_json(const RunCost& cost) {
   std::string text;
   for (const StageCost& stage : cost.stages) {
     const StageProfile& sum = stage.sum;
-    nlohmann::ordered_json entry = {{"stage", stage.stage},
+    nlohmann::ordered_json entry = {{"name", "stages/" + stage.stage},
+                                    {"stage", stage.stage},
                                     {"threads", thread_count()},
                                     {"isa", isa_name(best_isa())},
                                     {"frames", stage.frames},
                                     {"iterations", sum.iterations},
                                     {"ms", stage.ms_each()},
                                     {"median_ms", stage.median_ms()},
+                                    {"min_ms", stage.min_ms()},
+                                    {"repeats", stage.ms_an_iteration.size()},
                                     {"seconds", sum.seconds},
                                     {"nodes", sum.nodes},
                                     {"forward_nodes", per_iteration(sum.tape.forward_nodes, stage)},
@@ -187,15 +194,18 @@ std::string cost_json(const RunCost& cost) {
                                     {"adjoint_numbers", per_iteration(sum.tape.adjoint_numbers, stage)},
                                     {"tape_bytes", sum.tape_bytes}};
     if (sum.tiles_of_image > 0)
-      entry.update({{"tiles_of_image", sum.tiles_of_image},
-                    {"gaussians", per_iteration(sum.counters.gaussians, stage)},
-                    {"tiles", per_iteration(sum.counters.tiles, stage)},
-                    {"pairs", per_iteration(sum.counters.pairs, stage)},
-                    {"fragments", per_iteration(sum.counters.fragments, stage)},
-                    {"adjoint_tiles", per_iteration(sum.counters.adjoint_tiles, stage)},
-                    {"layers", per_iteration(sum.counters.layers, stage)},
-                    {"told_squares", per_iteration(sum.counters.told_squares, stage)},
-                    {"composite_ms", composite_steps(stage)}});
+      entry.update(
+          {{"tiles_of_image", sum.tiles_of_image},
+           {"gaussians", per_iteration(sum.counters.gaussians, stage)},
+           {"tiles", per_iteration(sum.counters.tiles, stage)},
+           {"pairs", per_iteration(sum.counters.pairs, stage)},
+           {"fragments", per_iteration(sum.counters.fragments, stage)},
+           {"adjoint_tiles", per_iteration(sum.counters.adjoint_tiles, stage)},
+           {"layers", per_iteration(sum.counters.layers, stage)},
+           {"told_squares", per_iteration(sum.counters.told_squares, stage)},
+           {"mfragments_per_s",
+            stage.median_ms() > 0 ? per_iteration(sum.counters.fragments, stage) / stage.median_ms() / 1e3 : 0},
+           {"composite_ms", composite_steps(stage)}});
     if (cost.counts_allocations) entry["allocations"] = per_iteration(static_cast<Index>(sum.allocations), stage);
     text += entry.dump() + "\n";
     for (const CostPart& part : parts_of(stage)) {

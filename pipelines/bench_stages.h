@@ -17,6 +17,7 @@ struct StageCost {
 
   double ms_each() const;    ///< an iteration, on average
   double median_ms() const;  ///< of the frames' averages
+  double min_ms() const;     ///< likewise
 };
 
 /// What a run took.
@@ -37,7 +38,8 @@ double optimisation_seconds(const RunCost& cost);
 /// an operator (Adam, the tape itself) last.
 std::string cost_table(const RunCost& cost);
 
-/// The table as one JSON object a line: {"stage", "iterations", ...}, then {"stage", "operator", ...}.
+/// The table as one JSON object a line: {"name": "stages/STAGE", "stage", "iterations", ...}, then {"stage",
+/// "operator", ...}.
 std::string cost_json(const RunCost& cost);
 
 /// A bar a stage, as long as an iteration, parted by operators, as an SVG file.
