@@ -32,13 +32,11 @@ struct RowNumbers {
   RowNumbers after(Index rows) const { return {in_set + rows, of_all + rows, in_lists + rows}; }
 };
 
-/// Adds numbers from `first` on of all slots of a row to totals, in the order of the slots, in double. Pairs past the
-/// end of their tile have no sums (row B12). False if there are none.
-template <Index kCount, class S>
+/// Adds numbers from `first` on of all slots of a row to totals, in the order of the slots, in double: kParts times
+/// kCount of them. Pairs past the end of their tile have no sums (row B12). False if there are none.
+template <Index kCount, Index kParts, class S>
 bool sum_slots(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t key, Index n, Index first,
                double* totals) {
-  constexpr Index kParts = kSlotNumbers / kCount;
-  const Index numbers = from.stride - first;
   DoubleLanes<kCount> sums[kParts] = {};
   bool any = false;
   for (Index slot = slots.begin; slot < static_cast<Index>(slots.end); ++slot) {
@@ -46,12 +44,22 @@ bool sum_slots(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t ke
     if (end.index < 0 || key > end.key || (key == end.key && n > end.index)) continue;
     any = true;
     const S* const of_slot = from.sums + slot * from.stride + first;
-    for (Index part = 0; part < kParts; ++part) {
-      if (part * kCount < numbers) sums[part] = sums[part] + load_wide<kCount>(of_slot + part * kCount, 1, kCount);
-    }
+    for (Index part = 0; part < kParts; ++part)
+      sums[part] = sums[part] + load_wide<kCount>(of_slot + part * kCount, 1, kCount);
   }
   std::memcpy(totals, sums, sizeof sums);
   return any;
+}
+
+/// The same of as many parts as the slots have from there on, kMostParts at most.
+template <Index kCount, Index kMostParts, class S>
+bool sum_slots_of(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t key, Index n, Index first,
+                  double* totals) {
+  if constexpr (kMostParts > 1) {
+    if (from.stride - first <= (kMostParts - 1) * kCount)
+      return sum_slots_of<kCount, kMostParts - 1>(from, slots, key, n, first, totals);
+  }
+  return sum_slots<kCount, kMostParts>(from, slots, key, n, first, totals);
 }
 
 /// Moments as add_record_gradients takes them, from a slot's; returns Σ ∂/∂o.
@@ -84,7 +92,8 @@ void add_gradients(const SlotSums<S>& from, const SplatArrays<S>& set, const Ren
     for (Index i = 0; i < count; ++i) {
       const std::uint64_t key = depth_key(set, settings, row.in_set + i);
       const TileLists::Slots slots = from.lists.slots[row.in_lists + i];
-      rows[i] = sum_slots<kCount>(from, slots, key, row.of_all + i, first, totals[i]) ? -1 : 0;
+      rows[i] =
+          sum_slots_of<kCount, kSlotNumbers / kCount>(from, slots, key, row.of_all + i, first, totals[i]) ? -1 : 0;
     }
     if (!any_lane(rows)) return;
     if (first == 0 && from.first_feature > 0 && d.of_shape()) {
