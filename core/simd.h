@@ -5,6 +5,8 @@
 // and the order of every sum is written out. Kernels that need explicit vectors use Highway instead.
 #pragma once
 
+#include <cstddef>
+#include <type_traits>
 #include <utility>
 
 namespace hsi4d {
@@ -49,6 +51,19 @@ void on_isa([[maybe_unused]] Isa isa, F&& f) {
 template <class F>
 void on_best_isa(F&& f) {
   on_isa(best_isa(), f);
+}
+
+/// Calls f(kCount), a constant, compiled for the best instruction set: as many doubles as work best in step there
+/// (core/lanes.h), which are a register of AVX-512 and of AVX2.
+template <class F>
+void with_best_lanes(F&& f) {
+  auto four = [&] { f(std::integral_constant<std::ptrdiff_t, 4>()); };
+#if defined(HSI4D_ISA_CLONES)
+  auto eight = [&] { f(std::integral_constant<std::ptrdiff_t, 8>()); };
+  if (best_isa() == Isa::kAvx512) return detail::on_avx512(eight);
+  if (best_isa() == Isa::kAvx2) return detail::on_avx2(four);
+#endif
+  four();
 }
 
 }  // namespace hsi4d

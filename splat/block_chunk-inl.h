@@ -308,7 +308,7 @@ Index make_list(const Chunk& chunk, Index block, const BlockWorkspace& space) {
   size_t n = 0;
   for (size_t at = 0; at < size; at += static_cast<size_t>(kLanes)) {
     const auto blocks = hn::Load(di, space.blocks + at);  // zero past the end
-    n += hn::CompressStore(place, hn::Ne(hn::And(blocks, bit), zero), di, space.list + n);
+    n += store_chosen(place, hn::Ne(hn::And(blocks, bit), zero), space.list + n);
     place = hn::Add(place, step);
   }
   std::fill_n(space.list + n, 16, static_cast<std::int32_t>(size));

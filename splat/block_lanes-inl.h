@@ -8,11 +8,28 @@
 #endif
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include <hwy/highway.h>
+
+#ifndef HSI4D_CHOSEN_LANES
+#define HSI4D_CHOSEN_LANES
+namespace hsi4d::detail {
+/// The positions of the bits that are set, by byte.
+inline constexpr auto kChosenLanes = [] {
+  std::array<std::array<std::uint8_t, 8>, 256> lanes{};
+  for (size_t bits = 0; bits < 256; ++bits) {
+    for (std::uint8_t bit = 0, n = 0; bit < 8; ++bit) {
+      if ((bits >> bit & 1) != 0) lanes[bits][n++] = bit;
+    }
+  }
+  return lanes;
+}();
+}  // namespace hsi4d::detail
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace hsi4d::detail::HWY_NAMESPACE {
@@ -25,6 +42,9 @@ using M = hn::Mask<D>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(D()));
 constexpr int kParts = 16 / kLanes;  ///< vectors of a block
 using D4 = hn::CappedTag<float, 4>;
+using DI = hn::RebindToSigned<D>;
+using VI = hn::Vec<DI>;
+using MI = hn::Mask<DI>;
 
 // --- a few instructions that Highway has no name for -----------------------------------------------------------------
 
@@ -39,6 +59,8 @@ HWY_INLINE V fraction(V p) { return V{_mm512_reduce_ps(p.raw, 0x09)}; }
 HWY_INLINE V rest_of_rounding(V p) { return V{_mm512_reduce_ps(p.raw, 0x08)}; }
 HWY_INLINE V times_power_of_floor(V y, V p) { return V{_mm512_scalef_ps(y.raw, p.raw)}; }
 HWY_INLINE void keep_bits(M m, int, std::uint16_t* to) { _store_mask16(to, m.raw); }
+/// first, first + 1, … of the lanes where m, one behind the other; writes a whole vector, returns how many count.
+HWY_INLINE size_t store_chosen(VI place, MI m, std::int32_t* to) { return hn::CompressStore(place, m, DI(), to); }
 #else
 #if HWY_TARGET == HWY_SCALAR
 /// y 2^⌊p⌋ for y in [1, 2) and p ≥ −126; for smaller p some number.
@@ -64,6 +86,15 @@ HWY_INLINE void keep_bits(M m, int part, std::uint16_t* to) {
   std::uint8_t bits[8] = {};
   hn::StoreMaskBits(D(), m, bits);
   *to = static_cast<std::uint16_t>((part == 0 ? 0 : *to) | bits[0] << (part * kLanes));
+}
+/// The same by a table: GCC 12 copies that of Highway's CompressStore, of 1 KiB, to the stack in every call.
+HWY_INLINE size_t store_chosen(VI place, MI m, std::int32_t* to) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(DI(), m, bits);
+  const hn::Rebind<std::uint8_t, DI> bytes;
+  const auto lanes = hn::PromoteTo(DI(), hn::LoadU(bytes, kChosenLanes[bits[0]].data()));
+  hn::StoreU(hn::Add(hn::Set(DI(), hn::GetLane(place)), lanes), DI(), to);
+  return static_cast<size_t>(std::popcount(bits[0]));
 }
 #endif
 

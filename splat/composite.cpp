@@ -441,12 +441,14 @@ struct Composite {
     counters->times.backward_s = watch.lap();
     counters->adjoint_tiles = std::count_if(adjoint_last.data(), adjoint_last.data() + tiles.count(),
                                             [](const DepthKeyed& end) { return end.index >= 0; });
-    parallel_for(planned.moving.count, kGrain,
-                 [&](Index begin, Index end) { on_best_isa([&] { reduce(io, shared, begin, end); }); });
+    parallel_for(planned.moving.count, kGrain, [&](Index begin, Index end) {
+      with_best_lanes([&](auto lanes) { reduce<lanes()>(io, shared, begin, end); });
+    });
     counters->times.reduce_s = watch.lap();
   }
 
   /// Adds what the sums of rows [begin, end) of the lists mean to the gradients of both sets.
+  template <Index kCount>
   void reduce(const NodeIo<S>& io, const TileAdjoint<S>& adjoint, Index begin, Index end) const {
     const detail::SplatRows<S> rows = rows_of(io);
     const Index first = planned.moving.first + begin, after = planned.moving.first + end;
@@ -459,12 +461,12 @@ struct Composite {
         adjoint.sums,  adjoint.stride,       adjoint.wants_shape || in_blocks(io) ? kMoments : 0,
         in_blocks(io), planned.moving.lists, {adjoint_last.data(), static_cast<std::size_t>(adjoint_last.size())}};
     if (first < middle) {
-      detail::reduce_slots(sums, rows.still, view.settings, {first, first, begin}, middle - first,
-                           records.data() + first, gradients_of(io, kStill));
+      detail::reduce_slots<kCount>(sums, rows.still, view.settings, {first, first, begin}, middle - first,
+                                   records.data() + first, gradients_of(io, kStill));
     }
-    detail::reduce_slots(sums, rows.moving, view.settings,
-                         {middle - rows.second, middle, middle - planned.moving.first}, after - middle,
-                         records.data() + middle, gradients_of(io, 0));
+    detail::reduce_slots<kCount>(sums, rows.moving, view.settings,
+                                 {middle - rows.second, middle, middle - planned.moving.first}, after - middle,
+                                 records.data() + middle, gradients_of(io, 0));
   }
 
   // --- the rest ------------------------------------------------------------------------------------------------------

@@ -32,31 +32,40 @@ struct RowNumbers {
   RowNumbers after(Index rows) const { return {in_set + rows, of_all + rows, in_lists + rows}; }
 };
 
-/// Adds `numbers` numbers from `first` on of all slots of a row to totals, in the order of the slots, in double. Pairs
-/// past the end of their tile have no sums (row B12). False if there are none.
-template <class S>
+/// Adds numbers from `first` on of all slots of a row to totals, in the order of the slots, in double: kParts times
+/// kCount of them. Pairs past the end of their tile have no sums (row B12). False if there are none.
+template <Index kCount, Index kParts, class S>
 bool sum_slots(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t key, Index n, Index first,
                double* totals) {
-  const bool long_slot = from.stride - first > kLanes;
-  Lanes<double> low{}, high{};
+  DoubleLanes<kCount> sums[kParts] = {};
   bool any = false;
   for (Index slot = slots.begin; slot < static_cast<Index>(slots.end); ++slot) {
     const DepthKeyed& end = from.ends[static_cast<std::size_t>(from.lists.tile_of(slot))];
     if (end.index < 0 || key > end.key || (key == end.key && n > end.index)) continue;
     any = true;
-    const S* const sums = from.sums + slot * from.stride + first;
-    low = low + load_wide(sums, 1, kLanes);
-    if (long_slot) high = high + load_wide(sums + kLanes, 1, kLanes);
+    const S* const of_slot = from.sums + slot * from.stride + first;
+    for (Index part = 0; part < kParts; ++part)
+      sums[part] = sums[part] + load_wide<kCount>(of_slot + part * kCount, 1, kCount);
   }
-  std::memcpy(totals, &low, sizeof low);
-  std::memcpy(totals + kLanes, &high, sizeof high);
+  std::memcpy(totals, sums, sizeof sums);
   return any;
 }
 
+/// The same of as many parts as the slots have from there on, kMostParts at most.
+template <Index kCount, Index kMostParts, class S>
+bool sum_slots_of(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t key, Index n, Index first,
+                  double* totals) {
+  if constexpr (kMostParts > 1) {
+    if (from.stride - first <= (kMostParts - 1) * kCount)
+      return sum_slots_of<kCount, kMostParts - 1>(from, slots, key, n, first, totals);
+  }
+  return sum_slots<kCount, kMostParts>(from, slots, key, n, first, totals);
+}
+
 /// Moments as add_record_gradients takes them, from a slot's; returns Σ ∂/∂o.
-template <class S>
-WideLanes record_moments(bool of_blocks, const SplatRecord<S>* records, Index count, WideLanes* moments) {
-  WideLanes opacity{};
+template <class V, class S>
+V record_moments(bool of_blocks, const SplatRecord<S>* records, Index count, V* moments) {
+  V opacity{};
   for (Index i = 0; i < count; ++i) opacity[i] = static_cast<double>(records[i].opacity);
   if (of_blocks) {  // u and w are scaled
     constexpr double kInverse = 1 / kLog2Scale;
@@ -64,31 +73,34 @@ WideLanes record_moments(bool of_blocks, const SplatRecord<S>* records, Index co
     for (int i = 3; i < 6; ++i) moments[i] = moments[i] * (kInverse * kInverse);
     return moments[0] / lane_max(opacity, kLeastOpacity);
   }
-  const WideLanes d_opacity = moments[0];  // of g = v/o
+  const V d_opacity = moments[0];  // of g = v/o
   for (Index i = 0; i < kMoments; ++i) moments[i] = moments[i] * opacity;
   return d_opacity;
 }
 
-/// Adds the gradients of eight rows at most.
+/// Adds the gradients of kCount rows at most.
 ///
 /// @param records  of the first row, and so on
-template <class S>
+template <Index kCount, class S>
 void add_gradients(const SlotSums<S>& from, const SplatArrays<S>& set, const RenderSettings& settings, RowNumbers row,
                    Index count, const SplatRecord<S>* records, const SplatGradients<S>& d) {
   const Index features = d.features ? d.features.shape.cols : 0, numbers = from.first_feature + features;
-  LaneMask<WideLanes> rows{};
+  using V = DoubleLanes<kCount>;
+  LaneMask<V> rows{};
   for (Index first = 0; first < numbers; first += kSlotNumbers) {
-    double totals[kLanes][kSlotNumbers];
+    double totals[kCount][kSlotNumbers];
     for (Index i = 0; i < count; ++i) {
       const std::uint64_t key = depth_key(set, settings, row.in_set + i);
-      rows[i] = sum_slots(from, from.lists.slots[row.in_lists + i], key, row.of_all + i, first, totals[i]) ? -1 : 0;
+      const TileLists::Slots slots = from.lists.slots[row.in_lists + i];
+      rows[i] =
+          sum_slots_of<kCount, kSlotNumbers / kCount>(from, slots, key, row.of_all + i, first, totals[i]) ? -1 : 0;
     }
     if (!any_lane(rows)) return;
     if (first == 0 && from.first_feature > 0 && d.of_shape()) {
       static_assert(kMoments <= kSlotNumbers);
-      WideLanes moments[kMoments];
-      for (Index k = 0; k < kMoments; ++k) moments[k] = load_lanes(&totals[0][k], kSlotNumbers, count);
-      const WideLanes d_opacity = record_moments(from.of_blocks, records, count, moments);
+      V moments[kMoments];
+      for (Index k = 0; k < kMoments; ++k) moments[k] = load_lanes<kCount>(&totals[0][k], kSlotNumbers, count);
+      const V d_opacity = record_moments(from.of_blocks, records, count, moments);
       add_record_gradients(set, settings, row.in_set, count, records, rows, d_opacity, moments, d);
     }
     for (Index i = 0; i < count; ++i) {
@@ -100,13 +112,13 @@ void add_gradients(const SlotSums<S>& from, const SplatArrays<S>& set, const Ren
   }
 }
 
-/// Adds the gradients of some rows of one set. Call it in on_best_isa.
-template <class S>
+/// Adds the gradients of some rows of one set, kCount at a time. Call it in with_best_lanes.
+template <Index kCount, class S>
 void reduce_slots(const SlotSums<S>& from, const SplatArrays<S>& set, const RenderSettings& settings, RowNumbers row,
                   Index count, const SplatRecord<S>* records, const SplatGradients<S>& d) {
   if (!d.features && !d.of_shape()) return;  // a set may be frozen
-  for (Index i = 0; i < count; i += kLanes) {
-    add_gradients(from, set, settings, row.after(i), std::min(kLanes, count - i), records + i, d);
+  for (Index i = 0; i < count; i += kCount) {
+    add_gradients<kCount>(from, set, settings, row.after(i), std::min(kCount, count - i), records + i, d);
   }
 }
 

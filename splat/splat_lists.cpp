@@ -12,13 +12,13 @@ namespace hsi4d::detail {
 namespace {
 
 /// make_records of rows of both sets.
-template <class S>
+template <Index kCount, class S>
 void make_records(const SplatRows<S>& rows, Index begin, Index end, const RenderSettings& settings,
                   const TileGrid& tiles, SplatRecord<S>* records, Extent* extents) {
   const Index middle = std::clamp(rows.second, begin, end);
-  make_records(rows.still, settings, tiles, begin, middle, records, extents);
-  make_records(rows.moving, settings, tiles, middle - rows.second, end - rows.second, records + (middle - begin),
-               extents + (middle - begin));
+  make_records<kCount>(rows.still, settings, tiles, begin, middle, records, extents);
+  make_records<kCount>(rows.moving, settings, tiles, middle - rows.second, end - rows.second,
+                       records + (middle - begin), extents + (middle - begin));
 }
 
 }  // namespace
@@ -37,9 +37,9 @@ void list_splats(const SplatRows<S>& rows, Index first, Index count, const Rende
   DepthKeyed* const keys = result.keys.data();
   std::atomic<Index> bound = 0;  // of pairs
   parallel_for(count, kGrain, [&](Index begin, Index end) {
-    on_best_isa([&] {
-      make_records(rows, first + begin, first + end, settings, tiles, &records[static_cast<std::size_t>(first + begin)],
-                   &result.extents[begin]);
+    with_best_lanes([&](auto lanes) {
+      make_records<lanes()>(rows, first + begin, first + end, settings, tiles,
+                            &records[static_cast<std::size_t>(first + begin)], &result.extents[begin]);
       Index around = 0;
       for (Index i = begin; i < end; ++i) {
         around += tiles_around(result.extents[i], tiles);

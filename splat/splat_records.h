@@ -83,53 +83,54 @@ std::uint64_t depth_key(const SplatArrays<S>& splats, const RenderSettings& sett
   return key_of_depth(settings, splats.depths.data[n], depth_of(splats, n));
 }
 
-/// What extents and records of eight rows are made of.
+/// What extents and records of some rows are made of. V: lanes of double.
+template <class V>
 struct SplatOutlines {
-  ConicOf<WideLanes> conic;
-  WideLanes x, y;          ///< mean, pixels
-  WideLanes opacity;       ///< with the antialias factor
-  WideLanes log2_opacity;  ///< of an opacity held at or above kLeastOpacity
-  ReachOf<WideLanes> reach;
-  LaneMask<WideLanes> drawn;
+  ConicOf<V> conic;
+  V x, y;          ///< mean, pixels
+  V opacity;       ///< with the antialias factor
+  V log2_opacity;  ///< of an opacity held at or above kLeastOpacity
+  ReachOf<V> reach;
+  LaneMask<V> drawn;
 };
 
-/// Outlines of rows [n, n + count), eight at most. Not drawn are rows with numbers that are not finite, also once they
-/// are rounded to S, and those that are too near (rows A4-A6); their other numbers mean nothing.
-template <class S>
+/// Outlines of rows [n, n + count), as many as there are lanes at most. Not drawn are rows with numbers that are not
+/// finite, also once they are rounded to S, and those that are too near (rows A4-A6); their other numbers mean nothing.
+template <class V, class S>
 void outlines_of(const SplatArrays<S>& splats, const RenderSettings& settings, const ExtentRules& rules, Index n,
-                 Index count, SplatOutlines& o) {
+                 Index count, SplatOutlines<V>& o) {
   const auto load = [count](const ConstArray<S>& from, Index row, Index col) {
-    return load_wide(from.row(row) + col, from.shape.cols, count);
+    return load_wide<kLanesOf<V>>(from.row(row) + col, from.shape.cols, count);
   };
   o.x = load(splats.means, n, 0) + load(splats.means_rest, n, 0);
   o.y = load(splats.means, n, 1) + load(splats.means_rest, n, 1);
-  const WideLanes depth = load(splats.depths, n, 0) + load(splats.depth_rest, n, 0);
-  WideLanes factor[6];
+  const V depth = load(splats.depths, n, 0) + load(splats.depth_rest, n, 0);
+  V factor[6];
   for (Index i = 0; i < 6; ++i) factor[i] = load(splats.factors, n, i);
   o.drawn = conic_of(factor, settings.blur, o.conic) & (depth > settings.near) & lane_finite(depth) & lane_finite(o.x) &
             lane_finite(o.y);
-  LaneMask<WideLanes> some = factor[0] != 0.0;
-  for (const WideLanes& v : factor) some = some | (v != 0.0);
+  LaneMask<V> some = factor[0] != 0.0;
+  for (const V& v : factor) some = some | (v != 0.0);
   o.opacity = load(splats.opacities, n, 0);
   o.drawn = o.drawn & some & lane_finite(o.opacity);
   if (!any_lane(o.drawn)) return;
   if (settings.antialias) o.opacity = o.opacity * blur_compensation(o.conic);
   o.log2_opacity = lane_max(o.opacity, kLeastOpacity);
-  for (Index i = 0; i < kLanes; ++i) o.log2_opacity[i] = std::log2(o.log2_opacity[i]);
-  for (const WideLanes& number : {o.conic.l11, o.conic.l21, o.conic.l22, o.opacity, o.log2_opacity}) {
+  for (Index i = 0; i < kLanesOf<V>; ++i) o.log2_opacity[i] = std::log2(o.log2_opacity[i]);
+  for (const V& number : {o.conic.l11, o.conic.l21, o.conic.l22, o.opacity, o.log2_opacity}) {
     o.drawn = o.drawn & lane_finite(rounded_to<S>(number));
   }
   o.reach = reach_of(o.conic, o.x, o.log2_opacity, rules);
 }
 
 /// Record and extent of row n, which is lane i of the outlines; an empty extent if it is not drawn.
-template <class S>
+template <class V, class S>
 void finish_record(const SplatArrays<S>& splats, const TileGrid& grid, const ExtentRules& rules, Index n,
-                   const SplatOutlines& o, Index i, SplatRecord<S>& record, Extent& extent) {
+                   const SplatOutlines<V>& o, Index i, SplatRecord<S>& record, Extent& extent) {
   extent = {};
   if (!o.drawn[i] || !all_finite(splats.features.row(n), splats.features.shape.cols)) return;
-  const ConicOf<WideLanes>& c = o.conic;
-  const ReachOf<WideLanes>& r = o.reach;
+  const ConicOf<V>& c = o.conic;
+  const ReachOf<V>& r = o.reach;
   const Conic conic = {c.l11[i],        c.l21[i], c.l22[i], c.xx[i], c.xy[i], c.yy[i], c.sharp_determinant[i],
                        c.determinant[i]};
   const ReachOf<double> reach = {r.half_width[i],       r.half_height[i], r.right_dy[i], r.slope[i],
@@ -146,17 +147,17 @@ void finish_record(const SplatArrays<S>& splats, const TileGrid& grid, const Ext
             extent.row_end};
 }
 
-/// Records and extents of rows [begin, end); the extents of those that are not drawn are empty. Call it in
-/// on_best_isa.
+/// Records and extents of rows [begin, end); the extents of those that are not drawn are empty, kCount at a
+/// time: the same for any number. Call it in with_best_lanes.
 ///
 /// @param records, extents  of row `begin`, and so on
-template <class S>
+template <Index kCount = kLanes, class S>
 void make_records(const SplatArrays<S>& splats, const RenderSettings& settings, const TileGrid& grid, Index begin,
                   Index end, SplatRecord<S>* records, Extent* extents) {
   const ExtentRules rules = extent_rules(settings, static_cast<double>(std::numeric_limits<S>::epsilon()));
-  SplatOutlines outlines;
-  for (; begin < end; begin += kLanes, records += kLanes, extents += kLanes) {
-    const Index count = std::min(kLanes, end - begin);
+  SplatOutlines<DoubleLanes<kCount>> outlines;
+  for (; begin < end; begin += kCount, records += kCount, extents += kCount) {
+    const Index count = std::min(kCount, end - begin);
     outlines_of(splats, settings, rules, begin, count, outlines);
     for (Index i = 0; i < count; ++i) {
       finish_record(splats, grid, rules, begin + i, outlines, i, records[i], extents[i]);
@@ -187,43 +188,45 @@ struct SplatGradients {
 // d_cov is that of the full symmetric matrix: its off-diagonal number counts twice (row B21). L is that of the record,
 // with which u and w were made.
 
-/// Adjoint of make_records: adds what the sums of rows [n, n + count), eight at most, over all their pixels mean.
+/// Adjoint of make_records: adds what the sums of rows [n, n + count), as many as there are lanes at most, over all
+/// their pixels mean.
 ///
 /// @param records    of row n, and so on
 /// @param rows       those that have sums
 /// @param d_opacity  Σ ∂/∂o, o with the antialias factor
 /// @param moments    Σ v, Σ v u, Σ v w, Σ v u², Σ v u w, Σ v w²
-template <class S>
+template <class V, class S>
 void add_record_gradients(const SplatArrays<S>& splats, const RenderSettings& settings, Index n, Index count,
-                          const SplatRecord<S>* records, const LaneMask<WideLanes>& rows, WideLanes d_opacity,
-                          const WideLanes* moments, const SplatGradients<S>& d) {
-  WideLanes l11{}, l21{}, l22{};
-  const WideLanes zero{};
-  for (Index i = 0; i < std::min(count, kLanes); ++i) {
+                          const SplatRecord<S>* records, const LaneMask<V>& rows, V d_opacity, const V* moments,
+                          const SplatGradients<S>& d) {
+  constexpr Index kCount = kLanesOf<V>;
+  V l11{}, l21{}, l22{};
+  const V zero{};
+  for (Index i = 0; i < std::min(count, kCount); ++i) {
     l11[i] = static_cast<double>(records[i].l11);
     l21[i] = static_cast<double>(records[i].l21);
     l22[i] = static_cast<double>(records[i].l22);
   }
-  const auto add = [&](const Array<S>& to, Index col, const WideLanes& x) {
+  const auto add = [&](const Array<S>& to, Index col, const V& x) {
     if (to) add_lanes<S>(rows ? x : zero, to.row(n) + col, to.shape.cols, count);
   };
-  const WideLanes d_x = l11 * moments[1], d_y = l21 * moments[1] + l22 * moments[2];
+  const V d_x = l11 * moments[1], d_y = l21 * moments[1] + l22 * moments[2];
   for (const Array<S>& to : {d.means, d.means_rest}) {
     add(to, 0, d_x);
     add(to, 1, d_y);
   }
-  WideLanes v[6], d_v[6];
-  for (Index i = 0; i < 6; ++i) v[i] = load_wide(splats.factors.row(n) + i, 6, count);
+  V v[6], d_v[6];
+  for (Index i = 0; i < 6; ++i) v[i] = load_wide<kCount>(splats.factors.row(n) + i, 6, count);
   const auto lv = whitened_factor(v, settings.blur, l11, l22);
   for (std::size_t c = 0; c < 3; ++c) {
-    const WideLanes mu = moments[3] * lv[c] + moments[4] * lv[3 + c], mw = moments[4] * lv[c] + moments[5] * lv[3 + c];
+    const V mu = moments[3] * lv[c] + moments[4] * lv[3 + c], mw = moments[4] * lv[c] + moments[5] * lv[3 + c];
     d_v[c] = l11 * mu;
     d_v[3 + c] = l21 * mu + l22 * mw;
   }
   if (settings.antialias) {
-    ConicOf<WideLanes> conic;
+    ConicOf<V> conic;
     conic_of(v, settings.blur, conic);
-    const WideLanes opacity = load_wide(splats.opacities.row(n), 1, count);
+    const V opacity = load_wide<kCount>(splats.opacities.row(n), 1, count);
     blur_compensation_adjoint(v, settings.blur, conic, d_opacity * opacity, d_v);
     d_opacity = d_opacity * blur_compensation(conic);
   }

@@ -37,21 +37,27 @@ bool same(S a, S b) {
   return std::isnan(a) ? std::isnan(b) : std::memcmp(&a, &b, sizeof a) == 0;
 }
 
-/// Numbers of what f makes of eight numbers and of each of them alone that differ.
-template <class S, class F>
-int different(const F& f) {
+/// Numbers of what f makes of kCount numbers and of each of them alone that differ.
+template <class S, Index kCount, class F>
+int different_of(const F& f) {
   const std::vector<S> x = nasty_numbers<S>();
   int count = 0;
   on_best_isa([&] {
-    for (std::size_t i = 0; i + 3 * kLanes <= x.size(); ++i) {
-      const auto load = [&](std::size_t at) { return load_lanes(&x[at], 1, kLanes); };
-      const Lanes<S> all = f(load(i), load(i + kLanes), load(i + 2 * kLanes));
-      for (std::size_t k = 0; k < kLanes; ++k) {
-        count += same<S>(all[k], f(x[i + k], x[i + k + kLanes], x[i + k + 2 * kLanes])) ? 0 : 1;
+    for (std::size_t i = 0; i + 3 * kCount <= x.size(); ++i) {
+      const auto load = [&](std::size_t at) { return load_lanes<kCount>(&x[at], 1, kCount); };
+      const Lanes<S, kCount> all = f(load(i), load(i + kCount), load(i + 2 * kCount));
+      for (std::size_t k = 0; k < kCount; ++k) {
+        count += same<S>(all[k], f(x[i + k], x[i + k + kCount], x[i + k + 2 * kCount])) ? 0 : 1;
       }
     }
   });
   return count;
+}
+
+/// Of eight numbers and of four.
+template <class S, class F>
+int different(const F& f) {
+  return different_of<S, kLanes>(f) + different_of<S, 4>(f);
 }
 
 template <class S>
@@ -68,7 +74,7 @@ void check_lanes_are_numbers() {
 
 }  // namespace
 
-TEST_CASE("eight numbers in step have the bits of each alone") {
+TEST_CASE("eight numbers in step, and four, have the bits of each alone") {
   check_lanes_are_numbers<float>();
   check_lanes_are_numbers<double>();
 }
@@ -123,6 +129,25 @@ TEST_CASE("what is stored is rounded once") {
   CHECK(whole[7] == third);
   CHECK(rounded_to<float>(x)[3] == static_cast<double>(static_cast<float>(third)));
   CHECK(rounded_to<double>(x)[3] == third);
+}
+
+TEST_CASE("rows in fours have the sum of rows in eights, to the bit") {
+  const Random random(11);
+  std::array<double, 40> x;
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::exp(20 * random.normal(i));
+  RowSum fours, eights;
+  for (Index row = 0; row < 40; row += 4) fours.add(row, load_wide<4>(&x[static_cast<std::size_t>(row)], 1, 4));
+  for (Index row = 0; row < 40; row += 8) eights.add(row, load_wide(&x[static_cast<std::size_t>(row)], 1, 8));
+  CHECK(fours.total() == eights.total());
+  double sum = 0;
+  for (const double number : x) sum += number;
+  CHECK(eights.total() == Approx(sum).epsilon(1e-12));
+}
+
+TEST_CASE("with_best_lanes tells as many doubles as a register has") {
+  Index count = 0;
+  with_best_lanes([&](auto lanes) { count = lanes(); });
+  CHECK(count == (best_isa() == Isa::kAvx512 ? 8 : 4));
 }
 
 TEST_CASE("lanes are chosen, looked at and summed") {
