@@ -1,13 +1,14 @@
 #include "pipelines/cli/bench_command.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
 #include "core/formatted.h"
-#include "core/simd.h"
 #include "pipelines/bench_color_net.h"
+#include "pipelines/bench_machine.h"
 #include "pipelines/bench_pixel_filter.h"
 #include "pipelines/bench_rasterize.h"
 #include "pipelines/bench_skinning.h"
@@ -23,7 +24,6 @@ const char* unit_name(WorkUnit unit) {
 std::string json_line(const Measurement& m) {
   nlohmann::ordered_json line = {{"name", m.name},
                                  {"threads", m.threads},
-                                 {"isa", isa_name(best_isa())},
                                  {"median_ms", m.median_ms},
                                  {"min_ms", m.min_ms},
                                  {"repeats", m.repeats},
@@ -37,11 +37,12 @@ std::string json_line(const Measurement& m) {
                                  {"unit", unit_name(m.unit)},
                                  {"millions_per_s", m.millions_per_s()},
                                  {"peak_memory_bytes", m.peak_memory_bytes}};
+  if (m.unit == WorkUnit::kFragments) line["mfragments_per_s"] = m.millions_per_s();
   if (m.fma_peak_per_s > 0) line["fma_peak_per_s"] = m.fma_peak_per_s;
   if (m.peak_share()) line["fma_peak_share"] = *m.peak_share();
   if (m.image_error) line["image_error"] = *m.image_error;
   if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
-  return line.dump() + "\n";
+  return bench_line(std::move(line));
 }
 
 /// " 34.5" of a hundred, or nothing.
@@ -83,11 +84,14 @@ double rate(const SkinningMeasurement& m) { return m.median_ms > 0 ? bytes_read(
 std::string tenths(double value) { return value > 0 ? formatted("%.1f", value) : "-"; }
 
 std::string json_line(const SkinningMeasurement& m) {
-  nlohmann::ordered_json line = {{"name", m.name},           {"threads", m.threads}, {"isa", isa_name(best_isa())},
-                                 {"median_ms", m.median_ms}, {"min_ms", m.min_ms},   {"repeats", m.repeats}};
+  nlohmann::ordered_json line = {{"name", m.name},
+                                 {"threads", m.threads},
+                                 {"median_ms", m.median_ms},
+                                 {"min_ms", m.min_ms},
+                                 {"repeats", m.repeats}};
   if (m.gaussians > 0) {
     line.update({{"gaussians", m.gaussians}, {"joints", m.joints}});
-    return line.dump() + "\n";
+    return bench_line(std::move(line));
   }
   line.update({{"vertices", m.vertices},
                {"joints", m.joints},
@@ -95,13 +99,12 @@ std::string json_line(const SkinningMeasurement& m) {
                {"table_bytes", m.table_bytes},
                {"packing_error_m", m.packing_error_m},
                {"gbytes_per_s", rate(m)}});
-  return line.dump() + "\n";
+  return bench_line(std::move(line));
 }
 
 std::string json_line(const ColorNetMeasurement& m) {
   nlohmann::ordered_json line = {{"name", m.name},
                                  {"threads", m.threads},
-                                 {"isa", isa_name(best_isa())},
                                  {"median_ms", m.median_ms},
                                  {"min_ms", m.min_ms},
                                  {"repeats", m.repeats},
@@ -114,7 +117,7 @@ std::string json_line(const ColorNetMeasurement& m) {
     line["fma_peak_per_s"] = m.fma_peak_per_s;
     line["fma_peak_share"] = m.peak_share();
   }
-  return line.dump() + "\n";
+  return bench_line(std::move(line));
 }
 
 }  // namespace
