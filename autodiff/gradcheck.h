@@ -17,10 +17,13 @@ struct GradcheckOptions {
   double tolerance = 1e-7;
   /// Step relative to max(|x|, root mean square of the array, 1e-3); six evaluations within ±3 steps (error ~ step⁶).
   double step = 2e-3;
+  /// Where a discrete choice changes within the step, ten times shorter ones are tried that are not below this
+  /// (relative as the step); by default none.
+  double shortest_step = 1;
   /// Entries tried of each array; chosen at random when the array holds more.
   Index entries = 64;
-  /// Share of entries that may lie at a kink (a discrete choice changes within the step, or differences of two step
-  /// sizes disagree) before the check fails for seeing too little.
+  /// Share of entries that may lie at a kink (a discrete choice changes within the step, differences of two step sizes
+  /// disagree, or those to the left and to the right) before the check fails for seeing too little.
   double kink_share = 0.1;
   /// Checks each operator by itself as well, on its own inputs.
   bool each_node = true;

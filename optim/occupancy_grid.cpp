@@ -16,6 +16,7 @@ constexpr double kSmallestVoxel = 1e-4, kLargestVoxel = 10, kFarthest = 1e6;  //
 constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();      // no voxel of the set in this row yet
 constexpr Index kMostAlong = 16384;                                           // voxels: 3 n² stays below 2³¹
 constexpr Index kGrain = 64;                                                  // rows
+constexpr std::int64_t kMostBytes = 8 * kMostVoxels + (1 << 20);              // of a file's arrays: doubles at most
 
 // ---- Reading ----
 
@@ -139,10 +140,10 @@ double signed_distance(std::int32_t squared, bool is_solid, double voxel_size) {
 
 }  // namespace
 
-OccupancyGrid read_occupancy(const std::string& path) { return grid_of(Npz::read(path)); }
+OccupancyGrid read_occupancy(const std::string& path) { return grid_of(Npz::read(path, kMostBytes)); }
 
 OccupancyGrid decode_occupancy(std::span<const std::uint8_t> file, const std::string& name) {
-  return grid_of(Npz::decode(file, name));
+  return grid_of(Npz::decode(file, name, kMostBytes));
 }
 
 std::vector<std::int32_t> squared_voxel_distances(const std::vector<std::uint8_t>& set,
@@ -166,14 +167,15 @@ std::vector<std::int32_t> squared_voxel_distances(const std::vector<std::uint8_t
 
 OccupancyDistance::OccupancyDistance(const OccupancyGrid& grid)
     : cells_(grid.cells), origin_(grid.origin), voxel_size_(grid.voxel_size), is_y_up_(grid.is_y_up) {
-  const std::vector<std::int32_t> to_solid = squared_voxel_distances(grid.occupied, grid.cells);
-  std::vector<std::uint8_t> free(grid.occupied.size());
-  for (std::size_t i = 0; i < free.size(); ++i) free[i] = grid.occupied[i] == 1 ? 0 : 1;
-  const std::vector<std::int32_t> to_free = squared_voxel_distances(free, grid.cells);
-  nodes_.resize(free.size());
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    const bool is_solid = grid.occupied[i] == 1;
-    nodes_[i] = static_cast<float>(signed_distance(is_solid ? to_free[i] : to_solid[i], is_solid, voxel_size_));
+  nodes_.resize(grid.occupied.size());
+  std::vector<std::uint8_t> set = grid.occupied;
+  for (const bool is_solid : {false, true}) {  // the free voxels by the solid ones, and the other way round
+    const std::vector<std::int32_t> squared = squared_voxel_distances(set, cells_);
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      if ((grid.occupied[i] == 1) == is_solid)
+        nodes_[i] = static_cast<float>(signed_distance(squared[i], is_solid, voxel_size_));
+      set[i] ^= 1U;
+    }
   }
 }
 

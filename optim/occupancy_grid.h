@@ -30,7 +30,8 @@ struct OccupancyGrid {
 ///
 /// Throws UserError when the file cannot be read; DataError naming file and array: missing, a shape that does not fit,
 /// a number that is not finite or beyond 1e6, a size outside 1e-4 to 10 m, more than kMostVoxels, or than 16384 along
-/// an axis; a grid in which no voxel is occupied, or none is free.
+/// an axis; a grid in which no voxel is occupied, or none is free. Arrays that claim more than kMostVoxels doubles are
+/// refused before memory is taken for them.
 OccupancyGrid read_occupancy(const std::string& path);
 /// As read_occupancy, of a file in memory. @param name  what messages call it
 OccupancyGrid decode_occupancy(std::span<const std::uint8_t> file, const std::string& name);
@@ -49,7 +50,8 @@ std::vector<std::int32_t> squared_voxel_distances(const std::vector<std::uint8_t
 /// trilinear. So a wall along the axes has its exact distance, and any other place is within about a voxel of it.
 class OccupancyDistance {
  public:
-  /// Throws InternalError when no voxel is occupied, or none is free.
+  /// Takes 10 bytes a voxel while it is made, 4 after it. Throws InternalError when no voxel is occupied, or none is
+  /// free.
   explicit OccupancyDistance(const OccupancyGrid& grid);
 
   /// Metres; NaN outside of the grid, of which nothing is known. By several threads at once.

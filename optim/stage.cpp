@@ -5,12 +5,12 @@
 #include <cmath>
 #include <numeric>
 
-#include "autodiff/elementwise.h"
 #include "autodiff/inspect.h"
 #include "core/stopwatch.h"
 #include "core/suggest.h"
 #include "core/text.h"
 #include "optim/optimizer.h"
+#include "optim/stage_loss.h"
 
 namespace hsi4d {
 
@@ -18,122 +18,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::string message_of(const std::string& stage, const std::string& text) { return "stage '" + stage + "': " + text; }
-
-/// The weighted sum of the terms that are on.
-template <class S>
-struct RecordedLoss {
-  Var<S> total;
-  std::vector<Var<S>> terms;
-  std::vector<LossValue> values;  // of `terms`
-  std::vector<std::string> off;
-  std::vector<LeftOut> left_out;
-  std::vector<LossNote> notes;
-};
-
-const LossTerm& term_named(const std::string& name, std::span<const LossTerm> terms, const std::string& stage) {
-  std::vector<std::string> known;
-  for (const LossTerm& term : terms) {
-    if (term.description.name == name) return term;
-    known.push_back(term.description.name);
-  }
-  throw UserError(message_of(
-      stage, "there is no loss term \"" + name + "\"" + did_you_mean(name, known) + " (known: " + joined(known) + ")"));
-}
-
-/// What a term is recorded from: what was prepared of its settings, or is now.
-std::any prepared_of(const LossSettings& chosen, const LossTerm& term) {
-  if (chosen.prepared.has_value()) return chosen.prepared;
-  return prepared_loss(term.description.prepare, chosen.own.has_value() ? chosen.own : term.description.defaults);
-}
-
-template <class S>
-RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossTerm> terms, const LossInputs<S>& inputs,
-                            const std::string& stage) {
-  RecordedLoss<S> loss;
-  LossInputs<S> asking = inputs;
-  asking.left_out = &loss.left_out;
-  asking.notes = &loss.notes;
-  std::vector<std::string> reasons;
-  for (const auto& [name, chosen] : settings.losses) {
-    const LossTerm& term = term_named(name, terms, stage);
-    const Var<S> value = chosen.weight == 0 ? Var<S>{} : term.record(asking, prepared_of(chosen, term));
-    if (value.tape == nullptr) {
-      loss.off.push_back(name);
-      reasons.push_back(name + (chosen.weight == 0 ? " has weight 0" : " lacks an input"));
-      continue;
-    }
-    HSI4D_CHECK(value.shape().is_scalar(), "loss term " + name + " gives more than one number");
-    const Var<S> weighted = value * chosen.weight;
-    loss.total = loss.terms.empty() ? weighted : loss.total + weighted;
-    loss.terms.push_back(value);
-    loss.values.push_back({name, chosen.weight, 0});
-  }
-  if (!loss.terms.empty()) return loss;
-  throw UserError(message_of(
-      stage, "no loss term gives anything" + (reasons.empty() ? ": none is named" : ": " + joined(reasons))));
-}
-
-/// The groups that the settings name, in the settings' order.
-template <class S>
-std::vector<AdamGroup<S>> named_groups(const StageSettings& settings, const std::vector<ParameterGroup<S>>& available,
-                                       const std::string& stage) {
-  std::vector<AdamGroup<S>> groups;
-  for (const auto& [name, group_settings] : settings.optimize) {
-    for (const ParameterGroup<S>& group : available) {
-      if (group.name == name) groups.push_back({group, group_settings});
-    }
-  }
-  for (auto a = groups.begin(); a != groups.end(); ++a) {
-    for (auto b = groups.begin(); b != a; ++b) {
-      for (const Var<S> x : a->parameters.blocks) {
-        for (const Var<S> y : b->parameters.blocks) {
-          if (x.id != y.id) continue;
-          throw UserError(message_of(
-              stage, "groups \"" + b->parameters.name + "\" and \"" + a->parameters.name + "\" share the parameter '" +
-                         TapeInspector<S>(x.owner()).array_name(x.id) + "'; only one of them can be optimised"));
-        }
-      }
-    }
-  }
-  return groups;
-}
-
-template <class S>
-void set_frozen(Tape<S>& tape, const ParameterGroup<S>& group, bool frozen) {
-  for (const Var<S> block : group.blocks) frozen ? tape.freeze(block) : tape.unfreeze(block);
-}
-
 template <class S>
 void release(Tape<S>& tape, const std::vector<HeldOutput>& outputs) {
   for (const HeldOutput& held : outputs) tape.release(TapeInspector<S>(tape).handle(held.id));
 }
-
-/// The tape as it was: nothing recorded, parameters frozen or not as found.
-template <class S>
-class TapeGuard {
- public:
-  TapeGuard(Tape<S>& tape, const std::vector<ParameterGroup<S>>& available)
-      : tape_(tape), available_(available), mark_(tape.mark()) {
-    for (const ParameterGroup<S>& group : available) {
-      for (const Var<S> block : group.blocks) frozen_.push_back(tape.frozen(block));
-    }
-  }
-  void restore() const {
-    tape_.set_profiling(false);
-    tape_.rewind(mark_);
-    auto was_frozen = frozen_.begin();
-    for (const ParameterGroup<S>& group : available_) {
-      for (const Var<S> block : group.blocks) *was_frozen++ ? tape_.freeze(block) : tape_.unfreeze(block);
-    }
-  }
-
- private:
-  Tape<S>& tape_;
-  const std::vector<ParameterGroup<S>>& available_;
-  typename Tape<S>::Mark mark_;
-  std::vector<bool> frozen_;
-};
 
 /// A stage in the course of its iterations.
 template <class S>
@@ -296,9 +184,7 @@ class StageRun {
   double evaluated_loss() const { return static_cast<double>(tape_.value(loss_.total).scalar()); }
 
   void read_terms() {
-    for (std::size_t k = 0; k < loss_.terms.size(); ++k) {
-      loss_.values[k].value = static_cast<double>(tape_.value(loss_.terms[k]).scalar());
-    }
+    loss_.read_values();
     for (std::size_t k = 0; k < loss_.left_out.size(); ++k) {
       for (Index o = 0; o < loss_.left_out[k].objects; ++o) {
         if (loss_.left_out[k].is_left_out(o)) ++left_out_[k][static_cast<std::size_t>(o)];
@@ -325,10 +211,7 @@ class StageRun {
       const auto& blocks = group.parameters.blocks;
       if (blocks.empty() || !moves_in(group.settings, iteration)) continue;
       if (std::any_of(blocks.begin(), blocks.end(), [&](Var<S> block) { return tape_.has_gradient(block); })) continue;
-      std::vector<std::string> names;
-      for (const LossValue& term : loss_.values) names.push_back(term.name);
-      throw UserError(message_of(options_.name, "no loss term depends on the group \"" + group.parameters.name +
-                                                    "\" (terms: " + joined(names) + ")"));
+      throw no_term_depends_on(group.parameters.name, loss_.values, options_.name);
     }
   }
 
@@ -341,11 +224,11 @@ class StageRun {
   [[noreturn]] void throw_diverged(const std::string& when) const {
     std::vector<std::string> values;
     for (const LossValue& term : loss_.values) values.push_back(term.name + " " + rounded(term.value, 6));
-    throw StageDivergedError(message_of(options_.name, "given up in " + when + " after " +
-                                                           std::to_string(optimizer_.rollbacks()) +
-                                                           " steps that had to be taken back (max_rollbacks is " +
-                                                           std::to_string(settings_.optimizer.max_rollbacks) +
-                                                           "): " + offender_ + "; terms: " + joined(values)));
+    throw StageDivergedError(stage_message(options_.name, "given up in " + when + " after " +
+                                                              std::to_string(optimizer_.rollbacks()) +
+                                                              " steps that had to be taken back (max_rollbacks is " +
+                                                              std::to_string(settings_.optimizer.max_rollbacks) +
+                                                              "): " + offender_ + "; terms: " + joined(values)));
   }
 
   /// Runs the tape once more, looking at every number: "; first: nan in forward of 'log' …". Empty where all is finite

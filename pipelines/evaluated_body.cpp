@@ -51,6 +51,7 @@ EvaluatedBody EvaluatedBody::of_avatar(const std::string& file, Track& track) {
   EvaluatedBody body;
   body.avatar_ = read_avatar(file);
   track.motion = for_body(track.motion, *body.avatar_);
+  turn_z_up(track);
   body.skeleton_ = {body.avatar_->parents, body.avatar_->joints};
   return body;
 }
@@ -62,6 +63,7 @@ EvaluatedBody EvaluatedBody::of_model(const std::string& file, Track& track) {
   body.betas_.assign(track.motion.betas.begin(), track.motion.betas.begin() + betas);
   const BodyModel rest = rest_body(*body.model_, body.betas_);
   track.motion = for_body(track.motion, rest);
+  turn_z_up(track);
   body.skeleton_ = {rest.parents, rest.joints};
   return body;
 }

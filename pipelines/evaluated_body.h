@@ -15,9 +15,9 @@ namespace hsi4d {
 /// A skeleton, and what stands for the body's vertices.
 class EvaluatedBody {
  public:
-  /// An avatar; the track is moved to stand on it. Errors as read_avatar.
+  /// An avatar; the track is moved to stand on it, z up. Errors as read_avatar.
   static EvaluatedBody of_avatar(const std::string& file, Track& track);
-  /// A body model in the track's own shape; the track is moved to stand on it. Errors as read_smplx.
+  /// A body model in the track's own shape; the track is moved to stand on it, z up. Errors as read_smplx.
   static EvaluatedBody of_model(const std::string& file, Track& track);
 
   const RestSkeleton& skeleton() const { return skeleton_; }

@@ -32,7 +32,7 @@ struct Measurement {
   const std::string& input;
   Evaluation result = {};
   Track estimate = {};
-  std::optional<EvaluatedBody> body = {};
+  std::optional<EvaluatedBody> body = {}, truth_body = {};
   AlignedTracks tracks = {};
   std::vector<Gaussians> objects = {};         // of the estimate, in its order; empty: not known
   std::vector<std::string> object_names = {};  // of those
@@ -80,33 +80,105 @@ std::string avatar_for(const EvaluationSettings& settings, const std::string& in
                   "F.safetensors says it");
 }
 
-TrackOptions track_options(const EvaluationSettings& settings, const std::vector<std::string>& folders) {
-  TrackOptions options{settings.from_rate, settings.person, settings.up, settings.objects, "object"};
+/// @param upright  as UpHints has it
+TrackOptions track_options(const EvaluationSettings& settings, const std::vector<std::string>& folders,
+                           const std::optional<Vector3<double>>& upright) {
+  TrackOptions options;
+  options.frame_rate = settings.from_rate;
+  options.person = settings.person;
+  options.up = settings.up;
+  options.upright = upright;
+  options.objects = settings.objects;
   const std::vector<std::string> names = first_of(folders, object_names_of_track);
   if (names.size() == 1) options.object_name = names.front();
   return options;
 }
 
-// ---- Alignment ----
-
-/// Lays the estimate's frame 0 on that of `first`, which is on the same kind of body.
-void lay_on(const Measurement& m, const BodyPose& first, Track& track) {
-  if (!track.object_poses.empty())
-    throw UserError("hsi4d evaluate: --align moves the body alone, and " + m.input + " has objects too");
-  const Vector3<double> pelvis = pelvis_of(m.body->skeleton().joints);
-  track.motion.poses = laid_on(std::move(track.motion.poses), first, pelvis, m.settings.align);
+/// Of the truth, of whose motions the options say what these leave open themselves.
+TrackOptions truth_options(const EvaluationSettings& settings, const std::vector<std::string>& folders) {
+  TrackOptions options = track_options(settings, folders, {});
+  options.objects.clear();
+  options.fills_in = true;
+  return options;
 }
 
-void align_without_truth(Measurement& m, const std::string& avatar, const std::vector<std::string>& folders) {
+// ---- Where things are ----
+
+/// The pelvis of frame 0 in the world, of a track on its body.
+Rigid<double> first_pelvis(const Track& track) {
+  HSI4D_CHECK(track.motion.pelvis_rest.has_value(), track.name + ": is on no body");
+  return world_pelvis(track.motion.poses.front(), *track.motion.pelvis_rest);
+}
+
+/// The pelvis that the run or dataset begins with, where it is of use; nothing where there is none.
+std::optional<Rigid<double>> initial_pelvis(const std::string& avatar, const std::vector<std::string>& folders,
+                                            const Measurement& m) {
+  if (m.settings.align == MotionAlign::kNone && fs::is_directory(m.input)) return std::nullopt;
   const std::string initial = first_of(folders, initial_of_track);
-  if (initial.empty())
-    throw UserError("hsi4d evaluate: --align: " + m.input +
-                    ": there is no frame 0 to lay it on; --truth or --data has one");
+  if (initial.empty()) return std::nullopt;
   Track first;
   first.name = initial;
   first.motion = read_motion_aloud(initial);
   put_on_body(m.settings, avatar, first);
-  lay_on(m, first.motion.poses.front(), m.estimate);
+  return first_pelvis(first);
+}
+
+/// Lays the estimate's frame 0 on a pelvis: all that it holds moves alike.
+void lay_on(const std::optional<Rigid<double>>& pelvis, Measurement& m) {
+  if (m.settings.align == MotionAlign::kNone) return;
+  if (!pelvis)
+    throw UserError("hsi4d evaluate: --align: " + m.input +
+                    ": there is no frame 0 to lay it on; --truth or --data has one");
+  move_world(world_laid_on(first_pelvis(m.estimate), *pelvis, m.settings.align), m.estimate);
+}
+
+/// The mean of the centres in an object's file, about which its poses act.
+Vector3<double> centroid_in_file(const std::string& file) {
+  const Gaussians gaussians = read_splats(file).gaussians;
+  Vector3<double> sum = Vector3<double>::Zero();
+  for (Index g = 0; g < gaussians.count(); ++g) sum += Vector3<float>(gaussians.means.data() + 3 * g).cast<double>();
+  return gaussians.count() == 0
+             ? sum
+             : Vector3<double>(gaussians.origin_world + sum / static_cast<double>(gaussians.count()));
+}
+
+/// --object-surface of an object; empty: not given.
+std::string surface_of_object(const EvaluationSettings& settings, const std::string& name) {
+  for (const auto& [object, file] : settings.object_surfaces) {
+    if (object == name) return file;
+  }
+  return "";
+}
+
+/// Where in its own file the point is that an object's poses act about: the mean of its Gaussians' centres, where these
+/// are not known that of its mesh's vertices. Nothing where neither is known.
+std::optional<Vector3<double>> centroid_of_object(const EvaluationSettings& settings,
+                                                  const std::vector<std::string>& folders, const std::string& name) {
+  const std::string gaussians =
+      first_of(folders, [&name](const std::string& path) { return object_file_of_track(path, name); });
+  if (!gaussians.empty()) return centroid_in_file(gaussians);
+  const std::string surface = surface_of_object(settings, name);
+  return surface.empty() ? std::nullopt : std::optional(mesh_centroid(surface));
+}
+
+/// Objects whose translations are of the origins of their files get those of their centroids c: t' = R c + t. Where a
+/// centroid is not known, objects are left out.
+void place_objects(const std::vector<std::string>& folders, Measurement& m, Track& track) {
+  if (!track.objects_are_of_origins) return;
+  for (std::size_t o = 0; o < track.objects.size(); ++o) {
+    const auto centroid = centroid_of_object(m.settings, folders, track.objects[o]);
+    if (!centroid) {
+      m.result.notes.push_back(
+          "obj_trans of " + track.name + " is the place of the origin of the object's file, which " +
+          "is not known: no object (--data or --object-surface " + track.objects[o] + "=F says where it is)");
+      track.objects.clear();
+      track.object_poses.clear();
+      break;
+    }
+    for (std::vector<ObjectPose>& poses : track.object_poses)
+      poses[o].translation += so3_exp(poses[o].rotation) * *centroid;
+  }
+  track.objects_are_of_origins = false;
 }
 
 // ---- What is measured ----
@@ -121,8 +193,10 @@ void add(const MetricValues& means, const std::vector<MetricValues>& by_frame, E
 
 /// The objects' Gaussians, where all are known.
 void read_objects(const std::vector<std::string>& folders, Measurement& m) {
-  const std::vector<std::string> files =
-      first_of(folders, [&m](const std::string& path) { return object_files_of_track(path, m.estimate); });
+  std::vector<std::string> files;
+  for (const std::string& name : m.estimate.objects)
+    files.push_back(first_of(folders, [&name](const std::string& path) { return object_file_of_track(path, name); }));
+  if (std::find(files.begin(), files.end(), "") != files.end()) files.clear();
   for (const std::string& file : files) m.objects.push_back(read_object(file));
   if (!files.empty()) m.object_names = m.estimate.objects;
   if (files.empty() && !m.estimate.object_poses.empty())
@@ -166,16 +240,20 @@ void measure_feet_and_hands(Measurement& m) {
   add(mean_after_first(contact), contact, m.result);
 }
 
-/// Places that are known to be free: where the first camera is, and the joints of the first frame.
+/// Places that are known to be free: where the first camera is, and the joints of the first frame; of the truth where
+/// it has them.
 std::vector<Vector3<double>> free_places(const Measurement& m) {
-  std::vector<Vector3<double>> places;
+  std::vector<const FrameState*> firsts;
   for (const std::vector<FrameState>* const states : {&m.tracks.truth, &m.tracks.estimate}) {
-    if (states->empty()) continue;
-    const FrameState& first = states->front();
-    if (first.camera_from_world) places.push_back(inverse(*first.camera_from_world).translation);
-    for (std::size_t i = 0; i + 2 < first.joints.size(); i += 3) places.emplace_back(first.joints.data() + i);
-    break;
+    if (!states->empty()) firsts.push_back(&states->front());
   }
+  std::vector<Vector3<double>> places;
+  for (const FrameState* const first : firsts) {
+    if (!first->camera_from_world || !places.empty()) continue;
+    places.push_back(inverse(*first->camera_from_world).translation);
+  }
+  const std::vector<double>& joints = firsts.front()->joints;
+  for (std::size_t i = 0; i + 2 < joints.size(); i += 3) places.emplace_back(joints.data() + i);
   return places;
 }
 
@@ -217,35 +295,15 @@ void measure_scene(const std::vector<std::string>& folders, const std::vector<st
   add_penetration(counts, penetration_values, m.result);
 }
 
-/// The mean of the centres in an object's file, about which its poses act.
-Vector3<double> centroid_in_file(const std::string& file) {
-  const Gaussians gaussians = read_splats(file).gaussians;
-  Vector3<double> sum = Vector3<double>::Zero();
-  for (Index g = 0; g < gaussians.count(); ++g) sum += Vector3<float>(gaussians.means.data() + 3 * g).cast<double>();
-  return gaussians.count() == 0
-             ? sum
-             : Vector3<double>(gaussians.origin_world + sum / static_cast<double>(gaussians.count()));
-}
-
 Solid solid_of_object(const std::vector<std::string>& folders, std::size_t index, const Measurement& m) {
   const std::string& name = m.estimate.objects[index];
-  for (const auto& [object, file] : m.settings.object_surfaces) {
-    if (object != name) continue;
-    const std::vector<std::string> files =
-        first_of(folders, [&m](const std::string& path) { return object_files_of_track(path, m.estimate); });
-    return object_mesh_solid(file,
-                             files.empty() ? Vector3<double>(Vector3<double>::Zero()) : centroid_in_file(files[index]));
-  }
+  const std::string surface = surface_of_object(m.settings, name);
+  if (!surface.empty()) return object_mesh_solid(surface, *centroid_of_object(m.settings, folders, name));
   return m.objects.empty() ? Solid{} : object_solid(m.objects[index], name);
 }
 
 void measure_objects(const std::vector<std::string>& folders, const std::vector<std::vector<double>>& points,
                      Measurement& m) {
-  for (const auto& [name, file] : m.settings.object_surfaces) {
-    if (std::find(m.estimate.objects.begin(), m.estimate.objects.end(), name) == m.estimate.objects.end())
-      throw UserError("hsi4d evaluate: --object-surface: " + m.input + " has no object \"" + name + "\"" +
-                      (m.estimate.objects.empty() ? "" : "; there is " + joined(m.estimate.objects)));
-  }
   if (m.estimate.object_poses.empty()) return;
   std::vector<SignedDistance> distances;
   std::vector<std::string> sources;
@@ -293,28 +351,66 @@ void measure_clip(const std::string& file, Evaluation& result) {
   result.notes.push_back(std::move(note));
 }
 
+void check_object_surfaces(const Measurement& m) {
+  for (const auto& [name, file] : m.settings.object_surfaces) {
+    if (std::find(m.estimate.objects.begin(), m.estimate.objects.end(), name) == m.estimate.objects.end())
+      throw UserError("hsi4d evaluate: --object-surface: " + m.input + " has no object \"" + name + "\"" +
+                      (m.estimate.objects.empty() ? "" : "; there is " + joined(m.estimate.objects)));
+  }
+}
+
+void note_world(const Track& track, Measurement& m, const std::string& before) {
+  if (!track.world.empty()) m.result.notes.push_back(before + track.world);
+}
+
+/// The truth on its body; nothing where there is none.
+std::optional<Track> take_truth(const std::vector<std::string>& truths, const std::vector<std::string>& folders,
+                                const std::string& avatar, Measurement& m) {
+  if (truths.empty()) return std::nullopt;
+  Track truth = read_joined_tracks(truths, truth_options(m.settings, folders));
+  m.truth_body = put_on_body(m.settings, avatar, truth);
+  note_world(truth, m, "the truth: ");
+  place_objects(folders, m, truth);
+  return truth;
+}
+
+/// The estimate on its body, in the world of the truth.
+/// @param begin  the pelvis that it should begin with
+void take_estimate(const std::optional<Rigid<double>>& begin, const std::vector<std::string>& folders,
+                   const std::string& avatar, Measurement& m) {
+  std::optional<Vector3<double>> upright;
+  if (begin) upright = Vector3<double>(begin->rotation.row(2));
+  m.estimate = read_track(m.input, track_options(m.settings, folders, upright));
+  m.body = put_on_body(m.settings, avatar, m.estimate);
+  note_world(m.estimate, m, "");
+  if (m.estimate.objects_stay)
+    m.result.notes.push_back("the objects of " + m.settings.objects + " are in the scene's world, z up");
+  lay_on(begin, m);
+  check_object_surfaces(m);
+  place_objects(folders, m, m.estimate);
+}
+
 /// The estimate and, where there is one, the truth, on their bodies and at the same moments.
 void read_tracks(const std::vector<std::string>& truths, const std::vector<std::string>& folders, Measurement& m) {
   if (!m.settings.objects.empty() && fs::is_directory(m.input))
     throw UserError("hsi4d evaluate: --objects is for a motion (.npz); " + m.input + " has objects of its own");
   const std::string avatar = avatar_for(m.settings, m.input, folders);
-  m.estimate = read_track(m.input, track_options(m.settings, folders));
-  m.body = put_on_body(m.settings, avatar, m.estimate);
-  if (!m.estimate.world.empty()) m.result.notes.push_back(m.estimate.world);
-  if (truths.empty()) {
-    if (m.settings.align != MotionAlign::kNone) align_without_truth(m, avatar, folders);
+  const std::optional<Track> truth = take_truth(truths, folders, avatar, m);
+  take_estimate(truth ? first_pelvis(*truth) : initial_pelvis(avatar, folders, m), folders, avatar, m);
+  m.result.has_objects = !m.estimate.objects.empty() || (truth && !truth->objects.empty()) ||
+                         !first_of(folders, object_names_of_track).empty();
+  if (!truth) {
     m.tracks = by_itself(m.estimate, m.body->skeleton(), m.settings.frame_rate);
     read_objects(folders, m);
     begin_without_truth(m);
     m.result.notes.emplace_back("there is no truth: errors are not measured (--truth names one)");
     return;
   }
-  Track truth = read_joined_tracks(truths);
-  const EvaluatedBody truth_body = put_on_body(m.settings, avatar, truth);
-  if (m.settings.align != MotionAlign::kNone) lay_on(m, truth.motion.poses.front(), m.estimate);
-  m.tracks = aligned(m.estimate, m.body->skeleton(), truth, truth_body.skeleton(), m.settings.frame_rate);
+  m.estimate.motion.frame_rate = rate_beside(m.estimate, *truth);
+  m.estimate.motion.says_frame_rate = true;
+  m.tracks = aligned(m.estimate, m.body->skeleton(), *truth, m.truth_body->skeleton(), m.settings.frame_rate);
   read_objects(folders, m);
-  measure_errors(truth, m);
+  measure_errors(*truth, m);
 }
 
 /// Looks whether all paths hold what they should, and finds the truths.

@@ -22,12 +22,14 @@ struct EvaluationSettings {
   std::string body_model;  ///< joints and vertices are those of this body, in each motion's own shape
   std::string avatar;
   std::string surface, occupancy, scene;  ///< what is solid: a mesh, a grid, what Gaussians show; one at most
-  std::string objects;                    ///< poses of objects beside a motion
+  std::string objects;                    ///< poses of objects in the scene, beside a motion
   std::vector<std::pair<std::string, std::string>> object_surfaces;  ///< meshes of objects, by name
   MotionAlign align = MotionAlign::kNone;  ///< how a motion is laid on frame 0 of the truth or the data
-  std::optional<double> from_rate = {}, frame_rate = {};
+  /// What files of other programs leave open; of the truth only what its file does not say.
+  std::optional<double> from_rate = {};
   std::optional<UpAxis> up = {};
   int person = 0;
+  std::optional<double> frame_rate = {};  ///< to measure at
 };
 
 /// What one input came to.
@@ -35,6 +37,7 @@ struct Evaluation {
   std::string name, truth;  ///< no truth: ""
   Index frames = 0;
   double frame_rate = 0;
+  bool has_objects = false;                 ///< something is moved in the clip: its motion, truth or data say so
   MetricValues values;                      ///< means over frames 1 to T, in no order
   std::vector<FrameMetrics> per_frame;      ///< of frames 1 to T
   std::vector<std::string> notes;           ///< what was found or taken, for people

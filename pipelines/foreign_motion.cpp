@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "body/motion_edit.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/npz.h"
@@ -72,28 +71,6 @@ std::vector<std::vector<ObjectPose>> read_unnamed(const NpyArray& rotations, con
   return poses;
 }
 
-}  // namespace
-
-UpFinding find_up(const std::string& path, const Motion& motion, std::optional<UpAxis> wanted) {
-  if (wanted) return {*wanted, *wanted == UpAxis::kY ? "y is up, as --up says: turned" : ""};
-  const Npz file = Npz::read(path);
-  if (file.has("mocap_frame_rate") || file.has("mocap_framerate")) return {};
-  const Vector3<double> up = mean_upright(motion);
-  const double least = kUprightShare * up.norm();
-  if (up[1] >= least && up.norm() > 0) return {UpAxis::kY, "y is up, by the posture: turned (--up z if it is not)"};
-  if (up[2] >= least && up.norm() > 0) return {UpAxis::kZ, "z is up, by the posture"};
-  if (up[1] <= -least && up.norm() > 0)
-    throw DataError(path +
-                    ": y points down, by the posture, as in a camera's frame; a motion in the world is needed (--up z "
-                    "or y says that it is one)");
-  return {UpAxis::kZ, "z is taken for up: the posture does not tell (--up y if y is)"};
-}
-
-ObjectPose turned_z_up(const ObjectPose& pose) {
-  const Matrix3<double> turn = z_up_from_y_up().rotation;
-  return {so3_log(Matrix3<double>(turn * so3_exp(pose.rotation))), turn * pose.translation};
-}
-
 /// Files are called by objects' names.
 void check_object_name(const std::string& name, const std::string& path) {
   const bool is_fit = !name.empty() && name != "." && name != ".." &&
@@ -102,6 +79,47 @@ void check_object_name(const std::string& name, const std::string& path) {
   if (!is_fit)
     throw DataError(path + ": has an object called " + json_string(name) +
                     "; allowed are names that a file may have, without / and \\");
+}
+
+/// The root's rotation in frame 0.
+Matrix3<double> first_root(const Motion& motion) {
+  return so3_exp(Vector3<double>(motion.poses.front().axis_angle.data()));
+}
+
+[[noreturn]] void refuse_camera_frame(const std::string& path, const char* by) {
+  throw DataError(path + ": y points down, by " + by +
+                  ", as in a camera's frame; a motion in the world is needed (--up z or y says that it is one)");
+}
+
+/// By what is up in the frame of the root; nothing where no axis is near to it.
+std::optional<UpFinding> up_as_known(const std::string& path, const Motion& motion, const Vector3<double>& upright) {
+  const Matrix3<double> root = first_root(motion);
+  const double z = dot(Vector3<double>(root.row(2)), upright), y = dot(Vector3<double>(root.row(1)), upright);
+  if (std::max(z, std::fabs(y)) < kUprightShare) return std::nullopt;
+  if (-y > z && -y > y) refuse_camera_frame(path, "how the body is in frame 0");
+  if (y > z) return UpFinding{UpAxis::kY, "y is up, as the body is in frame 0: turned (--up z if it is not)"};
+  return UpFinding{UpAxis::kZ, "z is up, as the body is in frame 0"};
+}
+
+UpFinding up_by_posture(const std::string& path, const Motion& motion) {
+  const Vector3<double> up = mean_upright(motion);
+  const double least = kUprightShare * up.norm();
+  if (up[1] >= least && up.norm() > 0) return {UpAxis::kY, "y is up, by the posture: turned (--up z if it is not)"};
+  if (up[2] >= least && up.norm() > 0) return {UpAxis::kZ, "z is up, by the posture"};
+  if (up[1] <= -least && up.norm() > 0) refuse_camera_frame(path, "the posture");
+  return {UpAxis::kZ, "z is taken for up: the posture does not tell (--up y if y is)"};
+}
+
+}  // namespace
+
+UpFinding find_up(const std::string& path, const Motion& motion, const UpHints& hints) {
+  const Npz file = Npz::read(path);
+  const bool is_of_amass = file.has("mocap_frame_rate") || file.has("mocap_framerate");
+  if (hints.wanted && !(hints.fills_in && is_of_amass))
+    return {*hints.wanted, *hints.wanted == UpAxis::kY ? "y is up, as --up says: turned" : ""};
+  if (is_of_amass) return {};
+  const std::optional<UpFinding> known = hints.upright ? up_as_known(path, motion, *hints.upright) : std::nullopt;
+  return known ? *known : up_by_posture(path, motion);
 }
 
 ForeignObjects read_motion_objects(const std::string& path, const std::string& unnamed) {
@@ -117,11 +135,13 @@ ForeignObjects read_motion_objects(const std::string& path, const std::string& u
     return objects;
   }
   const NpyArray* const rotations = first_of(file, {"obj_rot_mat", "obj_rot"});
-  const NpyArray* const places = first_of(file, {"obj_com_pos", "window_obj_com_pos", "obj_trans"});
+  const NpyArray* const centres = first_of(file, {"obj_com_pos", "window_obj_com_pos"});
+  const NpyArray* const places = centres == nullptr ? first_of(file, {"obj_trans"}) : centres;
   if (rotations == nullptr && places == nullptr) return objects;
   if (rotations == nullptr || places == nullptr)
-    throw DataError(file.source() + ": has '" +
-                    (rotations == nullptr ? "obj_com_pos' but no 'obj_rot_mat'" : "obj_rot_mat' but no 'obj_com_pos'"));
+    throw DataError((rotations == nullptr ? places : rotations)->source() + ": is there without '" +
+                    (rotations == nullptr ? "obj_rot_mat" : "obj_com_pos") + "'");
+  objects.are_of_origins = centres == nullptr;
   objects.names = {unnamed};
   objects.poses = read_unnamed(*rotations, *places);
   return objects;

@@ -55,9 +55,8 @@ std::vector<BodyPose> poses_of_frames(const Motion& motion, const fs::path& file
   return poses;
 }
 
-/// R of laid_on.
-Matrix3<double> world_turn(const BodyPose& from, const BodyPose& to, MotionAlign align) {
-  const Matrix3<double> e = so3_exp(from.rotation_of(0)), f = so3_exp(to.rotation_of(0));
+/// R of world_laid_on.
+Matrix3<double> world_turn(const Matrix3<double>& e, const Matrix3<double>& f, MotionAlign align) {
   if (align == MotionAlign::kRotation) return f * e.transpose();
   // The trace of R_z(θ) E Fᵀ is largest, which is 1 + 2 cos of the angle that is left.
   const Matrix3<double> m = e * f.transpose();
@@ -76,15 +75,24 @@ std::vector<BodyPose> read_estimate(const fs::path& file, const Avatar& avatar, 
   return poses_of_frames(motion, file, frames, "");
 }
 
+Rigid<double> world_pelvis(const BodyPose& pose, const Vector3<double>& pelvis_rest) {
+  return {so3_exp(pose.rotation_of(0)), pelvis_rest + pose.transl};
+}
+
+Rigid<double> world_laid_on(const Rigid<double>& from, const Rigid<double>& to, MotionAlign align) {
+  if (align == MotionAlign::kNone) return {};
+  const Matrix3<double> turn = world_turn(from.rotation, to.rotation, align);
+  return {turn, to.translation - turn * from.translation};
+}
+
 std::vector<BodyPose> laid_on(std::vector<BodyPose> estimate, const BodyPose& first, const Vector3<double>& pelvis_rest,
                               MotionAlign align) {
   if (align != MotionAlign::kNone) {
-    const BodyPose& begin = estimate.front();
-    const Matrix3<double> turn = world_turn(begin, first, align);
-    const Vector3<double> move = pelvis_rest + first.transl - turn * (pelvis_rest + begin.transl);
+    const Rigid<double> to_from =
+        world_laid_on(world_pelvis(estimate.front(), pelvis_rest), world_pelvis(first, pelvis_rest), align);
     Motion motion;
     motion.poses = std::move(estimate);
-    estimate = transformed(motion, Rigid<double>{turn, move}, pelvis_rest).poses;
+    estimate = transformed(motion, to_from, pelvis_rest).poses;
   }
   estimate.front() = first;
   return estimate;

@@ -6,6 +6,7 @@
 
 #include "body/avatar.h"
 #include "body/motion_io.h"
+#include "core/rigid.h"
 #include "pipelines/data_settings.h"
 #include "pipelines/frame_source.h"
 
@@ -24,15 +25,23 @@ std::vector<BodyPose> estimated_poses(const Motion& motion, const std::filesyste
 /// estimated_poses, for a motion of one pose too.
 std::vector<BodyPose> read_estimate(const std::filesystem::path& file, const Avatar& avatar, const FrameSource& frames);
 
-/// Moves an estimate so that its frame 0 stands where the human of frame 0 does, as an estimator's world is not the
-/// scene's.
+/// A pelvis in the world: the root's rotation, and its place r_0 + t.
+/// @param pelvis_rest  r_0, of the body that the pose is of, metres
+Rigid<double> world_pelvis(const BodyPose& pose, const Vector3<double>& pelvis_rest);
+
+/// What brings the world of an estimate to the one that is meant, as an estimator's world is not the scene's:
 ///
 ///   x ↦ R x + c with   R = R_z(θ), θ that which brings R_z(θ) E nearest to F   (heading)
 ///                      R = F Eᵀ                                              (rotation)
 ///
-/// E and F are the root's rotations of the estimate and of `first` in frame 0, and c puts the one's pelvis on the
-/// other's. `heading` keeps what the estimator knows of the vertical; both worlds have z up. Frame 0 becomes `first`,
-/// bit for bit, which is exact.
+/// E and F are the rotations of the two pelvises, and c puts the one's place on the other's. `heading` keeps what the
+/// estimator knows of the vertical; both worlds have z up. `none` changes nothing.
+///
+/// @param from, to  world_pelvis of the estimate, each by its own body, and where it is meant to be
+Rigid<double> world_laid_on(const Rigid<double>& from, const Rigid<double>& to, MotionAlign align);
+
+/// Moves an estimate by world_laid_on so that its frame 0 stands where the human of frame 0 does. Frame 0 becomes
+/// `first`, bit for bit, which is exact.
 ///
 /// @param pelvis_rest  of the body that all poses are of, metres
 std::vector<BodyPose> laid_on(std::vector<BodyPose> estimate, const BodyPose& first, const Vector3<double>& pelvis_rest,

@@ -43,8 +43,8 @@ bool is_of_objects(const MetricValues& values) {
   });
 }
 
-const double* own_figure(const PublishedFigure& figure, const MetricValues& values) {
-  if (figure.metric.empty() || figure.is_dynamic != is_of_objects(values)) return nullptr;
+const double* own_figure(const PublishedFigure& figure, const MetricValues& values, bool is_dynamic) {
+  if (figure.metric.empty() || figure.is_dynamic != is_dynamic) return nullptr;
   return find_metric(values, figure.metric);
 }
 

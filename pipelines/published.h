@@ -37,11 +37,13 @@ inline constexpr std::string_view kPublishedSource =
 /// All that are known.
 const std::vector<PublishedFigure>& published_figures();
 
-/// Whether metrics are of a clip in which an object moves, by what there is of objects among them.
+/// Whether metrics are of a clip with an object, by what there is of objects among them: those of a run have
+/// contact_share in each such clip.
 bool is_of_objects(const MetricValues& values);
 
 /// Our value that stands beside a published one: of the same metric, and of a clip of the same kind; else null.
-const double* own_figure(const PublishedFigure& figure, const MetricValues& values);
+/// @param is_dynamic  whether the clip has an object
+const double* own_figure(const PublishedFigure& figure, const MetricValues& values, bool is_dynamic);
 
 /// "TRUMANS 0.046, LINGO 0.058"; empty where there are none.
 std::string other_figures_text(const PublishedFigure& figure);

@@ -112,19 +112,18 @@ Image reduced_cover(const Image& covered, const Camera& camera) {
   return result;
 }
 
-template <class S>
-StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
-                               const FrameStageCallback& callback) {
-  const auto& [name, stage] = task.config.stages[task.stage];
-  StageProbe probe(task.watch);
-  Tape<S> tape;
+/// Records a frame as a stage has it, beside what it is compared with, and calls use(graph, inputs of the losses).
+/// @param camera_reach  as FrameGraphSettings has it
+template <class S, class F>
+void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& frame, const SceneState& state,
+                      const ColorState& colors, std::optional<double> camera_reach, F use) {
+  const StageSettings& stage = task.config.stages[task.stage].second;
   tape.set_skips(task.config.skip.tape);
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
   settings.longest_side_px = stage.longest_side_px;
   settings.human_opacity = some_loss_reads(stage, kReadsHumanOpacity);
   settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
-  const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");
-  settings.camera_reach = camera != nullptr ? longest_way(*camera, stage.iterations, stage.optimizer) : 0;
+  settings.camera_reach = camera_reach;
   settings.seen = rows_to_draw(task, state);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
   graph.set_state(state);
@@ -133,19 +132,45 @@ StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, Sc
   graph.set_targets(targets_of(task, frame, weight));
   LossInputs<S> inputs = graph.loss_inputs();
   if (weight.empty()) inputs.weight = {};
-  const StageResult result = run_stage<S>(tape, stage, task.losses, inputs, graph.groups(),
-                                          [&](const IterationReport& report) {
-                                            const RenderCounters& counters = *graph.rendered().counters;
-                                            probe.iteration_ended(report, &counters);
-                                            callback(report, counters);
-                                            probe.iteration_begins();
-                                          },
-                                          {.name = name + ", frame " + std::to_string(frame.index),
-                                           .kept = &colors.moments,
-                                           .profile = probe.is_on(),
-                                           .held = graph.held()});
-  graph.read_state(stage.optimize, state);
-  if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
+  use(graph, inputs);
+}
+
+/// Calls use(frame) with the frame in images of the size that the stage asks for.
+template <class F>
+auto at_stage_size(const StageTask& task, const FrameTask& frame, F use) {
+  const Camera camera = camera_of_size(task.clip, task.config.stages[task.stage].second.longest_side_px);
+  if (camera.width == task.clip.camera.width && camera.height == task.clip.camera.height) return use(frame);
+  const ClipFrame small = reduced_frame(frame.frame, camera);
+  const Image covered = reduced_cover(frame.covered, camera);
+  return use(FrameTask{frame.index, small, covered, frame.done});
+}
+
+std::string name_in_frame(const StageTask& task, const FrameTask& frame) {
+  return task.config.stages[task.stage].first + ", frame " + std::to_string(frame.index);
+}
+
+template <class S>
+StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+                               const FrameStageCallback& callback) {
+  const auto& [name, stage] = task.config.stages[task.stage];
+  StageProbe probe(task.watch);
+  Tape<S> tape;
+  const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");
+  const double reach = camera != nullptr ? longest_way(*camera, stage.iterations, stage.optimizer) : 0;
+  StageResult result;
+  with_frame_graph<S>(tape, task, frame, state, colors, reach, [&](FrameGraph<S>& graph, const LossInputs<S>& inputs) {
+    result = run_stage<S>(
+        tape, stage, task.losses, inputs, graph.groups(),
+        [&](const IterationReport& report) {
+          const RenderCounters& counters = *graph.rendered().counters;
+          probe.iteration_ended(report, &counters);
+          callback(report, counters);
+          probe.iteration_begins();
+        },
+        {.name = name_in_frame(task, frame), .kept = &colors.moments, .profile = probe.is_on(), .held = graph.held()});
+    graph.read_state(stage.optimize, state);
+    if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
+  });
   const Camera drawn = camera_of_size(task.clip, stage.longest_side_px);
   probe.stage_ended(result, {.stage = name,
                              .frame = frame.index,
@@ -155,16 +180,21 @@ StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, Sc
   return result;
 }
 
-/// In images of the size that the stage asks for.
 template <class S>
 StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
                                const FrameStageCallback& callback) {
-  const Camera camera = camera_of_size(task.clip, task.config.stages[task.stage].second.longest_side_px);
-  if (camera.width == task.clip.camera.width && camera.height == task.clip.camera.height)
-    return run_stage_on_frame<S>(task, frame, state, colors, callback);
-  const ClipFrame small = reduced_frame(frame.frame, camera);
-  const Image covered = reduced_cover(frame.covered, camera);
-  return run_stage_on_frame<S>(task, {frame.index, small, covered, frame.done}, state, colors, callback);
+  return at_stage_size(
+      task, frame, [&](const FrameTask& sized) { return run_stage_on_frame<S>(task, sized, state, colors, callback); });
+}
+
+/// Records the sequence as a stage has it.
+template <class S>
+SequenceGraph<S> sequence_graph(Tape<S>& tape, const StageTask& task, const std::vector<SceneState>& states) {
+  const StageSettings& stage = task.config.stages[task.stage].second;
+  tape.set_skips(task.config.skip.tape);
+  const bool moves_pose = find_entry(stage.optimize, kPoseLatents) != nullptr;
+  const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
+  return SequenceGraph<S>(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);
 }
 
 template <class S>
@@ -173,10 +203,7 @@ StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>
   const auto& [name, stage] = task.config.stages[task.stage];
   StageProbe probe(task.watch);
   Tape<S> tape;
-  tape.set_skips(task.config.skip.tape);
-  const bool moves_pose = find_entry(stage.optimize, kPoseLatents) != nullptr;
-  const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
-  const SequenceGraph<S> graph(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);
+  const SequenceGraph<S> graph = sequence_graph<S>(tape, task, states);
   const StageResult result = run_stage<S>(tape, stage, task.losses, graph.loss_inputs(), graph.groups(),
                                           [&](const IterationReport& report) {
                                             probe.iteration_ended(report, nullptr);
@@ -212,6 +239,28 @@ StageResult run_frame_stage(const StageTask& task, const FrameTask& frame, Scene
 StageResult run_sequence_stage(const StageTask& task, std::vector<SceneState>& states, const StageCallback& callback) {
   return task.config.precision == RunPrecision::kFloat ? run_sequence_stage_in<float>(task, states, callback)
                                                        : run_sequence_stage_in<double>(task, states, callback);
+}
+
+StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, const SceneState& state,
+                                 const ColorState& colors, const StageGradcheckOptions& options) {
+  return at_stage_size(task, frame, [&](const FrameTask& sized) {
+    Tape<double> tape;
+    StageGradcheck found;
+    with_frame_graph<double>(
+        tape, task, sized, state, colors, std::nullopt, [&](const auto& graph, const auto& inputs) {
+          found = check_stage_gradient(tape, task.config.stages[task.stage].second, task.losses, inputs, graph.groups(),
+                                       name_in_frame(task, sized), options);
+        });
+    return found;
+  });
+}
+
+StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,
+                                    const StageGradcheckOptions& options) {
+  const auto& [name, stage] = task.config.stages[task.stage];
+  Tape<double> tape;
+  const SequenceGraph<double> graph = sequence_graph<double>(tape, task, states);
+  return check_stage_gradient(tape, stage, task.losses, graph.loss_inputs(), graph.groups(), name, options);
 }
 
 Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {

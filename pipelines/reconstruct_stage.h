@@ -9,6 +9,7 @@
 #include "core/image.h"
 #include "optim/loss_term.h"
 #include "optim/stage.h"
+#include "optim/stage_gradcheck.h"
 #include "pipelines/clip.h"
 #include "pipelines/color_state.h"
 #include "pipelines/run_config.h"
@@ -52,6 +53,15 @@ StageResult run_frame_stage(const StageTask& task, const FrameTask& frame, Scene
 /// @param states  by frame, frame 0 included, which is given; what the stage moves is written back
 /// Throws what run_stage throws.
 StageResult run_sequence_stage(const StageTask& task, std::vector<SceneState>& states, const StageCallback& callback);
+
+/// Checks the gradient of a stage of a frame against differences, in double whatever the config's precision. All of the
+/// scene is drawn, wherever the camera may get. Throws as check_stage_gradient.
+StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, const SceneState& state,
+                                 const ColorState& colors, const StageGradcheckOptions& options = {});
+
+/// Likewise of a stage over the sequence.
+StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,
+                                    const StageGradcheckOptions& options = {});
 
 /// The image [3,H,W] of a state, from its own camera.
 Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors);

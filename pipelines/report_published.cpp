@@ -7,7 +7,8 @@ namespace hsi4d {
 namespace {
 
 std::string row_of(const PublishedFigure& figure, const RunSummary& summary) {
-  const double* const own = summary.metrics.empty() ? nullptr : own_figure(figure, summary.metrics.back().values);
+  const MetricValues values = summary.metrics.empty() ? MetricValues{} : summary.metrics.back().values;
+  const double* const own = own_figure(figure, values, is_of_objects(values));
   const std::string others = other_figures_text(figure);
   return "<tr><th scope=\"row\" title=\"" + html_escape(std::string(figure.summary)) + "\">" +
          std::string(figure.label) + (figure.better > 0 ? " ↑" : " ↓") + "</th><td>" +

@@ -5,6 +5,7 @@
 
 #include "optim/gaussian_surface.h"
 #include "optim/mesh_distance.h"
+#include "optim/mesh_file.h"
 #include "optim/occupancy_grid.h"
 
 namespace hsi4d {
@@ -16,7 +17,7 @@ using Point = Vector3<double>;
 /// Discs of an object that are looked at, evenly chosen: which side of each is seen takes long for more.
 constexpr std::size_t kMostDiscs = 20000;
 
-/// Viewpoints stand so many times as far from an object's centroid as its farthest mean.
+/// Viewpoints stand so many times as far from an object's centroid as its farthest disc.
 constexpr double kViewDistance = 3;
 
 SignedDistance distance_of(std::vector<SurfaceDisc> discs) {
@@ -24,18 +25,11 @@ SignedDistance distance_of(std::vector<SurfaceDisc> discs) {
   return [distance](const Point& place) { return distance->at(place); };
 }
 
-double radius_of(const Gaussians& object) {
+/// How far the discs' centres are from the origin.
+double radius_of(const std::vector<SurfaceDisc>& discs) {
   double radius = 0;
-  for (Index g = 0; g < object.count(); ++g)
-    radius = std::max(radius, Vector3<float>(object.means.data() + 3 * g).cast<double>().norm());
+  for (const SurfaceDisc& disc : discs) radius = std::max(radius, disc.center.norm());
   return radius;
-}
-
-std::vector<SurfaceDisc> at_most(std::vector<SurfaceDisc> discs, std::size_t most) {
-  if (discs.size() <= most) return discs;
-  std::vector<SurfaceDisc> chosen;
-  for (std::size_t i = 0; i < most; ++i) chosen.push_back(discs[i * discs.size() / most]);
-  return chosen;
 }
 
 /// The directions of a cube's faces, edges and corners.
@@ -51,27 +45,6 @@ std::vector<Point> places_around(double distance) {
   return places;
 }
 
-/// Discs turned to the side from which more of the places see them: a ray that slips between two discs of the near side
-/// sees the far side's back, which one place alone would take for its front. Those that none sees are left out.
-std::vector<SurfaceDisc> facing_most(const std::vector<SurfaceDisc>& discs, const std::vector<Point>& places) {
-  std::vector<double> votes(discs.size(), 0);
-  for (const Point& place : places) {
-    std::size_t i = 0;
-    for (const SurfaceDisc& seen : facing(discs, {place})) {  // in the order of `discs`
-      while (discs[i].center != seen.center) ++i;
-      votes[i] += dot(seen.normal, discs[i].normal);
-      ++i;
-    }
-  }
-  std::vector<SurfaceDisc> turned;
-  for (std::size_t i = 0; i < discs.size(); ++i) {
-    if (votes[i] == 0) continue;
-    turned.push_back(discs[i]);
-    if (votes[i] < 0) turned.back().normal = -turned.back().normal;
-  }
-  return turned;
-}
-
 }  // namespace
 
 Solid mesh_solid(const std::string& path) {
@@ -85,15 +58,15 @@ Solid occupancy_solid(const std::string& path) {
 }
 
 Solid gaussian_solid(const Gaussians& scene, const std::vector<Point>& free_places, const std::string& name) {
-  std::vector<SurfaceDisc> discs = facing(surface_discs(scene), free_places);
+  std::vector<SurfaceDisc> discs = facing(without_floaters(surface_discs(scene)), free_places);
   if (discs.empty()) return {};
   return {distance_of(std::move(discs)), "the Gaussians of " + name};
 }
 
 Solid object_solid(const Gaussians& object, const std::string& name) {
-  const double radius = radius_of(object);
-  std::vector<SurfaceDisc> discs =
-      facing_most(at_most(surface_discs(object), kMostDiscs), places_around(kViewDistance * radius));
+  std::vector<SurfaceDisc> discs = thinned(without_floaters(surface_discs(object)), kMostDiscs);
+  const double radius = radius_of(discs);
+  discs = facing_most(discs, places_around(kViewDistance * radius));
   if (discs.empty()) return {};
   double widest = 0;
   for (const SurfaceDisc& disc : discs) widest = std::max(widest, disc.width);
@@ -103,6 +76,13 @@ Solid object_solid(const Gaussians& object, const std::string& name) {
             return beyond > 0 ? beyond : near(place);
           },
           "the Gaussians of " + name};
+}
+
+Point mesh_centroid(const std::string& path) {
+  const TriangleMesh mesh = read_mesh(path);
+  Point sum = Point::Zero();
+  for (const Point& vertex : mesh.vertices) sum += vertex;
+  return sum / static_cast<double>(mesh.vertices.size());
 }
 
 Solid object_mesh_solid(const std::string& path, const Point& centroid) {

@@ -40,6 +40,10 @@ Solid gaussian_solid(const Gaussians& scene, const std::vector<Vector3<double>>&
 /// @return  without a distance where no Gaussian is opaque and flat
 Solid object_solid(const Gaussians& object, const std::string& name);
 
+/// The mean of a mesh's vertices, each place once: what poses of an object act about of which no Gaussians are known.
+/// Errors as read_mesh.
+Vector3<double> mesh_centroid(const std::string& path);
+
 /// Of an object's mesh, in the frame of its Gaussians' file; `centroid` of their means is where the object's own frame
 /// has its origin.
 Solid object_mesh_solid(const std::string& path, const Vector3<double>& centroid);

@@ -11,7 +11,6 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/npz.h"
 #include "core/rotation.h"
 #include "core/text.h"
 #include "pipelines/body_files.h"
@@ -30,21 +29,18 @@ constexpr double kSameMoment = 1e-6;  // frames
 
 // ---- Files ----
 
-/// The objects of a file of tracks: NAME of NAME/rotation.
-std::vector<std::string> object_names(const std::string& file) {
-  const std::string ending = "/rotation";
-  std::vector<std::string> names;
-  const Npz archive = Npz::read(file);
-  for (const std::string& name : archive.names()) {
-    if (name.ends_with(ending)) names.push_back(name.substr(0, name.size() - ending.size()));
-  }
-  return names;
-}
-
 void check_count(const std::string& file, std::size_t count, const char* what, const Track& track) {
   if (static_cast<Index>(count) == track.frames()) return;
   throw DataError(file + ": holds " + std::to_string(count) + " " + what + ", the motion beside it has " +
                   std::to_string(track.frames()) + " frames");
+}
+
+void take_objects(const std::string& file, const std::string& unnamed, Track& track) {
+  ForeignObjects found = read_motion_objects(file, unnamed);
+  track.objects = std::move(found.names);
+  track.object_poses = std::move(found.poses);
+  track.objects_are_of_origins = found.are_of_origins;
+  if (!track.objects.empty()) check_count(file, track.object_poses.size(), "frames of objects", track);
 }
 
 /// motion.npz, and objects.npz and cameras.json where they are there.
@@ -53,11 +49,7 @@ Track read_track_folder(const fs::path& folder, const std::string& name) {
   Track track;
   track.name = name;
   track.motion = read_motion_aloud(file("motion.npz"));
-  if (fs::exists(file("objects.npz"))) {
-    track.objects = object_names(file("objects.npz"));
-    track.object_poses = read_object_tracks(file("objects.npz"), track.objects);
-    check_count(file("objects.npz"), track.object_poses.size(), "frames", track);
-  }
+  if (fs::exists(file("objects.npz"))) take_objects(file("objects.npz"), TrackOptions{}.object_name, track);
   if (fs::exists(file("cameras.json"))) {
     for (const Camera& camera : read_cameras(file("cameras.json")))
       track.camera_from_world.push_back(camera.camera_from_world);
@@ -69,36 +61,27 @@ Track read_track_folder(const fs::path& folder, const std::string& name) {
 Track read_pose_track(const std::string& path, const TrackOptions& options) {
   PoseFolder folder = read_pose_folder(path, options.frame_rate.value_or(kPoseFolderRate), options.person);
   if (folder.filled > 0) log_warning(path + ": frames without a file, interpolated: " + std::to_string(folder.filled));
-  return {path, std::move(folder.motion), {}, {}, {}, {}};
+  Track track;
+  track.name = path;
+  track.motion = std::move(folder.motion);
+  return track;
 }
 
-/// A motion (.npz), with its objects, z up.
+/// A motion (.npz), with its objects.
 Track read_motion_track(const std::string& path, const TrackOptions& options) {
   Track track;
   track.name = path;
   track.motion = read_motion_aloud(path);
-  if (options.frame_rate) {
+  if (options.frame_rate && !(options.fills_in && track.motion.says_frame_rate)) {
     track.motion.frame_rate = *options.frame_rate;
     track.motion.says_frame_rate = true;
   }
-  if (options.objects.empty()) {
-    ForeignObjects found = read_motion_objects(path, options.object_name);
-    track.objects = std::move(found.names);
-    track.object_poses = std::move(found.poses);
-    if (!track.objects.empty()) check_count(path, track.object_poses.size(), "poses of objects", track);
-  } else {
-    track.objects = object_names(options.objects);
-    track.object_poses = read_object_tracks(options.objects, track.objects);
-    check_count(options.objects, track.object_poses.size(), "frames", track);
-  }
-  const UpFinding finding = find_up(path, track.motion, options.up);
+  track.objects_stay = !options.objects.empty();
+  take_objects(track.objects_stay ? options.objects : path, options.object_name, track);
+  if (track.objects_stay && track.objects.empty()) throw DataError(options.objects + ": holds no poses of objects");
+  const UpFinding finding = find_up(path, track.motion, {options.up, options.fills_in, options.upright});
   track.world = finding.words;
-  if (finding.up == UpAxis::kY) {
-    track.motion = transformed(track.motion, z_up_from_y_up(), track.motion.pelvis_rest.value_or(kSmplxPelvis));
-    for (std::vector<ObjectPose>& poses : track.object_poses) {
-      for (ObjectPose& pose : poses) pose = turned_z_up(pose);
-    }
-  }
+  track.up = finding.up;
   return track;
 }
 
@@ -134,7 +117,7 @@ fs::path common_data_path(const std::string& run, std::string_view key) {
 /// Puts a track behind another whose last frame is its first.
 void append_track(const Track& more, Track& track) {
   if (more.objects != track.objects || more.camera_from_world.empty() != track.camera_from_world.empty() ||
-      more.motion.frame_rate != track.motion.frame_rate)
+      more.motion.frame_rate != track.motion.frame_rate || more.up != track.up)
     throw DataError(more.name + ": has other objects, cameras or another frame rate than " + track.name);
   const auto append = [](const auto& from, auto& to) {
     if (!from.empty()) to.insert(to.end(), from.begin() + 1, from.end());
@@ -250,14 +233,6 @@ std::vector<std::size_t> places_of(const Track& track, const Track& wanted) {
   return places;
 }
 
-/// The rate of `track`, beside that of `other`.
-double rate_of(const Track& track, const Track& other) {
-  if (track.motion.says_frame_rate) return track.motion.frame_rate;
-  if (track.frames() == other.frames() && other.motion.says_frame_rate) return other.motion.frame_rate;
-  throw UserError(track.name + ": says no frame rate, and has " + std::to_string(track.frames()) + " frames where " +
-                  other.name + " has " + std::to_string(other.frames()) + "; --from-rate says it");
-}
-
 /// The rate to compare at: that of the slower track, or a slower one.
 double compared_rate(double slower, std::optional<double> wanted, const std::string& name) {
   if (!wanted) return slower;
@@ -338,30 +313,40 @@ std::vector<std::string> truths_of_run(const std::string& path) {
   return truths;
 }
 
-Track read_joined_tracks(const std::vector<std::string>& paths) {
+Track read_joined_tracks(const std::vector<std::string>& paths, const TrackOptions& options) {
   HSI4D_CHECK(!paths.empty(), "there is no track to join");
-  Track track = read_track(paths.front());
-  for (std::size_t i = 1; i < paths.size(); ++i) append_track(read_track(paths[i]), track);
+  Track track = read_track(paths.front(), options);
+  for (std::size_t i = 1; i < paths.size(); ++i) append_track(read_track(paths[i], options), track);
   return track;
 }
 
-std::vector<std::string> object_files_of_track(const std::string& path, const Track& track) {
-  const auto file_of = [&path](const std::string& name) -> fs::path {
-    if (is_run_folder(path)) return object_path(path, name);
-    if (!fs::is_directory(path)) return {};
-    for (const fs::path& folder : dataset_folders(path)) {
-      const DataSettings data = dataset_inputs(folder);
-      if (const ObjectSettings* const object = find_entry(data.objects, name)) return object->gaussians;
-    }
-    return {};
-  };
-  std::vector<std::string> files;
-  for (const std::string& name : track.objects) {
-    const fs::path file = file_of(name);
-    if (file.empty() || !fs::exists(file)) return {};
-    files.push_back(file.string());
+void move_world(const Rigid<double>& to_from, Track& track) {
+  HSI4D_CHECK(track.motion.pelvis_rest.has_value(), track.name + ": is on no body");
+  track.motion = transformed(track.motion, to_from, *track.motion.pelvis_rest);
+  for (Rigid<double>& camera : track.camera_from_world) camera = compose(camera, inverse(to_from));
+  if (track.objects_stay) return;
+  for (std::vector<ObjectPose>& poses : track.object_poses) {
+    for (ObjectPose& pose : poses)
+      pose = {so3_log(Matrix3<double>(to_from.rotation * so3_exp(pose.rotation))),
+              transform_point(to_from, pose.translation)};
   }
-  return files;
+}
+
+void turn_z_up(Track& track) {
+  if (track.up == UpAxis::kZ) return;
+  move_world(z_up_from_y_up(), track);
+  track.up = UpAxis::kZ;
+}
+
+std::string object_file_of_track(const std::string& path, const std::string& object) {
+  const auto existing = [](const fs::path& file) { return fs::exists(file) ? file.string() : ""; };
+  if (is_run_folder(path)) return existing(object_path(path, object));
+  if (!fs::is_directory(path)) return "";
+  for (const fs::path& folder : dataset_folders(path)) {
+    const DataSettings data = dataset_inputs(folder);
+    if (const ObjectSettings* const found = find_entry(data.objects, object)) return existing(found->gaussians);
+  }
+  return "";
 }
 
 std::vector<std::string> object_names_of_track(const std::string& path) {
@@ -437,9 +422,16 @@ AlignedTracks by_itself(const Track& track, const RestSkeleton& body, std::optio
   return tracks;
 }
 
+double rate_beside(const Track& track, const Track& other) {
+  if (track.motion.says_frame_rate) return track.motion.frame_rate;
+  if (track.frames() == other.frames() && other.motion.says_frame_rate) return other.motion.frame_rate;
+  throw UserError(track.name + ": says no frame rate, and has " + std::to_string(track.frames()) + " frames where " +
+                  other.name + " has " + std::to_string(other.frames()) + "; --from-rate says it");
+}
+
 AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, const Track& truth,
                       const RestSkeleton& truth_body, std::optional<double> frame_rate) {
-  const double estimate_rate = rate_of(estimate, truth), truth_rate = rate_of(truth, estimate);
+  const double estimate_rate = rate_beside(estimate, truth), truth_rate = rate_beside(truth, estimate);
   const std::vector<std::size_t> objects = places_of(estimate, truth);
   std::vector<std::size_t> true_objects(objects.size());
   std::iota(true_objects.begin(), true_objects.end(), std::size_t{0});

@@ -23,17 +23,24 @@ struct Track {
   std::vector<std::vector<ObjectPose>> object_poses;  ///< [frame][object]; empty: none are known
   std::vector<Rigid<double>> camera_from_world;       ///< by frame; empty: none are known
   std::string world;  ///< what was found of its world, for people; empty: nothing to say
+  /// Which axis of its world is up. A body turns about its pelvis, so that z is only then up when its body is known:
+  /// see turn_z_up.
+  UpAxis up = UpAxis::kZ;
+  bool objects_stay = false;  ///< the objects' poses are in the scene's world, z up, and do not move with the track's
+  bool objects_are_of_origins = false;  ///< their translations are those of the origins of the objects' files
 
   Index frames() const { return std::ssize(motion.poses); }
 };
 
 /// How motions of other programs are read.
 struct TrackOptions {
-  std::optional<double> frame_rate = {};  ///< frames a second of a motion, instead of what it says
-  int person = 0;                         ///< of a folder of SMPLer-X
-  std::optional<UpAxis> up = {};          ///< of a motion's world; none: find_up says it
-  std::string objects = {};               ///< a file of object poses beside a motion; empty: what it holds itself
-  std::string object_name = "object";     ///< what an object without a name is called
+  std::optional<double> frame_rate = {};        ///< frames a second of a motion, instead of what it says
+  int person = 0;                               ///< of a folder of SMPLer-X
+  std::optional<UpAxis> up = {};                ///< of a motion's world; none: find_up says it
+  bool fills_in = false;                        ///< rate and `up` are of motions alone that do not say them themselves
+  std::optional<Vector3<double>> upright = {};  ///< as UpHints has it
+  std::string objects = {};  ///< a file of object poses in the scene beside a motion; empty: what it holds itself
+  std::string object_name = "object";  ///< what an object without a name is called
 };
 
 /// Whether a folder is one that `hsi4d run` writes.
@@ -45,11 +52,10 @@ bool is_run_folder(const std::string& path);
 void check_holds_track(const std::string& path, const std::string& member);
 
 /// Reads what a path holds: a run folder (motion.npz, objects.npz, cameras.json), a dataset with truth/, such a truth/
-/// itself, a motion (.npz), or a folder of SMPLer-X (read_pose_folder). A motion whose world has y up is turned to z
-/// up, its objects with it.
+/// itself, a motion (.npz), or a folder of SMPLer-X (read_pose_folder).
 ///
 /// Throws UserError naming the path for anything else, a run that has not come to its end, and a dataset without truth;
-/// UserError and DataError of the readers; DataError where counts of frames differ.
+/// UserError and DataError of the readers; DataError where counts of frames differ, or a file of object poses has none.
 Track read_track(const std::string& path, const TrackOptions& options = {});
 
 /// The avatar that belongs to a run folder (its config's), or to a dataset; empty where there is none.
@@ -61,11 +67,18 @@ std::vector<std::string> truths_of_run(const std::string& path);
 
 /// Reads tracks of which each begins with the last frame of the one before, as one. Throws as read_track, and DataError
 /// where they do not fit each other.
-Track read_joined_tracks(const std::vector<std::string>& paths);
+Track read_joined_tracks(const std::vector<std::string>& paths, const TrackOptions& options = {});
 
-/// The files of a track's objects, in its order, by the config of a run folder or the dataset; none where one of them
-/// is not there.
-std::vector<std::string> object_files_of_track(const std::string& path, const Track& track);
+/// Moves a track to another world, x_to = R x + c: the body about its pelvis, its cameras, and its objects but for
+/// those that stay. Its motion must say where the pelvis stands in the rest pose, as for_body makes it: else
+/// InternalError.
+void move_world(const Rigid<double>& to_from, Track& track);
+
+/// Turns a track whose world has y up to z up, by move_world.
+void turn_z_up(Track& track);
+
+/// The file of the Gaussians of an object, by the config of a run folder or the dataset; empty where it is not there.
+std::string object_file_of_track(const std::string& path, const std::string& object);
 
 /// The names of the objects of a run folder's config, or of a dataset.
 std::vector<std::string> object_names_of_track(const std::string& path);
@@ -83,6 +96,10 @@ struct RestSkeleton {
   std::vector<int> parents;
   std::vector<double> joints;  ///< [J,3] metres
 };
+
+/// Frames a second of a track: what it says, else those of `other` where it has as many frames. Throws UserError naming
+/// the track where nobody knows.
+double rate_beside(const Track& track, const Track& other);
 
 /// Two tracks at the same moments.
 struct AlignedTracks {

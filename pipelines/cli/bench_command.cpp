@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/check.h"
 #include "core/file.h"
 #include "core/formatted.h"
 #include "pipelines/bench_color_net.h"
@@ -12,6 +13,7 @@
 #include "pipelines/bench_pixel_filter.h"
 #include "pipelines/bench_rasterize.h"
 #include "pipelines/bench_skinning.h"
+#include "pipelines/bench_tape.h"
 
 namespace hsi4d::cli {
 
@@ -120,9 +122,28 @@ std::string json_line(const ColorNetMeasurement& m) {
   return bench_line(std::move(line));
 }
 
-}  // namespace
+std::string json_line(const TapeMeasurement& m) {
+  nlohmann::ordered_json line = {{"name", m.name},           {"threads", 1},       {"isa", isa_name(best_isa())},
+                                 {"median_ms", m.median_ms}, {"min_ms", m.min_ms}, {"repeats", m.repeats}};
+  line.update(m.nodes > 0 ? nlohmann::ordered_json{{"nodes", m.nodes}, {"ns_per_node", m.ns_each()}}
+                          : nlohmann::ordered_json{{"elements", m.elements}, {"ns_per_element", m.ns_each()}});
+  if (m.ratio) line.update({{"against", m.against}, {"ratio", *m.ratio}});
+  if (m.goal) line["goal"] = *m.goal;
+  return line.dump() + "\n";
+}
 
-std::string bench_rasterize_command(const BenchOptions& options) {
+/// What a topic measured: for people, and for programs.
+struct BenchText {
+  std::string table, json;
+};
+
+/// The table of a topic whose measurements go into the file that was asked for.
+std::string written(const BenchText& text, const BenchOptions& options) {
+  if (!options.json.empty()) write_text_file(options.json, text.json);
+  return text.table;
+}
+
+BenchText measure_rasterize(const BenchOptions& options) {
   std::string json, table;
   table += formatted("%-44s %10s %10s %7s %10s %12s %8s %-9s %6s\n", "", "median ms", "least ms", "tiles", "pairs",
                      "fragments", "M/s", "of", "peak %");
@@ -140,11 +161,10 @@ std::string bench_rasterize_command(const BenchOptions& options) {
     peak = std::max(peak, m.fma_peak_per_s);
   });
   table += peak_line(peak);
-  if (!options.json.empty()) write_text_file(options.json, json);
-  return table;
+  return {std::move(table), std::move(json)};
 }
 
-std::string bench_skinning_command(const BenchOptions& options) {
+BenchText measure_skinning(const BenchOptions& options) {
   std::string json, table;
   table += formatted("%-40s %10s %10s %9s %8s %10s %7s\n", "", "median ms", "least ms", "points", "columns", "MB read",
                      "GB/s");
@@ -154,11 +174,10 @@ std::string bench_skinning_command(const BenchOptions& options) {
                        tenths(bytes_read(m) / 1e6).c_str(), tenths(rate(m)).c_str());
     json += json_line(m);
   });
-  if (!options.json.empty()) write_text_file(options.json, json);
-  return table;
+  return {std::move(table), std::move(json)};
 }
 
-std::string bench_color_net_command(const BenchOptions& options) {
+BenchText measure_color_net(const BenchOptions& options) {
   std::string json, table;
   table += formatted("%-36s %10s %10s %9s %6s %6s %10s %7s\n", "", "median ms", "least ms", "gaussians", "width",
                      "layers", "M mul-add", "peak %");
@@ -172,8 +191,56 @@ std::string bench_color_net_command(const BenchOptions& options) {
     peak = std::max(peak, m.fma_peak_per_s);
   });
   table += peak_line(peak);
-  if (!options.json.empty()) write_text_file(options.json, json);
-  return table;
+  return {std::move(table), std::move(json)};
+}
+
+/// What was asked of a measurement, and what came of it; nothing where nothing was.
+std::string goal_text(const TapeMeasurement& m) {
+  if (!m.goal) return "";
+  return m.ratio ? formatted("%.2f of %s, at most %.3g", *m.ratio, m.against.c_str(), *m.goal)
+                 : formatted("at most %.3g ns", *m.goal);
+}
+
+BenchText measure_tape(const BenchOptions& options) {
+  BenchText text;
+  text.table = formatted("%-28s %12s %12s %9s %9s\n", "", "median us", "least us", "ns each", "of");
+  for (const TapeMeasurement& m : bench_tape({options.workloads, options.repeats})) {
+    const std::string what = m.nodes > 0 ? formatted("%lld nodes", static_cast<long long>(m.nodes))
+                                         : formatted("%lld rows", static_cast<long long>(m.elements));
+    text.table += formatted("%-28s %12.3f %12.3f %9.2f %12s  %s\n", m.name.c_str(), 1e3 * m.median_ms, 1e3 * m.min_ms,
+                            m.ns_each(), what.c_str(), goal_text(m).c_str());
+    text.json += json_line(m);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string bench_rasterize_command(const BenchOptions& options) {
+  return written(measure_rasterize(options), options);
+}
+
+std::string bench_skinning_command(const BenchOptions& options) { return written(measure_skinning(options), options); }
+
+std::string bench_color_net_command(const BenchOptions& options) {
+  return written(measure_color_net(options), options);
+}
+
+std::string bench_tape_command(const BenchOptions& options) {
+  if (options.threads != 1) throw UserError("hsi4d bench tape: --threads: the tape is measured on one thread");
+  return written(measure_tape(options), options);
+}
+
+std::string bench_kernels_command(const BenchOptions& options) {
+  if (!options.workloads.empty())
+    throw UserError("hsi4d bench: --workload: workloads are of one topic; name it, `hsi4d bench TOPIC --workload W`");
+  BenchText all;
+  for (const auto measure : {measure_rasterize, measure_skinning, measure_color_net, measure_tape}) {
+    const BenchText of_topic = measure(options);
+    all.table += (all.table.empty() ? "" : "\n") + of_topic.table;
+    all.json += of_topic.json;
+  }
+  return written(all, options);
 }
 
 std::string bench_pixel_filter_command(const BenchOptions& options) {

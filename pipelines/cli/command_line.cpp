@@ -53,6 +53,7 @@ CommandLine::CommandLine(const std::vector<LossTerm>& terms)
   add_info();
   add_bench(terms);
   add_stress();
+  add_gradcheck(terms);
   add_check();
   add_schema();
   add_list();

@@ -22,6 +22,7 @@
 #include "pipelines/cli/demo_command.h"
 #include "pipelines/cli/evaluate_command.h"
 #include "pipelines/cli/failure.h"
+#include "pipelines/cli/gradcheck_command.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/motion_command.h"
@@ -65,6 +66,7 @@ struct CommandLine {
   BenchStagesOptions bench_stages;
   BenchScalingOptions bench_scaling;
   StressOptions stress;
+  GradcheckArguments gradcheck;
   BenchParetoOptions bench_pareto;
   SelectCameraOptions select_camera;
   EvaluateOptions evaluate;
@@ -104,6 +106,7 @@ struct CommandLine {
   CLI::Option* add_scene(CLI::App& command, SceneOptions& options);
   // command_line_bench.cpp
   void add_stress();
+  void add_gradcheck(const std::vector<LossTerm>& terms);
   void add_bench(const std::vector<LossTerm>& terms);
   void add_bench_pareto(CLI::App& command);
   /// @param threads  that were asked for; 0: none

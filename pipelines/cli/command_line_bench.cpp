@@ -29,15 +29,52 @@ void CommandLine::add_stress() {
   });
 }
 
+void CommandLine::add_gradcheck(const std::vector<LossTerm>& terms) {
+  GradcheckArguments& a = gradcheck;
+  CLI::App* command = app->add_subcommand(
+      "gradcheck",
+      "Check the gradient of a stage, its whole loss by each parameter group, against differences in double");
+  command->add_option("CONFIG", a.config, "The config file, with its data")->required();
+  command->add_option("--stage", a.check.stage, "Which of its stages")->type_name("S")->required();
+  add_overrides(*command, a.overrides);
+  command->add_option("--frame", a.check.frame, "The frame, of a stage over frames; default: 3, or the last of fewer")
+      ->check(whole_number())
+      ->type_name("I");
+  command
+      ->add_option("--entries", a.check.entries,
+                   "Numbers that are tried of each array, at random; each takes six renders or more")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000))
+      ->type_name("N");
+  command->add_option("--seed", a.check.seed, "Which numbers these are, and the disturbance")
+      ->capture_default_str()
+      ->check(whole_number())
+      ->type_name("N");
+  add_threads(*command, a.threads);
+  command->add_option("--json", a.json, "File for the figures, one JSON object a group")->type_name("F");
+  command->footer(
+      "The state is that in which the frame would begin, every number of the groups disturbed by up to 0.01.\n"
+      "Numbers at a kink (Gaussians change places, a pixel is just reached) are told and judge nothing.\n"
+      "It is quick in small images: --set approx.longest_side_px=64.\n"
+      "Exit status: 1 when a gradient is wrong, or too many kinks leave it open.");
+  command->callback([this, &terms] { run = [this, &terms] { return gradcheck_command(gradcheck, terms, status); }; });
+}
+
 void CommandLine::add_bench(const std::vector<LossTerm>& terms) {
-  CLI::App* command = app->add_subcommand("bench",
-                                          "Measure the speed of the renderer, the body or a whole run, time against "
-                                          "error, or the pixel filter: a table, and one JSON object a measurement");
-  command->add_option("TOPIC", topic, "What: rasterize, skinning, color_net, pixel_filter, stages, scaling, pareto")
-      ->required()
-      ->check(CLI::IsMember({"rasterize", "skinning", "color_net", "pixel_filter", "stages", "scaling", "pareto"}));
-  command->add_option("--workload", bench.workloads, "Only these; default: all; not of stages and scaling");
-  command->add_option("--threads", bench.threads, "Threads; default: 1, of stages and scaling what the config says")
+  CLI::App* command =
+      app->add_subcommand("bench",
+                          "Measure the speed of the renderer, the body, the tape or a whole run, time against "
+                          "error, or the pixel filter: a table, and one JSON object a measurement");
+  const std::vector<std::string> topics = {"rasterize",    "skinning", "color_net", "tape",
+                                           "pixel_filter", "stages",   "scaling",   "pareto"};
+  command
+      ->add_option("TOPIC", topic,
+                   "What: " + joined(topics) + "; default: the kernels, which are rasterize, skinning, color_net, tape")
+      ->check(CLI::IsMember(topics));
+  command->add_option("--workload", bench.workloads, "Of a topic: only these; default: all; not of stages and scaling");
+  command
+      ->add_option("--threads", bench.threads,
+                   "Threads; default: 1, of stages and scaling what the config says; of tape 1 always")
       ->check(CLI::Range(1, 1024));
   command
       ->add_option(
@@ -112,6 +149,8 @@ std::string CommandLine::run_bench(int threads, const std::vector<LossTerm>& ter
   }
   if (topic == "skinning") return bench_skinning_command(bench);
   if (topic == "color_net") return bench_color_net_command(bench);
+  if (topic == "tape") return bench_tape_command(bench);
+  if (topic.empty()) return bench_kernels_command(bench);
   return topic == "rasterize" ? bench_rasterize_command(bench) : bench_pixel_filter_command(bench);
 }
 

@@ -81,11 +81,18 @@ void CommandLine::add_evaluate() {
                    "Joints are those of this avatar; without either, of the avatar of the run or dataset")
       ->type_name("F.safetensors");
   add_evaluate_scene(*command);
-  command->add_option("--from-rate", s.from_rate, "Frames a second of the motions, instead of what they say")
+  command
+      ->add_option("--from-rate", s.from_rate,
+                   "Frames a second of the motions, instead of what they say; of a truth that does not say it too")
       ->type_name("HZ");
   command->add_option("--frame-rate", s.frame_rate, "Frames a second to measure at, instead of the slower ones")
       ->type_name("HZ");
-  command->add_option("--up", o.up, "Which axis of motions is up, y or z, instead of what is found")->type_name("AXIS");
+  command
+      ->add_option(
+          "--up", o.up,
+          "Which axis of motions is up, y or z, instead of what is found; of a truth by other names than AMASS's "
+          "too")
+      ->type_name("AXIS");
   command
       ->add_option("--align", o.align,
                    "How a motion is laid on frame 0 of the truth or the data: none, heading or rotation")
@@ -109,7 +116,8 @@ void CommandLine::add_evaluate_scene(CLI::App& command) {
   command.add_option("--surface", s.surface, "A mesh of what is solid (.obj, .ply, .glb)")->type_name("F");
   command.add_option("--occupancy", s.occupancy, "A grid of voxels instead, free or occupied")->type_name("F.npz");
   command.add_option("--scene", s.scene, "Gaussians instead, of what they show")->type_name("F.ply");
-  command.add_option("--objects", s.objects, "Poses of objects beside a motion, as a run's objects.npz")
+  command
+      .add_option("--objects", s.objects, "Poses of objects in the scene beside a motion, z up, as a run's objects.npz")
       ->type_name("F.npz");
   command
       .add_option("--object-surface", evaluate.object_surfaces,

@@ -119,7 +119,7 @@ std::string published_text(const std::vector<Evaluation>& results) {
     std::vector<std::string> row = {std::string(figure.label), figure.is_dynamic ? "dynamic" : "static"};
     bool is_measured = false;
     for (const Evaluation& result : results) {
-      const double* const own = own_figure(figure, result.values);
+      const double* const own = own_figure(figure, result.values, result.has_objects);
       is_measured = is_measured || own != nullptr;
       row.push_back(own == nullptr ? "-" : fixed_number(*own, figure.decimals));
     }
@@ -160,6 +160,7 @@ ConfigValue json_of(const Evaluation& result) {
   object.add("name", ConfigValue::make_string(result.name));
   if (!result.truth.empty()) object.add("truth", ConfigValue::make_string(result.truth));
   if (!result.surface.empty()) object.add("surface", ConfigValue::make_string(result.surface));
+  object.add("clip", ConfigValue::make_string(result.has_objects ? "dynamic" : "static"));
   object.add("frames", ConfigValue::make_integer(result.frames));
   object.add("frame_rate", ConfigValue::make_number(result.frame_rate));
   add_numbers(object, result.values);

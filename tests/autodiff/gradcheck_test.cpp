@@ -124,6 +124,40 @@ TEST_CASE("a kink is told from a bug, and too many kinks are not a pass") {
   CHECK_FALSE(report.ok());
 }
 
+TEST_CASE("a kink at the point itself is seen, where central differences of all steps agree") {
+  for (const double at : {1e-12, 3e-9, 2e-7, 1e-5, 3e-4}) {
+    for (const bool is_upside_down : {false, true}) {
+      INFO("|x| at " << at);
+      Tape<double> tape;
+      const auto x = tape.parameter("x", shape_of(20, 1));
+      for (Index i = 0; i < 20; ++i) tape.write(x).data[i] = i == 7 ? at : 0.3 + 0.02 * static_cast<double>(i);
+      const auto y = abs(x) * (is_upside_down ? -2.0 : 0.5);
+      GradcheckOptions options;
+      options.kink_share = 0.25;
+      const GradcheckReport report = gradcheck(tape, sum(y + square(x)), options);
+      INFO(report.text());
+      CHECK(report.failures.empty());
+      CHECK(report.kinks >= 1);
+      CHECK(report.worst_error < 1e-7);
+      CHECK(report.ok());
+    }
+  }
+}
+
+TEST_CASE("where a choice changes within the step shorter ones are tried, if any are allowed") {
+  Tape<double> tape;
+  const auto x = tape.parameter("x", kScalarShape);
+  const auto y = tape.record(JumpOp{}, {x}, kScalarShape, Source::current());
+  tape.set(x, {1.0001});
+  GradcheckOptions options;
+  options.tolerance = 1e-6;
+  options.shortest_step = 1e-5;
+  CHECK(gradcheck(tape, y, options).ok());
+  CHECK(gradcheck(tape, y, options).kinks == 0);
+  tape.set(x, {1.00001});
+  CHECK(gradcheck(tape, y, options).kinks == 2);
+}
+
 namespace {
 
 /// y = x², which throws away from its first value.

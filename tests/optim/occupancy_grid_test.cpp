@@ -136,6 +136,21 @@ TEST_CASE("a grid with y up is turned") {
   CHECK(std::isnan(distance.at({0.75, 0.25, 0.5})));
 }
 
+TEST_CASE("a grid that claims too much is refused before memory is taken for it") {
+  // 3 MB of noise that claim to unpack to 2 GiB and 17 MB: the size stands in the archive's directory.
+  RandomSequence random(10);
+  std::vector<std::uint8_t> noise(3000000);
+  for (std::uint8_t& voxel : noise) voxel = static_cast<std::uint8_t>(random.uniform(0, 256));
+  NpzWriter file;
+  file.add<std::uint8_t>("occupancy", {100, 100, 300}, noise);
+  Bytes bytes = file.encode(NpzPacking::deflated);
+  const std::array<std::uint8_t, 4> size = {0x40, 0xC7, 0x2D, 0x00}, claim = {0x00, 0x00, 0x10, 0x81};  // with a header
+  const auto at = std::find_end(bytes.begin(), bytes.end(), size.begin(), size.end());
+  REQUIRE(at != bytes.end());
+  std::copy(claim.begin(), claim.end(), at);
+  CHECK(fault(bytes) == "g.npz: array 'occupancy': brings the arrays to 2165309440 bytes; at most 2148532224 are read");
+}
+
 TEST_CASE("occupancy files are read, and what is wrong with them is told") {
   const TemporaryFolder here;
   const std::vector<std::uint8_t> numbers = {1, 0, 0, 1, 0, 0};

@@ -45,6 +45,14 @@ void write_standing(const char* path, const Layout& names, const Vector3<double>
   file.write(path);
 }
 
+/// On a body whose pelvis is that of SMPL-X, z up.
+Track on_body(Track track) {
+  track.motion = for_body(track.motion, kSmplxName, kSmplxPelvis);
+  turn_z_up(track);
+  CHECK(track.up == UpAxis::kZ);
+  return track;
+}
+
 void check_is_standing(const Track& track, const Vector3<double>& first, const Vector3<double>& second) {
   REQUIRE(track.frames() == 2);
   CHECK(track.motion.poses[0].axis_angle[48] == Approx(0.25));
@@ -70,12 +78,12 @@ TEST_CASE("motions by the names of TRUMANS LINGO CHOIS and smplx are read alike"
                               Layout{"trans", "root_orient", "pose_body"}}) {          // CHOIS, OMOMO, AMASS
     write_standing("m.npz", names, Vector3<double>::Zero(), count++ % 2 == 1);
     INFO(names.trans);
-    const Track track = read_track("m.npz");
+    const Track track = on_body(read_track("m.npz"));
     CHECK(track.world == "y is up, by the posture: turned (--up z if it is not)");
     CHECK(track.motion.frame_rate == 30);
     check_is_standing(track, turned, turned + step);
     write_standing("z.npz", names, Vector3<double>(kQuarter, 0, 0));
-    const Track level = read_track("z.npz");
+    const Track level = on_body(read_track("z.npz"));
     CHECK(level.world == "z is up, by the posture");
     check_is_standing(level, pelvis, pelvis + step);
   }
@@ -88,7 +96,7 @@ TEST_CASE("a motion of WHAM by its own names is one of SMPL with y up") {
   file.add<double>("pose_world", {1, 72}, std::vector<double>(72, 0.0));
   file.add<double>("betas", {1, 10}, std::vector<double>(10, 0.0));
   file.write("w.npz");
-  const Track track = read_track("w.npz", {.frame_rate = 25});
+  const Track track = on_body(read_track("w.npz", {.frame_rate = 25}));
   CHECK(track.motion.converted_from == "SMPL");
   CHECK(track.motion.frame_rate == 25);
   const Vector3<double> pelvis = kSmplPelvis + Vector3<double>(1, 2, 3);
@@ -112,6 +120,50 @@ TEST_CASE("which way is up can be told, is that of AMASS by its names, and may s
   CHECK(read_track("camera.npz", {.up = UpAxis::kZ}).frames() == 2);
 }
 
+TEST_CASE("how the body begins tells which way is up of who lies") {
+  const TemporaryFolder here;
+  const Layout names{"trans", "root_orient", "pose_body"};
+  // z up, on the back with the head to y; the same root stands with y up.
+  write_standing("m.npz", names, Vector3<double>::Zero());
+  CHECK(read_track("m.npz").up == UpAxis::kY);
+  const Track lying = read_track("m.npz", {.upright = Vector3<double>(0, 0, 1)});
+  CHECK(lying.up == UpAxis::kZ);
+  CHECK(lying.world == "z is up, as the body is in frame 0");
+  const Track standing = read_track("m.npz", {.upright = Vector3<double>(0, 1, 0)});
+  CHECK(standing.up == UpAxis::kY);
+  CHECK(standing.world == "y is up, as the body is in frame 0: turned (--up z if it is not)");
+  // With the head to −y, and a camera's frame.
+  write_standing("n.npz", names, Vector3<double>(0, 0, 2 * kQuarter));
+  CHECK_THROWS_WITH(read_track("n.npz"), Contains("n.npz: y points down, by the posture"));
+  CHECK(read_track("n.npz", {.upright = Vector3<double>(0, 0, 1)}).up == UpAxis::kZ);
+  CHECK_THROWS_WITH(read_track("n.npz", {.upright = Vector3<double>(0, 1, 0)}),
+                    Contains("n.npz: y points down, by how the body is in frame 0"));
+  // Near to no axis: by the posture.
+  CHECK(read_track("m.npz", {.upright = Vector3<double>(1, 0, 0)}).world ==
+        "y is up, by the posture: turned (--up z if it is not)");
+  // Of files that say it themselves, options that fill in say nothing.
+  write_standing("amass.npz", names, Vector3<double>::Zero(), false, "mocap_frame_rate");
+  CHECK(read_track("amass.npz", {.frame_rate = 5, .up = UpAxis::kY, .fills_in = true}).up == UpAxis::kZ);
+  CHECK(read_track("amass.npz", {.frame_rate = 5, .up = UpAxis::kY, .fills_in = true}).motion.frame_rate == 30);
+  CHECK(read_track("n.npz", {.up = UpAxis::kY, .fills_in = true}).up == UpAxis::kY);
+}
+
+TEST_CASE("obj_trans is the place of the mesh's origin, where nothing says that of its centre") {
+  const TemporaryFolder here;
+  const auto objects_of = [](std::initializer_list<const char*> names) {
+    NpzWriter file;
+    file.add<double>("obj_rot", {1, 3, 3}, {1, 0, 0, 0, 1, 0, 0, 0, 1});
+    double x = 1;
+    for (const char* const name : names) file.add<double>(name, {1, 3, 1}, {x++, 0, 0});
+    file.write("o.npz");
+    return read_motion_objects("o.npz", "object");
+  };
+  CHECK(objects_of({"obj_trans"}).are_of_origins);
+  const ForeignObjects both = objects_of({"obj_trans", "obj_com_pos"});
+  CHECK_FALSE(both.are_of_origins);
+  CHECK(both.poses[0][0].translation[0] == 2);
+}
+
 TEST_CASE("objects in a motion's file turn with its world") {
   const TemporaryFolder here;
   const auto write = [](const char* path, const std::vector<double>& matrix, std::int64_t frames = 2) {
@@ -130,23 +182,27 @@ TEST_CASE("objects in a motion's file turn with its world") {
     file.write(path);
   };
   write("o.npz", {1, 0, 0, 0, 1, 0, 0, 0, 1});
-  const Track track = read_track("o.npz", {.object_name = "vase"});
+  const Track track = on_body(read_track("o.npz", {.object_name = "vase"}));
   REQUIRE(track.objects == std::vector<std::string>{"vase"});
   REQUIRE(track.object_poses.size() == 2);
   const ObjectPose& pose = track.object_poses[1][0];
   CHECK((pose.translation - Vector3<double>(1, -3, 2)).norm() < 1e-12);
   CHECK((pose.rotation - Vector3<double>(kQuarter, 0, 0)).norm() < 1e-12);
-  const Track level = read_track("o.npz", {.up = UpAxis::kZ});
+  const Track level = on_body(read_track("o.npz", {.up = UpAxis::kZ}));
   CHECK(level.objects == std::vector<std::string>{"object"});
   CHECK(level.object_poses[0][0].translation == Vector3<double>(1, 2, 3));
   write("m.npz", {1, 0, 0, 0, 1, 0, 0, 0, -1});
   CHECK_THROWS_WITH(read_track("m.npz"), "m.npz: array 'obj_rot_mat': frame 0 is no rotation");
   write("t.npz", {1, 0, 0, 0, 1, 0, 0, 0, 1}, 3);
-  CHECK_THROWS_WITH(read_track("t.npz"), "t.npz: holds 3 poses of objects, the motion beside it has 2 frames");
+  CHECK_THROWS_WITH(read_track("t.npz"), "t.npz: holds 3 frames of objects, the motion beside it has 2 frames");
   NpzWriter half;
   half.add<double>("obj_rot", {1, 3, 3}, {1, 0, 0, 0, 1, 0, 0, 0, 1});
   half.write("h.npz");
-  CHECK_THROWS_WITH(read_motion_objects("h.npz", "object"), "h.npz: has 'obj_rot_mat' but no 'obj_com_pos'");
+  CHECK_THROWS_WITH(read_motion_objects("h.npz", "object"), "h.npz: array 'obj_rot': is there without 'obj_com_pos'");
+  NpzWriter other;
+  other.add<double>("obj_trans", {1, 3}, {1, 0, 0});
+  other.write("t.npz");
+  CHECK_THROWS_WITH(read_motion_objects("t.npz", "object"), "t.npz: array 'obj_trans': is there without 'obj_rot_mat'");
   NpzWriter ours;
   ours.add<double>("box/rotation", {1, 3}, {0, 0, 1});
   ours.add<double>("box/translation", {1, 3}, {4, 5, 6});

@@ -39,13 +39,15 @@ class MadeSweep {
   }
 
   /// A run that is done with this error.
-  void finish(std::size_t index, double mpjpe) {
+  void finish(std::size_t index, double mpjpe) { finish_with(index, std::to_string(mpjpe)); }
+  /// Likewise with the error as its summary has it: null, or no JSON at all.
+  void finish_with(std::size_t index, const std::string& mpjpe) {
     const RunPaths run{paths_.run(plan_.runs[index].id)};
     here_.write(run.status(), R"({"state": "done"})");
     here_.write(run.summary(), R"({"name": "x", "frames": 4, "seconds": 2, "truth": true, "metrics": [
       {"stage": "interaction", "seconds": 1, "iterations": 5, "mpjpe_mm": 99},
       {"stage": "refinement", "seconds": 1, "iterations": 5, "mpjpe_mm": )" +
-                                   std::to_string(mpjpe) + R"(}],
+                                   mpjpe + R"(}],
       "baselines": {}, "per_frame": [], "baselines_per_frame": {}})");
   }
 

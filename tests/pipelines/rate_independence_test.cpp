@@ -81,6 +81,46 @@ TEST_CASE("metrics of one motion at 10 30 60 and 120 frames a second are alike")
   }
 }
 
+TEST_CASE("thresholds are the same at any rate, next to them on either side") {
+  constexpr double kRates[] = {10, 12.5, 30, 60, 120};
+  for (const double rate : kRates) {
+    INFO(rate);
+    // Both feet slide for two seconds at so many metres a second, and so high above where they were.
+    const auto sliding = [rate](double speed, double height) {
+      std::vector<std::vector<double>> joints;
+      for (int k = 0; k <= static_cast<int>(2 * rate); ++k) {
+        joints.emplace_back(66, 0.0);
+        for (const char* name : {"left_ankle", "right_ankle", "left_foot", "right_foot"}) {
+          double* const foot = joints.back().data() + 3 * smplx_joint(name);
+          foot[0] = speed * k / rate;
+          foot[2] = k == 0 ? 0 : height;
+        }
+      }
+      return mean_after_first(sliding_by_frame(joints, rate));
+    };
+    CHECK(sliding(0.501, 0).empty());
+    CHECK(sliding(0.499, 0).at(0).second == Approx(49.9));
+    CHECK(sliding(0.2, 0.051).empty());
+    // At 10 frames a second or more the way up to 4 mm is no step that is too fast.
+    CHECK(sliding(0.2, 0.004).at(0).second == Approx(20));
+    // A hand that nears a box by 0.1 m/s for two seconds: nearer than 5 cm in the last half second.
+    std::vector<std::vector<double>> hands;
+    std::vector<SceneState> states(static_cast<std::size_t>(2 * rate) + 1);
+    for (std::size_t k = 0; k < states.size(); ++k) {
+      hands.emplace_back(66, 9.0);
+      double* const wrist = hands.back().data() + 3 * smplx_joint("left_wrist");
+      wrist[0] = wrist[1] = 0;
+      wrist[2] = 0.2 - 0.1 * static_cast<double>(k) / rate;
+      states[k].objects.resize(1);
+    }
+    Gaussians box;
+    box.means = {0, 0, 0};
+    box.opacity_logits = {0};
+    const MetricValues contact = mean_after_first(contact_share_by_frame(hands, {&box}, states));
+    CHECK(*find_metric(contact, "contact_share") == Approx(0.25).margin(1 / (2 * rate)));
+  }
+}
+
 TEST_CASE("a rate to measure at is that of the slower motion or below it") {
   const BodyModel body = procedural_body();
   const RestSkeleton skeleton{body.parents, body.joints};

@@ -15,6 +15,7 @@
 #include "pipelines/run_folder.h"
 #include "pipelines/view3d.h"
 #include "tests/pipelines/small_clip.h"
+#include "tests/support/markup.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 
@@ -25,41 +26,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Why a page is not well formed: the first tag that does not fit; "" where all do. The page writes its tags as XML
-/// does, so every one is closed, by its pair or by itself.
-std::string tag_fault(const std::string& page) {
-  std::vector<std::string> open;
-  for (size_t i = 0; i < page.size();) {
-    if (page[i] != '<') {
-      if (page[i] == '>') return "a > outside of a tag at " + std::to_string(i);
-      ++i;
-      continue;
-    }
-    size_t end = i + 1;
-    for (char quote = 0; end < page.size() && (quote != 0 || page[end] != '>'); ++end) {
-      if (quote == 0 && page[end] == '<') return "a < inside of a tag at " + std::to_string(end);
-      if (quote != 0 ? page[end] == quote : page[end] == '"') quote = quote != 0 ? 0 : '"';
-    }
-    if (end == page.size()) return "a tag without an end";
-    const std::string tag = page.substr(i + 1, end - i - 1);
-    const std::string name = tag.substr(0, tag.find_first_of(" /\n", 1));
-    i = end + 1;
-    if (tag.starts_with("!DOCTYPE")) continue;
-    if (tag.starts_with("/")) {
-      if (open.empty() || open.back() != tag.substr(1))
-        return "</" + tag.substr(1) + "> closes " + (open.empty() ? "nothing" : open.back());
-      open.pop_back();
-    } else if (!tag.ends_with("/")) {
-      open.push_back(name);
-      if (name == "script" || name == "style") {  // no tags inside
-        i = page.find("</" + name + ">", i);
-        if (i == std::string::npos) return name + " is not closed";
-      }
-    }
-  }
-  return open.empty() ? "" : open.back() + " is not closed";
-}
-
 std::set<std::string> ids_of(const std::string& page) {
   std::set<std::string> ids;
   for (size_t at = page.find(" id=\""); at != std::string::npos; at = page.find(" id=\"", at + 1)) {
@@ -67,12 +33,6 @@ std::set<std::string> ids_of(const std::string& page) {
     CHECK(ids.insert(page.substr(begin, page.find('"', begin) - begin)).second);  // each once
   }
   return ids;
-}
-
-size_t count_of(const std::string& text, const std::string& part) {
-  size_t count = 0;
-  for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
-  return count;
 }
 
 /// What stands between the first `begin` and the next `end`.

@@ -20,6 +20,22 @@ namespace {
 
 using Point = Vector3<double>;
 
+/// The six sides of a box.
+Gaussians sheets_of_box(const Point& low, const Point& high, double spacing = 0.02) {
+  Gaussians gaussians;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1.0, 1.0}) {
+      Point corner = low, u = Point::Zero(), v = Point::Zero();
+      const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+      corner[axis] = side < 0 ? low[axis] : high[axis];
+      u[a] = high[a] - low[a];
+      v[b] = high[b] - low[b];
+      add_sheet(gaussians, corner, u, v, spacing);
+    }
+  }
+  return gaussians;
+}
+
 }  // namespace
 
 TEST_CASE("a box as a mesh, as voxels and as Gaussians is the same solid") {
@@ -39,17 +55,7 @@ TEST_CASE("a box as a mesh, as voxels and as Gaussians is the same solid") {
   file.add<double>("origin", {3}, {-0.4, -0.5, -0.3});
   file.add_scalar("voxel_size", 0.02);
   file.write("box.npz");
-  Gaussians gaussians;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const double side : {-1.0, 1.0}) {
-      Point corner = low, u = Point::Zero(), v = Point::Zero();
-      const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-      corner[axis] = side < 0 ? low[axis] : high[axis];
-      u[a] = high[a] - low[a];
-      v[b] = high[b] - low[b];
-      add_sheet(gaussians, corner, u, v, 0.02);
-    }
-  }
+  const Gaussians gaussians = sheets_of_box(low, high);
   const Solid mesh = mesh_solid("box.ply"), grid = occupancy_solid("box.npz"), shown = object_solid(gaussians, "box");
   CHECK(mesh.source == "the mesh box.ply");
   CHECK(grid.source == "the occupancy grid box.npz");
@@ -68,6 +74,47 @@ TEST_CASE("a box as a mesh, as voxels and as Gaussians is the same solid") {
   // About a centroid that is not the file's origin.
   const Solid moved = object_mesh_solid("box.ply", {0.1, 0, 0});
   CHECK(moved.distance({0.1, 0, 0}) == Approx(mesh.distance({0.2, 0, 0})).margin(1e-12));
+}
+
+TEST_CASE("few Gaussians that float far from an object change nothing") {
+  const Point low(-0.2, -0.3, -0.1), high(0.2, 0.3, 0.1);
+  Gaussians gaussians = sheets_of_box(low, high);
+  const Solid alone = object_solid(gaussians, "box");
+  add_disc(gaussians, {0, 0, 40}, {0, 0, 1}, 0.01);
+  add_disc(gaussians, {900, 0, 0}, {0, 0, 1}, 0.01);
+  gaussians.opacity_logits.back() = -3;  // faint
+  const Solid with = object_solid(gaussians, "box");
+  RandomSequence random(6);
+  for (int i = 0; i < 200; ++i) {
+    const Point place(random.uniform(-0.4, 0.4), random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3));
+    INFO(place.transpose());
+    CHECK(with.distance(place) == alone.distance(place));
+  }
+  CHECK(with.distance({0, 0, 39.95}) > 30);
+}
+
+TEST_CASE("an object larger than a room is solid within") {
+  const Point low(-4, -3, -2), high(4, 3, 2);
+  const Solid solid = object_solid(sheets_of_box(low, high, 0.2), "ship");
+  REQUIRE(solid.distance);
+  for (const Point& inner : {Point(-3.95, 0.1, 0.2), Point(0.3, 2.95, 0.1), Point(1, 1, -1.95)})
+    CHECK(solid.distance(inner) == Approx(-0.05).margin(1e-3));
+  CHECK(solid.distance({-4.05, 0.1, 0.2}) == Approx(0.05).margin(1e-3));
+}
+
+TEST_CASE("behind a Gaussian that floats in the air of a scene all is free") {
+  Gaussians scene;
+  add_sheet(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0.04);
+  add_disc(scene, {0.5, 0, 1}, {1, 0, 0}, 0.1);
+  const Solid solid = gaussian_solid(scene, {Point(3, 0, 1.2)}, "scene.ply");
+  CHECK(solid.distance({0.45, 0, 1}) > 0);
+  CHECK(solid.distance({0.1, 0.1, -0.02}) == Approx(-0.02).margin(1e-3));
+}
+
+TEST_CASE("the centroid of a mesh is the mean of its vertices") {
+  const TemporaryFolder here;
+  write_mesh("box.ply", box_mesh({1, 2, 3}, {3, 6, 4}));
+  CHECK((mesh_centroid("box.ply") - Point(2, 4, 3.5)).norm() < 1e-12);
 }
 
 TEST_CASE("points inside of objects that move count once, as deep as they are at most") {

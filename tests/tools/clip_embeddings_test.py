@@ -1,4 +1,5 @@
-"""tools/services/clip_embeddings.py: it compiles, explains itself, and refuses what makes no sense. CLIP itself is not run.
+"""tools/services/clip_embeddings.py: it explains itself, refuses what makes no sense, and writes what a model returns, by
+stand-ins for CLIP of transformers 4 and 5.
 
     python3 tests/tools/clip_embeddings_test.py TOOLS        # the folder tools/
 """
@@ -12,8 +13,79 @@ import tempfile
 program = pathlib.Path(sys.argv[1]).resolve() / "services" / "clip_embeddings.py"
 
 
-def run(*arguments):
-    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+# What the script takes of PyTorch, Pillow and transformers. An image's embedding is its file's length and 1, a text's
+# its own length and 2.
+STAND_INS = {
+    "torch.py": """
+import contextlib
+import numpy
+
+class Tensor:
+    def __init__(self, rows):
+        self.rows = numpy.array(rows, dtype=numpy.float32)
+    def float(self):
+        return self
+    def cpu(self):
+        return self
+    def numpy(self):
+        return self.rows
+
+inference_mode = contextlib.nullcontext
+""",
+    "PIL.py": """
+import pathlib
+
+class Image:
+    @staticmethod
+    def open(file):
+        image = Image()
+        image.length = len(pathlib.Path(file).read_bytes())
+        return image
+    def convert(self, mode):
+        assert mode == "RGB"
+        return self
+""",
+    "transformers.py": """
+import os
+import torch
+
+class Inputs(dict):
+    def to(self, device):
+        return self
+
+class CLIPProcessor:
+    @staticmethod
+    def from_pretrained(name):
+        return CLIPProcessor()
+    def __call__(self, images=None, text=None, **others):
+        return Inputs(images=images) if text is None else Inputs(text=text)
+
+class BaseModelOutputWithPooling:
+    def __init__(self, pooled):
+        self.last_hidden_state = None
+        self.pooler_output = pooled
+
+class CLIPModel:
+    @staticmethod
+    def from_pretrained(name):
+        return CLIPModel()
+    def to(self, device):
+        return self
+    def eval(self):
+        return self
+    def returned(self, rows):
+        tensor = torch.Tensor(rows)
+        return tensor if os.environ["TRANSFORMERS"] == "4" else BaseModelOutputWithPooling(tensor)
+    def get_image_features(self, images):
+        return self.returned([[image.length, 1] for image in images])
+    def get_text_features(self, text):
+        return self.returned([[len(words), 2] for words in text])
+""",
+}
+
+
+def run(*arguments, **variables):
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **variables}
     command = [sys.executable, str(program), *map(str, arguments)]
     return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
 
@@ -48,4 +120,23 @@ with tempfile.TemporaryDirectory() as name:
     check(asked(batch=0), 2, "--batch: 0 is out of range")
     assert not (folder / "clip.npz").exists()
     assert os.access(program, os.X_OK)
+
+    try:
+        import numpy
+    except ImportError:
+        print("there is no NumPy: what is written is not tested")
+        sys.exit(77)
+    for module, text in STAND_INS.items():
+        (folder / "modules" / module).parent.mkdir(exist_ok=True)
+        (folder / "modules" / module).write_text(text)
+    for number in range(2, 6):
+        (folder / f"000{number}_render.png").write_bytes(b"x" * number)
+    for version in ("4", "5"):
+        out = folder / f"clip{version}.npz"
+        check(run("--video", folder, "--text", "sits", "--frame-rate", 30, "--out", out, "--batch", 2,
+                  PYTHONPATH=str(folder / "modules"), TRANSFORMERS=version), 0, "5 frames, 2 numbers each")
+        made = numpy.load(out)
+        assert made["image_embeddings"].tolist() == [[0, 1], [2, 1], [3, 1], [4, 1], [5, 1]], version
+        assert made["text_embedding"].tolist() == [4, 2]
+        assert (made["frame_rate"], str(made["prompt"])) == (30, "sits")
 print("passed")

@@ -7,7 +7,8 @@
 
 To be run by the Python in which transformers, PyTorch, Pillow and NumPy are installed. As clip.npz in a run's folder
 `hsi4d evaluate` finds it; elsewhere --clip names it. The paper does not say with which weights it scores; those of
-ViT-B/32 are the custom of the field. Its arguments are checked by a dry run only; the model itself was not run.
+ViT-B/32 are the custom of the field. Works with transformers 4 and 5; tested with stand-ins for it, the model itself
+was not run.
 """
 
 import pathlib
@@ -22,6 +23,11 @@ def frame_files(video, pattern, folder):
         return sorted(pathlib.Path(video).glob(pattern))
     service.run(["ffmpeg", "-v", "error", "-i", video, "-fps_mode", "passthrough", pathlib.Path(folder) / "%06d.png"])
     return sorted(pathlib.Path(folder).glob("*.png"))
+
+
+def rows_of(features):
+    """The numbers [N,D] of what CLIP returns: of transformers 4 a tensor, of 5 an object that holds it."""
+    return getattr(features, "pooler_output", features).float().cpu().numpy()
 
 
 def embedded(files, text, model_name, device, batch):
@@ -40,9 +46,9 @@ def embedded(files, text, model_name, device, batch):
         for first in range(0, len(files), batch):
             images = [Image.open(file).convert("RGB") for file in files[first:first + batch]]
             inputs = processor(images=images, return_tensors="pt").to(device)
-            rows.append(model.get_image_features(**inputs).float().cpu().numpy())
+            rows.append(rows_of(model.get_image_features(**inputs)))
         inputs = processor(text=[text], return_tensors="pt", padding=True, truncation=True).to(device)
-        of_text = model.get_text_features(**inputs).float().cpu().numpy()[0]
+        of_text = rows_of(model.get_text_features(**inputs))[0]
     return np.concatenate(rows), of_text
 
 

@@ -40,6 +40,8 @@ TEST_CASE("bench rasterize measures every step and writes one object a measureme
     CHECK(m.at("unit") == (composites ? "fragments" : step == "bin" ? "pairs" : "gaussians"));
     const double rate = m.at(m.at("unit").get<std::string>()).get<double>() / m.at("median_ms").get<double>() / 1e3;
     CHECK(m.at("millions_per_s").get<double>() == Approx(rate));
+    CHECK(m.contains("mfragments_per_s") == composites);
+    if (composites) CHECK(m.at("mfragments_per_s") == m.at("millions_per_s"));
     CHECK(m.at("peak_memory_bytes") > m.at("pixels").get<double>() * 4 * 4);
     CHECK(m.contains("fma_peak_share") == (composites && m.contains("fma_peak_per_s")));
     if (!m.contains("fma_peak_share")) continue;
@@ -150,6 +152,68 @@ TEST_CASE("bench color_net measures forward and backward and writes one object a
       cli::bench_color_net_command(options),
       "hsi4d bench color_net: no workload \"wid\"; known: default, view_direction, narrow, wide, deep; did "
       "you mean \"wide\"?");
+}
+
+TEST_CASE("bench tape measures nodes and lambda losses and writes one object a measurement") {
+  const TemporaryFolder folder;
+  cli::BenchOptions options;
+  options.repeats = 3;
+  options.json = folder / "m.json";
+  const std::string table = cli::bench_tape_command(options);
+  std::istringstream lines(read_text_file(options.json));
+  std::map<std::string, nlohmann::json> found;
+  for (std::string line; std::getline(lines, line);) {
+    const auto m = nlohmann::json::parse(line);
+    const std::string name = m.at("name");
+    INFO(line);
+    CHECK(table.find(name) != std::string::npos);
+    CHECK(m.at("threads") == 1);
+    CHECK(m.at("repeats") == 3);
+    CHECK(m.at("min_ms") > 0);
+    CHECK(m.at("median_ms") >= m.at("min_ms"));
+    const bool is_chain = m.contains("nodes");
+    const double count = m.at(is_chain ? "nodes" : "elements"),
+                 each = m.at(is_chain ? "ns_per_node" : "ns_per_element");
+    CHECK(count == (is_chain ? 1000 : 2048));
+    CHECK(each == Approx(1e6 * m.at("median_ms").get<double>() / count));
+    found[name] = m;
+  }
+  CHECK(found.size() == 6);
+  CHECK(found.at("tape/nodes/both").at("goal") == 100);
+  CHECK_FALSE(found.at("tape/additions/both").contains("goal"));
+  for (const auto& [loss, goal] : std::map<std::string, int>{{"tape/loss_of_4/", 2}, {"tape/loss_of_10/", 3}}) {
+    const nlohmann::json &gradient = found.at(loss + "gradient"), &primal = found.at(loss + "primal");
+    CHECK(gradient.at("goal") == goal);
+    CHECK(gradient.at("against") == loss + "primal");
+    CHECK(gradient.at("ratio").get<double>() ==
+          Approx(gradient.at("median_ms").get<double>() / primal.at("median_ms").get<double>()));
+    CHECK_FALSE(primal.contains("ratio"));
+  }
+  options.workloads = {"loss_of_10"};
+  CHECK(cli::bench_tape_command(options).find("tape/loss_of_4") == std::string::npos);
+  options.workloads = {"loss_of_5"};
+  CHECK_THROWS_WITH(cli::bench_tape_command(options),
+                    "hsi4d bench tape: no workload \"loss_of_5\"; known: nodes, additions, loss_of_4, loss_of_10; did "
+                    "you mean \"loss_of_4\"?");
+  options.threads = 2;
+  CHECK_THROWS_WITH(cli::bench_tape_command(options),
+                    "hsi4d bench tape: --threads: the tape is measured on one thread");
+}
+
+TEST_CASE("bench without a topic measures the kernels", "[full]") {
+  const TemporaryFolder folder;
+  cli::BenchOptions options;
+  options.repeats = 1;
+  options.json = folder / "m.json";
+  const std::string table = cli::bench_kernels_command(options), json = read_text_file(options.json);
+  for (const char* name :
+       {"rasterize/small/forward", "skinning/smplx/both", "color_net/default/both", "tape/nodes/both"}) {
+    CHECK(table.find(name) != std::string::npos);
+    CHECK(json.find("{\"name\":\"" + std::string(name) + "\"") != std::string::npos);
+  }
+  options.workloads = {"small"};
+  CHECK_THROWS_WITH(cli::bench_kernels_command(options),
+                    "hsi4d bench: --workload: workloads are of one topic; name it, `hsi4d bench TOPIC --workload W`");
 }
 
 TEST_CASE("bench pixel_filter judges every filter at a height and writes one object a measurement", "[full]") {

@@ -110,6 +110,10 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
     for (const char* name : {"object_translation_cm", "camera_rotation_deg"})
       CHECK_FALSE(motion["results"][0].contains(name));
     CHECK(motion["results"][0]["penetration_share"] == one["penetration_share"]);
+    // Its clip has an object, though nothing of it is measured.
+    CHECK(motion["results"][0]["clip"] == "dynamic");
+    CHECK_THAT(run_hsi4d({"evaluate", "one/motion.npz", "--truth", TinyDataset::folder().string()}).out,
+               !Contains("0.019"));
     // With the poses of its object beside it, that too.
     const nlohmann::json with_object =
         evaluated({"one/motion.npz", "--objects", "one/objects.npz", "--truth", TinyDataset::folder().string()});
@@ -130,6 +134,7 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
         evaluated({"one/motion.npz", "--truth", data("truth/motion.npz"), "--avatar", data("avatar.safetensors")});
     CHECK(known["results"][0]["mpjpe_mm"].get<double>() == Approx(a).margin(1e-9));
     CHECK_FALSE(known["results"][0].contains("world_mpjpe_depth_mm"));  // no camera
+    CHECK(known["results"][0]["clip"] == "static");
     procedural_file().write("body.npz");
     const nlohmann::json model =
         evaluated({"one/motion.npz", "--truth", data("truth/motion.npz"), "--body-model", "body.npz"});
@@ -188,7 +193,7 @@ TEST_CASE("what evaluate cannot compare is told") {
   longer.poses.push_back(longer.poses.back());
   write_motion((dataset.path / "truth/motion.npz").string(), longer);
   CHECK_THAT(refused({motion, "--truth", dataset.path.string()}),
-             Contains("objects.npz: holds 4 frames, the motion beside it has 5 frames"));
+             Contains("objects.npz: holds 4 frames of objects, the motion beside it has 5 frames"));
   CHECK(refused({}).find("RUN") != std::string::npos);
   CHECK(refused({motion, "--truth", truth, "--up", "x"}) ==
         "hsi4d evaluate: --up: \"x\" is not known; allowed: y, z\n");
@@ -285,8 +290,9 @@ TEST_CASE("a motion of another world is laid on frame 0") {
   CHECK(alone["foot_sliding_mm"].get<double>() >= 0);
   CHECK(refused({"moved.npz", "--avatar", data("avatar.safetensors"), "--align", "heading"}) ==
         "hsi4d evaluate: --align: moved.npz: there is no frame 0 to lay it on; --truth or --data has one\n");
-  CHECK(refused({truth, "--truth", truth, "--align", "heading"}) ==
-        "hsi4d evaluate: --align moves the body alone, and " + truth + " has objects too\n");
+  // All of a run or dataset moves alike.
+  const nlohmann::json same = evaluated({truth, "--truth", truth, "--align", "heading"})["results"][0];
+  for (const char* name : {"world_mpjpe_mm", "object_add_cm", "camera_translation_cm"}) CHECK(same[name] < 1e-9);
 }
 
 TEST_CASE("trajectories are exported beside the numbers") {

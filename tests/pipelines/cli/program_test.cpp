@@ -192,7 +192,7 @@ TEST_CASE("mistakes on the command line end with 2 and one message") {
       "run, demo, synth, select-camera, evaluate, report, study, sweep, run-one, render, gradients, avatar, pose, "
       "motion, "
       "convert, info, "
-      "bench, stress, check, schema, list";
+      "bench, stress, gradcheck, check, schema, list";
   CHECK(mistake({"chek"}) == "hsi4d: there is no command \"chek\"; known: " + commands + "; did you mean \"check\"?\n");
   CHECK(mistake({"frobnicate"}) == "hsi4d: there is no command \"frobnicate\"; known: " + commands + "\n");
   CHECK(mistake({}) == "hsi4d: give a command: " + commands + "; `hsi4d --help` explains them\n");

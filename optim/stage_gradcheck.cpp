@@ -1,0 +1,84 @@
+#include "optim/stage_gradcheck.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/random.h"
+#include "core/text.h"
+#include "optim/stage_loss.h"
+
+namespace hsi4d {
+
+namespace {
+
+void disturb(Tape<double>& tape, const std::vector<AdamGroup<double>>& groups, const StageGradcheckOptions& options) {
+  const Random random(options.differences.seed, random_stream("stage_gradcheck.disturbance"));
+  std::uint64_t at = 0;
+  for (const AdamGroup<double>& group : groups) {
+    for (const Var<double> block : group.parameters.blocks) {
+      const Array<double> numbers = tape.write(block);
+      for (Index row = 0; row < numbers.total_rows(); ++row) {
+        for (Index col = 0; col < numbers.shape.cols; ++col)
+          numbers.row(row)[col] += options.disturbance * random.uniform(at++, -1, 1);
+      }
+      if (group.parameters.range) hold_in_range(block, *group.parameters.range);
+    }
+  }
+}
+
+Index count_numbers(const ParameterGroup<double>& group) {
+  Index count = 0;
+  for (const Var<double> block : group.blocks) count += block.shape().count();
+  return count;
+}
+
+StageGradcheck check_recorded(Tape<double>& tape, const std::vector<AdamGroup<double>>& groups,
+                              RecordedLoss<double>& loss, const std::string& stage, const GradcheckOptions& options) {
+  StageGradcheck result;
+  result.off = loss.off;
+  tape.forward(loss.total);
+  loss.read_values();
+  result.loss = tape.value(loss.total).scalar();
+  result.terms = loss.values;
+  if (!std::isfinite(result.loss)) throw UserError(stage_message(stage, "the loss is " + rounded(result.loss, 6)));
+  for (const AdamGroup<double>& group : groups) {
+    const ParameterGroup<double>& parameters = group.parameters;
+    GroupGradcheck& found = result.groups.emplace_back(GroupGradcheck{parameters.name, count_numbers(parameters), {}});
+    if (found.numbers == 0) continue;
+    set_frozen(tape, parameters, false);
+    found.report = gradcheck(tape, loss.total, options);
+    set_frozen(tape, parameters, true);
+    if (found.report.entries == 0) throw no_term_depends_on(parameters.name, loss.values, stage);
+  }
+  return result;
+}
+
+}  // namespace
+
+bool StageGradcheck::ok() const {
+  const auto has_passed = [](const GroupGradcheck& group) { return group.numbers == 0 || group.report.ok(); };
+  return std::any_of(groups.begin(), groups.end(), [](const auto& group) { return group.report.entries > 0; }) &&
+         std::all_of(groups.begin(), groups.end(), has_passed);
+}
+
+StageGradcheck check_stage_gradient(Tape<double>& tape, const StageSettings& settings, std::span<const LossTerm> terms,
+                                    const LossInputs<double>& inputs,
+                                    const std::vector<ParameterGroup<double>>& available, const std::string& stage,
+                                    const StageGradcheckOptions& options) {
+  check_groups(settings, names_of(available), "stage '" + stage + "'");
+  const TapeGuard<double> guard(tape, available);
+  try {
+    const std::vector<AdamGroup<double>> groups = named_groups(settings, available, stage);
+    RecordedLoss<double> loss = record_loss(settings, terms, inputs, stage);
+    for (const ParameterGroup<double>& group : available) set_frozen(tape, group, true);
+    disturb(tape, groups, options);
+    StageGradcheck result = check_recorded(tape, groups, loss, stage, options.differences);
+    guard.restore();
+    return result;
+  } catch (...) {
+    guard.restore();
+    throw;
+  }
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,78 @@
+#include "pipelines/cli/gradcheck_command.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/formatted.h"
+#include "core/text.h"
+#include "pipelines/cli/failure.h"
+#include "pipelines/cli/run_command.h"
+#include "pipelines/cli/text.h"
+
+namespace hsi4d::cli {
+
+namespace {
+
+const char* verdict(const GroupGradcheck& group) {
+  if (group.numbers == 0) return "nothing to move";
+  if (!group.report.failures.empty()) return "WRONG";
+  return group.report.ok() ? "right" : "TOO MANY KINKS";
+}
+
+std::string error_text(const GroupGradcheck& group) {
+  return group.report.kinks == group.report.entries ? "-" : formatted("%.1e", group.report.worst_error);
+}
+
+std::string heading(const StageCheck& check) {
+  std::string text = "stage " + check.stage;
+  text += check.frame ? ", frame " + std::to_string(*check.frame) : ", all frames";
+  text += ": loss " + rounded(check.found.loss, 6) + " =";
+  for (const LossValue& term : check.found.terms)
+    text += (&term == &check.found.terms.front() ? " " : " + ") + rounded(term.weight, 4) + " * " + term.name + " " +
+            rounded(term.value, 6);
+  if (!check.found.off.empty()) text += "; off: " + joined(check.found.off);
+  return text + "\n";
+}
+
+std::string group_table(const StageCheck& check) {
+  std::vector<std::vector<std::string>> rows = {{"GROUP", "NUMBERS", "TRIED", "AT KINKS", "WORST ERROR", ""}};
+  for (const GroupGradcheck& group : check.found.groups)
+    rows.push_back({group.group, std::to_string(group.numbers), std::to_string(group.report.entries),
+                    std::to_string(group.report.kinks), error_text(group), verdict(group)});
+  return table(rows);
+}
+
+std::string json_line(const StageCheck& check, const GroupGradcheck& group) {
+  nlohmann::ordered_json line = {{"stage", check.stage}};
+  if (check.frame) line["frame"] = *check.frame;
+  line.update({{"group", group.group},
+               {"numbers", group.numbers},
+               {"tried", group.report.entries},
+               {"at_kinks", group.report.kinks},
+               {"worst_error", group.report.worst_error},
+               {"tolerance", check.tolerance},
+               {"verdict", verdict(group)}});
+  return line.dump() + "\n";
+}
+
+}  // namespace
+
+std::string gradcheck_command(const GradcheckArguments& arguments, const std::vector<LossTerm>& losses, int& status) {
+  const RunConfig config =
+      load_run_config(arguments.config, arguments.overrides, descriptions_of(losses), ConfigUse::kRun);
+  StageCheckOptions options = arguments.check;
+  options.threads = run_threads(arguments.threads);
+  const StageCheck check = check_stage(config, losses, options);
+  std::string text = heading(check) + group_table(check), json;
+  for (const GroupGradcheck& group : check.found.groups) {
+    json += json_line(check, group);
+    if (group.numbers > 0 && !group.report.ok()) text += group.group + ": " + group.report.text() + "\n";
+  }
+  if (!arguments.json.empty()) write_text_file(arguments.json, json);
+  text += formatted("allowed: %.0e, relative to the larger of the number's gradient and the array's root mean square\n",
+                    check.tolerance);
+  if (!check.found.ok()) status = kRowsFailed;
+  return text;
+}
+
+}  // namespace hsi4d::cli
