@@ -123,13 +123,16 @@ std::string json_line(const ColorNetMeasurement& m) {
 }
 
 std::string json_line(const TapeMeasurement& m) {
-  nlohmann::ordered_json line = {{"name", m.name},           {"threads", 1},       {"isa", isa_name(best_isa())},
-                                 {"median_ms", m.median_ms}, {"min_ms", m.min_ms}, {"repeats", m.repeats}};
+  nlohmann::ordered_json line = {{"name", m.name},
+                                 {"threads", 1},
+                                 {"median_ms", m.median_ms},
+                                 {"min_ms", m.min_ms},
+                                 {"repeats", m.repeats}};
   line.update(m.nodes > 0 ? nlohmann::ordered_json{{"nodes", m.nodes}, {"ns_per_node", m.ns_each()}}
                           : nlohmann::ordered_json{{"elements", m.elements}, {"ns_per_element", m.ns_each()}});
   if (m.ratio) line.update({{"against", m.against}, {"ratio", *m.ratio}});
   if (m.goal) line["goal"] = *m.goal;
-  return line.dump() + "\n";
+  return bench_line(std::move(line));
 }
 
 /// What a topic measured: for people, and for programs.

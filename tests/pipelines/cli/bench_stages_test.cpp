@@ -68,18 +68,13 @@ TEST_CASE("bench stages tells where the time of every stage goes", "[run]") {
   for (const auto& [name, stage] : stages) {
     INFO(name);
     check_bench_row(stage);
-    CHECK(stage["name"] == "stages/" + name);
     CHECK(stage["threads"] == 2);
-    CHECK(stage["repeats"] == (name == "refinement" ? 1 : 2));
-    CHECK(stage.contains("mfragments_per_s") == (name != "refinement"));
     CHECK(of_parts[name] > 0);
     // Whatever the clock does: the parts lie in the stage, with the run that ends it.
     CHECK(of_parts[name] * stage["iterations"].get<double>() <= 1e3 * stage["seconds"].get<double>());
     CHECK(stage["tape_bytes"] > 0);
     CHECK(stage["name"] == "stages/" + name);
     CHECK(stage["repeats"] == (name == "refinement" ? 1 : 2));  // frames
-    CHECK(stage["min_ms"] > 0);
-    CHECK(stage["min_ms"] <= stage["median_ms"]);
     CHECK(stage.contains("mfragments_per_s") == stage.contains("fragments"));
   }
   CHECK(stages["camera"]["tiles_of_image"] == 9);
