@@ -111,6 +111,19 @@ function(hsi4d_embed_study_assets)
   target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/study_assets.cpp)
 endfunction()
 
+# Compiler and flags, which measurements tell beside their times.
+function(hsi4d_embed_flags)
+  string(TOUPPER "${CMAKE_BUILD_TYPE}" type)
+  get_target_property(arithmetic hsi4d_arithmetic INTERFACE_COMPILE_OPTIONS)
+  get_directory_property(everywhere COMPILE_OPTIONS)
+  list(JOIN arithmetic " " arithmetic)
+  list(JOIN everywhere " " everywhere)
+  string(REGEX REPLACE " +" " " flags "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${type}} ${everywhere} ${arithmetic}")
+  string(STRIP "${flags}" flags)
+  set_property(SOURCE pipelines/bench_machine.cpp APPEND PROPERTY COMPILE_DEFINITIONS
+               HSI4D_COMPILER="${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}" HSI4D_FLAGS="${flags}")
+endfunction()
+
 # hsi4d_find_commit(OUT): the commit that is checked out, or "unknown" where the source is not the top of a git checkout.
 # A commit configures the build anew.
 function(hsi4d_find_commit out)

@@ -10,6 +10,7 @@
 #include <hwy/targets.h>
 
 #include "core/check.h"
+#include "core/held_isa.h"
 
 namespace hsi4d {
 
@@ -47,11 +48,27 @@ Isa choose_isa() {
                   "' is unknown; allowed: baseline, avx2, avx512");
 }
 
+Isa& chosen_isa() {
+  static Isa isa = choose_isa();
+  return isa;
+}
+
 }  // namespace
 
-Isa best_isa() {
-  static const Isa isa = choose_isa();
-  return isa;
+Isa best_isa() { return chosen_isa(); }
+
+HeldIsa::HeldIsa(Isa isa) : before_(chosen_isa()), targets_before_(hwy::SupportedTargets()) {
+  HSI4D_CHECK(isa <= before_, std::string("cannot hold to ") + isa_name(isa) + ", which is more than there is");
+  if (isa == before_) return;
+  chosen_isa() = isa;
+  hold_highway(isa);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+HeldIsa::~HeldIsa() {
+  chosen_isa() = before_;
+  hwy::SetSupportedTargetsForTest(targets_before_);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 const char* isa_name(Isa isa) {

@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
+#include <set>
+#include <thread>
 
 #include "core/check.h"
+#include "core/held_isa.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/stopwatch.h"
@@ -83,6 +87,15 @@ void append_others(std::vector<ParetoSetting>& all) {
     append(all, "sh_degree", std::to_string(degree), [degree](ParetoSetting& s) { s.settings.sh_degree = degree; });
 }
 
+void append_machine(std::vector<ParetoSetting>& all) {
+  for (const Isa isa : {Isa::kBaseline, Isa::kAvx2, Isa::kAvx512}) {
+    if (isa <= best_isa()) append(all, "isa", isa_name(isa), [isa](ParetoSetting& s) { s.isa = isa; });
+  }
+  const std::set<int> counts = {2, std::max(2, static_cast<int>(std::thread::hardware_concurrency()))};
+  for (const int count : counts)
+    append(all, "threads", std::to_string(count), [count](ParetoSetting& s) { s.threads = count; });
+}
+
 void append_product(std::vector<ParetoSetting>& all) {
   for (const NamedValue& alpha_min : kProductAlphaMins) {
     for (const NamedValue& stop : kProductStops) {
@@ -135,13 +148,25 @@ class Truth {
 
 struct Seconds {
   double forward = 0, backward = 0;
+
+  double both() const { return forward + backward; }
 };
 
 /// A scene on a tape, to be run again and again.
 struct KeptScene {
-  std::function<Seconds()> run;  ///< from the numbers to the image, and back
+  Isa isa = Isa::kBaseline;
+  int threads = 1;
+  std::function<Seconds()> pass;  ///< from the numbers to the image, and back
   std::function<SceneGradients()> result;
   std::shared_ptr<const RenderCounters> counters;
+
+  /// With the instruction set and the threads that are asked for.
+  Seconds run() const {
+    const HeldIsa held(isa);
+    Seconds seconds;
+    with_threads(threads, [&] { seconds = pass(); });
+    return seconds;
+  }
 };
 
 template <class S>
@@ -149,7 +174,7 @@ KeptScene keep_as(const ParetoScene& scene, const SceneView& view, const std::ve
   const auto taped = std::make_shared<TapedScene<S>>(PosedGaussians{scene.gaussians, {}}, view, false);
   KeptScene kept;
   kept.counters = taped->rendered.counters;
-  kept.run = [taped, planes = planar<S>(cotangent)] {
+  kept.pass = [taped, planes = planar<S>(cotangent)] {
     for (const Var<S> leaf : {taped->means, taped->quats, taped->log_scales, taped->logits, taped->sh, taped->xi})
       taped->tape.write(leaf);  // as if it had changed
     Seconds seconds;
@@ -169,10 +194,14 @@ KeptScene keep_as(const ParetoScene& scene, const SceneView& view, const std::ve
   return kept;
 }
 
-KeptScene keep(const ParetoScene& scene, const ParetoSetting& setting, const std::vector<double>& cotangent) {
+KeptScene keep(const ParetoScene& scene, const ParetoSetting& setting, int threads,
+               const std::vector<double>& cotangent) {
   const SceneView view{.camera = scene.camera, .settings = setting.settings, .precision = setting.precision};
-  return setting.precision == Precision::kDouble ? keep_as<double>(scene, view, cotangent)
-                                                 : keep_as<float>(scene, view, cotangent);
+  KeptScene kept = setting.precision == Precision::kDouble ? keep_as<double>(scene, view, cotangent)
+                                                           : keep_as<float>(scene, view, cotangent);
+  kept.isa = setting.isa.value_or(best_isa());
+  kept.threads = setting.threads > 0 ? setting.threads : threads;
+  return kept;
 }
 
 double median(std::vector<double> values) {
@@ -180,9 +209,10 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-RunTimes times_of(const std::vector<Seconds>& runs, double Seconds::*part) {
+template <class Part>
+RunTimes times_of(const std::vector<Seconds>& runs, const Part& part) {
   std::vector<double> values;
-  for (const Seconds& s : runs) values.push_back(s.*part);
+  for (const Seconds& s : runs) values.push_back(std::invoke(part, s));
   return {median(values), *std::min_element(values.begin(), values.end())};
 }
 
@@ -198,11 +228,12 @@ void measure_times(const KeptScene& kept, const KeptScene& usual, int repeats, P
     const Seconds &a = mine.back(), &b = others.back();
     forward.push_back(a.forward / b.forward);
     backward.push_back(a.backward / b.backward);
-    both.push_back((a.forward + a.backward) / (b.forward + b.backward));
+    both.push_back(a.both() / b.both());
   }
   row.repeats = repeats;
   row.forward = times_of(mine, &Seconds::forward);
   row.backward = times_of(mine, &Seconds::backward);
+  row.both = times_of(mine, &Seconds::both);
   if (&kept == &usual) return;
   row.forward_ratio = median(forward);
   row.backward_ratio = median(backward);
@@ -215,24 +246,28 @@ bool is_measured(const ParetoScene& scene, const ParetoSetting& setting) {
 
 void measure_scene(const ParetoScene& scene, const ParetoBench& bench, const std::function<void(ParetoRow)>& add) {
   const std::vector<double> cotangent = random_cotangent(scene.camera);
-  const KeptScene usual = keep(scene, pareto_settings().front(), cotangent);
+  const KeptScene usual = keep(scene, pareto_settings().front(), bench.threads, cotangent);
   Truth truth(scene, cotangent);
   for (const ParetoSetting& setting : bench.settings) {
     if (!is_measured(scene, setting)) continue;
     const bool is_usual = setting.name() == pareto_settings().front().name();
-    const KeptScene other = is_usual ? KeptScene{} : keep(scene, setting, cotangent);
+    const KeptScene other = is_usual ? KeptScene{} : keep(scene, setting, bench.threads, cotangent);
     const KeptScene& kept = is_usual ? usual : other;
     ParetoRow row{.scene = scene.name, .is_extreme = scene.is_extreme, .knob = setting.knob, .value = setting.value};
     row.model = setting.model;
-    row.threads = bench.threads;
+    row.isa = kept.isa;
+    row.threads = kept.threads;
     measure_times(kept, usual, bench.repeats, row);
     row.gaussians = scene.gaussians.count();
     row.pixels = static_cast<Index>(scene.camera.width) * scene.camera.height;
     row.fragments = kept.counters->fragments;
     row.pairs = kept.counters->pairs;
-    const SceneGradients result = kept.result(), &reference = truth.of(setting);
-    row.image = image_error(result.rendered.image, reference.rendered.image);
-    row.gradients = gradient_errors(result, reference);
+    const SceneGradients result = kept.result();
+    with_threads(bench.threads, [&] {
+      const SceneGradients& reference = truth.of(setting);
+      row.image = image_error(result.rendered.image, reference.rendered.image);
+      row.gradients = gradient_errors(result, reference);
+    });
     add(std::move(row));
   }
 }
@@ -247,10 +282,13 @@ const std::vector<ParetoSetting>& pareto_settings() {
     append_others(made);
     append_product(made);
     append(made, "depth_key", "double", [](ParetoSetting& s) { s.settings.depth_key = DepthKey::kDouble; });
+    append_machine(made);
     return made;
   }();
   return all;
 }
+
+bool is_machine_knob(const std::string& knob) { return knob == "isa" || knob == "threads"; }
 
 std::vector<std::string> pareto_knobs() {
   std::vector<std::string> knobs;
@@ -269,14 +307,12 @@ Index pareto_row_count(const ParetoBench& bench) {
 
 std::vector<ParetoRow> measure_pareto(const ParetoBench& bench, const std::function<void(const ParetoRow&)>& told) {
   std::vector<ParetoRow> rows;
-  with_threads(bench.threads, [&] {
-    for (const ParetoScene& scene : bench.scenes) {
-      measure_scene(scene, bench, [&](ParetoRow row) {
-        rows.push_back(std::move(row));
-        if (told) told(rows.back());
-      });
-    }
-  });
+  for (const ParetoScene& scene : bench.scenes) {
+    measure_scene(scene, bench, [&](ParetoRow row) {
+      rows.push_back(std::move(row));
+      if (told) told(rows.back());
+    });
+  }
   return rows;
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/camera.h"
+#include "core/simd.h"
 #include "pipelines/scene_render.h"
 #include "splat/gaussians.h"
 
@@ -57,11 +58,17 @@ struct ParetoSetting {
   RenderSettings settings;
   Precision precision = Precision::kFloat;  ///< never kReference
   ParetoModel model = ParetoModel::kOwn;
+  std::optional<Isa> isa = {};  ///< none: the processor's best
+  int threads = 0;              ///< 0: those of the bench
 
   std::string name() const { return knob + " " + value; }
 };
 
-/// All settings, the default first.
+/// Whether a knob is what the machine gives, an instruction set or threads: no choice between time and error, so that
+/// it has rows and dots and no place in a front.
+bool is_machine_knob(const std::string& knob);
+
+/// All settings, the default first. Instruction sets are those that the processor has.
 const std::vector<ParetoSetting>& pareto_settings();
 
 /// The knobs of these settings, each once.
@@ -111,9 +118,10 @@ struct ParetoRow {
   std::string knob, value;
   ParetoModel model = ParetoModel::kOwn;
   Index gaussians = 0, pixels = 0, fragments = 0, pairs = 0;
-  int threads = 1;
-  int repeats = 0;
+  Isa isa = Isa::kBaseline;
+  int threads = 1, repeats = 0;
   RunTimes forward = {}, backward = {};  ///< of a kept tape: from the numbers to the image, and back to them
+  RunTimes both = {};                    ///< of one after the other
   double forward_ratio = 1;              ///< of medians, to the default's that ran in turns with it
   double backward_ratio = 1;             ///< likewise
   double time_ratio = 1;                 ///< of forward and backward together
@@ -122,6 +130,8 @@ struct ParetoRow {
 
   std::string name() const { return knob + " " + value; }
   bool is_preset() const { return knob == "quality"; }
+  /// Millions of fragments a second, forward and backward, by the median.
+  double mfragments_per_s() const;
   /// The largest relative L2 of the classes.
   double worst_gradient() const;
 };
@@ -136,7 +146,7 @@ struct ParetoBench {
 /// How many rows measure_pareto makes.
 Index pareto_row_count(const ParetoBench& bench);
 
-/// Measures. On one thread times are those that the processor gave.
+/// Measures. On one thread times are those that the processor gave, on more those of the clock.
 /// @param told  after every row; may be empty
 std::vector<ParetoRow> measure_pareto(const ParetoBench& bench, const std::function<void(const ParetoRow&)>& told = {});
 
@@ -166,8 +176,8 @@ struct ParetoPoint {
 /// @param scene  of this one alone; empty: all
 std::vector<ParetoPoint> pareto_points(const std::vector<ParetoRow>& rows, const std::string& scene = "");
 
-/// The points by what they have of a quantity.
-std::vector<TimeAndError> times_and_errors(const std::vector<ParetoPoint>& points, double ParetoPoint::*error);
+/// The front of the points by one of their errors, without those of is_machine_knob.
+std::vector<std::size_t> pareto_front(const std::vector<ParetoPoint>& points, double ParetoPoint::*error);
 
 // --- text ------------------------------------------------------------------------------------------------------------
 

@@ -61,6 +61,10 @@ std::optional<double> ImageError::psnr_db() const {
   return -20 * std::log10(rms);
 }
 
+double ParetoRow::mfragments_per_s() const {
+  return both.median_s > 0 ? 1e-6 * static_cast<double>(fragments) / both.median_s : 0;
+}
+
 double ParetoRow::worst_gradient() const {
   double worst = 0;
   for (const GradientError& error : gradients) worst = std::max(worst, error.relative_l2);
@@ -158,10 +162,17 @@ std::vector<ParetoPoint> pareto_points(const std::vector<ParetoRow>& rows, const
   return points;
 }
 
-std::vector<TimeAndError> times_and_errors(const std::vector<ParetoPoint>& points, double ParetoPoint::*error) {
-  std::vector<TimeAndError> result;
-  for (const ParetoPoint& point : points) result.push_back({point.time_ratio, point.*error});
-  return result;
+std::vector<std::size_t> pareto_front(const std::vector<ParetoPoint>& points, double ParetoPoint::*error) {
+  std::vector<std::size_t> places;  // of those that may be on it
+  std::vector<TimeAndError> candidates;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (is_machine_knob(points[i].knob)) continue;
+    places.push_back(i);
+    candidates.push_back({points[i].time_ratio, points[i].*error});
+  }
+  std::vector<std::size_t> front = pareto_front(candidates);
+  for (std::size_t& i : front) i = places[i];
+  return front;
 }
 
 }  // namespace hsi4d

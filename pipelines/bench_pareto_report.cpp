@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/formatted.h"
-#include "core/simd.h"
 #include "core/text.h"
+#include "pipelines/bench_machine.h"
 #include "pipelines/bench_pareto.h"
 #include "pipelines/report_plots.h"
 
@@ -54,7 +54,7 @@ std::string point_line(const ParetoPoint& point, bool is_on_image_front, bool is
 /// Whether each point is on the front.
 std::vector<bool> on_front(const std::vector<ParetoPoint>& points, double ParetoPoint::*error) {
   std::vector<bool> result(points.size());
-  for (const std::size_t i : pareto_front(times_and_errors(points, error))) result[i] = true;
+  for (const std::size_t i : pareto_front(points, error)) result[i] = true;
   return result;
 }
 
@@ -88,31 +88,29 @@ std::string csv_text(const std::string& text) {
 }
 
 nlohmann::ordered_json json_of(const ParetoRow& row) {
-  const double median_ms = 1e3 * (row.forward.median_s + row.backward.median_s);
-  nlohmann::ordered_json line = {
-      {"name", "pareto/" + row.scene + "/" + row.name()},
-      {"threads", row.threads},
-      {"median_ms", median_ms},
-      {"min_ms", 1e3 * (row.forward.least_s + row.backward.least_s)},
-      {"mfragments_per_s", median_ms > 0 ? static_cast<double>(row.fragments) / median_ms / 1e3 : 0},
-      {"scene", row.scene},
-      {"knob", row.knob},
-      {"value", row.value},
-      {"extreme", row.is_extreme},
-      {"model", model_name(row.model)},
-      {"isa", isa_name(best_isa())},
-      {"gaussians", row.gaussians},
-      {"pixels", row.pixels},
-      {"fragments", row.fragments},
-      {"pairs", row.pairs},
-      {"repeats", row.repeats},
-      {"forward_ms", 1e3 * row.forward.median_s},
-      {"forward_min_ms", 1e3 * row.forward.least_s},
-      {"backward_ms", 1e3 * row.backward.median_s},
-      {"backward_min_ms", 1e3 * row.backward.least_s},
-      {"forward_ratio", row.forward_ratio},
-      {"backward_ratio", row.backward_ratio},
-      {"time_ratio", row.time_ratio}};
+  nlohmann::ordered_json line = {{"name", "pareto/" + row.scene + "/" + row.name()},
+                                 {"scene", row.scene},
+                                 {"knob", row.knob},
+                                 {"value", row.value},
+                                 {"extreme", row.is_extreme},
+                                 {"model", model_name(row.model)},
+                                 {"isa", isa_name(row.isa)},
+                                 {"threads", row.threads},
+                                 {"median_ms", 1e3 * row.both.median_s},
+                                 {"min_ms", 1e3 * row.both.least_s},
+                                 {"repeats", row.repeats},
+                                 {"gaussians", row.gaussians},
+                                 {"pixels", row.pixels},
+                                 {"fragments", row.fragments},
+                                 {"pairs", row.pairs},
+                                 {"mfragments_per_s", row.mfragments_per_s()},
+                                 {"forward_ms", 1e3 * row.forward.median_s},
+                                 {"forward_min_ms", 1e3 * row.forward.least_s},
+                                 {"backward_ms", 1e3 * row.backward.median_s},
+                                 {"backward_min_ms", 1e3 * row.backward.least_s},
+                                 {"forward_ratio", row.forward_ratio},
+                                 {"backward_ratio", row.backward_ratio},
+                                 {"time_ratio", row.time_ratio}};
   if (row.image.psnr_db()) line["psnr_db"] = *row.image.psnr_db();
   line.update({{"image_rms", row.image.rms},
                {"image_max", row.image.max},
@@ -194,7 +192,7 @@ std::string knob_color(const std::string& knob) {
 /// Dots by knob, presets named, the front as a line. Points without error have no place on a logarithmic axis.
 void add_points(const std::vector<ParetoPoint>& points, Plot& plot) {
   PlotLine front{.label = "front", .color = "#999", .points = {}};
-  for (const std::size_t i : pareto_front(times_and_errors(points, &ParetoPoint::image_rms)))
+  for (const std::size_t i : pareto_front(points, &ParetoPoint::image_rms))
     front.points.emplace_back(points[i].time_ratio, points[i].image_rms);
   plot.lines.push_back(std::move(front));
   const auto add = [&plot](const ParetoPoint& point) {
@@ -296,7 +294,8 @@ std::string pareto_front_table(const std::vector<ParetoRow>& rows) {
 
 std::string pareto_csv(const std::vector<ParetoRow>& rows) {
   std::string text =
-      "scene,knob,value,model,gaussians,pixels,fragments,pairs,repeats,forward_ms,forward_min_ms,backward_ms,"
+      "scene,knob,value,model,gaussians,pixels,fragments,pairs,repeats,threads,isa,median_ms,min_ms,forward_ms,forward_"
+      "min_ms,backward_ms,"
       "backward_min_ms,forward_ratio,backward_ratio,time_ratio,psnr_db,image_rms,image_max,image_p999,image_bias";
   for (const char* name : kGradientClasses)
     for (const char* part : {"relative_l2", "one_minus_cosine", "bias"}) text += std::string(",") + name + "_" + part;
@@ -305,8 +304,10 @@ std::string pareto_csv(const std::vector<ParetoRow>& rows) {
     text += csv_text(row.scene) + "," + row.knob + ",\"" + row.value + "\"," + model_name(row.model);
     for (const Index count : {row.gaussians, row.pixels, row.fragments, row.pairs, static_cast<Index>(row.repeats)})
       text += "," + std::to_string(count);
-    for (const double value : {1e3 * row.forward.median_s, 1e3 * row.forward.least_s, 1e3 * row.backward.median_s,
-                               1e3 * row.backward.least_s, row.forward_ratio, row.backward_ratio, row.time_ratio})
+    text += "," + std::to_string(row.threads) + "," + isa_name(row.isa);
+    for (const double value : {1e3 * row.both.median_s, 1e3 * row.both.least_s, 1e3 * row.forward.median_s,
+                               1e3 * row.forward.least_s, 1e3 * row.backward.median_s, 1e3 * row.backward.least_s,
+                               row.forward_ratio, row.backward_ratio, row.time_ratio})
       text += "," + csv_number(value);
     text += "," + (row.image.psnr_db() ? csv_number(*row.image.psnr_db()) : "");
     for (const double value : {row.image.rms, row.image.max, row.image.p999, row.image.bias})
@@ -321,7 +322,7 @@ std::string pareto_csv(const std::vector<ParetoRow>& rows) {
 
 std::string pareto_json(const std::vector<ParetoRow>& rows) {
   std::string text;
-  for (const ParetoRow& row : rows) text += json_of(row).dump() + "\n";
+  for (const ParetoRow& row : rows) text += bench_line(json_of(row));
   return text;
 }
 

@@ -112,6 +112,7 @@ ScalingCost cost_of(const std::string& name, const StageSettings& stage, const T
   cost.tiles = mean(told.sum.tiles);
   cost.pairs = mean(told.sum.pairs);
   cost.fragments = mean(told.sum.fragments);
+  cost.repeats = std::ssize(told.seconds);
   return cost;
 }
 
@@ -166,6 +167,7 @@ class Measured {
     point_.threads = thread_count();
     point_.scene_gaussians = clip.scene.count();
     point_.avatar_gaussians = clip.avatar.count();
+    point_.pixels = static_cast<Index>(clip.camera.width) * clip.camera.height;
     point_.object_gaussians = 0;
     for (const ClipObject& object : clip.objects) point_.object_gaussians += object.gaussians.count();
     if (point_.peak_memory_bytes == 0) point_.peak_memory_bytes = peak_memory_bytes();

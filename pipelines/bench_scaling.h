@@ -42,6 +42,7 @@ struct ScalingCost {
   double first_ms = 0;      ///< of the very first iteration, the least of all rounds
   double prepare_ms = 0, forward_ms = 0, backward_ms = 0;  ///< of `composite`: up to its lists; pixels; their adjoint
   Index channels = 0, tiles = 0, pairs = 0, fragments = 0;
+  Index repeats = 0;  ///< iterations that were measured
 
   /// What is not compositing: projection, colours, posing, losses, steps.
   double other_ms() const { return ms - prepare_ms - forward_ms - backward_ms; }
@@ -58,6 +59,7 @@ struct ScalingPoint {
   Index value = 0;
   int threads = 1;
   Index scene_gaussians = 0, avatar_gaussians = 0, object_gaussians = 0;  ///< that were made
+  Index pixels = 0;
   std::vector<ScalingCost> stages;
   Index peak_memory_bytes = 0;  ///< of the process until then
 };
@@ -93,8 +95,8 @@ struct ScalingResult {
 /// A table an axis: a line a stage and value, then the exponents.
 std::string scaling_table(const std::vector<ScalingResult>& results);
 
-/// The same as one JSON object a line: {"axis", "value", "stage", "ms", ...}, then {"axis", "stage", "quantity",
-/// "expected", "fitted"}.
+/// The same as one JSON object a line: {"name", "axis", "value", "stage", "median_ms", ...}, then {"axis", "stage",
+/// "quantity", "expected", "fitted"}.
 std::string scaling_json(const std::vector<ScalingResult>& results);
 
 /// Processor time over the values, over threads the least time, both on logarithmic scales, a panel an axis, as an SVG

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/formatted.h"
-#include "core/simd.h"
 #include "core/text.h"
+#include "pipelines/bench_machine.h"
 #include "pipelines/bench_scaling.h"
 #include "pipelines/report_plots.h"
 
@@ -122,16 +122,19 @@ constexpr const char* kStyle =
     ".plot polyline{fill:none;stroke-width:1.6}</style>\n";
 
 nlohmann::ordered_json json_of(const ScalingResult& result, const ScalingPoint& point, const ScalingCost& cost) {
-  return {{"axis", result.axis.name},
+  return {{"name", "scaling/" + result.axis.name + " " + std::to_string(point.value) + "/" + cost.stage},
+          {"axis", result.axis.name},
           {"value", point.value},
           {"stage", cost.stage},
           {"threads", point.threads},
-          {"isa", isa_name(best_isa())},
+          {"median_ms", cost.ms},
+          {"min_ms", cost.min_ms},
+          {"repeats", cost.repeats},
+          {"gaussians", point.scene_gaussians + point.avatar_gaussians + point.object_gaussians},
           {"scene_gaussians", point.scene_gaussians},
           {"avatar_gaussians", point.avatar_gaussians},
           {"object_gaussians", point.object_gaussians},
-          {"ms", cost.ms},
-          {"min_ms", cost.min_ms},
+          {"pixels", point.pixels},
           {"processor_ms", cost.processor_ms},
           {"first_ms", cost.first_ms},
           {"prepare_ms", cost.prepare_ms},
@@ -142,6 +145,7 @@ nlohmann::ordered_json json_of(const ScalingResult& result, const ScalingPoint& 
           {"tiles", cost.tiles},
           {"pairs", cost.pairs},
           {"fragments", cost.fragments},
+          {"mfragments_per_s", cost.ms > 0 ? static_cast<double>(cost.fragments) / cost.ms / 1e3 : 0},
           {"peak_memory_bytes", point.peak_memory_bytes}};
 }
 
@@ -164,7 +168,7 @@ std::string scaling_json(const std::vector<ScalingResult>& results) {
   std::string text;
   for (const ScalingResult& result : results) {
     for (const ScalingPoint& point : result.points)
-      for (const ScalingCost& cost : point.stages) text += json_of(result, point, cost).dump() + "\n";
+      for (const ScalingCost& cost : point.stages) text += bench_line(json_of(result, point, cost));
     for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) {
       nlohmann::ordered_json line = {{"axis", result.axis.name}, {"stage", fit.stage}, {"quantity", fit.quantity}};
       if (fit.expected) line["expected"] = *fit.expected;

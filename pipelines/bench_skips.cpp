@@ -1,10 +1,12 @@
 #include "pipelines/bench_skips.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "core/formatted.h"
+#include "pipelines/bench_machine.h"
 
 namespace hsi4d {
 
@@ -94,7 +96,9 @@ std::string comparison_table(const RunCost& with, const RunCost& without) {
 std::string comparison_json(const RunCost& with, const RunCost& without) {
   std::string text;
   for (const StagePair& pair : pairs_of(with, without)) {
-    nlohmann::ordered_json entry = {{"stage", pair.with.stage},
+    nlohmann::ordered_json entry = {{"name", "stages/" + pair.with.stage + "/skips"},
+                                    {"stage", pair.with.stage},
+                                    {"threads", with.threads},
                                     {"ms", pair.with.ms_each()},
                                     {"ms_without_skips", pair.without.ms_each()},
                                     {"ratio", pair.ratio()},
@@ -102,12 +106,14 @@ std::string comparison_json(const RunCost& with, const RunCost& without) {
                                     {"counters_without_skips", nlohmann::ordered_json::object()}};
     for (const auto& [name, count] : counters_of(pair.with)) entry["counters"][name] = count;
     for (const auto& [name, count] : counters_of(pair.without)) entry["counters_without_skips"][name] = count;
-    text += entry.dump() + "\n";
+    text += bench_line(std::move(entry));
   }
   const double seconds = seconds_without(with, without);
-  const nlohmann::ordered_json run = {
-      {"seconds", with.seconds}, {"seconds_without_skips", seconds}, {"ratio", seconds / with.seconds}};
-  return text + run.dump() + "\n";
+  return text + bench_line({{"name", "stages/skips"},
+                            {"threads", with.threads},
+                            {"seconds", with.seconds},
+                            {"seconds_without_skips", seconds},
+                            {"ratio", seconds / with.seconds}});
 }
 
 }  // namespace hsi4d

@@ -17,7 +17,8 @@ RunConfig without_skips(RunConfig config, int iterations);
 /// had, and of what that took beside them.
 std::string comparison_table(const RunCost& with, const RunCost& without);
 
-/// The same as one JSON object a line: {"stage", "ms", "ms_without_skips", "ratio", counters}, then the whole run's
+/// The same as one JSON object a line: {"name", "stage", "ms", "ms_without_skips", "ratio", counters}, then the whole
+/// run's
 /// {"seconds", "seconds_without_skips", "ratio"}.
 std::string comparison_json(const RunCost& with, const RunCost& without);
 

@@ -1,12 +1,13 @@
 #include "pipelines/bench_stages.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "core/formatted.h"
-#include "core/parallel.h"
 #include "core/simd.h"
+#include "pipelines/bench_machine.h"
 #include "pipelines/report_plots.h"
 
 namespace hsi4d {
@@ -28,6 +29,12 @@ double per_iteration(double seconds, const StageCost& cost) {
 
 double per_iteration(Index count, const StageCost& cost) {
   return cost.sum.iterations > 0 ? static_cast<double>(count) / static_cast<double>(cost.sum.iterations) : 0;
+}
+
+/// Millions of fragments a second of whole iterations, by the median.
+double mfragments_per_s(const StageCost& cost) {
+  const double ms = cost.median_ms();
+  return ms > 0 ? per_iteration(cost.sum.counters.fragments, cost) / ms / 1e3 : 0;
 }
 
 void add_operators(const std::vector<OperatorProfile>& more, std::vector<OperatorProfile>& operators) {
@@ -148,6 +155,7 @@ void add_profile(const StageProfile& profile, std::vector<StageCost>& stages) {
   sum.counters += profile.counters;
   sum.tape += profile.tape;
   sum.allocations += profile.allocations;
+  sum.pixels_of_image = profile.pixels_of_image;
   sum.tiles_of_image = profile.tiles_of_image;
   sum.nodes = std::max(sum.nodes, profile.nodes);
   sum.tape_bytes = std::max(sum.tape_bytes, profile.tape_bytes);
@@ -169,7 +177,7 @@ std::string cost_table(const RunCost& cost) {
             part_lines(stage) + composite_line(stage);
   }
   return text + formatted("\noptimisation %.1f s of %.1f s on %d threads (%s), at most %.0f MB\n",
-                          optimisation_seconds(cost), cost.seconds, thread_count(), isa_name(best_isa()),
+                          optimisation_seconds(cost), cost.seconds, cost.threads, isa_name(best_isa()),
                           1e-6 * static_cast<double>(cost.peak_memory_bytes));
 }
 
@@ -179,14 +187,13 @@ std::string cost_json(const RunCost& cost) {
     const StageProfile& sum = stage.sum;
     nlohmann::ordered_json entry = {{"name", "stages/" + stage.stage},
                                     {"stage", stage.stage},
-                                    {"threads", thread_count()},
-                                    {"isa", isa_name(best_isa())},
-                                    {"frames", stage.frames},
-                                    {"iterations", sum.iterations},
+                                    {"threads", cost.threads},
                                     {"ms", stage.ms_each()},
                                     {"median_ms", stage.median_ms()},
                                     {"min_ms", stage.min_ms()},
                                     {"repeats", stage.ms_an_iteration.size()},
+                                    {"frames", stage.frames},
+                                    {"iterations", sum.iterations},
                                     {"seconds", sum.seconds},
                                     {"nodes", sum.nodes},
                                     {"forward_nodes", per_iteration(sum.tape.forward_nodes, stage)},
@@ -194,20 +201,19 @@ std::string cost_json(const RunCost& cost) {
                                     {"adjoint_numbers", per_iteration(sum.tape.adjoint_numbers, stage)},
                                     {"tape_bytes", sum.tape_bytes}};
     if (sum.tiles_of_image > 0)
-      entry.update(
-          {{"tiles_of_image", sum.tiles_of_image},
-           {"gaussians", per_iteration(sum.counters.gaussians, stage)},
-           {"tiles", per_iteration(sum.counters.tiles, stage)},
-           {"pairs", per_iteration(sum.counters.pairs, stage)},
-           {"fragments", per_iteration(sum.counters.fragments, stage)},
-           {"adjoint_tiles", per_iteration(sum.counters.adjoint_tiles, stage)},
-           {"layers", per_iteration(sum.counters.layers, stage)},
-           {"told_squares", per_iteration(sum.counters.told_squares, stage)},
-           {"mfragments_per_s",
-            stage.median_ms() > 0 ? per_iteration(sum.counters.fragments, stage) / stage.median_ms() / 1e3 : 0},
-           {"composite_ms", composite_steps(stage)}});
+      entry.update({{"pixels", sum.pixels_of_image},
+                    {"tiles_of_image", sum.tiles_of_image},
+                    {"gaussians", per_iteration(sum.counters.gaussians, stage)},
+                    {"tiles", per_iteration(sum.counters.tiles, stage)},
+                    {"pairs", per_iteration(sum.counters.pairs, stage)},
+                    {"fragments", per_iteration(sum.counters.fragments, stage)},
+                    {"mfragments_per_s", mfragments_per_s(stage)},
+                    {"adjoint_tiles", per_iteration(sum.counters.adjoint_tiles, stage)},
+                    {"layers", per_iteration(sum.counters.layers, stage)},
+                    {"told_squares", per_iteration(sum.counters.told_squares, stage)},
+                    {"composite_ms", composite_steps(stage)}});
     if (cost.counts_allocations) entry["allocations"] = per_iteration(static_cast<Index>(sum.allocations), stage);
-    text += entry.dump() + "\n";
+    text += bench_line(std::move(entry));
     for (const CostPart& part : parts_of(stage)) {
       const nlohmann::ordered_json of_part = {{"stage", stage.stage},
                                               {"operator", part.name},
@@ -219,10 +225,11 @@ std::string cost_json(const RunCost& cost) {
       text += of_part.dump() + "\n";
     }
   }
-  const nlohmann::ordered_json all = {{"optimisation_s", optimisation_seconds(cost)},
-                                      {"seconds", cost.seconds},
-                                      {"peak_memory_bytes", cost.peak_memory_bytes}};
-  return text + all.dump() + "\n";
+  return text + bench_line({{"name", "stages"},
+                            {"threads", cost.threads},
+                            {"optimisation_s", optimisation_seconds(cost)},
+                            {"seconds", cost.seconds},
+                            {"peak_memory_bytes", cost.peak_memory_bytes}});
 }
 
 namespace {

@@ -17,14 +17,15 @@ struct StageCost {
 
   double ms_each() const;    ///< an iteration, on average
   double median_ms() const;  ///< of the frames' averages
-  double min_ms() const;     ///< likewise
+  double min_ms() const;     ///< the least of them
 };
 
 /// What a run took.
 struct RunCost {
   std::vector<StageCost> stages;  ///< in the order in which they were first met
-  double seconds = 0;             ///< of the run, reading and writing included
-  Index peak_memory_bytes = 0;    ///< of the process
+  int threads = 1;
+  double seconds = 0;           ///< of the run, reading and writing included
+  Index peak_memory_bytes = 0;  ///< of the process
   bool counts_allocations = false;
 };
 
@@ -38,8 +39,8 @@ double optimisation_seconds(const RunCost& cost);
 /// an operator (Adam, the tape itself) last.
 std::string cost_table(const RunCost& cost);
 
-/// The table as one JSON object a line: {"name": "stages/STAGE", "stage", "iterations", ...}, then {"stage",
-/// "operator", ...}.
+/// The table as one JSON object a line: {"name", "stage", "iterations", ...}, then {"stage", "operator", ...}; of the
+/// whole run last.
 std::string cost_json(const RunCost& cost);
 
 /// A bar a stage, as long as an iteration, parted by operators, as an SVG file.

@@ -171,10 +171,11 @@ StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, Sc
     graph.read_state(stage.optimize, state);
     if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
   });
+  const Camera drawn = camera_of_size(task.clip, stage.longest_side_px);
   probe.stage_ended(result, {.stage = name,
                              .frame = frame.index,
-                             .tiles_of_image = tiles_in_image(camera_of_size(task.clip, stage.longest_side_px),
-                                                              task.config.render.tile),
+                             .pixels_of_image = static_cast<Index>(drawn.width) * drawn.height,
+                             .tiles_of_image = tiles_in_image(drawn, task.config.render.tile),
                              .tape_bytes = tape.memory_bytes()});
   return result;
 }

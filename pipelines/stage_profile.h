@@ -32,7 +32,8 @@ struct StageProfile {
   Index nodes = 0;               ///< of the tape
   RenderCounters counters = {};  ///< sums over the iterations; none over the sequence
   TapeCounters tape = {};        ///< sums over the iterations
-  Index tiles_of_image = 0;      ///< in one image; 0: nothing was drawn
+  Index pixels_of_image = 0;     ///< 0: nothing was drawn
+  Index tiles_of_image = 0;      ///< likewise
   std::int64_t allocations = 0;  ///< by the second half of the iterations, where they are counted
   Index tape_bytes = 0;
 };

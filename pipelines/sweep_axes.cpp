@@ -140,6 +140,18 @@ class AxisChecks {
 
 void check_sweep_axes(const SweepFile& sweep, ConfigProblems& problems) { AxisChecks(sweep, problems).run(); }
 
+std::int64_t sweep_combinations(const SweepBlock& block) {
+  std::int64_t count = 1;
+  const auto cross = [&count](std::size_t choices) {
+    if (choices > 0) count = std::min(count * static_cast<std::int64_t>(choices), kMostSweepRuns + 1);
+  };
+  for (const std::size_t choices : {block.clips.size(), block.ablations.size(), block.seeds.size()}) cross(choices);
+  for (const auto* axes : {&block.grid, &block.zip}) {
+    for (const SweepAxis& axis : *axes) cross(axis.points.size());
+  }
+  return count;
+}
+
 bool has_sweep_axis(const SweepBlock& block, const std::string& key) {
   if (key == "block") return !block.name.empty();
   if (key == "clip") return !block.clips.empty();

@@ -16,8 +16,6 @@ namespace {
 using Kind = ConfigValue::Kind;
 using Strings = std::vector<std::string>;
 
-constexpr std::int64_t kMostSeeds = 100000;
-
 const Strings kBlockKeys = {"name", "base", "set", "clips", "seeds", "ablations", "grid", "zip", "skip", "only"};
 const Strings kFileKeys = {"name", "base", "set",    "clips",   "seeds",   "ablations", "grid", "zip",
                            "skip", "only", "blocks", "compare", "threads", "memory_mb", "slurm"};
@@ -183,7 +181,7 @@ class Reader {
     std::vector<SweepVariant> all;
     if (tree.kind == Kind::kObject) return ablations(tree, in, false);
     if (tree.kind == Kind::kNumber) {
-      const auto count = seed_number(tree, in, 1, kMostSeeds);
+      const auto count = seed_number(tree, in, 1, kMostSweepRuns);
       for (std::int64_t i = 0; count && i < *count; ++i) all.push_back({std::to_string(i), {}, i});
       return all;
     }
@@ -376,11 +374,13 @@ class Reader {
     if (blocks == nullptr) {
       sweep.blocks.push_back(whole);
       sweep.blocks.back().name.clear();
+      refuse_too_many(tree.origin, "", sweep_combinations(whole));
       return;
     }
     if (!expect(*blocks, Kind::kArray, "/blocks", "a list of blocks, [{...}]") || is_empty(*blocks, "/blocks", false))
       return;
     std::set<std::string> names;
+    std::int64_t runs = 0;
     for (std::size_t i = 0; i < blocks->items.size(); ++i) {
       const std::string place = child_pointer("/blocks", std::to_string(i));
       const ConfigValue& own = blocks->items[i];
@@ -390,7 +390,15 @@ class Reader {
       const std::string& name = sweep.blocks.back().name;
       if (!name.empty() && !names.insert(name).second)
         add(find_member(own, "name")->origin, place + "/name", json_string(name) + " is the name of another block too");
+      runs += sweep_combinations(sweep.blocks.back());
+      if (refuse_too_many(own.origin, place, runs)) return;  // each block has seeds and axes of its own in memory
     }
+  }
+
+  bool refuse_too_many(const ConfigOrigin& origin, const std::string& pointer, std::int64_t runs) {
+    if (runs <= kMostSweepRuns) return false;
+    add(origin, pointer, "the axes make more than " + std::to_string(kMostSweepRuns) + " runs, which is the most");
+    return true;
   }
 
   void check_slurm(const ConfigValue& tree, const SweepSlurm& slurm) {

@@ -71,6 +71,9 @@ struct SweepSlurm {
   std::vector<std::string> options;  ///< more of sbatch
 };
 
+/// The most runs that a sweep's file may ask for, before `skip` and `only` leave some out.
+inline constexpr std::int64_t kMostSweepRuns = 100000;
+
 /// A sweep's file, read.
 struct SweepFile {
   std::string name;
@@ -91,7 +94,7 @@ std::string sweep_schema();
 
 /// Reads a sweep's file as far as it can be told without the configs that it names. Throws one UserError with every
 /// problem: unknown keys, values of a wrong kind, empty or unequal lists, names that occur twice, settings that two
-/// axes name, rules about what is no axis.
+/// axes name, rules about what is no axis, more than kMostSweepRuns runs.
 /// @param tree  what load_config made of it
 /// @param file  whose name the sweep has where it does not say one
 SweepFile read_sweep_file(const ConfigValue& tree, const std::filesystem::path& file, ConfigProblems& problems);
@@ -102,6 +105,9 @@ void check_sweep_axes(const SweepFile& sweep, ConfigProblems& problems);
 
 /// Whether a block has an axis of that name: block, clip, ablation, seed, or the key of a setting.
 bool has_sweep_axis(const SweepBlock& block, const std::string& key);
+
+/// How many runs the axes of a block make before its rules; beyond kMostSweepRuns one more than these.
+std::int64_t sweep_combinations(const SweepBlock& block);
 
 /// A key in one spelling, "stages.camera.iterations": two that name one place are then equal.
 std::string sweep_key(const std::string& key);

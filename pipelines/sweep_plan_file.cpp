@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 
 #include "core/check.h"
 #include "pipelines/json_text.h"
@@ -17,10 +18,18 @@ ConfigValue words_json(const std::vector<std::pair<std::string, std::string>>& w
   return object;
 }
 
-std::vector<std::pair<std::string, std::string>> words_of(const ConfigValue& object, const char* key) {
+/// {KEY: text, ...}; none where there is no such member.
+/// @param in  the object's place
+std::vector<std::pair<std::string, std::string>> words_of(const ConfigValue& object, const char* key,
+                                                          const std::string& in) {
   std::vector<std::pair<std::string, std::string>> words;
+  const std::string pointer = child_pointer(in, key);
   if (const ConfigValue* const member = find_member(object, key)) {
-    for (const ConfigMember& word : member->members) words.emplace_back(word.key, word.value.text);
+    check_kind(*member, Kind::kObject, pointer);
+    for (const ConfigMember& word : member->members) {
+      check_kind(word.value, Kind::kString, child_pointer(pointer, word.key));
+      words.emplace_back(word.key, word.value.text);
+    }
   }
   return words;
 }
@@ -47,7 +56,12 @@ const ConfigValue& member_of(const ConfigValue& object, const char* key, const s
 }
 
 int integer_of(const ConfigValue& object, const char* key, const std::string& in) {
-  return static_cast<int>(whole_number_of(member_of(object, key, in, Kind::kNumber), child_pointer(in, key)));
+  constexpr int kMost = std::numeric_limits<int>::max();
+  const ConfigValue& member = member_of(object, key, in, Kind::kNumber);
+  const std::int64_t number = whole_number_of(member, child_pointer(in, key));
+  if (number > kMost)
+    fail_at(member, child_pointer(in, key), shown(member) + " is too large; allowed: 0 to " + std::to_string(kMost));
+  return static_cast<int>(number);
 }
 
 SweepSlurm slurm_of(const ConfigValue& tree) {
@@ -58,8 +72,10 @@ SweepSlurm slurm_of(const ConfigValue& tree) {
   slurm.at_once = integer_of(object, "at_once", "/slurm");
   slurm.partition = string_member(object, "partition");
   slurm.grace_s = integer_of(object, "grace_s", "/slurm");
-  for (const ConfigValue& option : member_of(object, "options", "/slurm", Kind::kArray).items)
+  for (const ConfigValue& option : member_of(object, "options", "/slurm", Kind::kArray).items) {
+    check_kind(option, Kind::kString, "/slurm/options");
     slurm.options.push_back(option.text);
+  }
   return slurm;
 }
 
@@ -77,7 +93,7 @@ SweepRun run_of(const ConfigValue& object, const std::string& in) {
   run.clip = string_member(object, "clip");
   run.ablation = string_member(object, "ablation");
   run.seed = string_member(object, "seed");
-  run.values = words_of(object, "values");
+  run.values = words_of(object, "values", in);
   run.dataset = string_member(object, "dataset");
   if (!run.dataset.empty() && !is_id(run.dataset))
     fail_at(object, in + "/dataset", json_string(run.dataset) + " is not the name of a dataset");
@@ -122,9 +138,11 @@ SweepPlan parse_sweep_plan(const std::string& text, const std::string& name) {
   SweepPlan plan;
   plan.name = member_of(tree, "name", "", Kind::kString).text;
   plan.threads = integer_of(tree, "threads", "");
-  plan.memory_mb = number_of(member_of(tree, "memory_mb", "", Kind::kNumber), "/memory_mb");
+  const ConfigValue& memory = member_of(tree, "memory_mb", "", Kind::kNumber);
+  plan.memory_mb = number_of(memory, "/memory_mb");
+  if (plan.memory_mb < 0) fail_at(memory, "/memory_mb", shown(memory) + " is below 0");
   plan.slurm = slurm_of(tree);
-  plan.compare = words_of(tree, "compare");
+  plan.compare = words_of(tree, "compare", "");
   const ConfigValue& runs = member_of(tree, "runs", "", Kind::kArray);
   for (std::size_t i = 0; i < runs.items.size(); ++i)
     plan.runs.push_back(run_of(runs.items[i], child_pointer("/runs", std::to_string(i))));

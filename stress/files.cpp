@@ -105,9 +105,9 @@ bool comes_back(S x, Remedy remedy) {
   return read_back<S>(text, remedy) == x;
 }
 
-/// Whether a number that is none is written.
+/// Whether a number that is none is written, and read again as one.
 bool is_written(double x, Remedy remedy) {
-  if (remedy == Remedy::kOff) return true;
+  if (remedy == Remedy::kOff) return !std::isfinite(read_back<double>(formatted("%g", x), remedy));
   try {
     ConfigValue::make_number(x);
     return true;

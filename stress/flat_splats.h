@@ -12,6 +12,7 @@
 #include "splat/composite.h"
 #include "splat/splat_records.h"
 #include "stress/measures.h"
+#include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
 
@@ -21,14 +22,6 @@ Var<S> leaf(Tape<S>& tape, std::string_view name, const Shape& shape, const std:
   const Var<S> var = tape.parameter(name, shape);
   tape.set(var, std::vector<S>(numbers.begin(), numbers.end()));
   return var;
-}
-
-/// The numbers of an array, row by row.
-template <class S>
-std::vector<double> numbers_of(const ConstArray<S>& a) {
-  std::vector<double> result;
-  for (Index r = 0; r < a.total_rows(); ++r) result.insert(result.end(), a.row(r), a.row(r) + a.shape.cols);
-  return result;
 }
 
 inline double largest_size(const std::vector<double>& a) {

@@ -8,7 +8,7 @@
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
-#include "core/stopwatch.h"
+#include "stress/faded.h"
 #include "stress/moving.h"
 #include "stress/plain_adam.h"
 #include "stress/small_scene.h"
@@ -88,7 +88,7 @@ bool has_denormals(const Adam<S>& adam) {
 /// A scene that is fitted to the image of another.
 template <class S>
 struct Fit {
-  TapedScene<S> taped{small_scene(16, kWidth, kHeight, 90)};
+  TapedSmallScene<S> taped{small_scene(16, kWidth, kHeight, 90)};
   std::vector<Var<S>> leaves = taped.leaves();
   std::vector<double> frame = exact_image(small_scene(16, kWidth, kHeight, 91));
   Var<S> target, weight, loss;
@@ -165,70 +165,11 @@ std::vector<StressFigure> to_the_end(Remedy remedy) {
       {"float and double apart, relative (told, not bounded)", relative_l2(single.parameters, full.parameters), 10}};
 }
 
-/// Adam on many numbers of one slope, on one thread; a plain loop without the remedy.
-class ManyNumbers {
- public:
-  explicit ManyNumbers(Remedy remedy) : remedy_(remedy) {}
-
-  /// Processor seconds of a step.
-  double step(int step, double slope) {
-    if (remedy_ == Remedy::kOn) {
-      const Array<double> all = tape_.write(slopes_);
-      std::fill_n(all.data, kMany, slope);
-      tape_.forward(loss_);
-      tape_.backward(loss_);
-    }
-    Stopwatch watch;
-    if (remedy_ == Remedy::kOn) {
-      adam_.step(step, kSteps, tape_.value(loss_).scalar());
-    } else {
-      plain_step(step, slope);
-    }
-    return watch.lap();
-  }
-
- private:
-  static constexpr Index kMany = 4096;
-
-  void plain_step(int step, double slope) {
-    const double by_m = 1 / (1 - std::pow(0.9, step + 1)), by_v = 1 / (1 - std::pow(0.999, step + 1));
-    for (std::size_t i = 0; i < x_.size(); ++i) {
-      m_[i] = 0.9 * m_[i] + 0.1 * slope, v_[i] = 0.999 * v_[i] + 0.001 * slope * slope;
-      x_[i] -= kRate * by_m * m_[i] / (std::sqrt(by_v * v_[i]) + 1e-8);
-    }
-  }
-
-  Remedy remedy_;
-  Tape<double> tape_;
-  Var<double> numbers_ = tape_.parameter("numbers", shape_of(kMany, 1));
-  Var<double> slopes_ = tape_.constant("slopes", shape_of(kMany, 1));
-  Var<double> loss_ = sum(numbers_ * slopes_);
-  Adam<double> adam_{tape_, {moving_at<double>({numbers_}, kRate)}, {}};
-  std::vector<double> x_ = std::vector<double>(kMany, 0), m_ = x_, v_ = x_;
-};
-
-/// Time of a step on numbers that had a gradient in the first step alone, over that on numbers that always have one: of
-/// both the least of many that run in turns, so that what else the machine does hardly counts.
-double slowdown_of_faded(Remedy remedy) {
-  constexpr int kTimed = 1000;
-  double alive = std::numeric_limits<double>::infinity(), faded = alive;
-  with_threads(1, [&] {
-    ManyNumbers of_some(remedy), of_none(remedy);
-    for (int step = 0; step < kSteps; ++step) {
-      const double some = of_some.step(step, 1), none = of_none.step(step, step == 0 ? 1 : 0);
-      if (step < kSteps - kTimed) continue;
-      alive = std::min(alive, some);
-      faded = std::min(faded, none);
-    }
-  });
-  return faded / alive;
-}
-
 /// L2: that denormals vanish is what decides; what they cost depends on the processor.
 std::vector<StressFigure> without_denormals(Remedy remedy) {
   const Outcome outcome = run_on_threads<float>({.plain_adam = remedy == Remedy::kOff});
   return {{"steps of 10,000 with a denormal moment", outcome.denormal_steps, 0},
-          {"time of a step with faded moments over one with others", slowdown_of_faded(remedy), 1.5}};
+          {"time of a step with faded moments over one with others", slowdown_of_faded(remedy, kSteps), 1.5}};
 }
 
 /// L3
@@ -250,11 +191,12 @@ std::vector<StressFigure> on_any_threads(Remedy remedy) {
 std::span<const StressCase> long_run_cases() {
   static constexpr std::array kCases = {
       StressCase{"L1", "10,000 steps, one of them with a bad frame", "gradients are looked at before a step",
-                 to_the_end},
+                 to_the_end, "", false, "16 Gaussians, 32 x 24 px"},
       StressCase{"L2", "moments that fade for thousands of steps become denormal", "denormals are flushed",
-                 without_denormals},
+                 without_denormals, "", false, "16 Gaussians, 32 x 24 px"},
       StressCase{"L3", "10,000 steps end elsewhere on other threads",
-                 "partitions that the number of threads does not change", on_any_threads, "", true},
+                 "partitions that the number of threads does not change", on_any_threads, "", true,
+                 "16 Gaussians, 32 x 24 px"},
   };
   return kCases;
 }

@@ -8,6 +8,7 @@
 #include "core/random.h"
 #include "optim/adam.h"
 #include "stress/arithmetic.h"
+#include "stress/faded.h"
 #include "stress/moving.h"
 #include "stress/plain_adam.h"
 
@@ -54,12 +55,17 @@ std::vector<double> some_gradient(Index count, int step) {
 
 /// What one bad number among good gradients does.
 struct Damage {
-  double changed = 0;  ///< numbers of the state that the step with it changed
-  double lost = 0;     ///< numbers that twenty good steps after it do not move, or that are none
-  double uncounted = 0;
+  double changed = 0;     ///< numbers of the state that the step with it changed
+  double stuck = 0;       ///< numbers that the next good step does not move
+  double lost = 0;        ///< numbers that twenty good steps after it do not move far, or that are none
+  double miscounted = 0;  ///< bad evaluations that are told, off one
+
+  void add(const Damage& other) {
+    changed += other.changed, stuck += other.stuck, lost += other.lost, miscounted += other.miscounted;
+  }
 };
 
-/// @param step   of the gradient; returns how many bad ones were counted
+/// @param step   of the gradient; returns how many bad ones were counted so far
 /// @param state  all numbers, moments included
 Damage damage_of(double bad, const std::function<double(const std::vector<double>&)>& step,
                  const std::function<std::vector<double>()>& parameters,
@@ -70,10 +76,15 @@ Damage damage_of(double bad, const std::function<double(const std::vector<double
   const std::vector<double> before = state();
   std::vector<double> gradient = some_gradient(kCount, 6);
   gradient[10] = bad;
-  damage.uncounted = 1 - step(gradient);
+  step(gradient);
   const std::vector<double> after = state(), at = parameters();
   for (std::size_t i = 0; i < after.size(); ++i) damage.changed += after[i] == before[i] ? 0 : 1;
-  for (int i = 7; i < 27; ++i) step(some_gradient(kCount, i));
+  step(some_gradient(kCount, 7));
+  const std::vector<double> next = parameters();
+  for (std::size_t i = 0; i < next.size(); ++i) damage.stuck += std::abs(next[i] - at[i]) > 0 ? 0 : 1;
+  double counted = 0;
+  for (int i = 8; i < 27; ++i) counted = step(some_gradient(kCount, i));
+  damage.miscounted = std::abs(1 - counted);
   const std::vector<double> end = parameters();
   for (std::size_t i = 0; i < end.size(); ++i) damage.lost += std::abs(end[i] - at[i]) > 1e-3 ? 0 : 1;
   return damage;
@@ -156,7 +167,7 @@ struct Fading {
 };
 
 Fading fade(Remedy remedy) {
-  constexpr int kSteps = 7500;  // 0.9^6700 is the least normal number, 0.9^7050 the least of all
+  constexpr int kSteps = 100'000;  // 0.9^6700 is the least normal number, 0.9^7050 the least of all
   Fading result;
   if (remedy == Remedy::kOn) {
     Slopes<float> problem(2, 0.01, 1e-8);
@@ -185,12 +196,16 @@ std::vector<StressFigure> bad_gradients(Remedy remedy) {
   Damage sum;
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
                            -std::numeric_limits<double>::infinity(), 3e38}) {
-    const Damage damage = remedy == Remedy::kOn ? damage_to_adam(bad) : damage_to_plain_adam(bad);
-    sum.changed += damage.changed, sum.lost += damage.lost, sum.uncounted += damage.uncounted;
+    sum.add(remedy == Remedy::kOn ? damage_to_adam(bad) : damage_to_plain_adam(bad));
   }
+  // The least denormal is a gradient like any other.
+  const Damage least = remedy == Remedy::kOn ? damage_to_adam(1e-45) : damage_to_plain_adam(1e-45);
   return {{"numbers that a step with one bad gradient changed", sum.changed, 0},
-          {"parameters that are lost or stand still after it", sum.lost, 0},
-          {"bad evaluations that were not counted, of 4", sum.uncounted, 0}};
+          {"parameters that the next good step does not move", sum.stuck, 0},
+          {"parameters that are lost or stand still in the end", sum.lost, 0},
+          {"bad evaluations counted, off one each, of 4", sum.miscounted, 0},
+          {"evaluations with one gradient of 1e-45 that count", std::abs(1 - least.miscounted), 0},
+          {"parameters that stand still after these", least.stuck + least.lost, 0}};
 }
 
 std::vector<StressFigure> place_of_eps(Remedy remedy) {
@@ -227,8 +242,9 @@ std::vector<StressFigure> bias_corrections(Remedy remedy) {
 
 std::vector<StressFigure> fading_moments(Remedy remedy) {
   const Fading computed = fade(remedy), unflushed = fade(Remedy::kOff);
-  return {{"steps of 7500 with a denormal moment", computed.denormals, 0},
-          {"what flushing changes in the parameter", std::abs(computed.x - unflushed.x), 1e-6}};
+  return {{"steps of 100,000 with a denormal moment", computed.denormals, 0},
+          {"what flushing changes in the parameter", std::abs(computed.x - unflushed.x), 1e-6},
+          {"time of a step with faded moments over one with others", slowdown_of_faded(remedy, 100'000), 1.2}};
 }
 
 }  // namespace hsi4d::stress

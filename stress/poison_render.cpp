@@ -229,7 +229,7 @@ Vars<S> all_images(const Rendered<S>& out, bool with_depth) {
 template <class S>
 void try_render(bool with_depth, Changes& changes) {
   const SmallScene scene = small_scene(kRows, 32, 24, 81);
-  TapedScene<S> taped(scene, with_all(with_depth));
+  TapedSmallScene<S> taped(scene, with_all(with_depth));
   Drawing<S> drawing{taped.tape, taped.leaves()};
   drawing.look_at(all_images(taped.rendered, with_depth));
   std::vector<double> behind = scene.means;
@@ -309,7 +309,7 @@ std::vector<StressFigure> poisoned_render(Remedy remedy) {
 void add_render_operators(OperatorNames& names) {
   FlatDrawing<double> flat;
   add_poisoned_operators<double>(flat.tape, flat.poisoned(), flat.drawing.images, names);
-  TapedScene<double> taped(small_scene(kRows, 32, 24, 81), with_all(true));
+  TapedSmallScene<double> taped(small_scene(kRows, 32, 24, 81), with_all(true));
   add_poisoned_operators<double>(taped.tape, taped.leaves(), all_images(taped.rendered, true), names);
 }
 

@@ -11,6 +11,8 @@
 #include "splat/opacity.h"
 #include "splat/render.h"
 #include "splat/sh.h"
+#include "stress/measures.h"
+#include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
 
@@ -55,49 +57,15 @@ inline SplatView view_of(const SmallScene& scene) {
   return view;
 }
 
-/// Row-major numbers of an array, without padding.
-template <class S>
-std::vector<double> numbers_of(const ConstArray<S>& array) {
-  std::vector<double> all;
-  for (Index r = 0; r < array.total_rows(); ++r) {
-    for (Index c = 0; c < array.shape.cols; ++c) all.push_back(static_cast<double>(array.row(r)[c]));
-  }
-  return all;
-}
-
-template <class S>
-void set_numbers(Tape<S>& tape, Var<S> leaf, const std::vector<double>& numbers) {
-  tape.set(leaf, std::vector<S>(numbers.begin(), numbers.end()));
-}
-
-/// |a − b| / |b|, L2.
-inline double relative_l2(const std::vector<double>& a, const std::vector<double>& b) {
-  double difference = 0, size = 0;
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    difference += (a[i] - b[i]) * (a[i] - b[i]);
-    size += b[i] * b[i];
-  }
-  return std::sqrt(difference) / std::sqrt(size);
-}
-
-inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  double worst = 0;
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    const double off = std::abs(a[i] - b[i]);
-    worst = off <= worst ? worst : off;  // what is not a number stays
-  }
-  return worst;
-}
-
 /// The scene on a tape.
 template <class S>
-struct TapedScene {
+struct TapedSmallScene {
   Tape<S> tape;
   SplatView view;
   Var<S> means, quats, log_scales, logits, sh, xi, background;
   Rendered<S> rendered;
 
-  explicit TapedScene(const SmallScene& scene, const RenderRequest& request = {}) : view(view_of(scene)) {
+  explicit TapedSmallScene(const SmallScene& scene, const RenderRequest& request = {}) : view(view_of(scene)) {
     const auto leaf = [&](const char* name, const std::vector<double>& numbers) {
       const Var<S> var = tape.parameter(name, shape_of(scene.count, std::ssize(numbers) / scene.count));
       set_numbers(tape, var, numbers);
@@ -123,7 +91,7 @@ struct TapedScene {
 
 /// The image of a scene, in double.
 inline std::vector<double> exact_image(const SmallScene& scene) {
-  TapedScene<double> taped(scene);
+  TapedSmallScene<double> taped(scene);
   taped.tape.forward(taped.rendered.image);
   return taped.value(taped.rendered.image);
 }

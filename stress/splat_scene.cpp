@@ -9,20 +9,13 @@
 #include "splat/opacity.h"
 #include "splat/sh.h"
 #include "stress/measures.h"
+#include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
 
 namespace {
 
 constexpr double kY00 = 0.28209479177387814;  // the constant harmonic
-
-template <class S>
-std::vector<double> numbers_of(const ConstArray<S>& a) {
-  std::vector<double> result;
-  result.reserve(static_cast<std::size_t>(a.shape.count()));
-  for (Index r = 0; r < a.total_rows(); ++r) result.insert(result.end(), a.row(r), a.row(r) + a.shape.cols);
-  return result;
-}
 
 /// Σ x w, with weights of their own stream.
 template <class S>

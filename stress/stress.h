@@ -30,11 +30,12 @@ struct StressCase {
   const char* id;       ///< "A1"
   const char* failure;  ///< what goes wrong, in a few words
   const char* remedy;   ///< what is switched off without it
-  /// The figures, the same ones in the same order for both. Deterministic; seconds at most. What it throws counts as a
-  /// figure that does not hold.
+  /// The figures, the same ones in the same order for both. The same in every run but for times; seconds at most. What
+  /// it throws counts as a figure that does not hold, and without the remedy proves nothing.
   std::vector<StressFigure> (*run)(Remedy);
-  const char* exempt = "";   ///< why this row cannot apply here; then `run` is null
-  bool own_threads = false;  ///< it compares numbers of threads, so it runs beside any limit
+  const char* exempt = "";    ///< why this row cannot apply here; then `run` is null
+  bool own_threads = false;   ///< it compares numbers of threads, so it runs beside any limit
+  const char* tried_on = "";  ///< the scenes by their sizes, where there are such: "60 Gaussians, 48 x 32 px"
 };
 
 /// What became of a case.
@@ -46,7 +47,7 @@ struct StressResult {
 
   /// The program's own way holds.
   bool holds() const;
-  /// Without the remedy some figure does not hold.
+  /// Without the remedy some figure was measured that does not hold.
   bool would_fail() const;
   bool passed() const { return holds() && would_fail(); }
 };

@@ -95,7 +95,8 @@ double vjp_error(Remedy remedy) {
   return std::abs(difference) / size;
 }
 
-/// Projection that leaves the rows of what is not to be drawn as it found them.
+/// Projection that leaves the rows of what is not to be drawn as it found them, those of the gradient in memory of its
+/// own, from one iteration to the next.
 struct ProjectingOnlyTheVisible {
   static constexpr const char* kName = "projecting_only_the_visible";
   void forward(NodeIo<float>& io) {
@@ -105,7 +106,20 @@ struct ProjectingOnlyTheVisible {
       for (Index i = 0; i < 2; ++i) io.out()(n, i) = p(n, i) / p(n, 2);
     }
   }
-  void backward(NodeIo<float>&) {}
+  void backward(NodeIo<float>& io) {
+    const ConstArray<float> p = io.in(0), d = io.d_out();
+    kept.resize(static_cast<std::size_t>(3 * p.shape.rows));
+    for (Index n = 0; n < p.shape.rows; ++n) {
+      float* const row = kept.data() + 3 * n;
+      if (p(n, 2) > static_cast<float>(kNear)) {
+        const float x = d(n, 0) / p(n, 2), y = d(n, 1) / p(n, 2);
+        row[0] = x, row[1] = y, row[2] = -(x * p(n, 0) + y * p(n, 1)) / p(n, 2);
+      }
+      for (Index c = 0; io.wants(0) && c < 3; ++c) io.d_in(0)(n, c) += row[c];
+    }
+  }
+
+  std::vector<float> kept = {};
 };
 
 double not_zero_at(const std::vector<double>& numbers, const std::vector<Index>& rows, Index cols) {
@@ -172,7 +186,7 @@ std::vector<StressFigure> products_with_vectors(Remedy remedy) {
 // they held then, and the adjoints NaN.
 std::vector<StressFigure> rows_not_drawn(Remedy remedy) {
   SmallScene scene = small_scene(60, 32, 24, 15);
-  TapedScene<float> taped(scene);
+  TapedSmallScene<float> taped(scene);
   std::vector<Index> behind;
   for (Index n = 0; n < scene.count; n += 3) {
     scene.means[static_cast<std::size_t>(3 * n + 2)] *= -1;
@@ -182,11 +196,14 @@ std::vector<StressFigure> rows_not_drawn(Remedy remedy) {
   if (remedy == Remedy::kOff) {
     const Var<float> places =
         tape.record(ProjectingOnlyTheVisible{}, {taped.means}, shape_of(scene.count, 2), Source::current());
+    const auto numbers = static_cast<std::size_t>(places.shape().count());
     tape.forward(places);
+    tape.backward(places, std::vector<float>(numbers, std::numeric_limits<float>::quiet_NaN()));
     set_numbers(tape, taped.means, scene.means);
     tape.forward(places);
+    tape.backward(places, std::vector<float>(numbers, 1));
     return {{"numbers of culled rows that are not 0", not_zero_at(taped.value(places), behind, 2), 0},
-            {"gradients of culled rows that are not 0", 0, 0}};
+            {"gradients of culled rows that are not 0", not_zero_at(taped.gradient(taped.means), behind, 3), 0}};
   }
   const Var<float> image = taped.rendered.image;
   const auto pixels = static_cast<std::size_t>(image.shape().count());

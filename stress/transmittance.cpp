@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "splat/debug_pixel.h"
 #include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
@@ -181,24 +183,42 @@ std::vector<StressFigure> million_on_one_pixel(Remedy remedy) {
   if (remedy == Remedy::kOff) settings.transmittance_stop = 0;
   const int count = remedy == Remedy::kOn ? 1'000'000 : 100'000;  // without it a tenth is bad enough
   FlatSplats stack;
-  const std::vector<double> round = {0.2, 0, 0, 0, 0.2, 0}, front = {1, 1}, back = {0, 1};
+  const std::vector<double> round = {0.2, 0, 0, 0, 0.2, 0}, front = {1, 1, 1}, back = {0, 1, 1};
   for (int i = 0; i < count; ++i) stack.add(8.5, 8.5, 2, round, 0.3, i < 8 ? front : back);
-  FlatRender<float> render(stack, plain_view(17, 17, settings));
-  render.backward();
+  const SplatView view = plain_view(17, 17, settings);
+  FlatRender<float> render(stack, view);
+  const std::vector<float> ones(static_cast<std::size_t>(render.out.channels.shape().count()), 1);
+  double seconds = 0;
+  with_threads(1, [&] {
+    Stopwatch watch;
+    render.tape.write(render.means);  // as if they had moved
+    render.tape.forward(render.out.channels);
+    render.tape.backward(render.out.channels, ones);
+    seconds = watch.lap();
+  });
   const std::vector<double> image = render.image(), t = render.value(render.out.transmittance);
   double outside = 0, sum = 0;
   for (std::size_t p = 0; p < t.size(); ++p) {
     outside = std::max({outside, t[p] - 1, -t[p]});
     sum = std::max(sum, std::abs(image[t.size() + p] + t[p] - 1));
   }
+  const PixelTrace trace = trace_pixel(render.tape, render.projected, render.opacities, render.features, view, {8, 8});
+  double rises = trace.composited.empty() ? 1 : 0;
+  for (std::size_t i = 1; i < trace.composited.size(); ++i)
+    rises += trace.composited[i].transmittance < trace.composited[i - 1].transmittance ? 0 : 1;
+  double broken = 0;
+  for (const Var<float> var : {render.means, render.factors, render.opacities, render.features})
+    broken += not_finite(render.d(var));
   const double order = std::abs(image[8 * 17 + 8] - (1 - std::pow(0.7, 8)));
   // log(stop)/log(1 − alpha_min) layers finish any pixel that one of them is drawn in; 5 × 5 pixels are.
   return {{"(pixel, Gaussian) composited", static_cast<double>(render.out.counters->fragments), 25 * 2360},
           {"(tile, Gaussian) with an adjoint", static_cast<double>(render.out.counters->reached), 20'000},
+          {"seconds of a processor, forward and backward", seconds, 1},
           {"T outside of [0, 1]", outside, 0},
+          {"places at which T does not fall", rises, 0},
           {"sum of weights and T, off 1", sum, 1e-6},
           {"colour off that of the eight in front", order, 1e-6},
-          {"gradients that are not finite", not_finite(render.d(render.opacities)), 0}};
+          {"gradients that are not finite", broken, 0}};
 }
 
 std::vector<StressFigure> opaque_wall(Remedy remedy) {

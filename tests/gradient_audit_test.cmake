@@ -18,11 +18,13 @@ function(expect title rows)
   endif()
 endfunction()
 
-expect("all there" "| `exp` | x | 1e-7 |\n| `mlp` | rows | 1e-7 |\n\n| `center` | y | 1e-7 |\n")
-expect("an operator is missing" "| `exp` | x | 1e-7 |\n| `center` | y | 1e-7 |\n" "mlp has no row")
-expect("a loss term is missing" "| `exp` | x | 1e-7 |\n| `mlp` | rows | 1e-7 |\n" "center has no row")
-expect("no figures" "| `exp` | x | 1e-7 |\n| `mlp` | | |\n| `center` | y | 1e-7 |\n" "mlp has no figures")
-expect("one too many" "| `exp` | x | 1e-7 |\n| `mlp` | y | 0 |\n| `center` | y | 1e-7 |\n| `old` | z |\n" "there is no old")
+expect("all there" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | rows | 1e-7 | 3e-9 | 0 |\n\n| `center` | y | 1e-7 | 3e-9 | 0 |\n")
+expect("an operator is missing" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `center` | y | 1e-7 | 3e-9 | 0 |\n" "mlp has no row")
+expect("a loss term is missing" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | rows | 1e-7 | 3e-9 | 0 |\n" "center has no row")
+expect("no figures" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | | | | |\n| `center` | y | 1e-7 | 3e-9 | 0 |\n" "mlp lacks a figure")
+expect("no complex step" "| `exp` | x | 1e-7 | 3e-9 | |\n| `mlp` | y | 1e-7 | 3e-9 | 0 |\n| `center` | y | 1e-7 | 3e-9 | | |\n"
+       "exp lacks a figure" "center lacks a figure")
+expect("one too many" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | y | 0 | 0 | 0 |\n| `center` | y | 1e-7 | 3e-9 | 0 |\n| `old` | z | 0 | 0 | 0 |\n" "there is no old")
 file(REMOVE_RECURSE ${SCRATCH})
 
 find_audit_errors(errors ${ROOT})

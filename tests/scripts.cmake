@@ -42,8 +42,10 @@ if(HSI4D_PYTHON)
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/clip_embeddings_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "services for video, masks and poses"
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
+  add_test(NAME "the gate of time and error"
+           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/bench_test.py ${PROJECT_SOURCE_DIR}/tools)
   set_tests_properties("exporters of VPoser, WHAM, GVHMR and TRAM" "services for video, masks and poses" "embeddings by CLIP"
-                       PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
+                       "the gate of time and error" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
 else()
   message(STATUS "There is no python3: the exporters and services in tools/ are not tested")
 endif()

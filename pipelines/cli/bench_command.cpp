@@ -1,14 +1,15 @@
 #include "pipelines/cli/bench_command.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
 #include "core/file.h"
 #include "core/formatted.h"
-#include "core/simd.h"
 #include "pipelines/bench_color_net.h"
+#include "pipelines/bench_machine.h"
 #include "pipelines/bench_pixel_filter.h"
 #include "pipelines/bench_rasterize.h"
 #include "pipelines/bench_skinning.h"
@@ -25,7 +26,6 @@ const char* unit_name(WorkUnit unit) {
 std::string json_line(const Measurement& m) {
   nlohmann::ordered_json line = {{"name", m.name},
                                  {"threads", m.threads},
-                                 {"isa", isa_name(best_isa())},
                                  {"median_ms", m.median_ms},
                                  {"min_ms", m.min_ms},
                                  {"repeats", m.repeats},
@@ -44,7 +44,7 @@ std::string json_line(const Measurement& m) {
   if (m.peak_share()) line["fma_peak_share"] = *m.peak_share();
   if (m.image_error) line["image_error"] = *m.image_error;
   if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
-  return line.dump() + "\n";
+  return bench_line(std::move(line));
 }
 
 /// " 34.5" of a hundred, or nothing.
@@ -86,11 +86,14 @@ double rate(const SkinningMeasurement& m) { return m.median_ms > 0 ? bytes_read(
 std::string tenths(double value) { return value > 0 ? formatted("%.1f", value) : "-"; }
 
 std::string json_line(const SkinningMeasurement& m) {
-  nlohmann::ordered_json line = {{"name", m.name},           {"threads", m.threads}, {"isa", isa_name(best_isa())},
-                                 {"median_ms", m.median_ms}, {"min_ms", m.min_ms},   {"repeats", m.repeats}};
+  nlohmann::ordered_json line = {{"name", m.name},
+                                 {"threads", m.threads},
+                                 {"median_ms", m.median_ms},
+                                 {"min_ms", m.min_ms},
+                                 {"repeats", m.repeats}};
   if (m.gaussians > 0) {
     line.update({{"gaussians", m.gaussians}, {"joints", m.joints}});
-    return line.dump() + "\n";
+    return bench_line(std::move(line));
   }
   line.update({{"vertices", m.vertices},
                {"joints", m.joints},
@@ -98,13 +101,12 @@ std::string json_line(const SkinningMeasurement& m) {
                {"table_bytes", m.table_bytes},
                {"packing_error_m", m.packing_error_m},
                {"gbytes_per_s", rate(m)}});
-  return line.dump() + "\n";
+  return bench_line(std::move(line));
 }
 
 std::string json_line(const ColorNetMeasurement& m) {
   nlohmann::ordered_json line = {{"name", m.name},
                                  {"threads", m.threads},
-                                 {"isa", isa_name(best_isa())},
                                  {"median_ms", m.median_ms},
                                  {"min_ms", m.min_ms},
                                  {"repeats", m.repeats},
@@ -117,17 +119,20 @@ std::string json_line(const ColorNetMeasurement& m) {
     line["fma_peak_per_s"] = m.fma_peak_per_s;
     line["fma_peak_share"] = m.peak_share();
   }
-  return line.dump() + "\n";
+  return bench_line(std::move(line));
 }
 
 std::string json_line(const TapeMeasurement& m) {
-  nlohmann::ordered_json line = {{"name", m.name},           {"threads", 1},       {"isa", isa_name(best_isa())},
-                                 {"median_ms", m.median_ms}, {"min_ms", m.min_ms}, {"repeats", m.repeats}};
+  nlohmann::ordered_json line = {{"name", m.name},
+                                 {"threads", 1},
+                                 {"median_ms", m.median_ms},
+                                 {"min_ms", m.min_ms},
+                                 {"repeats", m.repeats}};
   line.update(m.nodes > 0 ? nlohmann::ordered_json{{"nodes", m.nodes}, {"ns_per_node", m.ns_each()}}
                           : nlohmann::ordered_json{{"elements", m.elements}, {"ns_per_element", m.ns_each()}});
   if (m.ratio) line.update({{"against", m.against}, {"ratio", *m.ratio}});
   if (m.goal) line["goal"] = *m.goal;
-  return line.dump() + "\n";
+  return bench_line(std::move(line));
 }
 
 /// What a topic measured: for people, and for programs.

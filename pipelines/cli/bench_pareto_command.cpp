@@ -56,7 +56,7 @@ std::vector<ParetoSetting> tracked_settings(const std::vector<ParetoRow>& rows,
     return std::find(all.begin(), all.end(), name) != all.end();
   };
   for (double ParetoPoint::*error : {&ParetoPoint::image_rms, &ParetoPoint::gradient})
-    for (const std::size_t i : pareto_front(times_and_errors(points, error))) names.push_back(points[i].name());
+    for (const std::size_t i : pareto_front(points, error)) names.push_back(points[i].name());
   std::vector<ParetoSetting> tracked;
   for (const ParetoSetting& setting : measured)
     if ((setting.knob == "quality" || has(names, setting.name())) && !has(slow, setting.name()))

@@ -4,6 +4,7 @@
 
 #include "core/file.h"
 #include "core/memory.h"
+#include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "pipelines/bench_skips.h"
 #include "pipelines/bench_stages.h"
@@ -49,6 +50,7 @@ MeasuredRun measured_run(const RunConfig& config, const BenchStagesOptions& opti
   RunCost cost;
   const StageWatch watch{[&cost](const StageProfile& profile) { add_profile(profile, cost.stages); },
                          heap_allocation_counter()};
+  cost.threads = options.threads > 0 ? options.threads : config.threads > 0 ? config.threads : thread_count();
   cost.counts_allocations = watch.allocation_count != nullptr;
   RunOptions run;
   run.folder = free_folder(out).string();

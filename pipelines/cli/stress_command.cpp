@@ -1,6 +1,7 @@
 #include "pipelines/cli/stress_command.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string_view>
 
@@ -58,6 +59,7 @@ std::string lines_of(const StressResult& result) {
     text += formatted("     %-58s %9s of %9s   without %9s\n", figure.what.c_str(), number(figure.measured).c_str(),
                       number(figure.allowed).c_str(), without.c_str());
   }
+  if (*row.tried_on != '\0') text += formatted("     on: %s\n", row.tried_on);
   if (!result.error.empty()) text += formatted("     thrown: %s\n", result.error.c_str());
   if (!result.error_without.empty()) text += formatted("     thrown without: %s\n", result.error_without.c_str());
   return text + formatted("     without: %s\n", row.remedy);
@@ -78,10 +80,57 @@ nlohmann::ordered_json json_of(const StressResult& result) {
   nlohmann::ordered_json line = {
       {"row", result.row->id},        {"verdict", verdict(result)}, {"failure", result.row->failure},
       {"remedy", result.row->remedy}, {"figures", figures},         {"seconds", result.seconds}};
+  if (*result.row->tried_on != '\0') line["tried_on"] = result.row->tried_on;
   if (!result.error.empty()) line["thrown"] = result.error;
   if (!result.error_without.empty()) line["thrown_without_remedy"] = result.error_without;
   if (result.row->run == nullptr) line["exempt"] = result.row->exempt;
   return line;
+}
+
+// --- the table at the end --------------------------------------------------------------------------------------------
+
+struct RowClass {
+  char letter;
+  const char* name;
+};
+constexpr std::array<RowClass, 9> kClasses = {{{'A', "projection, covariance"},
+                                               {'B', "alpha, blending, sorting"},
+                                               {'C', "rotations"},
+                                               {'D', "skinning, priors, contacts"},
+                                               {'E', "losses"},
+                                               {'F', "tape, Adam, arithmetic, files"},
+                                               {'P', "what is not a number, in every input"},
+                                               {'R', "relations that a render keeps"},
+                                               {'L', "10,000 steps"}}};
+
+/// What became of some rows.
+struct RowCounts {
+  Index tried = 0, failed = 0, exempt = 0;
+  double seconds = 0;
+
+  void add(const StressResult& result) {
+    const bool is_exempt = result.row->run == nullptr;
+    tried += is_exempt ? 0 : 1;
+    exempt += is_exempt ? 1 : 0;
+    failed += !is_exempt && !result.passed() ? 1 : 0;
+    seconds += result.seconds;
+  }
+};
+
+/// A line for each class that has rows, by the first letter of their ids.
+std::string class_table(const std::vector<StressResult>& results) {
+  std::string text =
+      formatted("\n%-40s %6s %6s %6s %6s %8s\n", "class", "tried", "held", "failed", "exempt", "seconds");
+  for (const RowClass& one : kClasses) {
+    RowCounts counts;
+    for (const StressResult& result : results)
+      if (result.row->id[0] == one.letter) counts.add(result);
+    if (counts.tried + counts.exempt == 0) continue;
+    text += formatted("%c  %-37s %6lld %6lld %6lld %6lld %8.1f\n", one.letter, one.name,
+                      static_cast<long long>(counts.tried), static_cast<long long>(counts.tried - counts.failed),
+                      static_cast<long long>(counts.failed), static_cast<long long>(counts.exempt), counts.seconds);
+  }
+  return text;
 }
 
 // --- functions -------------------------------------------------------------------------------------------------------
@@ -139,8 +188,9 @@ StressOutcome stress_command(const StressOptions& options) {
       log_warning(std::string("row ") + result.row->id + ": " + verdict(result));
     }
   };
-  run_stress(cases, tell, options.threads.value_or(0));
+  const std::vector<StressResult> results = run_stress(cases, tell, options.threads.value_or(0));
   if (!options.json.empty()) write_text_file(options.json, json);
+  outcome.text += class_table(results);
   const Index tried = std::ssize(cases) - exempt;
   outcome.text +=
       formatted("%lld rows tried, %lld held, %lld failed%s; %lld exempt\n", static_cast<long long>(tried),

@@ -7,8 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
+#include "tests/pipelines/bench_rows.h"
 
 using namespace hsi4d;
+using namespace hsi4d::test;
 using Catch::Matchers::Contains;
 
 namespace {
@@ -130,12 +132,19 @@ TEST_CASE("scaling runs the stages that draw a frame and counts what they do") {
   int costs = 0, fitted = 0;
   for (std::string line; std::getline(lines, line);) {
     const nlohmann::json object = nlohmann::json::parse(line);
-    costs += object.contains("ms") ? 1 : 0;
+    costs += object.contains("median_ms") ? 1 : 0;
     fitted += object.contains("fitted") ? 1 : 0;
-    if (!object.contains("ms")) continue;
+    if (!object.contains("median_ms")) continue;
     const double parts = object["prepare_ms"].get<double>() + object["forward_ms"].get<double>() +
                          object["backward_ms"].get<double>() + object["other_ms"].get<double>();
-    CHECK(parts == Approx(object["ms"].get<double>()));
+    CHECK(object["name"] == "scaling/" + object["axis"].get<std::string>() + " " + object["value"].dump() + "/" +
+                                object["stage"].get<std::string>());
+    check_bench_row(object);
+    CHECK(object.contains("mfragments_per_s"));
+    CHECK(object["repeats"] == kScalingRounds);
+    CHECK(object["pixels"] == 48 * 48);
+    CHECK(object["gaussians"].get<Index>() == few.object_gaussians + 300 + object["scene_gaussians"].get<Index>());
+    CHECK(parts == Approx(object["median_ms"].get<double>()));
   }
   CHECK(costs == 2 * 2 + 2);
   CHECK(fitted == 8);  // of one value nothing follows

@@ -189,6 +189,10 @@ TEST_CASE("mistakes of a sweep's file are told with their place") {
         "sweep.json:9: /blocks/1/name: \"x\" is the name of another block too");
   CHECK(refused({{"seeds", {1, 1}}}) == "sweep.json:6: /seeds/1: 1 is in the list twice");
   CHECK(refused({{"seeds", 0}}) == "sweep.json:4: /seeds: 0 is not a seed; allowed: 1 to 100000");
+  CHECK(refused({{"seeds", 50001}, {"grid", {{"render.blur", {0.1, 0.2}}}}}) ==
+        "sweep.json:1: the axes make more than 100000 runs, which is the most");
+  CHECK(refused({{"seeds", 60000}, {"blocks", {{{"name", "x"}}, {{"name", "y"}}, {{"name", "z"}}}}}) ==
+        "sweep.json:9: /blocks/1: the axes make more than 100000 runs, which is the most");
   CHECK(refused({{"ablations", {{"a b", Json::object()}}}}) ==
         "sweep.json:5: /ablations/a b: \"a b\" cannot be a name; allowed: letters, digits, '_' and '-'");
   CHECK(refused({{"skip", {{{"seed", 7}}}}, {"seeds", 3}}) == "sweep.json:5: /skip/0: no run has these values");

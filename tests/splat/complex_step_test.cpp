@@ -8,6 +8,7 @@
 #include "splat/composite.h"
 #include "splat/covariance.h"
 #include "splat/opacity.h"
+#include "splat/render.h"
 #include "splat/sh.h"
 #include "tests/support/complex_step_check.h"
 #include "tests/support/flat_splats.h"
@@ -211,4 +212,39 @@ TEST_CASE("compositing has the gradients of complex steps") {
         return composite(SplatSet<double>{projected, in[2], in[3]}, view, in[4]).channels;
       },
       [&](const ComplexInputs& in) { return plain_composite(in, splats.depths, kWidth, kHeight, view.settings.blur); });
+}
+
+TEST_CASE("depth has the gradients of complex steps") {
+  SplatView view = view_from_aside();
+  view.settings = smooth_settings();
+  view.settings.blur = 300;  // wide enough that the depth has a gradient in every pixel
+  RenderRequest request;
+  request.depth = true;
+  constexpr Index kCount = 5;
+  check_complex_step(
+      {{"means", shape_of(kCount, 3), -0.3, 0.3},
+       {"axes", shape_of(kCount, 9), -0.2, 0.2},
+       {"xi", shape_of(1, 6), -0.1, 0.1},
+       {"opacities", shape_of(kCount, 1), 0.2, 0.9}},
+      [&](const Vars& in) {
+        Tape<double>& tape = in[0].owner();
+        const V colors = tape.constant("colors", shape_of(kCount, 3)), black = tape.constant("black", shape_of(1, 3));
+        return render<double>({in[0], in[1], in[3], colors}, in[2], black, view, request).depth;
+      },
+      [&](const ComplexInputs& in) {
+        const std::array<Complexes, 3> projected = plain_projection(view, in);
+        Complexes features;
+        std::vector<double> depths;
+        for (const Complex z : projected[2]) {
+          features.insert(features.end(), {z, 1, 0});
+          depths.push_back(z.real());
+        }
+        const Camera& camera = view.camera;
+        const Complexes sums = plain_composite({projected[0], projected[1], in[3], features, Complexes(3)}, depths,
+                                               camera.width, camera.height, view.settings.blur);
+        const std::size_t pixels = sums.size() / 3;
+        Complexes depth(pixels);
+        for (std::size_t i = 0; i < pixels; ++i) depth[i] = sums[i] / sums[pixels + i];
+        return depth;
+      });
 }

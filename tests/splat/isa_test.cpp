@@ -7,7 +7,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "core/simd.h"
+#include "core/check.h"
+#include "core/held_isa.h"
 #include "tests/support/taped_splats.h"
 
 using namespace hsi4d;
@@ -33,6 +34,26 @@ TEST_CASE("what is tried on every instruction set leaves the one that was asked 
   CHECK(vector_target() == before);
   CHECK_THROWS(on_every_target([] { throw 1; }));
   CHECK(vector_target() == before);
+}
+
+TEST_CASE("all kernels can be held to a lesser instruction set for a while", "[isa]") {
+  const Isa before = best_isa();
+  const std::string target = vector_target();
+  for (const Isa isa : {Isa::kBaseline, Isa::kAvx2, Isa::kAvx512}) {
+    if (isa > before) {
+      CHECK_THROWS_AS(HeldIsa(isa), InternalError);
+      continue;
+    }
+    const HeldIsa held(isa);
+    CHECK(best_isa() == isa);
+    CHECK(vector_target() == wanted_vector_target());
+    const HeldIsa less(Isa::kBaseline);
+    CHECK(best_isa() == Isa::kBaseline);
+    CHECK(vector_target() == wanted_vector_target());
+    if (isa > Isa::kBaseline) CHECK_THROWS_AS(HeldIsa(isa), InternalError);
+  }
+  CHECK(best_isa() == before);
+  CHECK(vector_target() == target);
 }
 
 TEMPLATE_TEST_CASE("instruction sets agree to rounding [B13, F10]", "", float, double) {

@@ -73,6 +73,13 @@ TEST_CASE("a case passes where it holds and would not without its remedy") {
   const StressResult thrown = result_of(+[](Remedy) -> Figures { throw std::runtime_error("broken"); });
   CHECK_FALSE(thrown.holds());
   CHECK(thrown.error == "broken");
+  CHECK_FALSE(thrown.would_fail());
+  const StressResult thrown_without = result_of(+[](Remedy remedy) {
+    if (remedy == Remedy::kOff) throw std::runtime_error("broken");
+    return Figures{{"", 1, 2}};
+  });
+  CHECK(thrown_without.holds());
+  CHECK_FALSE(thrown_without.passed());  // nothing was measured without the remedy
   CHECK_FALSE(result_of(+[](Remedy) { return Figures{}; }).holds());
 }
 

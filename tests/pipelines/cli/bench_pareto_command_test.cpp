@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "splat/io_ply.h"
+#include "tests/pipelines/bench_rows.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 
@@ -43,6 +44,9 @@ TEST_CASE("bench pareto measures the Gaussians of a file and writes tables and a
   std::vector<nlohmann::json> rows;
   for (std::string line; std::getline(text, line);) rows.push_back(nlohmann::json::parse(line));
   REQUIRE(rows.size() == 5);
+  for (const nlohmann::json& row : rows) check_bench_row(row);
+  CHECK(rows[4]["name"] == "pareto/few.ply/tile 8");
+  CHECK((rows[4]["threads"] == 1 && rows[4].contains("mfragments_per_s") && rows[4]["pixels"] == 128 * 128));
   CHECK((rows[0]["knob"] == "quality" && rows[0]["value"] == "default" && rows[0]["time_ratio"] == 1));
   CHECK(rows[0]["psnr_db"] > 40);
   CHECK(rows[0]["fragments"] > 100);
@@ -61,10 +65,11 @@ TEST_CASE("bench pareto tells what it does not know before it measures") {
     CHECK(result.status == 2);
     return result.err;
   };
-  CHECK_THAT(error_of({"--knob", "alpha_mim"}),
-             Contains("hsi4d bench pareto: no knob \"alpha_mim\"; known: quality, alpha_min, transmittance_stop, "
-                      "alpha_cap, footprint, precision, tile, sh_degree, product, depth_key; did you mean "
-                      "\"alpha_min\"?"));
+  CHECK_THAT(
+      error_of({"--knob", "alpha_mim"}),
+      Contains("hsi4d bench pareto: no knob \"alpha_mim\"; known: quality, alpha_min, transmittance_stop, "
+               "alpha_cap, footprint, precision, tile, sh_degree, product, depth_key, isa, threads; did you mean "
+               "\"alpha_min\"?"));
   CHECK_THAT(error_of({"--workload", "garden"}), Contains("no workload \"garden\"; known: sparse, dense"));
   CHECK_THAT(error_of({"--scene", "none.ply"}), Contains("none.ply"));
   CHECK_THAT(error_of({"--seeds", "101"}), Contains("--seeds"));
