@@ -123,11 +123,8 @@ std::string json_line(const ColorNetMeasurement& m) {
 }
 
 std::string json_line(const TapeMeasurement& m) {
-  nlohmann::ordered_json line = {{"name", m.name},
-                                 {"threads", 1},
-                                 {"median_ms", m.median_ms},
-                                 {"min_ms", m.min_ms},
-                                 {"repeats", m.repeats}};
+  nlohmann::ordered_json line = {
+      {"name", m.name}, {"threads", 1}, {"median_ms", m.median_ms}, {"min_ms", m.min_ms}, {"repeats", m.repeats}};
   line.update(m.nodes > 0 ? nlohmann::ordered_json{{"nodes", m.nodes}, {"ns_per_node", m.ns_each()}}
                           : nlohmann::ordered_json{{"elements", m.elements}, {"ns_per_element", m.ns_each()}});
   if (m.ratio) line.update({{"against", m.against}, {"ratio", *m.ratio}});
