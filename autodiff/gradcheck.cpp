@@ -145,7 +145,7 @@ class Checker {
     };
     double expected = 0;
     while (!difference(probe, x, step, choices, expected)) {
-      if (step / 10 < options_.shortest_step * size_of_x) return add_kink();
+      if (!(step / 10 > 0) || step / 10 < options_.shortest_step * size_of_x) return add_kink();
       step /= 10;
     }
     double error = error_of(expected);

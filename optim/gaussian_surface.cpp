@@ -133,7 +133,8 @@ class DiscGrid {
 
  private:
   std::int64_t cell_along(const Point& p, int axis) const {
-    return static_cast<std::int64_t>(std::floor((p[axis] - low_[axis]) / edge_));
+    const double cell = std::floor((p[axis] - low_[axis]) / edge_);
+    return static_cast<std::int64_t>(std::clamp(cell, -1.0, static_cast<double>(count_[axis])));
   }
 
   /// How far along a ray the wall before cell `number` of an axis is, metres.

@@ -38,7 +38,7 @@ struct LossInputs {
   Var<S> object_opacity;  ///< [O,H,W] rendered opacity Σ T α of each object's Gaussians, occluders included, 0 to 1;
                           ///< only for terms that `read` it, as the next three
   Var<S> object_center_target;  ///< [O,3] centre of each object in the frame: x px, y px (pixel centres at +0.5), and
-                                ///< 1, or 0 where the frame shows none of it
+                                ///< how much of it the frame shows, up to 1; 0 where none is
   Var<S> object_masks;          ///< [O,H,W] what of the frame shows each object, 0 to 1
   Var<S> object_seen;           ///< [O,1,1] 1, or 0 where the frame shows none of the object
   Var<S> object_depth;          ///< [O,1] mean camera z of each object's Gaussian centres, metres

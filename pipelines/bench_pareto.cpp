@@ -35,7 +35,7 @@ constexpr std::array<NamedValue, 4> kCaps = {
     {{"0.99", kAlphaCapCompatible}, {"0.999", 0.999}, {"1-2^-12", kAlphaCap}, {"1", kNoAlphaCap}}};
 /// Of the product: the knobs whose values trade time for error, without those that no preset would take.
 constexpr std::array<NamedValue, 4> kProductAlphaMins = {
-    {{"1/512", 1.0 / 512}, {"1/1024", 1.0 / 1024}, {"1e-4", 1e-4}, {"1e-5", kAlphaMinAccurate}}};
+    {{"1/512", 1.0 / 512}, {"1/1024", 1.0 / 1024}, {"1e-4", 1e-4}, {"2e-6", kAlphaMinAccurate}}};
 constexpr std::array<NamedValue, 4> kProductStops = {{{"1e-2", 1e-2}, {"1e-3", 1e-3}, {"1e-4", 1e-4}, {"1e-6", 1e-6}}};
 
 ParetoSetting preset(Quality quality, const char* name) {

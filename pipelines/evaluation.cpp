@@ -272,7 +272,7 @@ Solid scene_solid(const std::vector<std::string>& folders, Measurement& m) {
   Solid solid = gaussian_solid(read_splats(scene).gaussians, free_places(m), scene);
   if (!solid.distance)
     m.result.notes.push_back("penetration is not measured: no Gaussian of " + scene +
-                             " is opaque, flat and seen from the first frame");
+                             " is opaque, flat, not alone and seen from the first frame");
   return solid;
 }
 

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/LU>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
@@ -435,7 +439,7 @@ void FrameGraph<S>::set_object_masks(const FrameTargets& targets) {
   for (std::size_t o = 0; o < objects_.size(); ++o) {
     S* center = tape_.write(inputs_.object_center_target).row(static_cast<Index>(o));
     for (Index i = 0; i < 3; ++i) center[i] = static_cast<S>(targets.centers[o][i]);
-    tape_.write(inputs_.object_seen).data[o] = center[2];
+    tape_.write(inputs_.object_seen).data[o] = center[2] > 0 ? 1 : 0;
   }
 }
 
@@ -452,7 +456,7 @@ Vector3<double> mask_center(const Image& mask, double threshold) {
       y_sum += m * (y + 0.5);
     }
   }
-  return is_seen ? Vector3<double>(x_sum / mass, y_sum / mass, 1) : Vector3<double>::Zero();
+  return is_seen ? Vector3<double>(x_sum / mass, y_sum / mass, mass) : Vector3<double>::Zero();
 }
 
 namespace {
@@ -491,6 +495,23 @@ double mean_depth(const Gaussians& object, const ObjectPose& pose, const Rigid<d
   const Vector3<double> centre = sum / static_cast<double>(object.count());
   const Vector3<double> world = so3_exp(pose.rotation) * centre + pose.translation;
   return transform_point(camera_from_world, world)[2];
+}
+
+double covered_area(const Gaussians& object, const ObjectPose& pose, const Camera& camera) {
+  const Rigid<double> world_from_object{so3_exp(pose.rotation), pose.translation};
+  Vector2<double> mean = Vector2<double>::Zero();
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  Index count = 0;
+  for (Index i = 0; i < object.count(); ++i) {
+    const Vector3<double> place = Vector3<float>(object.means.data() + 3 * i).cast<double>();
+    const Vector3<double> p = transform_point(camera.camera_from_world, transform_point(world_from_object, place));
+    if (!(p[2] > kNear)) continue;
+    const Vector2<double> pixel = project_point(camera, p), from_mean = pixel - mean;
+    mean += from_mean / static_cast<double>(++count);
+    spread += from_mean * (pixel - mean).transpose();
+  }
+  if (count == 0) return 0;
+  return 4 * std::numbers::pi * std::sqrt(std::max(0.0, spread.determinant())) / static_cast<double>(count);
 }
 
 template class FrameGraph<float>;

@@ -55,7 +55,7 @@ Camera camera_of_size(const Clip& clip, int longest_side_px);
 struct FrameTargets {
   const Image* image = nullptr;                 ///< [3,H,W]
   const Image* weight = nullptr;                ///< [1,H,W]; null: every pixel counts
-  std::vector<Vector3<double>> centers;         ///< by object: x px, y px, 1 or 0 (none); with object_masks
+  std::vector<Vector3<double>> centers;         ///< by object: x px, y px, the share that is seen; with object_masks
   std::vector<double> depths;                   ///< by object: mean camera z at the clip's first frame, metres
   const Image* human_mask = nullptr;            ///< [1,H,W] coverage; needed with settings.human_opacity
   bool human_seen = true;                       ///< the frame shows some of the human
@@ -151,8 +151,8 @@ class FrameGraph {
   LossInputs<S> inputs_;
 };
 
-/// Centre of a mask's coverage (pixel centres at +0.5) in x and y, and 1; zeros for a mask that nowhere reaches the
-/// threshold, as its faint pixels may be anything.
+/// Centre of a mask's coverage (pixel centres at +0.5) in x and y, and that coverage, pixels; zeros for a mask that
+/// nowhere reaches the threshold, as its faint pixels may be anything.
 Vector3<double> mask_center(const Image& mask, double threshold);
 
 /// The matrix that takes six numbers (translation, rotation) in the frame of `increment` to the camera's frame, so that
@@ -163,5 +163,9 @@ Matrix6<double> camera_from_increment(CameraIncrement increment, const Camera& c
 
 /// Mean camera z of an object's Gaussian centres, metres.
 double mean_depth(const Gaussians& object, const ObjectPose& pose, const Rigid<double>& camera_from_world);
+
+/// How many pixels an object would cover with nothing before it, by the spread Σ of its Gaussians' centres in the
+/// image: 4π √det Σ, which is the area of an ellipse that they fill evenly.
+double covered_area(const Gaussians& object, const ObjectPose& pose, const Camera& camera);
 
 }  // namespace hsi4d

@@ -82,7 +82,20 @@ std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& st
   return rows;
 }
 
-FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, const Image& weight) {
+/// As mask_center has it, the coverage as a share of what the object covers at its present pose with nothing before it.
+Vector3<double> center_and_share(const Image& mask, const StageTask& task, std::size_t object,
+                                 const SceneState& state) {
+  Vector3<double> center = mask_center(mask, task.config.data.mask_threshold);
+  if (center[2] == 0) return center;
+  Camera camera = camera_of_size(task.clip, task.config.stages[task.stage].second.longest_side_px);
+  camera.camera_from_world = state.camera_from_world;
+  const double area = covered_area(task.clip.objects[object].gaussians, state.objects[object], camera);
+  center[2] = center[2] < area ? center[2] / area : 1;
+  return center;
+}
+
+FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, const SceneState& state,
+                        const Image& weight) {
   const Clip& clip = task.clip;
   const ClipFrame& frame = frame_task.frame;
   const SceneState& first = first_state(task, frame_task);
@@ -91,11 +104,9 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   targets.weight = weight.empty() ? nullptr : &weight;
   targets.human_mask = &frame.human_mask;
   targets.human_seen = mask_center(frame.human_mask, task.config.data.mask_threshold)[2] != 0;
-  for (const Image& mask : frame.object_masks) {
-    targets.object_masks.push_back(&mask);
-    targets.centers.push_back(mask_center(mask, task.config.data.mask_threshold));
-  }
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    targets.object_masks.push_back(&frame.object_masks[o]);
+    targets.centers.push_back(center_and_share(frame.object_masks[o], task, o, state));
     targets.depths.push_back(mean_depth(clip.objects[o].gaussians, first.objects[o], first.camera_from_world));
   }
   return targets;
@@ -129,7 +140,7 @@ void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& fra
   graph.set_state(state);
   if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));
   const Image weight = pixel_weights(stage, frame, task.config);
-  graph.set_targets(targets_of(task, frame, weight));
+  graph.set_targets(targets_of(task, frame, state, weight));
   LossInputs<S> inputs = graph.loss_inputs();
   if (weight.empty()) inputs.weight = {};
   use(graph, inputs);

@@ -14,7 +14,7 @@ namespace {
 
 using Point = Vector3<double>;
 
-/// Discs of an object that are looked at, evenly chosen: which side of each is seen takes long for more.
+/// Discs of an object that are looked at, chosen at random: which side of each is seen takes long for more.
 constexpr std::size_t kMostDiscs = 20000;
 
 /// Viewpoints stand so many times as far from an object's centroid as its farthest disc.

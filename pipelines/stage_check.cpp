@@ -31,7 +31,9 @@ void take_sources(RunConfig& config) {
   if (!has_sources(config.sources)) return;
   for (const SourceOutput& output : planned_sources(config)) {
     if (!output.is_there)
-      throw UserError("hsi4d gradcheck: /sources/" + output.what + ": is not made yet; `hsi4d run` makes it");
+      throw UserError("hsi4d gradcheck: /sources/" + output.what + ": " +
+                      (output.path.empty() ? "its output" : output.path.string()) +
+                      " is not made yet; `hsi4d run` makes it");
     take_output(output, config.data);
   }
 }

@@ -187,13 +187,13 @@ class Reader {
     }
     if (!expect(tree, Kind::kArray, in, "a number of seeds, a list of them, or {NAME: {KEY: value}}")) return all;
     if (is_empty(tree, in, false)) return all;
+    std::set<std::int64_t> seen;
     for (std::size_t i = 0; i < tree.items.size(); ++i) {
       const std::string place = child_pointer(in, std::to_string(i));
       const auto seed = seed_number(tree.items[i], place, 0, std::numeric_limits<std::int64_t>::max());
       if (!seed) continue;
       const std::string name = std::to_string(*seed);
-      if (std::any_of(all.begin(), all.end(), [&](const SweepVariant& other) { return other.name == name; }))
-        add(tree.items[i].origin, place, name + " is in the list twice");
+      if (!seen.insert(*seed).second) add(tree.items[i].origin, place, name + " is in the list twice");
       all.push_back({name, {}, seed});
     }
     return all;

@@ -268,7 +268,7 @@ void write_dataset(const SyntheticSettings& settings, const RenderSettings& rend
   write_ply(out.file("scene.ply"), scene);
   write_avatar(out.file("avatar.safetensors"), avatar);
   if (object.exists()) write_ply(out.file(fs::path("objects") / (object.name + ".ply")), object.gaussians);
-  write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
+  write_text_file(out.file(kSyntheticFile), synthetic_settings_json(settings, body_settings));
   const TriangleMesh solids = synthetic_solids(settings, whole.plan);
   if (!solids.faces.empty()) write_mesh(out.file(kSurfaceFile), solids);
   const ConfigValue data = data_sections(object, settings, !solids.faces.empty());

@@ -28,6 +28,9 @@
 
 namespace hsi4d {
 
+/// In the folder of a dataset that was generated: the settings that it was made with.
+inline constexpr const char* kSyntheticFile = "synthetic.json";
+
 /// How the video of a dataset is rendered. Not as the reconstruction renders: with hardly a cut, and at the
 /// supersampled size, so that the pixel filter that the reconstruction should use is narrower, blur/supersample² + 1/16
 /// pixels² for a supersample of 2.

@@ -14,6 +14,7 @@
 #include "core/rotation.h"
 #include "core/text.h"
 #include "pipelines/posed_avatar.h"
+#include "pipelines/synthetic.h"
 #include "pipelines/view_set.h"
 
 namespace hsi4d {
@@ -164,7 +165,7 @@ void write_views(const SyntheticSettings& settings, const RenderSettings& render
       shown.step();
     }
   }
-  write_text_file(out.file("synthetic.json"), synthetic_settings_json(settings, body_settings));
+  write_text_file(out.file(kSyntheticFile), synthetic_settings_json(settings, body_settings));
   write_text_file(out.file("views.json"), view_set_json("motion.npz", "cameras.json", views));
   out.commit();
 }

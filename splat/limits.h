@@ -15,7 +15,7 @@ inline constexpr double kAlphaCapCompatible = 0.99;
 
 /// A Gaussian fainter than this at a pixel is skipped there: one 8-bit step (stability B5).
 inline constexpr double kAlphaMin = 1.0 / 255;
-inline constexpr double kAlphaMinAccurate = 1e-5;
+inline constexpr double kAlphaMinAccurate = 2e-6;
 
 /// Compositing of a pixel ends when the transmittance falls below this (stability B4).
 inline constexpr double kTransmittanceStop = 1e-3;

@@ -95,7 +95,7 @@ struct RenderApproximations {
   bool collapse_suffix = false;
 };
 
-/// Sets what the quality names: `fast` stops earlier; `accurate` has no cap, alpha_min 1e-5 and stop 1e-7; `reference`
+/// Sets what the quality names: `fast` stops earlier; `accurate` has no cap, alpha_min 2e-6 and stop 1e-7; `reference`
 /// has no cap, no cut, no stop and sorts in double.
 void apply_quality(RenderSettings& settings, Quality quality);
 

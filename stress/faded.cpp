@@ -74,7 +74,7 @@ double slowdown_of_faded(Remedy remedy, int steps) {
       faded = std::min(faded, none);
     }
   });
-  return faded / alive;
+  return alive > 0 ? faded / alive : 1;  // a clock that is too coarse to tell
 }
 
 }  // namespace hsi4d::stress

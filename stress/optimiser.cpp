@@ -55,13 +55,13 @@ std::vector<double> some_gradient(Index count, int step) {
 
 /// What one bad number among good gradients does.
 struct Damage {
-  double changed = 0;     ///< numbers of the state that the step with it changed
-  double stuck = 0;       ///< numbers that the next good step does not move
-  double lost = 0;        ///< numbers that twenty good steps after it do not move far, or that are none
-  double miscounted = 0;  ///< bad evaluations that are told, off one
+  double changed = 0;  ///< numbers of the state that the step with it changed
+  double stuck = 0;    ///< numbers that the next good step does not move
+  double lost = 0;     ///< numbers that twenty good steps after it do not move far, or that are none
+  double counted = 0;  ///< bad evaluations that are told
 
   void add(const Damage& other) {
-    changed += other.changed, stuck += other.stuck, lost += other.lost, miscounted += other.miscounted;
+    changed += other.changed, stuck += other.stuck, lost += other.lost, counted += other.counted;
   }
 };
 
@@ -82,9 +82,7 @@ Damage damage_of(double bad, const std::function<double(const std::vector<double
   step(some_gradient(kCount, 7));
   const std::vector<double> next = parameters();
   for (std::size_t i = 0; i < next.size(); ++i) damage.stuck += std::abs(next[i] - at[i]) > 0 ? 0 : 1;
-  double counted = 0;
-  for (int i = 8; i < 27; ++i) counted = step(some_gradient(kCount, i));
-  damage.miscounted = std::abs(1 - counted);
+  for (int i = 8; i < 27; ++i) damage.counted = step(some_gradient(kCount, i));
   const std::vector<double> end = parameters();
   for (std::size_t i = 0; i < end.size(); ++i) damage.lost += std::abs(end[i] - at[i]) > 1e-3 ? 0 : 1;
   return damage;
@@ -194,17 +192,20 @@ Fading fade(Remedy remedy) {
 
 std::vector<StressFigure> bad_gradients(Remedy remedy) {
   Damage sum;
+  double miscounted = 0;
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
                            -std::numeric_limits<double>::infinity(), 3e38}) {
-    sum.add(remedy == Remedy::kOn ? damage_to_adam(bad) : damage_to_plain_adam(bad));
+    const Damage damage = remedy == Remedy::kOn ? damage_to_adam(bad) : damage_to_plain_adam(bad);
+    sum.add(damage);
+    miscounted += std::abs(1 - damage.counted);
   }
   // The least denormal is a gradient like any other.
   const Damage least = remedy == Remedy::kOn ? damage_to_adam(1e-45) : damage_to_plain_adam(1e-45);
   return {{"numbers that a step with one bad gradient changed", sum.changed, 0},
           {"parameters that the next good step does not move", sum.stuck, 0},
           {"parameters that are lost or stand still in the end", sum.lost, 0},
-          {"bad evaluations counted, off one each, of 4", sum.miscounted, 0},
-          {"evaluations with one gradient of 1e-45 that count", std::abs(1 - least.miscounted), 0},
+          {"bad evaluations counted, off one each, of 4", miscounted, 0},
+          {"evaluations with one gradient of 1e-45 that count", least.counted, 0},
           {"parameters that stand still after these", least.stuck + least.lost, 0}};
 }
 
@@ -244,7 +245,7 @@ std::vector<StressFigure> fading_moments(Remedy remedy) {
   const Fading computed = fade(remedy), unflushed = fade(Remedy::kOff);
   return {{"steps of 100,000 with a denormal moment", computed.denormals, 0},
           {"what flushing changes in the parameter", std::abs(computed.x - unflushed.x), 1e-6},
-          {"time of a step with faded moments over one with others", slowdown_of_faded(remedy, 100'000), 1.2}};
+          {"time of a step with faded moments over one with others", slowdown_of_faded(remedy, 9000), 1.5}};
 }
 
 }  // namespace hsi4d::stress

@@ -1,5 +1,5 @@
 // L = mean over objects of |ĉ − c|²: ĉ = Σ m u / Σ m the centre of the object's rendered opacity m, c that of its mask
-// in the frame.   [method, stage 2]
+// in the frame.   [method, stage 2]   by_share: each times the share of the object that the frame shows.
 #include "autodiff/centroid.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/map.h"
@@ -21,6 +21,7 @@ constexpr std::array<ConfigChoice<CenterUnit>, 2> kCenterUnits = {
 struct CenterSettings {
   CenterUnit unit = CenterUnit::kPixels;
   double min_opacity = 1;  // pixels
+  bool by_share = false;
 };
 
 void describe(ConfigFields& fields, CenterSettings& settings) {
@@ -28,12 +29,16 @@ void describe(ConfigFields& fields, CenterSettings& settings) {
                 "What distances are measured in: pixels of the image, or its width");
   fields.number("min_opacity", settings.min_opacity, {.min = 1e-6},
                 "An object whose opacity sums to less than this many pixels counts as hidden: the term is off for it");
+  fields.boolean(
+      "by_share", settings.by_share,
+      "An object counts by the share of it that the frame shows: the centre of a sliver beside the human says "
+      "little, and would pull the human out of the way");
 }
 
 /// Whether the term is on for an object.
 template <class M, class V>
 bool is_on(M mass, V visible, double min_opacity) {
-  return mass >= static_cast<M>(min_opacity) && visible >= V(0.5);
+  return mass >= static_cast<M>(min_opacity) && visible > V(0);
 }
 
 /// Columns x, y, mass of the centres beside x, y, visible of the targets; each object's distance², 0 where it is off.
@@ -41,12 +46,15 @@ template <class S>
 Var<S> mean_squared_distance(Var<S> centres, Var<S> targets, const CenterSettings& settings, double unit_px) {
   const auto column = [](Var<S> x, Index c) { return slice_cols(x, c, 1); };
   const double least = settings.min_opacity;
-  const Var<S> total = sum_over({column(centres, 0), column(centres, 1), column(centres, 2), column(targets, 0),
-                                 column(targets, 1), column(targets, 2)},
-                                [least](auto x, auto y, auto mass, auto target_x, auto target_y, auto visible) {
-                                  const bool on = is_on(value_of(mass), value_of(visible), least);
-                                  return select(on, square(x - target_x) + square(y - target_y), S(0));
-                                });
+  const bool by_share = settings.by_share;
+  const Var<S> total =
+      sum_over({column(centres, 0), column(centres, 1), column(centres, 2), column(targets, 0), column(targets, 1),
+                column(targets, 2)},
+               [least, by_share](auto x, auto y, auto mass, auto target_x, auto target_y, auto visible) {
+                 const bool on = is_on(value_of(mass), value_of(visible), least);
+                 const auto distance = square(x - target_x) + square(y - target_y);
+                 return select(on, select(by_share, visible, S(1)) * distance, S(0));
+               });
   return total * (1 / (static_cast<double>(centres.shape().rows) * unit_px * unit_px));
 }
 
@@ -57,7 +65,7 @@ LeftOut hidden_objects(Var<S> centres, Var<S> targets, double min_opacity) {
           [=](Index object) {
             const S mass = centres.owner().value(centres)(object, 2);
             const S visible = targets.owner().value(targets)(object, 2);
-            return visible >= S(0.5) && !is_on(mass, visible, min_opacity);
+            return visible > S(0) && !is_on(mass, visible, min_opacity);
           }};
 }
 

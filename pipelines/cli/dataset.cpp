@@ -48,7 +48,7 @@ void make_dataset(const RunConfig& config, const std::vector<LossTerm>& losses, 
 }
 
 void check_dataset(const RunConfig& config, const fs::path& folder) {
-  const std::string file = (folder / "synthetic.json").string();
+  const std::string file = (folder / kSyntheticFile).string();
   if (read_text_file(file) == synthetic_settings_json(config.synthetic, config.body)) return;
   throw UserError(file + ": the dataset was made with other settings than these; make a new one in another folder");
 }

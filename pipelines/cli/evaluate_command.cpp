@@ -17,6 +17,7 @@
 #include "pipelines/json_text.h"
 #include "pipelines/published.h"
 #include "pipelines/run_folder.h"
+#include "pipelines/synthetic.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -32,6 +33,22 @@ void remove_member(ConfigValue& object, std::string_view key) {
   std::erase_if(object.members, [key](const ConfigMember& member) { return member.key == key; });
 }
 
+void remove_prefix(ConfigValue& value, const std::string& prefix) {
+  if (value.kind == ConfigValue::Kind::kString && value.text.starts_with(prefix)) value.text.erase(0, prefix.size());
+  for (ConfigMember& member : value.members) remove_prefix(member.value, prefix);
+  for (ConfigValue& item : value.items) remove_prefix(item, prefix);
+}
+
+/// Names the files of a generated dataset as they are called in its folder: which clip they are of the settings
+/// `synthetic` say, and every seed of a sweep has a folder of its own.
+void forget_generated_folder(ConfigValue& data) {
+  for (const ConfigMember& member : data.members) {
+    if (member.key != "camera" || member.value.kind != ConfigValue::Kind::kString) continue;
+    const std::filesystem::path folder = std::filesystem::path(member.value.text).parent_path();
+    if (std::filesystem::exists(folder / kSyntheticFile)) return remove_prefix(data, folder.string() + "/");
+  }
+}
+
 /// The config of a run without what may differ between repetitions: its name, its seeds, its threads.
 std::optional<std::string> config_without_seed(const std::string& run) {
   const std::string file = RunPaths{run}.config();
@@ -40,6 +57,7 @@ std::optional<std::string> config_without_seed(const std::string& run) {
   for (const char* const key : {"name", "seed", "threads"}) remove_member(tree, key);
   for (ConfigMember& member : tree.members) {
     if (member.key == "synthetic") remove_member(member.value, "seed");
+    if (member.key == "data") forget_generated_folder(member.value);
   }
   return to_json(tree);
 }

@@ -226,6 +226,17 @@ TEST_CASE("center is off for an object that is hidden or not in the frame's mask
   CHECK(objects.largest_slope(1) == 0);
 }
 
+TEST_CASE("center by_share counts an object by how much of it the frame shows") {
+  Objects objects;
+  objects.value();
+  const double slope = objects.largest_slope(0);
+  objects.tape.set(objects.inputs.object_center_target, {8.5, 6.5, 0.01, 10.5, 6, 1});
+  CHECK(objects.value() ==
+        Approx((9 + 16 + 4) / 2.0).epsilon(1e-14));  // without it a sliver counts like a whole object
+  CHECK(objects.value(R"({"by_share": true})") == Approx((0.01 * (9 + 16) + 4) / 2.0).epsilon(1e-14));
+  CHECK(objects.largest_slope(0) == Approx(0.01 * slope).epsilon(1e-12));
+}
+
 TEST_CASE("center tells which objects the render hides, not those that the frame does not show") {
   Objects objects;
   std::vector<LeftOut> left_out;

@@ -39,7 +39,7 @@ TEST_CASE("quality presets hold their bounds") {
   const RenderSettings fast = read(R"({"quality": "fast"})");
   CHECK(fast.transmittance_stop > RenderSettings{}.transmittance_stop);
   const RenderSettings accurate = read(R"({"quality": "accurate"})");
-  CHECK(accurate.alpha_min <= 1e-5);
+  CHECK(accurate.alpha_min <= 2e-6);
   CHECK(accurate.transmittance_stop <= 1e-7);
   const RenderSettings reference = read(R"({"quality": "reference"})");
   CHECK(reference.alpha_cap == 1);

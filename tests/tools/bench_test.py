@@ -23,7 +23,7 @@ shutil.copy(pathlib.Path(__file__).with_name("rows.json"), sys.argv[sys.argv.ind
 
 
 def row(scene, knob, value, time_ratio, errors, decibels=60.0):
-    return {"scene": scene, "knob": knob, "value": value, "model": "own", "isa": "avx512", "time_ratio": time_ratio,
+    return {"scene": scene, "knob": knob, "value": value, "model": "own", "isa": STORED["isa"], "time_ratio": time_ratio,
             "psnr_db": decibels, "image_rms": errors["image_rms"], "image_max": errors["image_max"],
             "gradients": {"means": {"relative_l2": errors["gradient"]}, "sh": {"relative_l2": 0.0}}}
 
@@ -91,6 +91,15 @@ class Gate(unittest.TestCase):
         def worsen(stored, by):
             stored["default"]["time"] /= by
         self.assertIn("  quality default: 1.102 of the stored time", self.check_bound(1.10, worsen))
+
+    def test_times_of_another_instruction_set_are_told_alone(self):
+        stored = copy.deepcopy(json.loads(Gate.front_text))
+        stored["isa"] = "another"
+        stored["default"]["time"] /= 2
+        self.front.write_text(json.dumps(stored))
+        done = self.run_gate()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("stored ones are of another, these of", done.stdout)
 
     def test_a_setting_of_the_front_is_too_slow(self):
         def worsen(stored, by):

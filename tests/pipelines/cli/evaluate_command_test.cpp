@@ -81,6 +81,20 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
   CHECK(both["mean"]["mpjpe_mm"].get<double>() == Approx((a + b) / 2));
   CHECK(both["std"]["mpjpe_mm"].get<double>() == Approx(std::fabs(a - b) / std::sqrt(2)));
 
+  // Each seed of a sweep has a dataset in a folder of its own.
+  fs::copy(TinyDataset::folder(), "seed_7", fs::copy_options::recursive);
+  fs::copy("three", "seven", fs::copy_options::recursive);
+  write_changed("three/config.resolved.json", "seven/config.resolved.json", [](auto& tree) {
+    std::string text = tree["data"].dump();
+    const std::string folder = TinyDataset::folder().string(), other = fs::absolute("seed_7").string();
+    for (std::size_t at = 0; (at = text.find(folder + "/", at)) != std::string::npos; at += other.size())
+      text.replace(at, folder.size(), other);
+    tree["data"] = nlohmann::json::parse(text);
+  });
+  CHECK(evaluated({"one", "seven"})["mean"]["diversity_mm"] == both["mean"]["diversity_mm"]);
+  fs::remove("seed_7/synthetic.json");  // some other data
+  CHECK_FALSE(evaluated({"one", "seven"}).contains("mean"));
+
   const nlohmann::json apart = evaluated({"one", "two"});  // other iterations: a mean says nothing
   CHECK(apart["results"].size() == 2);
   CHECK_FALSE((apart.contains("mean") || apart.contains("std")));
