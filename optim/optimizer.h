@@ -29,6 +29,9 @@ class Optimizer {
   /// What takes back steps and keeps moments; null: this method does neither.
   Adam<S>* adam() { return std::get_if<Adam<S>>(&method_); }
   const Adam<S>* adam() const { return std::get_if<Adam<S>>(&method_); }
+  /// What learns a curvature that may be kept; null: this method does not.
+  QuasiNewton<S>* newton() { return std::get_if<QuasiNewton<S>>(&method_); }
+  const QuasiNewton<S>* newton() const { return std::get_if<QuasiNewton<S>>(&method_); }
 
  private:
   using Method = std::variant<Adam<S>, QuasiNewton<S>>;

@@ -60,6 +60,22 @@ QuasiNewton<S>::QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups) : t
     trial_[i] = unit_[i] > 0 ? static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i] : 0;
   });
   start_ = trial_;
+  first_ = Eigen::MatrixXd::Identity(count, count);
+}
+
+template <class S>
+void QuasiNewton<S>::set_curvature(const std::vector<double>& inverse_hessian) {
+  const Index n = unit_.size();
+  HSI4D_CHECK(steps_ == 0, "a curvature that comes after the first step");
+  if (std::ssize(inverse_hessian) == n * n) first_ = Eigen::Map<const Eigen::MatrixXd>(inverse_hessian.data(), n, n);
+}
+
+template <class S>
+std::vector<double> QuasiNewton<S>::curvature() const {
+  if (!is_learnt_) return {};
+  Eigen::MatrixXd whole = inverse_hessian_.template selfadjointView<Eigen::Lower>();
+  whole /= whole.diagonal().maxCoeff();
+  return {whole.data(), whole.data() + whole.size()};
 }
 
 template <class S>
@@ -116,7 +132,8 @@ void QuasiNewton<S>::accept(double loss) {
     const double curvature = moved_.dot(change_);
     if (curvature > kLeastCurvature * moved_.norm() * change_.norm()) {
       const Index n = moved_.size();
-      if (steps_ == 1) inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) * (curvature / change_.squaredNorm());
+      if (!is_learnt_) scale_first(change_, curvature);
+      is_learnt_ = true;
       auto h = inverse_hessian_.selfadjointView<Eigen::Lower>();
       product_.noalias() = h * change_;
       h.rankUpdate(moved_, (curvature + change_.dot(product_)) / (curvature * curvature));
@@ -132,11 +149,21 @@ void QuasiNewton<S>::accept(double loss) {
   ++steps_;
 }
 
+/// H becomes the first one, scaled so that yᵀ H y is `curvature`.
+template <class S>
+void QuasiNewton<S>::scale_first(const VectorX& y, double curvature) {
+  product_.noalias() = first_ * y;
+  inverse_hessian_ = first_ * (curvature / y.dot(product_));
+}
+
 template <class S>
 void QuasiNewton<S>::choose_direction() {
   const double steepest = gradient_.cwiseAbs().maxCoeff();
   const Index n = gradient_.size();
-  if (steps_ == 1 && steepest > 0) inverse_hessian_ = Eigen::MatrixXd::Identity(n, n) / steepest;
+  if (steps_ == 1 && steepest > 0) {
+    product_.noalias() = first_ * gradient_;
+    inverse_hessian_ = first_ / product_.cwiseAbs().maxCoeff();
+  }
   direction_.setZero();
   if (steepest > 0) direction_.noalias() -= inverse_hessian_.selfadjointView<Eigen::Lower>() * gradient_;
   slope_ = direction_.dot(gradient_);

@@ -43,6 +43,8 @@ class StageRun {
     held_ = reached_outputs(options.held);
     if (settings.plateau.iterations > 0) losses_.reserve(static_cast<std::size_t>(settings.iterations));
     for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
+    if (options.curvature != nullptr && optimizer_.newton() != nullptr)
+      optimizer_.newton()->set_curvature(*options.curvature);
     if (options.kept == nullptr || optimizer_.adam() == nullptr) return;
     for (const AdamGroup<S>& group : groups_) {
       const auto kept = options.kept->find(group.parameters.name);
@@ -58,6 +60,7 @@ class StageRun {
       iterate(iterations++, callback);
     evaluate_the_end();
     keep_moments();
+    keep_curvature();
     return {iterations,
             evaluated_loss(),
             loss_.values,
@@ -277,6 +280,12 @@ class StageRun {
       const auto kept = options_.kept->find(group.parameters.name);
       if (kept != options_.kept->end()) kept->second = optimizer_.adam()->moments(group.parameters.name);
     }
+  }
+
+  void keep_curvature() const {
+    if (options_.curvature == nullptr || optimizer_.newton() == nullptr) return;
+    std::vector<double> learnt = optimizer_.newton()->curvature();
+    if (!learnt.empty()) *options_.curvature = std::move(learnt);
   }
 
   Tape<S>& tape_;

@@ -46,6 +46,10 @@ void describe(ConfigFields& f, OptimizerSettings& s) {
   f.number("eps", s.eps, {.min = 1e-30, .max = 1}, "Added to the root of the second moment");
   f.integer("max_rollbacks", s.max_rollbacks, {.min = 0, .max = kMostIterations},
             "Steps of a stage that may be taken back because a number was not finite; one more is an error");
+  f.boolean(
+      "keep_curvature", s.keep_curvature,
+      "bfgs begins a frame's stage with what it has learnt of the curvature in the frame before, which takes fewer "
+      "evaluations");
 }
 
 void describe(ConfigFields& f, ParameterGroupSettings& s) {
@@ -104,6 +108,11 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
                "\" have no meaning";
     }
     return "";
+  });
+  f.rule({"optimizer", "over"}, [&s]() -> std::string {
+    if (!s.optimizer.keep_curvature) return "";
+    if (s.optimizer.kind != OptimizerKind::kBfgs) return "keep_curvature is of bfgs";
+    return s.over == StageScope::kFrame ? "" : "only a stage over frames has a frame before to keep the curvature of";
   });
   f.rule({"draw", "over"}, [&s]() -> std::string {
     return s.over == StageScope::kSequence && s.draw != Draw::kAll ? "a stage over the sequence draws nothing" : "";

@@ -24,7 +24,8 @@ struct OptimizerSettings {
   double beta1 = 0.9;
   double beta2 = 0.999;
   double eps = 1e-8;
-  int max_rollbacks = 10;  ///< bad steps of a stage that are taken back; one more is an error
+  int max_rollbacks = 10;       ///< bad steps of a stage that are taken back; one more is an error
+  bool keep_curvature = false;  ///< a frame begins with what bfgs has learnt in the frame before
 };
 
 /// When and how far one group of parameters moves.

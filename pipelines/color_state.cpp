@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "core/check.h"
 
@@ -13,6 +14,7 @@ constexpr const char* kFeatures = "color_net/features";
 constexpr const char* kMoments = "color_net/moments";
 constexpr const char* kFeatureGroup = "avatar_features";
 constexpr const char* kLayerGroup = "color_net";
+constexpr std::string_view kCurvature = "curvature/";
 
 /// The numbers of a network as a checkpoint names them; `with_features` says whether they are among them.
 template <class Net, class F>
@@ -24,6 +26,11 @@ void for_arrays(Net& net, bool with_features, const F& f) {
   }
 }
 
+void check_finite(const Checkpoint& checkpoint, const std::string& name, const std::vector<double>& numbers) {
+  if (std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); })) return;
+  throw DataError(checkpoint.source() + ": \"" + name + "\" holds a number that is not finite");
+}
+
 void check_numbers(const Checkpoint& checkpoint, const std::string& name, const std::vector<double>& numbers,
                    std::size_t wanted) {
   if (numbers.size() != wanted) {
@@ -31,8 +38,7 @@ void check_numbers(const Checkpoint& checkpoint, const std::string& name, const 
                     " numbers, this color net has " + std::to_string(wanted) +
                     "; the inputs have changed since the run began");
   }
-  if (std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); })) return;
-  throw DataError(checkpoint.source() + ": \"" + name + "\" holds a number that is not finite");
+  check_finite(checkpoint, name, numbers);
 }
 
 /// Moments are of the network's arrays, one block each, or not there yet.
@@ -69,6 +75,9 @@ ColorState first_color_state(std::optional<ColorNet> net) {
 }
 
 void store_color_state(const ColorState& state, Checkpoint& checkpoint) {
+  for (const auto& [stage, numbers] : state.curvature) {
+    if (!numbers.empty()) checkpoint.set(std::string(kCurvature) + stage, numbers);
+  }
   if (!state.net) return;
   for_arrays(*state.net, features_moved(state),
              [&](const std::string& name, const std::vector<double>& numbers) { checkpoint.set(name, numbers); });
@@ -76,6 +85,11 @@ void store_color_state(const ColorState& state, Checkpoint& checkpoint) {
 }
 
 ColorState stored_color_state(const Checkpoint& checkpoint, ColorState first) {
+  for (const std::string& name : checkpoint.names()) {
+    if (!name.starts_with(kCurvature)) continue;
+    check_finite(checkpoint, name, checkpoint.doubles(name));
+    first.curvature[name.substr(kCurvature.size())] = checkpoint.doubles(name);
+  }
   if (!first.net) return first;
   for_arrays(*first.net, checkpoint.has(kFeatures), [&](const std::string& name, std::vector<double>& numbers) {
     const std::vector<double>& found = checkpoint.doubles(name);

@@ -1,7 +1,11 @@
-// The human's colours in the course of a run: all frames share them, and each goes on from where the last one left off.
+// What frames hand on to each other beside poses: the human's colours, which all share, and what optimisers have
+// learnt.
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "body/color_net.h"
 #include "optim/checkpoint.h"
@@ -13,13 +17,15 @@ namespace hsi4d {
 struct ColorState {
   std::optional<ColorNet> net;
   AdamState moments;  ///< of the groups color_net and avatar_features; without blocks until a stage moves them
+  /// What bfgs has learnt of the curvature, by stage, where optimizer.keep_curvature asks for it; empty: nothing yet.
+  std::map<std::string, std::vector<double>, std::less<>> curvature = {};
 };
 
 /// A run's start. @param net  nothing for a run without
 ColorState first_color_state(std::optional<ColorNet> net);
 
-/// Puts network and moments into a checkpoint, as "color_net/...". Features are in it once they have moved: else they
-/// are those of the start.
+/// Puts network and moments into a checkpoint, as "color_net/...", and curvatures as "curvature/STAGE". Features are in
+/// it once they have moved: else they are those of the start.
 void store_color_state(const ColorState& state, Checkpoint& checkpoint);
 
 /// What store_color_state put there, bit for bit.

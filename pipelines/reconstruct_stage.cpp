@@ -170,15 +170,18 @@ StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, Sc
   const double reach = camera != nullptr ? longest_way(*camera, stage.iterations, stage.optimizer) : 0;
   StageResult result;
   with_frame_graph<S>(tape, task, frame, state, colors, reach, [&](FrameGraph<S>& graph, const LossInputs<S>& inputs) {
-    result = run_stage<S>(
-        tape, stage, task.losses, inputs, graph.groups(),
-        [&](const IterationReport& report) {
-          const RenderCounters& counters = *graph.rendered().counters;
-          probe.iteration_ended(report, &counters);
-          callback(report, counters);
-          probe.iteration_begins();
-        },
-        {.name = name_in_frame(task, frame), .kept = &colors.moments, .profile = probe.is_on(), .held = graph.held()});
+    result = run_stage<S>(tape, stage, task.losses, inputs, graph.groups(),
+                          [&](const IterationReport& report) {
+                            const RenderCounters& counters = *graph.rendered().counters;
+                            probe.iteration_ended(report, &counters);
+                            callback(report, counters);
+                            probe.iteration_begins();
+                          },
+                          {.name = name_in_frame(task, frame),
+                           .kept = &colors.moments,
+                           .curvature = stage.optimizer.keep_curvature ? &colors.curvature[name] : nullptr,
+                           .profile = probe.is_on(),
+                           .held = graph.held()});
     graph.read_state(stage.optimize, state);
     if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
   });

@@ -69,6 +69,33 @@ TEST_CASE("bfgs finds the least of a quadratic in few evaluations and says that 
   CHECK(valley.tape.value(valley.loss).scalar() < 1e-6 * before);
 }
 
+TEST_CASE("bfgs takes fewer evaluations with the curvature that it learnt before") {
+  std::vector<double> learnt;
+  const auto evaluations = [&learnt] {
+    Valley<double> valley;
+    QuasiNewton<double> method(valley.tape, {{{"x", {valley.x}}, moving(0.001)}});
+    CHECK(method.curvature().empty());
+    if (!learnt.empty()) method.set_curvature(learnt);
+    const Index count = valley.run(method, 200);
+    learnt = method.curvature();
+    return count;
+  };
+  const Index first = evaluations();
+  const auto n = static_cast<std::size_t>(std::llround(std::sqrt(learnt.size())));
+  REQUIRE(n * n == learnt.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    largest = std::max(largest, learnt[i * n + i]);
+    for (std::size_t j = 0; j < i; ++j) CHECK(learnt[i * n + j] == learnt[j * n + i]);
+  }
+  CHECK(largest == 1);
+  const Index second = evaluations();
+  INFO(first << " evaluations, then " << second);
+  CHECK(2 * second < first);
+  learnt.assign(4, 1);  // of another number of numbers
+  CHECK(evaluations() == first);
+}
+
 TEST_CASE("bfgs ends at the best point that it evaluated") {
   for (const Index most : {1, 2, 3, 4, 7}) {
     Valley<double> valley;

@@ -137,6 +137,14 @@ TEST_CASE("missing keys and contradictions") {
                                                     "lr_final_share of \"root\" have no meaning"));
 }
 
+TEST_CASE("a curvature is kept by bfgs alone, from frame to frame") {
+  CHECK_THAT(fault(stage(R"("iterations": 9, "optimizer": {"keep_curvature": true})")),
+             Contains("/stages/camera") && Contains("keep_curvature is of bfgs"));
+  CHECK_THAT(
+      fault(stage(R"("iterations": 9, "over": "sequence", "optimizer": {"kind": "bfgs", "keep_curvature": true})")),
+      Contains("/stages/camera") && Contains("only a stage over frames has a frame before"));
+}
+
 TEST_CASE("duplicate keys, numbers that are not finite, broken JSON") {
   CHECK_THAT(fault("{\"seed\": 1,\n\"seed\": 2}"),
              Equals("a.json:2: /seed: written twice, first in line 1; keep one of them"));

@@ -94,6 +94,10 @@ TEST_CASE("a run with approximations that was stopped and resumed has the bits o
   config.approx.hold_colors = true;
   config.approx.camera_pixel_share = 0.5;
   config.approx.seen_within_deg = 10;
+  StageSettings& camera = config.stages.front().second;
+  REQUIRE(find_entry(camera.optimize, "camera") != nullptr);
+  camera.optimizer.kind = OptimizerKind::kBfgs;
+  camera.optimizer.keep_curvature = true;
   carry_out_tiny(config, "whole");
   for (const int last : {kPerFrame + 3, 2 * kPerFrame + 11}) {
     INFO("stopped after iteration " << last);

@@ -62,6 +62,7 @@ RunProgress random_progress(const Clip& clip) {
   progress.seconds = 12.345;
   progress.start.frames[1] = {1, 0, 2};
   progress.start.seconds = 0.125;
+  progress.colors.curvature["camera"] = {1, -0.0, 0.25, 1.0 / 3};
   return progress;
 }
 
@@ -141,6 +142,7 @@ TEST_CASE("progress survives its checkpoint bit for bit") {
     CHECK(read.totals[s].fragments == saved.totals[s].fragments);
     CHECK(same_bits(read.totals[s].seconds, saved.totals[s].seconds));
   }
+  CHECK(read.colors.curvature == saved.colors.curvature);
   CHECK(read.start_errors == saved.start_errors);
   CHECK(read.inputs == saved.inputs);
   CHECK(read.image_errors == saved.image_errors);  // in the same order, which summary.json shows
