@@ -49,7 +49,7 @@ void describe(ConfigFields& f, OptimizerSettings& s) {
   f.boolean(
       "keep_curvature", s.keep_curvature,
       "bfgs begins a frame's stage with what it has learnt of the curvature in the frame before, which takes fewer "
-      "evaluations");
+      "evaluations; adam learns none");
 }
 
 void describe(ConfigFields& f, ParameterGroupSettings& s) {
@@ -111,7 +111,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   });
   f.rule({"optimizer", "over"}, [&s]() -> std::string {
     if (!s.optimizer.keep_curvature) return "";
-    if (s.optimizer.kind != OptimizerKind::kBfgs) return "keep_curvature is of bfgs";
     return s.over == StageScope::kFrame ? "" : "only a stage over frames has a frame before to keep the curvature of";
   });
   f.rule({"draw", "over"}, [&s]() -> std::string {
