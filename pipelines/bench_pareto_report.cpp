@@ -230,7 +230,7 @@ std::string legend(double y) {
   for (const std::string& knob : pareto_knobs()) {
     text += formatted("<circle cx=\"%.0f\" cy=\"%.0f\" r=\"4\" fill=\"%s\"/>", x + 5, y - 4, knob_color(knob).c_str()) +
             formatted("<text x=\"%.0f\" y=\"%.0f\">", x + 13, y) + html_escape(knob) + "</text>\n";
-    x += 28 + 6.6 * static_cast<double>(knob.size());
+    x += 24 + 6.2 * static_cast<double>(knob.size());
   }
   return text;
 }
