@@ -156,19 +156,22 @@ def lost_node():
 
 
 def time_limit():
-    """A run that needs more time than it has saves its state, is queued again and goes on."""
+    """A run that needs more time than it has saves its state, is queued again and goes on.
+
+    Slurm warns up to a minute early, so a time of a minute and grace would leave none to compute in.
+    """
     clip = folder / "clip.json"
     clip.write_text(json.dumps({"synthetic": {"frames": 60, "size_px": 128, "scene_gaussians": 4000, "avatar_gaussians": 2000}}))
     run(program, "synth", clip, "--out", folder / "clip")
     sweep = write_sweep("limit", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
-                        set={"stages.interaction.iterations": 150}, slurm={"time": "00:01:00", "grace_s": 35})
+                        set={"stages.interaction.iterations": 300}, slurm={"time": "00:02:00", "grace_s": 35})
     print(run(program, "sweep", sweep, "--out", folder / "limit", "--launcher", "slurm").strip())
     wait_for("a run of more than its time", queue_is_empty, 900)
     check_once(folder / "limit")
     limit = write_sweep("hopeless", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
-                        set={"stages.interaction.iterations": 1000000}, slurm={"time": "00:01:00", "grace_s": 20})
+                        set={"stages.interaction.iterations": 1000000}, slurm={"time": "00:02:00", "grace_s": 35})
     run(program, "sweep", limit, "--out", folder / "hopeless", "--launcher", "slurm")
-    wait_for("a run that cannot finish a frame in its time", queue_is_empty, 200)
+    wait_for("a run that cannot finish a frame in its time", queue_is_empty, 300)
     told = "".join(f.read_text() for f in (folder / "hopeless" / "slurm").glob("*_0.txt"))
     assert "before a frame was finished, and would be again" in told, told
     noted = attempts(folder / "hopeless", ids(folder / "hopeless")[0])[-1]
