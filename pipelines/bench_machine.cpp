@@ -43,7 +43,8 @@ const BenchMachine& bench_machine() {
   return machine;
 }
 
-std::string bench_line(nlohmann::ordered_json row) {
+std::string bench_line(const std::string& text) {
+  nlohmann::ordered_json row = nlohmann::ordered_json::parse(text);
   const BenchMachine& m = bench_machine();
   if (!row.contains("isa")) row["isa"] = isa_name(best_isa());
   nlohmann::ordered_json& machine = row["machine"];

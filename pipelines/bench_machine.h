@@ -3,8 +3,6 @@
 
 #include <string>
 
-#include <nlohmann/json_fwd.hpp>
-
 namespace hsi4d {
 
 /// The machine, and how the program was compiled.
@@ -19,6 +17,7 @@ struct BenchMachine {
 const BenchMachine& bench_machine();
 
 /// A measurement as a line of JSON: the row, then "isa" unless the row has one, and "machine".
-std::string bench_line(nlohmann::ordered_json row);
+/// @param row  a JSON object
+std::string bench_line(const std::string& row);
 
 }  // namespace hsi4d

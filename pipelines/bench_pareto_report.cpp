@@ -322,7 +322,7 @@ std::string pareto_csv(const std::vector<ParetoRow>& rows) {
 
 std::string pareto_json(const std::vector<ParetoRow>& rows) {
   std::string text;
-  for (const ParetoRow& row : rows) text += bench_line(json_of(row));
+  for (const ParetoRow& row : rows) text += bench_line(json_of(row).dump());
   return text;
 }
 

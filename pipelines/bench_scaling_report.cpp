@@ -168,7 +168,7 @@ std::string scaling_json(const std::vector<ScalingResult>& results) {
   std::string text;
   for (const ScalingResult& result : results) {
     for (const ScalingPoint& point : result.points)
-      for (const ScalingCost& cost : point.stages) text += bench_line(json_of(result, point, cost));
+      for (const ScalingCost& cost : point.stages) text += bench_line(json_of(result, point, cost).dump());
     for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) {
       nlohmann::ordered_json line = {{"axis", result.axis.name}, {"stage", fit.stage}, {"quantity", fit.quantity}};
       if (fit.expected) line["expected"] = *fit.expected;

@@ -106,14 +106,15 @@ std::string comparison_json(const RunCost& with, const RunCost& without) {
                                     {"counters_without_skips", nlohmann::ordered_json::object()}};
     for (const auto& [name, count] : counters_of(pair.with)) entry["counters"][name] = count;
     for (const auto& [name, count] : counters_of(pair.without)) entry["counters_without_skips"][name] = count;
-    text += bench_line(std::move(entry));
+    text += bench_line(entry.dump());
   }
   const double seconds = seconds_without(with, without);
-  return text + bench_line({{"name", "stages/skips"},
-                            {"threads", with.threads},
-                            {"seconds", with.seconds},
-                            {"seconds_without_skips", seconds},
-                            {"ratio", seconds / with.seconds}});
+  return text + bench_line(nlohmann::ordered_json{{"name", "stages/skips"},
+                                                  {"threads", with.threads},
+                                                  {"seconds", with.seconds},
+                                                  {"seconds_without_skips", seconds},
+                                                  {"ratio", seconds / with.seconds}}
+                               .dump());
 }
 
 }  // namespace hsi4d

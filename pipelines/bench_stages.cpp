@@ -213,7 +213,7 @@ std::string cost_json(const RunCost& cost) {
                     {"told_squares", per_iteration(sum.counters.told_squares, stage)},
                     {"composite_ms", composite_steps(stage)}});
     if (cost.counts_allocations) entry["allocations"] = per_iteration(static_cast<Index>(sum.allocations), stage);
-    text += bench_line(std::move(entry));
+    text += bench_line(entry.dump());
     for (const CostPart& part : parts_of(stage)) {
       const nlohmann::ordered_json of_part = {{"stage", stage.stage},
                                               {"operator", part.name},
@@ -225,11 +225,12 @@ std::string cost_json(const RunCost& cost) {
       text += of_part.dump() + "\n";
     }
   }
-  return text + bench_line({{"name", "stages"},
-                            {"threads", cost.threads},
-                            {"optimisation_s", optimisation_seconds(cost)},
-                            {"seconds", cost.seconds},
-                            {"peak_memory_bytes", cost.peak_memory_bytes}});
+  return text + bench_line(nlohmann::ordered_json{{"name", "stages"},
+                                                  {"threads", cost.threads},
+                                                  {"optimisation_s", optimisation_seconds(cost)},
+                                                  {"seconds", cost.seconds},
+                                                  {"peak_memory_bytes", cost.peak_memory_bytes}}
+                               .dump());
 }
 
 namespace {

@@ -99,14 +99,17 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   const Clip& clip = task.clip;
   const ClipFrame& frame = frame_task.frame;
   const SceneState& first = first_state(task, frame_task);
+  const bool are_objects_read = some_loss_reads(task.config.stages[task.stage].second, kReadsObjectOpacity);
   FrameTargets targets;
   targets.image = &frame.target;
   targets.weight = weight.empty() ? nullptr : &weight;
   targets.human_mask = &frame.human_mask;
   targets.human_seen = mask_center(frame.human_mask, task.config.data.mask_threshold)[2] != 0;
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
-    targets.object_masks.push_back(&frame.object_masks[o]);
-    targets.centers.push_back(center_and_share(frame.object_masks[o], task, o, state));
+    if (are_objects_read) {
+      targets.object_masks.push_back(&frame.object_masks[o]);
+      targets.centers.push_back(center_and_share(frame.object_masks[o], task, o, state));
+    }
     targets.depths.push_back(mean_depth(clip.objects[o].gaussians, first.objects[o], first.camera_from_world));
   }
   return targets;

@@ -44,7 +44,7 @@ std::string json_line(const Measurement& m) {
   if (m.peak_share()) line["fma_peak_share"] = *m.peak_share();
   if (m.image_error) line["image_error"] = *m.image_error;
   if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
-  return bench_line(std::move(line));
+  return bench_line(line.dump());
 }
 
 /// " 34.5" of a hundred, or nothing.
@@ -93,7 +93,7 @@ std::string json_line(const SkinningMeasurement& m) {
                                  {"repeats", m.repeats}};
   if (m.gaussians > 0) {
     line.update({{"gaussians", m.gaussians}, {"joints", m.joints}});
-    return bench_line(std::move(line));
+    return bench_line(line.dump());
   }
   line.update({{"vertices", m.vertices},
                {"joints", m.joints},
@@ -101,7 +101,7 @@ std::string json_line(const SkinningMeasurement& m) {
                {"table_bytes", m.table_bytes},
                {"packing_error_m", m.packing_error_m},
                {"gbytes_per_s", rate(m)}});
-  return bench_line(std::move(line));
+  return bench_line(line.dump());
 }
 
 std::string json_line(const ColorNetMeasurement& m) {
@@ -119,7 +119,7 @@ std::string json_line(const ColorNetMeasurement& m) {
     line["fma_peak_per_s"] = m.fma_peak_per_s;
     line["fma_peak_share"] = m.peak_share();
   }
-  return bench_line(std::move(line));
+  return bench_line(line.dump());
 }
 
 std::string json_line(const TapeMeasurement& m) {
@@ -129,7 +129,7 @@ std::string json_line(const TapeMeasurement& m) {
                           : nlohmann::ordered_json{{"elements", m.elements}, {"ns_per_element", m.ns_each()}});
   if (m.ratio) line.update({{"against", m.against}, {"ratio", *m.ratio}});
   if (m.goal) line["goal"] = *m.goal;
-  return bench_line(std::move(line));
+  return bench_line(line.dump());
 }
 
 /// What a topic measured: for people, and for programs.
