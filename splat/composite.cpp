@@ -45,7 +45,6 @@ using detail::TileAdjoint;
 using detail::TileEntry;
 using detail::TileGrid;
 using detail::TileJob;
-using detail::TileLists;
 using detail::wants_features;
 using detail::wants_gradient;
 using detail::wants_shape;
@@ -351,12 +350,7 @@ struct Composite {
     result.times = counters->times;
     result.channels = counters->channels;
     result.kept_bytes = kept.bytes();
-    for (const detail::SplatLists* part : {&planned.still, &planned.moving}) {
-      for (Index i = 0; i < part->count; ++i) {
-        const TileLists::Slots slots = part->lists.slots[i];
-        result.visible += slots.end > slots.begin ? 1 : 0;
-      }
-    }
+    result.visible = planned.still.visible + planned.moving.visible;
     for (Index tile = 0; tile < tiles.count(); ++tile) {
       if (!is_needed(io, tiles, tile)) continue;
       const detail::TilePlan& plan = planned.plans[tile];
@@ -381,6 +375,7 @@ struct Composite {
     if constexpr (std::is_same_v<S, float>) {
       if (in_blocks(io)) {
         detail::BlockJob job = block_job_of(tiles, tile);
+        job.entries = job.entries.first(static_cast<std::size_t>(tile_counts[tile].end));  // none follows with an adjoint
         job.workspace = d_transmittance + pixels;
         if (!planned.plans[tile].behind.empty()) {
           detail::see_behind(tiles.tile, scene.channels, job.blocks, planned.layer(tile), d_channels, d_transmittance);

@@ -62,6 +62,8 @@ void list_splats(const SplatRows<S>& rows, Index first, Index count, const Rende
   const Index most = static_cast<Index>(static_cast<double>(limit) / bytes_per_pair);
   const Index pairs = result.lists.find(result.extents.span(), tiles, most, bound);
   check_pair_memory(pairs, bytes_per_pair * static_cast<double>(pairs), limit);
+  const std::span<const TileLists::Slots> slots = result.lists.slots.span();
+  result.visible = std::count_if(slots.begin(), slots.end(), [](const auto& of) { return of.end > of.begin; });
   result.lists.deal(order, tiles, static_cast<std::int32_t>(first));
   times.bin_s = watch.lap();
 }

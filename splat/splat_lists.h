@@ -24,6 +24,7 @@ struct SplatRows {
 /// Rows [first, first + count).
 struct SplatLists {
   Index first = 0, count = 0;
+  Index visible = 0;  ///< rows that reach some tile
   Buffer<Extent> extents;
   Buffer<DepthKeyed> keys, room;
   TileLists lists;  ///< entries name rows as they are counted through, slots are counted from `first`

@@ -8,7 +8,7 @@
 namespace hsi4d::detail {
 
 void TilePlans::reset(Index tiles) {
-  still.count = 0;
+  still.count = still.visible = 0;
   layers.resize(static_cast<std::size_t>(tiles));
   for (TileLayer& layer : layers) layer.made = false;
 }
