@@ -15,6 +15,7 @@ constexpr double kShorterProbe = 0.1;      // of the one before, where that was 
 constexpr double kFirstDamping = 1e-4;     // of the first direction's curvature
 constexpr double kLeastGain = 1e-4;        // of the model's, for a step that is taken
 constexpr double kSmallestStep = 0.02;     // of the learning rates
+constexpr double kSmallestGain = 1e-6;     // of the loss: a few roundings of it in float
 constexpr double kEnough = 0.5;            // of the mean gain of a direction: one that gives less is the last
 constexpr double kLeastCurvature = 1e-10;  // of |p| |B p|
 constexpr double kLeastNew = 1e-6;         // of a direction, across those before
@@ -94,7 +95,7 @@ StepReport GaussNewton<S>::step(Index iteration, Index iterations, double loss) 
     if (is_room && !is_solved() && find_direction()) {
       ask_for_product();
     } else {
-      done_ = left < 1 || !(largest(step_) >= kSmallestStep);
+      done_ = left < 1 || !(largest(step_) >= kSmallestStep) || !(gain_ > kSmallestGain * std::fabs(loss_));
       ask_for_step();
     }
   }

@@ -57,7 +57,8 @@ class GaussNewton {
   /// M in units of the learning rates, all of it, the largest number of its diagonal 1; empty where nothing was learnt.
   std::vector<double> curvature() const { return is_learnt_ ? whole_of(inverse_) : std::vector<double>(); }
 
-  /// No further evaluation is wanted: the next step would move no number by a fiftieth of its learning rate.
+  /// No further evaluation is wanted: the next step would move no number by a fiftieth of its learning rate, or make
+  /// the loss smaller by a millionth at most.
   bool is_done() const { return done_; }
   Index rollbacks() const { return rollbacks_; }
 
