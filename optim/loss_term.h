@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "autodiff/tape.h"
+#include "autodiff/seam.h"
 #include "optim/loss_description.h"
 #include "optim/motion_start.h"
 
@@ -59,11 +59,18 @@ struct LossInputs {
   std::function<Var<S>(const std::vector<BodyPoint>& points)> body_points;
   std::function<Var<S>(const std::vector<ObjectPoint>& points)> object_points;
 
+  const SeamMode* seams = nullptr;  ///< of all that has a gradient here, in a stage by gauss_newton; else null
+
   std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
   std::vector<LossNote>* notes = nullptr;    ///< where it tells what it found; null: nobody asks
 
   static bool given(Var<S> input) { return input.tape != nullptr; }
 };
+
+/// The same inputs behind seams (autodiff/seam.h), what functions record of them too.
+/// @param mode  has to outlive the recording
+template <class S>
+LossInputs<S> with_seams(LossInputs<S> inputs, const SeamMode& mode);
 
 /// A loss term: its description, and the function that records it on a tape and returns a scalar, or an empty Var where
 /// an input that it needs is not given: the term is off then, and the stage reports it.

@@ -10,19 +10,12 @@
 // a step that was too long costs one.
 #pragma once
 
-#include "optim/adam.h"
+#include "optim/unit_numbers.h"
 
 namespace hsi4d {
 
-/// The most numbers that a stage may move by BFGS: H has the square of that.
-inline constexpr Index kMostQuasiNewtonNumbers = 1024;
-
 /// No number goes further in one step than this many times its group's learning rate.
 inline constexpr double kLongestQuasiNewtonStep = 10;
-
-/// No number gets further from its start in a stage than this many times its group's learning rate: what of a scene a
-/// camera may come to see is known from it before the stage begins.
-inline constexpr double kLongestQuasiNewtonWay = 40;
 
 /// The optimiser of one stage. Steps are bitwise the same for any number of threads, and allocate nothing after the
 /// first two. Learning rates are the units in which numbers of different kinds compare and the length of the first
@@ -32,8 +25,7 @@ inline constexpr double kLongestQuasiNewtonWay = 40;
 template <class S>
 class QuasiNewton {
  public:
-  /// @param groups  leaves of `tape`, none of them twice. Throws UserError for more than kMostQuasiNewtonNumbers
-  ///                numbers, and for groups whose numbers are changed between steps (axis-angles, ranges).
+  /// @param groups  as UnitNumbers has them, with the same errors
   QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups);
   QuasiNewton(const QuasiNewton&) = delete;
   QuasiNewton& operator=(const QuasiNewton&) = delete;
@@ -57,18 +49,12 @@ class QuasiNewton {
  private:
   using VectorX = Eigen::VectorXd;
 
-  std::optional<BadNumber> read_gradient(double loss);
   void accept(double loss);
   void scale_first(const VectorX& y, double curvature);
   void choose_direction();
-  void stay_within_reach();
   void shorten(double loss);
-  void write_trial();
 
-  Tape<S>& tape_;
-  std::vector<AdamGroup<S>> groups_;
-  std::vector<GroupStep> reports_;
-  VectorX unit_, start_;                  // learning rates, by number; and where the stage began, in units
+  UnitNumbers<S> numbers_;
   VectorX trial_, trial_gradient_;        // where the loss was just evaluated, in units; and the gradient by these
   VectorX point_, gradient_, direction_;  // the best so far
   VectorX moved_, change_, product_;      // s, y, H y

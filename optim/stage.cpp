@@ -33,8 +33,8 @@ class StageRun {
         settings_(settings),
         options_(options),
         groups_(named_groups(settings, available, options.name)),
-        loss_(record_loss(settings, terms, inputs, options.name)),
-        optimizer_(tape, groups_, settings.optimizer) {
+        loss_(record_loss(settings, terms, inputs_of(settings, inputs), options.name)),
+        optimizer_(tape, groups_, settings.optimizer, seams_) {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
     for (const AdamGroup<S>& group : groups_) {
       hold(group.parameters);
@@ -43,8 +43,7 @@ class StageRun {
     held_ = reached_outputs(options.held);
     if (settings.plateau.iterations > 0) losses_.reserve(static_cast<std::size_t>(settings.iterations));
     for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
-    if (options.curvature != nullptr && optimizer_.newton() != nullptr)
-      optimizer_.newton()->set_curvature(*options.curvature);
+    if (options.curvature != nullptr) optimizer_.set_curvature(*options.curvature);
     if (options.kept == nullptr || optimizer_.adam() == nullptr) return;
     for (const AdamGroup<S>& group : groups_) {
       const auto kept = options.kept->find(group.parameters.name);
@@ -105,6 +104,10 @@ class StageRun {
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
               seconds_since(start), counters, shares_});
+  }
+
+  LossInputs<S> inputs_of(const StageSettings& settings, const LossInputs<S>& inputs) {
+    return settings.optimizer.kind == OptimizerKind::kGaussNewton ? with_seams(inputs, seams_) : inputs;
   }
 
   /// Held outputs that the loss depends on; what it does not is never computed.
@@ -283,8 +286,8 @@ class StageRun {
   }
 
   void keep_curvature() const {
-    if (options_.curvature == nullptr || optimizer_.newton() == nullptr) return;
-    std::vector<double> learnt = optimizer_.newton()->curvature();
+    if (options_.curvature == nullptr) return;
+    std::vector<double> learnt = optimizer_.curvature();
     if (!learnt.empty()) *options_.curvature = std::move(learnt);
   }
 
@@ -292,6 +295,7 @@ class StageRun {
   const StageSettings& settings_;
   const StageOptions& options_;
   std::vector<AdamGroup<S>> groups_;
+  SeamMode seams_;  // of the loss's inputs
   RecordedLoss<S> loss_;
   Optimizer<S> optimizer_;
   Index undone_at_end_ = 0;

@@ -40,16 +40,19 @@ const char* words_of(LossNeeds needs) {
 
 void describe(ConfigFields& f, OptimizerSettings& s) {
   f.choice("kind", s.kind, kOptimizerKinds,
-           "The method: Adam, or BFGS with a line search, for few numbers such as the camera's");
+           "The method: Adam, or, for few numbers such as the camera's, BFGS with a line search or damped Gauss-Newton "
+           "steps");
   f.number("beta1", s.beta1, {.min = 0, .below = 1}, "Decay of the first moment");
   f.number("beta2", s.beta2, {.min = 0, .below = 1}, "Decay of the second moment");
   f.number("eps", s.eps, {.min = 1e-30, .max = 1}, "Added to the root of the second moment");
   f.integer("max_rollbacks", s.max_rollbacks, {.min = 0, .max = kMostIterations},
             "Steps of a stage that may be taken back because a number was not finite; one more is an error");
+  f.integer("products", s.products, {.min = 1, .max = 100},
+            "gauss_newton: products of a direction with the curvature, an evaluation each, that a step takes at most");
   f.boolean(
       "keep_curvature", s.keep_curvature,
-      "bfgs begins a frame's stage with what it has learnt of the curvature in the frame before, which takes fewer "
-      "evaluations; adam learns none");
+      "bfgs or gauss_newton begins a frame's stage with what it has learnt of the curvature in the frame before, which "
+      "takes fewer evaluations; adam learns none");
 }
 
 void describe(ConfigFields& f, ParameterGroupSettings& s) {
@@ -101,13 +104,24 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   f.object("optimizer", s.optimizer, "How gradients become steps");
   f.object("plateau", s.plateau, "When the stage ends early, as its loss no longer falls");
   f.rule({"optimizer", "optimize"}, [&s]() -> std::string {
-    if (s.optimizer.kind != OptimizerKind::kBfgs) return "";
+    if (s.optimizer.kind == OptimizerKind::kAdam) return "";
     for (const auto& [name, group] : s.optimize) {
       if (group.from != 0 || group.until || group.every != 1 || group.lr_final_share != 1)
-        return "bfgs moves all numbers in every step: from, until, every and lr_final_share of \"" + name +
+        return std::string(choice_name<OptimizerKind>(kOptimizerKinds, s.optimizer.kind)) +
+               " moves all numbers in every step: from, until, every and lr_final_share of \"" + name +
                "\" have no meaning";
     }
     return "";
+  });
+  f.rule({"optimizer", "gradient_shares"}, [&s]() -> std::string {
+    return s.optimizer.kind == OptimizerKind::kGaussNewton && s.gradient_shares != 0
+               ? "gauss_newton evaluates changes of gradients, of which terms have no shares; allowed: 0"
+               : "";
+  });
+  f.rule({"optimizer", "plateau"}, [&s]() -> std::string {
+    return s.optimizer.kind == OptimizerKind::kGaussNewton && s.plateau.iterations != 0
+               ? "gauss_newton ends by itself, and its evaluations are not all of states that it was in; allowed: 0"
+               : "";
   });
   f.rule({"optimizer", "over"}, [&s]() -> std::string {
     if (!s.optimizer.keep_curvature) return "";

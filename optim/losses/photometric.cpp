@@ -19,11 +19,16 @@ void describe(ConfigFields& fields, PhotometricSettings& settings) {
                 "Share of the structural term: (1 - share) L1 + share (1 - SSIM)");
 }
 
+/// Differences that count as squares where a stage asks for curvatures: what rounding to grey levels leaves, and some.
+constexpr double kLeastDifference = 0.01;
+
+/// @param seams  null: nobody asks for curvatures
 template <class S>
-Var<S> difference(Var<S> a, Var<S> b, double ssim_share) {
-  if (ssim_share == 0) return l1(a, b);
+Var<S> difference(Var<S> a, Var<S> b, double ssim_share, const SeamMode* seams) {
   if (ssim_share == 1) return d_ssim(a, b);
-  return l1(a, b) * (1 - ssim_share) + d_ssim(a, b) * ssim_share;
+  const Var<S> distance = seams == nullptr ? l1(a, b) : reweighted_l1(a, b, kLeastDifference, *seams);
+  if (ssim_share == 0) return distance;
+  return distance * (1 - ssim_share) + d_ssim(a, b) * ssim_share;
 }
 
 }  // namespace
@@ -33,9 +38,9 @@ LossTerm photometric_loss() {
       "photometric", "L1 and structural difference of the rendered image and the frame where the weight says so",
       [](const auto& in, const PhotometricSettings& settings) {
         if (!in.given(in.rendered) || !in.given(in.target)) return decltype(in.rendered){};
-        if (!in.given(in.weight)) return difference(in.rendered, in.target, settings.ssim_share);
+        if (!in.given(in.weight)) return difference(in.rendered, in.target, settings.ssim_share, in.seams);
         return difference(weighted_image(in.rendered, in.weight), weighted_image(in.target, in.weight),
-                          settings.ssim_share);
+                          settings.ssim_share, in.seams);
       });
 }
 
