@@ -121,11 +121,12 @@ struct Divide {
 template <class S>
 struct Minimum {
   static constexpr const char* kName = "min";
-  S value(S a, S b) const { return b < a ? b : a; }
+  static bool is_second(S a, S b) { return b < a || b != b; }  // NaN of either: a comparison alone would lose b's
+  S value(S a, S b) const { return is_second(a, b) ? b : a; }
   template <class>
   S partials(S* p, S a, S b) const {
-    p[0] = b < a ? S(0) : S(1);
-    p[1] = b < a ? S(1) : S(0);
+    p[0] = is_second(a, b) ? S(0) : S(1);
+    p[1] = is_second(a, b) ? S(1) : S(0);
     return value(a, b);
   }
 };
@@ -133,11 +134,12 @@ struct Minimum {
 template <class S>
 struct Maximum {
   static constexpr const char* kName = "max";
-  S value(S a, S b) const { return b > a ? b : a; }
+  static bool is_second(S a, S b) { return b > a || b != b; }
+  S value(S a, S b) const { return is_second(a, b) ? b : a; }
   template <class>
   S partials(S* p, S a, S b) const {
-    p[0] = b > a ? S(0) : S(1);
-    p[1] = b > a ? S(1) : S(0);
+    p[0] = is_second(a, b) ? S(0) : S(1);
+    p[1] = is_second(a, b) ? S(1) : S(0);
     return value(a, b);
   }
 };

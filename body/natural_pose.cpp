@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "autodiff/elementwise.h"
@@ -168,6 +169,8 @@ double ratio_slope(double m, double n, double ratio) {
 TwistSwing twist_swing(const Matrix3<double>& rotation, int twist_axis) {
   TwistSwing t;
   t.q = quaternion_from_matrix(rotation);
+  if (!rotation.allFinite())
+    t.q.setConstant(std::numeric_limits<double>::quiet_NaN());  // not the identity, a fine pose
   t.k = twist_axis;
   t.i = (t.k + 1) % 3;
   t.j = (t.k + 2) % 3;
@@ -208,10 +211,10 @@ Matrix3<double> twist_swing_adjoint(const Matrix3<double>& rotation, const Twist
   return d_rotation;
 }
 
-/// How far angle x is beyond its range; below it, negative.
+/// How far angle x is beyond its range; below it, negative; NaN for NaN, which is within no range.
 double beyond(const NaturalJoint& joint, int axis, double x) {
   const double low = joint.low[axis] * kRadians, high = joint.high[axis] * kRadians;
-  return x > high ? x - high : x < low ? x - low : 0;
+  return x > high ? x - high : x >= low ? 0 : x - low;
 }
 
 template <class S>

@@ -60,7 +60,7 @@ Var<S> natural_encode(Var<S> rotations, Source where = Source::current());
 /// At half a turn of swing (n < kLeastTwist) the twist is taken as 0.
 ///
 /// @param rotations  [21T,9] rotation matrices by rows
-/// @return           [21T,1] radians²
+/// @return           [21T,1] radians²; NaN of a rotation that is not finite
 /// Adjoint: rotations, as functions of nine free numbers each. None to the twist where it is taken as 0. Pivots, sides
 /// and that choice are part of the signature.
 template <class S>

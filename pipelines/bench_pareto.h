@@ -150,6 +150,39 @@ Index pareto_row_count(const ParetoBench& bench);
 /// @param told  after every row; may be empty
 std::vector<ParetoRow> measure_pareto(const ParetoBench& bench, const std::function<void(const ParetoRow&)>& told = {});
 
+// --- reconstructions -------------------------------------------------------------------------------------------------
+
+/// What a setting's errors come to in a reconstruction, over all seeds (bench_pareto_tracking.h). Standard deviations
+/// are those of a sample; 0 of one.
+struct TrackedPoint {
+  std::string knob, value;
+  bool is_fixed_time = false;  ///< as many iterations as take as long as the default's; else as many as the default's
+  double cost_ratio = 1;       ///< processor time of a frame's iterations, to the default's, at as many of them
+  Index iterations = 0;        ///< a frame, of all stages
+  Index seeds = 0;
+  struct Spread {
+    double mean = 0, deviation = 0;
+  };
+  Spread joints_mm = {}, world_mm = {}, object_cm = {}, camera_cm = {},
+         camera_deg = {};  ///< errors of the last stage, means over the frames
+
+  std::string name() const { return knob + " " + value; }
+  bool is_preset() const { return knob == "quality"; }
+  /// In JSON and CSV.
+  const char* budget() const { return is_fixed_time ? "time" : "steps"; }
+};
+
+/// An error of reconstructions by its name in summary.json, JSON and CSV.
+struct TrackedError {
+  const char* metric;
+  TrackedPoint::Spread TrackedPoint::*place;
+};
+inline constexpr std::array<TrackedError, 5> kTrackedErrors = {{{"mpjpe_mm", &TrackedPoint::joints_mm},
+                                                                {"world_mpjpe_mm", &TrackedPoint::world_mm},
+                                                                {"object_translation_cm", &TrackedPoint::object_cm},
+                                                                {"camera_translation_cm", &TrackedPoint::camera_cm},
+                                                                {"camera_rotation_deg", &TrackedPoint::camera_deg}}};
+
 // --- the front -------------------------------------------------------------------------------------------------------
 
 /// Something that takes time and has an error.
@@ -185,13 +218,15 @@ std::vector<std::size_t> pareto_front(const std::vector<ParetoPoint>& points, do
 std::string pareto_table(const std::vector<ParetoRow>& rows);
 /// Fronts over all scenes and of avatar_in_scene, by image and by gradient; presets beside them.
 std::string pareto_front_table(const std::vector<ParetoRow>& rows);
-/// A head line, and a line a row. No PSNR where there is no difference.
-std::string pareto_csv(const std::vector<ParetoRow>& rows);
+/// A head line, a line a row and one a reconstructed setting and budget, which have no scene. No PSNR where there is no
+/// difference.
+std::string pareto_csv(const std::vector<ParetoRow>& rows, const std::vector<TrackedPoint>& tracked = {});
 /// One JSON object a line.
 std::string pareto_json(const std::vector<ParetoRow>& rows);
 /// Time against each error, a column for all scenes and one for avatar_in_scene, as an SVG file: dots by knob, the
-/// front as a line, presets named.
-std::string pareto_svg(const std::vector<ParetoRow>& rows);
+/// front as a line, presets named. Below, where settings were reconstructed with, time against the pose's errors, a
+/// column for as many steps and one for as much time: means, with a standard deviation to either side.
+std::string pareto_svg(const std::vector<ParetoRow>& rows, const std::vector<TrackedPoint>& tracked = {});
 
 /// Two of its panels: the errors of image and gradient of the scene by which settings are chosen.
 std::string pareto_front_svg(const std::vector<ParetoRow>& rows);

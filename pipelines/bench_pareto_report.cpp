@@ -87,6 +87,57 @@ std::string csv_text(const std::string& text) {
   return quoted + "\"";
 }
 
+/// The columns of a render; then those of a reconstruction.
+std::vector<std::string> csv_columns() {
+  std::vector<std::string> names = {
+      "scene",          "knob",        "value",           "model",         "gaussians",      "pixels",     "fragments",
+      "pairs",          "repeats",     "threads",         "isa",           "median_ms",      "min_ms",     "forward_ms",
+      "forward_min_ms", "backward_ms", "backward_min_ms", "forward_ratio", "backward_ratio", "time_ratio", "psnr_db",
+      "image_rms",      "image_max",   "image_p999",      "image_bias"};
+  for (const char* name : kGradientClasses)
+    for (const char* part : {"relative_l2", "one_minus_cosine", "bias"})
+      names.push_back(std::string(name) + "_" + part);
+  return names;
+}
+
+std::vector<std::string> tracked_csv_columns() {
+  std::vector<std::string> names = {"tracking", "iterations", "seeds", "cost_ratio"};
+  for (const TrackedError& error : kTrackedErrors) {
+    names.push_back(std::string(error.metric) + "_mean");
+    names.push_back(std::string(error.metric) + "_deviation");
+  }
+  return names;
+}
+
+std::string csv_line(const ParetoRow& row) {
+  std::string line = csv_text(row.scene) + "," + row.knob + ",\"" + row.value + "\"," + model_name(row.model);
+  for (const Index count : {row.gaussians, row.pixels, row.fragments, row.pairs, static_cast<Index>(row.repeats)})
+    line += "," + std::to_string(count);
+  line += "," + std::to_string(row.threads) + "," + isa_name(row.isa);
+  for (const double value :
+       {1e3 * row.both.median_s, 1e3 * row.both.least_s, 1e3 * row.forward.median_s, 1e3 * row.forward.least_s,
+        1e3 * row.backward.median_s, 1e3 * row.backward.least_s, row.forward_ratio, row.backward_ratio, row.time_ratio})
+    line += "," + csv_number(value);
+  line += "," + (row.image.psnr_db() ? csv_number(*row.image.psnr_db()) : "");
+  for (const double value : {row.image.rms, row.image.max, row.image.p999, row.image.bias})
+    line += "," + csv_number(value);
+  for (const GradientError& error : row.gradients)
+    for (const double value : {error.relative_l2, error.one_minus_cosine, error.bias}) line += "," + csv_number(value);
+  return line + std::string(tracked_csv_columns().size(), ',') + "\n";
+}
+
+std::string csv_line(const TrackedPoint& point) {
+  const std::size_t of_a_render = csv_columns().size();
+  std::string line = "," + point.knob + ",\"" + point.value + "\"" + std::string(of_a_render - 3, ',') + "," +
+                     point.budget() + "," + std::to_string(point.iterations) + "," + std::to_string(point.seeds) + "," +
+                     csv_number(point.cost_ratio);
+  for (const TrackedError& error : kTrackedErrors) {
+    const TrackedPoint::Spread& spread = point.*error.place;
+    line += "," + csv_number(spread.mean) + "," + csv_number(spread.deviation);
+  }
+  return line + "\n";
+}
+
 nlohmann::ordered_json json_of(const ParetoRow& row) {
   nlohmann::ordered_json line = {{"name", "pareto/" + row.scene + "/" + row.name()},
                                  {"scene", row.scene},
@@ -131,6 +182,7 @@ nlohmann::ordered_json json_of(const ParetoRow& row) {
 
 constexpr double kPanelWidth = 460, kPanelHeight = 254;  // as plots are: 210 high for 380, enlarged
 constexpr double kTitle = 66, kHead = 24, kGap = 26;     // of the picture; above and beside each panel
+constexpr double kSection = 40;                          // above the panels of reconstructions
 
 /// An error over rows of one setting, a row of panels each.
 struct PlottedError {
@@ -163,17 +215,23 @@ std::vector<ParetoPoint> points_of(std::vector<ParetoRow> rows, const std::strin
   return pareto_points(rows, scene);
 }
 
+/// Ticks of a logarithmic axis of ratios that has 1: those between the least and the most of them.
+std::vector<double> ratio_ticks(const std::vector<double>& ratios) {
+  const double least = std::min(1.0, *std::min_element(ratios.begin(), ratios.end())),
+               most = std::max(1.0, *std::max_element(ratios.begin(), ratios.end()));
+  std::vector<double> ticks = {0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 20, 50};
+  if (most < 5 * least) ticks = {0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2, 2.5, 3, 3.5, 4, 5};
+  std::erase_if(ticks, [least, most](double tick) { return tick < 0.97 * least || tick > 1.03 * most; });
+  return ticks;
+}
+
 Plot plot_of(const std::vector<ParetoPoint>& points, const std::string& title) {
   Plot plot{.title = title, .x_label = "time, ratio to the default's", .unit = "", .lines = {}};
   plot.is_log = plot.is_log_x = true;
-  plot.ticks_x = {0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 20, 50};
   plot.decimals = 6;
-  double least = 1, most = 1;
-  for (const ParetoPoint& point : points) {
-    least = std::min(least, point.time_ratio);
-    most = std::max(most, point.time_ratio);
-  }
-  std::erase_if(plot.ticks_x, [least, most](double tick) { return tick < 0.97 * least || tick > 1.03 * most; });
+  std::vector<double> ratios = {1};
+  for (const ParetoPoint& point : points) ratios.push_back(point.time_ratio);
+  plot.ticks_x = ratio_ticks(ratios);
   return plot;
 }
 
@@ -210,18 +268,96 @@ void add_points(const std::vector<ParetoPoint>& points, Plot& plot) {
     if (point.is_preset()) add(point);
 }
 
+/// Where a plot stands whose panel begins at (x, y).
+std::string place_in_picture(double x, double y) {
+  return formatted(" x=\"%.0f\" y=\"%.0f\" width=\"%.0f\" height=\"%.0f\"", x, y + kHead, kPanelWidth, kPanelHeight);
+}
+
+std::string panel_title(double x, double y, const std::string& title) {
+  return formatted("<text x=\"%.0f\" y=\"%.0f\" font-weight=\"bold\">", x + 8, y + 12) + html_escape(title) +
+         "</text>\n";
+}
+
 std::string panel(const std::vector<ParetoRow>& rows, const std::string& scene, const PlottedError& error, double x,
                   double y) {
   const std::string title = std::string(error.name) + (scene.empty() ? ", median of all scenes" : ", " + scene);
   const std::vector<ParetoPoint> points = points_of(rows, scene, error);
   Plot plot = plot_of(points, title);
-  plot.attributes =
-      formatted(" x=\"%.0f\" y=\"%.0f\" width=\"%.0f\" height=\"%.0f\"", x, y + kHead, kPanelWidth, kPanelHeight);
+  plot.attributes = place_in_picture(x, y);
   add_points(points, plot);
   const bool has_place =
       std::any_of(points.begin(), points.end(), [](const ParetoPoint& p) { return p.image_rms > 0; });
-  return formatted("<text x=\"%.0f\" y=\"%.0f\" font-weight=\"bold\">", x + 8, y + 12) + html_escape(title) +
-         (has_place ? "" : ": 0") + "</text>\n" + (has_place ? plot_svg(plot) : "") + "\n";
+  return panel_title(x, y, title + (has_place ? "" : ": 0")) + (has_place ? plot_svg(plot) : "") + "\n";
+}
+
+// Panels of reconstructions.
+
+/// An error of reconstructions that has a row of panels.
+struct PlottedTracking {
+  const char* name;
+  const char* unit;
+  TrackedPoint::Spread TrackedPoint::*place;
+  int decimals;
+};
+constexpr std::array<PlottedTracking, 4> kPlottedTracking = {
+    {{"joints beside the pelvis", "mm", &TrackedPoint::joints_mm, 2},
+     {"joints in the world", "mm", &TrackedPoint::world_mm, 2},
+     {"object", "cm", &TrackedPoint::object_cm, 2},
+     {"camera", "degrees", &TrackedPoint::camera_deg, 4}}};
+
+/// Whether a preset's name stands below its dot: away from another preset nearby.
+bool is_named_below(const TrackedPoint& point, const std::vector<TrackedPoint>& tracked,
+                    TrackedPoint::Spread TrackedPoint::*place) {
+  return std::any_of(tracked.begin(), tracked.end(), [&](const TrackedPoint& other) {
+    return other.is_preset() && other.is_fixed_time == point.is_fixed_time &&
+           std::abs(std::log(other.cost_ratio / point.cost_ratio)) < 0.2 && (other.*place).mean > (point.*place).mean;
+  });
+}
+
+/// A dot at the mean, on a bar of a standard deviation to either side.
+void add_tracked(const TrackedPoint& point, const PlottedTracking& plotted, bool is_below, Plot& plot) {
+  const TrackedPoint::Spread& spread = point.*plotted.place;
+  const std::string name = point.is_preset() ? point.value : point.name();
+  plot.lines.push_back(
+      {.label = name + formatted(": %.*f +- %.*f ", plotted.decimals, spread.mean, plotted.decimals, spread.deviation) +
+                plotted.unit,
+       .color = knob_color(point.knob),
+       .points = {{point.cost_ratio, std::max(0.0, spread.mean - spread.deviation)},
+                  {point.cost_ratio, spread.mean + spread.deviation}},
+       .opacity = 0.45});
+  plot.lines.push_back({.label = name,
+                        .color = knob_color(point.knob),
+                        .points = {{point.cost_ratio, spread.mean}},
+                        .has_dots = true,
+                        .opacity = 0,
+                        .is_named = point.is_preset(),
+                        .name_is_below = is_below});
+}
+
+std::string tracked_panel(const std::vector<TrackedPoint>& tracked, bool is_fixed_time, const PlottedTracking& plotted,
+                          double x, double y) {
+  const std::string title = std::string(plotted.name) + ", " + plotted.unit +
+                            (is_fixed_time ? ", after as long as the default" : ", after as many steps");
+  Plot plot{.title = title,
+            .x_label = "time of a step, ratio to the default's",
+            .unit = plotted.unit,
+            .lines = {},
+            .is_log_x = true,
+            .begins_at_zero = true,
+            .decimals = plotted.decimals,
+            .attributes = place_in_picture(x, y)};
+  std::vector<double> ratios = {1};
+  for (const TrackedPoint& point : tracked) {
+    ratios.push_back(point.cost_ratio);
+    const TrackedPoint::Spread& spread = point.*plotted.place;
+    plot.also_y.push_back(spread.mean + spread.deviation);  // of both budgets, which stand side by side
+  }
+  plot.ticks_x = ratio_ticks(ratios);
+  for (const bool is_preset : {false, true})  // presets on top of the others
+    for (const TrackedPoint& point : tracked)
+      if (point.is_fixed_time == is_fixed_time && point.is_preset() == is_preset)
+        add_tracked(point, plotted, is_named_below(point, tracked, plotted.place), plot);
+  return panel_title(x, y, title) + plot_svg(plot) + "\n";
 }
 
 std::string legend(double y) {
@@ -254,9 +390,23 @@ std::vector<std::string> columns_of(const std::vector<ParetoRow>& rows) {
 double left_of(std::size_t column) { return kGap + (kPanelWidth + kGap) * static_cast<double>(column); }
 double top_of(std::size_t row) { return kTitle + (kHead + kPanelHeight + kGap) * static_cast<double>(row); }
 
+/// The panels of reconstructions, from `top` on.
+std::string tracked_panels(const std::vector<TrackedPoint>& tracked, double top) {
+  std::string text =
+      formatted("<text x=\"%.0f\" y=\"%.0f\" font-size=\"16\">", kGap + 8, top + 14) +
+      formatted("what it comes to: errors of a reconstruction, mean and standard deviation of %lld seeds",
+                static_cast<long long>(tracked.front().seeds)) +
+      "</text>\n";
+  for (std::size_t r = 0; r < kPlottedTracking.size(); ++r)
+    for (const bool is_fixed_time : {false, true})
+      text += tracked_panel(tracked, is_fixed_time, kPlottedTracking[r], left_of(is_fixed_time ? 1 : 0),
+                            top + kSection + top_of(r) - top_of(0));
+  return text;
+}
+
 /// Panels in two columns, with a title and what colours mean.
-std::string picture(const std::string& panels, std::size_t rows) {
-  const double width = left_of(2), height = top_of(rows);
+std::string picture(const std::string& panels, double height) {
+  const double width = left_of(2);
   return formatted("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" ", width, height) +
          formatted("width=\"%.0f\" height=\"%.0f\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n", width,
                    height) +
@@ -292,31 +442,13 @@ std::string pareto_front_table(const std::vector<ParetoRow>& rows) {
   return text;
 }
 
-std::string pareto_csv(const std::vector<ParetoRow>& rows) {
-  std::string text =
-      "scene,knob,value,model,gaussians,pixels,fragments,pairs,repeats,threads,isa,median_ms,min_ms,forward_ms,forward_"
-      "min_ms,backward_ms,"
-      "backward_min_ms,forward_ratio,backward_ratio,time_ratio,psnr_db,image_rms,image_max,image_p999,image_bias";
-  for (const char* name : kGradientClasses)
-    for (const char* part : {"relative_l2", "one_minus_cosine", "bias"}) text += std::string(",") + name + "_" + part;
+std::string pareto_csv(const std::vector<ParetoRow>& rows, const std::vector<TrackedPoint>& tracked) {
+  std::string text;
+  for (const std::string& name : csv_columns()) text += (text.empty() ? "" : ",") + name;
+  for (const std::string& name : tracked_csv_columns()) text += "," + name;
   text += "\n";
-  for (const ParetoRow& row : rows) {
-    text += csv_text(row.scene) + "," + row.knob + ",\"" + row.value + "\"," + model_name(row.model);
-    for (const Index count : {row.gaussians, row.pixels, row.fragments, row.pairs, static_cast<Index>(row.repeats)})
-      text += "," + std::to_string(count);
-    text += "," + std::to_string(row.threads) + "," + isa_name(row.isa);
-    for (const double value : {1e3 * row.both.median_s, 1e3 * row.both.least_s, 1e3 * row.forward.median_s,
-                               1e3 * row.forward.least_s, 1e3 * row.backward.median_s, 1e3 * row.backward.least_s,
-                               row.forward_ratio, row.backward_ratio, row.time_ratio})
-      text += "," + csv_number(value);
-    text += "," + (row.image.psnr_db() ? csv_number(*row.image.psnr_db()) : "");
-    for (const double value : {row.image.rms, row.image.max, row.image.p999, row.image.bias})
-      text += "," + csv_number(value);
-    for (const GradientError& error : row.gradients)
-      for (const double value : {error.relative_l2, error.one_minus_cosine, error.bias})
-        text += "," + csv_number(value);
-    text += "\n";
-  }
+  for (const ParetoRow& row : rows) text += csv_line(row);
+  for (const TrackedPoint& point : tracked) text += csv_line(point);
   return text;
 }
 
@@ -326,20 +458,25 @@ std::string pareto_json(const std::vector<ParetoRow>& rows) {
   return text;
 }
 
-std::string pareto_svg(const std::vector<ParetoRow>& rows) {
+std::string pareto_svg(const std::vector<ParetoRow>& rows, const std::vector<TrackedPoint>& tracked) {
   const std::vector<std::string> columns = columns_of(rows);
   std::string body;
   for (std::size_t r = 0; r < kPlotted.size(); ++r)
     for (std::size_t c = 0; c < columns.size(); ++c)
       body += panel(rows, columns[c], kPlotted[r], left_of(c), top_of(r));
-  return picture(body, kPlotted.size());
+  double height = top_of(kPlotted.size());
+  if (!tracked.empty()) {
+    body += tracked_panels(tracked, height);
+    height += kSection + top_of(kPlottedTracking.size()) - top_of(0);
+  }
+  return picture(body, height);
 }
 
 std::string pareto_front_svg(const std::vector<ParetoRow>& rows) {
   const std::string scene = columns_of(rows).empty() ? "" : columns_of(rows).back();
   return picture(panel(rows, scene, kPlotted[kImageError], left_of(0), top_of(0)) +
                      panel(rows, scene, kPlotted[kGradientError], left_of(1), top_of(0)),
-                 1);
+                 top_of(1));
 }
 
 }  // namespace hsi4d

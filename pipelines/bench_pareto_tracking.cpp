@@ -21,17 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr int kTimedIterations = 30;  // of a stage, by which its cost is known
 
-/// The metrics of summary.json that are told, and where.
-struct ToldMetric {
-  const char* metric;
-  TrackedPoint::Spread TrackedPoint::*place;
-};
-constexpr std::array<ToldMetric, 5> kTold = {{{"mpjpe_mm", &TrackedPoint::joints_mm},
-                                              {"world_mpjpe_mm", &TrackedPoint::world_mm},
-                                              {"object_translation_cm", &TrackedPoint::object_cm},
-                                              {"camera_translation_cm", &TrackedPoint::camera_cm},
-                                              {"camera_rotation_deg", &TrackedPoint::camera_deg}}};
-
 /// The config with a setting's knobs; blur, near plane and the like are the config's.
 RunConfig config_with(const RunConfig& config, const ParetoSetting& setting) {
   RunConfig result = config;
@@ -107,7 +96,7 @@ class PassingFolder {
 struct Job {
   RunConfig config;
   TrackedPoint point;
-  std::array<std::vector<double>, kTold.size()> values = {};  ///< by kTold, a seed each
+  std::array<std::vector<double>, kTrackedErrors.size()> values = {};  ///< by kTrackedErrors, a seed each
 };
 
 std::vector<Job> jobs_of(const Tracking& tracking, const std::vector<LossTerm>& losses) {
@@ -117,7 +106,7 @@ std::vector<Job> jobs_of(const Tracking& tracking, const std::vector<LossTerm>& 
   std::vector<Job> jobs;
   for (std::size_t i = 0; i < configs.size(); ++i) {
     const ParetoSetting& setting = tracking.settings[i];
-    TrackedPoint point{.knob = setting.knob, .value = setting.value};
+    TrackedPoint point{.knob = setting.knob, .value = setting.value, .seeds = tracking.seeds};
     point.cost_ratio = cost_of(configs[i], measured[i]) / cost_of(configs[0], measured[0]);
     point.iterations = iterations_of(configs[i]);
     jobs.push_back({configs[i], point});
@@ -137,8 +126,8 @@ void run_job(Job& job, const fs::path& dataset, const fs::path& folder, int seed
   options.folder = folder.string();
   options.threads = 1;
   const RunSummary summary = carry_out(config, losses, options);
-  for (std::size_t m = 0; m < kTold.size(); ++m)
-    if (const double* value = find_metric(summary.metrics.back().values, kTold[m].metric))
+  for (std::size_t m = 0; m < kTrackedErrors.size(); ++m)
+    if (const double* value = find_metric(summary.metrics.back().values, kTrackedErrors[m].metric))
       job.values[m].push_back(*value);
   fs::remove_all(folder);
 }
@@ -177,7 +166,8 @@ std::vector<TrackedPoint> measure_tracking(const Tracking& tracking, const std::
   }
   std::vector<TrackedPoint> points;
   for (Job& job : jobs) {
-    for (std::size_t m = 0; m < kTold.size(); ++m) job.point.*kTold[m].place = spread_of(job.values[m]);
+    for (std::size_t m = 0; m < kTrackedErrors.size(); ++m)
+      job.point.*kTrackedErrors[m].place = spread_of(job.values[m]);
     points.push_back(job.point);
   }
   return points;
@@ -205,12 +195,10 @@ std::string tracking_table(const std::vector<TrackedPoint>& points) {
 std::string tracking_json(const std::vector<TrackedPoint>& points) {
   std::string text;
   for (const TrackedPoint& p : points) {
-    nlohmann::ordered_json line = {{"tracking", p.is_fixed_time ? "time" : "steps"},
-                                   {"knob", p.knob},
-                                   {"value", p.value},
-                                   {"cost_ratio", p.cost_ratio},
-                                   {"iterations", p.iterations}};
-    for (const ToldMetric& told : kTold) {
+    nlohmann::ordered_json line = {{"tracking", p.budget()},     {"knob", p.knob},
+                                   {"value", p.value},           {"cost_ratio", p.cost_ratio},
+                                   {"iterations", p.iterations}, {"seeds", p.seeds}};
+    for (const TrackedError& told : kTrackedErrors) {
       const TrackedPoint::Spread& spread = p.*told.place;
       line[told.metric] = {{"mean", spread.mean}, {"deviation", spread.deviation}};
     }

@@ -13,21 +13,6 @@
 
 namespace hsi4d {
 
-/// A setting over all seeds. Standard deviations are those of a sample; 0 of one.
-struct TrackedPoint {
-  std::string knob, value;
-  bool is_fixed_time = false;  ///< as many iterations as take as long as the default's; else as many as the default's
-  double cost_ratio = 1;       ///< processor time of a frame's iterations, to the default's, at as many of them
-  Index iterations = 0;        ///< a frame, of all stages
-  struct Spread {
-    double mean = 0, deviation = 0;
-  };
-  Spread joints_mm = {}, world_mm = {}, object_cm = {}, camera_cm = {},
-         camera_deg = {};  ///< errors of the last stage, means over the frames
-
-  std::string name() const { return knob + " " + value; }
-};
-
 /// What is reconstructed, and how.
 struct Tracking {
   RunConfig config;  ///< with the section `synthetic` and stages that draw a frame; its seed and that of `synthetic`

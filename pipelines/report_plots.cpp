@@ -226,6 +226,8 @@ std::string plot_svg(const Plot& plot) {
   }
   if (xs.empty()) return "<p class=\"nothing\">There is nothing to plot.</p>";
   if (plot.begins_at_zero && !plot.is_log) ys.add(0);
+  for (const double y : plot.also_y)
+    if (has_place(plot, y)) ys.add(y);
   Axis x = plot.is_log_x ? log_axis(xs) : linear_axis(xs, 8, plot.has_whole_x, false);
   if (plot.is_log_x) x.ticks = plot.ticks_x;
   const Axis y = plot.is_log ? log_axis(ys) : linear_axis(ys, 5, false, true);

@@ -29,12 +29,13 @@ struct Plot {
   bool is_log = false;    ///< y on a logarithmic scale; points ≤ 0 are left out
   bool is_log_x = false;  ///< x on a logarithmic scale with ticks at ticks_x; all x > 0
   std::vector<double> ticks_x{};
-  bool begins_at_zero = false;  ///< y, unless it is logarithmic
-  bool has_whole_x = true;      ///< x ticks at whole numbers only
-  int decimals = 2;             ///< of y in tooltips
-  bool is_timed = false;        ///< x is the frame, of which the page's script marks the one that is looked at
-  double width = 380;           ///< in the units of the view box, where letters are 12 high; the page scales it
-  std::string attributes{};     ///< more of the element's attributes, of this program's making
+  bool begins_at_zero = false;   ///< y, unless it is logarithmic
+  std::vector<double> also_y{};  ///< what the axis of y reaches beside the points, so that plots have one in common
+  bool has_whole_x = true;       ///< x ticks at whole numbers only
+  int decimals = 2;              ///< of y in tooltips
+  bool is_timed = false;         ///< x is the frame, of which the page's script marks the one that is looked at
+  double width = 380;            ///< in the units of the view box, where letters are 12 high; the page scales it
+  std::string attributes{};      ///< more of the element's attributes, of this program's making
 };
 
 /// The plot as one <svg> element; a few words instead where there is nothing to plot.

@@ -19,7 +19,7 @@ constexpr int kMostCoefficients = (kHighestShDegree + 1) * (kHighestShDegree + 1
 
 // --- colours ---------------------------------------------------------------------------------------------------------
 
-/// From the camera's centre to eight means; (0, 0, 1) where they are the same point.
+/// From the camera's centre to eight means; (0, 0, 1) where they are the same point, NaN where one is not finite.
 struct ViewDirections {
   WideLanes unit[3], length;
   LaneMask<WideLanes> usable;
@@ -29,10 +29,12 @@ struct ViewDirections {
 template <class S>
 ViewDirections view_directions(const Vector3<double>& center, const S* means, Index count) {
   const WideLanes zero{}, one = lane_constant<WideLanes>(1);
+  const WideLanes none = lane_constant<WideLanes>(std::numeric_limits<double>::quiet_NaN());
   ViewDirections d{};
   for (int i = 0; i < 3; ++i) d.unit[i] = load_wide(means + i, 3, count) - center[i];
   const WideLanes largest = lane_max(lane_max(lane_abs(d.unit[0]), lane_abs(d.unit[1])), lane_abs(d.unit[2]));
-  d.usable = lane_finite(d.unit[0]) & lane_finite(d.unit[1]) & lane_finite(d.unit[2]) & (largest > zero);
+  const LaneMask<WideLanes> finite = lane_finite(d.unit[0]) & lane_finite(d.unit[1]) & lane_finite(d.unit[2]);
+  d.usable = finite & (largest > zero);
   const WideLanes scale = d.usable ? largest : one;
   WideLanes square = zero;
   for (WideLanes& x : d.unit) {
@@ -40,7 +42,10 @@ ViewDirections view_directions(const Vector3<double>& center, const S* means, In
     square = square + x * x;
   }
   const WideLanes norm = d.usable ? lane_sqrt(square) : one, inverse = one / norm;
-  for (int i = 0; i < 3; ++i) d.unit[i] = d.usable ? d.unit[i] * inverse : (i == 2 ? one : zero);
+  for (int i = 0; i < 3; ++i) {
+    const WideLanes otherwise = i == 2 ? one : zero;
+    d.unit[i] = d.usable ? d.unit[i] * inverse : (finite ? otherwise : none);
+  }
   d.length = norm * scale;
   return d;
 }

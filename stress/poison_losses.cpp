@@ -147,9 +147,10 @@ double changed_by_objects(Remedy remedy) {
 /// What steps with one poisoned number do.
 struct Steps {
   double tried = 0, bad = 0;
-  double lost = 0;    ///< other parameters that are no numbers after it
-  double moved = 0;   ///< bad evaluations that moved something
-  double errors = 0;  ///< of the program
+  double unheard = 0;  ///< NaN that results depend on, all of which are finite
+  double lost = 0;     ///< other parameters that are no numbers after it
+  double moved = 0;    ///< bad evaluations that moved something
+  double errors = 0;   ///< of the program
 };
 
 template <class S>
@@ -172,7 +173,7 @@ double not_finite(const std::vector<double>& numbers) {
 
 /// One step of a term's inputs; without the remedy, of Adam's first step as it is without a look at the gradient.
 template <class S>
-void step(TermOnTape<S>& term, Remedy remedy, Steps& steps) {
+bool step(TermOnTape<S>& term, Remedy remedy, Steps& steps) {
   const std::vector<double> before = all_numbers(term);
   term.run();
   const bool is_bad = !all_finite(term.results());
@@ -194,6 +195,24 @@ void step(TermOnTape<S>& term, Remedy remedy, Steps& steps) {
   double moved = 0;
   for (std::size_t i = 0; i < after.size(); ++i) moved += same_bits(after[i], before[i]) ? 0 : 1;
   steps.moved += is_bad && moved > 0 ? 1 : 0;
+  return is_bad;
+}
+
+/// Whether results depend on a number: others in its place change them.
+template <class S>
+bool depends_on(TermOnTape<S>& term, Var<S> leaf, Index row) {
+  term.run();
+  const std::vector<double> before = term.results();
+  const S good = term.tape.value(leaf).row(row)[0];
+  bool is_other = false;
+  for (const double other : {static_cast<double>(good) * 1.01 + 1e-3, static_cast<double>(good) * 0.99 - 1e-3}) {
+    term.tape.write(leaf).row(row)[0] = static_cast<S>(other);
+    term.run();
+    const std::vector<double> after = term.results();
+    for (std::size_t i = 0; i < after.size(); ++i) is_other = is_other || !same_bits(after[i], before[i]);
+  }
+  term.tape.write(leaf).row(row)[0] = good;
+  return is_other;
 }
 
 template <class S>
@@ -206,11 +225,14 @@ void try_term(const LossTerm& of, Remedy remedy, Steps& steps) {
     const Var<S> leaf = term.made.leaves[i];
     if (!term.tape.has_gradient(leaf)) continue;  // the term does not read it
     for (const Index row : {Index(0), term.tape.value(leaf).total_rows() - 1}) {
+      const bool is_heard = depends_on(term, leaf, row);
       for (const S poison : kPoison<S>) {
         term.tape.write(leaf).row(row)[0] = poison;
         steps.tried += 1;
         try {
-          step(term, remedy, steps);
+          const bool is_bad = step(term, remedy, steps);
+          // Without the remedy what is not finite is 0, as it is often "mended": nothing tells it any more.
+          steps.unheard += std::isnan(poison) && is_heard && !(is_bad && remedy == Remedy::kOn) ? 1 : 0;
         } catch (const std::exception&) {
           steps.errors += 1;
         }
@@ -242,6 +264,7 @@ std::vector<StressFigure> poisoned_losses(Remedy remedy) {
   return {{"parameters lost by steps with a poisoned input", steps.lost, 0},
           {"bad evaluations that moved something", steps.moved, 0},
           {"errors", steps.errors, 0},
+          {"NaN that matters and leaves all finite", steps.unheard, 0},
           {"share of poisoned inputs that leave all finite", 1 - steps.bad / steps.tried, 0.9}};
 }
 

@@ -69,7 +69,8 @@ struct Drawing {
 
 struct Changes {
   double pixels = 0, gradients = 0, not_finite = 0;
-  double kept = 0;  ///< results that are others after a bad number has gone
+  double kept = 0;       ///< results that are others after a bad number has gone
+  double swallowed = 0;  ///< finite pixels of what is shared and is not finite
 };
 
 double different(const std::vector<double>& a, const std::vector<double>& b) {
@@ -125,16 +126,31 @@ void try_poison(Drawing<S>& drawing, const std::vector<PoisonedPlace<S>>& places
   }
 }
 
-/// What all Gaussians share may spoil everything while it is bad, and nothing afterwards.
+/// The pixels with a number in place of another.
 template <class S>
-void try_shared(Drawing<S>& drawing, const Vars<S>& places, Changes& changes) {
+std::vector<double> pixels_with(Drawing<S>& drawing, Var<S> place, S number) {
+  const S before = std::exchange(drawing.tape.write(place)(0, 1), number);
+  drawing.tape.forward(drawing.loss);
+  drawing.tape.write(place)(0, 1) = before;
+  return drawing.pixels();
+}
+
+/// What all Gaussians share may spoil everything while it is bad, and nothing afterwards.
+///
+/// @param seen  what has to be seen while it is not finite; nothing is drawn by a camera that is not (kGates)
+template <class S>
+void try_shared(Drawing<S>& drawing, const Vars<S>& places, Var<S> seen, Changes& changes) {
   drawing.run();
   const std::array good = {drawing.pixels(), drawing.gradients(-1)};
   for (const Var<S> place : places) {
+    const PoisonResults others = {pixels_with(drawing, place, drawing.tape.value(place)(0, 1) + S(1e-2))};
+    const std::vector<std::vector<bool>> depends = changed_numbers(others, {good[0]});
     for (const S poison : kPoison<S>) {
       const S before = std::exchange(drawing.tape.write(place)(0, 1), poison);
       try {
         drawing.run();
+        if (!std::isfinite(poison) && place.id == seen.id)
+          changes.swallowed += swallowed_numbers({drawing.pixels()}, depends, {});
       } catch (const UserError&) {  // a camera that makes no sense: told
       }
       drawing.tape.write(place)(0, 1) = before;
@@ -207,7 +223,7 @@ void try_composite(Changes& changes) {
                  {flat.opacities},
                  {flat.features, true, true}},
                 flat.factors, std::vector<double>(6 * kRows, 0), changes);
-  try_shared<S>(flat.drawing, {flat.background}, changes);
+  try_shared<S>(flat.drawing, {flat.background}, flat.background, changes);
 }
 
 RenderRequest with_all(bool with_depth) {
@@ -241,7 +257,7 @@ void try_render(bool with_depth, Changes& changes) {
                  {taped.logits, false},
                  {taped.sh, true, true}},
                 taped.means, behind, changes);
-  try_shared<S>(drawing, {taped.xi, taped.background}, changes);
+  try_shared<S>(drawing, {taped.xi, taped.background}, taped.background, changes);
 }
 
 /// Pixels of which a Gaussian is left out by a factor of 0 in place of a gate: Σ weight · valid · colour.
@@ -269,7 +285,12 @@ Changes masked_by_product() {
   };
   Changes changes;
   for (const double poison : kPoison<double>) {
-    if (!std::isfinite(poison)) changes.pixels += different(image(17, poison, true), image(17, poison, false));
+    if (std::isfinite(poison)) continue;
+    const std::vector<double> without = image(17, poison, false);
+    changes.pixels += different(image(17, poison, true), without);
+    // A background that is not finite, taken for black where it is not, and taken away again where it is.
+    changes.swallowed += swallowed_numbers({without}, {std::vector<bool>(without.size(), true)}, {});
+    for (const double pixel : without) changes.kept += same_bits((pixel + poison) - poison, pixel) ? 0 : 1;
   }
   return changes;
 }
@@ -285,6 +306,7 @@ std::vector<StressFigure> figures_of(Remedy remedy, const F& measure) {
   return {{"pixels that differ from those without the Gaussian", changes.pixels, 0},
           {"gradients that do, or are not 0 for it", changes.gradients, 0},
           {"numbers that are not finite where inputs are", changes.not_finite, 0},
+          {"finite pixels of what all share and is not", changes.swallowed, 0},
           {"results that differ when what all share is good again", changes.kept, 0}};
 }
 

@@ -93,8 +93,8 @@ std::string bench_pareto_command(const BenchParetoOptions& options, const std::v
     tracked = track(tracking, losses, observer);
   }
   if (!options.json.empty()) write_text_file(options.json, pareto_json(rows) + tracking_json(tracked));
-  if (!options.csv.empty()) write_text_file(options.csv, pareto_csv(rows));
-  if (!options.plot.empty()) write_text_file(options.plot, pareto_svg(rows));
+  if (!options.csv.empty()) write_text_file(options.csv, pareto_csv(rows, tracked));
+  if (!options.plot.empty()) write_text_file(options.plot, pareto_svg(rows, tracked));
   if (!options.front.empty()) write_text_file(options.front, pareto_front_svg(rows));
   const std::string fronts = pareto_front_table(rows);
   return pareto_table(rows) + (fronts.empty() ? "" : "\n" + fronts) +

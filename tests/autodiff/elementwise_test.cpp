@@ -1,6 +1,8 @@
 #include "autodiff/elementwise.h"
 
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "autodiff/map.h"
 #include "tests/support/operator_check.h"
@@ -70,6 +72,20 @@ TEST_CASE("map and its dual numbers pass the operator checks", "[parallel]") {
         return sum_over({in[0], in[1], in[2]}, bump);
       },
       kFew);
+}
+
+TEST_CASE("the smaller and the larger are NaN where either number is") {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  Tape<double> tape;
+  const Var<double> a = tape.parameter("a", shape_of(1, 4)), b = tape.parameter("b", shape_of(1, 4));
+  const double first[] = {kNan, 1, kNan, 1}, second[] = {2, kNan, kNan, 2};
+  for (Index c = 0; c < 4; ++c) tape.write(a)(0, c) = first[c], tape.write(b)(0, c) = second[c];
+  for (const auto& [result, last] : {std::pair{min(a, b), 1.0}, std::pair{max(a, b), 2.0}}) {
+    tape.forward(result);
+    const ConstArray<double> y = tape.value(result);
+    for (Index c = 0; c < 3; ++c) CHECK(std::isnan(y(0, c)));
+    CHECK(y(0, 3) == last);
+  }
 }
 
 TEST_CASE("stop_gradient copies the value and has no gradient behind it") {

@@ -187,7 +187,7 @@ TEST_CASE("every scene is drawn with fewer errors the fewer cuts there are") {
   std::string head, line;
   std::getline(csv, head);
   const auto commas = std::count(head.begin(), head.end(), ',');
-  CHECK(commas == 24 + 18);
+  CHECK(commas == 24 + 18 + 4 + 2 * std::ssize(kTrackedErrors));  // a render's, its gradients', a reconstruction's
   for (objects = 0; std::getline(csv, line); ++objects)
     CHECK(std::count(line.begin(), line.end(), ',') == commas + std::count(line.begin(), line.end(), '"') / 2 - 1);
   CHECK(objects == rows.size());
@@ -200,6 +200,86 @@ TEST_CASE("every scene is drawn with fewer errors the fewer cuts there are") {
   CHECK_THAT(pareto_front_svg(rows), Contains("image, RMS, avatar_in_scene") &&
                                          Contains("gradient, relative L2, worst class, avatar_in_scene") &&
                                          Contains(">default</text>") && !Contains("median of all scenes"));
+}
+
+namespace {
+
+/// Reconstructions with the default and with `fast`, for both budgets.
+std::vector<TrackedPoint> made_up_tracking() {
+  std::vector<TrackedPoint> points;
+  for (const bool is_fixed_time : {false, true}) {
+    TrackedPoint point{.knob = "quality", .value = "default", .iterations = 68, .seeds = 5};
+    point.is_fixed_time = is_fixed_time;
+    point.joints_mm = {13.43, 5.3};
+    points.push_back(point);
+    point.value = "fast";
+    point.cost_ratio = 0.9;
+    point.joints_mm = {is_fixed_time ? 40 : 12.2, 5.25};
+    points.push_back(point);
+  }
+  return points;
+}
+
+std::size_t occurrences(const std::string& text, const std::string& word) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) ++count;
+  return count;
+}
+
+/// Part i of a line of CSV that has no comma in a text.
+std::string field(const std::string& line, std::size_t i) {
+  std::size_t from = 0;
+  for (; i > 0; --i) from = line.find(',', from) + 1;
+  return line.substr(from, line.find(',', from) - from);
+}
+
+}  // namespace
+
+TEST_CASE("a table of numbers has reconstructions below renders, under the same head") {
+  const std::vector<TrackedPoint> tracked = made_up_tracking();
+  std::istringstream csv(pareto_csv({made_up("a", "x", 1, 1e-3, 0.1)}, tracked));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(csv, line);) lines.push_back(line);
+  REQUIRE(lines.size() == 2 + tracked.size());
+  const auto count_of = [](const std::string& line) { return std::count(line.begin(), line.end(), ','); };
+  for (const std::string& line : lines) CHECK(count_of(line) == count_of(lines[0]));
+  const auto named = [&](const std::string& line, const std::string& column) {
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(count_of(lines[0])); ++i)
+      if (field(lines[0], i) == column) return field(line, i);
+    return "no column " + column;
+  };
+  CHECK(named(lines[1], "scene") == "a");
+  CHECK(named(lines[1], "tracking").empty());
+  CHECK(named(lines[1], "mpjpe_mm_mean").empty());
+  CHECK(named(lines[3], "scene").empty());
+  CHECK(named(lines[3], "time_ratio").empty());
+  CHECK(named(lines[3], "value") == "\"fast\"");
+  CHECK(named(lines[3], "tracking") == "steps");
+  CHECK(named(lines[3], "iterations") == "68");
+  CHECK(named(lines[3], "seeds") == "5");
+  CHECK(named(lines[3], "cost_ratio") == "0.9");
+  CHECK(named(lines[3], "mpjpe_mm_mean") == "12.2");
+  CHECK(named(lines[3], "mpjpe_mm_deviation") == "5.25");
+  CHECK(named(lines[5], "tracking") == "time");
+  CHECK(named(lines[5], "mpjpe_mm_mean") == "40");
+}
+
+TEST_CASE("a picture has what errors come to below them: means and their spread, by both budgets") {
+  const std::vector<ParetoRow> rows = {made_up("a", "x", 1, 1e-3, 0.1), made_up("a", "y", 2, 1e-4, 0.01)};
+  const std::string without = pareto_svg(rows), svg = pareto_svg(rows, made_up_tracking());
+  CHECK_THAT(without, !Contains("reconstruction"));
+  CHECK_THAT(svg, Contains("errors of a reconstruction, mean and standard deviation of 5 seeds") &&
+                      Contains(">joints beside the pelvis, mm, after as many steps</text>") &&
+                      Contains(">joints beside the pelvis, mm, after as long as the default</text>") &&
+                      Contains("<title>fast: 12.20 +- 5.25 mm</title>") &&
+                      Contains("<title>default: 13.43 +- 5.30 mm</title>"));
+  CHECK(occurrences(svg, "<svg class=\"plot\"") == occurrences(without, "<svg class=\"plot\"") + 8);
+  // Side by side on one axis: the left one, whose errors are below 20, reaches as far.
+  const std::size_t left = svg.find("aria-label=\"joints beside the pelvis, mm, after as many steps"),
+                    right = svg.find("aria-label=\"joints beside the pelvis, mm, after as long");
+  REQUIRE((left != std::string::npos && right != std::string::npos));
+  CHECK_THAT(svg.substr(left, svg.find("</svg>", left) - left), Contains(">40</text>"));
+  CHECK_THAT(svg.substr(right, svg.find("</svg>", right) - right), Contains(">40</text>"));
 }
 
 namespace {
