@@ -243,6 +243,29 @@ std::string without_static_layers(const RunConfig& config) {
   return config.precision == RunPrecision::kDouble ? "precision=double" : "";
 }
 
+// ---- Optimisers ----
+
+/// Settings of a kind of optimiser that the stage does not have. They are no mistakes: a config that extends another
+/// one changes the kind alone, and the rest stands there.
+std::vector<RunNote> optimizer_notes(const RunConfig& config) {
+  std::vector<RunNote> notes;
+  for (const auto& [name, stage] : config.stages) {
+    const OptimizerSettings& own = stage.optimizer;
+    const OptimizerSettings usual;
+    const bool is_adam = own.kind == OptimizerKind::kAdam;
+    std::vector<std::string> idle;
+    if (is_adam && own.keep_curvature) idle.emplace_back("keep_curvature");
+    if (!is_adam && own.beta1 != usual.beta1) idle.emplace_back("beta1");
+    if (!is_adam && own.beta2 != usual.beta2) idle.emplace_back("beta2");
+    if (!is_adam && own.eps != usual.eps) idle.emplace_back("eps");
+    if (!idle.empty())
+      notes.push_back({LogLevel::kWarning, "stages." + name + ".optimizer: " + joined(idle) +
+                                               (idle.size() == 1 ? " does" : " do") + " nothing with kind " +
+                                               (is_adam ? "adam" : "bfgs")});
+  }
+  return notes;
+}
+
 /// Whether `problem` may be one only because of another, at the pointer `other`.
 bool may_follow(const RunProblem& problem, const std::string& other) {
   for (const std::string& need : problem.needs) {
@@ -309,7 +332,7 @@ void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use,
 }
 
 std::vector<RunNote> run_notes(const RunConfig& config) {
-  std::vector<RunNote> notes;
+  std::vector<RunNote> notes = optimizer_notes(config);
   const auto inform = [&notes](const char* text) { notes.push_back({LogLevel::kInfo, text}); };
   const RenderSkips& render = config.skip.render;
   if (!render.static_tiles && render.static_layer) inform("skip.static_tiles=false switches skip.static_layer off too");

@@ -17,7 +17,7 @@
 namespace hsi4d {
 
 struct StudySettings {
-  std::string a, b;           ///< run folders, or folders of runs with the same names
+  std::string a, b;           ///< run folders, folders of runs with the same names, or runs of sweeps
   std::filesystem::path out;  ///< a new or empty folder
   std::string texts;          ///< JSON file {"NAME": "what was to happen"}; empty: as the runs' configs say
   Index pairs_per_person = kPairsPerPerson;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "pipelines/json_text.h"
 #include "pipelines/run_folder.h"
 #include "pipelines/run_prompt.h"
+#include "pipelines/sweep_selection.h"
 
 namespace hsi4d {
 
@@ -44,6 +46,36 @@ void collect(const fs::path& folder, const std::string& name, std::set<fs::path>
   }
   for (const fs::path& inner : folders_in(folder))
     collect(inner, (name.empty() ? "" : name + "/") + inner.filename().string(), seen, runs);
+}
+
+/// The runs of a sweep that can be shown, by their names without these axes.
+Runs runs_of_sweep(const SweepSelection& selection, const std::set<std::string>& axes,
+                   std::vector<std::string>& notes) {
+  Runs runs;
+  std::map<std::string, std::string> whole_names;
+  std::size_t silent = 0;
+  for (const std::size_t run : selection.runs) {
+    const fs::path folder = selection.folder(run);
+    if (!has_preview(folder)) {
+      ++silent;
+      continue;
+    }
+    const std::string name = name_without_axes(selection.plan.runs[run], axes), whole = selection.name(run);
+    if (!runs.emplace(name, folder).second)
+      throw UserError(selection.text + ": " + json_string(whole_names[name]) + " and " + json_string(whole) +
+                      " would both be compared with one run of the other side; name more of what the runs have");
+    whole_names[name] = whole;
+  }
+  if (runs.empty())
+    throw UserError(selection.text + ": no run has a preview.mp4, which is made where ffmpeg is installed");
+  const auto tell = [&](std::size_t count, const char* why) {
+    if (count > 0)
+      notes.push_back(selection.text + ": " + std::to_string(count) + (count == 1 ? " run is" : " runs are") +
+                      " left out, " + why);
+  };
+  tell(selection.not_done, "not done yet");
+  tell(silent, "without a preview.mp4");
+  return runs;
 }
 
 /// By names relative to the folder; "" where it is a run itself.
@@ -93,8 +125,20 @@ void tell_unmatched(const std::string& folder, const Runs& runs, const std::stri
   if (!names.empty()) notes.push_back(other + " lacks what " + folder + " has, which is left out: " + joined(names));
 }
 
+/// What A and B hold. Runs of sweeps go by their names without what either side has named: "seed 1" both of A's
+/// "whole, seed 1" and of B's "no_color_net, seed 1".
+std::pair<Runs, Runs> runs_of_both(const std::string& a, const std::string& b, std::vector<std::string>& notes) {
+  const std::optional<SweepSelection> first = select_sweep_runs(a), second = select_sweep_runs(b);
+  std::set<std::string> axes;
+  for (const std::optional<SweepSelection>* const selection : {&first, &second}) {
+    if (*selection) axes.insert((*selection)->axes.begin(), (*selection)->axes.end());
+  }
+  return {first ? runs_of_sweep(*first, axes, notes) : runs_in(a),
+          second ? runs_of_sweep(*second, axes, notes) : runs_in(b)};
+}
+
 std::vector<StudyRuns> matched(const std::string& a, const std::string& b, std::vector<std::string>& notes) {
-  const Runs first = runs_in(a), second = runs_in(b);
+  const auto [first, second] = runs_of_both(a, b, notes);
   const bool is_run = first.contains(""), is_other_run = second.contains("");
   if (is_run != is_other_run)
     throw UserError((is_run ? a : b) + " is one run, " + (is_run ? b : a) +

@@ -442,10 +442,11 @@ std::string plain_value(const std::string& json) {
 
 std::string short_sweep_key(const std::string& key) { return last_parts(key, 1); }
 
-std::string sweep_label(const SweepRun& run) {
-  std::vector<std::string> parts;
-  for (const std::string& name : {run.block, run.clip, run.ablation}) {
-    if (!name.empty()) parts.push_back(name);
+std::vector<SweepLabelPart> sweep_label_parts(const SweepRun& run) {
+  std::vector<SweepLabelPart> parts;
+  for (const auto& [axis, name] :
+       {std::pair<const char*, std::string>{"block", run.block}, {"clip", run.clip}, {"ablation", run.ablation}}) {
+    if (!name.empty()) parts.push_back({axis, name});
   }
   for (const auto& [key, value] : run.values) {
     std::size_t count = 1;
@@ -453,10 +454,22 @@ std::string sweep_label(const SweepRun& run) {
       return other.first != own && last_parts(other.first, count) == last_parts(own, count);
     };
     while (last_parts(key, count) != key && std::any_of(run.values.begin(), run.values.end(), is_like)) ++count;
-    parts.push_back(last_parts(key, count) + " " + plain_value(value));
+    parts.push_back({key, last_parts(key, count) + " " + plain_value(value)});
   }
-  if (!run.seed.empty()) parts.push_back("seed " + run.seed);
-  return parts.empty() ? "the only run" : joined(parts);
+  if (!run.seed.empty()) parts.push_back({"seed", "seed " + run.seed});
+  return parts;
+}
+
+std::string sweep_label(const SweepRun& run) {
+  std::vector<std::string> texts;
+  for (SweepLabelPart& part : sweep_label_parts(run)) texts.push_back(std::move(part.text));
+  return texts.empty() ? "the only run" : joined(texts);
+}
+
+SweepRun without_repetition(SweepRun run) {
+  run.clip.clear();
+  run.seed.clear();
+  return run;
 }
 
 SweepPlan plan_sweep(const fs::path& file, const std::vector<LossDescription>& losses) {

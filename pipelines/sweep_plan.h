@@ -31,8 +31,19 @@ struct SweepPlan {
   SweepSlurm slurm;
 };
 
+/// What a run is called on an axis: "no_color_net" on "ablation", "iterations 100" on that key, "seed 1" on "seed".
+struct SweepLabelPart {
+  std::string axis, text;
+};
+
+/// The parts of a run's label, of the axes that it has, in order.
+std::vector<SweepLabelPart> sweep_label_parts(const SweepRun& run);
+
 /// What a run is called: "no_color_net, iterations 100, seed 1"; "the only run" where there is no axis.
 std::string sweep_label(const SweepRun& run);
+
+/// The run without clip and seed: what it has in common with those of its row of the results.
+SweepRun without_repetition(SweepRun run);
 
 /// The last parts of keys that tell them apart: "iterations".
 std::string short_sweep_key(const std::string& key);

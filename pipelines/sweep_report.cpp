@@ -134,14 +134,15 @@ std::string sweep_page(const SweepResults& results) {
   return page + runs_section(results) + "</main>\n</body>\n</html>\n";
 }
 
-std::string write_sweep_results(const SweepPaths& paths) {
+SweepWritten write_sweep_results(const SweepPaths& paths) {
   const SweepFolderLock lock(paths);
-  const SweepResults results = read_sweep_results(paths);
-  const std::string markdown = sweep_markdown(results);
-  write_text_file(paths.csv(), sweep_csv(results));
+  SweepWritten written{read_sweep_results(paths), ""};
+  const std::string markdown = sweep_markdown(written.results);
+  write_text_file(paths.csv(), sweep_csv(written.results));
   write_text_file(paths.markdown(), markdown);
-  write_text_file(paths.report(), sweep_page(results));
-  return markdown + "\nreport: " + paths.report() + "\n";
+  write_text_file(paths.report(), sweep_page(written.results));
+  written.text = markdown + "\nreport: " + paths.report() + "\n";
+  return written;
 }
 
 }  // namespace hsi4d

@@ -8,9 +8,14 @@
 
 namespace hsi4d {
 
-/// Writes the three from what the folder holds now; runs that are not done are told. Returns what a terminal is shown:
-/// the tables, and where the report is. Errors as read_sweep_results.
-std::string write_sweep_results(const SweepPaths& paths);
+/// What was written, and the text that tells it: the tables of results.md, and where the report is.
+struct SweepWritten {
+  SweepResults results;
+  std::string text;
+};
+
+/// Writes the three from what the folder holds now; runs that are not done are told. Errors as read_sweep_results.
+SweepWritten write_sweep_results(const SweepPaths& paths);
 
 /// The text of report.html: one file that needs no other but for its links to the reports of runs.
 std::string sweep_page(const SweepResults& results);

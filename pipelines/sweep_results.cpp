@@ -9,13 +9,6 @@
 namespace hsi4d {
 namespace {
 
-/// A run without clip and seed.
-SweepRun without_repetition(SweepRun run) {
-  run.clip.clear();
-  run.seed.clear();
-  return run;
-}
-
 bool is_repetition(const SweepRun& a, const SweepRun& b) {
   return a.block == b.block && a.ablation == b.ablation && a.values == b.values;
 }
@@ -123,18 +116,24 @@ const MetricFacts& seconds_facts() {
   return facts;
 }
 
-SweepResults read_sweep_results(const SweepPaths& paths) {
+SweepResults sweep_results_of(SweepPlan plan, std::vector<SweepRow> rows) {
   SweepResults results;
-  results.plan = read_sweep_plan(paths);
-  for (std::size_t i = 0; i < results.plan.runs.size(); ++i) {
-    results.rows.push_back(read_row(paths, i, results.plan.runs[i]));
-    const std::string& clip = results.plan.runs[i].clip;
-    if (std::find(results.clips.begin(), results.clips.end(), clip) == results.clips.end())
-      results.clips.push_back(clip);
+  for (const SweepRun& run : plan.runs) {
+    if (std::find(results.clips.begin(), results.clips.end(), run.clip) == results.clips.end())
+      results.clips.push_back(run.clip);
   }
-  results.groups = groups_of(results.plan);
-  results.metrics = metrics_of(results.rows);
+  results.groups = groups_of(plan);
+  results.metrics = metrics_of(rows);
+  results.plan = std::move(plan);
+  results.rows = std::move(rows);
   return results;
+}
+
+SweepResults read_sweep_results(const SweepPaths& paths) {
+  SweepPlan plan = read_sweep_plan(paths);
+  std::vector<SweepRow> rows;
+  for (std::size_t i = 0; i < plan.runs.size(); ++i) rows.push_back(read_row(paths, i, plan.runs[i]));
+  return sweep_results_of(std::move(plan), std::move(rows));
 }
 
 GroupStatistics group_statistics(const SweepResults& results, const SweepGroup& group, const MetricFacts& metric,

@@ -48,6 +48,9 @@ struct SweepResults {
 /// Facts of the time of a run, which is a metric here.
 const MetricFacts& seconds_facts();
 
+/// Results of runs as they stand: their groups, clips and metrics. @param rows  by index, of all runs of the plan
+SweepResults sweep_results_of(SweepPlan plan, std::vector<SweepRow> rows);
+
 /// Reads how the runs of a folder stand. Errors as read_sweep_plan.
 SweepResults read_sweep_results(const SweepPaths& paths);
 

@@ -68,16 +68,32 @@ bool is_number(const std::string& text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
+/// What an array computes: runs of a plan of the folder. Its tasks count from one of them, as Slurm has a highest task.
+struct ArraySource {
+  std::string plan_file;
+  std::size_t first = 0;  ///< the run of task 0
+
+  /// "PLAN.json", or "PLAN.json+1000".
+  std::string text() const { return first == 0 ? plan_file : plan_file + "+" + std::to_string(first); }
+};
+
+ArraySource parse_source(const std::string& text) {
+  const std::size_t plus = text.rfind('+');
+  if (plus == std::string::npos || !is_number(text.substr(plus + 1))) return {text, 0};
+  return {text.substr(0, plus), std::stoul(text.substr(plus + 1))};
+}
+
 /// Adds a run of an array, which has its indices from a plan of the folder.
-void add_run(const fs::path& folder, const std::string& plan_file, const std::string& index, QueuedJobs& queued,
+void add_run(const fs::path& folder, const ArraySource& source, const std::string& task, QueuedJobs& queued,
              std::map<std::string, SweepPlan>& plans) {
-  if (!is_number(index)) return;
+  if (!is_number(task)) return;
+  const std::string& plan_file = source.plan_file;
   auto plan = plans.find(plan_file);
   if (plan == plans.end()) {
     const std::string path = (folder.parent_path() / "plans" / plan_file).string();
     plan = plans.emplace(plan_file, parse_sweep_plan(read_text_file(path), path)).first;
   }
-  const std::size_t run = std::stoul(index);
+  const std::size_t run = source.first + std::stoul(task);
   if (run < plan->second.runs.size()) queued.runs.insert(plan->second.runs[run].id);
 }
 
@@ -108,27 +124,38 @@ QueuedJobs queued_jobs(const fs::path& folder) {
       queued.has_results = true;
     } else {
       queued.arrays.insert(job);
-      add_run(folder, what, index, queued, plans);
+      add_run(folder, parse_source(what), index, queued, plans);
     }
   }
   const std::string file = (folder / "jobs.txt").string();  // of jobs that were given another comment
   std::istringstream jobs(fs::exists(file) ? read_text_file(file) : "");
-  for (std::string job, plan_file; jobs >> job >> plan_file;) {
+  for (std::string job, source; jobs >> job >> source;) {
     if (queued.arrays.contains(job)) continue;
     std::istringstream indices(told_of_job(job));
     for (std::string index; indices >> index;) {
       queued.arrays.insert(job);
-      add_run(folder, plan_file, index, queued, plans);
+      add_run(folder, parse_source(source), index, queued, plans);
     }
   }
   return queued;
 }
 
-void check_array_size(const std::vector<std::size_t>& runs) {
-  const std::string most = setting_of_slurm("MaxArraySize");
-  if (most.empty() || runs.back() < std::strtoul(most.c_str(), nullptr, 10)) return;
-  throw UserError("run " + std::to_string(runs.back()) + " is beyond what this Slurm takes in an array (MaxArraySize " +
-                  most + "); cut the sweep into several files");
+/// Runs that one array computes.
+struct ArrayPart {
+  std::vector<std::size_t> runs;
+  std::size_t first = 0;  ///< the run of its task 0
+};
+
+/// The runs in as few arrays as this Slurm takes them in, whose tasks are below MaxArraySize.
+std::vector<ArrayPart> array_parts(const std::vector<std::size_t>& runs) {
+  const std::size_t most = std::strtoul(setting_of_slurm("MaxArraySize").c_str(), nullptr, 10);
+  if (most == 0 || runs.back() < most) return {{runs, 0}};
+  std::vector<ArrayPart> parts;
+  for (const std::size_t run : runs) {
+    if (parts.empty() || run - parts.back().first >= most) parts.push_back({{}, run});
+    parts.back().runs.push_back(run);
+  }
+  return parts;
 }
 
 /// Submits a script and returns the id of its job.
@@ -148,16 +175,22 @@ std::string script(const SweepPaths& paths, const std::string& name, const std::
   return file;
 }
 
-std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const std::vector<std::size_t>& runs,
-                         const std::string& program, int jobs, int threads) {
+/// @param after  another array that has to be over before, "": none
+std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const ArrayPart& part,
+                         const std::string& program, int jobs, int threads, const std::string& after) {
   const std::string whole = slurm_folder(paths).parent_path().string();
-  const std::string plan_file = fs::path(paths.frozen_plan(plan)).filename().string();
-  const std::string command = quoted(program) + " run-one " + quoted(whole + "/plans/" + plan_file) +
-                              " \"$SLURM_ARRAY_TASK_ID\" --out " + quoted(whole) + " --threads " +
-                              std::to_string(threads) + " --requeue";
-  const std::string job = submit(array_options(paths, plan, runs, jobs, threads), script(paths, "run.sh", command));
+  const ArraySource source = {fs::path(paths.frozen_plan(plan)).filename().string(), part.first};
+  const std::string first = std::to_string(part.first);
+  const std::string index = part.first == 0 ? "$SLURM_ARRAY_TASK_ID" : "$((SLURM_ARRAY_TASK_ID + " + first + "))";
+  const std::string command = quoted(program) + " run-one " + quoted(whole + "/plans/" + source.plan_file) + " \"" +
+                              index + "\" --out " + quoted(whole) + " --threads " + std::to_string(threads) +
+                              " --requeue";
+  std::vector<std::string> options = array_options(paths, plan, part.runs, jobs, threads, part.first);
+  if (!after.empty()) options.push_back("--dependency=afterany:" + after);
+  const std::string name = part.first == 0 ? "run.sh" : "run_from_" + first + ".sh";
+  const std::string job = submit(std::move(options), script(paths, name, command));
   const std::string known = (slurm_folder(paths) / "jobs.txt").string();
-  write_text_file(known, (fs::exists(known) ? read_text_file(known) : "") + job + " " + plan_file + "\n");
+  write_text_file(known, (fs::exists(known) ? read_text_file(known) : "") + job + " " + source.text() + "\n");
   return job;
 }
 
@@ -176,6 +209,8 @@ std::string submit_results(const SweepPaths& paths, const SweepPlan& plan, const
                 script(paths, "results.sh", quoted(program) + " report " + quoted(folder.parent_path().string())));
 }
 
+int most_at_once(const SweepPlan& plan, int jobs) { return jobs > 0 ? jobs : plan.slurm.at_once; }
+
 }  // namespace
 
 std::string array_text(const std::vector<std::size_t>& indices) {
@@ -191,13 +226,16 @@ std::string array_text(const std::vector<std::size_t>& indices) {
 }
 
 std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan& plan,
-                                       const std::vector<std::size_t>& runs, int jobs, int threads) {
+                                       const std::vector<std::size_t>& runs, int jobs, int threads, std::size_t first) {
   const SweepSlurm& slurm = plan.slurm;
-  const int at_once = jobs > 0 ? jobs : slurm.at_once;
+  const int at_once = most_at_once(plan, jobs);
+  std::vector<std::size_t> tasks = runs;
+  for (std::size_t& task : tasks) task -= first;
+  const ArraySource source = {fs::path(paths.frozen_plan(plan)).filename().string(), first};
   std::vector<std::string> options = {
       "--job-name=" + plan.name,
-      "--comment=" + job_comment(slurm_folder(paths), fs::path(paths.frozen_plan(plan)).filename().string()),
-      "--array=" + array_text(runs) + (at_once > 0 ? "%" + std::to_string(at_once) : ""),
+      "--comment=" + job_comment(slurm_folder(paths), source.text()),
+      "--array=" + array_text(tasks) + (at_once > 0 ? "%" + std::to_string(at_once) : ""),
       "--output=" + without_patterns(slurm_folder(paths).string()) + "/%A_%a.txt",
       "--open-mode=append",
       "--requeue",
@@ -227,12 +265,14 @@ SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std
     }
   }
   std::set<std::string> arrays = queued.arrays;
-  if (!submitted.runs.empty()) {
-    check_array_size(submitted.runs);
-    submitted.array = submit_array(paths, plan, submitted.runs, program, jobs, threads);
-    arrays.insert(submitted.array);
+  for (const ArrayPart& part : submitted.runs.empty() ? std::vector<ArrayPart>() : array_parts(submitted.runs)) {
+    // The most at once are those of an array: with such a bound the next one waits for the one before.
+    const bool waits = most_at_once(plan, jobs) > 0 && !submitted.arrays.empty();
+    submitted.arrays.push_back(
+        submit_array(paths, plan, part, program, jobs, threads, waits ? submitted.arrays.back() : ""));
+    arrays.insert(submitted.arrays.back());
   }
-  const bool has_results_of_all = queued.has_results && submitted.array.empty();
+  const bool has_results_of_all = queued.has_results && submitted.arrays.empty();
   if (!arrays.empty() && !has_results_of_all) submitted.results = submit_results(paths, plan, arrays, program);
   return submitted;
 }

@@ -111,19 +111,6 @@ Strings value_keys(const SweepPlan& plan) {
   return keys;
 }
 
-/// Runs that are not done, with why.
-std::string unfinished_text(const SweepResults& results) {
-  std::string text;
-  for (const SweepRow& row : results.rows) {
-    if (row.state == SweepRunState::kDone) continue;
-    std::string message = row.last ? row.last->message : "";
-    std::replace(message.begin(), message.end(), '\n', ' ');
-    text += "- run " + std::to_string(row.index) + ", " + sweep_label(results.plan.runs[row.index]) + ": " +
-            std::string(sweep_run_state_name(row.state)) + (message.empty() ? "" : ", " + message) + "\n";
-  }
-  return text;
-}
-
 /// Text in a cell of a Markdown table, where | begins the next one.
 std::string in_cell(const std::string& text) {
   std::string out;
@@ -234,6 +221,18 @@ SweepTable difference_table(const SweepResults& results) {
   return table;
 }
 
+std::string unfinished_text(const SweepResults& results) {
+  std::string text;
+  for (const SweepRow& row : results.rows) {
+    if (row.state == SweepRunState::kDone) continue;
+    std::string message = row.last ? row.last->message : "";
+    std::replace(message.begin(), message.end(), '\n', ' ');
+    text += "- run " + std::to_string(row.index) + ", " + sweep_label(results.plan.runs[row.index]) + ": " +
+            std::string(sweep_run_state_name(row.state)) + (message.empty() ? "" : ", " + message) + "\n";
+  }
+  return text;
+}
+
 std::string markdown_of(const SweepTable& table) {
   if (table.rows.empty()) return "";
   std::vector<Strings> lines = {{""}};
@@ -279,7 +278,7 @@ std::string sweep_markdown(const SweepResults& results) {
 
 std::string sweep_csv(const SweepResults& results) {
   const Strings keys = value_keys(results.plan);
-  Strings head = {"index", "run", "block", "clip", "ablation", "seed"};
+  Strings head = {"index", "run", "name", "block", "clip", "ablation", "seed"};
   head.insert(head.end(), keys.begin(), keys.end());
   for (const char* const name : {"state", "starts", "programs", "version", "git", "program", "host", "peak_mb"})
     head.push_back(name);
@@ -287,7 +286,7 @@ std::string sweep_csv(const SweepResults& results) {
   std::string text = csv_line(head);
   for (const SweepRow& row : results.rows) {
     const SweepRun& run = results.plan.runs[row.index];
-    Strings words = {std::to_string(row.index), run.id, run.block, run.clip, run.ablation, run.seed};
+    Strings words = {std::to_string(row.index), run.id, sweep_label(run), run.block, run.clip, run.ablation, run.seed};
     for (const std::string& key : keys) {
       const auto has =
           std::find_if(run.values.begin(), run.values.end(), [&key](const auto& value) { return value.first == key; });

@@ -50,6 +50,9 @@ std::string progress_text(const SweepResults& results);
 /// A metric as the heading of a column, "MPJPE, mm ↓".
 std::string metric_heading(const MetricFacts& facts);
 
+/// Runs that are not done, a line each, with why.
+std::string unfinished_text(const SweepResults& results);
+
 /// The table as Markdown, in columns of one width; empty for one without rows.
 std::string markdown_of(const SweepTable& table);
 

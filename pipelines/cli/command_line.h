@@ -17,6 +17,7 @@
 #include "pipelines/cli/bench_pareto_command.h"
 #include "pipelines/cli/bench_scaling_command.h"
 #include "pipelines/cli/bench_stages_command.h"
+#include "pipelines/cli/bench_topics.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/convert_command.h"
 #include "pipelines/cli/demo_command.h"
@@ -63,6 +64,7 @@ struct CommandLine {
   PoseOptions pose;
   MotionOptions motion;
   BenchOptions bench;
+  BenchTopicOptions bench_topic_options;
   BenchStagesOptions bench_stages;
   BenchScalingOptions bench_scaling;
   StressOptions stress;
@@ -78,6 +80,8 @@ struct CommandLine {
 
   explicit CommandLine(const std::vector<LossTerm>& terms);
   ~CommandLine();
+  /// Before help is shown: that of a topic of `bench` is of its own options alone.
+  void describe_for_help();
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;
 
@@ -108,6 +112,8 @@ struct CommandLine {
   void add_stress();
   void add_gradcheck(const std::vector<LossTerm>& terms);
   void add_bench(const std::vector<LossTerm>& terms);
+  void add_bench_measuring(CLI::App& command);
+  void add_bench_runs(CLI::App& command);
   void add_bench_pareto(CLI::App& command);
   /// @param threads  that were asked for; 0: none
   std::string run_bench(int threads, const std::vector<LossTerm>& terms);

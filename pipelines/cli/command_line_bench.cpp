@@ -65,40 +65,16 @@ void CommandLine::add_bench(const std::vector<LossTerm>& terms) {
       app->add_subcommand("bench",
                           "Measure the speed of the renderer, the body, the tape or a whole run, time against "
                           "error, or the pixel filter: a table, and one JSON object a measurement");
-  const std::vector<std::string> topics = {"rasterize",    "skinning", "color_net", "tape",
-                                           "pixel_filter", "stages",   "scaling",   "pareto"};
   command
       ->add_option("TOPIC", topic,
-                   "What: " + joined(topics) + "; default: the kernels, which are rasterize, skinning, color_net, tape")
-      ->check(CLI::IsMember(topics));
-  command->add_option("--workload", bench.workloads, "Of a topic: only these; default: all; not of stages and scaling");
-  command
-      ->add_option("--threads", bench.threads,
-                   "Threads; default: 1, of stages and scaling what the config says; of tape 1 always")
-      ->check(CLI::Range(1, 1024));
-  command
-      ->add_option(
-          "--repeats", bench.repeats,
-          "Runs of each, of which the median is told; default: 9, of scaling 20; not of pixel_filter and stages")
-      ->check(CLI::Range(1, 1000));
-  command->add_option("--height", bench.heights_px, "Heights of the figures of pixel_filter, px; default: 32 to 512")
-      ->check(CLI::Range(8.0, 2048.0));
-  command->add_option("--json", bench.json, "File for the measurements, one JSON object a line");
-  command->add_option("--config", bench_stages.config, "Of stages, scaling and pareto: the config that is run")
-      ->type_name("F.json");
-  command->add_option("--out", bench_stages.out,
-                      "Of stages: folder of dataset and runs; default: runs/bench/CONFIG. Of pareto: folder that is "
-                      "made for those of the reconstructions and removed again; default: runs/bench/pareto");
-  command->add_option("--plot", bench_stages.plot, "Of stages, scaling and pareto: file for a picture")
-      ->type_name("F.svg");
+                   "What: " + joined(bench_topic_names()) + "; default: the kernels, which are " +
+                       joined(kernel_topics()) + ". `hsi4d bench TOPIC --help` explains each")
+      ->check(CLI::IsMember(bench_topic_names()));
+  add_bench_measuring(*command);
+  add_bench_runs(*command);
   add_bench_pareto(*command);
-  command
-      ->add_option("--axis", bench_scaling.axes,
-                   "Of scaling: scene, avatar, image or threads, with its values or without; default: all")
-      ->type_name("AXIS[=N,N...]");
-  command->add_flag("--compare", bench_stages.compare, "Of stages: run again without skips, and tell the ratio");
-  add_overrides(*command, bench_stages.overrides);
   command->callback([this, command, &terms] {
+    bench_topic_options.refuse_others(topic);
     const int threads = command->count("--threads") > 0 ? bench.threads : 0;
     if (command->count("--repeats") > 0) bench_scaling.repeats = bench.repeats;
     if (command->count("--config") > 0) bench_pareto.config = bench_stages.config;
@@ -107,21 +83,69 @@ void CommandLine::add_bench(const std::vector<LossTerm>& terms) {
   });
 }
 
+void CommandLine::add_bench_measuring(CLI::App& command) {
+  BenchTopicOptions& of = bench_topic_options;
+  // Without a topic it is refused by the kernels, which say what to do instead.
+  of.add(command.add_option("--workload", bench.workloads),
+         {{kernel_topics(), "only these workloads; default: all"},
+          {{"pixel_filter"}, "only these figures; default: all"},
+          {{"pareto"}, "only these of the scenes that are made up; default: all"}});
+  of.add(command.add_option("--threads", bench.threads)->check(CLI::Range(1, 1024)),
+         {{{"rasterize", "skinning", "color_net", "pixel_filter", "pareto"}, "threads; default: 1"},
+          {{"stages", "scaling"}, "threads; default: what the config says"},
+          {{"tape"}, "1, always"}});
+  std::vector<std::string> repeated = kernel_topics();
+  repeated.emplace_back("pareto");
+  of.add(command.add_option("--repeats", bench.repeats)->check(CLI::Range(1, 1000)),
+         {{repeated, "runs of each, of which the median is told; default: 9"},
+          {{"scaling"}, "iterations of each stage, of which the median is told; default: 20"}});
+  of.add(command.add_option("--height", bench.heights_px)->check(CLI::Range(8.0, 2048.0)),
+         {{{"pixel_filter"}, "heights of the figures, px; default: 32 to 512"}});
+  of.add(command.add_option("--json", bench.json)->type_name("F"),
+         {{bench_topic_names(), "file for the measurements, one JSON object a line"}});
+}
+
+void CommandLine::add_bench_runs(CLI::App& command) {
+  const std::vector<std::string> of_runs = {"stages", "scaling", "pareto"};
+  BenchTopicOptions& of = bench_topic_options;
+  of.add(command.add_option("--config", bench_stages.config)->type_name("F.json"),
+         {{{"stages", "scaling"}, "the config that is run; default: configs/bench/paper_scale.json"},
+          {{"pareto"}, "the config of the reconstructions; default: configs/bench/pareto_tracking.json"}});
+  of.add(add_several(command, "--set", bench_stages.overrides, "")->type_name("KEY=VALUE"),
+         {{of_runs, "change one setting of the config: render.blur=0.1. The value is JSON, or else text"}});
+  of.add(command.add_option("--out", bench_stages.out)->type_name("DIR"),
+         {{{"stages"}, "folder of dataset and runs; default: runs/bench/CONFIG"},
+          {{"pareto"},
+           "folder that is made for datasets and reconstructions and removed again; default: runs/bench/pareto"}});
+  of.add(command.add_option("--plot", bench_stages.plot)->type_name("F.svg"), {{of_runs, "file for a picture"}});
+  of.add(command.add_option("--axis", bench_scaling.axes)->type_name("AXIS[=N,N...]"),
+         {{{"scaling"}, "scene, avatar, image or threads, with its values or without; default: all"}});
+  of.add(command.add_flag("--compare", bench_stages.compare),
+         {{{"stages"}, "run again without skips, and tell the ratio"}});
+}
+
 void CommandLine::add_bench_pareto(CLI::App& command) {
+  const std::vector<std::string> pareto = {"pareto"};
   BenchParetoOptions& o = bench_pareto;
-  command.add_option("--csv", o.csv, "Of pareto: file for the measurements, a line each")->type_name("F.csv");
-  command.add_option("--front", o.front, "Of pareto: file for a picture of what settings are chosen by, two panels")
-      ->type_name("F.svg");
-  command
-      .add_option(
-          "--scene", o.scene_files,
-          std::string("Of pareto: Gaussians of a file to measure too, or of all files in a folder, instead of all "
-                      "that are made up unless --workload names some; ") +
-              kSplatFormats)
-      ->type_name("F.ply|DIR");
-  command.add_option("--knob", o.knobs, "Of pareto: only these and the default; default: all");
-  command.add_option("--seeds", o.seeds, "Of pareto: reconstructions of each setting; default: 5; 0 leaves these out")
-      ->check(CLI::Range(0, 100));
+  BenchTopicOptions& of = bench_topic_options;
+  of.add(command.add_option("--csv", o.csv)->type_name("F.csv"), {{pareto, "file for the measurements, a line each"}});
+  of.add(command.add_option("--front", o.front)->type_name("F.svg"),
+         {{pareto, "file for a picture of what settings are chosen by, two panels"}});
+  of.add(
+      command.add_option("--scene", o.scene_files)->type_name("F.ply|DIR"),
+      {{pareto, std::string("Gaussians of a file to measure too, or of all files in a folder, instead of all that are "
+                            "made up unless --workload names some; ") +
+                    kSplatFormats}});
+  of.add(command.add_option("--knob", o.knobs), {{pareto, "only these and the default; default: all"}});
+  of.add(command.add_option("--seeds", o.seeds)->check(CLI::Range(0, 100)),
+         {{pareto, "reconstructions of each setting; default: 5; 0 leaves these out"}});
+}
+
+void CommandLine::describe_for_help() {
+  const CLI::App* const chosen = app->get_subcommands().empty() ? nullptr : app->get_subcommands().front();
+  if (chosen == nullptr || chosen->get_name() != "bench") return;
+  const std::vector<std::string> words = chosen->get_option("TOPIC")->results();
+  if (!words.empty()) bench_topic_options.describe_topic(words.front(), *app->get_subcommand("bench"));
 }
 
 std::string CommandLine::run_bench(int threads, const std::vector<LossTerm>& terms) {

@@ -62,8 +62,11 @@ void CommandLine::add_evaluate() {
   CLI::App* command =
       app->add_subcommand("evaluate", "Errors of runs and motions against the truth, and what of them needs none");
   command
-      ->add_option("RUN", o.inputs,
-                   "Folders of runs, motions by AMASS's or SMPL-X's names (.npz), folders of SMPLer-X's files")
+      ->add_option(
+          "RUN", o.inputs,
+          "Folders of runs, motions by AMASS's or SMPL-X's names (.npz), folders of SMPLer-X's files; of a sweep "
+          "its folder, for all runs that are done, or SWEEP/NAME, for those of that name: "
+          "runs/ablations/whole")
       ->required();
   command
       ->add_option("--truth", s.truth,
@@ -128,7 +131,7 @@ void CommandLine::add_evaluate_scene(CLI::App& command) {
 
 void CommandLine::add_report() {
   CLI::App* report = app->add_subcommand("report", "Write report.html of runs and sweeps, and print their errors");
-  report->add_option("RUN", runs, "Folders of runs or sweeps")->required();
+  report->add_option("RUN", runs, "Folders of runs or sweeps; SWEEP/NAME: runs of a sweep by name")->required();
   report->callback([this] { run = [this] { return report_command(runs); }; });
 }
 
@@ -136,7 +139,10 @@ void CommandLine::add_study() {
   StudyOptions& o = study;
   CLI::App* command =
       app->add_subcommand("study", "Make a page on which people choose between videos, or tell what they chose");
-  command->add_option("RUNS", o.runs, "A and B: two folders of runs, or of folders of runs with the same names")
+  command
+      ->add_option("RUNS", o.runs,
+                   "A and B: two runs, two folders of runs with the same names, or runs of sweeps: SWEEP/NAME, as "
+                   "runs/ablations/whole")
       ->expected(0, 2)
       ->option_text("A B");
   command->add_option("--out", o.out, "Where the page goes: a new or empty folder; the key goes beside it")

@@ -4,15 +4,15 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
-#include <span>
 
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
 #include "core/text.h"
-#include "optim/motion_metrics.h"
 #include "pipelines/baseline_export.h"
+#include "pipelines/cli/evaluate_tables.h"
 #include "pipelines/cli/scene_options.h"
+#include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/json_text.h"
 #include "pipelines/published.h"
@@ -21,13 +21,6 @@
 
 namespace hsi4d::cli {
 namespace {
-
-/// A metric over the inputs that have it.
-struct Spread {
-  const MetricFacts* facts;
-  double mean = 0, deviation = 0;  ///< the sample's standard deviation
-  std::size_t count = 0;
-};
 
 void remove_member(ConfigValue& object, std::string_view key) {
   std::erase_if(object.members, [key](const ConfigMember& member) { return member.key == key; });
@@ -88,81 +81,6 @@ std::vector<Spread> spreads_of(const std::vector<Evaluation>& results) {
   return spreads;
 }
 
-/// How far repetitions are apart.
-struct Diversity {
-  const MetricFacts* facts;
-  double value;
-};
-
-/// Rows of text, of which the first is the header.
-using Rows = std::vector<std::vector<std::string>>;
-
-std::string label_of(const MetricFacts& facts) {
-  return std::string(facts.label) + (facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]");
-}
-
-std::string table_of(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean,
-                     const std::vector<Diversity>& diversity) {
-  Rows rows(1, {""});
-  for (const Evaluation& result : results) rows[0].push_back(result.name);
-  if (has_mean) rows[0].emplace_back("mean ± std");
-  for (const Spread& spread : spreads) {
-    const MetricFacts& facts = *spread.facts;
-    std::vector<std::string> row = {label_of(facts)};
-    for (const Evaluation& result : results) {
-      const double* const value = find_metric(result.values, facts.name);
-      row.push_back(value == nullptr ? "-" : fixed_number(*value, facts.decimals));
-    }
-    if (has_mean) {
-      row.push_back(fixed_number(spread.mean, facts.decimals) +
-                    (spread.count > 1 ? " ± " + fixed_number(spread.deviation, facts.decimals) : ""));
-    }
-    rows.push_back(std::move(row));
-  }
-  for (const auto& [facts, value] : diversity) {
-    std::vector<std::string> row = {label_of(*facts)};
-    row.resize(results.size() + 1, "-");
-    row.push_back(fixed_number(value, facts->decimals));
-    rows.push_back(std::move(row));
-  }
-  return table(rows);
-}
-
-/// The paper's figures that some input has a metric for, beside ours.
-std::string published_text(const std::vector<Evaluation>& results) {
-  Rows rows(1, {"beside the paper", "its clips"});
-  for (const Evaluation& result : results) rows[0].push_back(result.name);
-  for (const char* const column : {"ZeroHSI", "others, as published there"}) rows[0].emplace_back(column);
-  for (const PublishedFigure& figure : published_figures()) {
-    std::vector<std::string> row = {std::string(figure.label), figure.is_dynamic ? "dynamic" : "static"};
-    bool is_measured = false;
-    for (const Evaluation& result : results) {
-      const double* const own = own_figure(figure, result.values, result.has_objects);
-      is_measured = is_measured || own != nullptr;
-      row.push_back(own == nullptr ? "-" : fixed_number(*own, figure.decimals));
-    }
-    const std::string others = other_figures_text(figure);
-    row.push_back(fixed_number(figure.value, figure.decimals));
-    row.push_back(others.empty() ? "-" : others);
-    if (is_measured) rows.push_back(std::move(row));
-  }
-  if (rows.size() == 1) return "";
-  return "\n" + table(rows) + "Published: " + std::string(kPublishedSource) +
-         ".\nThey are of other clips, which are not public: the order of magnitude can be compared.\n";
-}
-
-std::string frames_text(const std::vector<Evaluation>& results) {
-  std::string text;
-  for (const Evaluation& result : results)
-    text += result.name + ": frames 1 to " + std::to_string(result.frames - 1) + " at " +
-            short_number(result.frame_rate) + " a second" + (result.truth.empty() ? "" : ", against " + result.truth) +
-            "\n";
-  for (const Evaluation& result : results) {
-    for (const std::string& note : result.notes) text += result.name + ": " + note + "\n";
-  }
-  return text;
-}
-
 void add_numbers(ConfigValue& object, const MetricValues& values) {
   for (const auto& [name, value] : values) object.add(name, ConfigValue::make_number(value));
 }
@@ -210,7 +128,7 @@ ConfigValue published_json() {
 }
 
 std::string json_text(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean,
-                      const std::vector<Diversity>& diversity) {
+                      const std::vector<Diversity>& diversity, const EvaluateInputs& inputs) {
   ConfigValue root = ConfigValue::make_object(), all = ConfigValue::make_array();
   for (const Evaluation& result : results) all.items.push_back(json_of(result));
   root.add("results", std::move(all));
@@ -224,28 +142,12 @@ std::string json_text(const std::vector<Evaluation>& results, const std::vector<
     root.add("mean", object_of(means));
     root.add("std", object_of(deviations));
   }
+  if (!inputs.sweeps.empty()) root.add("sweeps", sweeps_json(inputs, results));
   ConfigValue published = ConfigValue::make_object();
   published.add("source", ConfigValue::make_string(kPublishedSource));
   published.add("figures", published_json());
   root.add("published", std::move(published));
   return to_json(root);
-}
-
-/// The mean distance over all pairs of repetitions, in the world and of poses alone.
-std::vector<Diversity> diversity_of(const std::vector<Evaluation>& results) {
-  std::vector<std::vector<std::span<const double>>> motions;
-  for (const Evaluation& result : results) {
-    if (result.frame_rate != results.front().frame_rate ||
-        result.joints.front().size() != results.front().joints.front().size())
-      return {};
-    motions.emplace_back(result.joints.begin() + 1, result.joints.end());
-  }
-  std::vector<Diversity> diversity;
-  for (const auto& [name, is_of_poses] : {std::pair{"diversity_mm", false}, {"diversity_pose_mm", true}}) {
-    const std::optional<double> value = pairwise_distance_mm(motions, is_of_poses);
-    if (value) diversity.push_back({find_metric_facts(name), *value});
-  }
-  return diversity;
 }
 
 // ---- Options ----
@@ -344,20 +246,35 @@ std::string exported(const EvaluateOptions& options, const EvaluationSettings& s
   return text;
 }
 
+std::vector<const Evaluation*> pointers_to(const std::vector<Evaluation>& results) {
+  std::vector<const Evaluation*> pointers;
+  for (const Evaluation& result : results) pointers.push_back(&result);
+  return pointers;
+}
+
 }  // namespace
 
-std::string evaluate_command(const EvaluateOptions& options) {
+std::string evaluate_command(const EvaluateOptions& given) {
+  const EvaluateInputs inputs = evaluate_inputs(given.inputs);
+  EvaluateOptions options = given;
+  options.inputs = inputs.paths;
   const EvaluationSettings settings = settings_of(options);
   check_outputs(options);
   std::vector<Evaluation> results;
-  for (std::size_t i = 0; i < options.inputs.size(); ++i)
+  for (std::size_t i = 0; i < options.inputs.size(); ++i) {
     results.push_back(evaluate(settings, options.inputs[i], clip_of(options, i)));
+    results.back().name = inputs.names[i];
+  }
   const std::vector<Spread> spreads = spreads_of(results);
   const bool is_alike = are_repetitions(options.inputs);
-  const std::vector<Diversity> diversity = is_alike ? diversity_of(results) : std::vector<Diversity>();
-  if (!options.json.empty()) write_text_file(options.json, json_text(results, spreads, is_alike, diversity));
-  return table_of(results, spreads, is_alike && results.size() > 1, diversity) + "\n" + frames_text(results) +
-         published_text(results) + exported(options, settings);
+  const std::vector<Diversity> diversity = is_alike ? diversity_of(pointers_to(results)) : std::vector<Diversity>();
+  if (!options.json.empty()) write_text_file(options.json, json_text(results, spreads, is_alike, diversity, inputs));
+  const std::string published = published_text(results, inputs) + exported(options, settings);
+  if (inputs.sweeps.empty() || is_alike)
+    return table_of(results, spreads, is_alike && results.size() > 1, diversity) + "\n" + frames_text(results) +
+           published;
+  return table_of_runs(results, spreads) + sweeps_text(inputs, results, stdout_columns()) +
+         notes_of_runs(results, inputs) + published;
 }
 
 }  // namespace hsi4d::cli

@@ -9,7 +9,7 @@
 namespace hsi4d::cli {
 
 struct EvaluateOptions {
-  std::vector<std::string> inputs;           ///< folders of runs, motions (.npz), folders of SMPLer-X
+  std::vector<std::string> inputs;           ///< folders of runs, runs of sweeps, motions (.npz), folders of SMPLer-X
   EvaluationSettings settings;               ///< --truth, --data, --body-model, ...
   std::vector<std::string> object_surfaces;  ///< --object-surface NAME=F
   std::string align = "none";                ///< --align none|heading|rotation
@@ -20,8 +20,9 @@ struct EvaluateOptions {
 };
 
 /// A table with a row for each metric of summary.json that can be measured, and a column for each input; for several
-/// repetitions their mean, standard deviation and diversity too. Then what was taken for the truth, the scene and the
-/// world of each, and the paper's figures beside ours. Writes the JSON file, and what other methods start from.
+/// repetitions their mean, standard deviation and diversity too. Runs of a sweep that differ in more than seeds have a
+/// row each, and the tables of the sweep's report. Then what was taken for the truth, the scene and the world of each,
+/// and the paper's figures beside ours. Writes the JSON file, and what other methods start from.
 ///
 /// Throws UserError or DataError with one message for whatever is wrong with options and files.
 std::string evaluate_command(const EvaluateOptions& options);

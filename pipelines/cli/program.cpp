@@ -42,6 +42,7 @@ int run_commands(int argc, const char* const* argv, const std::vector<LossTerm>&
   try {
     line.app->parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
+    line.describe_for_help();
     print(line.app->help());  // of the subcommand, if one was named
     return kDone;
   } catch (const CLI::CallForVersion& version_text) {

@@ -20,10 +20,10 @@
 #include "pipelines/cli/failure.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/run_command.h"
+#include "pipelines/cli/sweep_text.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/sweep_local.h"
-#include "pipelines/sweep_report.h"
 #include "pipelines/sweep_run.h"
 #include "pipelines/sweep_slurm.h"
 
@@ -62,6 +62,21 @@ PlacedPlan read_plan(const std::string& sweep, const std::string& out, const std
   return placed;
 }
 
+/// The rows of the runs as a table; on a terminal without the names of folders, and labels shortened, where they find
+/// no place.
+std::string runs_table(std::vector<std::vector<std::string>> rows) {
+  constexpr int kRun = 1, kLabel = 1;  // the second once the first is gone
+  constexpr std::size_t kLeast = 20;
+  const std::optional<int> columns = stdout_columns();
+  if (!columns || table_width(column_widths(rows)) <= static_cast<std::size_t>(*columns)) return table(rows);
+  for (auto& row : rows) row.erase(row.begin() + kRun);
+  const std::vector<std::size_t> widths = column_widths(rows);
+  const std::size_t others = table_width(widths) - widths[kLabel], all = static_cast<std::size_t>(*columns);
+  for (auto& row : rows) row[kLabel] = shortened(row[kLabel], all > others + kLeast ? all - others : kLeast);
+  return table(rows) +
+         "\nwithout the names of folders, to be no wider than the terminal: --dry-run | less -S has them\n";
+}
+
 /// The runs as a table, with how each stands.
 std::string plan_text(const PlacedPlan& placed) {
   const SweepPlan& plan = placed.plan;
@@ -80,8 +95,9 @@ std::string plan_text(const PlacedPlan& placed) {
                     first == i ? std::string(sweep_run_state_name(state)) : "as " + std::to_string(first)});
   }
   const std::size_t runs = distinct_runs(plan).size();
-  std::string text = table(rows) + "\nsweep " + plan.name + ": " + count_text(std::ssize(plan.runs), "combination") +
-                     ", " + count_text(static_cast<std::int64_t>(runs), "run") + ", " + std::to_string(done) + " done";
+  std::string text = runs_table(std::move(rows)) + "\nsweep " + plan.name + ": " +
+                     count_text(std::ssize(plan.runs), "combination") + ", " +
+                     count_text(static_cast<std::int64_t>(runs), "run") + ", " + std::to_string(done) + " done";
   if (!datasets.empty()) text += "; " + count_text(std::ssize(datasets), "dataset") + " to be generated";
   return text + "; folder " + placed.paths.folder.string() + "\n";
 }
@@ -154,7 +170,7 @@ std::string local_sweep(const SweepArguments& arguments, const PlacedPlan& place
   for (const SweepFailure& failure : outcome.failures)
     status = std::max(status, failure.is_our_bug ? kOurBug : kUserMistake);
   try {
-    return write_sweep_results(placed.paths) + failures_text(placed.plan, outcome);
+    return write_and_show_results(placed.paths) + failures_text(placed.plan, outcome);
   } catch (const std::exception& problem) {  // a full disk, perhaps
     const std::string failures = failures_text(placed.plan, outcome);
     if (failures.empty()) throw;
@@ -187,12 +203,15 @@ std::string slurm_sweep(const SweepArguments& arguments, const PlacedPlan& place
   const std::string folder = placed.paths.folder.string();
   const std::string queued =
       jobs.queued > 0 ? count_text(static_cast<std::int64_t>(jobs.queued), "run") + " in the queue already\n" : "";
-  if (jobs.array.empty() && !jobs.results.empty())
+  if (jobs.arrays.empty() && !jobs.results.empty())
     return queued + "submitted the results as job " + jobs.results + "\n";
-  if (jobs.array.empty()) return queued + "nothing is left to submit; hsi4d report " + folder + " tells the results\n";
-  return queued + "submitted " + count_text(std::ssize(jobs.runs), "run") + " as job " + jobs.array +
-         ", the results as job " + jobs.results + "; squeue --jobs " + jobs.array + "," + jobs.results +
-         " tells how they stand, hsi4d report " + folder + " what is there\n";
+  if (jobs.arrays.empty()) return queued + "nothing is left to submit; hsi4d report " + folder + " tells the results\n";
+  std::string all;
+  for (const std::string& array : jobs.arrays) all += array + ",";
+  return queued + "submitted " + count_text(std::ssize(jobs.runs), "run") +
+         (jobs.arrays.size() == 1 ? " as job " : " as jobs ") + joined(jobs.arrays) + ", the results as job " +
+         jobs.results + "; squeue --jobs " + all + jobs.results + " tells how they stand, hsi4d report " + folder +
+         " what is there\n";
 }
 
 /// The right to compute a run. A launcher does not wait for it, and gets nothing: it has others to start.

@@ -14,15 +14,17 @@ namespace {
 constexpr double kTerminalInterval = 0.1, kPlainInterval = 10;  // seconds
 constexpr int kUsualColumns = 80;
 
-int terminal_columns() {
+int terminal_columns(int file) {
   winsize size{};
-  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsualColumns;
+  return ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsualColumns;
 }
 
 void show_bar(const ProgressState& state) {
   // One column stays free: writing the last one makes some terminals wrap. "\x1b[K" clears what a longer line left.
   std::string text = "\r";
-  text.append(progress_bar(state, terminal_columns() - 1)).append("\x1b[K").append(state.is_finished ? "\n" : "");
+  text.append(progress_bar(state, terminal_columns(STDERR_FILENO) - 1))
+      .append("\x1b[K")
+      .append(state.is_finished ? "\n" : "");
   std::fputs(text.c_str(), stderr);
   std::fflush(stderr);
 }
@@ -34,6 +36,11 @@ void show_line(const ProgressState& state) { std::fprintf(stderr, "%s\n", progre
 bool stderr_is_terminal() {
   const char* const term = std::getenv("TERM");
   return isatty(STDERR_FILENO) != 0 && term != nullptr && std::string(term) != "dumb" && *term != '\0';
+}
+
+std::optional<int> stdout_columns() {
+  if (isatty(STDOUT_FILENO) == 0) return std::nullopt;
+  return terminal_columns(STDOUT_FILENO);
 }
 
 Observer observer_on_terminal(bool quiet) {

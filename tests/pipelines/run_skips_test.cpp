@@ -336,3 +336,19 @@ TEST_CASE("a stage may work on smaller images than the run", "[run]") {
   CHECK(differences(small, all).back() > 0);
   CHECK(differences(small, all).back() < 0.3);
 }
+
+TEST_CASE("settings of an optimiser that the stage does not have are told, and leave the kind free to be changed") {
+  const auto told = [](const std::string& optimizer, std::vector<std::string> more = {}) {
+    more.insert(more.begin(),
+                {"stages.camera.optimize.camera.lr_final_share=1", "stages.camera.optimizer=" + optimizer});
+    return notes_of(more);
+  };
+  using Notes = std::vector<std::string>;
+  const std::string bfgs = R"({"kind": "bfgs", "keep_curvature": true})";
+  CHECK(told(bfgs).empty());
+  CHECK(told(bfgs, {"stages.camera.optimizer.kind=adam"}) ==
+        Notes{"warning: stages.camera.optimizer: keep_curvature does nothing with kind adam"});
+  CHECK(told(R"({"kind": "bfgs", "beta1": 0.8, "eps": 1e-9})") ==
+        Notes{"warning: stages.camera.optimizer: beta1, eps do nothing with kind bfgs"});
+  CHECK(told(R"({"beta1": 0.8, "eps": 1e-9})").empty());
+}

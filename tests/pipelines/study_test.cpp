@@ -10,6 +10,7 @@
 
 #include "core/image_io.h"
 #include "core/video.h"
+#include "tests/pipelines/made_sweep.h"
 #include "tests/support/program.h"
 
 using namespace hsi4d;
@@ -160,6 +161,50 @@ TEST_CASE("names of a study without a seed follow from nothing that people could
     CHECK(read_study_key(std::string(page) + "-key.json").pairs.size() == 2);
   }
   CHECK(names.size() == 2 * (2 + 2 * 3));
+}
+
+namespace {
+
+/// Gives the runs of a sweep previews, each with a grey of its own.
+void show_runs(const MadeSweep& sweep, std::size_t first, std::size_t end) {
+  for (std::size_t i = first; i < end; ++i)
+    write_video(fs::path(sweep.paths().run(sweep.id(i))) / "preview.mp4",
+                {0, 0.05F * static_cast<float>(i + 2), 0.5F, 1});
+}
+
+}  // namespace
+
+TEST_CASE("two methods of a sweep are compared by clip and seed") {
+  MadeSweep sweep;
+  sweep.finish_all();
+  show_runs(sweep, 0, 11);
+  const ProgramResult made = study({"made/plain", "made/other", "--out", "page", "--seed", "0"});
+  INFO(made.err);
+  REQUIRE(made.status == 0);
+  CHECK_THAT(made.out, StartsWith("page/index.html: 5 pairs, of which a person is shown 5; ") &&
+                           Contains("note: made/other: 1 run is left out, without a preview.mp4\n") &&
+                           Contains("note: made/other lacks what made/plain has, which is left out: b, seed 2\n"));
+  const nlohmann::json key = json_of("page-key.json");
+  CHECK(key["a"] == "made/plain");
+  const char* const names[] = {"a, seed 0", "a, seed 1", "a, seed 2", "b, seed 0", "b, seed 1"};
+  for (std::size_t i = 0; i < 5; ++i) {
+    CHECK(key["pairs"][i]["name"] == names[i]);
+    const std::string a = key["pairs"][i]["a"], b = key["pairs"][i]["b"];
+    CHECK(grey_of("page/videos/" + a + ".mp4") == Approx(0.05 * static_cast<double>(i + 2)).margin(0.02));
+    CHECK(grey_of("page/videos/" + b + ".mp4") == Approx(0.05 * static_cast<double>(i + 8)).margin(0.02));
+  }
+  for (const char* word : {"made/", "plain", "seed 0"}) CHECK_THAT(file_text("page/index.html"), !Contains(word));
+
+  // Single runs, runs beside those of another program, and what would be ambiguous.
+  REQUIRE(study({"made/a, plain, seed 0", "made/a, other, seed 1", "--out", "one"}).status == 0);
+  CHECK(json_of("one-key.json")["pairs"][0]["name"] == "pair");
+  foreign_run("baseline/a", 0.9F);
+  REQUIRE(study({"made/plain, seed 0", "baseline", "--out", "beside"}).status == 0);
+  CHECK(json_of("beside-key.json")["pairs"][0]["name"] == "a");
+  CHECK(refused({"made/plain", "made/other, seed 0", "--out", "x"}) ==
+        "made/plain: \"a, plain, seed 0\" and \"a, plain, seed 1\" would both be compared with one run of the other "
+        "side; name more of what the runs have\n");
+  CHECK_THAT(refused({"made/plain", "made/others", "--out", "x"}), Contains("did you mean \"other\"?"));
 }
 
 TEST_CASE("a run that has several names is compared once") {

@@ -71,7 +71,7 @@ TEST_CASE("a sweep that is not complete tells what is there") {
   CHECK(paired_difference(results, results.groups[1], mpjpe())->differences == std::vector<double>{6});
   const std::string text = sweep_markdown(results);
   CHECK_THAT(text, Contains("- run 7, a, other, seed 1: failed, no scene\n"));
-  CHECK_THAT(sweep_csv(results), Contains("\n6,00000000000000f6,,a,other,0,done,0,0,,,,,,16,2\n"));
+  CHECK_THAT(sweep_csv(results), Contains("\n6,00000000000000f6,\"a, other, seed 0\",,a,other,0,done,0,0,,,,,,16,2\n"));
   CHECK_THAT(sweep_page(results), Contains("<p class=\"message\">no scene</p>"));
 }
 

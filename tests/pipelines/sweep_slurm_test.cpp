@@ -65,7 +65,7 @@ struct StandInCluster {
 TEST_CASE("a sweep is submitted as an array and a job for its results") {
   const StandInCluster cluster;
   const SlurmJobs jobs = cluster.submit();
-  CHECK(jobs.array == "101");
+  CHECK(jobs.arrays == std::vector<std::string>{"101"});
   CHECK(jobs.results == "102");
   REQUIRE(cluster.asked().size() == 2);
   CHECK_THAT(cluster.asked()[0],
@@ -73,6 +73,37 @@ TEST_CASE("a sweep is submitted as an array and a job for its results") {
   CHECK_THAT(cluster.asked()[1], Contains("--dependency=afterany:101 ") && Contains(cluster.comment("results")));
   CHECK(file_text("made/slurm/jobs.txt") == "101 " + cluster.plan_name() + "\n");
   CHECK_THAT(file_text("made/slurm/run.sh"), Contains("exec '/opt/hsi4d' run-one '") && Contains(" --requeue\n"));
+}
+
+TEST_CASE("more runs than Slurm takes in an array are several, whose tasks count from their first run") {
+  const StandInCluster cluster;
+  cluster.script("scontrol", "echo 'MaxArraySize = 3'");
+  const SlurmJobs jobs = cluster.submit();
+  CHECK(jobs.arrays == std::vector<std::string>{"101", "102"});
+  CHECK(jobs.results == "103");
+  const std::string later = cluster.plan_name() + "+3";
+  CHECK_THAT(cluster.asked()[0], Contains("--array=0-2 ") && Contains(cluster.comment(cluster.plan_name()) + " "));
+  CHECK_THAT(cluster.asked()[1],
+             Contains("--array=0 ") && Contains(cluster.comment(later) + " ") && !Contains("--dependency"));
+  CHECK_THAT(cluster.asked()[2], Contains("--dependency=afterany:101:102 "));
+  CHECK(file_text("made/slurm/jobs.txt") == "101 " + cluster.plan_name() + "\n102 " + later + "\n");
+  CHECK_THAT(file_text("made/slurm/run.sh"), Contains(" \"$SLURM_ARRAY_TASK_ID\" --out "));
+  CHECK_THAT(file_text("made/slurm/run_from_3.sh"), Contains(" \"$((SLURM_ARRAY_TASK_ID + 3))\" --out "));
+
+  // What is in the queue is told by the tasks of its array, by comments and by jobs.txt.
+  cluster.made.here().write("queue.txt", "101 1 " + cluster.comment(cluster.plan_name()) + "\n102 0 its_owner's\n");
+  cluster.made.here().write("job.txt", "0\n");
+  const SlurmJobs rest = cluster.submit();
+  CHECK(rest.queued == 2);
+  CHECK(rest.runs == std::vector<std::size_t>{0, 2});
+}
+
+TEST_CASE("arrays of which only so many runs may be computed at once wait for each other") {
+  const StandInCluster cluster;
+  cluster.script("scontrol", "echo 'MaxArraySize = 3'");
+  submit_sweep(cluster.made.paths(), cluster.made.plan(), "/opt/hsi4d", 2, 1);
+  CHECK_THAT(cluster.asked()[0], Contains("--array=0-2%2 ") && !Contains("--dependency"));
+  CHECK_THAT(cluster.asked()[1], Contains("--array=0%2 ") && Contains("--dependency=afterany:101 "));
 }
 
 TEST_CASE("what a killed launcher has submitted is not submitted again") {
@@ -83,7 +114,7 @@ TEST_CASE("what a killed launcher has submitted is not submitted again") {
                                              comment + "\n9 N/A of_another_sweep\n8 N/A\n");
   const SlurmJobs jobs = cluster.submit();
   CHECK(jobs.queued == 4);
-  CHECK(jobs.array.empty());
+  CHECK(jobs.arrays.empty());
   CHECK(jobs.results == "101");
   CHECK_THAT(cluster.asked().at(0), Contains("--dependency=afterany:7 "));
   cluster.made.here().write("queue.txt", file_text("queue.txt") + "10 N/A " + cluster.comment("results") + "\n");

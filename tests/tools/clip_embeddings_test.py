@@ -4,11 +4,14 @@ stand-ins for CLIP of transformers 4 and 5.
     python3 tests/tools/clip_embeddings_test.py TOOLS        # the folder tools/
 """
 
+import json
 import os
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
+import zipfile
 
 program = pathlib.Path(sys.argv[1]).resolve() / "services" / "clip_embeddings.py"
 
@@ -121,6 +124,31 @@ with tempfile.TemporaryDirectory() as name:
     assert not (folder / "clip.npz").exists()
     assert os.access(program, os.X_OK)
 
+    # Runs and sweeps say all of it themselves.
+    def write_run(run, state="done", prompt="a person sits", rate=10.0):
+        (run / "frames").mkdir(parents=True)
+        for number in range(3):
+            (run / "frames" / f"000{number}_render.png").write_bytes(b"x" * (number + 1))
+        (run / "frames" / "0000_target.png").touch()
+        (run / "status.json").write_text(json.dumps({"state": state}))
+        (run / "config.resolved.json").write_text(json.dumps({"instance": {"prompt": prompt}}))
+        header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (), }".ljust(117) + b"\n"
+        with zipfile.ZipFile(run / "motion.npz", "w") as motion:
+            motion.writestr("mocap_frame_rate.npy", b"\x93NUMPY\x01\x00v\x00" + header + struct.pack("<d", rate))
+
+    write_run(folder / "one", rate=25.0)
+    write_run(folder / "sweep" / "runs" / "aa")
+    write_run(folder / "sweep" / "runs" / "bb", state="running")
+    write_run(folder / "silent", prompt="")
+    (folder / "sweep" / "sweep.json").write_text(json.dumps({"runs": [{"id": "aa"}, {"id": "bb"}, {"id": "aa"}, {"id": "cc"}]}))
+    both = ("--runs", folder / "one", folder / "sweep")
+    told = run(*both, "--dry-run")
+    check(told, 0, 'one/clip.npz: 3 frames at 25 a second, "a person sits"', "aa/clip.npz: 3 frames at 10 a second")
+    assert told.stdout.count("\n") == 2, told.stdout
+    check(run("--runs", folder / "silent"), 2, "silent: its config says no text")
+    check(run("--runs", folder), 2, "holds no run of hsi4d and no sweep")
+    check(run(*both, "--text", "x"), 2, "--text is not for --runs")
+
     try:
         import numpy
     except ImportError:
@@ -131,12 +159,20 @@ with tempfile.TemporaryDirectory() as name:
         (folder / "modules" / module).write_text(text)
     for number in range(2, 6):
         (folder / f"000{number}_render.png").write_bytes(b"x" * number)
+    paths = os.pathsep.join(filter(None, [str(folder / "modules"), os.environ.get("PYTHONPATH", "")]))
+    modules = {"PYTHONPATH": paths, "TRANSFORMERS": "5"}
     for version in ("4", "5"):
         out = folder / f"clip{version}.npz"
         check(run("--video", folder, "--text", "sits", "--frame-rate", 30, "--out", out, "--batch", 2,
-                  PYTHONPATH=str(folder / "modules"), TRANSFORMERS=version), 0, "5 frames, 2 numbers each")
+                  PYTHONPATH=paths, TRANSFORMERS=version), 0, "5 frames, 2 numbers each")
         made = numpy.load(out)
         assert made["image_embeddings"].tolist() == [[0, 1], [2, 1], [3, 1], [4, 1], [5, 1]], version
         assert made["text_embedding"].tolist() == [4, 2]
         assert (made["frame_rate"], str(made["prompt"])) == (30, "sits")
+    check(run(*both, **modules), 0, "one/clip.npz: 3 frames, 2 numbers each", "aa/clip.npz")
+    made = numpy.load(folder / "one" / "clip.npz")
+    assert made["image_embeddings"].tolist() == [[1, 1], [2, 1], [3, 1]] and made["frame_rate"] == 25
+    check(run(*both, **modules), 0, "every run has its embeddings")
+    os.utime(folder / "one" / "clip.npz", (1, 1))  # frames that were computed since
+    check(run(*both, "--dry-run"), 0, "one/clip.npz: 3 frames at 25")
 print("passed")

@@ -29,7 +29,8 @@ if missing or os.geteuid() != 0:
 
 folder = arguments.keep or pathlib.Path(tempfile.mkdtemp(prefix="hsi4d_slurm_"))
 cluster = folder / "cluster"
-environment = {**os.environ, "SLURM_CONF": str(cluster / "slurm.conf")}
+# Twelve runs are two arrays then.
+environment = {**os.environ, "SLURM_CONF": str(cluster / "slurm.conf"), "SLURM_LOCAL_ARRAY": "9"}
 
 
 def run(*words, check=True):

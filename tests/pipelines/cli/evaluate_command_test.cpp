@@ -10,6 +10,7 @@
 #include "core/rotation.h"
 #include "tests/optim/meshes.h"
 #include "tests/pipelines/tiny_run.h"
+#include "tests/pipelines/tiny_sweep.h"
 #include "tests/support/procedural_file.h"
 #include "tests/support/program.h"
 
@@ -327,4 +328,46 @@ TEST_CASE("trajectories are exported beside the numbers") {
         "hsi4d evaluate: --export: mine holds something else, with a summary.json; choose another folder\n");
   CHECK(fs::exists("two/0/trajectory.npz"));
   CHECK(fs::exists("two/1/trajectory.npz"));
+}
+
+TEST_CASE("runs of a sweep are measured by their names, and together as its report has them", "[run]") {
+  const TemporaryFolder here;
+  write_tiny_base();
+  write_sweep({{"seeds", 2}, {"ablations", {{"whole", {}}, {"short", {{"stages.interaction.iterations", 3}}}}}});
+  REQUIRE(run_hsi4d({"sweep", "sweep.json", "--out", "s", "--jobs", "2", "--threads", "2"}).status == 0);
+  const nlohmann::json all = evaluated({"s"});
+  const std::vector<std::string> ids = ids_of("s");
+  REQUIRE(all["results"].size() == 4);
+  const char* const names[] = {"whole, seed 0", "whole, seed 1", "short, seed 0", "short, seed 1"};
+  double error[4];
+  for (std::size_t i = 0; i < 4; ++i) {
+    CHECK(all["results"][i]["name"] == names[i]);
+    error[i] = all["results"][i]["mpjpe_mm"];
+    const nlohmann::json summary = json_of(fs::path("s") / "runs" / ids[i] / "summary.json");
+    CHECK(error[i] == Approx(summary["metrics"].back()["mpjpe_mm"].get<double>()).margin(1e-9));
+  }
+  CHECK_FALSE(all.contains("mean"));  // of different ablations it would say nothing
+  const nlohmann::json &sweep = all["sweeps"][0], &whole = sweep["rows"][0], &cut = sweep["rows"][1];
+  CHECK(sweep["compared_with"] == "whole");
+  CHECK(whole["name"] == "whole");
+  CHECK(whole["mean"]["mpjpe_mm"].get<double>() == Approx((error[0] + error[1]) / 2));
+  CHECK(whole["std"]["mpjpe_mm"].get<double>() == Approx(std::fabs(error[0] - error[1]) / std::sqrt(2.0)));
+  CHECK(whole["mean"]["diversity_mm"].get<double>() > 0);
+  CHECK_FALSE(whole.contains("difference"));
+  CHECK(cut["difference"]["mpjpe_mm"]["pairs"] == 2);
+  CHECK(cut["difference"]["mpjpe_mm"]["mean"].get<double>() ==
+        Approx((error[2] - error[0] + error[3] - error[1]) / 2).margin(1e-9));
+
+  const std::string text = run_hsi4d({"evaluate", "s"}).out;
+  CHECK_THAT(text, Contains("\nwhole, seed 1  ") && Contains("\n## Means\n") &&
+                       Contains("\n## Differences to whole\n") && Contains("\n## Diversity over seeds\n") &&
+                       Contains("\nall: frames 1 to 3 at 10 a second, against "
+                                "its dataset/truth"));
+  // Repetitions of one row are those of one config: they have a mean, as runs by their paths do.
+  const nlohmann::json row = evaluated({"s/whole"});
+  CHECK(row["results"].size() == 2);
+  CHECK(row["mean"]["mpjpe_mm"].get<double>() == Approx((error[0] + error[1]) / 2));
+  CHECK(row["mean"]["diversity_mm"].get<double>() == Approx(whole["mean"]["diversity_mm"].get<double>()));
+  CHECK(evaluated({"s/short, seed 1", "s/runs/" + ids[0]})["results"][0]["name"] == "s/short, seed 1");
+  CHECK_THAT(refused({"s/hole"}), Contains("did you mean \"whole\"?"));
 }
