@@ -333,8 +333,12 @@ TEST_CASE("trajectories are exported beside the numbers") {
 TEST_CASE("runs of a sweep are measured by their names, and together as its report has them", "[run]") {
   const TemporaryFolder here;
   write_tiny_base();
-  write_sweep({{"seeds", 2}, {"ablations", {{"whole", {}}, {"short", {{"stages.interaction.iterations", 3}}}}}});
-  REQUIRE(run_hsi4d({"sweep", "sweep.json", "--out", "s", "--jobs", "2", "--threads", "2"}).status == 0);
+  const nlohmann::ordered_json ablations = {{"whole", nlohmann::ordered_json::object()},
+                                            {"short", {{"stages.interaction.iterations", 3}}}};
+  write_sweep({{"seeds", 2}, {"ablations", ablations}});
+  const ProgramResult computed = run_hsi4d({"sweep", "sweep.json", "--out", "s", "--jobs", "2", "--threads", "2"});
+  INFO(computed.err);
+  REQUIRE(computed.status == 0);
   const nlohmann::json all = evaluated({"s"});
   const std::vector<std::string> ids = ids_of("s");
   REQUIRE(all["results"].size() == 4);
