@@ -205,14 +205,18 @@ Dual<S, A> abs(const Dual<S, A>& x) {
   return x.chain(std::fabs(x.value), S(x.value > 0) - S(x.value < 0));
 }
 
-/// The larger / smaller; on a tie the first.
+/// The larger / smaller; on a tie the first. NaN where either is: a comparison alone would lose the second's.
 template <LambdaNumber A, LambdaNumber B>
 auto max(const A& a, const B& b) {
-  return select(value_of(b) > value_of(a), b, a);
+  const auto x = value_of(a);
+  const auto y = value_of(b);
+  return select((y > x) | (y != y), b, a);
 }
 template <LambdaNumber A, LambdaNumber B>
 auto min(const A& a, const B& b) {
-  return select(value_of(b) < value_of(a), b, a);
+  const auto x = value_of(a);
+  const auto y = value_of(b);
+  return select((y < x) | (y != y), b, a);
 }
 
 /// x held within [low, high]; no gradient where it is held.

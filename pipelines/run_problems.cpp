@@ -258,10 +258,11 @@ std::vector<RunNote> optimizer_notes(const RunConfig& config) {
     if (!is_adam && own.beta1 != usual.beta1) idle.emplace_back("beta1");
     if (!is_adam && own.beta2 != usual.beta2) idle.emplace_back("beta2");
     if (!is_adam && own.eps != usual.eps) idle.emplace_back("eps");
+    if (own.kind != OptimizerKind::kGaussNewton && own.products != usual.products) idle.emplace_back("products");
     if (!idle.empty())
       notes.push_back({LogLevel::kWarning, "stages." + name + ".optimizer: " + joined(idle) +
                                                (idle.size() == 1 ? " does" : " do") + " nothing with kind " +
-                                               (is_adam ? "adam" : "bfgs")});
+                                               std::string(choice_name<OptimizerKind>(kOptimizerKinds, own.kind))});
   }
   return notes;
 }

@@ -80,7 +80,10 @@ TEST_CASE("the smaller and the larger are NaN where either number is") {
   const Var<double> a = tape.parameter("a", shape_of(1, 4)), b = tape.parameter("b", shape_of(1, 4));
   const double first[] = {kNan, 1, kNan, 1}, second[] = {2, kNan, kNan, 2};
   for (Index c = 0; c < 4; ++c) tape.write(a)(0, c) = first[c], tape.write(b)(0, c) = second[c];
-  for (const auto& [result, last] : {std::pair{min(a, b), 1.0}, std::pair{max(a, b), 2.0}}) {
+  const auto smaller = map({a, b}, [](auto x, auto y) { return min(x, y); });
+  const auto larger = map({a, b}, [](auto x, auto y) { return max(x, y); });
+  const std::pair<Var<double>, double> results[] = {{min(a, b), 1}, {max(a, b), 2}, {smaller, 1}, {larger, 2}};
+  for (const auto& [result, last] : results) {
     tape.forward(result);
     const ConstArray<double> y = tape.value(result);
     for (Index c = 0; c < 3; ++c) CHECK(std::isnan(y(0, c)));
