@@ -106,6 +106,7 @@ struct ReweightedL1 {
 
   // d_a += g w d / n
   void backward(NodeIo<S>& io) {
+    io.begin_rows(1, 0, io.in(1).total_rows());  // b has none
     if (!io.wants(0)) return;
     const ConstArray<S> a = io.in(0), b = io.in(1);
     const Array<S> d = io.d_in(0);

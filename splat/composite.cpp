@@ -375,7 +375,8 @@ struct Composite {
     if constexpr (std::is_same_v<S, float>) {
       if (in_blocks(io)) {
         detail::BlockJob job = block_job_of(tiles, tile);
-        job.entries = job.entries.first(static_cast<std::size_t>(tile_counts[tile].end));  // none follows with an adjoint
+        job.entries =
+            job.entries.first(static_cast<std::size_t>(tile_counts[tile].end));  // none follows with an adjoint
         job.workspace = d_transmittance + pixels;
         if (!planned.plans[tile].behind.empty()) {
           detail::see_behind(tiles.tile, scene.channels, job.blocks, planned.layer(tile), d_channels, d_transmittance);

@@ -5,6 +5,7 @@
 #include "autodiff/map.h"
 #include "autodiff/mlp.h"
 #include "autodiff/rotations.h"
+#include "autodiff/seam.h"
 #include "autodiff/ssim.h"
 #include "autodiff/weighted_image.h"
 #include "core/rotation.h"
@@ -15,6 +16,7 @@ namespace hsi4d::stress {
 namespace {
 
 constexpr Index kRows = 40;
+constexpr SeamMode kOrdinaryRun;
 
 /// An operator on one array [kRows,cols].
 template <class S, class F>
@@ -101,6 +103,7 @@ struct Arrays {
     one([](V x) { return reshape(x, 3 * kRows, 1); }).outputs = {units_of(3)};
     one([](V x) { return slice_rows(x, 5, 20); }).outputs = {[](Index row) { return row + 5; }};
     one([](V x) { return slice_cols(x, 1, 2); });
+    one([](V x) { return seam(x, kOrdinaryRun); });
     one([](V x) {
       return gather_rows(x, {7, 3, 3, 30, 0, 39});
     }).outputs = {[](Index row) {
@@ -116,6 +119,7 @@ struct Arrays {
     two([](V a, V b) { return l2(a, b); });
     two([](V a, V b) { return huber(a, b, 0.3); });
     two([](V a, V b) { return charbonnier(a, b, 0.1); });
+    two([](V a, V b) { return reweighted_l1(a, b, 0.1, kOrdinaryRun); });
     two([](V a, V b) {
       return sum_over({a, b}, [](auto x, auto y) {
         using namespace hsi4d;
