@@ -1,6 +1,19 @@
 #include "autodiff/arena.h"
 
+#include "core/huge_pages.h"
+
 namespace hsi4d {
+
+namespace {
+
+/// In large pages: every frame has a new tape, and to be given a page takes longer than to fill it.
+void add_block(std::vector<Buffer<std::byte>>& blocks, Index bytes) {
+  blocks.emplace_back();
+  blocks.back().resize(bytes);
+  advise_huge_pages(blocks.back().data(), bytes);
+}
+
+}  // namespace
 
 void* Arena::allocate(Index bytes) {
   const Index wanted = round_up(bytes, kAlignment);
@@ -10,8 +23,7 @@ void* Arena::allocate(Index bytes) {
   }
   if (position_.block == blocks_.size()) {
     const Index size = std::max(next_block_bytes_, wanted);
-    blocks_.emplace_back();
-    blocks_.back().resize(size);
+    add_block(blocks_, size);
     next_block_bytes_ = size + size / 2;
   }
   void* memory = blocks_[position_.block].data() + position_.offset;
@@ -24,8 +36,7 @@ void Arena::reset() {
   if (blocks_.size() < 2) return;
   const Index total = capacity_bytes();
   blocks_.clear();
-  blocks_.emplace_back();
-  blocks_.back().resize(total);
+  add_block(blocks_, total);
 }
 
 Index Arena::capacity_bytes() const {

@@ -5,6 +5,7 @@
 #include "autodiff/copy_in.h"
 #include "autodiff/finite.h"
 #include "autodiff/tape.h"
+#include "core/huge_pages.h"
 #include "core/parallel.h"
 
 namespace hsi4d {
@@ -55,7 +56,10 @@ void Tape<S>::activate(const Plan& plan) {
   for (ArrayRecord& array : arrays_) array.adjoint = nullptr;
   const S* const before = adjoints_.data();
   adjoints_.resize(plan.adjoint_size);
-  if (adjoints_.data() != before) defined_adjoints_ = 0;
+  if (adjoints_.data() != before) {
+    advise_huge_pages(adjoints_.data(), adjoints_.capacity_bytes());
+    defined_adjoints_ = 0;
+  }
   if (plan.adjoint_size > defined_adjoints_) {
     std::fill(adjoints_.data() + defined_adjoints_, adjoints_.data() + plan.adjoint_size, S(0));
     defined_adjoints_ = plan.adjoint_size;
