@@ -109,8 +109,10 @@ def queue_is_empty():
     return run("squeue", "--noheader").strip() == ""
 
 
-def write_sweep(name, **more):
+def write_sweep(name, iterations=None, **more):
     smoke = json.loads((configs / "sweeps" / "smoke.json").read_text())
+    if iterations is not None:
+        smoke["set"]["stages.interaction.iterations"] = iterations
     for key in ("base", "clips"):
         value = smoke[key]
         smoke[key] = {k: str(configs / "sweeps" / v) for k, v in value.items()} if isinstance(value, dict) else str(configs / "sweeps" / value)
@@ -132,7 +134,7 @@ def smoke_is_the_same():
 
 def lost_node():
     """Twelve runs; when both nodes compute, node2 is gone with all that it does."""
-    sweep = write_sweep("lost", seeds=6, slurm={"at_once": 4})
+    sweep = write_sweep("lost", iterations=400, seeds=6, slurm={"at_once": 4})  # long enough to be met in the middle
     run(program, "sweep", sweep, "--out", folder / "lost_local")
     print(run(program, "sweep", sweep, "--out", folder / "lost", "--launcher", "slurm").strip())
 
