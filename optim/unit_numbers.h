@@ -26,9 +26,9 @@ class UnitNumbers {
   using VectorX = Eigen::VectorXd;
 
   /// @param groups  leaves of `tape`, none of them twice
-  /// @param method  what messages call it. Throws UserError for more than kMostUnitNumbers numbers, and for groups
-  /// whose
-  ///                numbers are changed between steps (axis-angles, ranges).
+  /// @param method  what messages call it
+  /// Throws UserError for more than kMostUnitNumbers numbers, and for groups whose numbers are changed between steps
+  /// (axis-angles, ranges).
   UnitNumbers(Tape<S>& tape, std::vector<AdamGroup<S>> groups, const std::string& method);
   UnitNumbers(const UnitNumbers&) = delete;
   UnitNumbers& operator=(const UnitNumbers&) = delete;

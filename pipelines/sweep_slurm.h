@@ -10,11 +10,10 @@ namespace hsi4d {
 
 /// What has been submitted.
 struct SlurmJobs {
-  std::vector<std::size_t> runs;  ///< indices that the arrays compute
-  std::size_t queued = 0;         ///< runs that an earlier array of this folder has still to compute
-  std::vector<std::string>
-      arrays;           ///< ids of the arrays that were submitted: one, or more of more runs than Slurm takes
-  std::string results;  ///< id of the job for the results; empty: none
+  std::vector<std::size_t> runs;    ///< indices that the arrays compute
+  std::size_t queued = 0;           ///< runs that an earlier array of this folder has still to compute
+  std::vector<std::string> arrays;  ///< ids of those submitted: one, or more of more runs than Slurm takes in one
+  std::string results;              ///< id of the job for the results; empty: none
 };
 
 /// Indices as --array takes them: {0, 1, 2, 5} is "0-2,5".

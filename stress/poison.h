@@ -6,9 +6,8 @@
 // others have to keep their bits; operators which say that they draw nothing of a bad row keep the gradients of what
 // all units share finite. What all units share reaches everything, so that other rules hold of it, and of every input:
 // - a number that is not finite is never swallowed: whatever depends on it is not finite either, or is the limit that
-// an
-//   infinity has, or an error says so. Which results depend on a number is measured, by other good ones in its place.
-//   kGates names the operators that take out what is bad, and why;
+//   an infinity has, or an error says so. Which results depend on a number is measured, by other good ones in its
+//   place. kGates names the operators that take out what is bad, and why;
 // - where 0 or a denormal stands in what all units share, values and gradients are finite, but at the poles of kPoles;
 // - a run after a bad number has gone has the bits of the runs before it: nothing of it is kept.
 #pragma once
