@@ -77,13 +77,12 @@ class StageRun {
     const auto start = Clock::now();
     for (const AdamGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
     hold_values(i);
-    const auto set_up = Clock::now();
     tape_.forward(loss_.total);
     const Index forward_nodes = tape_.counters().forward_nodes;  // before others run, for shares
-    times_.forward += seconds_since(set_up);
+    times_.forward += seconds_since(start);
+    const auto evaluated = Clock::now();
     shares_.clear();
     if (settings_.gradient_shares > 0 && i % settings_.gradient_shares == 0) shares_ = shares_of_terms(i);
-    const auto evaluated = Clock::now();
     tape_.backward(loss_.total);
     times_.backward += seconds_since(evaluated);
     TapeCounters counters = tape_.counters();

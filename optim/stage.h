@@ -50,8 +50,9 @@ struct LeftOutObject {
 
 /// Where the time of a stage went, seconds.
 struct StageTimes {
-  double forward = 0, backward = 0;  ///< of the tape
-  double step = 0;                   ///< looking at every number, moving the parameters
+  double forward = 0,
+         backward = 0;  ///< of the tape; freezing and holding are of the first, shares of terms of the second
+  double step = 0;      ///< looking at every number, moving the parameters
 };
 
 /// What a stage has done.

@@ -77,10 +77,7 @@ RunConfig stretched(RunConfig config, double factor) {
 /// A folder that is not there yet, and is gone at the end.
 class PassingFolder {
  public:
-  explicit PassingFolder(const fs::path& path) : path_(path) {
-    if (fs::exists(path))
-      throw UserError(path.string() + ": is there; hsi4d bench pareto makes this folder and removes it again (--out)");
-  }
+  explicit PassingFolder(const fs::path& path) : path_(path) { check_tracking_folder(path); }
   PassingFolder(const PassingFolder&) = delete;
   PassingFolder& operator=(const PassingFolder&) = delete;
   ~PassingFolder() {
@@ -147,6 +144,11 @@ std::string spread_text(const TrackedPoint::Spread& spread, int decimals) {
 }
 
 }  // namespace
+
+void check_tracking_folder(const fs::path& folder) {
+  if (fs::exists(folder))
+    throw UserError(folder.string() + ": is there; hsi4d bench pareto makes this folder and removes it again (--out)");
+}
 
 Index tracking_run_count(const Tracking& tracking) { return 2 * std::ssize(tracking.settings) * tracking.seeds; }
 

@@ -23,6 +23,9 @@ struct Tracking {
   std::filesystem::path folder;  ///< for datasets and runs, removed again
 };
 
+/// Throws UserError naming the folder if it is there.
+void check_tracking_folder(const std::filesystem::path& folder);
+
 /// How many runs measure_tracking makes.
 Index tracking_run_count(const Tracking& tracking);
 

@@ -66,13 +66,17 @@ std::vector<CostPart> parts_of(const StageCost& cost) {
   }
   std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
   const StageTimes& times = cost.sum.times;
-  parts.push_back({"the tape itself", per_iteration(std::max(0.0, times.forward - forward), cost),
-                   per_iteration(std::max(0.0, times.backward - backward), cost), 0, 0, 0});
+  parts.push_back({"the tape itself", per_iteration(times.forward - forward, cost),
+                   per_iteration(times.backward - backward, cost), 0, 0, 0});
   parts.push_back({"checks and steps", 0, per_iteration(times.step, cost), 0, 0, 0});
   return parts;
 }
 
-std::string stage_line(const StageCost& cost, bool counts_allocations) {
+double allocations_each(const StageCost& cost) {
+  return static_cast<double>(cost.sum.allocations) / static_cast<double>(cost.sum.counted);
+}
+
+std::string stage_line(const StageCost& cost) {
   const RenderCounters& c = cost.sum.counters;
   const double all = static_cast<double>(cost.sum.tiles_of_image);
   std::string text =
@@ -81,8 +85,7 @@ std::string stage_line(const StageCost& cost, bool counts_allocations) {
   text += all > 0 ? formatted(" %6.0f of %-6.0f %9.0f %11.0f", per_iteration(c.tiles, cost), all,
                               per_iteration(c.pairs, cost), per_iteration(c.fragments, cost))
                   : formatted(" %16s %9s %11s", "-", "-", "-");
-  text += counts_allocations ? formatted(" %8.2f", per_iteration(static_cast<Index>(cost.sum.allocations), cost))
-                             : formatted(" %8s", "-");
+  text += cost.sum.counted > 0 ? formatted(" %8.2f", allocations_each(cost)) : formatted(" %8s", "-");
   return text + formatted(" %7.1f\n", 1e-6 * static_cast<double>(cost.sum.tape_bytes));
 }
 
@@ -123,6 +126,14 @@ std::string composite_line(const StageCost& cost) {
 
 double StageCost::ms_each() const { return per_iteration(sum.iteration_seconds, *this); }
 
+double StageCost::ms_each_of(double iterations) const {
+  const double runs = static_cast<double>(ms_an_iteration.size()), rest = static_cast<double>(sum.iterations) - runs;
+  if (!(runs > 0)) return 0;
+  const double first = sum.first_seconds / runs;
+  const double later = rest > 0 ? (sum.iteration_seconds - sum.first_seconds) / rest : first;
+  return 1e3 * (first + (iterations - 1) * later) / iterations;
+}
+
 double StageCost::median_ms() const {
   if (ms_an_iteration.empty()) return 0;
   std::vector<double> sorted = ms_an_iteration;
@@ -149,12 +160,14 @@ void add_profile(const StageProfile& profile, std::vector<StageCost>& stages) {
   sum.iterations += profile.iterations;
   sum.seconds += profile.seconds;
   sum.iteration_seconds += profile.iteration_seconds;
+  sum.first_seconds += profile.first_seconds;
   sum.times.forward += profile.times.forward;
   sum.times.backward += profile.times.backward;
   sum.times.step += profile.times.step;
   sum.counters += profile.counters;
   sum.tape += profile.tape;
   sum.allocations += profile.allocations;
+  sum.counted += profile.counted;
   sum.pixels_of_image = profile.pixels_of_image;
   sum.tiles_of_image = profile.tiles_of_image;
   sum.nodes = std::max(sum.nodes, profile.nodes);
@@ -171,7 +184,7 @@ double optimisation_seconds(const RunCost& cost) {
 std::string cost_table(const RunCost& cost) {
   std::string text = formatted("%-16s %9s %8s %8s %8s %16s %9s %11s %8s %7s\n", "stage", "iterat.", "ms each", "median",
                                "all, s", "tiles", "pairs", "fragments", "allocat.", "tape MB");
-  for (const StageCost& stage : cost.stages) text += stage_line(stage, cost.counts_allocations);
+  for (const StageCost& stage : cost.stages) text += stage_line(stage);
   for (const StageCost& stage : cost.stages) {
     text += formatted("\n%-28s %8s %8s\n", (stage.stage + ", ms an iteration").c_str(), "forward", "back") +
             part_lines(stage) + composite_line(stage);
@@ -212,7 +225,7 @@ std::string cost_json(const RunCost& cost) {
                     {"layers", per_iteration(sum.counters.layers, stage)},
                     {"told_squares", per_iteration(sum.counters.told_squares, stage)},
                     {"composite_ms", composite_steps(stage)}});
-    if (cost.counts_allocations) entry["allocations"] = per_iteration(static_cast<Index>(sum.allocations), stage);
+    if (sum.counted > 0) entry["allocations"] = allocations_each(stage);
     text += bench_line(entry.dump());
     for (const CostPart& part : parts_of(stage)) {
       const nlohmann::ordered_json of_part = {{"stage", stage.stage},

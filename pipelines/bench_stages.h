@@ -15,9 +15,10 @@ struct StageCost {
   StageProfile sum;                     ///< counts and seconds of all of them; of tape_bytes and nodes the most
   std::vector<double> ms_an_iteration;  ///< by frame
 
-  double ms_each() const;    ///< an iteration, on average
-  double median_ms() const;  ///< of the frames' averages
-  double min_ms() const;     ///< the least of them
+  double ms_each() const;                      ///< an iteration, on average
+  double ms_each_of(double iterations) const;  ///< the same, had each frame as many: the first is another than the rest
+  double median_ms() const;                    ///< of the frames' averages
+  double min_ms() const;                       ///< the least of them
 };
 
 /// What a run took.
@@ -26,7 +27,6 @@ struct RunCost {
   int threads = 1;
   double seconds = 0;           ///< of the run, reading and writing included
   Index peak_memory_bytes = 0;  ///< of the process
-  bool counts_allocations = false;
 };
 
 /// Adds one stage of a frame.

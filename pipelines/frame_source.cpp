@@ -40,9 +40,20 @@ bool is_number(const std::string& text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// Refuses 8.png, 9.png, 10.png: in the order of their names 10 comes first.
+/// A name as the text before the digits that it ends with, and these: "frame_0012.png" is "frame_" and "0012".
+std::pair<std::string, std::string> split_number(const std::string& name) {
+  const std::string stem = fs::path(name).stem().string();
+  const std::size_t last = stem.find_last_not_of("0123456789");
+  const std::size_t begin = last == std::string::npos ? 0 : last + 1;
+  return {stem.substr(0, begin), stem.substr(begin)};
+}
+
+/// Refuses 8.png, 9.png, 10.png, and frame_9.png, frame_10.png: in the order of their names 10 comes first.
 void check_numbering(const std::vector<std::string>& names, const fs::path& folder) {
-  const auto is_numbered = [](const std::string& name) { return is_number(fs::path(name).stem().string()); };
+  const auto is_numbered = [&names](const std::string& name) {
+    const auto [text, digits] = split_number(name);
+    return !digits.empty() && text == split_number(names.front()).first;
+  };
   if (!std::all_of(names.begin(), names.end(), is_numbered)) return;
   for (const std::string& name : names) {
     if (name.size() == names.front().size()) continue;
@@ -75,8 +86,10 @@ void warn_of_gaps(const std::vector<std::string>& names, const fs::path& folder)
   std::size_t widest = 0;
   Index widest_step = 0;
   for (std::size_t i = 1; i < names.size(); ++i) {
-    const std::optional<Index> before = number_of(names[i - 1]), here = number_of(names[i]);
-    if (!before || !here) return;
+    const auto [text_before, digits_before] = split_number(names[i - 1]);
+    const auto [text, digits] = split_number(names[i]);
+    const std::optional<Index> before = number_of(digits_before), here = number_of(digits);
+    if (!before || !here || text_before != text) return;
     const Index step = *here - *before;
     if (!least || step < *least) least = step;
     if (step <= widest_step) continue;

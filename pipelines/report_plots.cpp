@@ -261,8 +261,8 @@ std::string share_bar_svg(const std::string& title, const std::vector<std::pair<
 }
 
 std::string part_color(size_t i) {
-  constexpr std::array<const char*, 8> kColors = {"#3b82c4", "#d98a2b", "#3f9d6b", "#b4579a",
-                                                  "#7a6fc9", "#c2553f", "#4aa5a8", "#8b8f3a"};
+  constexpr std::array<const char*, 12> kColors = {"#3b82c4", "#d98a2b", "#3f9d6b", "#b4579a", "#7a6fc9", "#c2553f",
+                                                   "#4aa5a8", "#8b8f3a", "#7d4a1f", "#e7a6c8", "#1d4f6e", "#9fce5a"};
   return kColors[i % kColors.size()];
 }
 

@@ -24,7 +24,7 @@ std::string stage_text(const std::string& stage, const StageResult& result, cons
 void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip);
 
 /// Every group that had no gradient in all of a stage: one warning, with its frames; of hands, jaw and eyes, which are
-/// often hidden, in the log alone.
+/// often hidden, as an information.
 void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig& config);
 
 /// Sees the iterations of a stage.

@@ -42,8 +42,12 @@ std::int64_t StageProbe::allocation_count() const { return watch_->allocation_co
 
 void StageProbe::iteration_ended(const IterationReport& report, const RenderCounters* counters) {
   if (!is_on()) return;
-  if (report.iteration >= report.iterations / 2) allocations_ += allocation_count() - before_;
+  if (watch_->allocation_count && report.iteration >= report.iterations / 2) {
+    allocations_ += allocation_count() - before_;
+    ++counted_;
+  }
   iteration_seconds_ += report.seconds;
+  if (report.iteration == 0) first_seconds_ = report.seconds;
   tape_ += report.tape;
   if (counters != nullptr) counters_ += *counters;
 }
@@ -57,12 +61,14 @@ void StageProbe::stage_ended(const StageResult& result, StageProfile profile) co
   profile.iterations = result.iterations;
   profile.seconds = seconds_since(start_);
   profile.iteration_seconds = iteration_seconds_;
+  profile.first_seconds = first_seconds_;
   profile.times = result.times;
   profile.operators = by_operator(result.nodes);
   profile.nodes = static_cast<Index>(result.nodes.size());
   profile.counters = counters_;
   profile.tape = tape_;
   profile.allocations = allocations_;
+  profile.counted = counted_;
   watch_->done(profile);
 }
 

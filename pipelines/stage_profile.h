@@ -27,6 +27,7 @@ struct StageProfile {
   Index iterations = 0;
   double seconds = 0;            ///< from before the tape was recorded until the state was read back
   double iteration_seconds = 0;  ///< of the iterations, without what is made of their reports
+  double first_seconds = 0;      ///< of the first of them, in which memory is met for the first time
   StageTimes times = {};         ///< of the iterations
   std::vector<OperatorProfile> operators = {};
   Index nodes = 0;               ///< of the tape
@@ -34,7 +35,8 @@ struct StageProfile {
   TapeCounters tape = {};        ///< sums over the iterations
   Index pixels_of_image = 0;     ///< 0: nothing was drawn
   Index tiles_of_image = 0;      ///< likewise
-  std::int64_t allocations = 0;  ///< by the second half of the iterations, where they are counted
+  std::int64_t allocations = 0;  ///< by iterations in the second half of those that the stage may have
+  Index counted = 0;             ///< how many these are; 0: allocations are not counted, or it ended before
   Index tape_bytes = 0;
 };
 
@@ -67,8 +69,9 @@ class StageProbe {
   std::chrono::steady_clock::time_point start_;
   RenderCounters counters_;
   TapeCounters tape_;
-  double iteration_seconds_ = 0;
+  double iteration_seconds_ = 0, first_seconds_ = 0;
   std::int64_t allocations_ = 0, before_ = 0;
+  Index counted_ = 0;
 };
 
 }  // namespace hsi4d

@@ -1,6 +1,7 @@
 #include "pipelines/sweep_plan.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -8,6 +9,7 @@
 #include "core/check.h"
 #include "core/config_file.h"
 #include "core/config_place.h"
+#include "core/log.h"
 #include "core/text.h"
 #include "optim/checkpoint.h"
 #include "pipelines/config_kind.h"
@@ -260,6 +262,7 @@ class Planner {
       plan.runs.push_back(combination.run);
     }
     throw_if_any(plan);
+    warn_of_unread();
     refuse_mixed_blocks(all, plan);
     plan.compare = reference(plan);
     return plan;
@@ -292,6 +295,7 @@ class Planner {
         lay_into_config(tree, setting.key, setting.value, setting.origin, problems);
     }
     const bool is_made = is_generated(tree) && !has_own_data(tree);
+    if (!is_generated(tree)) note_unread(c);
     if (c.seed) {
       const ConfigValue seed = ConfigValue::make_integer(*c.seed);
       lay_into_config(tree, "seed", seed, {}, problems);
@@ -313,6 +317,20 @@ class Planner {
     if (config.synthetic.kind == SyntheticKind::kViews)
       throw UserError(name + ": /synthetic/kind: \"views\" are for hsi4d avatar fit; a run needs a clip");
     if (config.stages.empty()) throw UserError(name + ": /stages: a run needs at least one stage");
+  }
+
+  /// What a sweep sets of a dataset that is there, and not made.
+  void note_unread(const Combination& c) {
+    for (const auto* layer : c.layers) {
+      for (const SweepSetting& setting : *layer)
+        if (config_keys(setting.key).front() == "synthetic") ++unread_[sweep_key(setting.key)];
+    }
+  }
+
+  void warn_of_unread() const {
+    for (const auto& [key, runs] : unread_)
+      log_warning(sweep_.name + ": nothing reads " + key + " in " + std::to_string(runs) +
+                  (runs == 1 ? " run" : " runs") + ", whose config names its data");
   }
 
   void note(const std::string& problem, std::size_t run) {
@@ -418,6 +436,7 @@ class Planner {
   const std::vector<LossDescription>& losses_;
   std::map<fs::path, ConfigValue> trees_;
   std::map<std::string, std::string> identities_;
+  std::map<std::string, std::int64_t> unread_;                              // runs, by key
   std::vector<std::pair<std::string, std::vector<std::size_t>>> problems_;  // text, runs
 };
 

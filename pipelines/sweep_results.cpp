@@ -112,7 +112,8 @@ std::size_t SweepResults::count(SweepRunState state) const {
 }
 
 const MetricFacts& seconds_facts() {
-  static const MetricFacts facts{"seconds", "time", "s", "Time of the run on the clock", 1, -1};
+  static const MetricFacts facts{
+      "seconds", "time", "s", "Time of reconstructing on the clock, without start, preview and report", 1, -1};
   return facts;
 }
 

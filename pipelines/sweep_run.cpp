@@ -72,7 +72,12 @@ RunConfig data_of(const fs::path& dataset, const std::vector<LossTerm>& losses) 
   ConfigValue tree = load_config(dataset / "config.json", {}, problems);
   std::erase_if(tree.members,
                 [](const ConfigMember& section) { return section.key != "data" && section.key != "chain"; });
-  return read_run_config(tree, descriptions_of(losses), problems);
+  try {
+    return read_run_config(tree, descriptions_of(losses), problems);
+  } catch (const UserError& problem) {
+    throw UserError(std::string(problem.what()) + "\n" + dataset.string() +
+                    ": is not whole; remove it, and the sweep makes it again");
+  }
 }
 
 /// Names the files of a dataset in a run's config. How masks are read is the run's own.

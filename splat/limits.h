@@ -49,9 +49,10 @@ inline constexpr double kLeastOpacity = 1e-30;
 inline constexpr float kLeastAlpha = 0x1p-126f;
 
 /// In float, settings below these take the more exact form of the pixel loops: u and w from the block's centre, and an
-/// exponential to half a unit in the last place.
-inline constexpr float kExactBelowAlpha = 1.0f / 1024;
-inline constexpr float kExactBelowStop = 1e-5f;
+/// exponential to half a unit in the last place. Above, cuts are larger errors than what that form saves, also those of
+/// `accurate` (docs/numerics/pareto.md#the-careful-arithmetic).
+inline constexpr float kExactBelowAlpha = 1e-6f;
+inline constexpr float kExactBelowStop = 1e-7f;
 inline constexpr float kExactBelowBlur = 0.1f;
 
 /// Side of a square tile, pixels.

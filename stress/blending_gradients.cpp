@@ -5,6 +5,7 @@
 
 #include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
+#include "stress/measures.h"
 
 namespace hsi4d::stress {
 
@@ -235,7 +236,7 @@ std::vector<StressFigure> conic_gradient(Remedy remedy) {
       differences.push_back(
           static_cast<double>((image_loss(up, opacity, weights) - image_loss(down, opacity, weights)) / (2 * kStep)));
     }
-    worst = std::max(worst, largest_difference(computed, differences) / largest_size(differences));
+    worst = larger(worst, largest_difference(computed, differences) / largest_size(differences));
   }
   return {{"d V off differences, of the largest", worst, 1e-6}};
 }

@@ -89,8 +89,8 @@ std::vector<StressFigure> weight_sums(Remedy remedy) {
   const std::vector<double> there = skinned<double>(remedy, raw, moved, points);
   double template_error = 0, drift = 0, accepted = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    template_error = worst(template_error, std::abs(static_cast<double>(at_rest[i]) - points[i]));
-    drift = worst(drift, std::abs(there[i] - here[i] - 1000));
+    template_error = larger(template_error, std::abs(static_cast<double>(at_rest[i]) - points[i]));
+    drift = larger(drift, std::abs(there[i] - here[i] - 1000));
   }
   SparseWeights wrong = raw;
   for (std::size_t k = 0; k < 4; ++k) wrong.weights[k] *= 0.97;
@@ -208,7 +208,7 @@ double flat_image_error(const Frame& axes, const Frame& bone, int& broken) {
   double error = 0;
   for (Index p = 0; p < 32 * 32; ++p) {
     const double found = static_cast<double>(tape.value(image)(0, p / 32, p % 32));
-    error = worst(error, std::abs(found - truth.color[static_cast<std::size_t>(3 * p)]));
+    error = larger(error, std::abs(found - truth.color[static_cast<std::size_t>(3 * p)]));
   }
   return error;
 }
@@ -229,7 +229,7 @@ std::vector<StressFigure> opposite_bones(Remedy remedy) {
     above(i / 3, i % 3) += 1e-4;
     below(i / 3, i % 3) -= 1e-4;
     const double slope = (blended(above, f, c).loss - blended(below, f, c).loss) / 2e-4;
-    gradient = worst(gradient, std::abs(at.d_bone(i / 3, i % 3) - slope) / 0.1);
+    gradient = larger(gradient, std::abs(at.d_bone(i / 3, i % 3) - slope) / 0.1);
   }
   int broken = 0;
   const double image = flat_image_error(at.frame, second_bone(kPi), broken);
@@ -255,7 +255,7 @@ std::vector<StressFigure> small_offsets(Remedy remedy) {
     const long double squared = dot(exact_w, exact_w);
     const Matrix3<double> exact =
         k * static_cast<double>(stumpff_series(1, squared)) + k * k * static_cast<double>(stumpff_series(2, squared));
-    for (int i = 0; i < 9; ++i) error = worst(error, relative(tape.value(offsets).data[i], exact(i / 3, i % 3)));
+    for (int i = 0; i < 9; ++i) error = larger(error, relative(tape.value(offsets).data[i], exact(i / 3, i % 3)));
   }
   return {{"relative error of an entry of R - I", error, 1e-6}};
 }

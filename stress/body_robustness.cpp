@@ -77,7 +77,7 @@ std::vector<StressFigure> bad_steps(Remedy remedy) {
     if (i == 7 || i == 20) changed += std::memcmp(before.data(), after.data(), sizeof before) != 0 ? 1 : 0;
   }
   double left = 0;
-  for (std::size_t k = 0; k < 5; ++k) left = worst(left, std::abs(numbers()[k] - kGoals[k]));
+  for (std::size_t k = 0; k < 5; ++k) left = larger(left, std::abs(numbers()[k] - kGoals[k]));
   return {{"bad steps that move a number", changed, 0},
           {"bad steps that are not told", untold, 0},
           {"distance to the goal after 600 steps", left, 1e-3}};
@@ -111,9 +111,9 @@ std::vector<StressFigure> distances_at_zero(Remedy remedy) {
   const Vector3<double> direction = Vector3<double>(1, -0.5, 0.25).normalized();
   for (Index r = 0; r < count; ++r) {
     const Vector3<double> d = widen(Vector3<float>(&gradient[static_cast<std::size_t>(3 * r)]));
-    size = worst(size, d.norm());
+    size = larger(size, d.norm());
     if (r == count - 1) at_zero = largest(d);
-    if (r <= 15) error = worst(error, largest(Vector3<double>(d - direction)));
+    if (r <= 15) error = larger(error, largest(Vector3<double>(d - direction)));
   }
   return {{"gradient of the distance of equal points", at_zero, 0},
           {"largest gradient of a distance", size, 1 + 1e-6},
@@ -166,7 +166,7 @@ std::vector<StressFigure> near_neighbours(Remedy remedy) {
     for (std::size_t i = 1; i < points.size(); ++i) truth = distance(i) < distance(truth) ? i : truth;
     const std::size_t found = remedy == Remedy::kOn ? static_cast<std::size_t>(index.nearest(widen(at)).face)
                                                     : nearest_by_squares(points, at);
-    beyond = worst(beyond, distance(found) - distance(truth));
+    beyond = larger(beyond, distance(found) - distance(truth));
     other += found != truth ? 1 : 0;
   }
   for (int repeat = 0; repeat < 50; ++repeat) {  // beside `at` by steps that floats have there
@@ -191,9 +191,9 @@ std::vector<StressFigure> joint_ranges(Remedy remedy) {
       float sum = 0;
       for (const float x : pose) {
         sum += std::exp(x) * std::exp(x);
-        gradient = worst(gradient, static_cast<double>(2 * std::exp(x) * std::exp(x)));
+        gradient = larger(gradient, static_cast<double>(2 * std::exp(x) * std::exp(x)));
       }
-      energy = worst(energy, static_cast<double>(sum));
+      energy = larger(energy, static_cast<double>(sum));
       continue;
     }
     Tape<float> tape;
@@ -202,8 +202,8 @@ std::vector<StressFigure> joint_ranges(Remedy remedy) {
     const Var<float> loss = joint_limit_energy(rotations_from_axis_angle(x));
     tape.forward(loss);
     tape.backward(loss);
-    energy = worst(energy, static_cast<double>(tape.value(loss).scalar()));
-    for (int i = 0; i < 63; ++i) gradient = worst(gradient, std::abs(static_cast<double>(tape.gradient(x).data[i])));
+    energy = larger(energy, static_cast<double>(tape.value(loss).scalar()));
+    for (int i = 0; i < 63; ++i) gradient = larger(gradient, std::abs(static_cast<double>(tape.gradient(x).data[i])));
   }
   // A joint is at most half a turn about each of three axes beyond a range that holds 0.
   return {{"energy of a pose, rad^2", energy, 63 * kPi * kPi}, {"largest gradient", gradient, 1e3}};
@@ -235,8 +235,8 @@ std::vector<StressFigure> unlikely_poses(Remedy remedy) {
       energy = -2 * std::log(p);
       for (std::size_t i = 0; i < count; ++i) d_z[i] = -2 / p * (-z[i] * p);
     }
-    energy_error = worst(energy_error, relative(energy, squares));
-    for (std::size_t i = 0; i < count; ++i) gradient_error = worst(gradient_error, relative(d_z[i], 2.0L * z[i]));
+    energy_error = larger(energy_error, relative(energy, squares));
+    for (std::size_t i = 0; i < count; ++i) gradient_error = larger(gradient_error, relative(d_z[i], 2.0L * z[i]));
   }
   return {{"relative error of the energy", energy_error, 1e-5},
           {"relative error of its gradient", gradient_error, 1e-6}};
@@ -261,8 +261,8 @@ std::vector<StressFigure> turns_beyond_half(Remedy remedy) {
   double angle = 0, jacobian = 0, change = 0;
   run_stage<double>(tape, settings, terms, inputs, groups, [&](const IterationReport&) {
     const Vector3<double> now(tape.value(w).data);
-    angle = worst(angle, now.norm());
-    jacobian = worst(jacobian, largest(so3_left_jacobian_inverse(now)));
+    angle = larger(angle, now.norm());
+    jacobian = larger(jacobian, largest(so3_left_jacobian_inverse(now)));
   });
   RandomSequence random(22, random_stream("stress.D9"));
   for (const double turned : {3.2, 4.0, 2 * kPi - 1e-3, 2 * kPi + 1e-3, 9.0}) {
@@ -270,8 +270,8 @@ std::vector<StressFigure> turns_beyond_half(Remedy remedy) {
     const Vector3<float> before = narrow(Vector3<double>(Vector3<double>(x, y, random.normal()).normalized() * turned));
     Vector3<float> after = before;
     if (remedy == Remedy::kOn) wrap_axis_angle(after);
-    change = worst(change, largest(Matrix3<double>(so3_exp(widen(after)) - so3_exp(widen(before)))));
-    angle = worst(angle, widen(after).norm());
+    change = larger(change, largest(Matrix3<double>(so3_exp(widen(after)) - so3_exp(widen(before)))));
+    angle = larger(angle, widen(after).norm());
   }
   return {{"largest angle, rad", angle, kPi * (1 + 1e-6)},
           {"entry of the inverse Jacobian", jacobian, 2},

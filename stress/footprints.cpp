@@ -9,6 +9,7 @@
 #include "splat/tiles.h"
 #include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
+#include "stress/measures.h"
 
 namespace hsi4d::stress {
 
@@ -71,7 +72,7 @@ TileChoices tile_choices(const FlatSplats& splats, const SplatView& view) {
       result.needed += is_needed ? 1 : 0;
       result.missed += is_needed && !listed[tile] ? 1 : 0;
       result.in_vain += !is_needed && listed[tile] ? 1 : 0;
-      if (!listed[tile]) result.largest_left_out = std::max(result.largest_left_out, alpha);
+      if (!listed[tile]) result.largest_left_out = larger(result.largest_left_out, alpha);
     }
   }
   return result;
@@ -89,7 +90,7 @@ double error_of_opaque(const SplatView& view) {
     for (std::size_t p = 0; p < image.size(); ++p) {
       const Index column = static_cast<Index>(p) % view.camera.width, row = static_cast<Index>(p) / view.camera.width;
       const double alpha = std::min(view.settings.alpha_cap, std::exp(-exponent_at(splats, 0, column, row)));
-      worst = std::max(worst, std::abs(image[p] - (alpha < view.settings.alpha_min ? 0 : alpha)));
+      worst = larger(worst, std::abs(image[p] - (alpha < view.settings.alpha_min ? 0 : alpha)));
     }
   }
   return worst;
@@ -247,14 +248,14 @@ std::vector<StressFigure> pixel_centres(Remedy remedy) {
     x -= kRight, y -= kDown;
     if (on || (x >= 0 && x < kWidth && y >= 0 && y < kHeight)) inside.push_back(n);
   }
-  const SplatView larger = plain_view(kWidth + 64, kHeight + 32, RenderSettings());
+  const SplatView around_view = plain_view(kWidth + 64, kHeight + 32, RenderSettings());
   const std::vector<double> c = FlatRender<float>(part.picked(inside), view).image();
-  const std::vector<double> d = FlatRender<float>(around, larger).image();
+  const std::vector<double> d = FlatRender<float>(around, around_view).image();
   double mirror = 0, padding = 0;
   for (int p = 0; p < kWidth * kHeight; ++p) {
     const int row = p / kWidth, column = p % kWidth;
-    mirror = std::max(mirror, std::abs(a[p] - b[row * kWidth + kWidth - 1 - column]));
-    padding = std::max(padding, std::abs(c[p] - d[(row + kDown) * (kWidth + 64) + column + kRight]));
+    mirror = larger(mirror, std::abs(a[p] - b[row * kWidth + kWidth - 1 - column]));
+    padding = larger(padding, std::abs(c[p] - d[(row + kDown) * (kWidth + 64) + column + kRight]));
   }
   const double both = projected_column(remedy, 0.2, view) + projected_column(remedy, -0.2, view);
   return {{"image off its mirror image", mirror, 1e-6},

@@ -109,7 +109,7 @@ void add_turns(FunctionTable& table, Index points) {
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         const long double entry = exact_rotation(exact, c1, c2, i, j);
-        off = worst(off, static_cast<double>(std::abs(r(i, j) - entry) / ulp_of<S>(1)));
+        off = larger(off, static_cast<double>(std::abs(r(i, j) - entry) / ulp_of<S>(1)));
       }
     }
     exponential.add_error(t, off);
@@ -118,7 +118,7 @@ void add_turns(FunctionTable& table, Index points) {
       double most = 0;
       for (std::size_t i = 0; i < 3; ++i) {
         const long double difference = std::abs(back[static_cast<Eigen::Index>(i)] - exact[i]);
-        most = worst(most, static_cast<double>(difference / ulp_of<S>(std::sqrt(square))));
+        most = larger(most, static_cast<double>(difference / ulp_of<S>(std::sqrt(square))));
       }
       return most;
     };

@@ -169,11 +169,11 @@ std::vector<StressFigure> flat_areas(Remedy remedy) {
       const Picture<float> x = flat_picture(level, noise, 1, 1), y = flat_picture(level + 0.01, noise, 1, 2);
       const Similarity found = computed(x, y), truth = similarity_by_windows(widened(x), widened(y), false);
       for (std::size_t i = 0; i < truth.map.size(); ++i) {
-        error = worst(error, std::abs(found.map[i] - truth.map[i]));
-        above = worst(above, found.map[i] - 1);
+        error = larger(error, std::abs(found.map[i] - truth.map[i]));
+        above = larger(above, found.map[i] - 1);
       }
-      gradient = worst(gradient, difference_norm(found.d_x, truth.d_x) / norm(truth.d_x));
-      for (const double value : computed(x, x).map) same = worst(same, std::abs(value - 1));
+      gradient = larger(gradient, difference_norm(found.d_x, truth.d_x) / norm(truth.d_x));
+      for (const double value : computed(x, x).map) same = larger(same, std::abs(value - 1));
     }
   }
   return {{"error of a pixel's similarity", error, 1e-6},
@@ -191,10 +191,10 @@ std::vector<StressFigure> data_ranges(Remedy remedy) {
         similarity(flat_picture(0.5, noise, 255, 3), flat_picture(0.5, noise, 255, 4), remedy == Remedy::kOn ? 255 : 1);
     double sum = 0;
     for (std::size_t i = 0; i < one.map.size(); ++i) {
-      pixel = worst(pixel, std::abs(one.map[i] - other.map[i]));
+      pixel = larger(pixel, std::abs(one.map[i] - other.map[i]));
       sum += one.map[i] - other.map[i];
     }
-    mean = worst(mean, std::abs(sum) / static_cast<double>(one.map.size()));
+    mean = larger(mean, std::abs(sum) / static_cast<double>(one.map.size()));
   }
   // A pixel's is right to 1e-6 in each of the two.
   return {{"difference of mean similarities", mean, 1e-6}, {"difference of a pixel's", pixel, 2e-6}};
@@ -237,8 +237,8 @@ std::vector<StressFigure> logarithms_of_zero(Remedy remedy) {
       const long double u = z > 0.5f ? -static_cast<long double>(x) : static_cast<long double>(x);
       const long double truth = std::max(u, 0.0L) + std::log1p(std::exp(-std::abs(u)));
       const long double exact_slope = (z > 0.5f ? -1 : 1) / (1 + std::exp(-u));
-      value = worst(value, std::abs(static_cast<double>(loss - truth)) / std::max(1.0, static_cast<double>(truth)));
-      gradient = worst(gradient, std::abs(static_cast<double>(slope - exact_slope)));
+      value = larger(value, std::abs(static_cast<double>(loss - truth)) / std::max(1.0, static_cast<double>(truth)));
+      gradient = larger(gradient, std::abs(static_cast<double>(slope - exact_slope)));
     }
   }
   const Image image = grey_image(0.25f);
@@ -274,8 +274,8 @@ std::vector<StressFigure> equal_numbers(Remedy remedy) {
   double at_zero = 0, elsewhere = 0;
   for (std::size_t i = 0; i < kCount; ++i) {
     const double d = static_cast<double>(gradient[i]) * kCount;
-    if (i % 3 == 1) at_zero = worst(at_zero, std::abs(d));
-    if (i % 3 != 1) elsewhere = worst(elsewhere, std::abs(d - (i % 3 == 0 ? 1 : -1)));
+    if (i % 3 == 1) at_zero = larger(at_zero, std::abs(d));
+    if (i % 3 != 1) elsewhere = larger(elsewhere, std::abs(d - (i % 3 == 0 ? 1 : -1)));
   }
   return {{"gradient where both are equal", at_zero, 0}, {"error of the gradient elsewhere", elsewhere, 1e-6}};
 }
@@ -323,9 +323,9 @@ std::vector<StressFigure> long_means(Remedy remedy) {
     return result;
   };
   const std::array<float, 2> one = means(1), many = means(16);
-  const double error = worst(relative(one[0], sum / count), relative(one[1], squares / count));
+  const double error = larger(relative(one[0], sum / count), relative(one[1], squares / count));
   const double threads =
-      worst(std::abs(static_cast<double>(one[0] - many[0])), std::abs(static_cast<double>(one[1] - many[1])));
+      larger(std::abs(static_cast<double>(one[0] - many[0])), std::abs(static_cast<double>(one[1] - many[1])));
   return {{"relative error of the mean", error, 1e-7}, {"difference of 1 and 16 threads", threads, 0}};
 }
 

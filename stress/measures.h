@@ -11,6 +11,9 @@
 
 namespace hsi4d::stress {
 
+/// The larger of two errors; what is not a number is larger than any.
+inline double larger(double a, double b) { return std::isnan(a) || b <= a ? a : b; }
+
 /// The largest of some magnitudes; infinity if one of them is not a number.
 class Largest {
  public:

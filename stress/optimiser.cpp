@@ -9,6 +9,7 @@
 #include "optim/adam.h"
 #include "stress/arithmetic.h"
 #include "stress/faded.h"
+#include "stress/measures.h"
 #include "stress/moving.h"
 #include "stress/plain_adam.h"
 
@@ -151,7 +152,7 @@ std::vector<double> traced(double scale, Remedy remedy) {
 
 double largest_relative(const std::vector<double>& a, const std::vector<double>& b) {
   double worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(a[i] - b[i]) / std::abs(b[i]));
+  for (std::size_t i = 0; i < a.size(); ++i) worst = larger(worst, std::abs(a[i] - b[i]) / std::abs(b[i]));
   return worst;
 }
 
@@ -235,7 +236,7 @@ std::vector<StressFigure> bias_corrections(Remedy remedy) {
       const double computed =
           remedy == Remedy::kOn ? bias_correction(beta, t)
                                 : static_cast<double>(1.0f - std::pow(static_cast<float>(beta), static_cast<float>(t)));
-      worst = std::max(worst, static_cast<double>(std::abs((computed - exact) / exact)));
+      worst = larger(worst, static_cast<double>(std::abs((computed - exact) / exact)));
     }
   }
   return {{"relative error of 1 - beta^t, t to 10^6", worst, 1e-12}};

@@ -15,6 +15,7 @@
 #include "splat/sh.h"
 #include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
+#include "stress/measures.h"
 
 namespace hsi4d::stress {
 
@@ -76,14 +77,14 @@ std::vector<StressFigure> normalized_depth(Remedy remedy) {
     const double weight = opacity * (2 - opacity);
     if (!(weight > 0)) continue;
     const double expected = (opacity * kDepths[0] + (1 - opacity) * opacity * kDepths[1]) / weight;
-    depth_error = std::max(depth_error, std::abs(computed.depth / expected - 1));
+    depth_error = larger(depth_error, std::abs(computed.depth / expected - 1));
     if (weight <= kLeastDepthWeight) {
-      phantom = std::max(phantom, largest_size(computed.d_opacities));
+      phantom = larger(phantom, largest_size(computed.d_opacities));
       continue;
     }
     const double d_second = (1 - opacity) * (kDepths[1] - expected) / weight;
     const double d_first = (kDepths[0] - expected - opacity * (kDepths[1] - expected)) / weight;
-    gradient_error = std::max(gradient_error, largest_difference(precise.d_opacities, {d_first, d_second}) * weight);
+    gradient_error = larger(gradient_error, largest_difference(precise.d_opacities, {d_first, d_second}) * weight);
   }
   return {{"depths and gradients that are not finite", broken, 0},
           {"relative error of the depth", depth_error, 1e-5},
@@ -116,7 +117,7 @@ std::vector<StressFigure> saturated_sigmoid(Remedy remedy) {
     outside += opacities[i] >= 0 && opacities[i] <= 1 ? 0 : 1;
     if (std::abs(logits[i]) > 80) continue;
     const double e = std::exp(-std::abs(logits[i])), exact = e / ((1 + e) * (1 + e));
-    error = std::max(error, std::abs(slopes[i] / exact - 1));
+    error = larger(error, std::abs(slopes[i] / exact - 1));
   }
   // Opacities of exactly 0 and 1, as files have them.
   Gaussians ends;
@@ -169,8 +170,8 @@ Banding banding(const F& function, const G& exact, double lowest) {
     const auto x = static_cast<float>(lowest * i / steps);
     const float value = function(x), near = static_cast<float>(exact(x));
     const double off = std::abs(static_cast<double>(value) - exact(x));
-    worst.ulps = std::max(worst.ulps, off / static_cast<double>(std::nextafter(near, 2.0f) - near));
-    worst.relative = std::max(worst.relative, off / exact(x));
+    worst.ulps = larger(worst.ulps, off / static_cast<double>(std::nextafter(near, 2.0f) - near));
+    worst.relative = larger(worst.relative, off / exact(x));
     worst.rises += value <= last ? 0 : 1;
     last = value;
   }
@@ -219,7 +220,7 @@ std::vector<StressFigure> held_color(Remedy remedy) {
   double error = 0, powers = 0;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const double exact = colors[i] > 0 ? kShC0 : 0;
-    error = std::max(error, std::abs(d[i] - exact) / kShC0);
+    error = larger(error, std::abs(d[i] - exact) / kShC0);
     powers += std::isnan(std::pow(colors[i], 1 / 2.2)) ? 1 : 0;
   }
   return {{"d harmonic off the forward pass's branch, of Y0", error, 1e-6},

@@ -103,10 +103,10 @@ std::vector<StressFigure> quaternion_signs(Remedy remedy) {
   for (int repeat = 0; repeat < 200; ++repeat) {
     const Vector4<float> p = narrow(random.rotation()), q = narrow(random.rotation());
     const auto log = [on](const Vector4<float>& x) { return widen(on ? quaternion_log(x) : one_sided_log(x)); };
-    difference = worst(difference, largest(Vector3<double>(log(q) - log(Vector4<float>(-q)))));
-    beyond = worst(beyond, log(q).norm() - kPi);
+    difference = larger(difference, largest(Vector3<double>(log(q) - log(Vector4<float>(-q)))));
+    beyond = larger(beyond, log(q).norm() - kPi);
     const Vector4<float> middle = on ? slerp(p, q, 0.5f) : one_sided_slerp(p, q, 0.5f);
-    longer = worst(longer, angle_between(p, middle) - angle_between(p, q) / 2);
+    longer = larger(longer, angle_between(p, middle) - angle_between(p, q) / 2);
   }
   return {{"log(q) - log(-q), rad", difference, 0},
           {"angle beyond half a turn, rad", beyond, 4e-7},
@@ -127,9 +127,9 @@ std::vector<StressFigure> quaternion_lengths(Remedy remedy) {
     } else {
       r = plainly_normalised(q, g, d_q);
     }
-    off = worst(off, orthogonality_error(r));
+    off = larger(off, orthogonality_error(r));
     const double length = is_broken ? 1 : std::max(widen(q).norm(), static_cast<double>(smallest_length<float>()));
-    gradient = worst(gradient, largest(widen(d_q)) * length);
+    gradient = larger(gradient, largest(widen(d_q)) * length);
     if (is_broken && !degenerate) ++untold;
   };
   for (const float s : {1e-45f, 1e-38f, 1e-30f, 1e-20f, 1.0f, 1e20f, 1e38f}) try_one({s, -s, s, s}, false);
@@ -161,10 +161,10 @@ std::vector<StressFigure> parallel_columns(Remedy remedy) {
     } else {
       r = plain_columns(a, b, g, d_b);
     }
-    off = worst(off, orthogonality_error(r));
-    det = worst(det, std::abs(determinant(widen(r)) - 1));
-    gradient = worst(gradient, largest(widen(d_a)));
-    gradient = worst(gradient, largest(widen(d_b)));
+    off = larger(off, orthogonality_error(r));
+    det = larger(det, std::abs(determinant(widen(r)) - 1));
+    gradient = larger(gradient, largest(widen(d_a)));
+    gradient = larger(gradient, largest(widen(d_b)));
     if (digit > 4 && !degenerate) ++untold;
   }
   return {{"R R^T - I, units of eps", off, 4},
@@ -197,13 +197,13 @@ std::vector<StressFigure> pivots(Remedy remedy) {
       } else {
         q = quaternion_by_roots(r, g, d_r);
       }
-      value = worst(value, largest(Vector4<double>(widen(q) - truth)));
+      value = larger(value, largest(Vector4<double>(widen(q) - truth)));
       for (int k = 0; k < 3; ++k) {
         const Matrix3<double> turned = hat(Vector3<double>(Vector3<double>::Unit(k))) * exact;
         double along = 0;
         for (int n = 0; n < 9; ++n) along += widen(d_r)(n / 3, n % 3) * turned(n / 3, n % 3);
         const Vector4<double> step = quaternion_product(Vector4<double>(Vector4<double>::Unit(1 + k)), truth);
-        slope = worst(slope, std::abs(along - step[i] / 2));
+        slope = larger(slope, std::abs(along - step[i] / 2));
       }
     }
   }
@@ -229,7 +229,7 @@ std::vector<StressFigure> dead_branches(Remedy remedy) {
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const double d = static_cast<double>(tape.gradient(x).data[i]), at = static_cast<double>(numbers[i]);
     if (!std::isfinite(d)) ++broken;
-    error = worst(error, std::abs(d - (at > 0 ? std::log(at) + 1 : 2)));
+    error = larger(error, std::abs(d - (at > 0 ? std::log(at) + 1 : 2)));
   }
   return {{"gradients that are not finite", broken, 0}, {"error of the gradient", error, 1e-5}};
 }
@@ -277,9 +277,9 @@ std::vector<StressFigure> chains(Remedy remedy) {
         for (int i = 0; i < 9; ++i) found(i / 3, i % 3) = static_cast<double>(a[4 * (i / 3) + i % 3]);
         for (int i = 0; i < 3; ++i) found_place[i] = static_cast<double>(tape.value(posed.joints)(j, i));
       }
-      rotation_error = worst(rotation_error, largest(Matrix3<double>(found - exact)));
-      place_error = worst(place_error, largest(Vector3<double>(found_place - exact_place)));
-      off = worst(off, orthogonality_error(Matrix3<float>(narrow(found))));
+      rotation_error = larger(rotation_error, largest(Matrix3<double>(found - exact)));
+      place_error = larger(place_error, largest(Vector3<double>(found_place - exact_place)));
+      off = larger(off, orthogonality_error(Matrix3<float>(narrow(found))));
     }
   }
   return {{"R - product in double, units of eps", rotation_error / 1.19e-7, 0.5},
@@ -311,15 +311,15 @@ std::vector<StressFigure> views_along_up(Remedy remedy) {
     const Vector3<double> direction = Vector3<double>::Unit(i / 24) * (i / 12 % 2 == 0 ? 1 : -1);
     const Vector3<double> target = eye + direction + beside[i % 4] * normal_vector(random);
     const Matrix3<double> r = look(eye, target, Vector3<double>::Unit(i / 4 % 3)).rotation;
-    off = worst(off, largest(Matrix3<double>(r * r.transpose() - Matrix3<double>::Identity())));
-    off = worst(off, std::abs(determinant(r) - 1));
-    axis = worst(axis, largest(Vector3<double>(r * (target - eye).normalized() - above)));
+    off = larger(off, largest(Matrix3<double>(r * r.transpose() - Matrix3<double>::Identity())));
+    off = larger(off, std::abs(determinant(r) - 1));
+    axis = larger(axis, largest(Vector3<double>(r * (target - eye).normalized() - above)));
   }
   Matrix3<double> before = look(eye, eye + Vector3<double>(1, 0, 0), above).rotation;
   for (double angle = 0; angle < 1.3; angle += 1e-4) {
     const Vector3<double> direction(std::cos(angle), 0.1 * std::sin(5 * angle), std::sin(angle));
     const Matrix3<double> r = look(eye, eye + direction, above).rotation;
-    jump = worst(jump, largest(Matrix3<double>(r - before)));
+    jump = larger(jump, largest(Matrix3<double>(r - before)));
     before = r;
   }
   try {

@@ -6,11 +6,9 @@
 #include <limits>
 
 #include "core/linear.h"
+#include "stress/measures.h"
 
 namespace hsi4d::stress {
-
-/// The larger of two errors; what is not a number is larger than any.
-inline double worst(double a, double b) { return std::isnan(a) || b <= a ? a : b; }
 
 /// |value − exact| / |exact|.
 inline double relative(long double value, long double exact) {
@@ -39,7 +37,7 @@ template <class S, int R, int C>
 template <int R, int C>
 double largest(const Eigen::Matrix<double, R, C>& m) {
   double size = 0;
-  for (Eigen::Index i = 0; i < m.size(); ++i) size = worst(size, std::abs(m.data()[i]));
+  for (Eigen::Index i = 0; i < m.size(); ++i) size = larger(size, std::abs(m.data()[i]));
   return size;
 }
 

@@ -104,10 +104,10 @@ std::vector<StressFigure> gradient_at_identity(Remedy remedy) {
       const Vector3<float> w(s, -s, s / 2);
       const Turn turn = remedy == Remedy::kOn ? taped_turn(w) : textbook_turn(w, kBareRoot);
       const double off = largest(Eigen::Matrix<double, 9, 3>(turn.slope - exact_slope(widen(w))));
-      (size <= 1e-8f ? at_zero : near_zero) = worst(size <= 1e-8f ? at_zero : near_zero, off);
+      (size <= 1e-8f ? at_zero : near_zero) = larger(size <= 1e-8f ? at_zero : near_zero, off);
       Matrix3<double> r;
       for (int i = 0; i < 9; ++i) r(i / 3, i % 3) = turn.value[i];
-      value = worst(value, orthogonality_error(Matrix3<float>(narrow(r))));
+      value = larger(value, orthogonality_error(Matrix3<float>(narrow(r))));
     }
   }
   return {{"R R^T - I, units of eps", value, 4},
@@ -149,8 +149,8 @@ std::vector<StressFigure> coefficients(Remedy remedy) {
       c2 = (1 - std::cos(angle)) / x;
       d_c2 = (std::sin(angle) / angle / 2 - c2) / x;
     }
-    value = worst(value, relative(c2, stumpff_series(2, x)));
-    slope = worst(slope, relative(d_c2, stumpff_series(2, x, true)));
+    value = larger(value, relative(c2, stumpff_series(2, x)));
+    slope = larger(slope, relative(d_c2, stumpff_series(2, x, true)));
   }
   return {{"relative error of (1 - cos t)/t^2", value, 4 * 1.19e-7}, {"relative error of its derivative", slope, 1e-5}};
 }
@@ -175,22 +175,22 @@ std::vector<StressFigure> switches(Remedy remedy) {
     const double c1 = on ? 1 - x * detail::stumpff_series<3>(x) : short_series(1, x);
     const double c2 = on ? 0.5 - x * detail::stumpff_series<4>(x) : short_series(2, x);
     for (const auto& [c, k] : {std::pair{angles.c1, 1}, {angles.c2, 2}, {c1, 1}, {c2, 2}}) {
-      sines = worst(sines, ulps(c, stumpff_series(k, x)));
+      sines = larger(sines, ulps(c, stumpff_series(k, x)));
     }
     x = u * kStumpffSeries;
     Stumpff<double> half{};
     detail::add_doubled(stumpff(x / 4), half);
     const double c3 = on ? detail::stumpff_series<3>(x) : short_series(3, x);
     for (const auto& [c, k] : {std::pair{half.c3, 3}, {half.c4, 4}, {half.c5, 5}, {c3, 3}}) {
-      series = worst(series, ulps(c, stumpff_series(k, x)));
+      series = larger(series, ulps(c, stumpff_series(k, x)));
     }
     x = u * kStumpffDouble;
     detail::add_doubled(stumpff(x / 4), half);
     Stumpff<double> quotients = detail::stumpff_from_sines(x);
     detail::add_quotients(x, quotients);
     for (const Stumpff<double>& c : {half, quotients}) {
-      doubled = worst(doubled, ulps(c.c3, stumpff_series(3, x)));
-      doubled = worst(doubled, ulps(c.c5, stumpff_series(5, x)));
+      doubled = larger(doubled, ulps(c.c3, stumpff_series(3, x)));
+      doubled = larger(doubled, ulps(c.c5, stumpff_series(5, x)));
     }
   }
   const double below = std::nextafter(kStumpffSines, 0.0);
@@ -230,9 +230,9 @@ std::vector<StressFigure> log_near_half_turn(Remedy remedy) {
       const Vector3<double> found = w / w.norm();
       // At π to the rounding of floats both axes are right.
       const double sign = kPi - angle > 1e-6 || axis.dot(found) > 0 ? 1 : -1;
-      angle_error = worst(angle_error, std::abs(w.norm() - angle));
-      axis_error = worst(axis_error, (found - sign * axis).norm());
-      round_trip = worst(round_trip, largest(Matrix3<double>(axis_turn(found, w.norm()) - widen(r))));
+      angle_error = larger(angle_error, std::abs(w.norm() - angle));
+      axis_error = larger(axis_error, (found - sign * axis).norm());
+      round_trip = larger(round_trip, largest(Matrix3<double>(axis_turn(found, w.norm()) - widen(r))));
     }
   }
   return {{"error of the angle, rad", angle_error, 2 * 1.19e-7 * kPi},
@@ -277,8 +277,8 @@ std::vector<StressFigure> inverse_jacobian(Remedy remedy) {
       d = textbook.value;
       d_d = textbook.partial(0);
     }
-    value = worst(value, relative(d, cotangent_series(x, false)));
-    slope = worst(slope, relative(d_d, cotangent_series(x, true)));
+    value = larger(value, relative(d, cotangent_series(x, false)));
+    slope = larger(slope, relative(d_d, cotangent_series(x, true)));
   }
   return {{"relative error of the coefficient", value, 1e-5}, {"relative error of its derivative", slope, 1e-5}};
 }

@@ -9,6 +9,7 @@
 #include "splat/debug_pixel.h"
 #include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
+#include "stress/measures.h"
 
 namespace hsi4d::stress {
 
@@ -106,9 +107,9 @@ std::vector<StressFigure> kept_transmittance(Remedy remedy) {
       const StackGradient exact = exact_gradient(stack, stop);
       const StackGradient computed =
           remedy == Remedy::kOn ? program_gradient(stack, stop) : divided_gradient(stack, stop, Stored::kOpacity);
-      transmittance = std::max(transmittance, largest_relative(computed.in_front, exact.in_front));
+      transmittance = larger(transmittance, largest_relative(computed.in_front, exact.in_front));
       double& gradient = stop == 1e-4 ? early : late;
-      gradient = std::max(gradient, relative_l2(computed.d_alpha, exact.d_alpha));
+      gradient = larger(gradient, relative_l2(computed.d_alpha, exact.d_alpha));
     }
   }
   return {{"relative error of T in the backward pass", transmittance, 1e-5},
@@ -129,7 +130,7 @@ std::vector<StressFigure> opaque_gradients(Remedy remedy) {
                                              ? program_gradient(stack, 0).d_alpha
                                              : divided_gradient(stack, 0, Stored::kTransmittance).d_alpha;
     broken += not_finite(computed);
-    error = std::max(error, largest_difference(computed, exact) / largest_size(exact));
+    error = larger(error, largest_difference(computed, exact) / largest_size(exact));
   }
   return {{"gradients that are not finite", broken, 0}, {"error of d alpha, of the largest", error, 1e-5}};
 }
@@ -150,8 +151,8 @@ std::vector<StressFigure> stop_rule(Remedy remedy) {
     for (int k = 0; k < 60; ++k) add_layer(stack, random.uniform(0, 1), random.uniform(0, 1));
     RenderSettings endless = settings;
     endless.transmittance_stop = 0;
-    worst = std::max(worst, largest_difference(FlatRender<float>(stack, one_pixel(settings)).image(),
-                                               FlatRender<float>(stack, one_pixel(endless)).image()));
+    worst = larger(worst, largest_difference(FlatRender<float>(stack, one_pixel(settings)).image(),
+                                             FlatRender<float>(stack, one_pixel(endless)).image()));
   }
   return {{"light lost: T = 0.0999, then an opaque one", error, 1.1e-4},
           {"light lost in random stacks", worst, kTransmittanceStop + kSumOf60}};
@@ -171,7 +172,7 @@ std::vector<StressFigure> faint_layers(Remedy remedy) {
   for (const PixelSplat& layer : trace.composited) {
     if (layer.alpha >= cut.settings.alpha_min) continue;
     through *= 1 - layer.alpha;
-    largest = std::max(largest, layer.alpha);
+    largest = larger(largest, layer.alpha);
   }
   const bool on = remedy == Remedy::kOn;
   return {{"opacity lost of 1000 layers of 0.0039", on ? std::abs(uncut.image()[0] - exact) : lost, 1e-5},
@@ -206,8 +207,8 @@ std::vector<StressFigure> million_on_one_pixel(Remedy remedy) {
   const std::vector<double> image = render.image(), t = render.value(render.out.transmittance);
   double outside = 0, sum = 0;
   for (std::size_t p = 0; p < t.size(); ++p) {
-    outside = std::max({outside, t[p] - 1, -t[p]});
-    sum = std::max(sum, std::abs(image[t.size() + p] + t[p] - 1));
+    outside = larger(outside, larger(t[p] - 1, -t[p]));
+    sum = larger(sum, std::abs(image[t.size() + p] + t[p] - 1));
   }
   const PixelTrace trace = trace_pixel(render.tape, render.projected, render.opacities, render.features, view, {8, 8});
   double rises = trace.composited.empty() ? 1 : 0;

@@ -73,6 +73,21 @@ std::vector<TrackedPoint> track(const Tracking& tracking, const std::vector<Loss
   return points;
 }
 
+/// Throws UserError for a file or a folder that could not be written at the end, before anything is measured.
+void check_outputs(const BenchParetoOptions& options) {
+  for (const std::string& path : {options.json, options.csv, options.plot, options.front})
+    if (!path.empty()) const AtomicFile unfinished(path);
+  if (options.seeds > 0) check_tracking_folder(options.out);
+}
+
+void write_outputs(const BenchParetoOptions& options, const std::vector<ParetoRow>& rows,
+                   const std::vector<TrackedPoint>& tracked) {
+  if (!options.json.empty()) write_text_file(options.json, pareto_json(rows) + tracking_json(tracked));
+  if (!options.csv.empty()) write_text_file(options.csv, pareto_csv(rows, tracked));
+  if (!options.plot.empty()) write_text_file(options.plot, pareto_svg(rows, tracked));
+  if (!options.front.empty()) write_text_file(options.front, pareto_front_svg(rows));
+}
+
 }  // namespace
 
 std::string bench_pareto_command(const BenchParetoOptions& options, const std::vector<LossTerm>& losses) {
@@ -83,19 +98,18 @@ std::string bench_pareto_command(const BenchParetoOptions& options, const std::v
                 {},
                 options.seeds,
                 options.out};
+  check_outputs(options);
   const Observer observer = observer_on_terminal(false);
   Progress shown("settings", pareto_row_count(bench), observer.progress, observer.progress_interval);
   const std::vector<ParetoRow> rows = measure_pareto(bench, [&shown](const ParetoRow&) { shown.step(); });
   shown.finish();
+  write_outputs(options, rows, {});  // what is there is not lost if reconstructions fail
   std::vector<TrackedPoint> tracked;
   if (options.seeds > 0) {
     tracking.settings = tracked_settings(rows, bench.settings);
     tracked = track(tracking, losses, observer);
+    write_outputs(options, rows, tracked);
   }
-  if (!options.json.empty()) write_text_file(options.json, pareto_json(rows) + tracking_json(tracked));
-  if (!options.csv.empty()) write_text_file(options.csv, pareto_csv(rows, tracked));
-  if (!options.plot.empty()) write_text_file(options.plot, pareto_svg(rows, tracked));
-  if (!options.front.empty()) write_text_file(options.front, pareto_front_svg(rows));
   const std::string fronts = pareto_front_table(rows);
   return pareto_table(rows) + (fronts.empty() ? "" : "\n" + fronts) +
          (tracked.empty() ? "" : "\n" + tracking_table(tracked));

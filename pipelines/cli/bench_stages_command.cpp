@@ -51,7 +51,6 @@ MeasuredRun measured_run(const RunConfig& config, const BenchStagesOptions& opti
   const StageWatch watch{[&cost](const StageProfile& profile) { add_profile(profile, cost.stages); },
                          heap_allocation_counter()};
   cost.threads = options.threads > 0 ? options.threads : config.threads > 0 ? config.threads : thread_count();
-  cost.counts_allocations = watch.allocation_count != nullptr;
   RunOptions run;
   run.folder = free_folder(out).string();
   run.threads = options.threads;

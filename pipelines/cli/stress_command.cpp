@@ -173,7 +173,10 @@ StressOutcome function_table(const StressOptions& options) {
 
 StressOutcome stress_command(const StressOptions& options) {
   if (options.functions) return function_table(options);
-  const std::vector<StressCase> cases = asked_cases(options.rows);
+  return run_cases(asked_cases(options.rows), options);
+}
+
+StressOutcome run_cases(std::span<const StressCase> cases, const StressOptions& options) {
   std::string json;
   StressOutcome outcome;
   Index exempt = 0;

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/types.h"
+#include "stress/stress.h"
 
 namespace hsi4d::cli {
 
@@ -25,5 +27,8 @@ struct StressOutcome {
 
 /// Runs the rows. Throws UserError for one that is not known, and for rows beside `functions`.
 StressOutcome stress_command(const StressOptions& options);
+
+/// Runs these cases, whatever rows `options` names, and writes its file.
+StressOutcome run_cases(std::span<const StressCase> cases, const StressOptions& options);
 
 }  // namespace hsi4d::cli

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "autodiff/ssim.h"
+#include "tests/support/larger.h"
 #include "tests/support/operator_check.h"
 
 namespace hsi4d::test {
@@ -141,7 +142,7 @@ inline double norm(const std::vector<double>& a) {
 }
 inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   double worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::fabs(a[i] - b[i]));
+  for (std::size_t i = 0; i < a.size(); ++i) worst = larger(worst, std::fabs(a[i] - b[i]));
   return worst;
 }
 

@@ -7,6 +7,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
 #include "core/rotation.h"
+#include "tests/support/larger.h"
 #include "tests/support/operator_check.h"
 #include "tests/support/random_numbers.h"
 
@@ -116,7 +117,7 @@ TEST_CASE("D3: the offsets of tiny rotations are accurate to rounding of their o
         Vector3<double>(static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])));
     double error = 0, error_subtracted = 0;
     for (int i = 0; i < 9; ++i) {
-      error = std::max(error, std::abs(static_cast<double>(tape.value(offsets).data[i]) / exact(i / 3, i % 3) - 1));
+      error = larger(error, std::abs(static_cast<double>(tape.value(offsets).data[i]) / exact(i / 3, i % 3) - 1));
       error_subtracted = std::max(error_subtracted,
                                   std::abs(static_cast<double>(tape.value(subtracted).data[i]) - exact(i / 3, i % 3)));
     }

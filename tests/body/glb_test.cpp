@@ -10,6 +10,7 @@
 #include "body/procedural_body.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "tests/support/larger.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace hsi4d;
@@ -153,7 +154,7 @@ TEST_CASE("a GLB file, skinned as its specification says, is the body in motion,
       }
       REQUIRE(sum == Approx(1).margin(1e-7));
       const Vector3<double> y_up(expected[3 * v], expected[3 * v + 2], -expected[3 * v + 1]);
-      largest = std::max(largest, (x - y_up).norm());
+      largest = larger(largest, (x - y_up).norm());
       CHECK(Vector3<float>(normals.data() + 3 * v).norm() == Approx(1).margin(1e-6));
     }
     CHECK(largest < 1e-5);

@@ -12,6 +12,7 @@
 #include "core/random.h"
 #include "core/rotation.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/larger.h"
 #include "tests/support/operator_check.h"
 
 using namespace hsi4d;
@@ -96,7 +97,7 @@ Numbers numbers_of(const ConstArray<S>& array) {
 double largest_difference(const Numbers& a, const Numbers& b) {
   REQUIRE(a.size() == b.size());
   double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::fabs(a[i] - b[i]));
+  for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::fabs(a[i] - b[i]));
   return largest;
 }
 
@@ -247,9 +248,9 @@ TEST_CASE("C12: a chain of ten joints stays orthonormal in float and its points 
       Eigen::Matrix<double, 3, 4> x, y;
       for (int i = 0; i < 12; ++i) x(i / 4, i % 4) = a(j, i), y(i / 4, i % 4) = b(j, i);
       const Matrix3<double> r = x.leftCols<3>();
-      orthogonality = std::max(orthogonality, (r * r.transpose() - Matrix3<double>::Identity()).cwiseAbs().maxCoeff());
+      orthogonality = larger(orthogonality, (r * r.transpose() - Matrix3<double>::Identity()).cwiseAbs().maxCoeff());
       const Vector3<double> point = Vector3<double>(s.rest.data() + 3 * j) + Vector3<double>(0.1, -0.1, 0.1);
-      distance = std::max(distance, ((x - y) * point.homogeneous()).norm());
+      distance = larger(distance, ((x - y) * point.homogeneous()).norm());
     }
   }
   INFO("orthogonality " << orthogonality / std::numeric_limits<float>::epsilon() << " eps, points " << distance);

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/simd.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/larger.h"
 #include "tests/support/operator_check.h"
 
 using namespace hsi4d;
@@ -268,7 +269,7 @@ TEST_CASE("D1: weights are normalised: the rest pose is the template, and a tran
   };
   const auto largest_difference = [](const Numbers& a, const Numbers& b, double shift) {
     double largest = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::fabs(a[i] - b[i] - shift));
+    for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::fabs(a[i] - b[i] - shift));
     return largest;
   };
   for (const bool dense : {false, true}) {

@@ -5,6 +5,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/larger.h"
+
 using namespace hsi4d;
 
 namespace {
@@ -18,7 +20,7 @@ double worst_ulps(double low, double high, int steps) {
     const long double exact = std::exp(static_cast<long double>(x));
     const S rounded = static_cast<S>(exact);
     const double ulp = static_cast<double>(std::nextafter(rounded, std::numeric_limits<S>::infinity()) - rounded);
-    worst = std::max(worst, static_cast<double>(std::fabs(static_cast<long double>(vector_exp(x)) - exact)) / ulp);
+    worst = test::larger(worst, static_cast<double>(std::fabs(static_cast<long double>(vector_exp(x)) - exact)) / ulp);
   }
   return worst;
 }

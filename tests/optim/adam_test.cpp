@@ -11,6 +11,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/larger.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
@@ -125,7 +126,7 @@ TEST_CASE("the bias correction is right for small and large step counts") {
     double worst = 0;
     for (Index t = 1; t <= 1000000; t += t < 1000 ? 1 : 997) {
       const long double exact = -std::expm1(static_cast<long double>(t) * std::log(static_cast<long double>(beta)));
-      worst = std::max(worst, std::fabs(static_cast<double>(bias_correction(beta, t) / exact - 1)));
+      worst = larger(worst, std::fabs(static_cast<double>(bias_correction(beta, t) / exact - 1)));
     }
     INFO("beta " << beta);
     CHECK(worst < 1e-12);

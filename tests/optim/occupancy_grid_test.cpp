@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "tests/optim/meshes.h"
+#include "tests/support/larger.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace hsi4d;
@@ -116,7 +117,7 @@ TEST_CASE("the distance of a box of voxels is that of the box, and of its faces 
   double farthest = 0;
   for (int i = 0; i < 2000; ++i) {
     const Point place(random.uniform(-0.95, 0.95), random.uniform(-0.45, 0.95), random.uniform(0.05, 1.45));
-    farthest = std::max(farthest, std::fabs(distance.at(place) - box_distance(low, high, place)));
+    farthest = larger(farthest, std::fabs(distance.at(place) - box_distance(low, high, place)));
   }
   CHECK(farthest < h);
   CHECK(std::isnan(distance.at({-1.01, 0, 0.5})));

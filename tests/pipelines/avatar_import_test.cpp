@@ -9,6 +9,7 @@
 #include "pipelines/posed_avatar.h"
 #include "pipelines/synthetic_object.h"
 #include "splat/io_ply.h"
+#include "tests/support/larger.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace hsi4d;
@@ -39,7 +40,7 @@ std::vector<double> dense(const SparseWeights& w) {
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   REQUIRE(a.size() == b.size());
   double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+  for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::abs(a[i] - b[i]));
   return largest;
 }
 

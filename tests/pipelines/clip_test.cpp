@@ -305,6 +305,24 @@ TEST_CASE("frames whose names sort otherwise than their numbers are refused") {
             "names, so fill up with zeros");
 }
 
+TEST_CASE("frames with numbers behind a text are held to the same digits, and their gaps are told") {
+  const CopiedDataset dataset;
+  const fs::path frames = dataset.path / "frames";
+  for (const fs::path& folder : {frames, dataset.path / "masks/human"}) {
+    std::vector<fs::path> files;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
+    for (const fs::path& file : files) fs::rename(file, folder / ("shot2_" + file.filename().string()));
+  }
+  CHECK(message_of([&] { dataset.read(); }) == "no error");
+  fs::rename(frames / "shot2_0003.png", frames / "shot2_10.png");
+  CHECK(message_of([&] { dataset.read(); }) ==
+        frames.string() +
+            ": \"shot2_0000.png\" and \"shot2_10.png\" have different numbers of digits; frames are taken in "
+            "the order of their names, so fill up with zeros");
+  fs::rename(frames / "shot2_10.png", frames / "other.png");  // not all are numbered alike: by name
+  CHECK(message_of([&] { dataset.read(); }).find("different numbers") == std::string::npos);
+}
+
 TEST_CASE("inputs that are missing or damaged are told by name") {
   const CopiedDataset dataset;
   DataSettings data = dataset_inputs(dataset.path);

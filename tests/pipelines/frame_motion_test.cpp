@@ -12,6 +12,7 @@
 #include "pipelines/frame_graph.h"
 #include "pipelines/tape_image.h"
 #include "tests/pipelines/small_clip.h"
+#include "tests/support/larger.h"
 
 using namespace hsi4d;
 using test::small_clip;
@@ -155,7 +156,7 @@ TEST_CASE("gradients of terms over masks and motion are right for body and objec
     for (const Var<double> block : group.blocks) {
       const ConstArray<double> gradient = tape.gradient(block);
       double largest = 0;
-      for (Index i = 0; i < gradient.shape.count(); ++i) largest = std::max(largest, std::fabs(gradient.data[i]));
+      for (Index i = 0; i < gradient.shape.count(); ++i) largest = test::larger(largest, std::fabs(gradient.data[i]));
       CHECK(largest > 1e-4);
     }
     for (const Var<double> block : group.blocks) tape.freeze(block);
@@ -264,8 +265,8 @@ TEST_CASE("planes of human and objects are what images show in which nothing els
     for (Index y = 0; y < kHeight; ++y) {
       for (Index x = 0; x < kWidth; ++x) {
         const double opacity = planes(white == 2 ? 0 : white, y, x);
-        largest = std::max(largest, opacity);
-        for (Index c = 0; c < 3; ++c) difference = std::max(difference, std::fabs(seen(c, y, x) - opacity));
+        largest = test::larger(largest, opacity);
+        for (Index c = 0; c < 3; ++c) difference = test::larger(difference, std::fabs(seen(c, y, x) - opacity));
       }
     }
     CHECK(largest > 0.1);

@@ -5,6 +5,7 @@
 #include "core/check.h"
 #include "core/rotation.h"
 #include "tests/pipelines/small_clip.h"
+#include "tests/support/larger.h"
 
 using namespace hsi4d;
 using test::small_clip;
@@ -27,12 +28,12 @@ SceneState moving_state(const Clip& clip, double t) {
 double distance(const SceneState& a, const SceneState& b) {
   double largest = (a.body.transl - b.body.transl).norm();
   for (Index j = 0; j < kSmplxJoints; ++j)
-    largest = std::max(largest, (so3_exp(a.body.rotation_of(j)) - so3_exp(b.body.rotation_of(j))).norm());
+    largest = test::larger(largest, (so3_exp(a.body.rotation_of(j)) - so3_exp(b.body.rotation_of(j))).norm());
   for (std::size_t o = 0; o < a.objects.size(); ++o) {
-    largest = std::max(largest, (a.objects[o].translation - b.objects[o].translation).norm());
-    largest = std::max(largest, (so3_exp(a.objects[o].rotation) - so3_exp(b.objects[o].rotation)).norm());
+    largest = test::larger(largest, (a.objects[o].translation - b.objects[o].translation).norm());
+    largest = test::larger(largest, (so3_exp(a.objects[o].rotation) - so3_exp(b.objects[o].rotation)).norm());
   }
-  largest = std::max(largest, (a.camera_from_world.rotation - b.camera_from_world.rotation).norm());
+  largest = test::larger(largest, (a.camera_from_world.rotation - b.camera_from_world.rotation).norm());
   return std::max(largest, (a.camera_from_world.translation - b.camera_from_world.translation).norm());
 }
 

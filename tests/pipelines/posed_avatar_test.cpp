@@ -13,6 +13,7 @@
 #include "core/npz.h"
 #include "pipelines/cli/render_command.h"
 #include "splat/io_ply.h"
+#include "tests/support/larger.h"
 #include "tests/support/program.h"
 
 using namespace hsi4d;
@@ -57,7 +58,7 @@ TEST_CASE("a posed avatar has the colours of its color net") {
   };
   const auto distance = [](const std::vector<double>& a, const std::vector<double>& b) {
     double most = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::fabs(a[i] - b[i]));
+    for (std::size_t i = 0; i < a.size(); ++i) most = larger(most, std::fabs(a[i] - b[i]));
     return most;
   };
   BodyPose bent = rest_pose(2);
@@ -153,7 +154,7 @@ TEST_CASE("render draws a body of a motion, in every precision") {
   const auto largest_difference = [&](std::size_t a, std::size_t b) {
     double largest = 0;
     for (std::size_t i = 0; i < images[a].size(); ++i)
-      largest = std::max(largest, std::fabs(images[a][i] - images[b][i]));
+      largest = larger(largest, std::fabs(images[a][i] - images[b][i]));
     return largest;
   };
   CHECK(largest_difference(1, 0) < 1e-9);
@@ -176,7 +177,7 @@ namespace {
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   REQUIRE(a.size() == b.size());
   double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::fabs(a[i] - b[i]));
+  for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::fabs(a[i] - b[i]));
   return largest;
 }
 

@@ -13,6 +13,7 @@
 #include "optim/metrics.h"
 #include "optim/stage.h"
 #include "tests/pipelines/small_clip.h"
+#include "tests/support/larger.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/vposer_checkpoint.h"
 
@@ -55,7 +56,7 @@ std::any own_settings(const std::string& name, const std::string& text) {
 double largest_joint_distance(const Clip& clip, const SceneState& a, const SceneState& b) {
   const std::vector<double> x = pose_joints(clip.avatar, a.body), y = pose_joints(clip.avatar, b.body);
   double largest = 0;
-  for (std::size_t i = 0; i < x.size(); ++i) largest = std::max(largest, std::fabs(x[i] - y[i]));
+  for (std::size_t i = 0; i < x.size(); ++i) largest = test::larger(largest, std::fabs(x[i] - y[i]));
   return largest;
 }
 

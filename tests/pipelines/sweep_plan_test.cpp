@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/check.h"
+#include "core/log.h"
 #include "pipelines/json_text.h"
 #include "tests/pipelines/tiny_sweep.h"
 
@@ -54,6 +55,22 @@ TEST_CASE("a sweep without axes is its base") {
   CHECK(at(plan.runs[0], "/name") == "tiny: the only run");
   CHECK(plan.runs[0].id.size() == 16);
   CHECK(plan.runs[0].dataset.size() == 16);
+}
+
+TEST_CASE("what a sweep sets of a dataset that is not made is told") {
+  const TemporaryFolder here;
+  write_tiny_base();
+  std::vector<std::string> told;
+  const LogSink sink =
+      log_to([&told](LogLevel, std::string_view message) { told.emplace_back(message); }, LogLevel::kWarning);
+  Json set = {{"synthetic.frames", 4}};
+  plan_of({{"set", set}});
+  CHECK(told == kNone);
+  for (const char* name : {"scene", "avatar", "frames", "masks", "camera", "initial"})
+    set[std::string("data.") + name] = std::string("there/") + name;
+  plan_of({{"set", set}, {"seeds", 2}});
+  CHECK(told ==
+        std::vector<std::string>{"tiny: nothing reads synthetic.frames in 2 runs, whose config names its data"});
 }
 
 TEST_CASE("axes are crossed, seeds fastest") {

@@ -10,6 +10,7 @@
 #include "core/quaternion.h"
 #include "core/rotation.h"
 #include "tests/pipelines/small_clip.h"
+#include "tests/support/larger.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace hsi4d;
@@ -57,7 +58,7 @@ std::vector<double> transforms_of(const Safetensors& file, const std::string& na
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   REQUIRE(a.size() == b.size());
   double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::fabs(a[i] - b[i]));
+  for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::fabs(a[i] - b[i]));
   return largest;
 }
 
@@ -131,7 +132,7 @@ TEST_CASE("the file of the 3D view has the true body where it is known, and its 
     }
     if (share != 255) FAIL("the weights of vertex " << v << " sum to " << share);
     const double off = (place - Vector3<double>(expected.data() + 3 * v)).norm();
-    largest = std::max(largest, off);
+    largest = larger(largest, off);
     sum += off;
   }
   CHECK(largest < 1.5e-3);

@@ -11,6 +11,7 @@
 #include "splat/composite.h"
 #include "splat/debug_pixel.h"
 #include "tests/support/flat_splats.h"
+#include "tests/support/larger.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
@@ -129,8 +130,8 @@ TEMPLATE_TEST_CASE("a mirrored scene makes a mirrored image, and a padded image 
     for (Index r = 0; r < height; ++r) {
       for (Index x = 0; x < width; ++x) {
         const auto of = static_cast<double>(a(k, r, x));
-        mirror_error = std::max(mirror_error, std::abs(of - static_cast<double>(b(k, r, width - 1 - x))));
-        padding_error = std::max(padding_error, std::abs(of - static_cast<double>(c(k, r + 16, x + 32))));
+        mirror_error = larger(mirror_error, std::abs(of - static_cast<double>(b(k, r, width - 1 - x))));
+        padding_error = larger(padding_error, std::abs(of - static_cast<double>(c(k, r + 16, x + 32))));
       }
     }
   }
@@ -230,7 +231,7 @@ TEMPLATE_TEST_CASE("what is skipped changes a pixel by no more than its alphas' 
     for (std::size_t k = 0; k < 3; ++k) {
       const double error = std::abs(a[k * pixels + p] - b[k * pixels + p]);
       CHECK(error <= sum + 2e-6);
-      largest_error = std::max(largest_error, error);
+      largest_error = larger(largest_error, error);
     }
     largest_sum = std::max(largest_sum, sum);
   }

@@ -10,6 +10,7 @@
 #include "splat/block_kernel.h"
 #include "tests/support/flat_splats.h"
 #include "tests/support/isa.h"
+#include "tests/support/larger.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
@@ -79,7 +80,7 @@ void check_exponential(double lowest, double step) {
     const S value = pixel_gaussian(wanted);
     const long double exact = std::exp(static_cast<long double>(x));
     const S near = static_cast<S>(exact), ulp = std::nextafter(near, S(2)) - near;
-    worst = std::max(worst, static_cast<double>(std::abs(static_cast<long double>(value) - exact) / ulp));
+    worst = larger(worst, static_cast<double>(std::abs(static_cast<long double>(value) - exact) / ulp));
     monotone = monotone && (x < last_x ? value <= last : value >= last || x != last_x);
     last_x = x;
     last = value;

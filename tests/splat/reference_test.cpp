@@ -11,6 +11,7 @@
 #include "core/check.h"
 #include "core/random.h"
 #include "splat/reference_gaussian.h"
+#include "tests/support/larger.h"
 #include "tests/support/reference_images.h"
 
 using namespace hsi4d;
@@ -162,7 +163,7 @@ TEST_CASE("reference: alpha agrees with the textbook's formulas") {
             alpha[static_cast<std::size_t>(fragment.gaussian)] = fragment.alpha;
           for (std::size_t n = 0; n < alpha.size(); ++n) {
             const long double expected = std::max(0.0L, textbook_alpha(scene, n, row, column));
-            worst = std::max(worst, std::abs(alpha[n] - expected));
+            worst = larger(worst, std::abs(alpha[n] - expected));
             if (expected > 1e-3L) ++compared;
           }
         }

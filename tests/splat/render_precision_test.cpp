@@ -14,6 +14,7 @@
 #include "splat/conic.h"
 #include "tests/support/failed_images.h"
 #include "tests/support/isa.h"
+#include "tests/support/larger.h"
 #include "tests/support/pixel_choices.h"
 #include "tests/support/real_splats.h"
 #include "tests/support/taped_splats.h"
@@ -118,9 +119,9 @@ struct Summary {
     above += e.gradients.error > kGradients ? 1 : 0;
     pixels += e.pixels;
     flips += e.flips;
-    mean_image = std::max(mean_image, e.mean_image);
-    gradients = std::max(gradients, e.gradients.error);
-    elsewhere = std::max(elsewhere, e.elsewhere.error);
+    mean_image = larger(mean_image, e.mean_image);
+    gradients = larger(gradients, e.gradients.error);
+    elsewhere = larger(elsewhere, e.elsewhere.error);
   }
   void print(const char* what) const {
     std::printf("float against double, %s: %zu of %zu pixels flip a cut (%.2g %%)\n", what, flips, pixels,

@@ -11,6 +11,7 @@
 #include "tests/support/allocation_counter.h"
 #include "tests/support/flat_splats.h"
 #include "tests/support/isa.h"
+#include "tests/support/larger.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;
@@ -138,7 +139,7 @@ SplatView view_with(const RenderSettings& settings, bool tiles, bool layer, bool
 
 double largest_error(const std::vector<std::vector<double>>& a, const std::vector<std::vector<double>>& b) {
   double worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, relative_l2(a[i], b[i]));
+  for (std::size_t i = 0; i < a.size(); ++i) worst = larger(worst, relative_l2(a[i], b[i]));
   return worst;
 }
 
@@ -192,8 +193,8 @@ TEST_CASE("static layers change images by less than 1e-6 and gradients by less t
       CHECK(of_image <= 1e-6);
       CHECK(of_t <= 1e-6);
       CHECK(of_gradients <= 1e-5);
-      image = std::max(image, of_image);
-      gradients = std::max(gradients, of_gradients);
+      image = larger(image, of_image);
+      gradients = larger(gradients, of_gradients);
     }
   }
   WARN("static layers: image " << image << ", gradients " << gradients);
@@ -358,7 +359,7 @@ TEST_CASE("a collapsed suffix with an exclusive stop is off by what the last Gau
     TwoSets<float> two(sets, view_with(settings, true, true, true));
     two.run();
     const double difference = largest_difference(two.transmittance(), all.transmittance());
-    worst = std::max(worst, difference / stop);
+    worst = larger(worst, difference / stop);
     CHECK(difference <= stop / (1 - settings.alpha_cap));
     CHECK(largest_difference(two.image(), all.image()) <= 2 * stop / (1 - settings.alpha_cap));
   }

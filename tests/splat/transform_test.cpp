@@ -10,6 +10,7 @@
 #include "splat/reference.h"
 #include "splat/sh_basis.h"
 #include "splat/sh_rotation.h"
+#include "tests/support/larger.h"
 #include "tests/support/splat_files.h"
 #include "tests/support/splat_scenes.h"
 
@@ -64,7 +65,7 @@ TEST_CASE("the matrices that rotate harmonics rotate the basis, are orthogonal a
         for (int i = 0; i < 2 * l + 1; ++i) {
           double sum = 0;
           for (int k = 0; k < 2 * l + 1; ++k) sum += d.entry(l, i, k) * from[static_cast<std::size_t>(l * l + k)];
-          rotates = std::max(rotates, std::fabs(sum - to[static_cast<std::size_t>(l * l + i)]));
+          rotates = larger(rotates, std::fabs(sum - to[static_cast<std::size_t>(l * l + i)]));
         }
       }
     }
@@ -78,8 +79,8 @@ TEST_CASE("the matrices that rotate harmonics rotate the basis, are orthogonal a
               gram += d.entry(l, k, i) * d.entry(l, k, j);
               both += d.entry(l, i, k) * e.entry(l, k, j);
             }
-            orthogonal = std::max(orthogonal, std::fabs(gram - (i == j ? 1 : 0)));
-            group = std::max(group, std::fabs(both - product.entry(l, i, j)));
+            orthogonal = larger(orthogonal, std::fabs(gram - (i == j ? 1 : 0)));
+            group = larger(group, std::fabs(both - product.entry(l, i, j)));
           }
         }
       }
@@ -112,7 +113,7 @@ TEST_CASE("a Gaussian that is turned shows in the turned direction what it showe
       for (Index n = 0; n < g.count(); ++n) {
         for (const Vector3<double>& direction : directions()) {
           for (int c = 0; c < 3; ++c)
-            largest = std::max(largest, std::fabs(seen(turned, n, c, r * direction) - seen(g, n, c, direction)));
+            largest = larger(largest, std::fabs(seen(turned, n, c, r * direction) - seen(g, n, c, direction)));
         }
       }
       CHECK(largest < 1e-6);
@@ -211,8 +212,8 @@ TEST_CASE("what a camera that goes along sees does not change") {
   const std::vector<double> scaled = image(transformed(g, larger), far_camera);
   double difference = 0, scaled_difference = 0, contrast = 0;
   for (std::size_t i = 0; i < before.size(); ++i) {
-    difference = std::max(difference, std::fabs(after[i] - before[i]));
-    scaled_difference = std::max(scaled_difference, std::fabs(scaled[i] - before[i]));
+    difference = test::larger(difference, std::fabs(after[i] - before[i]));
+    scaled_difference = test::larger(scaled_difference, std::fabs(scaled[i] - before[i]));
     contrast = std::max(contrast, std::fabs(before[i] - before[i % 3]));
   }
   CHECK(contrast > 0.1);

@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 
 #include "splat/reference.h"
+#include "tests/support/larger.h"
 #include "tests/support/splat_scenes.h"
 
 namespace hsi4d::test {
@@ -37,7 +38,7 @@ long double largest_gap(const A& a, const B& b) {
   long double largest = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     REQUIRE(std::isfinite(a[i]));
-    largest = std::max(largest, std::abs(static_cast<long double>(a[i]) - static_cast<long double>(b[i])));
+    largest = larger(largest, std::abs(static_cast<long double>(a[i]) - static_cast<long double>(b[i])));
   }
   return largest;
 }

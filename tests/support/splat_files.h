@@ -12,6 +12,7 @@
 #include "core/quaternion.h"
 #include "splat/gaussians.h"
 #include "splat/sh_basis.h"
+#include "tests/support/larger.h"
 
 namespace hsi4d::test {
 
@@ -46,7 +47,7 @@ inline double largest_difference(const std::vector<float>& a, const std::vector<
   HSI4D_CHECK_EQ(a.size(), b.size());
   double largest = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
-    largest = std::max(largest, std::fabs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
+    largest = larger(largest, std::fabs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
   return largest;
 }
 
@@ -56,7 +57,7 @@ inline double largest_opacity_difference(const Gaussians& a, const Gaussians& b)
   HSI4D_CHECK_EQ(a.count(), b.count());
   double largest = 0;
   for (std::size_t n = 0; n < a.opacity_logits.size(); ++n)
-    largest = std::max(largest, std::fabs(opacity_of(a.opacity_logits[n]) - opacity_of(b.opacity_logits[n])));
+    largest = larger(largest, std::fabs(opacity_of(a.opacity_logits[n]) - opacity_of(b.opacity_logits[n])));
   return largest;
 }
 
@@ -71,7 +72,7 @@ inline double largest_angle(const Gaussians& a, const Gaussians& b) {
   for (Index n = 0; n < a.count(); ++n) {
     const Vector4<double> p = unit(a, n), q = unit(b, n);
     const double chord = (p - (dot(p, q) < 0 ? -1.0 : 1.0) * q).norm();
-    largest = std::max(largest, 4 * std::asin(std::min(1.0, chord / 2)));
+    largest = larger(largest, 4 * std::asin(std::min(1.0, chord / 2)));
   }
   return largest;
 }

@@ -13,7 +13,7 @@ import tempfile
 import unittest
 
 TOOLS = pathlib.Path(sys.argv.pop(1)).resolve()
-STORED = json.loads((TOOLS.parent / "bench/front.json").read_text())
+ISA, STORED = next(iter(json.loads((TOOLS.parent / "bench/front.json").read_text())["fronts"].items()))
 PRESETS = ("default", "reference", "accurate")
 
 STAND_IN = """#!/usr/bin/env python3
@@ -23,7 +23,7 @@ shutil.copy(pathlib.Path(__file__).with_name("rows.json"), sys.argv[sys.argv.ind
 
 
 def row(scene, knob, value, time_ratio, errors, decibels=60.0):
-    return {"scene": scene, "knob": knob, "value": value, "model": "own", "isa": STORED["isa"], "time_ratio": time_ratio,
+    return {"scene": scene, "knob": knob, "value": value, "model": "own", "isa": ISA, "time_ratio": time_ratio,
             "psnr_db": decibels, "image_rms": errors["image_rms"], "image_max": errors["image_max"],
             "gradients": {"means": {"relative_l2": errors["gradient"]}, "sh": {"relative_l2": 0.0}}}
 
@@ -58,11 +58,14 @@ class Gate(unittest.TestCase):
             self.assertEqual(self.run_gate("--store").returncode, 0)
             Gate.front_text = self.front.read_text()
         self.front.write_text(Gate.front_text)
-        self.stored = json.loads(Gate.front_text)
+        self.stored = json.loads(Gate.front_text)["fronts"][ISA]
         self.product = next(i for i, point in enumerate(self.stored["front"]) if point["knob"] == "product")
 
     def measure(self, rows):
         self.program.with_name("rows.json").write_text("".join(json.dumps(one) + "\n" for one in rows))
+
+    def write_fronts(self, fronts):
+        self.front.write_text(json.dumps({"fronts": fronts}))
 
     def run_gate(self, *more):
         command = [sys.executable, TOOLS / "bench", "--program", self.program, "--front", self.front, *more]
@@ -74,7 +77,7 @@ class Gate(unittest.TestCase):
         for by, status in ((1 + 0.99 * (bound - 1), 0), (1 + 1.02 * (bound - 1), 1)):
             doctored = copy.deepcopy(self.stored)
             worsen(doctored, by)
-            self.front.write_text(json.dumps(doctored))
+            self.write_fronts({ISA: doctored})
             result = self.run_gate()
             self.assertEqual(result.returncode, status, f"{by}\n{result.stdout}\n{result.stderr}")
         self.assertIn(f"worse than {self.front} allows:\n", result.stderr)
@@ -92,14 +95,20 @@ class Gate(unittest.TestCase):
             stored["default"]["time"] /= by
         self.assertIn("  quality default: 1.102 of the stored time", self.check_bound(1.10, worsen))
 
-    def test_times_of_another_instruction_set_are_told_alone(self):
-        stored = copy.deepcopy(json.loads(Gate.front_text))
-        stored["isa"] = "another"
-        stored["default"]["time"] /= 2
-        self.front.write_text(json.dumps(stored))
+    def test_every_instruction_set_has_a_front_of_its_own(self):
+        slow = copy.deepcopy(self.stored)
+        slow["default"]["time"] /= 2
+        self.write_fronts({"another": slow})
         done = self.run_gate()
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("stored ones are of another, these of", done.stdout)
+        self.assertIn(f"told, not compared: stored ones are of another, these of {ISA}", done.stdout)
+        slow["default"]["errors"]["needles"]["gradient"] /= 2
+        self.write_fronts({"another": slow})
+        self.assertEqual(self.run_gate().returncode, 1)  # errors are the same on all
+        self.write_fronts({"another": slow, ISA: self.stored})
+        self.assertEqual(self.run_gate().returncode, 0)
+        self.assertEqual(self.run_gate("--store").returncode, 0)
+        self.assertEqual(json.loads(self.front.read_text())["fronts"], {"another": slow, ISA: self.stored})
 
     def test_a_setting_of_the_front_is_too_slow(self):
         def worsen(stored, by):
@@ -136,7 +145,7 @@ class Gate(unittest.TestCase):
             self.assertEqual(result.returncode, 1)
             self.assertIn("\n  quality accurate, dense: ", result.stderr)
             self.assertEqual(self.run_gate("--store").returncode, 1)
-            self.assertEqual(json.loads(self.front.read_text()), self.stored)  # nothing was written
+            self.assertEqual(self.front.read_text(), Gate.front_text)  # nothing was written
 
     def check_nothing_to_compare(self, words):
         result = self.run_gate()
@@ -147,22 +156,24 @@ class Gate(unittest.TestCase):
     def test_there_is_no_front_or_none_that_can_be_read(self):
         self.front.unlink()
         self.check_nothing_to_compare("front.json: No such file or directory; tools/bench --store writes it")
-        stored = self.stored
-        for text, problem in (
-            ("{", "is no JSON"),
-            ("[]", "/front: is no list of settings"),
-            (json.dumps(dict(stored, default=1)), "/default: is no object"),
-            (json.dumps(dict(stored, default={"time": True})), "/default/time: is no number"),
-            (json.dumps(dict(stored, default={"time": 1, "errors": {}})), "/default/errors/sparse: is no object"),
-            (json.dumps(dict(stored, front=[{"knob": "tile"}])), "/front/0/time_ratio: is no number"),
-            (json.dumps(dict(stored, front=[dict(stored["front"][0], value=8)])), "/front/0: names no setting"),
-        ):
+        for text, problem in (("{", "is no JSON"), ("[]", "/fronts: is no object"), ('{"fronts": {}}', "/fronts: is no object")):
             self.front.write_text(text)
             self.check_nothing_to_compare(f"front.json: {problem}")
+        stored = self.stored
+        for one, problem in (
+            ([], "/front: is no list of settings"),
+            (dict(stored, default=1), "/default: is no object"),
+            (dict(stored, default={"time": True}), "/default/time: is no number"),
+            (dict(stored, default={"time": 1, "errors": {}}), "/default/errors/sparse: is no object"),
+            (dict(stored, front=[{"knob": "tile"}]), "/front/0/time_ratio: is no number"),
+            (dict(stored, front=[dict(stored["front"][0], value=8)]), "/front/0: names no setting"),
+        ):
+            self.write_fronts({ISA: one})
+            self.check_nothing_to_compare(f"front.json: /fronts/{ISA}{problem}")
 
     def test_a_setting_is_no_more(self):
         self.stored["front"][self.product]["value"] = "alpha_min 1/3"
-        self.front.write_text(json.dumps(self.stored))
+        self.write_fronts({ISA: self.stored})
         self.check_nothing_to_compare("has no setting product alpha_min 1/3; tools/bench --store")
 
     def test_there_is_no_program(self):

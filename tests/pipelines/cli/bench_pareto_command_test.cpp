@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <sstream>
 
 #include <catch2/catch.hpp>
@@ -74,6 +75,14 @@ TEST_CASE("bench pareto tells what it does not know before it measures") {
   CHECK_THAT(error_of({"--scene", "none.ply"}), Contains("none.ply"));
   CHECK_THAT(error_of({"--seeds", "101"}), Contains("--seeds"));
   CHECK_THAT(error_of({"--workload", "empty", "--config", "none.json"}), Contains("none.json"));
+  std::filesystem::create_directory("there");
+  const std::string config = std::string(HSI4D_SOURCE_DIR) + "/configs/bench/pareto_tracking.json";
+  for (const std::string& said :
+       {error_of({"--workload", "empty", "--seeds", "1", "--config", config, "--out", "there"}),
+        error_of({"--workload", "empty", "--seeds", "0", "--csv", "there"})}) {
+    CHECK_THAT(said, Contains("there: ") && !Contains("settings"));
+  }
+  CHECK_FALSE(std::filesystem::exists("there.tmp"));
   Gaussians none;
   write_ply("none_in.ply", none);
   CHECK_THAT(error_of({"--scene", "none_in.ply"}),

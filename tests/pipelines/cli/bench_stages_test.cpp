@@ -1,3 +1,5 @@
+#include "pipelines/bench_stages.h"
+
 #include <map>
 #include <sstream>
 
@@ -18,11 +20,12 @@ using Catch::Matchers::Equals;
 
 namespace {
 
-const std::string kConfig = std::string(HSI4D_SOURCE_DIR) + "/configs/bench/paper_scale.json";
+const std::string kConfigs = std::string(HSI4D_SOURCE_DIR) + "/configs/bench/";
+const std::string kConfig = kConfigs + "paper_scale.json";
 
-/// The shipped benchmark with little of everything.
-std::vector<std::string> small_bench() {
-  std::vector<std::string> words = {"bench",  "stages",     "--config", kConfig,     "--out",     "out",
+/// A shipped benchmark with little of everything.
+std::vector<std::string> small_bench(const std::string& config = kConfig) {
+  std::vector<std::string> words = {"bench",  "stages",     "--config", config,      "--out",     "out",
                                     "--json", "costs.json", "--plot",   "costs.svg", "--threads", "2"};
   for (const char* setting :
        {"synthetic.frames=3", "synthetic.size_px=48", "synthetic.scene_gaussians=3000",
@@ -95,6 +98,59 @@ TEST_CASE("bench stages tells where the time of every stage goes", "[run]") {
   const ProgramResult refused = run_hsi4d(other);
   CHECK(refused.status == 2);
   CHECK_THAT(refused.err, Contains("the dataset was made with other settings than these"));
+}
+
+TEST_CASE("the tape's own time is told where colours are held between iterations too", "[run]") {
+  const TemporaryFolder here;
+  const ProgramResult result = run_hsi4d(small_bench(kConfigs + "fast_scale.json"));
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  int told = 0;
+  for (const nlohmann::json& line : lines_of("costs.json")) {
+    if (line.value("operator", "") != "the tape itself" || line["stage"] == "refinement") continue;
+    INFO(line.dump());
+    CHECK(line["forward_ms"] > 0);
+    CHECK(line["backward_ms"] > 0);
+    ++told;
+  }
+  CHECK(told == 2);
+}
+
+TEST_CASE("the first iteration of a stage weighs once, however many there are") {
+  StageProfile profile;
+  profile.stage = "interaction";
+  profile.frame = 1;
+  profile.iterations = 20;
+  profile.first_seconds = 0.3;
+  profile.iteration_seconds = 0.3 + 19 * 0.1;
+  std::vector<StageCost> stages;
+  for (int frame = 0; frame < 2; ++frame) add_profile(profile, stages);
+  REQUIRE(stages.size() == 1);
+  CHECK(stages[0].ms_each() == Approx(110));
+  CHECK(stages[0].ms_each_of(20) == Approx(110));
+  CHECK(stages[0].ms_each_of(200) == Approx(101));
+  CHECK(stages[0].ms_each_of(1) == Approx(300));
+}
+
+TEST_CASE("allocations are those of iterations in the second half, where a stage comes so far") {
+  std::int64_t asked = 0;
+  StageProfile told;
+  const StageWatch watch{[&told](const StageProfile& profile) { told = profile; }, [&asked] { return asked += 3; }};
+  for (const Index ran : {3, 7}) {
+    StageProbe probe(&watch);
+    for (Index i = 0; i < ran; ++i) {
+      IterationReport report;
+      report.iteration = i;
+      report.iterations = 10;
+      probe.iteration_ended(report, nullptr);
+      probe.iteration_begins();
+    }
+    StageResult result;
+    result.iterations = ran;
+    probe.stage_ended(result, {});
+    CHECK(told.counted == (ran == 3 ? 0 : 2));
+    CHECK(told.allocations == 3 * told.counted);
+  }
 }
 
 TEST_CASE("bench stages tells what all skips together save", "[run]") {

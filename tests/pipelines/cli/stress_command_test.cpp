@@ -1,5 +1,6 @@
 #include "pipelines/cli/stress_command.h"
 
+#include <limits>
 #include <sstream>
 
 #include <catch2/catch.hpp>
@@ -22,6 +23,37 @@ TEST_CASE("stress tells rows, and those not known are refused with what is allow
   CHECK(outcome.text.find("projection") == std::string::npos);  // classes without rows that were asked for
   CHECK_THROWS_WITH(stress_command({.rows = {"Z1"}, .threads = {}, .json = {}}),
                     "there is no row \"Z1\"; allowed: A1 to L3, or a letter for its group");
+}
+
+TEST_CASE(
+    "stress fails where a row does, where nothing proves its remedy, and where it throws; exempt rows do not count") {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  using Figures = std::vector<StressFigure>;
+  const StressCase held{"X1", "held", "nothing", [](Remedy r) {
+                          return Figures{{"a", r == Remedy::kOn ? 1.0 : 3, 2}};
+                        }};
+  const StressCase failing{"X2", "fails", "nothing", [](Remedy) { return Figures{{"a", 3, 2}}; }};
+  const StressCase unproven{"X3", "unproven", "nothing", [](Remedy) { return Figures{{"a", 1, 2}}; }};
+  const StressCase throwing{"X4", "throws", "nothing", [](Remedy) -> Figures { throw DataError("no"); }};
+  const StressCase no_number{"X5", "no number", "nothing", [](Remedy r) {
+                               return Figures{{"a", r == Remedy::kOn ? kNone : 3, 2}};
+                             }};
+  const StressCase exempt{"X6", "exempt", "nothing", nullptr, "cannot be"};
+  const TemporaryFolder folder;
+  const auto outcome_of = [&](const std::vector<StressCase>& cases) {
+    return run_cases(cases, {.rows = {}, .threads = 1, .json = folder / "rows.jsonl"});
+  };
+  CHECK(outcome_of({held, exempt}).status == 0);
+  for (const StressCase& bad : {failing, unproven, throwing, no_number}) {
+    INFO(bad.failure);
+    const StressOutcome outcome = outcome_of({held, bad, exempt});
+    CHECK(outcome.status == 1);
+    CHECK(outcome.text.find(bad.id + std::string(bad.id == unproven.id ? "   NO PROOF" : "   FAILED ")) !=
+          std::string::npos);
+    CHECK(outcome.text.find("2 rows tried, 1 held, 1 failed (" + std::string(bad.id) + "); 1 exempt\n") !=
+          std::string::npos);
+    CHECK(read_text_file(folder / "rows.jsonl").find(bad.id) != std::string::npos);
+  }
 }
 
 TEST_CASE("stress --functions tells a line for each function, range and instruction set, and writes them as JSON") {
