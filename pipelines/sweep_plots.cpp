@@ -122,6 +122,15 @@ std::string label_beside(SweepRun run, const std::string& key) {
   return sweep_label(run);
 }
 
+/// Which line is which, below a plot: where lines end is where they are close together.
+std::string legend_of(const Plot& plot) {
+  std::string text = "<p class=\"legend\">";
+  for (const PlotLine& line : plot.lines)
+    text += "<span><span class=\"box\" style=\"background:" + line.color + "\"></span>" + html_escape(line.label) +
+            "</span>";
+  return text + "</p>";
+}
+
 }  // namespace
 
 std::string range_plot_svg(const std::string& title, const std::string& unit, const std::vector<RangeRow>& rows,
@@ -211,10 +220,9 @@ std::string axis_plot(const SweepResults& results, const std::string& key, const
     std::sort(points.begin(), points.end());
     PlotLine line{label, part_color(plot.lines.size()), points};
     line.has_dots = true;
-    line.is_named = lines.size() > 1;
     plot.lines.push_back(std::move(line));
   }
-  return plot_svg(plot);
+  return plot_svg(plot) + (lines.size() > 1 ? legend_of(plot) : "");
 }
 
 }  // namespace hsi4d

@@ -99,6 +99,12 @@ std::string runs_section(const SweepResults& results) {
   return text + "</tbody></table></div></section>\n";
 }
 
+std::string warnings_section(const SweepResults& results) {
+  const std::string text = warnings_text(results);
+  return text.empty() ? ""
+                      : "<section><h2>Warnings</h2>\n<p class=\"message\">" + html_escape(text) + "</p></section>\n";
+}
+
 std::string axes_sections(const SweepResults& results) {
   std::string text;
   for (const std::string& key : number_axes(results.plan))
@@ -131,7 +137,7 @@ std::string sweep_page(const SweepResults& results) {
       for (const std::string& clip : results.clips) page += html_of(mean_table(results, &clip));
     }
   }
-  return page + runs_section(results) + "</main>\n</body>\n</html>\n";
+  return page + warnings_section(results) + runs_section(results) + "</main>\n</body>\n</html>\n";
 }
 
 SweepWritten write_sweep_results(const SweepPaths& paths) {

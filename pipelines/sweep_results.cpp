@@ -1,8 +1,10 @@
 #include "pipelines/sweep_results.h"
 
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <set>
+#include <string_view>
 
 #include "core/file.h"
 
@@ -49,6 +51,20 @@ bool is_partner(const SweepPlan& plan, const SweepRun& run, const SweepRun& othe
 constexpr const char* kLostText =
     "its process ended without a word: it was killed, for want of memory perhaps, or its machine is gone";
 
+/// What a log warns of, each once.
+std::vector<std::string> warnings_of(const std::string& log) {
+  constexpr std::string_view kWarning = " warning ";
+  std::vector<std::string> warnings;
+  std::ifstream lines(log);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t level = line.find(' ');  // after the time
+    if (level == std::string::npos || line.compare(level, kWarning.size(), kWarning) != 0) continue;
+    std::string text = line.substr(level + kWarning.size());
+    if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(std::move(text));
+  }
+  return warnings;
+}
+
 SweepRow read_row(const SweepPaths& paths, std::size_t index, const SweepRun& run) {
   SweepRow row;
   row.index = index;
@@ -63,6 +79,7 @@ SweepRow read_row(const SweepPaths& paths, std::size_t index, const SweepRun& ru
   row.programs = programs.size();
   if (row.state == SweepRunState::kStarted && row.last && row.last->event == "start" && !is_claimed(paths, run.id))
     row.last->message = kLostText;
+  row.warnings = warnings_of(RunPaths{paths.run(run.id)}.log());
   if (row.state != SweepRunState::kDone) return row;
   const std::string file = RunPaths{paths.run(run.id)}.summary();
   const RunSummary summary = parse_summary(read_text_file(file), file);

@@ -17,9 +17,10 @@ struct SweepRow {
   SweepRunState state = SweepRunState::kNew;
   MetricValues values;  ///< of its last stage, and `seconds` of the run; empty unless it is done
   std::size_t starts = 0;
-  std::size_t programs = 0;          ///< builds of hsi4d that have computed at it
-  std::optional<SweepAttempt> last;  ///< what was noted last
-  double peak_mb = 0;                ///< the most of all attempts; 0: not known
+  std::size_t programs = 0;                ///< builds of hsi4d that have computed at it
+  std::optional<SweepAttempt> last;        ///< what was noted last
+  double peak_mb = 0;                      ///< the most of all attempts; 0: not known
+  std::vector<std::string> warnings = {};  ///< of its log, each once
 };
 
 /// Runs that differ in clip and seed alone.

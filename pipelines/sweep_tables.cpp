@@ -233,6 +233,30 @@ std::string unfinished_text(const SweepResults& results) {
   return text;
 }
 
+std::string warnings_text(const SweepResults& results) {
+  constexpr std::size_t kMostLines = 20;
+  std::vector<std::pair<std::string, std::size_t>> counts;  // in the order of the runs
+  for (const SweepRow& row : results.rows) {
+    for (const std::string& warning : row.warnings) {
+      const auto is_it = [&warning](const auto& known) { return known.first == warning; };
+      const auto known = std::find_if(counts.begin(), counts.end(), is_it);
+      if (known == counts.end()) {
+        counts.emplace_back(warning, 1);
+      } else {
+        ++known->second;
+      }
+    }
+  }
+  std::stable_sort(counts.begin(), counts.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::string text;
+  for (std::size_t i = 0; i < std::min(counts.size(), kMostLines); ++i)
+    text += "- " + std::to_string(counts[i].second) + " of " + std::to_string(results.rows.size()) +
+            (results.rows.size() == 1 ? " run: " : " runs: ") + counts[i].first + "\n";
+  if (counts.size() > kMostLines)
+    text += "- and " + std::to_string(counts.size() - kMostLines) + " others, in log.txt of the runs\n";
+  return text;
+}
+
 std::string markdown_of(const SweepTable& table) {
   if (table.rows.empty()) return "";
   std::vector<Strings> lines = {{""}};
@@ -272,8 +296,9 @@ std::string sweep_markdown(const SweepResults& results) {
       for (const std::string& clip : results.clips) add(mean_table(results, &clip));
     }
   }
-  const std::string unfinished = unfinished_text(results);
-  return unfinished.empty() ? text : text + "\n## Not done\n\n" + unfinished;
+  const std::string unfinished = unfinished_text(results), warnings = warnings_text(results);
+  if (!unfinished.empty()) text += "\n## Not done\n\n" + unfinished;
+  return warnings.empty() ? text : text + "\n## Warnings\n\n" + warnings;
 }
 
 std::string sweep_csv(const SweepResults& results) {

@@ -53,6 +53,9 @@ std::string metric_heading(const MetricFacts& facts);
 /// Runs that are not done, a line each, with why.
 std::string unfinished_text(const SweepResults& results);
 
+/// What the logs of runs warn of, a line each, what most runs do first: "- 12 of 12 runs: the loss ... is off".
+std::string warnings_text(const SweepResults& results);
+
 /// The table as Markdown, in columns of one width; empty for one without rows.
 std::string markdown_of(const SweepTable& table);
 

@@ -33,6 +33,8 @@ std::string sweep_text(const SweepPaths& paths, const SweepResults& results, int
   }
   const std::string unfinished = unfinished_text(results);
   if (!unfinished.empty()) text += "\nnot done:\n" + unfinished;
+  const std::string warnings = warnings_text(results);
+  if (!warnings.empty()) text += "\nwarnings:\n" + warnings;
   return text + "\nreport: " + paths.report() + "\nwhole tables" +
          (results.clips.size() > 1 ? ", of each clip too: " : ": ") + paths.markdown() + "\n";
 }

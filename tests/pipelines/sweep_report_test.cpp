@@ -117,6 +117,15 @@ TEST_CASE("an axis of numbers has a plot where two of its runs are done") {
   CHECK(tag_fault(plot) == "");
   CHECK_THAT(plot, Contains("render.blur"));
   CHECK_THAT(checked_page(sweep), Contains("<h2>By render.blur</h2>"));
+  CHECK(plot.find("class=\"legend\"") == std::string::npos);  // one line needs no name
+  MadeSweep crossed([](SweepPlan& plan) {
+    make_axis(plan, {"0.1", "0.2", "0.1", "0.2"});
+    for (std::size_t i = 0; i < 4; ++i) plan.runs[i].values.emplace_back("render.near", i < 2 ? "0.01" : "0.02");
+  });
+  for (const std::size_t i : {0, 1, 2, 3}) crossed.finish(i, 10 + static_cast<double>(i));
+  const std::string lines = axis_plot(crossed.read(), "render.blur", mpjpe());
+  CHECK(count_of(lines, "<polyline ") == 2);
+  CHECK_THAT(lines, Contains("</span>near 0.01</span>") && Contains("</span>near 0.02</span>"));
   MadeSweep words([](SweepPlan& plan) { make_axis(plan, {"\"a\"", "\"b\""}); });
   CHECK(number_axes(words.plan()).empty());
 }

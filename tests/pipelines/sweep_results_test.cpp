@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/file.h"
+#include "pipelines/run_folder.h"
 #include "pipelines/sweep_report.h"
 #include "pipelines/sweep_tables.h"
 #include "tests/pipelines/made_sweep.h"
@@ -56,6 +58,24 @@ TEST_CASE("differences are between runs of the same clip and seed") {
   CHECK(table.rows[0].cells[0].text == "6");
   CHECK(table.rows[0].cells[1].mark == SweepCell::Mark::kWorse);
   CHECK_THAT(table.rows[0].cells[1].text, Contains("+3.0 [+"));
+}
+
+TEST_CASE("warnings of runs are told with how many runs have them, once a run") {
+  MadeSweep sweep;
+  sweep.finish_all();
+  CHECK(warnings_text(sweep.read()).empty());
+  const auto log = [&sweep](std::size_t run, const std::string& text) {
+    write_text_file(RunPaths{sweep.paths().run(sweep.plan().runs[run].id)}.log(), text);
+  };
+  log(0,
+      "2026-01-01T00:00:00.000+00:00 info warning of nothing\n2026-01-01T00:00:01.000+00:00 warning one <was> here\n");
+  log(3,
+      "2026-01-01T00:00:01.000+00:00 warning seldom\n2026-01-01T00:00:01.000+00:00 warning one <was> here\n"
+      "2026-01-01T00:00:02.000+00:00 warning one <was> here\n");
+  const SweepResults results = sweep.read();
+  CHECK(warnings_text(results) == "- 2 of 12 runs: one <was> here\n- 1 of 12 runs: seldom\n");
+  CHECK_THAT(sweep_markdown(results), Contains("\n## Warnings\n\n- 2 of 12 runs: one <was> here\n"));
+  CHECK_THAT(sweep_page(results), Contains("<h2>Warnings</h2>") && Contains("one &lt;was&gt; here"));
 }
 
 TEST_CASE("a sweep that is not complete tells what is there") {
