@@ -72,12 +72,11 @@ void check_characters(const std::vector<std::string>& names, const fs::path& fol
   }
 }
 
-/// The number that a name is, "0012.png"; none where it is no number, or a large one.
-std::optional<Index> number_of(const std::string& name) {
+/// The number of digits; none where there are none, or many.
+std::optional<Index> number_of(const std::string& digits) {
   constexpr std::size_t kMostDigits = 15;
-  const std::string stem = fs::path(name).stem().string();
-  if (stem.size() > kMostDigits || !is_number(stem)) return std::nullopt;
-  return std::stoll(stem);
+  if (digits.size() > kMostDigits || !is_number(digits)) return std::nullopt;
+  return std::stoll(digits);
 }
 
 /// Frames count as equally far apart in time; where their numbers are not, one is missing.
@@ -197,7 +196,7 @@ FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(
 
 bool FrameSource::has_name(const std::string& name) const {
   if (!video_) return fs::exists(path_ / name);
-  const std::optional<Index> number = number_of(name);
+  const std::optional<Index> number = number_of(fs::path(name).stem().string());
   return number && *number < video_count_ && name == four_digits(*number) + ".png";
 }
 

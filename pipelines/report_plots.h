@@ -44,7 +44,7 @@ std::string plot_svg(const Plot& plot);
 /// A bar of named parts, each as wide as its share. Values ≥ 0.
 std::string share_bar_svg(const std::string& title, const std::vector<std::pair<std::string, double>>& parts);
 
-/// The colour of part i, CSS; parts repeat after eight.
+/// The colour of part i, CSS; colours repeat after twelve.
 std::string part_color(size_t i);
 
 }  // namespace hsi4d

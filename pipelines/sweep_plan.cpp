@@ -295,7 +295,7 @@ class Planner {
         lay_into_config(tree, setting.key, setting.value, setting.origin, problems);
     }
     const bool is_made = is_generated(tree) && !has_own_data(tree);
-    if (!is_generated(tree)) note_unread(c);
+    if (!is_made) note_unread(c);
     if (c.seed) {
       const ConfigValue seed = ConfigValue::make_integer(*c.seed);
       lay_into_config(tree, "seed", seed, {}, problems);

@@ -130,7 +130,8 @@ std::size_t SweepResults::count(SweepRunState state) const {
 
 const MetricFacts& seconds_facts() {
   static const MetricFacts facts{
-      "seconds", "time", "s", "Time of reconstructing on the clock, without start, preview and report", 1, -1};
+      "seconds", "time", "s", "Time of reconstructing on the clock, without reading the inputs, preview and report",
+      1,         -1};
   return facts;
 }
 

@@ -63,7 +63,7 @@ struct BlockWorkspace {
 };
 
 /// kPlain: no α reaches the cap, and the stop is inclusive. kCapped: with a cap and either stop. kExact: as kCapped,
-/// with u and w from the block's centre, and the better exponential: for settings whose user wants small errors.
+/// with u and w from the block's centre, and the better exponential: for settings without cuts, and small blurs.
 enum class Form { kPlain, kCapped, kExact };
 
 /// T in front of all Gaussians of the pixels of a block: 1, or −1 past the image's border.

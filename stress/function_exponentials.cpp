@@ -5,6 +5,7 @@
 #include "core/vector_exp.h"
 #include "splat/block_kernel.h"
 #include "splat/composite_kernel.h"
+#include "splat/limits.h"
 #include "stress/function_table.h"
 #include "stress/vector_targets.h"
 
@@ -96,12 +97,13 @@ Pixel<float> block_exponential(float p) {
   detail::SplatRecord<float> record{};
   record.opacity = 1;
   record.log2_opacity = p;
-  const detail::CompositeRules<float> rules{1, 1.0f / 1024, 1e-4f, false, false, 0.3f};
+  const detail::CompositeRules<float> rules{1, kExactBelowAlpha, 1e-4f, false, false, 0.3f};
   return {p, detail::block_pixel_alpha(16, record, rules, 0, 0, 0, 0).alpha};
 }
 
-/// Its better form, which settings have whose user asks for small errors. There log₂ o is not in the exponent, which is
-/// −w² here: of a mean so far away, and an l22 so small, that where in the tile the pixel lies is lost beside it.
+/// Its better form, which settings without cuts have, as `reference`, and small blurs. There log₂ o is not in the
+/// exponent, which is −w² here: of a mean so far away, and an l22 so small, that where in the tile the pixel lies is
+/// lost beside it.
 Pixel<float> exact_block_exponential(float p) {
   constexpr auto kScale = static_cast<float>(detail::kLog2Scale);
   detail::SplatRecord<float> record{};
@@ -118,8 +120,8 @@ void add_pixel_exponentials(FunctionTable& table, Index points) {
   const double steps[] = {-0.5, -1, -1.5, -2, -2.5, -3, -4, -8};
   const auto exp2 = [](long double p) { return std::exp2(p); };
   const auto exp = [](long double x) { return std::exp(x); };
-  add_pixels<float>(table, {"2^p, blocks of pixels", "p", -9.9, 0, 3.2}, points, steps, block_exponential, exp2);
-  add_pixels<float>(table, {"2^p, blocks of pixels, accurate", "p", -125, 0, 1.25}, points, steps,
+  add_pixels<float>(table, {"2^p, blocks of pixels", "p", -19.9, 0, 3.2}, points, steps, block_exponential, exp2);
+  add_pixels<float>(table, {"2^p, blocks of pixels, exact form", "p", -125, 0, 1.25}, points, steps,
                     exact_block_exponential, exp2);
   const double halves[] = {-0.34657359027997264, -1.0397207708399179, -1.732867951399863};
   add_pixels<float>(table, {"exp, rows of pixels", "x", -87, 0, 1.5}, points, halves, row_exponential<float>, exp);

@@ -9,6 +9,7 @@
 #include "splat/block_kernel.h"
 #include "splat/covariance.h"
 #include "splat/io_splat.h"
+#include "splat/limits.h"
 #include "splat/opacity.h"
 #include "splat/reference.h"
 #include "splat/render.h"
@@ -152,7 +153,7 @@ float block_power(float p) {
   detail::SplatRecord<float> record{};
   record.opacity = 1;
   record.log2_opacity = p;
-  const detail::CompositeRules<float> rules{1, 1.0f / 1024, 1e-4f, false, false, 0.3f};
+  const detail::CompositeRules<float> rules{1, kExactBelowAlpha, 1e-4f, false, false, 0.3f};
   return detail::block_pixel_alpha(16, record, rules, 0, 0, 0, 0).alpha;
 }
 
@@ -188,9 +189,11 @@ std::vector<StressFigure> quick_exponential(Remedy remedy) {
   const Banding rows = banding(
       e, [](float x) { return std::exp(static_cast<double>(x)); }, -87);
   const Banding blocks = banding(
-      power, [](float p) { return std::exp2(static_cast<double>(p)); }, -9.9);
+      power, [](float p) { return std::exp2(static_cast<double>(p)); }, -19.9);
   constexpr float kInf = std::numeric_limits<float>::infinity();
-  const double ends = static_cast<double>(std::max({std::abs(e(0) - 1), std::abs(power(0) - 1), e(-kInf), e(-104)}));
+  double ends = 0;
+  for (const float off : {std::abs(e(0) - 1), std::abs(power(0) - 1), e(-kInf), e(-104)})
+    ends = larger(ends, static_cast<double>(off));
   return {{"error of exp, units in the last place", rows.ulps, 2},
           {"relative error of alpha in blocks", blocks.relative, 1.9e-7},
           {"places where it rises as the distance does", rows.rises + blocks.rises, 0},

@@ -245,7 +245,7 @@ std::vector<StressFigure> opaque_wall(Remedy remedy) {
   const auto standard = leak(Quality::kDefault), accurate = leak(Quality::kAccurate);
   return {{"leak through an opaque wall, steps of 1/255", 255 * standard[0], 1.0 / 16},
           {"leak with quality accurate, steps of 1/255", 255 * accurate[0], 0},
-          {"leak off (1 - cap) cap", std::max(standard[1], accurate[1]), 1e-9}};
+          {"leak off (1 - cap) cap", larger(standard[1], accurate[1]), 1e-9}};
 }
 
 }  // namespace hsi4d::stress

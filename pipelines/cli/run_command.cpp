@@ -1,6 +1,7 @@
 #include "pipelines/cli/run_command.h"
 
 #include "core/check.h"
+#include "core/config_place.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/progress.h"
@@ -176,7 +177,7 @@ std::string run_command(const RunArguments& arguments, const std::vector<LossTer
   const RunConfig config = load_run_config(arguments.config, overrides, descriptions_of(losses), use);
   if (arguments.print_config) return resolved_config(config, descriptions_of(losses));
   for (const std::string& override : arguments.overrides)
-    if (override.starts_with("synthetic."))
+    if (config_keys(override.substr(0, override.find('='))).front() == "synthetic")
       log_warning("--set " + override + ": nothing reads it: a run has its data; hsi4d synth makes them");
   RunOptions options;
   options.folder = folder_of(arguments, config);

@@ -34,7 +34,7 @@ double distance(const SceneState& a, const SceneState& b) {
     largest = test::larger(largest, (so3_exp(a.objects[o].rotation) - so3_exp(b.objects[o].rotation)).norm());
   }
   largest = test::larger(largest, (a.camera_from_world.rotation - b.camera_from_world.rotation).norm());
-  return std::max(largest, (a.camera_from_world.translation - b.camera_from_world.translation).norm());
+  return test::larger(largest, (a.camera_from_world.translation - b.camera_from_world.translation).norm());
 }
 
 StartSettings all_from(StartFrom from) { return {from, from, from, from}; }

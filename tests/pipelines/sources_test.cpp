@@ -232,6 +232,10 @@ TEST_CASE("a run makes its video and masks by programs, once for what they are m
   // Another run, and one that goes on, have the same video.
   CHECK(Workshop::run("run", {"--resume"}).status == 0);
   CHECK_THAT(Workshop::run("dry", {"--dry-run"}).out, StartsWith("would write dry\n  4 frames of 48x48, scene of "));
+  for (const char* spelling : {"synthetic.frames=3", "/synthetic/frames=3", R"(synthetic={"frames": 3})"}) {
+    CHECK_THAT(run_hsi4d({"run", "run/config.resolved.json", "--out", "dry", "--dry-run", "--set", spelling}).err,
+               Contains(std::string("--set ") + spelling + ": nothing reads it"));
+  }
   CHECK_THAT(run_hsi4d({"run", "run/config.resolved.json", "--out", "dry", "--dry-run"}).out,
              StartsWith("would write dry\n  4 frames of 48x48, scene of "));
   CHECK(lines_of("film.txt").size() == 1);

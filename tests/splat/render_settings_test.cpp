@@ -46,8 +46,12 @@ TEST_CASE("quality presets hold their bounds") {
   CHECK(reference.alpha_min == 0);
   CHECK(reference.transmittance_stop == 0);
   CHECK(reference.depth_key == DepthKey::kDouble);
-  // Presets for speed take the quick form of the block kernel, and with a cap below 1 what stands still behind is
-  // composited once (static_layer.h). The backward pass divides by nothing and needs neither cap nor stop.
+  // All presets but the reference take the quick form of the block kernel. Those for speed have a cap below 1 too, so
+  // that what stands still behind is composited once (static_layer.h). The backward pass divides by nothing and needs
+  // neither cap nor stop.
+  CHECK(static_cast<float>(accurate.transmittance_stop) >= kExactBelowStop);
+  CHECK(static_cast<float>(accurate.alpha_min) >= kExactBelowAlpha);
+  CHECK(reference.alpha_min < static_cast<double>(kExactBelowAlpha));
   for (const RenderSettings& s : {fast, RenderSettings{}}) {
     CHECK(s.alpha_cap <= 1.0 - 1.0 / 4096);
     CHECK(s.transmittance_stop >= static_cast<double>(kExactBelowStop));

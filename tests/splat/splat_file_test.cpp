@@ -10,6 +10,7 @@
 #include "splat/io_compressed_ply.h"
 #include "splat/io_ply.h"
 #include "splat/io_splat.h"
+#include "tests/support/larger.h"
 #include "tests/support/splat_files.h"
 #include "tests/temporary_folder.h"
 
@@ -202,8 +203,8 @@ TEST_CASE("real scenes go through every format within its rounding") {
           const auto i = static_cast<std::size_t>(3 * n + c);
           least = std::min(least, expected.means[i]);
           greatest = std::max(greatest, expected.means[i]);
-          error = std::max(error, std::fabs(static_cast<double>(expected.means[i]) -
-                                            static_cast<double>(packed.gaussians.means[i])));
+          error = larger(error, std::fabs(static_cast<double>(expected.means[i]) -
+                                          static_cast<double>(packed.gaussians.means[i])));
         }
         const double levels = c == 1 ? 1023 : 2047;
         REQUIRE(error <= static_cast<double>(greatest - least) / levels / 2 + 1e-6 * reach);
