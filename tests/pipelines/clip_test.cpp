@@ -313,15 +313,17 @@ TEST_CASE("frames with numbers behind a text are held to the same digits, and th
     for (const fs::directory_entry& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
     for (const fs::path& file : files) fs::rename(file, folder / ("shot2_" + file.filename().string()));
   }
-  std::vector<std::string> told;
-  const LogSink sink =
-      log_to([&told](LogLevel, std::string_view message) { told.emplace_back(message); }, LogLevel::kWarning);
+  int gaps = 0;
+  const LogSink sink = log_to(
+      [&gaps](LogLevel, std::string_view message) {
+        gaps += message.find("seems to be missing") == std::string_view::npos ? 0 : 1;
+      },
+      LogLevel::kWarning);
   CHECK(message_of([&] { dataset.read(); }) == "no error");
-  CHECK(told.empty());
+  CHECK(gaps == 0);
   fs::rename(frames / "shot2_0001.png", frames / "shot2_0009.png");
-  CHECK(message_of([&] { dataset.read(); }) != "no error");  // masks have the old name
-  REQUIRE_FALSE(told.empty());
-  CHECK(told[0].find("seems to be missing") != std::string::npos);
+  CHECK(message_of([&] { dataset.read(); }) == "no error");
+  CHECK(gaps == 1);
   fs::rename(frames / "shot2_0009.png", frames / "shot2_0001.png");
   fs::rename(frames / "shot2_0003.png", frames / "shot2_10.png");
   CHECK(message_of([&] { dataset.read(); }) ==

@@ -66,8 +66,10 @@ TEST_CASE("what a sweep sets of a dataset that is not made is told") {
   Json set = {{"synthetic.frames", 4}};
   plan_of({{"set", set}});
   CHECK(told == kNone);
-  for (const char* name : {"scene", "avatar", "frames", "masks", "camera", "initial"})
+  for (const char* name : {"scene", "avatar", "frames", "masks", "camera", "initial"}) {
     set[std::string("data.") + name] = std::string("there/") + name;
+    fs::create_directories(fs::path("there") / name);  // a plan opens no data
+  }
   plan_of({{"set", set}, {"seeds", 2}});
   CHECK(told ==
         std::vector<std::string>{"tiny: nothing reads synthetic.frames in 2 runs, whose config names its data"});

@@ -134,14 +134,15 @@ def smoke_is_the_same():
 
 def lost_node():
     """Twelve runs; when both nodes compute, node2 is gone with all that it does."""
-    sweep = write_sweep("lost", iterations=400, seeds=6, slurm={"at_once": 4})  # long enough to be met in the middle
+    sweep = write_sweep("lost", iterations=1200, seeds=6, slurm={"at_once": 4})  # long enough to be met in the middle
     run(program, "sweep", sweep, "--out", folder / "lost_local")
     print(run(program, "sweep", sweep, "--out", folder / "lost", "--launcher", "slurm").strip())
 
     def is_computing():
         on_node2 = run("squeue", "--noheader", "--states=R", "--nodelist=node2", "--format=%i").split()
-        begun = [f for f in (folder / "lost" / "runs").glob("*/metrics.jsonl") if f.stat().st_size > 20000]
-        return len(on_node2) > 0 and len(begun) > 2
+        going = [i for i in ids(folder / "lost") if [a["event"] for a in attempts(folder / "lost", i)] == ["start"]]
+        logs = [folder / "lost" / "runs" / i / "metrics.jsonl" for i in going]
+        return len(on_node2) == 2 and len(going) == 4 and all(f.exists() and f.stat().st_size > 5000 for f in logs)
 
     wait_for("both nodes compute", is_computing, 200)
     interrupted = run("squeue", "--noheader", "--states=R", "--nodelist=node2", "--format=%i").split()
@@ -167,7 +168,7 @@ def time_limit():
     clip.write_text(json.dumps({"synthetic": {"frames": 60, "size_px": 128, "scene_gaussians": 4000, "avatar_gaussians": 2000}}))
     run(program, "synth", clip, "--out", folder / "clip")
     sweep = write_sweep("limit", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
-                        set={"stages.interaction.iterations": 300}, slurm={"time": "00:02:00", "grace_s": 35})
+                        set={"stages.interaction.iterations": 900}, slurm={"time": "00:02:00", "grace_s": 35})
     print(run(program, "sweep", sweep, "--out", folder / "limit", "--launcher", "slurm").strip())
     wait_for("a run of more than its time", queue_is_empty, 900)
     check_once(folder / "limit")
