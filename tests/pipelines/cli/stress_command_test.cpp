@@ -26,7 +26,7 @@ TEST_CASE("stress tells rows, and those not known are refused with what is allow
 }
 
 TEST_CASE(
-    "stress fails where a row does, where nothing proves its remedy, and where it throws; exempt rows do not count") {
+    "stress fails where a row does, where nothing proves its remedy, and where it throws, but not by exempt rows") {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   using Figures = std::vector<StressFigure>;
   const StressCase held{"X1", "held", "nothing", [](Remedy r) {
