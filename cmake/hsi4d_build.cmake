@@ -25,7 +25,7 @@ endif()
 add_library(hsi4d_warnings INTERFACE)
 target_compile_options(hsi4d_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion
                                                 -Wno-sign-conversion -Wno-psabi $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
-                                                $<$<CXX_COMPILER_ID:Clang>:-Wno-unknown-pragmas>
+                                                "$<$<CXX_COMPILER_ID:Clang>:-Wno-unknown-pragmas;-Wno-bitwise-instead-of-logical>"
                                                 ${hsi4d_sanitizer_warnings}
                                                 $<$<BOOL:${HSI4D_WARNINGS_AS_ERRORS}>:-Werror>)
 

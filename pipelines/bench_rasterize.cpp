@@ -48,7 +48,7 @@ struct Recorded {
     colors = parameter("colors", 3, w.colors, !with_colors);
     const Var<float> xi = tape.constant("xi", shape_of(1, 6));
     projected = project(means, gaussian_axes(quats, scales), xi, w.view);
-    composited = composite(SplatSet{projected, opacities, colors}, w.view);
+    composited = composite(SplatSet<float>{projected, opacities, colors}, w.view);
     const auto pixels = static_cast<std::size_t>(w.view.camera.width) * static_cast<std::size_t>(w.view.camera.height);
     cotangent.resize(3 * pixels);
     for (std::size_t i = 0; i < cotangent.size(); ++i) cotangent[i] = 1 + 0.001f * static_cast<float>(i % 977);

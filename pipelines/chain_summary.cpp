@@ -34,7 +34,8 @@ struct WeightedValues {
     for (const auto& [name, value] : values) {
       const double* const share = find_metric(values, share_of_depth(name));
       const double weight = share == nullptr ? frames : frames * *share;
-      auto at = std::find_if(entries.begin(), entries.end(), [&](const Entry& entry) { return entry.name == name; });
+      auto at = std::find_if(entries.begin(), entries.end(),
+                             [&name = name](const Entry& entry) { return entry.name == name; });
       if (at == entries.end()) at = entries.insert(at, {name, 0, 0});
       at->sum += is_counter(name) ? value : weight * value;
       at->weight += weight;
@@ -120,7 +121,8 @@ void append_frames(const std::vector<FrameMetrics>& frames, int begin, std::vect
 void take_over(const MetricValues& means, MetricValues& values) {
   for (const auto& [name, mean] : means) {
     if (!share_of_depth(name).empty()) continue;
-    const auto at = std::find_if(values.begin(), values.end(), [&](const auto& entry) { return entry.first == name; });
+    const auto at =
+        std::find_if(values.begin(), values.end(), [&name = name](const auto& entry) { return entry.first == name; });
     if (at != values.end()) at->second = mean;
   }
 }

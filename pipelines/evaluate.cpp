@@ -105,7 +105,8 @@ MetricValues mean_errors(std::span<const FrameMetrics> per_frame) {
   std::vector<double> counts;
   for (const FrameMetrics& frame : per_frame) {
     for (const auto& [name, value] : frame.values) {
-      const auto at = std::find_if(sums.begin(), sums.end(), [&](const auto& sum) { return sum.first == name; });
+      const auto at =
+          std::find_if(sums.begin(), sums.end(), [&name = name](const auto& sum) { return sum.first == name; });
       const auto i = static_cast<size_t>(at - sums.begin());
       if (at == sums.end()) {
         sums.emplace_back(name, 0.0);

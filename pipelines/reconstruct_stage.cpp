@@ -166,7 +166,8 @@ std::string name_in_frame(const StageTask& task, const FrameTask& frame) {
 template <class S>
 StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
                                const FrameStageCallback& callback) {
-  const auto& [name, stage] = task.config.stages[task.stage];
+  const std::string& name = task.config.stages[task.stage].first;
+  const StageSettings& stage = task.config.stages[task.stage].second;
   StageProbe probe(task.watch);
   Tape<S> tape;
   const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");

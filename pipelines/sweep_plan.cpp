@@ -343,7 +343,7 @@ class Planner {
   void throw_if_any(const SweepPlan& plan) const {
     std::string text;
     for (const auto& [problem, runs] : problems_) {
-      const auto has_more = [&](const auto& other) {  // another message has this one in it
+      const auto has_more = [&problem = problem](const auto& other) {  // another message has this one in it
         return other.first != problem && other.first.find(problem) != std::string::npos;
       };
       if (std::any_of(problems_.begin(), problems_.end(), has_more)) continue;

@@ -45,7 +45,7 @@ void add_path(SceneKit& kit) {
     const double a = 0.17 + 0.05 * kit.random.uniform(), b = 0.13 + 0.04 * kit.random.uniform();
     const double turn = 3 * kit.random.uniform(), shift = 50 * kit.random.uniform();
     const Rgb tone = kit.varied(Rgb(0.66, 0.63, 0.57), 0.1);
-    const SheetShape stone = [=, &kit](double u, double v) {
+    const SheetShape stone = [=](double u, double v) {
       const double angle = -2 * kPi * u, r = v * (1 + 0.12 * std::sin(3 * angle + shift));
       const double x = a * r * std::cos(angle), y = b * r * std::sin(angle);
       return Point(at[0] + std::cos(turn) * x - std::sin(turn) * y, at[1] + std::sin(turn) * x + std::cos(turn) * y,

@@ -46,8 +46,8 @@ Vector row_of(const std::vector<float>& values, std::size_t i) {
 
 /// An axis of a Gaussian.
 Vector axis_of(const std::vector<float>& quats, std::size_t i, int axis) {
-  const Vector4<double> q(double(quats[4 * i]), double(quats[4 * i + 1]), double(quats[4 * i + 2]),
-                          double(quats[4 * i + 3]));
+  const auto part = [&](std::size_t k) { return static_cast<double>(quats[4 * i + k]); };
+  const Vector4<double> q(part(0), part(1), part(2), part(3));
   return quaternion_to_matrix(q).col(axis);
 }
 
