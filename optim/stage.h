@@ -50,8 +50,8 @@ struct LeftOutObject {
 
 /// Where the time of a stage went, seconds.
 struct StageTimes {
-  double forward = 0,
-         backward = 0;  ///< of the tape; freezing and holding are of the first, shares of terms of the second
+  double forward = 0;   ///< of the tape, freezing and holding included
+  double backward = 0;  ///< of the tape, shares of terms included
   double step = 0;      ///< looking at every number, moving the parameters
 };
 

@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "tests/support/isa.h"
+#include "tests/support/larger.h"
 #include "tests/support/seeds.h"
 
 namespace hsi4d::test {
@@ -28,9 +29,6 @@ bool same_bits(const Vectors<S>& a, const Vectors<S>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const auto& x, const auto& y) { return same_bits(x, y); });
 }
-
-/// The larger; NaN when one of them is.
-double larger(double a, double b) { return !(b <= a) ? b : a; }
 
 std::vector<double> wide(const std::vector<double>& numbers) { return numbers; }
 std::vector<double> wide(const std::vector<float>& numbers) { return {numbers.begin(), numbers.end()}; }
