@@ -1,13 +1,13 @@
 #include "core/config_file.h"
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <optional>
 
 #include "core/check.h"
 #include "core/config_parse.h"
 #include "core/config_place.h"
+#include "core/file.h"
 #include "core/file_kind.h"
 #include "core/suggest.h"
 
@@ -48,15 +48,12 @@ FileText read_file(const fs::path& file) {
   const fs::file_status status = fs::status(file, error);
   if (!fs::exists(status)) return {"", "there is no such file" + suggest_file(file)};
   if (fs::is_directory(status)) return {"", "this is a folder, not a config file"};
-  if (fs::is_regular_file(status) && fs::file_size(file, error) > kLargestConfig)
-    return {"", "the file is larger than " + std::to_string(kLargestConfig >> 20U) + " MiB; a config is not"};
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return {"", "the file cannot be opened for reading"};
-  std::string text(kLargestConfig + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) return {"", "the file cannot be read"};
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.size() > kLargestConfig) return {"", "the file is larger than 8 MiB; a config is not"};
+  std::string text;
+  try {
+    text = read_text_file(file.string(), kLargestConfig);
+  } catch (const UserError& problem) {
+    return {"", std::string(problem.what()).substr(file.string().size() + 2)};  // without the path, which callers tell
+  }
   const std::string kind = file_kind(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
   if (!kind.empty() && kind != "JSON" && kind != "text") return {"", "looks like " + kind + ", not like JSON"};
   return {std::move(text), ""};

@@ -1,6 +1,7 @@
 // A config file with what it extends and with the command line's overrides, as one tree.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -12,7 +13,7 @@
 namespace hsi4d {
 
 /// The longest config file that is read, in bytes.
-inline constexpr std::uintmax_t kLargestConfig = 8U << 20U;
+inline constexpr int64_t kLargestConfig = int64_t{8} << 20;
 
 /// Reads `file` and lays it over the file that its "extends" names, and so on; then applies the overrides in their
 /// order.

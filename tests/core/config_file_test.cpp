@@ -150,5 +150,5 @@ TEST_CASE("a path is relative to the file that names it, on the command line to 
 TEST_CASE("a huge file is refused without being read") {
   const TemporaryFolder folder;
   folder.write("big.json", std::string(kLargestConfig + 1, ' '));
-  CHECK_THAT(loaded("big.json"), Equals("big.json: the file is larger than 8 MiB; a config is not"));
+  CHECK_THAT(loaded("big.json"), Equals("big.json: has 8388609 bytes; at most 8388608 are read"));
 }
