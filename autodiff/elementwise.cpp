@@ -283,7 +283,7 @@ struct LeakyRelu {
 /// Copies; has no adjoint. As an operator of its own it cuts the graph without freezing x for other users.
 template <class S>
 struct StopGradientOp {
-  static constexpr const char* kName = "stop_gradient";
+  static constexpr const char* kName = kStopGradient;
   void forward(NodeIo<S>& io) { std::copy_n(io.in(0).data, io.in(0).shape.memory(), io.out().data); }
   void backward(NodeIo<S>&) {}
 };

@@ -8,6 +8,8 @@
 
 namespace hsi4d {
 
+inline constexpr const char* kStopGradient = "stop_gradient";
+
 /// Right-hand side of an arithmetic operator: an array or a number. Converts implicitly, and so learns the caller's
 /// line.
 template <class S>
@@ -63,7 +65,7 @@ template <class S> Var<S> sigmoid(Var<S> x, Source where = Source::current());
 template <class S> Var<S> softplus(Var<S> x, Source where = Source::current());
 /// x where x > 0, else slope·x; the gradient at 0 is slope.
 template <class S> Var<S> leaky_relu(Var<S> x, double slope, Source where = Source::current());
-/// The value of x with no gradient behind it.
+/// The value of x with no gradient behind it. Its operator is called kStopGradient.
 template <class S> Var<S> stop_gradient(Var<S> x, Source where = Source::current());
 // clang-format on
 

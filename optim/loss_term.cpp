@@ -13,8 +13,8 @@ const std::vector<LossTerm>& loss_terms() {
 
 template <class S>
 LossInputs<S> with_seams(LossInputs<S> inputs, const SeamMode& mode) {
-  for (Var<S>* input : {&inputs.rendered, &inputs.object_opacity, &inputs.human_opacity, &inputs.object_depth,
-                        &inputs.body_rotations, &inputs.joints}) {
+  for (Var<S>* input : {&inputs.rendered, &inputs.object_opacity, &inputs.human_opacity, &inputs.object_place,
+                        &inputs.object_depth, &inputs.body_rotations, &inputs.joints}) {
     if (input->tape != nullptr) *input = seam(*input, mode);
   }
   const auto behind_seam = [&mode](auto& record) {

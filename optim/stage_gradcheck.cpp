@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
+#include "autodiff/elementwise.h"
+#include "autodiff/inspect.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "optim/stage_loss.h"
@@ -32,6 +35,28 @@ Index count_numbers(const ParameterGroup<double>& group) {
   return count;
 }
 
+/// While it lives, what a result that has been computed reads through stop_gradient stays as it is.
+class HeldStops {
+ public:
+  HeldStops(Tape<double>& tape, Var<double> result) : tape_(tape) {
+    TapeInspector<double> inspector(tape);
+    for (const auto node : inspector.nodes_of(result)) {
+      if (std::string_view(inspector.operator_name(node)) != kStopGradient) continue;
+      held_.push_back(inspector.handle(inspector.outputs(node).front()));
+    }
+    for (const Var<double> var : held_) tape_.hold(var);
+  }
+  ~HeldStops() {
+    for (const Var<double> var : held_) tape_.release(var);
+  }
+  HeldStops(const HeldStops&) = delete;
+  HeldStops& operator=(const HeldStops&) = delete;
+
+ private:
+  Tape<double>& tape_;
+  std::vector<Var<double>> held_;
+};
+
 StageGradcheck check_recorded(Tape<double>& tape, const std::vector<AdamGroup<double>>& groups,
                               RecordedLoss<double>& loss, const std::string& stage, const GradcheckOptions& options) {
   StageGradcheck result;
@@ -41,6 +66,7 @@ StageGradcheck check_recorded(Tape<double>& tape, const std::vector<AdamGroup<do
   result.loss = tape.value(loss.total).scalar();
   result.terms = loss.values;
   if (!std::isfinite(result.loss)) throw UserError(stage_message(stage, "the loss is " + rounded(result.loss, 6)));
+  const HeldStops stops(tape, loss.total);
   for (const AdamGroup<double>& group : groups) {
     const ParameterGroup<double>& parameters = group.parameters;
     GroupGradcheck& found = result.groups.emplace_back(GroupGradcheck{parameters.name, count_numbers(parameters), {}});

@@ -40,8 +40,9 @@ struct StageGradcheckOptions {
 };
 
 /// Records the loss as run_stage does, and looks at each group of the settings by itself, the others frozen, whichever
-/// iterations it moves in. Nothing is held. At the end (also by an exception) what was recorded is forgotten; the
-/// disturbance stays in the parameters.
+/// iterations it moves in. Outputs of stop_gradient are held meanwhile: what moves through them is left out of the
+/// gradient on purpose, and of the differences alike. Nothing else is held. At the end (also by an exception) what was
+/// recorded is forgotten; the disturbance stays in the parameters.
 ///
 /// @param stage  what messages call it
 /// Throws UserError as run_stage: an unknown group or term, no group, no term that gives anything, two groups that

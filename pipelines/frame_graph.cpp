@@ -2,21 +2,20 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <numbers>
-
-#include <Eigen/LU>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
+#include "body/skinning.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
+#include "pipelines/camera_increment.h"
 #include "pipelines/motion_inputs.h"
 #include "pipelines/tape_image.h"
 #include "splat/camera_center.h"
+#include "splat/project.h"
 #include "splat/reachable.h"
 
 namespace hsi4d {
@@ -210,7 +209,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
   const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
   const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
   const Var<S> rotation = record_rotations(orient);
-  objects_.push_back({orient, transl, rotation});
+  objects_.push_back({orient, transl, rotation, vars.means});
   const SplatInputs<S> splats = rigid_splats(vars, rotation, transl, xi_, view_);
   hold_colors(splats.colors, {"object_sh"});
   return {splats, object.gaussians.count()};
@@ -284,7 +283,10 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
   inputs_.target = tape_.constant("target", rendered_.image.shape());
   inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
   if (settings_.draw == Draw::kScene) return;
-  if (!objects_.empty()) record_object_depths(parts, first_object);
+  if (!objects_.empty()) {
+    record_object_depths(parts, first_object);
+    record_object_places();
+  }
   if (draws_objects()) record_object_masks();
   if (settings_.human_opacity) record_human_inputs();
 }
@@ -338,6 +340,19 @@ void FrameGraph<S>::record_object_depths(const std::vector<Part>& parts, std::si
   }
   inputs_.object_depth = concat_rows<S>(depths);
   inputs_.object_depth_target = tape_.constant("object_depth_target", shape_of(count, 1));
+}
+
+template <class S>
+void FrameGraph<S>::record_object_places() {
+  std::vector<Var<S>> transforms, means;
+  for (const Object& object : objects_) {
+    transforms.push_back(rigid_rows(object.rotation, object.transl));
+    means.push_back(sum_rows(object.means) * (1 / static_cast<double>(object.means.shape().rows)));
+  }
+  const Var<S> points = transform_points(concat_rows<S>(transforms), concat_rows<S>(means));
+  const Var<S> axes = tape_.constant("some_axes", shape_of(std::ssize(objects_), 9));
+  fill(axes, S(1));  // any but zeros, which mark what is not to be drawn and has no gradient
+  inputs_.object_place = project(points, axes, xi_, view_).means_px;
 }
 
 template <class S>
@@ -441,77 +456,6 @@ void FrameGraph<S>::set_object_masks(const FrameTargets& targets) {
     for (Index i = 0; i < 3; ++i) center[i] = static_cast<S>(targets.centers[o][i]);
     tape_.write(inputs_.object_seen).data[o] = center[2] > 0 ? 1 : 0;
   }
-}
-
-Vector3<double> mask_center(const Image& mask, double threshold) {
-  double mass = 0, x_sum = 0, y_sum = 0;
-  bool is_seen = false;
-  for (int y = 0; y < mask.height(); ++y) {
-    const float* row = mask.row(0, y);
-    for (int x = 0; x < mask.width(); ++x) {
-      const auto m = static_cast<double>(row[x]);
-      is_seen = is_seen || m >= threshold;
-      mass += m;
-      x_sum += m * (x + 0.5);
-      y_sum += m * (y + 0.5);
-    }
-  }
-  return is_seen ? Vector3<double>(x_sum / mass, y_sum / mass, mass) : Vector3<double>::Zero();
-}
-
-namespace {
-
-/// Median camera z of the Gaussians whose centres are in the image, metres; 1 where there are none.
-double median_depth(const Gaussians& scene, const Camera& camera) {
-  const View<double> view = view_of<double>(camera, scene.origin_world);
-  std::vector<double> depths;
-  for (Index i = 0; i < scene.count(); ++i) {
-    const Vector3<double> p =
-        point_in_view(view, Vector3<double>(Vector3<float>(scene.means.data() + 3 * i).cast<double>()));
-    if (!(p[2] > kNear)) continue;
-    const Vector2<double> pixel = project_point(camera, p);
-    if (pixel[0] >= 0 && pixel[0] < camera.width && pixel[1] >= 0 && pixel[1] < camera.height) depths.push_back(p[2]);
-  }
-  if (depths.empty()) return 1;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
-}
-
-}  // namespace
-
-Matrix6<double> camera_from_increment(CameraIncrement increment, const Camera& camera, const Gaussians& scene) {
-  Rigid<double> frame;
-  if (increment == CameraIncrement::kWorld) frame = camera.camera_from_world;
-  if (increment == CameraIncrement::kScene) frame.translation = {0, 0, median_depth(scene, camera)};
-  return se3_adjoint_matrix(frame);
-}
-
-double mean_depth(const Gaussians& object, const ObjectPose& pose, const Rigid<double>& camera_from_world) {
-  Vector3<double> sum = Vector3<double>::Zero();
-  for (Index i = 0; i < object.count(); ++i) {
-    sum += Vector3<float>(object.means.data() + 3 * i).cast<double>();
-  }
-  const Vector3<double> centre = sum / static_cast<double>(object.count());
-  const Vector3<double> world = so3_exp(pose.rotation) * centre + pose.translation;
-  return transform_point(camera_from_world, world)[2];
-}
-
-double covered_area(const Gaussians& object, const ObjectPose& pose, const Camera& camera) {
-  const Rigid<double> world_from_object{so3_exp(pose.rotation), pose.translation};
-  Vector2<double> mean = Vector2<double>::Zero();
-  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-  Index count = 0;
-  for (Index i = 0; i < object.count(); ++i) {
-    const Vector3<double> place = Vector3<float>(object.means.data() + 3 * i).cast<double>();
-    const Vector3<double> p = transform_point(camera.camera_from_world, transform_point(world_from_object, place));
-    if (!(p[2] > kNear)) continue;
-    const Vector2<double> pixel = project_point(camera, p), from_mean = pixel - mean;
-    mean += from_mean / static_cast<double>(++count);
-    spread += from_mean * (pixel - mean).transpose();
-  }
-  if (count == 0) return 0;
-  return 4 * std::numbers::pi * std::sqrt(std::max(0.0, spread.determinant())) / static_cast<double>(count);
 }
 
 template class FrameGraph<float>;

@@ -109,6 +109,7 @@ class FrameGraph {
   struct Object {
     Var<S> orient, transl;
     Var<S> rotation;  // [1,9] that orient gives
+    Var<S> means;     // [N,3] of its Gaussians, in its own frame
   };
 
   Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
@@ -126,6 +127,7 @@ class FrameGraph {
   void record_human_inputs();
   Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
   void record_object_depths(const std::vector<Part>& parts, std::size_t first_object);
+  void record_object_places();
   void record_object_masks();
   void set_object_masks(const FrameTargets& targets);
   bool draws_objects() const { return settings_.object_opacity && !objects_.empty(); }
@@ -150,22 +152,5 @@ class FrameGraph {
   Rendered<S> rendered_;
   LossInputs<S> inputs_;
 };
-
-/// Centre of a mask's coverage (pixel centres at +0.5) in x and y, and that coverage, pixels; zeros for a mask that
-/// nowhere reaches the threshold, as its faint pixels may be anything.
-Vector3<double> mask_center(const Image& mask, double threshold);
-
-/// The matrix that takes six numbers (translation, rotation) in the frame of `increment` to the camera's frame, so that
-/// T ← Exp(ξ) T is the update: the adjoint of the frame's own transform, [R, hat(t) R; 0, R].
-///
-/// @param camera  its pose is the one that the update starts from
-Matrix6<double> camera_from_increment(CameraIncrement increment, const Camera& camera, const Gaussians& scene);
-
-/// Mean camera z of an object's Gaussian centres, metres.
-double mean_depth(const Gaussians& object, const ObjectPose& pose, const Rigid<double>& camera_from_world);
-
-/// How many pixels an object would cover with nothing before it, by the spread Σ of its Gaussians' centres in the
-/// image: 4π √det Σ, which is the area of an ellipse that they fill evenly.
-double covered_area(const Gaussians& object, const ObjectPose& pose, const Camera& camera);
 
 }  // namespace hsi4d

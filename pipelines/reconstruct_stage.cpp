@@ -6,6 +6,7 @@
 #include "optim/optimizer.h"
 #include "pipelines/frame_graph.h"
 #include "pipelines/frame_images.h"
+#include "pipelines/in_frame.h"
 #include "pipelines/posed_avatar.h"
 #include "pipelines/sequence_graph.h"
 

@@ -1,5 +1,6 @@
 // L = mean over objects of |ĉ − c|²: ĉ = Σ m u / Σ m the centre of the object's rendered opacity m, c that of its mask
-// in the frame.   [method, stage 2]   by_share: each times the share of the object that the frame shows.
+// in the frame.   [method, stage 2]   by_share: each times the share of the object that the frame shows. moves
+// "object": ĉ moves as p does, the place of the object in the image, and no other way; of a hidden object, ĉ is p.
 #include "autodiff/centroid.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/map.h"
@@ -15,6 +16,12 @@ enum class CenterUnit { kPixels, kWidth };
 constexpr std::array<ConfigChoice<CenterUnit>, 2> kCenterUnits = {
     {{CenterUnit::kPixels, "pixels"}, {CenterUnit::kWidth, "width"}}};
 
+/// What the term has a gradient to.
+enum class CenterMoves { kAll, kObject };
+
+constexpr std::array<ConfigChoice<CenterMoves>, 2> kCenterMoves = {
+    {{CenterMoves::kAll, "all"}, {CenterMoves::kObject, "object"}}};
+
 /// In pixels the method's weight of 1e-3 makes an error of 5 px worth 0.025, as much as a photometric difference of 6
 /// grey levels: the term leads a lost object back, and fades below a pixel (1e-3), where colours say more. In widths of
 /// the image the same error is worth 1e-7 or less: the term would do nothing.
@@ -22,17 +29,23 @@ struct CenterSettings {
   CenterUnit unit = CenterUnit::kPixels;
   double min_opacity = 1;  // pixels
   bool by_share = false;
+  CenterMoves moves = CenterMoves::kAll;
 };
 
 void describe(ConfigFields& fields, CenterSettings& settings) {
   fields.choice("unit", settings.unit, kCenterUnits,
                 "What distances are measured in: pixels of the image, or its width");
-  fields.number("min_opacity", settings.min_opacity, {.min = 1e-6},
-                "An object whose opacity sums to less than this many pixels counts as hidden: the term is off for it");
+  fields.number(
+      "min_opacity", settings.min_opacity, {.min = 1e-6},
+      "An object whose opacity sums to less than this many pixels counts as hidden: the term is off for it, or, "
+      "where it moves the object alone, leads the place where it would be");
   fields.boolean(
       "by_share", settings.by_share,
       "An object counts by the share of it that the frame shows: the centre of a sliver beside the human says "
       "little, and would pull the human out of the way");
+  fields.choice("moves", settings.moves, kCenterMoves,
+                "What the term may move: all that the rendered opacity depends on, which is also what is before the "
+                "object, or the object alone, as a whole");
 }
 
 /// Whether the term is on for an object.
@@ -41,11 +54,33 @@ bool is_on(M mass, V visible, double min_opacity) {
   return mass >= static_cast<M>(min_opacity) && visible > V(0);
 }
 
+/// Rows (x, y, mass) of what is rendered. Where the object alone is moved, x and y change as its place does, and are
+/// that place where nothing of it is to be seen.
+template <class S>
+Var<S> rendered_centres(const LossInputs<S>& in, const CenterSettings& settings) {
+  const Var<S> rendered = centroids(in.object_opacity);
+  if (settings.moves == CenterMoves::kAll) return rendered;
+  const Var<S> centres = stop_gradient(rendered), place = stop_gradient(in.object_place);
+  const Var<S> mass = slice_cols(centres, 2, 1);
+  const Var<S> at = map({slice_cols(centres, 0, 2), mass, place},
+                        [least = settings.min_opacity](auto centre, auto m, auto of_object) {
+                          const auto seen = value_of(m) >= static_cast<decltype(value_of(m))>(least);
+                          return select(seen, centre, of_object);
+                        });
+  const Var<S> moved = in.object_place - place;  // zeros, with a gradient
+  return concat_cols<S>(std::array{at + moved, mass});
+}
+
+/// Less than this counts as hidden, and the term is off.
+double least_opacity(const CenterSettings& settings) {
+  return settings.moves == CenterMoves::kObject ? 0 : settings.min_opacity;
+}
+
 /// Columns x, y, mass of the centres beside x, y, visible of the targets; each object's distance², 0 where it is off.
 template <class S>
 Var<S> mean_squared_distance(Var<S> centres, Var<S> targets, const CenterSettings& settings, double unit_px) {
   const auto column = [](Var<S> x, Index c) { return slice_cols(x, c, 1); };
-  const double least = settings.min_opacity;
+  const double least = least_opacity(settings);
   const bool by_share = settings.by_share;
   const Var<S> total =
       sum_over({column(centres, 0), column(centres, 1), column(centres, 2), column(targets, 0), column(targets, 1),
@@ -77,12 +112,13 @@ LossTerm center_loss() {
       [](const auto& in, const CenterSettings& settings) {
         using Value = decltype(in.object_opacity);
         if (!in.given(in.object_opacity) || !in.given(in.object_center_target)) return Value{};
+        if (settings.moves == CenterMoves::kObject && !in.given(in.object_place)) return Value{};
         const Shape image = in.object_opacity.shape();
         if (image.planes == 0) return Value{};
         const double unit_px = settings.unit == CenterUnit::kPixels ? 1 : static_cast<double>(image.cols);
-        const auto centres = centroids(in.object_opacity);
+        const auto centres = rendered_centres(in, settings);
         if (in.left_out != nullptr) {
-          in.left_out->push_back(hidden_objects(centres, in.object_center_target, settings.min_opacity));
+          in.left_out->push_back(hidden_objects(centres, in.object_center_target, least_opacity(settings)));
         }
         return mean_squared_distance(centres, in.object_center_target, settings, unit_px);
       });

@@ -64,6 +64,17 @@ Complexes plane_of(const Complexes& x, std::size_t plane) {
   return {begin, begin + kPixels};
 }
 
+/// Where the mass of an image lies, pixels.
+std::array<Complex, 2> centre_of(const Complexes& opacity) {
+  Complex x = 0, y = 0, mass = 0;
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    mass += opacity[i];
+    x += opacity[i] * (static_cast<double>(i % kWidth) + 0.5);
+    y += opacity[i] * (static_cast<double>(i / kWidth) + 0.5);
+  }
+  return {x / mass, y / mass};
+}
+
 /// Σ over rows from..to and coordinates of (x_{r+1} − x_r)².
 Complex steps_between(const Complexes& joints, std::size_t from, std::size_t to) {
   Complex sum = 0;
@@ -174,17 +185,33 @@ TEST_CASE("loss terms of objects have the gradients of complex steps") {
       [](const ComplexInputs& in) {
         Complex sum = 0;
         for (std::size_t o = 0; o + 1 < kObjects; ++o) {  // the last is not in the frame
-          Complex x = 0, y = 0, mass = 0;
-          for (std::size_t i = 0; i < kPixels; ++i) {
-            const Complex opacity = in[0][o * kPixels + i];
-            mass += opacity;
-            x += opacity * (static_cast<double>(i % kWidth) + 0.5);
-            y += opacity * (static_cast<double>(i / kWidth) + 0.5);
-          }
-          sum += square(x / mass - in[1][3 * o]) + square(y / mass - in[1][3 * o + 1]);
+          const auto [x, y] = centre_of(plane_of(in[0], o));
+          sum += square(x - in[1][3 * o]) + square(y - in[1][3 * o + 1]);
         }
         return sum / static_cast<double>(kObjects);
       });
+  check_complex_step(
+      {image("object_opacity", kObjects),
+       {"object_center_target", shape_of(kObjects, 3), 0, 0, {4.5, 2, 1, 1.25, 3.5, 0.3, 0, 0, 0}},
+       {"object_place", shape_of(kObjects, 2), 0, 5}},
+      [](const Vars& in) {
+        Inputs given;
+        given.object_opacity = in[0], given.object_center_target = in[1], given.object_place = in[2];
+        return record_term("center", given, R"({"moves": "object", "by_share": true})");
+      },
+      [](const ComplexInputs& in) {
+        Complex sum = 0;
+        for (std::size_t o = 0; o + 1 < kObjects; ++o) {
+          const auto [x, y] = centre_of(plane_of(in[0], o));
+          const Complex* place = in[2].data() + 2 * o;
+          const Complex* target = in[1].data() + 3 * o;
+          const Complex moved_x = x.real() + place[0] - place[0].real();
+          const Complex moved_y = y.real() + place[1] - place[1].real();
+          sum += target[2] * (square(moved_x - target[0]) + square(moved_y - target[1]));
+        }
+        return Complexes{sum / static_cast<double>(kObjects)};
+      },
+      {.loss = "center"});
   check_loss(
       "depth", {{"object_depth", shape_of(3, 1), 1, 3}, {"object_depth_target", shape_of(3, 1), 1, 3}},
       [](Inputs& given, const Vars& in) { given.object_depth = in[0], given.object_depth_target = in[1]; },

@@ -119,7 +119,7 @@ TEST_CASE("a registered loss term says whether it needs the body or objects") {
     LossInputs<double> all = inputs_of(vars), no_body = all, no_objects = all;
     no_body.body_rotations = no_body.joints = no_body.joints_start = {};
     no_body.motion = nullptr;
-    no_objects.object_opacity = no_objects.object_center_target = no_objects.object_depth =
+    no_objects.object_opacity = no_objects.object_center_target = no_objects.object_place = no_objects.object_depth =
         no_objects.object_depth_target = {};
     CHECK(term.record(all).tape != nullptr);
     CHECK((term.record(no_body).tape == nullptr) == (term.description.needs == LossNeeds::kBody));
@@ -235,6 +235,33 @@ TEST_CASE("center by_share counts an object by how much of it the frame shows") 
         Approx((9 + 16 + 4) / 2.0).epsilon(1e-14));  // without it a sliver counts like a whole object
   CHECK(objects.value(R"({"by_share": true})") == Approx((0.01 * (9 + 16) + 4) / 2.0).epsilon(1e-14));
   CHECK(objects.largest_slope(0) == Approx(0.01 * slope).epsilon(1e-12));
+}
+
+TEST_CASE("center that moves the object alone has the same value, and a gradient to its place only") {
+  Objects objects;
+  const auto value = objects.value();
+  CHECK_THROWS(objects.value(R"({"moves": "nothing"})"));
+  objects.inputs.object_place = objects.tape.parameter("place", shape_of(2, 2));
+  objects.tape.set(objects.inputs.object_place, {5, 3, 30, 7});  // not where the rendered centre is
+  CHECK(objects.value(R"({"moves": "object"})") == Approx(value).epsilon(1e-14));
+  CHECK_FALSE(objects.tape.has_gradient(objects.inputs.object_opacity));  // none is computed
+  const auto slope = objects.tape.gradient(objects.inputs.object_place);
+  CHECK(slope(0, 0) == Approx(5.5 - 8.5));
+  CHECK(slope(0, 1) == Approx(2.5 - 6.5));
+  CHECK(slope(1, 0) == Approx(0).margin(1e-14));
+  CHECK(slope(1, 1) == Approx(8.0 - 6));
+  std::vector<LeftOut> left_out;
+  objects.inputs.left_out = &left_out;
+  objects.tape.write(objects.inputs.object_opacity)(1, 7, 10) = 0;  // wholly hidden: its place is led to the mask
+  objects.tape.write(objects.inputs.object_opacity)(1, 8, 10) = 0;
+  CHECK(objects.value(R"({"moves": "object"})") == Approx((9 + 16 + 19.5 * 19.5 + 1) / 2.0).epsilon(1e-14));
+  CHECK(objects.tape.gradient(objects.inputs.object_place)(1, 0) == Approx(30 - 10.5));
+  REQUIRE(left_out.size() == 1);
+  CHECK_FALSE(left_out[0].is_left_out(1));
+  objects.tape.set(objects.inputs.object_center_target,
+                   {8.5, 6.5, 1, 10.5, 6, 0});  // the frame does not show it either
+  CHECK(objects.value(R"({"moves": "object"})") == Approx((9 + 16) / 2.0).epsilon(1e-14));
+  CHECK(objects.tape.gradient(objects.inputs.object_place)(1, 0) == 0);
 }
 
 TEST_CASE("center tells which objects the render hides, not those that the frame does not show") {

@@ -96,6 +96,25 @@ TEST_CASE("a gradient that is a little wrong fails the check of a stage") {
   CHECK_THAT(found.groups[0].report.text(), Contains("whole tape: gradient of 'base' is wrong at "));
 }
 
+TEST_CASE("what a term leaves out of its gradient on purpose is no error of a stage") {
+  std::vector<LossTerm> terms = loss_terms();
+  terms.push_back(make_loss_term("stopped", "The picture times what it was", [](const auto& in) {
+    return mean(in.rendered * stop_gradient(square(in.rendered)));
+  }));
+  Picture picture;
+  const StageGradcheck found = picture.check({"tint"}, {"stopped", "masked_l2"}, terms);
+  INFO(found.groups[0].report.text());
+  CHECK(found.ok());
+  CHECK(found.groups[0].report.worst_error < 1e-6);
+  Tape<double>& tape = picture.tape;  // and what was recorded before the check follows its inputs after it
+  const Var<double> stopped = stop_gradient(picture.tint), twice = stopped * 2.0;
+  picture.inputs.rendered = picture.inputs.rendered * twice;
+  picture.check({"base"}, {"masked_l2"});
+  tape.set(picture.tint, {3});
+  tape.forward(twice);
+  CHECK(tape.value(twice).scalar() == 6);
+}
+
 TEST_CASE("numbers are disturbed within their ranges before a stage is looked at, the same for a seed") {
   const auto disturbed = [](double size, std::uint64_t seed) {
     Picture picture;

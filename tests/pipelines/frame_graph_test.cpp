@@ -13,7 +13,11 @@
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "optim/loss_term.h"
+#include "pipelines/camera_increment.h"
+#include "pipelines/in_frame.h"
 #include "tests/pipelines/small_clip.h"
+#include "tests/support/larger.h"
+#include "tests/support/loss_terms.h"
 
 using namespace hsi4d;
 using test::small_clip;
@@ -360,6 +364,78 @@ TEST_CASE("the mean depth of an object on the tape is that of the untaped functi
   }
 }
 
+TEST_CASE("the place of an object in the image is that of its Gaussians' mean, with the gradient of what moves it",
+          "[frame_graph]") {
+  const Clip clip = small_clip(24, 20, 20);
+  Tape<double> tape;
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(RotationParameters::kSixD));
+  graph.set_state(clip.first);
+  const Var<double> place = graph.loss_inputs().object_place;
+  tape.forward(place);
+  Camera camera = clip.camera;
+  camera.camera_from_world = clip.first.camera_from_world;
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    const Gaussians& object = clip.objects[o].gaussians;
+    Vector3<double> mean = Vector3<double>::Zero();
+    for (std::size_t i = 0; i < object.means.size(); ++i)
+      mean[static_cast<Index>(i % 3)] += static_cast<double>(object.means[i]) / static_cast<double>(object.count());
+    const ObjectPose& pose = clip.first.objects[o];
+    const Vector3<double> world = so3_exp(pose.rotation) * mean + pose.translation;
+    const Vector2<double> expected = project_point(camera, transform_point(camera.camera_from_world, world));
+    for (Index i = 0; i < 2; ++i)
+      CHECK(tape.value(place)(static_cast<Index>(o), i) == Approx(expected[i]).epsilon(1e-12));
+  }
+  for (const ParameterGroup<double>& group : graph.groups()) {
+    INFO(group.name);
+    const bool moves = group.name == "camera" || group.name == "object_orient" || group.name == "object_transl" ||
+                       group.name == "object_means";
+    for (const Var<double> block : group.blocks) tape.unfreeze(block);
+    const GradcheckReport report = gradcheck(tape, sum(square(place)));
+    INFO(report.text());
+    CHECK((report.entries > 0) == moves);
+    CHECK(report.failures.empty());
+    for (const Var<double> block : group.blocks) tape.freeze(block);
+  }
+}
+
+TEST_CASE("center that moves the object alone pulls neither the human nor the scene", "[frame_graph]") {
+  const Clip clip = small_clip(24, 20, 20);
+  const auto slopes = [&clip](const std::string& settings) {
+    Tape<double> tape;
+    FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, smooth_settings(RotationParameters::kSixD));
+    graph.set_state(clip.first);
+    const Image image = random_image(3, 20, 24, 3), weight = random_image(1, 20, 24, 4);
+    graph.set_targets(targets_for(image, weight));
+    for (const ParameterGroup<double>& group : graph.groups()) {
+      for (const Var<double> block : group.blocks) tape.unfreeze(block);
+    }
+    const Var<double> loss = test::record_term("center", graph.loss_inputs(), settings);
+    tape.forward(loss);
+    tape.backward(loss);
+    std::map<std::string, double> largest;
+    for (const ParameterGroup<double>& group : graph.groups()) {
+      double& of_group = largest[group.name];
+      for (const Var<double> block : group.blocks) {
+        if (!tape.has_gradient(block)) continue;
+        const ConstArray<double> d = tape.gradient(block);
+        for (Index i = 0; i < d.total_rows(); ++i) {
+          for (Index j = 0; j < d.shape.cols; ++j) of_group = test::larger(of_group, std::fabs(d.row(i)[j]));
+        }
+      }
+    }
+    return largest;
+  };
+  const auto all = slopes("{}"), object = slopes(R"({"moves": "object"})");
+  CHECK(all.at("transl") > 0);
+  CHECK(all.at("human_opacity_logits") > 0);
+  for (const auto& [group, slope] : object) {
+    INFO(group);
+    const bool is_moved =
+        group == "camera" || group == "object_orient" || group == "object_transl" || group == "object_means";
+    CHECK((slope > 0) == is_moved);
+  }
+}
+
 TEST_CASE("the loss depth has its whole gradient where part of an object is behind the camera", "[frame_graph]") {
   Clip clip = small_clip(24, 20, 20);
   Gaussians& object = clip.objects[0].gaussians;
@@ -396,37 +472,4 @@ TEST_CASE("the loss depth has its whole gradient where part of an object is behi
     }
     for (const Var<double> block : group->blocks) tape.freeze(block);
   }
-}
-
-TEST_CASE("the centre of a mask", "[frame_graph]") {
-  Image mask(1, 4, 6);
-  CHECK(mask_center(mask, 0.5) == Vector3<double>(0, 0, 0));
-  mask(0, 1, 2) = 0.25;
-  CHECK(mask_center(mask, 0.5) == Vector3<double>(0, 0, 0));  // too faint to be the object
-  mask(0, 1, 2) = 1;
-  CHECK(mask_center(mask, 0.5) == Vector3<double>(2.5, 1.5, 1));
-  mask(0, 3, 2) = 1;
-  CHECK(mask_center(mask, 0.5) == Vector3<double>(2.5, 2.5, 2));
-}
-
-TEST_CASE("the area that an object would cover is that of its Gaussians' centres in the image", "[frame_graph]") {
-  Camera camera = {200, 150, 160, 150, 100, 75, {}};
-  Gaussians disc;
-  std::vector<float> places;
-  for (double y = -1; y <= 1; y += 0.02) {
-    for (double x = -1; x <= 1; x += 0.02) {
-      if (x * x + y * y > 1) continue;
-      for (const double number : {0.3 * x, 0.2 * y, 0.0}) places.push_back(static_cast<float>(number));
-    }
-  }
-  disc.means = places;
-  disc.opacity_logits.resize(places.size() / 3);
-  const ObjectPose pose = {Vector3<double>(0, 0, 0.7), Vector3<double>(0.4, -0.2, 2)};
-  const double ellipse =
-      std::numbers::pi * 0.3 * 0.2 * 160 * 150 / 4;  // a turn about the view's axis hardly changes it
-  CHECK(covered_area(disc, pose, camera) == Approx(ellipse).epsilon(0.02));
-  camera.camera_from_world.translation = {0, 0, 2};  // twice as far
-  CHECK(covered_area(disc, pose, camera) == Approx(ellipse / 4).epsilon(0.02));
-  camera.camera_from_world.translation = {0, 0, -5};  // behind
-  CHECK(covered_area(disc, pose, camera) == 0);
 }
