@@ -176,6 +176,33 @@ TEST_CASE("an object that is never seen stays where it is given, and all that is
     if (line["stage"] == "interaction") CHECK(line["losses"]["center"] == 0);
 }
 
+TEST_CASE("an object that the frames show and the render does not is led back, where center moves the object alone",
+          "[run]") {
+  const TemporaryFolder here;
+  const Spoilt dataset;
+  const Vector3<double> side = 3 * read_cameras(dataset.file("camera.json"))[0].camera_from_world.rotation.row(0);
+  Vector3<double> truth;
+  write_changed(dataset.file("initial.json"), dataset.file("initial.json"), [&](nlohmann::ordered_json& initial) {
+    nlohmann::ordered_json& translation = initial["objects"][kTinyObject]["translation"];
+    for (Index i = 0; i < 3; ++i) {
+      truth[i] = translation[static_cast<std::size_t>(i)];
+      translation[static_cast<std::size_t>(i)] = truth[i] + side[i];  // out of the image
+    }
+  });
+  const auto error_at_the_end = [&](const std::string& moves) {
+    dataset.run("run_" + moves,
+                {"stages.interaction.iterations=60", "stages.interaction.optimize.object_transl.lr=0.1",
+                 "stages.interaction.losses.depth.weight=100", "stages.interaction.losses.center.moves=" + moves});
+    const Vector3<double> place =
+        read_object_tracks("run_" + moves + "/objects.npz", {kTinyObject}).back()[0].translation;
+    return (place - truth).norm();
+  };
+  const double lost = error_at_the_end("all"), found = error_at_the_end("object");
+  CAPTURE(lost, found);
+  CHECK(lost > 2.5);
+  CHECK(found < 0.3);
+}
+
 TEST_CASE("a camera that has nothing of the scene in view is told before the work, and finds nothing by it", "[run]") {
   const TemporaryFolder here;
   const Spoilt dataset;
