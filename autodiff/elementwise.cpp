@@ -283,7 +283,7 @@ struct LeakyRelu {
 /// Copies; has no adjoint. As an operator of its own it cuts the graph without freezing x for other users.
 template <class S>
 struct StopGradientOp {
-  static constexpr const char* kName = kStopGradient;
+  static constexpr const char* kName = "stop_gradient";
   void forward(NodeIo<S>& io) { std::copy_n(io.in(0).data, io.in(0).shape.memory(), io.out().data); }
   void backward(NodeIo<S>&) {}
 };
@@ -367,6 +367,8 @@ template <class S> Var<S> stop_gradient(Var<S> x, Source where) {
   x.tape->freeze(y);
   return y;
 }
+
+bool is_stop_gradient(std::string_view operator_name) { return operator_name == StopGradientOp<double>::kName; }
 
 #define HSI4D_ELEMENTWISE(S)                                                    \
   template Var<S> operator+(Var<S>, std::type_identity_t<Operand<S>>);          \

@@ -4,11 +4,11 @@
 // are written by hand, so that a factor 0 never meets an infinity (row C11 of the stability catalogue).
 #pragma once
 
+#include <string_view>
+
 #include "autodiff/tape.h"
 
 namespace hsi4d {
-
-inline constexpr const char* kStopGradient = "stop_gradient";
 
 /// Right-hand side of an arithmetic operator: an array or a number. Converts implicitly, and so learns the caller's
 /// line.
@@ -65,8 +65,11 @@ template <class S> Var<S> sigmoid(Var<S> x, Source where = Source::current());
 template <class S> Var<S> softplus(Var<S> x, Source where = Source::current());
 /// x where x > 0, else slope·x; the gradient at 0 is slope.
 template <class S> Var<S> leaky_relu(Var<S> x, double slope, Source where = Source::current());
-/// The value of x with no gradient behind it. Its operator is called kStopGradient.
+/// The value of x with no gradient behind it.
 template <class S> Var<S> stop_gradient(Var<S> x, Source where = Source::current());
 // clang-format on
+
+/// Whether an operator of this name is that of stop_gradient.
+bool is_stop_gradient(std::string_view operator_name);
 
 }  // namespace hsi4d

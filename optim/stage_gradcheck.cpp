@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/inspect.h"
@@ -41,7 +40,7 @@ class HeldStops {
   HeldStops(Tape<double>& tape, Var<double> result) : tape_(tape) {
     TapeInspector<double> inspector(tape);
     for (const auto node : inspector.nodes_of(result)) {
-      if (std::string_view(inspector.operator_name(node)) != kStopGradient) continue;
+      if (!is_stop_gradient(inspector.operator_name(node))) continue;
       held_.push_back(inspector.handle(inspector.outputs(node).front()));
     }
     for (const Var<double> var : held_) tape_.hold(var);
