@@ -41,8 +41,8 @@ struct LossInputs {
                                 ///< how much of it the frame shows, up to 1; 0 where none is
   Var<S> object_masks;          ///< [O,H,W] what of the frame shows each object, 0 to 1
   Var<S> object_seen;           ///< [O,1,1] 1, or 0 where the frame shows none of the object
-  Var<S> object_place;          ///< [O,2] where the mean of each object's Gaussian centres is in the image, x px, y px,
-                                ///< whatever is before it; zeros without gradient where it is not before the camera
+  Var<S> object_place;          ///< [O,2] where each object's centroid is in the image, x px, y px, whatever is before
+                                ///< it; zeros without gradient where it is not before the camera
   Var<S> object_depth;          ///< [O,1] mean camera z of each object's Gaussian centres, metres
   Var<S> object_depth_target;   ///< [O,1] what it was in the clip's first frame, metres
 

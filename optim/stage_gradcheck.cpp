@@ -41,7 +41,8 @@ class HeldStops {
     TapeInspector<double> inspector(tape);
     for (const auto node : inspector.nodes_of(result)) {
       if (!is_stop_gradient(inspector.operator_name(node))) continue;
-      held_.push_back(inspector.handle(inspector.outputs(node).front()));
+      const Var<double> output = inspector.handle(inspector.outputs(node).front());
+      if (!tape.held(output)) held_.push_back(output);
     }
     for (const Var<double> var : held_) tape_.hold(var);
   }

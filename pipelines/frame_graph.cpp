@@ -7,7 +7,6 @@
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
-#include "body/skinning.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
@@ -209,7 +208,7 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
   const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
   const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
   const Var<S> rotation = record_rotations(orient);
-  objects_.push_back({orient, transl, rotation, vars.means});
+  objects_.push_back({orient, transl, rotation});
   const SplatInputs<S> splats = rigid_splats(vars, rotation, transl, xi_, view_);
   hold_colors(splats.colors, {"object_sh"});
   return {splats, object.gaussians.count()};
@@ -342,17 +341,16 @@ void FrameGraph<S>::record_object_depths(const std::vector<Part>& parts, std::si
   inputs_.object_depth_target = tape_.constant("object_depth_target", shape_of(count, 1));
 }
 
+/// A pose's translation is where the object's centroid is.
 template <class S>
 void FrameGraph<S>::record_object_places() {
-  std::vector<Var<S>> transforms, means;
-  for (const Object& object : objects_) {
-    transforms.push_back(rigid_rows(object.rotation, object.transl));
-    means.push_back(sum_rows(object.means) * (1 / static_cast<double>(object.means.shape().rows)));
+  std::vector<Var<S>> centroids;
+  for (const Object& object : objects_) centroids.push_back(object.transl);
+  const Var<S> axes = tape_.constant("unit_axes", shape_of(std::ssize(objects_), 9));
+  for (Index o = 0; o < std::ssize(objects_); ++o) {  // without extent they would not be drawn, and have no gradient
+    for (const Index diagonal : {0, 4, 8}) tape_.write(axes)(o, diagonal) = 1;
   }
-  const Var<S> points = transform_points(concat_rows<S>(transforms), concat_rows<S>(means));
-  const Var<S> axes = tape_.constant("some_axes", shape_of(std::ssize(objects_), 9));
-  fill(axes, S(1));  // any but zeros, which mark what is not to be drawn and has no gradient
-  inputs_.object_place = project(points, axes, xi_, view_).means_px;
+  inputs_.object_place = project(concat_rows<S>(centroids), axes, xi_, view_).means_px;
 }
 
 template <class S>

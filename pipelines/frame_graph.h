@@ -109,7 +109,6 @@ class FrameGraph {
   struct Object {
     Var<S> orient, transl;
     Var<S> rotation;  // [1,9] that orient gives
-    Var<S> means;     // [N,3] of its Gaussians, in its own frame
   };
 
   Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);

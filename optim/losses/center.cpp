@@ -38,14 +38,15 @@ void describe(ConfigFields& fields, CenterSettings& settings) {
   fields.number(
       "min_opacity", settings.min_opacity, {.min = 1e-6},
       "An object whose opacity sums to less than this many pixels counts as hidden: the term is off for it, or, "
-      "where it moves the object alone, leads the place where it would be");
+      "where it moves the object alone, leads its place");
   fields.boolean(
       "by_share", settings.by_share,
       "An object counts by the share of it that the frame shows: the centre of a sliver beside the human says "
       "little, and would pull the human out of the way");
-  fields.choice("moves", settings.moves, kCenterMoves,
-                "What the term may move: all that the rendered opacity depends on, which is also what is before the "
-                "object, or the object alone, as a whole");
+  fields.choice(
+      "moves", settings.moves, kCenterMoves,
+      "What the term has a gradient in: all that the rendered opacity depends on, which is also what is before "
+      "the object, or the object's place alone (and the camera)");
 }
 
 /// Whether the term is on for an object.
@@ -54,33 +55,29 @@ bool is_on(M mass, V visible, double min_opacity) {
   return mass >= static_cast<M>(min_opacity) && visible > V(0);
 }
 
-/// Rows (x, y, mass) of what is rendered. Where the object alone is moved, x and y change as its place does, and are
-/// that place where nothing of it is to be seen.
+/// Rows (x, y, mass) of what is rendered, which change as the objects' places do. Of an object that is hidden they are
+/// its place and the least mass, unless that is not before the camera.
 template <class S>
-Var<S> rendered_centres(const LossInputs<S>& in, const CenterSettings& settings) {
-  const Var<S> rendered = centroids(in.object_opacity);
-  if (settings.moves == CenterMoves::kAll) return rendered;
-  const Var<S> centres = stop_gradient(rendered), place = stop_gradient(in.object_place);
-  const Var<S> mass = slice_cols(centres, 2, 1);
-  const Var<S> at = map({slice_cols(centres, 0, 2), mass, place},
-                        [least = settings.min_opacity](auto centre, auto m, auto of_object) {
-                          const auto seen = value_of(m) >= static_cast<decltype(value_of(m))>(least);
-                          return select(seen, centre, of_object);
-                        });
+Var<S> centres_by_place(const LossInputs<S>& in, double min_opacity) {
+  const Var<S> rendered = stop_gradient(centroids(in.object_opacity)), place = stop_gradient(in.object_place);
+  const auto column = [](Var<S> x, Index c) { return slice_cols(x, c, 1); };
+  const Var<S> mass = column(rendered, 2);
+  const S least = static_cast<S>(min_opacity);
+  const auto either = [least](auto centre, auto m, auto p) { return select(value_of(m) >= least, centre, p); };
+  const Var<S> at = map({slice_cols(rendered, 0, 2), mass, place}, either);
+  const Var<S> counted = map({mass, column(place, 0), column(place, 1)}, [least](auto m, auto x, auto y) {
+    const bool is_led = !(value_of(m) >= least) && (value_of(x) != S(0) || value_of(y) != S(0));
+    return select(is_led, least, m);
+  });
   const Var<S> moved = in.object_place - place;  // zeros, with a gradient
-  return concat_cols<S>(std::array{at + moved, mass});
-}
-
-/// Less than this counts as hidden, and the term is off.
-double least_opacity(const CenterSettings& settings) {
-  return settings.moves == CenterMoves::kObject ? 0 : settings.min_opacity;
+  return concat_cols<S>(std::array{at + moved, counted});
 }
 
 /// Columns x, y, mass of the centres beside x, y, visible of the targets; each object's distance², 0 where it is off.
 template <class S>
 Var<S> mean_squared_distance(Var<S> centres, Var<S> targets, const CenterSettings& settings, double unit_px) {
   const auto column = [](Var<S> x, Index c) { return slice_cols(x, c, 1); };
-  const double least = least_opacity(settings);
+  const double least = settings.min_opacity;
   const bool by_share = settings.by_share;
   const Var<S> total =
       sum_over({column(centres, 0), column(centres, 1), column(centres, 2), column(targets, 0), column(targets, 1),
@@ -116,9 +113,10 @@ LossTerm center_loss() {
         const Shape image = in.object_opacity.shape();
         if (image.planes == 0) return Value{};
         const double unit_px = settings.unit == CenterUnit::kPixels ? 1 : static_cast<double>(image.cols);
-        const auto centres = rendered_centres(in, settings);
+        const auto centres = settings.moves == CenterMoves::kAll ? centroids(in.object_opacity)
+                                                                 : centres_by_place(in, settings.min_opacity);
         if (in.left_out != nullptr) {
-          in.left_out->push_back(hidden_objects(centres, in.object_center_target, least_opacity(settings)));
+          in.left_out->push_back(hidden_objects(centres, in.object_center_target, settings.min_opacity));
         }
         return mean_squared_distance(centres, in.object_center_target, settings, unit_px);
       });

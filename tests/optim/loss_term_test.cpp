@@ -258,6 +258,11 @@ TEST_CASE("center that moves the object alone has the same value, and a gradient
   CHECK(objects.tape.gradient(objects.inputs.object_place)(1, 0) == Approx(30 - 10.5));
   REQUIRE(left_out.size() == 1);
   CHECK_FALSE(left_out[0].is_left_out(1));
+  objects.tape.set(objects.inputs.object_place, {5, 3, 0, 0});  // not before the camera: nothing can lead it
+  CHECK(objects.value(R"({"moves": "object"})") == Approx((9 + 16) / 2.0).epsilon(1e-14));
+  CHECK(left_out.back().is_left_out(1));
+  CHECK_FALSE(left_out.back().is_left_out(0));
+  objects.tape.set(objects.inputs.object_place, {5, 3, 30, 7});
   objects.tape.set(objects.inputs.object_center_target,
                    {8.5, 6.5, 1, 10.5, 6, 0});  // the frame does not show it either
   CHECK(objects.value(R"({"moves": "object"})") == Approx((9 + 16) / 2.0).epsilon(1e-14));
