@@ -7,6 +7,8 @@
 // vector code. It must be a pure function of its arguments, written with the mathematics of dual.h.
 #pragma once
 
+#include "autodiff/adjoint_run.h"
+#include "autodiff/block_sum.h"
 #include "autodiff/blocks.h"
 #include "autodiff/dual.h"
 #include "autodiff/tape.h"
@@ -103,27 +105,6 @@ void block_partials(const F& f, const Block<S, K>& block, S* y, const PartialRun
   }
 }
 
-/// Sum of a block's numbers in double: 32 running sums (enough to hide the latency of an addition), combined in a fixed
-/// order on every instruction set.
-template <class S>
-double block_sum(const S* y, Index n) {
-  constexpr Index kSums = 32;
-  double total = 0;
-  Index i = 0;
-  if (n >= kSums) {
-    double sums[kSums] = {};
-    for (; i + kSums <= n; i += kSums) {
-      for (Index lane = 0; lane < kSums; ++lane) sums[lane] += static_cast<double>(y[i + lane]);
-    }
-    for (Index half = kSums / 2; half > 0; half /= 2) {
-      for (Index lane = 0; lane < half; ++lane) sums[lane] += sums[lane + half];
-    }
-    total = sums[0];
-  }
-  for (; i < n; ++i) total += static_cast<double>(y[i]);
-  return total;
-}
-
 /// Adds blocks of partial derivatives to the adjoints of K operands, in parallel, the same bits for any thread count.
 /// An operand that several chunks share gets one double slot a chunk, summed in order at the end.
 template <class S, std::size_t K>
@@ -147,34 +128,13 @@ class AdjointSink {
   }
   bool wants(std::size_t k) const { return wants_[k]; }
 
-  /// d_x_k += partial_k · weight(i) over a block.
-  template <class W>
-  void add(Index chunk, const Block<S, K>& block, const PartialRuns<S, K>& partial, const W& weight) const {
+  /// d_x_k += partial_k · weight over a block.
+  void add(Index chunk, const Block<S, K>& block, const PartialRuns<S, K>& partial, const Weights<S>& weights) const {
     for (std::size_t k = 0; k < K; ++k) {
       if (!wants_[k]) continue;
-      const S* p = partial[k];
-      const bool one_number = walk_.column_step(k) == 0;
-      double* slot = slots_[k] == nullptr ? nullptr : slots_[k] + chunk * d_in_[k].shape.memory() + block.in[k];
-      S* d = d_in_[k].data + block.in[k];
-      if (slot == nullptr && assigns_[k]) {
-#pragma GCC ivdep
-        for (Index i = 0; i < block.n; ++i) d[i] = p[i] * weight(i);
-        continue;
-      }
-      if (slot == nullptr && !one_number) {
-#pragma GCC ivdep
-        for (Index i = 0; i < block.n; ++i) d[i] += p[i] * weight(i);
-        continue;
-      }
-      alignas(kAlignment) S weighted[kBlock];
-      for (Index i = 0; i < block.n; ++i) weighted[i] = p[i] * weight(i);
-      if (!one_number) {
-        for (Index i = 0; i < block.n; ++i) slot[i] += static_cast<double>(weighted[i]);
-      } else if (slot != nullptr) {
-        *slot += block_sum(weighted, block.n);
-      } else {
-        *d += static_cast<S>(block_sum(weighted, block.n));
-      }
+      AdjointRun<S> run{d_in_[k].data + block.in[k], nullptr, assigns_[k], walk_.column_step(k) == 0};
+      if (slots_[k] != nullptr) run.slot = slots_[k] + chunk * d_in_[k].shape.memory() + block.in[k];
+      add_weighted(run, partial[k], weights, block.n);
     }
   }
 
@@ -226,7 +186,7 @@ struct MapOp {
     const auto walk = detail::walk_inputs<S, K>(io, y.shape);
     const Partition part = walk.partition();
     parallel_for(part.n, part.grain, [&](Index begin, Index end) {
-      on_best_isa([&] {
+      on_best_isa_for<S>([&] {
         walk.run(begin, end, [&](const Block<S, K>& block) {
           alignas(kAlignment) S values[kBlock];
           detail::block_values(f, block, values);
@@ -243,13 +203,13 @@ struct MapOp {
     const Partition part = reduction_partition(all.n, all.grain);
     const detail::AdjointSink<S, K> sink(io, walk, part.chunks());
     parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-      on_best_isa([&] {
+      on_best_isa_for<S>([&] {
         walk.run(begin, end, [&](const Block<S, K>& block) {
           alignas(kAlignment) S values[kBlock];
           detail::PartialRoom<S, K> room;
           const S* d = d_y.data + block.out;
           detail::block_partials(f, block, values, room.runs());
-          sink.add(chunk, block, room.runs(), [d](Index i) { return d[i]; });
+          sink.add(chunk, block, room.runs(), {d, 0});
         });
       });
     });
@@ -287,10 +247,10 @@ struct SumOverOp {
     const Partition part = reduction_partition(all.n, all.grain);
     const detail::AdjointSink<S, K> sink(io, walk, part.chunks());
     parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
-      on_best_isa([&] {
+      on_best_isa_for<S>([&] {
         S* kept = saved_of(walk, begin);
         walk.run(begin, end, [&](const Block<S, K>& block) {
-          sink.add(chunk, block, next_runs(kept, block.n), [d_sum](Index) { return d_sum; });
+          sink.add(chunk, block, next_runs(kept, block.n), {nullptr, d_sum});
         });
       });
     });
@@ -311,7 +271,7 @@ struct SumOverOp {
 
   double sum_only(const BlockWalk<S, K>& walk, Index begin, Index end) const {
     double sum = 0;
-    on_best_isa([&] {
+    on_best_isa_for<S>([&] {
       walk.run(begin, end, [&](const Block<S, K>& block) {
         alignas(kAlignment) S values[kBlock];
         detail::block_values(f, block, values);
@@ -323,7 +283,7 @@ struct SumOverOp {
 
   double sum_and_save(const BlockWalk<S, K>& walk, Index begin, Index end) {
     double sum = 0;
-    on_best_isa([&] {
+    on_best_isa_for<S>([&] {
       S* keep = saved_of(walk, begin);
       walk.run(begin, end, [&](const Block<S, K>& block) {
         alignas(kAlignment) S values[kBlock];

@@ -9,7 +9,7 @@ namespace hsi4d {
 
 namespace {
 
-constexpr const char* kFormat = "hsi4d avatar";
+constexpr const char* kAvatarFormat = "hsi4d avatar";
 
 // Files are Safetensors or, of version 1, Npz.
 
@@ -17,8 +17,8 @@ void check_first_format(const Npz& file) {
   refuse_other_contents(file, {"an avatar"});
   if (!file.has("format")) throw DataError(file.source() + ": there is no array 'format'; this is no avatar");
   const std::string format = file.array("format").text();
-  if (format != kFormat)
-    throw DataError(file.source() + ": the format is '" + format + "'; allowed: '" + kFormat + "'");
+  if (format != kAvatarFormat)
+    throw DataError(file.source() + ": the format is '" + format + "'; allowed: '" + kAvatarFormat + "'");
   const auto version = file.array("version").scalar<int64_t>();
   if (version == 1) return;
   throw DataError(file.source() + ": the format's version is " + std::to_string(version) +
@@ -127,7 +127,7 @@ Avatar selected(const Avatar& avatar, std::span<const Index> rows) {
 }
 
 Avatar avatar_of(const Safetensors& file) {
-  file.require_format(kFormat, kAvatarVersion);
+  file.require_format(kAvatarFormat, kAvatarVersion);
   Avatar avatar = avatar_in(file);
   if (file.metadata().contains("body")) avatar.body = file.text("body");
   avatar.color_net = color_net_of(file, avatar.count(), avatar.joint_count());
@@ -146,7 +146,7 @@ Avatar read_avatar(const std::string& path) { return decode_avatar(read_file(pat
 
 SafetensorsWriter avatar_file(const Avatar& avatar) {
   check_sizes(avatar);
-  SafetensorsWriter file(kFormat, kAvatarVersion);
+  SafetensorsWriter file(kAvatarFormat, kAvatarVersion);
   const int64_t n = avatar.count(), k = avatar.weights.per_vertex, j = avatar.joint_count();
   file.add<float>("means", {n, 3}, avatar.means);
   file.add<float>("quats", {n, 4}, avatar.quats);

@@ -13,9 +13,9 @@ using Vector = Vector3<double>;
 
 // Joints of the SMPL-X layout.
 constexpr int kPelvis = 0, kHipLeft = 1, kHipRight = 2, kKneeLeft = 4, kKneeRight = 5, kAnkleLeft = 7, kAnkleRight = 8,
-              kFootLeft = 10, kFootRight = 11, kNeck = 12, kHead = 15, kShoulderLeft = 16, kShoulderRight = 17,
-              kElbowLeft = 18, kElbowRight = 19, kWristLeft = 20, kWristRight = 21, kJaw = 22, kEyeLeft = 23,
-              kEyeRight = 24;
+              kFootLeft = 10, kFootRight = 11, kNeckJoint = 12, kHeadJoint = 15, kShoulderLeft = 16,
+              kShoulderRight = 17, kElbowLeft = 18, kElbowRight = 19, kWristLeft = 20, kWristRight = 21, kJaw = 22,
+              kEyeLeft = 23, kEyeRight = 24;
 
 const Vector kSkin(0.80, 0.60, 0.48);
 const Vector kHair(0.20, 0.13, 0.09);
@@ -57,12 +57,12 @@ Clothing::Clothing(const BodyModel& body, double texture) : joints_(body.joints)
   HSI4D_CHECK(body.joint_names == smplx_joint_names(), "the body's joints are not those of SMPL-X");
   double top = body.vertices.empty() ? 0 : static_cast<double>(body.vertices[1]);
   for (std::size_t i = 1; i < body.vertices.size(); i += 3) top = std::max(top, static_cast<double>(body.vertices[i]));
-  head_size_ = std::max(top - joint(kHead)[1], 0.05) / 0.198;
+  head_size_ = std::max(top - joint(kHeadJoint)[1], 0.05) / 0.198;
 }
 
 Vector3<double> Clothing::color(const Vector& p, int j) const {
   const double y = p[1];
-  if (is_one_of(j, {kHead, kJaw, kEyeLeft, kEyeRight})) return head(p);
+  if (is_one_of(j, {kHeadJoint, kJaw, kEyeLeft, kEyeRight})) return head(p);
   if (j >= kEyeRight || is_one_of(j, {kElbowLeft, kElbowRight, kWristLeft, kWristRight})) return kSkin;
   if (is_one_of(j, {kShoulderLeft, kShoulderRight})) {
     const Vector shoulder = joint(j), arm = joint(j + 2) - shoulder;
@@ -78,7 +78,7 @@ Vector3<double> Clothing::color(const Vector& p, int j) const {
     if (above < 0.020) return trousers(p);
     return above < 0.055 ? kBelt : shirt(p, false);
   }
-  return y > joint(kNeck)[1] + 0.010 ? kSkin : shirt(p, false);
+  return y > joint(kNeckJoint)[1] + 0.010 ? kSkin : shirt(p, false);
 }
 
 // Sizes of the face are those of an adult, metres: the opening of an eye is 30 x 12 mm, an iris 12 mm, a mouth 48 mm
@@ -105,7 +105,7 @@ double Clothing::detail(const Vector& p) const {
 }
 
 Vector3<double> Clothing::head(const Vector& p) const {
-  const Vector from = on_face(p, joint(kHead));
+  const Vector from = on_face(p, joint(kHeadJoint));
   if (from[1] > 0.088 + 0.85 * from[2]) return kHair;  // the hairline, from forehead to nape
   for (const int j : {kEyeLeft, kEyeRight}) {
     const Vector off = on_face(p, joint(j));
@@ -139,7 +139,7 @@ Vector3<double> Clothing::mouth(double x, double y) const {
 Vector3<double> Clothing::shirt(const Vector& p, bool sleeve) const {
   const double waist = joint(kPelvis)[1];
   const double along = sleeve ? std::abs(p[0]) : p[1] - waist;
-  const bool front = p[2] > joint(kNeck)[2];
+  const bool front = p[2] > joint(kNeckJoint)[2];
   if (!sleeve && front && std::abs(p[0]) < 0.014) return between(kShirtDark, kButtons, 1, texture_);
   const double cloth = 0.8 * stripes(along, 0.070) + 0.2 * stripes(p[0] + 0.5 * p[2], 0.160);
   return between(kShirtDark, kShirtLight, cloth, texture_);

@@ -16,7 +16,7 @@ namespace hsi4d {
 namespace {
 
 constexpr const char* kPrefix = "color_net/";
-constexpr const char* kFormat = "hsi4d color net";  // of a file of its own
+constexpr const char* kNetFormat = "hsi4d color net";  // of a file of its own
 constexpr int kVersion = 1;
 
 /// Waves over the places of the rest pose.
@@ -221,7 +221,7 @@ void add_color_net(const ColorNet& net, SafetensorsWriter& file) {
 }
 
 void write_color_net(const std::string& path, const ColorNet& net) {
-  SafetensorsWriter file(kFormat, kVersion);
+  SafetensorsWriter file(kNetFormat, kVersion);
   add_color_net(net, file);
   file.write(path);
 }
@@ -255,7 +255,7 @@ std::optional<ColorNet> color_net_of(const Safetensors& file, Index rows, Index 
 
 ColorNet read_color_net(const std::string& path, Index rows, Index joints) {
   const Safetensors file = Safetensors::read(path);
-  file.require_format(kFormat, kVersion);
+  file.require_format(kNetFormat, kVersion);
   const NpyArray& features = file.array(array_name("features"));  // absent: this is told
   const std::vector<std::int64_t>& shape = features.shape();
   if (!shape.empty() && shape[0] != rows) {

@@ -107,7 +107,7 @@ Vector3<double> rest_of(const BodyModel& body, std::size_t joint) {
 }
 
 /// Unit quaternions x, y, z, w of a joint over time, each on the side of the one before it.
-std::vector<float> rotations_of(const Motion& motion, Index joint) {
+std::vector<float> local_rotations_of(const Motion& motion, Index joint) {
   std::vector<float> numbers;
   Vector4<double> before(1, 0, 0, 0);
   for (const BodyPose& pose : motion.poses) {
@@ -219,7 +219,7 @@ void add_animation(Parts& parts, const BodyModel& body, const Motion& motion) {
   for (std::size_t j = 0; j < body.parents.size(); ++j) {
     const auto joint = static_cast<Index>(j);
     if (is_still(motion, joint)) continue;
-    add_channel(j, "rotation", parts.add(rotations_of(motion, joint), kFloat, TINYGLTF_TYPE_VEC4, 0));
+    add_channel(j, "rotation", parts.add(local_rotations_of(motion, joint), kFloat, TINYGLTF_TYPE_VEC4, 0));
   }
   parts.model.animations.push_back(animation);
 }

@@ -35,9 +35,9 @@ constexpr NaturalJoint kSpine2    = {"spine2",        kY, {  3,   0,   0}, { 7, 
 constexpr NaturalJoint kLeftAnkle = {"left_ankle",    kY, { -4,   0,   0}, {12, 10,  8}, { -40,  -35, -35}, { 55,  35,  25}};
 constexpr NaturalJoint kSpine3    = {"spine3",        kY, {  0,   0,   0}, { 6,  7,  5}, { -25,  -30, -25}, { 35,  30,  25}};
 constexpr NaturalJoint kLeftFoot  = {"left_foot",     kY, {  0,   0,   0}, {10,  4,  4}, { -70,  -15, -15}, { 45,  15,  15}};
-constexpr NaturalJoint kNeck      = {"neck",          kY, {  5,   0,   0}, {12, 13,  9}, { -50,  -55, -40}, { 50,  55,  40}};
+constexpr NaturalJoint kNeckLimits      = {"neck",          kY, {  5,   0,   0}, {12, 13,  9}, { -50,  -55, -40}, { 50,  55,  40}};
 constexpr NaturalJoint kCollar    = {"left_collar",   kX, {  0,  -4,  -6}, { 7,  8,  8}, { -30,  -35, -25}, { 30,  30,  40}};
-constexpr NaturalJoint kHead      = {"head",          kY, {  0,   0,   0}, {11, 13,  8}, { -45,  -50, -40}, { 40,  50,  40}};
+constexpr NaturalJoint kHeadLimits      = {"head",          kY, {  0,   0,   0}, {11, 13,  8}, { -45,  -50, -40}, { 40,  50,  40}};
 constexpr NaturalJoint kShoulder  = {"left_shoulder", kX, {  8, -14, -56}, {25, 25, 24}, {-100, -140,-110}, { 95,  60, 100}};
 constexpr NaturalJoint kElbow     = {"left_elbow",    kX, {  0, -34,   0}, {20, 32,  9}, { -95, -155, -25}, { 95,  10,  25}};
 constexpr NaturalJoint kWrist     = {"left_wrist",    kX, {  0,   0,   0}, {20, 11, 16}, { -80,  -30, -80}, { 80,  45,  80}};
@@ -55,7 +55,7 @@ constexpr NaturalJoint mirrored(NaturalJoint joint, const char* name) {
   return joint;
 }
 
-constexpr NaturalJoint kJoints[] = {
+constexpr NaturalJoint kPosedJoints[] = {
     kLeftHip,
     mirrored(kLeftHip, "right_hip"),
     kSpine1,
@@ -67,10 +67,10 @@ constexpr NaturalJoint kJoints[] = {
     kSpine3,
     kLeftFoot,
     mirrored(kLeftFoot, "right_foot"),
-    kNeck,
+    kNeckLimits,
     kCollar,
     mirrored(kCollar, "right_collar"),
-    kHead,
+    kHeadLimits,
     kShoulder,
     mirrored(kShoulder, "right_shoulder"),
     kElbow,
@@ -78,16 +78,16 @@ constexpr NaturalJoint kJoints[] = {
     kWrist,
     mirrored(kWrist, "right_wrist"),
 };
-static_assert(std::size(kJoints) == kBodyPoseJoints);
+static_assert(std::size(kPosedJoints) == kBodyPoseJoints);
 
-const NaturalJoint& joint_of_row(Index row) { return kJoints[static_cast<std::size_t>(row % kBodyPoseJoints)]; }
+const NaturalJoint& joint_of_row(Index row) { return kPosedJoints[static_cast<std::size_t>(row % kBodyPoseJoints)]; }
 
 Matrix3<double> rotation_at_ease(const NaturalJoint& joint) {
   return so3_exp(Vector3<double>(joint.ease[0] * kRadians, joint.ease[1] * kRadians, joint.ease[2] * kRadians));
 }
 
 template <class S>
-Matrix3<S> matrix_at(const S* x) {
+Matrix3<S> rotation_at(const S* x) {
   Matrix3<S> m;
   m << x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8];
   return m;
@@ -103,7 +103,7 @@ struct TurnRows {
     const ConstArray<S> x = io.in(0);
     const Array<S> y = io.out();
     for (Index r = 0; r < x.shape.rows; ++r) {
-      const Matrix3<S> m = turns[static_cast<std::size_t>(r % kBodyPoseJoints)] * matrix_at(x.row(r));
+      const Matrix3<S> m = turns[static_cast<std::size_t>(r % kBodyPoseJoints)] * rotation_at(x.row(r));
       for (int i = 0; i < 9; ++i) y.row(r)[i] = m(i / 3, i % 3);
     }
   }
@@ -111,7 +111,7 @@ struct TurnRows {
     const ConstArray<S> d_y = io.d_out();
     const Array<S> d_x = io.d_in(0);
     for (Index r = 0; r < d_x.shape.rows; ++r) {
-      const Matrix3<S> m = turns[static_cast<std::size_t>(r % kBodyPoseJoints)].transpose() * matrix_at(d_y.row(r));
+      const Matrix3<S> m = turns[static_cast<std::size_t>(r % kBodyPoseJoints)].transpose() * rotation_at(d_y.row(r));
       for (int i = 0; i < 9; ++i) d_x.row(r)[i] += m(i / 3, i % 3);
     }
   }
@@ -121,7 +121,7 @@ template <class S>
 Var<S> turned_rows(Var<S> rotations, bool by_inverse, const Source& where) {
   TurnRows<S> op;
   for (std::size_t j = 0; j < op.turns.size(); ++j) {
-    const Matrix3<double> turn = rotation_at_ease(kJoints[j]);
+    const Matrix3<double> turn = rotation_at_ease(kPosedJoints[j]);
     op.turns[j] = (by_inverse ? Matrix3<double>(turn.transpose()) : turn).template cast<S>();
   }
   return rotations.owner().record(std::move(op), {rotations}, rotations.shape(), where);
@@ -132,7 +132,7 @@ template <class S>
 Var<S> spreads(Tape<S>& tape, bool inverse, const Source& where) {
   const Var<S> var = tape.constant("spread", shape_of(1, 3 * kBodyPoseJoints), where);
   std::vector<S> numbers;
-  for (const NaturalJoint& joint : kJoints) {
+  for (const NaturalJoint& joint : kPosedJoints) {
     for (const double spread : joint.spread) {
       numbers.push_back(static_cast<S>(inverse ? 1 / (spread * kRadians) : spread * kRadians));
     }
@@ -211,8 +211,8 @@ Matrix3<double> twist_swing_adjoint(const Matrix3<double>& rotation, const Twist
   return d_rotation;
 }
 
-/// How far angle x is beyond its range; below it, negative; NaN for NaN, which is within no range.
-double beyond(const NaturalJoint& joint, int axis, double x) {
+/// How far angle x is beyond_limit its range; below it, negative; NaN for NaN, which is within no range.
+double beyond_limit(const NaturalJoint& joint, int axis, double x) {
   const double low = joint.low[axis] * kRadians, high = joint.high[axis] * kRadians;
   return x > high ? x - high : x >= low ? 0 : x - low;
 }
@@ -222,7 +222,7 @@ struct JointLimitExcess {
   static constexpr const char* kName = "joint_limit_excess";
 
   static Matrix3<double> rotation_of(const ConstArray<S>& rotations, Index row) {
-    return matrix_at(rotations.row(row)).template cast<double>();
+    return rotation_at(rotations.row(row)).template cast<double>();
   }
 
   void forward(NodeIo<S>& io) {
@@ -234,7 +234,7 @@ struct JointLimitExcess {
         const TwistSwing t = twist_swing(rotation_of(r, row), joint.twist_axis);
         double sum = 0;
         for (int axis = 0; axis < 3; ++axis) {
-          const double x = beyond(joint, axis, t.angles[axis]);
+          const double x = beyond_limit(joint, axis, t.angles[axis]);
           sum += x * x;
         }
         *y.row(row) = static_cast<S>(sum);
@@ -252,7 +252,7 @@ struct JointLimitExcess {
         const TwistSwing t = twist_swing(rotation, joint.twist_axis);
         Vector3<double> g;
         for (int axis = 0; axis < 3; ++axis)
-          g[axis] = 2 * beyond(joint, axis, t.angles[axis]) * static_cast<double>(*d_y.row(row));
+          g[axis] = 2 * beyond_limit(joint, axis, t.angles[axis]) * static_cast<double>(*d_y.row(row));
         if (g == Vector3<double>::Zero()) continue;
         const Matrix3<double> d = twist_swing_adjoint(rotation, t, g);
         for (int i = 0; i < 9; ++i) d_r.row(row)[i] += static_cast<S>(d(i / 3, i % 3));
@@ -281,7 +281,7 @@ Index frames_of(Var<S> rotations) {
 
 }  // namespace
 
-std::span<const NaturalJoint> natural_joints() { return kJoints; }
+std::span<const NaturalJoint> natural_joints() { return kPosedJoints; }
 
 template <class S>
 Var<S> natural_decode(Var<S> latents, Source where) {

@@ -118,7 +118,7 @@ std::vector<double> joint_columns(const std::vector<double>& rows, Index width, 
   return result;
 }
 
-void read_joints(const Npz& file, SmplxModel& model) {
+void read_rest_joints(const Npz& file, SmplxModel& model) {
   if (has_readable(file, "J_template") && has_readable(file, "J_shapedirs")) {
     model.joints = checked_numbers(file, "J_template", {kJoints, 3});
     const NpyArray& array = file.array("J_shapedirs");
@@ -167,7 +167,7 @@ void read_faces(const Npz& file, SmplxModel& model) {
   }
 }
 
-void read_weights(const Npz& file, SmplxModel& model) {
+void read_skin_weights(const Npz& file, SmplxModel& model) {
   const NpyArray& array = file.array("weights");
   model.weights = {model.vertex_count(), kJoints, array.require_shape({model.vertex_count(), kJoints}).as<double>()};
   model.rescaled_weights = repair_weights(model.weights, array.source());
@@ -189,9 +189,9 @@ SmplxModel model_of(const Npz& file, const SmplxFileOptions& options) {
   if (model.vertices.empty()) throw DataError(file.array("v_template").source() + ": holds no vertex");
   read_faces(file, model);
   read_tree(file, model);
-  read_weights(file, model);
+  read_skin_weights(file, model);
   read_shape(file, options, model);
-  read_joints(file, model);
+  read_rest_joints(file, model);
   if (options.correctives && has_readable(file, "posedirs")) {
     model.correctives = checked_numbers(file, "posedirs", {model.vertex_count(), 3, kCorrectiveColumns});
   }

@@ -13,7 +13,7 @@ namespace hsi4d {
 
 namespace {
 
-struct Field {
+struct SequenceField {
   const char* name;
   SmplxTrack SmplxSequence::*track;
   Index joints;      // of a rotation; 0: no rotation
@@ -23,7 +23,7 @@ struct Field {
 
 constexpr Index kMostExpressions = 100;  // of SMPL-X 1.1
 
-constexpr Field kFields[] = {
+constexpr SequenceField kFields[] = {
     {"betas", &SmplxSequence::betas, 0, 0, kMostBetas},
     {"expression", &SmplxSequence::expression, 0, 0, kMostExpressions},
     {"global_orient", &SmplxSequence::global_orient, 1, 3, 3},
@@ -40,7 +40,7 @@ constexpr Field kFields[] = {
 constexpr const char* kNotes[] = {"gender",          "model_type",        "surface_model_type", "mocap_frame_rate",
                                   "mocap_framerate", "mocap_time_length", "frame_rate",         "fps"};
 
-std::string allowed_shapes(const Field& field) {
+std::string allowed_shapes(const SequenceField& field) {
   std::string text;
   if (field.width > 0) {
     const std::string width = std::to_string(field.width);
@@ -57,7 +57,8 @@ std::string allowed_shapes(const Field& field) {
 /// Whether the array is one row for all frames, or T rows; sets width and rows.
 ///
 /// @param other_frames  what other parameters have: [15,3] is a hand, if not 15 frames of 3 coefficients
-bool shape_fits(const Field& field, const std::vector<std::int64_t>& shape, Index other_frames, SmplxTrack& track) {
+bool shape_fits(const SequenceField& field, const std::vector<std::int64_t>& shape, Index other_frames,
+                SmplxTrack& track) {
   const bool is_table = shape.size() == 2 && field.joints > 1 && shape[0] == field.joints && shape[1] == 3;
   if (is_table && !(field.width == 0 && other_frames == field.joints)) {
     track.rows = 1;
@@ -75,7 +76,7 @@ bool shape_fits(const Field& field, const std::vector<std::int64_t>& shape, Inde
   return field.width > 0 ? track.width == field.width : track.width >= 1 && track.width <= field.most_width;
 }
 
-SmplxTrack read_track(const Field& field, const NpyArray& array, Index other_frames) {
+SmplxTrack read_track(const SequenceField& field, const NpyArray& array, Index other_frames) {
   SmplxTrack track;
   if (!shape_fits(field, array.shape(), other_frames, track)) {
     throw DataError(array.source() + ": has shape " + shape_text(array.shape()) +
@@ -97,7 +98,7 @@ SmplxTrack read_track(const Field& field, const NpyArray& array, Index other_fra
 /// Arrays that are no parameter; one that is nearly called as one that is missing is refused.
 std::vector<std::string> other_arrays(const Npz& file) {
   std::vector<std::string> known, names = file.names(), others;
-  for (const Field& field : kFields) known.emplace_back(field.name);
+  for (const SequenceField& field : kFields) known.emplace_back(field.name);
   for (const Npz::Skipped& skipped : file.skipped()) names.push_back(skipped.name);
   for (const std::string& name : names) {
     const bool is_note = std::find(std::begin(kNotes), std::end(kNotes), name) != std::end(kNotes);
@@ -115,7 +116,7 @@ std::vector<std::string> other_arrays(const Npz& file) {
 Index common_frames(const SmplxSequence& sequence) {
   Index frames = 1;
   const char* decided_by = nullptr;
-  for (const Field& field : kFields) {
+  for (const SequenceField& field : kFields) {
     const SmplxTrack& track = sequence.*field.track;
     if (!track.is_given() || track.rows == 1) continue;
     if (decided_by != nullptr && track.rows != frames) {
@@ -132,7 +133,7 @@ Index common_frames(const SmplxSequence& sequence) {
 bool read_tracks(const Npz& file, bool of_hands, SmplxSequence& sequence) {
   bool is_any = false;
   const Index other_frames = of_hands ? common_frames(sequence) : 0;
-  for (const Field& field : kFields) {
+  for (const SequenceField& field : kFields) {
     const bool is_skipped = std::any_of(file.skipped().begin(), file.skipped().end(),
                                         [&](const Npz::Skipped& s) { return s.name == field.name; });
     if ((field.joints == kHandJoints) != of_hands || (!file.has(field.name) && !is_skipped)) continue;
@@ -155,7 +156,7 @@ SmplxSequence sequence_of(const Npz& file) {
   const bool is_body = read_tracks(file, false, sequence), is_hand = read_tracks(file, true, sequence);
   if (!is_body && !is_hand) {
     std::vector<std::string> known;
-    for (const Field& field : kFields) known.emplace_back(field.name);
+    for (const SequenceField& field : kFields) known.emplace_back(field.name);
     throw DataError(file.source() + ": holds none of the parameters " + joined(known));
   }
   sequence.frames = common_frames(sequence);
@@ -166,7 +167,7 @@ bool is_pca(const SmplxTrack& hand, SmplxHands hands) {
   return hands == SmplxHands::kPca || (hands == SmplxHands::kByWidth && hand.width != kHandNumbers);
 }
 
-void check_hand(const SmplxModel& model, const SmplxSequence& sequence, const Field& field, SmplxHands hands) {
+void check_hand(const SmplxModel& model, const SmplxSequence& sequence, const SequenceField& field, SmplxHands hands) {
   const SmplxTrack& hand = sequence.*field.track;
   if (!hand.is_given()) return;
   const std::string start = sequence.source + ": array '" + field.name + "': has " + std::to_string(hand.width);
@@ -226,7 +227,7 @@ SmplxFrames<S> pose_frames(const SmplxModel& model, const SmplxSequence& sequenc
     var = tape.constant(name, shape_of(rows, track.width / rows));
     leaves.push_back({&track, var});
   };
-  for (const Field& field : kFields) {
+  for (const SequenceField& field : kFields) {
     if (field.joints == kHandJoints) check_hand(model, sequence, field, hands);
   }
   const auto hand_rows = [&](const SmplxTrack& hand) { return is_pca(hand, hands) ? 1 : kHandJoints; };

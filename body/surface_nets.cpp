@@ -12,13 +12,13 @@ namespace hsi4d::detail {
 namespace {
 
 using Vector = Vector3<double>;
-using Field = FunctionRef<double(const Vector&)>;
+using DistanceField = FunctionRef<double(const Vector&)>;
 using Map = FunctionRef<Vector(const Vector&)>;
 
 /// Values of the field at the nodes, each computed when first asked for.
 class Nodes {
  public:
-  Nodes(const NetGrid& grid, Map map, Field field)
+  Nodes(const NetGrid& grid, Map map, DistanceField field)
       : grid_(grid), map_(map), field_(field), values_(count(), std::numeric_limits<double>::quiet_NaN()) {}
 
   std::size_t count() const {
@@ -65,7 +65,7 @@ class Nodes {
  private:
   const NetGrid& grid_;
   Map map_;
-  Field field_;
+  DistanceField field_;
   std::vector<double> values_;
 };
 
@@ -136,7 +136,7 @@ void add_quadrangle(const std::array<std::int32_t, 4>& q, NetMesh& mesh) {
   }
 }
 
-Vector gradient(Field field, const Vector& p) {
+Vector gradient(DistanceField field, const Vector& p) {
   constexpr double kStep = 1e-4;
   Vector g;
   for (int i = 0; i < 3; ++i) {
@@ -148,7 +148,7 @@ Vector gradient(Field field, const Vector& p) {
 }
 
 /// Newton's steps along the gradient, each of 3 mm at most.
-Vector onto_surface(Field field, Vector p) {
+Vector onto_surface(DistanceField field, Vector p) {
   constexpr double kLongest = 0.003;
   for (int step = 0; step < 3; ++step) {
     const Vector g = gradient(field, p);
@@ -163,7 +163,7 @@ Vector onto_surface(Field field, Vector p) {
 }
 
 /// Moves each vertex half way to the mean of its neighbours, as far as that is along the surface.
-void even_out(Field field, const VertexNeighbours& around, std::vector<Vector>& vertices) {
+void even_out(DistanceField field, const VertexNeighbours& around, std::vector<Vector>& vertices) {
   std::vector<Vector> moved(vertices.size());
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     Vector mean = Vector::Zero();
@@ -201,7 +201,7 @@ VertexNeighbours vertex_neighbours(Index vertices, const std::vector<std::int32_
   return around;
 }
 
-NetMesh surface_net(const NetGrid& grid, Map map, Field field, const Vector3<double>& inside) {
+NetMesh surface_net(const NetGrid& grid, Map map, DistanceField field, const Vector3<double>& inside) {
   Nodes nodes(grid, map, field);
   const std::vector<std::size_t> cells = crossed_cells(nodes, grid, inside);
   std::vector<std::int32_t> vertex_of(nodes.count(), -1);

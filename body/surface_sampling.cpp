@@ -18,7 +18,7 @@ constexpr int kMoves = 6;
 constexpr Index kGrain = 1 << 14;
 
 /// A place on the surface, as small as goes: there are many.
-struct Place {
+struct SamplePlace {
   std::array<float, 3> point;  // metres
   float spacing;               // that is wanted, metres
   std::int32_t face;
@@ -57,7 +57,7 @@ struct Surface {
   }
   const Vector& normal(std::int32_t face) const { return normals[static_cast<std::size_t>(face)]; }
 
-  Place place(std::int32_t face, const std::array<double, 3>& shares) const {
+  SamplePlace place(std::int32_t face, const std::array<double, 3>& shares) const {
     const std::array<Vector, 3> c = face_corners(body, face);
     const Vector point = c[0] * shares[0] + c[1] * shares[1] + c[2] * shares[2];
     return {{static_cast<float>(point[0]), static_cast<float>(point[1]), static_cast<float>(point[2])},
@@ -67,10 +67,10 @@ struct Surface {
 };
 
 /// Places in strata of equal share, evenly within each triangle.
-std::vector<Place> draw_candidates(const Surface& surface, Index count, std::uint64_t seed) {
+std::vector<SamplePlace> draw_candidates(const Surface& surface, Index count, std::uint64_t seed) {
   const Random along(seed, random_stream("avatar.triangle")), in_a(seed, random_stream("avatar.u")),
       in_b(seed, random_stream("avatar.v"));
-  std::vector<Place> candidates(static_cast<std::size_t>(count));
+  std::vector<SamplePlace> candidates(static_cast<std::size_t>(count));
   parallel_for(count, kGrain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const auto at = static_cast<std::uint64_t>(i);
@@ -96,7 +96,7 @@ class Grid {
     entries_.reserve(static_cast<std::size_t>(wanted));
   }
 
-  void add(const Place& place) {
+  void add(const SamplePlace& place) {
     const std::uint64_t cell = key_of(cell_of(place.position()));
     std::int32_t& head = heads_[slot(cell)];
     const Vector& n = surface_.normal(place.face);
@@ -109,7 +109,7 @@ class Grid {
   }
 
   /// Squared distance of a place that was added; infinity on another side.
-  double squared_distance(std::int32_t i, const Place& place) const {
+  double squared_distance(std::int32_t i, const SamplePlace& place) const {
     const Entry& entry = entries_[static_cast<std::size_t>(i)];
     if (!same_side(entry, surface_.normal(place.face))) return std::numeric_limits<double>::infinity();
     return squared_distance(entry, place.position());
@@ -118,7 +118,7 @@ class Grid {
   /// Calls found(i, squared distance, its spacing) for places on the same side that are nearer than `reach`; it returns
   /// how far to look from there on.
   template <class F>
-  void around(const Place& place, double reach, F&& found) const {
+  void around(const SamplePlace& place, double reach, F&& found) const {
     const Vector point = place.position(), &normal = surface_.normal(place.face);
     const std::array<std::int64_t, 3> at = cell_of(point);
     std::array<std::array<double, 3>, 3> ways;  // squared, to the cells along each axis
@@ -233,7 +233,7 @@ class Sampling {
       std::vector<Index> left;
       for (const Index i : order) {
         if (std::ssize(kept_) == wanted_) break;
-        const Place& place = candidates_[static_cast<std::size_t>(i)];
+        const SamplePlace& place = candidates_[static_cast<std::size_t>(i)];
         const auto spacing = static_cast<double>(place.spacing);
         bool crowded = false;
         grid.around(place, share * spacing, [&](std::int32_t, double squared, double other) {
@@ -255,10 +255,10 @@ class Sampling {
   /// The kept place that is nearest to each candidate, on its side; ties: the lower one.
   void find_owners() {
     Grid grid(surface_, largest_spacing_, wanted_);
-    for (const Place& place : kept_) grid.add(place);
+    for (const SamplePlace& place : kept_) grid.add(place);
     parallel_for(static_cast<Index>(candidates_.size()), kGrain, [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i) {
-        const Place& place = candidates_[static_cast<std::size_t>(i)];
+        const SamplePlace& place = candidates_[static_cast<std::size_t>(i)];
         // The one of before is still near.
         std::int32_t& owner = owners_[static_cast<std::size_t>(i)];
         double nearest = owner < 0 ? std::numeric_limits<double>::infinity() : grid.squared_distance(owner, place);
@@ -325,9 +325,9 @@ class Sampling {
   const Surface& surface_;
   Index wanted_;
   std::uint64_t seed_;
-  std::vector<Place> candidates_;
+  std::vector<SamplePlace> candidates_;
   std::vector<std::int32_t> owners_;  // by candidate
-  std::vector<Place> kept_;
+  std::vector<SamplePlace> kept_;
   double largest_spacing_ = 0;
 };
 

@@ -17,16 +17,21 @@ set_target_properties(hsi4d_arithmetic PROPERTIES EXPORT_NAME arithmetic)
 target_compile_options(hsi4d_arithmetic INTERFACE -ffp-contract=off -fno-math-errno -fno-trapping-math)
 target_compile_features(hsi4d_arithmetic INTERFACE cxx_std_20)
 
+option(HSI4D_UNITY "Compile a room's source files together" ON)
+
 # Warnings: ours alone, never those of a project that uses us. (-Wrestrict misfires on std::string in g++ 12, PR 105651; -Wmaybe-uninitialized
 # on std::regex under sanitizers.)
 if(HSI4D_SANITIZE)
   set(hsi4d_sanitizer_warnings $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
+if(HSI4D_UNITY)  # a source file that is included: what it keeps to itself is no fault of a header
+  set(hsi4d_unity_warnings $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+endif()
 add_library(hsi4d_warnings INTERFACE)
 target_compile_options(hsi4d_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion
                                                 -Wno-sign-conversion -Wno-psabi $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
                                                 "$<$<CXX_COMPILER_ID:Clang>:-Wno-unknown-pragmas;-Wno-bitwise-instead-of-logical>"
-                                                ${hsi4d_sanitizer_warnings}
+                                                ${hsi4d_sanitizer_warnings} ${hsi4d_unity_warnings}
                                                 $<$<BOOL:${HSI4D_WARNINGS_AS_ERRORS}>:-Werror>)
 
 # Left out: what only tells earlier what would crash anyway (null, alignment), vptr and object-size. With them a large test
@@ -45,34 +50,85 @@ if(HSI4D_BUILD_FUZZERS)
   endif()
   add_compile_options(-fsanitize=fuzzer-no-link)
   add_compile_definitions(HWY_COMPILE_ONLY_STATIC)
-  file(GLOB kernels ${PROJECT_SOURCE_DIR}/*/*_kernel.cpp)
+  file(GLOB kernels ${PROJECT_SOURCE_DIR}/*/*_kernel.cpp ${PROJECT_SOURCE_DIR}/*/*/*_kernel.cpp)
   set_source_files_properties(${kernels} PROPERTIES COMPILE_OPTIONS -fno-sanitize=all)
 endif()
 
-# hsi4d_add_layer(NAME [DEPENDS layer...] [LINK target...] [PRIVATE_LINK target...])
-# Every source file of folder NAME becomes the static library hsi4d::NAME; a new file needs no edit here.
-function(hsi4d_add_layer name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "DEPENDS;LINK;PRIVATE_LINK")
-  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${name}/*.cpp)
-  list(FILTER sources EXCLUDE REGEX "/cli/main\\.cpp$")
-  list(TRANSFORM arg_DEPENDS PREPEND hsi4d::)
-  if(sources)
-    add_library(hsi4d_${name} STATIC ${sources})
-    set(scope PUBLIC)
-    target_link_libraries(hsi4d_${name} PRIVATE $<BUILD_INTERFACE:hsi4d_warnings> ${arg_PRIVATE_LINK})
-    set_target_properties(hsi4d_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  else()
-    add_library(hsi4d_${name} INTERFACE)
-    set(scope INTERFACE)
+# Files with vector code are compiled with -O3 and each by itself; all others with -O2 and, where unity builds are on,
+# a room at once, so that a header is read once a room.
+set(hsi4d_vector_code "foreach_target|on_best_isa|with_best_lanes|autodiff/map\\.h")
+# hsi4d_set_sources(TARGET SOURCE...): how the source files of a library or program are compiled.
+function(hsi4d_set_sources target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${HSI4D_UNITY} UNITY_BUILD_BATCH_SIZE 0)
+  foreach(source ${ARGN})
+    file(STRINGS ${source} found REGEX "${hsi4d_vector_code}" LIMIT_COUNT 1)
+    if(found)
+      set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
+      set_property(SOURCE ${source} PROPERTY SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endforeach()
+endfunction()
+
+# hsi4d_add_room(PATH [TOP] [APART] [DEPENDS room...] [LINK target...] [PRIVATE_LINK target...])
+# Every source file of folder PATH becomes the static library hsi4d_PATH; a new file needs no edit here. TOP: the files
+# of the folder itself, not those of the rooms in it; the library is hsi4d_PATH_top. APART: each source file is always compiled by itself, so that it sees no
+# name of another.
+function(hsi4d_add_room path)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "TOP;APART" "" "DEPENDS;LINK;PRIVATE_LINK")
+  string(REPLACE "/" "_" name ${path})
+  set(glob GLOB_RECURSE)
+  if(arg_TOP)
+    set(glob GLOB)
+    string(APPEND name "_top")
   endif()
+  file(${glob} sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${path}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/(main|image_module)\\.cpp$")
+  list(TRANSFORM arg_DEPENDS REPLACE "/" "_")
+  list(TRANSFORM arg_DEPENDS PREPEND hsi4d::)
+  add_library(hsi4d_${name} STATIC ${sources})
   add_library(hsi4d::${name} ALIAS hsi4d_${name})
-  set_target_properties(hsi4d_${name} PROPERTIES EXPORT_NAME ${name})
-  target_link_libraries(hsi4d_${name} ${scope} hsi4d::arithmetic ${arg_DEPENDS} ${arg_LINK})
-  target_include_directories(hsi4d_${name} ${scope}
+  set_target_properties(hsi4d_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  target_link_libraries(hsi4d_${name} PUBLIC hsi4d::arithmetic ${arg_DEPENDS} ${arg_LINK}
+                                      PRIVATE $<BUILD_INTERFACE:hsi4d_warnings> ${arg_PRIVATE_LINK})
+  target_include_directories(hsi4d_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/hsi4d>)
+  hsi4d_set_sources(hsi4d_${name} ${sources})
+  if(arg_APART)
+    set_target_properties(hsi4d_${name} PROPERTIES UNITY_BUILD OFF)
+  endif()
   set_property(GLOBAL APPEND PROPERTY HSI4D_LAYERS hsi4d_${name})
+endfunction()
+
+# The library that OpenImageIO is in (core/image_codec.h). Programs that link hsi4d::core find it by their run path.
+function(hsi4d_add_image_module)
+  add_library(hsi4d_images MODULE ${PROJECT_SOURCE_DIR}/core/image_module.cpp)
+  set_target_properties(hsi4d_images PROPERTIES PREFIX lib CXX_VISIBILITY_PRESET hidden
+                                                LIBRARY_OUTPUT_DIRECTORY ${CMAKE_RUNTIME_OUTPUT_DIRECTORY})
+  target_include_directories(hsi4d_images PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(hsi4d_images PRIVATE PkgConfig::OpenImageIO hsi4d_warnings)
+  add_dependencies(hsi4d_core hsi4d_images)
+  target_link_libraries(hsi4d_core PRIVATE ${CMAKE_DL_LIBS})
+  target_link_options(hsi4d_core INTERFACE $<BUILD_INTERFACE:LINKER:-rpath,${CMAKE_RUNTIME_OUTPUT_DIRECTORY}>
+                                           $<INSTALL_INTERFACE:LINKER:-rpath,$<INSTALL_PREFIX>/${CMAKE_INSTALL_LIBDIR}>)
+endfunction()
+
+# hsi4d_add_layer(NAME ROOM...): hsi4d::NAME, all its rooms.
+function(hsi4d_add_layer name)
+  list(TRANSFORM ARGN REPLACE "/" "_" OUTPUT_VARIABLE rooms)
+  list(TRANSFORM rooms PREPEND hsi4d::)
+  add_library(hsi4d_${name} INTERFACE)
+  add_library(hsi4d::${name} ALIAS hsi4d_${name})
+  set_target_properties(hsi4d_${name} PROPERTIES EXPORT_NAME ${name})
+  target_link_libraries(hsi4d_${name} INTERFACE ${rooms})
+  set_property(GLOBAL APPEND PROPERTY HSI4D_LAYERS hsi4d_${name})
+endfunction()
+
+# hsi4d_add_program(NAME MAIN ROOM): the program NAME.
+function(hsi4d_add_program name main room)
+  add_executable(${name} ${PROJECT_SOURCE_DIR}/${main})
+  target_link_libraries(${name} PRIVATE ${room} hsi4d_warnings)
 endfunction()
 
 # The demo's configs become part of the program, so that it runs from anywhere.
@@ -85,12 +141,12 @@ function(hsi4d_embed_demo_configs)
   file(READ ${demo} HSI4D_DEMO_CONFIG)
   file(READ ${quick} HSI4D_DEMO_QUICK_CONFIG)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/demo_configs.cpp.in ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp @ONLY)
-  target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp)
+  target_sources(hsi4d_pipelines_cli PRIVATE ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp)
 endfunction()
 
 # The report's style and scripts, in the order in which they need each other, become part of the library.
 function(hsi4d_embed_report_assets)
-  set(folder ${PROJECT_SOURCE_DIR}/pipelines/report_assets)
+  set(folder ${PROJECT_SOURCE_DIR}/pipelines/report/assets)
   set(HSI4D_REPORT_SCRIPTS "")
   foreach(name timeline compare plots view3d_data view3d_draw view3d start)
     file(READ ${folder}/${name}.js script)
@@ -100,19 +156,19 @@ function(hsi4d_embed_report_assets)
   file(READ ${folder}/report.css HSI4D_REPORT_CSS)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/report.css)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/report_assets.cpp.in ${PROJECT_BINARY_DIR}/generated/report_assets.cpp @ONLY)
-  target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/report_assets.cpp)
+  target_sources(hsi4d_pipelines_report PRIVATE ${PROJECT_BINARY_DIR}/generated/report_assets.cpp)
 endfunction()
 
 # Style, body and script of a study's page, likewise.
 function(hsi4d_embed_study_assets)
-  set(folder ${PROJECT_SOURCE_DIR}/pipelines/study_assets)
+  set(folder ${PROJECT_SOURCE_DIR}/pipelines/study/assets)
   foreach(kind css html js)
     string(TOUPPER ${kind} name)
     file(READ ${folder}/study.${kind} HSI4D_STUDY_${name})
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/study.${kind})
   endforeach()
   configure_file(${PROJECT_SOURCE_DIR}/cmake/study_assets.cpp.in ${PROJECT_BINARY_DIR}/generated/study_assets.cpp @ONLY)
-  target_sources(hsi4d_pipelines PRIVATE ${PROJECT_BINARY_DIR}/generated/study_assets.cpp)
+  target_sources(hsi4d_pipelines_study PRIVATE ${PROJECT_BINARY_DIR}/generated/study_assets.cpp)
 endfunction()
 
 # Compiler and flags, which measurements tell beside their times.
@@ -124,7 +180,7 @@ function(hsi4d_embed_flags)
   list(JOIN everywhere " " everywhere)
   string(REGEX REPLACE " +" " " flags "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${type}} ${everywhere} ${arithmetic}")
   string(STRIP "${flags}" flags)
-  set_property(SOURCE pipelines/bench_machine.cpp APPEND PROPERTY COMPILE_DEFINITIONS
+  set_property(SOURCE bench/machine.cpp APPEND PROPERTY COMPILE_DEFINITIONS
                HSI4D_COMPILER="${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}" HSI4D_FLAGS="${flags}")
 endfunction()
 

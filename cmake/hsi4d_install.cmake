@@ -2,11 +2,14 @@
 include(CMakePackageConfigHelpers)
 
 get_property(layers GLOBAL PROPERTY HSI4D_LAYERS)
+list(FILTER layers EXCLUDE REGEX "_(bench|stress)$")  # no part of the library
 install(TARGETS ${layers} hsi4d_arithmetic EXPORT hsi4d_targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-foreach(folder core autodiff splat body optim stress pipelines)
+foreach(folder core autodiff splat body optim pipelines)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/hsi4d FILES_MATCHING PATTERN "*.h")
 endforeach()
-install(TARGETS hsi4d RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS hsi4d_images LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+set_target_properties(hsi4d hsi4d-bench hsi4d-stress PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+install(TARGETS hsi4d hsi4d-bench hsi4d-stress RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/configs DESTINATION ${CMAKE_INSTALL_DATADIR}/hsi4d)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/hsi4d)

@@ -34,7 +34,7 @@ const ConfigValue* find_item(const ConfigValue& array, const std::string& key) {
 }
 
 template <class T>
-std::string number_text(T value) {
+std::string json_number_text(T value) {
   HSI4D_CHECK(std::isfinite(value), "a config cannot hold a number that is not finite");
   std::array<char, 32> buffer;
   const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
@@ -118,14 +118,14 @@ ConfigValue ConfigValue::make_boolean(bool value) {
 ConfigValue ConfigValue::make_number(double value) {
   ConfigValue made;
   made.kind = Kind::kNumber;
-  made.text = number_text(value);
+  made.text = json_number_text(value);
   return made;
 }
 
 ConfigValue ConfigValue::make_number(float value) {
   ConfigValue made;
   made.kind = Kind::kNumber;
-  made.text = number_text(value);
+  made.text = json_number_text(value);
   return made;
 }
 

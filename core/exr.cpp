@@ -70,7 +70,9 @@ class MemoryOutput : public exr::OStream {
   uint64_t position_ = 0;
 };
 
-[[noreturn]] void fail(const std::string& name, const std::string& reason) { throw DataError(name + ": " + reason); }
+[[noreturn]] void fail_exr(const std::string& name, const std::string& reason) {
+  throw DataError(name + ": " + reason);
+}
 
 std::string box_text(const Box2i& box) {
   std::ostringstream text;
@@ -84,7 +86,7 @@ int64_t height_of(const Box2i& box) { return int64_t{box.max.y} - box.min.y + 1;
 void check_window(const std::string& name, const char* what, const Box2i& box, int64_t channels, int64_t file_bytes,
                   const ImageLimits& limits) {
   const int64_t width = width_of(box), height = height_of(box);
-  if (width < 1 || height < 1) fail(name, std::string("its ") + what + " " + box_text(box) + " is empty");
+  if (width < 1 || height < 1) fail_exr(name, std::string("its ") + what + " " + box_text(box) + " is empty");
   check_image_size(name, channels, height, width, limits);
   check_packed_size(name, height, width, file_bytes);
 }
@@ -93,24 +95,24 @@ void check_window(const std::string& name, const char* what, const Box2i& box, i
 void check_header(const std::string& name, const exr::MultiPartInputFile& file, int64_t file_bytes,
                   const ImageLimits& limits) {
   if (file.parts() != 1) {
-    fail(name, "has " + std::to_string(file.parts()) + " parts; files of one part are read");
+    fail_exr(name, "has " + std::to_string(file.parts()) + " parts; files of one part are read");
   }
   const exr::Header& header = file.header(0);
-  if (header.hasType() && exr::isDeepData(header.type())) fail(name, "holds deep data, which is not read");
+  if (header.hasType() && exr::isDeepData(header.type())) fail_exr(name, "holds deep data, which is not read");
   int64_t channels = 0;
   for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel, ++channels) {
     const exr::Channel& c = channel.channel();
     if (c.xSampling != 1 || c.ySampling != 1) {
-      fail(name, std::string("channel '") + channel.name() + "' is subsampled " + std::to_string(c.xSampling) + " x " +
-                     std::to_string(c.ySampling) + ", which is not read");
+      fail_exr(name, std::string("channel '") + channel.name() + "' is subsampled " + std::to_string(c.xSampling) +
+                         " x " + std::to_string(c.ySampling) + ", which is not read");
     }
   }
-  if (channels == 0) fail(name, "has no channels");
+  if (channels == 0) fail_exr(name, "has no channels");
   check_window(name, "data window", header.dataWindow(), channels, file_bytes, limits);
   check_window(name, "display window", header.displayWindow(), channels, file_bytes, limits);
   if (!header.dataWindow().intersects(header.displayWindow())) {
-    fail(name, "its data window " + box_text(header.dataWindow()) + " lies outside of its display window " +
-                   box_text(header.displayWindow()));
+    fail_exr(name, "its data window " + box_text(header.dataWindow()) + " lies outside of its display window " +
+                       box_text(header.displayWindow()));
   }
 }
 
@@ -172,8 +174,8 @@ std::vector<half> half_plane(const std::string& name, const Layers& layers, int 
     for (int x = 0; x < planes.width(); ++x) {
       const half value(in[x]);
       if (value.isInfinity() && std::isfinite(in[x])) {
-        fail(name, "channel '" + layers.names[c] + "', row " + std::to_string(y) + ", column " + std::to_string(x) +
-                       ": " + std::to_string(in[x]) + " is beyond the range of half, ±65504");
+        fail_exr(name, "channel '" + layers.names[c] + "', row " + std::to_string(y) + ", column " + std::to_string(x) +
+                           ": " + std::to_string(in[x]) + " is beyond the range of half, ±65504");
       }
       result[y * planes.row_stride() + x] = value;
     }
@@ -193,7 +195,7 @@ Image Layers::select(std::span<const std::string> wanted) const {
   for (size_t i = 0; i < wanted.size(); ++i) {
     const int c = find(wanted[i]);
     if (c < 0) {
-      fail(source, "has no channel '" + wanted[i] + "'; there are: " + joined(names));
+      fail_exr(source, "has no channel '" + wanted[i] + "'; there are: " + joined(names));
     }
     const auto plane = planes.data().subspan(c * planes.plane_stride(), planes.plane_stride());
     std::ranges::copy(plane, result.row(static_cast<int>(i), 0));
@@ -220,7 +222,7 @@ Layers decode_layers(std::span<const uint8_t> file, const std::string& name, con
   } catch (const DataError&) {
     throw;
   } catch (const std::exception& error) {
-    fail(name, std::string("cannot be read as OpenEXR: ") + error.what());
+    fail_exr(name, std::string("cannot be read as OpenEXR: ") + error.what());
   }
 }
 

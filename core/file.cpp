@@ -17,7 +17,7 @@
 namespace hsi4d {
 namespace {
 
-[[noreturn]] void fail(const std::string& path, const std::string& what, int error) {
+[[noreturn]] void fail_file(const std::string& path, const std::string& what, int error) {
   throw UserError(path + ": " + what + ": " + system_message(error));
 }
 
@@ -40,9 +40,9 @@ class Descriptor {
 template <class Content>
 Content read_up_to(const std::string& path, int64_t limit, int64_t max_bytes) {
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.get() < 0) fail(path, "cannot be read", errno);
+  if (file.get() < 0) fail_file(path, "cannot be read", errno);
   struct stat status {};
-  if (::fstat(file.get(), &status) != 0) fail(path, "cannot be read", errno);
+  if (::fstat(file.get(), &status) != 0) fail_file(path, "cannot be read", errno);
   if (S_ISDIR(status.st_mode)) throw UserError(path + ": cannot be read: it is a folder");
   const int64_t claimed = S_ISREG(status.st_mode) ? int64_t{status.st_size} : 0;
   if (claimed > max_bytes && limit > max_bytes) {
@@ -59,7 +59,7 @@ Content read_up_to(const std::string& path, int64_t limit, int64_t max_bytes) {
     }
     const ssize_t got = ::read(file.get(), content.data() + size, content.size() - static_cast<size_t>(size));
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail(path, "cannot be read", errno);
+    if (got < 0) fail_file(path, "cannot be read", errno);
     if (got == 0) break;
     size += got;
     if (size > max_bytes) {
@@ -131,7 +131,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), target_(follow_li
     has_made_folders = true;
     error = EEXIST;
   }
-  if (error != 0) fail(path_, "cannot be written", error);
+  if (error != 0) fail_file(path_, "cannot be written", error);
 }
 
 AtomicFile::~AtomicFile() {
@@ -140,20 +140,20 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::append(std::span<const uint8_t> content) {
   Descriptor file(::open(temporary_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
-  if (file.get() < 0) fail(path_, "cannot be written", errno);
+  if (file.get() < 0) fail_file(path_, "cannot be written", errno);
   while (!content.empty()) {
     const ssize_t done = ::write(file.get(), content.data(), content.size());
     if (done < 0 && errno == EINTR) continue;
-    if (done < 0) fail(path_, "cannot be written", errno);
+    if (done < 0) fail_file(path_, "cannot be written", errno);
     content = content.subspan(static_cast<size_t>(done));
   }
   // Network file systems report a full disk here.
-  if (::close(file.release()) != 0) fail(path_, "cannot be written", errno);
+  if (::close(file.release()) != 0) fail_file(path_, "cannot be written", errno);
 }
 
 void AtomicFile::commit() {
   HSI4D_CHECK(!temporary_.empty(), path_ + " was committed before");
-  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail(path_, "cannot be written", errno);
+  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail_file(path_, "cannot be written", errno);
   temporary_.clear();
 }
 

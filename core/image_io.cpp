@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
-#include <memory>
+#include <limits>
 #include <string_view>
-
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 
 #include "core/check.h"
 #include "core/exr.h"
+#include "core/image_codec.h"
 #include "core/png.h"
 
 namespace hsi4d {
@@ -19,7 +18,7 @@ namespace {
 
 enum class FileKind { png, jpeg, exr, other };
 
-FileKind kind_of(std::span<const uint8_t> start) {
+FileKind image_kind(std::span<const uint8_t> start) {
   const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
   if (text.starts_with("\x89PNG\r\n\x1a\n")) return FileKind::png;
   if (text.starts_with("\xff\xd8\xff")) return FileKind::jpeg;
@@ -27,45 +26,40 @@ FileKind kind_of(std::span<const uint8_t> start) {
   return FileKind::other;
 }
 
-[[noreturn]] void fail(const std::string& name, const std::string& reason) { throw DataError(name + ": " + reason); }
-
-/// OpenImageIO keeps errors until asked and prints what nobody asked for; its own name of the file is ours already.
-std::string error_of(const OIIO::ImageInput* input) {
-  std::string text = input != nullptr && input->has_error() ? input->geterror() : OIIO::geterror();
-  while (text.ends_with('\n')) text.pop_back();
-  return text.empty() ? "no reason given" : text;
+[[noreturn]] void fail_image(const std::string& name, const std::string& reason) {
+  throw DataError(name + ": " + reason);
 }
 
 template <class Number>
-Image read_as(OIIO::ImageInput& input, const std::string& name, OIIO::TypeDesc type, float scale) {
-  const OIIO::ImageSpec spec = input.spec();
-  std::vector<Number> values(static_cast<size_t>(spec.image_pixels()) * static_cast<size_t>(spec.nchannels));
-  // read_image takes and clears 64 MB for any image, ten times a small JPEG's own cost.
-  const bool as_is = spec.tile_width == 0 && spec.format == type && spec.channelformats.empty();
-  const bool done = as_is ? input.read_native_scanlines(0, 0, spec.y, spec.y + spec.height, spec.z, values.data())
-                          : input.read_image(0, 0, 0, -1, type, values.data());
-  // A truncated JPEG is filled with grey and leaves only a note behind.
-  if (!done || input.has_error()) fail(name, "cannot be decoded: " + error_of(&input));
-  Image image(spec.nchannels, spec.height, spec.width);
-  for (int c = 0; c < spec.nchannels; ++c) {
-    for (int y = 0; y < spec.height; ++y) {
-      const Number* in = values.data() + (int64_t{y} * spec.width) * spec.nchannels + c;
+Image unpacked_as(const PackedImage& packed, float scale) {
+  Image image(packed.channels, packed.height, packed.width);
+  const int64_t pixel = packed.channels;
+  std::vector<Number> values(packed.values.size() / sizeof(Number));
+  std::memcpy(values.data(), packed.values.data(), packed.values.size());
+  for (int c = 0; c < packed.channels; ++c) {
+    for (int y = 0; y < packed.height; ++y) {
+      const Number* in = values.data() + (int64_t{y} * packed.width) * pixel + c;
       float* out = image.row(c, y);
-      for (int x = 0; x < spec.width; ++x) out[x] = static_cast<float>(in[int64_t{x} * spec.nchannels]) / scale;
+      for (int x = 0; x < packed.width; ++x) out[x] = static_cast<float>(in[x * pixel]) / scale;
     }
   }
   return image;
 }
 
-Image read_opened(OIIO::ImageInput& input, const std::string& name, int64_t file_bytes, const ImageLimits& limits) {
-  const OIIO::ImageSpec& spec = input.spec();
-  if (spec.deep || spec.depth > 1) fail(name, "holds deep or volume data, which is not read");
-  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1) fail(name, "has no pixels");
-  check_image_size(name, spec.nchannels, spec.height, spec.width, limits);
-  check_packed_size(name, spec.height, spec.width, file_bytes);
-  if (spec.format == OIIO::TypeDesc::UINT8) return read_as<uint8_t>(input, name, OIIO::TypeDesc::UINT8, 255.0f);
-  if (spec.format == OIIO::TypeDesc::UINT16) return read_as<uint16_t>(input, name, OIIO::TypeDesc::UINT16, 65535.0f);
-  return read_as<float>(input, name, OIIO::TypeDesc::FLOAT, 1.0f);
+Image unpacked(const PackedImage& packed) {
+  if (packed.type == PackedType::kUint8) return unpacked_as<uint8_t>(packed, 255.0f);
+  if (packed.type == PackedType::kUint16) return unpacked_as<uint16_t>(packed, 65535.0f);
+  return unpacked_as<float>(packed, 1.0f);
+}
+
+/// Refuses what is too large, and no image.
+FactsCheck check_facts(const std::string& name, int64_t file_bytes, const ImageLimits& limits) {
+  return [&name, file_bytes, &limits](const ImageFacts& facts) {
+    if (facts.is_volume) fail_image(name, "holds deep or volume data, which is not read");
+    if (facts.width < 1 || facts.height < 1 || facts.channels < 1) fail_image(name, "has no pixels");
+    check_image_size(name, facts.channels, facts.height, facts.width, limits);
+    check_packed_size(name, facts.height, facts.width, file_bytes);
+  };
 }
 
 /// Refuses by the frame header (ISO 10918-1, B.2.2) what is too large, since opening a progressive JPEG takes its
@@ -87,19 +81,15 @@ void check_jpeg_size(std::span<const uint8_t> file, const std::string& name, con
     const bool alone = marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8);
     at += alone ? 2 : 2 + static_cast<size_t>(number(at + 2));
   }
-  fail(name, "cannot be decoded: it has no JPEG frame");
+  fail_image(name, "cannot be decoded: it has no JPEG frame");
 }
 
 Image decode_jpeg(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
   check_jpeg_size(file, name, limits);
-  OIIO::Filesystem::IOMemReader reader(file.data(), file.size());
-  const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create("jpeg");
-  HSI4D_CHECK(input != nullptr, "OpenImageIO reads no JPEG: " + error_of(nullptr));
-  OIIO::ImageSpec spec;
-  if (!input->set_ioproxy(&reader) || !input->open(name, spec)) {
-    fail(name, "cannot be decoded: " + error_of(input.get()));
-  }
-  return read_opened(*input, name, std::ssize(file), limits);
+  PackedImage packed;
+  const std::string error = image_codec().read_jpeg(file, name, check_facts(name, std::ssize(file), limits), packed);
+  if (!error.empty()) fail_image(name, "cannot be decoded: " + error);
+  return unpacked(packed);
 }
 
 Image decode_exr(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
@@ -111,14 +101,13 @@ Image decode_exr(std::span<const uint8_t> file, const std::string& name, const I
 }
 
 Image read_other(const std::string& path, const ImageLimits& limits) {
-  OIIO::ImageSpec options;
-  options.attribute("oiio:UnassociatedAlpha", 1);
-  const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path, &options);
-  if (!input) fail(path, "cannot be decoded: " + error_of(nullptr));
-  std::error_code error;
-  const auto file_bytes = std::filesystem::file_size(path, error);
-  if (error) fail(path, "has no length: " + error.message());
-  return read_opened(*input, path, static_cast<int64_t>(file_bytes), limits);
+  std::error_code no_length;
+  const auto file_bytes = static_cast<int64_t>(std::filesystem::file_size(path, no_length));
+  if (no_length) fail_image(path, "has no length: " + no_length.message());
+  PackedImage packed;
+  const std::string error = image_codec().read_file(path, check_facts(path, file_bytes, limits), packed);
+  if (!error.empty()) fail_image(path, "cannot be decoded: " + error);
+  return unpacked(packed);
 }
 
 std::string ending_of(const std::string& path) {
@@ -130,39 +119,36 @@ std::string ending_of(const std::string& path) {
 
 /// Interleaved, clamped to [0, 1], scaled to the largest Number and rounded to nearest.
 template <class Number>
-std::vector<Number> quantise(const std::string& path, const Image& image) {
+PackedImage packed(const std::string& path, const Image& image) {
   constexpr double kLargest = std::numeric_limits<Number>::max();
-  std::vector<Number> result;
-  result.reserve(static_cast<size_t>(image.height()) * image.width() * image.channels());
+  std::vector<Number> numbers;
+  numbers.reserve(static_cast<size_t>(image.height()) * image.width() * image.channels());
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
       for (int c = 0; c < image.channels(); ++c) {
         const double value = image(c, y, x);
         if (std::isnan(value)) {
-          fail(path, "the number at row " + std::to_string(y) + ", column " + std::to_string(x) + ", channel " +
-                         std::to_string(c) + " is NaN, which this format cannot hold");
+          fail_image(path, "the number at row " + std::to_string(y) + ", column " + std::to_string(x) + ", channel " +
+                               std::to_string(c) + " is NaN, which this format cannot hold");
         }
-        result.push_back(static_cast<Number>(std::clamp(value, 0.0, 1.0) * kLargest + 0.5));
+        numbers.push_back(static_cast<Number>(std::clamp(value, 0.0, 1.0) * kLargest + 0.5));
       }
     }
   }
+  PackedImage result{image.width(),
+                     image.height(),
+                     image.channels(),
+                     sizeof(Number) == 1 ? PackedType::kUint8 : PackedType::kUint16,
+                     {}};
+  result.values.resize(numbers.size() * sizeof(Number));
+  std::memcpy(result.values.data(), numbers.data(), result.values.size());
   return result;
 }
 
-/// The first of OpenImageIO's complaints, or "".
-std::string write_packed(OIIO::ImageOutput& output, const std::string& path, const OIIO::ImageSpec& spec,
-                         const void* values) {
-  if (!output.open(path, spec)) return output.geterror();
-  if (!output.write_image(spec.format, values)) return output.geterror();
-  return output.close() ? "" : output.geterror();
-}
-
-Bytes encode_packed(const std::string& path, const char* format, const OIIO::ImageSpec& spec, const void* values) {
+Bytes encode_packed(const std::string& path, const char* format, const PackedImage& image,
+                    const CodecOptions& options) {
   Bytes content;
-  OIIO::Filesystem::IOVecOutput writer(content);
-  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(format);
-  HSI4D_CHECK(output != nullptr && output->set_ioproxy(&writer), std::string("OpenImageIO writes no ") + format);
-  const std::string error = write_packed(*output, path, spec, values);
+  const std::string error = image_codec().write(format, image, options, content);
   HSI4D_CHECK(error.empty(), path + ": " + error);
   return content;
 }
@@ -175,31 +161,13 @@ void check_channels(const std::string& path, const Image& image, std::initialize
                   " channels; this format takes " + allowed_text);
 }
 
-OIIO::ImageSpec packed_spec(const Image& image, OIIO::TypeDesc type) {
-  OIIO::ImageSpec spec(image.width(), image.height(), image.channels(), type);
-  if (image.channels() == 2) spec.channelnames = {"Y", "A"};
-  spec.alpha_channel = image.channels() % 2 == 0 ? image.channels() - 1 : -1;
-  spec.attribute("oiio:UnassociatedAlpha", 1);
-  return spec;
-}
-
-/// Only runs are sought: eight times faster than zlib's level 6, and rendered images and masks become no larger.
-OIIO::ImageSpec png_spec(const Image& image, OIIO::TypeDesc type) {
-  OIIO::ImageSpec spec = packed_spec(image, type);
-  spec.attribute("compression", "rle");
-  spec.attribute("png:compressionLevel", 1);
-  return spec;
-}
-
 Bytes encode_png(const std::string& path, const Image& image, int bits) {
   check_channels(path, image, {1, 2, 3, 4}, "1 to 4");
-  if (bits == 8) {
-    return encode_packed(path, "png", png_spec(image, OIIO::TypeDesc::UINT8), quantise<uint8_t>(path, image).data());
-  }
-  if (bits == 16) {
-    return encode_packed(path, "png", png_spec(image, OIIO::TypeDesc::UINT16), quantise<uint16_t>(path, image).data());
-  }
-  throw UserError(path + ": PNG with " + std::to_string(bits) + " bits; 8 and 16 are allowed");
+  if (bits != 8 && bits != 16)
+    throw UserError(path + ": PNG with " + std::to_string(bits) + " bits; 8 and 16 are allowed");
+  // Only runs are sought: eight times faster than zlib's level 6, and rendered images and masks become no larger.
+  const CodecOptions options = {{{"compression", "rle"}}, {{"png:compressionLevel", 1}}};
+  return encode_packed(path, "png", bits == 8 ? packed<uint8_t>(path, image) : packed<uint16_t>(path, image), options);
 }
 
 Bytes encode_jpeg(const std::string& path, const Image& image, const ImageFormat& format) {
@@ -208,10 +176,10 @@ Bytes encode_jpeg(const std::string& path, const Image& image, const ImageFormat
   if (quality < 1 || quality > 100) {
     throw UserError(path + ": JPEG with quality " + std::to_string(quality) + "; 1 to 100 is allowed");
   }
-  OIIO::ImageSpec spec = packed_spec(image, OIIO::TypeDesc::UINT8);
-  spec.attribute("Compression", "jpeg:" + std::to_string(quality));
-  spec.attribute("jpeg:subsampling", format.jpeg_half_color ? "4:2:0" : "4:4:4");
-  return encode_packed(path, "jpeg", spec, quantise<uint8_t>(path, image).data());
+  const CodecOptions options = {{{"Compression", "jpeg:" + std::to_string(quality)},
+                                 {"jpeg:subsampling", format.jpeg_half_color ? "4:2:0" : "4:4:4"}},
+                                {}};
+  return encode_packed(path, "jpeg", packed<uint8_t>(path, image), options);
 }
 
 Bytes encode_exr(const std::string& path, const Image& image, bool as_half) {
@@ -224,7 +192,7 @@ Bytes encode_exr(const std::string& path, const Image& image, bool as_half) {
 }  // namespace
 
 Image decode_image(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
-  switch (kind_of(file)) {
+  switch (image_kind(file)) {
     case FileKind::png:
       return decode_png(file, name, limits);
     case FileKind::jpeg:
@@ -234,13 +202,13 @@ Image decode_image(std::span<const uint8_t> file, const std::string& name, const
     case FileKind::other:
       break;
   }
-  fail(name, "is not a PNG, JPEG or OpenEXR file");
+  fail_image(name, "is not a PNG, JPEG or OpenEXR file");
 }
 
 Image read_image(const std::string& path, const ImageLimits& limits) {
   const Bytes start = read_file_start(path, 8);
-  if (start.empty()) fail(path, "is empty");
-  return kind_of(start) == FileKind::other ? read_other(path, limits) : decode_image(read_file(path), path, limits);
+  if (start.empty()) fail_image(path, "is empty");
+  return image_kind(start) == FileKind::other ? read_other(path, limits) : decode_image(read_file(path), path, limits);
 }
 
 Bytes encode_image(const std::string& path, const Image& image, const ImageFormat& format) {

@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kBytesPerKib = 1024;
-constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr double kNoMemoryLimit = std::numeric_limits<double>::infinity();
 
 /// The number behind a word that a line of a file begins with ("VmHWM:", "inactive_file "); negative: there is none.
 double number_behind(const fs::path& file, const std::string& word) {
@@ -42,7 +42,7 @@ constexpr GroupFiles kVersion2 = {"memory.max", "memory.current", "inactive_file
 /// Bytes that a group leaves.
 double left_in_group(const fs::path& group, const GroupFiles& files) {
   const auto limit = number_in(group / files.limit), used = number_in(group / files.used);
-  if (!limit || !used) return kNoLimit;
+  if (!limit || !used) return kNoMemoryLimit;
   return std::max(0.0, *limit - *used + std::max(0.0, number_behind(group / "memory.stat", files.droppable)));
 }
 

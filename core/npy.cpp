@@ -22,13 +22,13 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "elements are copied as they stand in the file");
 
-[[noreturn]] void fail(const std::string& source, const std::string& reason) {
+[[noreturn]] void fail_npy(const std::string& source, const std::string& reason) {
   throw DataError(source + ": " + reason);
 }
 
 // Types ---------------------------------------------------------------------------------------------------------------
 
-struct Type {
+struct NpyType {
   NpyKind kind;
   int64_t item_size;  // bytes
   int64_t swap_size;  // bytes that a byte order applies to
@@ -69,7 +69,7 @@ bool is_size_of(NpyKind kind, int64_t number) {
 }
 
 /// A byte order, a letter and a number of bytes (of characters for U). Nothing for a type that is not read.
-std::optional<Type> parse_type(std::string_view dtype) {
+std::optional<NpyType> parse_type(std::string_view dtype) {
   if (dtype.size() < 3) return std::nullopt;
   const char order = dtype[0];
   const std::optional<NpyKind> kind = kind_of(dtype[1]);
@@ -81,7 +81,7 @@ std::optional<Type> parse_type(std::string_view dtype) {
   const bool unicode = *kind == NpyKind::unicode;
   const int64_t swap_size = unicode ? 4 : *kind == NpyKind::bytes ? 1 : number;
   if (order != '<' && order != '>' && order != '=' && !(order == '|' && swap_size == 1)) return std::nullopt;
-  return Type{*kind, unicode ? 4 * number : number, swap_size, order == '>'};
+  return NpyType{*kind, unicode ? 4 * number : number, swap_size, order == '>'};
 }
 
 std::string unread_reason(const std::string& dtype) {
@@ -138,7 +138,7 @@ Bytes c_order(const Bytes& fortran, std::span<const int64_t> shape, int64_t item
 // Numbers -------------------------------------------------------------------------------------------------------------
 
 template <class T>
-std::string number_text(T value) {
+std::string entry_text(T value) {
   std::array<char, 64> text;
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
   return std::string(text.data(), end);
@@ -178,8 +178,8 @@ std::vector<To> convert_all(const Bytes& content, const std::string& source) {
     const std::optional<To> converted = convert<To, From>(value);
     if (!converted) {
       const char* needed = std::is_integral_v<To> ? "whole numbers in the range of " : "numbers in the range of ";
-      fail(source, "element " + std::to_string(i) + " is " + number_text(value) + "; " + needed + type_text<To>() +
-                       " are needed");
+      fail_npy(source, "element " + std::to_string(i) + " is " + entry_text(value) + "; " + needed + type_text<To>() +
+                           " are needed");
     }
     result[i] = *converted;
   }
@@ -291,8 +291,8 @@ NpyArray::NpyArray(std::string source, std::string dtype, NpyKind kind, int64_t 
 const NpyArray& NpyArray::require_shape(std::initializer_list<int64_t> wanted) const {
   const auto fits = [](int64_t is, int64_t needed) { return needed < 0 || is == needed; };
   if (!std::equal(shape_.begin(), shape_.end(), wanted.begin(), wanted.end(), fits)) {
-    fail(source_,
-         "has shape " + shape_text(shape_) + "; " + shape_text({wanted.begin(), wanted.size()}) + " is needed");
+    fail_npy(source_,
+             "has shape " + shape_text(shape_) + "; " + shape_text({wanted.begin(), wanted.size()}) + " is needed");
   }
   return *this;
 }
@@ -308,7 +308,7 @@ std::vector<T> NpyArray::as() const {
       return item_size_ == 4 ? convert_all<T, float>(content_, source_) : convert_all<T, double>(content_, source_);
     case NpyKind::bytes:
     case NpyKind::unicode:
-      fail(source_, "holds text (dtype '" + dtype_ + "'); numbers are needed");
+      fail_npy(source_, "holds text (dtype '" + dtype_ + "'); numbers are needed");
     default:
       break;
   }
@@ -325,7 +325,7 @@ std::vector<T> NpyArray::as() const {
 }
 
 void NpyArray::require_one() const {
-  if (size_ != 1) fail(source_, "has shape " + shape_text(shape_) + "; a single value is needed");
+  if (size_ != 1) fail_npy(source_, "has shape " + shape_text(shape_) + "; a single value is needed");
 }
 
 template <NpyNumber T>
@@ -336,7 +336,7 @@ T NpyArray::scalar() const {
 
 std::vector<std::string> NpyArray::strings() const {
   if (kind_ != NpyKind::bytes && kind_ != NpyKind::unicode) {
-    fail(source_, "holds numbers (dtype '" + dtype_ + "'); text is needed");
+    fail_npy(source_, "holds numbers (dtype '" + dtype_ + "'); text is needed");
   }
   std::vector<std::string> result(static_cast<size_t>(size_));
   for (size_t i = 0; i < result.size(); ++i) {
@@ -349,8 +349,8 @@ std::vector<std::string> NpyArray::strings() const {
         uint32_t code;
         std::memcpy(&code, item + at, 4);
         if (!is_character(code)) {
-          fail(source_,
-               "element " + std::to_string(i) + " holds " + std::to_string(code) + ", which is no Unicode character");
+          fail_npy(source_, "element " + std::to_string(i) + " holds " + std::to_string(code) +
+                                ", which is no Unicode character");
         }
         append_utf8(text, code);
       }
@@ -367,18 +367,18 @@ std::string NpyArray::text() const {
 
 NpyResult decode_npy(Bytes file, const std::string& source) {
   const NpyHeader header = parse_npy_header(file, source);
-  const std::optional<Type> type = parse_type(header.dtype);
+  const std::optional<NpyType> type = parse_type(header.dtype);
   if (!type) return {std::nullopt, unread_reason(header.dtype)};
   const std::optional<int64_t> needed = bytes_needed(header.shape, type->item_size);
   const std::string shape = "shape " + shape_text(header.shape) + " of '" + header.dtype + "'";
-  if (!needed) fail(source, shape + " is too large");
+  if (!needed) fail_npy(source, shape + " is too large");
   const int64_t present = std::ssize(file) - header.data_begin;
   if (*needed != present) {
-    fail(source, shape + " needs " + std::to_string(*needed) + " bytes, but " + std::to_string(present) +
-                     (present < *needed ? " are there (truncated)" : " are there"));
+    fail_npy(source, shape + " needs " + std::to_string(*needed) + " bytes, but " + std::to_string(present) +
+                         (present < *needed ? " are there (truncated)" : " are there"));
   }
   // Strings of no characters take no bytes, so that the file's size does not bound their number.
-  if (type->item_size == 0 && product(header.shape) > (1 << 20)) fail(source, shape + " is too large");
+  if (type->item_size == 0 && product(header.shape) > (1 << 20)) fail_npy(source, shape + " is too large");
   Bytes content = std::move(file);
   content.erase(content.begin(), content.begin() + header.data_begin);
   if (type->big_endian && type->swap_size > 1) swap_bytes(content, type->swap_size);
@@ -390,7 +390,7 @@ NpyResult decode_npy(Bytes file, const std::string& source) {
 
 NpyArray read_npy(const std::string& path) {
   NpyResult result = decode_npy(read_file(path), path);
-  if (!result.array) fail(path, result.unread_reason);
+  if (!result.array) fail_npy(path, result.unread_reason);
   return std::move(*result.array);
 }
 

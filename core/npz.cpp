@@ -30,7 +30,7 @@ struct ZipError {
   std::string text() { return zip_error_strerror(&value); }
 };
 
-[[noreturn]] void fail(const std::string& source, const std::string& reason) {
+[[noreturn]] void fail_npz(const std::string& source, const std::string& reason) {
   throw DataError(source + ": " + reason);
 }
 
@@ -45,7 +45,7 @@ Archive open_archive(std::span<const uint8_t> file, const std::string& source) {
   Archive archive(zip_open_from_source(buffer.get(), ZIP_RDONLY, &error.value));
   if (!archive) {
     const std::string other = is_zip(file) ? "" : other_kind(file, "a .npz archive");
-    fail(source, other.empty() ? "cannot be read as a zip archive: " + error.text() : other);
+    fail_npz(source, other.empty() ? "cannot be read as a zip archive: " + error.text() : other);
   }
   buffer.release();  // the archive owns it now
   return archive;
@@ -54,40 +54,41 @@ Archive open_archive(std::span<const uint8_t> file, const std::string& source) {
 /// What a member claims, checked against what the archive can hold before memory is taken for it.
 zip_stat_t checked_stat(zip_t* archive, zip_uint64_t index, int64_t file_bytes, const std::string& label) {
   zip_stat_t stat;
-  if (zip_stat_index(archive, index, 0, &stat) != 0) fail(label, zip_strerror(archive));
-  if (stat.encryption_method != ZIP_EM_NONE) fail(label, "is encrypted, which is not read");
+  if (zip_stat_index(archive, index, 0, &stat) != 0) fail_npz(label, zip_strerror(archive));
+  if (stat.encryption_method != ZIP_EM_NONE) fail_npz(label, "is encrypted, which is not read");
   if (stat.comp_method != ZIP_CM_STORE && stat.comp_method != ZIP_CM_DEFLATE) {
-    fail(label, "is packed by method " + std::to_string(stat.comp_method) + "; stored and deflated members are read");
+    fail_npz(label,
+             "is packed by method " + std::to_string(stat.comp_method) + "; stored and deflated members are read");
   }
   // Deflate packs 1032 to 1 at best.
   const zip_uint64_t densest = stat.comp_method == ZIP_CM_STORE ? 1 : 1040;
   if (stat.comp_size > static_cast<zip_uint64_t>(file_bytes) || stat.size / densest > stat.comp_size + 64) {
-    fail(label, "claims " + std::to_string(stat.size) + " bytes packed as " + std::to_string(stat.comp_size) +
-                    " in a file of " + std::to_string(file_bytes));
+    fail_npz(label, "claims " + std::to_string(stat.size) + " bytes packed as " + std::to_string(stat.comp_size) +
+                        " in a file of " + std::to_string(file_bytes));
   }
   return stat;
 }
 
 Bytes read_member(zip_t* archive, const zip_stat_t& stat, const std::string& label) {
   const Member member(zip_fopen_index(archive, stat.index, 0));
-  if (!member) fail(label, zip_strerror(archive));
+  if (!member) fail_npz(label, zip_strerror(archive));
   Bytes content(stat.size);
   constexpr size_t kMostAtOnce = size_t{1} << 30;  // libzip 1.7 miscounts what it unpacks beyond 2^32 bytes in one call
   size_t done = 0;
   while (done < content.size()) {
     const zip_uint64_t wanted = std::min(kMostAtOnce, content.size() - done);
     const zip_int64_t got = zip_fread(member.get(), content.data() + done, wanted);
-    if (got < 0) fail(label, std::string("cannot be unpacked: ") + zip_file_strerror(member.get()));
+    if (got < 0) fail_npz(label, std::string("cannot be unpacked: ") + zip_file_strerror(member.get()));
     if (got == 0) break;
     done += static_cast<size_t>(got);
   }
   // The checksum is tested when the end is read.
   uint8_t beyond;
   const zip_int64_t got = zip_fread(member.get(), &beyond, 1);
-  if (got < 0) fail(label, std::string("cannot be unpacked: ") + zip_file_strerror(member.get()));
+  if (got < 0) fail_npz(label, std::string("cannot be unpacked: ") + zip_file_strerror(member.get()));
   if (got > 0 || done != content.size()) {
-    fail(label, "unpacks to " + std::string(got > 0 ? "more" : "fewer") + " than the " + std::to_string(stat.size) +
-                    " bytes that it claims");
+    fail_npz(label, "unpacks to " + std::string(got > 0 ? "more" : "fewer") + " than the " + std::to_string(stat.size) +
+                        " bytes that it claims");
   }
   return content;
 }
@@ -97,7 +98,7 @@ Bytes read_member(zip_t* archive, const zip_stat_t& stat, const std::string& lab
 Npz Npz::read(const std::string& path, int64_t max_bytes) { return decode(read_file(path), path, max_bytes); }
 
 Npz Npz::decode(std::span<const uint8_t> file, const std::string& source, int64_t max_bytes) {
-  if (file.empty()) fail(source, "is empty");  // to libzip an archive without members
+  if (file.empty()) fail_npz(source, "is empty");  // to libzip an archive without members
   const Archive archive = open_archive(file, source);
   Npz npz;
   npz.source_ = source;
@@ -106,11 +107,11 @@ Npz Npz::decode(std::span<const uint8_t> file, const std::string& source, int64_
   const zip_int64_t count = zip_get_num_entries(archive.get(), 0);
   for (zip_int64_t i = 0; i < count; ++i) {
     const char* raw_name = zip_get_name(archive.get(), i, 0);
-    if (raw_name == nullptr) fail(source, "member " + std::to_string(i) + ": " + zip_strerror(archive.get()));
+    if (raw_name == nullptr) fail_npz(source, "member " + std::to_string(i) + ": " + zip_strerror(archive.get()));
     std::string name = raw_name;
     const bool is_array = name.ends_with(kEnding);
     if (is_array) name.resize(name.size() - kEnding.size());
-    if (!seen.insert(raw_name).second) fail(source, "holds '" + std::string(raw_name) + "' twice");
+    if (!seen.insert(raw_name).second) fail_npz(source, "holds '" + std::string(raw_name) + "' twice");
     if (!is_array) {
       npz.skipped_.push_back({name, "is no .npy member"});
       continue;
@@ -120,10 +121,10 @@ Npz Npz::decode(std::span<const uint8_t> file, const std::string& source, int64_
     // Members that share packed bytes would unpack to more than any one of them shows.
     packed += stat.comp_size;
     unpacked += stat.size;
-    if (packed > file.size()) fail(label, "shares its bytes with another member");
+    if (packed > file.size()) fail_npz(label, "shares its bytes with another member");
     if (unpacked > static_cast<zip_uint64_t>(max_bytes)) {
-      fail(label, "brings the arrays to " + std::to_string(unpacked) + " bytes; at most " + std::to_string(max_bytes) +
-                      " are read");
+      fail_npz(label, "brings the arrays to " + std::to_string(unpacked) + " bytes; at most " +
+                          std::to_string(max_bytes) + " are read");
     }
     NpyResult result = decode_npy(read_member(archive.get(), stat, label), label);
     if (result.array) {
@@ -140,8 +141,9 @@ const NpyArray& Npz::array(std::string_view name) const {
   const auto found = arrays_.find(name);
   if (found != arrays_.end()) return found->second;
   const auto skip = std::ranges::find(skipped_, name, &Skipped::name);
-  if (skip != skipped_.end()) fail(source_, "array '" + std::string(name) + "': " + skip->reason);
-  fail(source_, "has no array '" + std::string(name) + "'; there are: " + (names_.empty() ? "none" : joined(names_)));
+  if (skip != skipped_.end()) fail_npz(source_, "array '" + std::string(name) + "': " + skip->reason);
+  fail_npz(source_,
+           "has no array '" + std::string(name) + "'; there are: " + (names_.empty() ? "none" : joined(names_)));
 }
 
 // Writing -------------------------------------------------------------------------------------------------------------
@@ -177,7 +179,7 @@ Bytes empty_archive() {
   return content;
 }
 
-Bytes content_of(zip_source_t* source) {
+Bytes unpacked(zip_source_t* source) {
   zip_stat_t stat;
   HSI4D_CHECK(zip_source_stat(source, &stat) == 0 && zip_source_open(source) == 0, "an archive in memory");
   Bytes content(stat.size);
@@ -214,7 +216,7 @@ Bytes NpzWriter::encode(NpzPacking packing) const {
   HSI4D_CHECK(archive != nullptr, error.text());
   const std::string complaint = write_archive(std::move(archive), members_, packing);
   HSI4D_CHECK(complaint.empty(), complaint);
-  return content_of(source.get());
+  return unpacked(source.get());
 }
 
 void NpzWriter::write(const std::string& path, NpzPacking packing) const {

@@ -88,7 +88,7 @@ Image planar(const std::vector<uint8_t>& packed, int channels, int height, int w
   return image;
 }
 
-[[noreturn]] void fail(const std::string& name, const Decoder& decoder) {
+[[noreturn]] void fail_png(const std::string& name, const Decoder& decoder) {
   throw DataError(name + ": cannot be decoded as PNG: " + decoder.error);
 }
 
@@ -105,19 +105,19 @@ void check_packed_size(const std::string& name, int64_t height, int64_t width, i
 
 Image decode_png(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
   Decoder decoder{.content = file};
-  if (!read_header(decoder)) fail(name, decoder);
+  if (!read_header(decoder)) fail_png(name, decoder);
   const int64_t height = png_get_image_height(decoder.png, decoder.info);
   const int64_t width = png_get_image_width(decoder.png, decoder.info);
   check_image_size(name, png_get_channels(decoder.png, decoder.info), height, width, limits);
   check_packed_size(name, height, width, std::ssize(file));
-  if (!choose_expansions(decoder)) fail(name, decoder);
+  if (!choose_expansions(decoder)) fail_png(name, decoder);
   const int channels = png_get_channels(decoder.png, decoder.info);  // a palette's pixels have three or four
   check_image_size(name, channels, height, width, limits);
   const size_t row_bytes = png_get_rowbytes(decoder.png, decoder.info);
   std::vector<uint8_t> packed(row_bytes * static_cast<size_t>(height));
   std::vector<png_bytep> rows(static_cast<size_t>(height));
   for (size_t y = 0; y < rows.size(); ++y) rows[y] = packed.data() + y * row_bytes;
-  if (!read_pixels(decoder, rows.data())) fail(name, decoder);
+  if (!read_pixels(decoder, rows.data())) fail_png(name, decoder);
   const int h = static_cast<int>(height), w = static_cast<int>(width);
   if (png_get_bit_depth(decoder.png, decoder.info) == 16) return planar<uint16_t>(packed, channels, h, w, 65535.0f);
   return planar<uint8_t>(packed, channels, h, w, 255.0f);

@@ -24,23 +24,24 @@ using Kind = ConfigValue::Kind;
 constexpr std::string_view kMetadata = "__metadata__";
 constexpr int64_t kLengthBytes = 8;
 constexpr int64_t kDataAlignment = 64;  // bytes
-constexpr std::size_t kMostDimensions = 32;
+constexpr std::size_t kMostTensorDimensions = 32;
 
-struct Type {
+struct TensorType {
   std::string_view name;
   const char* npy;  // its elements in memory
   NpyKind kind;
   int64_t item_size;
 };
-constexpr Type kTypes[] = {{"F64", "<f8", NpyKind::floating, 8},         {"F32", "<f4", NpyKind::floating, 4},
-                           {"F16", "<f2", NpyKind::floating, 2},         {"BF16", "<f4", NpyKind::floating, 2},
-                           {"I64", "<i8", NpyKind::signed_integer, 8},   {"I32", "<i4", NpyKind::signed_integer, 4},
-                           {"I16", "<i2", NpyKind::signed_integer, 2},   {"I8", "|i1", NpyKind::signed_integer, 1},
-                           {"U64", "<u8", NpyKind::unsigned_integer, 8}, {"U32", "<u4", NpyKind::unsigned_integer, 4},
-                           {"U16", "<u2", NpyKind::unsigned_integer, 2}, {"U8", "|u1", NpyKind::unsigned_integer, 1},
-                           {"BOOL", "|b1", NpyKind::boolean, 1}};
+constexpr TensorType kTypes[] = {
+    {"F64", "<f8", NpyKind::floating, 8},         {"F32", "<f4", NpyKind::floating, 4},
+    {"F16", "<f2", NpyKind::floating, 2},         {"BF16", "<f4", NpyKind::floating, 2},
+    {"I64", "<i8", NpyKind::signed_integer, 8},   {"I32", "<i4", NpyKind::signed_integer, 4},
+    {"I16", "<i2", NpyKind::signed_integer, 2},   {"I8", "|i1", NpyKind::signed_integer, 1},
+    {"U64", "<u8", NpyKind::unsigned_integer, 8}, {"U32", "<u4", NpyKind::unsigned_integer, 4},
+    {"U16", "<u2", NpyKind::unsigned_integer, 2}, {"U8", "|u1", NpyKind::unsigned_integer, 1},
+    {"BOOL", "|b1", NpyKind::boolean, 1}};
 
-[[noreturn]] void fail(const std::string& source, const std::string& reason) {
+[[noreturn]] void fail_tensor(const std::string& source, const std::string& reason) {
   throw DataError(source + ": " + reason);
 }
 
@@ -55,7 +56,7 @@ struct Entry {
   int64_t begin = 0, end = 0;
 };
 
-std::optional<int64_t> whole_number(const ConfigValue& value) {
+std::optional<int64_t> size_member(const ConfigValue& value) {
   int64_t number = -1;
   const char* end = value.text.data() + value.text.size();
   if (value.kind != Kind::kNumber || std::from_chars(value.text.data(), end, number).ptr != end || number < 0)
@@ -67,7 +68,7 @@ std::optional<std::vector<int64_t>> whole_numbers(const ConfigValue& value) {
   if (value.kind != Kind::kArray) return std::nullopt;
   std::vector<int64_t> numbers;
   for (const ConfigValue& item : value.items) {
-    const std::optional<int64_t> number = whole_number(item);
+    const std::optional<int64_t> number = size_member(item);
     if (!number) return std::nullopt;
     numbers.push_back(*number);
   }
@@ -76,18 +77,18 @@ std::optional<std::vector<int64_t>> whole_numbers(const ConfigValue& value) {
 
 int64_t header_length(std::span<const uint8_t> file, const std::string& source) {
   if (std::ssize(file) < kLengthBytes)
-    fail(source, "has " + std::to_string(file.size()) + " bytes; a safetensors file begins with 8 for a length");
+    fail_tensor(source, "has " + std::to_string(file.size()) + " bytes; a safetensors file begins with 8 for a length");
   uint64_t length = 0;
   for (std::size_t i = kLengthBytes; i-- > 0;) length = length << 8 | file[i];
   const auto rest = static_cast<uint64_t>(file.size()) - kLengthBytes;
   if (length > rest || length > static_cast<uint64_t>(kMaxSafetensorsHeader))
-    fail(source, "claims a header of " + std::to_string(length) + " bytes; " + std::to_string(rest) +
-                     " follow, and at most " + std::to_string(kMaxSafetensorsHeader) + " are read");
+    fail_tensor(source, "claims a header of " + std::to_string(length) + " bytes; " + std::to_string(rest) +
+                            " follow, and at most " + std::to_string(kMaxSafetensorsHeader) + " are read");
   return static_cast<int64_t>(length);
 }
 
 ConfigValue parse_header(const std::string& text, const std::string& source) {
-  if (!text.starts_with('{')) fail(source, "the header does not begin with '{'; this is no safetensors file");
+  if (!text.starts_with('{')) fail_tensor(source, "the header does not begin with '{'; this is no safetensors file");
   const auto origin = std::make_shared<ConfigSource>();
   origin->name = source;
   ConfigProblems problems;
@@ -98,27 +99,28 @@ ConfigValue parse_header(const std::string& text, const std::string& source) {
   } catch (const UserError& error) {
     throw DataError(error.what());
   }
-  if (!is_read || header.kind != Kind::kObject) fail(source, "the header is no JSON object");
+  if (!is_read || header.kind != Kind::kObject) fail_tensor(source, "the header is no JSON object");
   return header;
 }
 
 Entry entry_of(const ConfigMember& member, const std::string& label) {
   Entry entry;
   entry.name = member.key;
-  if (member.value.kind != Kind::kObject) fail(label, "is " + kind_name(member.value) + ", not an object");
+  if (member.value.kind != Kind::kObject) fail_tensor(label, "is " + kind_name(member.value) + ", not an object");
   const ConfigValue *dtype = find_member(member.value, "dtype"), *shape = find_member(member.value, "shape"),
                     *offsets = find_member(member.value, "data_offsets");
   if (!dtype || !shape || !offsets || member.value.members.size() != 3)
-    fail(label, "needs the keys \"dtype\", \"shape\" and \"data_offsets\" and no other");
-  if (dtype->kind != Kind::kString) fail(label, "the dtype is " + kind_name(*dtype) + ", not a string");
+    fail_tensor(label, "needs the keys \"dtype\", \"shape\" and \"data_offsets\" and no other");
+  if (dtype->kind != Kind::kString) fail_tensor(label, "the dtype is " + kind_name(*dtype) + ", not a string");
   entry.dtype = dtype->text;
   const auto lengths = whole_numbers(*shape);
-  if (!lengths || lengths->size() > kMostDimensions)
-    fail(label, "the shape is " + shown(*shape) + "; allowed: at most 32 lengths from 0 on");
+  if (!lengths || lengths->size() > kMostTensorDimensions)
+    fail_tensor(label, "the shape is " + shown(*shape) + "; allowed: at most 32 lengths from 0 on");
   entry.shape = *lengths;
   const auto range = whole_numbers(*offsets);
   if (!range || range->size() != 2 || (*range)[0] > (*range)[1])
-    fail(label, "the data_offsets are " + shown(*offsets) + "; allowed: two numbers, the second not the smaller");
+    fail_tensor(label,
+                "the data_offsets are " + shown(*offsets) + "; allowed: two numbers, the second not the smaller");
   entry.begin = (*range)[0];
   entry.end = (*range)[1];
   return entry;
@@ -132,14 +134,14 @@ void check_layout(std::vector<Entry>& entries, int64_t bytes, const std::string&
   int64_t at = 0;
   for (const Entry& entry : entries) {
     if (entry.begin != at)
-      fail(source + ": array " + named(entry.name), "begins at byte " + std::to_string(entry.begin) +
-                                                        " of the data; it has to begin at " + std::to_string(at) +
-                                                        ", where the array before it ends");
+      fail_tensor(source + ": array " + named(entry.name), "begins at byte " + std::to_string(entry.begin) +
+                                                               " of the data; it has to begin at " +
+                                                               std::to_string(at) + ", where the array before it ends");
     at = entry.end;
   }
   if (at != bytes)
-    fail(source, "the arrays end at byte " + std::to_string(at) + " of the data, of which there are " +
-                     std::to_string(bytes) + (at > bytes ? "; the file is cut short" : ""));
+    fail_tensor(source, "the arrays end at byte " + std::to_string(at) + " of the data, of which there are " +
+                            std::to_string(bytes) + (at > bytes ? "; the file is cut short" : ""));
 }
 
 /// The product of the shape, unless the bytes that it needs go beyond int64.
@@ -163,11 +165,13 @@ Bytes widened(std::span<const uint8_t> halves) {
   return floats;
 }
 
-NpyArray array_of(const Entry& entry, const Type& type, std::span<const uint8_t> content, const std::string& label) {
+NpyArray array_of(const Entry& entry, const TensorType& type, std::span<const uint8_t> content,
+                  const std::string& label) {
   const std::optional<int64_t> count = count_of(entry.shape, type.item_size);
   if (!count || *count * type.item_size != std::ssize(content))
-    fail(label, "has " + std::to_string(content.size()) + " bytes; shape " + shape_text(entry.shape) + " of " +
-                    entry.dtype + (count ? " needs " + std::to_string(*count * type.item_size) : " needs too many"));
+    fail_tensor(label, "has " + std::to_string(content.size()) + " bytes; shape " + shape_text(entry.shape) + " of " +
+                           entry.dtype +
+                           (count ? " needs " + std::to_string(*count * type.item_size) : " needs too many"));
   const bool is_bf16 = type.name == "BF16";
   Bytes bytes = is_bf16 ? widened(content) : Bytes(content.begin(), content.end());
   return {label, type.npy, type.kind, is_bf16 ? 4 : type.item_size, entry.shape, std::move(bytes)};
@@ -180,7 +184,7 @@ Safetensors Safetensors::read(const std::string& path) { return decode(read_file
 Safetensors Safetensors::decode(std::span<const uint8_t> file, const std::string& source) {
   if (!looks_like_safetensors(file)) {
     const std::string other = other_kind(file, "a .safetensors file");
-    if (!other.empty()) fail(source, other);
+    if (!other.empty()) fail_tensor(source, other);
   }
   Safetensors result;
   result.source_ = source;
@@ -194,16 +198,16 @@ Safetensors Safetensors::decode(std::span<const uint8_t> file, const std::string
       entries.push_back(entry_of(member, source + ": array " + named(member.key)));
       continue;
     }
-    if (member.value.kind != Kind::kObject) fail(source, "the metadata is " + kind_name(member.value));
+    if (member.value.kind != Kind::kObject) fail_tensor(source, "the metadata is " + kind_name(member.value));
     for (const ConfigMember& text : member.value.members) {
       if (text.value.kind != Kind::kString)
-        fail(source, "metadata " + named(text.key) + " is " + kind_name(text.value) + ", not a string");
+        fail_tensor(source, "metadata " + named(text.key) + " is " + kind_name(text.value) + ", not a string");
       result.metadata_.emplace(text.key, text.value.text);
     }
   }
   check_layout(entries, std::ssize(data), source);
   for (const Entry& entry : entries) {
-    const auto type = std::ranges::find(kTypes, entry.dtype, &Type::name);
+    const auto type = std::ranges::find(kTypes, entry.dtype, &TensorType::name);
     if (type == std::end(kTypes)) {
       result.unread_.emplace(entry.name, entry.dtype);
       continue;
@@ -221,8 +225,8 @@ const NpyArray& Safetensors::array(std::string_view name) const {
   if (found != arrays_.end()) return found->second;
   const auto unread = unread_.find(name);
   if (unread != unread_.end())
-    fail(source_, "array " + named(name) + ": has dtype " + named(unread->second) + ", which is not read");
-  fail(source_, "has no array " + named(name) + "; there are: " + (names_.empty() ? "none" : joined(names_)));
+    fail_tensor(source_, "array " + named(name) + ": has dtype " + named(unread->second) + ", which is not read");
+  fail_tensor(source_, "has no array " + named(name) + "; there are: " + (names_.empty() ? "none" : joined(names_)));
 }
 
 const std::string& Safetensors::text(std::string_view key) const {
@@ -230,7 +234,7 @@ const std::string& Safetensors::text(std::string_view key) const {
   if (found != metadata_.end()) return found->second;
   std::vector<std::string> known;
   for (const auto& entry : metadata_) known.push_back(entry.first);
-  fail(source_, "has no metadata " + named(key) + "; there is: " + (known.empty() ? "none" : joined(known)));
+  fail_tensor(source_, "has no metadata " + named(key) + "; there is: " + (known.empty() ? "none" : joined(known)));
 }
 
 std::vector<std::string> Safetensors::texts(std::string_view key) const {
@@ -242,23 +246,23 @@ std::vector<std::string> Safetensors::texts(std::string_view key) const {
     is_list = is_list && item.kind == Kind::kString;
     result.push_back(item.text);
   }
-  if (!is_list) fail(source_, "metadata " + named(key) + " is no list of texts: [\"first\", \"second\"]");
+  if (!is_list) fail_tensor(source_, "metadata " + named(key) + " is no list of texts: [\"first\", \"second\"]");
   return result;
 }
 
 int Safetensors::require_format(std::string_view format, int newest) const {
   const auto found = metadata_.find("format");
   if (found == metadata_.end() || found->second != format)
-    fail(source_,
-         (found == metadata_.end() ? "the metadata has no \"format\"" : "the format is " + named(found->second)) +
-             "; allowed: " + named(format));
+    fail_tensor(source_, (found == metadata_.end() ? "the metadata has no \"format\""
+                                                   : "the format is " + named(found->second)) +
+                             "; allowed: " + named(format));
   const std::string& words = text("version");
   int version = 0;
   const char* end = words.data() + words.size();
   const bool is_number = std::from_chars(words.data(), end, version).ptr == end && !words.empty();
   if (is_number && version >= 1 && version <= newest) return version;
-  fail(source_, "the format's version is " + named(words) + "; allowed: 1 to " + std::to_string(newest) +
-                    (is_number && version > newest ? " (the file is from a newer program)" : ""));
+  fail_tensor(source_, "the format's version is " + named(words) + "; allowed: 1 to " + std::to_string(newest) +
+                           (is_number && version > newest ? " (the file is from a newer program)" : ""));
 }
 
 bool looks_like_safetensors(std::span<const uint8_t> start) {

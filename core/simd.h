@@ -53,6 +53,20 @@ void on_best_isa(F&& f) {
   on_isa(best_isa(), f);
 }
 
+/// As on_best_isa, for loops over numbers of type S. For double there is no code for AVX-512: what runs in double
+/// measures the error of float, and a third of the code would be for that alone.
+template <class S, class F>
+void on_best_isa_for(F&& f) {
+  if constexpr (std::is_same_v<S, double>) {
+#if defined(HSI4D_ISA_CLONES)
+    if (best_isa() != Isa::kBaseline) return detail::on_avx2(f);
+#endif
+    f();
+  } else {
+    on_best_isa(f);
+  }
+}
+
 /// Calls f(kCount), a constant, compiled for the best instruction set: as many doubles as work best in step there
 /// (core/lanes.h), which are a register of AVX-512 and of AVX2.
 template <class F>

@@ -18,7 +18,7 @@ namespace hsi4d {
 namespace {
 
 constexpr std::array kVideoEndings = {".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v"};
-constexpr int kLargestSide = 16384;         // pixels
+constexpr int kLargestVideoSide = 16384;    // pixels
 constexpr std::size_t kLongestHeader = 40;  // of a PPM, bytes
 
 std::string lower_ending(const std::string& path) {
@@ -53,7 +53,7 @@ std::string fact(const std::string& facts, const std::string& key) {
 }
 
 /// 0 where it is none.
-Index whole_number(const std::string& text) {
+Index read_whole(const std::string& text) {
   Index number = 0;
   const auto end = std::from_chars(text.data(), text.data() + text.size(), number);
   return end.ec == std::errc() && end.ptr == text.data() + text.size() && number > 0 ? number : 0;
@@ -90,12 +90,12 @@ VideoReader::VideoReader(const std::string& path) : path_(path) {
   read_file_start(path, 1);  // tells what is wrong with the path
   const std::string facts = probe(path);
   const std::string rate = fact(facts, "avg_frame_rate"), count = fact(facts, "nb_read_frames");
-  frames_ = whole_number(count);
+  frames_ = read_whole(count);
   if (frames_ < 1) throw DataError(path + ": holds no video that can be read");
   if (frames_ == 1) throw DataError(path + ": holds one picture and no video");
   const std::size_t slash = rate.find('/');
   if (slash == std::string::npos) return;
-  const Index over = whole_number(rate.substr(0, slash)), under = whole_number(rate.substr(slash + 1));
+  const Index over = read_whole(rate.substr(0, slash)), under = read_whole(rate.substr(slash + 1));
   if (over > 0 && under > 0) frame_rate_ = static_cast<double>(over) / static_cast<double>(under);
 }
 
@@ -128,8 +128,9 @@ Image VideoReader::next_frame() {
   }
   int width = 0, height = 0, largest = 0;
   if (std::sscanf(header.c_str(), "P6\n%d %d\n%d\n", &width, &height, &largest) != 3 || largest != 255 || width < 1 ||
-      height < 1 || width > kLargestSide || height > kLargestSide)
-    fail("has no size from 1x1 to " + std::to_string(kLargestSide) + "x" + std::to_string(kLargestSide) + " pixels");
+      height < 1 || width > kLargestVideoSide || height > kLargestVideoSide)
+    fail("has no size from 1x1 to " + std::to_string(kLargestVideoSide) + "x" + std::to_string(kLargestVideoSide) +
+         " pixels");
   Bytes pixels(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   if (decoder_->read(pixels) != pixels.size()) fail("cannot be read: the video ends in it");
   ++next_;

@@ -10,15 +10,15 @@ namespace hsi4d {
 
 namespace {
 
-constexpr double kProbe = 0.1;             // h p of a product, in learning rates: small for a step, large for rounding
-constexpr double kShorterProbe = 0.1;      // of the one before, where that was bad
-constexpr double kFirstDamping = 1e-4;     // of the first direction's curvature
-constexpr double kLeastGain = 1e-4;        // of the model's, for a step that is taken
-constexpr double kSmallestStep = 0.02;     // of the learning rates
-constexpr double kSmallestGain = 1e-6;     // of the loss: a few roundings of it in float
-constexpr double kEnough = 0.5;            // of the mean gain of a direction: one that gives less is the last
-constexpr double kLeastCurvature = 1e-10;  // of |p| |B p|
-constexpr double kLeastNew = 1e-6;         // of a direction, across those before
+constexpr double kProbe = 0.1;          // h p of a product, in learning rates: small for a step, large for rounding
+constexpr double kShorterProbe = 0.1;   // of the one before, where that was bad
+constexpr double kFirstDamping = 1e-4;  // of the first direction's curvature
+constexpr double kLeastGain = 1e-4;     // of the model's, for a step that is taken
+constexpr double kSmallestProductStep = 0.02;     // of the learning rates
+constexpr double kSmallestGain = 1e-6;            // of the loss: a few roundings of it in float
+constexpr double kEnough = 0.5;                   // of the mean gain of a direction: one that gives less is the last
+constexpr double kLeastProductCurvature = 1e-10;  // of |p| |B p|
+constexpr double kLeastNew = 1e-6;                // of a direction, across those before
 constexpr double kLeastDamping = 1e-30, kMostDamping = 1e30;
 
 double largest(const Eigen::VectorXd& x) { return x.size() == 0 ? 0 : x.cwiseAbs().maxCoeff(); }
@@ -95,7 +95,7 @@ StepReport GaussNewton<S>::step(Index iteration, Index iterations, double loss) 
     if (is_room && !is_solved() && find_direction()) {
       ask_for_product();
     } else {
-      done_ = left < 1 || !(largest(step_) >= kSmallestStep) || !(gain_ > kSmallestGain * std::fabs(loss_));
+      done_ = left < 1 || !(largest(step_) >= kSmallestProductStep) || !(gain_ > kSmallestGain * std::fabs(loss_));
       ask_for_step();
     }
   }
@@ -150,7 +150,7 @@ void GaussNewton<S>::add_product() {
 template <class S>
 void GaussNewton<S>::learn(const VectorX& direction, const VectorX& product) {
   const double curvature = direction.dot(product);
-  if (!(curvature > kLeastCurvature * direction.norm() * product.norm())) return;
+  if (!(curvature > kLeastProductCurvature * direction.norm() * product.norm())) return;
   if (!is_learnt_) {
     residual_.noalias() = inverse_.template selfadjointView<Eigen::Lower>() * product;
     inverse_ *= curvature / product.dot(residual_);

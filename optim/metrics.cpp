@@ -14,7 +14,6 @@
 namespace hsi4d {
 namespace {
 
-constexpr double kMillimetres = 1000, kCentimetres = 100;
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 

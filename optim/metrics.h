@@ -18,6 +18,9 @@
 
 namespace hsi4d {
 
+/// In a metre: errors are told in these.
+inline constexpr double kMillimetres = 1000, kCentimetres = 100;
+
 /// Joints that count: pelvis to wrists.
 inline constexpr Index kMetricJoints = 22;
 

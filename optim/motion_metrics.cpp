@@ -8,11 +8,9 @@
 namespace hsi4d {
 namespace {
 
-constexpr double kMillimetres = 1000;
-
 Vector3<double> joint_of(std::span<const double> joints, Index j) { return Vector3<double>(joints.data() + 3 * j); }
 
-Index counted_joints(std::span<const double> joints) {
+Index joints_of_motion(std::span<const double> joints) {
   HSI4D_CHECK(!joints.empty() && joints.size() % 3 == 0,
               "joints are [J,3], not " + std::to_string(joints.size()) + " numbers");
   return std::min(kMetricJoints, static_cast<Index>(joints.size()) / 3);
@@ -26,7 +24,7 @@ Vector3<double> second_difference(JointFrames joints, std::size_t t, Index j) {
 
 double frame_distance(std::span<const double> a, std::span<const double> b, bool root_relative) {
   HSI4D_CHECK_EQ(a.size(), b.size());
-  const Index count = counted_joints(a);
+  const Index count = joints_of_motion(a);
   const Vector3<double> apart =
       root_relative ? Vector3<double>(joint_of(a, 0) - joint_of(b, 0)) : Vector3<double>(Vector3<double>::Zero());
   double sum = 0;
@@ -40,7 +38,7 @@ std::vector<double> acceleration_errors(JointFrames joints, JointFrames truth, d
   HSI4D_CHECK_EQ(joints.size(), truth.size());
   std::vector<double> errors;
   if (joints.size() < 3) return errors;
-  const Index count = counted_joints(joints[0]);
+  const Index count = joints_of_motion(joints[0]);
   for (std::size_t t = 0; t < joints.size(); ++t) {
     HSI4D_CHECK_EQ(joints[t].size(), joints[0].size());
     HSI4D_CHECK_EQ(truth[t].size(), joints[0].size());

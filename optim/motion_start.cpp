@@ -10,7 +10,7 @@ namespace hsi4d {
 
 namespace {
 
-Vector3<double> mean_of(const std::vector<float>& means, Index row) {
+Vector3<double> mean_at(const std::vector<float>& means, Index row) {
   return Vector3<float>(means.data() + 3 * row).cast<double>();
 }
 
@@ -19,7 +19,7 @@ Vector3<double> mean_of(const std::vector<float>& means, Index row) {
 Vector3<double> MotionStart::place(const BodyPoint& point) const {
   const SparseWeights& weights = avatar->weights;
   const PosedJoints& posed = body_in(point.frame);
-  const Vector3<double> rest = mean_of(avatar->means, point.row);
+  const Vector3<double> rest = mean_at(avatar->means, point.row);
   Vector3<double> place = Vector3<double>::Zero();
   for (Index k = 0; k < weights.per_vertex; ++k) {
     const auto at = static_cast<std::size_t>(point.row * weights.per_vertex + k);
@@ -35,7 +35,7 @@ Vector3<double> MotionStart::place(const BodyPoint& point) const {
 Vector3<double> MotionStart::place(const ObjectPoint& point) const {
   const auto object = static_cast<std::size_t>(point.object);
   return transform_point(world_from_object[static_cast<std::size_t>(point.frame)][object],
-                         mean_of(objects[object]->means, point.row));
+                         mean_at(objects[object]->means, point.row));
 }
 
 bool is_hand_joint(Index joint) {

@@ -5,13 +5,12 @@
 #include <limits>
 
 #include "core/check.h"
+#include "optim/metrics.h"
 #include "optim/object_centres.h"
 
 namespace hsi4d {
 
-namespace {
-constexpr double kCentimetres = 100;
-}
+namespace {}
 
 struct ObjectPoints::Object {
   std::vector<Vector3<double>> points;  // object's frame

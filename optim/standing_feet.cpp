@@ -2,15 +2,14 @@
 
 #include "core/check.h"
 #include "core/types.h"
+#include "optim/metrics.h"
 #include "optim/motion_start.h"
 
 namespace hsi4d {
 
 namespace {
 
-constexpr double kMillimetres = 1000;
-
-Vector3<double> joint_of(std::span<const double> joints, Index joint) {
+Vector3<double> foot_joint(std::span<const double> joints, Index joint) {
   return Vector3<double>(joints.data() + 3 * joint);
 }
 
@@ -30,8 +29,8 @@ std::optional<double> foot_sliding_mm(std::span<const double> before, std::span<
   Index standing = 0;
   for (Index j = 0; j < static_cast<Index>(before.size()) / 3; ++j) {
     if (!is_foot_joint(j)) continue;
-    const Vector3<double> from = joint_of(before, j), to = joint_of(after, j);
-    if (!foot_stands(from, to, joint_of(first, j)[2], frame_rate, {})) continue;
+    const Vector3<double> from = foot_joint(before, j), to = foot_joint(after, j);
+    if (!foot_stands(from, to, foot_joint(first, j)[2], frame_rate, {})) continue;
     sum += (to - from).head<2>().norm();
     ++standing;
   }

@@ -1,17 +1,17 @@
 // Rows D: skinning, priors, contacts. Here skinning; the others are in body_robustness.cpp.
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include <Eigen/SVD>
 
 #include "autodiff/rotations.h"
 #include "body/blend_shapes.h"
 #include "body/skinning.h"
+#include "core/angles.h"
 #include "core/check.h"
 #include "core/random.h"
-#include "splat/reference.h"
-#include "splat/render.h"
+#include "splat/reference/reference.h"
+#include "splat/render/render.h"
 #include "stress/body_rows.h"
 #include "stress/rotation_measures.h"
 #include "stress/stress.h"
@@ -21,8 +21,6 @@ namespace hsi4d {
 namespace {
 
 using namespace stress;
-
-constexpr double kPi = std::numbers::pi;
 
 std::vector<double> uniform_numbers(Index count, std::string_view stream) {
   const Random random(1, random_stream(stream));

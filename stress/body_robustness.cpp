@@ -4,13 +4,13 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <numbers>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
 #include "body/pose_prior.h"
 #include "body/surface_index.h"
+#include "core/angles.h"
 #include "core/random.h"
 #include "core/rotation.h"
 #include "optim/stage.h"
@@ -21,10 +21,8 @@ namespace hsi4d::stress {
 
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 /// The definition, and nothing else.
-struct PlainAdam {
+struct PlainRootAdam {
   double m = 0, v = 0;
   double step(double x, double g, double lr, int t) {
     m = 0.9 * m + 0.1 * g;
@@ -48,7 +46,7 @@ std::vector<StressFigure> bad_steps(Remedy remedy) {
   ParameterGroupSettings settings;
   settings.lr = kRate;
   Adam<double> adam(tape, {{{"all", {x}}, settings}}, {});
-  std::array<PlainAdam, 5> plain;
+  std::array<PlainRootAdam, 5> plain;
   const auto numbers = [&] {
     std::array<double, 5> now;
     std::copy_n(tape.value(x).data, 5, now.begin());

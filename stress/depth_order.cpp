@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "core/check.h"
-#include "splat/tiles.h"
+#include "splat/render/tiles.h"
 #include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
 
@@ -16,7 +16,7 @@ namespace hsi4d::stress {
 
 namespace {
 
-constexpr int kSide = 8;  // of the images
+constexpr int kImageSide = 8;  // of the images
 
 /// Rows in another order: layers of equal depth are interleaved anew, each keeps the order within.
 FlatSplats interleaved(const FlatSplats& splats, std::size_t layers) {
@@ -35,7 +35,7 @@ FlatSplats interleaved(const FlatSplats& splats, std::size_t layers) {
 
 /// Rows of equal depth in layers 2, 3, …, small Gaussians all over the image.
 FlatSplats layered_splats(Index n, std::uint64_t layers) {
-  FlatSplats splats = random_splats(n, kSide, kSide, 1, 14);
+  FlatSplats splats = random_splats(n, kImageSide, kImageSide, 1, 14);
   RandomSequence random(16, 1);
   for (double& z : splats.depths) z = 2 + static_cast<double>(random.below(layers));
   for (double& v : splats.factors) v = static_cast<double>(static_cast<float>(v / 3));
@@ -45,8 +45,8 @@ FlatSplats layered_splats(Index n, std::uint64_t layers) {
 /// Front to back in the given order, in float, of round Gaussians of radius 1.
 std::vector<double> plain_image(const FlatSplats& splats, const std::vector<Index>& order) {
   std::vector<double> image;
-  for (int p = 0; p < kSide * kSide; ++p) {
-    const auto x = static_cast<float>(p % kSide) + 0.5f, y = static_cast<float>(p / kSide) + 0.5f;
+  for (int p = 0; p < kImageSide * kImageSide; ++p) {
+    const auto x = static_cast<float>(p % kImageSide) + 0.5f, y = static_cast<float>(p / kImageSide) + 0.5f;
     float t = 1, color = 0;
     for (const Index n : order) {
       const float dx = x - static_cast<float>(splats.means[2 * n]),
@@ -61,7 +61,7 @@ std::vector<double> plain_image(const FlatSplats& splats, const std::vector<Inde
   return image;
 }
 
-std::vector<Index> rows_of(const FlatSplats& splats) {
+std::vector<Index> rows_of_depths(const FlatSplats& splats) {
   std::vector<Index> rows(splats.depths.size());
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = static_cast<Index>(i);
   return rows;
@@ -69,14 +69,14 @@ std::vector<Index> rows_of(const FlatSplats& splats) {
 
 /// By depth alone, ties as they come.
 std::vector<double> unstable_image(const FlatSplats& splats) {
-  std::vector<Index> order = rows_of(splats);
+  std::vector<Index> order = rows_of_depths(splats);
   std::sort(order.begin(), order.end(), [&](Index a, Index b) { return splats.depths[a] < splats.depths[b]; });
   return plain_image(splats, order);
 }
 
 /// By a comparison that NaN takes part in. By insertion, which is defined even then; std::sort would not be.
 std::vector<double> compared_image(const FlatSplats& splats) {
-  std::vector<Index> order = rows_of(splats), drawn;
+  std::vector<Index> order = rows_of_depths(splats), drawn;
   for (std::size_t i = 1; i < order.size(); ++i) {
     for (std::size_t k = i; k > 0 && splats.depths[order[k]] < splats.depths[order[k - 1]]; --k) {
       std::swap(order[k], order[k - 1]);
@@ -91,7 +91,7 @@ std::vector<double> compared_image(const FlatSplats& splats) {
 }  // namespace
 
 std::vector<StressFigure> depth_sort(Remedy remedy) {
-  const SplatView view = plain_view(kSide, kSide, RenderSettings());
+  const SplatView view = plain_view(kImageSide, kImageSide, RenderSettings());
   const bool on = remedy == Remedy::kOn;
   const FlatSplats ties = layered_splats(100'000, 4), dealt = interleaved(ties, 4);
   FlatSplats broken = layered_splats(2000, 1000);

@@ -16,7 +16,7 @@ namespace hsi4d::stress {
 
 namespace {
 
-constexpr double kRate = 2e-3;
+constexpr double kFadedRate = 2e-3;
 
 /// Adam on many numbers of one slope, on one thread; a plain loop without the remedy.
 class ManyNumbers {
@@ -47,7 +47,7 @@ class ManyNumbers {
     const double by_m = 1 / (1 - std::pow(0.9, step + 1)), by_v = 1 / (1 - std::pow(0.999, step + 1));
     for (std::size_t i = 0; i < x_.size(); ++i) {
       m_[i] = 0.9 * m_[i] + 0.1 * slope, v_[i] = 0.999 * v_[i] + 0.001 * slope * slope;
-      x_[i] -= kRate * by_m * m_[i] / (std::sqrt(by_v * v_[i]) + 1e-8);
+      x_[i] -= kFadedRate * by_m * m_[i] / (std::sqrt(by_v * v_[i]) + 1e-8);
     }
   }
 
@@ -56,7 +56,7 @@ class ManyNumbers {
   Var<double> numbers_ = tape_.parameter("numbers", shape_of(kMany, 1));
   Var<double> slopes_ = tape_.constant("slopes", shape_of(kMany, 1));
   Var<double> loss_ = sum(numbers_ * slopes_);
-  Adam<double> adam_{tape_, {moving_at<double>({numbers_}, kRate)}, {}};
+  Adam<double> adam_{tape_, {moving_at<double>({numbers_}, kFadedRate)}, {}};
   std::vector<double> x_ = std::vector<double>(kMany, 0), m_ = x_, v_ = x_;
 };
 

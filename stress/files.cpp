@@ -12,7 +12,7 @@
 #include "core/config_parse.h"
 #include "core/formatted.h"
 #include "core/random.h"
-#include "splat/io_ply.h"
+#include "splat/files/io_ply.h"
 #include "stress/arithmetic.h"
 
 namespace hsi4d::stress {

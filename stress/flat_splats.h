@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/random.h"
-#include "splat/composite.h"
-#include "splat/splat_records.h"
+#include "splat/render/composite.h"
+#include "splat/render/splat_records.h"
 #include "stress/measures.h"
 #include "stress/tape_numbers.h"
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "splat/project.h"
-#include "splat/render.h"
-#include "splat/tiles.h"
+#include "splat/render/project.h"
+#include "splat/render/render.h"
+#include "splat/render/tiles.h"
 #include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
 #include "stress/measures.h"

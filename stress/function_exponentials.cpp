@@ -3,9 +3,9 @@
 
 #include "autodiff/dual.h"
 #include "core/vector_exp.h"
-#include "splat/block_kernel.h"
-#include "splat/composite_kernel.h"
 #include "splat/limits.h"
+#include "splat/render/block_kernel.h"
+#include "splat/render/composite_kernel.h"
 #include "stress/function_table.h"
 #include "stress/vector_targets.h"
 

@@ -25,8 +25,8 @@ constexpr int kSteps = 10000;
 constexpr int kBlindFrom =
     1000;                       ///< half of the image does not count from here on: what it alone shows has no gradient
 constexpr int kBadStep = 5000;  ///< the frame has a pixel that is no number
-constexpr double kRate = 2e-3;
-constexpr int kWidth = 32, kHeight = 24;
+constexpr double kLongRate = 2e-3;
+constexpr int kLongWidth = 32, kLongHeight = 24;
 
 /// How it is run.
 struct Way {
@@ -43,8 +43,6 @@ struct Outcome {
   double rollbacks = 0;
 };
 
-bool is_denormal(double x) { return std::fpclassify(x) == FP_SUBNORMAL; }
-
 /// Adam number by number, in this thread's own mode.
 template <class S>
 class PlainStepper {
@@ -54,7 +52,7 @@ class PlainStepper {
     for (const Var<S> leaf : leaves) {
       std::vector<double> x = numbers_of<S>(tape.value(leaf));
       const std::vector<double> d = numbers_of<S>(tape.gradient(leaf));
-      numbers_.resize(std::max(numbers_.size(), at + x.size()), {.lr = kRate});
+      numbers_.resize(std::max(numbers_.size(), at + x.size()), {.lr = kLongRate});
       for (std::size_t i = 0; i < x.size(); ++i) {
         PlainAdam<double>& number = numbers_[at++];
         number.x = x[i];
@@ -88,18 +86,18 @@ bool has_denormals(const Adam<S>& adam) {
 /// A scene that is fitted to the image of another.
 template <class S>
 struct Fit {
-  TapedSmallScene<S> taped{small_scene(16, kWidth, kHeight, 90)};
+  TapedSmallScene<S> taped{small_scene(16, kLongWidth, kLongHeight, 90)};
   std::vector<Var<S>> leaves = taped.leaves();
-  std::vector<double> frame = exact_image(small_scene(16, kWidth, kHeight, 91));
+  std::vector<double> frame = exact_image(small_scene(16, kLongWidth, kLongHeight, 91));
   Var<S> target, weight, loss;
 
   explicit Fit(const Way& way) {
     Tape<S>& tape = taped.tape;
     leaves.push_back(tape.parameter("offset", kScalarShape));
     target = tape.constant("target", taped.rendered.image.shape());
-    weight = tape.constant("weight", image_shape<S>(1, kHeight, kWidth));
+    weight = tape.constant("weight", image_shape<S>(1, kLongHeight, kLongWidth));
     set_numbers(tape, target, frame);
-    set_numbers(tape, weight, std::vector<double>(kWidth * kHeight, 1));
+    set_numbers(tape, weight, std::vector<double>(kLongWidth * kLongHeight, 1));
     const Var<S> image = way.thread_order ? offset_by_threads(taped.rendered.image, leaves.back())
                                           : taped.rendered.image + leaves.back();
     loss = l2(image, target, weight);
@@ -108,7 +106,7 @@ struct Fit {
     Tape<S>& tape = taped.tape;
     if (step == kBlindFrom) {
       const Array<S> w = tape.write(weight);
-      for (Index r = 0; r < kHeight; ++r) std::fill_n(w.row(r) + kWidth / 2, kWidth / 2, S(0));
+      for (Index r = 0; r < kLongHeight; ++r) std::fill_n(w.row(r) + kLongWidth / 2, kLongWidth / 2, S(0));
     }
     if (!way.bad_step || (step != kBadStep && step != kBadStep + 1)) return;
     frame[0] = step == kBadStep ? std::numeric_limits<double>::quiet_NaN() : frame[1];
@@ -120,7 +118,7 @@ template <class S>
 Outcome run_steps(const Way& way) {
   Fit<S> fit(way);
   Tape<S>& tape = fit.taped.tape;
-  Adam<S> adam(tape, {moving_at(fit.leaves, kRate)}, {});
+  Adam<S> adam(tape, {moving_at(fit.leaves, kLongRate)}, {});
   PlainStepper<S> plain;
   Outcome outcome;
   for (int step = 0; step < kSteps; ++step) {

@@ -8,7 +8,7 @@
 #include "core/parallel.h"
 #include "core/quaternion.h"
 #include "core/random.h"
-#include "splat/sh_rotation.h"
+#include "splat/files/sh_rotation.h"
 #include "stress/measures.h"
 #include "stress/pixel_walk.h"
 #include "stress/splat_scene.h"

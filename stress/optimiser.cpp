@@ -150,13 +150,11 @@ std::vector<double> traced(double scale, Remedy remedy) {
   return x;
 }
 
-double largest_relative(const std::vector<double>& a, const std::vector<double>& b) {
+double largest_relative_of_moments(const std::vector<double>& a, const std::vector<double>& b) {
   double worst = 0;
   for (std::size_t i = 0; i < a.size(); ++i) worst = larger(worst, std::abs(a[i] - b[i]) / std::abs(b[i]));
   return worst;
 }
-
-bool is_denormal(double x) { return std::fpclassify(x) == FP_SUBNORMAL; }
 
 /// Two numbers that had one gradient of 1 and none after it, for as long as m takes to vanish; and how often a moment
 /// was denormal.
@@ -222,9 +220,9 @@ std::vector<StressFigure> place_of_eps(Remedy remedy) {
     expected.push_back(static_cast<double>(number.x));
   }
   const std::vector<double> computed = traced(1, remedy);
-  return {{"relative error of ten steps", largest_relative(computed, expected), 1e-6},
-          {"change of the steps when the loss is 2^-20 of itself", largest_relative(traced(kScale, remedy), computed),
-           1e-4}};
+  return {{"relative error of ten steps", largest_relative_of_moments(computed, expected), 1e-6},
+          {"change of the steps when the loss is 2^-20 of itself",
+           largest_relative_of_moments(traced(kScale, remedy), computed), 1e-4}};
 }
 
 std::vector<StressFigure> bias_corrections(Remedy remedy) {

@@ -5,13 +5,13 @@
 #include <numeric>
 
 #include "core/parallel.h"
-#include "splat/block_kernel.h"
+#include "splat/render/block_kernel.h"
 
 namespace hsi4d::stress {
 
 namespace {
 
-constexpr Index kSide = 16;  // pixels: places within a tile are rounded in float
+constexpr Index kBlockSide = 16;  // pixels: places within a tile are rounded in float
 
 /// Three standard deviations along the longer axis, pixels: cov⁻¹ = Lᵀ L.
 double square_radius(const detail::SplatRecord<float>& r) {
@@ -33,7 +33,7 @@ WalkedScene::WalkedScene(const Scene& scene)
   const Index n = splats.rows();
   std::vector<detail::SplatRecord<float>> records(static_cast<std::size_t>(n));
   std::vector<detail::Extent> extents(records.size());
-  const detail::TileGrid grid = detail::tile_grid(camera_.width, camera_.height, kSide);
+  const detail::TileGrid grid = detail::tile_grid(camera_.width, camera_.height, kBlockSide);
   detail::make_records(splats, settings_, grid, 0, n, records.data(), extents.data());
   rows_.resize(records.size());
   std::iota(rows_.begin(), rows_.end(), Index(0));
@@ -50,12 +50,12 @@ std::vector<double> WalkedScene::walk(const detail::CompositeRules<float>& rules
   std::vector<double> result;
   for (Index row = 0; row < camera_.height; ++row) {
     for (Index col = 0; col < camera_.width; ++col) {
-      const Index top = row / kSide * kSide, left = col / kSide * kSide;
+      const Index top = row / kBlockSide * kBlockSide, left = col / kBlockSide * kBlockSide;
       float t = 1;
       for (std::size_t place = 0; place < records_.size(); ++place) {
         const detail::SplatRecord<float>& record = records_[place];
         if (!touches(record, row, col)) continue;
-        const auto pixel = detail::block_pixel_alpha(kSide, record, rules, left, top, row - top, col - left);
+        const auto pixel = detail::block_pixel_alpha(kBlockSide, record, rules, left, top, row - top, col - left);
         if (!pixel.drawn) continue;
         visit(result.size(), place, static_cast<double>(t) * static_cast<double>(pixel.alpha));
         t = detail::block_transmittance(t, pixel.alpha);

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "splat/splat_records.h"
+#include "splat/render/splat_records.h"
 #include "stress/splat_scene.h"
 
 namespace hsi4d::stress {

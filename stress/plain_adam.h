@@ -23,4 +23,6 @@ struct PlainAdam {
   }
 };
 
+inline bool is_denormal(double x) { return std::fpclassify(x) == FP_SUBNORMAL; }
+
 }  // namespace hsi4d::stress

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "stress/loss_inputs.h"
+#include "stress/measures.h"
 #include "stress/moving.h"
 #include "stress/poison.h"
 
@@ -163,12 +164,8 @@ std::vector<double> all_numbers(const TermOnTape<S>& term) {
   return all;
 }
 
-bool all_finite(const std::vector<double>& numbers) {
+bool all_finite_numbers(const std::vector<double>& numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
-}
-
-double not_finite(const std::vector<double>& numbers) {
-  return static_cast<double>(std::count_if(numbers.begin(), numbers.end(), [](double x) { return !std::isfinite(x); }));
 }
 
 /// One step of a term's inputs; without the remedy, of Adam's first step as it is without a look at the gradient.
@@ -176,7 +173,7 @@ template <class S>
 bool step(TermOnTape<S>& term, Remedy remedy, Steps& steps) {
   const std::vector<double> before = all_numbers(term);
   term.run();
-  const bool is_bad = !all_finite(term.results());
+  const bool is_bad = !all_finite_numbers(term.results());
   steps.bad += is_bad ? 1 : 0;
   constexpr double kRate = 1e-6;
   if (remedy == Remedy::kOn) {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <memory>
 
-#include "optim/distance_grid.h"
+#include "optim/solid/distance_grid.h"
 #include "stress/poison.h"
 
 namespace hsi4d::stress {

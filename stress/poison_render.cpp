@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "stress/measures.h"
 #include "stress/poison.h"
 
 namespace hsi4d::stress {
@@ -77,10 +78,6 @@ double different(const std::vector<double>& a, const std::vector<double>& b) {
   double count = 0;
   for (std::size_t i = 0; i < a.size(); ++i) count += same_bits(a[i], b[i]) ? 0 : 1;
   return count;
-}
-
-double not_finite(const std::vector<double>& numbers) {
-  return static_cast<double>(std::count_if(numbers.begin(), numbers.end(), [](double x) { return !std::isfinite(x); }));
 }
 
 /// An input that is poisoned, and what of it leaves the Gaussian out.

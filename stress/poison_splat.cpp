@@ -1,12 +1,12 @@
 // Row P4: the operators of splat whose rows are Gaussians.
-#include "splat/camera_center.h"
+#include "splat/render/camera_center.h"
 #include "stress/poison.h"
 
 namespace hsi4d::stress {
 
 namespace {
 
-constexpr Index kRows = 40;
+constexpr Index kSplatRows = 40;
 
 SplatView some_view(int sh_degree) {
   SplatView view = view_of({64, 48, 1, {}, {}, {}, {}, {}});
@@ -18,16 +18,16 @@ SplatView some_view(int sh_degree) {
 struct Splats {
   template <class S>
   std::vector<PoisonedOperator<S>> operator()() const {
-    const PoisonInput means{shape_of(kRows, 3)}, axes{shape_of(kRows, 9), {}, -0.2, 0.2};
+    const PoisonInput means{shape_of(kSplatRows, 3)}, axes{shape_of(kSplatRows, 9), {}, -0.2, 0.2};
     const PoisonInput xi{shape_of(1, 6), shared, -0.05, 0.05};
     std::vector<PoisonedOperator<S>> all;
     all.push_back(
-        {{{shape_of(kRows, 1), {}, -3, 3}}, [](const Vars<S>& in) { return Vars<S>{gaussian_opacities(in[0])}; }});
-    all.push_back({{{shape_of(kRows, 4)}, {shape_of(kRows, 3), {}, -3, 0}},
+        {{{shape_of(kSplatRows, 1), {}, -3, 3}}, [](const Vars<S>& in) { return Vars<S>{gaussian_opacities(in[0])}; }});
+    all.push_back({{{shape_of(kSplatRows, 4)}, {shape_of(kSplatRows, 3), {}, -3, 0}},
                    [](const Vars<S>& in) { return Vars<S>{gaussian_axes(in[0], in[1])}; }});
-    all.push_back({{{shape_of(kRows, 12)}, {shape_of(kRows, 9)}},
+    all.push_back({{{shape_of(kSplatRows, 12)}, {shape_of(kSplatRows, 9)}},
                    [](const Vars<S>& in) { return Vars<S>{transform_axes(in[0], in[1])}; }});
-    all.push_back({{{shape_of(1, 12), shared}, {shape_of(kRows, 9)}},
+    all.push_back({{{shape_of(1, 12), shared}, {shape_of(kSplatRows, 9)}},
                    [](const Vars<S>& in) { return Vars<S>{transform_axes(in[0], in[1])}; }});
     const auto projection = [](const Vars<S>& in) {
       const Projected<S> p = project(in[0], in[1], in[2], some_view(0), in.size() > 3 ? in[3] : Var<S>{});
@@ -36,7 +36,7 @@ struct Splats {
     all.push_back({{means, axes, xi}, projection, {}, true});
     all.push_back({{means, axes, xi, {shape_of(1, 4), shared, 30, 40}}, projection, {}, true});
     for (int degree = 0; degree <= 3; ++degree) {
-      const PoisonInput sh{shape_of(kRows, 3 * (degree + 1) * (degree + 1)), {}, -0.3, 0.3};
+      const PoisonInput sh{shape_of(kSplatRows, 3 * (degree + 1) * (degree + 1)), {}, -0.3, 0.3};
       all.push_back({{sh, means, xi},
                      [degree](const Vars<S>& in) { return Vars<S>{sh_colors(in[0], in[1], in[2], some_view(degree))}; },
                      {},

@@ -5,8 +5,8 @@
 
 #include "autodiff/complex_step.h"
 #include "core/random.h"
-#include "splat/block_kernel.h"
-#include "splat/covariance.h"
+#include "splat/render/block_kernel.h"
+#include "splat/render/covariance.h"
 #include "stress/measures.h"
 #include "stress/projection_rows.h"
 #include "stress/splat_scene.h"

@@ -76,12 +76,12 @@ Scene disc(int k) {
 }
 
 /// |dG/dm| of pixels of the central row, per metre; and what is not finite.
-struct Slopes {
+struct RaySlopes {
   Largest slope;
   double not_finite = 0;
 };
 
-void add_slopes(const Scene& scene, Slopes& slopes) {
+void add_slopes(const Scene& scene, RaySlopes& slopes) {
   TapedScene<float> taped(scene);
   taped.tape.forward(taped.rendered.transmittance);
   const double opacity = 1 / (1 + std::exp(-2.0));
@@ -98,7 +98,7 @@ void add_slopes(const Scene& scene, Slopes& slopes) {
 }
 
 /// Where the ray of a pixel meets the disc's plane, t = n·m / n·r, and G there.
-void add_slopes_of_rays(int k, Slopes& slopes) {
+void add_slopes_of_rays(int k, RaySlopes& slopes) {
   const auto [c, s] = turn_of(k);
   const double focal = 33;
   for (int col = 8; col <= 24; ++col) {
@@ -116,7 +116,7 @@ void add_slopes_of_rays(int k, Slopes& slopes) {
 }  // namespace
 
 std::vector<StressFigure> edge_on(Remedy remedy) {
-  Slopes slopes;
+  RaySlopes slopes;
   for (int k = 0; k <= 8; ++k) remedy == Remedy::kOn ? add_slopes(disc(k), slopes) : add_slopes_of_rays(k, slopes);
   // In the image no Gaussian is narrower than the blur: |dG/du| ≤ exp(−½)/sqrt(blur) a pixel.
   const double steepest = std::exp(-0.5) / std::sqrt(kBlur) * 33 / kDiscDepth;

@@ -3,11 +3,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 #include "autodiff/map.h"
 #include "body/kinematics.h"
+#include "core/angles.h"
 #include "core/camera.h"
 #include "core/check.h"
 #include "core/quaternion.h"
@@ -23,7 +23,6 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kPi = std::numbers::pi;
 
 /// A cotangent of matrices with symmetric and skew part.
 Matrix3<float> cotangent() { return Matrix3<float>::Ones() + hat(Vector3<float>(1, 2, 3)); }

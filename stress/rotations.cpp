@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "autodiff/dual.h"
+#include "core/angles.h"
 #include "core/rotation.h"
 #include "core/stumpff.h"
 #include "stress/rotation_measures.h"
@@ -18,8 +19,6 @@ namespace hsi4d {
 namespace {
 
 using namespace stress;
-
-constexpr double kPi = std::numbers::pi;
 
 /// A rotation by rows, and its derivative by the axis-angle vector.
 struct Turn {
@@ -73,7 +72,7 @@ Turn textbook_turn(const Vector3<float>& w, const Root& root) {
 }
 
 /// dR/dw_i = c1 E_i + c2 (E_i K + K E_i) + 2 w_i (c1' K + c2' K²), E_i the generators.
-Eigen::Matrix<double, 9, 3> exact_slope(const Vector3<double>& w) {
+Eigen::Matrix<double, 9, 3> exact_rotation_slope(const Vector3<double>& w) {
   const long double x = static_cast<long double>(w[0]) * w[0] + static_cast<long double>(w[1]) * w[1] +
                         static_cast<long double>(w[2]) * w[2];
   const auto c = [x](int k, bool derivative) { return static_cast<double>(stumpff_series(k, x, derivative)); };
@@ -103,7 +102,7 @@ std::vector<StressFigure> gradient_at_identity(Remedy remedy) {
     for (const float s : {size, -size}) {
       const Vector3<float> w(s, -s, s / 2);
       const Turn turn = remedy == Remedy::kOn ? taped_turn(w) : textbook_turn(w, kBareRoot);
-      const double off = largest(Eigen::Matrix<double, 9, 3>(turn.slope - exact_slope(widen(w))));
+      const double off = largest(Eigen::Matrix<double, 9, 3>(turn.slope - exact_rotation_slope(widen(w))));
       (size <= 1e-8f ? at_zero : near_zero) = larger(size <= 1e-8f ? at_zero : near_zero, off);
       Matrix3<double> r;
       for (int i = 0; i < 9; ++i) r(i / 3, i % 3) = turn.value[i];
@@ -121,7 +120,8 @@ std::vector<StressFigure> gradient_leaves_identity(Remedy remedy) {
     return remedy == Remedy::kOn ? taped_turn(w) : textbook_turn(w, kGuardedRoot);
   };
   const Vector3<float> zero = Vector3<float>::Zero();
-  const double value = largest(Eigen::Matrix<double, 9, 3>(turn_of(zero).slope - exact_slope(Vector3<double>::Zero())));
+  const double value =
+      largest(Eigen::Matrix<double, 9, 3>(turn_of(zero).slope - exact_rotation_slope(Vector3<double>::Zero())));
   const Vector3<double> truth(0.3, -0.2, 0.4);
   const Matrix3<double> r = axis_turn(truth.normalized(), truth.norm());
   Vector3<double> w = Vector3<double>::Zero();

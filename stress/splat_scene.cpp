@@ -5,9 +5,9 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
 #include "core/random.h"
-#include "splat/covariance.h"
-#include "splat/opacity.h"
-#include "splat/sh.h"
+#include "splat/render/covariance.h"
+#include "splat/render/opacity.h"
+#include "splat/render/sh.h"
 #include "stress/measures.h"
 #include "stress/tape_numbers.h"
 

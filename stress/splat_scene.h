@@ -7,8 +7,8 @@
 
 #include "core/camera.h"
 #include "splat/gaussians.h"
-#include "splat/reference.h"
-#include "splat/render.h"
+#include "splat/reference/reference.h"
+#include "splat/render/render.h"
 
 namespace hsi4d::stress {
 

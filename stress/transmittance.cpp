@@ -6,7 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "splat/debug_pixel.h"
+#include "splat/reference/debug_pixel.h"
 #include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
 #include "stress/measures.h"

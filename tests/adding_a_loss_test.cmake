@@ -90,7 +90,7 @@ file(WRITE ${source}/optim/losses/list.h "${list_after}")
 file(WRITE ${source}/mine.json "${config}")
 
 run("Configuring" ${CMAKE_COMMAND} -S ${source} -B ${build} -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER}
-    -DCMAKE_BUILD_TYPE=Release -DHSI4D_WARNINGS_AS_ERRORS=ON -DHSI4D_BUILD_BENCHMARKS=OFF)
+    -DCMAKE_BUILD_TYPE=Release -DHSI4D_WARNINGS_AS_ERRORS=ON)
 run("Building the program with the new term" ${CMAKE_COMMAND} --build ${build} --parallel 2 --target hsi4d)
 set(program ${build}/bin/hsi4d)
 run("hsi4d list losses" ${program} list losses)

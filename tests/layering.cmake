@@ -1,35 +1,72 @@
-# The rule of the layers, read from the #include lines: core ← autodiff ← {splat | body} ← optim ← stress ← pipelines.
+# The rule of the layers and of the rooms in them, read from the #include lines. A room may include what it stands on, and
+# what that stands on; CMakeLists.txt has the same table for the linker.
 
-# What each layer may include.
-set(layers core autodiff splat body optim stress pipelines)
-set(may_include_core core)
-set(may_include_autodiff core autodiff)
-set(may_include_splat core autodiff splat)
-set(may_include_body core autodiff body)
-set(may_include_optim core autodiff splat body optim)
-set(may_include_stress core autodiff splat body optim stress)
-set(may_include_pipelines core autodiff splat body optim stress pipelines)
+# ROOM: what it stands on. A file belongs to the innermost room whose folder it is in.
+set(stands_on
+    "core:" "autodiff: core"
+    "splat: autodiff" "splat/files: splat" "splat/render: splat" "splat/reference: splat/render"
+    "body: autodiff"
+    "optim: splat/files splat/reference body" "optim/solid: splat/files splat/reference body"
+    "optim/losses: optim optim/solid"
+    "pipelines/config: optim/losses" "pipelines/input: pipelines/config" "pipelines/draw: pipelines/input"
+    "pipelines/metrics: pipelines/input" "pipelines/record: pipelines/metrics" "pipelines/graph: pipelines/draw"
+    "pipelines/sources: pipelines/draw" "pipelines/avatar: pipelines/draw" "pipelines/synthetic: pipelines/draw"
+    "pipelines/report: pipelines/draw pipelines/record" "pipelines/evaluate: pipelines/record"
+    "pipelines/run: pipelines/graph pipelines/sources pipelines/report" "pipelines/chain: pipelines/run"
+    "pipelines/sweep: pipelines/chain pipelines/synthetic" "pipelines/study: pipelines/sweep pipelines/evaluate"
+    "pipelines/cli: pipelines/study pipelines/avatar"
+    "bench: pipelines/cli" "stress: pipelines/cli")
+
+set(rooms "")
+set(layers "")
+foreach(row ${stands_on})
+  string(REGEX MATCH "^([^:]+):(.*)$" row "${row}")
+  set(room ${CMAKE_MATCH_1})
+  string(REGEX MATCHALL "[^ ]+" below "${CMAKE_MATCH_2}")
+  set(may_include_${room} "")
+  foreach(lower ${below})
+    list(APPEND may_include_${room} ${may_include_${lower}})
+  endforeach()
+  list(APPEND may_include_${room} ${room})
+  list(REMOVE_DUPLICATES may_include_${room})
+  list(APPEND rooms ${room})
+  string(REGEX MATCH "^[^/]+" layer ${room})
+  list(APPEND layers ${layer})
+endforeach()
+list(REMOVE_DUPLICATES layers)
+
+# room_of(OUT path): the room of a file, or nothing.
+function(room_of out path)
+  cmake_path(GET path PARENT_PATH folder)
+  while(folder AND NOT folder IN_LIST rooms)
+    cmake_path(GET folder PARENT_PATH folder)
+  endwhile()
+  set(${out} "${folder}" PARENT_SCOPE)
+endfunction()
 
 # Libraries that take seconds to compile: in source files only.
 set(not_in_headers "^(nlohmann|CLI)/")
 
 # explain_include(OUT root file written): why `#include written` ("…" or <…>) is not allowed in root/file, or nothing.
 function(explain_include out root file written)
-  string(REGEX MATCH "^[^/]+" layer ${file})
+  room_of(room ${file})
   string(REGEX REPLACE "[<>\"]" "" path ${written})
-  string(REGEX MATCH "^[^/]+" target ${path})
+  string(REGEX MATCH "^[^/]+" layer ${path})
+  room_of(target ${path})
   set(reason "")
   if(file MATCHES "\\.h$" AND path MATCHES ${not_in_headers})
     set(reason "is slow to compile and belongs in source files only")
   elseif(written MATCHES "^<")
-    if(path MATCHES "/" AND target IN_LIST layers AND EXISTS ${root}/${path})
+    if(path MATCHES "/" AND layer IN_LIST layers AND EXISTS ${root}/${path})
       set(reason "is a file of this project: write it in quotes")
     endif()
   elseif(NOT EXISTS ${root}/${path} OR NOT path MATCHES "/" OR path MATCHES "(^|/)\\.\\.?/")
     set(reason "is not a path from the top of the source tree")
-  elseif(NOT target IN_LIST may_include_${layer})
-    string(REPLACE ";" ", " allowed "${may_include_${layer}}")
-    set(reason "is not allowed: ${layer} may include ${allowed}")
+  elseif(NOT room)
+    set(reason "is included in a file that is in no room")
+  elseif(NOT target OR NOT target IN_LIST may_include_${room})
+    string(REPLACE ";" ", " allowed "${may_include_${room}}")
+    set(reason "is not allowed: ${room} may include ${allowed}")
   endif()
   set(${out} "${reason}" PARENT_SCOPE)
 endfunction()

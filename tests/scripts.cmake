@@ -63,10 +63,10 @@ find_program(HSI4D_NODE node)
 if(HSI4D_SANITIZE)  # the pages are the same, and the program takes longer to make one
 elseif(HSI4D_NODE)
   add_test(NAME "the report in a browser"
-           COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/report_browser_test.mjs $<TARGET_FILE:hsi4d>
+           COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/report/browser_test.mjs $<TARGET_FILE:hsi4d>
                    ${PROJECT_SOURCE_DIR}/build/report_browser/node_modules)
   add_test(NAME "a study in a browser"
-           COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/study_browser_test.mjs $<TARGET_FILE:hsi4d>
+           COMMAND ${HSI4D_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/pipelines/study/browser_test.mjs $<TARGET_FILE:hsi4d>
                    ${PROJECT_SOURCE_DIR}/build/report_browser/node_modules)
   set_tests_properties("the report in a browser" "a study in a browser"
                        PROPERTIES LABELS quick SKIP_RETURN_CODE 77 TIMEOUT 600)

@@ -6,7 +6,7 @@ namespace hsi4d {
 
 namespace {
 
-constexpr double kWeight = 0.01;  // from 0.001 to 1 as good (docs/numerics/body.md)
+constexpr double kLimitWeight = 0.01;  // from 0.001 to 1 as good (docs/numerics/body.md)
 
 }  // namespace
 
@@ -16,7 +16,7 @@ LossTerm joint_limits_loss() {
         if (!in.given(in.body_rotations)) return decltype(in.body_rotations){};
         return joint_limit_energy(in.body_rotations);
       });
-  term.description.weight = kWeight;
+  term.description.weight = kLimitWeight;
   term.description.needs = LossNeeds::kBody;
   return term;
 }

@@ -1,7 +1,7 @@
 // L = mean over the points and frames that move of max(0, margin − d(x))², m²: the body stays out of what is solid.
-// d is the signed distance of a mesh (optim/mesh_distance.h) or of what the scene's Gaussians show
-// (optim/gaussian_surface.h), negative in the solid, by a grid that is sampled where the points come
-// (optim/distance_grid.h). The points are Gaussians of the human, the same of every frame, evenly chosen.
+// d is the signed distance of a mesh (optim/solid/mesh_distance.h) or of what the scene's Gaussians show
+// (optim/solid/gaussian_surface.h), negative in the solid, by a grid that is sampled where the points come
+// (optim/solid/distance_grid.h). The points are Gaussians of the human, the same of every frame, evenly chosen.
 //
 // Free space is where the clip's first camera is, and where the body's joints are in its first frame: from there the
 // scene's Gaussians are told front from back.   [beyond the paper, whose stage 3 has no such term; method.md, §8]
@@ -12,10 +12,10 @@
 
 #include "autodiff/elementwise.h"
 #include "autodiff/map.h"
-#include "optim/distance_grid.h"
-#include "optim/gaussian_surface.h"
 #include "optim/losses/list.h"
-#include "optim/mesh_distance.h"
+#include "optim/solid/distance_grid.h"
+#include "optim/solid/gaussian_surface.h"
+#include "optim/solid/mesh_distance.h"
 
 namespace hsi4d {
 

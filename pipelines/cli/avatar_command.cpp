@@ -10,14 +10,14 @@
 #include "core/check.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "pipelines/avatar_import.h"
-#include "pipelines/body_files.h"
-#include "pipelines/body_settings.h"
+#include "pipelines/avatar/import.h"
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/posed_avatar.h"
-#include "splat/info.h"
+#include "pipelines/config/body_settings.h"
+#include "pipelines/draw/posed_avatar.h"
+#include "pipelines/input/body_files.h"
+#include "splat/files/info.h"
 
 namespace hsi4d::cli {
 namespace {

@@ -2,7 +2,7 @@
 
 #include "core/check.h"
 #include "core/parallel.h"
-#include "pipelines/avatar_fit.h"
+#include "pipelines/avatar/fit.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/terminal.h"
@@ -15,7 +15,7 @@ namespace {
 constexpr const char* kOut = "hsi4d avatar fit: --out";
 
 /// Throws UserError when the avatar would replace something that is read, or cannot be written.
-void check_out(const std::string& out, const AvatarFitSettings& settings, const ViewSet& set) {
+void check_fitted_out(const std::string& out, const AvatarFitSettings& settings, const ViewSet& set) {
   std::vector<std::string> inputs = {settings.file.string(), settings.avatar.string(), settings.body.path.string()};
   for (const std::filesystem::path& file : set.files()) inputs.push_back(file.string());
   check_no_input(out, kOut, inputs);
@@ -36,7 +36,7 @@ std::string avatar_fit_command(const std::filesystem::path& config, const std::v
   check_ending(out.string(), kOut, {".safetensors"});
   const AvatarFitSettings settings = load_avatar_fit(config, overrides, descriptions_of(terms));
   const ViewSet set = read_view_set(settings.views);
-  check_out(out.string(), settings, set);
+  check_fitted_out(out.string(), settings, set);
   const InterruptWatch watch;
   AvatarFitResult result;
   with_threads(settings.threads > 0 ? settings.threads : thread_count(),

@@ -2,7 +2,8 @@
 #include <CLI/CLI.hpp>
 
 #include "pipelines/cli/command_line.h"
-#include "pipelines/study_key.h"
+#include "pipelines/cli/options.h"
+#include "pipelines/study/key.h"
 
 namespace hsi4d::cli {
 

@@ -3,6 +3,7 @@
 
 #include "core/text.h"
 #include "pipelines/cli/command_line.h"
+#include "pipelines/cli/options.h"
 
 namespace hsi4d::cli {
 

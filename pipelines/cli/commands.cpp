@@ -6,30 +6,30 @@
 #include "core/check.h"
 #include "core/config_file.h"
 #include "core/suggest.h"
-#include "pipelines/avatar_fit.h"
+#include "pipelines/avatar/fit.h"
 #include "pipelines/cli/instances.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/config_kind.h"
-#include "pipelines/frame_graph.h"
-#include "pipelines/run_config.h"
-#include "pipelines/run_problems.h"
-#include "pipelines/sequence_graph.h"
-#include "pipelines/sweep_plan.h"
-#include "pipelines/synthetic_motion.h"
-#include "pipelines/synthetic_places.h"
+#include "pipelines/config/config_kind.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/config/run_problems.h"
+#include "pipelines/config/synthetic_places.h"
+#include "pipelines/graph/frame_graph.h"
+#include "pipelines/graph/sequence_graph.h"
+#include "pipelines/sweep/plan.h"
+#include "pipelines/synthetic/motion.h"
 
 namespace hsi4d::cli {
 namespace {
 
 template <class T>
-std::string names_of(const ConfigMap<T>& map) {
+std::string names_of_choices(const ConfigMap<T>& map) {
   std::vector<std::string> names;
   for (const auto& [name, value] : map) names.push_back(name);
   return names.empty() ? "" : " (" + joined(names) + ")";
 }
 
 /// Loss terms by name, with what is off.
-std::string names_of(const ConfigMap<LossSettings>& losses) {
+std::string names_of_choices(const ConfigMap<LossSettings>& losses) {
   std::vector<std::string> names;
   for (const auto& [name, loss] : losses) names.push_back(name + (loss.weight == 0 ? " off by weight 0" : ""));
   return names.empty() ? "" : " (" + joined(names) + ")";
@@ -37,8 +37,8 @@ std::string names_of(const ConfigMap<LossSettings>& losses) {
 
 std::string stage_summary(const std::string& name, const StageSettings& stage) {
   return "  stage " + name + ": " + count_text(stage.iterations, "iteration") + ", " +
-         count_text(std::ssize(stage.optimize), "parameter group") + names_of(stage.optimize) + ", " +
-         count_text(std::ssize(stage.losses), "loss") + names_of(stage.losses) + "\n";
+         count_text(std::ssize(stage.optimize), "parameter group") + names_of_choices(stage.optimize) + ", " +
+         count_text(std::ssize(stage.losses), "loss") + names_of_choices(stage.losses) + "\n";
 }
 
 std::string summary(const std::filesystem::path& file, const RunConfig& config) {

@@ -8,33 +8,34 @@
 #include "core/rotation.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
-#include "splat/quantised.h"
-#include "splat/splat_file.h"
-#include "splat/transform.h"
+#include "splat/files/quantised.h"
+#include "splat/files/splat_file.h"
+#include "splat/files/transform.h"
 
 namespace hsi4d::cli {
 namespace {
 
-const std::string kCommand = "hsi4d convert: ";
+const std::string kConvertCommand = "hsi4d convert: ";
 
 Vector3<double> parse_vector(const std::string& text, const std::string& option) {
   if (text.empty()) return Vector3<double>::Zero();
-  const std::vector<double> numbers = parse_numbers(text, 3, kCommand + option, "x,y,z");
+  const std::vector<double> numbers = parse_numbers(text, 3, kConvertCommand + option, "x,y,z");
   return {numbers[0], numbers[1], numbers[2]};
 }
 
 Similarity similarity_of(const ConvertOptions& o) {
   if (!o.matrix.empty()) {
     if (o.scale != 1 || !o.rotate.empty() || !o.translate.empty())
-      throw UserError(kCommand + "--matrix says everything; leave out --scale, --rotate and --translate");
+      throw UserError(kConvertCommand + "--matrix says everything; leave out --scale, --rotate and --translate");
     const std::vector<double> numbers =
-        parse_numbers(o.matrix, 16, kCommand + "--matrix", "of a 4x4 matrix, row by row");
+        parse_numbers(o.matrix, 16, kConvertCommand + "--matrix", "of a 4x4 matrix, row by row");
     Matrix4<double> matrix;
     for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = numbers[static_cast<std::size_t>(i)];
-    return similarity_from_matrix(matrix, kCommand + "--matrix");
+    return similarity_from_matrix(matrix, kConvertCommand + "--matrix");
   }
   if (!(o.scale > 0) || !std::isfinite(o.scale))
-    throw UserError(kCommand + "--scale: " + short_number(o.scale) + " is no scale; allowed: a finite number above 0");
+    throw UserError(kConvertCommand + "--scale: " + short_number(o.scale) +
+                    " is no scale; allowed: a finite number above 0");
   const Vector3<double> degrees = parse_vector(o.rotate, "--rotate");
   return {o.scale, so3_exp(Vector3<double>(degrees * (std::numbers::pi / 180))),
           parse_vector(o.translate, "--translate")};
@@ -44,15 +45,16 @@ Similarity similarity_of(const ConvertOptions& o) {
 std::vector<Index> kept_rows(const Gaussians& g, const ConvertOptions& o) {
   Vector3<double> lower = Vector3<double>::Constant(-INFINITY), upper = Vector3<double>::Constant(INFINITY);
   if (!o.crop.empty()) {
-    const std::vector<double> box = parse_numbers(o.crop, 6, kCommand + "--crop", "x0,y0,z0,x1,y1,z1");
+    const std::vector<double> box = parse_numbers(o.crop, 6, kConvertCommand + "--crop", "x0,y0,z0,x1,y1,z1");
     lower = {box[0], box[1], box[2]};
     upper = {box[3], box[4], box[5]};
     if ((upper.array() < lower.array()).any())
-      throw UserError(kCommand + "--crop: \"" + o.crop +
+      throw UserError(kConvertCommand + "--crop: \"" + o.crop +
                       "\" ends before it begins; allowed: the least x, y, z, then the greatest");
   }
   if (!(o.min_opacity >= 0 && o.min_opacity <= 1))
-    throw UserError(kCommand + "--min-opacity: " + short_number(o.min_opacity) + " is no opacity; allowed: 0 to 1");
+    throw UserError(kConvertCommand + "--min-opacity: " + short_number(o.min_opacity) +
+                    " is no opacity; allowed: 0 to 1");
   std::vector<Index> rows;
   for (Index n = 0; n < g.count(); ++n) {
     const Vector3<double> mean = mean_world(g, n);
@@ -66,17 +68,18 @@ std::vector<Index> kept_rows(const Gaussians& g, const ConvertOptions& o) {
 SplatWriteOptions write_options(const ConvertOptions& o) {
   SplatWriteOptions options;
   if (file_ending(o.out) != ".spz" && (o.spz_version || !o.spz_sh_bits.empty()))
-    throw UserError(kCommand + (o.spz_version ? "--spz-version" : "--spz-sh-bits") +
+    throw UserError(kConvertCommand + (o.spz_version ? "--spz-version" : "--spz-sh-bits") +
                     " says how .spz files are written; " + o.out + " is none");
   options.spz.version = o.spz_version.value_or(options.spz.version);
   if (options.spz.version < 2 || options.spz.version > 4)
-    throw UserError(kCommand + "--spz-version: " + std::to_string(options.spz.version) +
+    throw UserError(kConvertCommand + "--spz-version: " + std::to_string(options.spz.version) +
                     " is not written; allowed: 2, 3, 4");
   if (o.spz_sh_bits.empty()) return options;
-  const std::vector<double> bits = parse_numbers(o.spz_sh_bits, 2, kCommand + "--spz-sh-bits", "A,B, from 1 to 8");
+  const std::vector<double> bits =
+      parse_numbers(o.spz_sh_bits, 2, kConvertCommand + "--spz-sh-bits", "A,B, from 1 to 8");
   for (const double count : bits) {
     if (!(count >= 1 && count <= 8) || count != std::floor(count))
-      throw UserError(kCommand + "--spz-sh-bits: \"" + o.spz_sh_bits +
+      throw UserError(kConvertCommand + "--spz-sh-bits: \"" + o.spz_sh_bits +
                       "\" are no numbers of bits; allowed: two whole numbers from 1 to 8, for example 5,4");
   }
   options.spz.sh1_bits = static_cast<int>(bits[0]);
@@ -88,12 +91,13 @@ SplatWriteOptions write_options(const ConvertOptions& o) {
 
 std::string convert_command(const ConvertOptions& o) {
   if (o.sh_degree < -1 || o.sh_degree > kHighestShDegree)
-    throw UserError(kCommand + "--sh-degree: " + std::to_string(o.sh_degree) + " is no degree; allowed: 0 to " +
+    throw UserError(kConvertCommand + "--sh-degree: " + std::to_string(o.sh_degree) + " is no degree; allowed: 0 to " +
                     std::to_string(kHighestShDegree));
   const Similarity similarity = similarity_of(o);
-  if (!has_splat_ending(o.out)) check_ending(o.out, kCommand + "OUT", {".ply", ".compressed.ply", ".splat", ".spz"});
+  if (!has_splat_ending(o.out))
+    check_ending(o.out, kConvertCommand + "OUT", {".ply", ".compressed.ply", ".splat", ".spz"});
   const SplatWriteOptions options = write_options(o);
-  check_no_input(o.out, kCommand + "OUT", {o.in});
+  check_no_input(o.out, kConvertCommand + "OUT", {o.in});
   check_writable(o.out);
   const SplatFile file = read_scene(o.in);
   const std::vector<Index> rows = kept_rows(file.gaussians, o);

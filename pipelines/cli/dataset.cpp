@@ -6,7 +6,7 @@
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/terminal.h"
-#include "pipelines/synthetic.h"
+#include "pipelines/synthetic/dataset.h"
 
 namespace hsi4d::cli {
 

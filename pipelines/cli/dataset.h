@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "optim/loss_term.h"
-#include "pipelines/run_config.h"
+#include "pipelines/config/run_config.h"
 
 namespace hsi4d::cli {
 

@@ -8,7 +8,7 @@
 #include "pipelines/cli/demo_configs.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/terminal.h"
-#include "pipelines/run_problems.h"
+#include "pipelines/config/run_problems.h"
 
 namespace hsi4d::cli {
 

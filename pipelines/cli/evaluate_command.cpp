@@ -8,16 +8,16 @@
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/text.h"
-#include "pipelines/baseline_export.h"
 #include "pipelines/cli/evaluate_tables.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/json_text.h"
-#include "pipelines/published.h"
-#include "pipelines/run_folder.h"
-#include "pipelines/synthetic.h"
+#include "pipelines/evaluate/baseline_export.h"
+#include "pipelines/record/folder.h"
+#include "pipelines/record/published.h"
+#include "pipelines/synthetic/dataset.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -81,13 +81,13 @@ std::vector<Spread> spreads_of(const std::vector<Evaluation>& results) {
   return spreads;
 }
 
-void add_numbers(ConfigValue& object, const MetricValues& values) {
+void add_metrics(ConfigValue& object, const MetricValues& values) {
   for (const auto& [name, value] : values) object.add(name, ConfigValue::make_number(value));
 }
 
 ConfigValue object_of(const MetricValues& values) {
   ConfigValue object = ConfigValue::make_object();
-  add_numbers(object, values);
+  add_metrics(object, values);
   return object;
 }
 
@@ -99,12 +99,12 @@ ConfigValue json_of(const Evaluation& result) {
   object.add("clip", ConfigValue::make_string(result.has_objects ? "dynamic" : "static"));
   object.add("frames", ConfigValue::make_integer(result.frames));
   object.add("frame_rate", ConfigValue::make_number(result.frame_rate));
-  add_numbers(object, result.values);
+  add_metrics(object, result.values);
   ConfigValue frames = ConfigValue::make_array();
   for (const FrameMetrics& frame : result.per_frame) {
     ConfigValue values = ConfigValue::make_object();
     values.add("frame", ConfigValue::make_integer(frame.frame));
-    add_numbers(values, frame.values);
+    add_metrics(values, frame.values);
     frames.items.push_back(std::move(values));
   }
   object.add("per_frame", std::move(frames));

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pipelines/evaluation.h"
+#include "pipelines/evaluate/evaluation.h"
 
 namespace hsi4d::cli {
 

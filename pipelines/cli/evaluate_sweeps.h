@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/config_value.h"
-#include "pipelines/evaluation.h"
-#include "pipelines/sweep_results.h"
-#include "pipelines/sweep_selection.h"
+#include "pipelines/evaluate/evaluation.h"
+#include "pipelines/sweep/results.h"
+#include "pipelines/sweep/selection.h"
 
 namespace hsi4d::cli {
 

@@ -7,7 +7,7 @@
 #include "core/text.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/published.h"
+#include "pipelines/record/published.h"
 
 namespace hsi4d::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include <new>
 
 #include "core/check.h"
-#include "pipelines/observer.h"
+#include "core/observer.h"
 
 namespace hsi4d::cli {
 

@@ -4,7 +4,7 @@
 #include <exception>
 #include <string>
 
-#include "pipelines/exit_status.h"
+#include "core/exit_status.h"
 
 namespace hsi4d::cli {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "optim/loss_term.h"
-#include "pipelines/stage_check.h"
+#include "pipelines/run/stage_check.h"
 
 namespace hsi4d::cli {
 

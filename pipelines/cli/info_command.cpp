@@ -13,8 +13,8 @@
 #include "core/safetensors.h"
 #include "core/suggest.h"
 #include "pipelines/cli/text.h"
-#include "splat/info.h"
-#include "splat/splat_file.h"
+#include "splat/files/info.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d::cli {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "splat/info.h"
+#include "splat/files/info.h"
 
 namespace hsi4d::cli {
 

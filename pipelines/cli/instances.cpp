@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "pipelines/run_config.h"
+#include "pipelines/config/run_config.h"
 
 namespace hsi4d::cli {
 

@@ -8,9 +8,9 @@
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "core/log.h"
-#include "pipelines/body_files.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
+#include "pipelines/input/body_files.h"
 
 namespace hsi4d::cli {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipelines/scene_render.h"
+#include "pipelines/draw/image_of_scene.h"
 
 namespace hsi4d::cli {
 

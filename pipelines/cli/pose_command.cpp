@@ -5,9 +5,9 @@
 #include "core/log.h"
 #include "core/npz.h"
 #include "core/suggest.h"
-#include "pipelines/body_files.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
+#include "pipelines/input/body_files.h"
 
 namespace hsi4d::cli {
 namespace {

@@ -1,80 +1,15 @@
 #include "pipelines/cli/program.h"
 
-#include <csignal>
-#include <cstdio>
-
-#include <CLI/CLI.hpp>
-
-#include "core/check.h"
-#include "core/log.h"
-#include "core/simd.h"
 #include "pipelines/cli/command_line.h"
-#include "pipelines/cli/command_words.h"
-#include "pipelines/cli/failure.h"
+#include "pipelines/cli/other_programs.h"
 
 namespace hsi4d::cli {
-namespace {
-
-void print(const std::string& text) {
-  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
-  if (!written) throw UserError("hsi4d: standard output cannot be written to");
-}
-
-int complain(const Failure& failure) {
-  std::fprintf(stderr, "%s\n", failure.message.c_str());
-  return failure.status;
-}
-
-/// What a command knows, and its commands.
-CommandWords words_of(const CLI::App& command) {
-  CommandWords words{command.get_name(), {}, {}};
-  for (const CLI::App* part : command.get_subcommands([](const CLI::App*) { return true; }))
-    words.commands.push_back(words_of(*part));
-  for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& name : option->get_lnames()) words.options.push_back("--" + name);
-  }
-  return words;
-}
-
-int run_commands(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
-  CommandLine line(losses);
-  check_words(argc, argv, words_of(*line.app));
-  try {
-    line.app->parse(argc, argv);
-  } catch (const CLI::CallForHelp&) {
-    line.describe_for_help();
-    print(line.app->help());  // of the subcommand, if one was named
-    return kDone;
-  } catch (const CLI::CallForVersion& version_text) {
-    print(std::string(version_text.what()) + "\n");
-    return kDone;
-  } catch (const CLI::ParseError& mistake) {
-    std::string command = "hsi4d";
-    for (auto chosen = line.app->get_subcommands(); !chosen.empty(); chosen = chosen.front()->get_subcommands())
-      command += " " + chosen.front()->get_name();
-    throw UserError(command + ": " + mistake.what() + "; `" + command + " --help` explains its arguments");
-  }
-  print(line.run());
-  return line.status;
-}
-
-}  // namespace
 
 int run_program(int argc, const char* const* argv, const std::vector<LossTerm>& losses) {
-  try {
-    const LogSink to_stderr = log_to(
-        [](LogLevel level, std::string_view message) {
-          std::fprintf(stderr, "hsi4d: %s%.*s\n",
-                       level == LogLevel::kInfo ? "" : (std::string(log_level_name(level)) + ": ").c_str(),
-                       static_cast<int>(message.size()), message.data());
-        },
-        LogLevel::kInfo);
-    std::signal(SIGCHLD, SIG_DFL);  // whoever has started us may have it ignored: no program's end would be told us
-    best_isa();                     // before any kernel runs
-    return run_commands(argc, argv, losses);
-  } catch (...) {
-    return complain(describe_failure(std::current_exception()));
-  }
+  return run_commands(argc, argv, [&]() -> std::unique_ptr<ProgramCommands> {
+    if (is_other_program(argc, argv)) become_other_program(argv);
+    return std::make_unique<CommandLine>(losses);
+  });
 }
 
 }  // namespace hsi4d::cli

@@ -5,17 +5,17 @@
 #include "core/check.h"
 #include "core/image_io.h"
 #include "core/rotation.h"
-#include "pipelines/body_files.h"
 #include "pipelines/cli/pixel_table.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/posed_avatar.h"
-#include "pipelines/state.h"
-#include "splat/transform.h"
+#include "pipelines/draw/posed_avatar.h"
+#include "pipelines/input/body_files.h"
+#include "pipelines/input/state.h"
+#include "splat/files/transform.h"
 
 namespace hsi4d::cli {
 namespace {
 
-void check_options(const RenderOptions& options) {
+void check_render_options(const RenderOptions& options) {
   check_ending(options.out, "hsi4d render: --out", {".png", ".exr", ".npz"});
   if (options.motion.empty() != options.avatar.empty())
     throw UserError(std::string("hsi4d render: ") + (options.motion.empty() ? "--avatar" : "--motion") +
@@ -130,7 +130,7 @@ void write_picture(const std::string& path, const SceneImage& rendered) {
 }  // namespace
 
 std::string render_command(const RenderOptions& options) {
-  check_options(options);
+  check_render_options(options);
   const SceneView view = view_of(options.shared, "hsi4d render");
   std::vector<PixelPlace> pixels;
   for (const std::string& pixel : options.pixels)

@@ -3,13 +3,13 @@
 #include <optional>
 
 #include "core/file.h"
-#include "pipelines/chain_report.h"
+#include "pipelines/chain/report.h"
 #include "pipelines/cli/sweep_text.h"
-#include "pipelines/gradient_table.h"
-#include "pipelines/report_data.h"
-#include "pipelines/report_page.h"
-#include "pipelines/run_folder.h"
-#include "pipelines/sweep_selection.h"
+#include "pipelines/record/folder.h"
+#include "pipelines/record/gradient_table.h"
+#include "pipelines/report/data.h"
+#include "pipelines/report/page.h"
+#include "pipelines/sweep/selection.h"
 
 namespace hsi4d::cli {
 

@@ -6,15 +6,15 @@
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "core/text.h"
-#include "pipelines/chain.h"
+#include "pipelines/chain/chain.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/clip.h"
-#include "pipelines/gradient_table.h"
-#include "pipelines/run_problems.h"
-#include "pipelines/sources.h"
-#include "pipelines/visibility.h"
+#include "pipelines/config/run_problems.h"
+#include "pipelines/draw/visibility.h"
+#include "pipelines/input/clip.h"
+#include "pipelines/record/gradient_table.h"
+#include "pipelines/sources/sources.h"
 
 namespace hsi4d::cli {
 

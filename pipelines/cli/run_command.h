@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "optim/loss_term.h"
-#include "pipelines/chain_summary.h"
-#include "pipelines/run.h"
+#include "pipelines/chain/summary.h"
+#include "pipelines/run/run.h"
 
 namespace hsi4d::cli {
 

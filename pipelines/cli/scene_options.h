@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/npz.h"
-#include "pipelines/scene_render.h"
-#include "splat/splat_file.h"
+#include "pipelines/draw/image_of_scene.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d::cli {
 

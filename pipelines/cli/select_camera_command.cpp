@@ -7,12 +7,12 @@
 #include "core/image_io.h"
 #include "core/parallel.h"
 #include "core/text.h"
-#include "pipelines/camera_selection.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/run_config.h"
-#include "pipelines/run_summary.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/draw/camera_selection.h"
+#include "pipelines/record/summary.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kMostTold = 5;
 
 /// What is missing, all at once.
-void check_inputs(const DataSettings& data) {
+void check_camera_inputs(const DataSettings& data) {
   std::vector<std::string> missing;
   for (const auto& [path, key] :
        {std::pair{&data.scene, "/data/scene"}, {&data.avatar, "/data/avatar"}, {&data.initial, "/data/initial"}}) {
@@ -54,7 +54,7 @@ void write_view(const std::string& file, const SceneSetup& setup, const Camera& 
 
 std::string select_camera_command(const SelectCameraOptions& options, const std::vector<LossDescription>& losses) {
   const RunConfig config = load_run_config(options.config, options.overrides, losses);
-  check_inputs(config.data);
+  check_camera_inputs(config.data);
   const InterruptWatch watch;
   CameraChoice choice;
   with_threads(config.threads > 0 ? config.threads : thread_count(), [&] {

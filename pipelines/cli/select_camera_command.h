@@ -18,9 +18,9 @@ struct SelectCameraOptions {
   bool quiet = false;
 };
 
-/// Chooses the camera of frame 0 (pipelines/camera_selection.h), and returns the best candidates as a table. The config
-/// needs data.scene, avatar, initial and the objects; of data.camera, where it is given, size and focal lengths are
-/// taken. Throws UserError and DataError for its inputs, Interrupted.
+/// Chooses the camera of frame 0 (pipelines/draw/camera_selection.h), and returns the best candidates as a table. The
+/// config needs data.scene, avatar, initial and the objects; of data.camera, where it is given, size and focal lengths
+/// are taken. Throws UserError and DataError for its inputs, Interrupted.
 std::string select_camera_command(const SelectCameraOptions& options, const std::vector<LossDescription>& losses);
 
 }  // namespace hsi4d::cli

@@ -9,9 +9,9 @@
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/run_summary.h"
-#include "pipelines/study.h"
-#include "pipelines/study_results.h"
+#include "pipelines/record/summary.h"
+#include "pipelines/study/results.h"
+#include "pipelines/study/study.h"
 
 namespace hsi4d::cli {
 
@@ -19,12 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kCommand = "hsi4d study: ";
+const std::string kStudyCommand = "hsi4d study: ";
 
 /// Throws where an option that belongs to the other of the two uses is given.
 void check_absent(const std::vector<std::pair<std::string, bool>>& options, const std::string& without) {
   for (const auto& [name, is_given] : options) {
-    if (is_given) throw UserError(kCommand + name + " " + without);
+    if (is_given) throw UserError(kStudyCommand + name + " " + without);
   }
 }
 
@@ -37,9 +37,9 @@ std::string notes_text(const std::vector<std::string>& notes) {
 std::string make_page(const StudyOptions& o) {
   check_absent({{"--key", !o.key.empty()}, {"--csv", !o.csv.empty()}, {"--json", !o.json.empty()}}, "is for --answers");
   if (o.runs.size() != 2)
-    throw UserError(kCommand + "compares two runs, or two folders of runs: A and B (" + std::to_string(o.runs.size()) +
-                    " given); --answers tells what people chose");
-  if (o.out.empty()) throw UserError(kCommand + "--out says where the page goes: a new or empty folder");
+    throw UserError(kStudyCommand + "compares two runs, or two folders of runs: A and B (" +
+                    std::to_string(o.runs.size()) + " given); --answers tells what people chose");
+  if (o.out.empty()) throw UserError(kStudyCommand + "--out says where the page goes: a new or empty folder");
   const InterruptWatch watch;
   const Study study =
       make_study({o.runs[0], o.runs[1], o.out, o.texts, o.pairs.value_or(kPairsPerPerson), o.seed, o.embed},
@@ -50,10 +50,10 @@ std::string make_page(const StudyOptions& o) {
          ": the key, which tells A from B: keep it, do not hand it out\n" + notes_text(study.notes);
 }
 
-std::string percent(double share) { return fixed_number(100 * share, 1); }
+std::string percent_text(double share) { return fixed_number(100 * share, 1); }
 
 std::string interval_text(const ShareInterval& interval) {
-  return percent(interval.low) + " to " + percent(interval.high);
+  return percent_text(interval.low) + " to " + percent_text(interval.high);
 }
 
 std::string shares_table(const std::vector<StudyShare>& shares) {
@@ -61,26 +61,26 @@ std::string shares_table(const std::vector<StudyShare>& shares) {
                                                  "95 % over persons", "Student's t", "chose left [%]"}};
   for (const StudyShare& share : shares) {
     rows.push_back({std::string(kStudyQuestions[share.question].id), std::to_string(share.persons),
-                    std::to_string(share.all.answers), percent(share.all.share()), interval_text(share.wilson),
+                    std::to_string(share.all.answers), percent_text(share.all.share()), interval_text(share.wilson),
                     share.bootstrap ? interval_text(*share.bootstrap) : "-",
                     share.student ? interval_text(*share.student) : "-",
-                    percent(static_cast<double>(share.prefer_left) / static_cast<double>(share.all.answers))});
+                    percent_text(static_cast<double>(share.prefer_left) / static_cast<double>(share.all.answers))});
   }
   return table(rows);
 }
 
 /// The files that are written are none of those that are read, nor the same.
-void check_outputs(const StudyOptions& o) {
+void check_study_outputs(const StudyOptions& o) {
   std::vector<std::string> inputs = study_answer_files(o.answers, nullptr);
   inputs.push_back(o.key);
   for (const auto& [name, file] : {std::pair{"--csv", o.csv}, {"--json", o.json}}) {
     if (file.empty()) continue;
-    check_no_input(file, kCommand + name, inputs);
+    check_no_input(file, kStudyCommand + name, inputs);
     check_writable(file);
   }
   const auto place = [](const std::string& file) { return fs::weakly_canonical(fs::absolute(file)); };
   if (!o.csv.empty() && !o.json.empty() && place(o.csv) == place(o.json))
-    throw UserError(kCommand + "--csv and --json are the same file, " + o.json);
+    throw UserError(kStudyCommand + "--csv and --json are the same file, " + o.json);
 }
 
 std::string tell_results(const StudyOptions& o) {
@@ -91,16 +91,16 @@ std::string tell_results(const StudyOptions& o) {
                 {"--seed", o.seed.has_value()}},
                "is for making a study, not for --answers");
   if (!o.runs.empty())
-    throw UserError(kCommand + "--answers are read without A and B, which the key knows; found " + o.runs.front());
+    throw UserError(kStudyCommand + "--answers are read without A and B, which the key knows; found " + o.runs.front());
   if (o.key.empty())
-    throw UserError(kCommand +
+    throw UserError(kStudyCommand +
                     "--key says which video is whose: the file that was made beside the study's folder, "
                     "DIR-key.json");
-  check_outputs(o);
+  check_study_outputs(o);
   const StudyKey key = read_study_key(o.key);
   const StudyAnswers answers = read_study_answers(o.answers, key);
   const std::vector<StudyShare> shares = study_shares(answers);
-  if (shares.empty()) throw UserError(kCommand + "the files hold no answer");
+  if (shares.empty()) throw UserError(kStudyCommand + "the files hold no answer");
   if (!o.csv.empty()) write_text_file(o.csv, study_answers_csv(key, answers));
   if (!o.json.empty()) write_text_file(o.json, study_results_json(key, answers, shares));
   return shares_table(shares) + "\nA: " + key.a + "\nB: " + key.b + "\n" +

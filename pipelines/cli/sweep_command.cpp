@@ -23,9 +23,9 @@
 #include "pipelines/cli/sweep_text.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
-#include "pipelines/sweep_local.h"
-#include "pipelines/sweep_run.h"
-#include "pipelines/sweep_slurm.h"
+#include "pipelines/sweep/local.h"
+#include "pipelines/sweep/run.h"
+#include "pipelines/sweep/slurm.h"
 
 namespace hsi4d::cli {
 

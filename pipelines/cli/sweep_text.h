@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "pipelines/sweep_report.h"
-#include "pipelines/sweep_tables.h"
+#include "pipelines/sweep/report.h"
+#include "pipelines/sweep/tables.h"
 
 namespace hsi4d::cli {
 

@@ -3,9 +3,9 @@
 #include "core/parallel.h"
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/terminal.h"
-#include "pipelines/run_config.h"
-#include "pipelines/synthetic.h"
-#include "pipelines/synthetic_views.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/synthetic/dataset.h"
+#include "pipelines/synthetic/views.h"
 
 namespace hsi4d::cli {
 

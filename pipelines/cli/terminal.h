@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "pipelines/observer.h"
+#include "core/observer.h"
 
 namespace hsi4d::cli {
 

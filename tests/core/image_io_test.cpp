@@ -133,7 +133,7 @@ TEST_CASE("image files are written and read back by path") {
   }
   CHECK(folder.count() == 2);
   // A format that only OpenImageIO knows: a Netpbm file written by hand.
-  write_text_file(folder / "b.ppm", std::string("P6\n2 1\n255\n") + "\x01\x02\x03\xff\x80\x40");
+  write_text_file(folder / "b.ppm", "P6\n2 1\n255\n\x01\x02\x03\xff\x80\x40");
   const Image ppm = read_image(folder / "b.ppm");
   REQUIRE(ppm.channels() == 3);
   CHECK(ppm(0, 0, 1) == 1);

@@ -1,9 +1,9 @@
 // What is read of a chain of clips: its summary, of which a report is made, and the result of a clip.
 #include "core/camera_file.h"
 #include "core/npz.h"
-#include "pipelines/chain_report.h"
-#include "pipelines/chain_results.h"
-#include "pipelines/chain_summary.h"
+#include "pipelines/chain/report.h"
+#include "pipelines/chain/results.h"
+#include "pipelines/chain/summary.h"
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 

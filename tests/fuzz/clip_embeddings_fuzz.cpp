@@ -3,7 +3,7 @@
 
 #include "core/check.h"
 #include "core/npz.h"
-#include "pipelines/clip_embeddings.h"
+#include "pipelines/metrics/clip_embeddings.h"
 #include "tests/fuzz/archive_list.h"
 
 namespace hsi4d::fuzz {

@@ -1,8 +1,8 @@
 // Compressed PLY files of Gaussians, binary and ascii. What is taken is whole (check_scene).
 #include <string_view>
 
-#include "splat/io_compressed_ply.h"
-#include "splat/io_ply.h"
+#include "splat/files/io_compressed_ply.h"
+#include "splat/files/io_ply.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/splat_scene.h"
 

@@ -5,10 +5,10 @@
 
 #include "core/config_file.h"
 #include "optim/loss_term.h"
-#include "pipelines/avatar_fit.h"
-#include "pipelines/config_kind.h"
-#include "pipelines/run_config.h"
-#include "pipelines/run_problems.h"
+#include "pipelines/avatar/fit.h"
+#include "pipelines/config/config_kind.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/config/run_problems.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace hsi4d::fuzz {

@@ -133,10 +133,11 @@ void mutate_once(Bytes& file, const std::vector<Bytes>& files, Random& random) {
   }
 }
 
-int run_all(int64_t mutations, uint64_t seed, bool trace) {
+/// @param reader  whose regressions are run
+int run_all(const std::string& reader, int64_t mutations, uint64_t seed, bool trace) {
   const std::vector<Bytes> files = corpus();
   Driver driver(trace);
-  run_regressions(driver, HSI4D_FUZZ_REGRESSIONS);
+  run_regressions(driver, std::filesystem::path(HSI4D_FUZZ_REGRESSIONS) / reader);
   for (size_t i = 0; i < files.size(); ++i) {
     if (driver.run(files[i])) continue;
     std::printf("corpus file %zu is refused\n", i);
@@ -190,5 +191,7 @@ int main(int argc, char** argv) {
   if (argc > 2 && std::string_view(argv[1]) == "try") return hsi4d::fuzz::run_files(argc - 2, argv + 2);
   const int64_t mutations = hsi4d::fuzz::number_or<int64_t>(argc, argv, 1, 2000);
   const uint64_t seed = hsi4d::fuzz::number_or<uint64_t>(argc, argv, 2, 1);
-  return hsi4d::fuzz::run_all(mutations, seed, argc > 3 && std::string_view(argv[3]) == "trace");
+  const std::string program = std::filesystem::path(argv[0]).filename().string();  // hsi4d_fuzz_READER
+  const std::string reader = program.substr(std::string_view("hsi4d_fuzz_").size());
+  return hsi4d::fuzz::run_all(reader, mutations, seed, argc > 3 && std::string_view(argv[3]) == "trace");
 }

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "optim/mesh_distance.h"
+#include "optim/solid/mesh_distance.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace hsi4d::fuzz {

@@ -1,6 +1,6 @@
 // Poses of objects in a motion's file: by name as ours, or of one object as CHOIS and OMOMO have them.
 #include "core/npz.h"
-#include "pipelines/foreign_motion.h"
+#include "pipelines/evaluate/foreign_motion.h"
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 

@@ -3,7 +3,7 @@
 
 #include "core/check.h"
 #include "core/npz.h"
-#include "optim/occupancy_grid.h"
+#include "optim/solid/occupancy_grid.h"
 #include "tests/fuzz/archive_list.h"
 
 namespace hsi4d::fuzz {

@@ -2,7 +2,7 @@
 #include <string>
 #include <string_view>
 
-#include "splat/io_ply.h"
+#include "splat/files/io_ply.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/splat_scene.h"
 

@@ -1,7 +1,7 @@
 // Checkpoints of a run, of a clip of three frames and two objects.
 #include "body/body_model.h"
 #include "optim/checkpoint.h"
-#include "pipelines/run_state.h"
+#include "pipelines/run/checkpoint.h"
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 

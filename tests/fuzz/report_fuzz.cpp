@@ -1,9 +1,9 @@
 // What a report reads of a run folder: one file of it is tried, the others are good.
 #include "core/image_io.h"
 #include "core/safetensors.h"
-#include "pipelines/gradient_table.h"
-#include "pipelines/report_data.h"
-#include "pipelines/report_page.h"
+#include "pipelines/record/gradient_table.h"
+#include "pipelines/report/data.h"
+#include "pipelines/report/page.h"
 #include "tests/fuzz/scratch.h"
 
 namespace hsi4d::fuzz {

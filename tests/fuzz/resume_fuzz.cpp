@@ -1,5 +1,5 @@
 // What a run that goes on finds in its folder: one of config, status and metrics is tried, the others are good.
-#include "pipelines/run_folder.h"
+#include "pipelines/record/folder.h"
 #include "tests/fuzz/scratch.h"
 
 namespace hsi4d::fuzz {

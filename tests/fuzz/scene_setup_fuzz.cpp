@@ -3,9 +3,9 @@
 #include "core/config_file.h"
 #include "core/image_io.h"
 #include "core/npz.h"
-#include "pipelines/scene_setup.h"
-#include "pipelines/view_set.h"
-#include "splat/splat_file.h"
+#include "pipelines/input/scene_setup.h"
+#include "pipelines/input/view_set.h"
+#include "splat/files/splat_file.h"
 #include "tests/fuzz/scratch.h"
 #include "tests/fuzz/splat_scene.h"
 

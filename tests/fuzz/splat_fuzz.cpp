@@ -1,6 +1,6 @@
 // Files of Gaussians told by content and ending, here .splat: any bytes. What is taken is whole (check_scene).
-#include "splat/io_splat.h"
-#include "splat/splat_file.h"
+#include "splat/files/io_splat.h"
+#include "splat/files/splat_file.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/splat_scene.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/check.h"
-#include "splat/splat_report.h"
+#include "splat/files/splat_report.h"
 
 namespace hsi4d::fuzz {
 

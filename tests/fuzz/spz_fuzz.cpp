@@ -1,7 +1,7 @@
 // Files of Gaussians in .spz: the three ways in which they are packed. The first byte says which: mutations of a gzip
 // stream seldom get past its checksum, so what is inside is tried without it too. What is taken is whole (check_scene).
 #include "core/compression.h"
-#include "splat/io_spz.h"
+#include "splat/files/io_spz.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/splat_scene.h"
 

@@ -1,8 +1,8 @@
 // A study's key and two persons' answers: one file of the three is tried, the others are good.
 #include <cmath>
 
-#include "pipelines/json_text.h"
-#include "pipelines/study_results.h"
+#include "core/json_text.h"
+#include "pipelines/study/results.h"
 #include "tests/fuzz/scratch.h"
 
 namespace hsi4d::fuzz {

@@ -1,7 +1,7 @@
 // Any bytes as a sweep's file. What is taken has blocks that begin with a config which is there, axes whose points have
 // a setting for each of their keys, and no more runs than a sweep may have.
 #include "core/config_file.h"
-#include "pipelines/sweep_file.h"
+#include "pipelines/sweep/file.h"
 #include "tests/fuzz/scratch.h"
 
 namespace hsi4d::fuzz {

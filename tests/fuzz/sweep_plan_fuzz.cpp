@@ -1,6 +1,6 @@
 // Any bytes as the plan of a sweep's folder. What is taken is written and read back to the same text.
 #include "core/check.h"
-#include "pipelines/sweep_plan.h"
+#include "pipelines/sweep/plan.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace hsi4d::fuzz {

@@ -1,7 +1,7 @@
 // Motions with objects and cameras, to be compared: one file of such a folder is tried, the others are good.
 #include "body/procedural_body.h"
 #include "core/npz.h"
-#include "pipelines/tracks.h"
+#include "pipelines/evaluate/tracks.h"
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 

@@ -9,7 +9,7 @@
 
 #include "core/buffer.h"
 #include "core/random.h"
-#include "splat/block_kernel.h"
+#include "splat/render/block_kernel.h"
 
 using namespace hsi4d;
 using namespace hsi4d::detail;

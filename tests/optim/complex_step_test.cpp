@@ -5,8 +5,8 @@
 
 #include "autodiff/matrix.h"
 #include "core/rotation.h"
-#include "optim/distance_grid.h"
-#include "optim/gaussian_surface.h"
+#include "optim/solid/distance_grid.h"
+#include "optim/solid/gaussian_surface.h"
 #include "tests/support/complex_formulas.h"
 #include "tests/support/complex_step_check.h"
 #include "tests/support/loss_terms.h"

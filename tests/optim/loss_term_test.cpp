@@ -6,7 +6,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
 #include "core/rotation.h"
-#include "tests/optim/surface_of_test.h"
+#include "tests/optim/solid/surface_of_test.h"
 #include "tests/support/loss_terms.h"
 #include "tests/support/operator_check.h"
 #include "tests/support/test_motion.h"

@@ -14,16 +14,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// kName of every operator that the sources define; what a benchmark defines for itself (bench_*.cpp) no tape of a run
-/// has.
+/// kName of every operator that the sources define.
 stress::OperatorNames operators_of_sources() {
   stress::OperatorNames names;
   const std::regex name("kName = \"([a-z0-9_]+)\"");
   for (const char* layer : {"core", "autodiff", "splat", "body", "optim", "pipelines"}) {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(fs::path(HSI4D_SOURCE_DIR) / layer)) {
       const fs::path& path = entry.path();
-      if ((path.extension() != ".h" && path.extension() != ".cpp") || path.filename().string().starts_with("bench_"))
-        continue;
+      if ((path.extension() != ".h" && path.extension() != ".cpp")) continue;
       const std::string text = read_text_file(path);
       for (std::sregex_iterator at(text.begin(), text.end(), name), end; at != end; ++at) names.insert((*at)[1]);
     }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/random.h"
-#include "splat/composite.h"
+#include "splat/render/composite.h"
 #include "tests/support/taped_splats.h"
 
 namespace hsi4d::test {

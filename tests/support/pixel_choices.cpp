@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "splat/pixel_walk.h"
+#include "splat/reference/pixel_walk.h"
 
 namespace hsi4d::test {
 

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "splat/composite.h"
+#include "splat/render/composite.h"
 
 namespace hsi4d::test {
 

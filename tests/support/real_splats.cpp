@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "splat/io_ply.h"
+#include "splat/files/io_ply.h"
 
 namespace hsi4d::test {
 

@@ -7,7 +7,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "splat/reference.h"
+#include "splat/reference/reference.h"
 #include "tests/support/larger.h"
 #include "tests/support/splat_scenes.h"
 

@@ -9,7 +9,7 @@
 
 #include "core/camera.h"
 #include "splat/gaussians.h"
-#include "splat/reference.h"
+#include "splat/reference/reference.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d::test {

@@ -10,10 +10,10 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
 #include "body/skinning.h"
-#include "splat/covariance.h"
-#include "splat/opacity.h"
-#include "splat/render.h"
-#include "splat/sh.h"
+#include "splat/render/covariance.h"
+#include "splat/render/opacity.h"
+#include "splat/render/render.h"
+#include "splat/render/sh.h"
 #include "tests/support/splat_scenes.h"
 
 namespace hsi4d::test {

@@ -5,7 +5,7 @@
 
 #include "core/random.h"
 #include "optim/motion_start.h"
-#include "tests/optim/surface_of_test.h"
+#include "tests/optim/solid/surface_of_test.h"
 
 namespace hsi4d::test {
 

@@ -5,8 +5,8 @@
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "core/file.h"
-#include "pipelines/posed_avatar.h"
-#include "splat/io_ply.h"
+#include "pipelines/draw/posed_avatar.h"
+#include "splat/files/io_ply.h"
 #include "tests/support/program.h"
 
 using namespace hsi4d;

@@ -9,8 +9,8 @@
 #include "core/image_io.h"
 #include "optim/loss_term.h"
 #include "pipelines/cli/avatar_command.h"
-#include "pipelines/synthetic_views.h"
-#include "pipelines/view_set.h"
+#include "pipelines/input/view_set.h"
+#include "pipelines/synthetic/views.h"
 #include "tests/support/program.h"
 
 using namespace hsi4d;

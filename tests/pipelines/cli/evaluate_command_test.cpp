@@ -8,11 +8,11 @@
 #include "body/motion_io.h"
 #include "core/npz.h"
 #include "core/rotation.h"
-#include "tests/optim/meshes.h"
-#include "tests/pipelines/tiny_run.h"
-#include "tests/pipelines/tiny_sweep.h"
+#include "tests/optim/solid/meshes.h"
 #include "tests/support/procedural_file.h"
 #include "tests/support/program.h"
+#include "tests/support/tiny_run.h"
+#include "tests/support/tiny_sweep.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;

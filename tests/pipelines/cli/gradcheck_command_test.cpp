@@ -7,8 +7,8 @@
 
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
-#include "tests/pipelines/tiny_run.h"
 #include "tests/support/program.h"
+#include "tests/support/tiny_run.h"
 
 using namespace hsi4d;
 using namespace hsi4d::test;

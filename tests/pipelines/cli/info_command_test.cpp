@@ -12,7 +12,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/npz.h"
-#include "splat/io_ply.h"
+#include "splat/files/io_ply.h"
 #include "tests/support/program.h"
 
 using namespace hsi4d;

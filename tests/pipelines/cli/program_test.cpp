@@ -10,7 +10,7 @@
 #include "optim/loss_term.h"
 #include "pipelines/cli/commands.h"
 #include "pipelines/cli/instances.h"
-#include "pipelines/run_config.h"
+#include "pipelines/config/run_config.h"
 #include "tests/support/program.h"
 #include "tests/support/test_losses.h"
 

@@ -7,8 +7,8 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/rotation.h"
-#include "pipelines/state.h"
-#include "splat/transform.h"
+#include "pipelines/input/state.h"
+#include "splat/files/transform.h"
 #include "tests/pipelines/cli/render_files.h"
 
 using namespace hsi4d;

@@ -15,7 +15,7 @@
 #include "core/npz.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/render_command.h"
-#include "splat/io_ply.h"
+#include "splat/files/io_ply.h"
 #include "tests/support/temporary_folder.h"
 
 namespace hsi4d::test {

@@ -6,7 +6,7 @@
 #include "core/check.h"
 #include "core/config_file.h"
 #include "optim/loss_term.h"
-#include "pipelines/run_config.h"
+#include "pipelines/config/run_config.h"
 #include "tests/support/temporary_folder.h"
 
 using namespace hsi4d;

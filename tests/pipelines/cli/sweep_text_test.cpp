@@ -6,8 +6,8 @@
 #include <catch2/catch.hpp>
 
 #include "core/text.h"
-#include "pipelines/sweep_tables.h"
-#include "tests/pipelines/made_sweep.h"
+#include "pipelines/sweep/tables.h"
+#include "tests/support/made_sweep.h"
 #include "tests/support/program.h"
 #include "tests/support/terminal_program.h"
 

@@ -1,0 +1,317 @@
+#include "bench/stages.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "bench/machine.h"
+#include "core/formatted.h"
+#include "core/simd.h"
+#include "pipelines/report/plots.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// A part of an iteration, for tables and plots: an operator, or what is in none.
+struct CostPart {
+  std::string name;
+  double forward_ms = 0, backward_ms = 0;  ///< an iteration
+  Index forward_runs = 0, forward_skips = 0, backward_runs = 0;
+
+  double ms() const { return forward_ms + backward_ms; }
+};
+
+double per_iteration(double seconds, const StageCost& cost) {
+  return cost.sum.iterations > 0 ? 1e3 * seconds / static_cast<double>(cost.sum.iterations) : 0;
+}
+
+double per_iteration(Index count, const StageCost& cost) {
+  return cost.sum.iterations > 0 ? static_cast<double>(count) / static_cast<double>(cost.sum.iterations) : 0;
+}
+
+/// Millions of fragments a second of whole iterations, by the median.
+double mfragments_per_s(const StageCost& cost) {
+  const double ms = cost.median_ms();
+  return ms > 0 ? per_iteration(cost.sum.counters.fragments, cost) / ms / 1e3 : 0;
+}
+
+void add_operators(const std::vector<OperatorProfile>& more, std::vector<OperatorProfile>& operators) {
+  for (const OperatorProfile& o : more) {
+    const auto is_it = [&o](const OperatorProfile& known) { return known.name == o.name; };
+    const auto place = std::find_if(operators.begin(), operators.end(), is_it);
+    if (place == operators.end()) {
+      operators.push_back(o);
+      continue;
+    }
+    place->nodes = std::max(place->nodes, o.nodes);
+    place->forward_runs += o.forward_runs;
+    place->forward_skips += o.forward_skips;
+    place->backward_runs += o.backward_runs;
+    place->forward_seconds += o.forward_seconds;
+    place->backward_seconds += o.backward_seconds;
+  }
+}
+
+/// Operators, the largest first; then the tape's own time and the steps.
+std::vector<CostPart> parts_of(const StageCost& cost) {
+  std::vector<CostPart> parts;
+  double forward = 0, backward = 0;
+  for (const OperatorProfile& o : cost.sum.operators) {
+    parts.push_back({o.name, per_iteration(o.forward_seconds, cost), per_iteration(o.backward_seconds, cost),
+                     o.forward_runs, o.forward_skips, o.backward_runs});
+    forward += o.forward_seconds;
+    backward += o.backward_seconds;
+  }
+  std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
+  const StageTimes& times = cost.sum.times;
+  parts.push_back({"the tape itself", per_iteration(times.forward - forward, cost),
+                   per_iteration(times.backward - backward, cost), 0, 0, 0});
+  parts.push_back({"checks and steps", 0, per_iteration(times.step, cost), 0, 0, 0});
+  return parts;
+}
+
+double allocations_each(const StageCost& cost) {
+  return static_cast<double>(cost.sum.allocations) / static_cast<double>(cost.sum.counted);
+}
+
+std::string stage_line(const StageCost& cost) {
+  const RenderCounters& c = cost.sum.counters;
+  const double all = static_cast<double>(cost.sum.tiles_of_image);
+  std::string text =
+      formatted("%-16s %9lld %8.2f %8.2f %8.1f", cost.stage.c_str(), static_cast<long long>(cost.sum.iterations),
+                cost.ms_each(), cost.median_ms(), cost.sum.seconds);
+  text += all > 0 ? formatted(" %6.0f of %-6.0f %9.0f %11.0f", per_iteration(c.tiles, cost), all,
+                              per_iteration(c.pairs, cost), per_iteration(c.fragments, cost))
+                  : formatted(" %16s %9s %11s", "-", "-", "-");
+  text += cost.sum.counted > 0 ? formatted(" %8.2f", allocations_each(cost)) : formatted(" %8s", "-");
+  return text + formatted(" %7.1f\n", 1e-6 * static_cast<double>(cost.sum.tape_bytes));
+}
+
+std::string part_lines(const StageCost& cost) {
+  std::string text;
+  const double whole = per_iteration(cost.sum.times.forward + cost.sum.times.backward + cost.sum.times.step, cost);
+  for (const CostPart& part : parts_of(cost)) {
+    if (!(part.ms() > 0)) continue;
+    text += formatted("  %-26s %8.3f %8.3f %6.1f %%\n", part.name.c_str(), part.forward_ms, part.backward_ms,
+                      100 * part.ms() / whole);
+  }
+  return text;
+}
+
+/// Steps of the operator `composite`, by name; ms an iteration.
+std::vector<std::pair<std::string, double>> composite_steps(const StageCost& cost) {
+  const RenderTimes& t = cost.sum.counters.times;
+  std::vector<std::pair<std::string, double>> steps;
+  for (const auto& [name, seconds] : {std::pair{"still", t.still_s},
+                                      {"records", t.records_s},
+                                      {"sort", t.sort_s},
+                                      {"bin", t.bin_s},
+                                      {"forward", t.forward_s},
+                                      {"backward", t.backward_s},
+                                      {"reduce", t.reduce_s}})
+    steps.emplace_back(name, per_iteration(seconds, cost));
+  return steps;
+}
+
+std::string composite_line(const StageCost& cost) {
+  if (cost.sum.tiles_of_image == 0) return "";
+  std::string text = "  of composite:";
+  for (const auto& [name, ms] : composite_steps(cost)) text += formatted(" %s %.2f", name.c_str(), ms);
+  return text + "\n";
+}
+
+}  // namespace
+
+double StageCost::ms_each() const { return per_iteration(sum.iteration_seconds, *this); }
+
+double StageCost::ms_each_of(double iterations) const {
+  const double runs = static_cast<double>(ms_an_iteration.size()), rest = static_cast<double>(sum.iterations) - runs;
+  if (!(runs > 0)) return 0;
+  const double first = sum.first_seconds / runs;
+  const double later = rest > 0 ? (sum.iteration_seconds - sum.first_seconds) / rest : first;
+  return 1e3 * (first + (iterations - 1) * later) / iterations;
+}
+
+double StageCost::median_ms() const {
+  if (ms_an_iteration.empty()) return 0;
+  std::vector<double> sorted = ms_an_iteration;
+  std::sort(sorted.begin(), sorted.end());
+  return sorted[sorted.size() / 2];
+}
+
+double StageCost::min_ms() const {
+  return ms_an_iteration.empty() ? 0 : *std::min_element(ms_an_iteration.begin(), ms_an_iteration.end());
+}
+
+void add_profile(const StageProfile& profile, std::vector<StageCost>& stages) {
+  const auto is_it = [&profile](const StageCost& known) { return known.stage == profile.stage; };
+  auto place = std::find_if(stages.begin(), stages.end(), is_it);
+  if (place == stages.end()) {
+    stages.push_back({});
+    place = stages.end() - 1;
+    place->stage = place->sum.stage = profile.stage;
+  }
+  StageProfile& sum = place->sum;
+  place->frames += profile.frame ? 1 : 0;
+  if (profile.iterations > 0)
+    place->ms_an_iteration.push_back(1e3 * profile.iteration_seconds / static_cast<double>(profile.iterations));
+  sum.iterations += profile.iterations;
+  sum.seconds += profile.seconds;
+  sum.iteration_seconds += profile.iteration_seconds;
+  sum.first_seconds += profile.first_seconds;
+  sum.times.forward += profile.times.forward;
+  sum.times.backward += profile.times.backward;
+  sum.times.step += profile.times.step;
+  sum.counters += profile.counters;
+  sum.tape += profile.tape;
+  sum.allocations += profile.allocations;
+  sum.counted += profile.counted;
+  sum.pixels_of_image = profile.pixels_of_image;
+  sum.tiles_of_image = profile.tiles_of_image;
+  sum.nodes = std::max(sum.nodes, profile.nodes);
+  sum.tape_bytes = std::max(sum.tape_bytes, profile.tape_bytes);
+  add_operators(profile.operators, sum.operators);
+}
+
+double optimisation_seconds(const RunCost& cost) {
+  double seconds = 0;
+  for (const StageCost& stage : cost.stages) seconds += stage.sum.iteration_seconds;
+  return seconds;
+}
+
+std::string cost_table(const RunCost& cost) {
+  std::string text = formatted("%-16s %9s %8s %8s %8s %16s %9s %11s %8s %7s\n", "stage", "iterat.", "ms each", "median",
+                               "all, s", "tiles", "pairs", "fragments", "allocat.", "tape MB");
+  for (const StageCost& stage : cost.stages) text += stage_line(stage);
+  for (const StageCost& stage : cost.stages) {
+    text += formatted("\n%-28s %8s %8s\n", (stage.stage + ", ms an iteration").c_str(), "forward", "back") +
+            part_lines(stage) + composite_line(stage);
+  }
+  return text + formatted("\noptimisation %.1f s of %.1f s on %d threads (%s), at most %.0f MB\n",
+                          optimisation_seconds(cost), cost.seconds, cost.threads, isa_name(best_isa()),
+                          1e-6 * static_cast<double>(cost.peak_memory_bytes));
+}
+
+std::string cost_json(const RunCost& cost) {
+  std::string text;
+  for (const StageCost& stage : cost.stages) {
+    const StageProfile& sum = stage.sum;
+    nlohmann::ordered_json entry = {{"name", "stages/" + stage.stage},
+                                    {"stage", stage.stage},
+                                    {"threads", cost.threads},
+                                    {"ms", stage.ms_each()},
+                                    {"median_ms", stage.median_ms()},
+                                    {"min_ms", stage.min_ms()},
+                                    {"repeats", stage.ms_an_iteration.size()},
+                                    {"frames", stage.frames},
+                                    {"iterations", sum.iterations},
+                                    {"seconds", sum.seconds},
+                                    {"nodes", sum.nodes},
+                                    {"forward_nodes", per_iteration(sum.tape.forward_nodes, stage)},
+                                    {"backward_nodes", per_iteration(sum.tape.backward_nodes, stage)},
+                                    {"adjoint_numbers", per_iteration(sum.tape.adjoint_numbers, stage)},
+                                    {"tape_bytes", sum.tape_bytes}};
+    if (sum.tiles_of_image > 0)
+      entry.update({{"pixels", sum.pixels_of_image},
+                    {"tiles_of_image", sum.tiles_of_image},
+                    {"gaussians", per_iteration(sum.counters.gaussians, stage)},
+                    {"tiles", per_iteration(sum.counters.tiles, stage)},
+                    {"pairs", per_iteration(sum.counters.pairs, stage)},
+                    {"fragments", per_iteration(sum.counters.fragments, stage)},
+                    {"mfragments_per_s", mfragments_per_s(stage)},
+                    {"adjoint_tiles", per_iteration(sum.counters.adjoint_tiles, stage)},
+                    {"layers", per_iteration(sum.counters.layers, stage)},
+                    {"told_squares", per_iteration(sum.counters.told_squares, stage)},
+                    {"composite_ms", composite_steps(stage)}});
+    if (sum.counted > 0) entry["allocations"] = allocations_each(stage);
+    text += bench_line(entry.dump());
+    for (const CostPart& part : parts_of(stage)) {
+      const nlohmann::ordered_json of_part = {{"stage", stage.stage},
+                                              {"operator", part.name},
+                                              {"forward_ms", part.forward_ms},
+                                              {"backward_ms", part.backward_ms},
+                                              {"forward_runs", part.forward_runs},
+                                              {"forward_skips", part.forward_skips},
+                                              {"backward_runs", part.backward_runs}};
+      text += of_part.dump() + "\n";
+    }
+  }
+  return text + bench_line(nlohmann::ordered_json{{"name", "stages"},
+                                                  {"threads", cost.threads},
+                                                  {"optimisation_s", optimisation_seconds(cost)},
+                                                  {"seconds", cost.seconds},
+                                                  {"peak_memory_bytes", cost.peak_memory_bytes}}
+                               .dump());
+}
+
+namespace {
+
+constexpr double kLeft = 130, kWidth = 740, kBar = 26, kRow = 20;  // of the picture, its units
+
+/// The operators that get a colour, the costliest of all stages first.
+std::vector<std::string> costliest_parts(const RunCost& cost) {
+  constexpr std::size_t kColors = 8;
+  std::vector<CostPart> all;
+  for (const StageCost& stage : cost.stages) {
+    const std::vector<CostPart> parts = parts_of(stage);
+    all.insert(all.end(), parts.begin(), parts.end());
+  }
+  std::stable_sort(all.begin(), all.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
+  std::vector<std::string> names;
+  for (const CostPart& part : all) {
+    if (names.size() < kColors && std::find(names.begin(), names.end(), part.name) == names.end())
+      names.push_back(part.name);
+  }
+  return names;
+}
+
+std::string color_of(const std::string& name, const std::vector<std::string>& costliest) {
+  const auto place = std::find(costliest.begin(), costliest.end(), name);
+  return place == costliest.end() ? "#b5b5b5" : part_color(static_cast<std::size_t>(place - costliest.begin()));
+}
+
+/// The bar of a stage and the legend below it.
+/// @param y  its top; afterwards that of the next
+std::string stage_bar(const StageCost& stage, double scale, const std::vector<std::string>& costliest, double& y) {
+  const double whole = stage.ms_each();
+  std::vector<CostPart> parts = parts_of(stage);
+  std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
+  std::string body = formatted("<text x=\"12\" y=\"%.0f\">%s</text>\n", y + 17, html_escape(stage.stage).c_str());
+  double x = kLeft, at = kLeft, row = y + kBar + 14;
+  for (const CostPart& part : parts) {
+    const std::string color = color_of(part.name, costliest), name = html_escape(part.name);
+    body += formatted("<rect x=\"%.1f\" y=\"%.0f\" width=\"%.1f\" height=\"%.0f\" fill=\"%s\">", x, y,
+                      part.ms() * scale, kBar, color.c_str()) +
+            formatted("<title>%s: %.2f ms</title></rect>\n", name.c_str(), part.ms());
+    x += part.ms() * scale;
+    if (part.ms() < 0.02 * whole) continue;
+    const double length = 30 + 6.8 * static_cast<double>(part.name.size() + 5);
+    if (at + length > kLeft + kWidth) at = kLeft, row += kRow;
+    body +=
+        formatted("<rect x=\"%.1f\" y=\"%.0f\" width=\"10\" height=\"10\" fill=\"%s\"/>", at, row - 9, color.c_str()) +
+        formatted("<text x=\"%.1f\" y=\"%.0f\">%s %.2f</text>\n", at + 14, row, name.c_str(), part.ms());
+    at += length;
+  }
+  body += formatted("<text x=\"%.1f\" y=\"%.0f\">%.2f ms</text>\n", x + 6, y + 17, whole);
+  y = row + 30;
+  return body;
+}
+
+}  // namespace
+
+std::string cost_svg(const RunCost& cost, const std::string& title) {
+  double longest = 0;
+  for (const StageCost& stage : cost.stages) longest = std::max(longest, stage.ms_each());
+  const std::vector<std::string> costliest = costliest_parts(cost);
+  std::string body = formatted("<text x=\"12\" y=\"26\" font-size=\"16\">%s</text>\n", html_escape(title).c_str());
+  double y = 44;
+  for (const StageCost& stage : cost.stages) body += stage_bar(stage, longest > 0 ? kWidth / longest : 0, costliest, y);
+  return formatted("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 980 %.0f\" font-family=\"sans-serif\" ",
+                   y) +
+         formatted("font-size=\"12\" fill=\"#222\">\n<rect width=\"980\" height=\"%.0f\" fill=\"#fff\"/>\n", y) + body +
+         "</svg>\n";
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,245 @@
+#include "pipelines/chain/chain.h"
+
+#include <exception>
+
+#include "body/motion_edit.h"
+#include "core/check.h"
+#include "core/config_value.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/version.h"
+#include "pipelines/chain/report.h"
+#include "pipelines/chain/results.h"
+#include "pipelines/config/run_problems.h"
+#include "pipelines/draw/visibility.h"
+#include "pipelines/input/body_files.h"
+#include "pipelines/report/report.h"
+#include "pipelines/run/frame_start.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// "clip 2 of 3, b".
+std::string clip_in_words(const RunConfig& chain, std::size_t index) {
+  return "clip " + std::to_string(index + 1) + " of " + std::to_string(chain.chain.size()) + ", " +
+         chain.chain[index].name;
+}
+
+/// The scene that a clip begins in. One without a state of its own is read with the first clip's, and no estimates.
+SceneSetup setup_of(const RunConfig& chain, const DataSettings& data) {
+  if (!data.initial.empty()) return read_scene_setup(data);
+  DataSettings with_state = data;
+  with_state.initial = chain.chain.front().data.initial;
+  SceneSetup setup = read_scene_setup(with_state);
+  setup.motion.poses.resize(1);
+  setup.object_tracks.clear();
+  return setup;
+}
+
+ClipFacts check_clip(const RunConfig& chain, std::size_t index) {
+  const DataSettings& data = chain.chain[index].data;
+  SceneSetup setup = setup_of(chain, data);
+  ClipFacts facts;
+  facts.name = chain.chain[index].name;
+  facts.motion = setup.motion;
+  facts.object_tracks = setup.object_tracks;
+  Clip clip = make_clip(data, std::move(setup));
+  set_image_size(clip, chain);
+  check_start(chain.start, clip);
+  if (index == 0) check_first_view(clip, data.camera.string());
+  check_frames(data, clip, losses_over_masks(chain));
+  facts.frames = clip.frames();
+  facts.frame_rate = clip.frame_rate;
+  facts.avatar = clip.avatar;
+  if (clip.truth) facts.true_first = clip.truth->front();
+  return facts;
+}
+
+/// The human's joints and the frame rate are those of the first clip.
+void check_alike(const std::vector<ClipFacts>& clips, const RunConfig& config) {
+  const ClipFacts& first = clips.front();
+  for (std::size_t i = 1; i < clips.size(); ++i) {
+    const std::string place = "/chain/" + std::to_string(i) + "/data/";
+    if (clips[i].avatar.joints != first.avatar.joints)
+      throw UserError(place + "avatar: " + config.chain[i].data.avatar.string() +
+                      ": the human's joints are not those of " + config.chain[0].data.avatar.string() +
+                      "; the clips of a chain have one body");
+    if (clips[i].frame_rate != first.frame_rate)
+      throw UserError(place + "frame_rate: the clip \"" + clips[i].name + "\" has " +
+                      to_json_line(ConfigValue::make_number(clips[i].frame_rate)) + " frames a second, \"" +
+                      first.name + "\" has " + to_json_line(ConfigValue::make_number(first.frame_rate)) +
+                      "; the clips of a chain have one frame rate");
+  }
+}
+
+ConfigValue numbers(const Vector3<double>& v) {
+  return ConfigValue::make_array(
+      {ConfigValue::make_number(v[0]), ConfigValue::make_number(v[1]), ConfigValue::make_number(v[2])});
+}
+
+/// Writes the state that a clip begins with: body and objects as given, its other frames as it has them itself.
+void write_start(const ChainPaths& paths, const ClipFacts& clip, const std::vector<std::string>& objects,
+                 const SceneState& state) {
+  Motion motion = clip.motion;
+  motion.poses.front() = state.body;
+  motion.pelvis_rest = pelvis_of(clip.avatar.joints);
+  ConfigValue root = ConfigValue::make_object(), poses = ConfigValue::make_object();
+  root.add("motion", ConfigValue::make_string(clip.name + ".npz"));
+  for (std::size_t o = 0; o < objects.size(); ++o) {
+    ConfigValue pose = ConfigValue::make_object();
+    pose.add("rotation", numbers(state.objects[o].rotation));
+    pose.add("translation", numbers(state.objects[o].translation));
+    poses.add(objects[o], std::move(pose));
+  }
+  root.add("objects", std::move(poses));
+  if (!clip.object_tracks.empty())
+    root.add("object_tracks", ConfigValue::make_string(fs::absolute(clip.object_tracks).string()));
+  fs::create_directories(fs::path(paths.start(clip.name)).parent_path());
+  write_motion(paths.start_motion(clip.name), motion);
+  write_text_file(paths.start(clip.name), to_json(root));
+}
+
+/// The config of a clip, which begins with the state that the one before left.
+RunConfig started_config(const RunConfig& chain, std::size_t index, const ChainPaths& paths) {
+  RunConfig clip = clip_config(chain, index);
+  if (index > 0) clip.data.initial = fs::absolute(paths.start(chain.chain[index].name));
+  return clip;
+}
+
+/// Whether a clip is done, with the inputs that it has now.
+/// Throws DataError naming an input that has changed since.
+bool is_done(const RunConfig& clip, const std::string& folder, const std::vector<LossTerm>& losses) {
+  if (look_at_run_folder(folder, resolved_config(clip, descriptions_of(losses)), true) != RunState::kDone) return false;
+  RunConfig prepared = clip;
+  prepare_run(prepared);
+  const Clip inputs = read_run_clip(prepared, losses);
+  return finished_frames(folder, prepared, inputs, losses) + 1 == inputs.frames();  // not without a checkpoint
+}
+
+/// Calls `work`; what it throws of the clip begins with the clip's number and name.
+template <class F>
+auto with_clip_named(const RunConfig& chain, std::size_t index, const F& work) {
+  try {
+    return work();
+  } catch (const Interrupted& stop) {
+    throw Interrupted(clip_in_words(chain, index) + ": " + stop.what());
+  } catch (const UserError& mistake) {
+    throw UserError(clip_in_words(chain, index) + ": " + mistake.what());
+  } catch (const DataError& damage) {
+    throw DataError(clip_in_words(chain, index) + ": " + damage.what());
+  }
+}
+
+/// One after the other, and each from where the one before ended.
+class Chain {
+ public:
+  Chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options,
+        const std::vector<ClipFacts>& clips)
+      : config_(config), losses_(losses), options_(options), clips_(clips), paths_{fs::path(options.folder)} {
+    for (const auto& [name, object] : config.chain.front().data.objects) objects_.push_back(name);
+  }
+
+  ChainSummary run(const RunFolder& folder) {
+    std::vector<ClipResult> results;
+    for (std::size_t i = 0; i < clips_.size(); ++i) {
+      if (i > 0) write_start(paths_, clips_[i], objects_, results.back().states.back());
+      run_clip(i, folder);
+      results.push_back(read_clip_result(clips_[i].name, paths_.clip(clips_[i].name), objects_));
+    }
+    return write_chain_results(folder.paths(), config_, {clips_, results, objects_});
+  }
+
+ private:
+  void run_clip(std::size_t i, const RunFolder& folder) const {
+    const RunConfig clip = started_config(config_, i, paths_);
+    RunOptions options = options_;
+    options.folder = paths_.clip(clips_[i].name);
+    with_clip_named(config_, i, [&] {
+      if (options.resume && is_done(clip, options.folder, losses_)) {
+        if (!fs::exists(RunPaths{options.folder}.report())) write_report(options.folder);  // killed before that
+        return;
+      }
+      folder.note("begins " + clip_in_words(config_, i));
+      carry_out(clip, losses_, options);
+    });
+  }
+
+  const RunConfig& config_;
+  const std::vector<LossTerm>& losses_;
+  const RunOptions& options_;
+  const std::vector<ClipFacts>& clips_;
+  ChainPaths paths_;
+  std::vector<std::string> objects_;
+};
+
+RunIdentity identity_of(const RunConfig& config, const std::vector<LossTerm>& losses, int asked) {
+  RunIdentity identity;
+  identity.config = resolved_config(config, descriptions_of(losses));
+  identity.seed = config.seed;
+  const int threads = asked > 0 ? asked : config.threads;
+  identity.threads = threads > 0 ? threads : thread_count();
+  identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
+  identity.is_chain = true;
+  return identity;
+}
+
+}  // namespace
+
+RunConfig clip_config(const RunConfig& chain, std::size_t index) {
+  RunConfig clip = chain;
+  clip.chain.clear();
+  clip.name = (chain.name.empty() ? "" : chain.name + ": ") + clip_in_words(chain, index);
+  clip.data = chain.chain.at(index).data;
+  return clip;
+}
+
+std::vector<ClipFacts> check_chain(const RunConfig& config) {
+  RunConfig prepared = config;
+  prepare_run(prepared);
+  if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);
+  std::vector<ClipFacts> clips;
+  for (std::size_t i = 0; i < config.chain.size(); ++i) clips.push_back(check_clip(config, i));
+  check_alike(clips, config);
+  return clips;
+}
+
+std::size_t finished_clips(const RunConfig& config, const std::string& folder, const std::vector<LossTerm>& losses) {
+  const ChainPaths paths{fs::path(folder)};
+  std::size_t done = 0;
+  const auto next_is_done = [&] {
+    return with_clip_named(config, done, [&] {
+      const std::string folder_of_clip = paths.clip(config.chain[done].name);
+      return fs::exists(folder_of_clip) && is_done(started_config(config, done, paths), folder_of_clip, losses);
+    });
+  };
+  while (done < config.chain.size() && next_is_done()) ++done;
+  return done;
+}
+
+ChainSummary carry_out_chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
+  const WarningsOnce once;  // inputs are looked at here, and again when their clip begins
+  const std::vector<ClipFacts> clips = check_chain(config);  // before anything is written
+  RunFolder folder(options.folder, identity_of(config, losses, options.threads), options.resume);
+  folder.take_over_config();
+  folder.note("hsi4d " + std::string(version()) + " (" + git_commit() + "), chain '" + config.name + "' of " +
+              std::to_string(clips.size()) + " clips");
+  try {
+    ChainSummary summary = Chain(config, losses, options, clips).run(folder);
+    folder.set_state(RunState::kDone);
+    write_chain_report(options.folder);
+    folder.note("done: " + std::to_string(summary.all.frames) + " frames");
+    return summary;
+  } catch (const Interrupted& stop) {
+    note_end(folder, RunState::kInterrupted, stop.what());
+    throw;
+  } catch (const std::exception& failure) {
+    note_end(folder, RunState::kFailed, failure.what());
+    throw;
+  }
+}
+
+}  // namespace hsi4d

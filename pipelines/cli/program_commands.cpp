@@ -1,0 +1,97 @@
+#include "pipelines/cli/program_commands.h"
+
+#include <csignal>
+#include <cstdio>
+#include <string_view>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "core/check.h"
+#include "core/log.h"
+#include "core/simd.h"
+#include "pipelines/cli/command_words.h"
+
+namespace hsi4d::cli {
+namespace {
+
+void print(const std::string& text) {
+  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  if (!written) throw UserError("hsi4d: standard output cannot be written to");
+}
+
+int complain(const Failure& failure) {
+  std::fprintf(stderr, "%s\n", failure.message.c_str());
+  return failure.status;
+}
+
+/// What a command knows, and its commands.
+CommandWords words_of(const CLI::App& command) {
+  CommandWords words{command.get_name(), {}, {}};
+  for (const CLI::App* part : command.get_subcommands([](const CLI::App*) { return true; }))
+    words.commands.push_back(words_of(*part));
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) words.options.push_back("--" + name);
+  }
+  return words;
+}
+
+int parse_and_run(int argc, const char* const* argv, ProgramCommands& commands) {
+  CLI::App& app = *commands.app;
+  check_words(argc, argv, words_of(app));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    commands.describe_for_help();
+    print(app.help());  // of the subcommand, if one was named
+    return kDone;
+  } catch (const CLI::CallForVersion& version_text) {
+    print(std::string(version_text.what()) + "\n");
+    return kDone;
+  } catch (const CLI::ParseError& mistake) {
+    std::string command = "hsi4d";
+    for (auto chosen = app.get_subcommands(); !chosen.empty(); chosen = chosen.front()->get_subcommands())
+      command += " " + chosen.front()->get_name();
+    throw UserError(command + ": " + mistake.what() + "; `" + command + " --help` explains its arguments");
+  }
+  print(commands.run());
+  return commands.status;
+}
+
+}  // namespace
+
+ProgramCommands::ProgramCommands()
+    : app(std::make_unique<CLI::App>("4D human-scene interaction from video by differentiable Gaussian splatting",
+                                     "hsi4d")) {
+  app->require_subcommand(1);
+  app->failure_message(CLI::FailureMessage::simple);
+}
+
+ProgramCommands::~ProgramCommands() = default;
+
+int run_commands(int argc, const char* const* argv, const MakeCommands& make) {
+  try {
+    const LogSink to_stderr = log_to(
+        [](LogLevel level, std::string_view message) {
+          std::fprintf(stderr, "hsi4d: %s%.*s\n",
+                       level == LogLevel::kInfo ? "" : (std::string(log_level_name(level)) + ": ").c_str(),
+                       static_cast<int>(message.size()), message.data());
+        },
+        LogLevel::kInfo);
+    std::signal(SIGCHLD, SIG_DFL);  // whoever has started us may have it ignored: no program's end would be told us
+    best_isa();                     // before any kernel runs
+    return parse_and_run(argc, argv, *make());
+  } catch (...) {
+    return complain(describe_failure(std::current_exception()));
+  }
+}
+
+int run_command_program(const char* command, int argc, const char* const* argv, const MakeCommands& make) {
+  std::vector<const char*> words = {"hsi4d", command};
+  if (argc > 1) words.insert(words.end(), argv + 1, argv + argc);
+  const int count = static_cast<int>(words.size());
+  words.push_back(nullptr);
+  return run_commands(count, words.data(), make);
+}
+
+}  // namespace hsi4d::cli

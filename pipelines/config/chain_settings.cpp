@@ -1,0 +1,48 @@
+#include "pipelines/config/chain_settings.h"
+
+#include <algorithm>
+#include <array>
+
+namespace hsi4d {
+
+namespace {
+
+/// Inputs that a later clip does not take over.
+constexpr std::array<const char*, 2> kOfOneClip = {"initial", "truth"};
+
+ConfigValue data_of(const ConfigValue& object) {
+  const ConfigValue* const data = find_member(object, "data");
+  return data == nullptr ? ConfigValue::make_object() : *data;
+}
+
+/// The clip's data, laid over those of the config.
+ConfigValue whole_data(const ConfigValue& shared, const ConfigValue& clip, bool is_first) {
+  ConfigValue below = shared;
+  std::erase_if(below.members, [is_first](const ConfigMember& member) {
+    return !is_first && std::find(kOfOneClip.begin(), kOfOneClip.end(), member.key) != kOfOneClip.end();
+  });
+  return merged(std::move(below), data_of(clip));
+}
+
+}  // namespace
+
+void describe(ConfigFields& f, ChainClip& s) {
+  f.string("name", s.name, "What the clip is called; its run folder too").required();
+  f.object("data", s.data, "Its inputs, laid over those of the config");
+}
+
+void lay_over_data(const ConfigValue& tree, std::vector<ChainClip>& chain, ConfigProblems& problems) {
+  const ConfigValue* const clips = find_member(tree, "chain");
+  if (clips == nullptr) return;
+  const ConfigValue shared = data_of(tree);
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    DataSettings data;
+    ConfigFields fields;
+    describe(fields, data);
+    const std::string pointer = child_pointer(child_pointer("/chain", std::to_string(i)), "data");
+    read_config(whole_data(shared, clips->items[i], i == 0), fields, problems, pointer);
+    chain[i].data = std::move(data);
+  }
+}
+
+}  // namespace hsi4d

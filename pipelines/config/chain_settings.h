@@ -1,0 +1,26 @@
+// Config section `chain`: clips that follow one another, each from where the one before ended.   [method.md, §6]
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/config.h"
+#include "pipelines/config/data_settings.h"
+
+namespace hsi4d {
+
+/// A clip of a chain.
+struct ChainClip {
+  std::string name;   ///< of its run folder too
+  DataSettings data;  ///< what is written, laid over the config's own by lay_over_data
+};
+
+/// Describes the section: every setting with its range.
+void describe(ConfigFields& fields, ChainClip& clip);
+
+/// Fills in what the clips share: their `data` becomes that of the whole config with their own laid over it. The state
+/// of frame 0 and the truth are of one clip: those of the config are the first clip's alone.
+/// @param tree  the config, in which everything that is written was found right
+void lay_over_data(const ConfigValue& tree, std::vector<ChainClip>& chain, ConfigProblems& problems);
+
+}  // namespace hsi4d

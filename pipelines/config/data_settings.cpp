@@ -1,0 +1,70 @@
+#include "pipelines/config/data_settings.h"
+
+#include <algorithm>
+
+#include "splat/files/splat_file.h"
+
+namespace hsi4d {
+
+DataSettings dataset_inputs(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  const fs::path base = fs::absolute(folder).lexically_normal();
+  DataSettings data;
+  data.scene = base / "scene.ply";
+  data.avatar = base / "avatar.safetensors";
+  if (!fs::exists(data.avatar) && fs::exists(base / "avatar.npz")) data.avatar = base / "avatar.npz";  // of version 1
+  data.frames = base / (fs::exists(base / kDatasetVideo) ? kDatasetVideo : "frames");
+  data.masks = base / "masks";
+  data.camera = base / "camera.json";
+  data.initial = base / "initial.json";
+  if (fs::exists(base / "truth")) data.truth = base / "truth";
+  if (fs::exists(base / "truth" / "surface.ply")) data.surface = base / "truth" / "surface.ply";
+  std::error_code error;  // no such folder: no objects
+  for (const fs::directory_entry& entry : fs::directory_iterator(base / "objects", error)) {
+    if (has_splat_ending(entry.path().string())) data.objects.push_back({entry.path().stem().string(), {entry.path()}});
+  }
+  std::sort(data.objects.begin(), data.objects.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  return data;
+}
+
+void describe(ConfigFields& f, ObjectSettings& s) {
+  f.path("gaussians", s.gaussians, {.must_exist = true},
+         "Its Gaussians (.ply, .splat or .spz), relative to the centroid of their means")
+      .required();
+}
+
+void describe(ConfigFields& f, DataSettings& s) {
+  f.path("scene", s.scene, {.must_exist = true}, "The static scene (.ply, .splat or .spz), metres, z up");
+  f.map("objects", s.objects, "Rigid objects that move, by name");
+  f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.safetensors)");
+  f.path("frames", s.frames, {.must_exist = true},
+         "The video: a file, or a folder of .png files in the order of their names; as large as the camera's image, or "
+         "larger");
+  f.path("masks", s.masks, {.must_exist = true},
+         "Folder of masks: human/ and one folder an object, grey .png files with the names of the frames; or human.mp4 "
+         "and "
+         "so on");
+  f.number("video_rate", s.video_rate, {.min = 0, .max = 1e4}, "Frames a second of the video; 0: what its file says");
+  f.number("frame_rate", s.frame_rate, {.min = 0, .max = 1e4},
+           "Frames a second that are kept, the nearest ones; estimated poses are resampled to it; 0: all");
+  f.path("camera", s.camera, {.must_exist = true}, "Camera of frame 0 (.json)");
+  f.path("initial", s.initial, {.must_exist = true}, "State of frame 0 and estimated poses (.json)");
+  f.path(
+      "motion", s.motion, {.must_exist = true},
+      "Motion (.npz) that was estimated from the video, in place of the poses of `initial` after frame 0; none: those");
+  f.choice(
+      "motion_align", s.motion_align, kMotionAligns,
+      "How it is laid on the human of frame 0: moved and turned about the vertical (heading), moved and turned as a "
+      "whole (rotation), or as it is (none)");
+  f.path("truth", s.truth, {},
+         "Folder with motion.npz, objects.npz, cameras.json to compare the result with; empty, or not there: none");
+  f.path(
+      "surface", s.surface, {},
+      "Mesh of what is solid in the scene (.obj, .ply, .glb), metres, world, by which penetration is measured; no loss "
+      "reads it; empty: not measured");
+  f.number("mask_threshold", s.mask_threshold, {.above = 0, .max = 1}, "Coverage from which a pixel belongs to a mask");
+  f.integer("mask_margin_px", s.mask_margin_px, {.min = 0, .max = 64},
+            "Pixels by which masks grow before they keep the camera stage from what is not scene");
+}
+
+}  // namespace hsi4d

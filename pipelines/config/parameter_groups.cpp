@@ -1,0 +1,57 @@
+#include "pipelines/config/parameter_groups.h"
+
+#include "core/check.h"
+
+namespace hsi4d {
+namespace {
+
+constexpr std::array<const char*, 5> kGaussianClasses = {"means", "quats", "log_scales", "opacity_logits", "sh"};
+
+}  // namespace
+
+std::vector<std::string> state_group_names(Draw draw) {
+  std::vector<std::string> names = {"camera"};
+  if (draw == Draw::kScene) return names;
+  names.insert(names.end(), {"object_orient", "object_transl", "transl"});
+  for (const JointGroup& joints : kJointGroups) names.emplace_back(joints.name);
+  names.insert(names.end(), {kColorNetGroup, kFeaturesGroup});
+  return names;
+}
+
+std::string state_group_summary(const std::string& name) {
+  if (name == "camera") return "Six numbers of the camera, translation and rotation";
+  if (name == "object_orient") return "Rotations of the objects";
+  if (name == "object_transl") return "Places of the objects";
+  if (name == "transl") return "Place of the body";
+  if (name == kColorNetGroup) return "Weights of the network that colours the human, which all frames share";
+  if (name == kFeaturesGroup) return "That network's features of each Gaussian, which all frames share";
+  for (const JointGroup& joints : kJointGroups) {
+    if (name == joints.name) return joints.summary;
+  }
+  throw InternalError("there is no group of the state called '" + name + "'");
+}
+
+std::vector<std::string> parameter_group_names(Draw draw) {
+  std::vector<std::string> names = state_group_names(draw);
+  names.emplace_back("background");
+  const auto add_classes = [&names](const std::string& part) {
+    for (const char* name : kGaussianClasses) names.push_back(part + "_" + name);
+  };
+  add_classes("scene");
+  if (draw == Draw::kScene) return names;
+  add_classes("object");
+  add_classes("human");
+  names.back() = "human_colors";
+  return names;
+}
+
+std::vector<std::string> sequence_group_names() { return {kTranslGroup, kOrientGroup, kPoseLatents}; }
+
+std::string sequence_group_summary(const std::string& name) {
+  if (name == kTranslGroup) return "Places of the body in all frames but the first";
+  if (name == kOrientGroup) return "Headings of the body in these frames";
+  if (name == kPoseLatents) return "Latents of the pose prior, which stand for the body's joints in these frames";
+  throw InternalError("there is no group of the sequence called '" + name + "'");
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,50 @@
+// The groups of parameters that stages move, by name.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+#include "optim/stage_settings.h"
+
+namespace hsi4d {
+
+/// Rows of the SMPL-X pose that a group of parameters holds.
+struct JointGroup {
+  const char* name;
+  Index first, count;
+  const char* summary;
+};
+inline constexpr std::array<JointGroup, 7> kJointGroups = {
+    {{"global_orient", 0, 1, "Heading of the body"},
+     {"body_pose", 1, 21, "21 joints of the body"},
+     {"jaw_pose", 22, 1, "The jaw"},
+     {"leye_pose", 23, 1, "The left eye"},
+     {"reye_pose", 24, 1, "The right eye"},
+     {"left_hand_pose", 25, 15, "15 joints of the left hand"},
+     {"right_hand_pose", 40, 15, "15 joints of the right hand"}}};
+
+/// Groups of the color net, which all frames share, of the place of the body, and of its heading.
+inline constexpr const char* kColorNetGroup = "color_net";
+inline constexpr const char* kFeaturesGroup = "avatar_features";
+inline constexpr const char* kTranslGroup = "transl";
+inline constexpr const char* kOrientGroup = "global_orient";
+/// The group of the latents of the pose prior, which stand for the joints.
+inline constexpr const char* kPoseLatents = "pose_latents";
+
+/// Names of the groups of a frame graph, by what it draws.
+std::vector<std::string> parameter_group_names(Draw draw);
+
+/// Those of them that a stage may move: what read_state brings back. The Gaussians' own numbers and the background are
+/// groups for gradient checks.
+std::vector<std::string> state_group_names(Draw draw);
+/// One of them in words: "Place of the body". Throws InternalError for another name.
+std::string state_group_summary(const std::string& name);
+
+/// Names of the groups that a stage over the sequence may move.
+std::vector<std::string> sequence_group_names();
+/// One of them in words. Throws InternalError for another name.
+std::string sequence_group_summary(const std::string& name);
+
+}  // namespace hsi4d

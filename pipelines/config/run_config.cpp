@@ -1,0 +1,208 @@
+#include "pipelines/config/run_config.h"
+
+#include <algorithm>
+
+#include "core/config_file.h"
+#include "optim/loss_term.h"
+#include "pipelines/config/config_fields.h"
+#include "pipelines/config/config_kind.h"
+#include "pipelines/config/run_problems.h"
+
+namespace hsi4d {
+namespace {
+
+constexpr int kMostThreads = 1024;
+
+constexpr const char* kSourcesFolder = "generated";  // beside a config
+
+/// Takes from section `sources` what its outputs do not depend on.
+void without_places(ConfigValue& sources) {
+  std::erase_if(sources.members, [](const ConfigMember& member) { return member.key == "folder"; });
+  for (ConfigMember& member : sources.members) {
+    const std::vector<std::string>& trying = settings_of_trying();
+    std::erase_if(member.value.members, [&trying](const ConfigMember& setting) {
+      return std::find(trying.begin(), trying.end(), setting.key) != trying.end();
+    });
+  }
+}
+
+}  // namespace
+
+SkipSettings no_skips() {
+  return {{.static_tiles = false,
+           .static_layer = false,
+           .zero_cotangent = false,
+           .unchanged_pixels = false,
+           .unseen_gaussians = false},
+          {.frozen_inputs = false, .unchanged_inputs = false, .unread_pixels = false}};
+}
+
+void describe(ConfigFields& f, CameraSettings& s) {
+  f.choice(
+      "increment", s.increment, kCameraIncrements,
+      "Frame of a camera's six numbers: its own (about its centre), the world's, or its own axes about the point at "
+      "the scene's median depth, which keeps turning and moving apart");
+}
+
+void describe(ConfigFields& f, SkipSettings& s) {
+  describe(f, s.render);
+  f.boolean("frozen_inputs", s.tape.frozen_inputs, "Make no gradient of numbers that do not move");
+  f.boolean("unchanged_inputs", s.tape.unchanged_inputs,
+            "Do not compute again what depends on nothing that has moved since");
+  f.boolean("unread_pixels", s.tape.unread_pixels, "Do not render what the only loss that sees it has no weight for");
+}
+
+void describe(ConfigFields& f, ApproxSettings& s) {
+  describe(f, s.render);
+  f.boolean(
+      "hold_colors", s.hold_colors,
+      "Colours of harmonics stay as in the stage's first iteration, those of the color net as when it last moved");
+  f.number(
+      "camera_pixel_share", s.camera_pixel_share, {.above = 0, .max = 1},
+      "Share of the pixels that count in stages that draw the scene alone, in blocks of 32, others in every frame");
+  f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
+            "Longest side of the images that are worked on: the camera's image, frames and masks are reduced to it "
+            "where they are larger; 0: as large as the camera's");
+  f.number("seen_within_deg", s.seen_within_deg, {.min = 0, .max = 90},
+           "Gaussians of human and objects that their own others hide when a stage of a frame begins, from the camera "
+           "and from so many degrees around, are left out of the stage; 0: all are drawn");
+}
+
+void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {
+  f.string("name", s.name, "What the run is called in its report");
+  f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed},
+            "Seed of what is random in a run: a new color net (a dataset has synthetic.seed)");
+  f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
+            "Threads; 0: one a core. Results do not depend on it");
+  f.choice("precision", s.precision, kRunPrecisions, "Type of the numbers that a run computes with");
+  f.choice("rotations", s.rotations, kRotationParameters,
+           "Numbers by which rotations are optimised: two columns of the matrix, or axis times angle");
+  f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
+  f.object("camera", s.camera, "How cameras are optimised");
+  f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");
+  f.object("start", s.start, "Where the stages of a frame begin");
+  f.object("instance", s.instance, "The instance of a benchmark that the config is about");
+  f.object("data", s.data, "The files that the run reads");
+  f.object("sources", s.sources, "Programs outside that make the video, the masks and the estimated motion of `data`");
+  f.list("chain", s.chain, "Clips that follow one another, each from the last state of the one before");
+  f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
+  f.object("color_net", s.color_net, "How the human's colours follow its pose");
+  f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
+  f.object("render", s.render, "How Gaussians become pixels");
+  f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");
+  f.object("approx", s.approx, "What may be computed nearly, and faster");
+  f.map("stages", s.stages,
+        "The stages of the run by name, in the order in which they run; those over the first frame run first",
+        [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });
+}
+
+RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescription>& losses, ConfigProblems& problems,
+                          ConfigUse use) {
+  RunConfig config;
+  ConfigFields fields;
+  describe(fields, config, losses);
+  read_config(tree, fields, problems);
+  // They run first wherever they are written: a file that extends another one can only append stages.
+  std::stable_partition(config.stages.begin(), config.stages.end(),
+                        [](const auto& entry) { return entry.second.over == StageScope::kFirst; });
+  take_instance_data(config.instance, config.data);
+  if (problems.empty()) lay_over_data(tree, config.chain, problems);
+  add_run_problems(tree, config, use, problems);
+  problems.throw_if_any();
+  return config;
+}
+
+RunConfig load_run_config(const std::filesystem::path& file, const std::vector<std::string>& overrides,
+                          const std::vector<LossDescription>& losses, ConfigUse use) {
+  ConfigProblems problems;
+  const ConfigValue tree = load_config(file, overrides, problems);
+  require_kind(tree, ConfigKind::kRun, file);
+  RunConfig config = read_run_config(tree, losses, problems, use);
+  if (has_sources(config.sources) && config.sources.folder.empty())
+    config.sources.folder = std::filesystem::absolute(file).parent_path().lexically_normal() / kSourcesFolder;
+  return config;
+}
+
+std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses) {
+  return with_fields(config, losses, [](const ConfigFields& fields) { return to_json(write_config(fields)); });
+}
+
+LossesOverMasks losses_over_masks(const RunConfig& config) {
+  const auto reading = [&config](std::initializer_list<std::string> names, const char* input) {
+    std::vector<std::string> found;
+    for (const std::string& name : names) {
+      const bool is_on = std::any_of(config.stages.begin(), config.stages.end(), [&](const auto& entry) {
+        const LossSettings* const loss = find_entry(entry.second.losses, name);
+        return entry.second.draw == Draw::kAll && loss != nullptr && reads_input(*loss, input);
+      });
+      if (is_on) found.push_back(name);
+    }
+    return found;
+  };
+  return {reading({"mask"}, kReadsHumanOpacity), reading({"center", "mask"}, kReadsObjectOpacity)};
+}
+
+namespace {
+
+/// Leaves of the section `data` what is no file.
+void drop_files(ConfigValue& data) {
+  std::erase_if(data.members, [](const ConfigMember& setting) {
+    return !setting.key.starts_with("mask_") && !setting.key.ends_with("_rate");
+  });
+}
+
+}  // namespace
+
+ConfigValue without_data(ConfigValue tree) {
+  std::erase_if(tree.members, [](const ConfigMember& member) {
+    return member.key == "synthetic" || member.key == "instance" || member.key == "threads" ||
+           member.key == "camera_selection" || (member.key == "chain" && member.value.items.empty());
+  });
+  for (ConfigMember& member : tree.members) {
+    std::vector<ConfigMember>& own = member.value.members;
+    if (member.key == "sources") without_places(member.value);
+    if (member.key == "body") std::erase_if(own, [](const ConfigMember& setting) { return setting.key == "path"; });
+    if (member.key == "data") drop_files(member.value);
+    for (ConfigValue& clip : member.value.items) {
+      for (ConfigMember& of_clip : clip.members) {
+        if (member.key == "chain" && of_clip.key == "data") drop_files(of_clip.value);
+      }
+    }
+  }
+  return tree;
+}
+
+ConfigValue sections_beside_data(const RunConfig& config, const std::vector<LossDescription>& losses) {
+  return without_data(with_fields(config, losses, write_config));
+}
+
+ConfigValue dataset_sections(const RunConfig& config, const std::vector<LossDescription>& losses) {
+  ConfigValue tree = sections_beside_data(config, losses);
+  std::erase_if(tree.members, [](const ConfigMember& member) { return member.key == "chain"; });
+  if (config.body.path.empty()) return tree;
+  for (ConfigMember& member : tree.members) {
+    if (member.key == "body")
+      member.value.add("path", ConfigValue::make_string(std::filesystem::absolute(config.body.path).string()));
+  }
+  return tree;
+}
+
+std::vector<ConfigPath> stage_files(const RunConfig& config, const std::vector<LossDescription>& losses) {
+  std::vector<ConfigPath> files =
+      with_fields(config, losses, [](const ConfigFields& fields) { return list_paths(fields); });
+  std::erase_if(files, [](const ConfigPath& file) {
+    return !file.pointer.starts_with("/stages/") || !std::filesystem::is_regular_file(file.path);
+  });
+  return files;
+}
+
+std::string run_config_schema(const std::vector<LossDescription>& losses) {
+  return with_fields(RunConfig{}, losses,
+                     [](const ConfigFields& fields) { return to_json(config_schema(fields, "hsi4d run config")); });
+}
+
+std::vector<ConfigSetting> run_config_settings(const std::vector<LossDescription>& losses) {
+  return with_fields(RunConfig{}, losses, [](const ConfigFields& fields) { return list_settings(fields); });
+}
+
+}  // namespace hsi4d

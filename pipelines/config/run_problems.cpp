@@ -1,0 +1,379 @@
+#include "pipelines/config/run_problems.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/check.h"
+#include "core/suggest.h"
+#include "core/text.h"
+#include "pipelines/config/masks.h"
+#include "pipelines/config/parameter_groups.h"
+
+namespace hsi4d {
+namespace {
+
+// ---- Stages ----
+
+void add_group_problems(const StageSettings& stage, const std::string& in, std::vector<RunProblem>& found) {
+  const std::string where = in + "/optimize";
+  const bool is_of_frame = stage.over != StageScope::kSequence;
+  const std::vector<std::string> known = is_of_frame ? state_group_names(stage.draw) : sequence_group_names();
+  if (stage.optimize.empty())
+    found.push_back({where, "no parameter group is named; known here: " + joined(known), {where}, true});
+  for (const auto& [name, group] : stage.optimize) {
+    const std::string place = child_pointer(where, name), hint = did_you_mean(name, known);
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      found.push_back({place,
+                       "there is no such parameter group" + (hint.empty() ? "; known here: " + joined(known) : hint),
+                       {in + "/draw", in + "/over"}});
+    if (stage.iterations > 0 && group.from >= stage.iterations)
+      found.push_back({child_pointer(place, "from"),
+                       std::to_string(group.from) + " is beyond the stage's " + std::to_string(stage.iterations) +
+                           " iterations; the group would never move",
+                       {in + "/iterations"}});
+  }
+}
+
+void add_loss_problems(const StageSettings& stage, const std::string& in, std::vector<RunProblem>& found) {
+  const std::string where = in + "/losses";
+  if (stage.losses.empty()) {
+    found.push_back({where, "a stage needs a loss", {where}, true});
+    return;
+  }
+  const bool is_of_sequence = stage.over == StageScope::kSequence;
+  if (is_of_sequence || stage.draw == Draw::kScene) {
+    const LossNeeds has = is_of_sequence ? LossNeeds::kBody : LossNeeds::kImages;
+    const std::string having =
+        is_of_sequence ? "a stage with \"over\": \"sequence\"" : "a stage with \"draw\": \"scene\"";
+    for (LossFault& fault : losses_without_inputs(stage, has, having))
+      found.push_back({in + fault.pointer, std::move(fault.text), {in + "/draw", in + "/over"}});
+  }
+  std::vector<std::string> names;
+  for (const auto& [name, loss] : stage.losses) {
+    if (loss.weight != 0) return;
+    names.push_back(name);
+  }
+  found.push_back({where,
+                   joined(names) + (names.size() == 1 ? " has" : " have") +
+                       " weight 0, which switches a loss off; a stage needs one that is on",
+                   {where}});
+}
+
+std::string scope_in_words(StageScope scope) {
+  if (scope == StageScope::kFirst) return "over the first frame";
+  return scope == StageScope::kFrame ? "over frames" : "over the sequence";
+}
+
+/// Stages over the first frame, then those over each of the others, then those over the sequence: each begins where
+/// those before ended.
+void add_order_problems(const ConfigMap<StageSettings>& stages, std::vector<RunProblem>& found) {
+  const auto place = [](const std::string& name) { return child_pointer(child_pointer("/stages", name), "over"); };
+  const auto is_of_frames = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
+  const bool has_frames = std::any_of(stages.begin(), stages.end(), is_of_frames);
+  const std::pair<std::string, StageSettings>* latest = nullptr;  // of those so far
+  for (const auto& entry : stages) {
+    const auto& [name, stage] = entry;
+    if (latest != nullptr && stage.over < latest->second.over) {
+      found.push_back({place(name),
+                       "a stage " + scope_in_words(stage.over) + " cannot come after " + json_string(latest->first) +
+                           ", which is " + scope_in_words(latest->second.over),
+                       {place(name), place(latest->first)}});
+      continue;
+    }
+    if (latest == nullptr && stage.over == StageScope::kSequence)
+      found.push_back({place(name), "a stage over the sequence needs one over frames before it", {place(name)}});
+    latest = &entry;
+  }
+  if (!has_frames && !stages.empty() && stages.front().second.over == StageScope::kFirst)
+    found.push_back({place(stages.front().first),
+                     "a stage over the first frame needs one over frames after it",
+                     {place(stages.front().first)}});
+}
+
+/// The best start is chosen by images of everything, before the first stage that draws it.
+void add_start_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  const auto is_of_frames = [](const auto& entry) { return entry.second.over == StageScope::kFrame; };
+  const auto chooses = [](const auto& entry) {
+    return entry.second.over == StageScope::kFrame && entry.second.draw == Draw::kAll;
+  };
+  if (std::none_of(config.stages.begin(), config.stages.end(), is_of_frames)) return;
+  if (std::any_of(config.stages.begin(), config.stages.end(), chooses)) return;
+  for (const auto& [key, from] :
+       {std::pair{"pose", config.start.pose}, {"root", config.start.root}, {"objects", config.start.objects}}) {
+    if (from == StartFrom::kBest)
+      found.push_back({std::string("/start/") + key,
+                       "\"best\" is never chosen: it compares images of everything, and every stage over frames has "
+                       "\"draw\": \"scene\"",
+                       {"/start", "/stages"}});
+  }
+}
+
+std::vector<RunProblem> loss_faults(RunConfig& config) {
+  std::vector<RunProblem> found;
+  for (auto& [name, stage] : config.stages) {
+    const std::string where = child_pointer("/stages", name);
+    for (LossFault& fault : prepare_losses(stage)) {
+      const std::string place = where + fault.pointer;
+      found.push_back({place, std::move(fault.text), {place}});
+    }
+  }
+  return found;
+}
+
+// ---- Inputs ----
+
+/// @param in  the section, "/data"
+void add_name_problems(const DataSettings& data, const std::string& in, std::vector<RunProblem>& found) {
+  for (const auto& [name, object] : data.objects) {
+    if (name.empty())
+      found.push_back({in + "/objects", "an object's name is empty; it names the folder of its masks", {}});
+    if (name == kHumanMasks)
+      found.push_back({child_pointer(in + "/objects", name),
+                       json_string(name) + " is the folder of the human's masks; use another name",
+                       {}});
+  }
+}
+
+/// What is wrong with the programs that make video, masks and motion.
+void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  struct Program {
+    const char* name;
+    const std::vector<std::string>& command;
+    const std::vector<std::string>& placeholders;
+    const std::filesystem::path& given;
+    const char* key;
+  };
+  const SourceSettings& sources = config.sources;
+  for (const Program& program :
+       {Program{"video", sources.video.command, video_placeholders(), config.data.frames, "frames"},
+        Program{"masks", sources.masks.command, mask_placeholders(), config.data.masks, "masks"},
+        Program{"motion", sources.motion.command, motion_placeholders(), config.data.motion, "motion"}}) {
+    const std::string section = std::string("/sources/") + program.name, key = std::string("/data/") + program.key;
+    for (CommandFault& fault : command_faults(program.command, program.placeholders))
+      found.push_back({section + fault.pointer, std::move(fault.text), {section + "/command"}});
+    if (!program.command.empty() && !program.given.empty())
+      found.push_back({key, "given, and " + section + " makes it too; remove one", {key, section}});
+    if (sources.prompt.empty() && uses_placeholder(program.command, "prompt"))
+      found.push_back({"/sources/prompt", "not given; " + section + "/command has {prompt}", {"/sources"}, true});
+  }
+}
+
+/// What of the inputs need not be given.
+struct KnownInputs {
+  bool video = false, masks = false;  ///< a program outside makes them
+  bool state = false;                 ///< frame 0 is that in which another clip ended
+};
+
+/// @param in  the section, "/data"
+void add_input_problems(const DataSettings& data, const std::string& in, const KnownInputs& known,
+                        std::vector<RunProblem>& found) {
+  struct Input {
+    const std::filesystem::path& path;
+    const char* key;
+    const char* what;
+    bool is_known = false;
+  };
+  const std::array inputs = {Input{data.scene, "scene", "a scene"},
+                             Input{data.avatar, "avatar", "an avatar"},
+                             Input{data.frames, "frames", "the frames of a video", known.video},
+                             Input{data.masks, "masks", "masks of the human and the objects", known.masks},
+                             Input{data.camera, "camera", "the camera of frame 0"},
+                             Input{data.initial, "initial", "the state of frame 0", known.state}};
+  const auto is_missing = [](const Input& input) { return input.path.empty() && !input.is_known; };
+  if (std::all_of(inputs.begin(), inputs.end(), is_missing)) {
+    std::vector<std::string> keys;
+    for (const Input& input : inputs) keys.emplace_back(input.key);
+    found.push_back({in,
+                     "no inputs are given; a run needs " + joined(keys) +
+                         ". `hsi4d synth` makes a dataset with a config beside it to run; `hsi4d demo` makes one and "
+                         "runs it",
+                     {in},
+                     true});
+    return;
+  }
+  for (const Input& input : inputs) {
+    const std::string place = in + "/" + input.key;
+    if (is_missing(input)) found.push_back({place, std::string("not given; a run needs ") + input.what, {place}, true});
+  }
+}
+
+// ---- Chains ----
+
+bool is_folder_name(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  });
+}
+
+std::string object_names(const DataSettings& data) {
+  std::vector<std::string> names;
+  for (const auto& [name, object] : data.objects) names.push_back(name);
+  return names.empty() ? "none" : joined(names);
+}
+
+void add_chain_problems(const std::vector<ChainClip>& chain, ConfigUse use, std::vector<RunProblem>& found) {
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const ChainClip& clip = chain[i];
+    const std::string where = child_pointer("/chain", std::to_string(i));
+    if (!is_folder_name(clip.name))
+      found.push_back(
+          {where + "/name", json_string(clip.name) + " is no name of a folder; allowed: letters, digits, _ and -", {}});
+    for (std::size_t k = 0; k < i; ++k) {
+      if (chain[k].name == clip.name)
+        found.push_back({where + "/name", json_string(clip.name) + " is the name of another clip too", {}});
+    }
+    if (object_names(clip.data) != object_names(chain.front().data))
+      found.push_back({where + "/data/objects",
+                       "the clip has the objects " + object_names(clip.data) + ", the first one " +
+                           object_names(chain.front().data) + "; the clips of a chain have the same, in one order",
+                       {}});
+    add_name_problems(clip.data, where + "/data", found);
+    if (use == ConfigUse::kRun) add_input_problems(clip.data, where + "/data", {.state = i > 0}, found);
+  }
+}
+
+// ---- Skips and approximations ----
+
+/// The setting that keeps static layers from being made, "skip.static_layer=false"; none: empty.
+std::string without_static_layers(const RunConfig& config) {
+  if (!config.skip.render.static_tiles) return "skip.static_tiles=false";
+  if (!config.skip.tape.frozen_inputs) return "skip.frozen_inputs=false";
+  if (!config.skip.render.static_layer) return "skip.static_layer=false";
+  return config.precision == RunPrecision::kDouble ? "precision=double" : "";
+}
+
+// ---- Optimisers ----
+
+/// Settings of a kind of optimiser that the stage does not have. They are no mistakes: a config that extends another
+/// one changes the kind alone, and the rest stands there.
+std::vector<RunNote> optimizer_notes(const RunConfig& config) {
+  std::vector<RunNote> notes;
+  for (const auto& [name, stage] : config.stages) {
+    const OptimizerSettings& own = stage.optimizer;
+    const OptimizerSettings usual;
+    const bool is_adam = own.kind == OptimizerKind::kAdam;
+    std::vector<std::string> idle;
+    if (is_adam && own.keep_curvature) idle.emplace_back("keep_curvature");
+    if (!is_adam && own.beta1 != usual.beta1) idle.emplace_back("beta1");
+    if (!is_adam && own.beta2 != usual.beta2) idle.emplace_back("beta2");
+    if (!is_adam && own.eps != usual.eps) idle.emplace_back("eps");
+    if (own.kind != OptimizerKind::kGaussNewton && own.products != usual.products) idle.emplace_back("products");
+    if (!idle.empty())
+      notes.push_back({LogLevel::kWarning, "stages." + name + ".optimizer: " + joined(idle) +
+                                               (idle.size() == 1 ? " does" : " do") + " nothing with kind " +
+                                               std::string(choice_name<OptimizerKind>(kOptimizerKinds, own.kind))});
+  }
+  return notes;
+}
+
+/// Whether `problem` may be one only because of another, at the pointer `other`.
+bool may_follow(const RunProblem& problem, const std::string& other) {
+  for (const std::string& need : problem.needs) {
+    if (other == need || other.starts_with(need + "/")) return true;
+  }
+  const std::size_t slash = problem.pointer.rfind('/') + 1;
+  return problem.is_absence && other.starts_with(problem.pointer.substr(0, slash)) &&
+         !nearest_name(other.substr(slash), {problem.pointer.substr(slash)}).empty();
+}
+
+void add(std::vector<RunProblem> more, std::vector<RunProblem>& found) {
+  for (RunProblem& problem : more) found.push_back(std::move(problem));
+}
+
+void throw_if_any(const std::vector<RunProblem>& found) {
+  if (found.empty()) return;
+  std::string text;
+  for (const RunProblem& problem : found) text += (text.empty() ? "" : "\n") + problem.pointer + ": " + problem.text;
+  throw UserError(text);
+}
+
+}  // namespace
+
+std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
+  std::vector<RunProblem> found;
+  if (use == ConfigUse::kSettings) return found;
+  if (use == ConfigUse::kRun && config.stages.empty())
+    found.push_back({"/stages", "a run needs at least one stage", {"/stages"}, true});
+  for (const auto& [name, stage] : config.stages) {
+    const std::string where = child_pointer("/stages", name);
+    add_group_problems(stage, where, found);
+    add_loss_problems(stage, where, found);
+  }
+  add_order_problems(config.stages, found);
+  add_start_problems(config, found);
+  if (!config.chain.empty()) {
+    if (has_sources(config.sources))
+      found.push_back({"/sources",
+                       "programs make video and masks of one clip, and this config is a chain; make those of each clip "
+                       "by a config of its own, and name them in the clip's data",
+                       {"/sources", "/chain"}});
+    add_chain_problems(config.chain, use, found);
+    return found;
+  }
+  add_name_problems(config.data, "/data", found);
+  add_source_problems(config, found);
+  if (use == ConfigUse::kRun) {
+    const SourceSettings& sources = config.sources;
+    add_input_problems(config.data, "/data",
+                       {.video = !sources.video.command.empty(), .masks = !sources.masks.command.empty()}, found);
+  }
+  return found;
+}
+
+void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use, ConfigProblems& problems) {
+  std::vector<RunProblem> found = run_problems(config, use);
+  if (use != ConfigUse::kSettings) add(loss_faults(config), found);
+  const std::vector<std::string> before = problems.pointers();
+  std::erase_if(found, [&before](const RunProblem& problem) {
+    return std::any_of(before.begin(), before.end(),
+                       [&problem](const std::string& other) { return may_follow(problem, other); });
+  });
+  for (const RunProblem& problem : found) problems.add(origin_at(tree, problem.pointer), problem.pointer, problem.text);
+}
+
+std::vector<RunNote> run_notes(const RunConfig& config) {
+  std::vector<RunNote> notes = optimizer_notes(config);
+  const auto inform = [&notes](const char* text) { notes.push_back({LogLevel::kInfo, text}); };
+  const RenderSkips& render = config.skip.render;
+  if (!render.static_tiles && render.static_layer) inform("skip.static_tiles=false switches skip.static_layer off too");
+  if (render.static_tiles && !config.skip.tape.frozen_inputs) {
+    inform("skip.frozen_inputs=false switches skip.static_tiles and skip.static_layer off too");
+  } else if (render.static_tiles && !config.skip.tape.unchanged_inputs) {
+    inform("skip.unchanged_inputs=false has made anew in every iteration what skip.static_tiles keeps");
+  }
+  if (config.approx.hold_colors) inform("approx.hold_colors is on: colours do not follow every change of the view");
+  if (config.approx.longest_side_px > 0) {
+    notes.push_back({LogLevel::kInfo, "approx.longest_side_px is on: images, cameras.json and PSNR are of at most " +
+                                          std::to_string(config.approx.longest_side_px) + " pixels"});
+  }
+  if (config.approx.seen_within_deg > 0)
+    inform("approx.seen_within_deg is on: Gaussians that are behind a human's or an object's own surface are left out");
+  if (config.approx.camera_pixel_share < 1) {
+    inform("approx.camera_pixel_share is on: stages that draw the scene alone see a part of the pixels in each frame");
+  }
+  if (!config.approx.render.collapse_suffix) return notes;
+  const std::string off = without_static_layers(config);
+  if (off.empty()) {
+    notes.push_back({LogLevel::kInfo,
+                     "approx.collapse_suffix is on: images are near, each pixel within render.transmittance_stop, " +
+                         rounded(config.render.transmittance_stop, 4)});
+  } else {
+    notes.push_back({LogLevel::kWarning, "approx.collapse_suffix=true does nothing with " + off});
+  }
+  return notes;
+}
+
+void prepare_run(RunConfig& config) {
+  std::vector<RunProblem> found = run_problems(config, ConfigUse::kRun);
+  add(loss_faults(config), found);
+  throw_if_any(found);
+}
+
+void check_inputs(const DataSettings& data) {
+  std::vector<RunProblem> found;
+  add_name_problems(data, "/data", found);
+  add_input_problems(data, "/data", {}, found);
+  throw_if_any(found);
+}
+
+}  // namespace hsi4d

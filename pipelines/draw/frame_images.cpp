@@ -1,0 +1,93 @@
+#include "pipelines/draw/frame_images.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipelines/draw/report_images.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// Pixels of `mask` at or above the threshold, grown by `margin` pixels to all sides, are set in `covered`.
+void add_covered(const Image& mask, double threshold, int margin, Image& covered) {
+  const int height = mask.height(), width = mask.width();
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (static_cast<double>(mask(0, y, x)) < threshold) continue;
+      for (int i = std::max(0, y - margin); i <= std::min(height - 1, y + margin); ++i) {
+        std::fill(covered.row(0, i) + std::max(0, x - margin), covered.row(0, i) + std::min(width, x + margin + 1),
+                  1.0F);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered) {
+  add_covered(frame.human_mask, data.mask_threshold, data.mask_margin_px, covered);
+  for (const Image& mask : frame.object_masks) add_covered(mask, data.mask_threshold, data.mask_margin_px, covered);
+}
+
+void keep_share(double share, Index frame, Image& weight) {
+  // Fractional parts of multiples of these fill a plane, and a line, evenly [Roberts 2018, R2 and R1].
+  constexpr double kRight = 0.7548776662466927, kDown = 0.5698402909980532, kNext = 0.6180339887498949;
+  constexpr int kBlock = 32;
+  Image part = weight;
+  bool is_some_left = false;
+  for (int y = 0; y < weight.height(); ++y) {
+    for (int x = 0; x < weight.width(); ++x) {
+      const double place = kRight * (x / kBlock) + kDown * (y / kBlock) + kNext * static_cast<double>(frame);
+      if (place - std::floor(place) >= share) part(0, y, x) = 0;
+      is_some_left = is_some_left || part(0, y, x) != 0;
+    }
+  }
+  if (is_some_left) weight = std::move(part);
+}
+
+Image complement(const Image& mask) {
+  Image result(1, mask.height(), mask.width());
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) result(0, y, x) = 1 - mask(0, y, x);
+  }
+  return result;
+}
+
+Image foreground_of(const ClipFrame& frame) {
+  Image result = frame.human_mask;
+  for (const Image& mask : frame.object_masks) {
+    for (int y = 0; y < result.height(); ++y) {
+      for (int x = 0; x < result.width(); ++x) result(0, y, x) = std::max(result(0, y, x), mask(0, y, x));
+    }
+  }
+  return result;
+}
+
+Image difference_image(const Image& a, const Image& b) {
+  Image result(a.channels(), a.height(), a.width());
+  for (int c = 0; c < a.channels(); ++c) {
+    for (int y = 0; y < a.height(); ++y) {
+      for (int x = 0; x < a.width(); ++x)
+        result(c, y, x) = static_cast<float>(kDifferenceGain) * std::fabs(a(c, y, x) - b(c, y, x));
+    }
+  }
+  return result;
+}
+
+template <class S>
+Image to_image(const ConstArray<S>& array) {
+  Image image(static_cast<int>(array.shape.planes), static_cast<int>(array.shape.rows),
+              static_cast<int>(array.shape.cols));
+  for (int c = 0; c < image.channels(); ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) image(c, y, x) = static_cast<float>(array(c, y, x));
+    }
+  }
+  return image;
+}
+
+template Image to_image(const ConstArray<float>&);
+template Image to_image(const ConstArray<double>&);
+
+}  // namespace hsi4d

@@ -1,0 +1,32 @@
+// Images of a frame: what masks cover, what is shown of the result.
+#pragma once
+
+#include "autodiff/tape.h"
+#include "core/image.h"
+#include "pipelines/config/data_settings.h"
+#include "pipelines/input/clip.h"
+
+namespace hsi4d {
+
+/// Pixels that a mask of the frame covers, at or above data.mask_threshold and grown by data.mask_margin_px to all
+/// sides, are set in `covered` [1,H,W].
+void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered);
+
+/// Sets weights to 0 outside of `share` of the blocks of 32 × 32 pixels, spread evenly; others for every frame. Where
+/// that would leave none, all stay.
+void keep_share(double share, Index frame, Image& weight);
+
+/// 1 − mask.
+Image complement(const Image& mask);
+
+/// The larger of all masks of the frame, pixel by pixel.
+Image foreground_of(const ClipFrame& frame);
+
+/// kDifferenceGain |a − b|.
+Image difference_image(const Image& a, const Image& b);
+
+/// An array of planes as an image.
+template <class S>
+Image to_image(const ConstArray<S>& array);
+
+}  // namespace hsi4d

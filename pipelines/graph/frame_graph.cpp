@@ -1,0 +1,409 @@
+#include "pipelines/graph/frame_graph.h"
+
+#include <algorithm>
+#include <array>
+
+#include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
+#include "autodiff/reduce.h"
+#include "autodiff/rotations.h"
+#include "core/check.h"
+#include "core/rotation.h"
+#include "core/rotation_6d.h"
+#include "pipelines/draw/tape_image.h"
+#include "pipelines/graph/camera_increment.h"
+#include "pipelines/graph/motion_inputs.h"
+#include "splat/render/camera_center.h"
+#include "splat/render/project.h"
+#include "splat/render/reachable.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr Index kJoints = kSmplxJoints;
+/// What of the scene the camera may see that moves no further than settings.camera_reach; one Gaussian where that is
+/// nothing.
+Gaussians seen_scene(const Gaussians& scene, const SplatView& view, const Matrix6<double>& xi_from_update,
+                     const FrameGraphSettings& settings) {
+  const Vector6<double> furthest = xi_from_update.cwiseAbs() * Vector6<double>::Constant(*settings.camera_reach);
+  std::vector<Index> rows = reachable_rows(scene, view, {furthest.head<3>().norm(), furthest.tail<3>().norm()});
+  if (rows.empty() && scene.count() > 0) rows.push_back(0);
+  return selected(scene, rows);
+}
+
+template <class S>
+void write_numbers(Tape<S>& tape, Var<S> leaf, const double* values) {
+  const Array<S> array = tape.write(leaf);
+  for (Index i = 0; i < array.shape.count(); ++i) array.data[i] = static_cast<S>(values[i]);
+}
+
+template <class S>
+Vector3<double> read_vector(Tape<S>& tape, Var<S> leaf) {
+  const ConstArray<S> array = tape.value(leaf);
+  return {static_cast<double>(array(0, 0)), static_cast<double>(array(0, 1)), static_cast<double>(array(0, 2))};
+}
+
+}  // namespace
+
+Camera camera_of_size(const Clip& clip, int longest_side_px) {
+  return longest_side_px > 0 ? reduced_camera(clip.camera, longest_side_px) : clip.camera;
+}
+
+template <class S>
+FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
+                          const FrameGraphSettings& settings)
+    : tape_(tape),
+      clip_(clip),
+      settings_(settings),
+      view_{camera_of_size(clip, settings.longest_side_px), clip.scene.origin_world, settings.render, settings.skip,
+            settings.approx} {
+  // Objects and the body are recorded in the world, and one render has one origin: the scene's must be zero until they
+  // are recorded relative to it.
+  HSI4D_CHECK(clip.scene.origin_world.isZero(0), "what moves is placed in the world, not relative to an origin");
+  view_.camera.camera_from_world = camera_from_world;
+  xi_from_update_ = camera_from_increment(settings.increment, view_.camera, clip.scene);
+  camera_update_ = leaf("camera", "camera_update", 1, 6, nullptr);
+  xi_ = camera_update_;
+  if (settings.increment != CameraIncrement::kCamera) {
+    const Var<S> map = tape_.constant("update_from_xi", shape_of(6, 6));  // transposed: it multiplies a row
+    const Matrix6<double> transposed = xi_from_update_;  // column-major, so its memory is the transpose
+    write_numbers(tape_, map, transposed.data());
+    xi_ = matmul(camera_update_, map);
+  }
+  const Vector3<float> background = settings.background.cast<float>();
+  background_ = leaf("background", "background", 1, 3, background.data());
+  const bool is_part_seen = settings.camera_reach && settings.skip.unseen_gaussians;
+  std::vector<Part> parts = {is_part_seen ? record_scene(seen_scene(clip.scene, view_, xi_from_update_, settings))
+                                          : record_scene(clip.scene)};
+  if (settings_.draw == Draw::kAll) {
+    record_moving(parts);
+  }
+  record_render(parts, 1);
+  for (const std::string& name : parameter_group_names(settings_.draw)) {  // without objects some have no leaves
+    const auto known = [&name](const ParameterGroup<S>& group) { return group.name == name; };
+    if (std::none_of(groups_.begin(), groups_.end(), known)) groups_.push_back({name, {}});
+  }
+  for (const ParameterGroup<S>& group : groups_) {
+    for (const Var<S> block : group.blocks) tape_.freeze(block);
+  }
+}
+
+template <class S>
+Var<S> FrameGraph<S>::leaf(const std::string& group, const std::string& name, Index rows, Index cols,
+                           const float* values) {
+  const Var<S> var = tape_.parameter(name, shape_of(rows, cols));
+  if (values != nullptr) {
+    const Array<S> array = tape_.write(var);
+    std::copy_n(values, rows * cols, array.data);
+  }
+  add_to_group(group, var);
+  return var;
+}
+
+template <class S>
+ParameterGroup<S>& FrameGraph<S>::add_to_group(const std::string& group, Var<S> leaf) {
+  auto place = std::find_if(groups_.begin(), groups_.end(), [&](const auto& known) { return known.name == group; });
+  if (place == groups_.end()) place = groups_.insert(place, ParameterGroup<S>{group, {}});
+  place->blocks.push_back(leaf);
+  return *place;
+}
+
+/// A leaf of one rotation a row, in the numbers that the settings choose.
+template <class S>
+Var<S> FrameGraph<S>::rotation_leaf(const std::string& group, const std::string& name, Index rows) {
+  const bool is_axis_angle = settings_.rotations == RotationParameters::kAxisAngle;
+  const Var<S> var = tape_.parameter(name, shape_of(rows, is_axis_angle ? 3 : 6));
+  add_to_group(group, var).are_axis_angles = is_axis_angle;
+  return var;
+}
+
+/// Leaves of a part's Gaussians: groups PART_means and so on; messages call them by `name`.
+template <class S>
+GaussianVars<S> FrameGraph<S>::gaussian_leaves(const std::string& part, const std::string& name, const Gaussians& g) {
+  const Index n = g.count();
+  GaussianVars<S> vars;
+  vars.means = leaf(part + "_means", name + " means", n, 3, g.means.data());
+  vars.quats = leaf(part + "_quats", name + " quats", n, 4, g.quats.data());
+  vars.log_scales = leaf(part + "_log_scales", name + " log_scales", n, 3, g.log_scales.data());
+  vars.opacity_logits = leaf(part + "_opacity_logits", name + " opacity_logits", n, 1, g.opacity_logits.data());
+  vars.colors = leaf(part + "_sh", name + " sh", n, 3 * g.sh_coefficients(), g.sh.data());
+  return vars;
+}
+
+template <class S>
+typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Gaussians& scene) {
+  const SplatInputs<S> splats = standing_splats(gaussian_leaves("scene", "scene", scene), xi_, view_);
+  hold_colors(splats.colors, {"scene_sh"});
+  return {splats, scene.count()};
+}
+
+template <class S>
+void FrameGraph<S>::record_moving(std::vector<Part>& parts) {
+  const std::optional<SeenRows>& seen = settings_.seen;
+  for (std::size_t o = 0; o < clip_.objects.size(); ++o) {
+    const ClipObject& object = clip_.objects[o];
+    parts.push_back(seen ? record_object({object.name, selected(object.gaussians, seen->objects[o])})
+                         : record_object(object));
+  }
+  parts.push_back(seen ? record_human(selected(clip_.avatar, seen->human)) : record_human(clip_.avatar));
+}
+
+template <class S>
+typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& object) {
+  const GaussianVars<S> vars = gaussian_leaves("object", object.name, object.gaussians);
+  const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
+  const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
+  const Var<S> rotation = record_rotations(orient);
+  objects_.push_back({orient, transl, rotation});
+  const SplatInputs<S> splats = rigid_splats(vars, rotation, transl, xi_, view_);
+  hold_colors(splats.colors, {"object_sh"});
+  return {splats, object.gaussians.count()};
+}
+
+template <class S>
+typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
+  const auto n = static_cast<Index>(avatar.opacity_logits.size());
+  HSI4D_CHECK_EQ(static_cast<Index>(avatar.parents.size()), kJoints);
+  GaussianVars<S> vars;
+  vars.means = leaf("human_means", "human means", n, 3, avatar.means.data());
+  vars.quats = leaf("human_quats", "human quats", n, 4, avatar.quats.data());
+  vars.log_scales = leaf("human_log_scales", "human log_scales", n, 3, avatar.log_scales.data());
+  vars.opacity_logits = leaf("human_opacity_logits", "human opacity_logits", n, 1, avatar.opacity_logits.data());
+  vars.colors = leaf("human_colors", "human colors", n, 3, avatar.colors.data());
+  for (const JointGroup& joints : kJointGroups) {
+    joint_rotations_.push_back(rotation_leaf(joints.name, joints.name, joints.count));
+  }
+  transl_ = leaf("transl", "transl", 1, 3, nullptr);
+  rotations_ = record_rotations(concat_rows<S>(joint_rotations_));
+  skeleton_ = kinematic_chain(rotations_, transl_, avatar.parents, avatar.joints);
+  if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations_, skeleton_, avatar), n};
+  const HumanColors<S> colors =
+      record_color_net(settings_.seen ? selected(*settings_.color_net, settings_.seen->human) : *settings_.color_net);
+  HSI4D_CHECK_EQ(colors.net.features.shape().rows, n);
+  const SplatInputs<S> splats = skinned_splats(vars, rotations_, skeleton_, avatar, &colors);
+  hold_colors(splats.colors, {kColorNetGroup, kFeaturesGroup});
+  return {splats, n};
+}
+
+/// Colours that are computed anew only where one of the groups moves, if that is wanted.
+template <class S>
+void FrameGraph<S>::hold_colors(Var<S> colors, const std::vector<std::string>& groups) {
+  if (settings_.hold_colors) held_.push_back({colors.id, groups});
+}
+
+template <class S>
+HumanColors<S> FrameGraph<S>::record_color_net(const ColorNet& net) {
+  color_net_ = color_net_leaves(tape_, net);
+  add_to_group(kFeaturesGroup, color_net_.features);
+  for (const MlpLayer<S>& layer : color_net_.layers) {
+    add_to_group(kColorNetGroup, layer.weights);
+    add_to_group(kColorNetGroup, layer.bias);
+  }
+  HumanColors<S> colors{color_net_, net.code_joints, {}, settings_.color_pose_gradient};
+  if (!net.view_direction) return colors;
+  const Var<S> center = camera_center(xi_, view_);
+  colors.camera_center = settings_.color_camera_gradient ? center : stop_gradient(center);
+  return colors;
+}
+
+template <class S>
+Var<S> FrameGraph<S>::record_rotations(Var<S> parameters) const {
+  return settings_.rotations == RotationParameters::kSixD ? rotations_from_6d(parameters)
+                                                          : rotations_from_axis_angle(parameters);
+}
+
+template <class S>
+void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t first_object) {
+  RenderRequest request;
+  Index row = 0;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const bool is_object = p >= first_object && p < first_object + objects_.size();
+    const bool is_human = settings_.draw == Draw::kAll && p + 1 == parts.size();
+    if ((is_object && settings_.object_opacity) || (is_human && settings_.human_opacity))
+      request.groups.emplace_back(row, row + parts[p].count);
+    row += parts[p].count;
+  }
+  rendered_ = render_parts(parts, request);
+  inputs_.rendered = rendered_.image;
+  inputs_.target = tape_.constant("target", rendered_.image.shape());
+  inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
+  if (settings_.draw == Draw::kScene) return;
+  if (!objects_.empty()) {
+    record_object_depths(parts, first_object);
+    record_object_places();
+  }
+  if (draws_objects()) record_object_masks();
+  if (settings_.human_opacity) record_human_inputs();
+}
+
+/// Opacities are those of the objects, and last of the human.
+template <class S>
+void FrameGraph<S>::record_human_inputs() {
+  inputs_.human_opacity = draws_objects()
+                              ? slice_planes(rendered_.group_opacity, static_cast<Index>(objects_.size()), 1)
+                              : rendered_.group_opacity;
+  inputs_.human_mask = tape_.constant("human_mask", inputs_.human_opacity.shape());
+  inputs_.human_seen = tape_.constant("human_seen", kScalarShape);
+}
+
+template <class S>
+void FrameGraph<S>::record_object_masks() {
+  const auto count = static_cast<Index>(objects_.size());
+  inputs_.object_opacity =
+      settings_.human_opacity ? slice_planes(rendered_.group_opacity, 0, count) : rendered_.group_opacity;
+  inputs_.object_center_target = tape_.constant("object_center_target", shape_of(count, 3));
+  inputs_.object_masks = tape_.constant("object_masks", inputs_.object_opacity.shape());
+  inputs_.object_seen = tape_.constant("object_seen", Shape{count, 1, 1, 1});
+}
+
+/// The scene is the first part; it stands still while the camera does.
+template <class S>
+Rendered<S> FrameGraph<S>::render_parts(const std::vector<Part>& parts, const RenderRequest& request) const {
+  if (parts.size() == 1) return render(parts.front().splats, xi_, background_, view_, request);
+  std::vector<SplatInputs<S>> moving;
+  for (std::size_t p = 1; p < parts.size(); ++p) moving.push_back(parts[p].splats);
+  return render(parts.front().splats, stacked_splats(moving), xi_, background_, view_, request);
+}
+
+template <class S>
+void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<SceneState>& frames) {
+  HSI4D_CHECK(settings_.draw == Draw::kAll, "a graph of the scene alone has no body");
+  std::vector<Var<S>> transforms;
+  for (const Object& object : objects_) transforms.push_back(rigid_rows(object.rotation, object.transl));
+  const Var<S> objects = transforms.empty() ? Var<S>{} : concat_rows<S>(transforms);
+  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects}, clip_, first, frames, inputs_);
+}
+
+template <class S>
+void FrameGraph<S>::record_object_depths(const std::vector<Part>& parts, std::size_t first_object) {
+  const auto count = static_cast<Index>(objects_.size());
+  std::vector<Var<S>> depths;
+  Index row = 0;  // of what moves
+  for (std::size_t p = 1; p < first_object + objects_.size(); ++p) {
+    if (p >= first_object) depths.push_back(mean(slice_rows(rendered_.projected.depths, row, parts[p].count)));
+    row += parts[p].count;
+  }
+  inputs_.object_depth = concat_rows<S>(depths);
+  inputs_.object_depth_target = tape_.constant("object_depth_target", shape_of(count, 1));
+}
+
+/// A pose's translation is where the object's centroid is.
+template <class S>
+void FrameGraph<S>::record_object_places() {
+  std::vector<Var<S>> centroids;
+  for (const Object& object : objects_) centroids.push_back(object.transl);
+  const Var<S> axes = tape_.constant("unit_axes", shape_of(std::ssize(objects_), 9));
+  for (Index o = 0; o < std::ssize(objects_); ++o) {  // without extent they would not be drawn, and have no gradient
+    for (const Index diagonal : {0, 4, 8}) tape_.write(axes)(o, diagonal) = 1;
+  }
+  inputs_.object_place = project(concat_rows<S>(centroids), axes, xi_, view_).means_px;
+}
+
+template <class S>
+void FrameGraph<S>::write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle) {
+  S* numbers = tape_.write(leaf).row(row);
+  if (settings_.rotations == RotationParameters::kAxisAngle) {
+    Vector3<double> wrapped = axis_angle;  // a file's may be any number of turns (row D9)
+    wrap_axis_angle(wrapped);
+    for (Index i = 0; i < 3; ++i) numbers[i] = static_cast<S>(wrapped[i]);
+    return;
+  }
+  const Matrix3<double> rotation = so3_exp(axis_angle);
+  for (Index i = 0; i < 6; ++i) numbers[i] = static_cast<S>(rotation(i % 3, i / 3));
+}
+
+template <class S>
+Vector3<double> FrameGraph<S>::read_rotation(Var<S> leaf, Index row) const {
+  const S* numbers = tape_.value(leaf).row(row);
+  Vector3<double> first(numbers[0], numbers[1], numbers[2]);
+  if (settings_.rotations == RotationParameters::kAxisAngle) {
+    wrap_axis_angle(first);
+    return first;
+  }
+  return so3_log(rotation_from_6d(first, Vector3<double>(numbers[3], numbers[4], numbers[5])));
+}
+
+template <class S>
+void FrameGraph<S>::set_state(const SceneState& state) {
+  const std::array<double, 6> no_update{};
+  write_numbers(tape_, camera_update_, no_update.data());
+  if (settings_.draw == Draw::kScene) return;
+  HSI4D_CHECK_EQ(state.objects.size(), objects_.size());
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    write_rotation(objects_[o].orient, 0, state.objects[o].rotation);
+    write_numbers(tape_, objects_[o].transl, state.objects[o].translation.data());
+  }
+  write_numbers(tape_, transl_, state.body.transl.data());
+  for (std::size_t g = 0; g < kJointGroups.size(); ++g) {
+    for (Index j = 0; j < kJointGroups[g].count; ++j) {
+      const double* axis_angle = state.body.axis_angle.data() + 3 * (kJointGroups[g].first + j);
+      write_rotation(joint_rotations_[g], j, Vector3<double>(axis_angle));
+    }
+  }
+}
+
+template <class S>
+void FrameGraph<S>::read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const {
+  const auto is_moved = [&moved](const char* group) { return find_entry(moved, group) != nullptr; };
+  if (is_moved("camera")) {
+    Vector6<double> update;
+    for (Index i = 0; i < 6; ++i) update[i] = static_cast<double>(tape_.value(camera_update_)(0, i));
+    const Vector6<double> xi = xi_from_update_ * update;
+    state.camera_from_world = se3_update(xi, view_.camera.camera_from_world);
+  }
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    if (is_moved("object_orient")) state.objects[o].rotation = read_rotation(objects_[o].orient, 0);
+    if (is_moved("object_transl")) state.objects[o].translation = read_vector(tape_, objects_[o].transl);
+  }
+  if (is_moved("transl")) state.body.transl = read_vector(tape_, transl_);
+  for (std::size_t g = 0; g < joint_rotations_.size(); ++g) {
+    if (!is_moved(kJointGroups[g].name)) continue;
+    for (Index j = 0; j < kJointGroups[g].count; ++j) {
+      const Vector3<double> axis_angle = read_rotation(joint_rotations_[g], j);
+      std::copy_n(axis_angle.data(), 3, state.body.axis_angle.data() + 3 * (kJointGroups[g].first + j));
+    }
+  }
+}
+
+template <class S>
+void FrameGraph<S>::read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const {
+  if (color_net_.layers.empty()) return;
+  if (find_entry(moved, kColorNetGroup) != nullptr) read_layers(color_net_, net);
+  if (find_entry(moved, kFeaturesGroup) != nullptr) read_features(color_net_, net);
+}
+
+template <class S>
+void FrameGraph<S>::set_targets(const FrameTargets& targets) {
+  HSI4D_CHECK(targets.image != nullptr, "a frame needs an image to be compared with");
+  write_image(inputs_.target, *targets.image);
+  if (targets.weight != nullptr) {
+    write_image(inputs_.weight, *targets.weight);
+  } else {
+    fill(inputs_.weight, S(1));
+  }
+  if (inputs_.given(inputs_.human_mask)) {
+    write_image(inputs_.human_mask, *targets.human_mask);
+    fill(inputs_.human_seen, S(targets.human_seen ? 1 : 0));
+  }
+  if (!inputs_.given(inputs_.object_depth)) return;
+  HSI4D_CHECK_EQ(targets.depths.size(), objects_.size());
+  write_numbers(tape_, inputs_.object_depth_target, targets.depths.data());
+  if (inputs_.given(inputs_.object_masks)) set_object_masks(targets);
+}
+
+template <class S>
+void FrameGraph<S>::set_object_masks(const FrameTargets& targets) {
+  HSI4D_CHECK_EQ(targets.centers.size(), objects_.size());
+  write_images(inputs_.object_masks, targets.object_masks);
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    S* center = tape_.write(inputs_.object_center_target).row(static_cast<Index>(o));
+    for (Index i = 0; i < 3; ++i) center[i] = static_cast<S>(targets.centers[o][i]);
+    tape_.write(inputs_.object_seen).data[o] = center[2] > 0 ? 1 : 0;
+  }
+}
+
+template class FrameGraph<float>;
+template class FrameGraph<double>;
+
+}  // namespace hsi4d

@@ -1,0 +1,147 @@
+// One frame on a tape: from the parameters of camera, human and objects to the image and the inputs of the losses.
+//
+//   scene       means, quats, log_scales, opacity_logits, sh                                ─┐
+//   object o    the same, moved by [exp(orient) | transl]                                     ├─ render ─ image, masks
+//   human       rotations → kinematic chain → blended transforms → means, axes; color net   ─┘
+//
+// Every number that the image depends on is a leaf, frozen unless a stage moves it, so that each can be optimised, and
+// checked, by its group's name.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/loss_term.h"
+#include "optim/parameters.h"
+#include "optim/stage.h"
+#include "pipelines/config/parameter_groups.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/draw/posed_splats.h"
+#include "pipelines/draw/seen_rows.h"
+#include "pipelines/input/clip.h"
+#include "pipelines/input/state.h"
+#include "splat/render/render.h"
+
+namespace hsi4d {
+
+/// What a frame graph draws and how.
+struct FrameGraphSettings {
+  RenderSettings render;
+  RenderSkips skip = {};
+  RenderApproximations approx = {};
+  bool hold_colors = false;  ///< colours change only where what makes them moves, see held()
+  RotationParameters rotations = RotationParameters::kSixD;
+  CameraIncrement increment = CameraIncrement::kCamera;
+  Draw draw = Draw::kAll;
+  Vector3<double> background = Vector3<double>::Zero();
+  const ColorNet* color_net = nullptr;  ///< of the human's colours, read when the graph is recorded; null: the avatar's
+  bool color_pose_gradient = true;      ///< colours of the net have a gradient in the pose
+  bool color_camera_gradient = false;   ///< and, by the direction of view, in the camera
+  bool human_opacity = false;           ///< the losses read the human's opacity, which costs a channel of the render
+  bool object_opacity = false;          ///< likewise of the objects, a channel each
+  /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
+  /// out, and the groups of the scene then hold the others alone. None: all are kept.
+  std::optional<double> camera_reach = {};
+  int longest_side_px = 0;  ///< of the image, at most; 0: as large as the clip's camera has it
+  /// What is drawn of objects and human; the groups of their Gaussians then hold that alone, and `object_depth` is its
+  /// mean. None: all of it.
+  std::optional<SeenRows> seen = {};
+};
+
+/// The camera of images of a clip that are at most so large; 0: the clip's.
+Camera camera_of_size(const Clip& clip, int longest_side_px);
+
+/// What a frame is compared with.
+struct FrameTargets {
+  const Image* image = nullptr;                 ///< [3,H,W]
+  const Image* weight = nullptr;                ///< [1,H,W]; null: every pixel counts
+  std::vector<Vector3<double>> centers;         ///< by object: x px, y px, the share that is seen; with object_masks
+  std::vector<double> depths;                   ///< by object: mean camera z at the clip's first frame, metres
+  const Image* human_mask = nullptr;            ///< [1,H,W] coverage; needed with settings.human_opacity
+  bool human_seen = true;                       ///< the frame shows some of the human
+  std::vector<const Image*> object_masks = {};  ///< coverage by object; needed with settings.object_opacity
+};
+
+/// The frame graph. The tape and the clip must outlive it.
+template <class S>
+class FrameGraph {
+ public:
+  /// Records the graph; nothing is computed. `camera_from_world` is the camera about which the update is taken.
+  FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
+             const FrameGraphSettings& settings);
+
+  /// Writes the state into the leaves. The camera's update becomes zero: `state` must have the camera that the graph
+  /// was recorded with.
+  void set_state(const SceneState& state);
+  /// Reads the leaves of the groups named in `moved` back into `state`; the rest of it keeps its bits. Rotations come
+  /// as axis-angle with angles up to π.
+  void read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const;
+  /// Reads features and layers of the color net back, those of them that are named in `moved`.
+  void read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const;
+  /// Records what terms over the body's motion read. For graphs that draw all, once, after set_state.
+  /// @param first   the clip's first frame
+  /// @param frames  the states before this frame that such terms see, and last the one that was set
+  void give_motion(const SceneState& first, const std::vector<SceneState>& frames);
+  /// Writes the frame: target, the weight of pixels, centres of the objects' masks. See FrameTargets.
+  void set_targets(const FrameTargets& targets);
+
+  const Rendered<S>& rendered() const { return rendered_; }
+  const LossInputs<S>& loss_inputs() const { return inputs_; }
+  /// Everything that may move, all of it frozen.
+  const std::vector<ParameterGroup<S>>& groups() const { return groups_; }
+  /// Colours, where settings.hold_colors says so.
+  const std::vector<HeldOutput>& held() const { return held_; }
+
+ private:
+  struct Part {  // rows of all Gaussians that belong together
+    SplatInputs<S> splats;
+    Index count = 0;
+  };
+  struct Object {
+    Var<S> orient, transl;
+    Var<S> rotation;  // [1,9] that orient gives
+  };
+
+  Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
+  ParameterGroup<S>& add_to_group(const std::string& group, Var<S> leaf);
+  Var<S> rotation_leaf(const std::string& group, const std::string& name, Index rows);
+  GaussianVars<S> gaussian_leaves(const std::string& part, const std::string& name, const Gaussians& g);
+  Part record_scene(const Gaussians& scene);
+  void record_moving(std::vector<Part>& parts);
+  Part record_object(const ClipObject& object);
+  Part record_human(const Avatar& avatar);
+  HumanColors<S> record_color_net(const ColorNet& net);
+  void hold_colors(Var<S> colors, const std::vector<std::string>& groups);
+  Var<S> record_rotations(Var<S> parameters) const;
+  void record_render(const std::vector<Part>& parts, std::size_t first_object);
+  void record_human_inputs();
+  Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
+  void record_object_depths(const std::vector<Part>& parts, std::size_t first_object);
+  void record_object_places();
+  void record_object_masks();
+  void set_object_masks(const FrameTargets& targets);
+  bool draws_objects() const { return settings_.object_opacity && !objects_.empty(); }
+  void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
+  Vector3<double> read_rotation(Var<S> leaf, Index row) const;
+
+  Tape<S>& tape_;
+  const Clip& clip_;
+  FrameGraphSettings settings_;
+  SplatView view_;
+  std::vector<ParameterGroup<S>> groups_;
+  std::vector<HeldOutput> held_;
+  Matrix6<double> xi_from_update_;
+  Var<S> camera_update_;  // the leaf: numbers in the frame of settings.increment
+  Var<S> xi_, background_;
+  std::vector<Object> objects_;
+  Var<S> transl_;
+  std::vector<Var<S>> joint_rotations_;  // by kJointGroups
+  Var<S> rotations_;                     // [55,9] that they give
+  PosedSkeleton<S> skeleton_;
+  ColorNetVars<S> color_net_;  // empty without a color net
+  Rendered<S> rendered_;
+  LossInputs<S> inputs_;
+};
+
+}  // namespace hsi4d

@@ -1,0 +1,158 @@
+#include "pipelines/graph/motion_inputs.h"
+
+#include <algorithm>
+
+#include "autodiff/matrix.h"
+#include "body/skinning.h"
+#include "body/vposer.h"
+#include "core/check.h"
+#include "core/rotation.h"
+#include "optim/metrics.h"
+#include "pipelines/graph/tape_rows.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr Index kCoordinates = 3 * kMetricJoints;
+
+std::shared_ptr<const MotionStart> start_of(const Clip& clip, const SceneState& first,
+                                            const std::vector<SceneState>& frames, Index moving) {
+  auto start = std::make_shared<MotionStart>();
+  start->avatar = &clip.avatar;
+  for (const ClipObject& object : clip.objects) start->objects.push_back(&object.gaussians);
+  start->scene = &clip.scene;
+  start->first_camera_center = inverse(first.camera_from_world).translation;
+  start->still_frames = std::ssize(frames) - moving;
+  start->frame_rate = clip.frame_rate;
+  start->first_body = pose_skeleton(clip.avatar, first.body);
+  for (const SceneState& frame : frames) {
+    start->body.push_back(pose_skeleton(clip.avatar, frame.body));
+    std::vector<Rigid<double>> objects;
+    for (const ObjectPose& pose : frame.objects) objects.push_back({so3_exp(pose.rotation), pose.translation});
+    start->world_from_object.push_back(std::move(objects));
+  }
+  return start;
+}
+
+/// Joints of frames [first, last) when the stage began.
+std::vector<double> start_joints(const MotionStart& motion, Index first, Index last) {
+  std::vector<double> rows;
+  for (Index t = first; t < last; ++t) {
+    const std::vector<double>& joints = motion.body_in(t).joints;
+    rows.insert(rows.end(), joints.begin(), joints.begin() + kCoordinates);
+  }
+  return rows;
+}
+
+/// The frames that stand, and those that move below them.
+template <class S>
+Var<S> joint_rows(const MovingFrames<S>& moving, const MotionStart& motion) {
+  Tape<S>& tape = moving.skeleton.joints.owner();
+  const Index frames = motion.moving_frames();
+  const Var<S> all = reshape(moving.skeleton.joints, frames, moving.skeleton.joints.shape().count() / frames);
+  const Var<S> moved = slice_cols(all, 0, kCoordinates);
+  if (motion.still_frames == 0) return moved;
+  const Var<S> still =
+      constant_rows<S>(tape, "joints_before", start_joints(motion, 0, motion.still_frames), kCoordinates);
+  return concat_rows<S>(std::array{still, moved});
+}
+
+/// The rotations of joints 1 to 21 of all frames that move.
+template <class S>
+Var<S> body_rotation_rows(Var<S> rotations) {
+  const Index joints = kSmplxJoints, frames = rotations.shape().rows / joints;
+  if (frames == 1) return slice_rows(rotations, 1, kBodyPoseJoints);
+  const Var<S> by_frame = reshape(rotations, frames, 9 * joints);
+  return reshape(slice_cols(by_frame, 9, 9 * kBodyPoseJoints), frames * kBodyPoseJoints, 9);
+}
+
+/// Points that follow transforms [.,12] by weights: those of some rows of files, each in a frame that moves.
+template <class S>
+struct FollowingPoints {
+  SparseWeights weights;
+  std::vector<double> rest;
+
+  Var<S> record(Var<S> transforms) {
+    weights.joints = transforms.shape().rows;
+    const Var<S> points = constant_rows<S>(transforms.owner(), "points_at_rest", rest, 3);
+    return skin_points(SkinWeights<S>(weights), transforms, points);
+  }
+  void add_rest(const std::vector<float>& means, Index row) {
+    for (Index i = 0; i < 3; ++i) rest.push_back(static_cast<double>(means[static_cast<std::size_t>(3 * row + i)]));
+    ++weights.vertices;
+  }
+};
+
+Index moving_frame(const MotionStart& motion, Index frame) {
+  HSI4D_CHECK(frame >= motion.still_frames && frame < motion.frames(), "the point's frame does not move in the stage");
+  return frame - motion.still_frames;
+}
+
+template <class S>
+Var<S> record_body_points(Var<S> transforms, const MotionStart& motion, const std::vector<BodyPoint>& points) {
+  const SparseWeights& all = motion.avatar->weights;
+  FollowingPoints<S> chosen;
+  chosen.weights.per_vertex = all.per_vertex;
+  for (const BodyPoint& point : points) {
+    const Index first_joint = moving_frame(motion, point.frame) * all.joints;
+    for (Index k = 0; k < all.per_vertex; ++k) {
+      const auto at = static_cast<std::size_t>(point.row * all.per_vertex + k);
+      chosen.weights.indices.push_back(static_cast<std::int32_t>(first_joint + all.indices[at]));
+      chosen.weights.weights.push_back(all.weights[at]);
+    }
+    chosen.add_rest(motion.avatar->means, point.row);
+  }
+  return chosen.record(transforms);
+}
+
+template <class S>
+Var<S> record_object_points(Tape<S>& tape, Var<S> transforms, const MotionStart& motion,
+                            const std::vector<ObjectPoint>& points) {
+  if (transforms.tape == nullptr) {  // the objects stand
+    std::vector<double> places;
+    for (const ObjectPoint& point : points) {
+      const Vector3<double> place = motion.place(point);
+      places.insert(places.end(), place.data(), place.data() + 3);
+    }
+    return constant_rows<S>(tape, "object_points", places, 3);
+  }
+  FollowingPoints<S> chosen;
+  chosen.weights.per_vertex = 1;
+  for (const ObjectPoint& point : points) {
+    moving_frame(motion, point.frame);
+    chosen.weights.indices.push_back(static_cast<std::int32_t>(point.object));
+    chosen.weights.weights.push_back(1);
+    chosen.add_rest(motion.objects[static_cast<std::size_t>(point.object)]->means, point.row);
+  }
+  return chosen.record(transforms);
+}
+
+}  // namespace
+
+template <class S>
+void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneState& first,
+                 const std::vector<SceneState>& frames, LossInputs<S>& inputs) {
+  const Index count = moving.rotations.shape().rows / kSmplxJoints;
+  const std::shared_ptr<const MotionStart> motion = start_of(clip, first, frames, count);
+  inputs.motion = motion;
+  inputs.body_rotations = body_rotation_rows(moving.rotations);
+  inputs.joints = joint_rows(moving, *motion);
+  Tape<S>& tape = inputs.joints.owner();
+  inputs.joints_start =
+      constant_rows<S>(tape, "joints_start", start_joints(*motion, 0, motion->frames()), kCoordinates);
+  const Var<S> transforms = moving.skeleton.transforms, objects = moving.object_transforms;
+  inputs.body_points = [transforms, motion](const std::vector<BodyPoint>& points) {
+    return record_body_points(transforms, *motion, points);
+  };
+  inputs.object_points = [&tape, objects, motion](const std::vector<ObjectPoint>& points) {
+    return record_object_points(tape, objects, *motion, points);
+  };
+}
+
+template void give_motion(const MovingFrames<float>&, const Clip&, const SceneState&, const std::vector<SceneState>&,
+                          LossInputs<float>&);
+template void give_motion(const MovingFrames<double>&, const Clip&, const SceneState&, const std::vector<SceneState>&,
+                          LossInputs<double>&);
+
+}  // namespace hsi4d

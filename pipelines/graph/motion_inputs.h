@@ -1,0 +1,32 @@
+// The inputs of loss terms over the body's motion: places of joints, of some Gaussians of hands and feet, of objects.
+#pragma once
+
+#include "body/kinematics.h"
+#include "optim/loss_term.h"
+#include "pipelines/input/clip.h"
+
+namespace hsi4d {
+
+/// The M frames that a stage moves, on its tape.
+template <class S>
+struct MovingFrames {
+  Var<S> rotations;           ///< [M·55,9] of all joints, relative to their parents
+  PosedSkeleton<S> skeleton;  ///< of the frames
+  Var<S> object_transforms;   ///< [O,12] rows [3,4] of world_from_object, of one frame; empty: the objects stand
+};
+
+/// Fills in body_rotations, joints, joints_start, motion, body_points and object_points.
+///
+/// @param first   the clip's first frame
+/// @param frames  states when the stage begins: some that stand still, then the M that move
+/// The clip must outlive the inputs.
+template <class S>
+void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneState& first,
+                 const std::vector<SceneState>& frames, LossInputs<S>& inputs);
+
+extern template void give_motion(const MovingFrames<float>&, const Clip&, const SceneState&,
+                                 const std::vector<SceneState>&, LossInputs<float>&);
+extern template void give_motion(const MovingFrames<double>&, const Clip&, const SceneState&,
+                                 const std::vector<SceneState>&, LossInputs<double>&);
+
+}  // namespace hsi4d

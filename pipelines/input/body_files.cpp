@@ -1,0 +1,63 @@
+#include "pipelines/input/body_files.h"
+
+#include <algorithm>
+
+#include "body/motion_edit.h"
+#include "body/pose_layout.h"
+#include "body/procedural_body.h"
+#include "body/smplx_file.h"
+#include "core/log.h"
+
+namespace hsi4d {
+
+void warn_of_repairs(const SmplxModel& model) {
+  if (model.rescaled_weights == 0) return;
+  log_warning(model.source +
+              ": vertices whose skinning weights are divided by their sum: " + std::to_string(model.rescaled_weights));
+}
+
+void warn_of_excess(const std::string& file, const std::string& name, std::span<const double> numbers, Index width,
+                    const SmplxModel& model, Index there) {
+  if (width <= there) return;
+  bool is_zero = true;
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    is_zero = is_zero && (static_cast<Index>(i) % width < there || numbers[i] == 0);
+  if (is_zero) return;
+  log_warning(file + ": array '" + name + "': has " + std::to_string(width) + " numbers a frame; " + model.source +
+              " has " + std::to_string(there) + ", and the others are left out");
+}
+
+SmplxModel read_model_for(const std::string& path, const std::string& motion, const std::vector<double>& betas) {
+  const SmplxModel bare = read_smplx(path, {.betas = 0, .expressions = 0, .correctives = false});
+  warn_of_repairs(bare);
+  warn_of_excess(motion, "betas", betas, std::ssize(betas), bare, bare.betas_in_file);
+  const Index count = std::min<Index>(bare.betas_in_file, static_cast<Index>(betas.size()));
+  return count == 0 ? bare : read_smplx(path, {.betas = count, .expressions = 0, .correctives = false});
+}
+
+Motion read_motion_aloud(const std::string& path) {
+  Motion motion = read_motion(path);
+  if (motion.lost_shape)
+    log_warning(path + ": is of " + motion.converted_from + ", whose betas are no shape of SMPL-X: they are left out");
+  return motion;
+}
+
+Motion read_motion_for(const std::string& path, const Avatar& avatar) {
+  return for_body(read_motion_aloud(path), avatar);
+}
+
+SmplxModel body_model_of(const BodySettings& settings) {
+  SmplxModel model = settings.kind == BodyKind::kProcedural ? procedural_smplx(settings.betas)
+                                                            : read_smplx(settings.path.string(), {settings.betas, 0});
+  warn_of_repairs(model);
+  return model;
+}
+
+BodyModel rest_body(const BodySettings& settings) {
+  if (settings.kind == BodyKind::kProcedural && settings.shape.empty()) return procedural_body();
+  std::vector<double> betas = settings.shape;
+  betas.resize(static_cast<std::size_t>(settings.betas));
+  return rest_body(body_model_of(settings), betas);
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,47 @@
+// Files of bodies as the program reads them: what was repaired or left out is told in the log.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "body/avatar.h"
+#include "body/motion_io.h"
+#include "body/smplx_file.h"
+#include "pipelines/config/body_settings.h"
+
+namespace hsi4d {
+
+/// Tells how many vertices have repaired skinning weights, where there are any.
+void warn_of_repairs(const SmplxModel& model);
+
+/// Tells that numbers of shape or expression beyond what a model has are left out, unless all of those are 0.
+///
+/// @param file     that they are in, for the message, and
+/// @param name     of their array
+/// @param numbers  rows of `width`
+/// @param there    how many the model has
+void warn_of_excess(const std::string& file, const std::string& name, std::span<const double> numbers, Index width,
+                    const SmplxModel& model, Index there);
+
+/// The model that the settings name, in the layout of SMPL-X, without expressions; weights that were repaired are told
+/// in the log. Throws as read_smplx; DataError when it has fewer betas than are asked for.
+SmplxModel body_model_of(const BodySettings& settings);
+
+/// The body in its rest pose and its shape, whatever its kind. Throws as body_model_of.
+BodyModel rest_body(const BodySettings& settings);
+
+/// Reads a body model with as many directions of shape as a motion has numbers for, as far as the file has them: the
+/// first `betas` numbers are those of the model that is returned. Tells what is repaired or left out. Throws as
+/// read_smplx.
+///
+/// @param motion  the file that the betas are of, for messages
+SmplxModel read_model_for(const std::string& path, const std::string& motion, const std::vector<double>& betas);
+
+/// Reads a motion, and tells what of it is left out because it is of another body model. Throws as read_motion.
+Motion read_motion_aloud(const std::string& path);
+
+/// As read_motion_aloud, moved to the avatar's body (for_body): its pelvis is where the file has it.
+Motion read_motion_for(const std::string& path, const Avatar& avatar);
+
+}  // namespace hsi4d

@@ -1,0 +1,289 @@
+#include "pipelines/input/clip.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "body/motion_edit.h"
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "optim/solid/mesh_distance.h"
+#include "pipelines/config/run_problems.h"
+#include "pipelines/input/body_files.h"
+#include "pipelines/input/pose_estimate.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The poses of data.motion, laid on frame 0, or else those of the initial state; empty: none.
+std::vector<BodyPose> estimate_of(const DataSettings& data, const SceneSetup& setup, const Avatar& avatar,
+                                  const FrameSource& frames) {
+  if (data.motion.empty()) return estimated_poses(setup.motion, setup.motion_file, frames);
+  return laid_on(read_estimate(data.motion, avatar, frames), setup.motion.poses.front(), pelvis_of(avatar.joints),
+                 data.motion_align);
+}
+
+/// As estimate_of, of the objects.
+std::vector<std::vector<ObjectPose>> object_estimate_of(const fs::path& file, const Clip& clip) {
+  if (file.empty() || clip.objects.empty()) return {};
+  std::vector<std::string> names;
+  for (const ClipObject& object : clip.objects) names.push_back(object.name);
+  return kept_frames(read_object_tracks(file.string(), names), clip.video->frames, file.string(), "frames");
+}
+
+/// The rate of the clip: that of its video, if it is known, or else of the motion.
+double rate_of(const FrameSource& frames, const SceneSetup& setup) {
+  if (frames.frame_rate() > 0) return frames.frame_rate();
+  if (!setup.motion.says_frame_rate && setup.motion.poses.size() > 1)
+    log_warning(setup.motion_file.string() + ": says no frame rate and is taken for " +
+                rounded(setup.motion.frame_rate, 4) + " frames a second");
+  return setup.motion.frame_rate;
+}
+
+std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, const Avatar& avatar,
+                                   const FrameSource& frames) {
+  const auto file = [&folder](const char* name) { return (folder / name).string(); };
+  const std::vector<BodyPose> bodies =
+      kept_frames(read_motion_for(file("motion.npz"), avatar).poses, frames, file("motion.npz"), "poses");
+  const std::vector<Camera> cameras =
+      kept_frames(read_cameras(file("cameras.json")), frames, file("cameras.json"), "cameras");
+  std::vector<std::vector<ObjectPose>> objects(bodies.size());
+  if (!names.empty())
+    objects = kept_frames(read_object_tracks(file("objects.npz"), names), frames, file("objects.npz"), "frames");
+  std::vector<SceneState> truth(bodies.size());
+  for (std::size_t t = 0; t < truth.size(); ++t) truth[t] = {cameras[t].camera_from_world, objects[t], bodies[t]};
+  return truth;
+}
+
+/// Whether there is something to compare with. A dataset may have been handed on without it.
+/// @param key, use  the setting, and what is not done without it
+bool is_there(const fs::path& path, const char* key, const char* use) {
+  if (path.empty() || fs::exists(path)) return !path.empty();
+  log_warning(path.string() + ": there is no such file or folder (data." + key + "); " + use);
+  return false;
+}
+
+std::string size_text(const Image& image) {
+  return std::to_string(image.width()) + "x" + std::to_string(image.height());
+}
+
+std::string size_text(const Camera& camera) {
+  return std::to_string(camera.width) + "x" + std::to_string(camera.height);
+}
+
+bool has_size_of(const Image& image, const Camera& camera) {
+  return image.height() == camera.height && image.width() == camera.width;
+}
+
+/// Whether an image becomes one of the camera by taking means of its pixels: larger, and of the same shape but for
+/// the rounding of sizes.
+bool is_enlarged(const Image& image, const Camera& camera) {
+  if (image.width() < camera.width || image.height() < camera.height) return false;
+  const double across = static_cast<double>(image.width()) / camera.width,
+               down = static_cast<double>(image.height()) / camera.height;
+  return std::fabs(across / down - 1) < 1.0 / std::min(camera.width, camera.height);
+}
+
+/// The image of the camera's size.
+Image reduced(const Image& image, const Camera& camera) {
+  return has_size_of(image, camera) ? image : resize_area(image, camera.height, camera.width);
+}
+
+/// Files of floats may hold anything.
+void check_finite(const Image& image, const std::string& place) {
+  for (int c = 0; c < image.channels(); ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      const float* row = image.row(c, y);
+      const float* bad = std::find_if(row, row + image.width(), [](float value) { return !std::isfinite(value); });
+      if (bad == row + image.width()) continue;
+      throw DataError(place + ": the number at row " + std::to_string(y) + ", column " + std::to_string(bad - row) +
+                      ", channel " + std::to_string(c) + " is " + (std::isnan(*bad) ? "NaN" : "infinite") +
+                      "; frames and masks hold finite numbers");
+    }
+  }
+}
+
+/// A mask that is as large as the frame of the video, in the camera's size; empty where there is none.
+Image read_mask(const MaskSource& source, const Clip& clip, Index index, const Image& frame) {
+  const Image mask = source.read(clip.video->frames, index);
+  if (mask.width() == 0) return Image(1, clip.camera.height, clip.camera.width);
+  check_finite(mask, source.place(clip.video->frames, index));
+  if (mask.height() == frame.height() && mask.width() == frame.width()) return reduced(mask, clip.camera);
+  throw DataError(source.place(clip.video->frames, index) + ": is " + size_text(mask) + " pixels, " +
+                  (has_size_of(frame, clip.camera) ? "the camera's image " : "the video's frame ") + size_text(frame));
+}
+
+/// A folder of masks that is not there is a wrong name. Single masks may be missing: nothing is seen in that frame.
+MaskSource open_masks(const fs::path& folder, const std::string& name, const FrameSource& frames) {
+  const MaskSource masks(folder, name);
+  const Index missing = masks.missing(frames);
+  if (missing > 0)
+    log_warning(masks.path().string() + ": has no mask for " + std::to_string(missing) + " of " +
+                std::to_string(frames.count()) + " frames; these count as empty");
+  const MaskSource::Count count = masks.count(frames);
+  if (count.unused > 0)
+    log_warning(masks.path().string() + ": holds " + std::to_string(count.all) + " masks, the video has " +
+                std::to_string(frames.video_count()) + " frames; " + std::to_string(count.unused) +
+                " of the masks belong to no frame and are not used");
+  return masks;
+}
+
+/// False for a mask that nowhere reaches the threshold.
+bool shows_something(const Image& mask, double threshold) {
+  for (int y = 0; y < mask.height(); ++y) {
+    const float* row = mask.row(0, y);
+    if (std::any_of(row, row + mask.width(), [&](float m) { return static_cast<double>(m) >= threshold; })) return true;
+  }
+  return false;
+}
+
+/// What hidden masks do to the losses, as the end of a message.
+std::string off_text(const std::vector<std::string>& losses) {
+  std::vector<std::string> quoted;
+  for (const std::string& name : losses) quoted.push_back("\"" + name + "\"");
+  if (quoted.empty()) return "";
+  return (quoted.size() == 1 ? "; the loss " : "; the losses ") + joined(quoted) +
+         (quoted.size() == 1 ? " is" : " are") + " off for it there";
+}
+
+}  // namespace
+
+Clip read_clip(const DataSettings& data) {
+  check_inputs(data);
+  return make_clip(data, read_scene_setup(data));
+}
+
+Clip make_clip(const DataSettings& data, SceneSetup setup) {
+  Clip clip;
+  auto video = std::make_shared<ClipVideo>(ClipVideo{{data.frames, {data.video_rate, data.frame_rate}}, {}});
+  clip.frame_files = video->frames.names();
+  clip.camera = read_camera(data.camera.string());
+  clip.scene = std::move(setup.scene);
+  clip.avatar = std::move(setup.avatar);
+  clip.objects = std::move(setup.objects);
+  clip.first.camera_from_world = clip.camera.camera_from_world;
+  clip.first.objects = setup.poses;
+  std::vector<std::string> names;
+  for (const ClipObject& object : clip.objects) names.push_back(object.name);
+  video->masks.push_back(open_masks(data.masks, kHumanMasks, video->frames));
+  for (const std::string& name : names) video->masks.push_back(open_masks(data.masks, name, video->frames));
+  clip.video = video;
+  clip.estimate = estimate_of(data, setup, clip.avatar, video->frames);
+  clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
+  clip.first.body = setup.motion.poses.front();
+  clip.frame_rate = rate_of(video->frames, setup);
+  clip.betas = setup.motion.betas;
+  clip.gender = setup.motion.gender;
+  if (is_there(data.surface, "surface", "penetration is not measured")) {
+    clip.surface = read_mesh_distance(data.surface.string(), kMeasuredThickness);
+    clip.surface_file = data.surface.filename().string();
+  }
+  if (is_there(data.truth, "truth", "the result is not compared with the truth"))
+    clip.truth = read_truth(data.truth, names, clip.avatar, video->frames);
+  clip.files = {{"/data/scene", data.scene},
+                {"/data/avatar", data.avatar},
+                {"/data/camera", data.camera},
+                {"/data/initial", data.initial},
+                {"/data/initial: /motion", setup.motion_file}};
+  if (!data.motion.empty()) clip.files.push_back({"/data/motion", data.motion});
+  if (!setup.object_tracks.empty()) clip.files.push_back({"/data/initial: /object_tracks", setup.object_tracks});
+  for (const auto& [name, object] : data.objects)
+    clip.files.push_back({"/data/objects/" + name + "/gaussians", object.gaussians});
+  if (!video->frames.file().empty()) clip.files.push_back({"/data/frames", video->frames.file()});
+  for (const MaskSource& masks : video->masks) {
+    if (masks.is_video()) clip.files.push_back({"masks/" + masks.path().filename().string(), masks.path()});
+  }
+  return clip;
+}
+
+ClipFrame reduced_frame(const ClipFrame& frame, const Camera& camera) {
+  ClipFrame result = {reduced(frame.target, camera), reduced(frame.human_mask, camera), {}};
+  for (const Image& mask : frame.object_masks) result.object_masks.push_back(reduced(mask, camera));
+  return result;
+}
+
+bool fits_camera(const Image& frame, const Camera& camera) {
+  return has_size_of(frame, camera) || is_enlarged(frame, camera);
+}
+
+void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses) {
+  std::vector<std::vector<bool>> is_seen(static_cast<std::size_t>(clip.frames()));  // [frame][human, then objects]
+  const auto look = [&](Index begin, Index end) {
+    for (Index index = begin; index < end; ++index) {
+      std::vector<bool>& seen = is_seen[static_cast<std::size_t>(index)];
+      const ClipFrame frame = read_frame(clip, index);
+      seen.push_back(shows_something(frame.human_mask, data.mask_threshold));
+      for (const Image& mask : frame.object_masks) seen.push_back(shows_something(mask, data.mask_threshold));
+    }
+  };
+  const bool has_videos =
+      !clip.video->frames.file().empty() ||
+      std::any_of(clip.video->masks.begin(), clip.video->masks.end(), [](const MaskSource& m) { return m.is_video(); });
+  if (!has_videos) {
+    parallel_for(clip.frames(), 1, look);
+  } else {
+    look(0, clip.frames());  // videos are decoded in order
+  }
+  const auto warn_if_hidden = [&](std::size_t mask, const std::string& name, const std::string& what,
+                                  const std::vector<std::string>& off) {
+    std::vector<Index> hidden;
+    for (std::size_t t = 1; t < is_seen.size(); ++t) {  // frame 0 is given
+      if (!is_seen[t][mask]) hidden.push_back(static_cast<Index>(t));
+    }
+    if (hidden.empty()) return;
+    log_warning((data.masks / name).string() + ": " + what + " is hidden in " +
+                (hidden.size() == 1 ? "frame " : "frames ") + frame_ranges(hidden) +
+                ": no pixel reaches data.mask_threshold" + off_text(off));
+  };
+  warn_if_hidden(0, kHumanMasks, "the human", losses.human);
+  for (std::size_t o = 0; o < clip.objects.size(); ++o)
+    warn_if_hidden(1 + o, clip.objects[o].name, "the object", losses.objects);
+}
+
+std::string frame_ranges(const std::vector<Index>& frames) {
+  std::vector<std::string> ranges;
+  for (std::size_t begin = 0; begin < frames.size();) {
+    std::size_t last = begin;
+    while (last + 1 < frames.size() && frames[last + 1] == frames[last] + 1) ++last;
+    ranges.push_back(std::to_string(frames[begin]) + (last == begin ? "" : "-" + std::to_string(frames[last])));
+    begin = last + 1;
+  }
+  return joined(ranges);
+}
+
+std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, Index index) {
+  const std::string& name = clip.frame_files.at(static_cast<std::size_t>(index));
+  const FrameSource& frames = clip.video->frames;
+  std::vector<ClipFile> files;
+  if (frames.file().empty()) files.push_back({"frames/" + name, data.frames / name});
+  for (const MaskSource& masks : clip.video->masks) {
+    if (!masks.is_video())
+      files.push_back({"masks/" + masks.path().filename().string() + "/" + name, masks.file(frames, index)});
+  }
+  return files;
+}
+
+ClipFrame read_frame(const Clip& clip, Index index) {
+  const FrameSource& frames = clip.video->frames;
+  const Image read = frames.read(index);
+  if (read.channels() < 3 || !fits_camera(read, clip.camera)) {
+    throw DataError(frames.place(index) + ": is " + size_text(read) + " with " + std::to_string(read.channels()) +
+                    " channels; the camera's image is " + size_text(clip.camera) + " with 3");
+  }
+  ClipFrame frame;
+  const Image colors = take_channels(read, 0, 3);
+  check_finite(colors, frames.place(index));
+  frame.target = reduced(colors, clip.camera);
+  frame.human_mask = read_mask(clip.video->masks.front(), clip, index, read);
+  for (std::size_t m = 1; m < clip.video->masks.size(); ++m)
+    frame.object_masks.push_back(read_mask(clip.video->masks[m], clip, index, read));
+  return frame;
+}
+
+}  // namespace hsi4d

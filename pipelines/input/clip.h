@@ -1,0 +1,93 @@
+// What a reconstruction reads: scene, objects, avatar, the video's frames and masks, the state of frame 0.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/image.h"
+#include "optim/solid/mesh_distance.h"
+#include "pipelines/config/data_settings.h"
+#include "pipelines/config/masks.h"
+#include "pipelines/input/frame_source.h"
+#include "pipelines/input/scene_setup.h"
+
+namespace hsi4d {
+
+/// A file that a run reads.
+struct ClipFile {
+  std::string name;  ///< what it is, wherever it lies: "/data/scene", "frames/0001.png"
+  std::filesystem::path path;
+};
+
+/// Pictures of the clip.
+struct ClipVideo {
+  FrameSource frames;
+  std::vector<MaskSource> masks;  ///< of the human, then of each object
+};
+
+/// All that stays the same over the clip. Frames are read one by one (read_frame).
+struct Clip {
+  Gaussians scene;
+  std::vector<ClipObject> objects;
+  Avatar avatar;
+  Camera camera;                                         ///< of frame 0; size and intrinsics of all frames
+  SceneState first;                                      ///< state of frame 0, given; poses are of the avatar's body
+  std::vector<BodyPose> estimate;                        ///< estimated poses by frame; empty: none
+  std::vector<std::vector<ObjectPose>> object_estimate;  ///< estimated poses [frame][object]; empty: none
+  std::vector<double> betas;                             ///< of the person, as the motion file says; empty: not known
+  std::string gender = "neutral";                        ///< of the body model, likewise
+  double frame_rate = 10;                                ///< frames a second
+  std::vector<std::string> frame_files;                  ///< names of the frames, in order
+  std::shared_ptr<const ClipVideo> video;                ///< what read_frame reads
+  std::optional<std::vector<SceneState>> truth;
+  std::shared_ptr<const MeshDistance> surface;  ///< of data.surface; null: not known
+  std::string surface_file;
+  std::vector<ClipFile> files;  ///< read for it, but for the truth, which no result depends on
+
+  Index frames() const { return static_cast<Index>(frame_files.size()); }
+};
+
+/// One frame of the video.
+struct ClipFrame {
+  Image target;                     ///< [3,H,W]
+  Image human_mask;                 ///< [1,H,W] coverage
+  std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
+};
+
+/// The frame in the size of a camera: means of its pixels.
+ClipFrame reduced_frame(const ClipFrame& frame, const Camera& camera);
+
+/// Reads everything but the frames. Throws UserError or DataError naming the file: missing, damaged, sizes that do not
+/// fit each other.
+Clip read_clip(const DataSettings& data);
+
+/// As read_clip, of a scene that is read. data.initial is of no meaning.
+Clip make_clip(const DataSettings& data, SceneSetup setup);
+
+/// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on.
+/// A human or an object that some masks after frame 0 show nothing of is told in the log, each with its frames. Throws
+/// as read_frame.
+/// @param losses  those of the run that such masks switch off
+void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses);
+
+/// Whether a frame becomes an image of the camera: as large, or larger and of the same shape but for the rounding of
+/// sizes.
+bool fits_camera(const Image& frame, const Camera& camera);
+
+/// Reads frame `index` and its masks, and reduces larger ones to the camera's size. A mask that has no file counts as
+/// empty. Throws as read_clip; a number that is not finite too, with its row and column.
+ClipFrame read_frame(const Clip& clip, Index index);
+
+/// The files of a frame: the image, and the masks of human and objects, which may be missing. None of those that are in
+/// videos.
+std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, Index index);
+
+/// Frames in words: "3", "2-4, 9".
+/// @param frames  ascending
+std::string frame_ranges(const std::vector<Index>& frames);
+
+}  // namespace hsi4d

@@ -1,0 +1,258 @@
+#include "pipelines/input/frame_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <optional>
+
+#include "core/check.h"
+#include "core/image_io.h"
+#include "core/log.h"
+#include "core/text.h"
+#include "core/video.h"
+
+namespace hsi4d {
+
+namespace detail {
+
+struct OpenVideo {
+  explicit OpenVideo(const std::filesystem::path& path) : reader(path.string()) {}
+
+  Image read(Index frame) {
+    const std::lock_guard lock(mutex);
+    return reader.read(frame);
+  }
+
+  std::mutex mutex;
+  VideoReader reader;
+};
+
+}  // namespace detail
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Index kFewestFrames = 2;
+
+bool is_number(const std::string& text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// A name as the text before the digits that it ends with, and these: "frame_0012.png" is "frame_" and "0012".
+std::pair<std::string, std::string> split_number(const std::string& name) {
+  const std::string stem = fs::path(name).stem().string();
+  const std::size_t last = stem.find_last_not_of("0123456789");
+  const std::size_t begin = last == std::string::npos ? 0 : last + 1;
+  return {stem.substr(0, begin), stem.substr(begin)};
+}
+
+/// Refuses 8.png, 9.png, 10.png, and frame_9.png, frame_10.png: in the order of their names 10 comes first.
+void check_numbering(const std::vector<std::string>& names, const fs::path& folder) {
+  const auto is_numbered = [&names](const std::string& name) {
+    const auto [text, digits] = split_number(name);
+    return !digits.empty() && text == split_number(names.front()).first;
+  };
+  if (!std::all_of(names.begin(), names.end(), is_numbered)) return;
+  for (const std::string& name : names) {
+    if (name.size() == names.front().size()) continue;
+    throw DataError(
+        folder.string() + ": \"" + names.front() + "\" and \"" + name +
+        "\" have different numbers of digits; frames are taken in the order of their names, so fill up with zeros");
+  }
+}
+
+/// Logs, checkpoints and reports hold the names.
+void check_characters(const std::vector<std::string>& names, const fs::path& folder) {
+  for (const std::string& name : names) {
+    if (is_plain_text(name)) continue;
+    throw UserError(folder.string() + ": the name \"" + with_escapes(name) +
+                    "\" is not UTF-8 text without control characters; rename the frame, and its masks with it");
+  }
+}
+
+/// The number of digits; none where there are none, or many.
+std::optional<Index> number_of(const std::string& digits) {
+  constexpr std::size_t kMostDigits = 15;
+  if (digits.size() > kMostDigits || !is_number(digits)) return std::nullopt;
+  return std::stoll(digits);
+}
+
+/// Frames count as equally far apart in time; where their numbers are not, one is missing.
+void warn_of_gaps(const std::vector<std::string>& names, const fs::path& folder) {
+  std::optional<Index> least;
+  std::size_t widest = 0;
+  Index widest_step = 0;
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    const auto [text_before, digits_before] = split_number(names[i - 1]);
+    const auto [text, digits] = split_number(names[i]);
+    const std::optional<Index> before = number_of(digits_before), here = number_of(digits);
+    if (!before || !here || text_before != text) return;
+    const Index step = *here - *before;
+    if (!least || step < *least) least = step;
+    if (step <= widest_step) continue;
+    widest_step = step;
+    widest = i;
+  }
+  if (least && widest_step > *least)
+    log_warning(folder.string() + ": \"" + names[widest - 1] + "\" is followed by \"" + names[widest] +
+                "\"; frames count as equally far apart in time, so one seems to be missing");
+}
+
+/// What else is in a folder that may have been meant for frames: "; its 12 .jpg files are not read".
+std::string unread_text(const std::map<std::string, Index>& count_of_ending) {
+  std::string text;
+  for (const auto& [ending, count] : count_of_ending)
+    text += (text.empty() ? "; its " : ", ") + std::to_string(count) + " " + ending;
+  return text.empty() ? "" : text + " files are not read";
+}
+
+/// The .png files of a folder, in the order of their names.
+std::vector<std::string> png_names(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::map<std::string, Index> others;  // by ending
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string ending = entry.path().extension().string();
+    if (ending == ".png") names.push_back(entry.path().filename().string());
+    if (ending != ".png" && !ending.empty() && is_plain_text(ending)) ++others[ending];
+  }
+  if (error) throw UserError(folder.string() + ": cannot be listed as a folder of frames: " + error.message());
+  std::sort(names.begin(), names.end());
+  check_characters(names, folder);
+  check_numbering(names, folder);
+  if (std::ssize(names) < kFewestFrames) {
+    throw UserError(folder.string() + ": holds " + std::to_string(names.size()) +
+                    " .png files; a clip needs at least 2 frames" + unread_text(others));
+  }
+  warn_of_gaps(names, folder);
+  return names;
+}
+
+/// Numbers of the frames of `count` that are kept.
+std::vector<Index> kept_frames(Index count, double video, double kept) {
+  std::vector<Index> numbers;
+  const double step = kept > 0 ? video / kept : 1;
+  for (Index t = 0;; ++t) {
+    const auto number = static_cast<Index>(std::llround(static_cast<double>(t) * step));
+    if (number >= count) return numbers;
+    numbers.push_back(number);
+  }
+}
+
+/// The rate of the video, where frames are to be chosen by it.
+double rate_of_video(const fs::path& path, double of_file, const FrameRates& rates) {
+  const double video = rates.video > 0 ? rates.video : of_file;
+  if (rates.kept == 0) return video;
+  if (video == 0)
+    throw UserError(path.string() + ": does not say how many frames a second it has, so that " +
+                    number_text(rates.kept) + " of them cannot be kept; data.video_rate says it");
+  if (rates.kept > video)
+    throw UserError(path.string() + ": has " + number_text(video) + " frames a second; data.frame_rate, " +
+                    number_text(rates.kept) + ", cannot be more");
+  return video;
+}
+
+/// The video called `name` in a folder; empty: there is none. Throws UserError where there are two.
+fs::path video_in(const fs::path& folder, const std::string& name) {
+  fs::path video;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().stem() != name || !is_video_name(entry.path().string())) continue;
+    if (!video.empty())
+      throw UserError(video.string() + ", " + entry.path().string() + ": both hold masks of \"" + name +
+                      "\"; remove one");
+    video = entry.path();
+  }
+  return video;
+}
+
+std::string frame_of(const fs::path& video, Index number) {
+  return video.string() + ": frame " + std::to_string(number);
+}
+
+}  // namespace
+
+FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(path) {
+  std::vector<std::string> files;
+  if (fs::is_directory(path)) {
+    files = png_names(path);
+  } else if (is_video_name(path.string())) {
+    video_ = std::make_shared<detail::OpenVideo>(path);
+  } else {
+    throw UserError(path.string() + ": is neither a folder of frames nor a video (" + video_endings() + ")");
+  }
+  video_count_ = video_ ? video_->reader.frames() : std::ssize(files);
+  video_rate_ = rate_of_video(path, video_ ? video_->reader.frame_rate() : 0, rates);
+  numbers_ = kept_frames(video_count_, video_rate_, rates.kept);
+  frame_rate_ = rates.kept > 0 ? rates.kept : video_rate_;
+  for (const Index number : numbers_)
+    names_.push_back(video_ ? four_digits(number) + ".png" : files[static_cast<std::size_t>(number)]);
+  if (std::ssize(numbers_) < kFewestFrames)
+    throw UserError(path.string() + ": gives " + std::to_string(numbers_.size()) + " of its " +
+                    std::to_string(video_count_) + " frames; a clip needs at least 2");
+}
+
+bool FrameSource::has_name(const std::string& name) const {
+  if (!video_) return fs::exists(path_ / name);
+  const std::optional<Index> number = number_of(fs::path(name).stem().string());
+  return number && *number < video_count_ && name == four_digits(*number) + ".png";
+}
+
+std::string FrameSource::place(Index frame) const {
+  return video_ ? frame_of(path_, number(frame)) : (path_ / names_[static_cast<std::size_t>(frame)]).string();
+}
+
+Image FrameSource::read(Index frame) const { return video_ ? video_->read(number(frame)) : read_image(place(frame)); }
+
+MaskSource::MaskSource(const fs::path& folder, const std::string& name) : path_(folder / name) {
+  const fs::path video = video_in(folder, name);
+  if (fs::is_directory(path_)) {
+    if (!video.empty())
+      throw UserError(path_.string() + ", " + video.string() + ": both hold masks of \"" + name + "\"; remove one");
+    return;
+  }
+  if (video.empty()) throw DataError(path_.string() + ": there is no such folder of masks");
+  path_ = video;
+  video_ = std::make_shared<detail::OpenVideo>(video);
+}
+
+Index MaskSource::missing(const FrameSource& frames) const {
+  if (!video_) {
+    Index missing = 0;
+    for (Index t = 0; t < frames.count(); ++t) missing += fs::exists(file(frames, t)) ? 0 : 1;
+    return missing;
+  }
+  const Index needed = frames.number(frames.count() - 1) + 1;
+  if (video_->reader.frames() >= needed) return 0;
+  throw DataError(path_.string() + ": has " + std::to_string(video_->reader.frames()) +
+                  " frames, the clip needs the first " + std::to_string(needed));
+}
+
+MaskSource::Count MaskSource::count(const FrameSource& frames) const {
+  if (video_) return {video_->reader.frames(), std::max<Index>(0, video_->reader.frames() - frames.video_count())};
+  Count count;
+  std::error_code ignored;  // single masks that cannot be read are told when they are
+  for (const fs::directory_entry& entry : fs::directory_iterator(path_, ignored)) {
+    if (entry.path().extension() != ".png") continue;
+    ++count.all;
+    count.unused += frames.has_name(entry.path().filename().string()) ? 0 : 1;
+  }
+  return count;
+}
+
+fs::path MaskSource::file(const FrameSource& frames, Index frame) const {
+  return video_ ? fs::path() : path_ / frames.names()[static_cast<std::size_t>(frame)];
+}
+
+std::string MaskSource::place(const FrameSource& frames, Index frame) const {
+  return video_ ? frame_of(path_, frames.number(frame)) : file(frames, frame).string();
+}
+
+Image MaskSource::read(const FrameSource& frames, Index frame) const {
+  if (!video_ && !fs::exists(file(frames, frame))) return {};
+  return take_channels(video_ ? video_->read(frames.number(frame)) : read_image(place(frames, frame)), 0, 1);
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,101 @@
+#include "pipelines/input/pose_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/motion_edit.h"
+#include "core/log.h"
+#include "core/rotation.h"
+#include "core/text.h"
+#include "pipelines/input/body_files.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The pose at a moment of a motion, in seconds.
+BodyPose pose_at(const Motion& motion, double seconds) {
+  const double place = std::min(seconds * motion.frame_rate, static_cast<double>(motion.poses.size() - 1));
+  const auto before = static_cast<std::size_t>(place);
+  if (before + 1 == motion.poses.size()) return motion.poses.back();
+  return interpolated(motion.poses[before], motion.poses[before + 1], place - static_cast<double>(before));
+}
+
+/// Whether a motion of another rate than the video's goes on to the clip's last frame, but for half a frame of its own.
+bool covers(const Motion& motion, const FrameSource& frames) {
+  if (!motion.says_frame_rate || frames.video_rate() == 0) return false;
+  const double end = static_cast<double>(frames.number(frames.count() - 1)) / frames.video_rate();
+  return end <= (static_cast<double>(motion.poses.size()) - 0.5) / motion.frame_rate;
+}
+
+/// Tells of poses from a moment on that would be that of another frame of the video.
+void warn_of_rest(const Motion& motion, const fs::path& file, const FrameSource& frames) {
+  constexpr double kSameMoment = 1e-9;  // seconds
+  const double last = static_cast<double>(motion.poses.size() - 1) / motion.frame_rate,
+               end = static_cast<double>(frames.video_count()) / frames.video_rate();
+  if (last < end - kSameMoment) return;
+  log_warning(file.string() + ": holds " + std::to_string(motion.poses.size()) + " poses at " +
+              rounded(motion.frame_rate, 4) + " a second, the video has " + std::to_string(frames.video_count()) +
+              " frames at " + rounded(frames.video_rate(), 4) + "; poses after its end are not used");
+}
+
+/// A pose for each frame of the clip.
+/// @param or_else  what is allowed beside as many as frames
+std::vector<BodyPose> poses_of_frames(const Motion& motion, const fs::path& file, const FrameSource& frames,
+                                      const char* or_else) {
+  const Index count = std::ssize(motion.poses);
+  if (count == frames.count() || count == frames.video_count() || !covers(motion, frames))
+    return kept_frames(motion.poses, frames, file.string(), "poses", or_else);
+  warn_of_rest(motion, file, frames);
+  std::vector<BodyPose> poses;
+  for (Index t = 0; t < frames.count(); ++t)
+    poses.push_back(pose_at(motion, static_cast<double>(frames.number(t)) / frames.video_rate()));
+  return poses;
+}
+
+/// R of world_laid_on.
+Matrix3<double> world_turn(const Matrix3<double>& e, const Matrix3<double>& f, MotionAlign align) {
+  if (align == MotionAlign::kRotation) return f * e.transpose();
+  // The trace of R_z(θ) E Fᵀ is largest, which is 1 + 2 cos of the angle that is left.
+  const Matrix3<double> m = e * f.transpose();
+  return so3_exp(Vector3<double>(0, 0, std::atan2(m(0, 1) - m(1, 0), m(0, 0) + m(1, 1))));
+}
+
+}  // namespace
+
+std::vector<BodyPose> estimated_poses(const Motion& motion, const fs::path& file, const FrameSource& frames) {
+  if (motion.poses.size() == 1) return {};
+  return poses_of_frames(motion, file, frames, ", or frame 0 alone");
+}
+
+std::vector<BodyPose> read_estimate(const fs::path& file, const Avatar& avatar, const FrameSource& frames) {
+  const Motion motion = read_motion_for(file.string(), avatar);
+  return poses_of_frames(motion, file, frames, "");
+}
+
+Rigid<double> world_pelvis(const BodyPose& pose, const Vector3<double>& pelvis_rest) {
+  return {so3_exp(pose.rotation_of(0)), pelvis_rest + pose.transl};
+}
+
+Rigid<double> world_laid_on(const Rigid<double>& from, const Rigid<double>& to, MotionAlign align) {
+  if (align == MotionAlign::kNone) return {};
+  const Matrix3<double> turn = world_turn(from.rotation, to.rotation, align);
+  return {turn, to.translation - turn * from.translation};
+}
+
+std::vector<BodyPose> laid_on(std::vector<BodyPose> estimate, const BodyPose& first, const Vector3<double>& pelvis_rest,
+                              MotionAlign align) {
+  if (align != MotionAlign::kNone) {
+    const Rigid<double> to_from =
+        world_laid_on(world_pelvis(estimate.front(), pelvis_rest), world_pelvis(first, pelvis_rest), align);
+    Motion motion;
+    motion.poses = std::move(estimate);
+    estimate = transformed(motion, to_from, pelvis_rest).poses;
+  }
+  estimate.front() = first;
+  return estimate;
+}
+
+}  // namespace hsi4d

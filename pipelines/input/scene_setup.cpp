@@ -1,0 +1,104 @@
+#include "pipelines/input/scene_setup.h"
+
+#include <array>
+
+#include "core/check.h"
+#include "core/config_file.h"
+#include "core/log.h"
+#include "pipelines/input/body_files.h"
+#include "splat/files/splat_file.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// initial.json: the state of frame 0, and estimated poses of all frames.
+struct InitialPose {
+  std::array<double, 3> rotation{}, translation{};
+};
+
+struct InitialSettings {
+  fs::path motion;
+  ConfigMap<InitialPose> objects;
+  fs::path object_tracks;
+};
+
+void describe(ConfigFields& f, InitialPose& s) {
+  f.numbers("rotation", s.rotation, {}, "Axis-angle, radians").required();
+  f.numbers("translation", s.translation, {}, "Position of the object's centroid, metres").required();
+}
+
+void describe(ConfigFields& f, InitialSettings& s) {
+  f.path("motion", s.motion, {.must_exist = true, .may_be_empty = false},
+         "Poses (.npz): frame 0 exact, the others estimates; one frame alone: no estimates")
+      .required();
+  f.map("objects", s.objects, "Poses of the objects at frame 0, by name");
+  f.path("object_tracks", s.object_tracks, {.must_exist = true},
+         "Estimated poses of the objects in all frames (.npz, as a run's objects.npz); empty: none");
+}
+
+InitialSettings read_initial(const fs::path& file) {
+  ConfigProblems problems;
+  const ConfigValue tree = load_config(file, {}, problems);
+  return read_settings<InitialSettings>(tree, problems);
+}
+
+/// The Gaussians of a file; what its reader rejected or held is told in the log.
+Gaussians read_gaussians(const fs::path& file) {
+  SplatFile read = read_splats(file.string());
+  const std::string remarks = summary_text(read.report);
+  if (!remarks.empty()) log_warning(file.string() + ": " + remarks);
+  if (read.gaussians.count() == 0) throw DataError(file.string() + ": holds no Gaussians that can be used");
+  return std::move(read.gaussians);
+}
+
+Gaussians centred(Gaussians gaussians) {
+  const Index count = gaussians.count();
+  for (Index c = 0; c < 3; ++c) {
+    double sum = 0;
+    for (Index i = 0; i < count; ++i) sum += static_cast<double>(gaussians.means[static_cast<std::size_t>(3 * i + c)]);
+    const double mean = sum / static_cast<double>(count);
+    for (Index i = 0; i < count; ++i) {
+      float& x = gaussians.means[static_cast<std::size_t>(3 * i + c)];
+      x = static_cast<float>(static_cast<double>(x) - mean);
+    }
+  }
+  gaussians.origin_world.setZero();
+  return gaussians;
+}
+
+ObjectPose initial_pose(const InitialSettings& initial, const std::string& name, const fs::path& file) {
+  const InitialPose* pose = find_entry(initial.objects, name);
+  if (pose == nullptr) throw DataError(file.string() + ": /objects: there is no pose of the object \"" + name + "\"");
+  return {Vector3<double>(pose->rotation.data()), Vector3<double>(pose->translation.data())};
+}
+
+}  // namespace
+
+Gaussians read_object(const fs::path& file) { return centred(read_gaussians(file)); }
+
+fs::path initial_motion_file(const DataSettings& data) { return read_initial(data.initial).motion; }
+
+SceneSetup read_scene_setup(const DataSettings& data) {
+  SceneSetup setup;
+  setup.scene = read_gaussians(data.scene);
+  setup.avatar = read_avatar(data.avatar.string());
+  if (setup.avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
+    throw DataError(data.avatar.string() + ": has " + std::to_string(setup.avatar.parents.size()) +
+                    " joints; a run needs the " + std::to_string(kSmplxJoints) + " of SMPL-X");
+  }
+  const InitialSettings initial = read_initial(data.initial);
+  for (const auto& [name, object] : data.objects) {
+    setup.objects.push_back({name, read_object(object.gaussians)});
+    setup.poses.push_back(initial_pose(initial, name, data.initial));
+  }
+  setup.motion_file = initial.motion;
+  setup.object_tracks = initial.object_tracks;
+  setup.motion = read_motion_for(initial.motion.string(), setup.avatar);
+  if (setup.motion.poses.empty()) throw DataError(initial.motion.string() + ": holds no frames");
+  return setup;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,122 @@
+#include "pipelines/input/view_set.h"
+
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/config_file.h"
+#include "core/image_io.h"
+
+namespace hsi4d {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// views.json as it is written.
+struct ViewSetFile {
+  std::string format;
+  int version = kViewSetVersion;
+  fs::path motion, cameras;
+  std::vector<PosedView> views;
+};
+
+void describe(ConfigFields& f, PosedView& v) {
+  f.path("image", v.image, {.must_exist = true, .may_be_empty = false}, "A picture").required();
+  f.path("mask", v.mask, {.must_exist = true}, "The share of each pixel that shows the human");
+  f.integer("camera", v.camera, {.min = 0}, "Its camera, from 0").required();
+  f.integer("frame", v.frame, {.min = 0}, "The frame of the motion that it shows, from 0").required();
+}
+
+void describe(ConfigFields& f, ViewSetFile& s) {
+  f.string("format", s.format, "\"hsi4d views\"").required();
+  f.integer("version", s.version, {.min = 1, .max = kViewSetVersion}, "Version of the format").required();
+  f.path("motion", s.motion, {.must_exist = true, .may_be_empty = false}, "Poses").required();
+  f.path("cameras", s.cameras, {.must_exist = true, .may_be_empty = false}, "Cameras").required();
+  f.list("views", s.views, "Pictures", [](ConfigFields& inner, PosedView& view) { describe(inner, view); });
+  f.rule({"format"}, [&s] { return s.format == "hsi4d views" ? "" : "is not \"hsi4d views\""; });
+  f.rule({"views"}, [&s] { return s.views.empty() ? "there is no view" : ""; });
+}
+
+/// Throws UserError unless camera and frame of every view are there.
+void check_numbers(const ViewSet& set) {
+  const auto check = [&](std::size_t view, const char* what, Index number, std::size_t count) {
+    if (number < static_cast<Index>(count)) return;
+    throw UserError(set.file.string() + ": /views/" + std::to_string(view) + "/" + what + ": " +
+                    std::to_string(number) + "; there are " + std::to_string(count) + ", counted from 0");
+  };
+  for (std::size_t v = 0; v < set.views.size(); ++v) {
+    check(v, "camera", set.views[v].camera, set.cameras.size());
+    check(v, "frame", set.views[v].frame, set.motion.poses.size());
+  }
+}
+
+Image read_sized(const fs::path& file, const Camera& camera) {
+  Image image = read_image(file.string());
+  if (image.width() == camera.width && image.height() == camera.height) return image;
+  throw DataError(file.string() + ": is " + std::to_string(image.width()) + "x" + std::to_string(image.height()) +
+                  " pixels; its camera has " + std::to_string(camera.width) + "x" + std::to_string(camera.height));
+}
+
+}  // namespace
+
+std::vector<fs::path> ViewSet::files() const {
+  std::vector<fs::path> all = {file, motion_file, cameras_file};
+  for (const PosedView& view : views) {
+    all.push_back(view.image);
+    if (!view.mask.empty()) all.push_back(view.mask);
+  }
+  return all;
+}
+
+ViewSet read_view_set(const fs::path& file) {
+  ConfigProblems problems;
+  const ConfigValue tree = load_config(file, {}, problems);
+  const ViewSetFile read = read_settings<ViewSetFile>(tree, problems);
+  ViewSet set{
+      file,        read_motion(read.motion.string()), read_cameras(read.cameras.string()), read.views, read.motion,
+      read.cameras};
+  check_numbers(set);
+  return set;
+}
+
+std::string view_set_json(const std::string& motion, const std::string& cameras, const std::vector<PosedView>& views) {
+  ConfigValue root = ConfigValue::make_object();
+  root.add("format", ConfigValue::make_string("hsi4d views"));
+  root.add("version", ConfigValue::make_number(static_cast<double>(kViewSetVersion)));
+  root.add("motion", ConfigValue::make_string(motion));
+  root.add("cameras", ConfigValue::make_string(cameras));
+  std::vector<ConfigValue> list;
+  for (const PosedView& view : views) {
+    ConfigValue entry = ConfigValue::make_object();
+    entry.add("image", ConfigValue::make_string(view.image.generic_string()));
+    if (!view.mask.empty()) entry.add("mask", ConfigValue::make_string(view.mask.generic_string()));
+    entry.add("camera", ConfigValue::make_number(static_cast<double>(view.camera)));
+    entry.add("frame", ConfigValue::make_number(static_cast<double>(view.frame)));
+    list.push_back(std::move(entry));
+  }
+  root.add("views", ConfigValue::make_array(std::move(list)));
+  return to_json(root);
+}
+
+ViewImage view_image(const ViewSet& set, const PosedView& view, const Vector3<double>& background) {
+  const Camera& camera = set.cameras[static_cast<std::size_t>(view.camera)];
+  const Image image = read_sized(view.image, camera);
+  if (image.channels() < 3) throw DataError(view.image.string() + ": is grey; a picture has three channels");
+  ViewImage result{take_channels(image, 0, 3), {}};
+  if (!view.mask.empty()) {
+    result.mask = take_channels(read_sized(view.mask, camera), 0, 1);
+  } else if (image.channels() == 4) {
+    result.mask = take_channels(image, 3, 1);
+  }
+  if (result.mask.empty()) return result;
+  for (int c = 0; c < 3; ++c) {
+    const auto behind = static_cast<float>(background[c]);
+    for (int y = 0; y < image.height(); ++y) {
+      const float* const share = result.mask.row(0, y);
+      float* const color = result.color.row(c, y);
+      for (int x = 0; x < image.width(); ++x) color[x] = share[x] * color[x] + (1 - share[x]) * behind;
+    }
+  }
+  return result;
+}
+
+}  // namespace hsi4d

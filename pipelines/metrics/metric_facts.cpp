@@ -1,0 +1,54 @@
+#include "pipelines/metrics/metric_facts.h"
+
+namespace hsi4d {
+
+const double* find_metric(const MetricValues& values, std::string_view name) {
+  for (const auto& [key, value] : values) {
+    if (key == name) return &value;
+  }
+  return nullptr;
+}
+
+const std::vector<MetricFacts>& metric_facts() {
+  static const std::vector<MetricFacts> facts = {
+      {"mpjpe_mm", "MPJPE", "mm", "Mean joint error, both pelvises at the origin", 1, -1},
+      {"pa_mpjpe_mm", "PA-MPJPE", "mm", "Mean joint error after the best similarity", 1, -1},
+      {"world_mpjpe_mm", "world MPJPE", "mm", "Mean joint error in the world", 1, -1},
+      {"world_mpjpe_image_mm", "world, across view", "mm", "Part of the world error across the camera's view", 1, -1},
+      {"world_mpjpe_depth_mm", "world, in depth", "mm", "Part of the world error along the camera's axis", 1, -1},
+      {"root_translation_mm", "root position", "mm", "Distance of the pelvises", 1, -1},
+      {"object_translation_cm", "object position", "cm", "Distance of the objects' centroids", 2, -1},
+      {"object_rotation_deg", "object rotation", "°", "Angle between the objects' rotations", 2, -1},
+      {"object_add_cm", "object ADD", "cm", "Mean distance of the objects' points", 2, -1},
+      {"object_add_s_cm", "object ADD-S", "cm", "The same to the nearest point, which forgives symmetries", 2, -1},
+      {"camera_translation_cm", "camera position", "cm", "Distance of the camera centres", 2, -1},
+      {"camera_rotation_deg", "camera rotation", "°", "Angle between the cameras' rotations", 3, -1},
+      {"psnr_db", "PSNR", "dB", "Peak signal-to-noise ratio, at most 100", 2, 1},
+      {"psnr_foreground_db", "PSNR, foreground", "dB", "Peak signal-to-noise ratio of human and objects", 2, 1},
+      {"ssim", "SSIM", "", "Structural similarity", 4, 1},
+      {"contact_share", "contact", "", "Share of frames in which a hand joint is nearer than 5 cm to an object", 3, 0},
+      {"contact_distance_mm", "contact distance", "mm",
+       "How far from it the hands' Gaussians that near are, on average", 1, 0},
+      {"penetration_share", "penetration", "", "Share of vertices inside something", 4, -1},
+      {"penetration_depth_mm", "penetration depth", "mm", "How deep they are inside, on average", 1, -1},
+      {"object_penetration_share", "object penetration", "", "Share of vertices inside an object", 4, -1},
+      {"object_penetration_depth_mm", "object pen. depth", "mm", "How deep they are inside, on average", 1, -1},
+      {"foot_sliding_mm", "foot sliding", "mm", "How far feet that stand slide in 0.1 s", 1, -1},
+      {"acceleration_error", "acceleration", "m/s²", "Mean error of the joints' accelerations", 2, -1},
+      {"jitter", "jitter", "m/s³", "Mean third derivative of the joints' places", 1, -1},
+      {"diversity_mm", "diversity", "mm", "Mean distance of joints over all pairs of repetitions", 1, 0},
+      {"diversity_pose_mm", "diversity of poses", "mm", "The same with pelvises at the origin", 1, 0},
+      {"clip_score", "CLIP score", "", "Agreement of the video with its text: 100 times the mean cosine", 2, 1},
+      {"clip_consistency", "CLIP consistency", "", "Likeness of frames 0.1 s apart: 100 times the mean cosine", 2, 1},
+  };
+  return facts;
+}
+
+const MetricFacts* find_metric_facts(std::string_view name) {
+  for (const MetricFacts& facts : metric_facts()) {
+    if (facts.name == name) return &facts;
+  }
+  return nullptr;
+}
+
+}  // namespace hsi4d

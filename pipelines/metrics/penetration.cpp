@@ -1,0 +1,99 @@
+#include "pipelines/metrics/penetration.h"
+
+#include <algorithm>
+
+#include "core/check.h"
+#include "core/parallel.h"
+#include "optim/metrics.h"
+#include "optim/motion_start.h"
+
+namespace hsi4d {
+namespace {
+
+constexpr Index kVertexGrain = 64;
+
+Vector3<double> point_at(std::span<const double> points, Index p) { return Vector3<double>(points.data() + 3 * p); }
+
+/// @param distance_at  of point p, metres; NaN or above 0: free
+template <class F>
+Penetration counted(Index count, const F& distance_at) {
+  std::vector<double> distances(static_cast<std::size_t>(count));
+  parallel_for(count, kVertexGrain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) distances[static_cast<std::size_t>(i)] = distance_at(i);
+  });
+  Penetration counts{.points = count};
+  for (const double distance : distances) {
+    if (!(distance < 0)) continue;  // free, or not known
+    ++counts.inside;
+    counts.depth -= distance;
+  }
+  return counts;
+}
+
+MetricValues values_of(const Penetration& counts, const std::string& before) {
+  const double share = counts.points > 0 ? static_cast<double>(counts.inside) / static_cast<double>(counts.points) : 0;
+  const double depth = counts.inside > 0 ? counts.depth / static_cast<double>(counts.inside) : 0;
+  return {{before + "penetration_share", share}, {before + "penetration_depth_mm", kMillimetres * depth}};
+}
+
+}  // namespace
+
+std::vector<double> measured_points(const Avatar& avatar, const BodyPose& pose) {
+  MotionStart motion;
+  motion.avatar = &avatar;
+  motion.first_body = pose_skeleton(avatar, pose);
+  const Index rows = avatar.weights.vertices, count = std::min(kMeasuredPoints, rows);
+  std::vector<double> points;
+  for (Index i = 0; i < count; ++i) {
+    const Vector3<double> place = motion.place(BodyPoint{kFirstFrame, i * rows / count});
+    points.insert(points.end(), place.data(), place.data() + 3);
+  }
+  return points;
+}
+
+Penetration penetration_of(const SignedDistance& distance, std::span<const double> points) {
+  return counted(std::ssize(points) / 3, [&](Index i) { return distance(point_at(points, i)); });
+}
+
+Penetration penetration_of(const std::vector<SignedDistance>& distances,
+                           std::span<const Rigid<double>> world_from_object, std::span<const double> points) {
+  HSI4D_CHECK_EQ(distances.size(), world_from_object.size());
+  return counted(std::ssize(points) / 3, [&](Index i) {
+    double least = 0;
+    for (std::size_t o = 0; o < distances.size(); ++o) {
+      if (!distances[o]) continue;
+      const double distance = distances[o](transform_point(inverse(world_from_object[o]), point_at(points, i)));
+      if (distance < least) least = distance;
+    }
+    return least;
+  });
+}
+
+std::vector<Penetration> penetration_by_frame(const Clip& clip, const std::vector<SceneState>& states) {
+  HSI4D_CHECK(clip.surface != nullptr, "the clip has no surface");
+  const SignedDistance distance = [&clip](const Vector3<double>& place) { return clip.surface->at(place); };
+  std::vector<Penetration> by_frame;
+  for (const SceneState& state : states)
+    by_frame.push_back(penetration_of(distance, measured_points(clip.avatar, state.body)));
+  return by_frame;
+}
+
+MetricValues penetration_values(const Penetration& counts) { return values_of(counts, ""); }
+
+MetricValues object_penetration_values(const Penetration& counts) { return values_of(counts, "object_"); }
+
+Penetration sum_after_first(const std::vector<Penetration>& by_frame) {
+  Penetration sum;
+  for (std::size_t t = 1; t < by_frame.size(); ++t) {
+    sum.points += by_frame[t].points;
+    sum.inside += by_frame[t].inside;
+    sum.depth += by_frame[t].depth;
+  }
+  return sum;
+}
+
+MetricValues mean_penetration(const std::vector<Penetration>& by_frame) {
+  return penetration_values(sum_after_first(by_frame));
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,49 @@
+// The files in which a run leaves its result.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "body/body_model.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/input/clip.h"
+#include "pipelines/input/color_state.h"
+#include "pipelines/record/folder.h"
+
+namespace hsi4d {
+
+/// Whether some stage moves the color net.
+bool moves_colors(const RunConfig& config);
+
+/// The rate of the copy of the motion that other programs take, the SMPL-X add-on for Blender for example.
+inline constexpr double kExportedRate = 30;
+
+/// Writes motion.npz, motion_30fps.npz, objects.npz, cameras.json, and color_net.safetensors where a stage moved it.
+/// @param states  the result by frame, frame 0 included
+void write_results(const RunPaths& paths, const RunConfig& config, const Clip& clip,
+                   const std::vector<SceneState>& states, const ColorState& colors);
+
+/// The bodies of the frames as motion.npz has them.
+Motion motion_of(const Clip& clip, const std::vector<SceneState>& states);
+
+/// Writes body.glb, the body in motion. It has to be the avatar's: of its kind, and with joints where the avatar has
+/// them. Where it is another the log says so, and no file is written.
+/// @return  the body; nothing where it is another, or cannot be read
+std::optional<BodyModel> write_body(const RunPaths& paths, const BodySettings& body, const Avatar& avatar,
+                                    const Motion& motion);
+
+/// Writes what a viewer shows: frames/NNNN_side.png of every frame, the reconstruction from another side; frame 0 as it
+/// was given, frames/0000_{target,render}.png; and preview.mp4: video, reconstruction, both one over the other, and the
+/// other side, next to each other. Where ffmpeg fails the log says so, and no video is written.
+///
+/// @param render  the image of a state of a frame, from the state's camera
+void write_views(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
+                 const std::function<Image(Index frame, const SceneState& state)>& render);
+
+/// A camera that looks from another side: turned about the vertical axis through `pivot`.
+///
+/// @param pivot  metres, world
+/// @param angle  radians, counter-clockwise from above
+Rigid<double> turned_camera(const Rigid<double>& camera_from_world, const Vector3<double>& pivot, double angle);
+
+}  // namespace hsi4d

@@ -1,0 +1,300 @@
+#include "pipelines/record/summary.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "core/check.h"
+#include "core/config_value.h"
+#include "core/json_text.h"
+#include "core/text.h"
+#include "pipelines/record/gradient_table.h"
+
+namespace hsi4d {
+namespace {
+
+using Kind = ConfigValue::Kind;
+
+// ---- Writing ----
+
+/// Adds a number to an object; what JSON cannot hold is refused by name (row F12 of the stability catalogue).
+void add_number(ConfigValue& object, const std::string& pointer, const std::string& name, double value) {
+  const std::string place = child_pointer(pointer, name);
+  HSI4D_CHECK(std::isfinite(value), "summary.json: " + place + ": " + std::to_string(value) + " is not finite");
+  HSI4D_CHECK(find_member(object, name) == nullptr, "summary.json: " + place + ": the name occurs twice");
+  object.add(name, ConfigValue::make_number(value));
+}
+
+void add_values(ConfigValue& object, const std::string& pointer, const MetricValues& values) {
+  for (const auto& [name, value] : values) add_number(object, pointer, name, value);
+}
+
+ConfigValue stage_json(const StageSummary& stage, const std::string& pointer) {
+  ConfigValue object = ConfigValue::make_object();
+  object.add("stage", ConfigValue::make_string(stage.stage));
+  if (stage.of_frame_0) object.add("frame", ConfigValue::make_integer(0));
+  add_number(object, pointer, "seconds", stage.seconds);
+  object.add("iterations", ConfigValue::make_integer(stage.iterations));
+  add_values(object, pointer, stage.values);
+  if (!stage.gradient_shares.empty()) object.add("gradient_shares", mean_shares_json(stage.gradient_shares));
+  return object;
+}
+
+ConfigValue frames_json(const std::vector<FrameMetrics>& frames, const std::string& pointer) {
+  ConfigValue array = ConfigValue::make_array();
+  for (size_t i = 0; i < frames.size(); ++i) {
+    ConfigValue object = ConfigValue::make_object();
+    object.add("frame", ConfigValue::make_integer(frames[i].frame));
+    add_values(object, child_pointer(pointer, std::to_string(i)), frames[i].values);
+    array.items.push_back(std::move(object));
+  }
+  return array;
+}
+
+ConfigValue start_json(const StartSummary& start) {
+  ConfigValue object = ConfigValue::make_object();
+  add_number(object, "/start", "seconds", start.seconds);
+  for (const StartCounts& part : start.parts) {
+    ConfigValue counts = ConfigValue::make_object();
+    for (const auto& [name, frames] : part.begun) counts.add(name, ConfigValue::make_integer(frames));
+    object.add(part.part, std::move(counts));
+  }
+  return object;
+}
+
+// ---- Reading ----
+
+/// Every number of an object but those named in `taken`; null (a gap) and other kinds are passed over.
+MetricValues read_values(const ConfigValue& object, const std::string& pointer,
+                         std::initializer_list<std::string_view> taken) {
+  MetricValues values;
+  for (const ConfigMember& member : object.members) {
+    if (member.value.kind != Kind::kNumber) continue;
+    if (std::find(taken.begin(), taken.end(), member.key) != taken.end()) continue;
+    values.emplace_back(member.key, number_of(member.value, child_pointer(pointer, member.key)));
+  }
+  return values;
+}
+
+double read_number(const ConfigValue& object, const std::string& pointer, std::string_view key) {
+  const ConfigValue* const member = find_member(object, key);
+  return member == nullptr ? 0 : number_of(*member, child_pointer(pointer, key));
+}
+
+Index read_count(const ConfigValue& object, const std::string& pointer, std::string_view key) {
+  const ConfigValue* const member = find_member(object, key);
+  return member == nullptr ? 0 : whole_number_of(*member, child_pointer(pointer, key));
+}
+
+StageSummary read_stage(const ConfigValue& value, const std::string& pointer) {
+  check_kind(value, Kind::kObject, pointer);
+  StageSummary stage;
+  stage.stage = string_member(value, "stage");
+  if (stage.stage.empty()) fail_at(value, pointer, "there is no \"stage\", the name of the stage");
+  stage.seconds = read_number(value, pointer, "seconds");
+  stage.iterations = read_count(value, pointer, "iterations");
+  stage.of_frame_0 = find_member(value, "frame") != nullptr;
+  stage.values = read_values(value, pointer, {"seconds", "iterations", "frame"});
+  if (const ConfigValue* const shares = find_member(value, "gradient_shares"))
+    stage.gradient_shares = parse_mean_shares(*shares, child_pointer(pointer, "gradient_shares"));
+  return stage;
+}
+
+std::vector<FrameMetrics> read_frames(const ConfigValue& value, const std::string& pointer) {
+  check_kind(value, Kind::kArray, pointer);
+  std::vector<FrameMetrics> frames;
+  for (size_t i = 0; i < value.items.size(); ++i) {
+    const std::string place = child_pointer(pointer, std::to_string(i));
+    check_kind(value.items[i], Kind::kObject, place);
+    if (find_member(value.items[i], "frame") == nullptr) fail_at(value.items[i], place, "there is no \"frame\"");
+    frames.push_back(
+        {static_cast<int>(read_count(value.items[i], place, "frame")), read_values(value.items[i], place, {"frame"})});
+  }
+  return frames;
+}
+
+Baseline& baseline_named(std::vector<Baseline>& baselines, const std::string& name) {
+  for (Baseline& baseline : baselines) {
+    if (baseline.name == name) return baseline;
+  }
+  return baselines.emplace_back(Baseline{name, {}, {}, false});
+}
+
+void read_baselines(const ConfigValue& tree, RunSummary& summary) {
+  if (const ConfigValue* const means = find_member(tree, "baselines")) {
+    check_kind(*means, Kind::kObject, "/baselines");
+    for (const ConfigMember& member : means->members) {
+      const std::string place = child_pointer("/baselines", member.key);
+      check_kind(member.value, Kind::kObject, place);
+      Baseline& baseline = baseline_named(summary.baselines, member.key);
+      baseline.of_frame_0 = find_member(member.value, "frame") != nullptr;
+      baseline.values = read_values(member.value, place, {"frame"});
+    }
+  }
+  if (const ConfigValue* const frames = find_member(tree, "baselines_per_frame")) {
+    check_kind(*frames, Kind::kObject, "/baselines_per_frame");
+    for (const ConfigMember& member : frames->members)
+      baseline_named(summary.baselines, member.key).per_frame =
+          read_frames(member.value, child_pointer("/baselines_per_frame", member.key));
+  }
+}
+
+StartSummary read_start(const ConfigValue& value) {
+  check_kind(value, Kind::kObject, "/start");
+  StartSummary start;
+  start.seconds = read_number(value, "/start", "seconds");
+  for (const ConfigMember& part : value.members) {
+    if (part.value.kind != Kind::kObject) continue;
+    StartCounts counts{part.key, {}};
+    const std::string place = child_pointer("/start", part.key);
+    for (const ConfigMember& begun : part.value.members)
+      counts.begun.emplace_back(begun.key, whole_number_of(begun.value, child_pointer(place, begun.key)));
+    start.parts.push_back(std::move(counts));
+  }
+  return start;
+}
+
+// ---- The table ----
+
+/// The number that a reader sees: ties in the table are ties of what is printed.
+double as_shown(double value, int decimals) {
+  const std::string text = fixed_number(value, decimals);
+  double shown = 0;
+  std::from_chars(text.data(), text.data() + text.size(), shown);
+  return shown;
+}
+
+}  // namespace
+
+std::string summary_json(const RunSummary& summary) {
+  ConfigValue tree = ConfigValue::make_object();
+  tree.add("name", ConfigValue::make_string(summary.name));
+  tree.add("frames", ConfigValue::make_integer(summary.frames));
+  add_number(tree, "", "seconds", summary.seconds);
+  tree.add("truth", ConfigValue::make_boolean(summary.has_truth));
+  if (!summary.surface.empty()) tree.add("surface", ConfigValue::make_string(summary.surface));
+  ConfigValue stages = ConfigValue::make_array();
+  for (size_t i = 0; i < summary.metrics.size(); ++i)
+    stages.items.push_back(stage_json(summary.metrics[i], child_pointer("/metrics", std::to_string(i))));
+  tree.add("metrics", std::move(stages));
+  if (!summary.start.parts.empty()) tree.add("start", start_json(summary.start));
+  ConfigValue means = ConfigValue::make_object(), by_frame = ConfigValue::make_object();
+  for (const Baseline& baseline : summary.baselines) {
+    const std::string place = child_pointer("/baselines", baseline.name);
+    HSI4D_CHECK(find_member(means, baseline.name) == nullptr, "summary.json: " + place + ": the name occurs twice");
+    ConfigValue object = ConfigValue::make_object();
+    if (baseline.of_frame_0) object.add("frame", ConfigValue::make_integer(0));
+    add_values(object, place, baseline.values);
+    means.add(baseline.name, std::move(object));
+    if (!baseline.per_frame.empty())
+      by_frame.add(baseline.name,
+                   frames_json(baseline.per_frame, child_pointer("/baselines_per_frame", baseline.name)));
+  }
+  tree.add("baselines", std::move(means));
+  tree.add("per_frame", frames_json(summary.per_frame, "/per_frame"));
+  if (!by_frame.members.empty()) tree.add("baselines_per_frame", std::move(by_frame));
+  return to_json(tree);
+}
+
+RunSummary parse_summary(const std::string& text, const std::string& name) {
+  const ConfigValue tree = parse_json_text(text, name);
+  check_kind(tree, Kind::kObject, "");
+  RunSummary summary;
+  summary.name = string_member(tree, "name");
+  summary.frames = static_cast<int>(read_count(tree, "", "frames"));
+  summary.seconds = read_number(tree, "", "seconds");
+  if (const ConfigValue* const truth = find_member(tree, "truth")) {  // version 0.1 does not say
+    check_kind(*truth, Kind::kBoolean, "/truth");
+    summary.has_truth = truth->boolean;
+  }
+  summary.surface = string_member(tree, "surface");
+  if (const ConfigValue* const stages = find_member(tree, "metrics")) {
+    check_kind(*stages, Kind::kArray, "/metrics");
+    for (size_t i = 0; i < stages->items.size(); ++i)
+      summary.metrics.push_back(read_stage(stages->items[i], child_pointer("/metrics", std::to_string(i))));
+  }
+  if (const ConfigValue* const start = find_member(tree, "start")) summary.start = read_start(*start);
+  read_baselines(tree, summary);
+  if (const ConfigValue* const frames = find_member(tree, "per_frame"))
+    summary.per_frame = read_frames(*frames, "/per_frame");
+  return summary;
+}
+
+bool ErrorTable::is_best(std::size_t row, std::size_t column) const {
+  const MetricFacts& facts = *columns[column];
+  const double* const own = rows[row].values[column];
+  if (own == nullptr || facts.better == 0 || !std::isfinite(*own)) return false;
+  const double shown_own = as_shown(*own, facts.decimals);
+  bool some_is_worse = false;
+  for (const Row& other : rows) {
+    if (other.values[column] == nullptr || !std::isfinite(*other.values[column])) continue;
+    if (other.of_frame_0 != rows[row].of_frame_0) continue;
+    const double ahead = (as_shown(*other.values[column], facts.decimals) - shown_own) * facts.better;
+    if (ahead > 0) return false;
+    some_is_worse = some_is_worse || ahead < 0;
+  }
+  return some_is_worse;
+}
+
+ErrorTable make_error_table(const RunSummary& summary) {
+  std::vector<std::pair<const MetricValues*, ErrorTable::Row>> sources;
+  for (const Baseline& baseline : summary.baselines)
+    sources.push_back({&baseline.values, {baseline.name, true, {}, baseline.of_frame_0}});
+  for (const StageSummary& stage : summary.metrics)
+    sources.push_back({&stage.values, {stage.stage, false, {}, stage.of_frame_0}});
+  ErrorTable table;
+  for (const MetricFacts& facts : metric_facts()) {
+    const bool occurs = std::any_of(sources.begin(), sources.end(), [&facts](const auto& source) {
+      return find_metric(*source.first, facts.name) != nullptr;
+    });
+    if (!occurs) continue;
+    table.columns.push_back(&facts);
+    for (auto& [values, row] : sources) row.values.push_back(find_metric(*values, facts.name));
+  }
+  for (auto& [values, row] : sources) table.rows.push_back(std::move(row));
+  return table;
+}
+
+std::string error_table(const RunSummary& summary) {
+  const ErrorTable table = make_error_table(summary);
+  // A row a metric and a column a result: there are few results, and a terminal is narrow.
+  std::vector<std::vector<std::string>> lines(1, {""});
+  for (const ErrorTable::Row& row : table.rows) lines[0].push_back(row.name + " ");
+  for (size_t m = 0; m < table.columns.size(); ++m) {
+    const MetricFacts& facts = *table.columns[m];
+    const std::string unit = facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]";
+    std::vector<std::string> line = {std::string(facts.label) + unit};
+    for (size_t r = 0; r < table.rows.size(); ++r) {
+      const double* const value = table.rows[r].values[m];
+      line.push_back(value == nullptr ? "- "
+                                      : fixed_number(*value, facts.decimals) + (table.is_best(r, m) ? "*" : " "));
+    }
+    lines.push_back(std::move(line));
+  }
+  std::vector<size_t> widths(lines[0].size());
+  for (const auto& line : lines)
+    for (size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], count_characters(line[i]));
+  std::string text;
+  for (const auto& line : lines) {
+    for (size_t i = 0; i < line.size(); ++i) {
+      const std::string blanks(widths[i] - count_characters(line[i]), ' ');
+      text += i == 0 ? line[i] + blanks : "  " + blanks + line[i];
+    }
+    text.erase(text.find_last_not_of(' ') + 1);
+    text += "\n";
+  }
+  return table.columns.empty() ? "no errors were measured\n" : text;
+}
+
+std::string fixed_number(double value, int decimals) {
+  if (!std::isfinite(value)) return "not finite";
+  std::array<char, 512> buffer;  // the longest double has 309 digits before its point
+  const auto end =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::fixed, decimals);
+  std::string text(buffer.data(), end.ptr);
+  const bool is_zero = text.find_first_not_of("-0.") == std::string::npos;
+  return is_zero && text.starts_with('-') ? text.substr(1) : text;
+}
+
+}  // namespace hsi4d

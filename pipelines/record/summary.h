@@ -1,0 +1,112 @@
+// What a run came to, as summary.json holds it, and what is known of each metric: unit, direction, digits.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/types.h"
+#include "pipelines/metrics/metric_facts.h"
+
+namespace hsi4d {
+
+/// What of a group's gradient came from a term (optim/gradient_shares.h): means over the evaluations that were looked
+/// at.
+struct MeanGradientShare {
+  std::string group, term;
+  double share = 0, cosine = 0;
+  Index evaluations = 0;
+};
+
+/// One stage: its errors at its end, and counters.
+struct StageSummary {
+  std::string stage;
+  double seconds = 0;
+  Index iterations = 0;
+  MetricValues values;
+  std::vector<MeanGradientShare> gradient_shares = {};  ///< empty: not measured
+  bool of_frame_0 = false;  ///< a stage over the first frame: the errors are those of frame 0 alone
+};
+
+/// A result without the method, to compare with: "start" (what the run was given), "copy_frame_0" (nothing moves), and
+/// of a run with stages over the first frame "given_frame_0" (frame 0 as it was given).
+struct Baseline {
+  std::string name;
+  MetricValues values;                  ///< means over the frames
+  std::vector<FrameMetrics> per_frame;  ///< may be empty
+  bool of_frame_0 = false;              ///< the errors are those of frame 0 alone
+};
+
+/// How often a part of the state began a frame with which of its starts, where the best of them is taken.
+struct StartCounts {
+  std::string part;                                  ///< "pose", "root" or "objects"
+  std::vector<std::pair<std::string, Index>> begun;  ///< frames by start: "previous", "estimate", "velocity"
+};
+
+/// What choosing the best starts came to.
+struct StartSummary {
+  double seconds = 0;
+  std::vector<StartCounts> parts;  ///< empty: nothing was chosen
+};
+
+/// summary.json. Means are over the frames that were optimised, 1 to T; frame 0 is given.
+struct RunSummary {
+  std::string name;
+  int frames = 0;
+  double seconds = 0;
+  bool has_truth = true;              ///< false: errors of body, objects and camera could not be measured
+  std::string surface;                ///< the mesh by which penetration was measured; empty: it was not
+  std::vector<StageSummary> metrics;  ///< in order, the last one is the final one
+  StartSummary start;
+  std::vector<Baseline> baselines;
+  std::vector<FrameMetrics> per_frame;  ///< of the result
+};
+
+/// The text of summary.json:
+///
+///   {"name", "frames", "seconds", "truth": BOOL, "surface",
+///    "metrics": [{"stage", "frame"?, "seconds", "iterations", NAME: NUMBER...,
+///                 "gradient_shares": {GROUP: {TERM: {"share", "cosine", "evaluations"}...}...}}...],
+///    "start": {"seconds", PART: {START: FRAMES...}...},
+///    "baselines": {NAME: {"frame"?, NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
+///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface", "start" and
+///    "gradient_shares" only where there are any)
+///
+/// with "frame": 0 where errors are those of frame 0 alone.
+/// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and
+/// for a name that occurs twice.
+std::string summary_json(const RunSummary& summary);
+
+/// Reads what summary_json writes. Members that it does not know are passed over, as newer versions may add some.
+///
+/// @param name  what messages call the text: the file
+/// Throws DataError naming file, line and member.
+RunSummary parse_summary(const std::string& text, const std::string& name);
+
+/// The table of errors: a row for each baseline and each stage, a column for each metric that occurs in some row.
+struct ErrorTable {
+  struct Row {
+    std::string name;
+    bool is_baseline = false;
+    std::vector<const double*> values;  ///< a column each, into the summary; null: not measured
+    bool of_frame_0 = false;            ///< of frame 0 alone
+  };
+  std::vector<const MetricFacts*> columns;
+  std::vector<Row> rows;
+
+  /// True where no row's value as shown (to the decimals of its metric) is better, and some row's is worse; rows of
+  /// frame 0 alone are compared with each other.
+  bool is_best(std::size_t row, std::size_t column) const;
+};
+
+/// Baselines first, then stages. It refers to `summary`, which must outlive it.
+ErrorTable make_error_table(const RunSummary& summary);
+
+/// The table of errors as plain text for a terminal, the best value of each row marked with *.
+std::string error_table(const RunSummary& summary);
+
+/// `value` with a fixed number of decimals, whatever the locale; "-0.00" is "0.00". "not finite" for NaN and infinity.
+std::string fixed_number(double value, int decimals);
+
+}  // namespace hsi4d

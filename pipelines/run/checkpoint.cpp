@@ -1,0 +1,334 @@
+#include "pipelines/run/checkpoint.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "core/check.h"
+#include "optim/checkpoint.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr Index kPoseNumbers = 3 * kSmplxJoints;
+constexpr Index kRigidNumbers = 12;
+constexpr std::size_t kCounts = 5;  // whole numbers of a stage's totals
+constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "psnr_foreground_db",
+                                                     "ssim"};  // as image_errors orders
+
+/// Errors of images, frame by frame: as "KIND/FRAME/NAME".
+std::string error_name(const char* kind, std::size_t frame, const std::string& name) {
+  return std::string(kind) + "/" + std::to_string(frame) + "/" + name;
+}
+
+void store_errors(const char* kind, const std::vector<MetricValues>& errors, Checkpoint& checkpoint) {
+  for (std::size_t t = 0; t < errors.size(); ++t) {
+    for (const auto& [name, value] : errors[t]) checkpoint.set(error_name(kind, t, name), std::vector<double>{value});
+  }
+}
+
+std::vector<MetricValues> stored_errors(const char* kind, std::size_t frames, const Checkpoint& checkpoint) {
+  std::vector<MetricValues> errors(frames);
+  for (std::size_t t = 0; t < frames; ++t) {
+    for (const char* name : kImageErrors) {
+      const std::string entry = error_name(kind, t, name);
+      if (!checkpoint.has(entry)) continue;
+      const std::vector<double>& error = checkpoint.doubles(entry);
+      if (error.size() != 1)
+        throw DataError(checkpoint.source() + ": \"" + entry + "\" holds " + std::to_string(error.size()) +
+                        " numbers, 1 is needed");
+      errors[t].emplace_back(name, error[0]);
+    }
+  }
+  return errors;
+}
+
+constexpr const char* kLeftOut = "left_out";
+
+/// A line each: "STAGE FRAME OBJECT TERM<tab>REASON".
+std::string left_out_text(const std::vector<LeftOutInFrame>& left_out) {
+  std::string text;
+  for (const LeftOutInFrame& entry : left_out) {
+    text += std::to_string(entry.stage) + " " + std::to_string(entry.frame) + " " + std::to_string(entry.object) + " " +
+            entry.term + "\t" + entry.reason + "\n";
+  }
+  return text;
+}
+
+/// @param stages       over the first frame and over frames
+/// @param first_frame  1, or 0 where there are stages over frame 0
+std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages,
+                                        Index first_frame) {
+  std::vector<LeftOutInFrame> left_out;
+  if (!checkpoint.has(kLeftOut)) return left_out;
+  std::istringstream lines(checkpoint.text(kLeftOut));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    LeftOutInFrame entry;
+    words >> entry.stage >> entry.frame >> entry.object;
+    words.get();
+    std::getline(words, entry.term, '\t');
+    std::getline(words, entry.reason);
+    if (!words || entry.stage >= stages || entry.object < 0 || entry.object >= std::ssize(clip.objects) ||
+        entry.frame < first_frame || entry.frame >= clip.frames()) {
+      throw DataError(checkpoint.source() + ": \"" + kLeftOut + "\" holds \"" + line +
+                      "\", which is no stage, frame, object, term and reason of this clip");
+    }
+    left_out.push_back(entry);
+  }
+  return left_out;
+}
+
+constexpr const char* kStill = "still";
+
+/// A line each: "STAGE FRAME GROUP".
+std::string still_text(const std::vector<StillGroup>& still) {
+  std::string text;
+  for (const StillGroup& entry : still)
+    text += std::to_string(entry.stage) + " " + std::to_string(entry.frame) + " " + entry.group + "\n";
+  return text;
+}
+
+/// @param stages, first_frame  as left_out_of
+std::vector<StillGroup> still_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages,
+                                 Index first_frame) {
+  std::vector<StillGroup> still;
+  if (!checkpoint.has(kStill)) return still;
+  std::istringstream lines(checkpoint.text(kStill));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    StillGroup entry;
+    words >> entry.stage >> entry.frame >> entry.group;
+    if (!words || entry.stage >= stages || entry.frame < first_frame || entry.frame >= clip.frames())
+      throw DataError(checkpoint.source() + ": \"" + kStill + "\" holds \"" + line +
+                      "\", which is no stage, frame and group of this clip");
+    still.push_back(entry);
+  }
+  return still;
+}
+
+/// One state as numbers: camera [R | t] (12), then 6 an object, then the body's transl (3) and axis-angles (165).
+void append(const SceneState& state, std::vector<double>& numbers) {
+  for (Index r = 0; r < 3; ++r) {
+    for (Index c = 0; c < 3; ++c) numbers.push_back(state.camera_from_world.rotation(r, c));
+    numbers.push_back(state.camera_from_world.translation[r]);
+  }
+  for (const ObjectPose& pose : state.objects) {
+    numbers.insert(numbers.end(), pose.rotation.data(), pose.rotation.data() + 3);
+    numbers.insert(numbers.end(), pose.translation.data(), pose.translation.data() + 3);
+  }
+  numbers.insert(numbers.end(), state.body.transl.data(), state.body.transl.data() + 3);
+  numbers.insert(numbers.end(), state.body.axis_angle.begin(), state.body.axis_angle.end());
+}
+
+/// The pixels of a mask, row by row, without what pads its rows.
+std::vector<float> pixels_of(const Image& mask) {
+  std::vector<float> pixels;
+  for (int y = 0; y < mask.height(); ++y) pixels.insert(pixels.end(), mask.row(0, y), mask.row(0, y) + mask.width());
+  return pixels;
+}
+
+void set_pixels(const std::vector<float>& pixels, Image& mask) {
+  for (int y = 0; y < mask.height(); ++y) {
+    std::copy_n(pixels.data() + static_cast<std::ptrdiff_t>(y) * mask.width(), mask.width(), mask.row(0, y));
+  }
+}
+
+Index numbers_per_state(const Clip& clip) {
+  return kRigidNumbers + 6 * static_cast<Index>(clip.objects.size()) + 3 + kPoseNumbers;
+}
+
+SceneState state_from(const double* numbers, const Clip& clip) {
+  SceneState state;
+  for (Index r = 0; r < 3; ++r) {
+    for (Index c = 0; c < 3; ++c) state.camera_from_world.rotation(r, c) = *numbers++;
+    state.camera_from_world.translation[r] = *numbers++;
+  }
+  for (std::size_t o = 0; o < clip.objects.size(); ++o, numbers += 6) {
+    state.objects.push_back({Vector3<double>(numbers), Vector3<double>(numbers + 3)});
+  }
+  state.body.transl = Vector3<double>(numbers);
+  state.body.axis_angle.assign(numbers + 3, numbers + 3 + kPoseNumbers);
+  return state;
+}
+
+// ---- Totals ----
+
+/// Counts and seconds of stages, as a checkpoint has them.
+struct StoredTotals {
+  std::vector<std::int64_t> counts;  // kCounts a stage
+  std::vector<double> seconds;
+
+  void add(const StageTotals& totals) {
+    counts.insert(counts.end(), {totals.iterations, totals.rollbacks, totals.tiles, totals.pairs, totals.fragments});
+    seconds.push_back(totals.seconds);
+  }
+};
+
+StageTotals totals_at(const std::vector<std::int64_t>& counts, const std::vector<double>& seconds, std::size_t stage) {
+  const std::int64_t* count = counts.data() + kCounts * stage;
+  return {count[0], count[1], seconds[stage], count[2], count[3], count[4]};
+}
+
+// ---- Entries of a checkpoint ----
+
+/// Throws DataError unless an entry has as many numbers as this clip needs.
+void expect_size(const Checkpoint& checkpoint, const std::string& name, std::size_t found, std::size_t wanted) {
+  if (found == wanted) return;
+  throw DataError(checkpoint.source() + ": \"" + name + "\" holds " + std::to_string(found) +
+                  " numbers, this clip needs " + std::to_string(wanted) +
+                  "; the inputs have changed since the run began");
+}
+
+/// An entry of states, all of them finite.
+const std::vector<double>& stored_states(const Checkpoint& checkpoint, const std::string& name, std::size_t numbers) {
+  const std::vector<double>& states = checkpoint.doubles(name);
+  expect_size(checkpoint, name, states.size(), numbers);
+  if (!std::all_of(states.begin(), states.end(), [](double x) { return std::isfinite(x); }))
+    throw DataError(checkpoint.source() + ": \"" + name + "\" holds a number that is not finite");
+  return states;
+}
+
+void store_first_frame(const std::vector<FirstFrameState>& stages, Checkpoint& checkpoint) {
+  if (stages.empty()) return;
+  std::vector<double> states;
+  StoredTotals totals;
+  for (const FirstFrameState& stage : stages) {
+    append(stage.state, states);
+    totals.add(stage.totals);
+  }
+  checkpoint.set("first_frame/states", std::move(states));
+  checkpoint.set("first_frame/counts", std::move(totals.counts));
+  checkpoint.set("first_frame/seconds", std::move(totals.seconds));
+}
+
+std::vector<FirstFrameState> stored_first_frame(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages) {
+  std::vector<FirstFrameState> found;
+  if (stages == 0) return found;
+  const auto per_state = static_cast<std::size_t>(numbers_per_state(clip));
+  const std::vector<double>& states = stored_states(checkpoint, "first_frame/states", stages * per_state);
+  const std::vector<std::int64_t>& counts = checkpoint.integers("first_frame/counts");
+  expect_size(checkpoint, "first_frame/counts", counts.size(), kCounts * stages);
+  const std::vector<double>& seconds = checkpoint.doubles("first_frame/seconds");
+  expect_size(checkpoint, "first_frame/seconds", seconds.size(), stages);
+  for (std::size_t s = 0; s < stages; ++s)
+    found.push_back({state_from(states.data() + s * per_state, clip), totals_at(counts, seconds, s)});
+  return found;
+}
+
+void store_start(const StartTotals& start, Checkpoint& checkpoint) {
+  std::vector<std::int64_t> frames;
+  for (const auto& part : start.frames) frames.insert(frames.end(), part.begin(), part.end());
+  checkpoint.set("start/frames", std::move(frames));
+  checkpoint.set("start/seconds", std::vector<double>{start.seconds});
+}
+
+/// Nothing where there is none: a checkpoint of a version that did not count.
+StartTotals stored_start(const Checkpoint& checkpoint) {
+  StartTotals start;
+  if (!checkpoint.has("start/frames")) return start;
+  const std::vector<std::int64_t>& frames = checkpoint.integers("start/frames");
+  expect_size(checkpoint, "start/frames", frames.size(), kChosenParts.size() * kChosenStarts.size());
+  const std::vector<double>& seconds = checkpoint.doubles("start/seconds");
+  expect_size(checkpoint, "start/seconds", seconds.size(), 1);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    start.frames[i / kChosenStarts.size()][i % kChosenStarts.size()] = frames[i];
+  start.seconds = seconds[0];
+  return start;
+}
+
+}  // namespace
+
+const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement) {
+  return refinement.stages.empty() ? progress.after_stage.back() : refinement.stages.back().states;
+}
+
+RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net) {
+  RunProgress progress;
+  progress.after_stage.assign(stages, {clip.first});
+  progress.totals.resize(stages);
+  progress.image_errors.resize(1);
+  progress.start_errors.resize(1);
+  progress.covered = Image(1, clip.camera.height, clip.camera.width);
+  progress.colors = first_color_state(std::move(net));
+  return progress;
+}
+
+void save_progress(const std::string& file, const std::string& config, const RunProgress& progress) {
+  Checkpoint checkpoint;
+  std::vector<double> states;
+  StoredTotals totals;
+  for (const auto& stage : progress.after_stage) {
+    for (const SceneState& state : stage) append(state, states);
+  }
+  for (const StageTotals& stage : progress.totals) totals.add(stage);
+  totals.seconds.push_back(progress.seconds);
+  checkpoint.set("frames", std::vector<std::int64_t>{progress.frames_done()});
+  checkpoint.set("states", std::move(states));
+  checkpoint.set("counts", std::move(totals.counts));
+  checkpoint.set("seconds", std::move(totals.seconds));
+  store_first_frame(progress.first_frame, checkpoint);
+  checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
+  checkpoint.set("covered", pixels_of(progress.covered));
+  checkpoint.set("inputs", progress.inputs);
+  if (!progress.left_out.empty()) checkpoint.set(kLeftOut, left_out_text(progress.left_out));
+  if (!progress.still.empty()) checkpoint.set(kStill, still_text(progress.still));
+  if (progress.start.seconds > 0) store_start(progress.start, checkpoint);
+  store_color_state(progress.colors, checkpoint);
+  store_errors("image_errors", progress.image_errors, checkpoint);
+  store_errors("start_errors", progress.start_errors, checkpoint);
+  checkpoint.save(file, text_hash(config));
+}
+
+RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
+                          std::optional<ColorNet> net, std::size_t first_stages) {
+  const Checkpoint checkpoint = load_checkpoint(file, text_hash(config));
+  const auto expect = [&checkpoint](const char* name, std::size_t found, std::size_t wanted) {
+    expect_size(checkpoint, name, found, wanted);
+  };
+  RunProgress progress = first_progress(clip, stages, std::move(net));
+  const std::vector<std::int64_t>& frames = checkpoint.integers("frames");
+  expect("frames", frames.size(), 1);
+  if (frames[0] < 1 || frames[0] > clip.frames()) {
+    throw DataError(file + ": " + std::to_string(frames[0]) + " frames done, the clip has " +
+                    std::to_string(clip.frames()));
+  }
+  const std::vector<std::int64_t>& size = checkpoint.integers("size_px");
+  expect("size_px", size.size(), 2);
+  if (size[0] != clip.camera.width || size[1] != clip.camera.height) {
+    throw DataError(file + ": of a video of " + std::to_string(size[0]) + "x" + std::to_string(size[1]) +
+                    " pixels, the camera's image is " + std::to_string(clip.camera.width) + "x" +
+                    std::to_string(clip.camera.height) + "; the inputs have changed since the run began");
+  }
+  const auto done = static_cast<std::size_t>(frames[0]), per_state = static_cast<std::size_t>(numbers_per_state(clip));
+  const std::vector<double>& states = stored_states(checkpoint, "states", stages * done * per_state);
+  const std::vector<std::int64_t>& counts = checkpoint.integers("counts");
+  expect("counts", counts.size(), kCounts * stages);
+  const std::vector<double>& seconds = checkpoint.doubles("seconds");
+  expect("seconds", seconds.size(), stages + 1);
+  for (std::size_t s = 0; s < stages; ++s) {
+    progress.after_stage[s].clear();
+    for (std::size_t t = 0; t < done; ++t) {
+      progress.after_stage[s].push_back(state_from(states.data() + (s * done + t) * per_state, clip));
+    }
+    progress.totals[s] = totals_at(counts, seconds, s);
+  }
+  progress.seconds = seconds.back();
+  progress.first_frame = stored_first_frame(checkpoint, clip, first_stages);
+  const std::vector<float>& covered = checkpoint.floats("covered");
+  expect("covered", covered.size(), pixels_of(progress.covered).size());
+  set_pixels(covered, progress.covered);
+  progress.inputs = checkpoint.text("inputs");
+  progress.start = stored_start(checkpoint);
+  progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
+  const Index first_frame = first_stages > 0 ? 0 : 1;
+  progress.left_out = left_out_of(checkpoint, clip, first_stages + stages, first_frame);
+  progress.still = still_of(checkpoint, clip, first_stages + stages, first_frame);
+  progress.image_errors = stored_errors("image_errors", done, checkpoint);
+  progress.start_errors = stored_errors("start_errors", done, checkpoint);
+  return progress;
+}
+
+}  // namespace hsi4d

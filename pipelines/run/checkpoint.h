@@ -1,0 +1,95 @@
+// What a run has found so far, and its checkpoint.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/image.h"
+#include "pipelines/input/clip.h"
+#include "pipelines/input/color_state.h"
+#include "pipelines/input/state.h"
+#include "pipelines/record/summary.h"
+#include "pipelines/run/start_choice.h"
+
+namespace hsi4d {
+
+/// Work and time that a stage has taken over the frames so far.
+struct StageTotals {
+  Index iterations = 0;
+  Index rollbacks = 0;
+  double seconds = 0;
+  Index tiles = 0, pairs = 0, fragments = 0;  ///< rendered, over all iterations
+};
+
+/// An object that a loss term left out, in some iterations at least.
+struct LeftOutInFrame {
+  std::size_t stage = 0;
+  Index frame = 0, object = 0;
+  std::string term, reason;
+};
+
+/// A group of parameters whose gradient was 0 in every iteration of a stage of a frame: nothing depended on it.
+struct StillGroup {
+  std::size_t stage = 0;
+  Index frame = 0;
+  std::string group;
+};
+
+/// Frame 0 after a stage over the first frame.
+struct FirstFrameState {
+  SceneState state;
+  StageTotals totals;
+};
+
+/// Everything that the next frame depends on, or that the end of the run tells.
+struct RunProgress {
+  std::vector<FirstFrameState> first_frame;          ///< by stage over the first frame; none: frame 0 is as given
+  std::vector<std::vector<SceneState>> after_stage;  ///< [stage over frames][frame]; frame 0 is the given or found one
+  std::vector<StageTotals> totals;                   ///< by stage over frames
+  std::vector<MetricValues> image_errors;            ///< [frame]; none of a frame 0 that is as given
+  std::vector<MetricValues> start_errors;            ///< the same of what each frame's image was given
+  std::string inputs;                                ///< what was read so far, in the form of input_hashes
+  Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
+  std::vector<LeftOutInFrame> left_out;              ///< in the order in which it happened
+  std::vector<StillGroup> still;                     ///< likewise
+  StartTotals start;                                 ///< where the best start was chosen
+  ColorState colors;                                 ///< after the last frame done
+  double seconds = 0;                                ///< of the frames done
+
+  /// Frames done, frame 0 included.
+  Index frames_done() const { return after_stage.empty() ? 0 : static_cast<Index>(after_stage.front().size()); }
+};
+
+/// All frames after a stage over the sequence.
+struct RefinedStates {
+  std::vector<SceneState> states;  ///< by frame, frame 0 included
+  StageTotals totals;
+};
+
+/// What the stages over the sequence have found, which come after all frames. It is in no checkpoint.
+struct RefinementProgress {
+  std::vector<RefinedStates> stages;
+  std::vector<MetricValues> image_errors;  ///< of the last of them, by frame, as those of RunProgress
+  double seconds = 0;
+};
+
+/// The states by frame after the last stage so far.
+const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement);
+
+/// Nothing done but the given frame 0.
+/// @param stages  how many there are over frames
+/// @param net  with which the run begins, if it has one
+RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net = {});
+
+/// Writes the checkpoint of a run, in one step.
+/// @param config  the text to which the checkpoint belongs: the config, without what no result depends on
+void save_progress(const std::string& file, const std::string& config, const RunProgress& progress);
+
+/// Reads it back, bit for bit. Throws DataError naming the file when it is damaged, of another config, or of another
+/// clip.
+/// @param stages, net   as of first_progress
+/// @param first_stages  how many there are over the first frame
+RunProgress load_progress(const std::string& file, const std::string& config, const Clip& clip, std::size_t stages,
+                          std::optional<ColorNet> net = {}, std::size_t first_stages = 0);
+
+}  // namespace hsi4d

@@ -1,0 +1,387 @@
+#include "pipelines/run/reconstruct.h"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <optional>
+
+#include "core/image_io.h"
+#include "core/log.h"
+#include "core/stopwatch.h"
+#include "core/text.h"
+#include "pipelines/draw/frame_images.h"
+#include "pipelines/draw/visibility.h"
+#include "pipelines/input/input_hashes.h"
+#include "pipelines/metrics/sequence_errors.h"
+#include "pipelines/record/results.h"
+#include "pipelines/report/view3d.h"
+#include "pipelines/run/checkpoint.h"
+#include "pipelines/run/reconstruct_stage.h"
+#include "pipelines/run/stage_log.h"
+#include "pipelines/run/start_choice.h"
+#include "pipelines/run/summarize.h"
+
+namespace hsi4d {
+
+namespace {
+
+std::string checkpoint_file(const RunPaths& paths) { return paths.checkpoint() + "/progress.npz"; }
+
+/// The text that the checkpoints of a run belong to.
+std::string checkpoint_identity(const RunConfig& config, const std::vector<LossTerm>& losses) {
+  return to_json(sections_beside_data(config, descriptions_of(losses)));
+}
+
+std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
+  return first_color_net(config.color_net, clip.avatar, config.seed);
+}
+
+std::size_t count_stages(const RunConfig& config, StageScope over) {
+  const auto is_over = [over](const auto& entry) { return entry.second.over == over; };
+  return static_cast<std::size_t>(std::count_if(config.stages.begin(), config.stages.end(), is_over));
+}
+
+/// What is in a checkpoint, if its inputs are still the same.
+RunProgress read_checkpoint(const std::string& file, const std::string& identity, const RunConfig& config,
+                            const Clip& clip) {
+  RunProgress progress;
+  try {
+    progress = load_progress(file, identity, clip, count_stages(config, StageScope::kFrame), first_net(config, clip),
+                             count_stages(config, StageScope::kFirst));
+  } catch (const DataError& damage) {
+    throw DataError(std::string(damage.what()) + "; without this file the run begins anew");
+  }
+  std::vector<ClipFile> files = clip.files;
+  for (Index t = 0; t < progress.frames_done(); ++t) {
+    const std::vector<ClipFile> of_frame = frame_files(config.data, clip, t);
+    files.insert(files.end(), of_frame.begin(), of_frame.end());
+  }
+  check_unchanged(progress.inputs, files, file);
+  return progress;
+}
+
+/// What is told of a run that was stopped in frame `frame` of `frames`, or after the last of them: those before it are
+/// kept.
+/// @param first  the first frame that is worked on: 1, or 0 where frame 0 is not as given
+std::string stop_message(Index frame, Index frames, Index first) {
+  const std::string text =
+      "interrupted " + (frame < frames ? "in frame " + std::to_string(frame) : "after the last frame") + "; ";
+  if (frame == first) return text + "no frame was finished";
+  const std::string from = std::to_string(first);
+  return text +
+         (frame == first + 1 ? "frame " + from + " is"
+                             : "frames " + from + " to " + std::to_string(frame - 1) + " are") +
+         " finished and kept";
+}
+
+class Reconstruction {
+ public:
+  Reconstruction(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
+                 const Observer& observer)
+      : config_(config),
+        losses_(losses),
+        folder_(folder),
+        observer_(observer),
+        identity_(checkpoint_identity(config, losses)),
+        clip_(clip),
+        first_stages_(count_stages(config, StageScope::kFirst)),
+        frame_stages_(count_stages(config, StageScope::kFrame)),
+        progress_(first_progress(clip_, frame_stages_, first_net(config, clip))),
+        start_colors_(progress_.colors),
+        bar_(config.name, total_steps(), observer.progress, observer.progress_interval) {}
+
+  RunSummary run() {
+    resume();
+    if (progress_.frames_done() == 0) run_first_frame();
+    while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
+    if (sequence_stage() < config_.stages.size()) refine();
+    bar_.finish();
+    warn_of_left_out(progress_.left_out, config_, clip_);
+    warn_of_still_groups(progress_.still, config_);
+    warn_of_what_is_out_of_view(clip_, result());
+    write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
+    RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
+    add_gradient_shares(config_, folder_.paths().metrics(), summary);
+    folder_.write_summary(summary);
+    const std::optional<BodyModel> body =
+        write_body(folder_.paths(), config_.body, clip_.avatar, motion_of(clip_, result()));
+    view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
+    write_views(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
+      stop_if_asked(clip_.frames());
+      return render_state(config_, clip_, state, colors_after(frame));
+    });
+    return summary;
+  }
+
+ private:
+  /// Stages over the first frame come first, then those over frames, and last those over the sequence.
+  std::size_t sequence_stage() const { return first_stages_ + frame_stages_; }
+
+  std::int64_t steps_of(StageScope over) const {
+    std::int64_t steps = 0;
+    for (const auto& [name, stage] : config_.stages) steps += stage.over == over ? stage.iterations : 0;
+    return steps;
+  }
+  /// Steps of the frames before `frame`.
+  std::int64_t steps_before(Index frame) const {
+    if (frame == 0) return 0;
+    return steps_of(StageScope::kFirst) + steps_of(StageScope::kFrame) * (frame - 1);
+  }
+  std::int64_t total_steps() const { return steps_before(clip_.frames()) + steps_of(StageScope::kSequence); }
+
+  void resume() {
+    const std::string file = checkpoint_file(folder_.paths());
+    if (folder_.resumed_from() && std::filesystem::exists(file)) {
+      progress_ = read_checkpoint(file, identity_, config_, clip_);
+    } else {
+      if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
+      add_covered(read_frame(clip_, 0), config_.data, progress_.covered);
+      progress_.inputs = input_hashes(clip_.files) + input_hashes(frame_files(config_.data, clip_, 0));
+    }
+    folder_.take_over_config();
+    if (folder_.resumed_from())
+      folder_.note("resumed with frame " + std::to_string(progress_.frames_done()) + " of " +
+                   std::to_string(clip_.frames() - 1));
+    folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
+    bar_.skip(steps_before(progress_.frames_done()));
+  }
+
+  /// The stages over frame 0, from the given state on. What they find stands in its place from then on.
+  void run_first_frame() {
+    const auto begin = std::chrono::steady_clock::now();
+    const ClipFrame frame = read_frame(clip_, 0);
+    progress_.image_errors.clear();
+    progress_.start_errors.clear();
+    write_start_image(0, frame);
+    SceneState state = clip_.first;
+    for (std::size_t s = 0; s < first_stages_; ++s) {
+      StageTotals totals;
+      run_in_frame(s, {0, frame, progress_.covered, {}}, state, progress_.colors, totals);
+      progress_.first_frame.push_back({state, totals});
+    }
+    end_frame(0, frame, std::vector(frame_stages_, state), begin);
+  }
+
+  void run_frame(Index index) {
+    const auto begin = std::chrono::steady_clock::now();
+    const ClipFrame frame = read_frame(clip_, index);
+    add_covered(frame, config_.data, progress_.covered);
+    SceneState state = frame_start(config_.start, clip_, progress_.after_stage.back());
+    ColorState colors = progress_.colors;
+    std::vector<SceneState> after;
+    bool has_start = !chooses_start(config_.start);
+    for (std::size_t s = 0; s < frame_stages_; ++s) {
+      if (!has_start && config_.stages[first_stages_ + s].second.draw == Draw::kAll) {
+        state = chosen_start(index, frame, state, colors);
+        has_start = true;
+      }
+      run_in_frame(first_stages_ + s, {index, frame, progress_.covered, progress_.after_stage.back()}, state, colors,
+                   progress_.totals[s]);
+      after.push_back(state);
+    }
+    progress_.colors = std::move(colors);
+    write_start_image(index, frame);
+    progress_.inputs += input_hashes(frame_files(config_.data, clip_, index));
+    end_frame(index, frame, after, begin);
+  }
+
+  /// Where the stages that draw everything begin, told in the log.
+  SceneState chosen_start(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors) {
+    const auto begin = std::chrono::steady_clock::now();
+    const ChosenStart chosen = choose_start(config_, clip_, progress_.after_stage.back(), frame, state, colors);
+    const double seconds = seconds_since(begin);
+    progress_.start.add(chosen);
+    progress_.start.seconds += seconds;
+    const std::string text = start_text(chosen);
+    if (!text.empty())
+      folder_.note("frame " + std::to_string(index) + ", start: " + text + ", chosen in " + rounded(seconds, 3) + " s");
+    return chosen.state;
+  }
+
+  /// Keeps what was found in a frame: in memory, as images, in the checkpoint.
+  /// @param after  the state after each stage over frames
+  void end_frame(Index index, const ClipFrame& frame, const std::vector<SceneState>& after,
+                 std::chrono::steady_clock::time_point begin) {
+    write_image(folder_.paths().frame_image(static_cast<int>(index), "target"), frame.target);
+    write_result(index, frame, after.back(), progress_.colors, progress_.image_errors);
+    if (progress_.colors.net && moves_colors(config_))
+      write_color_net(folder_.paths().frame_color_net(static_cast<int>(index)), *progress_.colors.net);
+    for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
+    progress_.seconds += seconds_since(begin);
+    save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
+  }
+
+  /// The stages over the whole sequence, each from where the one before ended.
+  void refine() {
+    const auto begin = std::chrono::steady_clock::now();
+    for (std::size_t s = sequence_stage(); s < config_.stages.size(); ++s) {
+      std::vector<SceneState> states = result();
+      const StageTotals totals = run_over_sequence(s, states);
+      refinement_.stages.push_back({std::move(states), totals});
+    }
+    refinement_.image_errors.resize(1);
+    for (Index t = 1; t < clip_.frames(); ++t) {
+      stop_if_asked(clip_.frames());
+      const ClipFrame frame = read_frame(clip_, t);
+      write_result(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), refinement_.image_errors);
+    }
+    refinement_.seconds = seconds_since(begin);
+  }
+
+  StageTotals run_over_sequence(std::size_t s, std::vector<SceneState>& states) {
+    const auto& [name, stage] = config_.stages[s];
+    std::string begin;  // of the loss, for the log
+    const auto note_iteration = [&](const IterationReport& report) {
+      if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
+      note(std::nullopt, s, report, nullptr, nullptr);
+    };
+    const StageResult result =
+        run_sequence_stage({config_, clip_, losses_, s, observer_.stages}, states, note_iteration);
+    warn_of_terms_off(result.off, name, stage);
+    warn_of_idle_terms(result.notes, name);
+    folder_.note("all frames, " + stage_text(name, result, begin, clip_));
+    return {result.iterations, result.rollbacks, result.seconds};
+  }
+
+  /// The color net as it was after a frame, in the precision of its file, so that a resumed run has the same.
+  ColorState colors_after(Index frame) const {
+    ColorState colors = start_colors_;
+    if (frame >= first_worked_on() && colors.net && moves_colors(config_))
+      colors.net = read_color_net(folder_.paths().frame_color_net(static_cast<int>(frame)), clip_.avatar.count(),
+                                  clip_.avatar.joint_count());
+    return colors;
+  }
+
+  const std::vector<SceneState>& result() const { return result_of(progress_, refinement_); }
+
+  Index first_worked_on() const { return first_stages_ > 0 ? 0 : 1; }
+
+  /// @param totals  of the stage, to which this is added
+  void run_in_frame(std::size_t s, const FrameTask& frame, SceneState& state, ColorState& colors, StageTotals& totals) {
+    const auto& [name, stage] = config_.stages[s];
+    std::string begin;  // of the loss, for the log
+    GradientWatch gradients;
+    const auto note_iteration = [&](const IterationReport& report, const RenderCounters& counters) {
+      gradients.see(report.groups);
+      if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
+      note(frame.index, s, report, &counters, &totals);
+    };
+    const StageResult result =
+        run_frame_stage({config_, clip_, losses_, s, observer_.stages}, frame, state, colors, note_iteration);
+    totals.iterations += result.iterations;
+    totals.rollbacks += result.rollbacks;
+    totals.seconds += result.seconds;
+    // By then all frames before are there that terms over the motion want to see.
+    if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1) || stage.over == StageScope::kFirst)
+      warn_of_terms_off(result.off, name, stage);
+    for (const LeftOutObject& object : result.left_out) {
+      if (!object.is_of_masks && !object.of_human)
+        progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
+    }
+    for (const std::string& group : gradients.still_groups()) progress_.still.push_back({s, frame.index, group});
+    folder_.note("frame " + std::to_string(frame.index) + ", " + stage_text(name, result, begin, clip_));
+  }
+
+  /// @param frame     none: all at once
+  /// @param counters, totals  null: nothing was drawn
+  void note(std::optional<Index> frame, std::size_t s, const IterationReport& report, const RenderCounters* counters,
+            StageTotals* totals) {
+    const std::string& stage = config_.stages[s].first;
+    if (report.rolled_back) {
+      log_warning((frame ? "frame " + std::to_string(*frame) : "all frames") + ", stage " + stage + ", iteration " +
+                  std::to_string(report.iteration) + ": no step, " + std::string(report.offender));
+    }
+    IterationRecord record;
+    if (frame) record.frame = static_cast<int>(*frame);
+    record.stage = stage;
+    record.iteration = report.iteration;
+    record.loss = report.loss;
+    for (const LossValue& term : report.terms) record.losses.emplace_back(term.name, term.value);
+    record.seconds = report.seconds;
+    record.rolled_back = report.rolled_back;
+    record.gradient_shares = report.gradient_shares;
+    if (counters != nullptr) add_counters(*counters, *totals, record);
+    for (const auto& [name, count] : {std::pair{"forward_nodes", report.tape.forward_nodes},
+                                      {"backward_nodes", report.tape.backward_nodes},
+                                      {"adjoint_numbers", report.tape.adjoint_numbers}})
+      record.counters.emplace_back(name, static_cast<double>(count));
+    folder_.append_metrics(record);
+    show(report);
+    stop_if_asked(frame.value_or(clip_.frames()));
+  }
+
+  void show(const IterationReport& report) {
+    terms_.clear();
+    for (const LossValue& term : report.terms) terms_.push_back({term.name, term.value});
+    bar_.step_with("loss", report.loss, terms_);
+  }
+
+  /// @param frame  the one at hand; that beyond the last: all are done
+  void stop_if_asked(Index frame) const {
+    if (observer_.wants_stop()) throw Interrupted(stop_message(frame, clip_.frames(), first_worked_on()));
+  }
+
+  static void add_counters(const RenderCounters& counters, StageTotals& totals, IterationRecord& record) {
+    totals.tiles += counters.tiles;
+    totals.pairs += counters.pairs;
+    totals.fragments += counters.fragments;
+    for (const auto& [name, count] : {std::pair{"channels", counters.channels},
+                                      {"gaussians", counters.gaussians},
+                                      {"tiles", counters.tiles},
+                                      {"pairs", counters.pairs},
+                                      {"groups", counters.groups},
+                                      {"fragments", counters.fragments},
+                                      {"layers", counters.layers},
+                                      {"told_squares", counters.told_squares},
+                                      {"adjoint_tiles", counters.adjoint_tiles}}) {
+      record.counters.emplace_back(name, static_cast<double>(count));
+    }
+  }
+
+  /// Writes images of a frame's result and notes how far it is from the video.
+  void write_result(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors,
+                    std::vector<MetricValues>& errors) {
+    const RunPaths& paths = folder_.paths();
+    const auto number = static_cast<int>(index);
+    const Image image = render_state(config_, clip_, state, colors), foreground = foreground_of(frame);
+    write_image(paths.frame_image(number, "render"), image);
+    write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
+    errors.push_back(image_errors(image, frame.target, &foreground));
+  }
+
+  void write_start_image(Index index, const ClipFrame& frame) {
+    const Image start = render_state(config_, clip_, given_start(clip_, index), start_colors_);
+    const Image foreground = foreground_of(frame);
+    write_image(folder_.paths().frame_image(static_cast<int>(index), "start"), start);
+    progress_.start_errors.push_back(image_errors(start, frame.target, &foreground));
+  }
+
+  const RunConfig& config_;
+  const std::vector<LossTerm>& losses_;
+  RunFolder& folder_;
+  const Observer& observer_;
+  std::string identity_;  // the text that a checkpoint of this run belongs to
+  const Clip& clip_;
+  std::size_t first_stages_, frame_stages_;
+  RunProgress progress_;
+  RefinementProgress refinement_;
+  const ColorState start_colors_;
+  Progress bar_;
+  std::vector<ProgressPart> terms_;  // of the iteration at hand
+};
+
+}  // namespace
+
+Index finished_frames(const std::string& folder, const RunConfig& config, const Clip& clip,
+                      const std::vector<LossTerm>& losses) {
+  const std::string file = checkpoint_file(RunPaths{folder});
+  if (!std::filesystem::exists(file)) return 0;
+  return read_checkpoint(file, checkpoint_identity(config, losses), config, clip).frames_done() - 1;
+}
+
+RunSummary reconstruct(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses,
+                       RunFolder& folder, const Observer& observer) {
+  return Reconstruction(config, clip, losses, folder, observer).run();
+}
+
+}  // namespace hsi4d

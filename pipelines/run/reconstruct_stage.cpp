@@ -1,0 +1,290 @@
+#include "pipelines/run/reconstruct_stage.h"
+
+#include <algorithm>
+
+#include "body/pose_prior.h"
+#include "optim/optimizer.h"
+#include "pipelines/draw/frame_images.h"
+#include "pipelines/draw/posed_avatar.h"
+#include "pipelines/graph/frame_graph.h"
+#include "pipelines/graph/frame_masks.h"
+#include "pipelines/graph/sequence_graph.h"
+
+namespace hsi4d {
+
+namespace {
+
+FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const ColorState& colors) {
+  return {config.render,
+          config.skip.render,
+          config.approx.render,
+          config.approx.hold_colors,
+          config.rotations,
+          config.camera.increment,
+          draw,
+          Vector3<double>(config.background.data()),
+          colors.net ? &*colors.net : nullptr,
+          config.color_net.pose_gradient,
+          config.color_net.camera_gradient};
+}
+
+/// Whether a term that is on reads an input which is made on demand.
+bool some_loss_reads(const StageSettings& stage, const char* input) {
+  return stage.draw == Draw::kAll && std::any_of(stage.losses.begin(), stage.losses.end(), [input](const auto& entry) {
+           return reads_input(entry.second, input);
+         });
+}
+
+/// The frames that terms over the motion see: up to kFramesBefore that are done, and the one at hand.
+std::vector<SceneState> seen_frames(std::span<const SceneState> done, const SceneState& state) {
+  std::vector<SceneState> frames(done.end() - std::min(kFramesBefore, std::ssize(done)), done.end());
+  frames.push_back(state);
+  return frames;
+}
+
+/// Empty where every pixel counts.
+Image pixel_weights(const StageSettings& stage, const FrameTask& task, const RunConfig& config) {
+  const double share = stage.draw == Draw::kScene ? config.approx.camera_pixel_share : 1;
+  if (stage.weight == PixelWeight::kAll && share == 1) return {};
+  Image covered(1, task.covered.height(), task.covered.width());
+  if (stage.weight == PixelWeight::kUnoccluded) covered = task.covered;
+  if (stage.weight == PixelWeight::kBackground || stage.weight == PixelWeight::kForeground)
+    add_covered(task.frame, config.data, covered);
+  Image weight = stage.weight == PixelWeight::kForeground ? std::move(covered) : complement(covered);
+  if (share < 1) keep_share(share, task.index, weight);
+  return weight;
+}
+
+/// Frame 0 as the stages of a frame see it: as it was found, or, while it is looked for, as it was given.
+const SceneState& first_state(const StageTask& task, const FrameTask& frame) {
+  return frame.done.empty() ? task.clip.first : frame.done.front();
+}
+
+/// What a stage draws of objects and human, where approx.seen_within_deg asks for less than all. What the stage needs
+/// wholly is kept: objects for their mean depth, the human for features that move.
+std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& state) {
+  const auto& stage = task.config.stages[task.stage].second;
+  const double within_deg = task.config.approx.seen_within_deg;
+  if (within_deg == 0 || stage.draw == Draw::kScene) return {};
+  const Clip& clip = task.clip;
+  Lookout lookout{camera_of_size(clip, stage.longest_side_px), task.config.render, within_deg};
+  lookout.camera.camera_from_world = state.camera_from_world;
+  const bool needs_objects = find_entry(stage.losses, "depth") != nullptr;
+  const bool needs_human = find_entry(stage.optimize, "avatar_features") != nullptr;
+  SeenRows rows;
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    const Gaussians& object = clip.objects[o].gaussians;
+    rows.objects.push_back(needs_objects ? all_rows(object.count())
+                                         : seen_rows(posed_object(object, state.objects[o]), lookout));
+  }
+  const Avatar& avatar = clip.avatar;
+  rows.human = needs_human ? all_rows(avatar.count())
+                           : seen_rows({rest_gaussians(avatar), blended_transforms(avatar, state.body)}, lookout);
+  return rows;
+}
+
+/// As mask_center has it, the coverage as a share of what the object covers at its present pose with nothing before it.
+Vector3<double> center_and_share(const Image& mask, const StageTask& task, std::size_t object,
+                                 const SceneState& state) {
+  Vector3<double> center = mask_center(mask, task.config.data.mask_threshold);
+  if (center[2] == 0) return center;
+  Camera camera = camera_of_size(task.clip, task.config.stages[task.stage].second.longest_side_px);
+  camera.camera_from_world = state.camera_from_world;
+  const double area = covered_area(task.clip.objects[object].gaussians, state.objects[object], camera);
+  center[2] = center[2] < area ? center[2] / area : 1;
+  return center;
+}
+
+FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, const SceneState& state,
+                        const Image& weight) {
+  const Clip& clip = task.clip;
+  const ClipFrame& frame = frame_task.frame;
+  const SceneState& first = first_state(task, frame_task);
+  const bool are_objects_read = some_loss_reads(task.config.stages[task.stage].second, kReadsObjectOpacity);
+  FrameTargets targets;
+  targets.image = &frame.target;
+  targets.weight = weight.empty() ? nullptr : &weight;
+  targets.human_mask = &frame.human_mask;
+  targets.human_seen = mask_center(frame.human_mask, task.config.data.mask_threshold)[2] != 0;
+  for (std::size_t o = 0; o < clip.objects.size(); ++o) {
+    if (are_objects_read) {
+      targets.object_masks.push_back(&frame.object_masks[o]);
+      targets.centers.push_back(center_and_share(frame.object_masks[o], task, o, state));
+    }
+    targets.depths.push_back(mean_depth(clip.objects[o].gaussians, first.objects[o], first.camera_from_world));
+  }
+  return targets;
+}
+
+Index tiles_in_image(const Camera& camera, int tile) {
+  return Index{(camera.width + tile - 1) / tile} * ((camera.height + tile - 1) / tile);
+}
+
+/// Covered where a part of a pixel is.
+Image reduced_cover(const Image& covered, const Camera& camera) {
+  Image result = resize_area(covered, camera.height, camera.width);
+  for (float& x : result.data()) x = x > 0 ? 1 : 0;
+  return result;
+}
+
+/// Records a frame as a stage has it, beside what it is compared with, and calls use(graph, inputs of the losses).
+/// @param camera_reach  as FrameGraphSettings has it
+template <class S, class F>
+void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& frame, const SceneState& state,
+                      const ColorState& colors, std::optional<double> camera_reach, F use) {
+  const StageSettings& stage = task.config.stages[task.stage].second;
+  tape.set_skips(task.config.skip.tape);
+  FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
+  settings.longest_side_px = stage.longest_side_px;
+  settings.human_opacity = some_loss_reads(stage, kReadsHumanOpacity);
+  settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
+  settings.camera_reach = camera_reach;
+  settings.seen = rows_to_draw(task, state);
+  FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
+  graph.set_state(state);
+  if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));
+  const Image weight = pixel_weights(stage, frame, task.config);
+  graph.set_targets(targets_of(task, frame, state, weight));
+  LossInputs<S> inputs = graph.loss_inputs();
+  if (weight.empty()) inputs.weight = {};
+  use(graph, inputs);
+}
+
+/// Calls use(frame) with the frame in images of the size that the stage asks for.
+template <class F>
+auto at_stage_size(const StageTask& task, const FrameTask& frame, F use) {
+  const Camera camera = camera_of_size(task.clip, task.config.stages[task.stage].second.longest_side_px);
+  if (camera.width == task.clip.camera.width && camera.height == task.clip.camera.height) return use(frame);
+  const ClipFrame small = reduced_frame(frame.frame, camera);
+  const Image covered = reduced_cover(frame.covered, camera);
+  return use(FrameTask{frame.index, small, covered, frame.done});
+}
+
+std::string name_in_frame(const StageTask& task, const FrameTask& frame) {
+  return task.config.stages[task.stage].first + ", frame " + std::to_string(frame.index);
+}
+
+template <class S>
+StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+                               const FrameStageCallback& callback) {
+  const std::string& name = task.config.stages[task.stage].first;
+  const StageSettings& stage = task.config.stages[task.stage].second;
+  StageProbe probe(task.watch);
+  Tape<S> tape;
+  const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");
+  const double reach = camera != nullptr ? longest_way(*camera, stage.iterations, stage.optimizer) : 0;
+  StageResult result;
+  with_frame_graph<S>(tape, task, frame, state, colors, reach, [&](FrameGraph<S>& graph, const LossInputs<S>& inputs) {
+    result = run_stage<S>(tape, stage, task.losses, inputs, graph.groups(),
+                          [&](const IterationReport& report) {
+                            const RenderCounters& counters = *graph.rendered().counters;
+                            probe.iteration_ended(report, &counters);
+                            callback(report, counters);
+                            probe.iteration_begins();
+                          },
+                          {.name = name_in_frame(task, frame),
+                           .kept = &colors.moments,
+                           .curvature = stage.optimizer.keep_curvature ? &colors.curvature[name] : nullptr,
+                           .profile = probe.is_on(),
+                           .held = graph.held()});
+    graph.read_state(stage.optimize, state);
+    if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
+  });
+  const Camera drawn = camera_of_size(task.clip, stage.longest_side_px);
+  probe.stage_ended(result, {.stage = name,
+                             .frame = frame.index,
+                             .pixels_of_image = static_cast<Index>(drawn.width) * drawn.height,
+                             .tiles_of_image = tiles_in_image(drawn, task.config.render.tile),
+                             .tape_bytes = tape.memory_bytes()});
+  return result;
+}
+
+template <class S>
+StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+                               const FrameStageCallback& callback) {
+  return at_stage_size(
+      task, frame, [&](const FrameTask& sized) { return run_stage_on_frame<S>(task, sized, state, colors, callback); });
+}
+
+/// Records the sequence as a stage has it.
+template <class S>
+SequenceGraph<S> sequence_graph(Tape<S>& tape, const StageTask& task, const std::vector<SceneState>& states) {
+  const StageSettings& stage = task.config.stages[task.stage].second;
+  tape.set_skips(task.config.skip.tape);
+  const bool moves_pose = find_entry(stage.optimize, kPoseLatents) != nullptr;
+  const PosePrior prior = stage.pose_prior ? *stage.pose_prior : read_pose_prior(stage.pose_weights.string());
+  return SequenceGraph<S>(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);
+}
+
+template <class S>
+StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>& states,
+                                  const StageCallback& callback) {
+  const auto& [name, stage] = task.config.stages[task.stage];
+  StageProbe probe(task.watch);
+  Tape<S> tape;
+  const SequenceGraph<S> graph = sequence_graph<S>(tape, task, states);
+  const StageResult result = run_stage<S>(tape, stage, task.losses, graph.loss_inputs(), graph.groups(),
+                                          [&](const IterationReport& report) {
+                                            probe.iteration_ended(report, nullptr);
+                                            callback(report);
+                                            probe.iteration_begins();
+                                          },
+                                          {.name = name, .kept = nullptr, .profile = probe.is_on()});
+  graph.read_states(stage.optimize, states);
+  probe.stage_ended(result, {.stage = name, .tape_bytes = tape.memory_bytes()});
+  return result;
+}
+
+template <class S>
+Image render_state_in(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {
+  Tape<S> tape;
+  FrameGraphSettings settings = graph_settings(config, Draw::kAll, colors);
+  settings.camera_reach = 0;
+  FrameGraph<S> graph(tape, clip, state.camera_from_world, settings);
+  graph.set_state(state);
+  tape.forward(graph.rendered().image);
+  return to_image(tape.value(graph.rendered().image));
+}
+
+}  // namespace
+
+StageResult run_frame_stage(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+                            const FrameStageCallback& callback) {
+  return task.config.precision == RunPrecision::kFloat
+             ? run_frame_stage_in<float>(task, frame, state, colors, callback)
+             : run_frame_stage_in<double>(task, frame, state, colors, callback);
+}
+
+StageResult run_sequence_stage(const StageTask& task, std::vector<SceneState>& states, const StageCallback& callback) {
+  return task.config.precision == RunPrecision::kFloat ? run_sequence_stage_in<float>(task, states, callback)
+                                                       : run_sequence_stage_in<double>(task, states, callback);
+}
+
+StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, const SceneState& state,
+                                 const ColorState& colors, const StageGradcheckOptions& options) {
+  return at_stage_size(task, frame, [&](const FrameTask& sized) {
+    Tape<double> tape;
+    StageGradcheck found;
+    with_frame_graph<double>(
+        tape, task, sized, state, colors, std::nullopt, [&](const auto& graph, const auto& inputs) {
+          found = check_stage_gradient(tape, task.config.stages[task.stage].second, task.losses, inputs, graph.groups(),
+                                       name_in_frame(task, sized), options);
+        });
+    return found;
+  });
+}
+
+StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,
+                                    const StageGradcheckOptions& options) {
+  const auto& [name, stage] = task.config.stages[task.stage];
+  Tape<double> tape;
+  const SequenceGraph<double> graph = sequence_graph<double>(tape, task, states);
+  return check_stage_gradient(tape, stage, task.losses, graph.loss_inputs(), graph.groups(), name, options);
+}
+
+Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {
+  return config.precision == RunPrecision::kFloat ? render_state_in<float>(config, clip, state, colors)
+                                                  : render_state_in<double>(config, clip, state, colors);
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,69 @@
+// The stages of a run: one of them in a frame, or over the sequence. A stage is its tape, what it is compared with, and
+// the parts of the state that it moves.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/image.h"
+#include "optim/loss_term.h"
+#include "optim/stage.h"
+#include "optim/stage_gradcheck.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/input/clip.h"
+#include "pipelines/input/color_state.h"
+#include "pipelines/input/state.h"
+#include "pipelines/run/stage_profile.h"
+#include "splat/render/render.h"
+
+namespace hsi4d {
+
+/// A stage of a run.
+struct StageTask {
+  const RunConfig& config;
+  const Clip& clip;
+  const std::vector<LossTerm>& losses;  ///< that the config may name
+  std::size_t stage = 0;                ///< in config.stages
+  const StageWatch* watch = nullptr;    ///< null: nobody wants to know where time goes
+};
+
+/// A frame that stages work on.
+struct FrameTask {
+  Index index = 0;
+  const ClipFrame& frame;
+  const Image& covered;              ///< [1,H,W] 1 where the human or an object has been so far, in this frame too
+  std::span<const SceneState> done;  ///< the result of the frames before, frame 0 included; none in frame 0
+};
+
+/// Frames before the one at hand that terms over the motion see: three differences need as many.
+inline constexpr std::ptrdiff_t kFramesBefore = 3;
+
+/// Called after every iteration of a frame's stage, with the work of its render. May throw to end the stage.
+using FrameStageCallback = std::function<void(const IterationReport&, const RenderCounters&)>;
+
+/// Runs a stage of a frame.
+/// @param state   from where it starts; what the stage moves is written back
+/// @param colors  likewise
+/// Throws what run_stage throws.
+StageResult run_frame_stage(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+                            const FrameStageCallback& callback);
+
+/// Runs a stage over the sequence.
+/// @param states  by frame, frame 0 included, which is given; what the stage moves is written back
+/// Throws what run_stage throws.
+StageResult run_sequence_stage(const StageTask& task, std::vector<SceneState>& states, const StageCallback& callback);
+
+/// Checks the gradient of a stage of a frame against differences, in double whatever the config's precision. All of the
+/// scene is drawn, wherever the camera may get. Throws as check_stage_gradient.
+StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, const SceneState& state,
+                                 const ColorState& colors, const StageGradcheckOptions& options = {});
+
+/// Likewise of a stage over the sequence.
+StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,
+                                    const StageGradcheckOptions& options = {});
+
+/// The image [3,H,W] of a state, from its own camera.
+Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors);
+
+}  // namespace hsi4d

@@ -1,0 +1,140 @@
+#include "pipelines/run/run.h"
+
+#include <exception>
+#include <optional>
+#include <utility>
+
+#include "core/check.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "core/text.h"
+#include "core/version.h"
+#include "pipelines/config/run_problems.h"
+#include "pipelines/draw/visibility.h"
+#include "pipelines/input/body_files.h"
+#include "pipelines/report/report.h"
+#include "pipelines/run/frame_start.h"
+#include "pipelines/sources/sources.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// Runs `body` on the threads that were asked for; 0: one a core.
+template <class F>
+void on_threads(int threads, F&& body) {
+  if (threads > 0) return with_threads(threads, body);
+  body();
+}
+
+/// What is logged before a run has its folder; it belongs into that folder's log too.
+class EarlyMessages {
+ public:
+  void move_to(const RunFolder& folder) {
+    sink_.reset();
+    for (const auto& [level, message] : messages_) folder.note(message, level);
+  }
+
+ private:
+  std::vector<std::pair<LogLevel, std::string>> messages_;
+  std::optional<LogSink> sink_ =
+      log_to([this](LogLevel level, std::string_view message) { messages_.emplace_back(level, message); });
+};
+
+/// First line of a run's log.
+std::string opening(const RunConfig& config, const Clip& clip, const RunIdentity& identity) {
+  return "hsi4d " + std::string(version()) + " (" + git_commit() + "), run '" + config.name +
+         "': " + std::to_string(clip.frames()) + " frames of " + std::to_string(clip.camera.width) + "x" +
+         std::to_string(clip.camera.height) + " pixels, " + std::to_string(config.stages.size()) + " stages, " +
+         std::to_string(identity.threads) + (identity.threads == 1 ? " thread, " : " threads, ") + identity.precision;
+}
+
+/// Last line of the log of a run that is done.
+std::string closing(const RunSummary& summary) {
+  std::string text = "done: " + std::to_string(summary.frames) + " frames in " + duration_text(summary.seconds);
+  if (summary.metrics.empty()) return text;
+  for (const char* name : {"psnr_db", "ssim", "mpjpe_mm", "object_translation_cm", "camera_translation_cm"}) {
+    const double* const value = find_metric(summary.metrics.back().values, name);
+    if (value != nullptr) text += ", " + std::string(name) + " " + rounded(*value, 4);
+  }
+  return text;
+}
+
+RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Clip& clip,
+                            const std::vector<LossTerm>& losses, const RunOptions& options) {
+  try {
+    RunSummary summary;
+    on_threads(options.threads > 0 ? options.threads : config.threads,
+               [&] { summary = reconstruct(config, clip, losses, folder, options.observer); });
+    folder.set_state(RunState::kDone);  // the report tells it
+    write_report(options.folder);
+    folder.note(closing(summary));
+    return summary;
+  } catch (const Interrupted& stop) {
+    note_end(folder, RunState::kInterrupted, stop.what());
+    throw;
+  } catch (const std::exception& failure) {
+    note_end(folder, RunState::kFailed, failure.what());
+    throw;
+  }
+}
+
+}  // namespace
+
+void note_end(RunFolder& folder, RunState state, const std::string& message) noexcept {
+  try {
+    // In the run's log alone: whoever called gets the exception, and would read the message twice.
+    folder.note(std::string(run_state_name(state)) + ": " + message,
+                state == RunState::kFailed ? LogLevel::kError : LogLevel::kInfo);
+    folder.set_state(state, message);
+  } catch (const std::exception&) {
+  }
+}
+
+void set_image_size(Clip& clip, const RunConfig& config) {
+  if (config.approx.longest_side_px > 0) clip.camera = reduced_camera(clip.camera, config.approx.longest_side_px);
+}
+
+Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
+  Clip clip = read_clip(config.data);
+  set_image_size(clip, config);
+  for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
+    clip.files.push_back({file.pointer, file.path});
+  if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});
+  return clip;
+}
+
+void check_run_clip(const RunConfig& config, const Clip& clip) {
+  check_start(config.start, clip);
+  check_first_view(clip, config.data.camera.string());
+  check_frames(config.data, clip, losses_over_masks(config));
+}
+
+RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses, const RunOptions& options) {
+  HSI4D_CHECK(asked.chain.empty(), "a chain is carried out by carry_out_chain");
+  RunConfig config = asked;
+  prepare_run(config);
+  EarlyMessages early;
+  for (const RunNote& note : run_notes(config)) log_message(note.level, note.text);
+  RunIdentity identity;
+  identity.config = resolved_config(config, descriptions_of(losses));  // without what programs outside make
+  on_threads(options.threads > 0 ? options.threads : config.threads, [&] {
+    if (!has_sources(config.sources)) return;
+    look_at_run_folder(options.folder, identity.config, options.resume);  // before anything is made for nothing
+    config.data = make_sources(config, options.observer);
+  });
+  const Clip clip = read_run_clip(config, losses);                       // before anything is written
+  if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);  // what is wrong with it shows now
+  check_run_clip(config, clip);
+  identity.seed = config.seed;
+  const int threads = options.threads > 0 ? options.threads : config.threads;
+  identity.threads = threads > 0 ? threads : thread_count();
+  identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
+  RunFolder folder(options.folder, identity, options.resume);
+  folder.note(opening(config, clip, identity));
+  early.move_to(folder);
+  return reconstruct_into(folder, config, clip, losses, options);
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,115 @@
+#include "pipelines/run/stage_log.h"
+
+#include <utility>
+
+#include "core/log.h"
+#include "core/text.h"
+
+namespace hsi4d {
+
+namespace {
+
+std::string left_out_line(const StageResult& result, const Clip& clip) {
+  std::string text;
+  for (const LeftOutObject& object : result.left_out) {
+    const std::string name = object.of_human ? "the human" : clip.objects[static_cast<std::size_t>(object.object)].name;
+    text += ", " + object.term + " without " + name + " in " + std::to_string(object.evaluations) + " of " +
+            std::to_string(result.iterations + 1) + " evaluations";
+  }
+  return text;
+}
+
+/// Messages, each of several frames.
+class FramesOfMessages {
+ public:
+  void add(const std::string& begin, Index frame, LogLevel level = LogLevel::kWarning) {
+    std::vector<Index>& frames = frames_[begin];
+    if (frames.empty()) order_.emplace_back(level, begin);
+    if (frames.empty() || frames.back() != frame) frames.push_back(frame);
+  }
+  /// Each once, with its frames, in the order in which it was first added.
+  void log() const {
+    for (const auto& [level, begin] : order_) {
+      const std::vector<Index>& frames = frames_.at(begin);
+      log_message(level, begin + (frames.size() == 1 ? "frame " : "frames ") + frame_ranges(frames));
+    }
+  }
+
+ private:
+  std::map<std::string, std::vector<Index>> frames_;
+  std::vector<std::pair<LogLevel, std::string>> order_;
+};
+
+/// Hands, jaw and eyes: the body or an object may be in front of them.
+bool is_often_hidden(const std::string& group) { return group.ends_with("_pose") && group != "body_pose"; }
+
+}  // namespace
+
+std::string loss_text(double loss, std::span<const LossValue> terms) {
+  std::vector<std::string> parts;
+  for (const LossValue& term : terms) parts.push_back(term.name + " " + rounded(term.value, 4));
+  return rounded(loss, 4) + " (" + joined(parts) + ")";
+}
+
+std::string stage_text(const std::string& stage, const StageResult& result, const std::string& begin,
+                       const Clip& clip) {
+  std::string text = "stage " + stage + ": " + std::to_string(result.iterations) + " iterations in " +
+                     rounded(result.seconds, 3) + " s, loss " + begin + " -> " + loss_text(result.loss, result.terms);
+  if (result.rollbacks > 0) text += ", " + std::to_string(result.rollbacks) + " steps not taken";
+  text += left_out_line(result, clip);
+  for (const LossNote& note : result.notes) text += ", " + note.term + ": " + note.text;
+  return text;
+}
+
+void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip) {
+  FramesOfMessages messages;
+  for (const LeftOutInFrame& entry : left_out) {
+    const std::string begin = "stage " + config.stages[entry.stage].first + ": the loss \"" + entry.term +
+                              "\" was off for the object \"" +
+                              clip.objects[static_cast<std::size_t>(entry.object)].name + "\" (" + entry.reason +
+                              "), in some iterations at least, in ";
+    messages.add(begin, entry.frame);
+  }
+  messages.log();
+}
+
+void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig& config) {
+  FramesOfMessages messages;
+  for (const StillGroup& entry : still)
+    messages.add("stage " + config.stages[entry.stage].first + ": what the losses see did not depend on the group \"" +
+                     entry.group + "\" (its gradient was 0 in every iteration) in ",
+                 entry.frame, is_often_hidden(entry.group) ? LogLevel::kInfo : LogLevel::kWarning);
+  messages.log();
+}
+
+void GradientWatch::see(std::span<const GroupStep> groups) {
+  for (const GroupStep& group : groups) {
+    if (!group.moved) continue;
+    const auto known = has_gradient_.try_emplace(std::string(group.name), false).first;
+    known->second = known->second || group.gradient_norm > 0;
+  }
+}
+
+std::vector<std::string> GradientWatch::still_groups() const {
+  std::vector<std::string> names;
+  for (const auto& [name, has_gradient] : has_gradient_) {
+    if (!has_gradient) names.push_back(name);
+  }
+  return names;
+}
+
+void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage) {
+  for (const LossNote& note : notes) {
+    if (note.is_idle) log_warning("stage " + stage + ": the loss \"" + note.term + "\" moves nothing: " + note.text);
+  }
+}
+
+void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings) {
+  for (const std::string& term : off) {
+    const LossSettings* const term_settings = find_entry(settings.losses, term);
+    log_warning("stage " + stage + ": the loss \"" + term + "\" is off: " +
+                (term_settings != nullptr && term_settings->weight == 0 ? "its weight is 0" : "it lacks an input"));
+  }
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,47 @@
+// What the log says of the stages of a run.
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "optim/stage.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/input/clip.h"
+#include "pipelines/run/checkpoint.h"
+
+namespace hsi4d {
+
+/// A loss and its terms: "0.1234 (l1 0.1, ssim 0.2)".
+std::string loss_text(double loss, std::span<const LossValue> terms);
+
+/// What a stage did: iterations, time, loss before and after, steps not taken, what terms left out and noted.
+/// @param begin  loss_text of the first iteration
+std::string stage_text(const std::string& stage, const StageResult& result, const std::string& begin, const Clip& clip);
+
+/// Every object that a term of a stage left out: one warning, with its frames.
+void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConfig& config, const Clip& clip);
+
+/// Every group that had no gradient in all of a stage: one warning, with its frames; of hands, jaw and eyes, which are
+/// often hidden, as an information.
+void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig& config);
+
+/// Sees the iterations of a stage.
+class GradientWatch {
+ public:
+  void see(std::span<const GroupStep> groups);
+  /// Groups that were on in some iteration, and had a gradient other than 0 in none.
+  std::vector<std::string> still_groups() const;
+
+ private:
+  std::map<std::string, bool, std::less<>> has_gradient_;  // by group that was on
+};
+
+/// Every term of a stage that moves nothing by what it found: one warning, with that.
+void warn_of_idle_terms(const std::vector<LossNote>& notes, const std::string& stage);
+
+/// Every term of a stage that is off: one warning, with the reason.
+void warn_of_terms_off(const std::vector<std::string>& off, const std::string& stage, const StageSettings& settings);
+
+}  // namespace hsi4d

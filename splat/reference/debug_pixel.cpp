@@ -1,0 +1,89 @@
+#include "splat/reference/debug_pixel.h"
+
+#include <cmath>
+#include <utility>
+
+#include "core/check.h"
+#include "splat/reference/pixel_walk.h"
+
+namespace hsi4d {
+
+namespace {
+
+/// o G at a pixel's centre, in double.
+template <class S>
+double uncapped_alpha(const detail::SplatRecord<S>& g, PixelPlace place) {
+  const double dx = place.column + 0.5 - g.x, dy = place.row + 0.5 - g.y;
+  const double u = static_cast<double>(g.l11) * dx + static_cast<double>(g.l21) * dy;
+  const double w = static_cast<double>(g.l22) * dy;
+  return static_cast<double>(g.opacity) * std::exp(-0.5 * (u * u + w * w));
+}
+
+}  // namespace
+
+double PixelTrace::weight_sum() const {
+  double sum = 0;
+  for (const PixelSplat& splat : composited) sum += splat.weight();
+  return sum;
+}
+
+void PixelTrace::add(PixelSplat splat) {
+  const std::array<double, 3> before = color();
+  for (std::size_t c = 0; c < 3; ++c) splat.so_far[c] = before[c] + splat.weight() * splat.color[c];
+  depth_sum += splat.weight() * splat.depth;
+  composited.push_back(std::move(splat));
+}
+
+void PixelTrace::skip(const PixelSplat& splat) {
+  ++skipped;
+  if (!nearest_miss || splat.full > nearest_miss->full) nearest_miss = splat;
+}
+
+template <class S>
+PixelTrace trace_pixel(const Tape<S>& tape, const Projected<S>& projected, Var<S> opacities, Var<S> features,
+                       const SplatView& view, PixelPlace place) {
+  const Camera& camera = view.camera;
+  HSI4D_CHECK(place.column >= 0 && place.column < camera.width && place.row >= 0 && place.row < camera.height,
+              "the pixel is not in the image");
+  const detail::SplatArrays<S> splats = {tape.value(projected.means_px),
+                                         tape.value(projected.factors),
+                                         tape.value(projected.depths),
+                                         tape.value(projected.depth_rest),
+                                         tape.value(projected.means_rest),
+                                         tape.value(opacities),
+                                         tape.value(features)};
+  const ConstArray<S> colors = splats.features;
+  HSI4D_CHECK(colors.shape.cols >= 3, std::to_string(colors.shape.cols) + " features hold no colour");
+  const Index tile =
+      detail::tile_of(detail::tile_grid(camera.width, camera.height, view.settings.tile), place.row, place.column);
+  const detail::PixelWalk<S> walk(splats, view, tile);
+  PixelTrace trace;
+  trace.place = place;
+  trace.behind_stop = walk.visit(place.row, place.column, [&](const detail::PixelStep<S>& step) {
+    const Index n = step.row;
+    PixelSplat splat{n};
+    splat.depth = detail::depth_of(splats, n);
+    splat.alpha = static_cast<double>(step.alpha);
+    splat.capped = step.capped;
+    splat.full = step.drawn && !step.capped ? splat.alpha : uncapped_alpha(*step.record, place);
+    splat.transmittance = static_cast<double>(step.transmittance);
+    for (Index c = 0; c < 3; ++c) splat.color[static_cast<std::size_t>(c)] = static_cast<double>(colors(n, c));
+    trace.stopped = step.stops;
+    if (step.composited) {
+      trace.add(splat);
+      trace.transmittance = static_cast<double>(step.behind);
+    } else if (step.drawn) {
+      trace.refused = splat;
+    } else {
+      trace.skip(splat);
+    }
+  });
+  return trace;
+}
+
+template PixelTrace trace_pixel(const Tape<float>&, const Projected<float>&, Var<float>, Var<float>, const SplatView&,
+                                PixelPlace);
+template PixelTrace trace_pixel(const Tape<double>&, const Projected<double>&, Var<double>, Var<double>,
+                                const SplatView&, PixelPlace);
+
+}  // namespace hsi4d

@@ -1,0 +1,339 @@
+#include "pipelines/avatar/fit.h"
+
+#include <algorithm>
+#include <array>
+
+#include <catch2/catch.hpp>
+
+#include "body/procedural_body.h"
+#include "core/camera_file.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "core/parallel.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/draw/posed_avatar.h"
+#include "pipelines/input/body_files.h"
+#include "pipelines/synthetic/dataset.h"
+#include "pipelines/synthetic/views.h"
+#include "tests/temporary_folder.h"
+
+using namespace hsi4d;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A stage that learns fast enough for a test.
+StageSettings quick_stage(int iterations) {
+  StageSettings stage;
+  stage.iterations = iterations;
+  stage.optimize = {{"colors", {.lr = 0.05, .lr_final_share = 0.1, .until = {}}},
+                    {"opacity_logits", {.lr = 0.02, .lr_final_share = 0.1, .until = {}}},
+                    {"color_net", {.lr = 0.001, .lr_final_share = 0.1, .until = {}}}};
+  stage.losses = {{"photometric", LossSettings{}}};
+  return stage;
+}
+
+AvatarFitSettings quick_fit(const fs::path& views, int iterations = 150) {
+  AvatarFitSettings settings;
+  settings.views = views;
+  settings.gaussians = 2500;
+  settings.held_cameras = {2};
+  settings.render.blur = 0.1;
+  settings.stage = quick_stage(iterations);
+  return settings;
+}
+
+SyntheticSettings few_views() {
+  SyntheticSettings settings;
+  settings.kind = SyntheticKind::kViews;
+  settings.size_px = 96;
+  settings.avatar_gaussians = 4000;
+  settings.views_cameras = 4;
+  settings.views_poses = 2;
+  settings.seed = 5;
+  return settings;
+}
+
+/// A set of views made once for all tests.
+const fs::path& made_views() {
+  static const TemporaryFolder folder;
+  static const fs::path file = [] {
+    write_views(few_views(), video_render_settings(), fs::path(folder.path()) / "views");
+    return fs::path(folder.path()) / "views" / "views.json";
+  }();
+  return file;
+}
+
+AvatarFitResult fitted(const AvatarFitSettings& settings, const Observer& observer = {}) {
+  return fit_avatar(settings, first_avatar(settings), read_view_set(settings.views), loss_terms(), observer);
+}
+
+}  // namespace
+
+TEST_CASE("an avatar is learnt from pictures, and shown from where nobody stood") {
+  AvatarFitSettings settings = quick_fit(made_views());
+  settings.stage.iterations = 1;
+  const AvatarFitResult before = fitted(settings), after = fitted(quick_fit(made_views()));
+  WARN("held back: " << before.held.psnr_db << " dB before, " << after.held.psnr_db << " dB after, of the human "
+                     << after.held.psnr_foreground_db.value() << "; learnt " << after.learnt.psnr_db
+                     << ", of the human " << after.learnt.psnr_foreground_db.value());
+  CHECK(after.learnt.views == 6);
+  CHECK(after.held.views == 2);
+  CHECK(after.held.psnr_db > before.held.psnr_db + 4);
+  CHECK(after.held.psnr_db > 30);
+  CHECK(after.held.psnr_foreground_db.value() > 21);
+  CHECK(after.learnt.psnr_db > 38);
+  CHECK(after.learnt.psnr_foreground_db.value() > 32);
+  CHECK(after.avatar.count() == 2500);
+  CHECK(after.avatar.means == before.avatar.means);  // not among what moves
+  CHECK(after.avatar.colors != before.avatar.colors);
+  CHECK(after.avatar.color_net.has_value());
+  const TemporaryFolder folder;
+  write_avatar(folder / "a.safetensors", after.avatar);
+  CHECK(read_avatar(folder / "a.safetensors").colors == after.avatar.colors);
+}
+
+TEST_CASE("colours that are beyond what can be shown, or learnt, come back") {
+  const TemporaryFolder folder;
+  AvatarFitSettings settings = quick_fit(made_views(), 25);
+  settings.stage.optimize = {{"colors", {.lr = 0.05, .until = {}}}};
+  Avatar start = first_avatar(settings);
+  start.color_net.reset();
+  for (std::size_t i = 0; i < start.colors.size(); ++i) start.colors[i] = std::array{0.0F, 1.6F, -0.4F}[i % 3];
+  write_avatar(folder / "start.safetensors", start);
+  settings.avatar = folder / "start.safetensors";
+  for (const ColorNetUse use : {ColorNetUse::kOn, ColorNetUse::kOff}) {
+    settings.color_net.use = use;
+    AvatarFitSettings first = settings;
+    first.stage.iterations = 1;
+    const AvatarFitResult before = fitted(first), after = fitted(settings);
+    const double low = use == ColorNetUse::kOn ? kLeastColor : 0, high = use == ColorNetUse::kOn ? kLargestColor : 1;
+    const auto is_shown = [&](float c) { return c >= static_cast<float>(low) && c <= static_cast<float>(high); };
+    CHECK(std::all_of(after.avatar.colors.begin(), after.avatar.colors.end(), is_shown));
+    CHECK(after.learnt.psnr_foreground_db.value() > before.learnt.psnr_foreground_db.value() + 3);
+
+    // Of what does not move nothing is changed, be it as it may.
+    first.stage.optimize = {{"opacity_logits", {.lr = 0.05, .until = {}}}};
+    CHECK((fitted(first).avatar.colors == start.colors));
+  }
+}
+
+TEST_CASE("what a fit measures is what the file of its avatar shows") {
+  const TemporaryFolder folder;
+  for (const ColorNetUse use : {ColorNetUse::kOn, ColorNetUse::kOff}) {
+    AvatarFitSettings settings = quick_fit(made_views(), 8);
+    settings.stage.optimize = {{"colors", {.lr = 0.3, .until = {}}}, {"color_net", {.lr = 0.01, .until = {}}}};
+    settings.color_net.use = use;
+    const AvatarFitResult result = fitted(settings);
+    write_avatar(folder / "a.safetensors", result.avatar);
+    settings.avatar = folder / "a.safetensors";
+    settings.stage.iterations = 1;
+    settings.stage.optimize = {{"opacity_logits", {.lr = 1e-30, .until = {}}}};  // which changes nothing
+    const AvatarFitResult again = fitted(settings);
+    CHECK((again.avatar.colors == result.avatar.colors));
+    CHECK(again.held.psnr_db == result.held.psnr_db);
+    CHECK(again.learnt.psnr_foreground_db == result.learnt.psnr_foreground_db);
+  }
+}
+
+TEST_CASE("an avatar fit is the same for any number of threads and again") {
+  const AvatarFitSettings settings = quick_fit(made_views(), 8);
+  std::vector<float> colors;
+  for (const int threads : {1, 2, 3, 1}) {
+    with_threads(threads, [&] {
+      const AvatarFitResult result = fitted(settings);
+      if (colors.empty()) colors = result.avatar.colors;
+      CHECK(result.avatar.colors == colors);
+    });
+  }
+}
+
+TEST_CASE("views of one camera written as updates of another are those of the camera itself") {
+  // A fit that learns nothing shows the truth as the pictures do, from every camera and in every pose.
+  const ViewSet set = read_view_set(made_views());
+  AvatarFitSettings settings = quick_fit(made_views(), 1);
+  settings.avatar = made_views().parent_path() / "truth" / "avatar.safetensors";
+  settings.color_net.use = ColorNetUse::kOff;
+  settings.render = video_render_settings();
+  settings.render.blur = 0.15;
+  settings.stage.optimize = {{"colors", {.lr = 1e-12, .until = {}}}};
+  settings.held_cameras = {};
+  const AvatarFitResult result = fitted(settings);
+  CHECK(result.learnt.views == 8);
+  CHECK(result.learnt.psnr_db > 38);  // of 8 bits, and another pixel filter
+}
+
+TEST_CASE("a picture's alpha is its mask, and views that make no sense are refused") {
+  const ViewSet set = read_view_set(made_views());
+  REQUIRE(set.views.size() == 8);
+  CHECK(set.cameras.size() == 4);
+  CHECK(set.motion.poses.size() == 2);
+  const ViewImage grey = view_image(set, set.views[3], {0.5, 0.5, 0.5}), red = view_image(set, set.views[3], {1, 0, 0});
+  CHECK(grey.mask(0, 0, 0) == 0);
+  CHECK(grey.mask(0, 48, 48) == 1);
+  CHECK(grey.color(1, 0, 0) == 0.5f);
+  CHECK(red.color(0, 0, 0) == 1.0f);
+  CHECK(red.color(2, 48, 48) == grey.color(2, 48, 48));
+
+  const TemporaryFolder folder;
+  fs::copy(made_views().parent_path(), fs::path(folder.path()) / "views", fs::copy_options::recursive);
+  const fs::path file = fs::path(folder.path()) / "views" / "views.json";
+  const auto fault = [&](std::vector<PosedView> views) {
+    write_text_file(file, view_set_json("motion.npz", "cameras.json", views));
+    try {
+      const ViewSet read = read_view_set(file);
+      view_image(read, read.views.front(), {0, 0, 0});
+    } catch (const std::exception& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  const PosedView good{"images/0000.png", {}, 0, 0};
+  CHECK(fault({good}) == "");
+  CHECK_THAT(fault({}), Catch::Contains("there is no view"));
+  CHECK_THAT(fault({good, {"images/0000.png", {}, 4, 0}}),
+             Catch::Contains("/views/1/camera: 4; there are 4, counted from 0"));
+  CHECK_THAT(fault({{"images/0000.png", {}, 0, 2}}), Catch::Contains("/views/0/frame: 2; there are 2"));
+  CHECK_THAT(fault({{"images/9.png", {}, 0, 0}}), Catch::Contains("images/9.png"));
+  write_image((fs::path(folder.path()) / "views" / "small.png").string(), Image(3, 4, 4));
+  CHECK_THAT(fault({{"small.png", {}, 0, 0}}), Catch::Contains("is 4x4 pixels; its camera has 96x96"));
+  write_image((fs::path(folder.path()) / "views" / "grey.png").string(), Image(1, 96, 96));
+  CHECK_THAT(fault({{"grey.png", {}, 0, 0}}), Catch::Contains("is grey"));
+  write_text_file(file,
+                  R"({"format": "hsi4d views", "version": 2, "motion": "motion.npz", "cameras": "cameras.json"})");
+  CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("/version"));
+  write_text_file(file, R"({"format": "views", "version": 1, "motion": "motion.npz", "cameras": "cameras.json"})");
+  CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("hsi4d views"));
+}
+
+TEST_CASE("an avatar fit refuses what it cannot do, and stops when asked") {
+  AvatarFitSettings settings = quick_fit(made_views(), 5);
+  settings.held_cameras = {0, 1, 2, 3};
+  CHECK_THROWS_WITH(fitted(settings), Catch::Contains("all views are held back"));
+  settings.file = "fit.json";
+  settings.held_cameras = {0, 4};
+  CHECK_THROWS_WITH(fitted(settings), Catch::Contains("fit.json: /held_cameras/1: no view of ") &&
+                                          Catch::Contains("is of camera 4; there are 4, counted from 0"));
+  settings.held_cameras = {};
+  settings.held_frames = {2};
+  CHECK_THROWS_WITH(fitted(settings), Catch::Contains("fit.json: /held_frames/0: no view of ") &&
+                                          Catch::Contains("is of frame 2; there are 2, counted from 0"));
+  settings = quick_fit(made_views(), 5);
+  Observer observer;
+  observer.stop_requested = [] { return true; };
+  CHECK_THROWS_AS(fitted(settings, observer), Interrupted);
+}
+
+TEST_CASE("the config of an avatar fit is checked") {
+  const TemporaryFolder folder;
+  const auto load = [&](const std::string& text) {
+    write_text_file(folder / "fit.json", text);
+    return load_avatar_fit(folder / "fit.json", {}, descriptions_of(loss_terms()));
+  };
+  const std::string views = "\"views\": \"" + made_views().string() + "\"";
+  const AvatarFitSettings read = load("{" + views + R"(, "held_frames": [1], "stage": {"iterations": 3,
+      "optimize": {"colors": {"lr": 0.1}}, "losses": {"photometric": {}}}})");
+  CHECK(read.held_frames == std::vector<double>{1});
+  CHECK(read.stage.iterations == 3);
+  CHECK(is_held(read, {"a.png", {}, 0, 1}));
+  CHECK_FALSE(is_held(read, {"a.png", {}, 0, 0}));
+  CHECK_THROWS_WITH(load("{}"), Catch::Contains("views"));
+  const fs::path shipped = fs::path(HSI4D_SOURCE_DIR) / "configs" / "avatar" / "fit.json";
+  CHECK(load_avatar_fit(shipped, {"views=" + made_views().string()}, descriptions_of(loss_terms())).gaussians == 20000);
+  CHECK_THROWS_WITH(load("{" + views + R"(, "held_cameras": [0.5]})"), Catch::Contains("whole numbers"));
+  CHECK_THROWS_WITH(load("{" + views + R"(, "stage": {"iterations": 1, "optimize": {"colours": {"lr": 1}}}})"),
+                    Catch::Contains("colors"));
+}
+
+TEST_CASE("the shipped views are learnt by the shipped fit") {
+  const TemporaryFolder folder;
+  const fs::path configs = fs::path(HSI4D_SOURCE_DIR) / "configs" / "avatar";
+  // As they are but for sizes and counts.
+  RunConfig made = load_run_config(configs / "views.json", {}, descriptions_of(loss_terms()));
+  CHECK(made.synthetic.kind == SyntheticKind::kViews);
+  made.synthetic.size_px = 48;
+  made.synthetic.avatar_gaussians = 1500;
+  made.synthetic.views_cameras = 3;
+  made.synthetic.views_poses = 2;
+  const fs::path views = fs::path(folder.path()) / "views";
+  write_views(made.synthetic, video_render_settings(), views);
+  AvatarFitSettings settings =
+      load_avatar_fit(configs / "fit.json", {"views=" + (views / "views.json").string(), "gaussians=1000"},
+                      descriptions_of(loss_terms()));
+  settings.stage.iterations = 12;
+  for (auto& [name, group] : settings.stage.optimize) group.from = 0;  // as later iterations would be
+  AvatarFitSettings first = settings;
+  first.stage.iterations = 1;
+  const AvatarFitResult before = fitted(first), after = fitted(settings);
+  INFO("learnt " << before.learnt.psnr_db << " dB before, " << after.learnt.psnr_db << " dB after");
+  CHECK(after.learnt.views == 6);
+  CHECK(after.held.views == 0);
+  CHECK(after.learnt.psnr_db > before.learnt.psnr_db + 1);
+  CHECK(after.stage.rollbacks == 0);
+  const Avatar start = first_avatar(settings);  // everything that the stage names has moved
+  CHECK(after.avatar.colors != start.colors);
+  CHECK(after.avatar.opacity_logits != start.opacity_logits);
+  CHECK(after.avatar.log_scales != start.log_scales);
+  CHECK(after.avatar.means != start.means);
+  REQUIRE(after.avatar.color_net.has_value());
+  CHECK(after.avatar.color_net->layers.back().bias != start.color_net->layers.back().bias);
+  CHECK(after.avatar.color_net->features != start.color_net->features);
+}
+
+TEST_CASE("an avatar of a real body, learnt from the reference's pictures, is right in new views and poses", "[full]") {
+  const fs::path file = fs::path(HSI4D_SOURCE_DIR) / "../shared/data/bodies/makehuman_smplx_layout.npz";
+  if (!fs::exists(file)) {
+    WARN("skipped: " << file << " is not there");
+    return;
+  }
+  const TemporaryFolder folder;
+  AvatarFitSettings settings;
+  settings.body.kind = BodyKind::kSmplx;
+  settings.body.path = file;
+  AvatarSettings truth;
+  truth.gaussians = 6000;
+  truth.seed = 11;
+  const BodyModel body = rest_body(settings.body);
+  const Avatar shown = surface_avatar(body, truth);
+  // Six cameras and four poses to learn from. Held back are a seventh camera and a fifth pose, and both together.
+  const Motion motion{10, view_poses(body, 5)};
+  const std::vector<Camera> cameras = ring_of_cameras(7, 96);
+  std::vector<PosedView> views;
+  for (Index pose = 0; pose < 4; ++pose) {
+    for (Index camera = 0; camera < 6; ++camera) views.push_back({{}, {}, camera, pose});
+  }
+  const std::vector<std::pair<Index, Index>> held = {{6, 0}, {6, 2}, {0, 4}, {3, 4}, {6, 4}};
+  for (const auto& [camera, pose] : held) views.push_back({{}, {}, camera, pose});
+  fs::create_directories(fs::path(folder.path()) / "images");
+  parallel_for(std::ssize(views), 1, [&](Index begin, Index end) {  // the reference uses one thread a picture
+    for (Index v = begin; v < end; ++v) {
+      PosedView& view = views[static_cast<std::size_t>(v)];
+      view.image = "images/" + std::to_string(v) + ".png";
+      write_image(folder / view.image.string(),
+                  picture_with_alpha(shown, motion.poses[static_cast<std::size_t>(view.frame)],
+                                     cameras[static_cast<std::size_t>(view.camera)], video_render_settings(),
+                                     Precision::kReference, 2));
+    }
+  });
+  write_motion(folder / "motion.npz", motion);
+  write_cameras(folder / "cameras.json", cameras);
+  write_text_file(folder / "views.json", view_set_json("motion.npz", "cameras.json", views));
+  settings.views = folder / "views.json";
+  settings.held_cameras = {6};
+  settings.held_frames = {4};
+  settings.gaussians = 8000;
+  settings.seed = 3;
+  settings.render.blur = 0.08;
+  settings.stage = quick_stage(600);
+  settings.stage.optimize.push_back({"log_scales", {.lr = 0.004, .lr_final_share = 0.1, .until = {}}});
+  const AvatarFitResult result = fitted(settings);
+  WARN("held back: " << result.held.views << " views, " << result.held.psnr_db << " dB, of the human alone "
+                     << result.held.psnr_foreground_db.value() << " dB; learnt: " << result.learnt.views << " views, "
+                     << result.learnt.psnr_db << " dB, of the human alone " << result.learnt.psnr_foreground_db.value()
+                     << " dB; " << result.stage.seconds << " s");
+  CHECK(result.held.views == 5);
+  CHECK(result.learnt.views == 24);
+  CHECK(result.held.psnr_db >= 30);
+  CHECK(result.held.psnr_foreground_db.value() >= 30);
+}

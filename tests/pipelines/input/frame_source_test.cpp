@@ -1,0 +1,165 @@
+#include "pipelines/input/frame_source.h"
+
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+#include "core/image_io.h"
+#include "core/text.h"
+#include "core/video.h"
+#include "pipelines/input/clip.h"
+#include "tests/support/tiny_run.h"
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Message;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// An image of one colour, by which it is known again.
+Image numbered(int number, int height = 16, int width = 24) {
+  Image image(3, height, width);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < height; ++y) std::fill_n(image.row(c, y), width, static_cast<float>(number) / 40);
+  }
+  return image;
+}
+
+int number_of(const Image& image) { return static_cast<int>(std::lround(40 * image(1, 3, 3))); }
+
+void write_numbered_video(const std::string& path, int frames, double rate) {
+  VideoWriter video(path, 24, 16, {.frame_rate = rate, .quality = 1});
+  for (int t = 0; t < frames; ++t) video.add(numbered(t));
+  video.commit();
+}
+
+void write_numbered_folder(const std::string& folder, int frames) {
+  fs::create_directories(folder);
+  for (int t = 0; t < frames; ++t) write_image(folder + "/" + four_digits(t) + ".png", numbered(t));
+}
+
+std::vector<int> numbers_of(const FrameSource& source) {
+  std::vector<int> numbers;
+  for (Index t = 0; t < source.count(); ++t) numbers.push_back(number_of(source.read(t)));
+  return numbers;
+}
+
+}  // namespace
+
+TEST_CASE("a video and a folder of its frames give the same clip") {
+  const TemporaryFolder here;
+  write_numbered_video("a.mp4", 16, 30);
+  write_numbered_folder("a", 16);
+  const FrameSource video("a.mp4", {0, 10}), folder("a", {30, 10});
+  CHECK(numbers_of(video) == std::vector<int>{0, 3, 6, 9, 12, 15});
+  CHECK(numbers_of(folder) == numbers_of(video));
+  CHECK(video.names() == folder.names());
+  CHECK(video.names()[2] == "0006.png");
+  CHECK(video.frame_rate() == 10);
+  CHECK(folder.frame_rate() == 10);
+  CHECK(video.place(1) == "a.mp4: frame 3");
+  CHECK(folder.place(1) == "a/0003.png");
+  CHECK(number_of(video.read(1)) == 3);  // back again
+}
+
+TEST_CASE("frames are the nearest to the rate that is kept, or all") {
+  const TemporaryFolder here;
+  write_numbered_folder("a", 13);
+  CHECK(numbers_of(FrameSource("a", {25, 10})) == std::vector<int>{0, 3, 5, 8, 10});  // 2.5 and 7.5 up; 12.5 is beyond
+  CHECK(FrameSource("a", {}).count() == 13);
+  CHECK(FrameSource("a", {}).frame_rate() == 0);
+  CHECK(FrameSource("a", {12, 12}).count() == 13);
+}
+
+TEST_CASE("rates that cannot be kept are told") {
+  const TemporaryFolder here;
+  write_numbered_folder("a", 5);
+  write_numbered_video("a.mp4", 5, 30);
+  CHECK_THROWS_MATCHES(FrameSource("a", {0, 10}), UserError,
+                       Message("a: does not say how many frames a second it has, so that 10 of them cannot be kept; "
+                               "data.video_rate says it"));
+  CHECK_THROWS_MATCHES(FrameSource("a.mp4", {0, 60}), UserError,
+                       Message("a.mp4: has 30 frames a second; data.frame_rate, 60, cannot be more"));
+  CHECK_THROWS_MATCHES(FrameSource("a.mp4", {0, 1}), UserError,
+                       Message("a.mp4: gives 1 of its 5 frames; a clip needs at least 2"));
+}
+
+TEST_CASE("masks are a folder or a video of the human or the object") {
+  const TemporaryFolder here;
+  write_numbered_video("a.mp4", 12, 30);
+  const FrameSource frames("a.mp4", {0, 10});
+  write_numbered_folder("masks/human", 12);
+  fs::remove("masks/human/0006.png");
+  write_numbered_video("masks/can.mp4", 10, 30);
+  write_numbered_video("masks/short.mp4", 9, 30);
+  const MaskSource human("masks", "human"), can("masks", "can");
+  CHECK(human.missing(frames) == 1);
+  CHECK(human.read(frames, 2).width() == 0);
+  CHECK(human.read(frames, 1).channels() == 1);
+  CHECK(can.missing(frames) == 0);
+  CHECK(can.is_video());
+  for (const Index t : {0, 1, 3})
+    CHECK(std::lround(40 * can.read(frames, t)(0, 3, 3)) == std::lround(40 * frames.read(t)(0, 3, 3)));
+  CHECK_THROWS_MATCHES(MaskSource("masks", "short").missing(frames), DataError,
+                       Message("masks/short.mp4: has 9 frames, the clip needs the first 10"));
+  CHECK_THROWS_MATCHES(MaskSource("masks", "cup"), DataError, Message("masks/cup: there is no such folder of masks"));
+}
+
+TEST_CASE("a clip of videos at twice the size is that of its images, nearly") {
+  const CopiedDataset dataset;
+  const DataSettings images = dataset_inputs(dataset.path);
+  const Clip of_images = read_clip(images);
+  const auto doubled = [](const Image& image) {
+    return resize_area(image, 2 * image.height(), 2 * image.width());  // an enlargement repeats pixels
+  };
+  const auto write_video = [&](const fs::path& path, const auto& image_of) {
+    VideoWriter video(path.string(), 2 * kTinyPixels, 2 * kTinyPixels, {.frame_rate = 10, .quality = 1});
+    for (Index t = 0; t < of_images.frames(); ++t) {
+      const Image image = doubled(image_of(read_frame(of_images, t)));
+      Image rgb(3, image.height(), image.width());
+      for (int c = 0; c < 3; ++c) {
+        for (int y = 0; y < image.height(); ++y)
+          std::copy_n(image.row(image.channels() == 3 ? c : 0, y), image.width(), rgb.row(c, y));
+      }
+      video.add(rgb);
+    }
+    video.commit();
+  };
+  write_video(dataset.path / "video.mp4", [](const ClipFrame& frame) { return frame.target; });
+  const fs::path masks = dataset.path / "video_masks";
+  fs::create_directories(masks);
+  write_video(masks / "human.mp4", [](const ClipFrame& frame) { return frame.human_mask; });
+  write_video(masks / (std::string(kTinyObject) + ".mp4"),
+              [](const ClipFrame& frame) { return frame.object_masks[0]; });
+  DataSettings data = images;
+  data.frames = dataset.path / "video.mp4";
+  data.masks = masks;
+  const Clip clip = read_clip(data);
+  REQUIRE(clip.frames() == of_images.frames());
+  CHECK(frame_files(data, clip, 1).empty());
+  CHECK(clip.files.size() == of_images.files.size() + 3);
+  check_frames(data, clip, {});
+  for (Index t = 0; t < clip.frames(); ++t) {
+    const ClipFrame a = read_frame(of_images, t), b = read_frame(clip, t);
+    double sum = 0;
+    for (int y = 0; y < kTinyPixels; ++y) {
+      for (int x = 0; x < kTinyPixels; ++x) {
+        sum +=
+            std::fabs(a.target(1, y, x) - b.target(1, y, x)) + std::fabs(a.human_mask(0, y, x) - b.human_mask(0, y, x));
+      }
+    }
+    CHECK(sum / (kTinyPixels * kTinyPixels) < 0.05);
+  }
+}
+
+TEST_CASE("frames smaller than the camera's image, or of another shape, are refused") {
+  const CopiedDataset dataset;
+  const DataSettings data = dataset_inputs(dataset.path);
+  for (const auto& [height, width] : {std::pair{kTinyPixels / 2, kTinyPixels / 2}, {2 * kTinyPixels, kTinyPixels}}) {
+    write_image((dataset.path / "frames/0002.png").string(), Image(3, height, width));
+    const Clip clip = read_clip(data);
+    CHECK_THROWS_AS(read_frame(clip, 2), DataError);
+  }
+}

@@ -1,0 +1,361 @@
+#include "splat/render/tiles.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "splat/render/block_kernel.h"
+#include "tests/support/larger.h"
+
+using namespace hsi4d;
+using namespace hsi4d::detail;
+
+namespace {
+
+const double kInf = std::numeric_limits<double>::infinity(), kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// Random factor of a needle of the given length and width, turned by any angle; numbers are those of S.
+template <class S>
+std::array<double, 6> needle(RandomSequence& random, double length, double width) {
+  const double angle = random.uniform(0, 3.141592653589793), mix = random.uniform(0, 6.283185307179586);
+  const double c = std::cos(angle), s = std::sin(angle);
+  // V = rotation · diag(length, width) · rows of a rotation in three dimensions
+  const double a[3] = {std::cos(mix), std::sin(mix), 0}, b[3] = {-0.6 * std::sin(mix), 0.6 * std::cos(mix), 0.8};
+  std::array<double, 6> v;
+  for (std::size_t k = 0; k < 3; ++k) {
+    v[k] = static_cast<S>(c * length * a[k] - s * width * b[k]);
+    v[3 + k] = static_cast<S>(s * length * a[k] + c * width * b[k]);
+  }
+  return v;
+}
+
+long double exact_determinant(const std::array<double, 6>& v, long double blur) {
+  const auto minor = [&](std::size_t i, std::size_t j) {
+    return static_cast<long double>(v[i]) * v[3 + j] - static_cast<long double>(v[j]) * v[3 + i];
+  };
+  const long double m01 = minor(0, 1), m02 = minor(0, 2), m12 = minor(1, 2);
+  long double trace = 0;
+  for (const double x : v) trace += static_cast<long double>(x) * x;
+  return m01 * m01 + m02 * m02 + m12 * m12 + blur * trace + blur * blur;
+}
+
+/// ½ dᵀ cov⁻¹ d.
+long double exact_exponent(const std::array<double, 6>& v, long double blur, long double dx, long double dy) {
+  long double xx = blur, yy = blur, xy = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    xx += static_cast<long double>(v[k]) * v[k];
+    yy += static_cast<long double>(v[3 + k]) * v[3 + k];
+    xy += static_cast<long double>(v[k]) * v[3 + k];
+  }
+  // As a sum of squares, pivot on the larger.
+  const long double det = exact_determinant(v, blur);
+  if (xx < yy) std::swap(xx, yy), std::swap(dx, dy);
+  const long double across = dy - xy / xx * dx;
+  return 0.5L * (dx * dx / xx + across * across * xx / det);
+}
+
+template <class S>
+SplatRecord<S> record_of(const Conic& conic, double x, double y, double opacity) {
+  SplatRecord<S> r{};
+  r.x = x, r.y = y;
+  r.l11 = static_cast<S>(conic.l11), r.l21 = static_cast<S>(conic.l21), r.l22 = static_cast<S>(conic.l22);
+  r.opacity = static_cast<S>(opacity);
+  r.log2_opacity = static_cast<S>(std::log2(std::max(opacity, kLeastOpacity)));
+  return r;
+}
+
+Extent extent_of(const Conic& conic, double x, double y, double opacity, const TileGrid& grid,
+                 const RenderSettings& settings, double epsilon) {
+  const double log2_opacity = std::log2(std::max(opacity, kLeastOpacity));
+  const ExtentRules rules = extent_rules(settings, epsilon);
+  return detail::extent_of(conic, x, y, opacity, reach_of(conic, x, log2_opacity, rules), grid, rules);
+}
+
+/// What α is at a pixel of the image, in the tile that it lies in.
+template <class S>
+PixelAlpha<S> alpha_at(const SplatRecord<S>& record, const RenderSettings& settings, Index row, Index col) {
+  const CompositeRules<S> rules{static_cast<S>(settings.alpha_cap), static_cast<S>(settings.alpha_min), 0, false, false,
+                                static_cast<S>(settings.blur)};
+  TileJob<S> job{};
+  job.left = col / 16 * 16, job.top = row / 16 * 16;
+  if constexpr (std::is_same_v<S, float>) {
+    return block_pixel_alpha(16, record, rules, job.left, job.top, row - job.top, col - job.left);
+  }
+  return pixel_alpha(record, rules, job, row - job.top, col - job.left);
+}
+
+}  // namespace
+
+TEST_CASE("the determinant of needles is right, in double from factors of float [A1]") {
+  RandomSequence random(1, 2);
+  double worst = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const double length = std::pow(10, random.uniform(0, 5));
+    const auto v = needle<float>(random, length, 0.01);
+    for (const double blur : {0., 0.1, 0.3}) {
+      Conic conic;
+      REQUIRE(conic_of(v.data(), blur, conic));
+      const long double exact = exact_determinant(v, blur);
+      worst = test::larger(worst, static_cast<double>(std::abs(conic.determinant - exact) / exact));
+    }
+  }
+  CHECK(worst < 1e-12);
+}
+
+TEST_CASE("the exponent of needles is right in float and never negative [A1]") {
+  RandomSequence random(2, 2);
+  double worst = 0;
+  RenderSettings settings;
+  settings.alpha_min = 0;
+  settings.alpha_cap = 1;
+  for (int i = 0; i < 20000; ++i) {
+    const double length = std::pow(10, random.uniform(0, 4));
+    const auto v = needle<float>(random, length, 0.01);
+    for (const double blur : {0.1, 0.3}) {
+      Conic conic;
+      REQUIRE(conic_of(v.data(), blur, conic));
+      // A pixel near the axis, within the image that the needle reaches over.
+      const double norm = std::hypot(conic.xx, conic.xy), along = random.uniform(-1, 1) * std::min(length, 1000.0);
+      const double x = 500 + random.uniform(0, 1), y = 500 + random.uniform(0, 1);
+      const Index col = static_cast<Index>(std::clamp(x + along * conic.xx / norm + random.uniform(-2, 2), 0., 999.));
+      const Index row = static_cast<Index>(std::clamp(y + along * conic.xy / norm + random.uniform(-2, 2), 0., 999.));
+      const long double exact =
+          exact_exponent(v, blur, static_cast<long double>(col) + 0.5L - x, static_cast<long double>(row) + 0.5L - y);
+      const float g = alpha_at(record_of<float>(conic, x, y, 1), settings, row, col).alpha;
+      REQUIRE(g <= 1);
+      if (exact < 10)
+        worst = test::larger(worst, std::abs(-std::log(static_cast<double>(g)) - static_cast<double>(exact)));
+    }
+  }
+  CHECK(worst < 1e-3);
+}
+
+TEST_CASE("the antialias factor and its gradient are right at every size [A7]") {
+  RandomSequence random(3, 2);
+  const double blur = 0.3;
+  const auto exact = [&](const std::array<double, 6>& v) {
+    return std::sqrt(exact_determinant(v, 0) / exact_determinant(v, blur));
+  };
+  for (double size = 1e-8; size < 11; size *= 10) {
+    for (int i = 0; i < 100; ++i) {
+      const auto v = needle<double>(random, size, size * random.uniform(0.01, 1));
+      Conic conic;
+      REQUIRE(conic_of(v.data(), blur, conic));
+      CHECK(static_cast<double>(std::abs(blur_compensation(conic) / exact(v) - 1)) < 1e-12);
+      std::array<double, 6> d{};
+      blur_compensation_adjoint(v.data(), blur, conic, 1, d.data());
+      double error = 0, norm = 0;
+      for (std::size_t k = 0; k < 6; ++k) {
+        std::array<double, 6> up = v, down = v;
+        up[k] += 1e-5 * size * 0.01, down[k] -= 1e-5 * size * 0.01;
+        const double slope =
+            static_cast<double>((exact(up) - exact(down)) / (static_cast<long double>(up[k]) - down[k]));
+        error = test::larger(error, std::abs(slope - d[k]));
+        norm = std::max(norm, std::abs(slope));
+      }
+      CHECK(error < 1e-5 * norm);
+    }
+  }
+  // A Gaussian without area has the factor 0 and no gradient.
+  const std::array<double, 6> flat = {1, 0, 0, 2, 0, 0};
+  Conic conic;
+  REQUIRE(conic_of(flat.data(), blur, conic));
+  CHECK(blur_compensation(conic) == 0);
+  std::array<double, 6> d{};
+  blur_compensation_adjoint(flat.data(), blur, conic, 1, d.data());
+  CHECK(d == std::array<double, 6>{});
+  CHECK_FALSE(conic_of(flat.data(), 0, conic));
+}
+
+TEST_CASE("a factor that is left out of a tile has no pixel there that it would be drawn at [B7]", "[release]") {
+  RandomSequence random(4, 2);
+  const TileGrid grid = tile_grid(75, 50, 16);
+  RenderSettings settings;
+  Index left_out = 0, kept = 0, empty = 0;
+  for (int i = 0; i < 12000; ++i) {
+    settings.alpha_min = i % 3 == 0 ? 1e-5 : 1.0 / 255;
+    const double length = std::pow(10, random.uniform(-1, 2)), width = length * std::pow(10, random.uniform(-3, 0));
+    const auto v = needle<float>(random, length, width);
+    const double x = static_cast<float>(random.uniform(-40, 115)), y = static_cast<float>(random.uniform(-40, 90));
+    const double opacity =
+        static_cast<float>(i % 5 == 0 ? settings.alpha_min * random.uniform(0.9, 1.5) : random.uniform(0, 1));
+    Conic conic;
+    REQUIRE(conic_of(v.data(), 0.3, conic));
+    const Extent extent = extent_of(conic, x, y, opacity, grid, settings, std::numeric_limits<float>::epsilon());
+    std::vector<std::uint32_t> listed(static_cast<std::size_t>(grid.count()), 0);
+    for_each_tile(extent, grid, [&](Index tile, std::uint32_t blocks) {
+      REQUIRE(listed[static_cast<std::size_t>(tile)] == 0);
+      listed[static_cast<std::size_t>(tile)] = blocks;
+    });
+    for (Index tile = 0; tile < grid.count(); ++tile) {
+      const Index tile_row = tile / grid.cols, tile_col = tile % grid.cols;
+      for (Index block = 0; block < 16; ++block) {
+        bool drawn = false, drawn_in_rows = false;
+        for (Index p = 0; p < 16; ++p) {
+          const Index row = tile_row * 16 + block / 4 * 4 + p / 4, col = tile_col * 16 + block % 4 * 4 + p % 4;
+          if (row >= grid.height || col >= grid.width) continue;
+          const bool here = alpha_at(record_of<float>(conic, x, y, opacity), settings, row, col).drawn ||
+                            alpha_at(record_of<double>(conic, x, y, opacity), settings, row, col).drawn;
+          drawn = drawn || here;
+          drawn_in_rows = drawn_in_rows || (here && row >= extent.row_begin && row < extent.row_end);
+        }
+        const bool is_listed = (listed[static_cast<std::size_t>(tile)] >> block & 1) != 0;
+        REQUIRE(drawn == drawn_in_rows);
+        if (drawn) REQUIRE(is_listed);
+        is_listed ? (drawn ? ++kept : ++empty) : ++left_out;
+      }
+    }
+  }
+  CHECK(left_out > 50000);
+  CHECK(static_cast<double>(empty) < 0.1 * static_cast<double>(kept));  // and the test is sharp
+}
+
+TEST_CASE("extents of wild numbers stay inside of the image [A6]") {
+  const TileGrid grid = tile_grid(40, 30, 8);
+  for (const double size : {0., 1e-300, 1e-8, 1., 1e8, 1e150, 1e300, kInf, kNan}) {
+    for (const double at : {-kInf, -1e300, -1e20, -1., 0., 20., 1e10, 1e300, kInf, kNan}) {
+      for (const double opacity : {0., 1e-30, 0.5, 1., kInf, kNan}) {
+        for (const hsi4d::Footprint kind : {hsi4d::Footprint::kExact, hsi4d::Footprint::kSquare3Sigma}) {
+          for (const double alpha_min : {0., 1.0 / 255}) {
+            RenderSettings settings;
+            settings.footprint = kind;
+            settings.alpha_min = alpha_min;
+            const std::array<double, 6> v = {size, 0.1 * size, 0, 0, size, -0.1 * size};
+            Conic conic;
+            if (!conic_of(v.data(), 0.3, conic)) continue;
+            const Extent e = extent_of(conic, at, at, opacity, grid, settings, 1e-7);
+            CHECK((e.row_begin >= 0 && e.row_end <= grid.height));
+            if (e.row_begin >= e.row_end) continue;
+            for (std::int32_t first = 0; first < 16; first += kBands) {
+              BandSpans spans;
+              band_spans(e, grid, first, spans);
+              for (Index i = 0; i < kBands; ++i) {
+                if (spans.begin[i] < spans.end[i]) CHECK((spans.begin[i] >= 0 && spans.end[i] <= 2 * grid.cols));
+              }
+            }
+            for_each_tile(e, grid, [&](Index tile, std::uint32_t blocks) {
+              CHECK((tile >= 0 && tile < grid.count() && blocks > 0 && blocks < 16));
+            });
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("depth keys are in the order of the depths [B9]") {
+  const float depths[] = {-std::numeric_limits<float>::infinity(), -1, -1e-38f, 0, 1e-38f, 0.5f, 1, 1e30f,
+                          std::numeric_limits<float>::infinity()};
+  for (std::size_t i = 0; i + 1 < std::size(depths); ++i) {
+    CHECK(depth_bits(depths[i]) < depth_bits(depths[i + 1]));
+    CHECK(depth_bits(static_cast<double>(depths[i])) < depth_bits(static_cast<double>(depths[i + 1])));
+  }
+  CHECK(depth_bits(-0.0f) == depth_bits(0.0f));
+  CHECK(depth_bits(-0.0) == depth_bits(0.0));
+}
+
+TEST_CASE("the sort by depth is stable [B8]") {
+  RandomSequence random(5, 2);
+  for (const bool floats : {false, true}) {
+    for (const int kinds : {1, 3, 1000, 1 << 30}) {
+      std::vector<DepthKeyed> keys, room(20000);
+      for (std::int32_t i = 0; i < 20000; ++i) {
+        const double z = kinds == 1 ? 2.5 : std::floor(random.uniform(0, kinds)) / 7 - 3;
+        keys.push_back({floats ? depth_bits(static_cast<float>(z)) : depth_bits(z), i});
+      }
+      std::vector<DepthKeyed> expected = keys;
+      std::stable_sort(expected.begin(), expected.end(),
+                       [](const DepthKeyed& a, const DepthKeyed& b) { return a.key < b.key; });
+      const auto sorted = sort_by_depth(keys, room);
+      CHECK(std::equal(sorted.begin(), sorted.end(), expected.begin(), expected.end(),
+                       [](const DepthKeyed& a, const DepthKeyed& b) { return a.key == b.key && a.index == b.index; }));
+    }
+  }
+  std::vector<DepthKeyed> none;
+  CHECK(sort_by_depth(none, none).empty());
+}
+
+TEST_CASE("more pairs than fit are refused before memory is taken [B10]") {
+  const std::vector<Index> pairs = {1'000'000'000, 1'000'000'000, 1'000'000'000};
+  CHECK_THROWS_WITH(total_pairs(pairs), Catch::Contains("more than 2147483647 (tile, Gaussian) pairs"));
+  CHECK_THROWS_AS(total_pairs(pairs), UserError);
+  CHECK(total_pairs(std::span(pairs).first(2)) == 2'000'000'000);
+  CHECK_THROWS_WITH(check_pair_memory(2'000'000'000, 96e9, 12'000'000'000),
+                    Catch::Contains("96.0 GB for 2000000000 (tile, Gaussian) pairs, allowed are 12.0 GB"));
+  CHECK_THROWS_AS(check_pair_memory(1, 1001, 1000), UserError);
+  CHECK_NOTHROW(check_pair_memory(1, 1000, 1000));
+  CHECK(pair_memory_limit() > 100'000'000);
+}
+
+TEST_CASE("tile lists hold every pair once, in depth order, on any number of threads", "[parallel]") {
+  RandomSequence random(6, 2);
+  const TileGrid grid = tile_grid(150, 90, 16);
+  RenderSettings settings;
+  std::vector<Extent> extents;
+  for (int i = 0; i < 5000; ++i) {
+    const auto v = needle<double>(random, random.uniform(0.1, 10), random.uniform(0.1, 3));
+    Conic conic;
+    REQUIRE(conic_of(v.data(), 0.3, conic));
+    extents.push_back(extent_of(conic, random.uniform(-10, 160), random.uniform(-10, 100), random.uniform(0, 1), grid,
+                                settings, 1e-7));
+  }
+  for (std::size_t n = 0; n < extents.size(); n += 7) extents[n] = {};
+  // In depth order: every row but each seventh, backwards.
+  std::vector<DepthKeyed> order;
+  for (std::int32_t n = 4999; n >= 0; --n) {
+    if (n % 7 != 0) order.push_back({0, n});
+  }
+  std::vector<std::vector<TileEntry>> expected(static_cast<std::size_t>(grid.count()));
+  std::vector<Index> groups(static_cast<std::size_t>(grid.count()), 0);
+  std::vector<std::uint32_t> next_slot(extents.size() + 1, 0);  // slots are in the order of rows
+  for (std::size_t n = 0; n < extents.size(); ++n) {
+    next_slot[n + 1] = next_slot[n];
+    for_each_tile(extents[n], grid, [&](Index, std::uint32_t) { ++next_slot[n + 1]; });
+  }
+  const std::uint32_t slot = next_slot.back();
+  for (const DepthKeyed& d : order) {
+    for_each_tile(extents[static_cast<std::size_t>(d.index)], grid, [&](Index tile, std::uint32_t blocks) {
+      expected[static_cast<std::size_t>(tile)].push_back(
+          {d.index, next_slot[static_cast<std::size_t>(d.index)]++, blocks});
+      groups[static_cast<std::size_t>(tile)] += std::popcount(blocks);
+    });
+  }
+  Index bound = 0;
+  for (const Extent& extent : extents) bound += tiles_around(extent, grid);
+  REQUIRE(bound > slot);
+  for (const auto& [threads, most] :
+       {std::pair(1, bound), {2, bound}, {8, bound}, {1, Index(slot)}, {8, Index(slot)}}) {
+    TileLists lists;
+    with_threads(threads, [&] {
+      CHECK(lists.find(extents, grid, most, bound) == slot);
+      lists.deal(order, grid, 0);
+    });
+    REQUIRE(lists.pairs() == slot);
+    for (Index tile = 0; tile < grid.count(); ++tile) {
+      const auto& of_tile = expected[static_cast<std::size_t>(tile)];
+      REQUIRE(lists.tile_begin[tile + 1] - lists.tile_begin[tile] == static_cast<Index>(of_tile.size()));
+      CHECK(lists.tile_groups[tile] == groups[static_cast<std::size_t>(tile)]);
+      for (std::size_t i = 0; i < of_tile.size(); ++i) {
+        const TileEntry entry = lists.entries[lists.tile_begin[tile] + static_cast<Index>(i)];
+        CHECK(entry.index == of_tile[i].index);
+        CHECK(entry.slot == of_tile[i].slot);
+        CHECK(entry.blocks == of_tile[i].blocks);
+        CHECK(lists.tile_of(entry.slot) == tile);
+        CHECK((entry.slot >= lists.slots[entry.index].begin && entry.slot < lists.slots[entry.index].end));
+      }
+    }
+    for (Index n = 0; n < 5000; n += 7) CHECK(lists.slots[n].begin == lists.slots[n].end);
+  }
+  TileLists lists;
+  CHECK(lists.find(extents, grid, slot - 1, bound) == slot);  // counted, though not kept
+  TileLists none;
+  none.find({}, grid, 0, 0);
+  const Index pair_bytes = lists.capacity_bytes() - none.capacity_bytes() - std::ssize(extents) * 8;
+  CHECK(pair_bytes < 10000);  // no memory is taken for them [B10]
+}
