@@ -110,7 +110,9 @@ function(hsi4d_add_image_module)
   target_link_libraries(hsi4d_images PRIVATE PkgConfig::OpenImageIO hsi4d_warnings)
   add_dependencies(hsi4d_core hsi4d_images)
   target_link_libraries(hsi4d_core PRIVATE ${CMAKE_DL_LIBS})
-  target_link_options(hsi4d_core INTERFACE $<BUILD_INTERFACE:LINKER:-rpath,${CMAKE_RUNTIME_OUTPUT_DIRECTORY}>
+  # An old run path counts for libraries that others open in the program's name too, as sanitizers do.
+  target_link_options(hsi4d_core INTERFACE LINKER:--disable-new-dtags
+                                           $<BUILD_INTERFACE:LINKER:-rpath,${CMAKE_RUNTIME_OUTPUT_DIRECTORY}>
                                            $<INSTALL_INTERFACE:LINKER:-rpath,$<INSTALL_PREFIX>/${CMAKE_INSTALL_LIBDIR}>)
 endfunction()
 
