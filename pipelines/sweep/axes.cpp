@@ -55,7 +55,9 @@ class AxisChecks {
   void name_key(const SweepSetting& setting, const std::string& who, std::size_t axis) {
     const std::string key = sweep_key(setting.key);
     for (const Named& other : named_) {
-      if ((other.who == who && other.axis == axis) || !(is_within(key, other.key) || is_within(other.key, key)))
+      const bool is_own = other.who == who && other.axis == axis;
+      if (is_own && other.key == key) return;  // of another seed or ablation: 100,000 seeds name one key
+      if (is_own || !(is_within(key, other.key) || is_within(other.key, key)))
         continue;
       // Seeds that are numbers have no place of their own.
       const ConfigOrigin& origin = setting.origin.source == nullptr ? other.origin : setting.origin;
