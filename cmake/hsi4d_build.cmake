@@ -18,6 +18,30 @@ target_compile_options(hsi4d_arithmetic INTERFACE -ffp-contract=off -fno-math-er
 target_compile_features(hsi4d_arithmetic INTERFACE cxx_std_20)
 
 option(HSI4D_UNITY "Compile a room's source files together" ON)
+# Clang takes a precompiled header only with the very flags that it was made with; kernels have others.
+set(hsi4d_precompile OFF)
+if(HSI4D_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(hsi4d_precompile ON)
+endif()
+
+# What makes a second build or a link shorter is used where it is found.
+if(NOT DEFINED CMAKE_CXX_COMPILER_LAUNCHER)
+  find_program(HSI4D_CCACHE ccache)
+  mark_as_advanced(HSI4D_CCACHE)
+  if(HSI4D_CCACHE)
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${HSI4D_CCACHE})
+    if(hsi4d_precompile)
+      add_compile_options(-fpch-preprocess)  # without it ccache does not see the precompiled header
+    endif()
+  endif()
+endif()
+find_program(HSI4D_LINKER NAMES ld.mold ld.lld)
+mark_as_advanced(HSI4D_LINKER)
+if(HSI4D_LINKER)
+  cmake_path(GET HSI4D_LINKER EXTENSION LAST_ONLY linker)
+  string(SUBSTRING ${linker} 1 -1 linker)
+  add_link_options(-fuse-ld=${linker})
+endif()
 
 # Warnings: ours alone, never those of a project that uses us. (-Wrestrict misfires on std::string in g++ 12, PR 105651; -Wmaybe-uninitialized
 # on std::regex under sanitizers.)
@@ -57,6 +81,18 @@ endif()
 # Files with vector code are compiled with -O3 and each by itself; all others with -O2 and, where unity builds are on,
 # a room at once, so that a header is read once a room.
 set(hsi4d_vector_code "foreach_target|on_best_isa|with_best_lanes|autodiff/map\\.h")
+
+# hsi4d_use_headers(TARGET): the target reads cmake/headers.h as it was compiled once for all.
+if(hsi4d_precompile)
+  add_library(hsi4d_headers OBJECT ${PROJECT_SOURCE_DIR}/cmake/headers.cpp)
+  set_target_properties(hsi4d_headers PROPERTIES POSITION_INDEPENDENT_CODE ON)
+endif()
+function(hsi4d_use_headers target)
+  if(hsi4d_precompile)
+    target_precompile_headers(${target} REUSE_FROM hsi4d_headers)
+  endif()
+endfunction()
+
 # hsi4d_set_sources(TARGET SOURCE...): how the source files of a library or program are compiled.
 function(hsi4d_set_sources target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${HSI4D_UNITY} UNITY_BUILD_BATCH_SIZE 0)
@@ -95,6 +131,7 @@ function(hsi4d_add_room path)
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/hsi4d>)
   hsi4d_set_sources(hsi4d_${name} ${sources})
+  hsi4d_use_headers(hsi4d_${name})
   if(arg_APART)
     set_target_properties(hsi4d_${name} PROPERTIES UNITY_BUILD OFF)
   endif()

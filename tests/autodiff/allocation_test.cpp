@@ -10,6 +10,8 @@
 #include "core/parallel.h"
 #include "tests/support/allocation_counter.h"
 
+namespace allocation_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -58,3 +60,5 @@ TEMPLATE_TEST_CASE("a steady iteration allocates nothing", "", float, double) {
     });
   }
 }
+
+}  // namespace allocation_test

@@ -4,6 +4,8 @@
 
 #include "tests/support/operator_check.h"
 
+namespace centroid_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -51,3 +53,5 @@ TEST_CASE("centroids of a large faint image keep their digits in float") {
   CHECK(std::fabs(tape.value(centres)(0, 0) - 960) < 1e-4);
   CHECK(std::fabs(tape.value(centres)(0, 1) - 540) < 1e-4);
 }
+
+}  // namespace centroid_test

@@ -20,6 +20,8 @@
 #include "tests/support/complex_formulas.h"
 #include "tests/support/complex_step_check.h"
 
+namespace complex_step_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -376,3 +378,5 @@ TEST_CASE("networks have the gradients of complex steps") {
         return y;
       });
 }
+
+}  // namespace complex_step_test

@@ -6,6 +6,8 @@
 #include "autodiff/complex_step.h"
 #include "tests/support/operator_check.h"
 
+namespace difference_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -143,3 +145,5 @@ TEST_CASE("bad parameters are refused") {
   CHECK_THROWS_WITH(huber(a, a, 0), Catch::Contains("delta = 0"));
   CHECK_THROWS_WITH(charbonnier(a, a, -1), Catch::Contains("epsilon = -1"));
 }
+
+}  // namespace difference_test

@@ -7,6 +7,8 @@
 #include "autodiff/map.h"
 #include "tests/support/operator_check.h"
 
+namespace elementwise_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -156,3 +158,5 @@ TEST_CASE("results are the same bits on every instruction set") {
     CHECK(y == reference);
   }
 }
+
+}  // namespace elementwise_test

@@ -2,6 +2,8 @@
 // tests as passed when, and only when, a check in them fails.
 #include "tests/support/operator_check.h"
 
+namespace faulty_operator_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -75,3 +77,5 @@ TEST_CASE("check_operator sees a result that depends on the one before", "[!shou
 TEST_CASE("check_operator sees a gradient that changes when another input is frozen", "[!shouldfail]") {
   check_faulty(Fault::kFreezeMatters);
 }
+
+}  // namespace faulty_operator_test

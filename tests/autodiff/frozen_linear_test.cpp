@@ -4,6 +4,8 @@
 
 #include "tests/support/operator_check.h"
 
+namespace frozen_linear_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -59,3 +61,5 @@ TEST_CASE("an affine map refuses what does not fit") {
   const FrozenLinear<double> map(Numbers(8), Numbers(2));
   CHECK_THROWS_AS(frozen_linear(map, tape.parameter("x", shape_of(3, 5))), InternalError);
 }
+
+}  // namespace frozen_linear_test

@@ -8,6 +8,8 @@
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 
+namespace gradcheck_test {
+
 using namespace hsi4d;
 using Catch::Contains;
 
@@ -200,3 +202,5 @@ TEST_CASE("values are restored after a check") {
   CHECK(tape.value(loss).scalar() == value);
   CHECK(tape.gradient(x)(1, 2) == slope);
 }
+
+}  // namespace gradcheck_test

@@ -3,6 +3,8 @@
 #include "autodiff/reduce.h"
 #include "tests/support/operator_check.h"
 
+namespace matrix_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -72,3 +74,5 @@ TEST_CASE("wrong sizes and indices are named") {
   CHECK_THROWS_WITH(slice_rows(a, 4, 2), Catch::Contains("[6,3] against [5,3]"));
   CHECK_THROWS_WITH(mean(tape.parameter("nothing", shape_of(0, 3))), Catch::Contains("mean of an empty array"));
 }
+
+}  // namespace matrix_test

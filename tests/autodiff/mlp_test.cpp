@@ -12,6 +12,8 @@
 #include "tests/support/isa.h"
 #include "tests/support/operator_check.h"
 
+namespace mlp_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -377,3 +379,5 @@ TEST_CASE("mlp without rows, and with shapes that do not fit") {
   const std::vector<MlpLayer<float>> many(9, {leaf(4, 4), leaf(1, 4)});
   CHECK_THROWS_AS(record({leaf(9, 4), {}, {}, {}}, many), InternalError);
 }
+
+}  // namespace mlp_test

@@ -8,6 +8,8 @@
 #include "core/rotation_6d.h"
 #include "tests/support/operator_check.h"
 
+namespace rotations_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -169,3 +171,5 @@ TEST_CASE("axis-angle vectors of rotations pass the operator checks, and are the
   tape.forward(log);
   for (std::size_t i = 0; i < w.size(); ++i) CHECK(tape.value(log).data[i] == Approx(w[i]).margin(1e-14));
 }
+
+}  // namespace rotations_test

@@ -12,6 +12,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/patched_image.h"
 
+namespace seam_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -137,3 +139,5 @@ TEST_CASE("a seam passes on which squares of an image changed and are read, and 
   patch->col = 30;  // squares whose gradient was not read when it was kept
   CHECK(evaluate(loss).second == 0);
 }
+
+}  // namespace seam_test

@@ -8,6 +8,8 @@
 #include "core/parallel.h"
 #include "tests/autodiff/ssim_images.h"
 
+namespace ssim_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -241,3 +243,5 @@ TEST_CASE("ssim refuses what it can not compare") {
   PaddedImage<double> map({3, 20, 29, 32});
   CHECK_THROWS_WITH(ssim_map<double>(x.view(), x.view(), map.view()), Catch::Contains("[3,20,29] against [3,20,30]"));
 }
+
+}  // namespace ssim_test

@@ -9,6 +9,8 @@
 #include "autodiff/weighted_image.h"
 #include "tests/support/random_numbers.h"
 
+namespace tape_skips_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -175,3 +177,5 @@ TEST_CASE("an image that somebody asks for is made whole") {
   scene.tape.forward(scene.weighted);
   CHECK(scene.squares == 1);
 }
+
+}  // namespace tape_skips_test

@@ -9,6 +9,8 @@
 #include "autodiff/reduce.h"
 #include "core/parallel.h"
 
+namespace tape_test {
+
 using namespace hsi4d;
 using Catch::Contains;
 
@@ -493,3 +495,5 @@ TEST_CASE("misuse is refused with a clear message") {
   tape.forward(y);
   CHECK_THROWS_WITH(tape.backward(y), Contains("a loss is one number; shape against [2,3]"));
 }
+
+}  // namespace tape_test

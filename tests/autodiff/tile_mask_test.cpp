@@ -10,6 +10,8 @@
 #include "tests/support/allocation_counter.h"
 #include "tests/support/patched_image.h"
 
+namespace tile_mask_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -153,3 +155,5 @@ TEST_CASE("steady iterations of losses in squares allocate nothing") {
     });
   }
 }
+
+}  // namespace tile_mask_test

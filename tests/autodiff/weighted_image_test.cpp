@@ -7,6 +7,8 @@
 #include "core/check.h"
 #include "tests/support/operator_check.h"
 
+namespace weighted_image_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -68,3 +70,5 @@ TEST_CASE("weights of another size are refused") {
   CHECK_THROWS_AS(weighted_image(a, tape.constant("narrow", image_shape<float>(1, 21, 36))), InternalError);
   CHECK_THROWS_AS(weighted_image(a, a), InternalError);
 }
+
+}  // namespace weighted_image_test

@@ -12,6 +12,8 @@
 #include "tests/bench/rows.h"
 #include "tests/temporary_folder.h"
 
+namespace command_test {
+
 using namespace hsi4d;
 
 TEST_CASE("bench rasterize measures every step and writes one object a measurement") {
@@ -266,3 +268,5 @@ TEST_CASE("bench pixel_filter tells which figures and heights there are") {
   CHECK_THROWS_WITH(cli::bench_pixel_filter_command(options),
                     "hsi4d bench pixel_filter: a height of 4 px; allowed: 8 to 2048");
 }
+
+}  // namespace command_test

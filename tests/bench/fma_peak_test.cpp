@@ -5,6 +5,8 @@
 #include "core/parallel.h"
 #include "core/simd.h"
 
+namespace fma_peak_test {
+
 using namespace hsi4d;
 
 TEST_CASE("the peak of multiply-adds is what no processor exceeds, and none where there are none") {
@@ -22,3 +24,5 @@ TEST_CASE("the peak of multiply-adds is what no processor exceeds, and none wher
   CHECK(peak > 1e8);
   CHECK(peak < 1e12);  // 2 units of 16 lanes at 6 GHz are 192 G
 }
+
+}  // namespace fma_peak_test

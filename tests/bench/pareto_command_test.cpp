@@ -9,6 +9,8 @@
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 
+namespace pareto_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -89,3 +91,5 @@ TEST_CASE("bench pareto tells what it does not know before it measures") {
   CHECK_THAT(error_of({"--scene", "none_in.ply"}),
              Contains("none_in.ply: has no Gaussians, of which hsi4d bench pareto needs one or more"));
 }
+
+}  // namespace pareto_command_test

@@ -14,6 +14,8 @@
 #include "tests/bench/rows.h"
 #include "tests/support/temporary_folder.h"
 
+namespace pareto_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -389,3 +391,5 @@ TEST_CASE("an unknown scene of the benchmark is told with what is known") {
                     "hsi4d bench pareto: no workload \"needle\"; known: sparse, dense, opaque, needles, "
                     "avatar_close_up, avatar_in_scene, empty, stack; did you mean \"needles\"?");
 }
+
+}  // namespace pareto_test

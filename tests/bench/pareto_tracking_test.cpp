@@ -8,6 +8,8 @@
 #include "core/check.h"
 #include "tests/support/temporary_folder.h"
 
+namespace pareto_tracking_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -65,3 +67,5 @@ TEST_CASE("a folder that is there is not overwritten by reconstructions") {
       here.path().string() + ": is there; hsi4d bench pareto makes this folder and removes it again (--out)");
   CHECK(std::filesystem::exists(here.path()));
 }
+
+}  // namespace pareto_tracking_test

@@ -7,6 +7,8 @@
 #include "bench/pixel_filter_table.h"
 #include "core/check.h"
 
+namespace pixel_filter_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -148,3 +150,5 @@ TEST_CASE("antialias keeps the width of a lone thread thinner than a pixel") {
   CHECK(std::abs(antialias.brightness) < 0.01);
   CHECK(plain.width_px > 0.5);
 }
+
+}  // namespace pixel_filter_test

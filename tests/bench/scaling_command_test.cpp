@@ -6,6 +6,8 @@
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 
+namespace scaling_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -56,3 +58,5 @@ TEST_CASE("bench scaling tells of a value that cannot be before it measures") {
   CHECK_THAT(result.err,
              Contains("--set synthetic.scene_gaussians=600") && Contains("600 is out of range; allowed: 700 to"));
 }
+
+}  // namespace scaling_command_test

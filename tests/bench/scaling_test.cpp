@@ -9,6 +9,8 @@
 #include "core/check.h"
 #include "tests/bench/rows.h"
 
+namespace scaling_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -162,3 +164,5 @@ TEST_CASE("scaling needs a stage that draws a frame") {
   CHECK_THROWS_WITH(measure_scaling({config}, loss_terms(), 1),
                     "hsi4d bench scaling: the config has no stage that draws a frame");
 }
+
+}  // namespace scaling_test

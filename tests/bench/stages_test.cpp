@@ -13,6 +13,8 @@
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 
+namespace stages_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -181,3 +183,5 @@ TEST_CASE("bench stages tells what all skips together save", "[run]") {
   const nlohmann::json& interaction = compared["interaction"];
   CHECK(interaction["counters"]["fragments"] < interaction["counters_without_skips"]["fragments"]);
 }
+
+}  // namespace stages_test

@@ -6,6 +6,8 @@
 
 #include "tests/support/program.h"
 
+namespace topics_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -63,3 +65,5 @@ TEST_CASE("the help of a topic has its own options alone") {
   CHECK_THAT(all.out, Contains("TOPIC") && Contains("Of stages, scaling and pareto: file for a picture") &&
                           Contains("File for the measurements, one JSON object a line"));
 }
+
+}  // namespace topics_test

@@ -12,6 +12,8 @@
 #include "core/quaternion.h"
 #include "tests/temporary_folder.h"
 
+namespace avatar_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -347,3 +349,5 @@ TEST_CASE("faults of avatar files are named") {
         }) == "a: array 'weight_indices': has shape [2,9]; allowed: 1 to 8 weights a Gaussian");
   CHECK_THROWS_AS(read_avatar("no_such_avatar.safetensors"), UserError);
 }
+
+}  // namespace avatar_test

@@ -11,6 +11,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/random_numbers.h"
 
+namespace blend_shapes_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -144,3 +146,5 @@ TEST_CASE("arrays that do not fit the directions are refused") {
                     Catch::Contains("[2,9] against [1,18]"));
   CHECK_THROWS_AS(blend_shapes(rest, std::span<const BlendTerm<double>>()), InternalError);
 }
+
+}  // namespace blend_shapes_test

@@ -6,6 +6,8 @@
 #include "core/rotation.h"
 #include "tests/support/operator_check.h"
 
+namespace canonical_directions_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -92,3 +94,5 @@ TEST_CASE("a point whose transform is no number keeps the camera's gradient as i
   CHECK(d_center(std::nan("")) == without);
   CHECK(d_center(HUGE_VAL) == without);
 }
+
+}  // namespace canonical_directions_test

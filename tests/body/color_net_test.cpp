@@ -8,6 +8,8 @@
 #include "core/random.h"
 #include "tests/support/operator_check.h"
 
+namespace color_net_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -235,3 +237,5 @@ TEST_CASE("a colour at an end of the range has a gradient, so that it can come b
   CHECK(gradient.data[4] == 0);
   CHECK(gradient.data[5] == Approx(1).epsilon(1e-4));
 }
+
+}  // namespace color_net_test

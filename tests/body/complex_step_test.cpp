@@ -11,6 +11,8 @@
 #include "tests/support/complex_step_check.h"
 #include "tests/support/random_numbers.h"
 
+namespace complex_step_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -250,3 +252,5 @@ TEST_CASE("functions of poses have the gradients of complex steps") {
         return y;
       });
 }
+
+}  // namespace complex_step_test

@@ -7,6 +7,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/random_numbers.h"
 
+namespace directions_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -208,3 +210,5 @@ TEST_CASE("sources whose sizes do not fit are refused") {
   CHECK_THROWS_AS(Directions<double>(DirectionSource{values, 3, 10, {2}, 9}), InternalError);
   CHECK_THROWS_AS(Directions<double>(DirectionSource{values, 3, 10, {-1}, 9}), InternalError);
 }
+
+}  // namespace directions_test

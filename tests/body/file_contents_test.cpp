@@ -7,6 +7,8 @@
 #include "body/smplx_file.h"
 #include "body/vposer.h"
 
+namespace file_contents_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -44,3 +46,5 @@ TEST_CASE("a file of a body that is given in place of another is told by what it
   CHECK_THROWS_WITH(decode_motion(avatar, "a"),
                     "a: looks like a .safetensors file (hsi4d avatar), not like a .npz archive");
 }
+
+}  // namespace file_contents_test

@@ -13,6 +13,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/temporary_folder.h"
 
+namespace glb_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Json = nlohmann::json;
@@ -206,3 +208,5 @@ const fs = require('fs');
   INFO(file_text("report.txt"));
   CHECK(code == 0);
 }
+
+}  // namespace glb_test

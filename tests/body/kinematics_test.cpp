@@ -15,6 +15,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/operator_check.h"
 
+namespace kinematics_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -298,3 +300,5 @@ TEST_CASE("skeletons that are no tree, and other sizes, are refused") {
   CHECK_THROWS_AS(kinematic_chain(r, r, {-1, 0}, Numbers(6)), InternalError);
   CHECK_THROWS_AS(pose_joints(std::vector{-1, 0}, Numbers(6), rest_pose(3)), InternalError);
 }
+
+}  // namespace kinematics_test

@@ -15,6 +15,8 @@
 #include "tests/support/smplx_reference.h"
 #include "tests/support/temporary_folder.h"
 
+namespace motion_edit_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -275,3 +277,5 @@ TEST_CASE("faults of folders are named") {
   CHECK_THROWS_WITH(motion_of(decode_smplx_sequence(pca.encode(), "p.npz"), 30),
                     "p.npz: array 'left_hand_pose': has 6 numbers a frame; of a motion's hand 45 are needed");
 }
+
+}  // namespace motion_edit_test

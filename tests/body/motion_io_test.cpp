@@ -14,6 +14,8 @@
 #include "tests/temporary_folder.h"
 #include "tests/zip_archive.h"
 
+namespace motion_io_test {
+
 using namespace hsi4d;
 using test::ZipMember, test::archive_of, test::pickled_npy;
 
@@ -407,3 +409,5 @@ TEST_CASE("arrays of Python objects are named as such") {
   }
   CHECK(error_of("gender") == "accepted");
 }
+
+}  // namespace motion_io_test

@@ -7,6 +7,8 @@
 #include "body/body_model.h"
 #include "core/check.h"
 
+namespace pose_layout_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -48,3 +50,5 @@ TEST_CASE("poses of other sizes are refused") {
   }
   CHECK_THROWS_AS(smplx_pose(std::vector<double>(3), "a"), DataError);
 }
+
+}  // namespace pose_layout_test

@@ -11,6 +11,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/vposer_checkpoint.h"
 
+namespace pose_prior_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -440,3 +442,5 @@ TEST_CASE("descent on the excess leads into the ranges") {
   tape.forward(energy);
   CHECK(tape.value(energy).scalar() < 1e-6);
 }
+
+}  // namespace pose_prior_test

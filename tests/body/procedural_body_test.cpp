@@ -10,6 +10,8 @@
 
 #include "body/kinematics.h"
 
+namespace procedural_body_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -276,3 +278,5 @@ TEST_CASE("the procedural body has the same bits every time") {
   CHECK(again.weights.indices == body().weights.indices);
   CHECK(again.weights.weights == body().weights.weights);
 }
+
+}  // namespace procedural_body_test

@@ -13,6 +13,8 @@
 #include "core/random.h"
 #include "tests/support/larger.h"
 
+namespace procedural_directions_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -314,3 +316,5 @@ TEST_CASE("the procedural model goes through the taped body as its shaped rest d
   }
   CHECK(worst < 1e-6);  // rest_body has floats
 }
+
+}  // namespace procedural_directions_test

@@ -14,6 +14,8 @@
 #include "tests/support/allocation_counter.h"
 #include "tests/support/operator_check.h"
 
+namespace skin_frames_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -210,3 +212,5 @@ TEST_CASE("frames that do not fit the weights are refused") {
   const SkinWeights<double> dense(DenseWeights{4, 2, Numbers(8, 0.5)});
   CHECK_THROWS_WITH(skin_frames(dense, a, x, f), Catch::Contains("frames need sparse weights"));
 }
+
+}  // namespace skin_frames_test

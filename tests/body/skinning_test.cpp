@@ -13,6 +13,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/operator_check.h"
 
+namespace skinning_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -413,3 +415,5 @@ TEST_CASE("shapes that do not fit the weights are refused") {
   CHECK_THROWS_WITH(blend_transforms(weights, x), Catch::Contains("[4,3] against [2,12]"));
   CHECK_THROWS_WITH(transform_points(a, x), Catch::Contains("[2,12] against [4,12]"));
 }
+
+}  // namespace skinning_test

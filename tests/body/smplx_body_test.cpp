@@ -12,6 +12,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/smplx_reference.h"
 
+namespace smplx_body_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -484,3 +486,5 @@ TEST_CASE("rotations may be matrices") {
   p.body_pose = taped.tape.parameter("wrong", shape_of(21, 4));
   CHECK_THROWS_AS(pose_smplx(taped.tape, body, p), InternalError);
 }
+
+}  // namespace smplx_body_test

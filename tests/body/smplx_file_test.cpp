@@ -8,6 +8,8 @@
 #include "tests/support/smplx_reference.h"
 #include "tests/zip_archive.h"
 
+namespace smplx_file_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -289,3 +291,5 @@ TEST_CASE("the rest body is the shaped template") {
   for (std::size_t i = 0; i < 165; ++i) CHECK(shaped.joints[i] == Approx(expected.joints[i]).margin(1e-14));
   CHECK_THROWS_AS(rest_body(m, Numbers{1, 2}), InternalError);
 }
+
+}  // namespace smplx_file_test

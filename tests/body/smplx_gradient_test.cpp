@@ -11,6 +11,8 @@
 #include "tests/support/random_numbers.h"
 #include "tests/support/smplx_reference.h"
 
+namespace smplx_gradient_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -267,3 +269,5 @@ TEST_CASE("gradients of the MakeHuman body agree with complex step") {
     check_gradients(*arrays, model, form, Angles::kRandom, 2, 45);
   }
 }
+
+}  // namespace smplx_gradient_test

@@ -9,6 +9,8 @@
 #include "core/check.h"
 #include "tests/support/smplx_reference.h"
 
+namespace smplx_sequence_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -218,3 +220,5 @@ TEST_CASE("45 numbers of a hand are coefficients where one says so") {
   const SmplxFrames<double> posed = pose_frames<double>(model, sequence, SmplxHands::kPca);
   CHECK(largest_difference(posed.vertices, reference_smplx(arrays, pose).vertices, 0) <= 1e-9);
 }
+
+}  // namespace smplx_sequence_test

@@ -9,6 +9,8 @@
 #include "core/check.h"
 #include "core/random.h"
 
+namespace surface_index_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -131,3 +133,5 @@ TEST_CASE("normals of vertices are those of the faces around them, by area, and 
   CHECK(normals[4] == Vector(0, 0, 0));  // of no face
   CHECK(normals[5] == Vector(0, 0, 0));  // of a face without area
 }
+
+}  // namespace surface_index_test

@@ -11,6 +11,8 @@
 #include "core/parallel.h"
 #include "core/random.h"
 
+namespace surface_sampling_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -145,3 +147,5 @@ TEST_CASE("places on a surface: sizes are checked, few are found too") {
   CHECK_THROWS_AS(sample_surface(body, std::vector<double>(3, 1.0), 3, 0), InternalError);
   CHECK_THROWS_AS(sample_surface(body, std::vector<double>(9, 0.0), 3, 0), InternalError);
 }
+
+}  // namespace surface_sampling_test

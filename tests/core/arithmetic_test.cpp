@@ -14,6 +14,8 @@
 #include "core/parallel.h"
 #include "core/simd.h"
 
+namespace arithmetic_test {
+
 namespace hsi4d {
 namespace {
 
@@ -185,3 +187,5 @@ TEST_CASE("zeros keep their sign, quotients are divisions, and nothing is comput
 }
 
 }  // namespace hsi4d
+
+}  // namespace arithmetic_test

@@ -10,6 +10,8 @@
 #include "core/process.h"
 #include "tests/support/temporary_folder.h"
 
+namespace background_program_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -83,3 +85,5 @@ TEST_CASE("a background program that cannot be started is told") {
   CHECK_THROWS_WITH(BackgroundProgram({"true"}, "nowhere/out.txt"),
                     Catch::Matchers::StartsWith("nowhere/out.txt: cannot be written: "));
 }
+
+}  // namespace background_program_test

@@ -4,6 +4,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace base64_test {
+
 using namespace hsi4d;
 
 TEST_CASE("base64 of the test vectors of RFC 4648") {
@@ -17,3 +19,5 @@ TEST_CASE("base64 of the test vectors of RFC 4648") {
   CHECK(of("foobar") == "Zm9vYmFy");
   CHECK(of("\xfb\xff\xbf") == "+/+/");
 }
+
+}  // namespace base64_test

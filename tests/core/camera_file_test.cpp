@@ -10,6 +10,8 @@
 #include "core/rotation.h"
 #include "tests/temporary_folder.h"
 
+namespace camera_file_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Message;
 
@@ -210,3 +212,5 @@ TEST_CASE("transforms that cannot be used are refused") {
         "2 problems in c.json:\nc.json:1: /w: \"8\" is a string, not a whole number; allowed: 1 to 65536\n"
         "c.json:1: /frames: {} is an object, not an array");
 }
+
+}  // namespace camera_file_test

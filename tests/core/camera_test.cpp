@@ -6,6 +6,8 @@
 #include "core/check.h"
 #include "tests/core/adjoint_check.h"
 
+namespace camera_test {
+
 using namespace hsi4d;
 using namespace hsi4d::testing;
 
@@ -254,3 +256,5 @@ TEST_CASE("cropped and resized cameras see the same rays") {
   CHECK_THROWS_WITH(resized(camera, 5, -1), "resize: height is -1; allowed: a whole number > 0");
   CHECK_THROWS_WITH(resized(Camera(), 5, 5), "resize: camera: width is 0; allowed: a whole number > 0");
 }
+
+}  // namespace camera_test

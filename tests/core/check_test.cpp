@@ -4,6 +4,8 @@
 
 #include "core/version.h"
 
+namespace check_test {
+
 using Catch::Matchers::Contains;
 
 TEST_CASE("a failed check names the source line and both values") {
@@ -15,3 +17,5 @@ TEST_CASE("a failed check names the source line and both values") {
 TEST_CASE("the version has three numbers") {
   CHECK(std::string(hsi4d::version()).find_first_of('.') != std::string::npos);
 }
+
+}  // namespace check_test

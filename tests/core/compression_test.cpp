@@ -4,6 +4,8 @@
 
 #include "core/check.h"
 
+namespace compression_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Message;
 
@@ -97,3 +99,5 @@ TEST_CASE("Zstandard frames are packed and unpacked") {
     CHECK_THROWS_AS(decompress_zstd(std::span(frame).first(size), out, "a"), DataError);
   CHECK_THROWS_AS(decompress_zstd({}, out, "a"), DataError);
 }
+
+}  // namespace compression_test

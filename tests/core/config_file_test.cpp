@@ -6,6 +6,8 @@
 #include "core/config.h"
 #include "tests/support/temporary_folder.h"
 
+namespace config_file_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Equals;
 using hsi4d::test::TemporaryFolder;
@@ -152,3 +154,5 @@ TEST_CASE("a huge file is refused without being read") {
   folder.write("big.json", std::string(kLargestConfig + 1, ' '));
   CHECK_THAT(loaded("big.json"), Equals("big.json: has 8388609 bytes; at most 8388608 are read"));
 }
+
+}  // namespace config_file_test

@@ -4,6 +4,8 @@
 
 #include "core/check.h"
 
+namespace config_parse_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Equals;
 
@@ -156,3 +158,5 @@ TEST_CASE("hopeless text gives a bounded number of problems") {
   CHECK_FALSE(parse_config_text(text + "]", source(), problems, value));
   CHECK(problems.size() == 51);
 }
+
+}  // namespace config_parse_test

@@ -6,6 +6,8 @@
 #include "core/config_file.h"
 #include "tests/support/temporary_folder.h"
 
+namespace config_place_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -64,3 +66,5 @@ TEST_CASE("what one setting makes on its way is marked, what an object adds is n
   CHECK(stages.members[0].made_by_set);
   CHECK_FALSE(stages.members[1].made_by_set);
 }
+
+}  // namespace config_place_test

@@ -5,6 +5,8 @@
 #include "core/check.h"
 #include "core/config_file.h"
 
+namespace config_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Equals;
 
@@ -312,3 +314,5 @@ TEST_CASE("settings are listed with pointer, range, default and meaning") {
   CHECK(find("/list/0/x").allowed == "above 0");
   CHECK(find("/limit").allowed == "at least 0, or null");
 }
+
+}  // namespace config_test

@@ -11,6 +11,8 @@
 #include "core/config.h"
 #include "core/config_parse.h"
 
+namespace config_value_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -120,3 +122,5 @@ TEST_CASE("problems come in the order of sources and lines, in one message") {
 }
 
 TEST_CASE("pointers escape what RFC 6901 escapes") { CHECK(child_pointer("/a", "b/c~d") == "/a/b~1c~0d"); }
+
+}  // namespace config_value_test

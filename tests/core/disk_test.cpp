@@ -6,6 +6,8 @@
 
 #include "tests/support/temporary_folder.h"
 
+namespace disk_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -28,3 +30,5 @@ TEST_CASE("files that are put on the disk stay as they are") {
   sync_to_disk("nowhere");
   CHECK(file_text("a/b/c.txt") == "text");
 }
+
+}  // namespace disk_test

@@ -13,6 +13,8 @@
 #include "core/file.h"
 #include "tests/support/temporary_folder.h"
 
+namespace documents_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 namespace fs = std::filesystem;
@@ -120,3 +122,5 @@ TEST_CASE("the check of links finds what is wrong with them") {
         std::vector<std::string>{"a.md:3: c.md", "a.md:3: b.md#code", "a.md:4: b.md#two-words-2", "a.md:4: #there"});
   CHECK(documents_in(".").size() == 2);
 }
+
+}  // namespace documents_test

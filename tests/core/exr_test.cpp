@@ -19,6 +19,8 @@
 #include "core/image_io.h"
 #include "tests/temporary_folder.h"
 
+namespace exr_test {
+
 using namespace hsi4d;
 using Catch::Contains;
 using Imath::Box2i;
@@ -246,3 +248,5 @@ TEST_CASE("a damaged layer file is an error with a reason") {
   CHECK_THROWS_WITH(decode_layers(file, "v.exr", small),
                     Contains("v.exr: 7 channels of 40 x 40 pixels need more than the 46080 bytes allowed"));
 }
+
+}  // namespace exr_test

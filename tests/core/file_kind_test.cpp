@@ -6,6 +6,8 @@
 #include "core/npz.h"
 #include "core/safetensors.h"
 
+namespace file_kind_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -46,3 +48,5 @@ TEST_CASE("a file of another kind is named where an archive, or safetensors, sho
   CHECK_THROWS_WITH(safetensors(NpzWriter().encode()),
                     "a: looks like a .npz or .zip archive, not like a .safetensors file");
 }
+
+}  // namespace file_kind_test

@@ -7,6 +7,8 @@
 #include "core/check.h"
 #include "tests/support/temporary_folder.h"
 
+namespace file_lock_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -40,3 +42,5 @@ TEST_CASE("a lock knows whether its file is still the one of that name") {
   here.write("a", "");
   CHECK_FALSE(lock.is_in_place());
 }
+
+}  // namespace file_lock_test

@@ -8,6 +8,8 @@
 #include "core/check.h"
 #include "tests/temporary_folder.h"
 
+namespace file_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -122,3 +124,5 @@ TEST_CASE("a path is meant from the folder of the file that names it") {
   CHECK(path_beside("config.json", "scene.ply") == "scene.ply");
   CHECK(path_beside("/runs/config.json", "/data/scene.ply") == "/data/scene.ply");
 }
+
+}  // namespace file_test

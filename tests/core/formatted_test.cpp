@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace formatted_test {
+
 using namespace hsi4d;
 
 TEST_CASE("formatted text is printf's, of any length") {
@@ -10,3 +12,5 @@ TEST_CASE("formatted text is printf's, of any length") {
   const std::string many(5000, 'x');
   CHECK(formatted("<%s>", many.c_str()) == "<" + many + ">");
 }
+
+}  // namespace formatted_test

@@ -14,6 +14,8 @@
 #include "tests/support/larger.h"
 #include "tests/temporary_folder.h"
 
+namespace image_io_test {
+
 using namespace hsi4d;
 using Catch::Contains;
 
@@ -231,3 +233,5 @@ TEST_CASE("a header that claims too much is refused before memory is taken") {
       decode_image(png_claiming(16000, 16000), "a.png"),
       Contains("a.png: its header claims 16000 x 16000 pixels, more than its ") && Contains(" bytes can hold"));
 }
+
+}  // namespace image_io_test

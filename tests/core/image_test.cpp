@@ -7,6 +7,8 @@
 
 #include "core/check.h"
 
+namespace image_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -144,3 +146,5 @@ TEST_CASE("an image beyond the limits is refused by name") {
   CHECK_THROWS_WITH(check_image_size("a.png", 3, 100, 16, limits),
                     "a.png: 3 channels of 16 x 100 pixels need more than the 12800 bytes allowed");
 }
+
+}  // namespace image_test

@@ -10,6 +10,8 @@
 #include "core/random.h"
 #include "core/simd.h"
 
+namespace lanes_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -161,3 +163,5 @@ TEST_CASE("lanes are chosen, looked at and summed") {
   CHECK_FALSE(any_lane(LaneMask<WideLanes>{}));
   CHECK(any_lane(x == 128.0));
 }
+
+}  // namespace lanes_test

@@ -10,6 +10,8 @@
 #include "core/check.h"
 #include "tests/support/temporary_folder.h"
 
+namespace log_test {
+
 using namespace hsi4d;
 using hsi4d::test::file_text;
 using hsi4d::test::TemporaryFolder;
@@ -117,3 +119,5 @@ TEST_CASE("warnings go once to each sink as long as that is asked for") {
   CHECK(first == std::vector<std::string>{"a", "i", "i", "b", "a"});
   CHECK(second == std::vector<std::string>{"a", "b"});
 }
+
+}  // namespace log_test

@@ -4,6 +4,8 @@
 
 #include "tests/support/temporary_folder.h"
 
+namespace memory_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -50,3 +52,5 @@ TEST_CASE("control groups of version 1 are asked too") {
   here.write("sys/fs/cgroup/memory/docker/1/memory.stat", "inactive_file 1\ntotal_inactive_file 10485760\n");
   CHECK(available_memory_mb(".") == 110);
 }
+
+}  // namespace memory_test

@@ -9,6 +9,8 @@
 #include "core/check.h"
 #include "tests/temporary_folder.h"
 
+namespace npy_test {
+
 using namespace hsi4d;
 using Catch::Contains;
 
@@ -284,3 +286,5 @@ TEST_CASE("written arrays are numpy's bytes") {
   const std::string zero("a\0", 2);
   CHECK_THROWS_WITH(encode_npy({}, std::span(&zero, 1)), Contains("text ends in a zero"));
 }
+
+}  // namespace npy_test

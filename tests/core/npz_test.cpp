@@ -10,6 +10,8 @@
 #include "tests/temporary_folder.h"
 #include "tests/zip_archive.h"
 
+namespace npz_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Contains;
@@ -237,3 +239,5 @@ TEST_CASE("photographs with cameras are read") {
   CHECK(npz.array("height").scalar<int>() == 420);
   CHECK(npz.array("width").scalar<int>() == 648);
 }
+
+}  // namespace npz_test

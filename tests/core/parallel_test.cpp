@@ -9,6 +9,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace parallel_test {
+
 using namespace hsi4d;
 
 TEST_CASE("every element is visited once, whatever the number of threads", "[parallel]") {
@@ -92,3 +94,5 @@ TEST_CASE("pairwise summation of many equal terms is exact to rounding") {
   const std::vector<double> terms(1 << 20, 0.1);
   CHECK(pairwise_sum(terms.data(), static_cast<Index>(terms.size())) == Approx(0.1 * (1 << 20)).epsilon(1e-15));
 }
+
+}  // namespace parallel_test

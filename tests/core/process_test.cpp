@@ -13,6 +13,8 @@
 #include "core/check.h"
 #include "tests/support/temporary_folder.h"
 
+namespace process_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Message;
 using hsi4d::test::TemporaryFolder;
@@ -175,3 +177,5 @@ TEST_CASE("a program is ended when it is asked for, even one that does not want 
                                   {.seconds = 0, .stop_requested = [&asked] { return ++asked > 3; }});
   CHECK_FALSE(result.has_value());
 }
+
+}  // namespace process_test

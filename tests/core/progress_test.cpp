@@ -6,6 +6,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace progress_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -164,3 +166,5 @@ TEST_CASE("lines and bars hold what fits") {
   state.task = "\xC3\xA4\xC3\xB6";
   CHECK(progress_bar(state, 1) == "\xC3\xA4");
 }
+
+}  // namespace progress_test

@@ -5,6 +5,8 @@
 #include "core/rotation.h"
 #include "tests/core/adjoint_check.h"
 
+namespace quaternion_test {
+
 using namespace hsi4d;
 using namespace hsi4d::testing;
 
@@ -242,3 +244,5 @@ TEST_CASE("slerp goes the shorter way at constant speed and reaches both ends") 
     }
   }
 }
+
+}  // namespace quaternion_test

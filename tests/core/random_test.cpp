@@ -10,6 +10,8 @@
 #include "core/check.h"
 #include "core/rotation.h"
 
+namespace random_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Contains;
 
@@ -242,3 +244,5 @@ TEST_CASE("permutations hold every number once and are all equally likely") {
   CHECK(random.permutation(0, 1) == std::vector<Index>{0});
   CHECK_THROWS_WITH(random.permutation(0, -1), Contains("count is -1"));
 }
+
+}  // namespace random_test

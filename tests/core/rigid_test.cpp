@@ -4,6 +4,8 @@
 
 #include "tests/core/adjoint_check.h"
 
+namespace rigid_test {
+
 using namespace hsi4d;
 using namespace hsi4d::testing;
 
@@ -185,3 +187,5 @@ TEST_CASE("SE(3) in float agrees with double") {
     CHECK((se3_log(t) - xi).norm() < 4e-6f);
   }
 }
+
+}  // namespace rigid_test

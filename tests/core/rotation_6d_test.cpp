@@ -3,6 +3,8 @@
 #include "core/rotation.h"
 #include "tests/core/adjoint_check.h"
 
+namespace rotation_6d_test {
+
 using namespace hsi4d;
 using namespace hsi4d::testing;
 
@@ -149,3 +151,5 @@ TEST_CASE("the float adjoint of 6D agrees with double") {
     CHECK((widen(d_b) - expected_b).norm() <= 1e-5 * (expected_a.norm() + expected_b.norm()));
   }
 }
+
+}  // namespace rotation_6d_test

@@ -5,6 +5,8 @@
 
 #include "tests/core/adjoint_check.h"
 
+namespace rotation_test {
+
 using namespace hsi4d;
 using namespace hsi4d::testing;
 
@@ -340,3 +342,5 @@ TEST_CASE("C12: a chain of ten float rotations stays orthogonal and near the dou
   CHECK(worst_orthogonality <= 20);
   CHECK(worst_vertex < 1e-5);
 }
+
+}  // namespace rotation_test

@@ -8,6 +8,8 @@
 #include "core/check.h"
 #include "tests/temporary_folder.h"
 
+namespace safetensors_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -192,3 +194,5 @@ TEST_CASE("safetensors files are written in one step and known by their first by
   CHECK_FALSE(looks_like_safetensors(Bytes{'P', 'K', 3, 4, 20, 0, 0, 0, 0, 0}));
   CHECK_THROWS_AS(Safetensors::read(folder / "b.safetensors"), UserError);
 }
+
+}  // namespace safetensors_test

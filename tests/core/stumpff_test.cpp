@@ -4,6 +4,8 @@
 
 #include "tests/core/adjoint_check.h"
 
+namespace stumpff_test {
+
 using namespace hsi4d;
 using testing::ulps;
 
@@ -158,3 +160,5 @@ TEST_CASE("the Stumpff functions at 0 are the inverse factorials, and not a numb
   CHECK(std::isnan(stumpff(std::numeric_limits<double>::quiet_NaN()).c3));
   CHECK(std::isnan(stumpff(std::numeric_limits<double>::infinity()).c1));
 }
+
+}  // namespace stumpff_test

@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace suggest_test {
+
 using namespace hsi4d;
 
 TEST_CASE("edit distance counts insertions, deletions, substitutions and swaps") {
@@ -27,3 +29,5 @@ TEST_CASE("the nearest name is suggested only when it is near") {
   CHECK(did_you_mean("loses", known) == "; did you mean \"losses\"?");
   CHECK(did_you_mean("qqqqq", known).empty());
 }
+
+}  // namespace suggest_test

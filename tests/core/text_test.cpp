@@ -7,6 +7,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace text_test {
+
 using namespace hsi4d;
 
 TEST_CASE("words are joined by commas") {
@@ -60,3 +62,5 @@ TEST_CASE("text that is UTF-8 without control characters is told from what is no
   CHECK(utf8_length("") == 0);
   CHECK(utf8_length("\xe2\x82\xac.") == 3);
 }
+
+}  // namespace text_test

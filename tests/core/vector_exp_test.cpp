@@ -7,6 +7,8 @@
 
 #include "tests/support/larger.h"
 
+namespace vector_exp_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -48,3 +50,5 @@ TEMPLATE_TEST_CASE("B17: the vector exponential at its ends", "", float, double)
   CHECK(vector_exp(last) < Limits::infinity());
   CHECK(vector_exp(last * TestType(1.001)) == Limits::infinity());
 }
+
+}  // namespace vector_exp_test

@@ -9,6 +9,8 @@
 #include "core/image_io.h"
 #include "tests/support/temporary_folder.h"
 
+namespace video_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -131,3 +133,5 @@ TEST_CASE("a colour a pixel is closer to the picture than one for four, and keep
   CHECK(mean_difference(each, sharp) < 0.02);
   CHECK(mean_difference(shared, sharp) > 3 * mean_difference(each, sharp));
 }
+
+}  // namespace video_test

@@ -13,6 +13,8 @@
 #include "tests/support/allocation_counter.h"
 #include "tests/support/larger.h"
 
+namespace adam_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -426,3 +428,5 @@ TEST_CASE("a steady step allocates nothing") {
     });
   }
 }
+
+}  // namespace adam_test

@@ -8,6 +8,8 @@
 #include "core/npz.h"
 #include "tests/support/temporary_folder.h"
 
+namespace checkpoint_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -148,3 +150,5 @@ TEST_CASE("the hash of a text is FNV-1a") {
   CHECK(text_hash("") == "cbf29ce484222325");
   CHECK(text_hash("foobar") == "85944171f73967e8");
 }
+
+}  // namespace checkpoint_test

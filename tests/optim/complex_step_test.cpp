@@ -12,6 +12,8 @@
 #include "tests/support/loss_terms.h"
 #include "tests/support/test_motion.h"
 
+namespace complex_step_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -388,3 +390,5 @@ TEST_CASE("distances have the gradients of complex steps") {
         return sum / static_cast<double>(in[1].size() / 3);
       });
 }
+
+}  // namespace complex_step_test

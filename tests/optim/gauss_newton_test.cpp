@@ -12,6 +12,8 @@
 #include "core/parallel.h"
 #include "tests/support/allocation_counter.h"
 
+namespace gauss_newton_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Contains;
 
@@ -341,3 +343,5 @@ TEST_CASE("a steady step of gauss_newton allocates nothing") {
     CHECK_FALSE(method.is_done());
   });
 }
+
+}  // namespace gauss_newton_test

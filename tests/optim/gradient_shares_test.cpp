@@ -9,6 +9,8 @@
 #include "autodiff/reduce.h"
 #include "optim/stage.h"
 
+namespace gradient_shares_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -159,3 +161,5 @@ TEST_CASE("an evaluation that is not finite has no shares") {
   }
   CHECK(is_empty);
 }
+
+}  // namespace gradient_shares_test

@@ -4,6 +4,8 @@
 
 #include "core/config_file.h"
 
+namespace loss_description_test {
+
 using namespace hsi4d;
 
 namespace smooth {
@@ -37,3 +39,5 @@ TEST_CASE("a loss without settings has a weight only") {
   CHECK(fields.names() == std::vector<std::string>{"weight"});
   CHECK_THROWS_AS(settings.own_as<smooth::Settings>(), InternalError);
 }
+
+}  // namespace loss_description_test

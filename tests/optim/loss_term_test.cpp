@@ -11,6 +11,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/test_motion.h"
 
+namespace loss_term_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -463,3 +465,5 @@ TEST_CASE("a term reads the opacities that its settings say, while it is on") {
   for (const char* name : {"photometric", "depth", "contact"})
     CHECK(reads(default_settings(term_named(name).description)) == std::vector<bool>{false, false});
 }
+
+}  // namespace loss_term_test

@@ -10,6 +10,8 @@
 
 #include "core/check.h"
 
+namespace metrics_test {
+
 using namespace hsi4d;
 using Points = std::vector<double>;
 
@@ -272,3 +274,5 @@ TEST_CASE("jitter is the third derivative of the motion") {
   uneven[2] = Points(9);
   CHECK_THROWS_AS(jitter_of(uneven), InternalError);
 }
+
+}  // namespace metrics_test

@@ -8,6 +8,8 @@
 #include "core/random.h"
 #include "optim/metrics.h"
 
+namespace motion_metrics_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -79,3 +81,5 @@ TEST_CASE("diversity is the mean distance over all pairs of motions") {
   views[0].clear();
   CHECK_FALSE(pairwise_distance_mm(views, false).has_value());
 }
+
+}  // namespace motion_metrics_test

@@ -9,6 +9,8 @@
 #include "core/rotation.h"
 #include "tests/support/seeds.h"
 
+namespace object_centres_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -78,3 +80,5 @@ TEST_CASE("rounding in the tree loses no centre") {
 }
 
 TEST_CASE("without objects nothing is near") { CHECK_FALSE(ObjectCentres({}).nearest({0, 0, 0}, {}, 1)); }
+
+}  // namespace object_centres_test

@@ -9,6 +9,8 @@
 #include "core/random.h"
 #include "core/rotation.h"
 
+namespace object_points_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -76,3 +78,5 @@ TEST_CASE("of many points some are looked at, and of none nothing is wrong") {
   CHECK(points.errors(0, moved, truth).add_cm == Approx(50));
   CHECK(points.errors(1, moved, truth).add_cm == 0);
 }
+
+}  // namespace object_points_test

@@ -7,6 +7,8 @@
 
 #include "core/rotation.h"
 
+namespace parameters_test {
+
 using namespace hsi4d;
 
 TEST_CASE("axis-angle rows beyond half a turn are wrapped, others stay as they are") {
@@ -48,3 +50,5 @@ TEST_CASE("numbers beyond a range are put on its ends, others stay as they are")
   CHECK_FALSE(hold_in_range(x, {0.2, 0.8}));
   CHECK_NOTHROW(tape.backward(x, std::vector<float>(12, 1)));  // nothing was written: nothing is stale
 }
+
+}  // namespace parameters_test

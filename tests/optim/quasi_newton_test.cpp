@@ -11,6 +11,8 @@
 #include "core/parallel.h"
 #include "tests/support/allocation_counter.h"
 
+namespace quasi_newton_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Contains;
 
@@ -237,3 +239,5 @@ TEST_CASE("a steady step of bfgs allocates nothing") {
     CHECK_FALSE(method.is_done());
   });
 }
+
+}  // namespace quasi_newton_test

@@ -9,6 +9,8 @@
 #include "autodiff/reduce.h"
 #include "tests/support/larger.h"
 
+namespace stage_gradcheck_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Contains;
 
@@ -156,3 +158,5 @@ TEST_CASE("the tape is as before after the check of a stage, and mistakes are to
   CHECK_THROWS_WITH(picture.check({"tint"}, {"masked_l2"}), "stage 's': the loss is nan");
   CHECK(picture.tape.frozen(picture.tint));
 }
+
+}  // namespace stage_gradcheck_test

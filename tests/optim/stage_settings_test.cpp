@@ -9,6 +9,8 @@
 #include "optim/stage.h"
 #include "tests/support/temporary_folder.h"
 
+namespace stage_settings_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -115,3 +117,5 @@ TEST_CASE("losses that need what a stage does not have are named, unless they ar
   for (auto& [name, loss] : stage.losses) loss.weight = 0;
   CHECK(losses_without_inputs(stage, LossNeeds::kImages, "a picture").empty());
 }
+
+}  // namespace stage_settings_test

@@ -13,6 +13,8 @@
 #include "core/parallel.h"
 #include "tests/support/allocation_counter.h"
 
+namespace stage_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -570,3 +572,5 @@ TEST_CASE("a bad evaluation is not held") {
   const StageResult result = run(picture, settings, spoil, {.held = {{own.id, {"base"}}}});
   CHECK(std::isfinite(result.loss));
 }
+
+}  // namespace stage_test

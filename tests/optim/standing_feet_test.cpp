@@ -5,6 +5,8 @@
 #include "body/body_model.h"
 #include "core/check.h"
 
+namespace standing_feet_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -49,3 +51,5 @@ TEST_CASE("feet that are high or fast do not stand") {
   CHECK_FALSE(foot_sliding_mm(before.numbers, after.numbers, first.numbers, 20));           // 0.6 m/s
   CHECK_THROWS_AS(foot_sliding_mm(before.numbers, std::vector<double>(63), first.numbers, 10), InternalError);
 }
+
+}  // namespace standing_feet_test

@@ -8,6 +8,8 @@
 
 #include "core/image_io.h"
 
+namespace failed_images_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -63,3 +65,5 @@ TEST_CASE("images of a failing test are saved whatever is in them, or it is told
         "the images of odd could not be saved: 2 and 2 numbers are no two images of 2x2");
   CHECK(check_image("equal", {1, 2, 3, 4}, {1, 2, 3, 4.5}, 2, 2, 0.5) == 0.5);
 }
+
+}  // namespace failed_images_test

@@ -6,6 +6,8 @@
 
 #include "core/check.h"
 
+namespace gaussians_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -94,3 +96,5 @@ TEST_CASE("rows of Gaussians are picked, harmonics cut and padded") {
   CHECK(with_sh_degree(g, 2).sh == g.sh);
   CHECK_THROWS_AS(with_sh_degree(g, 4), InternalError);
 }
+
+}  // namespace gaussians_test

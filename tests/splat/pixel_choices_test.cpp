@@ -8,6 +8,8 @@
 
 #include "tests/support/flat_splats.h"
 
+namespace pixel_choices_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -65,3 +67,5 @@ TEST_CASE("pixel choices: counts, and only the pixels that change") {
     if (view.settings.transmittance_stop == 0) CHECK(choices.stopped == 0);
   }
 }
+
+}  // namespace pixel_choices_test

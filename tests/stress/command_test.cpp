@@ -10,6 +10,8 @@
 #include "core/file.h"
 #include "tests/temporary_folder.h"
 
+namespace command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::cli;
 
@@ -78,3 +80,5 @@ TEST_CASE("stress --functions tells a line for each function, range and instruct
   options.rows = {"A1"};
   CHECK_THROWS_WITH(stress_command(options), "--functions is a table of its own: --row says nothing to it");
 }
+
+}  // namespace command_test

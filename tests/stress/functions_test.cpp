@@ -10,6 +10,8 @@
 #include "core/simd.h"
 #include "stress/function_table.h"
 
+namespace functions_test {
+
 using namespace hsi4d;
 
 TEST_CASE("every function is as near its exact value as its bound says, and the bound is not idle", "[isa]") {
@@ -61,3 +63,5 @@ TEST_CASE("arguments lie within their range, near its ends and where a formula c
   CHECK(count([](float v) { return v > 2 - 0x1p-14f; }) > 50);
   CHECK(count([](float v) { return v != 0 && std::abs(v) < 1e-6f; }) > 100);
 }
+
+}  // namespace functions_test

@@ -8,6 +8,8 @@
 
 #include "core/file.h"
 
+namespace poison_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -56,3 +58,5 @@ TEST_CASE("an operator counts as poisoned only when each of its inputs is") {
   stress::add_poisoned_operators<double>(tape, {a, b}, outputs, names);
   CHECK(names == stress::OperatorNames{"add", "exp"});
 }
+
+}  // namespace poison_test

@@ -9,6 +9,8 @@
 
 #include "core/parallel.h"
 
+namespace stress_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -111,3 +113,5 @@ TEST_CASE("rows F hold, and would not without their remedies", "[release]") { ch
 TEST_CASE("what is not a number is caught in every slot", "[release]") { check_group(poison_cases()); }
 TEST_CASE("relations of renders hold", "[release]") { check_group(metamorphic_cases()); }
 TEST_CASE("10,000 steps end well", "[release]") { check_group(long_run_cases()); }
+
+}  // namespace stress_test

@@ -9,6 +9,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/test_motion.h"
 
+namespace motion_losses_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -219,3 +221,5 @@ TEST_CASE("foot_sliding counts feet that stood when the stage began") {
   CHECK(motion_loss("foot_sliding", "{}", sliding) == Approx(0.01).epsilon(1e-12));  // joint 9 is no foot
   CHECK(motion_loss("foot_sliding", R"({"speed": 0.05})", sliding) == 0);
 }
+
+}  // namespace motion_losses_test

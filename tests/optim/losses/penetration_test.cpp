@@ -13,6 +13,8 @@
 #include "tests/optim/solid/surface_of_test.h"
 #include "tests/temporary_folder.h"
 
+namespace penetration_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -162,3 +164,5 @@ TEST_CASE("penetration follows the scene that it is given, though it keeps what 
   for (std::size_t i = 2; i < scene.floor.means.size(); i += 3) scene.floor.means[i] += 0.03f;
   CHECK(run_term(scene, solid, height).loss == Approx(0.0064).epsilon(1e-3));
 }
+
+}  // namespace penetration_test

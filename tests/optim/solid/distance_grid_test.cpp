@@ -9,6 +9,8 @@
 #include "core/random.h"
 #include "tests/support/operator_check.h"
 
+namespace distance_grid_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -152,3 +154,5 @@ TEST_CASE("sampled_distance gives the same bits in whatever order its grid was f
   CHECK(value(filled, 1) == once);
   CHECK(value(half_space(settings), 3) == once);
 }
+
+}  // namespace distance_grid_test

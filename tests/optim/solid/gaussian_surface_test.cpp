@@ -9,6 +9,8 @@
 #include "core/random.h"
 #include "tests/optim/solid/surface_of_test.h"
 
+namespace gaussian_surface_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -209,3 +211,5 @@ TEST_CASE("noise of the discs is averaged") {
   }
   CHECK(std::sqrt(squares) < 0.002);  // of one disc 0.0029
 }
+
+}  // namespace gaussian_surface_test

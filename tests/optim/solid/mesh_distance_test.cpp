@@ -11,6 +11,8 @@
 #include "tests/optim/solid/meshes.h"
 #include "tests/temporary_folder.h"
 
+namespace mesh_distance_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -126,3 +128,5 @@ TEST_CASE("a mesh that is not closed, or turned inwards, is told in the log") {
   CHECK(told == std::vector<std::string>{inwards + ": the mesh is turned inwards: what lies outside of it counts as "
                                                    "solid"});
 }
+
+}  // namespace mesh_distance_test

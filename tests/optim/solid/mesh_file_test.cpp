@@ -11,6 +11,8 @@
 #include "tests/optim/solid/meshes.h"
 #include "tests/temporary_folder.h"
 
+namespace mesh_file_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -149,3 +151,5 @@ TEST_CASE("a damaged GLB file is refused") {
     CHECK_THROWS_AS(parsed(whole.substr(0, size), "a.glb"), DataError);
   }
 }
+
+}  // namespace mesh_file_test

@@ -13,6 +13,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/temporary_folder.h"
 
+namespace occupancy_grid_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -178,3 +180,5 @@ TEST_CASE("occupancy files are read, and what is wrong with them is told") {
   CHECK_THAT(fault(archive({0, 2, 3}, {}, {0, 0, 0}, {0.1})), Contains("has shape [0,2,3]; allowed: 1 to 16384"));
   CHECK(fault(archive({1, 2, 3}, numbers, {0, 0, 0}, {0.1}, "x")) == "g.npz: array 'up': is \"x\"; allowed: y, z");
 }
+
+}  // namespace occupancy_grid_test

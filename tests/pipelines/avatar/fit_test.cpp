@@ -17,6 +17,8 @@
 #include "pipelines/synthetic/views.h"
 #include "tests/temporary_folder.h"
 
+namespace fit_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -337,3 +339,5 @@ TEST_CASE("an avatar of a real body, learnt from the reference's pictures, is ri
   CHECK(result.held.psnr_db >= 30);
   CHECK(result.held.psnr_foreground_db.value() >= 30);
 }
+
+}  // namespace fit_test

@@ -12,6 +12,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/temporary_folder.h"
 
+namespace import_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Contains;
@@ -142,3 +144,5 @@ TEST_CASE("Gaussians that cover little of the body are no avatar of it") {
   for (float& x : far.means) x = 1e30F;
   CHECK(covered_share(far.means, body()) == 0);
 }
+
+}  // namespace import_test

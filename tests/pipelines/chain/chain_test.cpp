@@ -16,6 +16,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace chain_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -430,3 +432,5 @@ TEST_CASE("clips of a generated chain overlap by a frame of one motion", "[chain
     CHECK(file_text(fs::path("one") / name) == file_text(data / "clips/clip1" / name));
   CHECK(file_text("one/scene.ply") == file_text(data / "scene.ply"));
 }
+
+}  // namespace chain_test

@@ -9,6 +9,8 @@
 #include "splat/files/io_ply.h"
 #include "tests/support/program.h"
 
+namespace avatar_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Contains;
@@ -92,3 +94,5 @@ TEST_CASE("hsi4d avatar names what is wrong") {
   CHECK(read_file_start("far.ply", 3).size() == 3);
   CHECK_THROWS_AS(read_avatar("a.safetensors"), UserError);  // nothing was written
 }
+
+}  // namespace avatar_command_test

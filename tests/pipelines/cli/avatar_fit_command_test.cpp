@@ -13,6 +13,8 @@
 #include "pipelines/synthetic/views.h"
 #include "tests/support/program.h"
 
+namespace avatar_fit_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Contains;
@@ -191,3 +193,5 @@ TEST_CASE("hsi4d avatar fit refuses to hold back what is not there") {
                  Contains("views.json is of frame 1; there are 1, counted from 0"));
   CHECK_FALSE(fs::exists("a.safetensors"));
 }
+
+}  // namespace avatar_fit_command_test

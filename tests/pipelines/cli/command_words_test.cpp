@@ -4,6 +4,8 @@
 
 #include "core/check.h"
 
+namespace command_words_test {
+
 using namespace hsi4d;
 using cli::CommandWords;
 
@@ -47,3 +49,5 @@ TEST_CASE("words that commands do not know are told with the nearest one") {
   CHECK(refusal({"body", "make", "--sise", "3"}) ==
         "hsi4d body make: there is no option \"--sise\"; known: --size; did you mean \"--size\"?");
 }
+
+}  // namespace command_words_test

@@ -19,6 +19,8 @@
 #include "tests/support/splat_files.h"
 #include "tests/support/splat_scenes.h"
 
+namespace convert_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -247,3 +249,5 @@ TEST_CASE("render and gradients take any format, and draw what convert makes of 
     CHECK(Npz::read("gradients.npz").array("means").shape()[0] == g.count());
   }
 }
+
+}  // namespace convert_command_test

@@ -8,6 +8,8 @@
 #include "tests/support/running_program.h"
 #include "tests/support/tiny_run.h"
 
+namespace dataset_interrupt_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -115,3 +117,5 @@ TEST_CASE("progress of synth is a few plain lines outside of a terminal, and non
   CHECK(quiet.status == 0);
   CHECK(quiet.err.empty());
 }
+
+}  // namespace dataset_interrupt_test

@@ -7,6 +7,8 @@
 #include "pipelines/cli/pixel_table.h"
 #include "tests/pipelines/cli/render_files.h"
 
+namespace debug_pixel_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -150,3 +152,5 @@ TEST_CASE("a debug-pixel outside the image, or no pixel, is refused") {
   }
   CHECK_FALSE(std::filesystem::exists("a.npz"));
 }
+
+}  // namespace debug_pixel_test

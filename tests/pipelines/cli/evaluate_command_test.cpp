@@ -14,6 +14,8 @@
 #include "tests/support/tiny_run.h"
 #include "tests/support/tiny_sweep.h"
 
+namespace evaluate_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -375,3 +377,5 @@ TEST_CASE("runs of a sweep are measured by their names, and together as its repo
   CHECK(evaluated({"s/short, seed 1", "s/runs/" + ids[0]})["results"][0]["name"] == "s/short, seed 1");
   CHECK_THAT(refused({"s/hole"}), Contains("did you mean \"whole\"?"));
 }
+
+}  // namespace evaluate_command_test

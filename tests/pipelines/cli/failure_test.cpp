@@ -6,6 +6,8 @@
 
 #include "core/check.h"
 
+namespace failure_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -32,3 +34,5 @@ TEST_CASE("exit statuses tell the user's mistakes from our bugs") {
   CHECK(failure_of([] { throw 7; }).message ==
         "this is a bug in hsi4d, please report it: an exception of unknown type");
 }
+
+}  // namespace failure_test

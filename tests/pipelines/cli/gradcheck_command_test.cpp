@@ -10,6 +10,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace gradcheck_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -112,3 +114,5 @@ TEST_CASE("gradcheck says what it cannot look at") {
   CHECK(refused({"--stage", "refinement", "--frame", "1"}) ==
         "hsi4d gradcheck: --frame: the stage is over all frames at once\n");
 }
+
+}  // namespace gradcheck_command_test

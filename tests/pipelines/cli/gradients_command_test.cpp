@@ -5,6 +5,8 @@
 #include "core/image_io.h"
 #include "tests/pipelines/cli/render_files.h"
 
+namespace gradients_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -229,3 +231,5 @@ TEST_CASE("targets are read as they are") {
   bad.write("bad.npz");
   CHECK(fault([] { cli::read_target("bad.npz", 2, 3); }) == "bad.npz: row 1, column 0 of the image is not finite");
 }
+
+}  // namespace gradients_command_test

@@ -15,6 +15,8 @@
 #include "splat/files/io_ply.h"
 #include "tests/support/program.h"
 
+namespace info_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Message;
@@ -181,3 +183,5 @@ TEST_CASE("info gives Gaussians as JSON") {
   CHECK_THROWS_WITH(cli::info_command("a.npz", true),
                     "hsi4d info: --json tells of Gaussians; allowed: .ply, .splat, .spz");
 }
+
+}  // namespace info_command_test

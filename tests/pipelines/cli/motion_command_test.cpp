@@ -12,6 +12,8 @@
 #include "tests/support/program.h"
 #include "tests/support/smplx_reference.h"
 
+namespace motion_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -227,3 +229,5 @@ TEST_CASE("motion tells what is wrong") {
   CHECK_THAT(error({"in.npz", "in.npz"}), Contains("hsi4d motion: OUT"));
   CHECK_THAT(error({"none.npz", "out.npz"}), Contains("none.npz"));
 }
+
+}  // namespace motion_command_test

@@ -8,6 +8,8 @@
 #include "tests/support/program.h"
 #include "tests/support/smplx_reference.h"
 
+namespace pose_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -129,3 +131,5 @@ TEST_CASE("pose leaves out numbers of shape and expression that the model has no
         "hsi4d: warning: p.npz: array 'betas': has 16 numbers a frame; m.npz has 10, and the others are left out\n"
         "hsi4d: warning: p.npz: array 'expression': has 3 numbers a frame; m.npz has 2, and the others are left out\n");
 }
+
+}  // namespace pose_command_test

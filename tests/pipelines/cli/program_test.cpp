@@ -14,6 +14,8 @@
 #include "tests/support/program.h"
 #include "tests/support/test_losses.h"
 
+namespace program_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -221,3 +223,5 @@ TEST_CASE("output that cannot be written is an error, not silence") {
   CHECK(WEXITSTATUS(status) == 2);
   CHECK(file_text("stderr.txt") == "hsi4d: standard output cannot be written to\n");
 }
+
+}  // namespace program_test

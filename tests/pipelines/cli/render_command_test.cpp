@@ -11,6 +11,8 @@
 #include "splat/files/transform.h"
 #include "tests/pipelines/cli/render_files.h"
 
+namespace render_command_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -211,3 +213,5 @@ TEST_CASE("a scene without Gaussians is its background") {
     CHECK(numbers("g.npz", "camera") == std::vector<double>(6));
   }
 }
+
+}  // namespace render_command_test

@@ -7,6 +7,8 @@
 #include "tests/pipelines/cli/render_files.h"
 #include "tests/support/program.h"
 
+namespace scene_options_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::StartsWith;
@@ -153,3 +155,5 @@ TEST_CASE("render and gradients through the program") {
                                         "a.npz", "--out", "g.npz", "--set", "render.tile=8"});
   CHECK(size.status == 0);
 }
+
+}  // namespace scene_options_test

@@ -9,6 +9,8 @@
 #include "pipelines/config/run_config.h"
 #include "tests/support/temporary_folder.h"
 
+namespace settings_page_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -73,3 +75,5 @@ TEST_CASE("the page's examples are right") {
     CHECK((is_path || faults.find(": " + setting.pointer + ": ") == std::string::npos));
   }
 }
+
+}  // namespace settings_page_test

@@ -11,6 +11,8 @@
 #include "tests/support/program.h"
 #include "tests/support/terminal_program.h"
 
+namespace sweep_text_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -69,3 +71,5 @@ TEST_CASE("the table of runs leaves out folders' names where they find no place 
   CHECK_THAT(whole, Contains(sweep.id(1)) && !Contains("…"));
   CHECK(on_terminal({"sweep", "made", "--dry-run"}, 200, status) == whole);
 }
+
+}  // namespace sweep_text_test

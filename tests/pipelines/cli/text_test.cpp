@@ -4,6 +4,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace text_test {
+
 using namespace hsi4d;
 using namespace hsi4d::cli;
 using Rows = std::vector<std::vector<std::string>>;
@@ -53,3 +55,5 @@ TEST_CASE("text is broken between words") {
   CHECK(wrapped("± 1 longer_than_that 2", 4) == "± 1\nlonger_than_that\n2");
   CHECK(wrapped("", 5) == "");
 }
+
+}  // namespace text_test

@@ -11,6 +11,8 @@
 #include "tests/support/smplx_reference.h"
 #include "tests/support/temporary_folder.h"
 
+namespace body_settings_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -78,3 +80,5 @@ TEST_CASE("a config shapes the body") {
   settings.betas = 3;
   CHECK(rest_body(settings).joints == rest_body(procedural_smplx(), betas).joints);
 }
+
+}  // namespace body_settings_test

@@ -7,6 +7,8 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_losses.h"
 
+namespace errors_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -283,3 +285,5 @@ TEST_CASE("the program prints the same text and exits with 2") {
   CHECK_THAT(missing.err,
              Equals("configs/defualt.json: there is no such file; did you mean \"configs/default.json\"?\n"));
 }
+
+}  // namespace errors_test

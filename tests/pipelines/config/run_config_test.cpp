@@ -9,6 +9,8 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_losses.h"
 
+namespace run_config_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -112,3 +114,5 @@ TEST_CASE("settings are listed with those of every loss") {
        {"/render/alpha_min\n", "/stages/NAME/optimize/NAME/lr\n", "/stages/NAME/losses/photo/ssim_share\n"})
     CHECK_THAT(pointers, Catch::Matchers::Contains(expected));
 }
+
+}  // namespace run_config_test

@@ -10,6 +10,8 @@
 #include "pipelines/draw/posed_avatar.h"
 #include "tests/support/mesh_coverage.h"
 
+namespace avatar_cover_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -101,3 +103,5 @@ TEST_CASE("avatars of 50,000 and 300,000 Gaussians are opaque from all sides", "
     }
   }
 }
+
+}  // namespace avatar_cover_test

@@ -13,6 +13,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace camera_selection_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -161,3 +163,5 @@ TEST_CASE("select-camera writes a camera that a run can read, and what it sees")
             "/data/scene, /data/initial: not given; a camera is chosen by the scene, the human and the state "
             "of frame 0\n") != std::string::npos);
 }
+
+}  // namespace camera_selection_test

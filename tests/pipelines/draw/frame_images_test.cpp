@@ -4,6 +4,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace frame_images_test {
+
 using namespace hsi4d;
 
 TEST_CASE("a share of the pixels is kept in whole blocks, spread evenly, others in every frame") {
@@ -45,3 +47,5 @@ TEST_CASE("a share of the pixels is kept in whole blocks, spread evenly, others 
   keep_share(1, 5, all);
   for (int i = 0; i < 1600; ++i) CHECK(all(0, i / 40, i % 40) == 1);
 }
+
+}  // namespace frame_images_test

@@ -16,6 +16,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/program.h"
 
+namespace posed_avatar_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -353,3 +355,5 @@ TEST_CASE("transforms act in the world, whatever the means are relative to") {
   CHECK(largest_difference(rendered(Precision::kDouble), still) < 1e-9);
   CHECK(largest_difference(rendered(Precision::kFloat), still) < 1e-4);
 }
+
+}  // namespace posed_avatar_test

@@ -9,6 +9,8 @@
 #include "core/random.h"
 #include "tests/support/temporary_folder.h"
 
+namespace report_images_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 namespace fs = std::filesystem;
@@ -126,3 +128,5 @@ TEST_CASE("what is no image, or missing, is told") {
   CHECK(read_frame_images("nowhere", none).empty());
   CHECK(none == std::vector<std::string>{"There are no images in frames/."});
 }
+
+}  // namespace report_images_test

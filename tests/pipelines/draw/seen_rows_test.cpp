@@ -12,6 +12,8 @@
 #include "splat/render/sh.h"
 #include "tests/support/splat_scenes.h"
 
+namespace seen_rows_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -110,3 +112,5 @@ TEST_CASE("gathered rows are those asked for") {
   CHECK(gathered(table, none, 2).empty());
   CHECK_THROWS_WITH(gathered(table, beyond, 2), Catch::Contains("there is no row 3"));
 }
+
+}  // namespace seen_rows_test

@@ -10,6 +10,8 @@
 #include "core/rotation.h"
 #include "tests/support/tiny_run.h"
 
+namespace baseline_export_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -111,3 +113,5 @@ TEST_CASE("what TRUMANS LINGO and CHOIS start from is written", "[release]") {
     }
   }
 }
+
+}  // namespace baseline_export_test

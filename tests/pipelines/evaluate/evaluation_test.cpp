@@ -18,6 +18,8 @@
 #include "tests/support/procedural_file.h"
 #include "tests/support/tiny_run.h"
 
+namespace evaluation_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -286,3 +288,5 @@ TEST_CASE("an object is where its file's origin is said to be, by its centroid")
     CHECK((scene.track.object_poses[2][0].translation - centres[2][0].translation).norm() < 1e-9);
   }
 }
+
+}  // namespace evaluation_test

@@ -13,6 +13,8 @@
 #include "pipelines/evaluate/tracks.h"
 #include "tests/support/temporary_folder.h"
 
+namespace foreign_motion_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -223,3 +225,5 @@ TEST_CASE("objects of a motion have names that files may have") {
     CHECK_THROWS_WITH(read_motion_objects("m.npz", "object"), Contains("m.npz: has an object called \"" + name + "\""));
   }
 }
+
+}  // namespace foreign_motion_test

@@ -11,6 +11,8 @@
 #include "pipelines/metrics/contact_metrics.h"
 #include "pipelines/metrics/sequence_errors.h"
 
+namespace rate_independence_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -146,3 +148,5 @@ TEST_CASE("a rate to measure at is that of the slower motion or below it") {
   CHECK_THROWS_WITH(by_itself(silent, skeleton),
                     "swaying: has 1 frames; what is measured is of the frames after the first");
 }
+
+}  // namespace rate_independence_test

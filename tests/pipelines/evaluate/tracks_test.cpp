@@ -10,6 +10,8 @@
 #include "core/rotation.h"
 #include "tests/support/small_clip.h"
 
+namespace tracks_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -123,3 +125,5 @@ TEST_CASE("rates and lengths that cannot be compared are told") {
   for (BodyPose& pose : hand.motion.poses) pose = rest_pose(22);
   CHECK_THROWS_WITH(aligned(hand, body, truth, body), "moving: its poses have 22 joints, the body 55");
 }
+
+}  // namespace tracks_test

@@ -19,6 +19,8 @@
 #include "tests/support/loss_terms.h"
 #include "tests/support/small_clip.h"
 
+namespace frame_graph_test {
+
 using namespace hsi4d;
 using test::small_clip;
 
@@ -466,3 +468,5 @@ TEST_CASE("the loss depth has its whole gradient where part of an object is behi
     for (const Var<double> block : group->blocks) tape.freeze(block);
   }
 }
+
+}  // namespace frame_graph_test

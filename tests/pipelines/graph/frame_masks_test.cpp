@@ -4,6 +4,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace frame_masks_test {
+
 using namespace hsi4d;
 
 TEST_CASE("the centre of a mask", "[in_frame]") {
@@ -38,3 +40,5 @@ TEST_CASE("the area that an object would cover is that of its Gaussians' centres
   camera.camera_from_world.translation = {0, 0, -5};  // behind
   CHECK(covered_area(disc, pose, camera) == 0);
 }
+
+}  // namespace frame_masks_test

@@ -14,6 +14,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/small_clip.h"
 
+namespace frame_motion_test {
+
 using namespace hsi4d;
 using test::small_clip;
 
@@ -328,3 +330,5 @@ TEST_CASE("points and joints that terms over the motion read are where the state
     CHECK(tape.value(in.joints)(before - 1, 0) == tape.value(in.joints_start)(before - 1, 0));
   }
 }
+
+}  // namespace frame_motion_test

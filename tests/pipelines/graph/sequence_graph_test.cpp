@@ -17,6 +17,8 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/vposer_checkpoint.h"
 
+namespace sequence_graph_test {
+
 using namespace hsi4d;
 using test::small_clip;
 
@@ -246,3 +248,5 @@ TEST_CASE("a stage over the sequence moves the latents of VPoser where its setti
     for (Index i = 0; i < 9; ++i) CHECK(joint(i / 3, i % 3) == Approx(decoder.value(rotations)(j, i)).margin(1e-9));
   }
 }
+
+}  // namespace sequence_graph_test

@@ -16,6 +16,8 @@
 #include "splat/files/splat_file.h"
 #include "tests/support/tiny_run.h"
 
+namespace clip_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -398,3 +400,5 @@ TEST_CASE("inputs that are missing or damaged are told by name") {
     CHECK(message_of([&] { read_frame(clip, 2); }) == "no error");
   }
 }
+
+}  // namespace clip_test

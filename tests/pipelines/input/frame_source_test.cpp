@@ -11,6 +11,8 @@
 #include "pipelines/input/clip.h"
 #include "tests/support/tiny_run.h"
 
+namespace frame_source_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Message;
@@ -163,3 +165,5 @@ TEST_CASE("frames smaller than the camera's image, or of another shape, are refu
     CHECK_THROWS_AS(read_frame(clip, 2), DataError);
   }
 }
+
+}  // namespace frame_source_test

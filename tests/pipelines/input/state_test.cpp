@@ -7,6 +7,8 @@
 #include "tests/support/small_clip.h"
 #include "tests/support/temporary_folder.h"
 
+namespace state_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -96,3 +98,5 @@ TEST_CASE("bodies and cameras are those of the frames") {
     CHECK(bodies[t].transl == states[t].body.transl);
   }
 }
+
+}  // namespace state_test

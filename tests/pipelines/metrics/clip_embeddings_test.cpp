@@ -9,6 +9,8 @@
 #include "core/npz.h"
 #include "core/random.h"
 
+namespace clip_embeddings_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Contains;
 
@@ -120,3 +122,5 @@ TEST_CASE("embeddings are read, and what is wrong with them is told") {
   empty.add_scalar("frame_rate", 1.0);
   CHECK_THAT(fault(empty.encode()), Contains("image_embeddings"));
 }
+
+}  // namespace clip_embeddings_test

@@ -7,6 +7,8 @@
 #include "core/parallel.h"
 #include "tests/support/small_clip.h"
 
+namespace contact_metrics_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -131,3 +133,5 @@ TEST_CASE("sliding by frame is since the frame before, by the heights of frame 0
   CHECK(values[3].empty());
   CHECK(*find_metric(mean_after_first(values), "foot_sliding_mm") == Approx(15));
 }
+
+}  // namespace contact_metrics_test

@@ -9,6 +9,8 @@
 #include "pipelines/synthetic/scene.h"
 #include "tests/support/tiny_run.h"
 
+namespace penetration_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -121,3 +123,5 @@ TEST_CASE("a run with the loss penetration has the body less in the ground, and 
   CHECK(without > 0.1);
   CHECK(with < 0.3 * without);
 }
+
+}  // namespace penetration_test

@@ -8,6 +8,8 @@
 #include "core/camera.h"
 #include "core/check.h"
 
+namespace sequence_errors_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -113,3 +115,5 @@ TEST_CASE("the errors of images leave out a foreground that is not there") {
   mask(0, 3, 3) = 1;
   CHECK(value(image_errors(image, target, &mask), "psnr_foreground_db") == Approx(-10 * std::log10(0.25 / 3)));
 }
+
+}  // namespace sequence_errors_test

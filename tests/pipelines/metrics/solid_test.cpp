@@ -13,6 +13,8 @@
 #include "tests/optim/solid/surface_of_test.h"
 #include "tests/support/temporary_folder.h"
 
+namespace solid_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -153,3 +155,5 @@ TEST_CASE("made objects are solid to what their Gaussians show") {
   CHECK(solid_inside > 0.8 * discs);
   CHECK_FALSE(object_solid(Gaussians(), "nothing").distance);
 }
+
+}  // namespace solid_test

@@ -13,6 +13,8 @@
 #include "core/version.h"
 #include "tests/support/temporary_folder.h"
 
+namespace folder_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -276,3 +278,5 @@ TEST_CASE("the summary is written whole or not at all") {
   CHECK_THROWS_AS(folder.write_summary(summary), InternalError);
   CHECK(file_text("a/summary.json") == text);
 }
+
+}  // namespace folder_test

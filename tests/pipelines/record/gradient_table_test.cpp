@@ -6,6 +6,8 @@
 #include "core/check.h"
 #include "tests/support/tiny_run.h"
 
+namespace gradient_table_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -97,3 +99,5 @@ TEST_CASE("measuring shares changes no bit of a run's result, and both files hav
   CHECK(summary["metrics"][1]["gradient_shares"]["transl"]["photometric"]["evaluations"] == 9);
   CHECK_FALSE(json_of("off/summary.json")["metrics"][1].contains("gradient_shares"));
 }
+
+}  // namespace gradient_table_test

@@ -4,6 +4,8 @@
 
 #include "pipelines/report/published.h"
 
+namespace published_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Contains;
 
@@ -56,3 +58,5 @@ TEST_CASE("our figures stand beside those of clips of their kind alone") {
   CHECK_THAT(section, Contains("<td class=\"own\">0.500</td><td>0.835</td><td>CHOIS 0.687, LINGO 0.699</td>"));
   CHECK_THAT(section, !Contains("<td class=\"own\">0.020</td>") && Contains("arXiv 2412.18600"));
 }
+
+}  // namespace published_test

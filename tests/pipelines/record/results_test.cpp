@@ -12,6 +12,8 @@
 #include "core/video.h"
 #include "tests/support/tiny_run.h"
 
+namespace results_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -145,3 +147,5 @@ TEST_CASE("without ffmpeg a run is done all the same, and its log says what is n
   carry_out_tiny(config, "run", 1, true);  // and with it, later
   CHECK(std::filesystem::exists("run/preview.mp4"));
 }
+
+}  // namespace results_test

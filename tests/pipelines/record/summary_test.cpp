@@ -7,6 +7,8 @@
 
 #include "core/check.h"
 
+namespace summary_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Contains;
 
@@ -140,3 +142,5 @@ TEST_CASE("numbers for people have fixed decimals") {
   CHECK(fixed_number(1e300, 0).size() == 301);
   CHECK(fixed_number(std::nan(""), 2) == "not finite");
 }
+
+}  // namespace summary_test

@@ -19,6 +19,8 @@
 #include "tests/support/small_clip.h"
 #include "tests/support/temporary_folder.h"
 
+namespace report_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -449,3 +451,5 @@ TEST_CASE("the program reports runs and prints their errors") {
   CHECK(mistake.status == 2);
   CHECK(mistake.err == "nowhere: there is no such run folder\n");
 }
+
+}  // namespace report_test

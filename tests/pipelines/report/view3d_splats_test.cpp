@@ -10,6 +10,8 @@
 #include "splat/sh_basis.h"
 #include "tests/support/small_clip.h"
 
+namespace view3d_splats_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -119,3 +121,5 @@ TEST_CASE("what is far, faint or huge is not for a viewer, and fewer Gaussians a
   CHECK(few.counts.back() == 0);
   CHECK(few.boxes.size() == 18);
 }
+
+}  // namespace view3d_splats_test

@@ -13,6 +13,8 @@
 #include "tests/support/small_clip.h"
 #include "tests/support/temporary_folder.h"
 
+namespace view3d_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -162,3 +164,5 @@ TEST_CASE("files that are no 3D view are refused") {
   rateless.write("rateless");
   CHECK_THROWS_WITH(read_view3d("rateless"), "rateless: frame_rate is \"-3\", not a positive number");
 }
+
+}  // namespace view3d_test

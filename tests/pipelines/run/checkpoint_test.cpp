@@ -12,6 +12,8 @@
 #include "optim/checkpoint.h"
 #include "tests/support/temporary_folder.h"
 
+namespace checkpoint_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -255,3 +257,5 @@ TEST_CASE("what losses left out is in a checkpoint, and nothing that is not of t
                                      "\", which is no stage, frame, object, term and reason of this clip");
   }
 }
+
+}  // namespace checkpoint_test

@@ -13,6 +13,8 @@
 #include "pipelines/synthetic/scene.h"
 #include "tests/support/tiny_run.h"
 
+namespace color_net_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 namespace fs = std::filesystem;
@@ -229,3 +231,5 @@ TEST_CASE("a checkpoint with another color net is refused", "[run][color_net]") 
         std::string::npos);
   carry_out_tiny(config, "run", 1, true);
 }
+
+}  // namespace color_net_test

@@ -12,6 +12,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace errors_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -309,3 +311,5 @@ TEST_CASE("a checkpoint of other inputs is refused", "[run]") {
   check_has_failed("run", message);
   CHECK_THAT(file_text("run/log.txt"), Contains("failed: " + message + "\n"));
 }
+
+}  // namespace errors_test

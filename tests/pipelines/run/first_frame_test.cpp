@@ -10,6 +10,8 @@
 #include "pipelines/metrics/penetration.h"
 #include "tests/support/tiny_run.h"
 
+namespace first_frame_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Message;
@@ -274,3 +276,5 @@ TEST_CASE("a stage over the first frame moves what one over a frame does", "[fir
                     Catch::Matchers::Contains("/stages/first/optimize/pose_latents: there is no such parameter group; "
                                               "known here: camera, object_orient, object_transl, transl, "));
 }
+
+}  // namespace first_frame_test

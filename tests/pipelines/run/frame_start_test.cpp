@@ -7,6 +7,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/small_clip.h"
 
+namespace frame_start_test {
+
 using namespace hsi4d;
 using test::small_clip;
 
@@ -82,3 +84,5 @@ TEST_CASE("estimates that a clip does not have are told") {
   settings.objects = StartFrom::kEstimate;
   CHECK_THROWS_WITH(check_start(settings, clip), "/start/objects: \"estimate\": data.initial names no object_tracks");
 }
+
+}  // namespace frame_start_test

@@ -5,6 +5,8 @@
 #include "core/log.h"
 #include "tests/support/tiny_run.h"
 
+namespace human_alone_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 namespace fs = std::filesystem;
@@ -93,3 +95,5 @@ TEST_CASE("a camera that stands is left standing", "[run]") {
   CHECK(deg < 0.3);
   CHECK(number_in(summary.metrics.back().values, "camera_translation_cm") == cm);  // no later stage moves it
 }
+
+}  // namespace human_alone_test

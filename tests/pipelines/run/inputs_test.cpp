@@ -11,6 +11,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace inputs_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -172,3 +174,5 @@ TEST_CASE("frames in which an object is not seen are told once, as ranges", "[ru
   CHECK_THAT(file_text("run/log.txt"),
              Contains(" warning " + masks.string() + ": the object is hidden in frames 2-3" + rest));
 }
+
+}  // namespace inputs_test

@@ -11,6 +11,8 @@
 #include "tests/support/running_program.h"
 #include "tests/support/tiny_run.h"
 
+namespace interrupt_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 namespace fs = std::filesystem;
@@ -184,3 +186,5 @@ TEST_CASE("a run that a signal ends while it writes its results goes on with the
     }
   }
 }
+
+}  // namespace interrupt_test

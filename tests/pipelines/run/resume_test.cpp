@@ -8,6 +8,8 @@
 #include "tests/support/running_program.h"
 #include "tests/support/tiny_run.h"
 
+namespace resume_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -282,3 +284,5 @@ TEST_CASE("a demo that was killed and resumed has the bits of one that never was
   CHECK(wrong.status == 2);
   CHECK_FALSE(fs::exists("wrong"));
 }
+
+}  // namespace resume_test

@@ -17,6 +17,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace run_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -650,3 +652,5 @@ TEST_CASE("a dataset without its truth gives the same result, and the summary sa
     CHECK_FALSE(unknown["metrics"].back().contains(name));
   CHECK(number_at(unknown["metrics"].back(), "psnr_db") == number_at(known["metrics"].back(), "psnr_db"));
 }
+
+}  // namespace run_test

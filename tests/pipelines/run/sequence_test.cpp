@@ -15,6 +15,8 @@
 #include "tests/support/tiny_run.h"
 #include "tests/support/vposer_checkpoint.h"
 
+namespace sequence_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Message;
@@ -249,3 +251,5 @@ TEST_CASE("a run whose stage over the sequence has VPoser's weights moves in its
   carry_out_tiny(config, "again", 2);
   CHECK(differences("vposer", "again") == kNone);
 }
+
+}  // namespace sequence_test

@@ -16,6 +16,8 @@
 #include "pipelines/input/state.h"
 #include "tests/support/tiny_run.h"
 
+namespace skips_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -357,3 +359,5 @@ TEST_CASE("settings of an optimiser that the stage does not have are told, and l
   CHECK(told(gauss_newton, {"stages.camera.optimizer.kind=bfgs"}) ==
         Notes{"warning: stages.camera.optimizer: beta2, products do nothing with kind bfgs"});
 }
+
+}  // namespace skips_test

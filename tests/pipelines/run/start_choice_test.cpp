@@ -8,6 +8,8 @@
 #include "tests/support/small_clip.h"
 #include "tests/support/tiny_run.h"
 
+namespace start_choice_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -134,3 +136,5 @@ TEST_CASE("a best start that no stage would choose is refused") {
   config.start.objects = StartFrom::kVelocity;
   CHECK_NOTHROW(prepare_run(config));
 }
+
+}  // namespace start_choice_test

@@ -14,6 +14,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace unseen_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -370,3 +372,5 @@ TEST_CASE("a folder of frames in another format is told, and numbers that leave 
     CHECK(warnings_of([&] { read_clip(config.data); }).empty());
   }
 }
+
+}  // namespace unseen_test

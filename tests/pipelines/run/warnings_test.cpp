@@ -11,6 +11,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace warnings_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -246,3 +248,5 @@ TEST_CASE("warnings from before there was a folder, and a resumed run, are in th
   carry_out_tiny(config, "run", 1, true);
   CHECK_THAT(file_text("run/log.txt"), Contains("info resumed with frame 2 of 3\n"));
 }
+
+}  // namespace warnings_test

@@ -16,6 +16,8 @@
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
+namespace services_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -301,3 +303,5 @@ TEST_CASE("an estimate is laid on the human of frame 0") {
     CHECK(left(best) < left(other));
   }
 }
+
+}  // namespace services_test

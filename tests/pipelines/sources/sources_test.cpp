@@ -16,6 +16,8 @@
 #include "tests/support/running_program.h"
 #include "tests/support/tiny_run.h"
 
+namespace sources_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -528,3 +530,5 @@ TEST_CASE("what is being made elsewhere is not swept, and what has its record al
   CHECK(lines_of("film.txt").size() == 2);
   CHECK(lines_of("mask.txt").size() == 1);
 }
+
+}  // namespace sources_test

@@ -5,6 +5,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace results_test {
+
 using namespace hsi4d;
 
 TEST_CASE("the interval of a share is Wilson's") {
@@ -138,3 +140,5 @@ TEST_CASE("answers are counted by question, pair and side") {
         "x,walk,quality,A,B,4.5,0\n"
         "y,\"sits, then \"\"stands\"\"\",quality,B,A,2,7\n");
 }
+
+}  // namespace results_test

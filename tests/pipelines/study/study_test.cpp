@@ -13,6 +13,8 @@
 #include "tests/support/made_sweep.h"
 #include "tests/support/program.h"
 
+namespace study_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -433,3 +435,5 @@ TEST_CASE("answers that do not belong to the study are refused with their file")
              Matches("swapped.json:4: /study: \"" + study_name +
                      "\" is not that of this content, [0-9a-f]{16}: the key has been changed\n"));
 }
+
+}  // namespace study_test

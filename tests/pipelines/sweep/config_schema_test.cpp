@@ -13,6 +13,8 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_losses.h"
 
+namespace config_schema_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using nlohmann::json;
@@ -215,3 +217,5 @@ TEST_CASE("the schema of sweeps accepts those that are shipped and refuses what 
     CHECK_FALSE(reads(base + more));
   }
 }
+
+}  // namespace config_schema_test

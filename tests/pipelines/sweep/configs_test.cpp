@@ -12,6 +12,8 @@
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 
+namespace configs_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 namespace fs = std::filesystem;
@@ -131,3 +133,5 @@ TEST_CASE("the smoke sweep is computed", "[full]") {
   CHECK(sweep.out.find("\n4 runs: 4 done\n") != std::string::npos);
   CHECK(fs::exists("runs/smoke/report.html"));
 }
+
+}  // namespace configs_test

@@ -11,6 +11,8 @@
 #include "pipelines/synthetic/dataset.h"
 #include "tests/support/temporary_folder.h"
 
+namespace instance_seeds_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -123,3 +125,5 @@ TEST_CASE("seeds of an instance are videos of other frames, timing, camera, clot
     CHECK((human_color(one.frames[0]) - human_color(other.frames[0])).norm() > 0.02);
   }
 }
+
+}  // namespace instance_seeds_test

@@ -6,6 +6,8 @@
 
 #include "tests/support/made_sweep.h"
 
+namespace local_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -162,3 +164,5 @@ TEST_CASE("after a failure what runs is interrupted and counted once") {
   CHECK(outcome.computed == 0);
   CHECK(outcome.not_done == std::vector<std::size_t>{1, 2, 3});
 }
+
+}  // namespace local_test

@@ -8,6 +8,8 @@
 #include "core/log.h"
 #include "tests/support/tiny_sweep.h"
 
+namespace plan_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -335,3 +337,5 @@ TEST_CASE("a clip whose instance has its data in place is that data") {
   CHECK(given.runs[0].id != made.runs[0].id);
   CHECK_THAT(at(given.runs[0], "/data/scene").get<std::string>(), Contains("there/scene.ply"));
 }
+
+}  // namespace plan_test

@@ -7,6 +7,8 @@
 #include "tests/support/made_sweep.h"
 #include "tests/support/markup.h"
 
+namespace report_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -149,3 +151,5 @@ TEST_CASE("plots of ranges hold values that are equal, zero, far apart or huge")
   }
   CHECK(range_plot_svg("t", "mm", {}, false, 1) == "<p class=\"nothing\">nothing to plot</p>");
 }
+
+}  // namespace report_test

@@ -8,6 +8,8 @@
 #include "pipelines/sweep/tables.h"
 #include "tests/support/made_sweep.h"
 
+namespace results_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -232,3 +234,5 @@ TEST_CASE("runs of an axis are compared with the same values of the others") {
   CHECK(partner_of(plan, 2) == 3);
   CHECK_FALSE(partner_of(plan, 3));
 }
+
+}  // namespace results_test

@@ -11,6 +11,8 @@
 #include "tests/support/running_program.h"
 #include "tests/support/tiny_sweep.h"
 
+namespace run_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -309,3 +311,5 @@ TEST_CASE("what Slurm is asked for") {
                                             "--open-mode=append", "--requeue", "--ntasks=1", "--cpus-per-task=3",
                                             "--signal=B:USR1@120", "--mem=700M", "--time=01:00:00", "--account=x"});
 }
+
+}  // namespace run_test

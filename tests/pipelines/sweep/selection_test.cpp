@@ -7,6 +7,8 @@
 #include "core/check.h"
 #include "tests/support/made_sweep.h"
 
+namespace selection_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -109,3 +111,5 @@ TEST_CASE("a run that several combinations come to is named once") {
   CHECK(chosen("made/a, seed 0") == Indices{0});
   CHECK(chosen("made/other, a, seed 0") == Indices{6});
 }
+
+}  // namespace selection_test

@@ -12,6 +12,8 @@
 #include "optim/checkpoint.h"
 #include "tests/support/made_sweep.h"
 
+namespace slurm_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -151,3 +153,5 @@ TEST_CASE("a sweep that does not say a whole number of MB asks for enough") {
   const std::vector<std::string> options = array_options({"/out"}, plan, {0}, 0, 1);
   CHECK(std::find(options.begin(), options.end(), "--mem=1M") != options.end());
 }
+
+}  // namespace slurm_test

@@ -9,6 +9,8 @@
 #include "core/check.h"
 #include "core/random.h"
 
+namespace statistics_test {
+
 using namespace hsi4d;
 
 TEST_CASE("mean and deviation of a sample by hand") {
@@ -59,3 +61,5 @@ TEST_CASE("the bootstrap's interval is that of the normal distribution for many 
   CHECK(again->low == interval->low);
   CHECK(again->high == interval->high);
 }
+
+}  // namespace statistics_test

@@ -25,6 +25,8 @@
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 
+namespace dataset_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 namespace fs = std::filesystem;
@@ -447,3 +449,5 @@ TEST_CASE("a demo whose dataset cannot be made leaves no folder") {
   CHECK(failed.err.find("bad.ply") != std::string::npos);
   CHECK_FALSE(fs::exists("demos/a"));
 }
+
+}  // namespace dataset_test

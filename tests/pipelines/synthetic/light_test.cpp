@@ -10,6 +10,8 @@
 #include "pipelines/synthetic/faults.h"
 #include "pipelines/synthetic/motion.h"
 
+namespace light_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -181,3 +183,5 @@ TEST_CASE("what was hidden shows something else afterwards") {
   RevealedContent(0, 7).apply(off);
   CHECK(off.color == before);
 }
+
+}  // namespace light_test

@@ -18,6 +18,8 @@
 #include "pipelines/synthetic/faults.h"
 #include "pipelines/synthetic/render.h"
 
+namespace motion_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -450,3 +452,5 @@ TEST_CASE("in the clip for the demo the hand hides part of the object") {
   INFO(hidden);
   CHECK(hidden >= 4);
 }
+
+}  // namespace motion_test

@@ -8,6 +8,8 @@
 #include "body/body_model.h"
 #include "core/rotation.h"
 
+namespace noise_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -160,3 +162,5 @@ TEST_CASE("masks grow and shrink by pixels, become jagged, and are dropped") {
   CHECK(disturbed_mask(mask, {.dropped_share = 1}, 3, "human", 0) == mask);
   CHECK(area(disturbed_mask(mask, {.dropped_share = 1}, 3, "human", 1)) == 0);
 }
+
+}  // namespace noise_test

@@ -11,6 +11,8 @@
 #include "splat/files/io_ply.h"
 #include "tests/support/temporary_folder.h"
 
+namespace scene_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -205,3 +207,5 @@ TEST_CASE("a motion is done at a place that the scene has") {
         "the scene kitchen has nothing for the motion slide; there are playground/slide");
   CHECK(place_names_of(Scene::kLivingRoom) == "sofa, sofa_back, table");
 }
+
+}  // namespace scene_test

@@ -8,6 +8,8 @@
 #include "core/check.h"
 #include "pipelines/synthetic/motion.h"
 
+namespace variation_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -85,3 +87,5 @@ TEST_CASE("a varied light comes from another side and is no light without variat
   CHECK(varied(at, left) > 0.3);
   CHECK(varied(at, left) < 1.3);
 }
+
+}  // namespace variation_test

@@ -4,6 +4,8 @@
 
 #include <catch2/catch.hpp>
 
+namespace info_test {
+
 using namespace hsi4d;
 
 TEST_CASE("distributions are by nearest rank") {
@@ -63,3 +65,5 @@ TEST_CASE("histograms count every number once") {
   CHECK(s.suspicions.transparent == 1);
   CHECK(s.suspicions.huge == 0);  // all at one place: there is no scene to be larger than
 }
+
+}  // namespace info_test

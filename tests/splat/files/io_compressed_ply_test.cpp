@@ -11,6 +11,8 @@
 #include "splat/files/io_ply.h"
 #include "tests/support/splat_files.h"
 
+namespace io_compressed_ply_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -238,3 +240,5 @@ TEST_CASE("a compressed PLY that was cut or lengthened is refused") {
   longer.push_back(0);
   CHECK_THROWS_AS(decode_ply(longer, "a.ply"), DataError);
 }
+
+}  // namespace io_compressed_ply_test

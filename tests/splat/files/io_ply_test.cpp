@@ -13,6 +13,8 @@
 #include "core/file.h"
 #include "tests/temporary_folder.h"
 
+namespace io_ply_test {
+
 using namespace hsi4d;
 using Catch::Matchers::Contains;
 using Catch::Matchers::Message;
@@ -357,3 +359,5 @@ TEST_CASE("real scenes are read whole") {
     UNSCOPED_INFO(summary_text(scene.report));
   }
 }
+
+}  // namespace io_ply_test

@@ -9,6 +9,8 @@
 #include "core/check.h"
 #include "tests/support/splat_files.h"
 
+namespace io_splat_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Message;
@@ -124,3 +126,5 @@ TEST_CASE("a .splat file of a wrong size and Gaussians that cannot be written ar
   CHECK_THROWS_MATCHES(encode_splat(g), UserError,
                        Message("Gaussian 1 has an opacity that is no number, which a .splat file cannot hold"));
 }
+
+}  // namespace io_splat_test

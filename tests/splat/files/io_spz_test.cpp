@@ -12,6 +12,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/splat_files.h"
 
+namespace io_spz_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -361,3 +363,5 @@ TEST_CASE("a .spz file that was cut is refused") {
       CHECK_THROWS_AS(decode_spz(std::span(whole).first(size), "a.spz"), DataError);
   }
 }
+
+}  // namespace io_spz_test

@@ -14,6 +14,8 @@
 #include "tests/support/splat_files.h"
 #include "tests/temporary_folder.h"
 
+namespace splat_file_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Contains;
@@ -215,3 +217,5 @@ TEST_CASE("real scenes go through every format within its rounding") {
     CHECK(largest_angle(packed.gaussians, expected) < 0.0049);
   }
 }
+
+}  // namespace splat_file_test

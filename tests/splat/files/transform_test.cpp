@@ -14,6 +14,8 @@
 #include "tests/support/splat_files.h"
 #include "tests/support/splat_scenes.h"
 
+namespace transform_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 using Catch::Matchers::Message;
@@ -266,3 +268,5 @@ TEST_CASE("a matrix that is no similarity is refused") {
   CHECK_THROWS_AS(transformed(Gaussians{}, {1, 2 * Matrix3<double>::Identity(), {0, 0, 0}}), InternalError);
   CHECK_THROWS_AS(transformed(Gaussians{}, {1, -Matrix3<double>::Identity(), {0, 0, 0}}), InternalError);
 }
+
+}  // namespace transform_test

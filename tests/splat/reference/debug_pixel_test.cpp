@@ -8,6 +8,8 @@
 
 #include "tests/support/flat_splats.h"
 
+namespace debug_pixel_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -142,3 +144,5 @@ TEST_CASE("what a pixel's trace says of each Gaussian") {
     CHECK_THROWS_AS(trace_pixel(flat.tape, flat.projected, flat.opacities, flat.features, view, outside),
                     InternalError);
 }
+
+}  // namespace debug_pixel_test

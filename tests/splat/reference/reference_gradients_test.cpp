@@ -8,6 +8,8 @@
 #include "splat/reference/reference.h"
 #include "tests/support/splat_scenes.h"
 
+namespace reference_gradients_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -410,3 +412,5 @@ TEST_CASE("reference: the factor of antialias has no gradient at its floor (A7)"
     check_gradients("antialias", other, 1e-8L);
   }
 }
+
+}  // namespace reference_gradients_test

@@ -5,6 +5,8 @@
 
 #include "tests/support/reference_images.h"
 
+namespace reference_symmetry_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -159,3 +161,5 @@ TEST_CASE("reference: double agrees with long double, and weights and transmitta
     CHECK(sum + behind == Approx(1).epsilon(1e-14));
   }
 }
+
+}  // namespace reference_symmetry_test

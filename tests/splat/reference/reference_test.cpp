@@ -14,6 +14,8 @@
 #include "tests/support/larger.h"
 #include "tests/support/reference_images.h"
 
+namespace reference_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -366,3 +368,5 @@ TEST_CASE("reference: sizes that contradict each other are refused") {
   CHECK_THROWS_AS(reference::render(good, flat, {0, 0, 0}, uncut()), InternalError);
   CHECK_THROWS_AS(reference::fragments(good, camera, uncut(), 0, camera.width), InternalError);
 }
+
+}  // namespace reference_test

@@ -3,6 +3,8 @@
 #include "core/rigid.h"
 #include "tests/support/operator_check.h"
 
+namespace camera_center_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -34,3 +36,5 @@ TEST_CASE("the centre of a moved camera is where its transform takes the camera'
   const Vector3<double> found = Vector3<double>(tape.value(center).data) + view.origin_world;
   CHECK(transform_point(moved, found).norm() < 1e-13);
 }
+
+}  // namespace camera_center_test

@@ -13,6 +13,8 @@
 #include "tests/support/complex_step_check.h"
 #include "tests/support/flat_splats.h"
 
+namespace complex_step_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -248,3 +250,5 @@ TEST_CASE("depth has the gradients of complex steps") {
         return depth;
       });
 }
+
+}  // namespace complex_step_test

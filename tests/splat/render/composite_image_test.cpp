@@ -13,6 +13,8 @@
 #include "tests/support/flat_splats.h"
 #include "tests/support/larger.h"
 
+namespace composite_image_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -289,3 +291,5 @@ TEMPLATE_TEST_CASE("long lists are composited over many segments as over one", "
     CHECK(d[i] == Approx(expected).epsilon(std::is_same_v<S, float> ? 1e-5 : 1e-11));
   }
 }
+
+}  // namespace composite_image_test

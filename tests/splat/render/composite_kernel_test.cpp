@@ -13,6 +13,8 @@
 #include "tests/support/isa.h"
 #include "tests/support/larger.h"
 
+namespace composite_kernel_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -217,3 +219,5 @@ TEST_CASE("the exponential of the block kernel, both forms: monotone, exact at 0
     for (const double p : {-126.1, -140.0, -200.0}) CHECK(exact_power(p).value == 0);
   });
 }
+
+}  // namespace composite_kernel_test

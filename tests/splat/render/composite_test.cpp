@@ -10,6 +10,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/pixel_choices.h"
 
+namespace composite_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -266,3 +268,5 @@ TEST_CASE("tiles without a cotangent are left out of the adjoint, which keeps it
     std::fill(cotangent.begin(), cotangent.begin() + 100 * 60, 0.0f);
   }
 }
+
+}  // namespace composite_test

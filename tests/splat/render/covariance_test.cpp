@@ -7,6 +7,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/taped_splats.h"
 
+namespace covariance_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -111,3 +113,5 @@ TEST_CASE("axes of wrong shapes are refused") {
   const auto t = tape.parameter("t", shape_of(2, 12)), axes = tape.parameter("axes", shape_of(3, 9));
   CHECK_THROWS_AS(transform_axes(t, axes), InternalError);
 }
+
+}  // namespace covariance_test

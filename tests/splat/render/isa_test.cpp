@@ -11,6 +11,8 @@
 #include "core/held_isa.h"
 #include "tests/support/taped_splats.h"
 
+namespace isa_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -80,3 +82,5 @@ TEMPLATE_TEST_CASE("instruction sets agree to rounding [B13, F10]", "", float, d
     });
   }
 }
+
+}  // namespace isa_test

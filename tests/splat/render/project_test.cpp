@@ -7,6 +7,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/taped_splats.h"
 
+namespace project_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -276,3 +278,5 @@ TEST_CASE("intrinsics on the tape are those of a camera, and are checked in ever
   CHECK_THROWS_AS(tape.forward(all), UserError);
   CHECK_THROWS_AS(project(means, axes, xi, view_of_camera(camera), xi), InternalError);
 }
+
+}  // namespace project_test

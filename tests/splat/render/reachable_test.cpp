@@ -9,6 +9,8 @@
 #include "tests/support/seeds.h"
 #include "tests/support/taped_splats.h"
 
+namespace reachable_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -111,3 +113,5 @@ TEST_CASE("a Gaussian whose numbers are not finite counts as reachable") {
   const std::vector<Index> rows = reachable_rows(scene.gaussians(), view_of_scene(scene), kReach);
   CHECK(std::find(rows.begin(), rows.end(), 0) != rows.end());
 }
+
+}  // namespace reachable_test

@@ -19,6 +19,8 @@
 #include "tests/support/real_splats.h"
 #include "tests/support/taped_splats.h"
 
+namespace render_precision_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -306,3 +308,5 @@ TEST_CASE("the renderer gives the same bits on any number of threads", "[paralle
     check(double());
   }
 }
+
+}  // namespace render_precision_test

@@ -9,6 +9,8 @@
 #include "tests/support/real_splats.h"
 #include "tests/support/taped_splats.h"
 
+namespace render_reference_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -160,3 +162,5 @@ TEST_CASE("double agrees with the brute-force renderer: real scenes", "[release]
   }
   worst_errors.report("real scenes");
 }
+
+}  // namespace render_reference_test

@@ -10,6 +10,8 @@
 #include "tests/support/allocation_counter.h"
 #include "tests/support/taped_splats.h"
 
+namespace render_robust_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -261,3 +263,5 @@ TEST_CASE("Gaussians that move within what they reached before allocate nothing"
   check(float());
   check(double());
 }
+
+}  // namespace render_robust_test

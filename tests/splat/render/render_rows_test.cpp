@@ -9,6 +9,8 @@
 #include "tests/support/flat_splats.h"
 #include "tests/support/taped_splats.h"
 
+namespace render_rows_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -229,3 +231,5 @@ TEST_CASE("gradients of one Gaussian over millions of pixels [F7]") {
     }
   }
 }
+
+}  // namespace render_rows_test

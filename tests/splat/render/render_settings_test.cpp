@@ -5,6 +5,8 @@
 #include "core/check.h"
 #include "core/config_file.h"
 
+namespace render_settings_test {
+
 using namespace hsi4d;
 
 namespace {
@@ -103,3 +105,5 @@ TEST_CASE("settings that contradict each other are refused") {
   CHECK_THROWS_WITH(read(R"({"alpha_cap": 0.5, "alpha_min": 0.5})"),
                     "render.json:1: /alpha_min: alpha_min must be below alpha_cap, or nothing is drawn");
 }
+
+}  // namespace render_settings_test

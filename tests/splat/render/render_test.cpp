@@ -10,6 +10,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/taped_splats.h"
 
+namespace render_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -412,3 +414,5 @@ TEST_CASE("groups out of range are refused") {
   CHECK_THROWS_WITH(TapedSplats<float>(scene, cotangent_of(scene.camera), request),
                     Catch::Contains("group [3, 11) of 10 Gaussians"));
 }
+
+}  // namespace render_test

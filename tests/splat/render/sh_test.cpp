@@ -6,6 +6,8 @@
 #include "tests/support/operator_check.h"
 #include "tests/support/taped_splats.h"
 
+namespace sh_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -126,3 +128,5 @@ TEST_CASE("wrong numbers of coefficients are refused") {
   const auto xi = tape.parameter("xi", shape_of(1, 6));
   CHECK_THROWS_AS(sh_colors(sh, means, xi, some_view()), InternalError);
 }
+
+}  // namespace sh_test

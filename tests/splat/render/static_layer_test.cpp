@@ -13,6 +13,8 @@
 #include "tests/support/isa.h"
 #include "tests/support/larger.h"
 
+namespace static_layer_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -409,3 +411,5 @@ TEST_CASE("a steady iteration with static layers allocates nothing") {
     });
   }
 }
+
+}  // namespace static_layer_test

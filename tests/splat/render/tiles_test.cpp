@@ -13,6 +13,8 @@
 #include "splat/render/block_kernel.h"
 #include "tests/support/larger.h"
 
+namespace tiles_test {
+
 using namespace hsi4d;
 using namespace hsi4d::detail;
 
@@ -359,3 +361,5 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
   const Index pair_bytes = lists.capacity_bytes() - none.capacity_bytes() - std::ssize(extents) * 8;
   CHECK(pair_bytes < 10000);  // no memory is taken for them [B10]
 }
+
+}  // namespace tiles_test

@@ -12,6 +12,8 @@
 #include "tests/support/flat_splats.h"
 #include "tests/support/isa.h"
 
+namespace unculled_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -180,3 +182,5 @@ TEST_CASE("flushing denormals changes nothing above 1e-30 [F4]", "[isa]") {
   CHECK(largest_difference({kept.sums.begin(), kept.sums.end()}, {flushed.sums.begin(), flushed.sums.end()}) <= 1e-30);
   CHECK(std::any_of(flushed.sums.begin(), flushed.sums.end(), [](float x) { return x > 1; }));
 }
+
+}  // namespace unculled_test

@@ -4,6 +4,8 @@
 #include "autodiff/difference.h"
 #include "tests/support/flat_splats.h"
 
+namespace unread_tiles_test {
+
 using namespace hsi4d;
 using namespace hsi4d::test;
 
@@ -75,3 +77,5 @@ TEMPLATE_TEST_CASE("tiles that the loss has no weight for are not composited and
     }
   }
 }
+
+}  // namespace unread_tiles_test
