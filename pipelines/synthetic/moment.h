@@ -1,5 +1,5 @@
-// One moment of a synthetic motion, before inverse kinematics: what the motions of synthetic_keys.cpp and
-// synthetic_walk.cpp make.
+// One moment of a synthetic motion, before inverse kinematics: what the motions of keys.cpp and
+// walk.cpp make.
 #pragma once
 
 #include <array>

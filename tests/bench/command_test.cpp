@@ -10,14 +10,14 @@
 #include "core/file.h"
 #include "core/simd.h"
 #include "tests/bench/rows.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace command_test {
 
 using namespace hsi4d;
 
 TEST_CASE("bench rasterize measures every step and writes one object a measurement") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   cli::BenchOptions options;
   options.workloads = {"small"};
   options.repeats = 1;
@@ -75,7 +75,7 @@ TEST_CASE("bench tells which workloads there are") {
 }
 
 TEST_CASE("bench skinning measures a body and writes one object a measurement") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   cli::BenchOptions options;
   options.workloads = {"fixed_hands", "no_correctives"};
   options.repeats = 2;
@@ -118,7 +118,7 @@ TEST_CASE("bench skinning measures a body and writes one object a measurement") 
 }
 
 TEST_CASE("bench color_net measures forward and backward and writes one object a measurement") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   cli::BenchOptions options;
   options.workloads = {"narrow", "view_direction"};
   options.repeats = 2;
@@ -157,7 +157,7 @@ TEST_CASE("bench color_net measures forward and backward and writes one object a
 }
 
 TEST_CASE("bench tape measures nodes and lambda losses and writes one object a measurement") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   cli::BenchOptions options;
   options.repeats = 3;
   options.json = folder / "m.json";
@@ -208,7 +208,7 @@ TEST_CASE("bench tape measures nodes and lambda losses and writes one object a m
 }
 
 TEST_CASE("bench without a topic measures the kernels", "[full]") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   cli::BenchOptions options;
   options.repeats = 1;
   options.json = folder / "m.json";
@@ -224,7 +224,7 @@ TEST_CASE("bench without a topic measures the kernels", "[full]") {
 }
 
 TEST_CASE("bench pixel_filter judges every filter at a height and writes one object a measurement", "[full]") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   cli::BenchOptions options;
   options.workloads = {"avatar_5000"};
   options.heights_px = {16};

@@ -10,7 +10,7 @@
 #include "body/procedural_body.h"
 #include "core/npz.h"
 #include "core/quaternion.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace avatar_test {
 
@@ -276,7 +276,7 @@ TEST_CASE("selected Gaussians of an avatar keep what is theirs") {
 }
 
 TEST_CASE("avatar files round-trip") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string path = folder / "a.safetensors";
   write_avatar(path, small_avatar());
   CHECK(equal(read_avatar(path), small_avatar()));
@@ -302,7 +302,7 @@ TEST_CASE("an avatar's file may hold more than the avatar") {
 }
 
 TEST_CASE("avatar files of version 1 are read, whatever their name") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   CHECK(equal(decode_avatar(first_file().encode(), "a.npz"), small_avatar()));
   first_file().write(folder / "a.safetensors");
   CHECK(equal(read_avatar(folder / "a.safetensors"), small_avatar()));

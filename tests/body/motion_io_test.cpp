@@ -11,7 +11,7 @@
 #include "body/pose_layout.h"
 #include "core/npz.h"
 #include "core/random.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/zip_archive.h"
 
 namespace motion_io_test {
@@ -64,7 +64,7 @@ double angle(const Motion& motion, std::size_t frame, const char* joint, int i) 
 }  // namespace
 
 TEST_CASE("motion files round-trip bit for bit") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const Motion motion = random_motion(7, 70);
   write_motion(folder / "m.npz", motion);
   const Motion read = read_motion(folder / "m.npz");
@@ -77,7 +77,7 @@ TEST_CASE("motion files round-trip bit for bit") {
 }
 
 TEST_CASE("motion files have the arrays that AMASS has") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const Motion motion = random_motion(3, 71);
   write_motion(folder / "m.npz", motion);
   const Npz file = Npz::read(folder / "m.npz");
@@ -145,7 +145,7 @@ TEST_CASE("poses in parts are read, missing parts are zero") {
 }
 
 TEST_CASE("shape and gender go along") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   Motion motion = random_motion(2, 72);
   motion.betas = Numbers(16, 0.5);
   motion.gender = "female";
@@ -210,7 +210,7 @@ TEST_CASE("faults of motion files are named") {
   CHECK(message_for([&](NpzWriter& f) { trans(f), f.add_scalar("mocap_frame_rate", 0.0); }) ==
         "m.npz: array 'mocap_frame_rate': is 0 frames a second; allowed: 0.01 to 100000");
   CHECK_THROWS_AS(read_motion("no_such_motion.npz"), UserError);
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{10, {rest_pose(22)}}), InternalError);
   CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{10, {}}), InternalError);
   CHECK_THROWS_AS(write_motion(folder / "m.npz", Motion{0, {rest_pose(55)}}), InternalError);
@@ -358,7 +358,7 @@ TEST_CASE("a motion says of what model it is, and where its pelvis stands") {
           f.add<double>("pelvis_rest", {2}, {1, 2});
         })) == "m.npz: array 'pelvis_rest': has shape [2]; [3] is needed");
 
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   Motion motion = random_motion(2, 73);
   motion.pelvis_rest = {0.1, -0.35, 1e-3};
   write_motion(folder / "m.npz", motion);

@@ -14,9 +14,7 @@
 #include "core/parallel.h"
 #include "core/simd.h"
 
-namespace arithmetic_test {
-
-namespace hsi4d {
+namespace hsi4d::arithmetic_test {
 namespace {
 
 /// A value that the compiler knows nothing of.
@@ -186,6 +184,4 @@ TEST_CASE("zeros keep their sign, quotients are divisions, and nothing is comput
   CHECK(std::fegetround() == FE_TONEAREST);
 }
 
-}  // namespace hsi4d
-
-}  // namespace arithmetic_test
+}  // namespace hsi4d::arithmetic_test

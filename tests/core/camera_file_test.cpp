@@ -8,7 +8,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/rotation.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace camera_file_test {
 
@@ -79,7 +79,7 @@ TEST_CASE("a camera is read as given") {
 }
 
 TEST_CASE("cameras are written and read back bitwise") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   Camera other = odd_camera();
   other.camera_from_world.translation = {1e-17, -1.0 / 7, 123456.789};
   other.width = 1;

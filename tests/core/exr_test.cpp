@@ -17,7 +17,7 @@
 
 #include "core/check.h"
 #include "core/image_io.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace exr_test {
 
@@ -93,7 +93,7 @@ TEST_CASE("half layers are rounded, depth is not") {
 }
 
 TEST_CASE("layers are written to and read from a path") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const Layers layers = view_layers(6, 9);
   write_layers(folder / "v.exr", layers);
   CHECK(read_layers(folder / "v.exr").select(layers.names) == layers.planes);
@@ -116,7 +116,7 @@ TEST_CASE("layers that do not fit are a bug of the caller") {
 }
 
 TEST_CASE("the planes cover the display window, wherever the data window lies") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string path = folder / "window.exr";
   const Box2i display(V2i(10, 20), V2i(17, 25));
   const auto check = [&](const Box2i& window) {
@@ -142,7 +142,7 @@ TEST_CASE("the planes cover the display window, wherever the data window lies") 
 }
 
 TEST_CASE("tiled files give their full-size level") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const Box2i window(V2i(0, 0), V2i(44, 36));
   std::vector<float> values = ramp(window);
   Imf::Header header(window, window);
@@ -159,7 +159,7 @@ TEST_CASE("tiled files give their full-size level") {
 }
 
 TEST_CASE("subsampled, deep and multi-part files are refused by what they are") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const Box2i window(V2i(0, 0), V2i(7, 7));
   std::vector<float> values = ramp(window);
   {

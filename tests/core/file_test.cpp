@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace file_test {
 
@@ -26,7 +26,7 @@ std::string message_of(auto&& action) {
 }  // namespace
 
 TEST_CASE("what is written is what is read, byte for byte") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   for (const size_t size : {0u, 1u, 65536u, 200001u}) {
     Bytes content(size);
     for (size_t i = 0; i < size; ++i) content[i] = static_cast<uint8_t>(i * 131 + i / 251);
@@ -45,7 +45,7 @@ TEST_CASE("a file without a size is read to its end") {
 }
 
 TEST_CASE("reading names the path and the reason") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string absent = folder / "absent";
   CHECK(message_of([&] { read_file(absent); }) == absent + ": cannot be read: No such file or directory");
   CHECK(message_of([&] { read_text_file(folder.path()); }) == folder.path() + ": cannot be read: it is a folder");
@@ -58,7 +58,7 @@ TEST_CASE("reading names the path and the reason") {
 }
 
 TEST_CASE("an atomic file appears at commit and leaves nothing behind otherwise") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string path = folder / "result";
   write_text_file(path, "old");
   {
@@ -85,7 +85,7 @@ TEST_CASE("an atomic file appears at commit and leaves nothing behind otherwise"
 }
 
 TEST_CASE("writing follows a link and refuses what is no file") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   write_text_file(folder / "target", "old");
   std::filesystem::create_symlink(folder / "target", folder / "link");
   write_text_file(folder / "link", "new");
@@ -102,7 +102,7 @@ TEST_CASE("writing follows a link and refuses what is no file") {
 }
 
 TEST_CASE("folders on the way to a file are made") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   write_text_file(folder / "a/b/text", "text");
   CHECK(read_text_file(folder / "a/b/text") == "text");
   const std::string denied = "/proc/nowhere/text";
@@ -111,7 +111,7 @@ TEST_CASE("folders on the way to a file are made") {
 }
 
 TEST_CASE("new files get the usual permissions") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   write_text_file(folder / "ours", "");
   std::ofstream(folder / "theirs").put('x');
   CHECK(std::filesystem::status(folder / "ours").permissions() ==

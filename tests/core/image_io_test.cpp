@@ -12,7 +12,7 @@
 #include "core/check.h"
 #include "tests/crc32.h"
 #include "tests/support/larger.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace image_io_test {
 
@@ -127,7 +127,7 @@ TEST_CASE("OpenEXR images keep every float, half is rounded") {
 }
 
 TEST_CASE("image files are written and read back by path") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const Image image = steps(3, 9, 14, 255);
   for (const char* name : {"a.png", "\xc3\xa4.exr"}) {
     write_image(folder / name, image);
@@ -157,7 +157,7 @@ TEST_CASE("images that cannot be written say why") {
 }
 
 TEST_CASE("files that are no image, are missing or damaged say why") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   CHECK_THROWS_AS(read_image(folder / "absent.png"), UserError);
   CHECK_THROWS_WITH(read_image(folder / "absent.png"), Contains("absent.png: cannot be read: No such file"));
   write_text_file(folder / "text.png", "not an image at all");
@@ -190,7 +190,7 @@ TEST_CASE("a damaged PNG is noticed") {
 }
 
 TEST_CASE("damaged images leave nothing on the standard error stream") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string written = folder / "stderr.txt";
   const int before = ::dup(2);
   REQUIRE(std::freopen(written.c_str(), "w", stderr) != nullptr);

@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace npy_test {
 
@@ -209,7 +209,7 @@ TEST_CASE("what is not read is named, not unpickled") {
   CHECK(reason_of("{'descr': [('x', '<f4'), ('y', '<f4', (2, 3))], 'fortran_order': False, 'shape': (3,), }") ==
         "has dtype 'structured', which is not read");
 
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   write_file(folder / "o.npy", npy("{'descr': '|O', 'fortran_order': False, 'shape': (), }", ""));
   CHECK_THROWS_WITH(read_npy(folder / "o.npy"),
                     folder / "o.npy" + ": holds Python objects (dtype '|O'), which are not unpickled");

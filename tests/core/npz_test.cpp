@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/zip_archive.h"
 
 namespace npz_test {
@@ -89,7 +89,7 @@ TEST_CASE("asking for an absent array or a wrong shape names file and array") {
 }
 
 TEST_CASE("equal arrays give equal files, in memory and on disk") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   for (const NpzPacking packing : {NpzPacking::stored, NpzPacking::deflated}) {
     example().write(folder / "a.npz", packing);
     CHECK(read_file(folder / "a.npz") == example().encode(packing));
@@ -189,7 +189,7 @@ TEST_CASE("more members than a plain archive can count", "[full]") {
   NpzWriter writer;
   const int count = 66000;
   for (int i = 0; i < count; ++i) writer.add_scalar(member_name(i), i);
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   writer.write(folder / "many.npz");
   const Npz npz = Npz::read(folder / "many.npz");
   REQUIRE(npz.names().size() == count);
@@ -198,7 +198,7 @@ TEST_CASE("more members than a plain archive can count", "[full]") {
 
 TEST_CASE("more bytes than a plain archive can count", "[full]") {
   const int64_t count = (int64_t{1} << 32) + 5;
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   {
     NpzWriter writer;
     std::vector<uint8_t> values(static_cast<size_t>(count));

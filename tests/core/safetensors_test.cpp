@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace safetensors_test {
 
@@ -184,7 +184,7 @@ TEST_CASE("what safetensors cannot hold is refused") {
 }
 
 TEST_CASE("safetensors files are written in one step and known by their first bytes") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string path = folder / "a.safetensors";
   example().write(path);
   CHECK(folder.count() == 1);

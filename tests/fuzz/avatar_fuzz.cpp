@@ -3,7 +3,7 @@
 #include "core/npz.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::avatar_fuzz {
 
 namespace {
 
@@ -56,4 +56,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { check_sizes(decode_avatar(archive_of(file), "fuzz")); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("avatar", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::avatar_fuzz

@@ -5,7 +5,7 @@
 #include "core/camera_file.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::camera_fuzz {
 namespace {
 
 Bytes bytes_of(std::string_view text) { return Bytes(text.begin(), text.end()); }
@@ -31,4 +31,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("camera", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::camera_fuzz

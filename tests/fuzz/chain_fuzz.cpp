@@ -7,7 +7,7 @@
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::chain_fuzz {
 
 namespace {
 
@@ -62,4 +62,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_chain && is_reported && is_clip;
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("chain", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::chain_fuzz

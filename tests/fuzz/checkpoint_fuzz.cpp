@@ -3,7 +3,7 @@
 #include "optim/checkpoint.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::checkpoint_fuzz {
 
 namespace {
 const std::string kHash = text_hash("{}");
@@ -28,4 +28,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("checkpoint", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::checkpoint_fuzz

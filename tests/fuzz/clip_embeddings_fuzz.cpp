@@ -6,7 +6,7 @@
 #include "pipelines/metrics/clip_embeddings.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::clip_embeddings_fuzz {
 
 namespace {
 
@@ -31,4 +31,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("clip_embeddings", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::clip_embeddings_fuzz

@@ -2,7 +2,7 @@
 #include "body/color_net.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::color_net_fuzz {
 
 namespace {
 
@@ -26,4 +26,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { check_sizes(read_color_net(scratch() / "net.safetensors", 1, 2)); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("color_net", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::color_net_fuzz

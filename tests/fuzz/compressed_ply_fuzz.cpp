@@ -6,7 +6,7 @@
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/splat_scene.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::compressed_ply_fuzz {
 namespace {
 
 constexpr std::string_view kAscii = R"(ply
@@ -46,4 +46,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { check_scene(decode_ply(file, "fuzz.ply")); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("compressed_ply", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::compressed_ply_fuzz

@@ -11,7 +11,7 @@
 #include "pipelines/config/run_problems.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::config_fuzz {
 namespace {
 
 std::string resolved(const std::string& text, const std::vector<std::string>& overrides) {
@@ -55,4 +55,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("config", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::config_fuzz

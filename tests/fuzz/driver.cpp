@@ -1,7 +1,7 @@
-// Runs a fuzz target as an ordinary test: NAME [MUTATIONS [SEED [trace]]].
-// The files of regressions/NAME, which once were findings; every corpus file as it is, cut at every length and with
+// Runs a layer's fuzz targets as ordinary tests: READER [MUTATIONS [SEED [trace]]].
+// The files of regressions/READER, which once were findings; every corpus file as it is, cut at every length and with
 // every byte flipped (of large ones at 400 places); then random mutations. "trace" prints each step before it is
-// run, to find one that crashes. NAME try FILE... runs files of yours.
+// run, to find one that crashes. READER try FILE... runs files of yours.
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -48,7 +48,7 @@ struct Tally {
 
 class Driver {
  public:
-  explicit Driver(bool trace) : trace_(trace) {}
+  Driver(const Target& target, bool trace) : target_(target), trace_(trace) {}
 
   bool run(const Bytes& file) {
     if (trace_) {
@@ -57,7 +57,7 @@ class Driver {
     }
     try {
       forget_allocations();
-      const bool taken = accepts(file);
+      const bool taken = target_.accepts(file);
       if (largest_allocation() > kLargestAllocation)
         found(file, "takes " + std::to_string(largest_allocation()) + " bytes at once");
       ++(taken ? tally_.taken : tally_.refused);
@@ -76,6 +76,7 @@ class Driver {
     std::exit(1);
   }
 
+  const Target& target_;
   bool trace_;
   Tally tally_;
 };
@@ -133,11 +134,10 @@ void mutate_once(Bytes& file, const std::vector<Bytes>& files, Random& random) {
   }
 }
 
-/// @param reader  whose regressions are run
-int run_all(const std::string& reader, int64_t mutations, uint64_t seed, bool trace) {
-  const std::vector<Bytes> files = corpus();
-  Driver driver(trace);
-  run_regressions(driver, std::filesystem::path(HSI4D_FUZZ_REGRESSIONS) / reader);
+int run_all(const Target& target, int64_t mutations, uint64_t seed, bool trace) {
+  const std::vector<Bytes> files = target.corpus();
+  Driver driver(target, trace);
+  run_regressions(driver, std::filesystem::path(HSI4D_FUZZ_REGRESSIONS) / target.name);
   for (size_t i = 0; i < files.size(); ++i) {
     if (driver.run(files[i])) continue;
     std::printf("corpus file %zu is refused\n", i);
@@ -164,8 +164,8 @@ int run_all(const std::string& reader, int64_t mutations, uint64_t seed, bool tr
   return 0;
 }
 
-int run_files(int count, char** paths) {
-  Driver driver(false);
+int run_files(const Target& target, int count, char** paths) {
+  Driver driver(target, false);
   for (int i = 0; i < count; ++i)
     std::printf("%s: %s\n", paths[i], driver.run(read_file(paths[i])) ? "taken" : "refused");
   return 0;
@@ -184,14 +184,25 @@ T number_or(int argc, char** argv, int i, T otherwise) {
   return value;
 }
 
+/// The target of this name; the names of all are told where there is none.
+const Target& target_named(std::string_view name) {
+  for (const Target* target : targets()) {
+    if (target->name == name) return *target;
+  }
+  std::printf("usage: READER [MUTATIONS [SEED [trace]]], or READER try FILE...; readers:");
+  for (const Target* target : targets()) std::printf(" %s", target->name);
+  std::printf("\n");
+  std::exit(2);
+}
+
 }  // namespace
 }  // namespace hsi4d::fuzz
 
 int main(int argc, char** argv) {
-  if (argc > 2 && std::string_view(argv[1]) == "try") return hsi4d::fuzz::run_files(argc - 2, argv + 2);
-  const int64_t mutations = hsi4d::fuzz::number_or<int64_t>(argc, argv, 1, 2000);
-  const uint64_t seed = hsi4d::fuzz::number_or<uint64_t>(argc, argv, 2, 1);
-  const std::string program = std::filesystem::path(argv[0]).filename().string();  // hsi4d_fuzz_READER
-  const std::string reader = program.substr(std::string_view("hsi4d_fuzz_").size());
-  return hsi4d::fuzz::run_all(reader, mutations, seed, argc > 3 && std::string_view(argv[3]) == "trace");
+  using namespace hsi4d::fuzz;
+  const Target& target = target_named(argc > 1 ? argv[1] : "");
+  if (argc > 3 && std::string_view(argv[2]) == "try") return run_files(target, argc - 3, argv + 3);
+  const int64_t mutations = number_or<int64_t>(argc, argv, 2, 2000);
+  const uint64_t seed = number_or<uint64_t>(argc, argv, 3, 1);
+  return run_all(target, mutations, seed, argc > 4 && std::string_view(argv[4]) == "trace");
 }

@@ -4,7 +4,7 @@
 #include "core/image_io.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::exr_fuzz {
 
 std::vector<Bytes> corpus() {
   Layers layers{{"R", "G", "B", "Z", "mask.human.A"}, Image(5, 6, 9), ""};
@@ -24,4 +24,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { decode_layers(file, "fuzz", limits); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("exr", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::exr_fuzz

@@ -13,11 +13,18 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 namespace hsi4d::fuzz {
 
-/// Small valid files, from which mutations start.
-std::vector<Bytes> corpus();
+/// A reader that is tried. Each READER_fuzz.cpp defines one, which adds itself to the program's list.
+struct Target {
+  Target(const char* target_name, std::vector<Bytes> (*target_corpus)(), bool (*target_accepts)(std::span<const uint8_t>));
 
-/// Whether the reader takes these bytes. Any exception but UserError and DataError leaves it, and is a finding.
-bool accepts(std::span<const uint8_t> file);
+  const char* name;
+  std::vector<Bytes> (*corpus)();                   ///< small valid files, from which mutations start
+  bool (*accepts)(std::span<const uint8_t> file);  ///< whether the reader takes these bytes; any exception but
+                                                   ///< UserError and DataError leaves it, and is a finding
+};
+
+/// The program's targets: a layer's, or libFuzzer's one.
+std::vector<const Target*>& targets();
 
 /// Whether `read` ends without one of the errors that a file may cause.
 template <class Read>

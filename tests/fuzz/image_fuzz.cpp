@@ -3,7 +3,7 @@
 #include "tests/crc32.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::image_fuzz {
 namespace {
 
 Image gradient(int channels, int height, int width) {
@@ -55,4 +55,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { decode_image(file, "fuzz", limits); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("image", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::image_fuzz

@@ -6,7 +6,7 @@
 #include "optim/solid/mesh_distance.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::mesh_fuzz {
 namespace {
 
 Bytes bytes_of(std::string_view text) { return Bytes(text.begin(), text.end()); }
@@ -88,4 +88,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_accepted;
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("mesh", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::mesh_fuzz

@@ -7,7 +7,7 @@
 #include "core/npz.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::motion_fuzz {
 
 namespace {
 
@@ -64,4 +64,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("motion", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::motion_fuzz

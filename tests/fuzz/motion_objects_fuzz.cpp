@@ -4,7 +4,7 @@
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::motion_objects_fuzz {
 
 namespace {
 
@@ -59,4 +59,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("motion_objects", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::motion_objects_fuzz

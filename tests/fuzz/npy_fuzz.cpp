@@ -4,7 +4,7 @@
 #include "core/npy.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::npy_fuzz {
 namespace {
 
 Bytes with_header(const std::string& dict, const std::string& data) {
@@ -47,4 +47,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("npy", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::npy_fuzz

@@ -3,7 +3,7 @@
 #include "core/npz.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::npz_fuzz {
 
 std::vector<Bytes> corpus() {
   NpzWriter small;
@@ -24,4 +24,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("npz", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::npz_fuzz

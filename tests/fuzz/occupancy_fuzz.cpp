@@ -6,7 +6,7 @@
 #include "optim/solid/occupancy_grid.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::occupancy_fuzz {
 
 namespace {
 
@@ -34,4 +34,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("occupancy", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::occupancy_fuzz

@@ -2,7 +2,7 @@
 #include "core/image_io.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::other_image_fuzz {
 
 namespace {
 
@@ -50,4 +50,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { read_image(scratch() / "image"); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("other_image", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::other_image_fuzz

@@ -6,7 +6,7 @@
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/splat_scene.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::ply_fuzz {
 namespace {
 
 Bytes bytes_of(std::string_view text) { return Bytes(text.begin(), text.end()); }
@@ -50,4 +50,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { check_scene(decode_ply(file, "fuzz.ply")); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("ply", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::ply_fuzz

@@ -4,7 +4,7 @@
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::pose_folder_fuzz {
 
 namespace {
 
@@ -34,4 +34,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("pose_folder", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::pose_folder_fuzz

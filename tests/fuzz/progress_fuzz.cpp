@@ -5,7 +5,7 @@
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::progress_fuzz {
 
 namespace {
 
@@ -62,4 +62,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("progress", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::progress_fuzz

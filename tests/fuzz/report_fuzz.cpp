@@ -6,7 +6,7 @@
 #include "pipelines/report/page.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::report_fuzz {
 
 namespace {
 
@@ -77,4 +77,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("report", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::report_fuzz

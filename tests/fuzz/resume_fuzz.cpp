@@ -2,7 +2,7 @@
 #include "pipelines/record/folder.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::resume_fuzz {
 
 namespace {
 
@@ -33,4 +33,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_taken;
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("resume", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::resume_fuzz

@@ -1,7 +1,7 @@
 #include "core/safetensors.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::safetensors_fuzz {
 
 std::vector<Bytes> corpus() {
   SafetensorsWriter mixed("hsi4d example", 1);
@@ -24,4 +24,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("safetensors", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::safetensors_fuzz

@@ -9,7 +9,7 @@
 #include "tests/fuzz/scratch.h"
 #include "tests/fuzz/splat_scene.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::scene_setup_fuzz {
 
 namespace {
 
@@ -76,4 +76,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { is_initial ? read_setup() : read_views(); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("scene_setup", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::scene_setup_fuzz

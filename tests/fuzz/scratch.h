@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tests/fuzz/fuzz.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace hsi4d::fuzz {
 
@@ -60,7 +60,7 @@ class Scratch {
   }
 
   std::vector<ScratchFile> files_;
-  TemporaryFolder folder_;
+  ScratchFolder folder_;
   std::size_t tried_ = 0;
 };
 

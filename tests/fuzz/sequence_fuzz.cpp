@@ -3,7 +3,7 @@
 #include "core/npz.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::sequence_fuzz {
 
 namespace {
 
@@ -38,4 +38,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("sequence", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::sequence_fuzz

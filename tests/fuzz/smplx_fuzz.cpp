@@ -3,7 +3,7 @@
 #include "core/npy.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::smplx_fuzz {
 
 namespace {
 
@@ -54,4 +54,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("smplx", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::smplx_fuzz

@@ -4,7 +4,7 @@
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/splat_scene.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::splat_fuzz {
 
 std::vector<Bytes> corpus() {
   const EncodedSplats two = encode_splat(two_gaussians(0));
@@ -24,4 +24,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { check_scene(decode_splats(file, "fuzz.bin")); }) || is_splat;
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("splat", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::splat_fuzz

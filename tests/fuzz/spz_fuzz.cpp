@@ -5,7 +5,7 @@
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/splat_scene.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::spz_fuzz {
 namespace {
 
 Bytes unpacked(const Bytes& gzip) {
@@ -45,4 +45,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { check_scene(decode_spz(content, "fuzz.spz")); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("spz", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::spz_fuzz

@@ -5,7 +5,7 @@
 #include "pipelines/study/results.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::study_fuzz {
 
 namespace {
 
@@ -99,4 +99,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("study", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::study_fuzz

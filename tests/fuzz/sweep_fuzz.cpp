@@ -4,7 +4,7 @@
 #include "pipelines/sweep/file.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::sweep_fuzz {
 
 namespace {
 
@@ -60,4 +60,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("sweep", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::sweep_fuzz

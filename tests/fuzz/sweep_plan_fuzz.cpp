@@ -3,7 +3,7 @@
 #include "pipelines/sweep/plan.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::sweep_plan_fuzz {
 
 namespace {
 
@@ -39,4 +39,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("sweep_plan", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::sweep_plan_fuzz

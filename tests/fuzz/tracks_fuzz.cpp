@@ -5,7 +5,7 @@
 #include "tests/fuzz/archive_list.h"
 #include "tests/fuzz/scratch.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::tracks_fuzz {
 
 namespace {
 
@@ -56,4 +56,6 @@ bool accepts(std::span<const uint8_t> file) {
   });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("tracks", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::tracks_fuzz

@@ -3,7 +3,7 @@
 #include "core/npz.h"
 #include "tests/fuzz/archive_list.h"
 
-namespace hsi4d::fuzz {
+namespace hsi4d::fuzz::vposer_fuzz {
 
 namespace {
 
@@ -37,4 +37,6 @@ bool accepts(std::span<const uint8_t> file) {
   return is_read([&] { decode_vposer(archive_of(file), "fuzz.npz"); });
 }
 
-}  // namespace hsi4d::fuzz
+const Target target("vposer", corpus, accepts);
+
+}  // namespace hsi4d::fuzz::vposer_fuzz

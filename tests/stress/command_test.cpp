@@ -8,7 +8,7 @@
 
 #include "core/check.h"
 #include "core/file.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace command_test {
 
@@ -41,7 +41,7 @@ TEST_CASE(
                                return Figures{{"a", r == Remedy::kOn ? kNone : 3, 2}};
                              }};
   const StressCase exempt{"X6", "exempt", "nothing", nullptr, "cannot be"};
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const auto outcome_of = [&](const std::vector<StressCase>& cases) {
     return run_cases(cases, {.rows = {}, .threads = 1, .json = folder / "rows.jsonl"});
   };
@@ -59,7 +59,7 @@ TEST_CASE(
 }
 
 TEST_CASE("stress --functions tells a line for each function, range and instruction set, and writes them as JSON") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   StressOptions options{.rows = {}, .threads = {}, .json = folder / "functions.jsonl"};
   options.functions = true;
   options.points = 1000;

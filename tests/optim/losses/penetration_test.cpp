@@ -11,7 +11,7 @@
 #include "optim/loss_term.h"
 #include "tests/optim/solid/meshes.h"
 #include "tests/optim/solid/surface_of_test.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace penetration_test {
 
@@ -122,7 +122,7 @@ TEST_CASE("penetration keeps a margin, and counts no more points than are asked 
 }
 
 TEST_CASE("penetration by a mesh, which may be of any size and far from the scene") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string path = std::string(folder.path()) + "/" + "box.ply";
   write_mesh(path, box_mesh({-2, -2, -0.5}, {2, 2, 0.25}));
   const std::any solid = prepared(R"({"mesh": ")" + path + R"("})");
@@ -134,7 +134,7 @@ TEST_CASE("penetration by a mesh, which may be of any size and far from the scen
 }
 
 TEST_CASE("penetration reads its mesh when it is prepared, and says what is wrong with it") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string path = std::string(folder.path()) + "/" + "empty.obj";
   write_text_file(path, "v 0 0 0\n");
   CHECK_THROWS_WITH(prepared(R"({"mesh": ")" + path + R"("})"), path + ": the mesh has no faces");

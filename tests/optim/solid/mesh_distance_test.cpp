@@ -9,7 +9,7 @@
 #include "core/log.h"
 #include "core/random.h"
 #include "tests/optim/solid/meshes.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace mesh_distance_test {
 
@@ -105,7 +105,7 @@ TEST_CASE("what is unknown behind an open mesh does not hide a solid") {
 }
 
 TEST_CASE("a mesh that is not closed, or turned inwards, is told in the log") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   std::vector<std::string> told;
   const LogSink sink = log_to([&](LogLevel, std::string_view text) { told.emplace_back(text); }, LogLevel::kWarning);
   const auto read = [&](const char* name, const TriangleMesh& mesh) {

@@ -9,7 +9,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "tests/optim/solid/meshes.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace mesh_file_test {
 
@@ -97,7 +97,7 @@ TEST_CASE("vertices at the same place become one, triangles without an area are 
 }
 
 TEST_CASE("a mesh that was written is read as it was") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::string path = std::string(folder.path()) + "/" + "box.ply";
   const TriangleMesh box = box_mesh({-0.1, 0.25, 1.0 / 3}, {1, 2, 3});
   write_mesh(path, box);

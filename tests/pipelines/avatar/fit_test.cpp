@@ -15,7 +15,7 @@
 #include "pipelines/input/body_files.h"
 #include "pipelines/synthetic/dataset.h"
 #include "pipelines/synthetic/views.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace fit_test {
 
@@ -59,7 +59,7 @@ SyntheticSettings few_views() {
 
 /// A set of views made once for all tests.
 const fs::path& made_views() {
-  static const TemporaryFolder folder;
+  static const ScratchFolder folder;
   static const fs::path file = [] {
     write_views(few_views(), video_render_settings(), fs::path(folder.path()) / "views");
     return fs::path(folder.path()) / "views" / "views.json";
@@ -91,13 +91,13 @@ TEST_CASE("an avatar is learnt from pictures, and shown from where nobody stood"
   CHECK(after.avatar.means == before.avatar.means);  // not among what moves
   CHECK(after.avatar.colors != before.avatar.colors);
   CHECK(after.avatar.color_net.has_value());
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   write_avatar(folder / "a.safetensors", after.avatar);
   CHECK(read_avatar(folder / "a.safetensors").colors == after.avatar.colors);
 }
 
 TEST_CASE("colours that are beyond what can be shown, or learnt, come back") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   AvatarFitSettings settings = quick_fit(made_views(), 25);
   settings.stage.optimize = {{"colors", {.lr = 0.05, .until = {}}}};
   Avatar start = first_avatar(settings);
@@ -122,7 +122,7 @@ TEST_CASE("colours that are beyond what can be shown, or learnt, come back") {
 }
 
 TEST_CASE("what a fit measures is what the file of its avatar shows") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   for (const ColorNetUse use : {ColorNetUse::kOn, ColorNetUse::kOff}) {
     AvatarFitSettings settings = quick_fit(made_views(), 8);
     settings.stage.optimize = {{"colors", {.lr = 0.3, .until = {}}}, {"color_net", {.lr = 0.01, .until = {}}}};
@@ -178,7 +178,7 @@ TEST_CASE("a picture's alpha is its mask, and views that make no sense are refus
   CHECK(red.color(0, 0, 0) == 1.0f);
   CHECK(red.color(2, 48, 48) == grey.color(2, 48, 48));
 
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   fs::copy(made_views().parent_path(), fs::path(folder.path()) / "views", fs::copy_options::recursive);
   const fs::path file = fs::path(folder.path()) / "views" / "views.json";
   const auto fault = [&](std::vector<PosedView> views) {
@@ -228,7 +228,7 @@ TEST_CASE("an avatar fit refuses what it cannot do, and stops when asked") {
 }
 
 TEST_CASE("the config of an avatar fit is checked") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const auto load = [&](const std::string& text) {
     write_text_file(folder / "fit.json", text);
     return load_avatar_fit(folder / "fit.json", {}, descriptions_of(loss_terms()));
@@ -249,7 +249,7 @@ TEST_CASE("the config of an avatar fit is checked") {
 }
 
 TEST_CASE("the shipped views are learnt by the shipped fit") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const fs::path configs = fs::path(HSI4D_SOURCE_DIR) / "configs" / "avatar";
   // As they are but for sizes and counts.
   RunConfig made = load_run_config(configs / "views.json", {}, descriptions_of(loss_terms()));
@@ -289,7 +289,7 @@ TEST_CASE("an avatar of a real body, learnt from the reference's pictures, is ri
     WARN("skipped: " << file << " is not there");
     return;
   }
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   AvatarFitSettings settings;
   settings.body.kind = BodyKind::kSmplx;
   settings.body.path = file;

@@ -526,10 +526,9 @@ TEST_CASE("the shipped example of real Gaussians runs with others in their place
   const TemporaryFolder here;
   fs::create_directories("tree/runs/robot");
   fs::copy(shipped_configs(), "tree/configs", fs::copy_options::recursive);
-  fs::create_directories("shared/data/bodies");
   fs::copy_file(fs::path(HSI4D_SOURCE_DIR) / "tests/assets/playbot_ground_crop.ply", "tree/runs/robot/ground.ply");
   fs::copy_file(TinyDataset::folder() / "objects" / (kTinyObject + ".ply"), "tree/runs/robot/robot.ply");
-  procedural_file().write("shared/data/bodies/makehuman_smplx_layout.npz");
+  procedural_file().write("tree/runs/robot/body.npz");
   RunConfig config =
       load_run_config("tree/configs/examples/robot.json", {"body.betas=0"}, descriptions_of(loss_terms()));
   CHECK(fs::exists(config.synthetic.scene_file));

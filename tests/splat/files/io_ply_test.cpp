@@ -11,7 +11,7 @@
 
 #include "core/check.h"
 #include "core/file.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace io_ply_test {
 
@@ -90,7 +90,7 @@ const std::string kRow = "1 2 3 -1 -2 -3 1 0 0 0 0.5 0.1 0.2 0.3\n";
 }  // namespace
 
 TEST_CASE("Gaussians are written to PLY and read back bitwise") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   for (int degree = 0; degree <= 3; ++degree) {
     Gaussians g = random_gaussians(17, degree);
     g.means[0] = -0.0F;

@@ -12,7 +12,7 @@
 #include "splat/files/io_splat.h"
 #include "tests/support/larger.h"
 #include "tests/support/splat_files.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace splat_file_test {
 
@@ -42,7 +42,7 @@ std::string fault(const Bytes& file, const std::string& name) {
 }  // namespace
 
 TEST_CASE("files of Gaussians are written by their ending and known by their content") {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   const Gaussians g = plain_gaussians(50, 1);
   const std::vector<std::pair<std::string, std::string>> kinds = {
       {"a.ply", "INRIA PLY"},      {"a.compressed.ply", "compressed PLY"}, {"a.splat", ".splat"},

@@ -8,20 +8,20 @@
 
 namespace hsi4d {
 
-class TemporaryFolder {
+class ScratchFolder {
  public:
-  TemporaryFolder() {
+  ScratchFolder() {
     static std::atomic<int> counter{0};
     path_ = std::filesystem::temp_directory_path() /
             ("hsi4d_test_" + std::to_string(::getpid()) + "_" + std::to_string(counter.fetch_add(1)));
     std::filesystem::create_directories(path_);
   }
-  ~TemporaryFolder() {
+  ~ScratchFolder() {
     std::error_code ignored;
     std::filesystem::remove_all(path_, ignored);
   }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
 
   std::string path() const { return path_.string(); }
   std::string operator/(const std::string& name) const { return (path_ / name).string(); }
