@@ -95,7 +95,7 @@ double bias_correction(double beta, Index steps);
 /// kLargestGradient) changes neither parameters nor moments; it is counted and halves the learning rate of all groups
 /// from then on (rows D4, F1). When the very next evaluation is bad too, the fault is in the parameters themselves: the
 /// last step is taken back, bitwise, to where all was finite. Denormal gradients count as zero, moments never become
-/// denormal (row F4).
+/// denormal (row F4: denormals).
 template <class S>
 class Adam {
  public:

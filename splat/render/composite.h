@@ -37,7 +37,7 @@ struct Composited {
 };
 
 /// Composites Gaussians into an image of view.camera's size. Not drawn are: rows whose factors are six zeros, depths ≤
-/// near, rows with a number that is not finite, and, with blur 0, Gaussians without area (rows A4-A6).
+/// near, rows with a number that is not finite, and, with blur 0, Gaussians without area (rows A4-A6: not drawable).
 ///
 /// @param background  none, or [1,B], 1 ≤ B ≤ C: what lies behind everything in the first channels
 /// @return            image-shaped arrays
