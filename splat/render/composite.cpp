@@ -78,7 +78,7 @@ struct Composite {
   Buffer<std::uint32_t> settled = {};  ///< of each tile: blocks whose outputs hold what stands still, and nothing else
   const S* written = nullptr;          ///< the output that `settled` tells of
   std::uint64_t written_over = 0;      ///< version of the background that it lies over
-  TileMask changed = {}, read = {};    ///< see NodeIo::tell_squares
+  TileMask changed = {}, read = {};    ///< see NodeIo::set_dirty_tiles
   double still_s = 0;                  ///< seconds of the state built for the next forward run
 
   TileGrid grid() const {
@@ -317,7 +317,7 @@ struct Composite {
       const std::int32_t index = planned.plans[tile].entries[static_cast<std::size_t>(end - 1)].index;
       tile_last[tile] = {rows_of(io).key(view.settings, index), index};
     });
-    tell_squares(io, tiles);
+    set_dirty_tiles(io, tiles);
     counters->times.forward_s = watch.lap();
     for (const TileCounts& counts : tile_counts.span()) {
       counters->fragments += std::max(counts.fragments, Index(0));
@@ -326,7 +326,7 @@ struct Composite {
   }
 
   /// Losses need to look again only where a tile was written, and to differentiate only where the backward run reads.
-  void tell_squares(const NodeIo<S>& io, const TileGrid& tiles) {
+  void set_dirty_tiles(const NodeIo<S>& io, const TileGrid& tiles) {
     const Index across = kMaskSquare / tiles.tile;  // tiles in a square
     changed.clear(tiles.height, tiles.width);
     read.clear(tiles.height, tiles.width);
@@ -339,7 +339,7 @@ struct Composite {
     if (!view.skip.unchanged_pixels) return;
     const int outputs = images_of(io).rest ? 3 : 2;
     for (int output = 0; output < outputs; ++output)
-      io.tell_squares(output, &changed, is_read_everywhere ? nullptr : &read);
+      io.set_dirty_tiles(output, &changed, is_read_everywhere ? nullptr : &read);
     counters->told_squares = changed.count();
   }
 
