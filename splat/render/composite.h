@@ -41,7 +41,7 @@ struct Composited {
 ///
 /// @param background  none, or [1,B], 1 ≤ B ≤ C: what lies behind everything in the first channels
 /// @return            image-shaped arrays
-/// Adjoint: projected.means_px and means_rest (of whose sum it is), projected.factors, opacities, features, background;
+/// Adjoint: projected.means_px and means_low (of whose sum it is), projected.factors, opacities, features, background;
 /// each computed only when wanted. None where o G > alpha_cap (unless cap_gradient is pass), none through the order,
 /// the choice of pixels and the stop. A Gaussian that is not drawn has gradient 0. Throws InternalError when the shapes
 /// do not fit; UserError when there are more than kMostPairs (tile, Gaussian) pairs, or when they would take more than
