@@ -16,9 +16,9 @@
 #include "splat/render/block_kernel.h"
 #include "splat/render/composite_io.h"
 #include "splat/render/composite_kernel.h"
-#include "splat/render/kept_tiles.h"
 #include "splat/render/pixel_step.h"
 #include "splat/render/slot_sums.h"
+#include "splat/render/tile_checkpoints.h"
 #include "splat/render/tile_image.h"
 #include "splat/render/tile_plans.h"
 
@@ -73,7 +73,7 @@ struct Composite {
   // What the backward pass needs of every tile.
   Buffer<DepthKeyed> tile_last = {};     ///< the last Gaussian composited in any pixel; index −1: none
   Buffer<DepthKeyed> adjoint_last = {};  ///< the same, of tiles with an adjoint; of the last backward run
-  detail::KeptTiles<S> kept = {};
+  detail::TileCheckpoints<S> kept = {};
   Buffer<TileCounts> tile_counts = {};
   Buffer<std::uint32_t> settled = {};  ///< of each tile: blocks whose outputs hold what stands still, and nothing else
   const S* written = nullptr;          ///< the output that `settled` tells of
