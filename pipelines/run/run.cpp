@@ -112,7 +112,7 @@ void check_run_clip(const RunConfig& config, const Clip& clip) {
 }
 
 RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& losses, const RunOptions& options) {
-  HSI4D_CHECK(asked.chain.empty(), "a chain is carried out by execute_chain");
+  HSI4D_CHECK(asked.chain.empty(), "a chain is executed by execute_chain");
   RunConfig config = asked;
   prepare_run(config);
   EarlyMessages early;
