@@ -43,7 +43,7 @@ using AdamState = std::map<std::string, GroupMoments, std::less<>>;
 
 /// A parameter group and how it moves.
 template <class S>
-struct AdamGroup {
+struct OptimizerGroup {
   ParameterGroup<S> parameters;
   ParameterGroupSettings settings;
 };
@@ -100,7 +100,7 @@ template <class S>
 class Adam {
  public:
   /// @param groups  leaves of `tape`, none of them twice. Throws InternalError otherwise.
-  Adam(Tape<S>& tape, std::vector<AdamGroup<S>> groups, const OptimizerSettings& settings);
+  Adam(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const OptimizerSettings& settings);
   Adam(const Adam&) = delete;
   Adam& operator=(const Adam&) = delete;
 
