@@ -9,7 +9,7 @@ namespace hsi4d {
 ///
 ///   M = Σ m(u),   x = Σ m(u) u_x / M,   y = Σ m(u) u_y / M,   u = (j + ½, i + ½) for row i, column j
 ///
-/// Summed in double (row E5 of the stability catalogue).
+/// Summed in double (row E5: long float sums).
 ///
 /// @param masks  [O,H,W] mass of each pixel, ≥ 0
 /// @return       [O,3] rows (x, y, M), pixels; x = y = 0 without gradient where M is 0

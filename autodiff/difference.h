@@ -9,7 +9,7 @@
 
 namespace hsi4d {
 
-/// Mean |a − b|. Gradient 0 where a = b (row E4). Adjoint: a, b, weight.
+/// Mean |a − b|. Gradient 0 where a = b (row E4: |x| at 0). Adjoint: a, b, weight.
 template <class S>
 Var<S> l1(Var<S> a, Var<S> b, Source where = Source::current());
 template <class S>

@@ -195,7 +195,7 @@ Dual<S, B> select(bool condition, std::type_identity_t<S> yes, const Dual<S, B>&
   return select(condition, Dual<S, 0>{yes, {}}, no);
 }
 
-/// |x|; its derivative at 0 is 0 (row E4 of the stability catalogue).
+/// |x|; its derivative at 0 is 0 (row E4: |x| at 0).
 template <std::floating_point T>
 T abs(T x) {
   return std::fabs(x);
@@ -247,7 +247,7 @@ T exp(T x) {
   return vector_exp(x);
 }
 
-/// √x; the derivative at 0 is 0, not ∞ (row D5).
+/// √x; the derivative at 0 is 0, not ∞ (row D5: distance 0).
 template <class S, unsigned A>
 Dual<S, A> sqrt(const Dual<S, A>& x) {
   const S root = std::sqrt(x.value);

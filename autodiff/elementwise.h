@@ -1,7 +1,7 @@
 // Elementwise arithmetic and functions of arrays, with broadcasting.
 //
 // Sizes of planes, rows and columns must be equal or 1. Either operand of + − * / may be a plain number. Derivatives
-// are written by hand, so that a factor 0 never meets an infinity (row C11 of the stability catalogue).
+// are written by hand, so that a factor 0 never meets an infinity (row C11: 0·∞).
 #pragma once
 
 #include <string_view>
@@ -59,7 +59,7 @@ template <class S> Var<S> log(Var<S> x, Source where = Source::current());
 template <class S> Var<S> sin(Var<S> x, Source where = Source::current());
 template <class S> Var<S> cos(Var<S> x, Source where = Source::current());
 template <class S> Var<S> tanh(Var<S> x, Source where = Source::current());
-/// 1/(1 + e⁻ˣ); the gradient is right far into saturation (row B15).
+/// 1/(1 + e⁻ˣ); the gradient is right far into saturation (row B15: saturated sigmoid).
 template <class S> Var<S> sigmoid(Var<S> x, Source where = Source::current());
 /// log(1 + eˣ).
 template <class S> Var<S> softplus(Var<S> x, Source where = Source::current());

@@ -47,7 +47,7 @@ enum class MlpOutput { kLinear, kSigmoid };
 /// @return        [N,C], C the outputs of the last layer
 /// Adjoint: rows, more, code, offset, all weights and biases; nothing is computed for those that are frozen, and
 /// nothing of the layers before the first that anything is wanted of. The sigmoid's is right far into saturation
-/// (row B15). Throws InternalError when the shapes do not fit.
+/// (row B15: saturated sigmoid). Throws InternalError when the shapes do not fit.
 template <class S>
 Var<S> mlp(const MlpInputs<S>& inputs, std::span<const MlpLayer<S>> layers, MlpOutput output,
            Source where = Source::current());

@@ -21,7 +21,7 @@ Var<S> sum_rows(Var<S> x, Source where = Source::current());
 template <class S>
 Var<S> sum_cols(Var<S> x, Source where = Source::current());
 
-/// Euclidean norm of each row, [N,C] → [N,1]. The gradient at a zero row is 0 (row D5). Adjoint: x.
+/// Euclidean norm of each row, [N,C] → [N,1]. The gradient at a zero row is 0 (row D5: distance 0). Adjoint: x.
 template <class S>
 Var<S> norm_cols(Var<S> x, Source where = Source::current());
 

@@ -8,7 +8,7 @@
 
 namespace hsi4d {
 
-/// R_j = exp(w_j), Rodrigues' formula with coefficients that are functions of |w|² (rows C1-C4).
+/// R_j = exp(w_j), Rodrigues' formula with coefficients that are functions of |w|² (rows C1-C4: small angles).
 ///
 /// @param axis_angle  [J,3] radians
 /// @return            [J,9] rotation matrices, row-major
@@ -27,7 +27,7 @@ Var<S> rotations_from_axis_angle(Var<S> axis_angle, Source where = Source::curre
 template <class S>
 Var<S> rotations_from_6d(Var<S> columns, Source where = Source::current());
 
-/// w_j = log R_j, |w_j| ≤ π, by the largest pivot's quaternion (row C5).
+/// w_j = log R_j, |w_j| ≤ π, by the largest pivot's quaternion (row C5: angle near π).
 ///
 /// @param rotations  [J,9] rotation matrices, row-major
 /// @return           [J,3] axis-angle, radians

@@ -40,7 +40,7 @@ struct Seam {
     const ConstArray<S> x = io.in(0);
     const Array<S> out = io.out();
     for_rows(x.shape, io.changed(0), [&](Index at, Index n) { std::copy_n(x.data + at, n, out.data + at); });
-    io.tell_squares(0, io.changed(0), io.read(0));
+    io.set_dirty_tiles(0, io.changed(0), io.read(0));
   }
 
   // d_x += d_out; or scale (d_out − kept) where it is known

@@ -113,7 +113,7 @@ class NodeIo {
   const TileMask* read(int i) const { return tape_->arrays_[input_ids_[i]].read; }
   /// In forward: output j is what it was before outside of these squares (kPersistentOutputs), and its adjoint is read
   /// in those. Null: everywhere. The masks have to live as long as the operator.
-  void tell_squares(int j, const TileMask* changed, const TileMask* read) const {
+  void set_dirty_tiles(int j, const TileMask* changed, const TileMask* read) const {
     auto& array = tape_->arrays_[first_output_ + static_cast<std::uint32_t>(j)];
     array.changed = changed;
     array.read = read;

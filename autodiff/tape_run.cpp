@@ -90,7 +90,7 @@ void Tape<S>::forward_node(NodeRecord& node) {
   const auto start = profiling_ ? Clock::now() : Clock::time_point{};
   io.ran_before_ = node.ran_at;
   node.ran_at = 0;  // stays so if the operator throws
-  for (std::uint32_t j = 0; j < node.output_count; ++j) io.tell_squares(static_cast<int>(j), nullptr, nullptr);
+  for (std::uint32_t j = 0; j < node.output_count; ++j) io.set_dirty_tiles(static_cast<int>(j), nullptr, nullptr);
   if (node.table->state_key != nullptr) {
     const std::uint64_t key = node.table->state_key(node.op, io);
     if (!node.state_valid || key != node.state_key) {

@@ -54,7 +54,7 @@ struct WeightedImage {
 #pragma GCC ivdep
       for (Index c = run.begin; c < run.end; ++c) to[c] = weight[c] == S(0) ? S(0) : from[c] * weight[c];
     });
-    io.tell_squares(0, changed, io.wants(kWeight) ? nullptr : io.read(kImage));
+    io.set_dirty_tiles(0, changed, io.wants(kWeight) ? nullptr : io.read(kImage));
   }
 
   // d_a = w d_out,  d_w = Σ a d_out over planes

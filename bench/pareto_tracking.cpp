@@ -122,7 +122,7 @@ void run_job(Job& job, const fs::path& dataset, const fs::path& folder, int seed
   RunOptions options;
   options.folder = folder.string();
   options.threads = 1;
-  const RunSummary summary = carry_out(config, losses, options);
+  const RunSummary summary = execute_run(config, losses, options);
   for (std::size_t m = 0; m < kTrackedErrors.size(); ++m)
     if (const double* value = find_metric(summary.metrics.back().values, kTrackedErrors[m].metric))
       job.values[m].push_back(*value);

@@ -31,7 +31,7 @@ Index tracking_run_count(const Tracking& tracking);
 
 /// Reconstructs on one thread.
 /// @param told  after every run; may be empty
-/// Throws as write_dataset and carry_out; UserError when the folder is there.
+/// Throws as write_dataset and execute_run; UserError when the folder is there.
 std::vector<TrackedPoint> measure_tracking(const Tracking& tracking, const std::vector<LossTerm>& losses,
                                            const std::function<void()>& told = {});
 

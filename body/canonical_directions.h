@@ -4,7 +4,7 @@
 //
 // L is the linear part of the point's blended transform, c the camera's centre. Where L is a rotation, v is the world's
 // direction turned back with the body; where blending has made it something else no inverse is needed, and v stays
-// finite also where L is singular (row D2).
+// finite also where L is singular (row D2: singular blend).
 #pragma once
 
 #include "autodiff/tape.h"

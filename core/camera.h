@@ -48,7 +48,7 @@ Matrix4<double> matrix_from_rigid(const Rigid<double>& transform);
 /// is orthonormal only to kRotationTolerance. Not finite where R has no inverse, which check_camera refuses.
 Vector3<double> camera_center_world(const Camera& camera);
 
-/// Pose that looks from `eye_world` to `target_world`, the image's top towards `up_world` (row C13).
+/// Pose that looks from `eye_world` to `target_world`, the image's top towards `up_world` (row C13: view along up).
 ///
 ///   z = (target − eye)/|…|,  x = z × up/|…|,  y = z × x,  R = [x y z]ᵀ,  t = −R eye
 ///

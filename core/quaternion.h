@@ -2,7 +2,7 @@
 //
 // A quaternion that is a parameter is "raw": any length, normalised by the function that reads it, so that its gradient
 // is orthogonal to it (row A13). A zero or non-finite one stands for the identity, has no gradient and is reported by
-// the `degenerate` flag, for the caller to count (row C8).
+// the `degenerate` flag, for the caller to count (row C8: zero quaternion).
 #pragma once
 
 #include "core/lanes.h"
@@ -152,7 +152,7 @@ Vector4<S> unit_quaternion_gradient(const Vector4<S>& q, const Matrix3<S>& d_r) 
 
 }  // namespace detail
 
-/// q / |q| for any length (row C8). Adjoint: quaternion_normalized_adjoint.
+/// q / |q| for any length (row C8: zero quaternion). Adjoint: quaternion_normalized_adjoint.
 ///
 /// @param q           raw quaternion
 /// @param degenerate  set to whether q is zero or non-finite; the result is then the identity
@@ -239,7 +239,7 @@ void quaternion_rotate_adjoint(const Vector4<S>& q, const Vector3<S>& point, con
 }
 
 /// Axis-angle of a raw quaternion, 2 atan2(|v|, w) v/|v| with w ≥ 0, so |result| ≤ π and log(q) = log(−q) bit for bit
-/// (row C7).
+/// (row C7: q and −q).
 ///
 /// @return  radians; zero for a degenerate quaternion
 /// Adjoint: quaternion_log_adjoint. The result jumps at half a turn; no gradient where quaternion_to_matrix has none.

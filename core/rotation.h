@@ -11,7 +11,7 @@
 //
 //   d_w = p a + q ((G + Gᵀ) w − 2 tr(G) w) + 2 (p' (a·w) + q' s) w,
 //
-// which at w = 0 is p a: the gradient at the identity is the generators, neither 0 nor NaN (rows C1, C2).
+// which at w = 0 is p a: the gradient at the identity is the generators, neither 0 nor NaN (rows C1, C2: angle 0).
 #pragma once
 
 #include <cmath>
@@ -31,7 +31,7 @@ struct HatPolynomial {
   W p, q, d_p, d_q;
 };
 
-/// p K + q K², entry by entry: nothing is subtracted from the diagonal (row D3).
+/// p K + q K², entry by entry: nothing is subtracted from the diagonal (row D3: R − I).
 template <class W>
 Matrix3<W> hat_polynomial(const Vector3<W>& w, const W& p, const W& q) {
   const Vector3<W> pw = w * p;
@@ -72,7 +72,7 @@ void inverse_jacobian_coefficient(const W& squared_angle, W& value, W& derivativ
 
 }  // namespace detail
 
-/// exp(w) − I = c1 K + c2 K², accurate to rounding of its own size for small w (row D3).
+/// exp(w) − I = c1 K + c2 K², accurate to rounding of its own size for small w (row D3: R − I).
 ///
 /// @param axis_angle  radians
 /// Adjoint: so3_exp_adjoint.
@@ -84,7 +84,7 @@ Matrix3<S> so3_exp_minus_identity(const Vector3<S>& axis_angle) {
   return detail::hat_polynomial(w, c.c1, c.c2).template cast<S>();
 }
 
-/// Rotation matrix of an axis-angle vector, exp(w) = I + c1 K + c2 K² (Rodrigues; rows C1-C4).
+/// Rotation matrix of an axis-angle vector, exp(w) = I + c1 K + c2 K² (Rodrigues; rows C1-C4: small angles).
 ///
 /// @param axis_angle  radians, any angle; smooth at 0. Non-finite numbers give a non-finite matrix.
 /// Adjoint: so3_exp_adjoint.
@@ -192,7 +192,7 @@ void so3_right_jacobian_inverse_adjoint(const Vector3<S>& axis_angle, const Matr
   so3_left_jacobian_inverse_adjoint(axis_angle, Matrix3<S>(d_inverse.transpose()), d_axis_angle);
 }
 
-/// Replaces an axis-angle vector by the one of the same rotation with |w| ≤ π, w (1 − 2πn/|w|) (row D9).
+/// The axis-angle vector of the same rotation with |w| ≤ π, w (1 − 2πn/|w|) (row D9: angles beyond π).
 ///
 /// @param axis_angle  radians, float or double; left alone if |w| ≤ π (to rounding, so that wrapping twice changes
 /// nothing) or

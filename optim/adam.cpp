@@ -108,10 +108,10 @@ double longest_adam_way(const ParameterGroupSettings& settings, Index iterations
 double bias_correction(double beta, Index steps) { return -std::expm1(static_cast<double>(steps) * std::log(beta)); }
 
 template <class S>
-Adam<S>::Adam(Tape<S>& tape, std::vector<AdamGroup<S>> groups, const OptimizerSettings& settings)
+Adam<S>::Adam(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const OptimizerSettings& settings)
     : tape_(tape), settings_(settings) {
   std::set<std::uint32_t> seen;
-  for (AdamGroup<S>& given : groups) {
+  for (OptimizerGroup<S>& given : groups) {
     Group group;
     group.name = std::move(given.parameters.name);
     group.settings = given.settings;

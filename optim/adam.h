@@ -43,7 +43,7 @@ using AdamState = std::map<std::string, GroupMoments, std::less<>>;
 
 /// A parameter group and how it moves.
 template <class S>
-struct AdamGroup {
+struct OptimizerGroup {
   ParameterGroup<S> parameters;
   ParameterGroupSettings settings;
 };
@@ -95,12 +95,12 @@ double bias_correction(double beta, Index steps);
 /// kLargestGradient) changes neither parameters nor moments; it is counted and halves the learning rate of all groups
 /// from then on (rows D4, F1). When the very next evaluation is bad too, the fault is in the parameters themselves: the
 /// last step is taken back, bitwise, to where all was finite. Denormal gradients count as zero, moments never become
-/// denormal (row F4).
+/// denormal (row F4: denormals).
 template <class S>
 class Adam {
  public:
   /// @param groups  leaves of `tape`, none of them twice. Throws InternalError otherwise.
-  Adam(Tape<S>& tape, std::vector<AdamGroup<S>> groups, const OptimizerSettings& settings);
+  Adam(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const OptimizerSettings& settings);
   Adam(const Adam&) = delete;
   Adam& operator=(const Adam&) = delete;
 

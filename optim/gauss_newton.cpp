@@ -52,7 +52,7 @@ double longest_gauss_newton_way(const ParameterGroupSettings& settings, Index it
 }
 
 template <class S>
-GaussNewton<S>::GaussNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups, Index products, SeamMode& seams)
+GaussNewton<S>::GaussNewton(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, Index products, SeamMode& seams)
     : numbers_(tape, std::move(groups), "gauss_newton"), seams_(seams), probe_(kProbe) {
   HSI4D_CHECK(products > 0, "no products");
   const Index n = numbers_.count();

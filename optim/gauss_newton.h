@@ -42,7 +42,7 @@ class GaussNewton {
   /// @param products  at most so many in a step
   /// @param seams     the mode of the seams through which alone the loss depends on the groups. It is changed to what
   ///                  the next evaluation has to tell.
-  GaussNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups, Index products, SeamMode& seams);
+  GaussNewton(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, Index products, SeamMode& seams);
   GaussNewton(const GaussNewton&) = delete;
   GaussNewton& operator=(const GaussNewton&) = delete;
   ~GaussNewton() { seams_ = {}; }

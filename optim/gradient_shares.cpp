@@ -53,9 +53,9 @@ void add_shares(std::span<const WeightedTerm<S>> terms, const std::string& group
 
 template <class S>
 std::vector<GradientShare> gradient_shares(Tape<S>& tape, std::span<const WeightedTerm<S>> terms,
-                                           std::span<const AdamGroup<S>> groups, Index iteration) {
+                                           std::span<const OptimizerGroup<S>> groups, Index iteration) {
   std::vector<const ParameterGroup<S>*> moving;
-  for (const AdamGroup<S>& group : groups) {
+  for (const OptimizerGroup<S>& group : groups) {
     if (!group.parameters.blocks.empty() && moves_in(group.settings, iteration)) moving.push_back(&group.parameters);
   }
   std::vector<std::vector<std::vector<double>>> gradients(moving.size());  // by group and term
@@ -74,8 +74,8 @@ std::vector<GradientShare> gradient_shares(Tape<S>& tape, std::span<const Weight
 }
 
 template std::vector<GradientShare> gradient_shares(Tape<float>&, std::span<const WeightedTerm<float>>,
-                                                    std::span<const AdamGroup<float>>, Index);
+                                                    std::span<const OptimizerGroup<float>>, Index);
 template std::vector<GradientShare> gradient_shares(Tape<double>&, std::span<const WeightedTerm<double>>,
-                                                    std::span<const AdamGroup<double>>, Index);
+                                                    std::span<const OptimizerGroup<double>>, Index);
 
 }  // namespace hsi4d

@@ -37,11 +37,11 @@ struct WeightedTerm {
 /// @return           groups in their order, of each the terms in theirs; empty when a number is not finite
 template <class S>
 std::vector<GradientShare> gradient_shares(Tape<S>& tape, std::span<const WeightedTerm<S>> terms,
-                                           std::span<const AdamGroup<S>> groups, Index iteration);
+                                           std::span<const OptimizerGroup<S>> groups, Index iteration);
 
 extern template std::vector<GradientShare> gradient_shares(Tape<float>&, std::span<const WeightedTerm<float>>,
-                                                           std::span<const AdamGroup<float>>, Index);
+                                                           std::span<const OptimizerGroup<float>>, Index);
 extern template std::vector<GradientShare> gradient_shares(Tape<double>&, std::span<const WeightedTerm<double>>,
-                                                           std::span<const AdamGroup<double>>, Index);
+                                                           std::span<const OptimizerGroup<double>>, Index);
 
 }  // namespace hsi4d

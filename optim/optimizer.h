@@ -13,7 +13,8 @@ template <class S>
 class Optimizer {
  public:
   /// @param seams  of the loss's inputs, for GaussNewton; has to outlive this
-  Optimizer(Tape<S>& tape, const std::vector<AdamGroup<S>>& groups, const OptimizerSettings& settings, SeamMode& seams)
+  Optimizer(Tape<S>& tape, const std::vector<OptimizerGroup<S>>& groups, const OptimizerSettings& settings,
+            SeamMode& seams)
       : method_(made(tape, groups, settings, seams)) {}
 
   StepReport step(Index iteration, Index iterations, double loss) {
@@ -53,7 +54,7 @@ class Optimizer {
     if (auto* gauss_newton = std::get_if<GaussNewton<S>>(&any)) use(*gauss_newton);
   }
 
-  static Method made(Tape<S>& tape, const std::vector<AdamGroup<S>>& groups, const OptimizerSettings& settings,
+  static Method made(Tape<S>& tape, const std::vector<OptimizerGroup<S>>& groups, const OptimizerSettings& settings,
                      SeamMode& seams) {
     switch (settings.kind) {
       case OptimizerKind::kBfgs:

@@ -22,7 +22,7 @@ double longest_quasi_newton_way(const ParameterGroupSettings& settings, Index it
 }
 
 template <class S>
-QuasiNewton<S>::QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups)
+QuasiNewton<S>::QuasiNewton(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups)
     : numbers_(tape, std::move(groups), "bfgs") {
   const Index count = numbers_.count();
   for (VectorX* numbers : {&trial_, &trial_gradient_, &point_, &gradient_, &direction_, &moved_, &change_, &product_})

@@ -26,7 +26,7 @@ template <class S>
 class QuasiNewton {
  public:
   /// @param groups  as UnitNumbers has them, with the same errors
-  QuasiNewton(Tape<S>& tape, std::vector<AdamGroup<S>> groups);
+  QuasiNewton(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups);
   QuasiNewton(const QuasiNewton&) = delete;
   QuasiNewton& operator=(const QuasiNewton&) = delete;
 

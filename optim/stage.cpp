@@ -36,7 +36,7 @@ class StageRun {
         loss_(record_loss(settings, terms, inputs_of(settings, inputs), options.name)),
         optimizer_(tape, groups_, settings.optimizer, seams_) {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
-    for (const AdamGroup<S>& group : groups_) {
+    for (const OptimizerGroup<S>& group : groups_) {
       hold(group.parameters);
       first_of_all_ = std::max(first_of_all_, static_cast<Index>(group.settings.from));
     }
@@ -45,7 +45,7 @@ class StageRun {
     for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
     if (options.curvature != nullptr) optimizer_.set_curvature(*options.curvature);
     if (options.kept == nullptr || optimizer_.adam() == nullptr) return;
-    for (const AdamGroup<S>& group : groups_) {
+    for (const OptimizerGroup<S>& group : groups_) {
       const auto kept = options.kept->find(group.parameters.name);
       if (kept != options.kept->end() && !kept->second.blocks.empty())
         optimizer_.adam()->set_moments(group.parameters.name, kept->second);
@@ -75,7 +75,7 @@ class StageRun {
  private:
   void iterate(Index i, const StageCallback& callback) {
     const auto start = Clock::now();
-    for (const AdamGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
+    for (const OptimizerGroup<S>& group : groups_) set_frozen(tape_, group.parameters, !moves_in(group.settings, i));
     hold_values(i);
     tape_.forward(loss_.total);
     const Index forward_nodes = tape_.counters().forward_nodes;  // before others run, for shares
@@ -124,7 +124,7 @@ class StageRun {
   }
 
   bool is_moved(const HeldOutput& held, Index iteration) const {
-    return std::any_of(groups_.begin(), groups_.end(), [&](const AdamGroup<S>& group) {
+    return std::any_of(groups_.begin(), groups_.end(), [&](const OptimizerGroup<S>& group) {
       return moves_in(group.settings, iteration) &&
              std::find(held.groups.begin(), held.groups.end(), group.parameters.name) != held.groups.end();
     });
@@ -212,7 +212,7 @@ class StageRun {
 
   /// A group that is on and that no term depends on would silently stay.
   void check_reached(Index iteration) const {
-    for (const AdamGroup<S>& group : groups_) {
+    for (const OptimizerGroup<S>& group : groups_) {
       const auto& blocks = group.parameters.blocks;
       if (blocks.empty() || !moves_in(group.settings, iteration)) continue;
       if (std::any_of(blocks.begin(), blocks.end(), [&](Var<S> block) { return tape_.has_gradient(block); })) continue;
@@ -278,7 +278,7 @@ class StageRun {
 
   void keep_moments() const {
     if (options_.kept == nullptr || optimizer_.adam() == nullptr) return;
-    for (const AdamGroup<S>& group : groups_) {
+    for (const OptimizerGroup<S>& group : groups_) {
       const auto kept = options_.kept->find(group.parameters.name);
       if (kept != options_.kept->end()) kept->second = optimizer_.adam()->moments(group.parameters.name);
     }
@@ -293,7 +293,7 @@ class StageRun {
   Tape<S>& tape_;
   const StageSettings& settings_;
   const StageOptions& options_;
-  std::vector<AdamGroup<S>> groups_;
+  std::vector<OptimizerGroup<S>> groups_;
   SeamMode seams_;  // of the loss's inputs
   RecordedLoss<S> loss_;
   Optimizer<S> optimizer_;

@@ -13,10 +13,11 @@ namespace hsi4d {
 
 namespace {
 
-void disturb(Tape<double>& tape, const std::vector<AdamGroup<double>>& groups, const StageGradcheckOptions& options) {
+void disturb(Tape<double>& tape, const std::vector<OptimizerGroup<double>>& groups,
+             const StageGradcheckOptions& options) {
   const Random random(options.differences.seed, random_stream("stage_gradcheck.disturbance"));
   std::uint64_t at = 0;
-  for (const AdamGroup<double>& group : groups) {
+  for (const OptimizerGroup<double>& group : groups) {
     for (const Var<double> block : group.parameters.blocks) {
       const Array<double> numbers = tape.write(block);
       for (Index row = 0; row < numbers.total_rows(); ++row) {
@@ -57,7 +58,7 @@ class HeldStops {
   std::vector<Var<double>> held_;
 };
 
-StageGradcheck check_recorded(Tape<double>& tape, const std::vector<AdamGroup<double>>& groups,
+StageGradcheck check_recorded(Tape<double>& tape, const std::vector<OptimizerGroup<double>>& groups,
                               RecordedLoss<double>& loss, const std::string& stage, const GradcheckOptions& options) {
   StageGradcheck result;
   result.off = loss.off;
@@ -67,7 +68,7 @@ StageGradcheck check_recorded(Tape<double>& tape, const std::vector<AdamGroup<do
   result.terms = loss.values;
   if (!std::isfinite(result.loss)) throw UserError(stage_message(stage, "the loss is " + rounded(result.loss, 6)));
   const HeldStops stops(tape, loss.total);
-  for (const AdamGroup<double>& group : groups) {
+  for (const OptimizerGroup<double>& group : groups) {
     const ParameterGroup<double>& parameters = group.parameters;
     GroupGradcheck& found = result.groups.emplace_back(GroupGradcheck{parameters.name, count_numbers(parameters), {}});
     if (found.numbers == 0) continue;
@@ -94,7 +95,7 @@ StageGradcheck check_stage_gradient(Tape<double>& tape, const StageSettings& set
   check_groups(settings, names_of(available), "stage '" + stage + "'");
   const TapeGuard<double> guard(tape, available);
   try {
-    const std::vector<AdamGroup<double>> groups = named_groups(settings, available, stage);
+    const std::vector<OptimizerGroup<double>> groups = named_groups(settings, available, stage);
     RecordedLoss<double> loss = record_loss(settings, terms, inputs, stage);
     for (const ParameterGroup<double>& group : available) set_frozen(tape, group, true);
     disturb(tape, groups, options);

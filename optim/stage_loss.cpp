@@ -72,9 +72,9 @@ RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossT
 }
 
 template <class S>
-std::vector<AdamGroup<S>> named_groups(const StageSettings& settings, const std::vector<ParameterGroup<S>>& available,
-                                       const std::string& stage) {
-  std::vector<AdamGroup<S>> groups;
+std::vector<OptimizerGroup<S>> named_groups(const StageSettings& settings,
+                                            const std::vector<ParameterGroup<S>>& available, const std::string& stage) {
+  std::vector<OptimizerGroup<S>> groups;
   for (const auto& [name, group_settings] : settings.optimize) {
     for (const ParameterGroup<S>& group : available) {
       if (group.name == name) groups.push_back({group, group_settings});
@@ -124,10 +124,11 @@ template RecordedLoss<float> record_loss(const StageSettings&, std::span<const L
                                          const std::string&);
 template RecordedLoss<double> record_loss(const StageSettings&, std::span<const LossTerm>, const LossInputs<double>&,
                                           const std::string&);
-template std::vector<AdamGroup<float>> named_groups(const StageSettings&, const std::vector<ParameterGroup<float>>&,
-                                                    const std::string&);
-template std::vector<AdamGroup<double>> named_groups(const StageSettings&, const std::vector<ParameterGroup<double>>&,
-                                                     const std::string&);
+template std::vector<OptimizerGroup<float>> named_groups(const StageSettings&,
+                                                         const std::vector<ParameterGroup<float>>&, const std::string&);
+template std::vector<OptimizerGroup<double>> named_groups(const StageSettings&,
+                                                          const std::vector<ParameterGroup<double>>&,
+                                                          const std::string&);
 template void set_frozen(Tape<float>&, const ParameterGroup<float>&, bool);
 template void set_frozen(Tape<double>&, const ParameterGroup<double>&, bool);
 template class TapeGuard<float>;

@@ -36,8 +36,8 @@ RecordedLoss<S> record_loss(const StageSettings& settings, std::span<const LossT
 
 /// The groups that the settings name, in the settings' order. Throws UserError where two of them share a parameter.
 template <class S>
-std::vector<AdamGroup<S>> named_groups(const StageSettings& settings, const std::vector<ParameterGroup<S>>& available,
-                                       const std::string& stage);
+std::vector<OptimizerGroup<S>> named_groups(const StageSettings& settings,
+                                            const std::vector<ParameterGroup<S>>& available, const std::string& stage);
 
 /// The error that no term depends on a group.
 UserError no_term_depends_on(const std::string& group, const std::vector<LossValue>& terms, const std::string& stage);

@@ -12,9 +12,9 @@ namespace {
 
 /// Calls visit(number, group, block, row, column of its array) for all numbers, in order.
 template <class S, class F>
-void for_numbers(const std::vector<AdamGroup<S>>& groups, const F& visit) {
+void for_numbers(const std::vector<OptimizerGroup<S>>& groups, const F& visit) {
   Index i = 0;
-  for (const AdamGroup<S>& group : groups) {
+  for (const OptimizerGroup<S>& group : groups) {
     for (const Var<S> block : group.parameters.blocks) {
       const Shape& shape = block.shape();
       for (Index r = 0; r < shape.planes * shape.rows; ++r) {
@@ -27,10 +27,10 @@ void for_numbers(const std::vector<AdamGroup<S>>& groups, const F& visit) {
 }  // namespace
 
 template <class S>
-UnitNumbers<S>::UnitNumbers(Tape<S>& tape, std::vector<AdamGroup<S>> groups, const std::string& method)
+UnitNumbers<S>::UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const std::string& method)
     : tape_(tape), groups_(std::move(groups)) {
   Index count = 0;
-  for (const AdamGroup<S>& group : groups_) {
+  for (const OptimizerGroup<S>& group : groups_) {
     reports_.push_back({group.parameters.name});
     if (group.parameters.are_axis_angles || group.parameters.range) {
       throw UserError("group \"" + group.parameters.name + "\": " + method +
@@ -45,7 +45,7 @@ UnitNumbers<S>::UnitNumbers(Tape<S>& tape, std::vector<AdamGroup<S>> groups, con
   }
   unit_.setZero(count);
   start_.setZero(count);
-  for_numbers(groups_, [&](Index i, const AdamGroup<S>& group, Var<S> block, Index r, Index c) {
+  for_numbers(groups_, [&](Index i, const OptimizerGroup<S>& group, Var<S> block, Index r, Index c) {
     unit_[i] = group.settings.lr;
     if (unit_[i] > 0) start_[i] = static_cast<double>(tape_.value(block).row(r)[c]) / unit_[i];
   });
@@ -57,7 +57,7 @@ std::optional<BadNumber> UnitNumbers<S>::read_gradient(double loss, VectorX& gra
   if (!std::isfinite(loss)) bad.emplace().value = loss;
   for (std::size_t g = 0; g < groups_.size(); ++g)
     reports_[g] = {groups_[g].parameters.name, false, groups_[g].settings.lr, 0};
-  for_numbers(groups_, [&](Index i, const AdamGroup<S>& group, Var<S> block, Index r, Index c) {
+  for_numbers(groups_, [&](Index i, const OptimizerGroup<S>& group, Var<S> block, Index r, Index c) {
     gradient[i] = 0;
     if (!tape_.has_gradient(block)) return;
     const double value = static_cast<double>(tape_.gradient(block).row(r)[c]);
@@ -77,7 +77,7 @@ template <class S>
 void UnitNumbers<S>::write(VectorX& z) {
   std::uint32_t written = 0;
   Array<S> numbers;
-  for_numbers(groups_, [&](Index i, const AdamGroup<S>&, Var<S> block, Index r, Index c) {
+  for_numbers(groups_, [&](Index i, const OptimizerGroup<S>&, Var<S> block, Index r, Index c) {
     if (!(unit_[i] > 0)) return;  // a rate of 0: it stays
     if (!numbers || written != block.id) numbers = tape_.write(block);
     written = block.id;

@@ -29,7 +29,7 @@ class UnitNumbers {
   /// @param method  what messages call it
   /// Throws UserError for more than kMostUnitNumbers numbers, and for groups whose numbers are changed between steps
   /// (axis-angles, ranges).
-  UnitNumbers(Tape<S>& tape, std::vector<AdamGroup<S>> groups, const std::string& method);
+  UnitNumbers(Tape<S>& tape, std::vector<OptimizerGroup<S>> groups, const std::string& method);
   UnitNumbers(const UnitNumbers&) = delete;
   UnitNumbers& operator=(const UnitNumbers&) = delete;
 
@@ -52,7 +52,7 @@ class UnitNumbers {
 
  private:
   Tape<S>& tape_;
-  std::vector<AdamGroup<S>> groups_;
+  std::vector<OptimizerGroup<S>> groups_;
   std::vector<GroupStep> reports_;
   VectorX unit_, start_;
 };

@@ -14,7 +14,7 @@
 
 namespace hsi4d {
 
-/// Plain data. Means are relative to origin_world, metres (row A10).
+/// Plain data. Means are relative to origin_world, metres (row A10: far from the origin).
 struct SplatView {
   Camera camera;
   Vector3<double> origin_world = Vector3<double>::Zero();

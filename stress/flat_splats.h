@@ -140,8 +140,8 @@ struct FlatRender {
     return {tape.value(means),
             tape.value(factors),
             tape.value(depths),
-            tape.value(projected.depth_rest),
-            tape.value(projected.means_rest),
+            tape.value(projected.depth_low),
+            tape.value(projected.means_low),
             tape.value(opacities),
             tape.value(features)};
   }

@@ -152,7 +152,7 @@ OrderedImage composited(const Scene& scene, bool by_depth) {
   Projected<float> projected = taped.rendered.projected;
   if (!by_depth) {
     projected.depths = taped.tape.constant("ones", projected.depths.shape());
-    projected.depth_rest = taped.tape.constant("zeros", projected.depths.shape());
+    projected.depth_low = taped.tape.constant("zeros", projected.depths.shape());
     taped.tape.set(projected.depths, std::vector<float>(static_cast<std::size_t>(scene.gaussians.count()), 1.0F));
   }
   const Var<float> image =

@@ -10,8 +10,8 @@ namespace hsi4d::stress {
 
 /// The group "all".
 template <class S>
-AdamGroup<S> moving_at(std::vector<Var<S>> leaves, double lr) {
-  AdamGroup<S> group;
+OptimizerGroup<S> moving_at(std::vector<Var<S>> leaves, double lr) {
+  OptimizerGroup<S> group;
   group.parameters.name = "all";
   group.parameters.blocks = std::move(leaves);
   group.settings.lr = lr;

@@ -28,8 +28,8 @@ WalkedScene::WalkedScene(const Scene& scene)
   const Projected<float>& p = taped.rendered.projected;
   const Tape<float>& tape = taped.tape;
   const detail::SplatArrays<float> splats = {
-      tape.value(p.means_px),   tape.value(p.factors),       tape.value(p.depths),    tape.value(p.depth_rest),
-      tape.value(p.means_rest), tape.value(taped.opacities), tape.value(taped.colors)};
+      tape.value(p.means_px),  tape.value(p.factors),       tape.value(p.depths),    tape.value(p.depth_low),
+      tape.value(p.means_low), tape.value(taped.opacities), tape.value(taped.colors)};
   const Index n = splats.rows();
   std::vector<detail::SplatRecord<float>> records(static_cast<std::size_t>(n));
   std::vector<detail::Extent> extents(records.size());

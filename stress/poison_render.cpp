@@ -178,10 +178,10 @@ template <class S>
 struct FlatDrawing {
   Tape<S> tape;
   Drawing<S> drawing{tape, {}};
-  Var<S> means, factors, depths, depth_rest, means_rest, opacities, features, background;
+  Var<S> means, factors, depths, depth_low, means_low, opacities, features, background;
 
   FlatDrawing();
-  Vars<S> poisoned() const { return {means, factors, depths, depth_rest, means_rest, opacities, features, background}; }
+  Vars<S> poisoned() const { return {means, factors, depths, depth_low, means_low, opacities, features, background}; }
 };
 
 template <class S>
@@ -198,12 +198,11 @@ FlatDrawing<S>::FlatDrawing() {
   features = leaf(3, flat.features);
   background = leaf(3, {0.2, 0.3, 0.4});
   depths = tape.constant("depths", shape_of(kRows, 1));
-  depth_rest = tape.constant("rest", shape_of(kRows, 1));
-  means_rest = tape.constant("rest", shape_of(kRows, 2));
+  depth_low = tape.constant("rest", shape_of(kRows, 1));
+  means_low = tape.constant("rest", shape_of(kRows, 2));
   set_numbers(tape, depths, flat.depths);
-  const Composited<S> out =
-      composite(SplatSet<S>{{means, factors, depths, depth_rest, means_rest}, opacities, features},
-                view_of({32, 24, 1, {}, {}, {}, {}, {}}), background);
+  const Composited<S> out = composite(SplatSet<S>{{means, factors, depths, depth_low, means_low}, opacities, features},
+                                      view_of({32, 24, 1, {}, {}, {}, {}, {}}), background);
   drawing.inputs = {means, factors, opacities, features, background};
   drawing.look_at({out.channels, out.transmittance});
 }
@@ -215,8 +214,8 @@ void try_composite(Changes& changes) {
                 {{flat.means},
                  {flat.factors},
                  {flat.depths},
-                 {flat.depth_rest},
-                 {flat.means_rest},
+                 {flat.depth_low},
+                 {flat.means_low},
                  {flat.opacities},
                  {flat.features, true, true}},
                 flat.factors, std::vector<double>(6 * kRows, 0), changes);

@@ -164,7 +164,7 @@ class Chain {
         return;
       }
       folder.note("begins " + clip_in_words(config_, i));
-      carry_out(clip, losses_, options);
+      execute_run(clip, losses_, options);
     });
   }
 
@@ -220,7 +220,7 @@ std::size_t finished_clips(const RunConfig& config, const std::string& folder, c
   return done;
 }
 
-ChainSummary carry_out_chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
+ChainSummary execute_chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
   const WarningsOnce once;  // inputs are looked at here, and again when their clip begins
   const std::vector<ClipFacts> clips = check_chain(config);  // before anything is written
   RunFolder folder(options.folder, identity_of(config, losses, options.threads), options.resume);

@@ -41,8 +41,8 @@ struct ClipFacts {
 RunConfig clip_config(const RunConfig& chain, std::size_t index);
 
 /// Reads the inputs of every clip, frames included, and keeps what is small. Later clips without a state of their own
-/// are read with the first one's. Throws as carry_out, and UserError where clips do not fit each other: other joints of
-/// the human, another frame rate.
+/// are read with the first one's. Throws as execute_run, and UserError where clips do not fit each other: other joints
+/// of the human, another frame rate.
 std::vector<ClipFacts> check_chain(const RunConfig& config);
 
 /// How many clips of the chain in a folder are done. Throws DataError naming the clip and its inputs that have changed
@@ -51,7 +51,7 @@ std::size_t finished_clips(const RunConfig& config, const std::string& folder, c
 
 /// Carries out the clips of `config.chain` one after the other, and joins what they found. With options.resume clips
 /// that are done are taken as they are, and the one that was interrupted goes on: the result has the same bits.
-/// Throws as carry_out; what is said of a clip begins with its number and name.
-ChainSummary carry_out_chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options);
+/// Throws as execute_run; what is said of a clip begins with its number and name.
+ChainSummary execute_chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options);
 
 }  // namespace hsi4d

@@ -63,7 +63,7 @@ std::vector<double> at_file_rows(const std::vector<double>& kept, const SplatRep
   return all;
 }
 
-/// A number that the reader held at a limit does not move what is drawn (row A5).
+/// A number that the reader held at a limit does not move what is drawn (row A5: huge scales).
 void zero_held(SceneGradients& g, const SplatReport& report) {
   for (const Index i : report.held_log_scales) g.log_scales[static_cast<std::size_t>(i)] = 0;
   for (const Index i : report.held_opacity_logits) g.opacity_logits[static_cast<std::size_t>(i)] = 0;

@@ -22,7 +22,7 @@ bool has_shape(const Motion& motion) {
 Motion read_any(const MotionOptions& options, bool& is_of_folder) {
   is_of_folder = std::filesystem::is_directory(options.in);
   if (!is_of_folder) {
-    Motion motion = read_motion_aloud(options.in);
+    Motion motion = read_motion_with_warnings(options.in);
     if (!options.from_rate && !motion.says_frame_rate)
       log_warning(options.in + ": says no frame rate and is taken for " + short_number(motion.frame_rate) +
                   " frames a second; --from-rate gives another");

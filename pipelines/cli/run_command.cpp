@@ -130,7 +130,7 @@ ChainSummary run_chain_on_terminal(const RunConfig& config, const std::vector<Lo
                                    const RunOptions& options) {
   const InterruptWatch watch;
   try {
-    return carry_out_chain(config, losses, options);
+    return execute_chain(config, losses, options);
   } catch (const Interrupted& stop) {
     throw Interrupted(std::string(stop.what()) + "; the same command with --out " + options.folder +
                       " --resume goes on");
@@ -151,7 +151,7 @@ RunSummary run_on_terminal(const RunConfig& config, const std::vector<LossTerm>&
                            const std::string& out) {
   const InterruptWatch watch;
   try {
-    return carry_out(config, losses, options);
+    return execute_run(config, losses, options);
   } catch (const Interrupted& stop) {
     throw Interrupted(std::string(stop.what()) + "; the same command with --out " + out + " --resume goes on");
   }

@@ -50,13 +50,13 @@ void mark_seen(TapedScene<float>& scene, const Vector6<double>& xi, std::vector<
 
 }  // namespace
 
-std::vector<Index> seen_rows(const PosedGaussians& part, const Lookout& lookout) {
+std::vector<Index> seen_rows(const PosedGaussians& part, const ViewRange& view_range) {
   const PosedGaussians drawn = grey(part);
-  TapedScene<float> scene(drawn, {lookout.camera, {}, lookout.render}, false);
+  TapedScene<float> scene(drawn, {view_range.camera, {}, view_range.render}, false);
   for (const Var<float> var : {scene.means, scene.quats, scene.log_scales, scene.logits, scene.xi})
     scene.tape.freeze(var);
-  const Vector3<double> about = transform_point(lookout.camera.camera_from_world, middle(drawn));
-  const double angle = lookout.within_deg * std::numbers::pi / 180;
+  const Vector3<double> about = transform_point(view_range.camera.camera_from_world, middle(drawn));
+  const double angle = view_range.within_deg * std::numbers::pi / 180;
   const std::array<Vector3<double>, 5> turns = {
       {{0, 0, 0}, {angle, 0, 0}, {-angle, 0, 0}, {0, angle, 0}, {0, -angle, 0}}};
   std::vector<char> is_seen(static_cast<std::size_t>(part.gaussians.count()));

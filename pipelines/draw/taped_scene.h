@@ -48,7 +48,7 @@ struct TapedScene {
   }
 
   /// What the tape's means are relative to: transforms may put them anywhere in the world, so that the camera is the
-  /// one place from which what is seen is near (row A10).
+  /// one place from which what is seen is near (row A10: far from the origin).
   static Vector3<double> origin_of(const PosedGaussians& posed, const Camera& camera) {
     return posed.transforms.empty() ? posed.gaussians.origin_world : camera_center_world(camera);
   }

@@ -118,7 +118,7 @@ std::optional<Rigid<double>> initial_pelvis(const std::string& avatar, const std
   if (initial.empty()) return std::nullopt;
   Track first;
   first.name = initial;
-  first.motion = read_motion_aloud(initial);
+  first.motion = read_motion_with_warnings(initial);
   put_on_body(m.settings, avatar, first);
   return first_pelvis(first);
 }

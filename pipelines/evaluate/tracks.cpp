@@ -48,7 +48,7 @@ Track read_track_folder(const fs::path& folder, const std::string& name) {
   const auto file = [&folder](const char* member) { return (folder / member).string(); };
   Track track;
   track.name = name;
-  track.motion = read_motion_aloud(file("motion.npz"));
+  track.motion = read_motion_with_warnings(file("motion.npz"));
   if (fs::exists(file("objects.npz"))) take_objects(file("objects.npz"), TrackOptions{}.object_name, track);
   if (fs::exists(file("cameras.json"))) {
     for (const Camera& camera : read_cameras(file("cameras.json")))
@@ -71,7 +71,7 @@ Track read_pose_track(const std::string& path, const TrackOptions& options) {
 Track read_motion_track(const std::string& path, const TrackOptions& options) {
   Track track;
   track.name = path;
-  track.motion = read_motion_aloud(path);
+  track.motion = read_motion_with_warnings(path);
   if (options.frame_rate && !(options.fills_in && track.motion.says_frame_rate)) {
     track.motion.frame_rate = *options.frame_rate;
     track.motion.says_frame_rate = true;

@@ -304,7 +304,7 @@ template <class S>
 void FrameGraph<S>::write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle) {
   S* numbers = tape_.write(leaf).row(row);
   if (settings_.rotations == RotationParameters::kAxisAngle) {
-    Vector3<double> wrapped = axis_angle;  // a file's may be any number of turns (row D9)
+    Vector3<double> wrapped = axis_angle;  // a file's may be any number of turns (row D9: angles beyond π)
     wrap_axis_angle(wrapped);
     for (Index i = 0; i < 3; ++i) numbers[i] = static_cast<S>(wrapped[i]);
     return;

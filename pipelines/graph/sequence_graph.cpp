@@ -28,7 +28,7 @@ std::vector<double> axis_angles(const std::vector<SceneState>& states, Index fir
   return all;
 }
 
-/// Rotations as numbers that a stage moves: axis-angle within half a turn (row D9), or two columns of the matrix.
+/// Rotations as numbers that a stage moves: axis-angle up to π (row D9: angles beyond π), or two columns of the matrix.
 std::vector<double> rotation_numbers(const std::vector<double>& axis_angle, RotationParameters parameters) {
   std::vector<double> numbers;
   for (std::size_t i = 0; i < axis_angle.size(); i += 3) {

@@ -35,7 +35,7 @@ SmplxModel read_model_for(const std::string& path, const std::string& motion, co
   return count == 0 ? bare : read_smplx(path, {.betas = count, .expressions = 0, .correctives = false});
 }
 
-Motion read_motion_aloud(const std::string& path) {
+Motion read_motion_with_warnings(const std::string& path) {
   Motion motion = read_motion(path);
   if (motion.lost_shape)
     log_warning(path + ": is of " + motion.converted_from + ", whose betas are no shape of SMPL-X: they are left out");
@@ -43,7 +43,7 @@ Motion read_motion_aloud(const std::string& path) {
 }
 
 Motion read_motion_for(const std::string& path, const Avatar& avatar) {
-  return for_body(read_motion_aloud(path), avatar);
+  return for_body(read_motion_with_warnings(path), avatar);
 }
 
 SmplxModel body_model_of(const BodySettings& settings) {

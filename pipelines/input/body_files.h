@@ -39,9 +39,9 @@ BodyModel rest_body(const BodySettings& settings);
 SmplxModel read_model_for(const std::string& path, const std::string& motion, const std::vector<double>& betas);
 
 /// Reads a motion, and tells what of it is left out because it is of another body model. Throws as read_motion.
-Motion read_motion_aloud(const std::string& path);
+Motion read_motion_with_warnings(const std::string& path);
 
-/// As read_motion_aloud, moved to the avatar's body (for_body): its pelvis is where the file has it.
+/// As read_motion_with_warnings, moved to the avatar's body (for_body): its pelvis is where the file has it.
 Motion read_motion_for(const std::string& path, const Avatar& avatar);
 
 }  // namespace hsi4d

@@ -136,7 +136,7 @@ std::string describe_differences(const std::string& before, const std::string& n
 
 // ---- Lines of metrics.jsonl ----
 
-/// A number that must be finite, or null where the step was rolled back (row F12 of the stability catalogue).
+/// A number that must be finite, or null where the step was rolled back (row F12: JSON infinities).
 ConfigValue record_number(double value, const std::string& pointer, bool rolled_back) {
   if (!std::isfinite(value) && rolled_back) return ConfigValue::make_null();
   HSI4D_CHECK(std::isfinite(value), "metrics.jsonl: " + pointer + ": " + std::to_string(value) + " is not finite");

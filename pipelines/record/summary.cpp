@@ -18,7 +18,7 @@ using Kind = ConfigValue::Kind;
 
 // ---- Writing ----
 
-/// Adds a number to an object; what JSON cannot hold is refused by name (row F12 of the stability catalogue).
+/// Adds a number to an object; what JSON cannot hold is refused by name (row F12: JSON infinities).
 void add_number(ConfigValue& object, const std::string& pointer, const std::string& name, double value) {
   const std::string place = child_pointer(pointer, name);
   HSI4D_CHECK(std::isfinite(value), "summary.json: " + place + ": " + std::to_string(value) + " is not finite");

@@ -67,19 +67,19 @@ std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& st
   const double within_deg = task.config.approx.seen_within_deg;
   if (within_deg == 0 || stage.draw == Draw::kScene) return {};
   const Clip& clip = task.clip;
-  Lookout lookout{camera_of_size(clip, stage.longest_side_px), task.config.render, within_deg};
-  lookout.camera.camera_from_world = state.camera_from_world;
+  ViewRange view_range{camera_of_size(clip, stage.longest_side_px), task.config.render, within_deg};
+  view_range.camera.camera_from_world = state.camera_from_world;
   const bool needs_objects = find_entry(stage.losses, "depth") != nullptr;
   const bool needs_human = find_entry(stage.optimize, "avatar_features") != nullptr;
   SeenRows rows;
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
     const Gaussians& object = clip.objects[o].gaussians;
     rows.objects.push_back(needs_objects ? all_rows(object.count())
-                                         : seen_rows(posed_object(object, state.objects[o]), lookout));
+                                         : seen_rows(posed_object(object, state.objects[o]), view_range));
   }
   const Avatar& avatar = clip.avatar;
   rows.human = needs_human ? all_rows(avatar.count())
-                           : seen_rows({rest_gaussians(avatar), blended_transforms(avatar, state.body)}, lookout);
+                           : seen_rows({rest_gaussians(avatar), blended_transforms(avatar, state.body)}, view_range);
   return rows;
 }
 

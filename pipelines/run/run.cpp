@@ -111,8 +111,8 @@ void check_run_clip(const RunConfig& config, const Clip& clip) {
   check_frames(config.data, clip, losses_over_masks(config));
 }
 
-RunSummary carry_out(const RunConfig& asked, const std::vector<LossTerm>& losses, const RunOptions& options) {
-  HSI4D_CHECK(asked.chain.empty(), "a chain is carried out by carry_out_chain");
+RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& losses, const RunOptions& options) {
+  HSI4D_CHECK(asked.chain.empty(), "a chain is executed by execute_chain");
   RunConfig config = asked;
   prepare_run(config);
   EarlyMessages early;

@@ -35,6 +35,6 @@ void check_run_clip(const RunConfig& config, const Clip& clip);
 ///
 /// Throws UserError and DataError for config, inputs and folder, Interrupted when asked to stop.
 /// @return  what summary.json holds
-RunSummary carry_out(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options);
+RunSummary execute_run(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options);
 
 }  // namespace hsi4d

@@ -124,7 +124,7 @@ RunSummary compute(const SweepPaths& paths, const SweepRun& run, const std::vect
     with_threads(threads, [&] { make_dataset(config, losses, dataset, observer); });
     take_over_data(dataset, losses, config);
   }
-  return config.chain.empty() ? carry_out(config, losses, options) : carry_out_chain(config, losses, options).all;
+  return config.chain.empty() ? execute_run(config, losses, options) : execute_chain(config, losses, options).all;
 }
 
 }  // namespace

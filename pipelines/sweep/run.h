@@ -21,7 +21,7 @@ struct SweepRunResult {
 /// @param claim     the right to compute this run
 /// @param threads   0: what the plan says, or one a core
 /// @param observer  shown what is computed; `stop_requested` ends it with its state saved
-/// Throws as carry_out, also what is wrong with the run's files.
+/// Throws as execute_run, also what is wrong with the run's files.
 SweepRunResult run_one(const SweepPaths& paths, const SweepPlan& plan, std::size_t index, SweepClaim& claim,
                        const std::vector<LossTerm>& losses, int threads, const Observer& observer);
 

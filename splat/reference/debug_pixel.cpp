@@ -48,8 +48,8 @@ PixelTrace trace_pixel(const Tape<S>& tape, const Projected<S>& projected, Var<S
   const detail::SplatArrays<S> splats = {tape.value(projected.means_px),
                                          tape.value(projected.factors),
                                          tape.value(projected.depths),
-                                         tape.value(projected.depth_rest),
-                                         tape.value(projected.means_rest),
+                                         tape.value(projected.depth_low),
+                                         tape.value(projected.means_low),
                                          tape.value(opacities),
                                          tape.value(features)};
   const ConstArray<S> colors = splats.features;

@@ -211,7 +211,7 @@ std::span<const TileEntry> entries_of_chunk(const BlockJob& job, Index number) {
 
 #if HWY_CAP_GE256
 /// The numbers of a Gaussian in one vector, in double where the mean takes part. Vectors are rounded to float where it
-/// is written, so that both passes have the same bits (row B13).
+/// is written, so that both passes have the same bits (row B13: two passes).
 HWY_INLINE void pack_splat(const SplatRecord<float>& r, const double* center, PackedSplat& p) {
   static_assert(offsetof(SplatRecord<float>, y) == offsetof(SplatRecord<float>, x) + sizeof(double) &&
                 offsetof(SplatRecord<float>, l22) == offsetof(SplatRecord<float>, l11) + 2 * sizeof(float) &&
@@ -234,7 +234,7 @@ HWY_INLINE void pack_splat(const SplatRecord<float>& r, const double* center, Pa
 }
 #else
 /// Not inlined: g++ 12 may carry on with the double where a float was rounded, in one caller and not in another, and
-/// both passes need the same bits (row B13).
+/// both passes need the same bits (row B13: two passes).
 HWY_NOINLINE void pack_splat(const SplatRecord<float>& r, const double* center, PackedSplat& p) {
   const double l11 = r.l11 * kLog2Scale, l21 = r.l21 * kLog2Scale, l22 = r.l22 * kLog2Scale;
   const double dx = center[0] - r.x, dy = center[1] - r.y;

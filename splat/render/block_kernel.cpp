@@ -7,7 +7,7 @@
 // that it finds the same α, the same T and the same end (row B13), and keeps α and w = T α of the segment. From the
 // back, v = w (g·f − S) and S ← S + α (g·f − S): nothing is divided (row B2). Sums over the pixels of a block are
 // made of 16 Gaussians at a time: 4×4 transposes make lanes of Gaussians, and the moments {1, x, y, x², xy, y²} of v
-// follow by rows. About the block's centre they are small numbers; they are moved to u and w there (row A1).
+// follow by rows. About the block's centre they are small numbers; they are moved to u and w there (row A1: needles).
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "splat/render/block_kernel.cpp"
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)

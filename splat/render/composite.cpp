@@ -16,9 +16,9 @@
 #include "splat/render/block_kernel.h"
 #include "splat/render/composite_io.h"
 #include "splat/render/composite_kernel.h"
-#include "splat/render/kept_tiles.h"
 #include "splat/render/pixel_step.h"
 #include "splat/render/slot_sums.h"
+#include "splat/render/tile_checkpoints.h"
 #include "splat/render/tile_image.h"
 #include "splat/render/tile_plans.h"
 
@@ -73,13 +73,13 @@ struct Composite {
   // What the backward pass needs of every tile.
   Buffer<DepthKeyed> tile_last = {};     ///< the last Gaussian composited in any pixel; index −1: none
   Buffer<DepthKeyed> adjoint_last = {};  ///< the same, of tiles with an adjoint; of the last backward run
-  detail::KeptTiles<S> kept = {};
+  detail::TileCheckpoints<S> kept = {};
   Buffer<TileCounts> tile_counts = {};
-  Buffer<std::uint32_t> settled = {};  ///< of each tile: blocks whose outputs hold what stands still, and nothing else
-  const S* written = nullptr;          ///< the output that `settled` tells of
-  std::uint64_t written_over = 0;      ///< version of the background that it lies over
-  TileMask changed = {}, read = {};    ///< see NodeIo::tell_squares
-  double still_s = 0;                  ///< seconds of the state built for the next forward run
+  Buffer<std::uint32_t> clean = {};  ///< of each tile: blocks whose outputs hold what stands still, and nothing else
+  const S* written = nullptr;        ///< the output that `clean` tells of
+  std::uint64_t written_over = 0;    ///< version of the background that it lies over
+  TileMask changed = {}, read = {};  ///< see NodeIo::set_dirty_tiles
+  double still_s = 0;                ///< seconds of the state built for the next forward run
 
   TileGrid grid() const {
     return detail::tile_grid(view.camera.width, view.camera.height, static_cast<Index>(view.settings.tile));
@@ -106,8 +106,8 @@ struct Composite {
     const TileGrid tiles = grid();
     Stopwatch watch;
     records.resize(rows_of(io).count());
-    settled.resize(tiles.count());
-    std::fill_n(settled.data(), tiles.count(), 0u);
+    clean.resize(tiles.count());
+    std::fill_n(clean.data(), tiles.count(), 0u);
     planned.reset(tiles.count());
     RenderTimes times;
     if (keeps_still(io)) list(io, 0, still_rows(io), planned.still, times);
@@ -188,8 +188,8 @@ struct Composite {
   }
 
   /// Blocks that show what moved there before, or nothing yet, and have to show what stands still.
-  std::uint32_t unsettled(const TileGrid& tiles, Index tile) const {
-    return detail::all_blocks(tiles.tile) & ~planned.plans[tile].blocks & ~settled[tile];
+  std::uint32_t dirty_blocks(const TileGrid& tiles, Index tile) const {
+    return detail::all_blocks(tiles.tile) & ~planned.plans[tile].blocks & ~clean[tile];
   }
 
   /// Whether somebody reads the outputs of a tile.
@@ -205,17 +205,17 @@ struct Composite {
     if constexpr (std::is_same_v<S, float>) {
       if (in_blocks(io)) {
         TileCounts counts{0, 0};
-        const std::uint32_t left = unsettled(tiles, tile);
+        const std::uint32_t left = dirty_blocks(tiles, tile);
         if (left != 0) counts.fragments += composite_still(io, tiles, tile, left, memory);
         if (plan.blocks != 0) {
           const TileCounts moved = composite_moving(io, tiles, tile, memory);
           counts = {counts.fragments + moved.fragments, moved.end};
         }
-        settled[tile] = all & ~plan.blocks;
+        clean[tile] = all & ~plan.blocks;
         return counts;
       }
     }
-    settled[tile] = plan.entries.empty() ? all : 0;
+    clean[tile] = plan.entries.empty() ? all : 0;
     return composite_plain(io, tiles, tile, memory);
   }
 
@@ -294,7 +294,7 @@ struct Composite {
     tile_last.resize(tiles.count());
     const std::uint64_t over = has_background(io) ? io.version(background_input(io)) : 0;
     if (written != io.out(kChannels).data || written_over != over) {
-      std::fill_n(settled.data(), tiles.count(), 0u);
+      std::fill_n(clean.data(), tiles.count(), 0u);
       written = io.out(kChannels).data;
       written_over = over;
     }
@@ -308,7 +308,7 @@ struct Composite {
       tile_counts[tile] = {kUntouched, 0};
       tile_last[tile] = {0, -1};
       if (!is_needed(io, tiles, tile)) return;
-      if (planned.plans[tile].entries.empty() && settled[tile] == detail::all_blocks(tiles.tile)) return;
+      if (planned.plans[tile].entries.empty() && clean[tile] == detail::all_blocks(tiles.tile)) return;
       const Workspaces::Held held(workspaces);
       planned.merge(rows_of(io), view.settings, plan_rules(io), tile);
       tile_counts[tile] = composite_tile(io, tiles, tile, memory.data() + held.number() * size);
@@ -317,7 +317,7 @@ struct Composite {
       const std::int32_t index = planned.plans[tile].entries[static_cast<std::size_t>(end - 1)].index;
       tile_last[tile] = {rows_of(io).key(view.settings, index), index};
     });
-    tell_squares(io, tiles);
+    set_dirty_tiles(io, tiles);
     counters->times.forward_s = watch.lap();
     for (const TileCounts& counts : tile_counts.span()) {
       counters->fragments += std::max(counts.fragments, Index(0));
@@ -326,7 +326,7 @@ struct Composite {
   }
 
   /// Losses need to look again only where a tile was written, and to differentiate only where the backward run reads.
-  void tell_squares(const NodeIo<S>& io, const TileGrid& tiles) {
+  void set_dirty_tiles(const NodeIo<S>& io, const TileGrid& tiles) {
     const Index across = kMaskSquare / tiles.tile;  // tiles in a square
     changed.clear(tiles.height, tiles.width);
     read.clear(tiles.height, tiles.width);
@@ -339,7 +339,7 @@ struct Composite {
     if (!view.skip.unchanged_pixels) return;
     const int outputs = images_of(io).rest ? 3 : 2;
     for (int output = 0; output < outputs; ++output)
-      io.tell_squares(output, &changed, is_read_everywhere ? nullptr : &read);
+      io.set_dirty_tiles(output, &changed, is_read_everywhere ? nullptr : &read);
     counters->told_squares = changed.count();
   }
 
@@ -355,7 +355,7 @@ struct Composite {
       if (!is_needed(io, tiles, tile)) continue;
       const detail::TilePlan& plan = planned.plans[tile];
       const auto still = static_cast<Index>(planned.still.of_tile(tile).size());
-      const bool moves = !plan.entries.empty(), restored = still > 0 && unsettled(tiles, tile) != 0;
+      const bool moves = !plan.entries.empty(), restored = still > 0 && dirty_blocks(tiles, tile) != 0;
       result.tiles += moves || restored ? 1 : 0;
       result.groups += plan.groups;
       result.pairs += static_cast<Index>(plan.entries.size() + plan.behind.size()) + (restored ? still : 0);
@@ -499,7 +499,7 @@ struct Composite {
   Index saved_bytes() const {
     return records.capacity_bytes() + planned.capacity_bytes() + tile_last.capacity_bytes() + changed.capacity_bytes() +
            read.capacity_bytes() + adjoint_last.capacity_bytes() + kept.capacity_bytes() +
-           tile_counts.capacity_bytes() + settled.capacity_bytes();
+           tile_counts.capacity_bytes() + clean.capacity_bytes();
   }
 };
 

@@ -37,11 +37,11 @@ struct Composited {
 };
 
 /// Composites Gaussians into an image of view.camera's size. Not drawn are: rows whose factors are six zeros, depths ≤
-/// near, rows with a number that is not finite, and, with blur 0, Gaussians without area (rows A4-A6).
+/// near, rows with a number that is not finite, and, with blur 0, Gaussians without area (rows A4-A6: not drawable).
 ///
 /// @param background  none, or [1,B], 1 ≤ B ≤ C: what lies behind everything in the first channels
 /// @return            image-shaped arrays
-/// Adjoint: projected.means_px and means_rest (of whose sum it is), projected.factors, opacities, features, background;
+/// Adjoint: projected.means_px and means_low (of whose sum it is), projected.factors, opacities, features, background;
 /// each computed only when wanted. None where o G > alpha_cap (unless cap_gradient is pass), none through the order,
 /// the choice of pixels and the stop. A Gaussian that is not drawn has gradient 0. Throws InternalError when the shapes
 /// do not fit; UserError when there are more than kMostPairs (tile, Gaussian) pairs, or when they would take more than

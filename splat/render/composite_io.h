@@ -27,8 +27,8 @@ Index check_set(const SplatSet<S>& set, Index channels) {
   HSI4D_CHECK_EQ(set.projected.means_px.shape(), shape_of(rows, 2));
   HSI4D_CHECK_EQ(set.projected.factors.shape(), shape_of(rows, 6));
   HSI4D_CHECK_EQ(set.projected.depths.shape(), shape_of(rows, 1));
-  HSI4D_CHECK_EQ(set.projected.depth_rest.shape(), shape_of(rows, 1));
-  HSI4D_CHECK_EQ(set.projected.means_rest.shape(), shape_of(rows, 2));
+  HSI4D_CHECK_EQ(set.projected.depth_low.shape(), shape_of(rows, 1));
+  HSI4D_CHECK_EQ(set.projected.means_low.shape(), shape_of(rows, 2));
   HSI4D_CHECK_EQ(set.opacities.shape(), shape_of(rows, 1));
   HSI4D_CHECK_EQ(set.features.shape(), shape_of(rows, channels));
   return rows;
@@ -44,7 +44,7 @@ std::vector<Var<S>> inputs_of(std::initializer_list<SplatSet<S>> sets, Index cha
     rows += check_set(set, channels);
     const Projected<S>& p = set.projected;
     inputs.insert(inputs.end(),
-                  {p.means_px, p.factors, p.depths, p.depth_rest, p.means_rest, set.opacities, set.features});
+                  {p.means_px, p.factors, p.depths, p.depth_low, p.means_low, set.opacities, set.features});
   }
   HSI4D_CHECK(rows <= std::numeric_limits<std::int32_t>::max(), std::to_string(rows) + " Gaussians");
   return inputs;

@@ -2,7 +2,7 @@
 //
 // Pixels of a row are lanes. A Gaussian visits the rows of the tile that its extent meets; what depends on the row
 // alone is computed once: u = l11 dx + (l21 dy), w = l22 dy. Forward and backward get G and α from the same two
-// functions, so that they agree to the last bit on what is composited (row B13).
+// functions, so that they agree to the last bit on what is composited (row B13: two passes).
 //
 // The backward pass walks the list from the back in segments. A segment is first replayed from the front (T in front of
 // each Gaussian, and G), starting from T that the forward pass kept: nothing is divided by 1 − α (row B2).

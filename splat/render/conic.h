@@ -73,7 +73,7 @@ std::array<T, 6> whitened_factor(const T* v, double blur, const T& l11, const T&
           l22 * v[5]};
 }
 
-/// sqrt(det V Vᵀ / det cov): what the opacity is multiplied with under antialias (row A7).
+/// sqrt(det V Vᵀ / det cov): what the opacity is multiplied with under antialias (row A7: antialias).
 template <class T>
 T blur_compensation(const ConicOf<T>& conic) {
   return lane_sqrt(T(conic.sharp_determinant / conic.determinant));

@@ -1,4 +1,4 @@
-// The axes of Gaussians: a 3×3 factor A R S of each covariance, which is never formed itself (row A1).
+// The axes of Gaussians: a 3×3 factor A R S of each covariance, which is never formed itself (row A1: needles).
 #pragma once
 
 #include "autodiff/tape.h"

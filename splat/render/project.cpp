@@ -208,7 +208,7 @@ struct Project {
   void forward(NodeIo<S>& io) {
     const ConstArray<S> means = io.in(kMeansIn), axes = io.in(kAxesIn);
     const Array<S> means_px = io.out(kMeans), factors = io.out(kFactors);
-    const Array<S> depths = io.out(kDepths), rest = io.out(kRest), means_rest = io.out(kMeansRest);
+    const Array<S> depths = io.out(kDepths), rest = io.out(kRest), means_low = io.out(kMeansRest);
     const Lens lens = this->lens(io);
     parallel_for(means.shape.rows, kGrain, [&](Index begin, Index end) {
       with_best_lanes([&](auto lanes) {
@@ -220,7 +220,7 @@ struct Project {
           const InImage<V> image = project_gaussian<S>(lens, g);
           for (Index i = 0; i < 2; ++i) {
             store_lanes<S>(image.drawn ? image.mean[i] : zero, means_px.row(n) + i, 2, count);
-            store_lanes<S>(image.drawn ? image.mean_rest[i] : zero, means_rest.row(n) + i, 2, count);
+            store_lanes<S>(image.drawn ? image.mean_rest[i] : zero, means_low.row(n) + i, 2, count);
           }
           for (Index i = 0; i < 6; ++i) {
             store_lanes<S>(image.drawn ? image.factor[i] : zero, factors.row(n) + i, 6, count);

@@ -16,11 +16,11 @@ namespace hsi4d {
 /// Gaussians in the image. A row of `factors` that is six zeros marks a Gaussian that is not to be drawn.
 template <class S>
 struct Projected {
-  Var<S> means_px;    ///< [N,2] (u, v); the centre of row i, column j is (j + 0.5, i + 0.5)
-  Var<S> factors;     ///< [N,6] V, 2×3 by rows, pixels
-  Var<S> depths;      ///< [N,1] camera z, metres, drawn or not; 0 where the point is not finite
-  Var<S> depth_rest;  ///< [N,1] what rounding took from the depths in float, zeros in double; has no adjoint
-  Var<S> means_rest;  ///< [N,2] what rounding took from the means, likewise
+  Var<S> means_px;   ///< [N,2] (u, v); the centre of row i, column j is (j + 0.5, i + 0.5)
+  Var<S> factors;    ///< [N,6] V, 2×3 by rows, pixels
+  Var<S> depths;     ///< [N,1] camera z, metres, drawn or not; 0 where the point is not finite
+  Var<S> depth_low;  ///< [N,1] what rounding took from the depths in float, zeros in double; has no adjoint
+  Var<S> means_low;  ///< [N,2] what rounding took from the means, likewise
 };
 
 /// Projects Gaussians with the camera Exp(ξ) · view.camera.

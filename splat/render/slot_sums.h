@@ -33,7 +33,7 @@ struct RowNumbers {
 };
 
 /// Adds numbers from `first` on of all slots of a row to totals, in the order of the slots, in double: kParts times
-/// kCount of them. Pairs past the end of their tile have no sums (row B12). False if there are none.
+/// kCount of them. Pairs past the end of their tile have no sums (row B12: crowded pixel). False if there are none.
 template <Index kCount, Index kParts, class S>
 bool sum_slots(const SlotSums<S>& from, TileLists::Slots slots, std::uint64_t key, Index n, Index first,
                double* totals) {

@@ -19,7 +19,7 @@ namespace hsi4d::detail {
 /// The inputs of composite, N rows each; see there.
 template <class S>
 struct SplatArrays {
-  ConstArray<S> means, factors, depths, depth_rest, means_rest, opacities, features;
+  ConstArray<S> means, factors, depths, depth_low, means_low, opacities, features;
   Index rows() const { return means.shape.rows; }
 };
 
@@ -64,7 +64,7 @@ bool all_finite(const S* x, Index n) {
 /// Camera z of row n in double, metres.
 template <class S>
 double depth_of(const SplatArrays<S>& splats, Index n) {
-  return static_cast<double>(splats.depths.data[n]) + static_cast<double>(splats.depth_rest.data[n]);
+  return static_cast<double>(splats.depths.data[n]) + static_cast<double>(splats.depth_low.data[n]);
 }
 
 /// What a Gaussian at a depth is sorted by in a render of type S.
@@ -102,9 +102,9 @@ void outlines_of(const SplatArrays<S>& splats, const RenderSettings& settings, c
   const auto load = [count](const ConstArray<S>& from, Index row, Index col) {
     return load_wide<kLanesOf<V>>(from.row(row) + col, from.shape.cols, count);
   };
-  o.x = load(splats.means, n, 0) + load(splats.means_rest, n, 0);
-  o.y = load(splats.means, n, 1) + load(splats.means_rest, n, 1);
-  const V depth = load(splats.depths, n, 0) + load(splats.depth_rest, n, 0);
+  o.x = load(splats.means, n, 0) + load(splats.means_low, n, 0);
+  o.y = load(splats.means, n, 1) + load(splats.means_low, n, 1);
+  const V depth = load(splats.depths, n, 0) + load(splats.depth_low, n, 0);
   V factor[6];
   for (Index i = 0; i < 6; ++i) factor[i] = load(splats.factors, n, i);
   o.drawn = conic_of(factor, settings.blur, o.conic) & (depth > settings.near) & lane_finite(depth) & lane_finite(o.x) &
@@ -176,8 +176,8 @@ bool make_record(const SplatArrays<S>& splats, const RenderSettings& settings, c
 /// Where the gradients of a set go; empty where none is wanted.
 template <class S>
 struct SplatGradients {
-  Array<S> means, means_rest, factors, opacities, features;
-  bool of_shape() const { return means || means_rest || factors || opacities; }
+  Array<S> means, means_low, factors, opacities, features;
+  bool of_shape() const { return means || means_low || factors || opacities; }
 };
 
 // With L = [l11 l21; 0 l22], v = ∂/∂ log α at a pixel and M the moments (Σ v u², …) as a symmetric matrix, from
@@ -211,7 +211,7 @@ void add_record_gradients(const SplatArrays<S>& splats, const RenderSettings& se
     if (to) add_lanes<S>(rows ? x : zero, to.row(n) + col, to.shape.cols, count);
   };
   const V d_x = l11 * moments[1], d_y = l21 * moments[1] + l22 * moments[2];
-  for (const Array<S>& to : {d.means, d.means_rest}) {
+  for (const Array<S>& to : {d.means, d.means_low}) {
     add(to, 0, d_x);
     add(to, 1, d_y);
   }

@@ -93,7 +93,7 @@ struct ReachOf {
 };
 
 /// α ≥ alpha_min where u² + w² ≤ 2 ln(o/alpha_min). With room for the rounding of the exponential, the opacity and the
-/// logarithms, and of u, whose two terms are as large as the ellipse is (row B7).
+/// logarithms, and of u, whose two terms are as large as the ellipse is (row B7: cut ellipses).
 ///
 /// @param log2_opacity  of an opacity held at or above kLeastOpacity
 template <class T>
@@ -138,7 +138,7 @@ inline Extent extent_within(const ReachOf<double>& reach, double x, double y, co
 }
 
 /// The extent that rules ask for. It never leaves out a pixel where min(cap, o G) ≥ alpha_min, with room for the
-/// rounding of the arithmetic (row B7).
+/// rounding of the arithmetic (row B7: cut ellipses).
 ///
 /// @param opacity  o, with the antialias factor
 /// @param reach    by reach_of, for a footprint that asks for it
@@ -191,13 +191,13 @@ struct TileEntry {
   std::uint32_t blocks;  ///< bit r · (blocks across) + c: may touch that block
 };
 
-/// The sum of the numbers of pairs. Throws UserError if it is above kMostPairs (row B10).
+/// The sum of the numbers of pairs. Throws UserError if it is above kMostPairs (row B10: too many pairs).
 Index total_pairs(std::span<const Index> pairs);
 
 /// Most bytes that the pairs of an image may take: kPairMemoryShare of the machine's memory.
 Index pair_memory_limit();
 
-/// Throws UserError if `bytes` is above `limit` (row B10).
+/// Throws UserError if `bytes` is above `limit` (row B10: too many pairs).
 ///
 /// @param pairs  that ask for the bytes
 void check_pair_memory(Index pairs, double bytes, Index limit);

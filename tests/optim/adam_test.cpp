@@ -31,7 +31,7 @@ struct Slopes {
     slopes = tape.constant("slopes", shape);
     loss = sum(x * slopes);
   }
-  AdamGroup<S> group(const ParameterGroupSettings& settings) const { return {{"all", {x}}, settings}; }
+  OptimizerGroup<S> group(const ParameterGroupSettings& settings) const { return {{"all", {x}}, settings}; }
   StepReport step(Adam<S>& adam, Index i = 0, Index n = 1000) {
     tape.forward(loss);
     tape.backward(loss);
@@ -405,7 +405,7 @@ TEST_CASE("moments of other parameters are refused, and rows of moments can be c
   moments.blocks[0].mean.pop_back();
   CHECK_THROWS_AS(adam.set_moments("all", moments), DataError);
   CHECK_THROWS_AS(adam.moments("none"), InternalError);
-  using Groups = std::vector<AdamGroup<double>>;
+  using Groups = std::vector<OptimizerGroup<double>>;
   CHECK_THROWS_AS(Adam<double>(problem.tape, Groups{{{"a", {problem.x, problem.x}}, settings}}, {}), InternalError);
   CHECK_THROWS_AS(Adam<double>(problem.tape, Groups{{{"a", {problem.loss}}, settings}}, {}), InternalError);
 }

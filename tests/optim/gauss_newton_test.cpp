@@ -315,7 +315,7 @@ TEST_CASE("gauss_newton refuses what it cannot move") {
   CHECK_THROWS_WITH((GaussNewton<double>(tape, {{{"colours", {many}}, moving(1)}}, 3, seams)),
                     "gauss_newton keeps a matrix of all pairs of the numbers that move: 1056 numbers, at most 1024 are "
                     "allowed");
-  AdamGroup<double> angles{{"global_orient", {few}}, moving(1)};
+  OptimizerGroup<double> angles{{"global_orient", {few}}, moving(1)};
   angles.parameters.are_axis_angles = true;
   CHECK_THROWS_WITH((GaussNewton<double>(tape, {angles}, 3, seams)),
                     Contains("group \"global_orient\": gauss_newton does not move"));

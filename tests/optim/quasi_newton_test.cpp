@@ -212,7 +212,7 @@ TEST_CASE("bfgs refuses what it cannot move") {
   CHECK_THROWS_WITH(
       (QuasiNewton<double>(tape, {{{"colours", {many}}, moving(1)}})),
       "bfgs keeps a matrix of all pairs of the numbers that move: 1056 numbers, at most 1024 are allowed");
-  AdamGroup<double> angles{{"global_orient", {few}}, moving(1)};
+  OptimizerGroup<double> angles{{"global_orient", {few}}, moving(1)};
   angles.parameters.are_axis_angles = true;
   CHECK_THROWS_WITH((QuasiNewton<double>(tape, {angles})), Contains("group \"global_orient\": bfgs does not move"));
 }

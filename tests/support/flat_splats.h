@@ -55,8 +55,8 @@ struct Flat {
     depths = leaf("depths", shape_of(n, 1), splats.depths);
     opacities = leaf("opacities", shape_of(n, 1), splats.opacities);
     features = leaf("features", shape_of(n, splats.channels), splats.features);
-    const Var<S> rest = tape.constant("rest", shape_of(n, 1)), means_rest = tape.constant("rest", shape_of(n, 2));
-    projected = {means, factors, depths, rest, means_rest};
+    const Var<S> rest = tape.constant("rest", shape_of(n, 1)), means_low = tape.constant("rest", shape_of(n, 2));
+    projected = {means, factors, depths, rest, means_low};
     out = composite(SplatSet{projected, opacities, features}, view);
     tape.forward(out.channels);
   }

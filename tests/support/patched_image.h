@@ -51,7 +51,7 @@ struct PatchedImage {
       read.add(r / kMaskSquare, c / kMaskSquare);
     });
     before = *patch;
-    if (patch->tells) io.tell_squares(0, is_new ? nullptr : &changed, &read);
+    if (patch->tells) io.set_dirty_tiles(0, is_new ? nullptr : &changed, &read);
   }
   void backward(NodeIo<S>& io) {
     double sum = 0;

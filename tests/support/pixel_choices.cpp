@@ -37,9 +37,9 @@ std::uint64_t choices_at(const hsi4d::detail::PixelWalk<S>& walk, Index row, Ind
 template <class S>
 PixelChoices pixel_choices(const Tape<S>& tape, const Projected<S>& projected, Var<S> opacities,
                            const SplatView& view) {
-  const hsi4d::detail::SplatArrays<S> splats = {tape.value(projected.means_px),   tape.value(projected.factors),
-                                                tape.value(projected.depths),     tape.value(projected.depth_rest),
-                                                tape.value(projected.means_rest), tape.value(opacities),
+  const hsi4d::detail::SplatArrays<S> splats = {tape.value(projected.means_px),  tape.value(projected.factors),
+                                                tape.value(projected.depths),    tape.value(projected.depth_low),
+                                                tape.value(projected.means_low), tape.value(opacities),
                                                 tape.value(projected.depths)};
   const hsi4d::detail::PixelWalk<S> walk(splats, view);
   const Index width = walk.grid().width, height = walk.grid().height;

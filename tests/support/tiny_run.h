@@ -94,14 +94,14 @@ inline RunConfig tiny_config(const std::vector<std::string>& overrides = {}) {
 }
 
 /// A run in this process.
-inline RunSummary carry_out_tiny(const RunConfig& config, const std::string& folder, int threads = 1,
-                                 bool resume = false, std::function<bool()> stop_requested = {}) {
+inline RunSummary execute_tiny(const RunConfig& config, const std::string& folder, int threads = 1, bool resume = false,
+                               std::function<bool()> stop_requested = {}) {
   RunOptions options;
   options.folder = folder;
   options.resume = resume;
   options.threads = threads;
   options.observer.stop_requested = std::move(stop_requested);
-  return carry_out(config, loss_terms(), options);
+  return execute_run(config, loss_terms(), options);
 }
 
 inline nlohmann::json json_of(const std::filesystem::path& file) { return nlohmann::json::parse(file_text(file)); }

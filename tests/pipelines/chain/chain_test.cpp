@@ -66,14 +66,14 @@ RunConfig chain_config(const std::vector<std::string>& overrides = {}) {
   return load_run_config(chain_file(), overrides, descriptions_of(loss_terms()), ConfigUse::kRun);
 }
 
-ChainSummary carry_out_tiny_chain(const RunConfig& config, const std::string& folder, int threads = 1,
-                                  bool resume = false, std::function<bool()> stop_requested = {}) {
+ChainSummary execute_tiny_chain(const RunConfig& config, const std::string& folder, int threads = 1,
+                                bool resume = false, std::function<bool()> stop_requested = {}) {
   RunOptions options;
   options.folder = folder;
   options.resume = resume;
   options.threads = threads;
   options.observer.stop_requested = std::move(stop_requested);
-  return carry_out_chain(config, loss_terms(), options);
+  return execute_chain(config, loss_terms(), options);
 }
 
 /// A config beside the dataset's own, changed.
@@ -122,7 +122,7 @@ TEST_CASE("a chain of clips is one motion, and each of its clips a whole run", "
   const RunConfig config = chain_config();
   REQUIRE(config.chain.size() == kClips);
   CHECK(config.chain[1].data.scene == config.chain[0].data.scene);
-  const ChainSummary summary = carry_out_tiny_chain(config, "run");
+  const ChainSummary summary = execute_tiny_chain(config, "run");
 
   for (const char* name : {"config.resolved.json", "status.json", "log.txt", "summary.json", "motion.npz",
                            "motion_30fps.npz", "objects.npz", "cameras.json", "body.glb", "preview.mp4", "report.html",
@@ -197,7 +197,7 @@ TEST_CASE("a chain of clips is one motion, and each of its clips a whole run", "
 TEST_CASE("a chain that was stopped anywhere and resumed has the bits of one that never was", "[run][chain][release]") {
   const TemporaryFolder here;
   const RunConfig config = chain_config({"stages.camera.iterations=3", "stages.interaction.iterations=3"});
-  carry_out_tiny_chain(config, "run");
+  execute_tiny_chain(config, "run");
   fs::rename("run", "whole");  // the clips' configs name the folder
   for (const auto& [last, message] :
        {std::pair{13, "clip 1 of 2, clip1: interrupted after the last frame; frames 1 to 2 are finished and kept"},
@@ -205,11 +205,11 @@ TEST_CASE("a chain that was stopped anywhere and resumed has the bits of one tha
         {26, "clip 2 of 2, clip2: interrupted in frame 2; frame 1 is finished and kept"}}) {
     INFO("stopped at " << last);
     int count = 0;
-    CHECK_THROWS_MATCHES(carry_out_tiny_chain(config, "run", 1, false, [&] { return ++count == last; }), Interrupted,
+    CHECK_THROWS_MATCHES(execute_tiny_chain(config, "run", 1, false, [&] { return ++count == last; }), Interrupted,
                          Message(message));
     CHECK(json_of("run/status.json")["state"] == "interrupted");
     CHECK(finished_clips(config, "run", loss_terms()) == (last < 19 ? 0 : 1));
-    carry_out_tiny_chain(config, "run", 2, true);
+    execute_tiny_chain(config, "run", 2, true);
     check_same_chains("run", "whole");
     fs::remove_all("run");
   }
@@ -222,7 +222,7 @@ TEST_CASE("a chain does not go on with a clip that is done of other frames", "[r
       load_run_config("data/config.json", {"stages.camera.iterations=1", "stages.interaction.iterations=1"},
                       descriptions_of(loss_terms()), ConfigUse::kRun);
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny_chain(config, "run", 1, false, [&] { return ++count == 12; }), Interrupted);
+  CHECK_THROWS_AS(execute_tiny_chain(config, "run", 1, false, [&] { return ++count == 12; }), Interrupted);
   CHECK(finished_clips(config, "run", loss_terms()) == 1);
   fs::copy_file("data/clips/clip1/frames/0001.png", "data/clips/clip1/frames/0002.png",
                 fs::copy_options::overwrite_existing);
@@ -231,10 +231,10 @@ TEST_CASE("a chain does not go on with a clip that is done of other frames", "[r
       ": is not what the run began with (frames/0002.png)\nrun/clips/clip1/checkpoint/progress.npz: goes on with the "
       "inputs as they were; without it the run begins anew";
   CHECK_THROWS_MATCHES(finished_clips(config, "run", loss_terms()), DataError, Message(message));
-  CHECK_THROWS_MATCHES(carry_out_tiny_chain(config, "run", 1, true), DataError, Message(message));
+  CHECK_THROWS_MATCHES(execute_tiny_chain(config, "run", 1, true), DataError, Message(message));
   fs::remove("run/clips/clip1/checkpoint/progress.npz");
   CHECK(finished_clips(config, "run", loss_terms()) == 0);
-  carry_out_tiny_chain(config, "run", 1, true);
+  execute_tiny_chain(config, "run", 1, true);
   CHECK(file_text("run/clips/clip1/frames/0002_target.png") == file_text("run/clips/clip1/frames/0001_target.png"));
 }
 
@@ -246,7 +246,7 @@ TEST_CASE("warnings of a chain's inputs are told once, and are in the log of the
   const LogSink sink = log_to([&told](LogLevel level, std::string_view text) {
     if (level == LogLevel::kWarning) told.emplace_back(text);
   });
-  carry_out_tiny_chain(
+  execute_tiny_chain(
       load_run_config("data/config.json", {"stages.camera.iterations=1", "stages.interaction.iterations=1"},
                       descriptions_of(loss_terms()), ConfigUse::kRun),
       "run");
@@ -260,7 +260,7 @@ TEST_CASE("warnings of a chain's inputs are told once, and are in the log of the
 
 TEST_CASE("evaluate knows the truth of a whole chain", "[run][chain]") {
   const TemporaryFolder here;
-  carry_out_tiny_chain(chain_config({"stages.camera.iterations=1", "stages.interaction.iterations=2"}), "run");
+  execute_tiny_chain(chain_config({"stages.camera.iterations=1", "stages.interaction.iterations=2"}), "run");
   const ProgramResult result = run_hsi4d({"evaluate", "run", "--json", "e.json"});
   INFO(result.err);
   REQUIRE(result.status == 0);
@@ -330,7 +330,7 @@ TEST_CASE("a later clip needs no state of its own", "[run][chain]") {
     content["stages"]["interaction"]["iterations"] = 2;
   });
   CHECK(config.chain[1].data.initial.empty());
-  carry_out_tiny_chain(config, "run");
+  execute_tiny_chain(config, "run");
   CHECK(read_motion("run/starts/clip2.npz").poses.size() == 1);
   CHECK(same(motion_in("run/clips/clip2").poses.front(), motion_in("run/clips/clip1").poses.back()));
   const nlohmann::json written = json_of("run/summary.json");

@@ -48,9 +48,9 @@ nlohmann::json evaluated(std::vector<std::string> arguments) {
 
 TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
   const TemporaryFolder here;
-  carry_out_tiny(tiny_config({"name=one"}), "one");
-  carry_out_tiny(tiny_config({"name=two", "stages.interaction.iterations=3"}), "two");
-  carry_out_tiny(tiny_config({"name=three", "seed=5", "stages.interaction.iterations=3"}), "three");
+  execute_tiny(tiny_config({"name=one"}), "one");
+  execute_tiny(tiny_config({"name=two", "stages.interaction.iterations=3"}), "two");
+  execute_tiny(tiny_config({"name=three", "seed=5", "stages.interaction.iterations=3"}), "three");
   // As if by the config of "one" with another seed: a result that differs.
   write_changed("one/config.resolved.json", "one/config.resolved.json", [](auto&) {});
   write_changed("one/config.resolved.json", "three/config.resolved.json", [](auto& tree) { tree["seed"] = 5; });

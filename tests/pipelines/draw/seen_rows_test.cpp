@@ -37,7 +37,7 @@ Gaussians ball(Index count) {
   return g;
 }
 
-Lookout lookout(double within_deg) { return {plain_camera({128, 128}), {}, within_deg}; }
+ViewRange view_range(double within_deg) { return {plain_camera({128, 128}), {}, within_deg}; }
 
 /// Angle between the camera's centre and a Gaussian, seen from the ball's, degrees.
 double angle_from_camera(const Gaussians& g, Index n) {
@@ -51,7 +51,7 @@ bool holds(const std::vector<Index>& rows, Index n) { return std::binary_search(
 
 TEST_CASE("of a ball is seen what faces the camera, and more from around") {
   const Gaussians g = ball(2000);
-  const std::vector<Index> narrow = seen_rows({g, {}}, lookout(1)), wide = seen_rows({g, {}}, lookout(25));
+  const std::vector<Index> narrow = seen_rows({g, {}}, view_range(1)), wide = seen_rows({g, {}}, view_range(25));
   CHECK(std::is_sorted(narrow.begin(), narrow.end()));
   CHECK(std::includes(wide.begin(), wide.end(), narrow.begin(), narrow.end()));
   const double horizon = 75.5;  // of a ball of radius 1 at 4: the angle whose cosine is 1/4
@@ -72,10 +72,10 @@ TEST_CASE("of a ball is seen what faces the camera, and more from around") {
 
 TEST_CASE("what is seen weighs as much by brute force") {
   const Gaussians g = ball(300);
-  const SceneView view{lookout(0).camera, {}, {}};
+  const SceneView view{view_range(0).camera, {}, {}};
   const SceneGradients by_sum = adjoint_reference(
       g, view, [](const SceneGradients& result) { return std::vector<double>(result.rendered.image.size(), 1); });
-  const std::vector<Index> rows = seen_rows({g, {}}, lookout(0));
+  const std::vector<Index> rows = seen_rows({g, {}}, view_range(0));
   int decided = 0;
   for (Index n = 0; n < g.count(); ++n) {
     const double weight = by_sum.sh[static_cast<std::size_t>(3 * n)] / kShC0;
@@ -90,10 +90,10 @@ TEST_CASE("what is seen weighs as much by brute force") {
 
 TEST_CASE("a part is looked at where its transforms put it") {
   Gaussians g = ball(500);
-  const std::vector<Index> there = seen_rows({g, {}}, lookout(5));
+  const std::vector<Index> there = seen_rows({g, {}}, view_range(5));
   for (Index n = 0; n < g.count(); ++n) g.means[static_cast<std::size_t>(3 * n + 2)] -= 4;  // to the origin
-  CHECK(seen_rows(posed_object(g, {{0, 0, 0}, {0, 0, 4}}), lookout(5)) == there);
-  const std::vector<Index> turned = seen_rows(posed_object(g, {{0, std::numbers::pi, 0}, {0, 0, 4}}), lookout(5));
+  CHECK(seen_rows(posed_object(g, {{0, 0, 0}, {0, 0, 4}}), view_range(5)) == there);
+  const std::vector<Index> turned = seen_rows(posed_object(g, {{0, std::numbers::pi, 0}, {0, 0, 4}}), view_range(5));
   std::vector<Index> both;
   std::set_intersection(there.begin(), there.end(), turned.begin(), turned.end(), std::back_inserter(both));
   CHECK(both.size() < 3 * there.size() / 4);
@@ -102,7 +102,7 @@ TEST_CASE("a part is looked at where its transforms put it") {
 TEST_CASE("of what is out of sight all is kept") {
   Gaussians g = ball(100);
   for (std::size_t i = 2; i < g.means.size(); i += 3) g.means[i] -= 12;  // behind the camera
-  CHECK(seen_rows({g, {}}, lookout(10)) == all_rows(100));
+  CHECK(seen_rows({g, {}}, view_range(10)) == all_rows(100));
 }
 
 TEST_CASE("gathered rows are those asked for") {

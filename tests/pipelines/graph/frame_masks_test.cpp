@@ -8,7 +8,7 @@ namespace frame_masks_test {
 
 using namespace hsi4d;
 
-TEST_CASE("the centre of a mask", "[in_frame]") {
+TEST_CASE("the centre of a mask", "[frame_masks]") {
   Image mask(1, 4, 6);
   CHECK(mask_center(mask, 0.5) == Vector3<double>(0, 0, 0));
   mask(0, 1, 2) = 0.25;
@@ -19,7 +19,7 @@ TEST_CASE("the centre of a mask", "[in_frame]") {
   CHECK(mask_center(mask, 0.5) == Vector3<double>(2.5, 2.5, 2));
 }
 
-TEST_CASE("the area that an object would cover is that of its Gaussians' centres in the image", "[in_frame]") {
+TEST_CASE("the area that an object would cover is that of its Gaussians' centres in the image", "[frame_masks]") {
   Camera camera = {200, 150, 160, 150, 100, 75, {}};
   Gaussians disc;
   std::vector<float> places;

@@ -109,7 +109,7 @@ TEST_CASE("a run with the loss penetration has the body less in the ground, and 
                         R"(", "weight": )" + weight + "}}");
     overrides.push_back(R"(stages.interaction.optimize={"transl": {"lr": 0.01, "lr_final_share": 0.05}})");
     overrides.emplace_back("stages.interaction.iterations=40");
-    carry_out_tiny(tiny_config(overrides), name);
+    execute_tiny(tiny_config(overrides), name);
     const nlohmann::json summary = json_of(std::string(name) + "/summary.json");
     CHECK(summary["surface"] == "surface.ply");
     CHECK_FALSE(summary["metrics"][0].contains("penetration_share"));

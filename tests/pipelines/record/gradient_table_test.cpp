@@ -64,7 +64,7 @@ TEST_CASE("shares of the gradient as a table, and in summary.json and back") {
 TEST_CASE("measuring shares changes no bit of a run's result, and both files have them", "[release]") {
   const TemporaryFolder folder;
   const auto run = [&](const char* name, const std::vector<std::string>& overrides) {
-    carry_out_tiny(tiny_config(overrides), name);
+    execute_tiny(tiny_config(overrides), name);
     return std::pair{file_text(std::string(name) + "/motion.npz"), file_text(std::string(name) + "/objects.npz")};
   };
   const auto off = run("off", {});

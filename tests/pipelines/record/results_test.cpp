@@ -73,7 +73,7 @@ TEST_CASE("a camera turned about a pivot sees it at the same place, from another
 
 TEST_CASE("a run leaves its result in forms that other programs take", "[run]") {
   const TemporaryFolder here;
-  carry_out_tiny(tiny_config(), "run");
+  execute_tiny(tiny_config(), "run");
   const RunPaths paths{"run"};
   const Motion motion = read_motion(paths.motion()), dense = read_motion(paths.motion_at_30());
   CHECK(dense.frame_rate == 30);
@@ -94,7 +94,7 @@ TEST_CASE("the body of another avatar is not written, and the log says so", "[ru
   const TemporaryFolder here;
   RunConfig config = tiny_config();
   config.body.shape = {8};  // much taller
-  carry_out_tiny(config, "run");
+  execute_tiny(config, "run");
   CHECK_FALSE(std::filesystem::exists(RunPaths{"run"}.body()));
   CHECK(read_text_file("run/log.txt").find("body.glb is not written: joints of the avatar are ") != std::string::npos);
 }
@@ -102,8 +102,7 @@ TEST_CASE("the body of another avatar is not written, and the log says so", "[ru
 TEST_CASE("a preview shows the video, the reconstruction, both, and another side", "[run]") {
   const TemporaryFolder here;
   // A wide pixel filter makes the reconstruction another picture than the video.
-  carry_out_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1", "render.blur=3"}),
-                 "run");
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1", "render.blur=3"}), "run");
   const RunPaths paths{"run"};
   VideoReader preview(paths.preview());
   REQUIRE(preview.frames() == kTinyFrames);
@@ -132,7 +131,7 @@ TEST_CASE("without ffmpeg a run is done all the same, and its log says what is n
   const RunConfig config = tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"});
   {
     const ChangedVariable nowhere("PATH", here.path().c_str());
-    carry_out_tiny(config, "run");
+    execute_tiny(config, "run");
   }
   CHECK(json_of("run/status.json")["state"] == "done");
   CHECK_FALSE(std::filesystem::exists("run/preview.mp4"));
@@ -144,7 +143,7 @@ TEST_CASE("without ffmpeg a run is done all the same, and its log says what is n
   CHECK_THAT(file_text("run/log.txt"),
              Catch::Matchers::Contains(" warning preview.mp4 is not written: ffmpeg: cannot be run: No such file or "
                                        "directory; is it installed, and in PATH?\n"));
-  carry_out_tiny(config, "run", 1, true);  // and with it, later
+  execute_tiny(config, "run", 1, true);  // and with it, later
   CHECK(std::filesystem::exists("run/preview.mp4"));
 }
 

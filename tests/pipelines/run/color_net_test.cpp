@@ -87,8 +87,8 @@ double last_number(const RunSummary& summary, const std::string& name) {
 TEST_CASE("where the human's appearance changes, a color net beats none", "[run][color_net]") {
   const TemporaryFolder here;
   write_changing_dataset("changing");
-  const RunSummary off = carry_out_tiny(config_of("changing", {"stages.interaction.iterations=60"}), "off");
-  const RunSummary on = carry_out_tiny(config_with_net("changing", 60, 0.01), "on");
+  const RunSummary off = execute_tiny(config_of("changing", {"stages.interaction.iterations=60"}), "off");
+  const RunSummary on = execute_tiny(config_with_net("changing", 60, 0.01), "on");
   const double psnr_off = last_number(off, "psnr_foreground_db"), psnr_on = last_number(on, "psnr_foreground_db");
   const double joints_off = last_number(off, "world_mpjpe_mm"), joints_on = last_number(on, "world_mpjpe_mm");
   WARN("PSNR of the foreground " << psnr_off << " dB without, " << psnr_on << " dB with a color net; world MPJPE "
@@ -107,7 +107,7 @@ TEST_CASE("the gain of a color net by learning rate and width", "[full][color_ne
   settings.object_gaussians = 500;
   write_changing_dataset("changing", settings);
   const std::string iterations = "stages.interaction.iterations=300";
-  const RunSummary off = carry_out_tiny(config_of("changing", {iterations}), "off", 2);
+  const RunSummary off = execute_tiny(config_of("changing", {iterations}), "off", 2);
   const double without = last_number(off, "psnr_foreground_db");
   WARN("without: " << without << " dB, " << last_number(off, "world_mpjpe_mm") << " mm");
   int count = 0;
@@ -117,7 +117,7 @@ TEST_CASE("the gain of a color net by learning rate and width", "[full][color_ne
       RunConfig config = config_of("changing", {"color_net.use=on", iterations});
       config.color_net.hidden_width = width;
       move_group(config, "color_net", lr);
-      const RunSummary on = carry_out_tiny(config, "on" + std::to_string(++count), 2);
+      const RunSummary on = execute_tiny(config, "on" + std::to_string(++count), 2);
       const double with = last_number(on, "psnr_foreground_db");
       WARN("lr " << lr << ", width " << width << ": " << with << " dB, " << last_number(on, "world_mpjpe_mm") << " mm, "
                  << on.metrics.back().seconds << " s");
@@ -131,7 +131,7 @@ TEST_CASE("a color net moves in the iterations that its group says, and persists
           "[run][color_net]") {
   const TemporaryFolder here;
   const RunConfig config = config_with_net(TinyDataset::folder(), 11, 0.002);
-  carry_out_tiny(config, "on");
+  execute_tiny(config, "on");
   // In iterations 0, 5 and 10 of every frame; the moments persist, so that the steps counted at the end are those of
   // the whole clip.
   const Clip clip = read_clip(config.data);
@@ -154,12 +154,12 @@ TEST_CASE("a run with a color net that was stopped and resumed has the bits of o
                                        {std::string("precision=") + precision, "color_net.view_direction=true"});
     move_group(config, "avatar_features", 0.01);
     const std::string whole = std::string("whole_") + precision, run = std::string("stopped_") + precision;
-    carry_out_tiny(config, whole);
+    execute_tiny(config, whole);
     for (const int last : {kPerFrame + 12, kPerFrame + 3}) {
       int count = 0;
-      CHECK_THROWS_AS(carry_out_tiny(config, run, 1, true, [&] { return ++count == last; }), Interrupted);
+      CHECK_THROWS_AS(execute_tiny(config, run, 1, true, [&] { return ++count == last; }), Interrupted);
     }
-    carry_out_tiny(config, run, 2, true);
+    execute_tiny(config, run, 2, true);
     CHECK(differences(whole, run) == kNone);
     CHECK(file_text(whole + "/color_net.safetensors") == file_text(run + "/color_net.safetensors"));
     CHECK(file_text(whole + "/checkpoint/progress.npz").size() == file_text(run + "/checkpoint/progress.npz").size());
@@ -168,18 +168,18 @@ TEST_CASE("a run with a color net that was stopped and resumed has the bits of o
 
 TEST_CASE("a color net that no stage moves changes nothing, and leaves no file", "[run][color_net]") {
   const TemporaryFolder here;
-  const RunSummary off = carry_out_tiny(tiny_config(), "off");
-  const RunSummary on = carry_out_tiny(tiny_config({"color_net.use=on"}), "on");
+  const RunSummary off = execute_tiny(tiny_config(), "off");
+  const RunSummary on = execute_tiny(tiny_config({"color_net.use=on"}), "on");
   CHECK_FALSE(fs::exists("on/color_net.safetensors"));
   CHECK(std::fabs(last_number(on, "psnr_db") - last_number(off, "psnr_db")) < 0.01);
   // auto: none, as the avatar's file has none
-  carry_out_tiny(tiny_config({"color_net.use=auto"}), "auto");
+  execute_tiny(tiny_config({"color_net.use=auto"}), "auto");
   std::vector<std::string> names = differences("off", "auto");
   std::erase(names, "config.resolved.json");
   CHECK(names == kNone);
   RunConfig named = tiny_config({"color_net.use=off"});
   move_group(named, "color_net", 0.01);
-  const RunSummary ablation = carry_out_tiny(named, "named");
+  const RunSummary ablation = execute_tiny(named, "named");
   CHECK(last_number(ablation, "psnr_db") == last_number(off, "psnr_db"));
 }
 
@@ -192,10 +192,10 @@ TEST_CASE("a run goes on with the network of the avatar's file", "[run][color_ne
   avatar.color_net->layers.back().bias = {2, -2, 0.5};  // everything turns red
   write_avatar(file, avatar);
   CHECK(*read_avatar(file).color_net == *avatar.color_net);
-  const RunSummary own = carry_out_tiny(config_of("data", {}), "own");
-  const RunSummary off = carry_out_tiny(config_of("data", {"color_net.use=off"}), "off");
+  const RunSummary own = execute_tiny(config_of("data", {}), "own");
+  const RunSummary off = execute_tiny(config_of("data", {"color_net.use=off"}), "off");
   CHECK(last_number(off, "psnr_foreground_db") > last_number(own, "psnr_foreground_db") + 3);
-  const RunSummary on = carry_out_tiny(config_of("data", {"color_net.use=on"}), "on");
+  const RunSummary on = execute_tiny(config_of("data", {"color_net.use=on"}), "on");
   CHECK(last_number(on, "psnr_db") == last_number(own, "psnr_db"));
 }
 
@@ -203,7 +203,7 @@ TEST_CASE("a checkpoint with another color net is refused", "[run][color_net]") 
   const TemporaryFolder here;
   const RunConfig config = config_with_net(TinyDataset::folder(), 5, 0.01);
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny(config, "run", 1, false, [&] { return ++count == kPerFrame; }), Interrupted);
+  CHECK_THROWS_AS(execute_tiny(config, "run", 1, false, [&] { return ++count == kPerFrame; }), Interrupted);
   const std::string file = "run/checkpoint/progress.npz";
   const auto refusal = [&](const std::string& name, std::vector<double> numbers) {
     const std::string hash = Npz::read(file).array("config_hash").text();
@@ -213,7 +213,7 @@ TEST_CASE("a checkpoint with another color net is refused", "[run][color_net]") 
     checkpoint.save(file, hash);
     std::string message = "no error";
     try {
-      carry_out_tiny(config, "run", 1, true);
+      execute_tiny(config, "run", 1, true);
     } catch (const DataError& error) {
       message = error.what();
     }
@@ -229,7 +229,7 @@ TEST_CASE("a checkpoint with another color net is refused", "[run][color_net]") 
       std::string::npos);
   CHECK(refusal("color_net/moments/color_net/1/mean", {1}).find("holds 1 numbers, this color net has 16") !=
         std::string::npos);
-  carry_out_tiny(config, "run", 1, true);
+  execute_tiny(config, "run", 1, true);
 }
 
 }  // namespace color_net_test

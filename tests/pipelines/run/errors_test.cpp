@@ -129,7 +129,7 @@ TEST_CASE("a damaged file that a loss names is found before anything is written,
   CHECK(run_hsi4d({"check", dataset.file("config.json")}).err == run.err);
   CHECK_FALSE(fs::exists("run"));
   const RunConfig config = load_run_config(dataset.file("config.json"), {}, descriptions_of(loss_terms()));
-  CHECK_THROWS_WITH(carry_out_tiny(config, "run"),
+  CHECK_THROWS_WITH(execute_tiny(config, "run"),
                     "/stages/interaction/losses/pose_prior/weights: " + dataset.file("vposer.npz") +
                         ": looks like text, not like a .npz archive");
   CHECK_FALSE(fs::exists("run"));
@@ -145,7 +145,7 @@ TEST_CASE("what a loss reads is read once in a run", "[run]") {
   const RunConfig config =
       load_run_config(tiny_config_file(), {R"(stages.interaction.losses={"counted": {}})"}, descriptions_of(terms));
   CHECK(reads == 0);
-  carry_out(config, terms, {.folder = "run", .threads = 1, .observer = {}});
+  execute_run(config, terms, {.folder = "run", .threads = 1, .observer = {}});
   CHECK(reads == 1);  // over three frames
 }
 

@@ -122,7 +122,7 @@ TEST_CASE("stages over the first frame find what was given some centimetres besi
   const RunConfig config = config_with_first_stages(dataset);
   REQUIRE(config.stages.size() == 4);
   CHECK(config.stages.front().first == "fit_first_camera");  // whatever was written first
-  const RunSummary summary = carry_out_tiny(config, "run");
+  const RunSummary summary = execute_tiny(config, "run");
 
   const MetricValues& given = baseline_of(summary, "given_frame_0").values;
   REQUIRE(summary.metrics.size() == 4);
@@ -155,7 +155,7 @@ TEST_CASE("stages over the first frame find what was given some centimetres besi
 
   // Frames that follow profit.
   RunConfig plain = load_run_config(dataset / "config.json", {}, descriptions_of(loss_terms()));
-  const RunSummary without = carry_out_tiny(plain, "plain");
+  const RunSummary without = execute_tiny(plain, "plain");
   CHECK(same(first_state_of("plain"), clip.first));
   CHECK(number_in(summary.metrics.back().values, "world_mpjpe_mm") <
         0.8 * number_in(without.metrics.back().values, "world_mpjpe_mm"));
@@ -167,7 +167,7 @@ TEST_CASE("depth as in frame 0 is that of the frame 0 that was found", "[run][fi
   RunConfig config = config_with_first_stages(
       dataset.path, {"stages.interaction.iterations=1", "stages.fit_first_camera.iterations=10",
                      "stages.fit_first_frame.iterations=10"});
-  carry_out_tiny(config, "run");
+  execute_tiny(config, "run");
   const auto depth_of_first_line = [](const fs::path& run) {
     for (const nlohmann::json& line : metrics_of(run)) {
       if (line["frame"] == 1 && line["stage"] == "interaction") return line["losses"]["depth"].get<double>();
@@ -176,7 +176,7 @@ TEST_CASE("depth as in frame 0 is that of the frame 0 that was found", "[run][fi
   };
   // Camera and object of frame 1 begin where those of frame 0 ended, but for what the camera's stage moves.
   config.stages[2].second.optimize[0].second.lr = 0;
-  carry_out_tiny(config, "standing");
+  execute_tiny(config, "standing");
   CHECK(depth_of_first_line("standing") < 1e-10);
   CHECK(depth_of_first_line("run") > 1e-10);
 }
@@ -189,7 +189,7 @@ TEST_CASE("what is solid and shares and starts and the 3D view are of the frame 
       dataset.path,
       {"stages.interaction.iterations=2", "stages.fit_first_camera.iterations=5", "stages.fit_first_frame.iterations=5",
        "stages.fit_first_frame.gradient_shares=1", "start.root=best", "start.objects=best"});
-  const RunSummary summary = carry_out_tiny(config, "run");
+  const RunSummary summary = execute_tiny(config, "run");
   const Clip clip = read_clip(config.data);
   const SceneState found = first_state_of("run");
   REQUIRE(summary.surface == clip.surface_file);
@@ -221,7 +221,7 @@ TEST_CASE("a run with stages over the first frame that was stopped and resumed h
   ParameterGroupSettings moved;
   moved.lr = 0.01;
   config.stages[1].second.optimize.emplace_back("color_net", moved);
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   for (const int last : {3, 6, 9, 10, 9 + kPerFrame + 2}) {
     INFO("stopped after iteration " << last);
     const std::string run = "stopped" + std::to_string(last);
@@ -229,9 +229,9 @@ TEST_CASE("a run with stages over the first frame that was stopped and resumed h
     const std::string message = last <= 9               ? "interrupted in frame 0; no frame was finished"
                                 : last <= 9 + kPerFrame ? "interrupted in frame 1; frame 0 is finished and kept"
                                                         : "interrupted in frame 2; frames 0 to 1 are finished and kept";
-    CHECK_THROWS_MATCHES(carry_out_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted,
+    CHECK_THROWS_MATCHES(execute_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted,
                          Message(message));
-    carry_out_tiny(config, run, 2, true);
+    execute_tiny(config, run, 2, true);
     CHECK(differences("whole", run) == kNone);
   }
 }

@@ -26,7 +26,7 @@ void write_waving(SyntheticObjectKind object, const fs::path& folder) {
 }
 
 RunSummary run(const fs::path& config, const std::string& out, const std::vector<std::string>& overrides = {}) {
-  return carry_out_tiny(load_run_config(config, overrides, descriptions_of(loss_terms())), out);
+  return execute_tiny(load_run_config(config, overrides, descriptions_of(loss_terms())), out);
 }
 
 /// The sum of a counter over the iterations of the stage that draws everything.

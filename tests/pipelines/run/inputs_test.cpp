@@ -29,7 +29,7 @@ void copy_dataset(const fs::path& to) { fs::copy(TinyDataset::folder(), to, fs::
 /// A run that was stopped in frame 2: frames 0 and 1 are in its checkpoint.
 void begin_run(const RunConfig& config, const std::string& folder) {
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny(config, folder, 1, false, [&] { return ++count == kPerFrame + 3; }), Interrupted);
+  CHECK_THROWS_AS(execute_tiny(config, folder, 1, false, [&] { return ++count == kPerFrame + 3; }), Interrupted);
 }
 
 /// Changes one byte of a file and nothing of its size.
@@ -48,7 +48,7 @@ void brighten(const fs::path& file) {
 
 std::string resume_message(const RunConfig& config, const std::string& folder) {
   try {
-    carry_out_tiny(config, folder, 1, true);
+    execute_tiny(config, folder, 1, true);
   } catch (const DataError& error) {
     return error.what();
   }
@@ -68,11 +68,11 @@ std::vector<std::string> warnings_of(const RunConfig& config) {
 TEST_CASE("a run goes on where its data has been moved, with another number of threads in its config", "[run]") {
   const TemporaryFolder here;
   copy_dataset("data");
-  carry_out_tiny(config_of("data"), "whole");
+  execute_tiny(config_of("data"), "whole");
   begin_run(config_of("data"), "run");
   fs::rename("data", "moved");
   const RunConfig moved = config_of("moved", {"threads=2", "synthetic.seed=9"});
-  carry_out_tiny(moved, "run", 0, true);
+  execute_tiny(moved, "run", 0, true);
   CHECK(file_text("run/config.resolved.json") == resolved_config(moved, descriptions_of(loss_terms())));
   CHECK(differences("whole", "run") == std::vector<std::string>{"config.resolved.json"});
   CHECK(json_of("run/status.json")["threads"] == 2);
@@ -82,7 +82,7 @@ TEST_CASE("a run is not resumed with an input whose content has changed, and say
   const TemporaryFolder here;
   copy_dataset("data");
   const RunConfig config = config_of("data");
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   begin_run(config, "run");
   const std::string scene = config.data.scene.string(), masks = config.data.masks.string();
   const std::string end =
@@ -131,7 +131,7 @@ TEST_CASE("a frame that was not reached yet may be mended before a run goes on",
   const RunConfig config = config_of("data");
   begin_run(config, "run");
   brighten(config.data.frames / "0003.png");
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   CHECK(resume_message(config, "run") == "resumed");
   CHECK(differences("whole", "run").empty());
 }
@@ -170,7 +170,7 @@ TEST_CASE("frames in which an object is not seen are told once, as ranges", "[ru
         std::vector<std::string>{masks.string() + ": the object is hidden in frame 2: no pixel reaches "
                                                   "data.mask_threshold"});
   write_image((masks / "0003.png").string(), Image(1, kTinyPixels, kTinyPixels));
-  carry_out_tiny(config, "run");
+  execute_tiny(config, "run");
   CHECK_THAT(file_text("run/log.txt"),
              Contains(" warning " + masks.string() + ": the object is hidden in frames 2-3" + rest));
 }

@@ -53,7 +53,7 @@ const std::vector<std::string> kNone;
 TEST_CASE("a run that was stopped anywhere and resumed has the bits of one that never was", "[run]") {
   const TemporaryFolder here;
   const RunConfig config = tiny_config();
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   // The iterations after which it is stopped: the very first one; within the first frame; the last one before a
   // checkpoint; the first one after it; in the last frame.
   for (const int last : {1, 10, kPerFrame, kPerFrame + 1, 2 * kPerFrame + 11}) {
@@ -62,7 +62,7 @@ TEST_CASE("a run that was stopped anywhere and resumed has the bits of one that 
     int count = 0;
     const auto stop = [&] { return ++count == last; };
     const int frame = (last - 1) / kPerFrame + 1;
-    CHECK_THROWS_MATCHES(carry_out_tiny(config, run, 1, false, stop), Interrupted,
+    CHECK_THROWS_MATCHES(execute_tiny(config, run, 1, false, stop), Interrupted,
                          Catch::Matchers::Message("interrupted in frame " + std::to_string(frame) + "; " +
                                                   (frame == 1   ? "no frame was finished"
                                                    : frame == 2 ? "frame 1 is finished and kept"
@@ -74,7 +74,7 @@ TEST_CASE("a run that was stopped anywhere and resumed has the bits of one that 
     CHECK_FALSE(fs::exists(run + "/summary.json"));
     CHECK_FALSE(fs::exists(run + "/motion.npz"));
     count = 0;
-    carry_out_tiny(config, run, 2, true, [&] { return ++count < 0; });
+    execute_tiny(config, run, 2, true, [&] { return ++count < 0; });
     // No frame that was done is done again; two images of each are drawn for the preview.
     CHECK(count == (kTinyFrames - frame) * kPerFrame + 2 * kTinyFrames);
     CHECK(state_of(run) == "done");
@@ -100,13 +100,13 @@ TEST_CASE("a run with approximations that was stopped and resumed has the bits o
   REQUIRE(find_entry(camera.optimize, "camera") != nullptr);
   camera.optimizer.kind = OptimizerKind::kBfgs;
   camera.optimizer.keep_curvature = true;
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   for (const int last : {kPerFrame + 3, 2 * kPerFrame + 11}) {
     INFO("stopped after iteration " << last);
     const std::string run = "stopped" + std::to_string(last);
     int count = 0;
-    CHECK_THROWS_AS(carry_out_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted);
-    carry_out_tiny(config, run, 2, true);
+    CHECK_THROWS_AS(execute_tiny(config, run, 1, false, [&] { return ++count == last; }), Interrupted);
+    execute_tiny(config, run, 2, true);
     CHECK(differences("whole", run) == kNone);
   }
 }
@@ -114,13 +114,13 @@ TEST_CASE("a run with approximations that was stopped and resumed has the bits o
 TEST_CASE("a run can be stopped and resumed again and again", "[run]") {
   const TemporaryFolder here;
   const RunConfig config = tiny_config();
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   bool is_done = false;
   int rounds = 0;
   while (!is_done && rounds < 10) {
     int count = 0;
     try {  // a frame and a bit more each time
-      carry_out_tiny(config, "run", 1, true, [&] { return ++count == kPerFrame + 3; });
+      execute_tiny(config, "run", 1, true, [&] { return ++count == kPerFrame + 3; });
       is_done = true;
     } catch (const Interrupted&) {
     }
@@ -128,13 +128,13 @@ TEST_CASE("a run can be stopped and resumed again and again", "[run]") {
   }
   CHECK(rounds == kTinyFrames);  // the preview is stopped too, once
   CHECK(differences("whole", "run") == kNone);
-  carry_out_tiny(config, "run", 1, true);  // a run that is done: nothing changes
+  execute_tiny(config, "run", 1, true);  // a run that is done: nothing changes
   CHECK(differences("whole", "run") == kNone);
 }
 
 TEST_CASE("a run that was killed and resumed has the bits of one that never was", "[run]") {
   const TemporaryFolder here;
-  carry_out_tiny(tiny_config(), "whole");
+  execute_tiny(tiny_config(), "whole");
   for (const int frame : {1, 2}) {  // before the first checkpoint, and after it
     INFO("killed in frame " << frame);
     const std::string run = "killed" + std::to_string(frame);
@@ -156,16 +156,16 @@ TEST_CASE("a run that was killed and resumed has the bits of one that never was"
 TEST_CASE("lines that a kill cut short are written again", "[run]") {
   const TemporaryFolder here;
   const RunConfig config = tiny_config();
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny(config, "run", 1, false, [&] { return ++count == kPerFrame + 5; }), Interrupted);
+  CHECK_THROWS_AS(execute_tiny(config, "run", 1, false, [&] { return ++count == kPerFrame + 5; }), Interrupted);
   fs::resize_file("run/metrics.jsonl", fs::file_size("run/metrics.jsonl") - 7);
   std::ofstream("run/frames/0002_render.png") << "half a file";
   std::ofstream("run/status.json") << "{\"state\": \"runn";
   for (const char* left :
        {"frames/0002_render.png.77-3.tmp", "checkpoint/progress.npz.77-4.tmp", "summary.json.77-5.tmp"})
     here.write(std::string("run/") + left, "half a file");
-  carry_out_tiny(config, "run", 1, true);
+  execute_tiny(config, "run", 1, true);
   CHECK(differences("whole", "run") == kNone);
   CHECK(state_of("run") == "done");
   CHECK(temporaries_in("run") == kNone);
@@ -193,7 +193,7 @@ TEST_CASE("a signal is noted once, and not at all where it is ignored", "[run]")
 
 TEST_CASE("SIGINT ends a run in good order", "[run]") {
   const TemporaryFolder here;
-  carry_out_tiny(tiny_config(), "whole");
+  execute_tiny(tiny_config(), "whole");
   for (const int signal : {SIGINT, SIGTERM}) {
     INFO("signal " << signal);
     const std::string run = "run" + std::to_string(signal);
@@ -219,13 +219,13 @@ TEST_CASE("a run that fails in the middle goes on once the cause is gone", "[run
   const fs::path data = fs::absolute("data");
   fs::copy(TinyDataset::folder(), data, fs::copy_options::recursive);
   const RunConfig config = load_run_config(data / "config.json", {}, descriptions_of(loss_terms()));
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   const std::string frame = (data / "frames" / "0002.png").string(), bytes = file_text(frame);
   const auto damage = [&] {  // after it was found to be sound
     std::ofstream(frame) << "no image";
     return false;
   };
-  CHECK_THROWS_AS(carry_out_tiny(config, "run", 1, false, damage), DataError);
+  CHECK_THROWS_AS(execute_tiny(config, "run", 1, false, damage), DataError);
   const std::string message = json_of("run/status.json")["message"];
   CHECK(state_of("run") == "failed");
   CHECK_THAT(message, Contains(frame));
@@ -236,7 +236,7 @@ TEST_CASE("a run that fails in the middle goes on once the cause is gone", "[run
   }
   CHECK(metrics_of("run").size() == kPerFrame);
   std::ofstream(frame, std::ios::binary) << bytes;
-  carry_out_tiny(config, "run", 1, true);
+  execute_tiny(config, "run", 1, true);
   CHECK(differences("whole", "run") == kNone);
 }
 

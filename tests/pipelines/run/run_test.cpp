@@ -105,7 +105,7 @@ void check_small_run(RunConfig config, const std::string& folder, bool on_its_ow
                 config.body);
   CHECK(fs::exists(folder + "-dataset/truth/motion.npz"));
   config.data = dataset_inputs(on_its_own ? fs::path(folder + "-dataset") : TinyDataset::folder());
-  const RunSummary summary = carry_out_tiny(config, folder);
+  const RunSummary summary = execute_tiny(config, folder);
   CHECK(summary.metrics.size() == config.stages.size());
   CHECK(number_in(summary.metrics.back().values, "psnr_db") > 10);
   CHECK(json_of(folder + "/status.json")["state"] == "done");
@@ -126,7 +126,7 @@ bool check_shipped_config(const fs::path& file, const std::string& folder, bool 
 
 TEST_CASE("a run leaves a whole run folder, and a result better than its baselines", "[run]") {
   const TemporaryFolder here;
-  const RunSummary summary = carry_out_tiny(longer_config(), "run");
+  const RunSummary summary = execute_tiny(longer_config(), "run");
   const fs::path run = "run";
   CHECK(names_in(run) == std::set<std::string>{".lock", "body.glb", "cameras.json", "checkpoint",
                                                "config.resolved.json", "frames", "log.txt", "metrics.jsonl",
@@ -188,10 +188,10 @@ TEST_CASE("a run leaves a whole run folder, and a result better than its baselin
 TEST_CASE("a run has the same bits for any number of threads", "[run][parallel]") {
   const TemporaryFolder here;
   const RunConfig config = tiny_config();
-  carry_out_tiny(config, "one", 1);
+  execute_tiny(config, "one", 1);
   for (const int threads : {2, 3}) {
     const std::string folder = std::to_string(threads);
-    carry_out_tiny(config, folder, threads);
+    execute_tiny(config, folder, threads);
     CHECK(json_of(folder + "/status.json")["threads"] == threads);
     CHECK(differences("one", folder) == std::vector<std::string>{});
   }
@@ -199,13 +199,13 @@ TEST_CASE("a run has the same bits for any number of threads", "[run][parallel]"
 
 TEST_CASE("the comparison of runs sees what differs", "[run]") {
   const TemporaryFolder here;
-  carry_out_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "a");
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "a");
   fs::copy("a", "b", fs::copy_options::recursive);
   CHECK(differences("a", "b").empty());
   fs::copy_file("b/frames/0001_target.png", "b/frames/0002_target.png", fs::copy_options::overwrite_existing);
   fs::remove("b/frames/0003_render.png");
   CHECK(differences("a", "b").size() == 2);
-  carry_out_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=2"}), "c");
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=2"}), "c");
   CHECK(differences("a", "c").size() > 5);
 }
 
@@ -213,7 +213,7 @@ TEST_CASE("a run without truth has no errors against it, but images", "[run]") {
   const TemporaryFolder here;
   RunConfig config = tiny_config();
   config.data.truth.clear();
-  const RunSummary summary = carry_out_tiny(config, "run");
+  const RunSummary summary = execute_tiny(config, "run");
   REQUIRE(summary.baselines.size() == 1);  // the image that the run was given
   CHECK(summary.baselines[0].name == "start");
   CHECK(summary.baselines[0].values.size() == 10);  // of images, the surfaces, contact and feet
@@ -237,7 +237,7 @@ TEST_CASE("a run without objects has no terms and no files of them", "[run]") {
   const TemporaryFolder here;
   RunConfig config = tiny_config();
   config.data.objects.clear();
-  const RunSummary summary = carry_out_tiny(config, "run");
+  const RunSummary summary = execute_tiny(config, "run");
   CHECK_FALSE(fs::exists("run/objects.npz"));
   CHECK(find_metric(summary.metrics.back().values, "object_translation_cm") == nullptr);
   CHECK(number_in(summary.metrics.back().values, "mpjpe_mm") > 0);
@@ -256,7 +256,7 @@ TEST_CASE("without estimates every frame starts from the one before", "[run]") {
   motion.poses.resize(1);
   write_motion((data / "initial_motion.npz").string(), motion);
   const RunConfig config = load_run_config(data / "config.json", {}, descriptions_of(loss_terms()));
-  const RunSummary summary = carry_out_tiny(config, "run");
+  const RunSummary summary = execute_tiny(config, "run");
   REQUIRE(summary.baselines.size() == 2);
   CHECK(number_in(summary.baselines[0].values, "mpjpe_mm") == number_in(summary.baselines[1].values, "mpjpe_mm"));
   const Motion result = read_motion("run/motion.npz");
@@ -274,7 +274,7 @@ TEST_CASE("estimated limbs are where frames start from, the root is the one befo
   RunConfig config = tiny_config();
   std::erase_if(config.stages.back().second.optimize,  // the body stays where frames start
                 [](const auto& group) { return group.first != "object_transl"; });
-  carry_out_tiny(config, "run");
+  execute_tiny(config, "run");
   const Motion result = read_motion("run/motion.npz");
   const Motion given = read_motion((TinyDataset::folder() / "initial_motion.npz").string());
   for (std::size_t t = 1; t < result.poses.size(); ++t) {
@@ -288,10 +288,10 @@ TEST_CASE("estimated limbs are where frames start from, the root is the one befo
 
 TEST_CASE("a run in double and with axis-angles finds about what one in float finds", "[run]") {
   const TemporaryFolder here;
-  const RunSummary plain = carry_out_tiny(tiny_config(), "float");
-  const RunSummary precise = carry_out_tiny(tiny_config({"precision=double"}), "double");
+  const RunSummary plain = execute_tiny(tiny_config(), "float");
+  const RunSummary precise = execute_tiny(tiny_config({"precision=double"}), "double");
   CHECK(json_of("double/status.json")["precision"] == "double");
-  const RunSummary vectors = carry_out_tiny(tiny_config({"rotations=axis_angle"}), "vectors");
+  const RunSummary vectors = execute_tiny(tiny_config({"rotations=axis_angle"}), "vectors");
   const auto last = [](const RunSummary& summary, const char* name) {
     return number_in(summary.metrics.back().values, name);
   };
@@ -308,7 +308,7 @@ TEST_CASE("the camera is found with increments in any frame", "[run]") {
   std::set<double> found;
   for (const char* increment : {"camera", "world", "scene"}) {
     INFO(increment);
-    const RunSummary summary = carry_out_tiny(
+    const RunSummary summary = execute_tiny(
         tiny_config({std::string("camera.increment=") + increment, "stages.camera.iterations=30"}), increment);
     const double error = number_in(summary.metrics[0].values, "camera_rotation_deg");
     CHECK(error < number_in(summary.baselines[0].values, "camera_rotation_deg"));
@@ -358,7 +358,7 @@ TEST_CASE("a dry run looks at the folder as the run would", "[run]") {
   const TemporaryFolder here;
   const std::string config = tiny_config_file();
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny(tiny_config(), "runs/tiny", 1, false, [&] { return ++count == 25; }), Interrupted);
+  CHECK_THROWS_AS(execute_tiny(tiny_config(), "runs/tiny", 1, false, [&] { return ++count == 25; }), Interrupted);
   // Without --out the next folder that is free.
   CHECK_THAT(run_hsi4d({"run", config, "--dry-run"}).out, StartsWith("would write runs/tiny-2\n"));
   const auto before = file_text("runs/tiny/status.json");

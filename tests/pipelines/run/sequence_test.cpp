@@ -106,16 +106,16 @@ void check_stopped_after(int last) {
   INFO("stopped after iteration " << last);
   const RunConfig config = refined_config();
   const TemporaryFolder here;
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   REQUIRE(result_of("whole").contains("body.glb"));
   int count = 0;
-  CHECK_THROWS_MATCHES(carry_out_tiny(config, "run", 1, false, [&] { return ++count == last; }), Interrupted,
+  CHECK_THROWS_MATCHES(execute_tiny(config, "run", 1, false, [&] { return ++count == last; }), Interrupted,
                        Message(stop_message_at(last)));
   CHECK(json_of("run/status.json")["state"] == "interrupted");
   CHECK(json_of("run/status.json")["message"] == stop_message_at(last));
   CHECK(metrics_of("run").size() == static_cast<std::size_t>(last));
   CHECK_FALSE(fs::exists("run/summary.json"));
-  carry_out_tiny(config, "run", 2, true);
+  execute_tiny(config, "run", 2, true);
   CHECK(differences("whole", "run") == kNone);
   std::set<std::string> seen;  // no line is there twice
   for (const nlohmann::json& line : metrics_of("run")) {
@@ -129,8 +129,8 @@ void check_stopped_after(int last) {
 TEST_CASE("a run with a stage over the sequence tells of it as of the others", "[run][sequence]") {
   const TemporaryFolder here;
   const RunConfig config = refined_config();
-  carry_out_tiny(frames_alone(config), "frames");
-  const RunSummary summary = carry_out_tiny(config, "run");
+  execute_tiny(frames_alone(config), "frames");
+  const RunSummary summary = execute_tiny(config, "run");
 
   const std::vector<nlohmann::json> lines = metrics_of("run");
   REQUIRE(lines.size() == kInFrames + kRefinementIterations);
@@ -197,8 +197,8 @@ TEST_CASE("a run with a stage over the sequence has the same bits for any number
   const TemporaryFolder here;
   for (const std::string precision : {"float", "double"}) {
     const RunConfig config = refined_config({"precision=" + precision});
-    carry_out_tiny(config, precision + "1", 1);
-    carry_out_tiny(config, precision + "2", 2);
+    execute_tiny(config, precision + "1", 1);
+    execute_tiny(config, precision + "2", 2);
     CHECK(differences(precision + "1", precision + "2") == kNone);
   }
   CHECK(file_text("float1/motion.npz") != file_text("double1/motion.npz"));
@@ -212,7 +212,7 @@ TEST_CASE("images after a stage over the sequence have each frame's own color ne
   for (auto& [name, stage] : config.stages) {
     if (name == "interaction") stage.optimize.emplace_back("color_net", moved);
   }
-  carry_out_tiny(config, "run");
+  execute_tiny(config, "run");
   const Clip clip = read_clip(config.data);
   std::vector<ColorNet> nets;
   for (int t = 1; t < kTinyFrames; ++t)
@@ -231,8 +231,8 @@ TEST_CASE("images after a stage over the sequence have each frame's own color ne
   }
   // Stopped and resumed within the stage, with the networks of the frames from their files.
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny(config, "again", 1, false, [&] { return ++count == kInFrames + 3; }), Interrupted);
-  carry_out_tiny(config, "again", 2, true);
+  CHECK_THROWS_AS(execute_tiny(config, "again", 1, false, [&] { return ++count == kInFrames + 3; }), Interrupted);
+  execute_tiny(config, "again", 2, true);
   CHECK(differences("run", "again") == kNone);
 }
 
@@ -242,13 +242,13 @@ TEST_CASE("a run whose stage over the sequence has VPoser's weights moves in its
   here.write("vposer.npz", std::string(bytes.begin(), bytes.end()));
   const std::string weights = "stages.refinement.pose_weights=" + fs::absolute("vposer.npz").string();
   const RunConfig config = refined_config({weights, "stages.refinement.iterations=3"});
-  const RunSummary summary = carry_out_tiny(config, "vposer"), natural = carry_out_tiny(refined_config(), "natural");
+  const RunSummary summary = execute_tiny(config, "vposer"), natural = execute_tiny(refined_config(), "natural");
   const double joints = number_in(summary.metrics.back().values, "mpjpe_mm");
   CHECK(std::isfinite(joints));
   CHECK(joints > number_in(natural.metrics.back().values, "mpjpe_mm") + 20);  // random weights have poses of their own
   CHECK(number_in(summary.metrics[1].values, "mpjpe_mm") == number_in(natural.metrics[1].values, "mpjpe_mm"));
   CHECK(metrics_of("vposer").size() == kInFrames + 3);
-  carry_out_tiny(config, "again", 2);
+  execute_tiny(config, "again", 2);
   CHECK(differences("vposer", "again") == kNone);
 }
 

@@ -46,7 +46,7 @@ struct SkipRun {
       : folder(name) {
     RunConfig config = tiny_config(overrides);
     change(config);
-    carry_out_tiny(config, folder);
+    execute_tiny(config, folder);
     motion = file_text(folder + "/motion.npz");
     objects = file_text(folder + "/objects.npz");
   }
@@ -318,7 +318,7 @@ TEST_CASE("check, a dry run and a run's log have what is to be known of skip and
   arguments.out = "run";
   arguments.dry_run = true;
   CHECK_THAT(cli::run_command(arguments, loss_terms()), Contains("  note: " + text));
-  carry_out_tiny(tiny_config(overrides), "run");
+  execute_tiny(tiny_config(overrides), "run");
   CHECK_THAT(file_text("run/log.txt"), Contains(" warning " + text));
 }
 

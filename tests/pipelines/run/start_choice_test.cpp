@@ -105,7 +105,7 @@ TEST_CASE("a run tells which starts it chose, resumed or not", "[run]") {
   const TemporaryFolder here;
   const RunConfig config = tiny_config(
       {"stages.camera.iterations=1", "stages.interaction.iterations=2", "start.root=best", "start.objects=best"});
-  carry_out_tiny(config, "whole");
+  execute_tiny(config, "whole");
   const std::string log = file_text("whole/log.txt");
   for (int t = 1; t < kTinyFrames; ++t)
     CHECK_THAT(log, Contains("frame " + std::to_string(t) + ", start: root ") && Contains(", objects "));
@@ -119,10 +119,10 @@ TEST_CASE("a run tells which starts it chose, resumed or not", "[run]") {
   }
   CHECK_THAT(file_text("whole/report.html"), Contains("</span>start</th><td>"));
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny(config, "run", 1, false, [&] { return ++count == 5; }), Interrupted);
-  carry_out_tiny(config, "run", 2, true);
+  CHECK_THROWS_AS(execute_tiny(config, "run", 1, false, [&] { return ++count == 5; }), Interrupted);
+  execute_tiny(config, "run", 2, true);
   CHECK(differences("whole", "run").empty());
-  carry_out_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "plain");
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "plain");
   CHECK_FALSE(json_of("plain/summary.json").contains("start"));
 }
 

@@ -46,7 +46,7 @@ struct Spoilt : CopiedDataset {
     return load_run_config(path / "config.json", overrides, descriptions_of(loss_terms()));
   }
   Texts run(const std::string& out, const Texts& overrides = {}) const {
-    return warnings_of([&] { carry_out_tiny(config(overrides), out); });
+    return warnings_of([&] { execute_tiny(config(overrides), out); });
   }
   /// The program refuses it before anything is written, with these words; a dry run too.
   void check_refused(const std::string& message) const {
@@ -132,9 +132,8 @@ TEST_CASE("a body that leaves the view is told with its frames, and comes back",
 
   int count = 0;  // stopped in frame 3, when frame 2 is in the checkpoint
   const RunConfig config = dataset.config(overrides);
-  CHECK_THROWS_AS(carry_out_tiny(config, "halves", 1, false, [&] { return ++count == 2 * kPerFrame + 3; }),
-                  Interrupted);
-  CHECK(warnings_of([&] { carry_out_tiny(config, "halves", 1, true); }) == told);
+  CHECK_THROWS_AS(execute_tiny(config, "halves", 1, false, [&] { return ++count == 2 * kPerFrame + 3; }), Interrupted);
+  CHECK(warnings_of([&] { execute_tiny(config, "halves", 1, true); }) == told);
   CHECK(differences("run", "halves").empty());
 }
 
@@ -336,7 +335,7 @@ TEST_CASE("frames and masks with numbers that are not finite are refused before 
     for (const char* name : {"frames/0001.png", "frames/0003.png"})
       write_as_exr(dataset.file(name), read_image(dataset.file(name)));
     CHECK(dataset.run("run").empty());
-    carry_out_tiny(tiny_config(), "plain");
+    execute_tiny(tiny_config(), "plain");
     CHECK(file_text("run/motion.npz") == file_text("plain/motion.npz"));
   }
 }

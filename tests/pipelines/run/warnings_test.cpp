@@ -93,7 +93,7 @@ RunSummary run_into_trap(const std::string& folder, int from, int count, const s
   options.resume = resume;
   const RunConfig read =
       load_run_config(file, {"stages.interaction.optimizer.max_rollbacks=" + max_rollbacks}, descriptions_of(terms));
-  return carry_out(read, terms, options);
+  return execute_run(read, terms, options);
 }
 
 }  // namespace
@@ -104,14 +104,14 @@ TEST_CASE("a loss that is off is told once, with the reason", "[run]") {
   const std::string no_input = "stage interaction: the loss \"depth\" is off: it lacks an input";
   SECTION("its weight is 0") {
     const Warnings warnings;
-    carry_out_tiny(tiny_config({"stages.interaction.losses.center.weight=0"}), "run");
+    execute_tiny(tiny_config({"stages.interaction.losses.center.weight=0"}), "run");
     CHECK(warnings.all() == std::vector<std::string>{no_weight});
   }
   SECTION("there is no object") {
     RunConfig config = tiny_config();
     config.data.objects.clear();
     const Warnings warnings;
-    carry_out_tiny(config, "run");
+    execute_tiny(config, "run");
     CHECK(warnings.holding(no_input) == 1);
     CHECK(warnings.holding("the loss \"center\" is off: it lacks an input") == 1);
     CHECK(warnings.all().size() == 2);
@@ -133,7 +133,7 @@ TEST_CASE("an object that center leaves out is told once, with its frames, also 
       "to less than min_opacity), in some iterations at least, in frames 1-3";
   {
     const Warnings warnings;
-    carry_out_tiny(config, "run");
+    execute_tiny(config, "run");
     CHECK(warnings.all() == std::vector<std::string>{told});
   }
   const std::string log = file_text("run/log.txt");
@@ -145,9 +145,9 @@ TEST_CASE("an object that center leaves out is told once, with its frames, also 
   }
   const Warnings warnings;
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny(config, "halves", 1, false, [&] { return ++count == 20; }), Interrupted);
+  CHECK_THROWS_AS(execute_tiny(config, "halves", 1, false, [&] { return ++count == 20; }), Interrupted);
   CHECK(warnings.all().empty());  // its frames are not known yet
-  carry_out_tiny(config, "halves", 1, true);
+  execute_tiny(config, "halves", 1, true);
   CHECK(warnings.all() == std::vector<std::string>{told});
   CHECK(differences("run", "halves").empty());
 }
@@ -155,7 +155,7 @@ TEST_CASE("an object that center leaves out is told once, with its frames, also 
 TEST_CASE("a run in which every loss is on warns of nothing", "[run]") {
   const TemporaryFolder here;
   const Warnings warnings;
-  carry_out_tiny(tiny_config(), "run");
+  execute_tiny(tiny_config(), "run");
   CHECK(warnings.all().empty());
 }
 
@@ -242,10 +242,10 @@ TEST_CASE("warnings from before there was a folder, and a resumed run, are in th
   fs::remove("data/masks/human/0002.png");
   const RunConfig config = load_run_config("data/config.json", {}, descriptions_of(loss_terms()));
   int count = 0;
-  CHECK_THROWS_AS(carry_out_tiny(config, "run", 1, false, [&] { return ++count == 20; }), Interrupted);
+  CHECK_THROWS_AS(execute_tiny(config, "run", 1, false, [&] { return ++count == 20; }), Interrupted);
   const std::string warning = "/human: has no mask for 1 of 4 frames; these count as empty";
   CHECK_THAT(file_text("run/log.txt"), Contains(warning) && Contains(" info interrupted: interrupted in frame 2"));
-  carry_out_tiny(config, "run", 1, true);
+  execute_tiny(config, "run", 1, true);
   CHECK_THAT(file_text("run/log.txt"), Contains("info resumed with frame 2 of 3\n"));
 }
 

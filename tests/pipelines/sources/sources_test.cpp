@@ -226,7 +226,7 @@ TEST_CASE("a run makes its video and masks by programs, once for what they are m
   CHECK(made() == all);
   CHECK(read_image(made_file("video", ".first_frame.png").string()).width() == kTinyPixels);
   CHECK(json_of(made_file("video", ".json"))["prompt"] == prompt);
-  carry_out_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "plain");
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "plain");
   for (const char* name : {"motion.npz", "objects.npz", "cameras.json"})
     CHECK(file_text(fs::path("run") / name) == file_text(fs::path("plain") / name));
   CHECK_THAT(file_text("run/log.txt"), Contains("video: runs ./film, "));

@@ -43,8 +43,8 @@ void check_composite(const std::string& name, const FlatSplats& splats, const Sp
   const auto record = [&](const auto& in) {
     auto& tape = in[0].owner();
     const auto rest = tape.constant("rest", shape_of(n, 1));
-    const auto means_rest = tape.constant("means rest", shape_of(n, 2));
-    const auto out = composite(SplatSet{Projected{in[0], in[1], in[2], rest, means_rest}, in[3], in[4]}, view);
+    const auto means_low = tape.constant("means rest", shape_of(n, 2));
+    const auto out = composite(SplatSet{Projected{in[0], in[1], in[2], rest, means_low}, in[3], in[4]}, view);
     return out.channels + out.transmittance;  // the transmittance is added to every channel
   };
   check_operator(name,

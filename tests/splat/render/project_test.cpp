@@ -149,16 +149,16 @@ TEST_CASE("means and depths and their rests make those in double") {
   const std::vector<double> mean = {0.25, 0.375, -0.125};
   Run<float> fast(view_of_camera(camera), mean, kAxes, kNoUpdate);
   Run<double> exact(view_of_camera(camera), mean, kAxes, kNoUpdate);
-  const double depth = fast.value(fast.projected.depths)[0], rest = fast.value(fast.projected.depth_rest)[0];
+  const double depth = fast.value(fast.projected.depths)[0], rest = fast.value(fast.projected.depth_low)[0];
   CHECK(rest != 0);
   CHECK(depth + rest == Approx(exact.value(exact.projected.depths)[0]).epsilon(1e-14));
   CHECK(depth == static_cast<double>(static_cast<float>(exact.value(exact.projected.depths)[0])));
-  CHECK(exact.value(exact.projected.depth_rest)[0] == 0);
+  CHECK(exact.value(exact.projected.depth_low)[0] == 0);
   for (std::size_t i = 0; i < 2; ++i) {
-    const double px = fast.value(fast.projected.means_px)[i], px_rest = fast.value(fast.projected.means_rest)[i];
+    const double px = fast.value(fast.projected.means_px)[i], px_rest = fast.value(fast.projected.means_low)[i];
     CHECK(px_rest != 0);
     CHECK(px + px_rest == Approx(exact.value(exact.projected.means_px)[i]).epsilon(1e-13));
-    CHECK(exact.value(exact.projected.means_rest)[i] == 0);
+    CHECK(exact.value(exact.projected.means_low)[i] == 0);
   }
 }
 

@@ -105,8 +105,8 @@ struct TwoSets {
             tape.parameter("depths", shape_of(n, 1)), tape.parameter("opacities", shape_of(n, 1)),
             tape.parameter("features", shape_of(n, splats.channels))};
     write(splats, vars);
-    const Var<S> rest = tape.constant("rest", shape_of(n, 1)), means_rest = tape.constant("rest", shape_of(n, 2));
-    return {{vars[0], vars[1], vars[2], rest, means_rest}, vars[3], vars[4]};
+    const Var<S> rest = tape.constant("rest", shape_of(n, 1)), means_low = tape.constant("rest", shape_of(n, 2));
+    return {{vars[0], vars[1], vars[2], rest, means_low}, vars[3], vars[4]};
   }
 };
 

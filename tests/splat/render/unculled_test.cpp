@@ -34,8 +34,8 @@ class Everything {
     const hsi4d::detail::SplatArrays<S> splats = {flat.tape.value(flat.means),
                                                   flat.tape.value(flat.factors),
                                                   flat.tape.value(flat.depths),
-                                                  flat.tape.value(flat.projected.depth_rest),
-                                                  flat.tape.value(flat.projected.means_rest),
+                                                  flat.tape.value(flat.projected.depth_low),
+                                                  flat.tape.value(flat.projected.means_low),
                                                   flat.tape.value(flat.opacities),
                                                   flat.tape.value(flat.features)};
     const Index n = splats.rows();

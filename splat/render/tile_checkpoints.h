@@ -10,7 +10,7 @@ namespace hsi4d::detail {
 
 /// Checkpoints of T, and where pixels or blocks stopped.
 template <class S>
-struct KeptTiles {
+struct TileCheckpoints {
   Buffer<Index> checkpoint_begin = {};  ///< pieces of a tile's, or a block's, pixels
   Buffer<S> checkpoints = {};
   Buffer<ListPosition<S>> last = {};  ///< plain kernel
