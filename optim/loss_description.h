@@ -96,7 +96,7 @@ inline LossSettings default_settings(const LossDescription& loss) {
 
 /// Describes the weight and the term's own settings.
 inline void describe(ConfigFields& fields, LossSettings& settings) {
-  fields.number("weight", settings.weight, {.min = 0}, "Factor of this term in the stage's sum; 0 switches it off");
+  fields.number("weight", settings.weight, {.min = 0}, "Factor in the stage's sum; 0: off");
   if (settings.describe_own) settings.describe_own(fields, settings.own);
 }
 

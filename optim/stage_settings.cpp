@@ -40,32 +40,29 @@ const char* words_of(LossNeeds needs) {
 
 void describe(ConfigFields& f, OptimizerSettings& s) {
   f.choice("kind", s.kind, kOptimizerKinds,
-           "The method: Adam, or, for few numbers such as the camera's, BFGS with a line search or damped Gauss-Newton "
-           "steps");
+           "Adam, or for few numbers such as the camera's: BFGS with a line search, or damped Gauss-Newton");
   f.number("beta1", s.beta1, {.min = 0, .below = 1}, "Decay of the first moment");
   f.number("beta2", s.beta2, {.min = 0, .below = 1}, "Decay of the second moment");
   f.number("eps", s.eps, {.min = 1e-30, .max = 1}, "Added to the root of the second moment");
   f.integer("max_rollbacks", s.max_rollbacks, {.min = 0, .max = kMostIterations},
-            "Steps of a stage that may be taken back because a number was not finite; one more is an error");
+            "Steps of a stage that may be undone because a number was not finite; one more is an error");
   f.integer("products", s.products, {.min = 1, .max = 100},
-            "gauss_newton: products of a direction with the curvature, an evaluation each, that a step takes at most");
-  f.boolean(
-      "keep_curvature", s.keep_curvature,
-      "bfgs or gauss_newton begins a frame's stage with what it has learnt of the curvature in the frame before, which "
-      "takes fewer evaluations; adam learns none");
+            "gauss_newton: curvature products per step at most, an evaluation each");
+  f.boolean("keep_curvature", s.keep_curvature,
+            "bfgs, gauss_newton: begin with the curvature of the frame before, for fewer evaluations");
 }
 
 void describe(ConfigFields& f, ParameterGroupSettings& s) {
   const IntegerRange iterations = {.min = 0, .max = kMostIterations};
   f.number("lr", s.lr, {.min = 0, .max = 1000}, "Learning rate").required();
   f.number("lr_final_share", s.lr_final_share, {.above = 0, .max = 1},
-           "Share of the learning rate that is left in the last iteration; it falls geometrically; 1: constant");
+           "Share of lr in the last iteration; it falls geometrically; 1: constant");
   f.integer("from", s.from, iterations, "First iteration in which the group moves");
   f.optional(s.until, [iterations](ConfigFields& inner, int& until) {
     inner.integer("until", until, iterations,
                   "First iteration in which it no longer moves; null: the end of the stage");
   });
-  f.integer("every", s.every, {.min = 1, .max = kMostIterations}, "It moves in every this many-th iteration");
+  f.integer("every", s.every, {.min = 1, .max = kMostIterations}, "It moves in every n-th iteration");
   f.rule({"until", "from"}, [&s]() -> std::string {
     if (!s.until || *s.until > s.from) return "";
     return std::to_string(*s.until) + " is not after from, which is " + std::to_string(s.from) +
@@ -75,32 +72,26 @@ void describe(ConfigFields& f, ParameterGroupSettings& s) {
 
 void describe(ConfigFields& f, PlateauSettings& s) {
   f.integer("iterations", s.iterations, {.min = 0, .max = kMostIterations},
-            "Iterations whose mean loss is compared with that of as many before; 0: the stage never ends early");
-  f.number("gain", s.gain, {.min = 0, .below = 1}, "Share by which the mean has to fall for the stage to go on");
+            "Iterations whose mean loss is compared with as many before; 0: never end early");
+  f.number("gain", s.gain, {.min = 0, .below = 1}, "Share by which the mean must fall for the stage to go on");
 }
 
 void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescription>& losses) {
   f.integer("iterations", s.iterations, {.min = 1, .max = kMostIterations}, "Steps of the optimiser").required();
-  f.choice(
-      "over", s.over, kStageScopes,
-      "What is optimised at once: a frame, each in its turn; the first frame before them, which is given otherwise; or "
-      "after them the whole sequence, which draws nothing");
-  f.choice("draw", s.draw, kDraws, "What is rendered: all, or the static scene alone");
-  f.choice(
-      "weight", s.weight, kPixelWeights,
-      "Pixels that count in weighted losses: all, those that no human or object has covered in any frame so far, those "
-      "that the frame's masks leave, or those that they cover");
+  f.choice("over", s.over, kStageScopes,
+           "What is optimised at once: frame 0 before the others, each frame in turn, or the sequence after them");
+  f.choice("draw", s.draw, kDraws, "What is rendered: everything, or the static scene alone");
+  f.choice("weight", s.weight, kPixelWeights,
+           "Pixels that count in weighted losses: all, those never masked so far, those outside this frame's masks, "
+           "those inside");
   f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
-            "Longest side of the images that the stage works on, which are reduced to it where the run's are larger; "
-            "0: those of the run. Coarse to fine is two stages");
+            "Longest side of the stage's images, for coarse to fine; 0: that of the run");
   f.map("optimize", s.optimize, "What moves: parameter groups by name");
   f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
   f.integer("gradient_shares", s.gradient_shares, {.min = 0, .max = kMostIterations},
-            "Measures each loss's share of the gradient in every this many-th iteration, which costs a backward pass a "
-            "loss; 0: never");
+            "Measure each loss's share of the gradient in every n-th iteration, a backward pass per loss; 0: never");
   f.path("pose_weights", s.pose_weights, {.must_exist = true},
-         "VPoser's weights (tools/export_vposer.py), whose latents a stage over the sequence moves; without, natural "
-         "poses by anatomy");
+         "VPoser's weights (tools/export_vposer.py), for a stage over the sequence; empty: natural poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
   f.object("plateau", s.plateau, "When the stage ends early, as its loss no longer falls");
   f.rule({"optimizer", "optimize"}, [&s]() -> std::string {

@@ -46,26 +46,24 @@ void apply_compatibility(RenderSettings& settings, Compatibility compatibility) 
 
 void describe(ConfigFields& f, RenderSkips& s) {
   f.boolean("static_tiles", s.static_tiles,
-            "Prepare what stands still once, and render only blocks that something touches which moves");
+            "Prepare what stands still once; render only blocks that something moving touches");
   f.boolean("static_layer", s.static_layer,
-            "Composite what stands in front of all that moves once, and leave it and what stands behind out of the "
-            "backward pass");
-  f.boolean("unchanged_pixels", s.unchanged_pixels,
-            "Leave pixels out of the losses that are as they were in the iteration before");
+            "Composite what is static before all that moves once; the backward pass skips it and what is behind");
+  f.boolean("unchanged_pixels", s.unchanged_pixels, "Losses skip pixels that are as in the iteration before");
   f.boolean("unseen_gaussians", s.unseen_gaussians,
-            "Leave Gaussians of the scene out that the camera cannot see in a stage, however far it moves there");
-  f.boolean("zero_cotangent", s.zero_cotangent, "Leave tiles out of the backward pass where the loss sees nothing");
+            "Leave out Gaussians of the scene that the camera cannot see, however far the stage may move it");
+  f.boolean("zero_cotangent", s.zero_cotangent, "The backward pass skips tiles in which the loss sees nothing");
 }
 
 void describe(ConfigFields& f, RenderApproximations& s) {
   f.boolean("collapse_suffix", s.collapse_suffix,
-            "Composite what stands still behind all that moves into one layer, once");
+            "Composite what is static behind all that moves into one layer, once");
 }
 
 void describe(ConfigFields& f, RenderSettings& s) {
   f.choice("quality", s.quality, kQualities, "Preset of alpha_cap, alpha_min, transmittance_stop and depth_key");
   f.choice("compatibility", s.compatibility, kCompatibilities,
-           "Preset that makes the numbers of another renderer; quality then stays default");
+           "Preset that matches another renderer; quality then stays default");
   f.rule({"quality", "compatibility"}, [&s]() -> std::string {
     const bool both = s.quality != Quality::kDefault && s.compatibility != Compatibility::kNone;
     return both ? "quality and compatibility set the same keys; write one of the two" : "";
@@ -74,24 +72,24 @@ void describe(ConfigFields& f, RenderSettings& s) {
     if (s.quality != Quality::kDefault) apply_quality(s, s.quality);
     apply_compatibility(s, s.compatibility);
   });
-  f.number("alpha_cap", s.alpha_cap, {.above = 0, .max = 1}, "Alpha is held at or below this; 1: no cap");
+  f.number("alpha_cap", s.alpha_cap, {.above = 0, .max = 1}, "Upper limit of alpha; 1: none");
   f.number("alpha_min", s.alpha_min, {.min = 0, .below = 1},
-           "A Gaussian fainter than this at a pixel is skipped there; 0: none is");
+           "A Gaussian fainter than this at a pixel is skipped there; 0: none");
   f.number("transmittance_stop", s.transmittance_stop, {.min = 0, .below = 1},
-           "A pixel is finished when its transmittance falls below this; 0: when no Gaussian is left");
+           "A pixel is finished when its transmittance falls below this; 0: after the last Gaussian");
   f.choice("stop_rule", s.stop_rule, kStopRules,
-           "inclusive adds the Gaussian that crosses transmittance_stop and then stops; exclusive does not add it");
+           "Whether the Gaussian that crosses transmittance_stop is added (inclusive) or not");
   f.choice("stop_when", s.stop_when, kStopWhens, "Whether a transmittance equal to transmittance_stop stops");
   f.choice("cap_gradient", s.cap_gradient, kCapGradients,
-           "Gradient of opacity and shape where alpha_cap holds: zero, or passed as if there were no cap");
+           "Gradient of opacity and shape where alpha_cap holds: zero, or as without a cap");
   f.choice("footprint", s.footprint, kFootprints,
-           "Pixels that a Gaussian may touch: exactly those of alpha_min, or a square of 3 standard deviations");
+           "Pixels that a Gaussian may touch: those of alpha_min, or a square of 3 standard deviations");
   f.number("blur", s.blur, {.min = 0, .max = 100}, "Variance of the pixel filter, pixels squared");
   f.boolean("antialias", s.antialias,
-            "Scale opacity down by what the blur widens, so that thin Gaussians keep their weight");
+            "Lower opacity by what the blur widens, so that thin Gaussians keep their weight");
   f.number("near", s.near, {.above = 0, .max = 1000}, "Gaussians at or nearer than this depth are culled, metres");
   f.number("frustum_clamp", s.frustum_clamp, {.min = 1, .max = 100},
-           "x/z and y/z of the projection's Jacobian are held within this many half-widths of the view");
+           "Limit of x/z and y/z in the projection's Jacobian, in half-widths of the view");
   f.integer("sh_degree", s.sh_degree, {.min = 0, .max = kHighestShDegree},
             "Highest degree of spherical harmonics used");
   f.optional(s.depth_key, [](ConfigFields& inner, DepthKey& key) {

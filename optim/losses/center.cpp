@@ -33,20 +33,15 @@ struct CenterSettings {
 };
 
 void describe(ConfigFields& fields, CenterSettings& settings) {
-  fields.choice("unit", settings.unit, kCenterUnits,
-                "What distances are measured in: pixels of the image, or its width");
+  fields.choice("unit", settings.unit, kCenterUnits, "Unit of distance: pixels, or the image's width");
   fields.number(
       "min_opacity", settings.min_opacity, {.min = 1e-6},
-      "An object whose opacity sums to less than this many pixels counts as hidden: the term is off for it, or, "
-      "where it moves the object alone, leads its place");
-  fields.boolean(
-      "by_share", settings.by_share,
-      "An object counts by the share of it that the frame shows: the centre of a sliver beside the human says "
-      "little, and would pull the human out of the way");
+      "Opacity, in pixels, below which an object is hidden: the term is off or, with moves `object`, leads its place");
+  fields.boolean("by_share", settings.by_share,
+                 "An object counts by its visible share, so that the centre of a sliver does not push the human aside");
   fields.choice(
       "moves", settings.moves, kCenterMoves,
-      "What the term has a gradient in: all that the rendered opacity depends on, which is also what is before "
-      "the object, or the object's place alone (and the camera)");
+      "What has a gradient: all that the rendered opacity depends on, or the object's place and the camera alone");
 }
 
 /// Whether the term is on for an object.

@@ -20,7 +20,7 @@ struct ContactSettings {
 
 void describe(ConfigFields& fields, ContactSettings& settings) {
   fields.number("distance", settings.distance, {.above = 0, .max = 10},
-                "Hands nearer to an object than this when the stage begins are drawn to it, metres");
+                "Hands nearer to an object than this at the stage's start are drawn to it, metres");
 }
 
 struct ContactPairs {

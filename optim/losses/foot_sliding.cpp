@@ -18,9 +18,9 @@ struct FootSlidingSettings {
 
 void describe(ConfigFields& fields, FootSlidingSettings& settings) {
   fields.number("height", settings.rule.height, {.min = 0, .max = 10},
-                "A foot stands while it is at most this much higher than in the first frame, metres");
+                "A foot stands if at most this much higher than in frame 0, metres");
   fields.number("speed", settings.rule.speed, {.above = 0, .max = 100},
-                "and slower than this when the stage begins, metres a second");
+                "and slower than this at the stage's start, metres per second");
 }
 
 Vector3<double> joint_of(const PosedJoints& body, Index joint) {

@@ -20,7 +20,7 @@ struct GroundSettings {
 
 void describe(ConfigFields& fields, GroundSettings& settings) {
   fields.integer("points", settings.points, {.min = 1, .max = 10000},
-                 "Gaussians of the feet, the lowest ones, whose mean height counts");
+                 "Lowest Gaussians of the feet whose mean height counts");
 }
 
 /// The lowest of the rows in a frame, and their mean height.

@@ -21,9 +21,9 @@ struct ObjectSmoothSettings {
 
 void describe(ConfigFields& fields, ObjectSmoothSettings& settings) {
   fields.integer("order", settings.order, {.min = 1, .max = 3},
-                 "Of the differences: 1 steps between adjacent frames, 2 changes of the steps, 3 changes of these");
+                 "Of the differences between frames: 1 steps, 2 changes of steps, 3 changes of these");
   fields.number("free", settings.free, {.min = 0, .max = 1e6},
-                "What costs nothing: metres a second with order 1, metres a second squared with 2, and so on");
+                "What costs nothing: m/s with order 1, m/s^2 with 2, m/s^3 with 3");
 }
 
 /// The Gaussians that lie furthest along an object's axes, to both sides: six, of which some may be the same.

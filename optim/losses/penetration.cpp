@@ -35,17 +35,15 @@ struct PenetrationSettings {
 
 void describe(ConfigFields& fields, PenetrationSettings& settings) {
   fields.path("mesh", settings.mesh, {.must_exist = true},
-              "What is solid (.obj, .ply, .glb), metres, world; without, what the scene's Gaussians show");
+              "What is solid (.obj, .ply, .glb), metres, world; empty: what the scene's Gaussians show");
   fields.number("margin", settings.margin, {.min = 0, .max = 1}, "Distance to keep from the surface, metres");
   fields.number("thickness", settings.thickness, {.above = 0, .max = 10},
-                "Behind Gaussians and open meshes so much is solid, metres; what is deeper counts as free");
-  fields.number("cell", settings.cell, {.min = 0.001, .max = 1},
-                "Edge of the cells between which distances are "
-                "interpolated, metres");
+                "Solid depth behind Gaussians and open meshes, metres; what is deeper is free");
+  fields.number("cell", settings.cell, {.min = 0.001, .max = 1}, "Cell size of the distance grid, metres");
   fields.integer("points", settings.points, {.min = 1, .max = 1000000},
-                 "Gaussians of the human that count, in each frame; all where there are fewer");
+                 "Gaussians of the human that count in each frame, at most");
   fields.integer("memory_mib", settings.memory_mib, {.min = 1, .max = 1000000},
-                 "Memory that the distances may take, MiB; more is an error");
+                 "Memory limit of the distance grid, MiB");
 }
 
 using GridPointer = std::shared_ptr<DistanceGrid>;

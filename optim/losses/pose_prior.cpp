@@ -19,7 +19,7 @@ struct PosePriorSettings {
 
 void describe(ConfigFields& fields, PosePriorSettings& settings) {
   fields.path("weights", settings.weights, {.must_exist = true},
-              "VPoser's weights (tools/export_vposer.py); without, natural poses by anatomy");
+              "VPoser's weights (tools/export_vposer.py); empty: natural poses by anatomy");
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ struct SmoothSettings {
 
 void describe(ConfigFields& fields, SmoothSettings& settings) {
   fields.integer("order", settings.order, {.min = 1, .max = 3},
-                 "Of the differences: 1 steps between adjacent frames, 2 changes of the steps, 3 changes of these");
+                 "Of the differences between frames: 1 steps, 2 changes of steps, 3 changes of these");
 }
 
 }  // namespace

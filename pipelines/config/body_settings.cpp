@@ -6,12 +6,11 @@
 namespace hsi4d {
 
 void describe(ConfigFields& f, BodySettings& s) {
-  f.choice("kind", s.kind, kBodyKinds, "The body that comes with the program, or a model in a SMPL-X file");
-  f.path("path", s.path, {.must_exist = true}, "The SMPL-X file (.npz), of kind smplx");
-  f.integer("betas", s.betas, {.min = 0, .max = kMostBetas},
-            "Numbers of its shape; the body of kind procedural has 10");
+  f.choice("kind", s.kind, kBodyKinds, "The program's own body, or a SMPL-X file");
+  f.path("path", s.path, {.must_exist = true}, "SMPL-X file (.npz), for kind smplx");
+  f.integer("betas", s.betas, {.min = 0, .max = kMostBetas}, "Number of shape parameters; procedural has 10");
   f.numbers("shape", s.shape, {.min = -kLargestBeta, .max = kLargestBeta},
-            "The betas of the body that synth makes an avatar of; fewer than `betas`: the others are 0");
+            "Betas of the avatar that synth makes; those left out are 0");
   f.rule({"path", "kind"}, [&s]() -> std::string {
     if (s.kind == BodyKind::kSmplx && s.path.empty()) return "kind smplx needs the file of a body model";
     if (s.kind == BodyKind::kProcedural && !s.path.empty()) return "kind procedural reads no file; kind smplx does";

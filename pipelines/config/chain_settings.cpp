@@ -27,7 +27,7 @@ ConfigValue whole_data(const ConfigValue& shared, const ConfigValue& clip, bool 
 }  // namespace
 
 void describe(ConfigFields& f, ChainClip& s) {
-  f.string("name", s.name, "What the clip is called; its run folder too").required();
+  f.string("name", s.name, "Name of the clip and of its run folder").required();
   f.object("data", s.data, "Its inputs, laid over those of the config");
 }
 

@@ -3,18 +3,16 @@
 namespace hsi4d {
 
 void describe(ConfigFields& f, ColorNetSettings& s) {
-  f.choice(
-      "use", s.use, kColorNetUses,
-      "The network that colours the human by its pose: that of the avatar's file if there is one, the same or a new "
-      "one, or none");
-  f.integer("features", s.features, {.min = 1, .max = 256}, "Numbers of each Gaussian, of a new network");
+  f.choice("use", s.use, kColorNetUses,
+           "Network that colours the human by its pose: the avatar's if there is one, that or else a new one, or none");
+  f.integer("features", s.features, {.min = 1, .max = 256}, "Features of each Gaussian, in a new network");
   f.integer("hidden_width", s.hidden_width, {.min = 1, .max = 1024}, "Width of its hidden layers");
-  f.integer("hidden_layers", s.hidden_layers, {.min = 0, .max = kMostMlpLayers - 1}, "How many they are");
-  f.boolean("view_direction", s.view_direction, "A new network also sees from where the camera looks");
+  f.integer("hidden_layers", s.hidden_layers, {.min = 0, .max = kMostMlpLayers - 1}, "Number of hidden layers");
+  f.boolean("view_direction", s.view_direction, "A new network also reads the viewing direction");
   f.boolean("pose_gradient", s.pose_gradient,
-            "Colours have a gradient in the pose; without, the pose is moved by what geometry says alone");
+            "Colours have a gradient in the pose; false: only geometry moves the pose");
   f.boolean("camera_gradient", s.camera_gradient,
-            "Colours have a gradient in the camera, by the direction from which it looks");
+            "Colours have a gradient in the camera, through the viewing direction");
 }
 
 std::optional<ColorNet> first_color_net(const ColorNetSettings& settings, const Avatar& avatar, std::int64_t seed) {

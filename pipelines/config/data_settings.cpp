@@ -38,33 +38,25 @@ void describe(ConfigFields& f, DataSettings& s) {
   f.map("objects", s.objects, "Rigid objects that move, by name");
   f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.safetensors)");
   f.path("frames", s.frames, {.must_exist = true},
-         "The video: a file, or a folder of .png files in the order of their names; as large as the camera's image, or "
-         "larger");
+         "Video file, or folder of .png files sorted by name; as large as the camera's image or larger");
   f.path("masks", s.masks, {.must_exist = true},
-         "Folder of masks: human/ and one folder an object, grey .png files with the names of the frames; or human.mp4 "
-         "and "
-         "so on");
-  f.number("video_rate", s.video_rate, {.min = 0, .max = 1e4}, "Frames a second of the video; 0: what its file says");
+         "Folder with human/ and one folder per object, grey .png files named as the frames; or human.mp4 and so on");
+  f.number("video_rate", s.video_rate, {.min = 0, .max = 1e4}, "Frames per second of the video; 0: as its file says");
   f.number("frame_rate", s.frame_rate, {.min = 0, .max = 1e4},
-           "Frames a second that are kept, the nearest ones; estimated poses are resampled to it; 0: all");
+           "Frames per second that are kept; estimated poses are resampled; 0: all");
   f.path("camera", s.camera, {.must_exist = true}, "Camera of frame 0 (.json)");
   f.path("initial", s.initial, {.must_exist = true}, "State of frame 0 and estimated poses (.json)");
-  f.path(
-      "motion", s.motion, {.must_exist = true},
-      "Motion (.npz) that was estimated from the video, in place of the poses of `initial` after frame 0; none: those");
-  f.choice(
-      "motion_align", s.motion_align, kMotionAligns,
-      "How it is laid on the human of frame 0: moved and turned about the vertical (heading), moved and turned as a "
-      "whole (rotation), or as it is (none)");
+  f.path("motion", s.motion, {.must_exist = true},
+         "Motion estimated from the video (.npz); replaces the poses of `initial` after frame 0");
+  f.choice("motion_align", s.motion_align, kMotionAligns,
+           "How `motion` is aligned with frame 0: moved and turned about the vertical (heading), or freely (rotation)");
   f.path("truth", s.truth, {},
-         "Folder with motion.npz, objects.npz, cameras.json to compare the result with; empty, or not there: none");
-  f.path(
-      "surface", s.surface, {},
-      "Mesh of what is solid in the scene (.obj, .ply, .glb), metres, world, by which penetration is measured; no loss "
-      "reads it; empty: not measured");
+         "Folder with motion.npz, objects.npz, cameras.json to compare the result with; may be missing");
+  f.path("surface", s.surface, {},
+         "Mesh of what is solid (.obj, .ply, .glb), metres, world: only for measuring penetration");
   f.number("mask_threshold", s.mask_threshold, {.above = 0, .max = 1}, "Coverage from which a pixel belongs to a mask");
   f.integer("mask_margin_px", s.mask_margin_px, {.min = 0, .max = 64},
-            "Pixels by which masks grow before they keep the camera stage from what is not scene");
+            "Pixels by which masks grow before they hide what is not scene from the camera stage");
 }
 
 }  // namespace hsi4d

@@ -6,11 +6,10 @@ void describe(ConfigFields& f, InstanceSettings& s) {
   f.string("scene", s.scene, "Name of the scene in its benchmark");
   f.string("type", s.type, "Indoor or outdoor");
   f.string("source", s.source, "Where the scene comes from");
-  f.string("object", s.object, "What moves beside the human; static: nothing");
-  f.string("prompt", s.prompt, "What the human does, as the benchmark tells it");
+  f.string("object", s.object, "What moves besides the human; static: nothing");
+  f.string("prompt", s.prompt, "What the human does, in the benchmark's words");
   f.path("folder", s.folder, {},
-         "Folder with the files of the instance, named as `hsi4d synth` names them; where it is there, they are "
-         "the inputs that `data` does not name");
+         "Folder with files named as by `hsi4d synth`; if it exists, they are the inputs that `data` does not name");
 }
 
 bool has_data(const InstanceSettings& instance) {

@@ -38,45 +38,42 @@ SkipSettings no_skips() {
 }
 
 void describe(ConfigFields& f, CameraSettings& s) {
-  f.choice(
-      "increment", s.increment, kCameraIncrements,
-      "Frame of a camera's six numbers: its own (about its centre), the world's, or its own axes about the point at "
-      "the scene's median depth, which keeps turning and moving apart");
+  f.choice("increment", s.increment, kCameraIncrements,
+           "Frame of a camera step: about its centre, the world, or its own axes about the point at the scene's median "
+           "depth");
 }
 
 void describe(ConfigFields& f, SkipSettings& s) {
   describe(f, s.render);
-  f.boolean("frozen_inputs", s.tape.frozen_inputs, "Make no gradient of numbers that do not move");
-  f.boolean("unchanged_inputs", s.tape.unchanged_inputs,
-            "Do not compute again what depends on nothing that has moved since");
-  f.boolean("unread_pixels", s.tape.unread_pixels, "Do not render what the only loss that sees it has no weight for");
+  f.boolean("frozen_inputs", s.tape.frozen_inputs, "Compute no gradient of what does not move");
+  f.boolean("unchanged_inputs", s.tape.unchanged_inputs, "Do not recompute what depends on nothing that has moved");
+  f.boolean("unread_pixels", s.tape.unread_pixels,
+            "Do not render pixels where the only loss that reads them has no weight");
 }
 
 void describe(ConfigFields& f, ApproxSettings& s) {
   describe(f, s.render);
-  f.boolean(
-      "hold_colors", s.hold_colors,
-      "Colours of harmonics stay as in the stage's first iteration, those of the color net as when it last moved");
-  f.number(
-      "camera_pixel_share", s.camera_pixel_share, {.above = 0, .max = 1},
-      "Share of the pixels that count in stages that draw the scene alone, in blocks of 32, others in every frame");
+  f.boolean("hold_colors", s.hold_colors,
+            "Harmonics keep the colours of the stage's first iteration, the color net those of its last step");
+  f.number("camera_pixel_share", s.camera_pixel_share, {.above = 0, .max = 1},
+           "Share of the pixels, in blocks of 32, that count in stages that draw the scene alone; other blocks in each "
+           "frame");
   f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
-            "Longest side of the images that are worked on: the camera's image, frames and masks are reduced to it "
-            "where they are larger; 0: as large as the camera's");
-  f.number("seen_within_deg", s.seen_within_deg, {.min = 0, .max = 90},
-           "Gaussians of human and objects that their own others hide when a stage of a frame begins, from the camera "
-           "and from so many degrees around, are left out of the stage; 0: all are drawn");
+            "Larger images, frames and masks are reduced to this longest side; 0: the camera's size");
+  f.number(
+      "seen_within_deg", s.seen_within_deg, {.min = 0, .max = 90},
+      "Leave out Gaussians that their own human or object hides from the camera and from this far around it; 0: none");
 }
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {
-  f.string("name", s.name, "What the run is called in its report");
+  f.string("name", s.name, "Name of the run; its default folder is named after it");
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed},
-            "Seed of what is random in a run: a new color net (a dataset has synthetic.seed)");
+            "Seed of a new color net; generated datasets have synthetic.seed");
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
             "Threads; 0: one a core. Results do not depend on it");
-  f.choice("precision", s.precision, kRunPrecisions, "Type of the numbers that a run computes with");
+  f.choice("precision", s.precision, kRunPrecisions, "Number type of the computation");
   f.choice("rotations", s.rotations, kRotationParameters,
-           "Numbers by which rotations are optimised: two columns of the matrix, or axis times angle");
+           "How rotations are optimised: two columns of the matrix, or axis times angle");
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
   f.object("camera", s.camera, "How cameras are optimised");
   f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");

@@ -52,18 +52,18 @@ std::string replaced(const std::string& argument, const std::function<std::strin
 }
 
 void describe_program(ConfigFields& f, ProgramSettings& s, const std::vector<std::string>& known) {
-  f.strings("command", s.command,
-            "The program and its arguments, which no shell reads; replaced in them: " + in_braces(known) +
-                "; none: the files of `data` are read");
+  f.strings(
+      "command", s.command,
+      "Program and arguments, without a shell; placeholders: " + in_braces(known) + "; empty: the files of `data`");
   f.number("timeout_s", s.timeout_s, {.min = 0, .max = kLongestTimeout},
-           "Seconds after which the program is ended; 0: it takes as long as it takes");
+           "Seconds after which the program is ended; 0: never");
   f.integer("retries", s.retries, {.min = 0, .max = kMostRetries}, "How often it is run again after a failure");
   f.number("retry_wait_s", s.retry_wait_s, {.min = 0, .max = kLongestTimeout},
-           "Seconds before it is run again, each time twice as many, at most an hour");
+           "Seconds before the first retry; doubles each time, to an hour at most");
   f.choice("retry_on", s.retry_on, kRetryOns,
-           "Which failures these are: exit status " + std::to_string(kTryAgainStatus) +
-               " (temporary), or other statuses than " + std::to_string(kAskedWronglyStatus) +
-               ", signals, time that is over and a missing output too (any)");
+           "Failures that are retried: exit status " + std::to_string(kTryAgainStatus) +
+               " (temporary); any: also statuses other than " + std::to_string(kAskedWronglyStatus) +
+               ", signals, timeouts, missing output");
 }
 
 }  // namespace
@@ -75,7 +75,7 @@ bool has_sources(const SourceSettings& sources) {
 void describe(ConfigFields& f, VideoSourceSettings& s) {
   describe_program(f, s, video_placeholders());
   f.choice("output", s.output, kVideoOutputs,
-           "What {out} is to be: a video file with this ending, or a folder of .png files (frames)");
+           "What {out} is: a video file with this ending, or a folder of .png files (frames)");
   f.integer("frames", s.frames, {.min = 0, .max = 1000000}, "Frames that the video must have; 0: any number");
 }
 
@@ -83,8 +83,8 @@ void describe(ConfigFields& f, SourceSettings& s) {
   const auto with = [](const std::vector<std::string>& known) {
     return [known](ConfigFields& fields, ProgramSettings& program) { describe_program(fields, program, known); };
   };
-  f.path("folder", s.folder, {}, "Where videos, masks and motions are kept; none: generated/ beside the config");
-  f.string("prompt", s.prompt, "What happens in the video, for {prompt}");
+  f.path("folder", s.folder, {}, "Where videos, masks and motions are kept; empty: generated/ beside the config");
+  f.string("prompt", s.prompt, "What happens in the video: {prompt}");
   f.object("video", s.video, "The program that makes the video of an image and a text");
   f.object("masks", s.masks, "The program that makes the masks of the video", with(mask_placeholders()));
   f.object("motion", s.motion, "The program that estimates the human's poses in the video",

@@ -10,43 +10,40 @@ namespace {
 
 void describe_noise(ConfigFields& f, SyntheticSettings& s) {
   f.number("pose_noise_deg", s.pose_noise_deg, {.min = 0, .max = 90},
-           "Root mean square angle by which each body joint of the initial motion is off, degrees; another in each "
-           "frame");
+           "RMS error of each body joint of the initial motion, new in each frame, degrees");
   f.number("pose_bias_deg", s.pose_bias_deg, {.min = 0, .max = 90},
-           "The same of an error that stays for seconds: of a joint it turns once in 8 s");
+           "RMS error of a joint that stays for seconds: it turns once in 8 s, degrees");
   f.number("pose_drift_deg", s.pose_drift_deg, {.min = 0, .max = 90},
-           "The same of an error that grows from frame to frame; this large in the last one");
+           "RMS error of a joint that grows to this in the last frame, degrees");
   f.number("hand_noise_share", s.hand_noise_share, {.min = 0, .max = 2},
-           "The three of finger joints, as a share of a body joint's");
+           "These three errors of finger joints, as a share of a body joint's");
   f.number("root_noise_deg", s.root_noise_deg, {.min = 0, .max = 90},
-           "Root mean square angle by which the whole body's orientation is off");
+           "RMS error of the whole body's orientation, degrees");
   f.number("root_noise_m", s.root_noise_m, {.min = 0, .max = 2},
-           "Standard deviation of each coordinate of the initial motion's root, metres");
+           "Standard deviation of each coordinate of the root, metres");
   f.number("root_drift_m", s.root_drift_m, {.min = 0, .max = 10},
-           "The same of an error that grows from frame to frame; this large in the last one");
+           "The same of an error that grows to this in the last frame");
   f.number("object_noise_deg", s.object_noise_deg, {.min = 0, .max = 180},
-           "Root mean square angle by which the object is off in initial_objects.npz; with this or the next, that file "
-           "is written");
+           "RMS error of the object in initial_objects.npz, degrees; this or the next makes that file");
   f.number("object_noise_m", s.object_noise_m, {.min = 0, .max = 2},
-           "Standard deviation of each coordinate of the object there, metres");
+           "Standard deviation of each coordinate of the object, metres");
 }
 
 void describe_files(ConfigFields& f, SyntheticSettings& s) {
   f.path("scene_file", s.scene_file, {.must_exist = true},
-         "Gaussians that stand in for the scene (.ply, .splat or .spz), z up; none: the scene is made");
+         "Gaussians in place of the scene (.ply, .splat or .spz), z up; empty: the scene is made");
   f.numbers("scene_place", s.scene_place, {.min = -1e6, .max = 1e6},
-            "Point of the floor of scene_file that the person acts at, after scene_scale, metres");
+            "Floor point of scene_file where the person acts, after scene_scale, metres");
   f.number("scene_turn_deg", s.scene_turn_deg, {.min = -360, .max = 360},
            "Turns scene_file about z through scene_place, degrees");
-  f.number("scene_scale", s.scene_scale, {.above = 0, .max = 1e6}, "Metres in a unit of scene_file");
+  f.number("scene_scale", s.scene_scale, {.above = 0, .max = 1e6}, "Metres per unit of scene_file");
   f.path("object_file", s.object_file, {.must_exist = true},
-         "Gaussians that stand in for the object, z up as it stands; they are held as `object` is; none: it is made");
+         "Gaussians in place of the object, z up, held as `object` is; empty: the object is made");
   f.numbers("object_grip", s.object_grip, {.min = -1e6, .max = 1e6},
-            "Where it is held: middle of its handle, in object_file's coordinates; empty: the middle of its top",
-            {0, 3});
+            "Middle of its handle in object_file's coordinates; empty: middle of its top", {0, 3});
   f.number("object_turn_deg", s.object_turn_deg, {.min = -360, .max = 360},
            "Turns object_file about z until its front is +x, degrees");
-  f.number("object_scale", s.object_scale, {.above = 0, .max = 1e6}, "Metres in a unit of object_file");
+  f.number("object_scale", s.object_scale, {.above = 0, .max = 1e6}, "Metres per unit of object_file");
   f.rule({"object_grip"}, [&s]() -> std::string {
     return s.object_grip.empty() || s.object_grip.size() == 3 ? "" : "a place has three numbers";
   });
@@ -112,23 +109,22 @@ std::string object_names_of(SyntheticMotionKind motion) {
 
 void describe(ConfigFields& f, SyntheticLight& s) {
   f.number("shading", s.shading, {.min = 0, .max = 1},
-           "How much darker surfaces of human and object are that face away from the light");
-  f.number("shadow", s.shadow, {.min = 0, .max = 1}, "How dark the shadow of human and object on the scene is");
+           "How much darker human and object are where they face away from the light");
+  f.number("shadow", s.shadow, {.min = 0, .max = 1}, "Darkness of the shadow of human and object");
 }
 
 void describe(ConfigFields& f, SyntheticFaults& s) {
   f.number("revealed", s.revealed, {.min = 0, .max = 1},
-           "Strength of invented content where the human or the object was in an earlier frame");
-  f.number("hands_fade", s.hands_fade, {.min = 0, .max = 1},
-           "How far the hands fade into the background in the middle of the clip");
-  f.number("appearance", s.appearance, {.min = 0, .max = 1}, "How far the human's colours change until the last frame");
+           "Strength of invented content where human or object were in an earlier frame");
+  f.number("hands_fade", s.hands_fade, {.min = 0, .max = 1}, "How far hands fade into the background in mid-clip");
+  f.number("appearance", s.appearance, {.min = 0, .max = 1}, "How far the human's colours change by the last frame");
 }
 
 void describe(ConfigFields& f, SyntheticMaskNoise& s) {
   f.number("grow_px", s.grow_px, {.min = -32, .max = 32},
            "How far masks reach beyond the truth, pixels; negative: short of it");
-  f.number("jagged_px", s.jagged_px, {.min = 0, .max = 32}, "How far their boundaries are off here and there, pixels");
-  f.number("dropped_share", s.dropped_share, {.min = 0, .max = 1}, "Share of masks after frame 0 that show nothing");
+  f.number("jagged_px", s.jagged_px, {.min = 0, .max = 32}, "How far their boundaries are off in places, pixels");
+  f.number("dropped_share", s.dropped_share, {.min = 0, .max = 1}, "Share of masks after frame 0 that are empty");
 }
 
 void describe(ConfigFields& f, SyntheticSettings& s) {
@@ -137,28 +133,27 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of textures, arrangement and noise");
   f.integer("frames", s.frames, {.min = 2, .max = 100000}, "Frames of the clip");
   f.integer("clips", s.clips, {.min = 1, .max = 1000},
-            "Clips of that many frames that follow one another, each with a camera of its own: a chain");
+            "Number of consecutive clips, each with its own camera: a chain");
   f.rule({"clips", "kind"}, [&s]() -> std::string {
     return s.clips > 1 && s.kind == SyntheticKind::kViews ? "views are of no clip" : "";
   });
   f.number("frame_rate", s.frame_rate, {.min = 1, .max = 1000},
-           "Frames a second; a lower rate gives larger steps between frames");
+           "Frames per second; fewer: larger steps between frames");
   f.integer("size_px", s.size_px, {.min = 16, .max = 8192}, "Width and height of a frame, pixels");
   f.integer("supersample", s.supersample, {.min = 1, .max = 8}, "Frames are rendered at this multiple and reduced");
-  f.choice(
-      "video", s.video, kSyntheticVideos,
-      "How frames are kept: mp4: video.mp4, H.264 with a colour a pixel (4:4:4); mp4_420: four pixels share one, as "
-      "generators write it; png: frames/, exact and without ffmpeg");
+  f.choice("video", s.video, kSyntheticVideos,
+           "mp4: H.264 with a colour per pixel (4:4:4); mp4_420: four pixels share one, as generators write it; png: "
+           "frames/, exact, without ffmpeg");
   f.integer("video_quality", s.video_quality, {.min = 0, .max = 51},
-            "Constant rate factor of the H.264: 0 without loss but that of colours, 51 worst");
+            "Constant rate factor of H.264: 0 lossless but for colours, 51 worst");
   f.rule({"video", "size_px"}, [&s]() -> std::string {
     if (s.video != SyntheticVideo::kMp4Shared || s.size_px % 2 == 0) return "";
     return "mp4_420 has blocks of 2x2 pixels, which size_px " + std::to_string(s.size_px) +
            " cannot be divided into; take an even size, or mp4";
   });
-  f.choice("scene", s.scene, kSyntheticSceneKinds, "Where it happens; `hsi4d list scenes` tells what there is");
-  f.choice("object", s.object, kSyntheticObjectKinds, "What is used");
-  f.choice("motion", s.motion, kSyntheticMotionKinds, "What is done; each motion has its objects");
+  f.choice("scene", s.scene, kSyntheticSceneKinds, "The scene; `hsi4d list scenes` describes them");
+  f.choice("object", s.object, kSyntheticObjectKinds, "The object in use");
+  f.choice("motion", s.motion, kSyntheticMotionKinds, "The action; each motion has its objects");
   f.rule({"motion", "object"}, [&s]() -> std::string {
     const auto& objects = objects_of(s.motion);
     if (std::find(objects.begin(), objects.end(), s.object) != objects.end()) return "";
@@ -167,31 +162,28 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
            std::string(choice_name<SyntheticObjectKind>(kSyntheticObjectKinds, s.object)) + "; it goes with " +
            object_names_of(s.motion);
   });
-  f.string(
-      "place", s.place,
-      "Place of the scene where a motion is done that needs one; empty: the first there. `hsi4d list scenes` tells "
-      "them");
+  f.string("place", s.place, "Place of a motion that needs one; empty: the first. `hsi4d list scenes` names them");
   f.rule({"place", "motion", "scene"}, [&s] { return place_problem(s.scene, s.motion, s.place); });
   f.number("variation", s.variation, {.min = 0, .max = 1},
-           "How far the seed changes when and how fast it is done, camera, start, clothes and light: 0 not at all");
+           "How far the seed varies timing, camera, start, clothes and light; 0: not at all");
   describe_files(f, s);
   f.integer("scene_gaussians", s.scene_gaussians, {.min = kFewestSceneGaussians, .max = 20000000},
             "Gaussians of the scene, at most; a few percent fewer are made");
   f.integer("avatar_gaussians", s.avatar_gaussians, {.min = 100, .max = 2000000}, "Gaussians of the human");
   f.integer("object_gaussians", s.object_gaussians, {.min = kFewestObjectGaussians, .max = 2000000},
             "Gaussians of the object, at most; a few percent fewer are made");
-  f.number("avatar_difference", s.avatar_difference, {.min = 0, .max = 2},
-           "How different the human in the video is from avatar.safetensors: 0 the same, 1 other Gaussians and colours "
-           "off by some hundredths");
+  f.number(
+      "avatar_difference", s.avatar_difference, {.min = 0, .max = 2},
+      "How far the human in the video differs from avatar.safetensors; 1: other Gaussians, colours off by hundredths");
   f.object("light", s.light, "How frames are lit beyond what is baked into the colours");
-  f.number("camera_drift", s.camera_drift, {.min = 0, .max = 5}, "How far the camera moves; 0: it stands");
+  f.number("camera_drift", s.camera_drift, {.min = 0, .max = 5}, "How far the camera moves; 0: not at all");
   f.number("camera_distance", s.camera_distance, {.min = 0.2, .max = 5},
-           "How far the camera is from what it looks at, of the distance as designed; smaller: nearer");
+           "Camera distance, as a multiple of the designed one");
   describe_noise(f, s);
   f.object("masks", s.masks, "Faults of the masks");
   f.object("faults", s.faults, "Faults of generated videos");
-  f.integer("views_cameras", s.views_cameras, {.min = 1, .max = 1000}, "Cameras in a ring, of kind views");
-  f.integer("views_poses", s.views_poses, {.min = 1, .max = 1000}, "Poses that each of them sees");
+  f.integer("views_cameras", s.views_cameras, {.min = 1, .max = 1000}, "Cameras in a ring (kind views)");
+  f.integer("views_poses", s.views_poses, {.min = 1, .max = 1000}, "Poses that each of them sees (kind views)");
 }
 
 std::string synthetic_settings_json(const SyntheticSettings& settings, const BodySettings& body) {
