@@ -1,6 +1,21 @@
 #include "pipelines/metrics/metric_facts.h"
 
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
 namespace hsi4d {
+namespace {
+
+/// The number that a reader sees: ties in a table are ties of what is printed.
+double as_shown(double value, int decimals) {
+  const std::string text = fixed_number(value, decimals);
+  double shown = 0;
+  std::from_chars(text.data(), text.data() + text.size(), shown);
+  return shown;
+}
+
+}  // namespace
 
 const double* find_metric(const MetricValues& values, std::string_view name) {
   for (const auto& [key, value] : values) {
@@ -49,6 +64,36 @@ const MetricFacts* find_metric_facts(std::string_view name) {
     if (facts.name == name) return &facts;
   }
   return nullptr;
+}
+
+std::string shown_metric(const MetricFacts& facts) {
+  return std::string(facts.label) + (facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]");
+}
+
+std::string metric_heading(const MetricFacts& facts) {
+  return std::string(facts.label) + (facts.unit.empty() ? "" : ", " + std::string(facts.unit)) +
+         (facts.better < 0   ? " ↓"
+          : facts.better > 0 ? " ↑"
+                             : "");
+}
+
+Cell metric_cell(const MetricFacts& facts, const double* value) {
+  return value == nullptr ? kNoCell : Cell(*value, facts.decimals);
+}
+
+void mark_best(const MetricFacts& facts, const std::vector<std::pair<Cell*, const double*>>& cells) {
+  if (facts.better == 0) return;
+  std::vector<std::pair<double, Cell*>> shown;
+  for (const auto& [cell, value] : cells) {
+    if (value != nullptr && std::isfinite(*value))
+      shown.emplace_back(as_shown(*value, facts.decimals) * facts.better, cell);
+  }
+  if (shown.empty()) return;
+  const auto [low, high] = std::minmax_element(shown.begin(), shown.end());
+  if (low->first == high->first) return;
+  for (const auto& [value, cell] : shown) {
+    if (value == high->first) cell->mark = "best";
+  }
 }
 
 }  // namespace hsi4d

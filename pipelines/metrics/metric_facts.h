@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/table.h"
+
 namespace hsi4d {
 
 /// Numbers by name, in the order in which they are shown.
@@ -35,5 +37,16 @@ const std::vector<MetricFacts>& metric_facts();
 
 /// The facts of a metric, or null for other numbers of a stage (counters).
 const MetricFacts* find_metric_facts(std::string_view name);
+
+/// "root position [mm]".
+std::string shown_metric(const MetricFacts& facts);
+/// A metric as the heading of a column, "MPJPE, mm ↓".
+std::string metric_heading(const MetricFacts& facts);
+/// A value to the decimals of its metric; kNoCell for null.
+Cell metric_cell(const MetricFacts& facts, const double* value);
+
+/// Marks the cells whose values look the best to the metric's decimals, unless all that there are look the same.
+/// @param cells  and values may be null; those are passed over
+void mark_best(const MetricFacts& facts, const std::vector<std::pair<Cell*, const double*>>& cells);
 
 }  // namespace hsi4d

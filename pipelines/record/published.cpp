@@ -48,11 +48,11 @@ const double* own_figure(const PublishedFigure& figure, const MetricValues& valu
   return find_metric(values, figure.metric);
 }
 
-std::string other_figures_text(const PublishedFigure& figure) {
+Cell other_figures_cell(const PublishedFigure& figure) {
   std::string text;
   for (const OtherFigure& other : figure.others)
     text += (text.empty() ? "" : ", ") + std::string(other.method) + " " + fixed_number(other.value, figure.decimals);
-  return text;
+  return text.empty() ? kNoCell : Cell(text);
 }
 
 }  // namespace hsi4d

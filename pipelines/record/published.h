@@ -45,7 +45,7 @@ bool is_of_objects(const MetricValues& values);
 /// @param is_dynamic  whether the clip has an object
 const double* own_figure(const PublishedFigure& figure, const MetricValues& values, bool is_dynamic);
 
-/// "TRUMANS 0.046, LINGO 0.058"; empty where there are none.
-std::string other_figures_text(const PublishedFigure& figure);
+/// "TRUMANS 0.046, LINGO 0.058"; kNoCell where there are none.
+Cell other_figures_cell(const PublishedFigure& figure);
 
 }  // namespace hsi4d
