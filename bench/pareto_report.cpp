@@ -384,7 +384,7 @@ std::string pareto_json(const std::vector<ParetoRow>& rows) {
 std::string pareto_svg(const std::vector<ParetoRow>& rows, const std::vector<TrackedPoint>& tracked) {
   const std::vector<std::string> columns = columns_of(rows);
   std::vector<PictureSection> sections = {renders_section()};
-  sections[0].columns = static_cast<int>(columns.size());
+  sections[0].columns = columns.size();
   for (const PlottedError& error : kPlotted)
     for (const std::string& scene : columns) sections[0].plots.push_back(panel(rows, scene, error));
   if (!tracked.empty()) {

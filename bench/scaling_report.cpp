@@ -15,9 +15,7 @@ namespace {
 // --- table -----------------------------------------------------------------------------------------------------------
 
 /// An exponent, or a dash.
-std::string exponent_text(const std::optional<double>& exponent) {
-  return exponent ? formatted("%.2f", *exponent + 0.0) : "-";
-}
+std::string exponent_text(const std::optional<double>& exponent) { return exponent ? fixed_number(*exponent, 2) : "-"; }
 
 /// What all points of the axis share.
 std::string others_text(const ScalingResult& result) {

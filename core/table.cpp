@@ -160,8 +160,8 @@ std::string table_markdown(const Table& table) {
     text += "|";
     for (std::size_t i = 0; i < row.size(); ++i)
       text += " " + row[i] + std::string(std::max<std::size_t>(widths[i], 1) - count_characters(row[i]), ' ') + " |";
-    text += "\n" + rule;
-    rule = rule.empty() ? "" : "\n";
+    text += "\n";
+    if (&row == &rows.front()) text += rule + "\n";
   }
   return text;
 }

@@ -201,14 +201,9 @@ void for_objects(const ConfigValue& tree, const char* key, const F& f) {
 
 Table metrics_table(Table table, const std::vector<const MetricValues*>& sources) {
   for (const std::vector<MetricFacts>* const known : {&metric_facts(), &join_metric_facts()}) {
-    for (const MetricFacts& facts : *known) {
-      std::vector<Cell> row = {Cell(shown_metric(facts), "", std::string(facts.summary))};
-      for (const MetricValues* source : sources) row.push_back(metric_cell(facts, find_metric(*source, facts.name)));
-      const bool is_measured =
-          std::any_of(row.begin() + 1, row.end(), [](const Cell& cell) { return cell.mark != "none"; });
-      if (is_measured) table.rows.push_back(std::move(row));
-    }
+    for (const MetricFacts& facts : *known) table.rows.push_back(metric_row(facts, sources));
   }
+  std::erase_if(table.rows, [](const std::vector<Cell>& row) { return row.empty(); });
   return table;
 }
 

@@ -64,12 +64,15 @@ std::string without_own_folders(std::string text, const EvaluateInputs& inputs, 
 std::string table_of(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean,
                      const std::vector<Diversity>& diversity) {
   Table table{.head = {""}};
-  for (const Evaluation& result : results) table.head.emplace_back(result.name);
+  std::vector<const MetricValues*> sources;
+  for (const Evaluation& result : results) {
+    table.head.emplace_back(result.name);
+    sources.push_back(&result.values);
+  }
   if (has_mean) table.head.emplace_back("mean ± std");
   for (const Spread& spread : spreads) {
     const MetricFacts& facts = *spread.facts;
-    std::vector<Cell> row = {shown_metric(facts)};
-    for (const Evaluation& result : results) row.push_back(metric_cell(facts, find_metric(result.values, facts.name)));
+    std::vector<Cell> row = metric_row(facts, sources);
     if (has_mean) {
       row.emplace_back(fixed_number(spread.mean, facts.decimals) +
                        (spread.count > 1 ? " ± " + fixed_number(spread.deviation, facts.decimals) : ""));
@@ -137,21 +140,13 @@ std::string notes_of_runs(const std::vector<Evaluation>& results, const Evaluate
 
 std::string published_text(const std::vector<Evaluation>& results, const EvaluateInputs& inputs) {
   const std::vector<MeasuredRow> columns = figure_columns(results, inputs);
-  Table table{.head = {"beside the paper", "its clips"}};
-  for (const MeasuredRow& column : columns) table.head.emplace_back(column.label);
-  for (const char* const column : {"ZeroHSI", "others, as published there"}) table.head.emplace_back(column);
-  for (const PublishedFigure& figure : published_figures()) {
-    std::vector<Cell> row = {figure.label, figure.is_dynamic ? "dynamic" : "static"};
-    bool is_measured = false;
-    for (const MeasuredRow& column : columns) {
-      const std::optional<double> own = figure_of(figure, column);
-      is_measured = is_measured || own;
-      row.push_back(own ? Cell(*own, figure.decimals) : kNoCell);
-    }
-    row.emplace_back(figure.value, figure.decimals);
-    row.push_back(other_figures_cell(figure));
-    if (is_measured) table.rows.push_back(std::move(row));
-  }
+  std::vector<std::string> names;
+  for (const MeasuredRow& column : columns) names.push_back(column.label);
+  Table table = published_table(
+      names, [&](const PublishedFigure& figure, std::size_t column) { return figure_of(figure, columns[column]); });
+  std::erase_if(table.rows, [](const std::vector<Cell>& row) {
+    return std::none_of(row.begin(), row.end(), [](const Cell& cell) { return cell.mark == "own"; });
+  });
   if (table.rows.empty()) return "";
   return "\n" + table_text(table, stdout_columns()) + "Published: " + std::string(kPublishedSource) +
          ".\nThey are of other clips, which are not public: the order of magnitude can be compared.\n";

@@ -2,20 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 
 namespace hsi4d {
-namespace {
-
-/// The number that a reader sees: ties in a table are ties of what is printed.
-double as_shown(double value, int decimals) {
-  const std::string text = fixed_number(value, decimals);
-  double shown = 0;
-  std::from_chars(text.data(), text.data() + text.size(), shown);
-  return shown;
-}
-
-}  // namespace
 
 const double* find_metric(const MetricValues& values, std::string_view name) {
   for (const auto& [key, value] : values) {
@@ -81,18 +69,31 @@ Cell metric_cell(const MetricFacts& facts, const double* value) {
   return value == nullptr ? kNoCell : Cell(*value, facts.decimals);
 }
 
-void mark_best(const MetricFacts& facts, const std::vector<std::pair<Cell*, const double*>>& cells) {
-  if (facts.better == 0) return;
+std::vector<Cell> metric_row(const MetricFacts& facts, const std::vector<const MetricValues*>& sources) {
+  std::vector<Cell> row = {Cell(shown_metric(facts), "", std::string(facts.summary))};
+  bool is_measured = false;
+  for (const MetricValues* const source : sources) {
+    const double* const value = find_metric(*source, facts.name);
+    is_measured = is_measured || value != nullptr;
+    row.push_back(metric_cell(facts, value));
+  }
+  return is_measured ? row : std::vector<Cell>();
+}
+
+void mark_best(int better, const std::vector<Cell*>& cells) {
   std::vector<std::pair<double, Cell*>> shown;
-  for (const auto& [cell, value] : cells) {
-    if (value != nullptr && std::isfinite(*value))
-      shown.emplace_back(as_shown(*value, facts.decimals) * facts.better, cell);
+  for (Cell* const cell : cells) {
+    double number = 0;
+    const char* const text = cell->text.data();
+    if (std::from_chars(text, text + cell->text.size(), number).ec == std::errc())
+      shown.emplace_back(number * better, cell);
   }
   if (shown.empty()) return;
   const auto [low, high] = std::minmax_element(shown.begin(), shown.end());
-  if (low->first == high->first) return;
+  const double best = high->first;
+  if (low->first == best) return;
   for (const auto& [value, cell] : shown) {
-    if (value == high->first) cell->mark = "best";
+    if (value == best) cell->mark = "best";
   }
 }
 

@@ -45,8 +45,12 @@ std::string metric_heading(const MetricFacts& facts);
 /// A value to the decimals of its metric; kNoCell for null.
 Cell metric_cell(const MetricFacts& facts, const double* value);
 
-/// Marks the cells whose values look the best to the metric's decimals, unless all that there are look the same.
-/// @param cells  and values may be null; those are passed over
-void mark_best(const MetricFacts& facts, const std::vector<std::pair<Cell*, const double*>>& cells);
+/// The metric and its value in each source; empty where none has it.
+std::vector<Cell> metric_row(const MetricFacts& facts, const std::vector<const MetricValues*>& sources);
+
+/// Marks the cells whose numbers are the best as they are shown, unless all are the same.
+/// @param better  as in MetricFacts
+/// @param cells   those whose text begins with no number are passed over
+void mark_best(int better, const std::vector<Cell*>& cells);
 
 }  // namespace hsi4d

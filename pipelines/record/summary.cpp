@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include "core/check.h"
@@ -214,36 +213,28 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
 }
 
 Table error_table(const RunSummary& summary) {
-  struct Column {
-    const MetricValues& values;
-    bool of_frame_0;
-    const char* mark;
-  };
   Table table{.head = {""}, .align = "lr"};
-  std::vector<Column> columns;
+  std::vector<const MetricValues*> sources;
+  std::vector<bool> of_frame_0;
   for (const Baseline& baseline : summary.baselines) {
     table.head.emplace_back(baseline.name, "baseline");
-    columns.push_back({baseline.values, baseline.of_frame_0, "baseline"});
+    sources.push_back(&baseline.values);
+    of_frame_0.push_back(baseline.of_frame_0);
   }
   for (const StageSummary& stage : summary.metrics) {
     table.head.emplace_back(stage.stage);
-    columns.push_back({stage.values, stage.of_frame_0, ""});
+    sources.push_back(&stage.values);
+    of_frame_0.push_back(stage.of_frame_0);
   }
   for (const MetricFacts& facts : metric_facts()) {
-    std::vector<Cell> row = {Cell(shown_metric(facts), "", std::string(facts.summary))};
-    std::vector<const double*> values;
-    for (const Column& column : columns) {
-      values.push_back(find_metric(column.values, facts.name));
-      row.push_back(metric_cell(facts, values.back()));
-      if (values.back() != nullptr) row.back().mark = column.mark;
+    std::vector<Cell> row = metric_row(facts, sources);
+    if (row.empty()) continue;
+    std::array<std::vector<Cell*>, 2> cells;  // of frame 0 alone, and others
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+      if (row[i + 1].mark.empty()) row[i + 1].mark = table.head[i + 1].mark;
+      cells[of_frame_0[i] ? 0 : 1].push_back(&row[i + 1]);
     }
-    if (std::count(values.begin(), values.end(), nullptr) == std::ssize(values)) continue;
-    for (const bool of_frame_0 : {false, true}) {
-      std::vector<std::pair<Cell*, const double*>> cells;
-      for (std::size_t i = 0; i < columns.size(); ++i)
-        if (columns[i].of_frame_0 == of_frame_0) cells.emplace_back(&row[i + 1], values[i]);
-      mark_best(facts, cells);
-    }
+    for (const auto& compared : cells) mark_best(facts.better, compared);
     table.rows.push_back(std::move(row));
   }
   return table;

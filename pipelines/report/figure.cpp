@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/table.h"
 #include "core/text.h"
@@ -13,10 +14,8 @@ namespace {
 
 // In the units of the view box; the page scales it.
 constexpr double kMostLeft = 204, kRight = 12, kTop = 10, kBottom = 38, kRowHeight = 20;
-constexpr double kLetter = 6.6, kLine = 18;              // mean width of a letter; height of a line of a legend
+constexpr double kLetter = 6.5, kLine = 18;              // mean width of a letter; height of a line of a legend
 constexpr double kGap = 26, kHeading = 20, kTitle = 34;  // of pictures: between plots, above one, above a section
-
-std::string coordinate(double value) { return fixed_number(value, 1); }
 
 /// A tick's number: as few digits as tell ticks apart.
 std::string tick_text(double value) { return rounded(value, 6); }
@@ -98,30 +97,35 @@ Axis log_axis(Range range) {
   }
   const double decades = std::log10(range.high / range.low);
   axis.range = {range.low / std::pow(10, 0.04 * decades), range.high * std::pow(10, 0.04 * decades)};
+  if (decades < 1) {  // too narrow for powers of ten
+    axis.ticks = linear_axis(axis.range, 5, false, false).ticks;
+    return axis;
+  }
   const int skip = decades > 7 ? static_cast<int>(decades / 6) + 1 : 1;
-  for (int power = static_cast<int>(std::floor(std::log10(axis.range.low)));
-       power <= static_cast<int>(std::ceil(std::log10(axis.range.high))); ++power) {
-    for (const double factor : {1.0, 2.0, 3.0, 5.0, 7.0}) {
-      const bool is_shown = factor == 1.0                    ? power % skip == 0
-                            : factor == 2.0 || factor == 5.0 ? decades < 2.5
-                                                             : decades < 0.8;
+  for (int power = static_cast<int>(std::floor(std::log10(axis.range.low))); std::pow(10, power) <= axis.range.high;
+       ++power) {
+    for (const double factor : {1.0, 2.0, 5.0}) {
       const double value = factor * std::pow(10, power);
+      const bool is_shown = factor == 1.0 ? power % skip == 0 : decades < 2.5;
       if (is_shown && value >= axis.range.low && value <= axis.range.high) axis.ticks.push_back(value);
     }
   }
-  if (axis.ticks.empty()) return linear_axis(range, 4, false, false);  // a range too narrow for round numbers
   return axis;
 }
 
 std::string line_svg(const char* css_class, double x1, double y1, double x2, double y2) {
-  return std::string("<line class=\"") + css_class + "\" x1=\"" + coordinate(x1) + "\" x2=\"" + coordinate(x2) +
-         "\" y1=\"" + coordinate(y1) + "\" y2=\"" + coordinate(y2) + "\"/>";
+  return formatted(R"(<line class="%s" x1="%.1f" x2="%.1f" y1="%.1f" y2="%.1f"/>)", css_class, x1, x2, y1, y2);
 }
 
 /// @param anchor  "start", "middle" or "end": what of it stands at x
 std::string text_svg(const char* css_class, const char* anchor, double x, double y, const std::string& text) {
-  return std::string("<text class=\"") + css_class + "\" text-anchor=\"" + anchor + "\" x=\"" + coordinate(x) +
-         "\" y=\"" + coordinate(y) + "\">" + html_escape(text) + "</text>";
+  return formatted(R"(<text class="%s" text-anchor="%s" x="%.1f" y="%.1f">%s</text>)", css_class, anchor, x, y,
+                   html_escape(text).c_str());
+}
+
+std::string dot_svg(double x, double y, double radius, const std::string& style, const std::string& tip) {
+  return formatted(R"(<circle cx="%.1f" cy="%.1f" r="%.3g" style="fill:%s"><title>%s</title></circle>)", x, y, radius,
+                   style.c_str(), html_escape(tip).c_str());
 }
 
 /// Entries from left to right, in as many lines as they need.
@@ -130,10 +134,9 @@ std::string legend_svg(const Legend& legend, double left, double right, double& 
   std::string svg;
   double x = right;
   for (const auto& [text, color] : legend) {
-    const double width = 26 + kLetter * static_cast<double>(count_characters(text));
+    const double width = 24 + kLetter * static_cast<double>(count_characters(text));
     if (x + width > right) x = left, y += kLine;
-    svg += "<circle cx=\"" + coordinate(x + 5) + "\" cy=\"" + coordinate(y - 8) + "\" r=\"4\" style=\"fill:" + color +
-           "\"/>" + text_svg("entry", "start", x + 13, y - 4, text) + "\n";
+    svg += dot_svg(x + 5, y - 8, 4, color, text) + text_svg("entry", "start", x + 13, y - 4, text) + "\n";
     x += width;
   }
   return svg;
@@ -189,8 +192,8 @@ std::string axes_svg(const Plot& plot, const Area& area) {
   if (!has_rows) svg += line_svg("axis", area.left, area.bottom, area.right, area.bottom);
   if (has_rows && plot.begins_at_zero) svg += line_svg("axis", area.at_x(0), area.top, area.at_x(0), area.bottom);
   if (plot.is_timed)
-    svg += "<line class=\"now\" visibility=\"hidden\" x1=\"0\" x2=\"0\" y1=\"" + coordinate(area.top) + "\" y2=\"" +
-           coordinate(area.bottom) + "\"/>";
+    svg += formatted(R"(<line class="now" visibility="hidden" x1="0" x2="0" y1="%.1f" y2="%.1f"/>)", area.top,
+                     area.bottom);
   return svg + text_svg("tick", "middle", (area.left + area.right) / 2, area.bottom + 33, plot.x_label) + "\n";
 }
 
@@ -208,18 +211,15 @@ std::string series_svg(const Plot& plot, const Series& series, const Area& area)
   for (const auto& point : series.points) {
     if (!has_place(plot, point)) continue;
     x = area.at_x(point.first), y = area.at_y(point.second);
-    points += (points.empty() ? "" : " ") + coordinate(x) + "," + coordinate(y);
-    if (series.dots > 0)
-      dots += "<circle cx=\"" + coordinate(x) + "\" cy=\"" + coordinate(y) + "\" r=\"" + rounded(series.dots, 3) +
-              "\" style=\"fill:" + series.color + opacity + "\"><title>" + html_escape(tip_of(plot, series, point)) +
-              "</title></circle>";
+    points += formatted("%s%.1f,%.1f", points.empty() ? "" : " ", x, y);
+    if (series.dots > 0) dots += dot_svg(x, y, series.dots, series.color + opacity, tip_of(plot, series, point));
   }
   if (points.empty()) return "";
   std::string svg;
   if (series.line > 0)
-    svg = "<polyline points=\"" + points + "\" style=\"stroke:" + series.color +
-          ";stroke-width:" + rounded(series.line, 3) + opacity + (series.is_dashed ? ";stroke-dasharray:5 4" : "") +
-          "\"><title>" + html_escape(series.label) + "</title></polyline>";
+    svg = formatted(R"(<polyline points="%s" style="stroke:%s;stroke-width:%.3g%s%s"><title>%s</title></polyline>)",
+                    points.c_str(), series.color.c_str(), series.line, opacity.c_str(),
+                    series.is_dashed ? ";stroke-dasharray:5 4" : "", html_escape(series.label).c_str());
   svg += dots;
   const bool is_at_right = x > 0.75 * plot.width;  // where the name would not fit beside it
   if (series.name != Series::Name::kNone)
@@ -228,15 +228,9 @@ std::string series_svg(const Plot& plot, const Series& series, const Area& area)
   return svg + "\n";
 }
 
-/// For the page's script: which frames the axis has, and where.
-std::string timed_attributes(const Area& area) {
-  return " timed\" data-from=\"" + coordinate(area.x.range.low) + "\" data-to=\"" + coordinate(area.x.range.high) +
-         "\" data-left=\"" + coordinate(area.left) + "\" data-right=\"" + coordinate(area.right) + "\"";
-}
-
-/// The plot's element at (x, y) of a picture, or without a place; empty where there is nothing to plot.
+/// The plot's element, at a place of a picture; empty where there is nothing to plot.
 /// @param height  what it has
-std::string placed_svg(const Plot& plot, const std::pair<double, double>* place, double& height) {
+std::string placed_svg(const Plot& plot, double left, double top, double& height) {
   Range xs, ys;
   for (const Series& series : plot.series) {
     for (const auto& point : series.points) {
@@ -246,18 +240,17 @@ std::string placed_svg(const Plot& plot, const std::pair<double, double>* place,
     }
   }
   if (xs.empty()) return "";
-  double top = 0;
-  const std::string legend = legend_svg(plot.legend, 8, plot.width, top);
-  const Area area = area_of(plot, xs, ys, top + kTop);
+  double below = 0;
+  std::string inside = "\n" + legend_svg(plot.legend, 8, plot.width, below);
+  const Area area = area_of(plot, xs, ys, below + kTop);
+  inside += axes_svg(plot, area);
+  for (const Series& series : plot.series) inside += series_svg(plot, series, area);
   height = area.height;
-  std::string svg = "<svg class=\"plot" + (plot.is_timed ? timed_attributes(area) : "\"");
-  if (place != nullptr)
-    svg += " x=\"" + coordinate(place->first) + "\" y=\"" + coordinate(place->second) + "\" width=\"" +
-           coordinate(plot.width) + "\" height=\"" + coordinate(height) + "\"";
-  svg += " role=\"img\" viewBox=\"0 0 " + fixed_number(plot.width, 0) + " " + fixed_number(height, 0) +
-         "\" aria-label=\"" + html_escape(plot.title) + "\">\n" + legend + axes_svg(plot, area);
-  for (const Series& series : plot.series) svg += series_svg(plot, series, area);
-  return svg + "</svg>";
+  return formatted(R"(<svg class="%s" data-from="%.1f" data-to="%.1f" data-left="%.1f" data-right="%.1f" )",
+                   plot.is_timed ? "plot timed" : "plot", area.x.range.low, area.x.range.high, area.left, area.right) +
+         formatted(R"(x="%.1f" y="%.1f" width="%.1f" height="%.1f" viewBox="0 0 %.1f %.1f" )", left, top, plot.width,
+                   height, plot.width, height) +
+         "role=\"img\" aria-label=\"" + html_escape(plot.title) + "\">" + inside + "</svg>";
 }
 
 constexpr const char* kPictureStyle =
@@ -274,21 +267,20 @@ std::string section_svg(const PictureSection& section, double width, double& y) 
     y += kLine;
   }
   svg += legend_svg(section.legend, kGap + 8, width, y);
-  for (std::size_t first = 0; first < section.plots.size(); first += static_cast<std::size_t>(section.columns)) {
-    double x = kGap, tallest = 0;
-    for (std::size_t i = first; i < std::min(section.plots.size(), first + static_cast<std::size_t>(section.columns));
-         ++i) {
-      const Plot& plot = section.plots[i];
-      double height = 0;
-      const std::pair<double, double> place = {x, y + kHeading};
-      const std::string drawn = placed_svg(plot, &place, height);
-      svg += text_svg("heading", "start", x + 8, y + 14, plot.title + (drawn.empty() ? ": nothing to plot" : "")) +
-             "\n" + drawn + "\n";
-      x += plot.width + kGap;
-      tallest = std::max(tallest, height);
-    }
-    y += kHeading + tallest + kGap / 2;
+  if (!section.legend.empty()) y += kGap / 4;
+  double tallest = 0;
+  for (std::size_t i = 0; i < section.plots.size(); ++i) {
+    const Plot& plot = section.plots[i];
+    const auto column = static_cast<double>(i % section.columns);
+    if (column == 0) y += std::exchange(tallest, 0);
+    const double x = kGap + column * (plot.width + kGap);
+    double height = 0;
+    const std::string drawn = placed_svg(plot, x, y + kHeading, height);
+    svg += text_svg("heading", "start", x + 8, y + 14, plot.title + (drawn.empty() ? ": nothing to plot" : "")) + "\n" +
+           drawn + "\n";
+    tallest = std::max(tallest, kHeading + height + kGap / 2);
   }
+  y += tallest;
   return svg;
 }
 
@@ -296,23 +288,21 @@ std::string section_svg(const PictureSection& section, double width, double& y) 
 
 std::string plot_svg(const Plot& plot) {
   double height = 0;
-  const std::string svg = placed_svg(plot, nullptr, height);
+  const std::string svg = placed_svg(plot, 0, 0, height);
   return svg.empty() ? "<p class=\"nothing\">There is nothing to plot.</p>" : svg;
 }
 
 std::string picture_svg(const std::vector<PictureSection>& sections) {
   double width = 0, height = kGap / 2;
   for (const PictureSection& section : sections) {
-    const std::size_t columns = std::min(section.plots.size(), static_cast<std::size_t>(section.columns));
-    if (columns > 0)
-      width = std::max(width, kGap + static_cast<double>(columns) * (section.plots.front().width + kGap));
+    const auto columns = static_cast<double>(std::min(section.plots.size(), section.columns));
+    for (const Plot& plot : section.plots) width = std::max(width, kGap + columns * (plot.width + kGap));
   }
   std::string body;
   for (const PictureSection& section : sections) body += section_svg(section, width, height);
-  const std::string size = " width=\"" + coordinate(width) + "\" height=\"" + coordinate(height) + "\"";
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + coordinate(width) + " " + coordinate(height) +
-         "\"" + size + " font-family=\"sans-serif\">\n" + kPictureStyle + "<rect" + size + " fill=\"#fff\"/>\n" + body +
-         "</svg>\n";
+  const std::string size = formatted(R"(width="%.1f" height="%.1f")", width, height);
+  return formatted(R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 %.1f %.1f" )", width, height) + size +
+         " font-family=\"sans-serif\">\n" + kPictureStyle + "<rect " + size + " fill=\"#fff\"/>\n" + body + "</svg>\n";
 }
 
 Plot bar_plot(const std::string& title, const std::string& unit, const std::vector<BarPart>& parts, double named) {

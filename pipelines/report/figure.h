@@ -50,7 +50,7 @@ struct PictureSection {
   std::string title = {}, note = {};
   Legend legend = {};
   std::vector<Plot> plots = {};
-  int columns = 2;
+  std::size_t columns = 2;
 };
 
 /// Sections below one another as an SVG file.

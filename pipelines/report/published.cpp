@@ -1,22 +1,15 @@
 #include "pipelines/report/published.h"
 
 #include "pipelines/record/published.h"
-#include "pipelines/report/figure.h"
 
 namespace hsi4d {
 
 std::string published_section(const RunSummary& summary) {
   const MetricValues values = summary.metrics.empty() ? MetricValues{} : summary.metrics.back().values;
-  Table table{.head = {"metric", "the paper's clips", "this run", "ZeroHSI, published", "others, as published there"}};
-  for (const PublishedFigure& figure : published_figures()) {
+  const Table table = published_table({"this run"}, [&](const PublishedFigure& figure, std::size_t) {
     const double* const own = own_figure(figure, values, is_of_objects(values));
-    table.rows.push_back(
-        {Cell(std::string(figure.label) + (figure.better > 0 ? " ↑" : " ↓"), "", std::string(figure.summary)),
-         figure.is_dynamic ? "dynamic" : "static",
-         own == nullptr ? kNoCell : Cell(fixed_number(*own, figure.decimals), "own"),
-         {figure.value, figure.decimals},
-         other_figures_cell(figure)});
-  }
+    return own == nullptr ? std::nullopt : std::optional<double>(*own);
+  });
   return "<section id=\"published\">\n<h2>Beside the paper</h2>\n<div class=\"card wide\">" +
          table_html(table, "published") +
          "</div>\n<p class=\"caption\">The paper's figures are means over its own clips, which are not "

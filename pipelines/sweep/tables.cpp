@@ -132,10 +132,9 @@ Table mean_table(const SweepResults& results, const std::string* clip) {
       table.rows[row][counts_end + m] = mean_text(means[row].sample, facts);
       counts[row].add(means[row]);
     }
-    std::vector<std::pair<Cell*, const double*>> comparable;
-    for (const std::size_t row : comparable_rows(means))
-      comparable.emplace_back(&table.rows[row][counts_end + m], &means[row].sample.mean);
-    mark_best(facts, comparable);
+    std::vector<Cell*> comparable;
+    for (const std::size_t row : comparable_rows(means)) comparable.push_back(&table.rows[row][counts_end + m]);
+    mark_best(facts.better, comparable);
   }
   for (std::size_t row = 0; row < counts.size(); ++row) {
     table.rows[row][1] = count_range(counts[row].seeds);
