@@ -116,39 +116,19 @@ nlohmann::ordered_json json_of(const ParetoRow& row) {
 /// The columns of CSV, as places in the JSON object of a line: of a render, of a reconstruction.
 std::vector<std::string> csv_places() {
   std::vector<std::string> places;
-  for (const char* const key : {"scene",
-                                "knob",
-                                "value",
-                                "model",
-                                "gaussians",
-                                "pixels",
-                                "fragments",
-                                "pairs",
-                                "repeats",
-                                "threads",
-                                "isa",
-                                "median_ms",
-                                "min_ms",
-                                "forward_ms",
-                                "forward_min_ms",
-                                "backward_ms",
-                                "backward_min_ms",
-                                "forward_ratio",
-                                "backward_ratio",
-                                "time_ratio",
-                                "psnr_db",
-                                "image_rms",
-                                "image_max",
-                                "image_p999",
-                                "image_bias"})
-    places.push_back(std::string("/") + key);
-  for (const char* const name : kGradientClasses)
-    for (const char* const error : {"relative_l2", "one_minus_cosine", "bias"})
-      places.push_back(std::string("/gradients/") + name + "/" + error);
-  for (const char* const key : {"tracking", "iterations", "seeds", "cost_ratio"})
-    places.push_back(std::string("/") + key);
+  const auto add = [&places](const char* keys) {
+    std::istringstream words(keys);
+    for (std::string key; words >> key;) places.push_back("/" + key);
+  };
+  add("scene knob value model gaussians pixels fragments pairs repeats threads isa median_ms min_ms forward_ms "
+      "forward_min_ms backward_ms backward_min_ms forward_ratio backward_ratio time_ratio psnr_db image_rms image_max "
+      "image_p999 image_bias");
+  for (const std::string name : kGradientClasses)
+    for (const char* const error : {"/relative_l2", "/one_minus_cosine", "/bias"})
+      places.push_back("/gradients/" + name + error);
+  add("tracking iterations seeds cost_ratio");
   for (const TrackedError& error : kTrackedErrors)
-    for (const char* const part : {"mean", "deviation"}) places.push_back(std::string("/") + error.metric + "/" + part);
+    for (const char* const part : {"/mean", "/deviation"}) places.push_back("/" + std::string(error.metric) + part);
   return places;
 }
 
@@ -193,26 +173,6 @@ std::vector<ParetoPoint> points_of(std::vector<ParetoRow> rows, const std::strin
   return pareto_points(rows, scene);
 }
 
-/// Ticks of a logarithmic axis of ratios that has 1: those between the least and the most of them.
-std::vector<double> ratio_ticks(const std::vector<double>& ratios) {
-  const double least = std::min(1.0, *std::min_element(ratios.begin(), ratios.end())),
-               most = std::max(1.0, *std::max_element(ratios.begin(), ratios.end()));
-  std::vector<double> ticks = {0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 20, 50};
-  if (most < 5 * least) ticks = {0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2, 2.5, 3, 3.5, 4, 5};
-  std::erase_if(ticks, [least, most](double tick) { return tick < 0.97 * least || tick > 1.03 * most; });
-  return ticks;
-}
-
-/// A plot over ratios of time.
-Plot plot_over_time(const std::string& title, const std::string& x_label, std::vector<double> ratios) {
-  ratios.push_back(1);
-  Plot plot{
-      .title = title, .x_label = x_label, .unit = "", .series = {}, .is_log_x = true, .ticks_x = ratio_ticks(ratios)};
-  plot.width = 460;
-  plot.height = 254;
-  return plot;
-}
-
 /// Presets are dark and products pale; the other knobs have the colours that there are.
 std::string knob_color(const std::string& knob) {
   if (knob == "quality") return "#111";
@@ -225,32 +185,44 @@ std::string knob_color(const std::string& knob) {
   return part_color(place);
 }
 
+/// A dot of its knob's colour, named where it is a preset.
+/// @param point  ParetoPoint or TrackedPoint
+template <class Point>
+Series dot_of(const Point& point, double time, double error, bool is_named_below) {
+  using Name = Series::Name;
+  return {.label = point.is_preset() ? point.value : point.name(),
+          .color = knob_color(point.knob),
+          .points = {{time, error}},
+          .line = 0,
+          .dots = 3,
+          .name = !point.is_preset() ? Name::kNone
+                  : is_named_below   ? Name::kBelow
+                                     : Name::kAbove};
+}
+
+/// The points, presets on top of the others.
+template <class Point>
+std::vector<Point> presets_last(std::vector<Point> points) {
+  std::stable_partition(points.begin(), points.end(), [](const Point& point) { return !point.is_preset(); });
+  return points;
+}
+
 /// Dots by knob, presets named, the front as a line. Points without error have no place on a logarithmic axis.
 Plot panel(const std::vector<ParetoRow>& rows, const std::string& scene, const PlottedError& error) {
   const std::vector<ParetoPoint> points = points_of(rows, scene, error);
-  std::vector<double> ratios;
-  for (const ParetoPoint& point : points) ratios.push_back(point.time_ratio);
-  Plot plot = plot_over_time(std::string(error.name) + (scene.empty() ? ", median of all scenes" : ", " + scene),
-                             "time, ratio to the default's", ratios);
-  plot.is_log = true;
-  plot.decimals = 6;
-  Series front{.label = "front", .color = "#999", .points = {}};
+  Plot plot{.title = std::string(error.name) + (scene.empty() ? ", median of all scenes" : ", " + scene),
+            .x_label = "time, ratio to the default's",
+            .unit = "",
+            .series = {{.label = "front", .color = "#999", .points = {}}},
+            .is_log = true,
+            .is_log_x = true,
+            .decimals = 6,
+            .width = kPanelWidth,
+            .height = kPanelHeight};
   for (const std::size_t i : pareto_front(points, &ParetoPoint::image_rms))
-    front.points.emplace_back(points[i].time_ratio, points[i].image_rms);
-  plot.series.push_back(std::move(front));
-  for (const bool is_preset : {false, true}) {  // presets on top of the others
-    for (const ParetoPoint& point : points) {
-      if (point.is_preset() != is_preset) continue;
-      plot.series.push_back({.label = is_preset ? point.value : point.name(),
-                             .color = knob_color(point.knob),
-                             .points = {{point.time_ratio, point.image_rms}},
-                             .line = 0,
-                             .dots = 3,
-                             .name = !is_preset                 ? Series::Name::kNone
-                                     : point.value == "default" ? Series::Name::kBelow
-                                                                : Series::Name::kAbove});
-    }
-  }
+    plot.series[0].points.emplace_back(points[i].time_ratio, points[i].image_rms);
+  for (const ParetoPoint& point : presets_last(points))
+    plot.series.push_back(dot_of(point, point.time_ratio, point.image_rms, point.value == "default"));
   return plot;
 }
 
@@ -278,43 +250,31 @@ bool is_named_below(const TrackedPoint& point, const std::vector<TrackedPoint>& 
   });
 }
 
-/// A dot at the mean, on a bar of a standard deviation to either side.
-void add_tracked(const TrackedPoint& point, const PlottedTracking& plotted, bool is_below, Plot& plot) {
-  const TrackedPoint::Spread& spread = point.*plotted.place;
-  const std::string name = point.is_preset() ? point.value : point.name(), color = knob_color(point.knob);
-  plot.series.push_back({.label = name + ": " + fixed_number(spread.mean, plotted.decimals) + " +- " +
-                                  fixed_number(spread.deviation, plotted.decimals) + " " + plotted.unit,
-                         .color = color,
-                         .points = {{point.cost_ratio, std::max(0.0, spread.mean - spread.deviation)},
-                                    {point.cost_ratio, spread.mean + spread.deviation}},
-                         .opacity = 0.45});
-  plot.series.push_back({.label = name,
-                         .color = color,
-                         .points = {{point.cost_ratio, spread.mean}},
-                         .line = 0,
-                         .dots = 3,
-                         .name = !point.is_preset() ? Series::Name::kNone
-                                 : is_below         ? Series::Name::kBelow
-                                                    : Series::Name::kAbove});
-}
-
+/// Dots at the means, on bars of a standard deviation to either side.
 Plot tracked_panel(const std::vector<TrackedPoint>& tracked, bool is_fixed_time, const PlottedTracking& plotted) {
-  std::vector<double> ratios, tops;
-  for (const TrackedPoint& point : tracked) {
-    ratios.push_back(point.cost_ratio);
-    tops.push_back((point.*plotted.place).mean + (point.*plotted.place).deviation);
+  Plot plot{.title = std::string(plotted.name) + ", " + plotted.unit +
+                     (is_fixed_time ? ", after as long as the default" : ", after as many steps"),
+            .x_label = "time of a step, ratio to the default's",
+            .unit = plotted.unit,
+            .series = {},
+            .is_log_x = true,
+            .begins_at_zero = true,
+            .decimals = plotted.decimals,
+            .width = kPanelWidth,
+            .height = kPanelHeight};
+  for (const TrackedPoint& point : presets_last(tracked)) {
+    const auto [mean, deviation] = point.*plotted.place;
+    plot.also.push_back(mean + deviation);  // of both budgets, which stand side by side
+    if (point.is_fixed_time != is_fixed_time) continue;
+    const Series dot = dot_of(point, point.cost_ratio, mean, is_named_below(point, tracked, plotted.place));
+    plot.series.push_back(
+        {.label = dot.label + formatted(": %.*f +- %.*f ", plotted.decimals, mean, plotted.decimals, deviation) +
+                  plotted.unit,
+         .color = dot.color,
+         .points = {{point.cost_ratio, std::max(0.0, mean - deviation)}, {point.cost_ratio, mean + deviation}},
+         .opacity = 0.45});
+    plot.series.push_back(dot);
   }
-  Plot plot = plot_over_time(std::string(plotted.name) + ", " + plotted.unit +
-                                 (is_fixed_time ? ", after as long as the default" : ", after as many steps"),
-                             "time of a step, ratio to the default's", ratios);
-  plot.unit = plotted.unit;
-  plot.decimals = plotted.decimals;
-  plot.begins_at_zero = true;
-  plot.also = tops;                           // of both budgets, which stand side by side
-  for (const bool is_preset : {false, true})  // presets on top of the others
-    for (const TrackedPoint& point : tracked)
-      if (point.is_fixed_time == is_fixed_time && point.is_preset() == is_preset)
-        add_tracked(point, plotted, is_named_below(point, tracked, plotted.place), plot);
   return plot;
 }
 

@@ -82,8 +82,8 @@ Plot growth_panel(const ScalingResult& result) {
             .series = {},
             .is_log = true,
             .is_log_x = true,
-            .width = 460,
-            .height = 254};
+            .width = kPanelWidth,
+            .height = kPanelHeight};
   for (const ScalingPoint& point : result.points) plot.ticks_x.push_back(static_cast<double>(point.value));
   for (const ScalingFit& fit : scaling_fits(result.axis, result.points)) {
     if (fit.quantity != quantity) continue;

@@ -159,7 +159,7 @@ Area area_of(const Plot& plot, Range xs, Range ys, double top) {
     if (has_place(plot.is_log, value)) values.add(value);
   Area area;
   area.x = plot.is_log_x ? log_axis(xs) : linear_axis(xs, has_rows ? 4 : 8, !has_rows && plot.has_whole_x, has_rows);
-  if (plot.is_log_x) area.x.ticks = plot.ticks_x;
+  if (plot.is_log_x && !plot.ticks_x.empty()) area.x.ticks = plot.ticks_x;
   const auto rows = static_cast<double>(plot.rows.size());
   if (has_rows)
     area.y.range = {rows - 0.5, -0.5};

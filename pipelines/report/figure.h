@@ -31,19 +31,22 @@ struct Plot {
   Legend legend{};                  ///< above the axes
   std::vector<std::string> rows{};  ///< y is not a number but a row, 0 the topmost one; these name them
   bool is_log = false;              ///< y on a logarithmic scale; points ≤ 0 are left out
-  bool is_log_x = false;            ///< x on a logarithmic scale with ticks at ticks_x; all x > 0
-  std::vector<double> ticks_x{};
-  bool begins_at_zero = false;  ///< y, unless it is logarithmic; x where there are rows
-  std::vector<double> also{};   ///< what that axis reaches beside the points, so that plots have one in common
-  bool has_whole_x = true;      ///< x ticks at whole numbers only
-  int decimals = 2;             ///< of y in tooltips
-  bool is_timed = false;        ///< x is the frame, of which the page's script marks the one that is looked at
-  double width = 380;           ///< in the units of the view box, where letters are 12 high; the page scales it
-  double height = 210;          ///< of the axes with their labels; rows have a height of their own
+  bool is_log_x = false;            ///< x likewise
+  std::vector<double> ticks_x{};    ///< of a logarithmic x; empty: round numbers
+  bool begins_at_zero = false;      ///< y, unless it is logarithmic; x where there are rows
+  std::vector<double> also{};       ///< what that axis reaches beside the points, so that plots have one in common
+  bool has_whole_x = true;          ///< x ticks at whole numbers only
+  int decimals = 2;                 ///< of y in tooltips
+  bool is_timed = false;            ///< x is the frame, of which the page's script marks the one that is looked at
+  double width = 380;               ///< in the units of the view box, where letters are 12 high; the page scales it
+  double height = 210;              ///< of the axes with their labels; rows have a height of their own
 };
 
 /// The plot as one <svg> element; a few words instead where there is nothing to plot.
 std::string plot_svg(const Plot& plot);
+
+/// The size of a plot in a picture.
+inline constexpr double kPanelWidth = 460, kPanelHeight = 254;
 
 /// Plots of one width under a title, so many beside one another.
 struct PictureSection {

@@ -50,10 +50,10 @@ TEST_CASE("columns are aligned as asked, with room for the marks of those at the
                     .rows = {{"error", {60, 1}, Cell("20.0", "best")}, {"time", kNoCell, 7}},
                     .align = "lr"};
   CHECK(table_text(table) ==
-        "metric   start     end\n"
-        "error     60.0    20.0*\n"
-        "time         -       7\n");
-  CHECK(table_width(table) == 23);
+        "metric  start    end\n"
+        "error    60.0   20.0*\n"
+        "time        -      7\n");
+  CHECK(table_width(table) == 21);
   CHECK(table_html(table, "errors") ==
         "<table class=\"errors\">\n<thead><tr><th>metric</th><th>start</th><th>end</th></tr></thead>\n<tbody>\n"
         "<tr><th scope=\"row\">error</th><td>60.0</td><td class=\"best\">20.0</td></tr>\n"
@@ -63,10 +63,10 @@ TEST_CASE("columns are aligned as asked, with room for the marks of those at the
 TEST_CASE("Markdown, CSV and HTML escape what they need to") {
   const Table table{.head = {"", "a|b"}, .rows = {{"x, \"y\"", Cell("<1>", "better")}, {"z"}}};
   CHECK(table_markdown(table) ==
-        "|         | a\\|b    |\n"
-        "|---------|---------|\n"
-        "| x, \"y\"  | **<1>** |\n"
-        "| z       |         |\n");
+        "|        | a\\|b    |\n"
+        "|--------|---------|\n"
+        "| x, \"y\" | **<1>** |\n"
+        "| z      |         |\n");
   CHECK(table_csv(table) == ",a|b\n\"x, \"\"y\"\"\",<1>\nz,\n");
   CHECK(html_escape("a<b>&\"'\x01\xFF") == "a&lt;b&gt;&amp;&quot;&#39;\xEF\xBF\xBD\xEF\xBF\xBD");
 }
