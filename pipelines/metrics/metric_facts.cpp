@@ -4,6 +4,11 @@
 #include <charconv>
 
 namespace hsi4d {
+namespace {
+
+const char* arrow_of(const MetricFacts& facts) { return facts.better < 0 ? " ↓" : facts.better > 0 ? " ↑" : ""; }
+
+}  // namespace
 
 const double* find_metric(const MetricValues& values, std::string_view name) {
   for (const auto& [key, value] : values) {
@@ -59,10 +64,7 @@ std::string shown_metric(const MetricFacts& facts) {
 }
 
 std::string metric_heading(const MetricFacts& facts) {
-  return std::string(facts.label) + (facts.unit.empty() ? "" : ", " + std::string(facts.unit)) +
-         (facts.better < 0   ? " ↓"
-          : facts.better > 0 ? " ↑"
-                             : "");
+  return std::string(facts.label) + (facts.unit.empty() ? "" : ", " + std::string(facts.unit)) + arrow_of(facts);
 }
 
 Cell metric_cell(const MetricFacts& facts, const double* value) {
@@ -71,6 +73,8 @@ Cell metric_cell(const MetricFacts& facts, const double* value) {
 
 std::vector<Cell> metric_row(const MetricFacts& facts, const std::vector<const MetricValues*>& sources) {
   std::vector<Cell> row = {Cell(shown_metric(facts), "", std::string(facts.summary))};
+  row[0].html =
+      html_escape(facts.label) + " <span class=\"unit\">" + html_escape(facts.unit) + arrow_of(facts) + "</span>";
   bool is_measured = false;
   for (const MetricValues* const source : sources) {
     const double* const value = find_metric(*source, facts.name);

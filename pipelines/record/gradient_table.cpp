@@ -146,10 +146,9 @@ std::string gradient_table(const RunSummary& summary) {
   for (const StageSummary& stage : summary.metrics) {
     if (!stage.gradient_shares.empty()) text += table_text(shares_table("stage " + stage.stage, stage.gradient_shares));
   }
-  return text.empty() ? text
-                      : "shares of the gradient, and cosines with the whole in brackets (means over the iterations "
-                        "looked at)\n" +
-                            text;
+  return text.empty()
+             ? text
+             : "shares of the gradient, and cosines with the whole (means over the iterations looked at)\n" + text;
 }
 
 }  // namespace hsi4d

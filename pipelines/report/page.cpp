@@ -133,7 +133,8 @@ std::string figures_section(const RunSummary& summary) {
 /// Names in the head and the first column as they are for people.
 Table with_labels(Table table) {
   for (Cell& cell : table.head) cell.html = row_label(cell.text);
-  for (auto& row : table.rows) row[0].html = row_label(row[0].text);
+  for (auto& row : table.rows)
+    if (row[0].html.empty()) row[0].html = row_label(row[0].text);
   return table;
 }
 
