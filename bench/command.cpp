@@ -13,7 +13,7 @@
 #include "bench/tape.h"
 #include "core/check.h"
 #include "core/file.h"
-#include "core/formatted.h"
+#include "core/table.h"
 
 namespace hsi4d::cli {
 
@@ -45,11 +45,6 @@ std::string json_line(const Measurement& m) {
   if (m.image_error) line["image_error"] = *m.image_error;
   if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
   return bench_line(line.dump());
-}
-
-/// " 34.5" of a hundred, or nothing.
-std::string share_text(const Measurement& m) {
-  return m.peak_share() ? formatted(" %6.1f", 100 * *m.peak_share()) : "";
 }
 
 /// What shares are of; nothing where none was measured.
@@ -144,54 +139,46 @@ std::string written(const BenchText& text, const BenchOptions& options) {
 }
 
 BenchText measure_rasterize(const BenchOptions& options) {
-  std::string json, table;
-  table += formatted("%-44s %10s %10s %7s %10s %12s %8s %-9s %6s\n", "", "median ms", "least ms", "tiles", "pairs",
-                     "fragments", "M/s", "of", "peak %");
+  std::string json;
+  Table table{.head = {"", "median ms", "least ms", "tiles", "pairs", "fragments", "M/s", "of", "peak %", ""},
+              .align = "lrrrrrrlrl"};
   double peak = 0;
   bench_rasterize({options.workloads, options.threads, options.repeats}, [&](const Measurement& m) {
-    table += formatted("%-44s %10.3f %10.3f %7lld %10lld %12lld %8.0f %-9s", m.name.c_str(), m.median_ms, m.min_ms,
-                       static_cast<long long>(m.tiles), static_cast<long long>(m.pairs),
-                       static_cast<long long>(m.fragments), m.millions_per_s(), unit_name(m.unit)) +
-             share_text(m) + "\n";
-    if (m.image_error && m.gradient_error) {
-      table += formatted("%-44s image within %.2g, gradients within %.2g (relative L2) of all rendered\n", "",
-                         *m.image_error, *m.gradient_error);
-    }
+    table.rows.push_back({m.name, Cell(m.median_ms, 3), Cell(m.min_ms, 3), m.tiles, m.pairs, m.fragments,
+                          Cell(m.millions_per_s(), 0), unit_name(m.unit)});
+    table.rows.back().push_back(m.peak_share() ? Cell(100 * *m.peak_share(), 1) : Cell());
+    if (m.image_error && m.gradient_error)
+      table.rows.back().emplace_back(formatted("image within %.2g, gradients within %.2g (relative L2) of all rendered",
+                                               *m.image_error, *m.gradient_error));
     json += json_line(m);
     peak = std::max(peak, m.fma_peak_per_s);
   });
-  table += peak_line(peak);
-  return {std::move(table), std::move(json)};
+  return {table_text(table) + peak_line(peak), std::move(json)};
 }
 
 BenchText measure_skinning(const BenchOptions& options) {
-  std::string json, table;
-  table += formatted("%-40s %10s %10s %9s %8s %10s %7s\n", "", "median ms", "least ms", "points", "columns", "MB read",
-                     "GB/s");
+  std::string json;
+  Table table{.head = {"", "median ms", "least ms", "points", "columns", "MB read", "GB/s"}, .align = "lr"};
   bench_skinning({options.workloads, options.threads, options.repeats}, [&](const SkinningMeasurement& m) {
-    table += formatted("%-40s %10.3f %10.3f %9lld %8lld %10s %7s\n", m.name.c_str(), m.median_ms, m.min_ms,
-                       static_cast<long long>(m.vertices + m.gaussians), static_cast<long long>(m.corrective_columns),
-                       tenths(bytes_read(m) / 1e6).c_str(), tenths(rate(m)).c_str());
+    table.rows.push_back({m.name, Cell(m.median_ms, 3), Cell(m.min_ms, 3), m.vertices + m.gaussians,
+                          m.corrective_columns, tenths(bytes_read(m) / 1e6), tenths(rate(m))});
     json += json_line(m);
   });
-  return {std::move(table), std::move(json)};
+  return {table_text(table), std::move(json)};
 }
 
 BenchText measure_color_net(const BenchOptions& options) {
-  std::string json, table;
-  table += formatted("%-36s %10s %10s %9s %6s %6s %10s %7s\n", "", "median ms", "least ms", "gaussians", "width",
-                     "layers", "M mul-add", "peak %");
+  std::string json;
+  Table table{.head = {"", "median ms", "least ms", "gaussians", "width", "layers", "M mul-add", "peak %"},
+              .align = "lr"};
   double peak = 0;
   bench_color_net({options.workloads, options.threads, options.repeats}, [&](const ColorNetMeasurement& m) {
-    table += formatted("%-36s %10.3f %10.3f %9lld %6lld %6lld %10s %7s\n", m.name.c_str(), m.median_ms, m.min_ms,
-                       static_cast<long long>(m.gaussians), static_cast<long long>(m.hidden_width),
-                       static_cast<long long>(m.hidden_layers), tenths(1e-6 * m.multiply_adds).c_str(),
-                       tenths(100 * m.peak_share()).c_str());
+    table.rows.push_back({m.name, Cell(m.median_ms, 3), Cell(m.min_ms, 3), m.gaussians, m.hidden_width, m.hidden_layers,
+                          tenths(1e-6 * m.multiply_adds), tenths(100 * m.peak_share())});
     json += json_line(m);
     peak = std::max(peak, m.fma_peak_per_s);
   });
-  table += peak_line(peak);
-  return {std::move(table), std::move(json)};
+  return {table_text(table) + peak_line(peak), std::move(json)};
 }
 
 /// What was asked of a measurement, and what came of it; nothing where nothing was.
@@ -202,16 +189,15 @@ std::string goal_text(const TapeMeasurement& m) {
 }
 
 BenchText measure_tape(const BenchOptions& options) {
-  BenchText text;
-  text.table = formatted("%-28s %12s %12s %9s %9s\n", "", "median us", "least us", "ns each", "of");
+  std::string json;
+  Table table{.head = {"", "median us", "least us", "ns each", "of"}, .align = "lrrrrl"};
   for (const TapeMeasurement& m : bench_tape({options.workloads, options.repeats})) {
-    const std::string what = m.nodes > 0 ? formatted("%lld nodes", static_cast<long long>(m.nodes))
-                                         : formatted("%lld rows", static_cast<long long>(m.elements));
-    text.table += formatted("%-28s %12.3f %12.3f %9.2f %12s  %s\n", m.name.c_str(), 1e3 * m.median_ms, 1e3 * m.min_ms,
-                            m.ns_each(), what.c_str(), goal_text(m).c_str());
-    text.json += json_line(m);
+    table.rows.push_back({m.name, Cell(1e3 * m.median_ms, 3), Cell(1e3 * m.min_ms, 3), Cell(m.ns_each(), 2),
+                          m.nodes > 0 ? std::to_string(m.nodes) + " nodes" : std::to_string(m.elements) + " rows",
+                          goal_text(m)});
+    json += json_line(m);
   }
-  return text;
+  return {table_text(table), std::move(json)};
 }
 
 }  // namespace
@@ -244,22 +230,23 @@ std::string bench_kernels_command(const BenchOptions& options) {
 }
 
 std::string bench_pixel_filter_command(const BenchOptions& options) {
-  std::string json, table;
-  table += formatted("%-50s %9s %9s %9s %9s %9s %8s %8s %10s\n", "", "sigma px", "blur px2", "width px", "half px",
-                     "size px", "light %", "rms", "distance %");
+  std::string json;
+  Table table{.head = {"", "sigma px", "blur px2", "width px", "half px", "size px", "light %", "rms", "distance %"},
+              .align = "lr"};
   PixelFilterBench bench;
   bench.figures = options.workloads;
   bench.threads = options.threads;
   if (!options.heights_px.empty()) bench.heights_px = options.heights_px;
   bench_pixel_filter(bench, [&](const FilterMeasurement& m) {
     const SilhouetteError& e = m.error;
-    table += formatted("%-50s %9.2f %9.4f %+9.3f %+9.3f %+9.3f %+8.2f %8.4f %+10.2f\n", m.name.c_str(), m.sigma_px,
-                       m.blur, e.width_px, e.half_width_px, m.distance_error * m.height_px, 100 * e.brightness, e.rms,
-                       100 * m.distance_error);
+    table.rows.push_back({m.name, Cell(m.sigma_px, 2), Cell(m.blur, 4), formatted("%+.3f", e.width_px),
+                          formatted("%+.3f", e.half_width_px), formatted("%+.3f", m.distance_error * m.height_px),
+                          formatted("%+.2f", 100 * e.brightness), Cell(e.rms, 4),
+                          formatted("%+.2f", 100 * m.distance_error)});
     json += json_line(m);
   });
   if (!options.json.empty()) write_text_file(options.json, json);
-  return table;
+  return table_text(table);
 }
 
 }  // namespace hsi4d::cli

@@ -1,13 +1,14 @@
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include <nlohmann/json.hpp>
 
 #include "bench/machine.h"
 #include "bench/pareto.h"
-#include "core/formatted.h"
-#include "core/text.h"
-#include "pipelines/report/plots.h"
+#include "bench/pareto_tracking.h"
+#include "core/table.h"
+#include "pipelines/report/figure.h"
 
 namespace hsi4d {
 
@@ -24,31 +25,19 @@ std::string psnr_text(const ImageError& error) {
   return error.psnr_db() ? formatted("%.1f", *error.psnr_db()) : std::string("-");
 }
 
-std::string row_line(const ParetoRow& row) {
-  std::string line = formatted(
-      "%-40s %6.2f %8.2f %8.2f %8.2f %8.2f %10lld %8lld  %6s %8s %8s %9s ", row.name().c_str(), row.time_ratio,
-      1e3 * row.forward.median_s, 1e3 * row.forward.least_s, 1e3 * row.backward.median_s, 1e3 * row.backward.least_s,
-      static_cast<long long>(row.fragments), static_cast<long long>(row.pairs), psnr_text(row.image).c_str(),
-      error_text(row.image.max).c_str(), error_text(row.image.p999).c_str(), error_text(row.image.bias).c_str());
-  for (const GradientError& error : row.gradients) line += formatted(" %8s", error_text(error.relative_l2).c_str());
-  return line + "\n";
-}
-
-std::string head_line() {
-  std::string line = formatted("%-40s %6s %8s %8s %8s %8s %10s %8s  %6s %8s %8s %9s ", "", "time", "fwd ms", "least",
-                               "bwd ms", "least", "fragments", "pairs", "dB", "max", "p99.9", "bias");
-  for (const char* name : kGradientClasses) line += formatted(" %8s", std::string(name).substr(0, 8).c_str());
-  return line + "\n";
-}
-
-std::string point_line(const ParetoPoint& point, bool is_on_image_front, bool is_on_gradient_front) {
-  return formatted("  %-40s %6.2f %9s %9s %9s %9s  %s\n", point.name().c_str(), point.time_ratio,
-                   error_text(point.image_rms).c_str(), error_text(point.worst_image_rms).c_str(),
-                   error_text(point.gradient).c_str(), error_text(point.worst_gradient).c_str(),
-                   is_on_image_front && is_on_gradient_front ? "image gradient"
-                   : is_on_image_front                       ? "image"
-                   : is_on_gradient_front                    ? "gradient"
-                                                             : "-");
+Table table_of(std::span<const ParetoRow> rows) {
+  Table table{
+      .head = {"", "time", "fwd ms", "least", "bwd ms", "least", "fragments", "pairs", "dB", "max", "p99.9", "bias"},
+      .align = "lr"};
+  table.head.insert(table.head.end(), kGradientClasses.begin(), kGradientClasses.end());
+  for (const ParetoRow& row : rows) {
+    table.rows.push_back({row.name(), Cell(row.time_ratio, 2), Cell(1e3 * row.forward.median_s, 2),
+                          Cell(1e3 * row.forward.least_s, 2), Cell(1e3 * row.backward.median_s, 2),
+                          Cell(1e3 * row.backward.least_s, 2), row.fragments, row.pairs, psnr_text(row.image),
+                          error_text(row.image.max), error_text(row.image.p999), error_text(row.image.bias)});
+    for (const GradientError& error : row.gradients) table.rows.back().emplace_back(error_text(error.relative_l2));
+  }
+  return table;
 }
 
 /// Whether each point is on the front.
@@ -65,78 +54,24 @@ std::string front_lines(const std::vector<ParetoPoint>& points) {
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::stable_sort(order.begin(), order.end(),
                    [&points](std::size_t a, std::size_t b) { return points[a].time_ratio < points[b].time_ratio; });
-  std::string text = formatted("  %-40s %6s %9s %9s %9s %9s  %s\n", "", "time", "image", "worst", "gradient", "worst",
-                               "on the front of");
-  for (const std::size_t i : order)
-    if (image[i] || gradient[i] || points[i].is_preset()) text += point_line(points[i], image[i], gradient[i]);
-  return text;
+  Table table{.head = {"", "time", "image", "worst", "gradient", "worst", "on the front of"}, .align = "lrrrrrl"};
+  for (const std::size_t i : order) {
+    const ParetoPoint& point = points[i];
+    if (!image[i] && !gradient[i] && !point.is_preset()) continue;
+    table.rows.push_back({point.name(), Cell(point.time_ratio, 2), error_text(point.image_rms),
+                          error_text(point.worst_image_rms), error_text(point.gradient),
+                          error_text(point.worst_gradient),
+                          image[i] && gradient[i] ? "image gradient"
+                          : image[i]              ? "image"
+                          : gradient[i]           ? "gradient"
+                                                  : "-"});
+  }
+  return table_text(table);
 }
 
 constexpr const char* kChosenScene = "avatar_in_scene";
 
 // --- numbers ---------------------------------------------------------------------------------------------------------
-
-/// A number in CSV; nothing where it is none.
-std::string csv_number(double value) { return std::isfinite(value) ? formatted("%.9g", value) : ""; }
-
-/// A text in CSV.
-std::string csv_text(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
-/// The columns of a render; then those of a reconstruction.
-std::vector<std::string> csv_columns() {
-  std::vector<std::string> names = {
-      "scene",          "knob",        "value",           "model",         "gaussians",      "pixels",     "fragments",
-      "pairs",          "repeats",     "threads",         "isa",           "median_ms",      "min_ms",     "forward_ms",
-      "forward_min_ms", "backward_ms", "backward_min_ms", "forward_ratio", "backward_ratio", "time_ratio", "psnr_db",
-      "image_rms",      "image_max",   "image_p999",      "image_bias"};
-  for (const char* name : kGradientClasses)
-    for (const char* part : {"relative_l2", "one_minus_cosine", "bias"})
-      names.push_back(std::string(name) + "_" + part);
-  return names;
-}
-
-std::vector<std::string> tracked_csv_columns() {
-  std::vector<std::string> names = {"tracking", "iterations", "seeds", "cost_ratio"};
-  for (const TrackedError& error : kTrackedErrors) {
-    names.push_back(std::string(error.metric) + "_mean");
-    names.push_back(std::string(error.metric) + "_deviation");
-  }
-  return names;
-}
-
-std::string csv_line(const ParetoRow& row) {
-  std::string line = csv_text(row.scene) + "," + row.knob + ",\"" + row.value + "\"," + model_name(row.model);
-  for (const Index count : {row.gaussians, row.pixels, row.fragments, row.pairs, static_cast<Index>(row.repeats)})
-    line += "," + std::to_string(count);
-  line += "," + std::to_string(row.threads) + "," + isa_name(row.isa);
-  for (const double value :
-       {1e3 * row.both.median_s, 1e3 * row.both.least_s, 1e3 * row.forward.median_s, 1e3 * row.forward.least_s,
-        1e3 * row.backward.median_s, 1e3 * row.backward.least_s, row.forward_ratio, row.backward_ratio, row.time_ratio})
-    line += "," + csv_number(value);
-  line += "," + (row.image.psnr_db() ? csv_number(*row.image.psnr_db()) : "");
-  for (const double value : {row.image.rms, row.image.max, row.image.p999, row.image.bias})
-    line += "," + csv_number(value);
-  for (const GradientError& error : row.gradients)
-    for (const double value : {error.relative_l2, error.one_minus_cosine, error.bias}) line += "," + csv_number(value);
-  return line + std::string(tracked_csv_columns().size(), ',') + "\n";
-}
-
-std::string csv_line(const TrackedPoint& point) {
-  const std::size_t of_a_render = csv_columns().size();
-  std::string line = "," + point.knob + ",\"" + point.value + "\"" + std::string(of_a_render - 3, ',') + "," +
-                     point.budget() + "," + std::to_string(point.iterations) + "," + std::to_string(point.seeds) + "," +
-                     csv_number(point.cost_ratio);
-  for (const TrackedError& error : kTrackedErrors) {
-    const TrackedPoint::Spread& spread = point.*error.place;
-    line += "," + csv_number(spread.mean) + "," + csv_number(spread.deviation);
-  }
-  return line + "\n";
-}
 
 nlohmann::ordered_json json_of(const ParetoRow& row) {
   nlohmann::ordered_json line = {{"name", "pareto/" + row.scene + "/" + row.name()},
@@ -178,11 +113,34 @@ nlohmann::ordered_json json_of(const ParetoRow& row) {
   return line;
 }
 
-// --- picture ---------------------------------------------------------------------------------------------------------
+/// The columns of CSV, as places in the JSON object of a line: of a render, of a reconstruction.
+std::vector<std::string> csv_places() {
+  std::vector<std::string> places;
+  const auto add = [&places](const char* keys) {
+    std::istringstream words(keys);
+    for (std::string key; words >> key;) places.push_back("/" + key);
+  };
+  add("scene knob value model gaussians pixels fragments pairs repeats threads isa median_ms min_ms forward_ms "
+      "forward_min_ms backward_ms backward_min_ms forward_ratio backward_ratio time_ratio psnr_db image_rms image_max "
+      "image_p999 image_bias");
+  for (const std::string name : kGradientClasses)
+    for (const char* const error : {"/relative_l2", "/one_minus_cosine", "/bias"})
+      places.push_back("/gradients/" + name + error);
+  add("tracking iterations seeds cost_ratio");
+  for (const TrackedError& error : kTrackedErrors)
+    for (const char* const part : {"/mean", "/deviation"}) places.push_back("/" + std::string(error.metric) + part);
+  return places;
+}
 
-constexpr double kPanelWidth = 460, kPanelHeight = 254;  // as plots are: 210 high for 380, enlarged
-constexpr double kTitle = 66, kHead = 24, kGap = 26;     // of the picture; above and beside each panel
-constexpr double kSection = 40;                          // above the panels of reconstructions
+/// "/gradients/means/bias" is "means_bias".
+std::string csv_name(const std::string& place) {
+  constexpr std::string_view kGroup = "/gradients";
+  std::string name = place.substr(place.starts_with(kGroup) ? kGroup.size() + 1 : 1);
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name;
+}
+
+// --- picture ---------------------------------------------------------------------------------------------------------
 
 /// An error over rows of one setting, a row of panels each.
 struct PlottedError {
@@ -215,26 +173,6 @@ std::vector<ParetoPoint> points_of(std::vector<ParetoRow> rows, const std::strin
   return pareto_points(rows, scene);
 }
 
-/// Ticks of a logarithmic axis of ratios that has 1: those between the least and the most of them.
-std::vector<double> ratio_ticks(const std::vector<double>& ratios) {
-  const double least = std::min(1.0, *std::min_element(ratios.begin(), ratios.end())),
-               most = std::max(1.0, *std::max_element(ratios.begin(), ratios.end()));
-  std::vector<double> ticks = {0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 20, 50};
-  if (most < 5 * least) ticks = {0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2, 2.5, 3, 3.5, 4, 5};
-  std::erase_if(ticks, [least, most](double tick) { return tick < 0.97 * least || tick > 1.03 * most; });
-  return ticks;
-}
-
-Plot plot_of(const std::vector<ParetoPoint>& points, const std::string& title) {
-  Plot plot{.title = title, .x_label = "time, ratio to the default's", .unit = "", .lines = {}};
-  plot.is_log = plot.is_log_x = true;
-  plot.decimals = 6;
-  std::vector<double> ratios = {1};
-  for (const ParetoPoint& point : points) ratios.push_back(point.time_ratio);
-  plot.ticks_x = ratio_ticks(ratios);
-  return plot;
-}
-
 /// Presets are dark and products pale; the other knobs have the colours that there are.
 std::string knob_color(const std::string& knob) {
   if (knob == "quality") return "#111";
@@ -247,47 +185,45 @@ std::string knob_color(const std::string& knob) {
   return part_color(place);
 }
 
+/// A dot of its knob's colour, named where it is a preset.
+/// @param point  ParetoPoint or TrackedPoint
+template <class Point>
+Series dot_of(const Point& point, double time, double error, bool is_named_below) {
+  using Name = Series::Name;
+  return {.label = point.is_preset() ? point.value : point.name(),
+          .color = knob_color(point.knob),
+          .points = {{time, error}},
+          .line = 0,
+          .dots = 3,
+          .name = !point.is_preset() ? Name::kNone
+                  : is_named_below   ? Name::kBelow
+                                     : Name::kAbove};
+}
+
+/// The points, presets on top of the others.
+template <class Point>
+std::vector<Point> presets_last(std::vector<Point> points) {
+  std::stable_partition(points.begin(), points.end(), [](const Point& point) { return !point.is_preset(); });
+  return points;
+}
+
 /// Dots by knob, presets named, the front as a line. Points without error have no place on a logarithmic axis.
-void add_points(const std::vector<ParetoPoint>& points, Plot& plot) {
-  PlotLine front{.label = "front", .color = "#999", .points = {}};
-  for (const std::size_t i : pareto_front(points, &ParetoPoint::image_rms))
-    front.points.emplace_back(points[i].time_ratio, points[i].image_rms);
-  plot.lines.push_back(std::move(front));
-  const auto add = [&plot](const ParetoPoint& point) {
-    plot.lines.push_back({.label = point.is_preset() ? point.value : point.name(),
-                          .color = knob_color(point.knob),
-                          .points = {{point.time_ratio, point.image_rms}},
-                          .has_dots = true,
-                          .opacity = 0,
-                          .is_named = point.is_preset(),
-                          .name_is_below = point.value == "default"});
-  };
-  for (const ParetoPoint& point : points)
-    if (!point.is_preset()) add(point);
-  for (const ParetoPoint& point : points)  // on top of the others
-    if (point.is_preset()) add(point);
-}
-
-/// Where a plot stands whose panel begins at (x, y).
-std::string place_in_picture(double x, double y) {
-  return formatted(" x=\"%.0f\" y=\"%.0f\" width=\"%.0f\" height=\"%.0f\"", x, y + kHead, kPanelWidth, kPanelHeight);
-}
-
-std::string panel_title(double x, double y, const std::string& title) {
-  return formatted("<text x=\"%.0f\" y=\"%.0f\" font-weight=\"bold\">", x + 8, y + 12) + html_escape(title) +
-         "</text>\n";
-}
-
-std::string panel(const std::vector<ParetoRow>& rows, const std::string& scene, const PlottedError& error, double x,
-                  double y) {
-  const std::string title = std::string(error.name) + (scene.empty() ? ", median of all scenes" : ", " + scene);
+Plot panel(const std::vector<ParetoRow>& rows, const std::string& scene, const PlottedError& error) {
   const std::vector<ParetoPoint> points = points_of(rows, scene, error);
-  Plot plot = plot_of(points, title);
-  plot.attributes = place_in_picture(x, y);
-  add_points(points, plot);
-  const bool has_place =
-      std::any_of(points.begin(), points.end(), [](const ParetoPoint& p) { return p.image_rms > 0; });
-  return panel_title(x, y, title + (has_place ? "" : ": 0")) + (has_place ? plot_svg(plot) : "") + "\n";
+  Plot plot{.title = std::string(error.name) + (scene.empty() ? ", median of all scenes" : ", " + scene),
+            .x_label = "time, ratio to the default's",
+            .unit = "",
+            .series = {{.label = "front", .color = "#999", .points = {}}},
+            .is_log = true,
+            .is_log_x = true,
+            .decimals = 6,
+            .width = kPanelWidth,
+            .height = kPanelHeight};
+  for (const std::size_t i : pareto_front(points, &ParetoPoint::image_rms))
+    plot.series[0].points.emplace_back(points[i].time_ratio, points[i].image_rms);
+  for (const ParetoPoint& point : presets_last(points))
+    plot.series.push_back(dot_of(point, point.time_ratio, point.image_rms, point.value == "default"));
+  return plot;
 }
 
 // Panels of reconstructions.
@@ -314,66 +250,33 @@ bool is_named_below(const TrackedPoint& point, const std::vector<TrackedPoint>& 
   });
 }
 
-/// A dot at the mean, on a bar of a standard deviation to either side.
-void add_tracked(const TrackedPoint& point, const PlottedTracking& plotted, bool is_below, Plot& plot) {
-  const TrackedPoint::Spread& spread = point.*plotted.place;
-  const std::string name = point.is_preset() ? point.value : point.name();
-  plot.lines.push_back(
-      {.label = name + formatted(": %.*f +- %.*f ", plotted.decimals, spread.mean, plotted.decimals, spread.deviation) +
-                plotted.unit,
-       .color = knob_color(point.knob),
-       .points = {{point.cost_ratio, std::max(0.0, spread.mean - spread.deviation)},
-                  {point.cost_ratio, spread.mean + spread.deviation}},
-       .opacity = 0.45});
-  plot.lines.push_back({.label = name,
-                        .color = knob_color(point.knob),
-                        .points = {{point.cost_ratio, spread.mean}},
-                        .has_dots = true,
-                        .opacity = 0,
-                        .is_named = point.is_preset(),
-                        .name_is_below = is_below});
-}
-
-std::string tracked_panel(const std::vector<TrackedPoint>& tracked, bool is_fixed_time, const PlottedTracking& plotted,
-                          double x, double y) {
-  const std::string title = std::string(plotted.name) + ", " + plotted.unit +
-                            (is_fixed_time ? ", after as long as the default" : ", after as many steps");
-  Plot plot{.title = title,
+/// Dots at the means, on bars of a standard deviation to either side.
+Plot tracked_panel(const std::vector<TrackedPoint>& tracked, bool is_fixed_time, const PlottedTracking& plotted) {
+  Plot plot{.title = std::string(plotted.name) + ", " + plotted.unit +
+                     (is_fixed_time ? ", after as long as the default" : ", after as many steps"),
             .x_label = "time of a step, ratio to the default's",
             .unit = plotted.unit,
-            .lines = {},
+            .series = {},
             .is_log_x = true,
             .begins_at_zero = true,
             .decimals = plotted.decimals,
-            .attributes = place_in_picture(x, y)};
-  std::vector<double> ratios = {1};
-  for (const TrackedPoint& point : tracked) {
-    ratios.push_back(point.cost_ratio);
-    const TrackedPoint::Spread& spread = point.*plotted.place;
-    plot.also_y.push_back(spread.mean + spread.deviation);  // of both budgets, which stand side by side
+            .width = kPanelWidth,
+            .height = kPanelHeight};
+  for (const TrackedPoint& point : presets_last(tracked)) {
+    const auto [mean, deviation] = point.*plotted.place;
+    plot.also.push_back(mean + deviation);  // of both budgets, which stand side by side
+    if (point.is_fixed_time != is_fixed_time) continue;
+    const Series dot = dot_of(point, point.cost_ratio, mean, is_named_below(point, tracked, plotted.place));
+    plot.series.push_back(
+        {.label = dot.label + formatted(": %.*f +- %.*f ", plotted.decimals, mean, plotted.decimals, deviation) +
+                  plotted.unit,
+         .color = dot.color,
+         .points = {{point.cost_ratio, std::max(0.0, mean - deviation)}, {point.cost_ratio, mean + deviation}},
+         .opacity = 0.45});
+    plot.series.push_back(dot);
   }
-  plot.ticks_x = ratio_ticks(ratios);
-  for (const bool is_preset : {false, true})  // presets on top of the others
-    for (const TrackedPoint& point : tracked)
-      if (point.is_fixed_time == is_fixed_time && point.is_preset() == is_preset)
-        add_tracked(point, plotted, is_named_below(point, tracked, plotted.place), plot);
-  return panel_title(x, y, title) + plot_svg(plot) + "\n";
+  return plot;
 }
-
-std::string legend(double y) {
-  std::string text;
-  double x = kGap + 8;
-  for (const std::string& knob : pareto_knobs()) {
-    text += formatted("<circle cx=\"%.0f\" cy=\"%.0f\" r=\"4\" fill=\"%s\"/>", x + 5, y - 4, knob_color(knob).c_str()) +
-            formatted("<text x=\"%.0f\" y=\"%.0f\">", x + 13, y) + html_escape(knob) + "</text>\n";
-    x += 24 + 6.2 * static_cast<double>(knob.size());
-  }
-  return text;
-}
-
-constexpr const char* kStyle =
-    "<style>.plot text{font-size:11px;fill:#555}.plot .name{font-size:9px;fill:#222}.plot .grid{stroke:#e4e4e4}"
-    ".plot .axis{stroke:#888}.plot polyline{fill:none;stroke-width:1.6}</style>\n";
 
 /// The scenes that have a column: all, where there are several, and the one that defaults are chosen by, or the only
 /// one.
@@ -387,47 +290,21 @@ std::vector<std::string> columns_of(const std::vector<ParetoRow>& rows) {
   return has_chosen ? std::vector<std::string>{"", kChosenScene} : std::vector<std::string>{""};
 }
 
-double left_of(std::size_t column) { return kGap + (kPanelWidth + kGap) * static_cast<double>(column); }
-double top_of(std::size_t row) { return kTitle + (kHead + kPanelHeight + kGap) * static_cast<double>(row); }
-
-/// The panels of reconstructions, from `top` on.
-std::string tracked_panels(const std::vector<TrackedPoint>& tracked, double top) {
-  std::string text =
-      formatted("<text x=\"%.0f\" y=\"%.0f\" font-size=\"16\">", kGap + 8, top + 14) +
-      formatted("what it comes to: errors of a reconstruction, mean and standard deviation of %lld seeds",
-                static_cast<long long>(tracked.front().seeds)) +
-      "</text>\n";
-  for (std::size_t r = 0; r < kPlottedTracking.size(); ++r)
-    for (const bool is_fixed_time : {false, true})
-      text += tracked_panel(tracked, is_fixed_time, kPlottedTracking[r], left_of(is_fixed_time ? 1 : 0),
-                            top + kSection + top_of(r) - top_of(0));
-  return text;
-}
-
-/// Panels in two columns, with a title and what colours mean.
-std::string picture(const std::string& panels, double height) {
-  const double width = left_of(2);
-  return formatted("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" ", width, height) +
-         formatted("width=\"%.0f\" height=\"%.0f\" font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n", width,
-                   height) +
-         kStyle + formatted("<rect width=\"%.0f\" height=\"%.0f\" fill=\"#fff\"/>\n", width, height) +
-         formatted("<text x=\"%.0f\" y=\"26\" font-size=\"16\">", kGap + 8) +
-         "time against error, forward and backward; line: the front</text>\n" + legend(48) + panels + "</svg>\n";
+/// What panels of renders stand under.
+PictureSection renders_section() {
+  PictureSection section{.title = "time against error, forward and backward; line: the front"};
+  for (const std::string& knob : pareto_knobs()) section.legend.emplace_back(knob, knob_color(knob));
+  return section;
 }
 
 }  // namespace
 
 std::string pareto_table(const std::vector<ParetoRow>& rows) {
-  std::string text, scene;
-  for (const ParetoRow& row : rows) {
-    if (row.scene != scene) {
-      text += (text.empty() ? "" : "\n") + row.scene +
-              formatted(": %lld Gaussians, %lld pixels\n", static_cast<long long>(row.gaussians),
-                        static_cast<long long>(row.pixels)) +
-              head_line();
-    }
-    scene = row.scene;
-    text += row_line(row);
+  std::string text;
+  for (auto first = rows.begin(), end = first; first != rows.end(); first = end) {
+    end = std::find_if(first, rows.end(), [&first](const ParetoRow& row) { return row.scene != first->scene; });
+    text += (text.empty() ? "" : "\n") + first->scene + ": " + std::to_string(first->gaussians) + " Gaussians, " +
+            std::to_string(first->pixels) + " pixels\n" + table_text(table_of({first, end}));
   }
   return text;
 }
@@ -443,13 +320,19 @@ std::string pareto_front_table(const std::vector<ParetoRow>& rows) {
 }
 
 std::string pareto_csv(const std::vector<ParetoRow>& rows, const std::vector<TrackedPoint>& tracked) {
-  std::string text;
-  for (const std::string& name : csv_columns()) text += (text.empty() ? "" : ",") + name;
-  for (const std::string& name : tracked_csv_columns()) text += "," + name;
-  text += "\n";
-  for (const ParetoRow& row : rows) text += csv_line(row);
-  for (const TrackedPoint& point : tracked) text += csv_line(point);
-  return text;
+  Table table;
+  const std::vector<std::string> places = csv_places();
+  for (const std::string& place : places) table.head.emplace_back(csv_name(place));
+  std::istringstream lines(pareto_json(rows) + tracking_json(tracked));
+  for (std::string line; std::getline(lines, line);) {
+    const nlohmann::json object = nlohmann::json::parse(line);
+    table.rows.emplace_back();
+    for (const std::string& place : places) {
+      const nlohmann::json value = object.value(nlohmann::json::json_pointer(place), nlohmann::json(""));
+      table.rows.back().emplace_back(value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+  return table_csv(table);
 }
 
 std::string pareto_json(const std::vector<ParetoRow>& rows) {
@@ -460,23 +343,25 @@ std::string pareto_json(const std::vector<ParetoRow>& rows) {
 
 std::string pareto_svg(const std::vector<ParetoRow>& rows, const std::vector<TrackedPoint>& tracked) {
   const std::vector<std::string> columns = columns_of(rows);
-  std::string body;
-  for (std::size_t r = 0; r < kPlotted.size(); ++r)
-    for (std::size_t c = 0; c < columns.size(); ++c)
-      body += panel(rows, columns[c], kPlotted[r], left_of(c), top_of(r));
-  double height = top_of(kPlotted.size());
+  std::vector<PictureSection> sections = {renders_section()};
+  sections[0].columns = columns.size();
+  for (const PlottedError& error : kPlotted)
+    for (const std::string& scene : columns) sections[0].plots.push_back(panel(rows, scene, error));
   if (!tracked.empty()) {
-    body += tracked_panels(tracked, height);
-    height += kSection + top_of(kPlottedTracking.size()) - top_of(0);
+    sections.push_back({.title = "what it comes to: errors of a reconstruction, mean and standard deviation of " +
+                                 std::to_string(tracked.front().seeds) + " seeds"});
+    for (const PlottedTracking& plotted : kPlottedTracking)
+      for (const bool is_fixed_time : {false, true})
+        sections[1].plots.push_back(tracked_panel(tracked, is_fixed_time, plotted));
   }
-  return picture(body, height);
+  return picture_svg(sections);
 }
 
 std::string pareto_front_svg(const std::vector<ParetoRow>& rows) {
   const std::string scene = columns_of(rows).empty() ? "" : columns_of(rows).back();
-  return picture(panel(rows, scene, kPlotted[kImageError], left_of(0), top_of(0)) +
-                     panel(rows, scene, kPlotted[kGradientError], left_of(1), top_of(0)),
-                 top_of(1));
+  PictureSection section = renders_section();
+  section.plots = {panel(rows, scene, kPlotted[kImageError]), panel(rows, scene, kPlotted[kGradientError])};
+  return picture_svg({section});
 }
 
 }  // namespace hsi4d

@@ -8,7 +8,7 @@
 
 #include "bench/scaling.h"
 #include "core/check.h"
-#include "core/formatted.h"
+#include "core/table.h"
 #include "core/text.h"
 #include "pipelines/run/run.h"
 #include "pipelines/synthetic/dataset.h"
@@ -178,18 +178,17 @@ std::vector<TrackedPoint> measure_tracking(const Tracking& tracking, const std::
 std::string tracking_table(const std::vector<TrackedPoint>& points) {
   std::string text;
   for (const bool is_fixed_time : {false, true}) {
-    text += (text.empty() ? "" : "\n") +
-            std::string(is_fixed_time ? "reconstruction, as long as the default's" : "reconstruction, as many steps") +
-            "\n" +
-            formatted("  %-40s %6s %6s %15s %15s %15s %15s %17s\n", "", "time", "steps", "joints mm", "world mm",
-                      "object cm", "camera cm", "camera deg");
+    Table table{.head = {"", "time", "steps", "joints mm", "world mm", "object cm", "camera cm", "camera deg"},
+                .align = "lr"};
     for (const TrackedPoint& p : points) {
       if (p.is_fixed_time != is_fixed_time) continue;
-      text += formatted("  %-40s %6.2f %6lld %15s %15s %15s %15s %17s\n", p.name().c_str(), p.cost_ratio,
-                        static_cast<long long>(p.iterations), spread_text(p.joints_mm, 2).c_str(),
-                        spread_text(p.world_mm, 2).c_str(), spread_text(p.object_cm, 2).c_str(),
-                        spread_text(p.camera_cm, 3).c_str(), spread_text(p.camera_deg, 4).c_str());
+      table.rows.push_back({p.name(), Cell(p.cost_ratio, 2), p.iterations, spread_text(p.joints_mm, 2),
+                            spread_text(p.world_mm, 2), spread_text(p.object_cm, 2), spread_text(p.camera_cm, 3),
+                            spread_text(p.camera_deg, 4)});
     }
+    text += (text.empty() ? "" : "\n") +
+            std::string(is_fixed_time ? "reconstruction, as long as the default's" : "reconstruction, as many steps") +
+            "\n" + table_text(table);
   }
   return text;
 }

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/machine.h"
-#include "core/formatted.h"
+#include "core/table.h"
 
 namespace hsi4d {
 
@@ -65,16 +65,6 @@ std::vector<std::pair<const char*, double>> counters_of(const StageCost& cost) {
   return counters;
 }
 
-std::string counter_lines(const StagePair& pair) {
-  const auto with = counters_of(pair.with), without = counters_of(pair.without);
-  std::string text;
-  for (std::size_t i = 0; i < with.size(); ++i) {
-    if (without[i].second > 0)
-      text += formatted("  %-18s %14.0f %14.0f\n", with[i].first, with[i].second, without[i].second);
-  }
-  return text;
-}
-
 }  // namespace
 
 RunConfig without_skips(RunConfig config, int iterations) {
@@ -87,15 +77,22 @@ RunConfig without_skips(RunConfig config, int iterations) {
 }
 
 std::string comparison_table(const RunCost& with, const RunCost& without) {
-  std::string text = formatted("%-20s %14s %14s %8s\n", "an iteration", "with skips", "without", "ratio");
+  const auto with_unit = [](double value, int decimals, const char* unit) {
+    return fixed_number(value, decimals) + unit;
+  };
+  Table table{.head = {"an iteration", "with skips", "without", "ratio"}, .align = "lr"};
   for (const StagePair& pair : pairs_of(with, without)) {
-    text += formatted("%-20s %11.2f ms %11.2f ms %8.2f\n", pair.with.stage.c_str(), pair.with.ms_each(),
-                      pair.ms_without(), pair.ratio()) +
-            counter_lines(pair);
+    table.rows.push_back({pair.with.stage, with_unit(pair.with.ms_each(), 2, " ms"),
+                          with_unit(pair.ms_without(), 2, " ms"), Cell(pair.ratio(), 2)});
+    const auto less = counters_of(pair.with), more = counters_of(pair.without);
+    for (std::size_t i = 0; i < more.size(); ++i)
+      if (more[i].second > 0)
+        table.rows.push_back({std::string("  ") + more[i].first, Cell(less[i].second, 0), Cell(more[i].second, 0)});
   }
   const double seconds = seconds_without(with, without);
-  return text +
-         formatted("%-20s %12.1f s %12.1f s %8.2f\n", "whole run", with.seconds, seconds, seconds / with.seconds);
+  table.rows.push_back(
+      {"whole run", with_unit(with.seconds, 1, " s"), with_unit(seconds, 1, " s"), {seconds / with.seconds, 2}});
+  return table_text(table);
 }
 
 std::string comparison_json(const RunCost& with, const RunCost& without) {

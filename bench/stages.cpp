@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/machine.h"
-#include "core/formatted.h"
 #include "core/simd.h"
-#include "pipelines/report/plots.h"
+#include "core/table.h"
+#include "pipelines/report/figure.h"
 
 namespace hsi4d {
 
@@ -76,28 +76,26 @@ double allocations_each(const StageCost& cost) {
   return static_cast<double>(cost.sum.allocations) / static_cast<double>(cost.sum.counted);
 }
 
-std::string stage_line(const StageCost& cost) {
+void add_stage(const StageCost& cost, Table& table) {
   const RenderCounters& c = cost.sum.counters;
-  const double all = static_cast<double>(cost.sum.tiles_of_image);
-  std::string text =
-      formatted("%-16s %9lld %8.2f %8.2f %8.1f", cost.stage.c_str(), static_cast<long long>(cost.sum.iterations),
-                cost.ms_each(), cost.median_ms(), cost.sum.seconds);
-  text += all > 0 ? formatted(" %6.0f of %-6.0f %9.0f %11.0f", per_iteration(c.tiles, cost), all,
-                              per_iteration(c.pairs, cost), per_iteration(c.fragments, cost))
-                  : formatted(" %16s %9s %11s", "-", "-", "-");
-  text += cost.sum.counted > 0 ? formatted(" %8.2f", allocations_each(cost)) : formatted(" %8s", "-");
-  return text + formatted(" %7.1f\n", 1e-6 * static_cast<double>(cost.sum.tape_bytes));
+  const auto all = static_cast<double>(cost.sum.tiles_of_image);
+  const auto number = [&](Index count) { return all > 0 ? Cell(per_iteration(count, cost), 0) : kNoCell; };
+  const Cell tiles = all > 0 ? Cell(number(c.tiles).text + " of " + fixed_number(all, 0)) : kNoCell;
+  table.rows.push_back({cost.stage, cost.sum.iterations, Cell(cost.ms_each(), 2), Cell(cost.median_ms(), 2),
+                        Cell(cost.sum.seconds, 1), tiles, number(c.pairs), number(c.fragments),
+                        cost.sum.counted > 0 ? Cell(allocations_each(cost), 2) : kNoCell,
+                        Cell(1e-6 * static_cast<double>(cost.sum.tape_bytes), 1)});
 }
 
 std::string part_lines(const StageCost& cost) {
-  std::string text;
   const double whole = per_iteration(cost.sum.times.forward + cost.sum.times.backward + cost.sum.times.step, cost);
+  Table table{.head = {cost.stage + ", ms an iteration", "forward", "back"}, .align = "lr"};
   for (const CostPart& part : parts_of(cost)) {
-    if (!(part.ms() > 0)) continue;
-    text += formatted("  %-26s %8.3f %8.3f %6.1f %%\n", part.name.c_str(), part.forward_ms, part.backward_ms,
-                      100 * part.ms() / whole);
+    if (part.ms() > 0)
+      table.rows.push_back({"  " + part.name, Cell(part.forward_ms, 3), Cell(part.backward_ms, 3),
+                            fixed_number(100 * part.ms() / whole, 1) + " %"});
   }
-  return text;
+  return table_text(table);
 }
 
 /// Steps of the operator `composite`, by name; ms an iteration.
@@ -182,13 +180,12 @@ double optimisation_seconds(const RunCost& cost) {
 }
 
 std::string cost_table(const RunCost& cost) {
-  std::string text = formatted("%-16s %9s %8s %8s %8s %16s %9s %11s %8s %7s\n", "stage", "iterat.", "ms each", "median",
-                               "all, s", "tiles", "pairs", "fragments", "allocat.", "tape MB");
-  for (const StageCost& stage : cost.stages) text += stage_line(stage);
-  for (const StageCost& stage : cost.stages) {
-    text += formatted("\n%-28s %8s %8s\n", (stage.stage + ", ms an iteration").c_str(), "forward", "back") +
-            part_lines(stage) + composite_line(stage);
-  }
+  Table table{
+      .head = {"stage", "iterat.", "ms each", "median", "all, s", "tiles", "pairs", "fragments", "allocat.", "tape MB"},
+      .align = "lr"};
+  for (const StageCost& stage : cost.stages) add_stage(stage, table);
+  std::string text = table_text(table);
+  for (const StageCost& stage : cost.stages) text += "\n" + part_lines(stage) + composite_line(stage);
   return text + formatted("\noptimisation %.1f s of %.1f s on %d threads (%s), at most %.0f MB\n",
                           optimisation_seconds(cost), cost.seconds, cost.threads, isa_name(best_isa()),
                           1e-6 * static_cast<double>(cost.peak_memory_bytes));
@@ -248,8 +245,6 @@ std::string cost_json(const RunCost& cost) {
 
 namespace {
 
-constexpr double kLeft = 130, kWidth = 740, kBar = 26, kRow = 20;  // of the picture, its units
-
 /// The operators that get a colour, the costliest of all stages first.
 std::vector<std::string> costliest_parts(const RunCost& cost) {
   constexpr std::size_t kColors = 8;
@@ -272,46 +267,25 @@ std::string color_of(const std::string& name, const std::vector<std::string>& co
   return place == costliest.end() ? "#b5b5b5" : part_color(static_cast<std::size_t>(place - costliest.begin()));
 }
 
-/// The bar of a stage and the legend below it.
-/// @param y  its top; afterwards that of the next
-std::string stage_bar(const StageCost& stage, double scale, const std::vector<std::string>& costliest, double& y) {
-  const double whole = stage.ms_each();
-  std::vector<CostPart> parts = parts_of(stage);
-  std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
-  std::string body = formatted("<text x=\"12\" y=\"%.0f\">%s</text>\n", y + 17, html_escape(stage.stage).c_str());
-  double x = kLeft, at = kLeft, row = y + kBar + 14;
-  for (const CostPart& part : parts) {
-    const std::string color = color_of(part.name, costliest), name = html_escape(part.name);
-    body += formatted("<rect x=\"%.1f\" y=\"%.0f\" width=\"%.1f\" height=\"%.0f\" fill=\"%s\">", x, y,
-                      part.ms() * scale, kBar, color.c_str()) +
-            formatted("<title>%s: %.2f ms</title></rect>\n", name.c_str(), part.ms());
-    x += part.ms() * scale;
-    if (part.ms() < 0.02 * whole) continue;
-    const double length = 30 + 6.8 * static_cast<double>(part.name.size() + 5);
-    if (at + length > kLeft + kWidth) at = kLeft, row += kRow;
-    body +=
-        formatted("<rect x=\"%.1f\" y=\"%.0f\" width=\"10\" height=\"10\" fill=\"%s\"/>", at, row - 9, color.c_str()) +
-        formatted("<text x=\"%.1f\" y=\"%.0f\">%s %.2f</text>\n", at + 14, row, name.c_str(), part.ms());
-    at += length;
-  }
-  body += formatted("<text x=\"%.1f\" y=\"%.0f\">%.2f ms</text>\n", x + 6, y + 17, whole);
-  y = row + 30;
-  return body;
-}
-
 }  // namespace
 
 std::string cost_svg(const RunCost& cost, const std::string& title) {
   double longest = 0;
   for (const StageCost& stage : cost.stages) longest = std::max(longest, stage.ms_each());
   const std::vector<std::string> costliest = costliest_parts(cost);
-  std::string body = formatted("<text x=\"12\" y=\"26\" font-size=\"16\">%s</text>\n", html_escape(title).c_str());
-  double y = 44;
-  for (const StageCost& stage : cost.stages) body += stage_bar(stage, longest > 0 ? kWidth / longest : 0, costliest, y);
-  return formatted("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 980 %.0f\" font-family=\"sans-serif\" ",
-                   y) +
-         formatted("font-size=\"12\" fill=\"#222\">\n<rect width=\"980\" height=\"%.0f\" fill=\"#fff\"/>\n", y) + body +
-         "</svg>\n";
+  PictureSection section{.title = title, .columns = 1};
+  for (const StageCost& stage : cost.stages) {
+    std::vector<CostPart> parts = parts_of(stage);
+    std::stable_sort(parts.begin(), parts.end(), [](const CostPart& a, const CostPart& b) { return a.ms() > b.ms(); });
+    std::vector<BarPart> bar;
+    for (const CostPart& part : parts)
+      bar.push_back({part.name, std::max(0.0, part.ms()), color_of(part.name, costliest)});
+    Plot plot = bar_plot(stage.stage + ": " + fixed_number(stage.ms_each(), 2) + " ms an iteration", "ms", bar, 0.02);
+    plot.also = {longest};
+    plot.width = 930;
+    section.plots.push_back(std::move(plot));
+  }
+  return picture_svg({section});
 }
 
 }  // namespace hsi4d

@@ -9,8 +9,8 @@
 
 #include "core/check.h"
 #include "core/file.h"
-#include "core/formatted.h"
 #include "core/log.h"
+#include "core/table.h"
 #include "core/text.h"
 #include "pipelines/cli/failure.h"
 #include "stress/functions.h"
@@ -119,18 +119,16 @@ struct RowCounts {
 
 /// A line for each class that has rows, by the first letter of their ids.
 std::string class_table(const std::vector<StressResult>& results) {
-  std::string text =
-      formatted("\n%-40s %6s %6s %6s %6s %8s\n", "class", "tried", "held", "failed", "exempt", "seconds");
+  Table table{.head = {"class", "tried", "held", "failed", "exempt", "seconds"}, .align = "lr"};
   for (const RowClass& one : kClasses) {
     RowCounts counts;
     for (const StressResult& result : results)
       if (result.row->id[0] == one.letter) counts.add(result);
     if (counts.tried + counts.exempt == 0) continue;
-    text += formatted("%c  %-37s %6lld %6lld %6lld %6lld %8.1f\n", one.letter, one.name,
-                      static_cast<long long>(counts.tried), static_cast<long long>(counts.tried - counts.failed),
-                      static_cast<long long>(counts.failed), static_cast<long long>(counts.exempt), counts.seconds);
+    table.rows.push_back({std::string(1, one.letter) + "  " + one.name, counts.tried, counts.tried - counts.failed,
+                          counts.failed, counts.exempt, Cell(counts.seconds, 1)});
   }
-  return text;
+  return "\n" + table_text(table);
 }
 
 // --- functions -------------------------------------------------------------------------------------------------------
@@ -150,21 +148,20 @@ StressOutcome function_table(const StressOptions& options) {
   StressOutcome outcome;
   std::string json;
   Index failed = 0;
-  const std::vector<FunctionErrors> table = function_errors(options.points);
-  outcome.text = formatted("%-34s %-6s %-22s %-8s %8s %8s %8s %13s %6s\n", "function", "", "range", "set", "points",
-                           "largest", "mean", "at", "bound");
-  for (const FunctionErrors& row : table) {
+  Table table{.head = {"function", "", "range", "set", "points", "largest", "mean", "at", "bound"},
+              .align = "llllrrrrrl"};
+  for (const FunctionErrors& row : function_errors(options.points)) {
     const std::string range = row.argument + formatted(" in [%.5g, %.5g]", row.low, row.high);
-    outcome.text +=
-        formatted("%-34s %-6s %-22s %-8s %8lld %8.2f %8.3f %13.6g %6.3g %s%s\n", row.function.c_str(),
-                  row.precision.c_str(), range.c_str(), row.isa.c_str(), static_cast<long long>(row.tried), row.worst,
-                  row.mean, row.worst_at, row.bound, unit_name(row.unit), row.holds() ? "" : "  FAILED");
+    table.rows.push_back({row.function, row.precision, range, row.isa, row.tried, Cell(row.worst, 2), Cell(row.mean, 3),
+                          formatted("%.6g", row.worst_at), formatted("%.3g", row.bound),
+                          std::string(unit_name(row.unit)) + (row.holds() ? "" : "  FAILED")});
     json += json_of(row).dump() + "\n";
     failed += row.holds() ? 0 : 1;
   }
   if (!options.json.empty()) write_text_file(options.json, json);
-  outcome.text += formatted("%lld rows tried, %lld within their bounds\n", static_cast<long long>(std::ssize(table)),
-                            static_cast<long long>(std::ssize(table) - failed));
+  const auto tried = std::ssize(table.rows);
+  outcome.text = table_text(table) + std::to_string(tried) + " rows tried, " + std::to_string(tried - failed) +
+                 " within their bounds\n";
   if (failed > 0) outcome.status = kRowsFailed;
   return outcome;
 }

@@ -8,50 +8,30 @@
 #include "core/progress.h"
 #include "pipelines/chain/summary.h"
 #include "pipelines/record/folder.h"
-#include "pipelines/report/assets.h"
-#include "pipelines/report/plots.h"
+#include "pipelines/report/figure.h"
+#include "pipelines/report/page.h"
 
 namespace hsi4d {
 
 namespace {
 
-std::string table_section(const std::string& title, const std::string& caption, const ChainTable& table) {
-  if (table.metrics.empty()) return "";
-  std::string text = "<section><h2>" + title + "</h2>\n<p class=\"caption\">" + caption +
-                     "</p>\n<div class=\"card wide\"><table class=\"errors\">\n<thead><tr><th></th>";
-  for (const std::string& column : table.columns) text += "<th>" + html_escape(column) + "</th>";
-  text += "</tr></thead>\n<tbody>\n";
-  for (std::size_t m = 0; m < table.metrics.size(); ++m) {
-    const MetricFacts& facts = *table.metrics[m];
-    text += "<tr><th title=\"" + html_escape(std::string(facts.summary)) + "\">" + html_escape(shown_metric(facts)) +
-            "</th>";
-    for (const double* value : table.values[m]) text += "<td>" + html_escape(shown_value(facts, value)) + "</td>";
-    text += "</tr>\n";
-  }
-  return text + "</tbody></table></div></section>\n";
-}
-
-/// Errors by frame of the whole chain, with a line where a clip begins.
-std::string plots_section(const ChainSummary& summary) {
-  std::string plots;
+/// Errors by frame of the whole chain.
+std::string errors_by_frame(const ChainSummary& summary) {
+  std::vector<std::pair<std::string, std::string>> plots;
   for (const MetricFacts& facts : metric_facts()) {
-    PlotLine line{"result", "var(--result)", {}};
+    Plot plot{.title = std::string(facts.label),
+              .x_label = "frame",
+              .unit = std::string(facts.unit),
+              .series = {{.label = "result", .color = "var(--result)", .points = {}}},
+              .begins_at_zero = facts.better < 0,
+              .decimals = facts.decimals};
     for (const FrameMetrics& frame : summary.all.per_frame) {
       if (const double* const value = find_metric(frame.values, facts.name))
-        line.points.emplace_back(frame.frame, *value);
+        plot.series[0].points.emplace_back(frame.frame, *value);
     }
-    if (line.points.empty()) continue;
-    Plot plot;
-    plot.title = std::string(facts.label);
-    plot.x_label = "frame";
-    plot.unit = std::string(facts.unit);
-    plot.decimals = facts.decimals;
-    plot.begins_at_zero = facts.better < 0;
-    plot.lines.push_back(std::move(line));
-    plots += "<div class=\"card\"><h3>" + html_escape(shown_metric(facts)) + "</h3>" + plot_svg(plot) + "</div>\n";
+    if (!plot.series[0].points.empty()) plots.emplace_back(shown_metric(facts), plot_svg(plot));
   }
-  return plots.empty() ? ""
-                       : "<section><h2>Errors by frame</h2>\n<div class=\"plots\">\n" + plots + "</div></section>\n";
+  return plots_section("Errors by frame", "", plots);
 }
 
 std::string clips_section(const ChainSummary& summary) {
@@ -66,23 +46,12 @@ std::string clips_section(const ChainSummary& summary) {
 }
 
 std::string page_of(const ChainSummary& summary) {
-  const std::string name = html_escape(summary.all.name);
-  std::string page =
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
-      "content=\"width=device-width, initial-scale=1\"/>\n<title>" +
-      name + "</title>\n<style>" + std::string(report_style()) + "</style>\n</head>\n<body>\n<main>\n<header><h1>" +
-      name + "</h1><span class=\"badge done\">done</span></header>\n";
-  page += "<p>" + std::to_string(summary.clips.size()) + " clips, " + std::to_string(summary.all.frames) + " frames, " +
-          html_escape(duration_text(summary.all.seconds)) + "</p>\n";
-  page += clips_section(summary);
-  page +=
-      table_section("Errors", "Of each clip's last stage, means over its frames after the first.", clip_table(summary));
-  page += table_section("Joins",
-                        "How far the first state of a clip is from the last one before it, and from the truth: the "
-                        "drift up to there.",
-                        join_table(summary));
-  page += plots_section(summary);
-  return page + "</main>\n</body>\n</html>\n";
+  return html_page(
+      summary.all.name,
+      "<header><h1>" + html_escape(summary.all.name) + "</h1><span class=\"badge done\">done</span></header>\n<p>" +
+          std::to_string(summary.clips.size()) + " clips, " + std::to_string(summary.all.frames) + " frames, " +
+          html_escape(duration_text(summary.all.seconds)) + "</p>\n" + clips_section(summary) +
+          table_section(clip_table(summary)) + table_section(join_table(summary)) + errors_by_frame(summary));
 }
 
 }  // namespace

@@ -199,19 +199,11 @@ void for_objects(const ConfigValue& tree, const char* key, const F& f) {
   }
 }
 
-ChainTable table_of(std::vector<std::string> columns, const std::vector<const MetricValues*>& sources) {
-  ChainTable table;
-  table.columns = std::move(columns);
-  std::vector<const MetricFacts*> known;
-  for (const MetricFacts& facts : metric_facts()) known.push_back(&facts);
-  for (const MetricFacts& facts : join_metric_facts()) known.push_back(&facts);
-  for (const MetricFacts* facts : known) {
-    std::vector<const double*> row;
-    for (const MetricValues* source : sources) row.push_back(find_metric(*source, facts->name));
-    if (std::all_of(row.begin(), row.end(), [](const double* value) { return value == nullptr; })) continue;
-    table.metrics.push_back(facts);
-    table.values.push_back(std::move(row));
+Table metrics_table(Table table, const std::vector<const MetricValues*>& sources) {
+  for (const std::vector<MetricFacts>* const known : {&metric_facts(), &join_metric_facts()}) {
+    for (const MetricFacts& facts : *known) table.rows.push_back(metric_row(facts, sources));
   }
+  std::erase_if(table.rows, [](const std::vector<Cell>& row) { return row.empty(); });
   return table;
 }
 
@@ -278,32 +270,29 @@ ChainSummary parse_chain_summary(const std::string& text, const std::string& nam
   return summary;
 }
 
-ChainTable clip_table(const ChainSummary& summary) {
-  std::vector<std::string> columns;
+Table clip_table(const ChainSummary& summary) {
+  Table table{
+      .title = "Errors", .caption = "Of each clip's last stage, means over its frames after the first", .head = {""}};
   std::vector<const MetricValues*> sources;
   for (const ClipSummary& clip : summary.clips) {
-    columns.push_back(clip.name);
+    table.head.emplace_back(clip.name);
     sources.push_back(&clip.summary.metrics.back().values);
   }
-  return table_of(std::move(columns), sources);
+  return metrics_table(std::move(table), sources);
 }
 
-ChainTable join_table(const ChainSummary& summary) {
-  std::vector<std::string> columns;
+Table join_table(const ChainSummary& summary) {
+  Table table{.title = "Joins",
+              .caption =
+                  "How far the first state of a clip is from the last one before it, and from the truth: the "
+                  "drift up to there",
+              .head = {""}};
   std::vector<const MetricValues*> sources;
   for (const JoinSummary& join : summary.joins) {
-    columns.push_back(join.before + "-" + join.after);
+    table.head.emplace_back(join.before + "-" + join.after);
     sources.push_back(&join.values);
   }
-  return table_of(std::move(columns), sources);
-}
-
-std::string shown_metric(const MetricFacts& facts) {
-  return std::string(facts.label) + (facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]");
-}
-
-std::string shown_value(const MetricFacts& facts, const double* value) {
-  return value == nullptr ? "-" : fixed_number(*value, facts.decimals);
+  return metrics_table(std::move(table), sources);
 }
 
 }  // namespace hsi4d

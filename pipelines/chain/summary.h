@@ -45,23 +45,11 @@ std::string chain_summary_json(const ChainSummary& summary);
 /// Throws DataError naming file, line and member.
 ChainSummary parse_chain_summary(const std::string& text, const std::string& name);
 
-/// A table with a row a metric.
-struct ChainTable {
-  std::vector<std::string> columns;                ///< names of clips, or of joins
-  std::vector<const MetricFacts*> metrics;         ///< a row each
-  std::vector<std::vector<const double*>> values;  ///< [metric][column]; null: not measured
-};
-
-/// Errors of the clips, and at the joins. They refer to `summary`, which must outlive them.
-ChainTable clip_table(const ChainSummary& summary);
-ChainTable join_table(const ChainSummary& summary);
+/// Errors of the clips, and at the joins: a row a metric, a column a clip or join. Without rows where there are none.
+Table clip_table(const ChainSummary& summary);
+Table join_table(const ChainSummary& summary);
 
 /// What is known of the jumps of JoinSummary, which are no errors of a run.
 const std::vector<MetricFacts>& join_metric_facts();
-
-/// "root position [mm]".
-std::string shown_metric(const MetricFacts& facts);
-/// The value as tables show it; "-" for none.
-std::string shown_value(const MetricFacts& facts, const double* value);
 
 }  // namespace hsi4d

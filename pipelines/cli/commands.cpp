@@ -72,45 +72,46 @@ std::string fit_summary(const std::filesystem::path& file, const AvatarFitSettin
 }
 
 std::string list_losses(const std::vector<LossDescription>& losses) {
-  std::vector<std::vector<std::string>> rows;
-  for (const LossDescription& loss : losses) rows.push_back({loss.name, loss.summary});
-  return table(rows);
+  Table table;
+  for (const LossDescription& loss : losses) table.rows.push_back({loss.name, loss.summary});
+  return table_text(table);
 }
 
 std::string settings_table(const std::vector<ConfigSetting>& settings) {
-  std::vector<std::vector<std::string>> rows = {{"SETTING", "DEFAULT", "ALLOWED", "MEANING"}};
+  Table table{.head = {"SETTING", "DEFAULT", "ALLOWED", "MEANING"}};
   for (const ConfigSetting& setting : settings)
-    rows.push_back({setting.pointer, setting.initial, setting.allowed, setting.summary});
-  return table(rows);
+    table.rows.push_back({setting.pointer, setting.initial, setting.allowed, setting.summary});
+  return table_text(table);
 }
 
 /// What a stage may move, by what it is over and what it draws.
 std::string list_stages() {
-  std::vector<std::vector<std::string>> rows = {{"OVER", "DRAW", "GROUP", "MOVES"}};
+  Table table{.head = {"OVER", "DRAW", "GROUP", "MOVES"}};
   for (const char* over : {"first_frame", "frame"}) {
     for (const ConfigChoice<Draw>& draw : kDraws) {
       for (const std::string& group : state_group_names(draw.value))
-        rows.push_back({over, draw.name, group, state_group_summary(group)});
+        table.rows.push_back({over, draw.name, group, state_group_summary(group)});
     }
   }
   for (const std::string& group : sequence_group_names())
-    rows.push_back({"sequence", "", group, sequence_group_summary(group)});
-  return table(rows);
+    table.rows.push_back({"sequence", "", group, sequence_group_summary(group)});
+  return table_text(table);
 }
 
 /// What synthetic.scene, synthetic.motion and synthetic.object can be, and the instances of the benchmark.
 std::string list_scenes(const std::vector<LossDescription>& losses) {
-  std::vector<std::vector<std::string>> rows = {{"SYNTHETIC", "", "WHAT", "PLACES, OBJECTS"}};
+  Table table{.head = {"SYNTHETIC", "", "WHAT", "PLACES, OBJECTS"}};
   for (const auto& kind : kSyntheticSceneKinds)
-    rows.push_back({"scene", kind.name, scene_summary(kind.value), place_names_of(kind.value)});
+    table.rows.push_back({"scene", kind.name, scene_summary(kind.value), place_names_of(kind.value)});
   for (const auto& kind : kSyntheticMotionKinds)
-    rows.push_back({"motion", kind.name, motion_summary(kind.value), object_names_of(kind.value)});
-  for (const auto& kind : kSyntheticObjectKinds) rows.push_back({"object", kind.name, object_summary(kind.value), ""});
+    table.rows.push_back({"motion", kind.name, motion_summary(kind.value), object_names_of(kind.value)});
+  for (const auto& kind : kSyntheticObjectKinds)
+    table.rows.push_back({"object", kind.name, object_summary(kind.value), ""});
   const std::vector<std::vector<std::string>> instances = instance_rows(instance_folder(), losses);
-  if (instances.empty()) return table(rows);
-  std::vector<std::vector<std::string>> found = {{"INSTANCE", "PROMPT", "OBJECT", "DATA"}};
-  found.insert(found.end(), instances.begin(), instances.end());
-  return table(rows) + "\n" + table(found);
+  if (instances.empty()) return table_text(table);
+  Table found{.head = {"INSTANCE", "PROMPT", "OBJECT", "DATA"}};
+  for (const auto& row : instances) found.rows.emplace_back(row.begin(), row.end());
+  return table_text(table) + "\n" + table_text(found);
 }
 
 /// A sweep has no settings of its own to override, and many configs.

@@ -64,20 +64,18 @@ std::vector<Diversity> diversity_of_row(const SweepResults& all, const SweepGrou
   return sums;
 }
 
-SweepTable diversity_table(const SweepResults& all, const MeasuredSweep& sweep,
-                           const std::vector<Evaluation>& results) {
-  SweepTable table{
-      "Diversity over seeds", "Mean distance over all pairs of repetitions of a clip; means over clips", {}, {}};
+Table diversity_table(const SweepResults& all, const MeasuredSweep& sweep, const std::vector<Evaluation>& results) {
+  Table table{.title = "Diversity over seeds",
+              .caption = "Mean distance over all pairs of repetitions of a clip; means over clips"};
   for (const SweepGroup& group : all.groups) {
     const std::vector<Diversity> diversity = diversity_of_row(all, group, sweep, results);
     if (diversity.empty()) continue;
-    table.columns.clear();
-    SweepTable::Row row{group.label, {}};
+    table.head = {""};
+    table.rows.push_back({group.label});
     for (const auto& [facts, value] : diversity) {
-      table.columns.push_back(metric_heading(*facts));
-      row.cells.push_back({fixed_number(value, facts->decimals)});
+      table.head.emplace_back(metric_heading(*facts));
+      table.rows.back().push_back(metric_cell(*facts, &value));
     }
-    table.rows.push_back(std::move(row));
   }
   return table;
 }
@@ -172,7 +170,7 @@ std::string sweeps_text(const EvaluateInputs& inputs, const std::vector<Evaluati
   for (const MeasuredSweep& sweep : inputs.sweeps) {
     const SweepResults all = measured(sweep, results);
     if (inputs.sweeps.size() > 1) text += "\n" + sweep.selection.text + "\n";
-    for (const SweepTable& table : {mean_table(all), difference_table(all), diversity_table(all, sweep, results)}) {
+    for (const Table& table : {mean_table(all), difference_table(all), diversity_table(all, sweep, results)}) {
       const std::string shown = sweep_table_text(table, columns);
       text += shown.empty() ? "" : "\n" + shown;
     }

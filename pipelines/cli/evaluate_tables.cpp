@@ -14,13 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Rows of text, of which the first is the header.
-using Rows = std::vector<std::vector<std::string>>;
-
-std::string label_of(const MetricFacts& facts) {
-  return std::string(facts.label) + (facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]");
-}
-
 /// What stands beside the paper's figures: a result, or the row of a sweep.
 std::vector<MeasuredRow> figure_columns(const std::vector<Evaluation>& results, const EvaluateInputs& inputs) {
   std::vector<MeasuredRow> columns;
@@ -70,42 +63,40 @@ std::string without_own_folders(std::string text, const EvaluateInputs& inputs, 
 
 std::string table_of(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads, bool has_mean,
                      const std::vector<Diversity>& diversity) {
-  Rows rows(1, {""});
-  for (const Evaluation& result : results) rows[0].push_back(result.name);
-  if (has_mean) rows[0].emplace_back("mean ± std");
+  Table table{.head = {""}};
+  std::vector<const MetricValues*> sources;
+  for (const Evaluation& result : results) {
+    table.head.emplace_back(result.name);
+    sources.push_back(&result.values);
+  }
+  if (has_mean) table.head.emplace_back("mean ± std");
   for (const Spread& spread : spreads) {
     const MetricFacts& facts = *spread.facts;
-    std::vector<std::string> row = {label_of(facts)};
-    for (const Evaluation& result : results) {
-      const double* const value = find_metric(result.values, facts.name);
-      row.push_back(value == nullptr ? "-" : fixed_number(*value, facts.decimals));
-    }
+    std::vector<Cell> row = metric_row(facts, sources);
     if (has_mean) {
-      row.push_back(fixed_number(spread.mean, facts.decimals) +
-                    (spread.count > 1 ? " ± " + fixed_number(spread.deviation, facts.decimals) : ""));
+      row.emplace_back(fixed_number(spread.mean, facts.decimals) +
+                       (spread.count > 1 ? " ± " + fixed_number(spread.deviation, facts.decimals) : ""));
     }
-    rows.push_back(std::move(row));
+    table.rows.push_back(std::move(row));
   }
   for (const auto& [facts, value] : diversity) {
-    std::vector<std::string> row = {label_of(*facts)};
-    row.resize(results.size() + 1, "-");
-    row.push_back(fixed_number(value, facts->decimals));
-    rows.push_back(std::move(row));
+    std::vector<Cell> row(results.size() + 1, kNoCell);
+    row[0] = shown_metric(*facts);
+    row.push_back(metric_cell(*facts, &value));
+    table.rows.push_back(std::move(row));
   }
-  return folded_table(std::move(rows), stdout_columns());
+  return table_text(table, stdout_columns());
 }
 
 std::string table_of_runs(const std::vector<Evaluation>& results, const std::vector<Spread>& spreads) {
-  Rows rows(1, {""});
-  for (const Spread& spread : spreads) rows[0].push_back(label_of(*spread.facts));
+  Table table{.head = {""}};
+  for (const Spread& spread : spreads) table.head.emplace_back(shown_metric(*spread.facts));
   for (const Evaluation& result : results) {
-    rows.push_back({result.name});
-    for (const Spread& spread : spreads) {
-      const double* const value = find_metric(result.values, spread.facts->name);
-      rows.back().push_back(value == nullptr ? "-" : fixed_number(*value, spread.facts->decimals));
-    }
+    table.rows.push_back({result.name});
+    for (const Spread& spread : spreads)
+      table.rows.back().push_back(metric_cell(*spread.facts, find_metric(result.values, spread.facts->name)));
   }
-  return folded_table(std::move(rows), stdout_columns());
+  return table_text(table, stdout_columns());
 }
 
 std::string frames_text(const std::vector<Evaluation>& results) {
@@ -149,24 +140,15 @@ std::string notes_of_runs(const std::vector<Evaluation>& results, const Evaluate
 
 std::string published_text(const std::vector<Evaluation>& results, const EvaluateInputs& inputs) {
   const std::vector<MeasuredRow> columns = figure_columns(results, inputs);
-  Rows rows(1, {"beside the paper", "its clips"});
-  for (const MeasuredRow& column : columns) rows[0].push_back(column.label);
-  for (const char* const column : {"ZeroHSI", "others, as published there"}) rows[0].emplace_back(column);
-  for (const PublishedFigure& figure : published_figures()) {
-    std::vector<std::string> row = {std::string(figure.label), figure.is_dynamic ? "dynamic" : "static"};
-    bool is_measured = false;
-    for (const MeasuredRow& column : columns) {
-      const std::optional<double> own = figure_of(figure, column);
-      is_measured = is_measured || own;
-      row.push_back(own ? fixed_number(*own, figure.decimals) : "-");
-    }
-    const std::string others = other_figures_text(figure);
-    row.push_back(fixed_number(figure.value, figure.decimals));
-    row.push_back(others.empty() ? "-" : others);
-    if (is_measured) rows.push_back(std::move(row));
-  }
-  if (rows.size() == 1) return "";
-  return "\n" + folded_table(std::move(rows), stdout_columns()) + "Published: " + std::string(kPublishedSource) +
+  std::vector<std::string> names;
+  for (const MeasuredRow& column : columns) names.push_back(column.label);
+  Table table = published_table(
+      names, [&](const PublishedFigure& figure, std::size_t column) { return figure_of(figure, columns[column]); });
+  std::erase_if(table.rows, [](const std::vector<Cell>& row) {
+    return std::none_of(row.begin(), row.end(), [](const Cell& cell) { return cell.mark == "own"; });
+  });
+  if (table.rows.empty()) return "";
+  return "\n" + table_text(table, stdout_columns()) + "Published: " + std::string(kPublishedSource) +
          ".\nThey are of other clips, which are not public: the order of magnitude can be compared.\n";
 }
 

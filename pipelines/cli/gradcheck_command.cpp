@@ -35,11 +35,11 @@ std::string heading(const StageCheck& check) {
 }
 
 std::string group_table(const StageCheck& check) {
-  std::vector<std::vector<std::string>> rows = {{"GROUP", "NUMBERS", "TRIED", "AT KINKS", "WORST ERROR", ""}};
+  Table table{.head = {"GROUP", "NUMBERS", "TRIED", "AT KINKS", "WORST ERROR", ""}};
   for (const GroupGradcheck& group : check.found.groups)
-    rows.push_back({group.group, std::to_string(group.numbers), std::to_string(group.report.entries),
-                    std::to_string(group.report.kinks), error_text(group), verdict(group)});
-  return table(rows);
+    table.rows.push_back(
+        {group.group, group.numbers, group.report.entries, group.report.kinks, error_text(group), verdict(group)});
+  return table_text(table);
 }
 
 std::string json_line(const StageCheck& check, const GroupGradcheck& group) {

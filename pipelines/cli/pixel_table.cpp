@@ -34,20 +34,21 @@ std::string name_of(const PixelSplat& splat, std::span<const FileRows> files) {
 }
 
 std::string composited_table(const PixelTrace& trace, std::span<const FileRows> files) {
-  std::vector<std::vector<std::string>> rows = {{"#", "file", "row", "depth", "alpha uncapped", "alpha", "T before",
-                                                 "weight", "colour", "sum of weight x colour", ""}};
+  Table table{.head = {"#", "file", "row", "depth", "alpha uncapped", "alpha", "T before", "weight", "colour",
+                       "sum of weight x colour", ""}};
   for (std::size_t i = 0; i < trace.composited.size(); ++i) {
     const PixelSplat& s = trace.composited[i];
     const FileRow from = file_row(s.index, files);
     const bool last = trace.stopped && !trace.refused && i + 1 == trace.composited.size();
-    rows.push_back({std::to_string(i + 1), from.file, from.row, digits(s.depth), digits(s.full), digits(s.alpha),
-                    digits(s.transmittance), digits(s.weight()), color_text(s.color.data()),
-                    color_text(s.so_far.data()), std::string(s.capped ? "capped" : "") + (last ? " stop" : "")});
+    table.rows.push_back({i + 1, from.file, from.row, digits(s.depth), digits(s.full), digits(s.alpha),
+                          digits(s.transmittance), digits(s.weight()), color_text(s.color.data()),
+                          color_text(s.so_far.data()), std::string(s.capped ? "capped" : "") + (last ? " stop" : "")});
   }
   if (files.size() == 1) {
-    for (auto& row : rows) row.erase(row.begin() + 1);
+    table.head.erase(table.head.begin() + 1);
+    for (auto& row : table.rows) row.erase(row.begin() + 1);
   }
-  return trace.composited.empty() ? std::string() : table(rows);
+  return trace.composited.empty() ? std::string() : table_text(table);
 }
 
 std::string skipped_text(const PixelTrace& trace, const RenderSettings& settings, std::span<const FileRows> files) {

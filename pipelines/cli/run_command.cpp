@@ -114,17 +114,7 @@ std::string chain_plan(const RunConfig& config, const std::vector<LossTerm>& los
   return text + stages_text(config);
 }
 
-std::string shown(const ChainTable& shown_table) {
-  if (shown_table.metrics.empty()) return "";
-  std::vector<std::vector<std::string>> rows(1, {""});
-  rows[0].insert(rows[0].end(), shown_table.columns.begin(), shown_table.columns.end());
-  for (std::size_t m = 0; m < shown_table.metrics.size(); ++m) {
-    rows.push_back({shown_metric(*shown_table.metrics[m])});
-    for (const double* value : shown_table.values[m])
-      rows.back().push_back(shown_value(*shown_table.metrics[m], value));
-  }
-  return table(rows) + "\n";
-}
+std::string shown(const Table& table) { return table.rows.empty() ? "" : table_text(table) + "\n"; }
 
 ChainSummary run_chain_on_terminal(const RunConfig& config, const std::vector<LossTerm>& losses,
                                    const RunOptions& options) {
@@ -161,7 +151,7 @@ std::string result_text(const RunSummary& summary, const std::string& folder) {
   const std::string shares = gradient_table(summary);
   const std::string note =
       summary.has_truth ? "" : "no ground truth: errors of body, objects and camera are not measured\n";
-  return error_table(summary) + note + (shares.empty() ? "" : "\n" + shares) + "\n" + std::to_string(summary.frames) +
+  return error_text(summary) + note + (shares.empty() ? "" : "\n" + shares) + "\n" + std::to_string(summary.frames) +
          " frames in " + duration_text(summary.seconds) +
          "; report: " + (std::filesystem::path(folder) / "report.html").string() + "\n";
 }

@@ -32,15 +32,15 @@ void check_camera_inputs(const DataSettings& data) {
 }
 
 std::string table_of(const CameraChoice& choice) {
-  std::vector<std::vector<std::string>> rows = {
-      {"VISIBLE", "COVERED [%]", "RADIUS [m]", "AZIMUTH [°]", "ELEVATION [°]"}};
+  Table table{.head = {"VISIBLE", "COVERED [%]", "RADIUS [m]", "AZIMUTH [°]", "ELEVATION [°]"}};
   for (std::size_t i = 0; i < std::min(kMostTold, choice.candidates.size()); ++i) {
     const CandidateView& view = choice.candidates[i];
-    rows.push_back({std::to_string(view.visible) + " of 22", view.cover ? fixed_number(100 * *view.cover, 0) : "-",
-                    rounded(view.radius_m, 4), rounded(view.azimuth_deg, 4), rounded(view.elevation_deg, 4)});
+    table.rows.push_back({std::to_string(view.visible) + " of 22",
+                          view.cover ? fixed_number(100 * *view.cover, 0) : "-", rounded(view.radius_m, 4),
+                          rounded(view.azimuth_deg, 4), rounded(view.elevation_deg, 4)});
   }
   const std::size_t others = choice.candidates.size() - std::min(kMostTold, choice.candidates.size());
-  return table(rows) + (others > 0 ? "and " + std::to_string(others) + " more candidates\n" : "");
+  return table_text(table) + (others > 0 ? "and " + std::to_string(others) + " more candidates\n" : "");
 }
 
 void write_view(const std::string& file, const SceneSetup& setup, const Camera& camera, const RunConfig& config) {

@@ -57,16 +57,16 @@ std::string interval_text(const ShareInterval& interval) {
 }
 
 std::string shares_table(const std::vector<StudyShare>& shares) {
-  std::vector<std::vector<std::string>> rows = {{"question", "persons", "answers", "prefer A [%]", "95 % of answers",
-                                                 "95 % over persons", "Student's t", "chose left [%]"}};
+  Table table{.head = {"question", "persons", "answers", "prefer A [%]", "95 % of answers", "95 % over persons",
+                       "Student's t", "chose left [%]"}};
   for (const StudyShare& share : shares) {
-    rows.push_back({std::string(kStudyQuestions[share.question].id), std::to_string(share.persons),
-                    std::to_string(share.all.answers), percent_text(share.all.share()), interval_text(share.wilson),
-                    share.bootstrap ? interval_text(*share.bootstrap) : "-",
-                    share.student ? interval_text(*share.student) : "-",
-                    percent_text(static_cast<double>(share.prefer_left) / static_cast<double>(share.all.answers))});
+    table.rows.push_back(
+        {kStudyQuestions[share.question].id, share.persons, share.all.answers, percent_text(share.all.share()),
+         interval_text(share.wilson), share.bootstrap ? interval_text(*share.bootstrap) : "-",
+         share.student ? interval_text(*share.student) : "-",
+         percent_text(static_cast<double>(share.prefer_left) / static_cast<double>(share.all.answers))});
   }
-  return table(rows);
+  return table_text(table);
 }
 
 /// The files that are written are none of those that are read, nor the same.

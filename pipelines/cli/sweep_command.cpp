@@ -64,23 +64,27 @@ PlacedPlan read_plan(const std::string& sweep, const std::string& out, const std
 
 /// The rows of the runs as a table; on a terminal without the names of folders, and labels shortened, where they find
 /// no place.
-std::string runs_table(std::vector<std::vector<std::string>> rows) {
+std::string runs_table(Table table) {
   constexpr int kRun = 1, kLabel = 1;  // the second once the first is gone
   constexpr std::size_t kLeast = 20;
   const std::optional<int> columns = stdout_columns();
-  if (!columns || table_width(column_widths(rows)) <= static_cast<std::size_t>(*columns)) return table(rows);
-  for (auto& row : rows) row.erase(row.begin() + kRun);
-  const std::vector<std::size_t> widths = column_widths(rows);
-  const std::size_t others = table_width(widths) - widths[kLabel], all = static_cast<std::size_t>(*columns);
-  for (auto& row : rows) row[kLabel] = shortened(row[kLabel], all > others + kLeast ? all - others : kLeast);
-  return table(rows) +
+  if (!columns || table_width(table) <= static_cast<std::size_t>(*columns)) return table_text(table);
+  table.head.erase(table.head.begin() + kRun);
+  std::size_t longest = 0;
+  for (auto& row : table.rows) {
+    row.erase(row.begin() + kRun);
+    longest = std::max(longest, count_characters(row[kLabel].text));
+  }
+  const std::size_t others = table_width(table) - longest, all = static_cast<std::size_t>(*columns);
+  for (auto& row : table.rows) row[kLabel] = shortened(row[kLabel].text, all > others + kLeast ? all - others : kLeast);
+  return table_text(table) +
          "\nwithout the names of folders, to be no wider than the terminal: --dry-run | less -S has them\n";
 }
 
 /// The runs as a table, with how each stands.
 std::string plan_text(const PlacedPlan& placed) {
   const SweepPlan& plan = placed.plan;
-  std::vector<std::vector<std::string>> rows = {{"INDEX", "RUN", "", "STATE"}};
+  Table table{.head = {"INDEX", "RUN", "", "STATE"}};
   std::set<std::string> datasets;
   std::size_t done = 0;
   for (std::size_t i = 0; i < plan.runs.size(); ++i) {
@@ -91,11 +95,11 @@ std::string plan_text(const PlacedPlan& placed) {
     const SweepRunState state = sweep_run_state(placed.paths, run.id);
     if (first == i && state == SweepRunState::kDone) ++done;
     if (!run.dataset.empty() && !fs::exists(placed.paths.dataset(run.dataset))) datasets.insert(run.dataset);
-    rows.push_back({std::to_string(i), run.id, sweep_label(run),
-                    first == i ? std::string(sweep_run_state_name(state)) : "as " + std::to_string(first)});
+    table.rows.push_back({i, run.id, sweep_label(run),
+                          first == i ? std::string(sweep_run_state_name(state)) : "as " + std::to_string(first)});
   }
   const std::size_t runs = distinct_runs(plan).size();
-  std::string text = runs_table(std::move(rows)) + "\nsweep " + plan.name + ": " +
+  std::string text = runs_table(std::move(table)) + "\nsweep " + plan.name + ": " +
                      count_text(std::ssize(plan.runs), "combination") + ", " +
                      count_text(static_cast<std::int64_t>(runs), "run") + ", " + std::to_string(done) + " done";
   if (!datasets.empty()) text += "; " + count_text(std::ssize(datasets), "dataset") + " to be generated";

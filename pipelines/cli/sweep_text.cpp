@@ -5,23 +5,11 @@
 
 namespace hsi4d::cli {
 
-std::string sweep_table_text(const SweepTable& table, std::optional<int> columns) {
-  if (table.rows.empty() || table.columns.empty()) return "";
-  if (!columns) return "## " + table.title + "\n\n" + table.caption + ".\n\n" + markdown_of(table);
-  std::vector<std::vector<std::string>> rows = {{""}};
-  rows[0].insert(rows[0].end(), table.columns.begin(), table.columns.end());
-  bool has_marks = false;
-  for (const SweepTable::Row& row : table.rows) {
-    rows.push_back({row.label});
-    for (const SweepCell& cell : row.cells) {
-      const bool is_marked = cell.mark != SweepCell::Mark::kNone && !cell.text.empty();
-      rows.back().push_back(cell.text + (is_marked ? "*" : ""));
-      has_marks = has_marks || is_marked;
-    }
-  }
-  return table.title + "\n\n" +
-         wrapped(table.caption + (has_marks ? " (*)." : "."), static_cast<std::size_t>(*columns)) + "\n\n" +
-         folded_table(std::move(rows), columns);
+std::string sweep_table_text(const Table& table, std::optional<int> columns) {
+  if (!columns || table.rows.empty() || table.head.size() < 2) return markdown_section(table);
+  const std::string text = table_text(table, columns);
+  const std::string caption = table.caption + (text.find('*') == std::string::npos ? "." : " (*).");
+  return table.title + "\n\n" + wrapped(caption, static_cast<std::size_t>(*columns)) + "\n\n" + text;
 }
 
 std::string sweep_text(const SweepPaths& paths, const SweepResults& results, int columns) {

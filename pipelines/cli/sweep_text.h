@@ -15,7 +15,7 @@ namespace hsi4d::cli {
 std::string sweep_text(const SweepPaths& paths, const SweepResults& results, int columns);
 
 /// The table in columns that are folded to that width, or as Markdown where there is none; empty for one without rows.
-std::string sweep_table_text(const SweepTable& table, std::optional<int> columns);
+std::string sweep_table_text(const Table& table, std::optional<int> columns);
 
 /// Writes the results of a sweep and returns what is shown of them where stdout leads to.
 std::string write_and_show_results(const SweepPaths& paths);

@@ -1,6 +1,14 @@
 #include "pipelines/metrics/metric_facts.h"
 
+#include <algorithm>
+#include <charconv>
+
 namespace hsi4d {
+namespace {
+
+const char* arrow_of(const MetricFacts& facts) { return facts.better < 0 ? " ↓" : facts.better > 0 ? " ↑" : ""; }
+
+}  // namespace
 
 const double* find_metric(const MetricValues& values, std::string_view name) {
   for (const auto& [key, value] : values) {
@@ -49,6 +57,48 @@ const MetricFacts* find_metric_facts(std::string_view name) {
     if (facts.name == name) return &facts;
   }
   return nullptr;
+}
+
+std::string shown_metric(const MetricFacts& facts) {
+  return std::string(facts.label) + (facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]");
+}
+
+std::string metric_heading(const MetricFacts& facts) {
+  return std::string(facts.label) + (facts.unit.empty() ? "" : ", " + std::string(facts.unit)) + arrow_of(facts);
+}
+
+Cell metric_cell(const MetricFacts& facts, const double* value) {
+  return value == nullptr ? kNoCell : Cell(*value, facts.decimals);
+}
+
+std::vector<Cell> metric_row(const MetricFacts& facts, const std::vector<const MetricValues*>& sources) {
+  std::vector<Cell> row = {Cell(shown_metric(facts), "", std::string(facts.summary))};
+  row[0].html =
+      html_escape(facts.label) + " <span class=\"unit\">" + html_escape(facts.unit) + arrow_of(facts) + "</span>";
+  bool is_measured = false;
+  for (const MetricValues* const source : sources) {
+    const double* const value = find_metric(*source, facts.name);
+    is_measured = is_measured || value != nullptr;
+    row.push_back(metric_cell(facts, value));
+  }
+  return is_measured ? row : std::vector<Cell>();
+}
+
+void mark_best(int better, const std::vector<Cell*>& cells) {
+  std::vector<std::pair<double, Cell*>> shown;
+  for (Cell* const cell : cells) {
+    double number = 0;
+    const char* const text = cell->text.data();
+    if (std::from_chars(text, text + cell->text.size(), number).ec == std::errc())
+      shown.emplace_back(number * better, cell);
+  }
+  if (shown.empty()) return;
+  const auto [low, high] = std::minmax_element(shown.begin(), shown.end());
+  const double best = high->first;
+  if (low->first == best) return;
+  for (const auto& [value, cell] : shown) {
+    if (value == best) cell->mark = "best";
+  }
 }
 
 }  // namespace hsi4d

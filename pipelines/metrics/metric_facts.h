@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/table.h"
+
 namespace hsi4d {
 
 /// Numbers by name, in the order in which they are shown.
@@ -35,5 +37,20 @@ const std::vector<MetricFacts>& metric_facts();
 
 /// The facts of a metric, or null for other numbers of a stage (counters).
 const MetricFacts* find_metric_facts(std::string_view name);
+
+/// "root position [mm]".
+std::string shown_metric(const MetricFacts& facts);
+/// A metric as the heading of a column, "MPJPE, mm ↓".
+std::string metric_heading(const MetricFacts& facts);
+/// A value to the decimals of its metric; kNoCell for null.
+Cell metric_cell(const MetricFacts& facts, const double* value);
+
+/// The metric and its value in each source; empty where none has it.
+std::vector<Cell> metric_row(const MetricFacts& facts, const std::vector<const MetricValues*>& sources);
+
+/// Marks the cells whose numbers are the best as they are shown, unless all are the same.
+/// @param better  as in MetricFacts
+/// @param cells   those whose text begins with no number are passed over
+void mark_best(int better, const std::vector<Cell*>& cells);
 
 }  // namespace hsi4d

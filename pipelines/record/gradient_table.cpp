@@ -62,45 +62,6 @@ void add_line(const ConfigValue& line, const std::string& stage, std::vector<Mea
              });
 }
 
-std::string padded(const std::string& text, std::size_t width, bool at_right) {
-  const std::string blanks(width - std::min(width, text.size()), ' ');
-  return at_right ? blanks + text : text + blanks;
-}
-
-std::string stage_table(const StageSummary& stage) {
-  std::vector<std::string> groups, terms;
-  const auto add_new = [](std::vector<std::string>& names, const std::string& name) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  };
-  for (const MeanGradientShare& share : stage.gradient_shares) {
-    add_new(groups, share.group);
-    add_new(terms, share.term);
-  }
-  std::vector<std::vector<std::string>> lines = {{"stage " + stage.stage}};
-  lines[0].insert(lines[0].end(), terms.begin(), terms.end());
-  for (const std::string& group : groups) {
-    std::vector<std::string> line = {"  " + group};
-    for (const std::string& term : terms) {
-      const auto share = std::find_if(stage.gradient_shares.begin(), stage.gradient_shares.end(),
-                                      [&](const auto& entry) { return entry.group == group && entry.term == term; });
-      line.push_back(share == stage.gradient_shares.end()
-                         ? "-"
-                         : fixed_number(100 * share->share, 1) + " % " + fixed_number(share->cosine, 2));
-    }
-    lines.push_back(std::move(line));
-  }
-  std::string text;
-  for (const auto& line : lines) {
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      std::size_t width = 0;
-      for (const auto& other : lines) width = std::max(width, other[i].size());
-      text += (i == 0 ? "" : "  ") + padded(line[i], width, i > 0);
-    }
-    text += "\n";
-  }
-  return text;
-}
-
 }  // namespace
 
 ConfigValue gradient_shares_json(std::span<const GradientShare> shares) {
@@ -158,10 +119,32 @@ std::vector<MeanGradientShare> parse_mean_shares(const ConfigValue& value, const
   return means;
 }
 
+Table shares_table(const std::string& heading, const std::vector<MeanGradientShare>& shares) {
+  Table table{.head = {heading}, .align = "lr"};
+  std::vector<std::string> groups;
+  for (const MeanGradientShare& share : shares) {
+    const auto is_it = [&share](const Cell& cell) { return cell.text == share.term; };
+    auto term = std::find_if(table.head.begin() + 1, table.head.end(), is_it);
+    if (term == table.head.end()) term = table.head.insert(term, Cell(share.term));
+    auto group = std::find(groups.begin(), groups.end(), share.group);
+    const auto row = static_cast<std::size_t>(group - groups.begin());
+    if (group == groups.end()) {
+      groups.push_back(share.group);
+      table.rows.push_back({share.group});
+    }
+    std::vector<Cell>& cells = table.rows[row];
+    const auto column = static_cast<std::size_t>(term - table.head.begin());
+    cells.resize(std::max(cells.size(), column + 1), kNoCell);
+    cells[column] = fixed_number(100 * share.share, 1) + " % (" + fixed_number(share.cosine, 2) + ")";
+  }
+  for (auto& cells : table.rows) cells.resize(table.head.size(), kNoCell);
+  return table;
+}
+
 std::string gradient_table(const RunSummary& summary) {
   std::string text;
   for (const StageSummary& stage : summary.metrics) {
-    if (!stage.gradient_shares.empty()) text += stage_table(stage);
+    if (!stage.gradient_shares.empty()) text += table_text(shares_table("stage " + stage.stage, stage.gradient_shares));
   }
   return text.empty()
              ? text

@@ -27,8 +27,11 @@ ConfigValue mean_shares_json(std::span<const MeanGradientShare> shares);
 /// Reads it. Throws DataError naming file, line and member.
 std::vector<MeanGradientShare> parse_mean_shares(const ConfigValue& value, const std::string& pointer);
 
-/// The means as plain text, of each stage that has any: a row a group, a column a term with its share in percent and
-/// its cosine. Empty where nothing was measured.
+/// The means of a stage: a row a group, a column a term with its share in percent and its cosine.
+/// @param heading  of the first column
+Table shares_table(const std::string& heading, const std::vector<MeanGradientShare>& shares);
+
+/// These of each stage that has any, as plain text. Empty where nothing was measured.
 std::string gradient_table(const RunSummary& summary);
 
 }  // namespace hsi4d

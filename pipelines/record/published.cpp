@@ -48,11 +48,29 @@ const double* own_figure(const PublishedFigure& figure, const MetricValues& valu
   return find_metric(values, figure.metric);
 }
 
-std::string other_figures_text(const PublishedFigure& figure) {
-  std::string text;
-  for (const OtherFigure& other : figure.others)
-    text += (text.empty() ? "" : ", ") + std::string(other.method) + " " + fixed_number(other.value, figure.decimals);
-  return text;
+Table published_table(
+    const std::vector<std::string>& columns,
+    const std::function<std::optional<double>(const PublishedFigure& figure, std::size_t column)>& own) {
+  Table table{.head = {"beside the paper", "its clips"}};
+  table.head.insert(table.head.end(), columns.begin(), columns.end());
+  for (const char* const published : {"ZeroHSI, published", "others, as published there"})
+    table.head.emplace_back(published);
+  for (const PublishedFigure& figure : published_figures()) {
+    std::string others;
+    for (const auto& [method, value] : figure.others)
+      others += (others.empty() ? "" : ", ") + std::string(method) + " " + fixed_number(value, figure.decimals);
+    std::vector<Cell> row = {
+        Cell(std::string(figure.label) + (figure.better > 0 ? " ↑" : " ↓"), "", std::string(figure.summary)),
+        figure.is_dynamic ? "dynamic" : "static"};
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const std::optional<double> value = own(figure, i);
+      row.push_back(value ? Cell(fixed_number(*value, figure.decimals), "own") : kNoCell);
+    }
+    row.emplace_back(figure.value, figure.decimals);
+    row.push_back(others.empty() ? kNoCell : Cell(others));
+    table.rows.push_back(std::move(row));
+  }
+  return table;
 }
 
 }  // namespace hsi4d

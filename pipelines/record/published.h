@@ -1,11 +1,13 @@
 // What the method's paper publishes, to stand beside our own figures and never among them.
 #pragma once
 
-#include <span>
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "core/table.h"
 #include "pipelines/record/summary.h"
 
 namespace hsi4d {
@@ -45,7 +47,10 @@ bool is_of_objects(const MetricValues& values);
 /// @param is_dynamic  whether the clip has an object
 const double* own_figure(const PublishedFigure& figure, const MetricValues& values, bool is_dynamic);
 
-/// "TRUMANS 0.046, LINGO 0.058"; empty where there are none.
-std::string other_figures_text(const PublishedFigure& figure);
+/// A row a figure: its clips, ours in each column (marked "own"), the paper's, and those of other methods.
+/// @param own  our value of a column, where there is one
+Table published_table(
+    const std::vector<std::string>& columns,
+    const std::function<std::optional<double>(const PublishedFigure& figure, std::size_t column)>& own);
 
 }  // namespace hsi4d

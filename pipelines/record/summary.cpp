@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include "core/check.h"
@@ -157,14 +156,6 @@ StartSummary read_start(const ConfigValue& value) {
 
 // ---- The table ----
 
-/// The number that a reader sees: ties in the table are ties of what is printed.
-double as_shown(double value, int decimals) {
-  const std::string text = fixed_number(value, decimals);
-  double shown = 0;
-  std::from_chars(text.data(), text.data() + text.size(), shown);
-  return shown;
-}
-
 }  // namespace
 
 std::string summary_json(const RunSummary& summary) {
@@ -221,80 +212,37 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
   return summary;
 }
 
-bool ErrorTable::is_best(std::size_t row, std::size_t column) const {
-  const MetricFacts& facts = *columns[column];
-  const double* const own = rows[row].values[column];
-  if (own == nullptr || facts.better == 0 || !std::isfinite(*own)) return false;
-  const double shown_own = as_shown(*own, facts.decimals);
-  bool some_is_worse = false;
-  for (const Row& other : rows) {
-    if (other.values[column] == nullptr || !std::isfinite(*other.values[column])) continue;
-    if (other.of_frame_0 != rows[row].of_frame_0) continue;
-    const double ahead = (as_shown(*other.values[column], facts.decimals) - shown_own) * facts.better;
-    if (ahead > 0) return false;
-    some_is_worse = some_is_worse || ahead < 0;
+Table error_table(const RunSummary& summary) {
+  Table table{.head = {""}, .align = "lr"};
+  std::vector<const MetricValues*> sources;
+  std::vector<bool> of_frame_0;
+  for (const Baseline& baseline : summary.baselines) {
+    table.head.emplace_back(baseline.name, "baseline");
+    sources.push_back(&baseline.values);
+    of_frame_0.push_back(baseline.of_frame_0);
   }
-  return some_is_worse;
-}
-
-ErrorTable make_error_table(const RunSummary& summary) {
-  std::vector<std::pair<const MetricValues*, ErrorTable::Row>> sources;
-  for (const Baseline& baseline : summary.baselines)
-    sources.push_back({&baseline.values, {baseline.name, true, {}, baseline.of_frame_0}});
-  for (const StageSummary& stage : summary.metrics)
-    sources.push_back({&stage.values, {stage.stage, false, {}, stage.of_frame_0}});
-  ErrorTable table;
+  for (const StageSummary& stage : summary.metrics) {
+    table.head.emplace_back(stage.stage);
+    sources.push_back(&stage.values);
+    of_frame_0.push_back(stage.of_frame_0);
+  }
   for (const MetricFacts& facts : metric_facts()) {
-    const bool occurs = std::any_of(sources.begin(), sources.end(), [&facts](const auto& source) {
-      return find_metric(*source.first, facts.name) != nullptr;
-    });
-    if (!occurs) continue;
-    table.columns.push_back(&facts);
-    for (auto& [values, row] : sources) row.values.push_back(find_metric(*values, facts.name));
+    std::vector<Cell> row = metric_row(facts, sources);
+    if (row.empty()) continue;
+    std::array<std::vector<Cell*>, 2> cells;  // of frame 0 alone, and others
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+      if (row[i + 1].mark.empty()) row[i + 1].mark = table.head[i + 1].mark;
+      cells[of_frame_0[i] ? 0 : 1].push_back(&row[i + 1]);
+    }
+    for (const auto& compared : cells) mark_best(facts.better, compared);
+    table.rows.push_back(std::move(row));
   }
-  for (auto& [values, row] : sources) table.rows.push_back(std::move(row));
   return table;
 }
 
-std::string error_table(const RunSummary& summary) {
-  const ErrorTable table = make_error_table(summary);
-  // A row a metric and a column a result: there are few results, and a terminal is narrow.
-  std::vector<std::vector<std::string>> lines(1, {""});
-  for (const ErrorTable::Row& row : table.rows) lines[0].push_back(row.name + " ");
-  for (size_t m = 0; m < table.columns.size(); ++m) {
-    const MetricFacts& facts = *table.columns[m];
-    const std::string unit = facts.unit.empty() ? "" : " [" + std::string(facts.unit) + "]";
-    std::vector<std::string> line = {std::string(facts.label) + unit};
-    for (size_t r = 0; r < table.rows.size(); ++r) {
-      const double* const value = table.rows[r].values[m];
-      line.push_back(value == nullptr ? "- "
-                                      : fixed_number(*value, facts.decimals) + (table.is_best(r, m) ? "*" : " "));
-    }
-    lines.push_back(std::move(line));
-  }
-  std::vector<size_t> widths(lines[0].size());
-  for (const auto& line : lines)
-    for (size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], count_characters(line[i]));
-  std::string text;
-  for (const auto& line : lines) {
-    for (size_t i = 0; i < line.size(); ++i) {
-      const std::string blanks(widths[i] - count_characters(line[i]), ' ');
-      text += i == 0 ? line[i] + blanks : "  " + blanks + line[i];
-    }
-    text.erase(text.find_last_not_of(' ') + 1);
-    text += "\n";
-  }
-  return table.columns.empty() ? "no errors were measured\n" : text;
-}
-
-std::string fixed_number(double value, int decimals) {
-  if (!std::isfinite(value)) return "not finite";
-  std::array<char, 512> buffer;  // the longest double has 309 digits before its point
-  const auto end =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::fixed, decimals);
-  std::string text(buffer.data(), end.ptr);
-  const bool is_zero = text.find_first_not_of("-0.") == std::string::npos;
-  return is_zero && text.starts_with('-') ? text.substr(1) : text;
+std::string error_text(const RunSummary& summary) {
+  const Table table = error_table(summary);
+  return table.rows.empty() ? "no errors were measured\n" : table_text(table);
 }
 
 }  // namespace hsi4d

@@ -84,29 +84,11 @@ std::string summary_json(const RunSummary& summary);
 /// Throws DataError naming file, line and member.
 RunSummary parse_summary(const std::string& text, const std::string& name);
 
-/// The table of errors: a row for each baseline and each stage, a column for each metric that occurs in some row.
-struct ErrorTable {
-  struct Row {
-    std::string name;
-    bool is_baseline = false;
-    std::vector<const double*> values;  ///< a column each, into the summary; null: not measured
-    bool of_frame_0 = false;            ///< of frame 0 alone
-  };
-  std::vector<const MetricFacts*> columns;
-  std::vector<Row> rows;
+/// The errors that occur in some result: a row a metric, as results are few and terminals narrow; a column a result,
+/// baselines first, then stages. The best of a row is marked; errors of frame 0 alone are compared with each other.
+Table error_table(const RunSummary& summary);
 
-  /// True where no row's value as shown (to the decimals of its metric) is better, and some row's is worse; rows of
-  /// frame 0 alone are compared with each other.
-  bool is_best(std::size_t row, std::size_t column) const;
-};
-
-/// Baselines first, then stages. It refers to `summary`, which must outlive it.
-ErrorTable make_error_table(const RunSummary& summary);
-
-/// The table of errors as plain text for a terminal, the best value of each row marked with *.
-std::string error_table(const RunSummary& summary);
-
-/// `value` with a fixed number of decimals, whatever the locale; "-0.00" is "0.00". "not finite" for NaN and infinity.
-std::string fixed_number(double value, int decimals);
+/// The table of errors for a terminal, or that there are none.
+std::string error_text(const RunSummary& summary);
 
 }  // namespace hsi4d

@@ -88,7 +88,7 @@ void read_summary_file(const RunPaths& paths, ReportData& data) {
     return;
   }
   data.summary = parse_summary(read_text_file(paths.summary()), paths.summary());
-  if (make_error_table(*data.summary).columns.empty())
+  if (error_table(*data.summary).rows.empty())
     data.notes.emplace_back("summary.json has no errors: the run had no ground truth to compare with.");
   else if (!data.summary->has_truth)
     data.notes.emplace_back("The run had no ground truth: errors of body, objects and camera are not measured.");

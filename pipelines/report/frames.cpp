@@ -7,8 +7,8 @@
 #include "core/compression.h"
 #include "core/config_value.h"
 #include "pipelines/report/assets.h"
+#include "pipelines/report/figure.h"
 #include "pipelines/report/page.h"
-#include "pipelines/report/plots.h"
 
 namespace hsi4d {
 namespace {

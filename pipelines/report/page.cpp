@@ -4,14 +4,13 @@
 #include <cmath>
 
 #include "core/progress.h"
+#include "pipelines/record/gradient_table.h"
 #include "pipelines/report/assets.h"
-#include "pipelines/report/plots.h"
+#include "pipelines/report/figure.h"
 #include "pipelines/report/published.h"
 
 namespace hsi4d {
 namespace {
-
-std::string text_of(std::string_view text) { return html_escape(std::string(text)); }
 
 const MetricValues* baseline_values(const RunSummary& summary, std::string_view name) {
   for (const Baseline& baseline : summary.baselines) {
@@ -26,19 +25,19 @@ std::string state_badge(const ReportData& data) {
   const std::vector<std::string> known = {"running", "done", "failed", "interrupted"};
   const bool is_known = std::find(known.begin(), known.end(), data.state) != known.end();
   const std::string shown = data.is_orphaned ? "stopped without a word" : data.state;
-  return "<span class=\"badge " + (is_known ? data.state : "unknown") + "\">" + text_of(shown) + "</span>";
+  return "<span class=\"badge " + (is_known ? data.state : "unknown") + "\">" + html_escape(shown) + "</span>";
 }
 
 std::string head_section(const ReportData& data) {
-  std::string text = "<header><h1>" + text_of(data.name) + "</h1>" + state_badge(data) + "</header>\n";
+  std::string text = "<header><h1>" + html_escape(data.name) + "</h1>" + state_badge(data) + "</header>\n";
   if (data.is_orphaned)
     text +=
         "<p class=\"message\">Its status says that it is running, but no process writes this folder any more: it "
         "was killed, or this is a copy.</p>\n";
-  if (!data.message.empty()) text += "<p class=\"message\">" + text_of(data.message) + "</p>\n";
+  if (!data.message.empty()) text += "<p class=\"message\">" + html_escape(data.message) + "</p>\n";
   text += "<dl class=\"facts\">\n";
   for (const auto& [label, value] : data.facts)
-    text += "<div><dt>" + text_of(label) + "</dt><dd>" + text_of(value) + "</dd></div>\n";
+    text += "<div><dt>" + html_escape(label) + "</dt><dd>" + html_escape(value) + "</dd></div>\n";
   return text + "</dl>\n";
 }
 
@@ -96,7 +95,7 @@ std::string worse_message(const RunSummary& summary, const MetricValues& baselin
     if (facts.name != skip && is_worse(facts, values, baseline) && !is_redeemed(facts, values, baseline))
       worse += (worse.empty() ? "" : "; ") + std::string(facts.label);
   }
-  return worse.empty() ? "" : "<p class=\"message\">Worse than " + name + ": " + text_of(worse) + ".</p>\n";
+  return worse.empty() ? "" : "<p class=\"message\">Worse than " + name + ": " + html_escape(worse) + ".</p>\n";
 }
 
 /// Against both baselines. What stands still does not tremble: of copy_frame_0 that is no merit.
@@ -120,9 +119,9 @@ std::string figures_section(const RunSummary& summary) {
     const double* const before = start == nullptr ? nullptr : find_metric(*start, name);
     const bool worse = before != nullptr && is_worse(facts, *value, *before);
     cards += std::string("<div class=\"card figure") + (worse ? " harmed" : "") + "\" title=\"" +
-             text_of(facts.summary) + "\"><div class=\"label\">" + text_of(facts.label) +
-             "</div><div class=\"value\">" + fixed_number(*value, facts.decimals) + " <small>" + text_of(facts.unit) +
-             "</small></div><div class=\"before\">" +
+             html_escape(facts.summary) + "\"><div class=\"label\">" + html_escape(facts.label) +
+             "</div><div class=\"value\">" + fixed_number(*value, facts.decimals) + " <small>" +
+             html_escape(facts.unit) + "</small></div><div class=\"before\">" +
              (before == nullptr || facts.better == 0 ? "" : change_text(facts, *value, *before)) + "</div></div>\n";
   }
   if (cards.empty()) return "";
@@ -131,50 +130,39 @@ std::string figures_section(const RunSummary& summary) {
 
 // ---- Errors ----
 
-/// A row a metric and a column a result, as on the terminal: results are few, and pages are narrow.
+/// Names in the head and the first column as they are for people.
+Table with_labels(Table table) {
+  for (Cell& cell : table.head) cell.html = row_label(cell.text);
+  for (auto& row : table.rows)
+    if (row[0].html.empty()) row[0].html = row_label(row[0].text);
+  return table;
+}
+
 std::string errors_section(const ReportData& data) {
   std::string text = "<section id=\"errors\">\n<h2>Errors</h2>\n";
-  const ErrorTable table = data.summary ? make_error_table(*data.summary) : ErrorTable();
-  if (table.columns.empty()) return text + "<p class=\"nothing\">No errors were measured.</p>\n</section>\n";
-  const auto column = [](const ErrorTable::Row& row) {
-    return std::string(row.is_baseline ? " class=\"baseline\"" : "");
-  };
-  text += "<div class=\"card wide\"><table class=\"errors\">\n<thead><tr><th>error</th>";
-  for (const ErrorTable::Row& row : table.rows) text += "<th" + column(row) + ">" + row_label(row.name) + "</th>";
-  text += "</tr></thead>\n<tbody>\n";
-  for (size_t m = 0; m < table.columns.size(); ++m) {
-    const MetricFacts& facts = *table.columns[m];
-    text += "<tr><th scope=\"row\" title=\"" + text_of(facts.summary) + "\">" + text_of(facts.label) +
-            " <span class=\"unit\">" + text_of(facts.unit) +
-            (facts.better > 0   ? " ↑"
-             : facts.better < 0 ? " ↓"
-                                : "") +
-            "</span></th>";
-    for (size_t r = 0; r < table.rows.size(); ++r) {
-      const double* const value = table.rows[r].values[m];
-      text += value == nullptr ? "<td class=\"none\">–</td>"
-                               : (table.is_best(r, m) ? "<td class=\"best\">" : "<td" + column(table.rows[r]) + ">") +
-                                     fixed_number(*value, facts.decimals) + "</td>";
-    }
-    text += "</tr>\n";
-  }
+  Table table = data.summary ? error_table(*data.summary) : Table();
+  if (table.rows.empty()) return text + "<p class=\"nothing\">No errors were measured.</p>\n</section>\n";
+  table.head[0] = "error";
   std::string of_frame_0;
-  for (const ErrorTable::Row& row : table.rows) {
-    if (row.of_frame_0) of_frame_0 += (of_frame_0.empty() ? "" : ", ") + row_label(row.name);
-  }
-  return text +
-         "</tbody></table></div>\n<p class=\"caption\">Means over the frames that were optimised; columns in grey are "
+  const auto add = [&of_frame_0](const std::string& name) {
+    of_frame_0 += (of_frame_0.empty() ? " Of frame 0 alone, and compared with each other: " : ", ") + row_label(name);
+  };
+  for (const Baseline& baseline : data.summary->baselines)
+    if (baseline.of_frame_0) add(baseline.name);
+  for (const StageSummary& stage : data.summary->metrics)
+    if (stage.of_frame_0) add(stage.stage);
+  return text + "<div class=\"card wide\">" + table_html(with_labels(std::move(table)), "errors") +
+         "</div>\n<p class=\"caption\">Means over the frames that were optimised; columns in grey are "
          "what no optimisation gives, the others the end of each stage. The best of each row is "
          "marked." +
-         (of_frame_0.empty() ? "" : " Of frame 0 alone, and compared with each other: " + of_frame_0 + ".") +
-         "</p>\n</section>\n";
+         of_frame_0 + (of_frame_0.empty() ? "" : ".") + "</p>\n</section>\n";
 }
 
 // ---- Errors by frame ----
 
-PlotLine frame_line(const std::string& label, const std::string& color, const std::vector<FrameMetrics>& frames,
-                    std::string_view metric) {
-  PlotLine line{label, color, {}, false, true, 1};
+Series frame_line(const std::string& label, const std::string& color, const std::vector<FrameMetrics>& frames,
+                  std::string_view metric) {
+  Series line{.label = label, .color = color, .points = {}, .dots = 3};
   for (const FrameMetrics& frame : frames) {
     const double* const value = find_metric(frame.values, metric);
     if (value != nullptr) line.points.emplace_back(frame.frame, *value);
@@ -187,13 +175,13 @@ std::string baseline_color(const Baseline& baseline) {
 }
 
 /// A baseline by frame, or its mean as a dashed line across.
-PlotLine baseline_line(const Baseline& baseline, const RunSummary& summary, std::string_view metric) {
-  PlotLine line = frame_line(baseline.name, baseline_color(baseline), baseline.per_frame, metric);
+Series baseline_line(const Baseline& baseline, const RunSummary& summary, std::string_view metric) {
+  Series line = frame_line(baseline.name, baseline_color(baseline), baseline.per_frame, metric);
   const double* const mean = find_metric(baseline.values, metric);
   if (!line.points.empty() || mean == nullptr) return line;
   line.label += " (mean)";
   line.is_dashed = true;
-  line.has_dots = false;
+  line.dots = 0;
   for (const FrameMetrics* const end : {&summary.per_frame.front(), &summary.per_frame.back()})
     line.points.emplace_back(end->frame, *mean);
   return line;
@@ -220,14 +208,14 @@ std::string frame_errors_section(const RunSummary& summary) {
     plot.unit = facts.unit;
     plot.decimals = facts.decimals;
     plot.begins_at_zero = facts.better <= 0;
-    const PlotLine result = frame_line("result", "var(--result)", summary.per_frame, facts.name);
+    const Series result = frame_line("result", "var(--result)", summary.per_frame, facts.name);
     if (result.points.empty()) continue;
     for (const Baseline& baseline : summary.baselines) {
-      if (!baseline.of_frame_0) plot.lines.push_back(baseline_line(baseline, summary, facts.name));
+      if (!baseline.of_frame_0) plot.series.push_back(baseline_line(baseline, summary, facts.name));
     }
-    plot.lines.push_back(result);
-    cards += "<div class=\"card\" title=\"" + text_of(facts.summary) + "\"><h3>" + text_of(facts.label) +
-             (facts.unit.empty() ? "" : " [" + text_of(facts.unit) + "]") + "</h3>" + plot_svg(plot) + "</div>\n";
+    plot.series.push_back(result);
+    cards += "<div class=\"card\" title=\"" + html_escape(facts.summary) + "\"><h3>" + html_escape(facts.label) +
+             (facts.unit.empty() ? "" : " [" + html_escape(facts.unit) + "]") + "</h3>" + plot_svg(plot) + "</div>\n";
   }
   if (cards.empty()) return "";
   return "<section id=\"errors-by-frame\">\n<h2>Errors by frame</h2>\n" + frame_errors_legend(summary) +
@@ -306,8 +294,10 @@ std::string losses_section(const ReportData& data) {
     plot.width = 560;
     for (size_t i = 0; i < stage.curves.size(); ++i) {
       const LossCurve& curve = stage.curves[i];
-      plot.lines.push_back({curve_name(curve), ramp_color(i, stage.curves.size()), thinned(curve.points), false, false,
-                            stage.curves.size() > 12 ? 0.6 : 0.9});
+      plot.series.push_back({.label = curve_name(curve),
+                             .color = ramp_color(i, stage.curves.size()),
+                             .points = thinned(curve.points),
+                             .opacity = stage.curves.size() > 12 ? 0.6 : 0.9});
     }
     text += "<div class=\"card\"><h3>" + row_label(stage.stage) + "</h3>" + ramp_legend(stage) + plot_svg(plot) +
             loss_caption(stage) + "</div>\n";
@@ -317,38 +307,13 @@ std::string losses_section(const ReportData& data) {
 
 // ---- Shares of the gradient ----
 
-/// A row a group, a column a term with its share and its cosine.
-std::string shares_table(const std::vector<MeanGradientShare>& shares) {
-  std::vector<std::string> groups, terms;
-  for (const MeanGradientShare& share : shares) {
-    if (std::find(groups.begin(), groups.end(), share.group) == groups.end()) groups.push_back(share.group);
-    if (std::find(terms.begin(), terms.end(), share.term) == terms.end()) terms.push_back(share.term);
-  }
-  std::string text = "<table>\n<thead><tr><th>group</th>";
-  for (const std::string& term : terms) text += "<th>" + row_label(term) + "</th>";
-  text += "</tr></thead>\n<tbody>\n";
-  for (const std::string& group : groups) {
-    text += "<tr><th scope=\"row\">" + row_label(group) + "</th>";
-    for (const std::string& term : terms) {
-      const auto at = std::find_if(shares.begin(), shares.end(), [&](const MeanGradientShare& share) {
-        return share.group == group && share.term == term;
-      });
-      text += at == shares.end()
-                  ? "<td class=\"none\">–</td>"
-                  : "<td>" + fixed_number(100 * at->share, 1) + " % (" + fixed_number(at->cosine, 2) + ")</td>";
-    }
-    text += "</tr>\n";
-  }
-  return text + "</tbody></table>";
-}
-
 std::string shares_section(const ReportData& data) {
   if (!data.summary) return "";
   std::string cards;
   for (const StageSummary& stage : data.summary->metrics) {
     if (stage.gradient_shares.empty()) continue;
-    cards += "<div class=\"card wide\"><h3>" + row_label(stage.stage) + "</h3>" + shares_table(stage.gradient_shares) +
-             "</div>\n";
+    cards += "<div class=\"card wide\"><h3>" + row_label(stage.stage) + "</h3>" +
+             table_html(with_labels(shares_table("group", stage.gradient_shares))) + "</div>\n";
   }
   if (cards.empty()) return "";
   return "<section id=\"shares\">\n<h2>Shares of the gradient</h2>\n" + cards +
@@ -410,31 +375,31 @@ std::string time_section(const ReportData& data) {
   double total = 0;
   for (const TimeRow& row : rows) total += row.seconds;
   if (!(total > 0)) return "";
-  std::vector<std::pair<std::string, double>> parts;
-  for (const TimeRow& row : rows) parts.emplace_back(row.name, row.seconds);
+  std::vector<BarPart> parts;
+  for (const TimeRow& row : rows) parts.push_back({row.name, row.seconds, part_color(parts.size())});
+  Plot bar = bar_plot("time by stage", "s", parts, 2);
+  bar.width = 1140;
   const std::vector<std::string> counters = counter_names(rows);
-  std::string text = "<section id=\"time\">\n<h2>Time</h2>\n" + share_bar_svg("time by stage", parts) +
-                     "\n<div class=\"card wide\"><table>\n<thead><tr><th>stage</th><th>seconds</th><th>share</th>"
-                     "<th>iterations</th><th>ms an iteration</th>";
-  for (const std::string& name : counters) text += "<th>" + row_label(name) + "</th>";
-  text += "</tr></thead>\n<tbody>\n";
+  Table table{.head = {"stage", "seconds", "share", "iterations", "ms an iteration"}};
+  table.head.insert(table.head.end(), counters.begin(), counters.end());
   for (size_t i = 0; i < rows.size(); ++i) {
     const TimeRow& row = rows[i];
-    const std::string none = "<td class=\"none\">–</td>";
-    text += "<tr><th scope=\"row\"><span class=\"box\" style=\"background:" + part_color(i) + "\"></span>" +
-            row_label(row.name) + "</th><td>" + fixed_number(row.seconds, 2) + "</td><td>" +
-            fixed_number(100 * row.seconds / total, 1) + " %</td>";
-    text += row.iterations == 0
-                ? none + none
-                : "<td>" + counter_text(static_cast<double>(row.iterations)) + "</td><td>" +
-                      fixed_number(1000 * row.seconds / static_cast<double>(row.iterations), 2) + "</td>";
+    const auto iterations = static_cast<double>(row.iterations);
+    std::vector<Cell> cells = {row.name, Cell(row.seconds, 2), fixed_number(100 * row.seconds / total, 1) + " %"};
+    cells.push_back(row.iterations == 0 ? kNoCell : Cell(counter_text(iterations)));
+    cells.push_back(row.iterations == 0 ? kNoCell : Cell(1000 * row.seconds / iterations, 2));
     for (const std::string& name : counters) {
       const double* const value = row.values == nullptr ? nullptr : find_metric(*row.values, name);
-      text += value == nullptr ? none : "<td>" + counter_text(*value) + "</td>";
+      cells.push_back(value == nullptr ? kNoCell : Cell(counter_text(*value)));
     }
-    text += "</tr>\n";
+    table.rows.push_back(std::move(cells));
   }
-  return text + "</tbody></table></div>\n</section>\n";
+  table = with_labels(std::move(table));
+  for (size_t i = 0; i < rows.size(); ++i)
+    table.rows[i][0].html =
+        "<span class=\"box\" style=\"background:" + part_color(i) + "\"></span>" + table.rows[i][0].html;
+  return "<section id=\"time\">\n<h2>Time</h2>\n" + plot_svg(bar) + "\n<div class=\"card wide\">" + table_html(table) +
+         "</div>\n</section>\n";
 }
 
 // ---- The rest ----
@@ -442,7 +407,7 @@ std::string time_section(const ReportData& data) {
 std::string notes_section(const ReportData& data) {
   if (data.notes.empty()) return "";
   std::string text = "<section id=\"notes\">\n<h2>Notes</h2>\n<div class=\"card\"><ul class=\"notes\">\n";
-  for (const std::string& note : data.notes) text += "<li>" + text_of(note) + "</li>\n";
+  for (const std::string& note : data.notes) text += "<li>" + html_escape(note) + "</li>\n";
   return text + "</ul></div>\n</section>\n";
 }
 
@@ -451,7 +416,7 @@ std::string config_section(const ReportData& data) {
   return "<section id=\"config\">\n<h2>Settings</h2>\n<div "
          "class=\"card\"><details><summary>config.resolved.json</summary>"
          "<pre>" +
-         text_of(data.config) + "</pre></details></div>\n</section>\n";
+         html_escape(data.config) + "</pre></details></div>\n</section>\n";
 }
 
 }  // namespace
@@ -463,12 +428,7 @@ std::string row_label(const std::string& name) {
 }
 
 std::string report_page(const ReportData& data) {
-  std::string page =
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
-      "content=\"width=device-width, initial-scale=1\"/>\n<title>" +
-      text_of(data.name) + " – hsi4d</title>\n<style>" + std::string(report_style()) +
-      "</style>\n</head>\n<body>\n<main>\n";
-  page += head_section(data);
+  std::string page = head_section(data);
   if (data.summary) page += figures_section(*data.summary);
   page += errors_section(data);
   page += frames_section(data);
@@ -481,7 +441,31 @@ std::string report_page(const ReportData& data) {
   page += notes_section(data);
   page += config_section(data);
   page += moving_data(data);
-  return page + "</main>\n</body>\n</html>\n";
+  return html_page(data.name + " – hsi4d", page);
+}
+
+std::string html_page(const std::string& title, const std::string& body) {
+  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
+         "content=\"width=device-width, initial-scale=1\"/>\n<title>" +
+         html_escape(title) + "</title>\n<style>" + std::string(report_style()) +
+         "</style>\n</head>\n<body>\n<main>\n" + body + "</main>\n</body>\n</html>\n";
+}
+
+std::string table_section(const Table& table) {
+  if (table.rows.empty() || table.head.size() < 2) return "";
+  return "<section><h2>" + html_escape(table.title) + "</h2>\n<p class=\"caption\">" + html_escape(table.caption) +
+         ".</p>\n<div class=\"card wide\">" + table_html(table, "errors") + "</div></section>\n";
+}
+
+std::string plots_section(const std::string& title, const std::string& caption,
+                          const std::vector<std::pair<std::string, std::string>>& plots) {
+  std::string cards;
+  for (const auto& [heading, plot] : plots)
+    if (!plot.empty()) cards += "<div class=\"card\"><h3>" + html_escape(heading) + "</h3>" + plot + "</div>\n";
+  if (cards.empty()) return "";
+  return "<section><h2>" + html_escape(title) + "</h2>\n" +
+         (caption.empty() ? "" : "<p class=\"caption\">" + html_escape(caption) + "</p>\n") +
+         "<div class=\"plots\">\n" + cards + "</div></section>\n";
 }
 
 }  // namespace hsi4d

@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/random.h"
+#include "core/table.h"
 #include "core/text.h"
 
 namespace hsi4d {
@@ -109,14 +110,6 @@ ConfigValue share_json(const StudyKey& key, const StudyShare& share) {
   }
   object.add("pairs", std::move(pairs));
   return object;
-}
-
-/// A field of a CSV file, in quotes where it needs them.  [RFC 4180]
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string field = "\"";
-  for (const char c : text) field += c == '"' ? "\"\"" : std::string(1, c);
-  return field + "\"";
 }
 
 }  // namespace
@@ -223,16 +216,14 @@ std::string study_results_json(const StudyKey& key, const StudyAnswers& answers,
 }
 
 std::string study_answers_csv(const StudyKey& key, const StudyAnswers& answers) {
-  std::string text = "person,pair,question,prefers,left,seconds,plays\n";
+  Table table{.head = {"person", "pair", "question", "prefers", "left", "seconds", "plays"}};
   for (const StudyPerson& person : answers.persons) {
-    for (const StudyAnswer& answer : person.answers) {
-      text += csv_field(person.person) + "," + csv_field(key.pairs[answer.pair].name) + "," +
-              std::string(kStudyQuestions[answer.question].id) + "," + (answer.prefers_a ? "A" : "B") + "," +
-              (answer.a_is_left ? "A" : "B") + "," + number_text(answer.seconds) + "," + number_text(answer.plays) +
-              "\n";
-    }
+    for (const StudyAnswer& answer : person.answers)
+      table.rows.push_back({person.person, key.pairs[answer.pair].name, kStudyQuestions[answer.question].id,
+                            answer.prefers_a ? "A" : "B", answer.a_is_left ? "A" : "B", number_text(answer.seconds),
+                            number_text(answer.plays)});
   }
-  return text;
+  return table_csv(table);
 }
 
 }  // namespace hsi4d

@@ -8,103 +8,11 @@
 #include <set>
 
 #include "core/text.h"
-#include "pipelines/report/plots.h"
+#include "pipelines/report/figure.h"
 #include "pipelines/sweep/tables.h"
 
 namespace hsi4d {
 namespace {
-
-// In the units of the view box, where letters are 12 high.
-constexpr double kWidth = 420, kRow = 20, kTop = 6, kBottom = 30, kRight = 12;
-constexpr double kLetter = 6.4;  // their mean width
-constexpr double kMostLabel = 190;
-constexpr int kTicks = 4;
-
-std::string coordinate(double value) { return fixed_number(value, 1); }
-
-/// The step of 1, 2 or 5 times a power of ten that cuts `span` into at most kTicks pieces.
-double nice_step(double span) {
-  const double rough = span / kTicks, power = std::pow(10, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (factor * power >= rough * (1 - 1e-9)) return factor * power;
-  }
-  return 10 * power;
-}
-
-/// A label that fits; the whole of it is in the tooltip.
-std::string fitted(const std::string& label) {
-  const auto most = static_cast<std::size_t>(kMostLabel / kLetter);
-  if (count_characters(label) <= most) return label;
-  std::string cut;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < label.size() && count + 1 < most; ++count) {
-    const std::size_t length = std::max<std::size_t>(1, utf8_length(std::string_view(label).substr(i)));
-    cut += label.substr(i, length);
-    i += length;
-  }
-  return cut + "…";
-}
-
-Interval extent_of(const std::vector<RangeRow>& rows, bool has_zero) {
-  Interval all{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-  const auto add = [&all](double value) { all = {std::min(all.low, value), std::max(all.high, value)}; };
-  for (const RangeRow& row : rows) {
-    for (const double value : row.points) add(value);
-    add(row.middle);
-    if (row.range) {
-      add(row.range->low);
-      add(row.range->high);
-    }
-  }
-  if (has_zero) add(0);
-  const double span = all.high - all.low, size = std::max(std::fabs(all.low), std::fabs(all.high));
-  const double room = span > 1e-12 * size ? 0.05 * span : size > 0 ? 0.05 * size : 1;
-  return {all.low - room, all.high + room};
-}
-
-std::string line_svg(double x1, double y1, double x2, double y2, const std::string& more) {
-  return "<line x1=\"" + coordinate(x1) + "\" y1=\"" + coordinate(y1) + "\" x2=\"" + coordinate(x2) + "\" y2=\"" +
-         coordinate(y2) + "\" " + more + "/>";
-}
-
-/// Where values are across a plot.
-struct Across {
-  Interval extent;
-  double left, right;
-  double operator()(double value) const {
-    return left + (right - left) * (value - extent.low) / (extent.high - extent.low);
-  }
-};
-
-std::string axis_svg(const Across& across, double bottom, const std::string& unit) {
-  std::string svg;
-  const double step = nice_step(across.extent.high - across.extent.low);
-  for (double tick = std::ceil(across.extent.low / step) * step; tick <= across.extent.high; tick += step) {
-    const double value = std::fabs(tick) < 1e-9 * step ? 0 : tick;
-    svg += line_svg(across(value), kTop, across(value), bottom, "class=\"grid\"");
-    svg += "<text x=\"" + coordinate(across(value)) + "\" y=\"" + coordinate(bottom + 14) +
-           "\" text-anchor=\"middle\">" + rounded(value, 6) + "</text>";
-  }
-  return svg + "<text x=\"" + coordinate(across.right) + "\" y=\"" + coordinate(bottom + 27) +
-         "\" text-anchor=\"end\">" + html_escape(unit) + "</text>";
-}
-
-std::string row_svg(const RangeRow& row, const Across& across, double y, const std::string& unit, int decimals) {
-  const auto number = [&](double value) { return fixed_number(value, decimals) + (unit.empty() ? "" : " " + unit); };
-  std::string tip = row.label + ": " + number(row.middle);
-  if (row.range) tip += ", " + number(row.range->low) + " to " + number(row.range->high);
-  std::string svg = "<g><title>" + html_escape(tip) + "</title><text x=\"" + coordinate(across.left - 8) + "\" y=\"" +
-                    coordinate(y + 4) + "\" text-anchor=\"end\">" + html_escape(fitted(row.label)) + "</text>";
-  const std::string stroke = "stroke=\"" + row.color + "\"";
-  if (row.range)
-    svg += line_svg(across(row.range->low), y, across(row.range->high), y,
-                    stroke + " stroke-width=\"5\" opacity=\"0.35\"");
-  for (const double value : row.points)
-    svg += "<circle cx=\"" + coordinate(across(value)) + "\" cy=\"" + coordinate(y) + "\" r=\"2.6\" fill=\"" +
-           row.color + "\" opacity=\"0.75\"/>";
-  return svg + line_svg(across(row.middle), y - 7, across(row.middle), y + 7, stroke + " stroke-width=\"2.4\"") +
-         "</g>\n";
-}
 
 std::optional<double> number_of_value(const std::string& json) {
   double number = 0;
@@ -122,31 +30,33 @@ std::string label_beside(SweepRun run, const std::string& key) {
   return sweep_label(run);
 }
 
-/// Which line is which, below a plot: where lines end is where they are close together.
-std::string legend_of(const Plot& plot) {
-  std::string text = "<p class=\"legend\">";
-  for (const PlotLine& line : plot.lines)
-    text += "<span><span class=\"box\" style=\"background:" + line.color + "\"></span>" + html_escape(line.label) +
-            "</span>";
-  return text + "</p>";
-}
-
 }  // namespace
 
 std::string range_plot_svg(const std::string& title, const std::string& unit, const std::vector<RangeRow>& rows,
                            bool has_zero, int decimals) {
-  if (rows.empty()) return "<p class=\"nothing\">nothing to plot</p>";
-  std::size_t longest = 0;
-  for (const RangeRow& row : rows) longest = std::max(longest, count_characters(row.label));
-  const double left = std::min(kMostLabel, static_cast<double>(longest) * kLetter) + 14;
-  const double bottom = kTop + kRow * static_cast<double>(rows.size());
-  const Across across{extent_of(rows, has_zero), left, kWidth - kRight};
-  std::string svg = "<svg class=\"plot\" role=\"img\" aria-label=\"" + html_escape(title) + "\" viewBox=\"0 0 " +
-                    coordinate(kWidth) + " " + coordinate(bottom + kBottom) + "\">\n" + axis_svg(across, bottom, unit);
-  if (has_zero) svg += line_svg(across(0), kTop, across(0), bottom, "class=\"axis\"");
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    svg += row_svg(rows[i], across, kTop + kRow * (static_cast<double>(i) + 0.5), unit, decimals);
-  return svg + "</svg>";
+  Plot plot{.title = title, .x_label = unit, .unit = unit, .series = {}, .begins_at_zero = has_zero, .width = 420};
+  const auto number = [&](double value) { return fixed_number(value, decimals) + (unit.empty() ? "" : " " + unit); };
+  for (const RangeRow& row : rows) {
+    const auto y = static_cast<double>(plot.rows.size());
+    plot.rows.push_back(row.label);
+    Series series{.label = row.label + ": " + number(row.middle), .color = row.color, .points = {}};
+    if (row.range) {
+      series.label += ", " + number(row.range->low) + " to " + number(row.range->high);
+      plot.series.push_back(series);
+      plot.series.back().points = {{row.range->low, y}, {row.range->high, y}};
+      plot.series.back().line = 5;
+      plot.series.back().opacity = 0.35;
+    }
+    plot.series.push_back(series);
+    plot.series.back().line = 0;
+    plot.series.back().dots = 2.6;
+    plot.series.back().opacity = 0.75;
+    for (const double value : row.points) plot.series.back().points.emplace_back(value, y);
+    series.points = {{row.middle, y - 0.35}, {row.middle, y + 0.35}};
+    series.line = 2.4;
+    plot.series.push_back(series);
+  }
+  return plot_svg(plot);
 }
 
 std::string mean_plot(const SweepResults& results, const MetricFacts& metric) {
@@ -210,19 +120,19 @@ std::string axis_plot(const SweepResults& results, const std::string& key, const
   }
   std::erase_if(lines, [](const auto& line) { return line.second.size() < 2; });
   if (lines.empty()) return "";
-  Plot plot;
-  plot.title = std::string(metric.label);
-  plot.x_label = key;
-  plot.unit = std::string(metric.unit);
-  plot.decimals = metric.decimals;
-  plot.has_whole_x = false;
+  Plot plot{.title = std::string(metric.label),
+            .x_label = key,
+            .unit = std::string(metric.unit),
+            .series = {},
+            .has_whole_x = false,
+            .decimals = metric.decimals};
   for (auto& [label, points] : lines) {
     std::sort(points.begin(), points.end());
-    PlotLine line{label, part_color(plot.lines.size()), points};
-    line.has_dots = true;
-    plot.lines.push_back(std::move(line));
+    const std::string color = part_color(plot.series.size());
+    plot.series.push_back({.label = label, .color = color, .points = points, .dots = 3});
+    if (lines.size() > 1) plot.legend.emplace_back(label, color);
   }
-  return plot_svg(plot) + (lines.size() > 1 ? legend_of(plot) : "");
+  return plot_svg(plot);
 }
 
 }  // namespace hsi4d

@@ -10,8 +10,6 @@
 namespace hsi4d {
 namespace {
 
-using Strings = std::vector<std::string>;
-
 std::string with_sign(const std::string& number) {
   if (number.find_first_of("123456789") == std::string::npos) return number;
   if (number.starts_with("-")) return "−" + number.substr(1);
@@ -33,9 +31,9 @@ std::string difference_text(const PairedDifference& paired, const MetricFacts& f
          "]";
 }
 
-SweepCell::Mark mark_of(const PairedDifference& paired, const MetricFacts& facts) {
-  if (!is_clear(paired, facts)) return SweepCell::Mark::kNone;
-  return paired.statistics.mean * facts.better > 0 ? SweepCell::Mark::kBetter : SweepCell::Mark::kWorse;
+std::string mark_of(const PairedDifference& paired, const MetricFacts& facts) {
+  if (!is_clear(paired, facts)) return "";
+  return paired.statistics.mean * facts.better > 0 ? "better" : "worse";
 }
 
 /// The rows whose means are of the same clips and seeds, of which there are the most: only these can be compared.
@@ -51,22 +49,6 @@ std::vector<std::size_t> comparable_rows(const std::vector<GroupStatistics>& mea
     if (has_more || is_larger) most = of_these;
   }
   return most;
-}
-
-/// Marks the best mean of a column, as it is shown, of those that can be compared, unless all are the same.
-void mark_best(const std::vector<GroupStatistics>& means, const MetricFacts& facts, std::size_t column,
-               SweepTable& table) {
-  if (facts.better == 0) return;
-  const double scale = std::pow(10, facts.decimals);
-  const auto shown = [&](std::size_t row) { return std::round(means[row].sample.mean * scale) * facts.better; };
-  const std::vector<std::size_t> rows = comparable_rows(means);
-  if (rows.size() < 2) return;
-  const auto is_worse = [&](std::size_t a, std::size_t b) { return shown(a) < shown(b); };
-  const auto [low, high] = std::minmax_element(rows.begin(), rows.end(), is_worse);
-  if (shown(*low) == shown(*high)) return;
-  for (const std::size_t row : rows) {
-    if (shown(row) == shown(*high)) table.rows[row].cells[column].mark = SweepCell::Mark::kBest;
-  }
 }
 
 /// "3", or "2 to 3" where not all metrics have the same.
@@ -87,22 +69,9 @@ struct RowCounts {
   }
 };
 
-std::string csv_text(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
-
-std::string csv_line(const Strings& words) {
-  std::string line;
-  for (const std::string& word : words) line += (line.empty() ? "" : ",") + csv_text(word);
-  return line + "\n";
-}
-
 /// The keys that runs have values of, in order.
-Strings value_keys(const SweepPlan& plan) {
-  Strings keys;
+std::vector<std::string> value_keys(const SweepPlan& plan) {
+  std::vector<std::string> keys;
   for (const SweepRun& run : plan.runs) {
     for (const auto& [key, value] : run.values) {
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) keys.push_back(key);
@@ -111,29 +80,11 @@ Strings value_keys(const SweepPlan& plan) {
   return keys;
 }
 
-/// Text in a cell of a Markdown table, where | begins the next one.
-std::string in_cell(const std::string& text) {
-  std::string out;
-  for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);
-  return out;
-}
-
-std::string mark_word(const SweepCell& cell) {
-  return cell.mark == SweepCell::Mark::kNone || cell.text.empty() ? cell.text : "**" + cell.text + "**";
-}
-
 }  // namespace
 
 bool is_clear(const PairedDifference& paired, const MetricFacts& metric) {
   return metric.better != 0 && paired.differences.size() >= kFewestPairs && paired.interval &&
          !paired.interval->contains(0);
-}
-
-std::string metric_heading(const MetricFacts& facts) {
-  return std::string(facts.label) + (facts.unit.empty() ? "" : ", " + std::string(facts.unit)) +
-         (facts.better < 0   ? " ↓"
-          : facts.better > 0 ? " ↑"
-                             : "");
 }
 
 std::string reference_text(const SweepPlan& plan) {
@@ -159,63 +110,59 @@ std::string progress_text(const SweepResults& results) {
   return text;
 }
 
-SweepTable mean_table(const SweepResults& results, const std::string* clip) {
-  SweepTable table;
-  table.title = clip == nullptr ? "Means" : *clip;
+Table mean_table(const SweepResults& results, const std::string* clip) {
   const bool has_clips = clip == nullptr && results.clips.size() > 1;
-  table.caption = "Mean ± standard deviation over the seeds";
-  if (has_clips) table.caption += "; of each seed the mean over the clips, where all of them are done";
-  table.caption += "; the best is marked of rows that are of the same clips and seeds";
-  table.columns.emplace_back("seeds");
-  if (has_clips) table.columns.emplace_back("clips");
-  const std::size_t counts_end = table.columns.size();
-  for (const MetricFacts* const facts : results.metrics) table.columns.push_back(metric_heading(*facts));
-  for (const SweepGroup& group : results.groups)
-    table.rows.push_back({group.label, std::vector<SweepCell>(table.columns.size())});
+  Table table{.title = clip == nullptr ? "Means" : *clip, .head = {"", "seeds"}};
+  table.caption = std::string("Mean ± standard deviation over the seeds") +
+                  (has_clips ? "; of each seed the mean over the clips, where all of them are done" : "") +
+                  "; the best is marked of rows that are of the same clips and seeds";
+  if (has_clips) table.head.emplace_back("clips");
+  const std::size_t counts_end = table.head.size();
+  for (const MetricFacts* const facts : results.metrics) table.head.emplace_back(metric_heading(*facts));
+  for (const SweepGroup& group : results.groups) {
+    table.rows.emplace_back(table.head.size());
+    table.rows.back()[0] = group.label;
+  }
   std::vector<RowCounts> counts(table.rows.size());
   for (std::size_t m = 0; m < results.metrics.size(); ++m) {
     const MetricFacts& facts = *results.metrics[m];
     std::vector<GroupStatistics> means;
     for (const SweepGroup& group : results.groups) means.push_back(group_statistics(results, group, facts, clip));
     for (std::size_t row = 0; row < means.size(); ++row) {
-      table.rows[row].cells[counts_end + m].text = mean_text(means[row].sample, facts);
+      table.rows[row][counts_end + m] = mean_text(means[row].sample, facts);
       counts[row].add(means[row]);
     }
-    mark_best(means, facts, counts_end + m, table);
+    std::vector<Cell*> comparable;
+    for (const std::size_t row : comparable_rows(means)) comparable.push_back(&table.rows[row][counts_end + m]);
+    mark_best(facts.better, comparable);
   }
   for (std::size_t row = 0; row < counts.size(); ++row) {
-    table.rows[row].cells[0].text = count_range(counts[row].seeds);
-    if (has_clips) table.rows[row].cells[1].text = count_range(counts[row].clips);
+    table.rows[row][1] = count_range(counts[row].seeds);
+    if (has_clips) table.rows[row][2] = count_range(counts[row].clips);
   }
-  if (clip != nullptr) {  // groups that do not have this clip
-    std::erase_if(table.rows, [](const SweepTable::Row& row) {
-      return std::all_of(row.cells.begin(), row.cells.end(), [](const SweepCell& cell) { return cell.text.empty(); });
-    });
-  }
+  if (clip != nullptr)  // groups that do not have this clip
+    std::erase_if(table.rows, [](const std::vector<Cell>& row) { return row[1].text.empty(); });
   return table;
 }
 
-SweepTable difference_table(const SweepResults& results) {
-  SweepTable table;
-  table.title = "Differences to " + reference_text(results.plan);
+Table difference_table(const SweepResults& results) {
+  Table table{.title = "Differences to " + reference_text(results.plan), .head = {"", "pairs"}};
   table.caption =
       "Run by run with the same clip and seed: mean [95 % interval of the mean by the bootstrap, 10,000 samples]; "
       "marked where the interval does not contain 0 and there are at least " +
       std::to_string(kFewestPairs) + " pairs";
-  table.columns.emplace_back("pairs");
-  for (const MetricFacts* const metric : results.metrics) table.columns.push_back(metric_heading(*metric));
+  for (const MetricFacts* const metric : results.metrics) table.head.emplace_back(metric_heading(*metric));
   for (const SweepGroup& group : results.groups) {
     if (group.is_reference) continue;
-    SweepTable::Row row{group.label, {SweepCell{}}};
+    std::vector<Cell> row = {group.label, ""};
     std::set<std::size_t> pairs;
     for (const MetricFacts* const metric : results.metrics) {
       const auto paired = paired_difference(results, group, *metric);
-      row.cells.push_back(paired ? SweepCell{difference_text(*paired, *metric), mark_of(*paired, *metric)}
-                                 : SweepCell{});
+      row.push_back(paired ? Cell(difference_text(*paired, *metric), mark_of(*paired, *metric)) : Cell());
       if (paired) pairs.insert(paired->statistics.count);
     }
     if (pairs.empty()) continue;
-    row.cells.front().text = count_range(pairs);
+    row[1] = count_range(pairs);
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -257,37 +204,16 @@ std::string warnings_text(const SweepResults& results) {
   return text;
 }
 
-std::string markdown_of(const SweepTable& table) {
-  if (table.rows.empty()) return "";
-  std::vector<Strings> lines = {{""}};
-  lines[0].insert(lines[0].end(), table.columns.begin(), table.columns.end());
-  for (const SweepTable::Row& row : table.rows) {
-    lines.push_back({in_cell(row.label)});
-    for (const SweepCell& cell : row.cells) lines.back().push_back(mark_word(cell));
-  }
-  std::vector<std::size_t> widths(lines[0].size(), 1);
-  for (const Strings& line : lines) {
-    for (std::size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], count_characters(line[i]));
-  }
-  std::string text;
-  for (std::size_t n = 0; n < lines.size(); ++n) {
-    text += "|";
-    for (std::size_t i = 0; i < widths.size(); ++i)
-      text += " " + lines[n][i] + std::string(widths[i] - count_characters(lines[n][i]), ' ') + " |";
-    text += "\n";
-    if (n > 0) continue;
-    text += "|";
-    for (const std::size_t width : widths) text += std::string(width + 2, '-') + "|";
-    text += "\n";
-  }
-  return text;
+std::string markdown_section(const Table& table) {
+  if (table.rows.empty() || table.head.size() < 2) return "";
+  return "## " + table.title + "\n\n" + table.caption + ".\n\n" + table_markdown(table);
 }
 
 std::string sweep_markdown(const SweepResults& results) {
   std::string text = "# " + results.plan.name + "\n\n" + progress_text(results) + "\n";
-  const auto add = [&text](const SweepTable& table) {
-    if (!table.rows.empty() && !table.columns.empty())
-      text += "\n## " + table.title + "\n\n" + table.caption + ".\n\n" + markdown_of(table);
+  const auto add = [&text](const Table& table) {
+    const std::string section = markdown_section(table);
+    text += section.empty() ? "" : "\n" + section;
   };
   if (results.count(SweepRunState::kDone) > 0) {
     add(mean_table(results));
@@ -302,33 +228,32 @@ std::string sweep_markdown(const SweepResults& results) {
 }
 
 std::string sweep_csv(const SweepResults& results) {
-  const Strings keys = value_keys(results.plan);
-  Strings head = {"index", "run", "name", "block", "clip", "ablation", "seed"};
-  head.insert(head.end(), keys.begin(), keys.end());
+  const std::vector<std::string> keys = value_keys(results.plan);
+  Table table{.head = {"index", "run", "name", "block", "clip", "ablation", "seed"}};
+  table.head.insert(table.head.end(), keys.begin(), keys.end());
   for (const char* const name : {"state", "starts", "programs", "version", "git", "program", "host", "peak_mb"})
-    head.push_back(name);
-  for (const MetricFacts* const metric : results.metrics) head.push_back(std::string(metric->name));
-  std::string text = csv_line(head);
+    table.head.emplace_back(name);
+  for (const MetricFacts* const metric : results.metrics) table.head.emplace_back(metric->name);
   for (const SweepRow& row : results.rows) {
     const SweepRun& run = results.plan.runs[row.index];
-    Strings words = {std::to_string(row.index), run.id, sweep_label(run), run.block, run.clip, run.ablation, run.seed};
+    std::vector<Cell> cells = {row.index, run.id, sweep_label(run), run.block, run.clip, run.ablation, run.seed};
     for (const std::string& key : keys) {
       const auto has =
           std::find_if(run.values.begin(), run.values.end(), [&key](const auto& value) { return value.first == key; });
-      words.push_back(has == run.values.end() ? "" : has->second);
+      cells.emplace_back(has == run.values.end() ? "" : has->second);
     }
     const SweepAttempt last = row.last.value_or(SweepAttempt{});
-    for (const std::string& word : {std::string(sweep_run_state_name(row.state)), std::to_string(row.starts),
-                                    std::to_string(row.programs), last.program.version, last.program.git,
-                                    last.program.hash, last.host, row.peak_mb > 0 ? number_text(row.peak_mb) : ""})
-      words.push_back(word);
+    for (const Cell& cell : std::initializer_list<Cell>{sweep_run_state_name(row.state), row.starts, row.programs,
+                                                        last.program.version, last.program.git, last.program.hash,
+                                                        last.host, row.peak_mb > 0 ? number_text(row.peak_mb) : ""})
+      cells.push_back(cell);
     for (const MetricFacts* const metric : results.metrics) {
       const double* const value = find_metric(row.values, metric->name);
-      words.push_back(value == nullptr ? "" : number_text(*value));
+      cells.emplace_back(value == nullptr ? "" : number_text(*value));
     }
-    text += csv_line(words);
+    table.rows.push_back(std::move(cells));
   }
-  return text;
+  return table_csv(table);
 }
 
 }  // namespace hsi4d

@@ -8,27 +8,10 @@
 
 namespace hsi4d {
 
-/// A cell with what it says of its number.
-struct SweepCell {
-  enum class Mark { kNone, kBest, kBetter, kWorse };
-  std::string text;
-  Mark mark = Mark::kNone;
-};
-
-/// A table, a row a group of runs, a column a metric.
-struct SweepTable {
-  std::string title, caption;
-  std::vector<std::string> columns;
-  struct Row {
-    std::string label;
-    std::vector<SweepCell> cells;
-  };
-  std::vector<Row> rows;
-};
-
-/// Mean ± standard deviation over the seeds of every group; the best mean of a column is marked.
+/// A row a group of runs, a column a metric: mean ± standard deviation over the seeds of every group; the best mean of
+/// a column is marked.
 /// @param clip  of this clip alone; null: of all
-SweepTable mean_table(const SweepResults& results, const std::string* clip = nullptr);
+Table mean_table(const SweepResults& results, const std::string* clip = nullptr);
 
 /// Fewest pairs of which an interval says something: signs of fewer agree by chance too often (of six in 2 · 2⁻⁶ = 3
 /// %).
@@ -39,7 +22,7 @@ bool is_clear(const PairedDifference& paired, const MetricFacts& metric);
 
 /// Differences to what groups are compared with, with their intervals; marked where they are clear. Without rows where
 /// nothing is compared.
-SweepTable difference_table(const SweepResults& results);
+Table difference_table(const SweepResults& results);
 
 /// What runs are compared with, for people: "whole"; empty: with nothing.
 std::string reference_text(const SweepPlan& plan);
@@ -47,17 +30,14 @@ std::string reference_text(const SweepPlan& plan);
 /// "24 runs: 22 done, 1 failed, 1 new".
 std::string progress_text(const SweepResults& results);
 
-/// A metric as the heading of a column, "MPJPE, mm ↓".
-std::string metric_heading(const MetricFacts& facts);
-
 /// Runs that are not done, a line each, with why.
 std::string unfinished_text(const SweepResults& results);
 
 /// What the logs of runs warn of, a line each, what most runs do first: "- 12 of 12 runs: the loss ... is off".
 std::string warnings_text(const SweepResults& results);
 
-/// The table as Markdown, in columns of one width; empty for one without rows.
-std::string markdown_of(const SweepTable& table);
+/// A table under its title and caption as Markdown; empty for one without rows or columns.
+std::string markdown_section(const Table& table);
 
 /// All results as Markdown.
 std::string sweep_markdown(const SweepResults& results);

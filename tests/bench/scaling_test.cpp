@@ -129,7 +129,7 @@ TEST_CASE("scaling runs the stages that draw a frame and counts what they do") {
                                               {chosen_axes({"threads=1"}).front(), {few}}};
   const std::string table = scaling_table(results);
   CHECK_THAT(table, Contains("scene: Gaussians of the scene, human 300, objects "));
-  CHECK_THAT(table, Contains("interaction  processor ms") && Contains("expected   fitted"));
+  CHECK_THAT(table, Contains("interaction  processor ms") && Contains("expected  fitted"));
   std::istringstream lines(scaling_json(results));
   int costs = 0, fitted = 0;
   for (std::string line; std::getline(lines, line);) {

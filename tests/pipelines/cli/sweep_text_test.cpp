@@ -47,7 +47,7 @@ TEST_CASE("a terminal is shown the tables of a sweep within its width, files and
                Contains("made: 12 runs: 12 done\n") && Contains("\nMeans\n") && Contains("\nDifferences to plain\n") &&
                    Contains("whole tables, of each clip too: made/results.md") && !Contains("|") && !Contains("**"));
     // Every column of the whole table is there, and the better mean is marked.
-    for (const std::string& column : mean_table(sweep.read()).columns) CHECK_THAT(text, Contains(column));
+    for (const Cell& column : mean_table(sweep.read()).head) CHECK_THAT(text, Contains(column.text));
     CHECK_THAT(text, Contains("35.0 ± 10.0*") || Contains("35.00 ± 10.00*"));
   }
   const std::string piped = run_hsi4d({"report", "made"}).out;

@@ -49,9 +49,9 @@ TEST_CASE("shares of the gradient as a table, and in summary.json and back") {
   summary.metrics.push_back({"b", 1, 2, {}, {}});
   CHECK(gradient_table(summary) ==
         "shares of the gradient, and cosines with the whole (means over the iterations looked at)\n"
-        "stage a           fit        smooth\n"
-        "  transl  50.0 % 0.50  50.0 % -0.12\n"
-        "  pose     0.0 % 0.00             -\n");
+        "stage a            fit          smooth\n"
+        "transl   50.0 % (0.50)  50.0 % (-0.12)\n"
+        "pose      0.0 % (0.00)               -\n");
   const RunSummary read = parse_summary(summary_json(summary), "summary.json");
   CHECK(read.surface == "room.ply");
   REQUIRE(read.metrics.size() == 2);

@@ -100,26 +100,25 @@ TEST_CASE("a damaged summary is told with file and line") {
 
 TEST_CASE("the table of errors has baselines, then stages, and marks the best") {
   const RunSummary summary = small_summary();
-  const ErrorTable table = make_error_table(summary);
-  REQUIRE(table.columns.size() == 3);
-  CHECK(table.columns[0]->name == "mpjpe_mm");
-  REQUIRE(table.rows.size() == 4);
-  CHECK(table.rows[0].name == "start");
-  CHECK(table.rows[0].is_baseline);
-  CHECK(table.rows[3].name == "interaction");
-  CHECK(table.rows[2].values[0] == nullptr);
-  CHECK_FALSE(table.is_best(0, 0));
-  CHECK(table.is_best(1, 0));  // 20.0 is shown for 20.01 and for 20.04: a tie
-  CHECK(table.is_best(3, 0));
-  CHECK_FALSE(table.is_best(2, 1));  // the same everywhere
-  CHECK(table.is_best(3, 2));        // larger is better
-  CHECK_FALSE(table.is_best(0, 2));
-  CHECK(error_table(summary) ==
+  const Table table = error_table(summary);
+  REQUIRE(table.rows.size() == 3);
+  CHECK(table.rows[0][0].text == "MPJPE [mm]");
+  REQUIRE(table.head.size() == 5);
+  CHECK((table.head[1].text == "start" && table.head[1].mark == "baseline"));
+  CHECK((table.head[4].text == "interaction" && table.head[4].mark.empty()));
+  CHECK(table.rows[0][3].text == kNoCell.text);
+  CHECK(table.rows[0][1].mark == "baseline");
+  CHECK(table.rows[0][2].mark == "best");  // 20.0 is shown for 20.01 and for 20.04: a tie
+  CHECK(table.rows[0][4].mark == "best");
+  CHECK_FALSE(table.rows[1][3].is_marked());  // the same everywhere
+  CHECK(table.rows[2][4].mark == "best");     // larger is better
+  CHECK_FALSE(table.rows[2][1].is_marked());
+  CHECK(error_text(summary) ==
         "                       start   copy_frame_0   camera   interaction\n"
         "MPJPE [mm]              60.0           20.0*       -          20.0*\n"
         "camera position [cm]       -              -     0.12          0.12\n"
         "SSIM                  0.5000              -        -        0.9000*\n");
-  CHECK(error_table(RunSummary()) == "no errors were measured\n");
+  CHECK(error_text(RunSummary()) == "no errors were measured\n");
 }
 
 TEST_CASE("every metric of the contract is known") {

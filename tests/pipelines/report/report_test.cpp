@@ -12,7 +12,7 @@
 #include "core/compression.h"
 #include "core/image_io.h"
 #include "pipelines/record/folder.h"
-#include "pipelines/report/plots.h"
+#include "pipelines/report/figure.h"
 #include "pipelines/report/view3d.h"
 #include "tests/support/markup.h"
 #include "tests/support/program.h"
@@ -407,9 +407,11 @@ TEST_CASE("plots survive flat, single and extreme values") {
                                                                  {{0, -5}, {10, 5}},
                                                                  {{0, 1.00001}, {1, 1.00002}},
                                                                  {{0, 1e-12}, {1e6, 2e-12}}}) {
-      Plot plot;
-      plot.is_log = is_log;
-      plot.lines = {{"a", "red", points, false, true, 1}};
+      const Plot plot{.title = "",
+                      .x_label = "",
+                      .unit = "",
+                      .series = {{.label = "a", .color = "red", .points = points, .dots = 3}},
+                      .is_log = is_log};
       const std::string svg = plot_svg(plot);
       INFO(svg);
       CHECK(tag_fault(svg) == "");
@@ -444,7 +446,7 @@ TEST_CASE("the program reports runs and prints their errors") {
   CHECK(result.status == 0);
   CHECK(result.err.empty());
   CHECK_THAT(result.out, Catch::Matchers::StartsWith("a/report.html\n") &&
-                             Contains(error_table(summary_named("first"))) &&
+                             Contains(error_text(summary_named("first"))) &&
                              Contains("\nb/report.html\nnote: summary.json is missing"));
   CHECK(file_text("a/report.html") == report_html("a"));
   const ProgramResult mistake = run_hsi4d({"report", "nowhere"});

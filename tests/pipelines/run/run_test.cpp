@@ -601,7 +601,7 @@ TEST_CASE("the demo halves the errors of what it is given, and tells them", "[fu
     CHECK(number_at(last, name) > 0);
   }
   // What it prints is that summary: every row has its numbers under its columns.
-  CHECK_THAT(demo.out, Contains(error_table(parse_summary(file_text("demo/run/summary.json"), "summary.json"))));
+  CHECK_THAT(demo.out, Contains(error_text(parse_summary(file_text("demo/run/summary.json"), "summary.json"))));
   std::map<std::string, std::vector<double>> rows;  // by label
   std::istringstream lines(demo.out);
   for (std::string line; std::getline(lines, line);) {

@@ -54,12 +54,12 @@ TEST_CASE("differences are between runs of the same clip and seed") {
   CHECK(paired->interval->low < 2.2);
   CHECK(paired->interval->high > 3.8);
   CHECK(paired->interval->high < 4.7);
-  const SweepTable table = difference_table(results);
+  const Table table = difference_table(results);
   REQUIRE(table.rows.size() == 1);
-  CHECK(table.columns[0] == "pairs");
-  CHECK(table.rows[0].cells[0].text == "6");
-  CHECK(table.rows[0].cells[1].mark == SweepCell::Mark::kWorse);
-  CHECK_THAT(table.rows[0].cells[1].text, Contains("+3.0 [+"));
+  CHECK(table.head[1].text == "pairs");
+  CHECK(table.rows[0][1].text == "6");
+  CHECK(table.rows[0][2].mark == "worse");
+  CHECK_THAT(table.rows[0][2].text, Contains("+3.0 [+"));
 }
 
 TEST_CASE("warnings of runs are told with how many runs have them, once a run") {
@@ -101,13 +101,15 @@ TEST_CASE("the best is marked among means of the same runs alone") {
   MadeSweep sweep;
   sweep.finish_all();
   const auto table = [&sweep] { return mean_table(sweep.read()); };
-  CHECK(table().columns == std::vector<std::string>{"seeds", "clips", "MPJPE, mm ↓", "time, s ↓"});
-  CHECK(table().rows[0].cells[2].mark == SweepCell::Mark::kBest);
-  CHECK(table().rows[0].cells[0].text == "3");
-  CHECK(table().rows[0].cells[1].text == "2");
+  std::vector<std::string> head;
+  for (const Cell& cell : table().head) head.push_back(cell.text);
+  CHECK(head == std::vector<std::string>{"", "seeds", "clips", "MPJPE, mm ↓", "time, s ↓"});
+  CHECK(table().rows[0][3].mark == "best");
+  CHECK(table().rows[0][1].text == "3");
+  CHECK(table().rows[0][2].text == "2");
   std::filesystem::remove_all(sweep.paths().run(sweep.id(11)));  // of "other" the worst one is missing now
-  CHECK(table().rows[1].cells[0].text == "2");
-  for (const auto& row : table().rows) CHECK(row.cells[2].mark == SweepCell::Mark::kNone);
+  CHECK(table().rows[1][1].text == "2");
+  for (const auto& row : table().rows) CHECK(row[3].mark.empty());
 }
 
 TEST_CASE("of a seed that lacks a clip there is no mean") {
