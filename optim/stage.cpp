@@ -203,8 +203,7 @@ class StageRun {
       for (std::size_t o = 0; o < left_out_[k].size(); ++o) {
         if (left_out_[k][o] == 0) continue;
         const LeftOut& asked = loss_.left_out[k];
-        objects.push_back(
-            {asked.term, asked.reason, static_cast<Index>(o), left_out_[k][o], asked.of_human, asked.is_of_masks});
+        objects.push_back({asked.term, asked.reason, static_cast<Index>(o), left_out_[k][o], asked.of_human});
       }
     }
     return objects;

@@ -1,5 +1,7 @@
 #include "optim/stage_settings.h"
 
+#include <algorithm>
+
 #include "core/check.h"
 
 namespace hsi4d {
@@ -22,16 +24,19 @@ std::string place_of(const std::string& name, LossSettings& loss) {
   return files.size() == 1 ? files.front().pointer : pointer;
 }
 
-const char* words_of(LossNeeds needs) {
-  switch (needs) {
-    case LossNeeds::kImages:
+const char* words_of(LossInput need) {
+  switch (need) {
+    case LossInput::kImage:
       return "an image";
-    case LossNeeds::kBody:
-      return "the body";
-    case LossNeeds::kObjects:
+    case LossInput::kObjectDepth:
+    case LossInput::kObjectOpacity:
       return "objects";
-    case LossNeeds::kBodyInImage:
+    case LossInput::kHumanOpacity:
       return "the body in an image";
+    case LossInput::kPose:
+    case LossInput::kMotion:
+    case LossInput::kObjectMotion:
+      return "the body";
   }
   return "";
 }
@@ -155,9 +160,9 @@ std::vector<LossFault> prepare_losses(StageSettings& stage) {
     }
   }
   for (auto& [name, loss] : stage.losses) {
-    if (loss.weight == 0 || loss.prepare == nullptr || loss.prepared.has_value()) continue;
+    if (loss.weight == 0 || !loss.term || loss.term->prepare == nullptr || loss.prepared.has_value()) continue;
     try {
-      loss.prepared = loss.prepare(loss.own);
+      loss.prepared = loss.term->prepare(loss.own);
     } catch (const UserError& mistake) {
       faults.push_back({place_of(name, loss), mistake.what()});
     } catch (const DataError& damage) {
@@ -167,12 +172,15 @@ std::vector<LossFault> prepare_losses(StageSettings& stage) {
   return faults;
 }
 
-std::vector<LossFault> losses_without_inputs(const StageSettings& stage, LossNeeds has, const std::string& having) {
+std::vector<LossFault> losses_without_inputs(const StageSettings& stage, std::span<const LossInput> has,
+                                             const std::string& having) {
   std::vector<LossFault> faults;
   for (const auto& [name, loss] : stage.losses) {
-    if (loss.weight == 0 || loss.needs == has) continue;
-    faults.push_back({child_pointer("/losses", name),
-                      std::string("this loss needs ") + words_of(loss.needs) + ", which " + having + " does not have"});
+    const std::vector<LossInput> needs = needs_of(loss);
+    const bool is_given = std::find_first_of(needs.begin(), needs.end(), has.begin(), has.end()) != needs.end();
+    if (loss.weight == 0 || is_given || needs.empty()) continue;
+    faults.push_back({child_pointer("/losses", name), std::string("this loss needs ") + words_of(needs.front()) +
+                                                          ", which " + having + " does not have"});
   }
   return faults;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -101,10 +102,16 @@ struct LossFault {
 /// @return  what its prepare function threw as UserError or DataError, a fault a loss
 std::vector<LossFault> prepare_losses(StageSettings& stage);
 
+/// What losses can read in a stage that draws the scene alone, and in one over the sequence.
+inline constexpr std::array<LossInput, 1> kImageInputs = {LossInput::kImage};
+inline constexpr std::array<LossInput, 3> kMotionInputs = {LossInput::kPose, LossInput::kMotion,
+                                                           LossInput::kObjectMotion};
+
 /// Losses that are on and need what the stage does not have.
 ///
-/// @param has     the one thing that it has
+/// @param has     what it has
 /// @param having  the stage in words: "a stage with ..."
-std::vector<LossFault> losses_without_inputs(const StageSettings& stage, LossNeeds has, const std::string& having);
+std::vector<LossFault> losses_without_inputs(const StageSettings& stage, std::span<const LossInput> has,
+                                             const std::string& having);
 
 }  // namespace hsi4d

@@ -146,22 +146,22 @@ std::vector<BodyPoint> chosen_points(const MotionStart& motion, Index most) {
 }  // namespace
 
 LossTerm penetration_loss() {
-  LossTerm term = make_loss_term<PenetrationSettings>(
-      "penetration", "How deep the body is inside of what is solid",
-      [](const PenetrationSettings& settings) { return prepared_solid(settings); },
-      [](const auto& in, const Solid& solid) {
-        using Value = decltype(in.joints);
-        if (!in.given(in.joints) || !in.motion) return Value{};
-        if (!solid.mesh && in.motion->scene == nullptr) return Value{};
-        const GridPointer grid = solid.mesh ? solid.mesh : solid.scene->of(*in.motion, solid.settings);
-        const Value places = in.body_points(chosen_points(*in.motion, solid.settings.points));
-        const float margin = static_cast<float>(solid.settings.margin);
-        const auto squares =
-            sum_over({sampled_distance(places, grid)}, [margin](auto d) { return square(max(margin - d, 0.0f)); });
-        return squares * (1 / static_cast<double>(places.shape().rows));
-      });
+  LossTerm term =
+      needing({LossInput::kMotion},
+              make_loss_term<PenetrationSettings>(
+                  "penetration", "How deep the body is inside of what is solid",
+                  [](const PenetrationSettings& settings) { return prepared_solid(settings); },
+                  [](const auto& in, const Solid& solid) {
+                    using Value = decltype(in.joints);
+                    if (!solid.mesh && in.motion->scene == nullptr) return Value{};
+                    const GridPointer grid = solid.mesh ? solid.mesh : solid.scene->of(*in.motion, solid.settings);
+                    const Value places = in.body_points(chosen_points(*in.motion, solid.settings.points));
+                    const float margin = static_cast<float>(solid.settings.margin);
+                    const auto squares = sum_over({sampled_distance(places, grid)},
+                                                  [margin](auto d) { return square(max(margin - d, 0.0f)); });
+                    return squares * (1 / static_cast<double>(places.shape().rows));
+                  }));
   term.description.weight = kWeight;
-  term.description.needs = LossNeeds::kBody;
   return term;
 }
 

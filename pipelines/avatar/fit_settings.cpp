@@ -62,7 +62,7 @@ void add_stage_faults(const ConfigValue& tree, const StageSettings& stage, Confi
 }
 
 void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProblems& problems) {
-  std::vector<LossFault> faults = losses_without_inputs(stage, LossNeeds::kImages, "a fit of an avatar");
+  std::vector<LossFault> faults = losses_without_inputs(stage, kImageInputs, "a fit of an avatar");
   for (LossFault& fault : prepare_losses(stage)) faults.push_back(std::move(fault));
   for (const LossFault& fault : faults) {
     const std::string pointer = "/stage" + fault.pointer;

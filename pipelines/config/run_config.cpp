@@ -1,6 +1,7 @@
 #include "pipelines/config/run_config.h"
 
 #include <algorithm>
+#include <set>
 
 #include "core/config_file.h"
 #include "optim/loss_term.h"
@@ -128,18 +129,15 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
 }
 
 LossesOverMasks losses_over_masks(const RunConfig& config) {
-  const auto reading = [&config](std::initializer_list<std::string> names, const char* input) {
-    std::vector<std::string> found;
-    for (const std::string& name : names) {
-      const bool is_on = std::any_of(config.stages.begin(), config.stages.end(), [&](const auto& entry) {
-        const LossSettings* const loss = find_entry(entry.second.losses, name);
-        return entry.second.draw == Draw::kAll && loss != nullptr && reads_input(*loss, input);
-      });
-      if (is_on) found.push_back(name);
+  std::set<std::string> human, objects;
+  for (const auto& [stage_name, stage] : config.stages) {
+    if (stage.draw != Draw::kAll) continue;
+    for (const auto& [name, loss] : stage.losses) {
+      if (needs_input(loss, LossInput::kHumanOpacity)) human.insert(name);
+      if (needs_input(loss, LossInput::kObjectOpacity)) objects.insert(name);
     }
-    return found;
-  };
-  return {reading({"mask"}, kReadsHumanOpacity), reading({"center", "mask"}, kReadsObjectOpacity)};
+  }
+  return {{human.begin(), human.end()}, {objects.begin(), objects.end()}};
 }
 
 namespace {

@@ -121,8 +121,8 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
 /// The text of config.resolved.json: every setting, defaults included. Reading it back gives the same config and text.
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses);
 
-/// The losses of stages that draw human and objects which empty masks switch off: `center` and `mask`, by their
-/// settings.
+/// The losses of stages that draw human and objects which empty masks switch off: those that need opacities, as
+/// `center` and `mask` do.
 LossesOverMasks losses_over_masks(const RunConfig& config);
 
 /// A tree of a config without what another dataset or machine would change: the files of data, chain and body,

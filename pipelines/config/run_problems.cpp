@@ -42,7 +42,7 @@ void add_loss_problems(const StageSettings& stage, const std::string& in, std::v
   }
   const bool is_of_sequence = stage.over == StageScope::kSequence;
   if (is_of_sequence || stage.draw == Draw::kScene) {
-    const LossNeeds has = is_of_sequence ? LossNeeds::kBody : LossNeeds::kImages;
+    const std::span<const LossInput> has = is_of_sequence ? std::span<const LossInput>(kMotionInputs) : kImageInputs;
     const std::string having =
         is_of_sequence ? "a stage with \"over\": \"sequence\"" : "a stage with \"draw\": \"scene\"";
     for (LossFault& fault : losses_without_inputs(stage, has, having))

@@ -28,10 +28,10 @@ FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const Colo
           config.color_net.camera_gradient};
 }
 
-/// Whether a term that is on reads an input which is made on demand.
-bool some_loss_reads(const StageSettings& stage, const char* input) {
+/// Whether a term that is on needs an input which is made on demand.
+bool some_loss_needs(const StageSettings& stage, LossInput input) {
   return stage.draw == Draw::kAll && std::any_of(stage.losses.begin(), stage.losses.end(), [input](const auto& entry) {
-           return reads_input(entry.second, input);
+           return needs_input(entry.second, input);
          });
 }
 
@@ -69,7 +69,10 @@ std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& st
   const Clip& clip = task.clip;
   Lookout lookout{camera_of_size(clip, stage.longest_side_px), task.config.render, within_deg};
   lookout.camera.camera_from_world = state.camera_from_world;
-  const bool needs_objects = find_entry(stage.losses, "depth") != nullptr;
+  const bool needs_objects = std::any_of(stage.losses.begin(), stage.losses.end(), [](const auto& entry) {
+    const std::vector<LossInput> needs = needs_of(entry.second);
+    return std::find(needs.begin(), needs.end(), LossInput::kObjectDepth) != needs.end();
+  });
   const bool needs_human = find_entry(stage.optimize, "avatar_features") != nullptr;
   SeenRows rows;
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
@@ -100,7 +103,7 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   const Clip& clip = task.clip;
   const ClipFrame& frame = frame_task.frame;
   const SceneState& first = first_state(task, frame_task);
-  const bool are_objects_read = some_loss_reads(task.config.stages[task.stage].second, kReadsObjectOpacity);
+  const bool are_objects_read = some_loss_needs(task.config.stages[task.stage].second, LossInput::kObjectOpacity);
   FrameTargets targets;
   targets.image = &frame.target;
   targets.weight = weight.empty() ? nullptr : &weight;
@@ -136,8 +139,8 @@ void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& fra
   tape.set_skips(task.config.skip.tape);
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
   settings.longest_side_px = stage.longest_side_px;
-  settings.human_opacity = some_loss_reads(stage, kReadsHumanOpacity);
-  settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
+  settings.human_opacity = some_loss_needs(stage, LossInput::kHumanOpacity);
+  settings.object_opacity = some_loss_needs(stage, LossInput::kObjectOpacity);
   settings.camera_reach = camera_reach;
   settings.seen = rows_to_draw(task, state);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
