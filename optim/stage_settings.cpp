@@ -78,12 +78,6 @@ void describe(ConfigFields& f, ParameterGroupSettings& s) {
   });
 }
 
-void describe(ConfigFields& f, PlateauSettings& s) {
-  f.integer("iterations", s.iterations, {.min = 0, .max = kMostIterations},
-            "Iterations whose mean loss is compared with that of as many before; 0: the stage never ends early");
-  f.number("gain", s.gain, {.min = 0, .below = 1}, "Share by which the mean has to fall for the stage to go on");
-}
-
 void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescription>& losses) {
   f.integer("iterations", s.iterations, {.min = 1, .max = kMostIterations}, "Steps of the optimiser").required();
   f.choice(
@@ -95,9 +89,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
       "weight", s.weight, kPixelWeights,
       "Pixels that count in weighted losses: all, those that no human or object has covered in any frame so far, those "
       "that the frame's masks leave, or those that they cover");
-  f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
-            "Longest side of the images that the stage works on, which are reduced to it where the run's are larger; "
-            "0: those of the run. Coarse to fine is two stages");
   f.map("optimize", s.optimize, "What moves: parameter groups by name");
   f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
   f.integer("gradient_shares", s.gradient_shares, {.min = 0, .max = kMostIterations},
@@ -107,7 +98,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
          "VPoser's weights (tools/export_vposer.py), whose latents a stage over the sequence moves; without, natural "
          "poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
-  f.object("plateau", s.plateau, "When the stage ends early, as its loss no longer falls");
   f.rule({"optimizer", "optimize"}, [&s]() -> std::string {
     if (s.optimizer.kind == OptimizerKind::kAdam) return "";
     for (const auto& [name, group] : s.optimize) {
@@ -123,11 +113,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
                ? "gauss_newton evaluates changes of gradients, of which terms have no shares; allowed: 0"
                : "";
   });
-  f.rule({"optimizer", "plateau"}, [&s]() -> std::string {
-    return s.optimizer.kind == OptimizerKind::kGaussNewton && s.plateau.iterations != 0
-               ? "gauss_newton ends by itself, and its evaluations are not all of states that it was in; allowed: 0"
-               : "";
-  });
   f.rule({"optimizer", "over"}, [&s]() -> std::string {
     if (!s.optimizer.keep_curvature) return "";
     return s.over == StageScope::kFrame ? "" : "only a stage over frames has a frame before to keep the curvature of";
@@ -138,9 +123,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   f.rule({"weight", "over"}, [&s]() -> std::string {
     return s.over == StageScope::kSequence && s.weight != PixelWeight::kAll ? "a stage over the sequence draws nothing"
                                                                             : "";
-  });
-  f.rule({"longest_side_px", "over"}, [&s]() -> std::string {
-    return s.over == StageScope::kSequence && s.longest_side_px != 0 ? "a stage over the sequence draws nothing" : "";
   });
   f.rule({"pose_weights", "over"}, [&s]() -> std::string {
     return s.over != StageScope::kSequence && !s.pose_weights.empty() ? "only a stage over the sequence has latents"

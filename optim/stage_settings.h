@@ -59,13 +59,6 @@ inline constexpr std::array<ConfigChoice<PixelWeight>, 4> kPixelWeights = {{{Pix
                                                                             {PixelWeight::kBackground, "background"},
                                                                             {PixelWeight::kForeground, "foreground"}}};
 
-/// When a stage ends before its iterations are over: when the mean loss of the last `iterations` is not below
-/// that of as many before by `gain` of it. Losses count from the iteration on in which every group has begun to move.
-struct PlateauSettings {
-  int iterations = 0;  ///< 0: never
-  double gain = 0.01;
-};
-
 inline constexpr int kLongestSide = 65536;  ///< of images, pixels
 
 /// One stage of the method.
@@ -74,20 +67,17 @@ struct StageSettings {
   StageScope over = StageScope::kFrame;
   Draw draw = Draw::kAll;
   PixelWeight weight = PixelWeight::kAll;
-  int longest_side_px = 0;                     ///< of the images that the stage sees, at most; 0: the run's
   ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
   ConfigMap<LossSettings> losses;              ///< by loss term
   int gradient_shares = 0;                     ///< every so many iterations (optim/gradient_shares.h); 0: never
   std::optional<PosePrior> pose_prior;         ///< with pose_weights, by prepare_losses; empty before
   std::filesystem::path pose_weights;          ///< over the sequence: VPoser's weights; empty: natural poses
   OptimizerSettings optimizer;
-  PlateauSettings plateau;
 };
 
 /// Describe the sections. `losses` are the terms that a stage may name.
 void describe(ConfigFields& fields, OptimizerSettings& settings);
 void describe(ConfigFields& fields, ParameterGroupSettings& settings);
-void describe(ConfigFields& fields, PlateauSettings& settings);
 void describe(ConfigFields& fields, StageSettings& settings, const std::vector<LossDescription>& losses);
 
 /// A loss of a stage that cannot be used.

@@ -24,13 +24,15 @@ namespace {
 /// m² against the photometric loss of a few hundredths: docs/numerics.md.
 constexpr double kWeight = 10;
 
+/// That distances may take: 3 KiB a block of 8³ cells near a surface, so 90,000 blocks.
+constexpr Index kMostBytes = Index{256} << 20U;
+
 struct PenetrationSettings {
   std::filesystem::path mesh;
   double margin = 0;       // metres
   double thickness = 0.1;  // metres
   double cell = 0.02;      // metres
   Index points = 1000;     // a frame
-  Index memory_mib = 256;
 };
 
 void describe(ConfigFields& fields, PenetrationSettings& settings) {
@@ -44,8 +46,6 @@ void describe(ConfigFields& fields, PenetrationSettings& settings) {
                 "interpolated, metres");
   fields.integer("points", settings.points, {.min = 1, .max = 1000000},
                  "Gaussians of the human that count, in each frame; all where there are fewer");
-  fields.integer("memory_mib", settings.memory_mib, {.min = 1, .max = 1000000},
-                 "Memory that the distances may take, MiB; more is an error");
 }
 
 using GridPointer = std::shared_ptr<DistanceGrid>;
@@ -54,7 +54,7 @@ GridPointer grid_of(DistanceGrid::Distance distance, const PenetrationSettings& 
   DistanceGrid::Settings grid;
   grid.cell = settings.cell;
   grid.reach = settings.margin + 2 * settings.cell;  // no farther is a node of a cell that a point within margin is in
-  grid.most_bytes = settings.memory_mib << 20U;
+  grid.most_bytes = kMostBytes;
   grid.name = "loss penetration";
   return std::make_shared<DistanceGrid>(std::move(distance), std::move(grid));
 }

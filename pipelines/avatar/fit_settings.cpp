@@ -4,6 +4,7 @@
 #include "pipelines/avatar/fit.h"
 #include "pipelines/config/config_fields.h"
 #include "pipelines/config/config_kind.h"
+#include "pipelines/config/removed_keys.h"
 
 namespace hsi4d {
 
@@ -110,7 +111,7 @@ AvatarFitSettings read_avatar_fit(const ConfigValue& tree, const std::filesystem
   settings.file = file;
   ConfigFields fields;
   describe(fields, settings, losses);
-  read_config(tree, fields, problems);
+  read_config(without_removed_keys(tree, problems), fields, problems);
   add_unused(tree, settings, problems);
   if (asks_views && problems.empty() && settings.views.empty()) problems.add(tree.origin, "/views", kNoViews);
   if (problems.empty()) {

@@ -11,8 +11,6 @@ void describe(ConfigFields& f, ColorNetSettings& s) {
   f.integer("hidden_width", s.hidden_width, {.min = 1, .max = 1024}, "Width of its hidden layers");
   f.integer("hidden_layers", s.hidden_layers, {.min = 0, .max = kMostMlpLayers - 1}, "How many they are");
   f.boolean("view_direction", s.view_direction, "A new network also sees from where the camera looks");
-  f.boolean("pose_gradient", s.pose_gradient,
-            "Colours have a gradient in the pose; without, the pose is moved by what geometry says alone");
   f.boolean("camera_gradient", s.camera_gradient,
             "Colours have a gradient in the camera, by the direction from which it looks");
 }

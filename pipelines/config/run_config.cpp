@@ -7,6 +7,7 @@
 #include "optim/loss_term.h"
 #include "pipelines/config/config_fields.h"
 #include "pipelines/config/config_kind.h"
+#include "pipelines/config/removed_keys.h"
 #include "pipelines/config/run_problems.h"
 
 namespace hsi4d {
@@ -54,13 +55,9 @@ void describe(ConfigFields& f, SkipSettings& s) {
 }
 
 void describe(ConfigFields& f, ApproxSettings& s) {
-  describe(f, s.render);
   f.boolean(
       "hold_colors", s.hold_colors,
       "Colours of harmonics stay as in the stage's first iteration, those of the color net as when it last moved");
-  f.number(
-      "camera_pixel_share", s.camera_pixel_share, {.above = 0, .max = 1},
-      "Share of the pixels that count in stages that draw the scene alone, in blocks of 32, others in every frame");
   f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
             "Longest side of the images that are worked on: the camera's image, frames and masks are reduced to it "
             "where they are larger; 0: as large as the camera's");
@@ -102,7 +99,7 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
   RunConfig config;
   ConfigFields fields;
   describe(fields, config, losses);
-  read_config(tree, fields, problems);
+  read_config(without_removed_keys(tree, problems), fields, problems);
   // They run first wherever they are written: a file that extends another one can only append stages.
   std::stable_partition(config.stages.begin(), config.stages.end(),
                         [](const auto& entry) { return entry.second.over == StageScope::kFirst; });

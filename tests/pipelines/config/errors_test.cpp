@@ -145,7 +145,7 @@ TEST_CASE("gauss_newton refuses what has no meaning for it") {
              Contains("/stages/camera") && Contains("gauss_newton moves all numbers in every step: from, until, every "
                                                     "and lr_final_share of \"root\" have no meaning"));
   CHECK_THAT(with(R"("gradient_shares": 3)"), Contains("of which terms have no shares; allowed: 0"));
-  CHECK_THAT(with(R"("plateau": {"iterations": 3})"), Contains("gauss_newton ends by itself"));
+
   CHECK_THAT(fault(stage(R"("iterations": 9, "optimizer": {"kind": "gauss_newton", "products": 0})")),
              Equals("a.json:2: /stages/camera/optimizer/products: 0 is out of range; allowed: 1 to 100"));
 }
@@ -154,6 +154,19 @@ TEST_CASE("a curvature is kept from frame to frame alone") {
   CHECK_THAT(
       fault(stage(R"("iterations": 9, "over": "sequence", "optimizer": {"kind": "bfgs", "keep_curvature": true})")),
       Contains("/stages/camera") && Contains("only a stage over frames has a frame before"));
+}
+
+TEST_CASE("a removed key is refused with what stands in its place, unless it says what is so now") {
+  const std::string plateau = "/stages/camera/plateau: no setting since 0.1.0: a stage ends after its iterations";
+  CHECK_THAT(fault(stage(R"("iterations": 3, "plateau": {"iterations": 5, "gain": 0.01})")), Contains(plateau));
+  CHECK_THAT(fault(stage(R"("iterations": 3)"), {"stages.camera.plateau.gain=0.5"}),
+             Contains("--set stages.camera.plateau.gain=0.5: " + plateau));
+  CHECK_THAT(fault(stage(R"("iterations": 3, "losses": {"center": {"unit": "width"}})")),
+             Contains("/stages/camera/losses/center/unit: no setting since 0.1.0: distances are in pixels"));
+  CHECK_THAT(fault(R"({"camera_selection": {"elevations_deg": [5]}})"),
+             Equals("a.json:1: /camera_selection/elevations_deg: no setting since 0.1.0: 0, 15 and 30 degrees above "
+                    "the horizon are tried"));
+  CHECK(fault(R"({"camera_selection": {"elevations_deg": [0, 15, 30], "at_objects": true}})") == "no fault");
 }
 
 TEST_CASE("duplicate keys, numbers that are not finite, broken JSON") {
