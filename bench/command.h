@@ -23,11 +23,11 @@ std::string bench_skinning_command(const BenchOptions& options);
 /// `hsi4d bench color_net`: returns a table.
 std::string bench_color_net_command(const BenchOptions& options);
 
-/// `hsi4d bench tape`: returns a table. On one thread. Throws UserError where options ask for more.
+/// `hsi4d bench tape`: returns a table. On one thread.
 std::string bench_tape_command(const BenchOptions& options);
 
 /// `hsi4d bench`: the tables of rasterize, skinning, color_net and tape, each with all its workloads; the tape on one
-/// thread. Throws UserError where options name workloads, which are of one topic.
+/// thread.
 std::string bench_kernels_command(const BenchOptions& options);
 
 /// `hsi4d bench pixel_filter`: returns a table. The workloads are figures.

@@ -17,12 +17,10 @@ namespace {
 struct Mode {
   const char* name;
   RenderSkips skip;
-  RenderApproximations approx;
 };
-constexpr std::array<Mode, 4> kModes = {{{"iteration", {false, false, false}, {false}},
-                                         {"iteration_static_tiles", {true, false, true}, {false}},
-                                         {"iteration_static_layer", {true, true, true}, {false}},
-                                         {"iteration_collapsed", {true, true, true}, {true}}}};
+constexpr std::array<Mode, 3> kModes = {{{"iteration", {false, false, false}},
+                                         {"iteration_static_tiles", {true, false, true}},
+                                         {"iteration_static_layer", {true, true, true}}}};
 
 /// A workload on a tape as two sets, from means and axes to the image.
 struct Iterated {
@@ -35,7 +33,6 @@ struct Iterated {
   Iterated(const Workload& w, const Mode& mode) {
     SplatView view = w.view;
     view.skip = mode.skip;
-    view.approx = mode.approx;
     const SplatInputs<float> still = inputs_of(w, 0, w.moving_begin, false);
     const SplatInputs<float> moving = inputs_of(w, w.moving_begin, w.count, true);
     const Var<float> xi = tape.constant("xi", shape_of(1, 6)), background = tape.constant("background", shape_of(1, 3));

@@ -35,7 +35,6 @@ ConfigValue* member_of(ConfigValue& object, std::string_view key) {
 
 /// Adds a problem unless `value` is an array of 4.
 bool expect_four(const ConfigValue& value, const char* what, const std::string& pointer, ConfigProblems& problems) {
-  if (value.kind == Kind::kUnreadable) return false;
   if (value.kind == Kind::kArray && value.items.size() == 4) return true;
   const std::string count =
       value.kind == Kind::kArray ? "has length " + std::to_string(value.items.size()) : "is " + kind_name(value);
@@ -44,7 +43,6 @@ bool expect_four(const ConfigValue& value, const char* what, const std::string& 
 }
 
 bool expect_number(const ConfigValue& value, const std::string& pointer, ConfigProblems& problems) {
-  if (value.kind == Kind::kUnreadable) return false;
   double number = 0;
   const char* end = value.text.data() + value.text.size();
   const bool is_number = value.kind == Kind::kNumber;
@@ -281,7 +279,7 @@ std::vector<Camera> read_transforms(ConfigValue& tree, ConfigProblems& problems)
   describe_intrinsics(fields, globals);
   read_known(tree, fields, problems, "");
   ConfigValue& frames = *member_of(tree, "frames");
-  if (frames.kind != Kind::kArray && frames.kind != Kind::kUnreadable)
+  if (frames.kind != Kind::kArray)
     problems.add(frames.origin, "/frames", shown(frames) + " is " + kind_name(frames) + ", not an array");
   problems.throw_if_any();
   refuse_distortion(tree, globals, "", problems);
@@ -299,9 +297,9 @@ std::vector<Camera> decode_cameras(const std::string& text, const std::string& n
   ConfigProblems problems;
   ConfigValue tree;
   if (!parse_config_text(text, source, problems, tree)) problems.throw_if_any();
-  if (tree.kind != Kind::kObject && tree.kind != Kind::kUnreadable)
+  if (tree.kind != Kind::kObject)
     problems.add(tree.origin, "", shown(tree) + " is " + kind_name(tree) + "; a file of cameras is an object: {...}");
-  if (tree.kind != Kind::kObject) problems.throw_if_any();
+  problems.throw_if_any();
   const bool is_transforms = find_member(tree, "frames") != nullptr;
   const bool is_list = find_member(tree, "format") || find_member(tree, "cameras");
   std::vector<Camera> cameras = is_transforms ? read_transforms(tree, problems)

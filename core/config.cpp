@@ -299,10 +299,6 @@ ConfigField& ConfigFields::add_numbers(std::string_view name, NumberRange range,
     std::vector<double> read(value.items.size());
     bool good = true;
     for (std::size_t i = 0; i < read.size(); ++i) {
-      if (value.items[i].kind == Kind::kUnreadable) {
-        good = false;
-        continue;
-      }
       good = read_number(value.items[i], range, child_pointer(pointer, std::to_string(i)), problems, read[i]) && good;
     }
     if (good) set(read);
@@ -333,7 +329,6 @@ ConfigField& ConfigFields::strings(std::string_view name, std::vector<std::strin
     std::vector<std::string> read;
     for (std::size_t i = 0; i < value.items.size(); ++i) {
       const ConfigValue& item = value.items[i];
-      if (item.kind == Kind::kUnreadable) continue;
       if (expect_kind(item, Kind::kString, "a string", "", child_pointer(pointer, std::to_string(i)), problems))
         read.push_back(item.text);
     }

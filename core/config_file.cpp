@@ -103,7 +103,6 @@ class Loader {
  private:
   ConfigValue load_base(const ConfigValue& extends, const ConfigSource& source) {
     ConfigValue nothing = ConfigValue::make_object();
-    if (extends.kind == Kind::kUnreadable) return nothing;
     if (extends.kind != Kind::kString || extends.text.empty()) {
       fail(extends, shown(extends) +
                         (extends.kind == Kind::kString ? " is empty" : " is " + kind_name(extends) + ", not a string") +

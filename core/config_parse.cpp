@@ -1,7 +1,5 @@
-// The parser is nlohmann's, driven through its SAX interface by an iterator that knows how far it has read: that is
-// where positions come from. When it stops at a fault that people commonly make, the fault is reported, overwritten in
-// a copy of the text by something of the same length, and the parse starts again; positions always refer to the
-// original text.
+// The parser is nlohmann's, driven through its SAX interface by an iterator that knows how far it has read: positions
+// come from there.
 #include "core/config_parse.h"
 
 #include <algorithm>
@@ -9,7 +7,6 @@
 #include <iterator>
 #include <numeric>
 #include <optional>
-#include <set>
 
 #include "core/check.h"
 
@@ -22,7 +19,7 @@ namespace hsi4d {
 namespace {
 
 using Kind = ConfigValue::Kind;
-constexpr int kMostRepairs = 50;
+constexpr std::size_t kMostBefore = 60, kMostAfter = 40;  // bytes of a line that a message shows around a fault
 
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -95,17 +92,12 @@ struct Stop {
   bool too_deep = false;
 };
 
-struct Duplicate {
-  std::string pointer;
-  ConfigOrigin first, second;
-};
-
 /// Builds the tree from the parser's events.
 class Builder : public nlohmann::json_sax<nlohmann::json> {
  public:
   Builder(const std::string& text, const char* const* furthest, const Lines& lines,
-          const std::shared_ptr<const ConfigSource>& source, const std::set<std::size_t>& unreadable, ConfigValue& root)
-      : text_(text), furthest_(furthest), lines_(lines), source_(source), unreadable_(unreadable), root_(root) {}
+          const std::shared_ptr<const ConfigSource>& source, ConfigProblems& problems, ConfigValue& root)
+      : text_(text), furthest_(furthest), lines_(lines), source_(source), problems_(problems), root_(root) {}
 
   bool null() override {
     scalar(Kind::kNull, 4);
@@ -156,7 +148,6 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
   }
 
   Stop stop;
-  std::vector<Duplicate> duplicates;
 
  private:
   std::size_t furthest() const { return static_cast<std::size_t>(*furthest_ - text_.data()); }
@@ -172,7 +163,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
 
   ConfigValue& add(Kind kind, std::size_t offset) {
     ConfigValue& value = place();
-    value.kind = unreadable_.contains(offset) ? Kind::kUnreadable : kind;
+    value.kind = kind;
     value.origin = origin(offset);
     return value;
   }
@@ -242,7 +233,8 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
         continue;
       }
       drop[order[i]] = true;
-      duplicates.push_back({object_pointer(again.key), kept.key_origin, again.key_origin});
+      problems_.add(again.key_origin, object_pointer(again.key),
+                    "written twice, first in line " + std::to_string(kept.key_origin.line) + "; keep one of them");
     }
     if (std::find(drop.begin(), drop.end(), true) == drop.end()) return;
     std::vector<ConfigMember> kept;
@@ -262,173 +254,112 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
   const char* const* furthest_;
   const Lines& lines_;
   const std::shared_ptr<const ConfigSource>& source_;
-  const std::set<std::size_t>& unreadable_;
+  ConfigProblems& problems_;
   ConfigValue& root_;
   std::vector<ConfigValue*> stack_;
   std::size_t event_end_ = 0;  // past the last thing that was understood
 };
 
-/// What is wrong at a stop, and how the text can be changed, in place and without changing its length, to go on.
+/// What is wrong at a stop.
 struct Diagnosis {
   std::size_t at = 0;
-  std::string pointer;
   std::string message;
-  std::size_t begin = 0, end = 0;  ///< bytes to overwrite; none: cannot go on
-  std::string with;                ///< padded with spaces
-  bool unreadable = false;         ///< what stands there now is not a value of the user's
+  bool of_value = false;  ///< the value that is being read is at fault, not the text around it
 };
 
-std::size_t word_begin(const std::string& text, std::size_t at) {
-  while (at > 0 && is_word_part(text[at - 1])) --at;
+bool has(const Stop& stop, const char* words) { return stop.reason.find(words) != std::string::npos; }
+
+std::size_t past_spaces(const std::string& text, std::size_t at) {
+  while (at < text.size() && is_space(text[at])) ++at;
   return at;
 }
 
-std::size_t word_end(const std::string& text, std::size_t at) {
-  while (at < text.size() && is_word_part(text[at])) ++at;
-  return at;
-}
-
-std::size_t comment_end(const std::string& text, std::size_t at) {
-  if (text.compare(at, 2, "/*") == 0) {
-    const std::size_t close = text.find("*/", at + 2);
-    return close == std::string::npos ? text.size() : close + 2;
-  }
-  return std::min(text.find('\n', at), text.size());
-}
-
-std::string lower(std::string word) {
-  for (char& c : word) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return word;
-}
-
-/// The bad word at `begin`: a number that JSON does not know, a literal in another language's spelling, an unquoted
-/// key.
-std::optional<Diagnosis> diagnose_word(const std::string& text, const Stop& stop) {
-  const std::size_t begin = word_begin(text, stop.start), end = word_end(text, stop.start);
-  if (begin == end) return std::nullopt;
+/// A word that is no JSON: nan, a literal or number in another language's spelling, an unquoted key.
+Diagnosis diagnose_word(const std::string& text, const Stop& stop) {
+  std::size_t begin = stop.start, end = stop.start;
+  while (begin > 0 && is_word_part(text[begin - 1])) --begin;
+  while (end < text.size() && is_word_part(text[end])) ++end;
   const std::string word = text.substr(begin, end - begin);
-  const std::string bare = lower(word[0] == '+' || word[0] == '-' ? word.substr(1) : word);
-  if (bare == "nan" || bare == "inf" || bare == "infinity")
-    return Diagnosis{begin, stop.pointer, word + " is not a finite number", begin, end, "0", true};
-  std::size_t after = end;
-  while (after < text.size() && is_space(text[after])) ++after;
+  std::string bare = word.substr(word[0] == '+' || word[0] == '-' ? 1 : 0);
+  for (char& c : bare) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  if (stop.number_too_large) return {begin, word + " is not a finite number: it is beyond the largest double", true};
+  if (bare == "nan" || bare == "inf" || bare == "infinity") return {begin, word + " is not a finite number", true};
+  const std::size_t after = past_spaces(text, end);
   if (is_letter(word[0]) && after < text.size() && text[after] == ':')
-    return Diagnosis{begin, "",   "not valid JSON: the key " + word + " needs double quotes: \"" + word + "\"", 0, 0,
-                     "",    false};
-  for (const auto* const meant : {"true", "false", "null"}) {
-    if (bare == meant || (bare == "none" && std::string(meant) == "null"))
-      return Diagnosis{begin, stop.pointer, "not valid JSON: " + word + " is written " + meant, begin, end,
-                       meant, false};
-  }
-  if (is_digit(word[0]) || ((word[0] == '.' || word[0] == '+' || word[0] == '-') && word.size() > 1))
-    return Diagnosis{begin, stop.pointer, "not valid JSON: " + word + " is not how JSON writes a number", begin, end,
-                     "0",   true};
-  return Diagnosis{begin, stop.pointer, "not valid JSON: " + word + " is not a value; strings take double quotes",
-                   begin, end,          "0",
-                   true};
+    return {begin, "not valid JSON: the key " + word + " needs double quotes: \"" + word + "\""};
+  return {begin,
+          "not valid JSON: " + word +
+              " is not a value; write true, false, null, a number such as 0.5, or a string in double quotes",
+          true};
 }
 
+/// A comma too many or too few before the stop.
 std::optional<Diagnosis> diagnose_comma(const std::string& text, const Stop& stop) {
   std::size_t last = stop.start;
   while (last > 0 && is_space(text[last - 1])) --last;
   if (last == 0) return std::nullopt;
   const char before = text[last - 1], here = text[stop.start];
   if ((here == '}' || here == ']') && before == ',')
-    return Diagnosis{last - 1, "",   std::string("not valid JSON: the comma before '") + here + "' is one too many",
-                     last - 1, last, "",
-                     false};
-  const bool wants_comma =
-      stop.reason.find("expected '}'") != std::string::npos || stop.reason.find("expected ']'") != std::string::npos;
-  const bool begins_value =
-      here == '"' || here == '{' || here == '[' || here == '-' || is_digit(here) || is_letter(here);
-  if (!wants_comma || !begins_value || before == ',' || before == '{' || before == '[') return std::nullopt;
-  Diagnosis missing{last - 1, "", "not valid JSON: a comma is missing after this", 0, 0, ",", false};
-  if (last < stop.start) missing.begin = last, missing.end = last + 1;
-  return missing;
+    return Diagnosis{last - 1, std::string("not valid JSON: the comma before '") + here + "' is one too many"};
+  const bool begins_value = here == '"' || here == '{' || here == '[' || is_word_part(here);
+  if ((!has(stop, "expected '}'") && !has(stop, "expected ']'")) || !begins_value || before == ',' || before == '{' ||
+      before == '[' || (last == stop.start && is_word_part(before)))
+    return std::nullopt;
+  return Diagnosis{last - 1, "not valid JSON: a comma is missing after this"};
 }
 
 Diagnosis diagnose(const std::string& text, const Stop& stop) {
-  if (stop.too_deep)
-    return {stop.start, "", "nested more than " + std::to_string(kDeepestConfig) + " levels deep", 0, 0, "", false};
-  if (stop.number_too_large) {
-    const std::size_t end = word_end(text, stop.start);
-    const std::string word = text.substr(stop.start, end - stop.start);
-    return {stop.start, stop.pointer, word + " is not a finite number: it is beyond the largest double",
-            stop.start, end,          "0",
-            true};
-  }
+  if (stop.too_deep) return {stop.start, "nested more than " + std::to_string(kDeepestConfig) + " levels deep"};
   if (stop.start >= text.size()) {
-    if (!stop.open) return {0, "", "not valid JSON: the file is empty", 0, 0, "", false};
-    return {text.size(),
-            "",
-            std::string("not valid JSON: the file ends inside the ") + (stop.open_is_array ? "array" : "object") +
-                " that line " + std::to_string(stop.open->line) + " opens",
-            0,
-            0,
-            "",
-            false};
+    if (!stop.open) return {0, "not valid JSON: the file is empty"};
+    return {text.size(), std::string("not valid JSON: the file ends inside the ") +
+                             (stop.open_is_array ? "array" : "object") + " that line " +
+                             std::to_string(stop.open->line) + " opens"};
   }
   const char here = text[stop.start];
   if (here == '#' || text.compare(stop.start, 2, "//") == 0 || text.compare(stop.start, 2, "/*") == 0)
-    return {
-        stop.start, "",   "not valid JSON: comments are not part of JSON", stop.start, comment_end(text, stop.start),
-        "",         false};
-  if (here == '\'')
-    return {stop.start, "", "not valid JSON: strings take double quotes, not single ones", 0, 0, "", false};
-  if (here == '"' && stop.end > stop.start && (stop.end == text.size() || text[stop.end - 1] == '\n') &&
-      stop.reason.find("invalid string") != std::string::npos)
-    return {stop.start, "", "not valid JSON: this string has no closing quote on its line", 0, 0, "", false};
-  if (stop.reason.find("expected ':'") != std::string::npos)
-    return {stop.start, "", "not valid JSON: a colon is missing between a key and its value", 0, 0, "", false};
-  const bool adjacent = stop.start > 0 && is_word_part(text[stop.start - 1]);
-  if (!adjacent) {
-    if (auto comma = diagnose_comma(text, stop)) return *comma;
+    return {stop.start, "not valid JSON: comments are not part of JSON"};
+  if (here == '\'') return {stop.start, "not valid JSON: strings take double quotes, not single ones"};
+  if (has(stop, "invalid string") && stop.end > stop.start && (stop.end == text.size() || text[stop.end - 1] == '\n'))
+    return {stop.start, "not valid JSON: this string has no closing quote on its line"};
+  if (const auto comma = diagnose_comma(text, stop)) return *comma;
+  if (is_word_part(here) && !has(stop, "expected ':'") && !has(stop, "expected end of input"))
+    return diagnose_word(text, stop);
+  return {here == '"' && stop.end > 0 ? stop.end - 1 : stop.start, "not valid JSON: " + stop.reason};
+}
+
+/// The line of text around an offset, and below it a caret.
+std::string line_with_caret(const std::string& text, std::size_t at) {
+  const auto continues = [&](std::size_t i) { return (static_cast<unsigned char>(text[i]) & 0xC0U) == 0x80U; };
+  std::size_t begin = at, end = at;
+  while (begin > 0 && text[begin - 1] != '\n' && (at - begin < kMostBefore || continues(begin))) --begin;
+  while (end < text.size() && text[end] != '\n' && (end - at < kMostAfter || continues(end))) ++end;
+  std::string line, indent;
+  for (std::size_t i = begin; i < end; ++i) {
+    line += static_cast<unsigned char>(text[i]) < 0x20U ? ' ' : text[i];
+    if (i < at && !continues(i)) indent += ' ';
   }
-  if (is_word_part(here)) {
-    if (auto word = diagnose_word(text, stop)) return *word;
-  }
-  if (stop.reason.find("expected end of input") != std::string::npos)
-    return {stop.start, "", "not valid JSON: there is more text after the end of the value", 0, 0, "", false};
-  return {
-      here == '"' && stop.end > 0 ? stop.end - 1 : stop.start, "", "not valid JSON: " + stop.reason, 0, 0, "", false};
+  return "\n  " + line + "\n  " + indent + "^";
 }
 
 }  // namespace
 
 bool parse_config_text(const std::string& text, const std::shared_ptr<const ConfigSource>& source,
                        ConfigProblems& problems, ConfigValue& value) {
-  const Lines lines(text);
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
     problems.add({source, 0, 0, 0}, "", "the file is UTF-16; save it as UTF-8");
     return false;
   }
-  std::string copy = text;
-  std::set<std::size_t> unreadable;
-  std::size_t repaired_at = std::string::npos;
-  for (int repair = 0;; ++repair) {
-    value = {};
-    const char* furthest = copy.data();
-    Builder builder(copy, &furthest, lines, source, unreadable, value);
-    const CountingIterator begin(copy.data(), &furthest), end(copy.data() + copy.size(), &furthest);
-    const bool whole = nlohmann::json::sax_parse(begin, end, &builder);
-    Diagnosis fault;
-    if (!whole) {
-      fault = diagnose(copy, builder.stop);
-      problems.add({source, fault.at, lines.line(fault.at), lines.column(fault.at)}, fault.pointer, fault.message);
-    }
-    // A repair that leads back to the same place did not help.
-    const bool last = whole || fault.begin == fault.end || fault.begin == repaired_at || repair == kMostRepairs;
-    repaired_at = fault.begin;
-    if (last) {
-      for (const Duplicate& twice : builder.duplicates)
-        problems.add(twice.second, twice.pointer,
-                     "written twice, first in line " + std::to_string(twice.first.line) + "; keep one of them");
-      return whole;
-    }
-    fault.with.resize(fault.end - fault.begin, ' ');
-    copy.replace(fault.begin, fault.end - fault.begin, fault.with);
-    if (fault.unreadable) unreadable.insert(fault.begin);
-  }
+  const Lines lines(text);
+  value = {};
+  const char* furthest = text.data();
+  Builder builder(text, &furthest, lines, source, problems, value);
+  const CountingIterator begin(text.data(), &furthest), end(text.data() + text.size(), &furthest);
+  if (nlohmann::json::sax_parse(begin, end, &builder)) return true;
+  const Diagnosis fault = diagnose(text, builder.stop);
+  problems.add({source, fault.at, lines.line(fault.at), lines.column(fault.at)},
+               fault.of_value ? builder.stop.pointer : "", fault.message + line_with_caret(text, fault.at));
+  return false;
 }
 
 bool parse_json_value(const std::string& text, const std::shared_ptr<const ConfigSource>& source, ConfigValue& value) {

@@ -13,8 +13,8 @@ inline constexpr int kDeepestConfig = 64;
 
 /// Parses one JSON text (RFC 8259, UTF-8, a byte order mark allowed).
 ///
-/// Faults that people commonly make (comments, trailing or missing commas, NaN, 1e999, True, .5) are reported and then
-/// read as what was meant, so that one run tells all of them; duplicate keys are reported, the first one kept.
+/// It stops at the first syntax error, which is reported with its line of text and a caret. Duplicate keys are
+/// reported, the first one kept.
 /// @param text      the bytes of the file
 /// @param source    what messages name, and what the origin of every value refers to
 /// @param problems  receives everything that is wrong

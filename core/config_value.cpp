@@ -98,9 +98,6 @@ void append_json(std::string& out, const ConfigValue& value, int indent) {
     case Kind::kObject:
       append_object(out, value, indent);
       break;
-    case Kind::kUnreadable:
-      out += "null";
-      break;
   }
 }
 
@@ -237,10 +234,8 @@ std::string kind_name(const ConfigValue& value) {
       return "an array";
     case Kind::kObject:
       return "an object";
-    case Kind::kUnreadable:
-      break;
   }
-  return "unreadable";
+  throw InternalError("no such kind of value");
 }
 
 std::string json_string(std::string_view text) {

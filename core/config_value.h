@@ -30,15 +30,7 @@ struct ConfigMember;
 
 /// One JSON value: plain data, for reading and for writing. Objects keep the order in which keys were written.
 struct ConfigValue {
-  enum class Kind {
-    kNull,
-    kBoolean,
-    kNumber,
-    kString,
-    kArray,
-    kObject,
-    kUnreadable,  ///< reported already by the parser; readers pass over it
-  };
+  enum class Kind { kNull, kBoolean, kNumber, kString, kArray, kObject };
   Kind kind = Kind::kNull;
   bool boolean = false;
   std::string text;  ///< of a number: as written, so that every type rounds it once; of a string: its UTF-8 characters

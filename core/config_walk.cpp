@@ -42,9 +42,7 @@ class Reader {
       if (field.kind == FieldKind::kStep || field.kind == FieldKind::kRule) continue;
       const std::size_t before = problems_.size();
       read_field(value, field, pointer);
-      const ConfigValue* const read = find_member(value, field.name);
-      if (problems_.size() != before || (read != nullptr && read->kind == Kind::kUnreadable))
-        wrong.push_back(field.name);
+      if (problems_.size() != before) wrong.push_back(field.name);
     }
     check_rules(value, fields, wrong, pointer);
   }
@@ -52,10 +50,9 @@ class Reader {
  private:
   bool expect_object(const ConfigValue& value, const std::string& pointer) {
     if (value.kind == Kind::kObject) return true;
-    if (value.kind != Kind::kUnreadable)
-      problems_.add(value.origin, pointer,
-                    value.kind == Kind::kNull ? "null is not an object: write {...}, or leave the key out"
-                                              : shown(value) + " is " + kind_name(value) + ", not an object");
+    problems_.add(value.origin, pointer,
+                  value.kind == Kind::kNull ? "null is not an object: write {...}, or leave the key out"
+                                            : shown(value) + " is " + kind_name(value) + ", not an object");
     return false;
   }
 
@@ -68,7 +65,6 @@ class Reader {
             "the key \"" + field.name + "\" is missing" + (field.allowed.empty() ? "" : "; allowed: " + field.allowed));
       return;
     }
-    if (value->kind == Kind::kUnreadable) return;
     const std::string here = child_pointer(pointer, field.name);
     switch (field.kind) {
       case FieldKind::kValue:

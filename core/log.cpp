@@ -19,36 +19,11 @@
 namespace hsi4d {
 namespace {
 
-spdlog::level::level_enum spdlog_level(LogLevel level) {
-  switch (level) {
-    case LogLevel::kTrace:
-      return spdlog::level::trace;
-    case LogLevel::kDebug:
-      return spdlog::level::debug;
-    case LogLevel::kInfo:
-      return spdlog::level::info;
-    case LogLevel::kWarning:
-      return spdlog::level::warn;
-    case LogLevel::kError:
-      return spdlog::level::err;
-  }
-  throw InternalError("no such log level");
-}
+// Levels are spdlog's own, by number and by name.
+static_assert(static_cast<int>(LogLevel::kTrace) == spdlog::level::trace);
+static_assert(static_cast<int>(LogLevel::kError) == spdlog::level::err);
 
-LogLevel own_level(spdlog::level::level_enum level) {
-  switch (level) {
-    case spdlog::level::trace:
-      return LogLevel::kTrace;
-    case spdlog::level::debug:
-      return LogLevel::kDebug;
-    case spdlog::level::info:
-      return LogLevel::kInfo;
-    case spdlog::level::warn:
-      return LogLevel::kWarning;
-    default:
-      return LogLevel::kError;
-  }
-}
+spdlog::level::level_enum spdlog_level(LogLevel level) { return static_cast<spdlog::level::level_enum>(level); }
 
 class FunctionSink : public spdlog::sinks::base_sink<std::mutex> {
  public:
@@ -56,7 +31,7 @@ class FunctionSink : public spdlog::sinks::base_sink<std::mutex> {
 
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
-    function_(own_level(message.level), std::string_view(message.payload.data(), message.payload.size()));
+    function_(static_cast<LogLevel>(message.level), std::string_view(message.payload.data(), message.payload.size()));
   }
   void flush_() override {}
 
@@ -181,19 +156,8 @@ LogSink install(spdlog::sink_ptr sink, LogLevel least) {
 }  // namespace
 
 std::string_view log_level_name(LogLevel level) {
-  switch (level) {
-    case LogLevel::kTrace:
-      return "trace";
-    case LogLevel::kDebug:
-      return "debug";
-    case LogLevel::kInfo:
-      return "info";
-    case LogLevel::kWarning:
-      return "warning";
-    case LogLevel::kError:
-      return "error";
-  }
-  return "";
+  const spdlog::string_view_t name = spdlog::level::to_string_view(spdlog_level(level));
+  return {name.data(), name.size()};
 }
 
 LogSink log_to_file(const std::filesystem::path& file, LogLevel least) {

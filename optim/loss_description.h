@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <any>
 #include <functional>
+#include <memory>
 #include <string>
-#include <string_view>
 #include <typeinfo>
 #include <utility>
 #include <vector>
@@ -15,15 +15,23 @@
 
 namespace hsi4d {
 
-/// What a loss term reads, without which it is off: the image and nothing else; the body's pose or motion; objects, or
-/// the body, and the image.
-enum class LossNeeds { kImages, kBody, kObjects, kBodyInImage };
+/// What a loss term may need, as LossInputs (optim/loss_term.h) has it. A term declares it once; what a stage makes for
+/// the term, which stages it can be in and where it is off follow.
+enum class LossInput {
+  kImage,          ///< rendered, target
+  kObjectDepth,    ///< object_depth, object_depth_target
+  kObjectOpacity,  ///< object_opacity, and what the frame says of the objects; a channel of the render each, on demand
+  kHumanOpacity,   ///< human_opacity, human_mask, human_seen; likewise
+  kPose,           ///< body_rotations
+  kMotion,         ///< joints, joints_start, motion, body_points
+  kObjectMotion,   ///< object_points, and motion with objects
+};
 
 /// What a term reads once from its settings; see LossDescription::prepare.
 using PrepareLoss = std::any (*)(const std::any& settings);
 
-/// The inputs made on demand (kReads… in optim/loss_term.h) that a term reads with these settings.
-using LossReads = std::function<std::vector<std::string>(const std::any& settings)>;
+/// What a term needs with these settings. It is off where none of it is given.
+using LossNeeds = std::function<std::vector<LossInput>(const std::any& settings)>;
 
 /// A loss term as configs and `hsi4d list losses` see it. Made by describe_loss.
 struct LossDescription {
@@ -31,11 +39,10 @@ struct LossDescription {
   std::string summary;  ///< one line
   std::any defaults;    ///< its own settings before anything is read; empty for a term that has none
   void (*describe_settings)(ConfigFields&, std::any&) = nullptr;
-  LossReads reads = {};           ///< made by reading() of optim/loss_term.h. Null: no such input
+  LossNeeds needs = {};           ///< made by needing() of optim/loss_term.h. Null: the image
   PrepareLoss prepare = nullptr;  ///< reads the files that the settings name, say: once, before a run writes anything.
                                   ///< What it returns is recorded from in place of the settings. Null: nothing to do
   double weight = 1;              ///< the default
-  LossNeeds needs = LossNeeds::kImages;
 };
 
 /// A loss term without settings of its own.
@@ -66,11 +73,8 @@ inline std::any prepared_loss(PrepareLoss prepare, const std::any& settings) {
 struct LossSettings {
   double weight = 1;
   std::any own;
-  void (*describe_own)(ConfigFields&, std::any&) = nullptr;
-  PrepareLoss prepare = nullptr;
-  LossNeeds needs = LossNeeds::kImages;
-  std::any prepared;  ///< of `own`, by prepare_losses (optim/stage_settings.h); empty before
-  LossReads reads = {};
+  std::shared_ptr<const LossDescription> term = {};  ///< null: a term without settings that needs the image
+  std::any prepared = {};  ///< of `own`, by prepare_losses (optim/stage_settings.h); empty before
 
   /// The term's own settings. Throws InternalError when the term has others than `Settings`.
   template <class Settings>
@@ -82,22 +86,27 @@ struct LossSettings {
   }
 };
 
-/// Whether a term with these settings is on and reads the input, one that is made on demand.
-inline bool reads_input(const LossSettings& loss, std::string_view input) {
-  if (loss.weight == 0 || !loss.reads) return false;
-  const std::vector<std::string> inputs = loss.reads(loss.own);
-  return std::find(inputs.begin(), inputs.end(), input) != inputs.end();
+/// What a term with these settings needs, whether it is on or not.
+inline std::vector<LossInput> needs_of(const LossSettings& loss) {
+  return loss.term && loss.term->needs ? loss.term->needs(loss.own) : std::vector{LossInput::kImage};
+}
+
+/// Whether a term with these settings is on and needs the input.
+inline bool needs_input(const LossSettings& loss, LossInput input) {
+  if (loss.weight == 0) return false;
+  const std::vector<LossInput> needs = needs_of(loss);
+  return std::find(needs.begin(), needs.end(), input) != needs.end();
 }
 
 /// The settings of a term before anything is read.
 inline LossSettings default_settings(const LossDescription& loss) {
-  return {loss.weight, loss.defaults, loss.describe_settings, loss.prepare, loss.needs, {}, loss.reads};
+  return {loss.weight, loss.defaults, std::make_shared<const LossDescription>(loss)};
 }
 
 /// Describes the weight and the term's own settings.
 inline void describe(ConfigFields& fields, LossSettings& settings) {
   fields.number("weight", settings.weight, {.min = 0}, "Factor in the stage's sum; 0: off");
-  if (settings.describe_own) settings.describe_own(fields, settings.own);
+  if (settings.term && settings.term->describe_settings) settings.term->describe_settings(fields, settings.own);
 }
 
 }  // namespace hsi4d

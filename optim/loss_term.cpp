@@ -3,6 +3,27 @@
 namespace hsi4d {
 
 template <class S>
+bool LossInputs<S>::gives(LossInput need) const {
+  switch (need) {
+    case LossInput::kImage:
+      return given(rendered) && given(target);
+    case LossInput::kObjectDepth:
+      return given(object_depth) && given(object_depth_target) && object_depth.shape().rows > 0;
+    case LossInput::kObjectOpacity:
+      return given(object_opacity) && object_opacity.shape().planes > 0;
+    case LossInput::kHumanOpacity:
+      return given(human_opacity);
+    case LossInput::kPose:
+      return given(body_rotations);
+    case LossInput::kMotion:
+      return given(joints) && motion;
+    case LossInput::kObjectMotion:
+      return object_points && motion && !motion->objects.empty();
+  }
+  return false;
+}
+
+template <class S>
 LossInputs<S> with_seams(LossInputs<S> inputs, const SeamMode& mode) {
   for (Var<S>* input : {&inputs.rendered, &inputs.object_opacity, &inputs.human_opacity, &inputs.object_place,
                         &inputs.object_depth, &inputs.body_rotations, &inputs.joints}) {
@@ -17,6 +38,8 @@ LossInputs<S> with_seams(LossInputs<S> inputs, const SeamMode& mode) {
   return inputs;
 }
 
+template bool LossInputs<float>::gives(LossInput) const;
+template bool LossInputs<double>::gives(LossInput) const;
 template LossInputs<float> with_seams(LossInputs<float>, const SeamMode&);
 template LossInputs<double> with_seams(LossInputs<double>, const SeamMode&);
 

@@ -1,6 +1,7 @@
 // Loss terms: what they may read, and how they are listed. docs/adding_a_loss.md shows how to write one.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -14,11 +15,11 @@ namespace hsi4d {
 
 /// What a term may leave out of its sum, though its inputs are given: objects, or the human.
 struct LeftOut {
-  std::string term, reason;
+  std::string term;
+  std::string reason;                             ///< empty: its mask is, of which a run warns before it begins
   Index objects = 0;                              ///< 1 of the human
   std::function<bool(Index object)> is_left_out;  ///< in the tape's last forward run
   bool of_human = false;
-  bool is_of_masks = false;  ///< it follows from the frame's masks, of which a run warns before it begins
 };
 
 /// What a term tells of what it found when it was recorded.
@@ -36,7 +37,7 @@ struct LossInputs {
   Var<S> weight;    ///< [1,H,W] how much a pixel counts, 0 to 1; not given where all do
 
   Var<S> object_opacity;  ///< [O,H,W] rendered opacity Σ T α of each object's Gaussians, occluders included, 0 to 1;
-                          ///< only for terms that `read` it, as the next three
+                          ///< only for terms that need kObjectOpacity, as the next three
   Var<S> object_center_target;  ///< [O,3] centre of each object in the frame: x px, y px (pixel centres at +0.5), and
                                 ///< how much of it the frame shows, up to 1; 0 where none is
   Var<S> object_masks;          ///< [O,H,W] what of the frame shows each object, 0 to 1
@@ -46,7 +47,7 @@ struct LossInputs {
   Var<S> object_depth;          ///< [O,1] mean camera z of each object's Gaussian centres, metres
   Var<S> object_depth_target;   ///< [O,1] what it was in the clip's first frame, metres
 
-  Var<S> human_opacity;  ///< [1,H,W] Σ T α of the human's Gaussians; only for terms that `read` it, as the next two
+  Var<S> human_opacity;  ///< [1,H,W] Σ T α of the human's Gaussians; for terms that need kHumanOpacity, as the next two
   Var<S> human_mask;     ///< [1,H,W] what of the frame shows the human, 0 to 1
   Var<S> human_seen;     ///< [1,1] 1, or 0 where the frame shows none of the human
 
@@ -67,6 +68,7 @@ struct LossInputs {
   std::vector<LossNote>* notes = nullptr;    ///< where it tells what it found; null: nobody asks
 
   static bool given(Var<S> input) { return input.tape != nullptr; }
+  bool gives(LossInput need) const;
 };
 
 /// The same inputs behind seams (autodiff/seam.h), what functions record of them too.
@@ -75,7 +77,8 @@ template <class S>
 LossInputs<S> with_seams(LossInputs<S> inputs, const SeamMode& mode);
 
 /// A loss term: its description, and the function that records it on a tape and returns a scalar, or an empty Var where
-/// an input that it needs is not given: the term is off then, and the stage reports it.
+/// it cannot: the term is off then, and the stage reports it. Of a term that declares what it needs the function is
+/// called only where some of that is given.
 struct LossTerm {
   LossDescription description;
   Var<float> (*record_float)(const LossInputs<float>& inputs, const std::any& prepared) = nullptr;
@@ -84,6 +87,11 @@ struct LossTerm {
   /// Records the term. `prepared` is prepared_loss of its settings; of most terms those are the settings themselves.
   template <class S>
   Var<S> record(const LossInputs<S>& inputs, const std::any& prepared) const {
+    if (description.needs) {
+      const std::vector<LossInput> needs = description.needs(prepared);
+      const auto is_given = [&inputs](LossInput need) { return inputs.gives(need); };
+      if (std::none_of(needs.begin(), needs.end(), is_given)) return {};
+    }
     if constexpr (std::is_same_v<S, float>) {
       return record_float(inputs, prepared);
     } else {
@@ -97,22 +105,17 @@ struct LossTerm {
   }
 };
 
-/// Inputs that are made only for stages with a term that reads them: each is a channel of the render, which costs time
-/// in every iteration. What the frame says of the same (masks, centres) comes with them.
-inline constexpr const char* kReadsHumanOpacity = "human_opacity";
-inline constexpr const char* kReadsObjectOpacity = "object_opacity";
-
-/// A term that reads inputs which are made on demand.
-inline LossTerm reading(LossTerm term, std::vector<std::string> inputs) {
-  term.description.reads = [inputs = std::move(inputs)](const std::any&) { return inputs; };
+/// A term that declares what it needs; it is off where none of it is given.
+inline LossTerm needing(std::vector<LossInput> inputs, LossTerm term) {
+  term.description.needs = [inputs = std::move(inputs)](const std::any&) { return inputs; };
   return term;
 }
 
-/// One whose settings say which of them it reads.
+/// One whose settings say what it needs; not for terms that prepare something of their settings.
 /// @param inputs_of  the inputs of a `const Settings&`
 template <class Settings, class F>
-LossTerm reading(LossTerm term, F inputs_of) {
-  term.description.reads = [inputs_of](const std::any& settings) -> std::vector<std::string> {
+LossTerm needing(F inputs_of, LossTerm term) {
+  term.description.needs = [inputs_of](const std::any& settings) -> std::vector<LossInput> {
     return inputs_of(std::any_cast<const Settings&>(settings));
   };
   return term;

@@ -38,10 +38,8 @@ class StageRun {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
     for (const OptimizerGroup<S>& group : groups_) {
       hold(group.parameters);
-      first_of_all_ = std::max(first_of_all_, static_cast<Index>(group.settings.from));
     }
     held_ = reached_outputs(options.held);
-    if (settings.plateau.iterations > 0) losses_.reserve(static_cast<std::size_t>(settings.iterations));
     for (const LeftOut& asked : loss_.left_out) left_out_.emplace_back(static_cast<std::size_t>(asked.objects), 0);
     if (options.curvature != nullptr) optimizer_.set_curvature(*options.curvature);
     if (options.kept == nullptr || optimizer_.adam() == nullptr) return;
@@ -55,8 +53,7 @@ class StageRun {
   StageResult run(const StageCallback& callback) {
     const auto start = Clock::now();
     Index iterations = 0;
-    while (iterations < settings_.iterations && !optimizer_.is_done() && !is_on_plateau())
-      iterate(iterations++, callback);
+    while (iterations < settings_.iterations && !optimizer_.is_done()) iterate(iterations++, callback);
     evaluate_the_end();
     keep_moments();
     keep_curvature();
@@ -94,7 +91,6 @@ class StageRun {
     const StepReport step = optimizer_.step(i, settings_.iterations, loss);
     if (step.rolled_back) note_rollback(*step.bad, i);
     if (!step.rolled_back) {
-      if (settings_.plateau.iterations > 0 && i >= first_of_all_) losses_.push_back(loss);
       offender_.clear();
       wrap_rotations(step);
       hold_ranges(step);
@@ -176,16 +172,6 @@ class StageRun {
     for (const Var<S> block : group.blocks) hold_in_range(block, *group.range);
   }
 
-  /// Only losses count after which every group has begun to move.
-  bool is_on_plateau() const {
-    const std::ptrdiff_t count = settings_.plateau.iterations;
-    if (count == 0 || std::ssize(losses_) < 2 * count) return false;
-    const auto middle = losses_.end() - count;
-    const double now = std::accumulate(middle, losses_.end(), 0.0);
-    const double before = std::accumulate(middle - count, middle, 0.0);
-    return !(now < before - settings_.plateau.gain * std::fabs(before));
-  }
-
   double evaluated_loss() const { return static_cast<double>(tape_.value(loss_.total).scalar()); }
 
   void read_terms() {
@@ -203,8 +189,7 @@ class StageRun {
       for (std::size_t o = 0; o < left_out_[k].size(); ++o) {
         if (left_out_[k][o] == 0) continue;
         const LeftOut& asked = loss_.left_out[k];
-        objects.push_back(
-            {asked.term, asked.reason, static_cast<Index>(o), left_out_[k][o], asked.of_human, asked.is_of_masks});
+        objects.push_back({asked.term, asked.reason, static_cast<Index>(o), left_out_[k][o], asked.of_human});
       }
     }
     return objects;
@@ -301,8 +286,6 @@ class StageRun {
   std::vector<std::vector<Index>> left_out_;  // evaluations, by loss_.left_out and object
   std::vector<GradientShare> shares_;         // of this iteration
   std::vector<HeldOutput> held_;
-  std::vector<double> losses_;  // of good evaluations, where a plateau ends the stage
-  Index first_of_all_ = 0;      // the first iteration in which all groups may move
   StageTimes times_;
   std::string offender_;  // of the last evaluation, if it was bad
 };

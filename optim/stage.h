@@ -40,12 +40,12 @@ struct IterationReport {
 /// Called after every iteration. May throw to end the stage: the parameters then stay as they are.
 using StageCallback = std::function<void(const IterationReport&)>;
 
-/// An object, or the human, that a term left out in some evaluations of a stage.
+/// An object, or the human, that a term left out in some evaluations of a stage, as LeftOut has it.
 struct LeftOutObject {
   std::string term, reason;
   Index object = 0;
-  Index evaluations = 0;                       ///< of iterations + 1
-  bool of_human = false, is_of_masks = false;  ///< as LeftOut has them
+  Index evaluations = 0;  ///< of iterations + 1
+  bool of_human = false;
 };
 
 /// Where the time of a stage went, seconds.

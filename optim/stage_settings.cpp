@@ -1,5 +1,7 @@
 #include "optim/stage_settings.h"
 
+#include <algorithm>
+
 #include "core/check.h"
 
 namespace hsi4d {
@@ -22,16 +24,19 @@ std::string place_of(const std::string& name, LossSettings& loss) {
   return files.size() == 1 ? files.front().pointer : pointer;
 }
 
-const char* words_of(LossNeeds needs) {
-  switch (needs) {
-    case LossNeeds::kImages:
+const char* words_of(LossInput need) {
+  switch (need) {
+    case LossInput::kImage:
       return "an image";
-    case LossNeeds::kBody:
-      return "the body";
-    case LossNeeds::kObjects:
+    case LossInput::kObjectDepth:
+    case LossInput::kObjectOpacity:
       return "objects";
-    case LossNeeds::kBodyInImage:
+    case LossInput::kHumanOpacity:
       return "the body in an image";
+    case LossInput::kPose:
+    case LossInput::kMotion:
+    case LossInput::kObjectMotion:
+      return "the body";
   }
   return "";
 }
@@ -70,12 +75,6 @@ void describe(ConfigFields& f, ParameterGroupSettings& s) {
   });
 }
 
-void describe(ConfigFields& f, PlateauSettings& s) {
-  f.integer("iterations", s.iterations, {.min = 0, .max = kMostIterations},
-            "Iterations whose mean loss is compared with as many before; 0: never end early");
-  f.number("gain", s.gain, {.min = 0, .below = 1}, "Share by which the mean must fall for the stage to go on");
-}
-
 void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescription>& losses) {
   f.integer("iterations", s.iterations, {.min = 1, .max = kMostIterations}, "Steps of the optimiser").required();
   f.choice("over", s.over, kStageScopes,
@@ -84,8 +83,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   f.choice("weight", s.weight, kPixelWeights,
            "Pixels that count in weighted losses: all, those never masked so far, those outside this frame's masks, "
            "those inside");
-  f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
-            "Longest side of the stage's images, for coarse to fine; 0: that of the run");
   f.map("optimize", s.optimize, "What moves: parameter groups by name");
   f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
   f.integer("gradient_shares", s.gradient_shares, {.min = 0, .max = kMostIterations},
@@ -93,7 +90,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   f.path("pose_weights", s.pose_weights, {.must_exist = true},
          "VPoser's weights (tools/export_vposer.py), for a stage over the sequence; empty: natural poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
-  f.object("plateau", s.plateau, "When the stage ends early, as its loss no longer falls");
   f.rule({"optimizer", "optimize"}, [&s]() -> std::string {
     if (s.optimizer.kind == OptimizerKind::kAdam) return "";
     for (const auto& [name, group] : s.optimize) {
@@ -109,11 +105,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
                ? "gauss_newton evaluates changes of gradients, of which terms have no shares; allowed: 0"
                : "";
   });
-  f.rule({"optimizer", "plateau"}, [&s]() -> std::string {
-    return s.optimizer.kind == OptimizerKind::kGaussNewton && s.plateau.iterations != 0
-               ? "gauss_newton ends by itself, and its evaluations are not all of states that it was in; allowed: 0"
-               : "";
-  });
   f.rule({"optimizer", "over"}, [&s]() -> std::string {
     if (!s.optimizer.keep_curvature) return "";
     return s.over == StageScope::kFrame ? "" : "only a stage over frames has a frame before to keep the curvature of";
@@ -124,9 +115,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   f.rule({"weight", "over"}, [&s]() -> std::string {
     return s.over == StageScope::kSequence && s.weight != PixelWeight::kAll ? "a stage over the sequence draws nothing"
                                                                             : "";
-  });
-  f.rule({"longest_side_px", "over"}, [&s]() -> std::string {
-    return s.over == StageScope::kSequence && s.longest_side_px != 0 ? "a stage over the sequence draws nothing" : "";
   });
   f.rule({"pose_weights", "over"}, [&s]() -> std::string {
     return s.over != StageScope::kSequence && !s.pose_weights.empty() ? "only a stage over the sequence has latents"
@@ -146,9 +134,9 @@ std::vector<LossFault> prepare_losses(StageSettings& stage) {
     }
   }
   for (auto& [name, loss] : stage.losses) {
-    if (loss.weight == 0 || loss.prepare == nullptr || loss.prepared.has_value()) continue;
+    if (loss.weight == 0 || !loss.term || loss.term->prepare == nullptr || loss.prepared.has_value()) continue;
     try {
-      loss.prepared = loss.prepare(loss.own);
+      loss.prepared = loss.term->prepare(loss.own);
     } catch (const UserError& mistake) {
       faults.push_back({place_of(name, loss), mistake.what()});
     } catch (const DataError& damage) {
@@ -158,12 +146,15 @@ std::vector<LossFault> prepare_losses(StageSettings& stage) {
   return faults;
 }
 
-std::vector<LossFault> losses_without_inputs(const StageSettings& stage, LossNeeds has, const std::string& having) {
+std::vector<LossFault> losses_without_inputs(const StageSettings& stage, std::span<const LossInput> has,
+                                             const std::string& having) {
   std::vector<LossFault> faults;
   for (const auto& [name, loss] : stage.losses) {
-    if (loss.weight == 0 || loss.needs == has) continue;
-    faults.push_back({child_pointer("/losses", name),
-                      std::string("this loss needs ") + words_of(loss.needs) + ", which " + having + " does not have"});
+    const std::vector<LossInput> needs = needs_of(loss);
+    const bool is_given = std::find_first_of(needs.begin(), needs.end(), has.begin(), has.end()) != needs.end();
+    if (loss.weight == 0 || is_given || needs.empty()) continue;
+    faults.push_back({child_pointer("/losses", name), std::string("this loss needs ") + words_of(needs.front()) +
+                                                          ", which " + having + " does not have"});
   }
   return faults;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -58,13 +59,6 @@ inline constexpr std::array<ConfigChoice<PixelWeight>, 4> kPixelWeights = {{{Pix
                                                                             {PixelWeight::kBackground, "background"},
                                                                             {PixelWeight::kForeground, "foreground"}}};
 
-/// When a stage ends before its iterations are over: when the mean loss of the last `iterations` is not below
-/// that of as many before by `gain` of it. Losses count from the iteration on in which every group has begun to move.
-struct PlateauSettings {
-  int iterations = 0;  ///< 0: never
-  double gain = 0.01;
-};
-
 inline constexpr int kLongestSide = 65536;  ///< of images, pixels
 
 /// One stage of the method.
@@ -73,20 +67,17 @@ struct StageSettings {
   StageScope over = StageScope::kFrame;
   Draw draw = Draw::kAll;
   PixelWeight weight = PixelWeight::kAll;
-  int longest_side_px = 0;                     ///< of the images that the stage sees, at most; 0: the run's
   ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
   ConfigMap<LossSettings> losses;              ///< by loss term
   int gradient_shares = 0;                     ///< every so many iterations (optim/gradient_shares.h); 0: never
   std::optional<PosePrior> pose_prior;         ///< with pose_weights, by prepare_losses; empty before
   std::filesystem::path pose_weights;          ///< over the sequence: VPoser's weights; empty: natural poses
   OptimizerSettings optimizer;
-  PlateauSettings plateau;
 };
 
 /// Describe the sections. `losses` are the terms that a stage may name.
 void describe(ConfigFields& fields, OptimizerSettings& settings);
 void describe(ConfigFields& fields, ParameterGroupSettings& settings);
-void describe(ConfigFields& fields, PlateauSettings& settings);
 void describe(ConfigFields& fields, StageSettings& settings, const std::vector<LossDescription>& losses);
 
 /// A loss of a stage that cannot be used.
@@ -101,10 +92,16 @@ struct LossFault {
 /// @return  what its prepare function threw as UserError or DataError, a fault a loss
 std::vector<LossFault> prepare_losses(StageSettings& stage);
 
+/// What losses can read in a stage that draws the scene alone, and in one over the sequence.
+inline constexpr std::array<LossInput, 1> kImageInputs = {LossInput::kImage};
+inline constexpr std::array<LossInput, 3> kMotionInputs = {LossInput::kPose, LossInput::kMotion,
+                                                           LossInput::kObjectMotion};
+
 /// Losses that are on and need what the stage does not have.
 ///
-/// @param has     the one thing that it has
+/// @param has     what it has
 /// @param having  the stage in words: "a stage with ..."
-std::vector<LossFault> losses_without_inputs(const StageSettings& stage, LossNeeds has, const std::string& having);
+std::vector<LossFault> losses_without_inputs(const StageSettings& stage, std::span<const LossInput> has,
+                                             const std::string& having);
 
 }  // namespace hsi4d

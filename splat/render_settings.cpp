@@ -55,11 +55,6 @@ void describe(ConfigFields& f, RenderSkips& s) {
   f.boolean("zero_cotangent", s.zero_cotangent, "The backward pass skips tiles in which the loss sees nothing");
 }
 
-void describe(ConfigFields& f, RenderApproximations& s) {
-  f.boolean("collapse_suffix", s.collapse_suffix,
-            "Composite what is static behind all that moves into one layer, once");
-}
-
 void describe(ConfigFields& f, RenderSettings& s) {
   f.choice("quality", s.quality, kQualities, "Preset of alpha_cap, alpha_min, transmittance_stop and depth_key");
   f.choice("compatibility", s.compatibility, kCompatibilities,

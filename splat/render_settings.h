@@ -87,14 +87,6 @@ struct RenderSkips {
   bool unseen_gaussians = true;
 };
 
-/// What changes the result a little: config section `approx`.
-struct RenderApproximations {
-  /// What stands still behind all that moves in a tile is composited once into one layer, as if nothing were in front
-  /// of it. T of a pixel is off by at most transmittance_stop, or transmittance_stop / (1 − alpha_cap) where the stop
-  /// rule is exclusive, as either result may leave out the Gaussian that crosses it. Needs static_layer.
-  bool collapse_suffix = false;
-};
-
 /// Sets what the quality names: `fast` stops earlier; `accurate` has no cap, alpha_min 2e-6 and stop 1e-7; `reference`
 /// has no cap, no cut, no stop and sorts in double.
 void apply_quality(RenderSettings& settings, Quality quality);
@@ -104,9 +96,8 @@ void apply_quality(RenderSettings& settings, Quality quality);
 /// 1e-4, its square support of 3σ, and the gradient passed through the cap.
 void apply_compatibility(RenderSettings& settings, Compatibility compatibility);
 
-/// Describe the sections `skip` and `approx`.
+/// Describes the section `skip`.
 void describe(ConfigFields& fields, RenderSkips& skip);
-void describe(ConfigFields& fields, RenderApproximations& approx);
 
 /// Describes every setting. A preset is applied before the other keys are read, so an explicitly written key wins.
 void describe(ConfigFields& fields, RenderSettings& settings);

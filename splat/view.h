@@ -20,7 +20,6 @@ struct SplatView {
   Vector3<double> origin_world = Vector3<double>::Zero();
   RenderSettings settings;
   RenderSkips skip = {};
-  RenderApproximations approx = {};
 };
 
 namespace detail {

@@ -11,29 +11,22 @@ namespace hsi4d {
 
 namespace {
 
-enum class CenterUnit { kPixels, kWidth };
-
-constexpr std::array<ConfigChoice<CenterUnit>, 2> kCenterUnits = {
-    {{CenterUnit::kPixels, "pixels"}, {CenterUnit::kWidth, "width"}}};
-
 /// What the term has a gradient to.
 enum class CenterMoves { kAll, kObject };
 
 constexpr std::array<ConfigChoice<CenterMoves>, 2> kCenterMoves = {
     {{CenterMoves::kAll, "all"}, {CenterMoves::kObject, "object"}}};
 
-/// In pixels the method's weight of 1e-3 makes an error of 5 px worth 0.025, as much as a photometric difference of 6
-/// grey levels: the term leads a lost object back, and fades below a pixel (1e-3), where colours say more. In widths of
-/// the image the same error is worth 1e-7 or less: the term would do nothing.
+/// Distances are in pixels: the method's weight of 1e-3 makes an error of 5 px worth 0.025, as much as a photometric
+/// difference of 6 grey levels. The term leads a lost object back, and fades below a pixel (1e-3), where colours say
+/// more.
 struct CenterSettings {
-  CenterUnit unit = CenterUnit::kPixels;
   double min_opacity = 1;  // pixels
   bool by_share = false;
   CenterMoves moves = CenterMoves::kAll;
 };
 
 void describe(ConfigFields& fields, CenterSettings& settings) {
-  fields.choice("unit", settings.unit, kCenterUnits, "Unit of distance: pixels, or the image's width");
   fields.number(
       "min_opacity", settings.min_opacity, {.min = 1e-6},
       "Opacity, in pixels, below which an object is hidden: the term is off or, with moves `object`, leads its place");
@@ -70,7 +63,7 @@ Var<S> centres_by_place(const LossInputs<S>& in, double min_opacity) {
 
 /// Columns x, y, mass of the centres beside x, y, visible of the targets; each object's distance², 0 where it is off.
 template <class S>
-Var<S> mean_squared_distance(Var<S> centres, Var<S> targets, const CenterSettings& settings, double unit_px) {
+Var<S> mean_squared_distance(Var<S> centres, Var<S> targets, const CenterSettings& settings) {
   const auto column = [](Var<S> x, Index c) { return slice_cols(x, c, 1); };
   const double least = settings.min_opacity;
   const bool by_share = settings.by_share;
@@ -82,7 +75,7 @@ Var<S> mean_squared_distance(Var<S> centres, Var<S> targets, const CenterSetting
                  const auto distance = square(x - target_x) + square(y - target_y);
                  return select(on, select(by_share, visible, S(1)) * distance, S(0));
                });
-  return total * (1 / (static_cast<double>(centres.shape().rows) * unit_px * unit_px));
+  return total * (1 / static_cast<double>(centres.shape().rows));
 }
 
 /// Objects that the frame shows and the render hides.
@@ -99,24 +92,20 @@ LeftOut hidden_objects(Var<S> centres, Var<S> targets, double min_opacity) {
 }  // namespace
 
 LossTerm center_loss() {
-  LossTerm term = make_loss_term<CenterSettings>(
-      "center", "Distance between the centre of each rendered object and that of its mask in the frame",
-      [](const auto& in, const CenterSettings& settings) {
-        using Value = decltype(in.object_opacity);
-        if (!in.given(in.object_opacity) || !in.given(in.object_center_target)) return Value{};
-        if (settings.moves == CenterMoves::kObject && !in.given(in.object_place)) return Value{};
-        const Shape image = in.object_opacity.shape();
-        if (image.planes == 0) return Value{};
-        const double unit_px = settings.unit == CenterUnit::kPixels ? 1 : static_cast<double>(image.cols);
-        const auto centres = settings.moves == CenterMoves::kAll ? centroids(in.object_opacity)
-                                                                 : centres_by_place(in, settings.min_opacity);
-        if (in.left_out != nullptr) {
-          in.left_out->push_back(hidden_objects(centres, in.object_center_target, settings.min_opacity));
-        }
-        return mean_squared_distance(centres, in.object_center_target, settings, unit_px);
-      });
-  term.description.needs = LossNeeds::kObjects;
-  return reading(std::move(term), {kReadsObjectOpacity});
+  return needing({LossInput::kObjectOpacity},
+                 make_loss_term<CenterSettings>(
+                     "center", "Distance between the centre of each rendered object and that of its mask in the frame",
+                     [](const auto& in, const CenterSettings& settings) {
+                       using Value = decltype(in.object_opacity);
+                       if (settings.moves == CenterMoves::kObject && !in.given(in.object_place)) return Value{};
+                       const auto centres = settings.moves == CenterMoves::kAll
+                                                ? centroids(in.object_opacity)
+                                                : centres_by_place(in, settings.min_opacity);
+                       if (in.left_out != nullptr) {
+                         in.left_out->push_back(hidden_objects(centres, in.object_center_target, settings.min_opacity));
+                       }
+                       return mean_squared_distance(centres, in.object_center_target, settings);
+                     }));
 }
 
 }  // namespace hsi4d

@@ -67,23 +67,23 @@ LossNote note_of(const ContactPairs& pairs, const MotionStart& motion, double di
 }  // namespace
 
 LossTerm contact_loss() {
-  LossTerm term = make_loss_term<ContactSettings>(
-      "contact", "How far hands are from the object that they were near to",
-      [](const auto& in, const ContactSettings& settings) {
-        using Value = decltype(in.joints);
-        if (!in.given(in.joints) || !in.motion || in.motion->objects.empty()) return Value{};
-        auto& tape = in.joints.owner();
-        const ContactPairs pairs = contact_pairs(*in.motion, settings.distance);
-        if (in.notes != nullptr) in.notes->push_back(note_of(pairs, *in.motion, settings.distance));
-        if (pairs.hands.empty()) return sum(in.joints) * 0.0;  // depends on what the term does, and moves nothing
-        const Value hands = in.body_points(pairs.hands), objects = in.object_points(pairs.objects);
-        const Value weights = tape.constant("contact_weights", shape_of(static_cast<Index>(pairs.weights.size()), 1));
-        const auto numbers = tape.write(weights);
-        std::copy(pairs.weights.begin(), pairs.weights.end(), numbers.data);
-        return l2(hands, objects, weights) * static_cast<double>(hands.shape().count());
-      });
-  term.description.needs = LossNeeds::kBody;
-  return term;
+  return needing({LossInput::kObjectMotion},
+                 make_loss_term<ContactSettings>(
+                     "contact", "How far hands are from the object that they were near to",
+                     [](const auto& in, const ContactSettings& settings) {
+                       using Value = decltype(in.joints);
+                       auto& tape = in.joints.owner();
+                       const ContactPairs pairs = contact_pairs(*in.motion, settings.distance);
+                       if (in.notes != nullptr) in.notes->push_back(note_of(pairs, *in.motion, settings.distance));
+                       if (pairs.hands.empty())
+                         return sum(in.joints) * 0.0;  // depends on what the term does, and moves nothing
+                       const Value hands = in.body_points(pairs.hands), objects = in.object_points(pairs.objects);
+                       const Value weights =
+                           tape.constant("contact_weights", shape_of(static_cast<Index>(pairs.weights.size()), 1));
+                       const auto numbers = tape.write(weights);
+                       std::copy(pairs.weights.begin(), pairs.weights.end(), numbers.data);
+                       return l2(hands, objects, weights) * static_cast<double>(hands.shape().count());
+                     }));
 }
 
 }  // namespace hsi4d

@@ -5,14 +5,9 @@
 namespace hsi4d {
 
 LossTerm depth_loss() {
-  LossTerm term = make_loss_term(
-      "depth", "Difference of each object's mean depth and that of the clip's first frame", [](const auto& in) {
-        const bool given =
-            in.given(in.object_depth) && in.given(in.object_depth_target) && in.object_depth.shape().rows > 0;
-        return given ? l2(in.object_depth, in.object_depth_target) : decltype(in.object_depth){};
-      });
-  term.description.needs = LossNeeds::kObjects;
-  return term;
+  return needing({LossInput::kObjectDepth},
+                 make_loss_term("depth", "Difference of each object's mean depth and that of the clip's first frame",
+                                [](const auto& in) { return l2(in.object_depth, in.object_depth_target); }));
 }
 
 }  // namespace hsi4d

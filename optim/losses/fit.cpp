@@ -7,14 +7,12 @@
 namespace hsi4d {
 
 LossTerm fit_loss() {
-  LossTerm term = make_loss_term("fit", "How far the joints are from where the stage found them", [](const auto& in) {
-    if (!in.given(in.joints) || !in.given(in.joints_start) || !in.motion) return decltype(in.joints){};
-    // Frames that stand still add nothing to the sum.
-    const double frames = static_cast<double>(in.motion->moving_frames());
-    return l2(in.joints, in.joints_start) * (static_cast<double>(in.joints.shape().count()) / frames);
-  });
-  term.description.needs = LossNeeds::kBody;
-  return term;
+  return needing({LossInput::kMotion},
+                 make_loss_term("fit", "How far the joints are from where the stage found them", [](const auto& in) {
+                   // Frames that stand still add nothing to the sum.
+                   const double frames = static_cast<double>(in.motion->moving_frames());
+                   return l2(in.joints, in.joints_start) * (static_cast<double>(in.joints.shape().count()) / frames);
+                 }));
 }
 
 }  // namespace hsi4d

@@ -48,22 +48,22 @@ std::vector<double> standing_weights(const MotionStart& motion, Index coordinate
 }  // namespace
 
 LossTerm foot_sliding_loss() {
-  LossTerm term = make_loss_term<FootSlidingSettings>(
-      "foot_sliding", "How far feet that stand go between adjacent frames",
-      [](const auto& in, const FootSlidingSettings& settings) {
-        if (!in.given(in.joints) || !in.motion || in.motion->frames() < 2) return decltype(in.joints){};
-        const Index coordinates = in.joints.shape().cols, first = first_pair(*in.motion),
-                    pairs = in.motion->frames() - 1 - first;
-        const std::vector<double> stand = standing_weights(*in.motion, coordinates, settings.rule);
-        auto& tape = in.joints.owner();
-        const auto weights = tape.constant("standing", shape_of(pairs, coordinates));
-        const auto numbers = tape.write(weights);
-        std::copy(stand.begin(), stand.end(), numbers.data);
-        return l2(slice_rows(in.joints, first + 1, pairs), slice_rows(in.joints, first, pairs), weights) *
-               static_cast<double>(coordinates);
-      });
-  term.description.needs = LossNeeds::kBody;
-  return term;
+  return needing({LossInput::kMotion},
+                 make_loss_term<FootSlidingSettings>(
+                     "foot_sliding", "How far feet that stand go between adjacent frames",
+                     [](const auto& in, const FootSlidingSettings& settings) {
+                       if (in.motion->frames() < 2) return decltype(in.joints){};
+                       const Index coordinates = in.joints.shape().cols, first = first_pair(*in.motion),
+                                   pairs = in.motion->frames() - 1 - first;
+                       const std::vector<double> stand = standing_weights(*in.motion, coordinates, settings.rule);
+                       auto& tape = in.joints.owner();
+                       const auto weights = tape.constant("standing", shape_of(pairs, coordinates));
+                       const auto numbers = tape.write(weights);
+                       std::copy(stand.begin(), stand.end(), numbers.data);
+                       return l2(slice_rows(in.joints, first + 1, pairs), slice_rows(in.joints, first, pairs),
+                                 weights) *
+                              static_cast<double>(coordinates);
+                     }));
 }
 
 }  // namespace hsi4d

@@ -45,26 +45,25 @@ LowestPoints lowest_points(const MotionStart& motion, const std::vector<Index>& 
 }  // namespace
 
 LossTerm ground_loss() {
-  LossTerm term = make_loss_term<GroundSettings>(
-      "ground", "How far the lower foot is above or below where the ground was in the first frame",
-      [](const auto& in, const GroundSettings& settings) {
-        using Value = decltype(in.joints);
-        if (!in.given(in.joints) || !in.motion) return Value{};
-        const MotionStart& motion = *in.motion;
-        const std::vector<Index> feet = rows_of_joints(*motion.avatar, is_foot_joint);
-        if (feet.empty()) return Value{};
-        const Index count = std::min(settings.points, std::ssize(feet));
-        std::vector<BodyPoint> points;
-        for (Index t = motion.still_frames; t < motion.frames(); ++t) {
-          const LowestPoints lowest = lowest_points(motion, feet, t, count);
-          points.insert(points.end(), lowest.points.begin(), lowest.points.end());
-        }
-        const Value heights = reshape(slice_cols(in.body_points(points), 2, 1), motion.moving_frames(), count);
-        const double ground = lowest_points(motion, feet, kFirstFrame, count).height;
-        return mean(square(sum_cols(heights) * (1 / static_cast<double>(count)) - ground));
-      });
-  term.description.needs = LossNeeds::kBody;
-  return term;
+  return needing({LossInput::kMotion},
+                 make_loss_term<GroundSettings>(
+                     "ground", "How far the lower foot is above or below where the ground was in the first frame",
+                     [](const auto& in, const GroundSettings& settings) {
+                       using Value = decltype(in.joints);
+                       const MotionStart& motion = *in.motion;
+                       const std::vector<Index> feet = rows_of_joints(*motion.avatar, is_foot_joint);
+                       if (feet.empty()) return Value{};
+                       const Index count = std::min(settings.points, std::ssize(feet));
+                       std::vector<BodyPoint> points;
+                       for (Index t = motion.still_frames; t < motion.frames(); ++t) {
+                         const LowestPoints lowest = lowest_points(motion, feet, t, count);
+                         points.insert(points.end(), lowest.points.begin(), lowest.points.end());
+                       }
+                       const Value heights =
+                           reshape(slice_cols(in.body_points(points), 2, 1), motion.moving_frames(), count);
+                       const double ground = lowest_points(motion, feet, kFirstFrame, count).height;
+                       return mean(square(sum_cols(heights) * (1 / static_cast<double>(count)) - ground));
+                     }));
 }
 
 }  // namespace hsi4d

@@ -12,12 +12,9 @@ constexpr double kLimitWeight = 0.01;  // from 0.001 to 1 as good (docs/numerics
 
 LossTerm joint_limits_loss() {
   LossTerm term =
-      make_loss_term("joint_limits", "How far the body's joints are beyond their ranges", [](const auto& in) {
-        if (!in.given(in.body_rotations)) return decltype(in.body_rotations){};
-        return joint_limit_energy(in.body_rotations);
-      });
+      needing({LossInput::kPose}, make_loss_term("joint_limits", "How far the body's joints are beyond their ranges",
+                                                 [](const auto& in) { return joint_limit_energy(in.body_rotations); }));
   term.description.weight = kLimitWeight;
-  term.description.needs = LossNeeds::kBody;
   return term;
 }
 

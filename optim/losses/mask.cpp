@@ -18,10 +18,10 @@ void describe(ConfigFields& fields, MaskSettings& settings) {
   fields.boolean("objects", settings.objects, "The objects' silhouettes count");
 }
 
-std::vector<std::string> opacities_of(const MaskSettings& settings) {
-  std::vector<std::string> inputs;
-  if (settings.human) inputs.emplace_back(kReadsHumanOpacity);
-  if (settings.objects) inputs.emplace_back(kReadsObjectOpacity);
+std::vector<LossInput> opacities_of(const MaskSettings& settings) {
+  std::vector<LossInput> inputs;
+  if (settings.human) inputs.push_back(LossInput::kHumanOpacity);
+  if (settings.objects) inputs.push_back(LossInput::kObjectOpacity);
   return inputs;
 }
 
@@ -29,18 +29,13 @@ std::vector<std::string> opacities_of(const MaskSettings& settings) {
 /// @param seen  1 or 0 of each plane
 template <class S>
 LeftOut unseen(Var<S> seen, bool of_human) {
-  return {"mask",
-          "its mask is empty",
-          seen.shape().count(),
-          [=](Index object) { return !(seen.owner().value(seen).data[object] >= S(0.5)); },
-          of_human,
-          true};
+  return {"mask", "", seen.shape().count(),
+          [=](Index object) { return !(seen.owner().value(seen).data[object] >= S(0.5)); }, of_human};
 }
 
 /// Mean over planes and pixels, planes that are not seen being 0.
 template <class S>
 Var<S> silhouettes(const LossInputs<S>& in, Var<S> opacity, Var<S> masks, Var<S> seen, bool of_human) {
-  if (!in.given(opacity) || !in.given(masks) || !in.given(seen) || opacity.shape().planes == 0) return {};
   if (in.left_out != nullptr) in.left_out->push_back(unseen(seen, of_human));
   return l2(opacity, masks, seen);
 }
@@ -48,19 +43,20 @@ Var<S> silhouettes(const LossInputs<S>& in, Var<S> opacity, Var<S> masks, Var<S>
 }  // namespace
 
 LossTerm mask_loss() {
-  LossTerm term = make_loss_term<MaskSettings>(
-      "mask", "Difference of the rendered silhouettes and the frame's masks",
-      [](const auto& in, const MaskSettings& settings) {
-        decltype(in.human_mask) human, objects;
-        if (settings.human) human = silhouettes(in, in.human_opacity, in.human_mask, in.human_seen, true);
-        if (settings.objects) objects = silhouettes(in, in.object_opacity, in.object_masks, in.object_seen, false);
-        if (human.tape == nullptr) return objects;
-        if (objects.tape == nullptr) return human;
-        const auto count = static_cast<double>(in.object_masks.shape().planes);
-        return human * (1 / (1 + count)) + objects * (count / (1 + count));
-      });
-  term.description.needs = LossNeeds::kBodyInImage;
-  return reading<MaskSettings>(std::move(term), opacities_of);
+  return needing<MaskSettings>(
+      opacities_of, make_loss_term<MaskSettings>(
+                        "mask", "Difference of the rendered silhouettes and the frame's masks",
+                        [](const auto& in, const MaskSettings& settings) {
+                          decltype(in.human_mask) human, objects;
+                          if (settings.human && in.gives(LossInput::kHumanOpacity))
+                            human = silhouettes(in, in.human_opacity, in.human_mask, in.human_seen, true);
+                          if (settings.objects && in.gives(LossInput::kObjectOpacity))
+                            objects = silhouettes(in, in.object_opacity, in.object_masks, in.object_seen, false);
+                          if (human.tape == nullptr) return objects;
+                          if (objects.tape == nullptr) return human;
+                          const auto count = static_cast<double>(in.object_masks.shape().planes);
+                          return human * (1 / (1 + count)) + objects * (count / (1 + count));
+                        }));
 }
 
 }  // namespace hsi4d

@@ -5,12 +5,12 @@
 namespace hsi4d {
 
 LossTerm masked_l2_loss() {
-  return make_loss_term("masked_l2", "Squared difference of the rendered image and the frame where the weight says so",
-                        [](const auto& in) {
-                          if (!in.given(in.rendered) || !in.given(in.target)) return decltype(in.rendered){};
-                          return in.given(in.weight) ? l2(in.rendered, in.target, in.weight)
-                                                     : l2(in.rendered, in.target);
-                        });
+  return needing(
+      {LossInput::kImage},
+      make_loss_term("masked_l2", "Squared difference of the rendered image and the frame where the weight says so",
+                     [](const auto& in) {
+                       return in.given(in.weight) ? l2(in.rendered, in.target, in.weight) : l2(in.rendered, in.target);
+                     }));
 }
 
 }  // namespace hsi4d

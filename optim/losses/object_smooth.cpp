@@ -70,7 +70,6 @@ Var<S> standing_places(Tape<S>& tape, const MotionStart& motion, const std::vect
 
 template <class S>
 Var<S> object_smooth(const LossInputs<S>& in, const ObjectSmoothSettings& settings) {
-  if (!in.motion || !in.object_points || in.motion->objects.empty()) return {};
   const MotionStart& motion = *in.motion;
   // Differences between frames that stand say nothing.
   const Index first = std::max<Index>(0, motion.still_frames - settings.order);
@@ -92,11 +91,10 @@ Var<S> object_smooth(const LossInputs<S>& in, const ObjectSmoothSettings& settin
 }  // namespace
 
 LossTerm object_smooth_loss() {
-  LossTerm term = make_loss_term<ObjectSmoothSettings>(
-      "object_smooth", "How far places on the objects go between adjacent frames",
-      [](const auto& in, const ObjectSmoothSettings& settings) { return object_smooth(in, settings); });
-  term.description.needs = LossNeeds::kBody;
-  return term;
+  return needing({LossInput::kObjectMotion},
+                 make_loss_term<ObjectSmoothSettings>(
+                     "object_smooth", "How far places on the objects go between adjacent frames",
+                     [](const auto& in, const ObjectSmoothSettings& settings) { return object_smooth(in, settings); }));
 }
 
 }  // namespace hsi4d

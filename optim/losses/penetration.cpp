@@ -24,13 +24,15 @@ namespace {
 /// m² against the photometric loss of a few hundredths: docs/numerics.md.
 constexpr double kWeight = 10;
 
+/// That distances may take: 3 KiB a block of 8³ cells near a surface, so 90,000 blocks.
+constexpr Index kMostBytes = Index{256} << 20U;
+
 struct PenetrationSettings {
   std::filesystem::path mesh;
   double margin = 0;       // metres
   double thickness = 0.1;  // metres
   double cell = 0.02;      // metres
   Index points = 1000;     // a frame
-  Index memory_mib = 256;
 };
 
 void describe(ConfigFields& fields, PenetrationSettings& settings) {
@@ -42,8 +44,6 @@ void describe(ConfigFields& fields, PenetrationSettings& settings) {
   fields.number("cell", settings.cell, {.min = 0.001, .max = 1}, "Cell size of the distance grid, metres");
   fields.integer("points", settings.points, {.min = 1, .max = 1000000},
                  "Gaussians of the human that count in each frame, at most");
-  fields.integer("memory_mib", settings.memory_mib, {.min = 1, .max = 1000000},
-                 "Memory limit of the distance grid, MiB");
 }
 
 using GridPointer = std::shared_ptr<DistanceGrid>;
@@ -52,7 +52,7 @@ GridPointer grid_of(DistanceGrid::Distance distance, const PenetrationSettings& 
   DistanceGrid::Settings grid;
   grid.cell = settings.cell;
   grid.reach = settings.margin + 2 * settings.cell;  // no farther is a node of a cell that a point within margin is in
-  grid.most_bytes = settings.memory_mib << 20U;
+  grid.most_bytes = kMostBytes;
   grid.name = "loss penetration";
   return std::make_shared<DistanceGrid>(std::move(distance), std::move(grid));
 }
@@ -144,22 +144,22 @@ std::vector<BodyPoint> chosen_points(const MotionStart& motion, Index most) {
 }  // namespace
 
 LossTerm penetration_loss() {
-  LossTerm term = make_loss_term<PenetrationSettings>(
-      "penetration", "How deep the body is inside of what is solid",
-      [](const PenetrationSettings& settings) { return prepared_solid(settings); },
-      [](const auto& in, const Solid& solid) {
-        using Value = decltype(in.joints);
-        if (!in.given(in.joints) || !in.motion) return Value{};
-        if (!solid.mesh && in.motion->scene == nullptr) return Value{};
-        const GridPointer grid = solid.mesh ? solid.mesh : solid.scene->of(*in.motion, solid.settings);
-        const Value places = in.body_points(chosen_points(*in.motion, solid.settings.points));
-        const float margin = static_cast<float>(solid.settings.margin);
-        const auto squares =
-            sum_over({sampled_distance(places, grid)}, [margin](auto d) { return square(max(margin - d, 0.0f)); });
-        return squares * (1 / static_cast<double>(places.shape().rows));
-      });
+  LossTerm term =
+      needing({LossInput::kMotion},
+              make_loss_term<PenetrationSettings>(
+                  "penetration", "How deep the body is inside of what is solid",
+                  [](const PenetrationSettings& settings) { return prepared_solid(settings); },
+                  [](const auto& in, const Solid& solid) {
+                    using Value = decltype(in.joints);
+                    if (!solid.mesh && in.motion->scene == nullptr) return Value{};
+                    const GridPointer grid = solid.mesh ? solid.mesh : solid.scene->of(*in.motion, solid.settings);
+                    const Value places = in.body_points(chosen_points(*in.motion, solid.settings.points));
+                    const float margin = static_cast<float>(solid.settings.margin);
+                    const auto squares = sum_over({sampled_distance(places, grid)},
+                                                  [margin](auto d) { return square(max(margin - d, 0.0f)); });
+                    return squares * (1 / static_cast<double>(places.shape().rows));
+                  }));
   term.description.weight = kWeight;
-  term.description.needs = LossNeeds::kBody;
   return term;
 }
 

@@ -34,14 +34,15 @@ Var<S> difference(Var<S> a, Var<S> b, double ssim_share, const SeamMode* seams) 
 }  // namespace
 
 LossTerm photometric_loss() {
-  return make_loss_term<PhotometricSettings>(
-      "photometric", "L1 and structural difference of the rendered image and the frame where the weight says so",
-      [](const auto& in, const PhotometricSettings& settings) {
-        if (!in.given(in.rendered) || !in.given(in.target)) return decltype(in.rendered){};
-        if (!in.given(in.weight)) return difference(in.rendered, in.target, settings.ssim_share, in.seams);
-        return difference(weighted_image(in.rendered, in.weight), weighted_image(in.target, in.weight),
-                          settings.ssim_share, in.seams);
-      });
+  return needing(
+      {LossInput::kImage},
+      make_loss_term<PhotometricSettings>(
+          "photometric", "L1 and structural difference of the rendered image and the frame where the weight says so",
+          [](const auto& in, const PhotometricSettings& settings) {
+            if (!in.given(in.weight)) return difference(in.rendered, in.target, settings.ssim_share, in.seams);
+            return difference(weighted_image(in.rendered, in.weight), weighted_image(in.target, in.weight),
+                              settings.ssim_share, in.seams);
+          }));
 }
 
 }  // namespace hsi4d

@@ -25,15 +25,13 @@ void describe(ConfigFields& fields, PosePriorSettings& settings) {
 }  // namespace
 
 LossTerm pose_prior_loss() {
-  LossTerm term = make_loss_term<PosePriorSettings>(
-      "pose_prior", "How unlikely the body's pose is",
-      [](const PosePriorSettings& settings) { return read_pose_prior(settings.weights.string()); },
-      [](const auto& in, const PosePrior& prior) {
-        if (!in.given(in.body_rotations)) return decltype(in.body_rotations){};
-        return prior.energy(prior.encode(in.body_rotations));
-      });
+  LossTerm term = needing(
+      {LossInput::kPose},
+      make_loss_term<PosePriorSettings>(
+          "pose_prior", "How unlikely the body's pose is",
+          [](const PosePriorSettings& settings) { return read_pose_prior(settings.weights.string()); },
+          [](const auto& in, const PosePrior& prior) { return prior.energy(prior.encode(in.body_rotations)); }));
   term.description.weight = kWeight;
-  term.description.needs = LossNeeds::kBody;
   return term;
 }
 

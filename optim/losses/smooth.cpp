@@ -24,22 +24,21 @@ void describe(ConfigFields& fields, SmoothSettings& settings) {
 }  // namespace
 
 LossTerm smooth_loss() {
-  LossTerm term = make_loss_term<SmoothSettings>(
-      "smooth", "How far joints go between adjacent frames", [](const auto& in, const SmoothSettings& settings) {
-        if (!in.given(in.joints) || !in.motion) return decltype(in.joints){};
-        // Differences between frames that stand say nothing.
-        const Index first = std::max<Index>(0, in.motion->still_frames - settings.order);
-        const Index frames = in.joints.shape().rows - first;
-        if (frames <= settings.order) return decltype(in.joints){};
-        auto steps = slice_rows(in.joints, first, frames);
-        for (int k = 0; k < settings.order; ++k) {
-          const Index rows = steps.shape().rows - 1;
-          steps = slice_rows(steps, 1, rows) - slice_rows(steps, 0, rows);
-        }
-        return sum(square(steps)) * (1 / static_cast<double>(steps.shape().rows));
-      });
-  term.description.needs = LossNeeds::kBody;
-  return term;
+  return needing(
+      {LossInput::kMotion},
+      make_loss_term<SmoothSettings>("smooth", "How far joints go between adjacent frames",
+                                     [](const auto& in, const SmoothSettings& settings) {
+                                       // Differences between frames that stand say nothing.
+                                       const Index first = std::max<Index>(0, in.motion->still_frames - settings.order);
+                                       const Index frames = in.joints.shape().rows - first;
+                                       if (frames <= settings.order) return decltype(in.joints){};
+                                       auto steps = slice_rows(in.joints, first, frames);
+                                       for (int k = 0; k < settings.order; ++k) {
+                                         const Index rows = steps.shape().rows - 1;
+                                         steps = slice_rows(steps, 1, rows) - slice_rows(steps, 0, rows);
+                                       }
+                                       return sum(square(steps)) * (1 / static_cast<double>(steps.shape().rows));
+                                     }));
 }
 
 }  // namespace hsi4d

@@ -4,6 +4,7 @@
 #include "pipelines/avatar/fit.h"
 #include "pipelines/config/config_fields.h"
 #include "pipelines/config/config_kind.h"
+#include "pipelines/config/removed_keys.h"
 
 namespace hsi4d {
 
@@ -62,7 +63,7 @@ void add_stage_faults(const ConfigValue& tree, const StageSettings& stage, Confi
 }
 
 void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProblems& problems) {
-  std::vector<LossFault> faults = losses_without_inputs(stage, LossNeeds::kImages, "a fit of an avatar");
+  std::vector<LossFault> faults = losses_without_inputs(stage, kImageInputs, "a fit of an avatar");
   for (LossFault& fault : prepare_losses(stage)) faults.push_back(std::move(fault));
   for (const LossFault& fault : faults) {
     const std::string pointer = "/stage" + fault.pointer;
@@ -110,7 +111,7 @@ AvatarFitSettings read_avatar_fit(const ConfigValue& tree, const std::filesystem
   settings.file = file;
   ConfigFields fields;
   describe(fields, settings, losses);
-  read_config(tree, fields, problems);
+  read_config(without_removed_keys(tree, problems), fields, problems);
   add_unused(tree, settings, problems);
   if (asks_views && problems.empty() && settings.views.empty()) problems.add(tree.origin, "/views", kNoViews);
   if (problems.empty()) {

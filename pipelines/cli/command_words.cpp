@@ -35,11 +35,12 @@ void check_first_word(int argc, const char* const* argv, const CommandWords& pro
                   "\"; known: " + joined(known) + did_you_mean(word, known));
 }
 
-/// Of a command with commands of its own: the one that was named, or null where an option stands in its place.
+/// Of a command with commands of its own: the one that was named, or null where an option stands in its place or none
+/// is needed.
 const CommandWords* chosen_part(int argc, const char* const* argv, const CommandWords& command) {
   const std::string word = argc > 2 ? argv[2] : "";
   if (const CommandWords* const part = find_command(command.commands, word)) return part;
-  if (word.starts_with("-")) return nullptr;
+  if (word.starts_with("-") || (word.empty() && !command.needs_command)) return nullptr;
   const std::vector<std::string> names = names_of(command.commands);
   throw UserError("hsi4d " + command.name + ": " +
                   (argc > 2 ? "there is no command \"" + word + "\"" : "give a command") + "; known: " + joined(names) +

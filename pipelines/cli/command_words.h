@@ -9,8 +9,9 @@ namespace hsi4d::cli {
 /// A command, or the program itself: what may follow its name.
 struct CommandWords {
   std::string name;
-  std::vector<CommandWords> commands;  ///< of which one has to follow; empty: none may
+  std::vector<CommandWords> commands;  ///< of which one may follow
   std::vector<std::string> options;    ///< long ones: "--out"
+  bool needs_command = false;          ///< one of the commands has to follow
 };
 
 /// Refuses a command line without a command, and one with a command or a long option that is not known: the parser

@@ -27,7 +27,7 @@ int complain(const Failure& failure) {
 
 /// What a command knows, and its commands.
 CommandWords words_of(const CLI::App& command) {
-  CommandWords words{command.get_name(), {}, {}};
+  CommandWords words{command.get_name(), {}, {}, command.get_require_subcommand_min() > 0};
   for (const CLI::App* part : command.get_subcommands([](const CLI::App*) { return true; }))
     words.commands.push_back(words_of(*part));
   for (const CLI::Option* option : command.get_options()) {
@@ -42,7 +42,6 @@ int parse_and_run(int argc, const char* const* argv, ProgramCommands& commands) 
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    commands.describe_for_help();
     print(app.help());  // of the subcommand, if one was named
     return kDone;
   } catch (const CLI::CallForVersion& version_text) {

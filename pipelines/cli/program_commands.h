@@ -23,9 +23,6 @@ struct ProgramCommands {
   virtual ~ProgramCommands();
   ProgramCommands(const ProgramCommands&) = delete;
   ProgramCommands& operator=(const ProgramCommands&) = delete;
-
-  /// Called before help is shown.
-  virtual void describe_for_help() {}
 };
 
 using MakeCommands = std::function<std::unique_ptr<ProgramCommands>()>;

@@ -12,13 +12,13 @@ struct CameraSelectionSettings {
   int width = 1024, height = 1024;  ///< of the image, pixels
   double field_of_view_deg = 50;    ///< across the image
   std::vector<double> radii_m = {2.5, 3.25, 4};
-  int azimuths = 24;  ///< around a whole circle, of which those that face the human are tried
-  std::vector<double> elevations_deg = {0, 15, 30};
   double frontal_deg = 20;  ///< views nearer to the human's heading than this are left out
   double above_pelvis_m = 0.1;
   double tolerance_m = 0.05;
-  bool at_objects = true;  ///< look between the human and the objects that it faces, or at the human
-  int trial_px = 256;      ///< longer side of the images in which joints are counted
+  // Not for configs:
+  int azimuths = 24;  ///< around a whole circle, of which those that face the human are tried
+  std::vector<double> elevations_deg = {0, 15, 30};
+  int trial_px = 256;  ///< longer side of the images in which joints are counted
 };
 
 /// Describes the section: every setting with its range.

@@ -9,8 +9,6 @@ void describe(ConfigFields& f, ColorNetSettings& s) {
   f.integer("hidden_width", s.hidden_width, {.min = 1, .max = 1024}, "Width of its hidden layers");
   f.integer("hidden_layers", s.hidden_layers, {.min = 0, .max = kMostMlpLayers - 1}, "Number of hidden layers");
   f.boolean("view_direction", s.view_direction, "A new network also reads the viewing direction");
-  f.boolean("pose_gradient", s.pose_gradient,
-            "Colours have a gradient in the pose; false: only geometry moves the pose");
   f.boolean("camera_gradient", s.camera_gradient,
             "Colours have a gradient in the camera, through the viewing direction");
 }

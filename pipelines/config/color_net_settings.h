@@ -26,7 +26,6 @@ struct ColorNetSettings {
   Index hidden_width = 32;
   Index hidden_layers = 2;
   bool view_direction = false;
-  bool pose_gradient = true;
   bool camera_gradient = false;
 };
 

@@ -1,11 +1,13 @@
 #include "pipelines/config/run_config.h"
 
 #include <algorithm>
+#include <set>
 
 #include "core/config_file.h"
 #include "optim/loss_term.h"
 #include "pipelines/config/config_fields.h"
 #include "pipelines/config/config_kind.h"
+#include "pipelines/config/removed_keys.h"
 #include "pipelines/config/run_problems.h"
 
 namespace hsi4d {
@@ -52,12 +54,8 @@ void describe(ConfigFields& f, SkipSettings& s) {
 }
 
 void describe(ConfigFields& f, ApproxSettings& s) {
-  describe(f, s.render);
   f.boolean("hold_colors", s.hold_colors,
             "Harmonics keep the colours of the stage's first iteration, the color net those of its last step");
-  f.number("camera_pixel_share", s.camera_pixel_share, {.above = 0, .max = 1},
-           "Share of the pixels, in blocks of 32, that count in stages that draw the scene alone; other blocks in each "
-           "frame");
   f.integer("longest_side_px", s.longest_side_px, {.min = 0, .max = kLongestSide},
             "Larger images, frames and masks are reduced to this longest side; 0: the camera's size");
   f.number(
@@ -98,7 +96,7 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
   RunConfig config;
   ConfigFields fields;
   describe(fields, config, losses);
-  read_config(tree, fields, problems);
+  read_config(without_removed_keys(tree, problems), fields, problems);
   // They run first wherever they are written: a file that extends another one can only append stages.
   std::stable_partition(config.stages.begin(), config.stages.end(),
                         [](const auto& entry) { return entry.second.over == StageScope::kFirst; });
@@ -125,18 +123,15 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
 }
 
 LossesOverMasks losses_over_masks(const RunConfig& config) {
-  const auto reading = [&config](std::initializer_list<std::string> names, const char* input) {
-    std::vector<std::string> found;
-    for (const std::string& name : names) {
-      const bool is_on = std::any_of(config.stages.begin(), config.stages.end(), [&](const auto& entry) {
-        const LossSettings* const loss = find_entry(entry.second.losses, name);
-        return entry.second.draw == Draw::kAll && loss != nullptr && reads_input(*loss, input);
-      });
-      if (is_on) found.push_back(name);
+  std::set<std::string> human, objects;
+  for (const auto& [stage_name, stage] : config.stages) {
+    if (stage.draw != Draw::kAll) continue;
+    for (const auto& [name, loss] : stage.losses) {
+      if (needs_input(loss, LossInput::kHumanOpacity)) human.insert(name);
+      if (needs_input(loss, LossInput::kObjectOpacity)) objects.insert(name);
     }
-    return found;
-  };
-  return {reading({"mask"}, kReadsHumanOpacity), reading({"center", "mask"}, kReadsObjectOpacity)};
+  }
+  return {{human.begin(), human.end()}, {objects.begin(), objects.end()}};
 }
 
 namespace {

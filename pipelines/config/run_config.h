@@ -56,12 +56,9 @@ SkipSettings no_skips();
 
 /// What changes the result a little: config section `approx`.
 struct ApproxSettings {
-  RenderApproximations render;
   /// Colours of harmonics are those of the stage's first iteration, the color net's those of the last iteration in
   /// which it moved; neither has a gradient in between.
   bool hold_colors = false;
-  /// Share of the pixels, in blocks, that count in stages that draw the scene alone; others in every frame.
-  double camera_pixel_share = 1;
   /// Longest side of the images that are worked on; the camera's image, frames and masks are reduced to it where they
   /// are larger. 0: as large as the camera's.
   int longest_side_px = 0;
@@ -121,8 +118,8 @@ RunConfig read_run_config(const ConfigValue& tree, const std::vector<LossDescrip
 /// The text of config.resolved.json: every setting, defaults included. Reading it back gives the same config and text.
 std::string resolved_config(const RunConfig& config, const std::vector<LossDescription>& losses);
 
-/// The losses of stages that draw human and objects which empty masks switch off: `center` and `mask`, by their
-/// settings.
+/// The losses of stages that draw human and objects which empty masks switch off: those that need opacities, as
+/// `center` and `mask` do.
 LossesOverMasks losses_over_masks(const RunConfig& config);
 
 /// A tree of a config without what another dataset or machine would change: the files of data, chain and body,

@@ -42,7 +42,7 @@ void add_loss_problems(const StageSettings& stage, const std::string& in, std::v
   }
   const bool is_of_sequence = stage.over == StageScope::kSequence;
   if (is_of_sequence || stage.draw == Draw::kScene) {
-    const LossNeeds has = is_of_sequence ? LossNeeds::kBody : LossNeeds::kImages;
+    const std::span<const LossInput> has = is_of_sequence ? std::span<const LossInput>(kMotionInputs) : kImageInputs;
     const std::string having =
         is_of_sequence ? "a stage with \"over\": \"sequence\"" : "a stage with \"draw\": \"scene\"";
     for (LossFault& fault : losses_without_inputs(stage, has, having))
@@ -232,16 +232,6 @@ void add_chain_problems(const std::vector<ChainClip>& chain, ConfigUse use, std:
   }
 }
 
-// ---- Skips and approximations ----
-
-/// The setting that keeps static layers from being made, "skip.static_layer=false"; none: empty.
-std::string without_static_layers(const RunConfig& config) {
-  if (!config.skip.render.static_tiles) return "skip.static_tiles=false";
-  if (!config.skip.tape.frozen_inputs) return "skip.frozen_inputs=false";
-  if (!config.skip.render.static_layer) return "skip.static_layer=false";
-  return config.precision == RunPrecision::kDouble ? "precision=double" : "";
-}
-
 // ---- Optimisers ----
 
 /// Settings of a kind of optimiser that the stage does not have. They are no mistakes: a config that extends another
@@ -348,18 +338,6 @@ std::vector<RunNote> run_notes(const RunConfig& config) {
   }
   if (config.approx.seen_within_deg > 0)
     inform("approx.seen_within_deg is on: Gaussians that are behind a human's or an object's own surface are left out");
-  if (config.approx.camera_pixel_share < 1) {
-    inform("approx.camera_pixel_share is on: stages that draw the scene alone see a part of the pixels in each frame");
-  }
-  if (!config.approx.render.collapse_suffix) return notes;
-  const std::string off = without_static_layers(config);
-  if (off.empty()) {
-    notes.push_back({LogLevel::kInfo,
-                     "approx.collapse_suffix is on: images are near, each pixel within render.transmittance_stop, " +
-                         rounded(config.render.transmittance_stop, 4)});
-  } else {
-    notes.push_back({LogLevel::kWarning, "approx.collapse_suffix=true does nothing with " + off});
-  }
   return notes;
 }
 

@@ -76,7 +76,7 @@ Vector heading_of(const BodyPose& pose) {
 Vector view_center(const SceneSetup& setup, const CameraSelectionSettings& settings) {
   const Vector pelvis = joint(first_joints(setup), 0), heading = heading_of(setup.motion.poses.front());
   double farthest = 0;  // along the heading; objects behind the human count for nothing
-  for (std::size_t o = 0; settings.at_objects && o < setup.objects.size(); ++o) {
+  for (std::size_t o = 0; o < setup.objects.size(); ++o) {
     const Rigid<double> pose{so3_exp(setup.poses[o].rotation), setup.poses[o].translation};
     const Gaussians& object = setup.objects[o].gaussians;
     for (Index i = 0; i < object.count(); ++i) {
@@ -160,7 +160,7 @@ CameraChoice select_camera(const SceneSetup& setup, const CameraSelectionSetting
   CameraChoice choice{intrinsics ? *intrinsics : camera_of(settings), candidate_views(setup, settings)};
   if (choice.candidates.empty())
     throw UserError(
-        "camera_selection: there are no candidates: radii, elevations or azimuths leave none that faces the human");
+        "camera_selection: there are no candidates: radii_m or frontal_deg leaves none that faces the human");
   const std::vector<double> joints = first_joints(setup);
   const FirstFrame frame = first_frame(setup, view_center(setup, settings));  // colours do not matter
   Progress bar("candidates", std::ssize(choice.candidates), observer.progress, observer.progress_interval);
@@ -184,7 +184,7 @@ CameraChoice select_camera(const SceneSetup& setup, const CameraSelectionSetting
   std::stable_sort(choice.candidates.begin(), choice.candidates.end(), is_better);
   if (choice.candidates.front().visible == 0)
     throw UserError("no joint of the human is to be seen from any of " + std::to_string(choice.candidates.size()) +
-                    " candidates; camera_selection.radii_m and elevations_deg say where they are");
+                    " candidates; camera_selection.radii_m says how far away they are");
   choice.camera.camera_from_world = choice.candidates.front().camera_from_world;
   return choice;
 }

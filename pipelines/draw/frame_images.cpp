@@ -30,22 +30,6 @@ void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covere
   for (const Image& mask : frame.object_masks) add_covered(mask, data.mask_threshold, data.mask_margin_px, covered);
 }
 
-void keep_share(double share, Index frame, Image& weight) {
-  // Fractional parts of multiples of these fill a plane, and a line, evenly [Roberts 2018, R2 and R1].
-  constexpr double kRight = 0.7548776662466927, kDown = 0.5698402909980532, kNext = 0.6180339887498949;
-  constexpr int kBlock = 32;
-  Image part = weight;
-  bool is_some_left = false;
-  for (int y = 0; y < weight.height(); ++y) {
-    for (int x = 0; x < weight.width(); ++x) {
-      const double place = kRight * (x / kBlock) + kDown * (y / kBlock) + kNext * static_cast<double>(frame);
-      if (place - std::floor(place) >= share) part(0, y, x) = 0;
-      is_some_left = is_some_left || part(0, y, x) != 0;
-    }
-  }
-  if (is_some_left) weight = std::move(part);
-}
-
 Image complement(const Image& mask) {
   Image result(1, mask.height(), mask.width());
   for (int y = 0; y < mask.height(); ++y) {

@@ -12,10 +12,6 @@ namespace hsi4d {
 /// sides, are set in `covered` [1,H,W].
 void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered);
 
-/// Sets weights to 0 outside of `share` of the blocks of 32 × 32 pixels, spread evenly; others for every frame. Where
-/// that would leave none, all stay.
-void keep_share(double share, Index frame, Image& weight);
-
 /// 1 − mask.
 Image complement(const Image& mask);
 

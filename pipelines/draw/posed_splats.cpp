@@ -16,15 +16,13 @@ namespace {
 template <class S>
 Var<S> net_colors(const HumanColors<S>& colors, Var<S> own, Var<S> rotations, const SkinWeights<S>& weights,
                   Var<S> joint_transforms, Var<S> means) {
-  const auto passed = [&colors](Var<S> var) { return colors.pose_gradient ? var : stop_gradient(var); };
   Var<S> directions;
   if (colors.camera_center.tape != nullptr) {
-    // skin_frames keeps these in registers. To blend them once, into memory for all three, takes as long at best, and a
-    // third more without pose_gradient.
-    const Var<S> blended = blend_transforms(weights, passed(joint_transforms));
-    directions = canonical_directions(blended, passed(means), colors.camera_center);
+    // skin_frames keeps these in registers. To blend them once, into memory for all three, takes as long at best.
+    const Var<S> blended = blend_transforms(weights, joint_transforms);
+    directions = canonical_directions(blended, means, colors.camera_center);
   }
-  return color_net(colors.net, own, pose_code(passed(rotations), colors.code_joints), directions);
+  return color_net(colors.net, own, pose_code(rotations, colors.code_joints), directions);
 }
 
 template <class S, class Member>

@@ -43,8 +43,7 @@ template <class S>
 struct HumanColors {
   ColorNetVars<S> net;
   std::vector<int> code_joints;
-  Var<S> camera_center;       ///< [1,3] metres, world; empty for a network without direction of view
-  bool pose_gradient = true;  ///< colours have a gradient in the pose, and the direction of view in the body
+  Var<S> camera_center;  ///< [1,3] metres, world; empty for a network without direction of view
 };
 
 /// A human in a pose: linear blend skinning of rest-pose Gaussians, axes by the blended linear map (row D2).
@@ -52,8 +51,7 @@ struct HumanColors {
 /// @param rotations  [J,9] of the joints
 /// @param skeleton   kinematic_chain of them
 /// @param colors     null: the avatar's own
-/// Adjoint: all numbers, rotations, the skeleton, the network's numbers, the camera's centre. Without pose_gradient
-/// none flows through the colours to rotations and skeleton.
+/// Adjoint: all numbers, rotations, the skeleton, the network's numbers, the camera's centre.
 template <class S>
 SplatInputs<S> skinned_splats(const GaussianVars<S>& human, Var<S> rotations, const PosedSkeleton<S>& skeleton,
                               const Avatar& avatar, const HumanColors<S>* colors = nullptr);

@@ -46,18 +46,13 @@ Vector3<double> read_vector(Tape<S>& tape, Var<S> leaf) {
 
 }  // namespace
 
-Camera camera_of_size(const Clip& clip, int longest_side_px) {
-  return longest_side_px > 0 ? reduced_camera(clip.camera, longest_side_px) : clip.camera;
-}
-
 template <class S>
 FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& camera_from_world,
                           const FrameGraphSettings& settings)
     : tape_(tape),
       clip_(clip),
       settings_(settings),
-      view_{camera_of_size(clip, settings.longest_side_px), clip.scene.origin_world, settings.render, settings.skip,
-            settings.approx} {
+      view_{clip.camera, clip.scene.origin_world, settings.render, settings.skip} {
   // Objects and the body are recorded in the world, and one render has one origin: the scene's must be zero until they
   // are recorded relative to it.
   HSI4D_CHECK(clip.scene.origin_world.isZero(0), "what moves is placed in the world, not relative to an origin");
@@ -200,7 +195,7 @@ HumanColors<S> FrameGraph<S>::record_color_net(const ColorNet& net) {
     add_to_group(kColorNetGroup, layer.weights);
     add_to_group(kColorNetGroup, layer.bias);
   }
-  HumanColors<S> colors{color_net_, net.code_joints, {}, settings_.color_pose_gradient};
+  HumanColors<S> colors{color_net_, net.code_joints, {}};
   if (!net.view_direction) return colors;
   const Var<S> center = camera_center(xi_, view_);
   colors.camera_center = settings_.color_camera_gradient ? center : stop_gradient(center);

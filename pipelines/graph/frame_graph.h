@@ -29,28 +29,22 @@ namespace hsi4d {
 struct FrameGraphSettings {
   RenderSettings render;
   RenderSkips skip = {};
-  RenderApproximations approx = {};
   bool hold_colors = false;  ///< colours change only where what makes them moves, see held()
   RotationParameters rotations = RotationParameters::kSixD;
   CameraIncrement increment = CameraIncrement::kCamera;
   Draw draw = Draw::kAll;
   Vector3<double> background = Vector3<double>::Zero();
   const ColorNet* color_net = nullptr;  ///< of the human's colours, read when the graph is recorded; null: the avatar's
-  bool color_pose_gradient = true;      ///< colours of the net have a gradient in the pose
-  bool color_camera_gradient = false;   ///< and, by the direction of view, in the camera
+  bool color_camera_gradient = false;   ///< colours of the net have a gradient in the camera, by the direction of view
   bool human_opacity = false;           ///< the losses read the human's opacity, which costs a channel of the render
   bool object_opacity = false;          ///< likewise of the objects, a channel each
   /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
   /// out, and the groups of the scene then hold the others alone. None: all are kept.
   std::optional<double> camera_reach = {};
-  int longest_side_px = 0;  ///< of the image, at most; 0: as large as the clip's camera has it
   /// What is drawn of objects and human; the groups of their Gaussians then hold that alone, and `object_depth` is its
   /// mean. None: all of it.
   std::optional<SeenRows> seen = {};
 };
-
-/// The camera of images of a clip that are at most so large; 0: the clip's.
-Camera camera_of_size(const Clip& clip, int longest_side_px);
 
 /// What a frame is compared with.
 struct FrameTargets {

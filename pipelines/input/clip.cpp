@@ -202,12 +202,6 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   return clip;
 }
 
-ClipFrame reduced_frame(const ClipFrame& frame, const Camera& camera) {
-  ClipFrame result = {reduced(frame.target, camera), reduced(frame.human_mask, camera), {}};
-  for (const Image& mask : frame.object_masks) result.object_masks.push_back(reduced(mask, camera));
-  return result;
-}
-
 bool fits_camera(const Image& frame, const Camera& camera) {
   return has_size_of(frame, camera) || is_enlarged(frame, camera);
 }

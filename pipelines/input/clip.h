@@ -58,9 +58,6 @@ struct ClipFrame {
   std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
 };
 
-/// The frame in the size of a camera: means of its pixels.
-ClipFrame reduced_frame(const ClipFrame& frame, const Camera& camera);
-
 /// Reads everything but the frames. Throws UserError or DataError naming the file: missing, damaged, sizes that do not
 /// fit each other.
 Clip read_clip(const DataSettings& data);

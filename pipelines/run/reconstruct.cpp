@@ -275,7 +275,7 @@ class Reconstruction {
     if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1) || stage.over == StageScope::kFirst)
       warn_of_terms_off(result.off, name, stage);
     for (const LeftOutObject& object : result.left_out) {
-      if (!object.is_of_masks && !object.of_human)
+      if (!object.reason.empty() && !object.of_human)
         progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
     }
     for (const std::string& group : gradients.still_groups()) progress_.still.push_back({s, frame.index, group});

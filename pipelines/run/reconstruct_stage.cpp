@@ -17,21 +17,19 @@ namespace {
 FrameGraphSettings graph_settings(const RunConfig& config, Draw draw, const ColorState& colors) {
   return {config.render,
           config.skip.render,
-          config.approx.render,
           config.approx.hold_colors,
           config.rotations,
           config.camera.increment,
           draw,
           Vector3<double>(config.background.data()),
           colors.net ? &*colors.net : nullptr,
-          config.color_net.pose_gradient,
           config.color_net.camera_gradient};
 }
 
-/// Whether a term that is on reads an input which is made on demand.
-bool some_loss_reads(const StageSettings& stage, const char* input) {
+/// Whether a term that is on needs an input which is made on demand.
+bool some_loss_needs(const StageSettings& stage, LossInput input) {
   return stage.draw == Draw::kAll && std::any_of(stage.losses.begin(), stage.losses.end(), [input](const auto& entry) {
-           return reads_input(entry.second, input);
+           return needs_input(entry.second, input);
          });
 }
 
@@ -44,15 +42,12 @@ std::vector<SceneState> seen_frames(std::span<const SceneState> done, const Scen
 
 /// Empty where every pixel counts.
 Image pixel_weights(const StageSettings& stage, const FrameTask& task, const RunConfig& config) {
-  const double share = stage.draw == Draw::kScene ? config.approx.camera_pixel_share : 1;
-  if (stage.weight == PixelWeight::kAll && share == 1) return {};
+  if (stage.weight == PixelWeight::kAll) return {};
   Image covered(1, task.covered.height(), task.covered.width());
   if (stage.weight == PixelWeight::kUnoccluded) covered = task.covered;
   if (stage.weight == PixelWeight::kBackground || stage.weight == PixelWeight::kForeground)
     add_covered(task.frame, config.data, covered);
-  Image weight = stage.weight == PixelWeight::kForeground ? std::move(covered) : complement(covered);
-  if (share < 1) keep_share(share, task.index, weight);
-  return weight;
+  return stage.weight == PixelWeight::kForeground ? std::move(covered) : complement(covered);
 }
 
 /// Frame 0 as the stages of a frame see it: as it was found, or, while it is looked for, as it was given.
@@ -67,9 +62,12 @@ std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& st
   const double within_deg = task.config.approx.seen_within_deg;
   if (within_deg == 0 || stage.draw == Draw::kScene) return {};
   const Clip& clip = task.clip;
-  ViewRange view_range{camera_of_size(clip, stage.longest_side_px), task.config.render, within_deg};
+  ViewRange view_range{clip.camera, task.config.render, within_deg};
   view_range.camera.camera_from_world = state.camera_from_world;
-  const bool needs_objects = find_entry(stage.losses, "depth") != nullptr;
+  const bool needs_objects = std::any_of(stage.losses.begin(), stage.losses.end(), [](const auto& entry) {
+    const std::vector<LossInput> needs = needs_of(entry.second);
+    return std::find(needs.begin(), needs.end(), LossInput::kObjectDepth) != needs.end();
+  });
   const bool needs_human = find_entry(stage.optimize, "avatar_features") != nullptr;
   SeenRows rows;
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
@@ -88,7 +86,7 @@ Vector3<double> center_and_share(const Image& mask, const StageTask& task, std::
                                  const SceneState& state) {
   Vector3<double> center = mask_center(mask, task.config.data.mask_threshold);
   if (center[2] == 0) return center;
-  Camera camera = camera_of_size(task.clip, task.config.stages[task.stage].second.longest_side_px);
+  Camera camera = task.clip.camera;
   camera.camera_from_world = state.camera_from_world;
   const double area = covered_area(task.clip.objects[object].gaussians, state.objects[object], camera);
   center[2] = center[2] < area ? center[2] / area : 1;
@@ -100,7 +98,7 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   const Clip& clip = task.clip;
   const ClipFrame& frame = frame_task.frame;
   const SceneState& first = first_state(task, frame_task);
-  const bool are_objects_read = some_loss_reads(task.config.stages[task.stage].second, kReadsObjectOpacity);
+  const bool are_objects_read = some_loss_needs(task.config.stages[task.stage].second, LossInput::kObjectOpacity);
   FrameTargets targets;
   targets.image = &frame.target;
   targets.weight = weight.empty() ? nullptr : &weight;
@@ -120,13 +118,6 @@ Index tiles_in_image(const Camera& camera, int tile) {
   return Index{(camera.width + tile - 1) / tile} * ((camera.height + tile - 1) / tile);
 }
 
-/// Covered where a part of a pixel is.
-Image reduced_cover(const Image& covered, const Camera& camera) {
-  Image result = resize_area(covered, camera.height, camera.width);
-  for (float& x : result.data()) x = x > 0 ? 1 : 0;
-  return result;
-}
-
 /// Records a frame as a stage has it, beside what it is compared with, and calls use(graph, inputs of the losses).
 /// @param camera_reach  as FrameGraphSettings has it
 template <class S, class F>
@@ -135,9 +126,8 @@ void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& fra
   const StageSettings& stage = task.config.stages[task.stage].second;
   tape.set_skips(task.config.skip.tape);
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
-  settings.longest_side_px = stage.longest_side_px;
-  settings.human_opacity = some_loss_reads(stage, kReadsHumanOpacity);
-  settings.object_opacity = some_loss_reads(stage, kReadsObjectOpacity);
+  settings.human_opacity = some_loss_needs(stage, LossInput::kHumanOpacity);
+  settings.object_opacity = some_loss_needs(stage, LossInput::kObjectOpacity);
   settings.camera_reach = camera_reach;
   settings.seen = rows_to_draw(task, state);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
@@ -150,22 +140,12 @@ void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& fra
   use(graph, inputs);
 }
 
-/// Calls use(frame) with the frame in images of the size that the stage asks for.
-template <class F>
-auto at_stage_size(const StageTask& task, const FrameTask& frame, F use) {
-  const Camera camera = camera_of_size(task.clip, task.config.stages[task.stage].second.longest_side_px);
-  if (camera.width == task.clip.camera.width && camera.height == task.clip.camera.height) return use(frame);
-  const ClipFrame small = reduced_frame(frame.frame, camera);
-  const Image covered = reduced_cover(frame.covered, camera);
-  return use(FrameTask{frame.index, small, covered, frame.done});
-}
-
 std::string name_in_frame(const StageTask& task, const FrameTask& frame) {
   return task.config.stages[task.stage].first + ", frame " + std::to_string(frame.index);
 }
 
 template <class S>
-StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
+StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
                                const FrameStageCallback& callback) {
   const std::string& name = task.config.stages[task.stage].first;
   const StageSettings& stage = task.config.stages[task.stage].second;
@@ -190,20 +170,13 @@ StageResult run_stage_on_frame(const StageTask& task, const FrameTask& frame, Sc
     graph.read_state(stage.optimize, state);
     if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
   });
-  const Camera drawn = camera_of_size(task.clip, stage.longest_side_px);
+  const Camera& drawn = task.clip.camera;
   probe.stage_ended(result, {.stage = name,
                              .frame = frame.index,
                              .pixels_of_image = static_cast<Index>(drawn.width) * drawn.height,
                              .tiles_of_image = tiles_in_image(drawn, task.config.render.tile),
                              .tape_bytes = tape.memory_bytes()});
   return result;
-}
-
-template <class S>
-StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
-                               const FrameStageCallback& callback) {
-  return at_stage_size(
-      task, frame, [&](const FrameTask& sized) { return run_stage_on_frame<S>(task, sized, state, colors, callback); });
 }
 
 /// Records the sequence as a stage has it.
@@ -262,16 +235,13 @@ StageResult run_sequence_stage(const StageTask& task, std::vector<SceneState>& s
 
 StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, const SceneState& state,
                                  const ColorState& colors, const StageGradcheckOptions& options) {
-  return at_stage_size(task, frame, [&](const FrameTask& sized) {
-    Tape<double> tape;
-    StageGradcheck found;
-    with_frame_graph<double>(
-        tape, task, sized, state, colors, std::nullopt, [&](const auto& graph, const auto& inputs) {
-          found = check_stage_gradient(tape, task.config.stages[task.stage].second, task.losses, inputs, graph.groups(),
-                                       name_in_frame(task, sized), options);
-        });
-    return found;
+  Tape<double> tape;
+  StageGradcheck found;
+  with_frame_graph<double>(tape, task, frame, state, colors, std::nullopt, [&](const auto& graph, const auto& inputs) {
+    found = check_stage_gradient(tape, task.config.stages[task.stage].second, task.losses, inputs, graph.groups(),
+                                 name_in_frame(task, frame), options);
   });
+  return found;
 }
 
 StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,

@@ -78,7 +78,7 @@ StageCheck check_stage(const RunConfig& asked, const std::vector<LossTerm>& loss
   RunConfig config = asked;
   const std::size_t index = stage_index(config, options.stage);
   if (!config.chain.empty()) throw UserError("hsi4d gradcheck: the config is a chain; allowed: that of one clip");
-  config.color_net.pose_gradient = config.color_net.camera_gradient = true;
+  config.color_net.camera_gradient = true;
   prepare_run(config);
   take_sources(config);
   const Clip clip = read_run_clip(config, losses);

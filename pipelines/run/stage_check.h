@@ -30,8 +30,8 @@ struct StageCheck {
 };
 
 /// Checks a stage where it would begin if all stages before it had left things as they were given: frames as estimated,
-/// or as frame 0, but for the disturbance (optim/stage_gradcheck.h). Gradients that color_net.pose_gradient and
-/// color_net.camera_gradient stop on purpose are let through.
+/// or as frame 0, but for the disturbance (optim/stage_gradcheck.h). Gradients that
+/// color_net.camera_gradient stops on purpose are let through.
 ///
 /// Throws UserError for a stage or a frame that is not there, for a chain, and where a program of `sources` would have
 /// to be run first; as a run for its inputs; as check_stage_gradient.

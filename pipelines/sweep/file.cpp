@@ -98,7 +98,6 @@ class Reader {
 
   bool expect(const ConfigValue& value, Kind kind, const std::string& pointer, const char* wanted) {
     if (value.kind == kind) return true;
-    if (value.kind == Kind::kUnreadable) return false;
     add(value.origin, pointer,
         (value.kind == Kind::kNull ? std::string("null is not ")
                                    : shown(value) + " is " + kind_name(value) + ", not ") +
@@ -129,7 +128,7 @@ class Reader {
       if (config_keys(member.key).empty()) {
         add(member.key_origin, child_pointer(in, member.key),
             json_string(member.key) + " is no key of a setting; write stages.camera.iterations");
-      } else if (member.value.kind != Kind::kUnreadable) {
+      } else {
         all.push_back({member.key, member.value, member.key_origin});
       }
     }

@@ -243,13 +243,13 @@ struct Composite {
     const detail::TilePlan& plan = planned.plans[tile];
     detail::TileLayer& layer = planned.layer(tile);
     const std::span<const TileEntry> still = planned.still.of_tile(tile);
-    const bool layered = plan_rules(io).in_layers && !still.empty(), collapse = view.approx.collapse_suffix;
+    const bool layered = plan_rules(io).in_layers && !still.empty();
     detail::BlockJob job = block_job_of(tiles, tile);
     job.state = memory;
     job.workspace = memory + 2 * numbers;
     Index fragments = 0;
     if (layered && !layer.made) {
-      fragments += detail::make_layer(tiles.tile, scene, job, still, collapse, layer);
+      fragments += detail::make_layer(tiles.tile, scene, job, still, layer);
       job.start = layer.first > 0 ? layer.front.data() : nullptr;
     }
     if (job.start != nullptr) {
@@ -261,7 +261,7 @@ struct Composite {
     const detail::BlockCounts counts = detail::composite_blocks(tiles.tile, scene, job);
     fragments += counts.fragments;
     if (!plan.behind.empty()) {
-      fragments += detail::composite_behind(tiles.tile, scene, job, plan.behind, collapse, memory + numbers, layer);
+      fragments += detail::composite_behind(tiles.tile, scene, job, plan.behind, memory + numbers, layer);
     }
     detail::store_blocks(tiles.tile, job, images_of(io));
     return {fragments, counts.end};

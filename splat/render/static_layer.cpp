@@ -82,22 +82,19 @@ template void merge_entries(const SplatRows<double>&, const RenderSettings&, std
                             std::span<const TileEntry>, TileEntry*);
 
 Index make_layer(Index side, const CompositeScene<float>& scene, BlockJob job, std::span<const TileEntry> still,
-                 bool collapse, TileLayer& layer) {
-  const auto composite = [&](std::span<const TileEntry> entries, Buffer<float>& state) {
-    state.resize(block_state(side, scene.channels));
-    job.entries = entries;
+                 TileLayer& layer) {
+  Index fragments = 0;
+  if (layer.first > 0) {
+    layer.front.resize(block_state(side, scene.channels));
+    job.entries = still.first(static_cast<std::size_t>(layer.first));
     job.blocks = all_blocks(side);
-    job.state = state.data();
+    job.state = layer.front.data();
     job.runs = nullptr;
     begin_blocks(side, job.width, job.height, scene.channels, job.state);
-    return composite_blocks(side, scene, job).fragments;
-  };
-  Index fragments = 0;
-  if (layer.first > 0) fragments += composite(still.first(static_cast<std::size_t>(layer.first)), layer.front);
+    fragments = composite_blocks(side, scene, job).fragments;
+  }
   const std::span<const TileEntry> behind = still.subspan(static_cast<std::size_t>(layer.after));
-  if (collapse) {
-    fragments += composite(behind, layer.collapsed);
-  } else if (!behind.empty()) {
+  if (!behind.empty()) {
     job.entries = behind;
     pack_blocks(side, scene, job, layer.behind);
   }
@@ -116,15 +113,15 @@ void for_each_block(std::uint32_t blocks, const F& f) {
 
 /// Adds what is behind a block to its state, and tells what of it is seen.
 ///
-/// @param own    T and channels of what is behind: over the state's T, or with `collapse` over 1
+/// @param own    T and channels of what is behind, over the state's T
 /// @param state  T and channels, in: behind what moves, out: behind everything
-void add_behind(const float* own, Index channels, float stop, bool collapse, float* state, float* seen) {
+void add_behind(const float* own, Index channels, float stop, float* state, float* seen) {
   float relative[kBlockPixels], absolute[kBlockPixels];  // factors of `own`; 0 where a pixel is finished
   for (Index p = 0; p < kBlockPixels; ++p) {
     const float front = state[p];
     const bool alive = front >= stop && front > 0;
-    relative[p] = alive ? (collapse ? 1.0f : 1 / front) : 0.0f;
-    absolute[p] = alive ? (collapse ? front : 1.0f) : 0.0f;
+    relative[p] = alive ? 1 / front : 0.0f;
+    absolute[p] = alive ? 1.0f : 0.0f;
     seen[p] = alive ? std::abs(own[p]) * relative[p] : 1.0f;
     state[p] = alive ? own[p] * absolute[p] : front;
   }
@@ -140,26 +137,21 @@ void add_behind(const float* own, Index channels, float stop, bool collapse, flo
 }  // namespace
 
 Index composite_behind(Index side, const CompositeScene<float>& scene, const BlockJob& job,
-                       std::span<const TileEntry> behind, bool collapse, float* memory, TileLayer& layer) {
+                       std::span<const TileEntry> behind, float* memory, TileLayer& layer) {
   const Index size = state_of_block(scene.channels);
-  const float* own = layer.collapsed.data();
-  Index fragments = 0;
-  if (!collapse) {
-    BlockJob rest = job;
-    rest.entries = behind;
-    rest.packed = &layer.behind;
-    rest.state = memory;
-    rest.runs = nullptr;
-    for_each_block(job.blocks, [&](Index b) {
-      std::copy_n(job.state + b * size, kBlockPixels, memory + b * size);
-      std::fill_n(memory + b * size + kBlockPixels, size - kBlockPixels, 0.0f);
-    });
-    fragments = composite_blocks(side, scene, rest).fragments;
-    own = memory;
-  }
+  BlockJob rest = job;
+  rest.entries = behind;
+  rest.packed = &layer.behind;
+  rest.state = memory;
+  rest.runs = nullptr;
+  for_each_block(job.blocks, [&](Index b) {
+    std::copy_n(job.state + b * size, kBlockPixels, memory + b * size);
+    std::fill_n(memory + b * size + kBlockPixels, size - kBlockPixels, 0.0f);
+  });
+  const Index fragments = composite_blocks(side, scene, rest).fragments;
   on_best_isa([&] {
     for_each_block(job.blocks, [&](Index b) {
-      add_behind(own + b * size, scene.channels, scene.rules.stop_below, collapse, job.state + b * size,
+      add_behind(memory + b * size, scene.channels, scene.rules.stop_below, job.state + b * size,
                  layer.seen.data() + b * size);
     });
   });

@@ -35,13 +35,10 @@ struct TileLayer {
   bool made = false;
   Index first = 0, after = 0;  ///< list positions of those among what moves
   Buffer<float> front;         ///< state behind those in front
-  Buffer<float> collapsed;     ///< state of those behind alone; only when they are collapsed
-  PackedBlocks behind;         ///< those behind; only when they are not collapsed
+  PackedBlocks behind;         ///< those behind
   Buffer<float> seen;          ///< of the last forward run: what is seen behind, relative to T there
 
-  Index capacity_bytes() const {
-    return front.capacity_bytes() + collapsed.capacity_bytes() + behind.capacity_bytes() + seen.capacity_bytes();
-  }
+  Index capacity_bytes() const { return front.capacity_bytes() + behind.capacity_bytes() + seen.capacity_bytes(); }
 };
 
 /// Finds the range of what moves in a tile and, when it is not the layer's, the cut; the layer has to be made then.
@@ -55,19 +52,18 @@ template <class S>
 void merge_entries(const SplatRows<S>& rows, const RenderSettings& settings, std::span<const TileEntry> still,
                    std::span<const TileEntry> moving, TileEntry* merged);
 
-/// Composites what stands still in front of a range, into layer.front; packs what is behind, or with `collapse`
-/// composites it. Returns the fragments.
+/// Composites what stands still in front of a range, into layer.front; packs what is behind. Returns the fragments.
 ///
 /// @param job  of the tile; its entries, blocks and state are not read
 Index make_layer(Index side, const CompositeScene<float>& scene, BlockJob job, std::span<const TileEntry> still,
-                 bool collapse, TileLayer& layer);
+                 TileLayer& layer);
 
 /// Composites what stands still behind over job.state, for job.blocks, and keeps layer.seen. Returns the fragments.
 ///
-/// @param behind  entries; not read when they are collapsed
+/// @param behind  entries
 /// @param memory  block_state numbers
 Index composite_behind(Index side, const CompositeScene<float>& scene, const BlockJob& job,
-                       std::span<const TileEntry> behind, bool collapse, float* memory, TileLayer& layer);
+                       std::span<const TileEntry> behind, float* memory, TileLayer& layer);
 
 /// From d_T of a tile's pixels to S behind what moves: S = Σ g_k seen_k + d_T seen_T.
 ///

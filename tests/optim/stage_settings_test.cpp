@@ -98,7 +98,7 @@ TEST_CASE("losses that need what a stage does not have are named, unless they ar
   StageSettings stage;
   for (const LossDescription& loss : known) stage.losses.emplace_back(loss.name, default_settings(loss));
   std::string text;
-  for (const LossFault& fault : losses_without_inputs(stage, LossNeeds::kImages, "a picture"))
+  for (const LossFault& fault : losses_without_inputs(stage, kImageInputs, "a picture"))
     text += fault.pointer + ": " + fault.text + "\n";
   CHECK(text ==
         "/losses/center: this loss needs objects, which a picture does not have\n"
@@ -113,9 +113,9 @@ TEST_CASE("losses that need what a stage does not have are named, unless they ar
         "/losses/penetration: this loss needs the body, which a picture does not have\n"
         "/losses/joint_limits: this loss needs the body, which a picture does not have\n"
         "/losses/pose_prior: this loss needs the body, which a picture does not have\n");
-  CHECK(losses_without_inputs(stage, LossNeeds::kBody, "a motion").size() == 5);  // all others
+  CHECK(losses_without_inputs(stage, kMotionInputs, "a motion").size() == 5);  // all others
   for (auto& [name, loss] : stage.losses) loss.weight = 0;
-  CHECK(losses_without_inputs(stage, LossNeeds::kImages, "a picture").empty());
+  CHECK(losses_without_inputs(stage, kImageInputs, "a picture").empty());
 }
 
 }  // namespace stage_settings_test

@@ -490,31 +490,6 @@ TEST_CASE("a steady iteration of a stage allocates nothing") {
   CHECK(at_end == at_20);
 }
 
-TEST_CASE("a stage ends early when its loss no longer falls") {
-  Picture<double> whole, short_one;
-  StageSettings settings = usual_stage();
-  settings.optimize = {{"tint", moving(0.3)}};
-  std::vector<double> losses;
-  const auto note = [&](const IterationReport& report) { losses.push_back(report.loss); };
-  const StageResult all = run(whole, settings, note);
-  settings.plateau = {.iterations = 10, .gain = 0.02};
-  const StageResult early = run(short_one, settings);
-  CHECK(all.iterations == settings.iterations);
-  REQUIRE(early.iterations < settings.iterations);
-  REQUIRE(early.iterations >= 20);
-  const auto mean_from = [&](Index first) {
-    return std::accumulate(losses.begin() + first, losses.begin() + first + 10, 0.0) / 10;
-  };
-  // It is the first iteration in which this is so.
-  for (Index n = 20; n <= early.iterations; ++n)
-    CHECK((mean_from(n - 10) >= 0.98 * mean_from(n - 20)) == (n == early.iterations));
-  // Losses before a group begins to move do not count.
-  Picture<double> late;
-  settings.optimize.push_back({"base", moving(1e-9)});
-  settings.optimize.back().second.from = 150;
-  CHECK(run(late, settings).iterations >= 170);
-}
-
 TEST_CASE("held outputs follow their inputs where a group moves that names them, and in the first iteration") {
   Picture<double> picture;
   StageSettings settings = usual_stage();

@@ -92,7 +92,7 @@ std::any prepared(const std::string& settings) {
   ConfigProblems problems;
   read_config(load_config_text(settings, "a.json", "", {}, problems), fields, problems);
   problems.throw_if_any();
-  return prepared_loss(chosen.prepare, chosen.own);
+  return prepared_loss(chosen.term->prepare, chosen.own);
 }
 
 }  // namespace

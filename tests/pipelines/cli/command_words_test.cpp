@@ -14,7 +14,7 @@ namespace {
 /// A program with a plain command and one with parts.
 const CommandWords kProgram = {
     "hsi4d",
-    {{"draw", {}, {"--help", "--out"}}, {"body", {{"make", {}, {"--size"}}, {"tell", {}, {}}}, {"--help"}}},
+    {{"draw", {}, {"--help", "--out"}}, {"body", {{"make", {}, {"--size"}}, {"tell", {}, {}}}, {"--help"}, true}},
     {}};
 
 /// The message of a refusal; "" where the words are known.

@@ -91,10 +91,8 @@ TEST_CASE("a run with approximations that was stopped and resumed has the bits o
   net.lr = 1e-3;
   net.every = 4;
   config.stages.back().second.optimize.emplace_back("color_net", net);
-  config.approx.render.collapse_suffix = true;
   config.approx.longest_side_px = kTinyPixels / 2;
   config.approx.hold_colors = true;
-  config.approx.camera_pixel_share = 0.5;
   config.approx.seen_within_deg = 10;
   StageSettings& camera = config.stages.front().second;
   REQUIRE(find_entry(camera.optimize, "camera") != nullptr);

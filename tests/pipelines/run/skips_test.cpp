@@ -34,7 +34,6 @@ const std::vector<std::string> kTilesOnly = {"skip.static_layer=false", "skip.un
                                              "skip.zero_cotangent=false"};
 const std::vector<std::string> kAllPixels = {"skip.static_layer=false", "skip.unseen_gaussians=false",
                                              "skip.unchanged_pixels=false"};
-const std::vector<std::string> kCollapsed = {"approx.collapse_suffix=true"};
 
 /// A run of the tiny clip in a folder; its result as bytes.
 struct SkipRun {
@@ -187,19 +186,6 @@ TEST_CASE("a config without skips has every one of the section off and few itera
   CHECK(find_entry(config.stages[1].second.optimize, "transl")->from == 2);
 }
 
-TEST_CASE("an approximation that a config sets changes the result a little, and its log names it", "[run]") {
-  const TemporaryFolder here;
-  const SkipRun on("on", {}), collapsed("collapsed", kCollapsed);
-  const double near = differences(collapsed, on).back();
-  INFO("collapsed " << near << " m or rad off");
-  CHECK(collapsed.motion != on.motion);
-  CHECK(near <= 0.05);  // 0.004 to 0.023 by avatar: an angle that few pixels tell
-  const std::string told =
-      "approx.collapse_suffix is on: images are near, each pixel within render.transmittance_stop, 0.001";
-  CHECK_THAT(file_text("collapsed/log.txt"), Contains(" info " + told + "\n"));
-  CHECK_THAT(file_text("on/log.txt"), !Contains("collapse_suffix"));
-}
-
 TEST_CASE("colours that are held cost fewer operators and change the result a little", "[run]") {
   const TemporaryFolder here;
   const auto move_net = [](RunConfig& config) {
@@ -222,28 +208,6 @@ TEST_CASE("colours that are held cost fewer operators and change the result a li
     CHECK(on.counted("backward_nodes", stage) < off.counted("backward_nodes", stage));
   }
   CHECK_THAT(file_text("on/log.txt"), Contains(" info approx.hold_colors is on: "));
-}
-
-TEST_CASE("a camera that sees a share of the pixels renders fewer tiles and is found nearly as well", "[run]") {
-  const TemporaryFolder here;
-  const SkipRun part("part", {"approx.camera_pixel_share=0.5"}), all("all", {});
-  CHECK(part.counted("tiles", "camera") < all.counted("tiles", "camera"));
-  CHECK(part.counted("tiles") == Approx(all.counted("tiles")).epsilon(0.2));  // the other stage sees all
-  const auto error = [](const SkipRun& run) {
-    return nlohmann::json::parse(file_text(run.folder + "/summary.json"))["metrics"][0]["camera_translation_cm"]
-        .get<double>();
-  };
-  INFO("cm: " << error(part) << " of a half, " << error(all) << " of all");
-  CHECK(error(part) < 3 * error(all) + 0.5);
-  CHECK_THAT(file_text("part/log.txt"), Contains(" info approx.camera_pixel_share is on: "));
-  // Whatever else says which pixels count; the weights of what a stage fits to are 0 or 1, and fewer are 1.
-  for (const char* const weight : {"all", "background", "foreground"}) {
-    INFO(weight);
-    const std::string set = "stages.camera.weight=" + std::string(weight);
-    const SkipRun fewer("fewer_" + std::string(weight), {"approx.camera_pixel_share=0.5", set});
-    const SkipRun full("full_" + std::string(weight), {set});
-    CHECK(fewer.counted("tiles", "camera") < full.counted("tiles", "camera"));
-  }
 }
 
 TEST_CASE("what human and objects hide of themselves is left out and the result is near", "[run]") {
@@ -276,27 +240,14 @@ TEST_CASE("a run whose images are reduced writes smaller ones and finds nearly t
 
 TEST_CASE("what settings of skip and approx do to each other is told", "[run]") {
   using Notes = std::vector<std::string>;
-  const std::string on =
-      "info: approx.collapse_suffix is on: images are near, each pixel within "
-      "render.transmittance_stop, ";
-  const std::string nothing = "warning: approx.collapse_suffix=true does nothing with ";
   const std::string off_too = "info: skip.static_tiles=false switches skip.static_layer off too";
   CHECK(notes_of({}).empty());
   CHECK(notes_of({"skip.zero_cotangent=false"}).empty());
   CHECK(notes_of({"skip.static_layer=false"}).empty());
-  CHECK(notes_of(kCollapsed) == Notes{on + "0.001"});
-  CHECK(notes_of({"approx.collapse_suffix=true", "render.quality=fast"}) == Notes{on + "0.01"});
-  CHECK(notes_of({"approx.collapse_suffix=true", "skip.static_layer=false"}) ==
-        Notes{nothing + "skip.static_layer=false"});
-  CHECK(notes_of({"approx.collapse_suffix=true", "skip.static_tiles=false"}) ==
-        Notes{off_too, nothing + "skip.static_tiles=false"});
-  CHECK(notes_of({"approx.collapse_suffix=true", "precision=double"}) == Notes{nothing + "precision=double"});
   CHECK(notes_of({"skip.static_tiles=false"}) == Notes{off_too});
   const std::string both_off =
       "info: skip.frozen_inputs=false switches skip.static_tiles and skip.static_layer off too";
   CHECK(notes_of({"skip.frozen_inputs=false"}) == Notes{both_off});
-  CHECK(notes_of({"skip.frozen_inputs=false", "approx.collapse_suffix=true"}) ==
-        Notes{both_off, nothing + "skip.frozen_inputs=false"});
   CHECK(notes_of({"skip.unchanged_inputs=false"}) ==
         Notes{"info: skip.unchanged_inputs=false has made anew in every iteration what skip.static_tiles keeps"});
   CHECK(notes_of({"skip.unread_pixels=false"}).empty());
@@ -305,8 +256,9 @@ TEST_CASE("what settings of skip and approx do to each other is told", "[run]") 
 
 TEST_CASE("check, a dry run and a run's log have what is to be known of skip and approx", "[run]") {
   const TemporaryFolder here;
-  const std::vector<std::string> overrides = {"approx.collapse_suffix=true", "skip.static_layer=false"};
-  const std::string text = "approx.collapse_suffix=true does nothing with skip.static_layer=false\n";
+  const std::vector<std::string> overrides = {"stages.camera.optimizer.keep_curvature=true",
+                                              "stages.camera.optimizer.kind=adam"};
+  const std::string text = "stages.camera.optimizer: keep_curvature does nothing with kind adam\n";
   const auto check = [](const std::vector<std::string>& set) {
     return cli::check_command(tiny_config_file(), set, false, descriptions_of(loss_terms()));
   };
@@ -320,24 +272,6 @@ TEST_CASE("check, a dry run and a run's log have what is to be known of skip and
   CHECK_THAT(cli::run_command(arguments, loss_terms()), Contains("  note: " + text));
   execute_tiny(tiny_config(overrides), "run");
   CHECK_THAT(file_text("run/log.txt"), Contains(" warning " + text));
-}
-
-TEST_CASE("a stage may work on smaller images than the run", "[run]") {
-  const TemporaryFolder here;
-  const auto run_with = [](const std::string& name, int side) {
-    return SkipRun(name, {"stages.camera.longest_side_px=" + std::to_string(side),
-                          "stages.interaction.longest_side_px=" + std::to_string(side)});
-  };
-  const SkipRun all("all", {}), same = run_with("same", 10 * kTinyPixels), small = run_with("small", kTinyPixels / 2);
-  CHECK(same.motion == all.motion);
-  CHECK(read_image("small/frames/0002_render.png").width() == kTinyPixels);
-  CHECK(read_cameras("small/cameras.json").at(1).width == kTinyPixels);
-  for (const char* const stage : {"camera", "interaction"}) {
-    INFO(stage);
-    CHECK(small.counted("fragments", stage) < 0.5 * all.counted("fragments", stage));
-  }
-  CHECK(differences(small, all).back() > 0);
-  CHECK(differences(small, all).back() < 0.3);
 }
 
 TEST_CASE("settings of an optimiser that the stage does not have are told, and leave the kind free to be changed") {

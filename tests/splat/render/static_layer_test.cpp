@@ -132,10 +132,9 @@ struct OneSet {
   }
 };
 
-SplatView view_with(const RenderSettings& settings, bool tiles, bool layer, bool collapse = false) {
+SplatView view_with(const RenderSettings& settings, bool tiles, bool layer) {
   SplatView view = view_of_size(kWidth, kHeight, settings);
   view.skip = {tiles, layer, true, true};
-  view.approx = {collapse};
   return view;
 }
 
@@ -326,46 +325,6 @@ TEST_CASE("counters of a render with static layers") {
   CHECK(layers.out.counters->tiles == tiles.out.counters->tiles);
   CHECK(layers.out.counters->fragments < tiles.out.counters->fragments);
   CHECK(layers.out.counters->groups < tiles.out.counters->groups);
-}
-
-TEST_CASE("a collapsed suffix is off by no more than the stop") {
-  const Sets sets = made_sets(60, 50, 30);
-  for (const double stop : {1e-4, 1e-2}) {
-    RenderSettings settings;
-    settings.transmittance_stop = stop;
-    OneSet<float> all(sets, view_with(settings, false, false));
-    TwoSets<float> two(sets, view_with(settings, true, true, true)), twice(sets, view_with(settings, true, true, true));
-    two.run();
-    // Features are within ±1, and both the one result and the other may leave out `stop`.
-    CHECK(largest_difference(two.image(), all.image()) <= 2 * stop);
-    CHECK(largest_difference(two.transmittance(), all.transmittance()) <= stop);
-    CHECK(largest_error(two.gradients(two.moving), all.gradients(true)) <= 10 * stop);
-    twice.run();
-    twice.move(made_sets(100, 30, 45).moving);
-    twice.run();
-    twice.move(sets.moving);
-    twice.run();
-    CHECK(twice.image() == two.image());
-    CHECK(twice.gradients(twice.moving) == two.gradients(two.moving));
-  }
-}
-
-TEST_CASE("a collapsed suffix with an exclusive stop is off by what the last Gaussian may hide") {
-  const Sets sets = made_sets(60, 50, 30);
-  double worst = 0;
-  for (const double stop : {1e-4, 1e-2}) {
-    RenderSettings settings;
-    apply_compatibility(settings, Compatibility::kGsplat);
-    settings.transmittance_stop = stop;
-    OneSet<float> all(sets, view_with(settings, false, false));
-    TwoSets<float> two(sets, view_with(settings, true, true, true));
-    two.run();
-    const double difference = largest_difference(two.transmittance(), all.transmittance());
-    worst = larger(worst, difference / stop);
-    CHECK(difference <= stop / (1 - settings.alpha_cap));
-    CHECK(largest_difference(two.image(), all.image()) <= 2 * stop / (1 - settings.alpha_cap));
-  }
-  CHECK(worst > 1);  // the bound of an inclusive stop does not hold
 }
 
 TEST_CASE("static layers make the same bits on any number of threads, again and again", "[isa]") {
