@@ -323,7 +323,7 @@ TEST_CASE("gradients through the human's colours are stopped where the settings 
   CHECK(none["body_pose"] == both["body_pose"]);
   for (const char* same : {"color_net", "avatar_features", "human_colors", "scene_sh"}) CHECK(none[same] == both[same]);
   CHECK_FALSE(none["color_net"].empty());
-  CHECK(gradients(nullptr, true, true)["color_net"].empty());
+  CHECK(gradients(nullptr, true)["color_net"].empty());
 }
 
 TEST_CASE("increments of a camera act in the frame that they name", "[frame_graph]") {
