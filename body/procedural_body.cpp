@@ -89,9 +89,7 @@ SmplxHand hand_space(int side) {
   return hand;
 }
 
-}  // namespace
-
-BodyModel procedural_body() {
+BodyModel made_body() {
   const detail::NetMesh mesh = body_mesh();
   BodyModel body;
   body.name = kProceduralName;
@@ -104,6 +102,13 @@ BodyModel procedural_body() {
   }
   body.faces = mesh.faces;
   body.weights = detail::procedural_weights(mesh);
+  return body;
+}
+
+}  // namespace
+
+BodyModel procedural_body() {
+  static const BodyModel body = made_body();  // half a second, and always the same
   return body;
 }
 

@@ -263,7 +263,7 @@ TEST_CASE("a table of numbers has reconstructions below renders, under the same 
   CHECK(named(lines[3], "mpjpe_mm_mean") == "12.2");
   CHECK(named(lines[3], "mpjpe_mm_deviation") == "5.25");
   CHECK(named(lines[5], "tracking") == "time");
-  CHECK(named(lines[5], "mpjpe_mm_mean") == "40");
+  CHECK(named(lines[5], "mpjpe_mm_mean") == "40.0");
 }
 
 TEST_CASE("a picture has what errors come to below them: means and their spread, by both budgets") {
