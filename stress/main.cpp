@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "pipelines/cli/options.h"
+#include "pipelines/cli/other_programs.h"
 #include "pipelines/cli/program_commands.h"
 #include "stress/command.h"
 
@@ -10,9 +11,7 @@ namespace {
 
 void add_stress(CLI::App& app, Program& program) {
   StressOptions& stress = program.options<StressOptions>();
-  CLI::App* command = app.add_subcommand("stress",
-                                         "Try every known way to fail: a row each, with what was measured, what is "
-                                         "allowed, and what it would be without the remedy");
+  CLI::App* command = app.add_subcommand(kStressProgram.command, kStressProgram.summary);
   command->add_option("--row", stress.rows, "Only these: A1, or a letter for its group; default: all")->type_name("ID");
   add_threads(*command, stress.threads);
   command->add_option("--json", stress.json, "File for the figures, one JSON object a row")->type_name("F");
