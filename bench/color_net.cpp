@@ -1,19 +1,36 @@
-#include "bench/color_net.h"
+// `hsi4d bench color_net`: time of a human's color net on the tape, forward and backward.
+#include "body/color_net.h"
 
 #include <algorithm>
+#include <array>
+#include <functional>
+
+#include <nlohmann/json.hpp>
 
 #include "bench/fma_peak.h"
-#include "body/color_net.h"
-#include "core/check.h"
+#include "bench/list.h"
+#include "bench/timing.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/stopwatch.h"
-#include "core/suggest.h"
-#include "core/text.h"
+#include "core/table.h"
 
-namespace hsi4d {
+namespace hsi4d::cli {
 
 namespace {
+
+/// One step of one workload: `forward`; `both`, forward and backward with all that may move; `pose`, the same with
+/// network and features frozen, as between the network's steps.
+struct ColorNetMeasurement : BenchTime {
+  Index gaussians = 0, features = 0, hidden_width = 0, hidden_layers = 0;
+  double multiply_adds = 0;   ///< of the matrices, those that the backward pass repeats included
+  double fma_peak_per_s = 0;  ///< measured just before, on as many threads; 0: no multiply-adds
+
+  /// Multiply-adds a second by the least time, as a share of the peak; 0 where that is not known.
+  double peak_share() const {
+    return fma_peak_per_s > 0 && min_ms > 0 ? multiply_adds / (1e-3 * min_ms) / fma_peak_per_s : 0;
+  }
+};
 
 constexpr Index kRows = 50000, kJoints = 55;
 
@@ -77,8 +94,8 @@ struct RecordedNet {
   }
 };
 
-void bench_workload(const NetWorkload& w, const ColorNetBench& options,
-                    const std::function<void(const ColorNetMeasurement&)>& report) {
+void bench_net(const NetWorkload& w, const BenchOptions& options,
+               const std::function<void(const ColorNetMeasurement&)>& report) {
   constexpr int kWarmUp = 3;
   const double peak = fma_peak_per_second();
   RecordedNet recorded(w);
@@ -94,14 +111,8 @@ void bench_workload(const NetWorkload& w, const ColorNetBench& options,
     const double all = recorded.run()[1];
     if (i >= 0) pose.push_back(all);
   }
-  const auto measured = [&](const char* step, std::vector<double> seconds, double multiply_adds) {
-    std::sort(seconds.begin(), seconds.end());
-    ColorNetMeasurement m;
-    m.name = std::string("color_net/") + w.name + "/" + step;
-    m.threads = options.threads;
-    m.median_ms = 1e3 * seconds[seconds.size() / 2];
-    m.min_ms = 1e3 * seconds.front();
-    m.repeats = static_cast<int>(seconds.size());
+  const auto measured = [&](const char* step, const std::vector<double>& seconds, double multiply_adds) {
+    ColorNetMeasurement m{bench_time(std::string("color_net/") + w.name + "/" + step, options.threads, seconds)};
     m.gaussians = kRows;
     m.features = 16;
     m.hidden_width = w.hidden_width;
@@ -113,36 +124,44 @@ void bench_workload(const NetWorkload& w, const ColorNetBench& options,
   const double once = recorded.multiply_adds;
   const double first_layer =  // through which no gradient goes back where only the pose is wanted
       mlp_multiply_adds(kRows, std::array<Index, 2>{w.view_direction ? 19 : 16, w.hidden_width});
-  measured("forward", std::move(forward), once);
-  measured("both", std::move(both), 4 * once);  // forward, again, to inputs, to weights
+  measured("forward", forward, once);
+  measured("both", both, 4 * once);  // forward, again, to inputs, to weights
   const double to_directions = w.view_direction ? mlp_multiply_adds(kRows, std::array<Index, 2>{3, w.hidden_width}) : 0;
-  measured("pose", std::move(pose), 3 * once - first_layer + to_directions);
+  measured("pose", pose, 3 * once - first_layer + to_directions);
+}
+
+std::string json_line(const ColorNetMeasurement& m) {
+  nlohmann::ordered_json line = {{"gaussians", m.gaussians},
+                                 {"features", m.features},
+                                 {"hidden_width", m.hidden_width},
+                                 {"hidden_layers", m.hidden_layers},
+                                 {"multiply_adds", m.multiply_adds}};
+  if (m.fma_peak_per_s > 0) {
+    line["fma_peak_per_s"] = m.fma_peak_per_s;
+    line["fma_peak_share"] = m.peak_share();
+  }
+  return bench_line(m, line.dump());
+}
+
+/// 50,000 Gaussians with 16 features, in float.
+BenchText measure_color_net(const BenchOptions& options) {
+  std::string json;
+  Table table{.head = {"", "median ms", "least ms", "gaussians", "width", "layers", "M mul-add", "peak %"},
+              .align = "lr"};
+  double peak = 0;
+  const auto report = [&](const ColorNetMeasurement& m) {
+    table.rows.push_back({m.name, Cell(m.median_ms, 3), Cell(m.min_ms, 3), m.gaussians, m.hidden_width, m.hidden_layers,
+                          tenths(1e-6 * m.multiply_adds), tenths(100 * m.peak_share())});
+    json += json_line(m);
+    peak = std::max(peak, m.fma_peak_per_s);
+  };
+  for (const NetWorkload& workload : chosen_workloads("color_net", options.workloads, kNetWorkloads))
+    with_threads(options.threads, [&] { bench_net(workload, options, report); });
+  return {table_text(table) + peak_line(peak), std::move(json)};
 }
 
 }  // namespace
 
-double ColorNetMeasurement::peak_share() const {
-  return fma_peak_per_s > 0 && min_ms > 0 ? multiply_adds / (1e-3 * min_ms) / fma_peak_per_s : 0;
-}
+BenchTopic color_net_topic() { return {"color_net", "Measure the color net, forward and backward", measure_color_net}; }
 
-std::vector<std::string> color_net_workloads() {
-  std::vector<std::string> names;
-  for (const NetWorkload& w : kNetWorkloads) names.emplace_back(w.name);
-  return names;
-}
-
-void bench_color_net(const ColorNetBench& options, const std::function<void(const ColorNetMeasurement&)>& report) {
-  const std::vector<std::string> all = color_net_workloads();
-  for (const std::string& name : options.workloads) {
-    if (std::find(all.begin(), all.end(), name) == all.end())
-      throw UserError("hsi4d bench color_net: no workload \"" + name + "\"; known: " + joined(all) +
-                      did_you_mean(name, all));
-  }
-  for (const NetWorkload& workload : kNetWorkloads) {
-    const auto& wanted = options.workloads;
-    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), workload.name) == wanted.end()) continue;
-    with_threads(options.threads, [&] { bench_workload(workload, options, report); });
-  }
-}
-
-}  // namespace hsi4d
+}  // namespace hsi4d::cli

@@ -96,7 +96,7 @@ double gradient_error(const Iterated& a, const Iterated& b) {
 
 }  // namespace
 
-void bench_iteration(const Workload& w, const RasterizeBench& options,
+void bench_iteration(const Workload& w, const cli::BenchOptions& options,
                      const std::function<void(const Measurement&)>& report) {
   std::vector<std::unique_ptr<Iterated>> all;
   for (const Mode& mode : kModes) all.push_back(std::make_unique<Iterated>(w, mode));

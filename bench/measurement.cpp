@@ -1,7 +1,5 @@
 #include "bench/measurement.h"
 
-#include <algorithm>
-
 #include "bench/workloads.h"
 #include "core/memory.h"
 #include "splat/render/render_counters.h"
@@ -20,14 +18,8 @@ std::optional<double> Measurement::peak_share() const {
 }
 
 Measurement measured(const Workload& workload, const RenderCounters& counters, int threads, const std::string& step,
-                     std::vector<double> seconds) {
-  std::sort(seconds.begin(), seconds.end());
-  Measurement m;
-  m.name = "rasterize/" + workload.name + "/" + step;
-  m.threads = threads;
-  m.median_ms = 1e3 * seconds[seconds.size() / 2];
-  m.min_ms = 1e3 * seconds.front();
-  m.repeats = static_cast<int>(seconds.size());
+                     const std::vector<double>& seconds) {
+  Measurement m{bench_time("rasterize/" + workload.name + "/" + step, threads, seconds)};
   m.gaussians = workload.count;
   m.fragments = counters.fragments;
   m.pairs = counters.pairs;

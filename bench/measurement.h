@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/timing.h"
 #include "core/types.h"
 
 namespace hsi4d {
@@ -16,11 +17,7 @@ struct Workload;
 enum class WorkUnit { kGaussians, kPairs, kFragments };
 
 /// One step of one workload. Rates follow from the numbers.
-struct Measurement {
-  std::string name;  ///< "rasterize/WORKLOAD/STEP"
-  int threads = 1;
-  double median_ms = 0, min_ms = 0;
-  int repeats = 0;
+struct Measurement : BenchTime {
   Index gaussians = 0, fragments = 0, groups = 0, pairs = 0, pixels = 0;
   Index tiles = 0;       ///< of which something was rendered
   Index kept_bytes = 0;  ///< of the pixels, from forward to backward, beside the outputs
@@ -42,6 +39,6 @@ struct Measurement {
 /// The measurement of a step of a workload.
 /// @param seconds  of each run, in any order, at least one
 Measurement measured(const Workload& workload, const RenderCounters& counters, int threads, const std::string& step,
-                     std::vector<double> seconds);
+                     const std::vector<double>& seconds);
 
 }  // namespace hsi4d

@@ -8,6 +8,7 @@
 #include <set>
 #include <thread>
 
+#include "bench/timing.h"
 #include "core/check.h"
 #include "core/held_isa.h"
 #include "core/parallel.h"
@@ -204,16 +205,11 @@ KeptScene keep(const ParetoScene& scene, const ParetoSetting& setting, int threa
   return kept;
 }
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
-
 template <class Part>
 RunTimes times_of(const std::vector<Seconds>& runs, const Part& part) {
   std::vector<double> values;
   for (const Seconds& s : runs) values.push_back(std::invoke(part, s));
-  return {median(values), *std::min_element(values.begin(), values.end())};
+  return {median_of(values), *std::min_element(values.begin(), values.end())};
 }
 
 /// Runs both in turns, after one that warms up.
@@ -235,9 +231,9 @@ void measure_times(const KeptScene& kept, const KeptScene& usual, int repeats, P
   row.backward = times_of(mine, &Seconds::backward);
   row.both = times_of(mine, &Seconds::both);
   if (&kept == &usual) return;
-  row.forward_ratio = median(forward);
-  row.backward_ratio = median(backward);
-  row.time_ratio = median(both);
+  row.forward_ratio = median_of(forward);
+  row.backward_ratio = median_of(backward);
+  row.time_ratio = median_of(both);
 }
 
 bool is_measured(const ParetoScene& scene, const ParetoSetting& setting) {

@@ -1,7 +1,12 @@
-#include "bench/pareto_command.h"
-
+// `hsi4d bench pareto`: run time against error, setting by setting, and what an error comes to in a reconstruction.
 #include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
 
+#include <CLI/CLI.hpp>
+
+#include "bench/list.h"
 #include "bench/pareto_tracking.h"
 #include "core/check.h"
 #include "core/file.h"
@@ -9,10 +14,22 @@
 #include "core/suggest.h"
 #include "core/text.h"
 #include "pipelines/cli/terminal.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d::cli {
 
 namespace {
+
+struct BenchParetoOptions : BenchConfigOptions {
+  std::vector<std::string> scenes;       ///< by name; empty: all, or none where there are files
+  std::vector<std::string> scene_files;  ///< files of Gaussians and folders of such files, a scene each
+  std::vector<std::string> knobs;        ///< empty: all
+  int threads = 1;
+  int repeats = 9;
+  int seeds = 5;                                    ///< of the reconstructions; 0: these are left out
+  std::filesystem::path out = "runs/bench/pareto";  ///< folder of their datasets
+  std::string csv, front;                           ///< files; empty: none
+};
 
 constexpr const char* kTrackedLike = "avatar_in_scene";  // what is reconstructed looks like it
 constexpr double kMostTrackedTime = 4;                   // of the default's: settings beyond are not reconstructed with
@@ -88,8 +105,9 @@ void write_outputs(const BenchParetoOptions& options, const std::vector<ParetoRo
   if (!options.front.empty()) write_text_file(options.front, pareto_front_svg(rows));
 }
 
-}  // namespace
-
+/// Measures, and reconstructs with the presets and with what is on the front of avatar_in_scene, but for what takes
+/// more than four times as long as the default. Names and the config are looked at before anything is measured. Returns
+/// tables.
 std::string bench_pareto_command(const BenchParetoOptions& options, const std::vector<LossTerm>& losses) {
   const ParetoBench bench{chosen_scenes(options), chosen_settings(options.knobs), options.repeats, options.threads};
   Tracking tracking;
@@ -113,6 +131,41 @@ std::string bench_pareto_command(const BenchParetoOptions& options, const std::v
   const std::string fronts = pareto_front_table(rows);
   return pareto_table(rows) + (fronts.empty() ? "" : "\n" + fronts) +
          (tracked.empty() ? "" : "\n" + tracking_table(tracked));
+}
+
+void add_pareto(CLI::App& command, Program& program) {
+  BenchParetoOptions& pareto = program.options<BenchParetoOptions>();
+  add_workload(command, pareto.scenes, "of the scenes that are made up");
+  command
+      .add_option(
+          "--scene", pareto.scene_files,
+          std::string("Gaussians of a file to measure too, or of all files in a folder, instead of all that are "
+                      "made up unless --workload names some; ") +
+              kSplatFormats)
+      ->type_name("F.ply|DIR");
+  command.add_option("--knob", pareto.knobs, "Only these and the default; default: all");
+  add_thread_count(command, pareto.threads, "1");
+  add_repeats(command, pareto.repeats);
+  command.add_option("--seeds", pareto.seeds, "Reconstructions of each setting; default: 5; 0 leaves these out")
+      ->check(CLI::Range(0, 100));
+  add_config(command, pareto, "The config of the reconstructions", "configs/bench/pareto_tracking.json");
+  command
+      .add_option("--out", pareto.out,
+                  "Folder that is made for datasets and reconstructions and removed again; default: runs/bench/pareto")
+      ->type_name("DIR");
+  command.add_option("--csv", pareto.csv, "File for the measurements, a line each")->type_name("F.csv");
+  command.add_option("--front", pareto.front, "File for a picture of what settings are chosen by, two panels")
+      ->type_name("F.svg");
+  run_when_chosen(command, program, [&] { return bench_pareto_command(pareto, program.terms); });
+}
+
+}  // namespace
+
+BenchTopic pareto_topic() {
+  return {
+      .name = "pareto",
+      .summary = "Measure run time against error, setting by setting, and what an error comes to in a reconstruction",
+      .add = add_pareto};
 }
 
 }  // namespace hsi4d::cli

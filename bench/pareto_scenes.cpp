@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "bench/pareto.h"
+#include "bench/topic.h"
 #include "bench/workloads.h"
 #include "core/check.h"
 #include "core/random.h"
@@ -188,14 +189,9 @@ std::vector<std::string> pareto_scene_names() {
 }
 
 ParetoScene pareto_scene(const std::string& name, double size) {
-  for (const NamedScene& named : kScenes) {
-    if (name != named.name) continue;
-    ParetoScene scene = named.make(size);
-    scene.name = name;
-    return scene;
-  }
-  const std::vector<std::string> all = pareto_scene_names();
-  throw UserError("hsi4d bench pareto: no workload \"" + name + "\"; known: " + joined(all) + did_you_mean(name, all));
+  ParetoScene scene = cli::chosen_workloads("pareto", {name}, kScenes).front().make(size);
+  scene.name = name;
+  return scene;
 }
 
 ParetoScene pareto_scene_of(const std::string& file) {

@@ -3,17 +3,38 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "bench/list.h"
 #include "body/procedural_body.h"
 #include "core/check.h"
+#include "core/file.h"
+#include "core/formatted.h"
 #include "core/parallel.h"
-#include "core/suggest.h"
+#include "core/table.h"
 #include "core/text.h"
 #include "pipelines/draw/posed_avatar.h"
 
 namespace hsi4d {
 
 namespace {
+
+/// One filter, judged on one figure at one distance.
+struct FilterMeasurement {
+  std::string name;  ///< "pixel_filter/FIGURE/HEIGHT/TRUTH/FILTER"
+  Index gaussians = 0;
+  double height_px = 0;   ///< of the figure
+  double distance_m = 0;  ///< from the camera
+  double sigma_px = 0;    ///< mean standard deviation of a Gaussian along the surface, without blur
+  double blur = 0;        ///< pixels²
+  bool antialias = false;
+  SilhouetteError error;
+  double distance_error =
+      0;  ///< relative: how much farther away the figure looks most like the truth, in least squares
+};
 
 constexpr double kFocalPx = 600;
 constexpr int kMarginPx = 8;
@@ -236,13 +257,23 @@ class FigureBench {
   const Report& report_;
 };
 
-}  // namespace
-
-std::vector<std::string> pixel_filter_figures() {
-  std::vector<std::string> names;
-  for (const NamedFigure& f : kFigures) names.emplace_back(f.name);
-  return names;
+std::string filter_row(const FilterMeasurement& m) {
+  const nlohmann::ordered_json line = {{"name", m.name},
+                                       {"gaussians", m.gaussians},
+                                       {"height_px", m.height_px},
+                                       {"distance_m", m.distance_m},
+                                       {"sigma_px", m.sigma_px},
+                                       {"blur", m.blur},
+                                       {"antialias", m.antialias},
+                                       {"width_px", m.error.width_px},
+                                       {"half_width_px", m.error.half_width_px},
+                                       {"brightness", m.error.brightness},
+                                       {"rms", m.error.rms},
+                                       {"distance_error", m.distance_error}};
+  return line.dump() + "\n";
 }
+
+}  // namespace
 
 PosedGaussians filter_figure(Index gaussians) {
   AvatarSettings settings;
@@ -270,25 +301,54 @@ SceneView figure_view(const PosedGaussians& figure, double height_px, const Vect
   return view;
 }
 
-void bench_pixel_filter(const PixelFilterBench& options, const std::function<void(const FilterMeasurement&)>& report) {
-  const std::vector<std::string> all = pixel_filter_figures();
-  for (const std::string& name : options.figures) {
-    if (std::find(all.begin(), all.end(), name) == all.end())
-      throw UserError("hsi4d bench pixel_filter: no workload \"" + name + "\"; known: " + joined(all) +
-                      did_you_mean(name, all));
-  }
+std::string bench_pixel_filter(const PixelFilterBench& options) {
+  const auto chosen = cli::chosen_workloads("pixel_filter", options.figures, kFigures);
   for (const double height : options.heights_px) {
     if (!(height >= 8 && height <= 2048))
       throw UserError("hsi4d bench pixel_filter: a height of " + number_text(height) + " px; allowed: 8 to 2048");
   }
-  for (const NamedFigure& named : kFigures) {
-    const auto& wanted = options.figures;
-    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), named.name) == wanted.end()) continue;
+  std::string json;
+  Table table{.head = {"", "sigma px", "blur px2", "width px", "half px", "size px", "light %", "rms", "distance %"},
+              .align = "lr"};
+  const auto report = [&](const FilterMeasurement& m) {
+    const SilhouetteError& e = m.error;
+    table.rows.push_back({m.name, Cell(m.sigma_px, 2), Cell(m.blur, 4), formatted("%+.3f", e.width_px),
+                          formatted("%+.3f", e.half_width_px), formatted("%+.3f", m.distance_error * m.height_px),
+                          formatted("%+.2f", 100 * e.brightness), Cell(e.rms, 4),
+                          formatted("%+.2f", 100 * m.distance_error)});
+    json += filter_row(m);
+  };
+  for (const NamedFigure& named : chosen) {
     const PosedGaussians figure = filter_figure(named.gaussians);
     for (const double height : options.heights_px)
       for (const TrueSilhouette& truth : kTruths)
         with_threads(options.threads, [&] { FigureBench(named.name, figure, height, report).against(truth); });
   }
+  if (!options.json.empty()) write_text_file(options.json, json);
+  return table_text(table);
 }
+
+namespace cli {
+namespace {
+
+void add_pixel_filter(CLI::App& command, Program& program) {
+  PixelFilterBench& options = program.options<PixelFilterBench>();
+  add_workload(command, options.figures, "figures");
+  add_thread_count(command, options.threads, "1");
+  add_json(command, options.json);
+  command.add_option("--height", options.heights_px, "Heights of the figures, px; default: 32 to 512")
+      ->check(CLI::Range(8.0, 2048.0));
+  run_when_chosen(command, program, [&] { return bench_pixel_filter(options); });
+}
+
+}  // namespace
+
+BenchTopic pixel_filter_topic() {
+  return {.name = "pixel_filter",
+          .summary = "Measure what the renderer's low-pass does to silhouettes",
+          .add = add_pixel_filter};
+}
+
+}  // namespace cli
 
 }  // namespace hsi4d

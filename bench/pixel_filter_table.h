@@ -2,7 +2,6 @@
 // distances.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -10,24 +9,11 @@
 
 namespace hsi4d {
 
-/// One filter, judged on one figure at one distance.
-struct FilterMeasurement {
-  std::string name;  ///< "pixel_filter/FIGURE/HEIGHT/TRUTH/FILTER"
-  Index gaussians = 0;
-  double height_px = 0;   ///< of the figure
-  double distance_m = 0;  ///< from the camera
-  double sigma_px = 0;    ///< mean standard deviation of a Gaussian along the surface, without blur
-  double blur = 0;        ///< pixels²
-  bool antialias = false;
-  SilhouetteError error;
-  double distance_error =
-      0;  ///< relative: how much farther away the figure looks most like the truth, in least squares
-};
-
 struct PixelFilterBench {
   std::vector<std::string> figures;  ///< names; empty: all
   std::vector<double> heights_px = {32, 64, 128, 256, 512};
   int threads = 1;
+  std::string json;  ///< path to write one JSON object a measurement to; empty: none
 };
 
 /// Widths are to be right to this, pixels.
@@ -36,9 +22,6 @@ inline constexpr double kWidthGoalPx = 0.05;
 /// Blur, pixels², that with antialias is nearly the best against the box for figures of any size.
 inline constexpr double kSharpBlur = 0.02;
 
-/// Names of the figures.
-std::vector<std::string> pixel_filter_figures();
-
 /// An avatar of `gaussians` Gaussians in its rest pose, facing +z at the origin.
 PosedGaussians filter_figure(Index gaussians);
 
@@ -46,7 +29,7 @@ PosedGaussians filter_figure(Index gaussians);
 /// against the grid of pixels.
 SceneView figure_view(const PosedGaussians& figure, double height_px, const Vector2<double>& shift_px);
 
-/// Measures; `report` gets each measurement as it is made. Three truths:
+/// Measures, and returns a table. Three truths:
 ///
 ///   box   the pixel's square alone: 8 × 8 samples a pixel, no blur
 ///   soft  the same seen through a lens of 0.25 px²
@@ -64,6 +47,6 @@ SceneView figure_view(const PosedGaussians& figure, double height_px, const Vect
 /// 4 × 4 samples a pixel, which bounds the error of the truth itself.
 ///
 /// Throws UserError for a figure that is not known, or a height below 8 or above 2048 px.
-void bench_pixel_filter(const PixelFilterBench& options, const std::function<void(const FilterMeasurement&)>& report);
+std::string bench_pixel_filter(const PixelFilterBench& options);
 
 }  // namespace hsi4d

@@ -1,20 +1,22 @@
-#include "bench/rasterize.h"
-
+// `hsi4d bench rasterize`: time and counts of the renderer's steps on made-up workloads.
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <span>
+
+#include <nlohmann/json.hpp>
 
 #include "bench/fma_peak.h"
 #include "bench/iteration.h"
+#include "bench/list.h"
+#include "bench/measurement.h"
 #include "bench/workloads.h"
-#include "core/check.h"
 #include "core/parallel.h"
-#include "core/suggest.h"
-#include "core/text.h"
+#include "core/table.h"
 #include "splat/render/covariance.h"
 #include "splat/render/render.h"
 
-namespace hsi4d {
+namespace hsi4d::cli {
 
 namespace {
 
@@ -81,8 +83,8 @@ constexpr std::array<Step, 2> kStepsWithColors = {
     {{"backward_with_colors", &RenderTimes::backward_s, WorkUnit::kFragments, kBackward + kBackwardOfColors},
      {"reduce_with_colors", &RenderTimes::reduce_s, WorkUnit::kGaussians}}};
 
-void bench_workload(const Workload& w, const RasterizeBench& options,
-                    const std::function<void(const Measurement&)>& report) {
+void bench_steps(const Workload& w, const BenchOptions& options,
+                 const std::function<void(const Measurement&)>& report) {
   const double peak = fma_peak_per_second();
   for (const bool with_colors : {false, true}) {
     RecordedRender recorded(w, with_colors);
@@ -97,7 +99,7 @@ void bench_workload(const Workload& w, const RasterizeBench& options,
     for (const Step& step : steps) {
       std::vector<double> seconds;
       for (const RenderTimes& t : times) seconds.push_back(t.*step.time);
-      Measurement m = measured(w, counters, options.threads, step.name, std::move(seconds));
+      Measurement m = measured(w, counters, options.threads, step.name, seconds);
       m.unit = step.unit;
       m.operations = step.operations * kLanes * static_cast<double>(counters.groups);
       m.fma_peak_per_s = peak;
@@ -106,32 +108,59 @@ void bench_workload(const Workload& w, const RasterizeBench& options,
   }
 }
 
-}  // namespace
-
-std::vector<std::string> rasterize_workloads() {
-  std::vector<std::string> names;
-  for (const RenderWorkload& w : kRenderWorkloads) names.emplace_back(w.name);
-  return names;
+const char* unit_name(WorkUnit unit) {
+  return unit == WorkUnit::kGaussians ? "gaussians" : unit == WorkUnit::kPairs ? "pairs" : "fragments";
 }
 
-void bench_rasterize(const RasterizeBench& options, const std::function<void(const Measurement&)>& report) {
-  const std::vector<std::string> all = rasterize_workloads();
-  for (const std::string& name : options.workloads) {
-    if (std::find(all.begin(), all.end(), name) == all.end())
-      throw UserError("hsi4d bench rasterize: no workload \"" + name + "\"; known: " + joined(all) +
-                      did_you_mean(name, all));
-  }
-  for (const RenderWorkload& named : kRenderWorkloads) {
-    const auto& wanted = options.workloads;
-    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), named.name) == wanted.end()) continue;
+std::string json_line(const Measurement& m) {
+  nlohmann::ordered_json line = {{"gaussians", m.gaussians},
+                                 {"fragments", m.fragments},
+                                 {"groups", m.groups},
+                                 {"pairs", m.pairs},
+                                 {"tiles", m.tiles},
+                                 {"pixels", m.pixels},
+                                 {"kept_bytes", m.kept_bytes},
+                                 {"unit", unit_name(m.unit)},
+                                 {"millions_per_s", m.millions_per_s()},
+                                 {"peak_memory_bytes", m.peak_memory_bytes}};
+  if (m.unit == WorkUnit::kFragments) line["mfragments_per_s"] = m.millions_per_s();
+  if (m.fma_peak_per_s > 0) line["fma_peak_per_s"] = m.fma_peak_per_s;
+  if (m.peak_share()) line["fma_peak_share"] = *m.peak_share();
+  if (m.image_error) line["image_error"] = *m.image_error;
+  if (m.gradient_error) line["gradient_error"] = *m.gradient_error;
+  return bench_line(m, line.dump());
+}
+
+BenchText measure_rasterize(const BenchOptions& options) {
+  std::string json;
+  Table table{.head = {"", "median ms", "least ms", "tiles", "pairs", "fragments", "M/s", "of", "peak %", ""},
+              .align = "lrrrrrrlrl"};
+  double peak = 0;
+  const auto report = [&](const Measurement& m) {
+    table.rows.push_back({m.name, Cell(m.median_ms, 3), Cell(m.min_ms, 3), m.tiles, m.pairs, m.fragments,
+                          Cell(m.millions_per_s(), 0), unit_name(m.unit)});
+    table.rows.back().push_back(m.peak_share() ? Cell(100 * *m.peak_share(), 1) : Cell());
+    if (m.image_error && m.gradient_error)
+      table.rows.back().emplace_back(formatted("image within %.2g, gradients within %.2g (relative L2) of all rendered",
+                                               *m.image_error, *m.gradient_error));
+    json += json_line(m);
+    peak = std::max(peak, m.fma_peak_per_s);
+  };
+  for (const RenderWorkload& named : chosen_workloads("rasterize", options.workloads, kRenderWorkloads)) {
     const Workload workload = named.make({});
     with_threads(options.threads, [&] {
-      bench_workload(workload, options, report);
-      if (workload.moving_begin > 0 && workload.moving_begin < workload.count) {
+      bench_steps(workload, options, report);
+      if (workload.moving_begin > 0 && workload.moving_begin < workload.count)
         bench_iteration(workload, options, report);
-      }
     });
   }
+  return {table_text(table) + peak_line(peak), std::move(json)};
 }
 
-}  // namespace hsi4d
+}  // namespace
+
+BenchTopic rasterize_topic() {
+  return {"rasterize", "Measure every step of the renderer, forward and backward", measure_rasterize};
+}
+
+}  // namespace hsi4d::cli

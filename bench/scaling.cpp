@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <ctime>
 
-#include "bench/measurement.h"
+#include "bench/timing.h"
 #include "core/check.h"
 #include "core/memory.h"
 #include "core/parallel.h"
@@ -89,10 +89,7 @@ struct Told {
   }
 };
 
-double median_ms(std::vector<double> seconds) {
-  std::sort(seconds.begin(), seconds.end());
-  return 1e3 * seconds[seconds.size() / 2];
-}
+double median_ms(const std::vector<double>& seconds) { return 1e3 * median_of(seconds); }
 
 double least_ms(const std::vector<double>& seconds) { return 1e3 * *std::min_element(seconds.begin(), seconds.end()); }
 

@@ -1,7 +1,12 @@
-#include "bench/scaling_command.h"
-
+// `hsi4d bench scaling`: the time of an iteration against the size of what is reconstructed.
+#include <filesystem>
 #include <map>
+#include <string>
+#include <vector>
 
+#include <CLI/CLI.hpp>
+
+#include "bench/list.h"
 #include "bench/scaling.h"
 #include "core/file.h"
 #include "core/parallel.h"
@@ -11,6 +16,12 @@
 namespace hsi4d::cli {
 
 namespace {
+
+struct BenchScalingOptions : BenchConfigOptions {
+  std::vector<std::string> axes;  ///< "scene", "scene=1000,2000"; empty: all
+  int threads = 0;                ///< of all axes but `threads`; 0: what the config says
+  int repeats = 20;               ///< iterations of a stage that are measured, of all rounds
+};
 
 /// What of a config the axes change, by which points are the same.
 using PointKey = std::vector<Index>;
@@ -28,8 +39,8 @@ RunConfig config_at(const BenchScalingOptions& options, const std::vector<LossTe
   return load_run_config(options.config, overrides, descriptions_of(losses), ConfigUse::kStages);
 }
 
-}  // namespace
-
+/// Measures the points of every axis; a point that several axes share is measured once. Every point's config is read
+/// before the first is measured. Returns a table.
 std::string bench_scaling_command(const BenchScalingOptions& options, const std::vector<LossTerm>& losses) {
   std::vector<ScalingResult> results;
   std::vector<RunConfig> configs;
@@ -60,6 +71,27 @@ std::string bench_scaling_command(const BenchScalingOptions& options, const std:
   const std::string title = "time of an iteration, " + configs.front().name;
   if (!options.plot.empty()) write_text_file(options.plot, scaling_svg(results, title));
   return scaling_table(results);
+}
+
+void add_scaling(CLI::App& command, Program& program) {
+  BenchScalingOptions& scaling = program.options<BenchScalingOptions>();
+  add_config(command, scaling, "The config that is run", "configs/bench/paper_scale.json");
+  add_thread_count(command, scaling.threads, "what the config says");
+  command
+      .add_option("--repeats", scaling.repeats, "Iterations of each stage, of which the median is told; default: 20")
+      ->check(CLI::Range(1, 1000));
+  command
+      .add_option("--axis", scaling.axes, "scene, avatar, image or threads, with its values or without; default: all")
+      ->type_name("AXIS[=N,N...]");
+  run_when_chosen(command, program, [&] { return bench_scaling_command(scaling, program.terms); });
+}
+
+}  // namespace
+
+BenchTopic scaling_topic() {
+  return {.name = "scaling",
+          .summary = "Measure an iteration against the size of what is reconstructed",
+          .add = add_scaling};
 }
 
 }  // namespace hsi4d::cli

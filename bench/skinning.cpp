@@ -1,38 +1,54 @@
-#include "bench/skinning.h"
-
+// `hsi4d bench skinning`: time of the SMPL-X body on the tape, forward and backward with respect to its pose, and of
+// the Gaussians on it.
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <optional>
+
+#include <nlohmann/json.hpp>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
+#include "bench/list.h"
+#include "bench/timing.h"
 #include "body/avatar.h"
 #include "body/procedural_body.h"
 #include "body/smplx_body.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/stopwatch.h"
-#include "core/suggest.h"
-#include "core/text.h"
+#include "core/table.h"
 #include "pipelines/draw/posed_splats.h"
 
-namespace hsi4d {
+namespace hsi4d::cli {
 
 namespace {
+
+/// One step of one workload; `both` is forward and then backward.
+struct SkinningMeasurement : BenchTime {
+  Index vertices = 0;   ///< 0 where Gaussians are posed
+  Index gaussians = 0;  ///< 0 where vertices are
+  Index joints = 0;
+  Index corrective_columns = 0;  ///< that follow every pose
+  Index table_bytes = 0;         ///< of these columns, read once in each direction
+  double packing_error_m = 0;    ///< most that packed numbers can move a vertex along an axis
+};
 
 constexpr Index kVertices = 10475;
 
 struct BodyWorkload {
   const char* name;
   bool hands_move, correctives, packed;
+  bool is_posing = false;  // Gaussians are posed instead of vertices
 };
-constexpr std::array<BodyWorkload, 5> kBodyWorkloads = {{{"smplx", true, true, true},
+constexpr std::array<BodyWorkload, 6> kBodyWorkloads = {{{"smplx", true, true, true},
                                                          {"smplx_floats", true, true, false},
                                                          {"fixed_hands", false, true, true},
                                                          {"fixed_hands_floats", false, true, false},
-                                                         {"no_correctives", true, false, false}}};
+                                                         {"no_correctives", true, false, false},
+                                                         {"posing", true, false, false, true}}};
 
 /// Largest corrective of a joint at a distance, metres: 5 mm at the joint, 0.3 mm everywhere.
 double corrective_size(double distance) { return 0.0003 + 0.0047 * std::exp(-distance * distance / (2 * 0.1 * 0.1)); }
@@ -117,14 +133,8 @@ struct RecordedBody {
 bool is_hand(SmplxPart part) { return part == SmplxPart::kLeftHand || part == SmplxPart::kRightHand; }
 
 SkinningMeasurement measured(const BodyWorkload& workload, const SmplxBody<float>& body, const char* step, int threads,
-                             std::vector<double> seconds) {
-  std::sort(seconds.begin(), seconds.end());
-  SkinningMeasurement m;
-  m.name = std::string("skinning/") + workload.name + "/" + step;
-  m.threads = threads;
-  m.median_ms = 1e3 * seconds[seconds.size() / 2];
-  m.min_ms = 1e3 * seconds.front();
-  m.repeats = static_cast<int>(seconds.size());
+                             const std::vector<double>& seconds) {
+  SkinningMeasurement m{bench_time(std::string("skinning/") + workload.name + "/" + step, threads, seconds)};
   m.vertices = body.vertex_count();
   m.joints = body.joint_count();
   for (std::size_t part = 0; part < kSmplxParts; ++part) {
@@ -137,8 +147,8 @@ SkinningMeasurement measured(const BodyWorkload& workload, const SmplxBody<float
   return m;
 }
 
-void bench_workload(const BodyWorkload& workload, const SmplxModel& model, const SkinningBench& options,
-                    const std::function<void(const SkinningMeasurement&)>& report) {
+void bench_body(const BodyWorkload& workload, const SmplxModel& model, const BenchOptions& options,
+                const std::function<void(const SkinningMeasurement&)>& report) {
   SmplxBodyOptions body_options;
   body_options.correctives = workload.correctives;
   body_options.packing = workload.packed ? kCorrectivePacking : 0;
@@ -158,14 +168,13 @@ void bench_workload(const BodyWorkload& workload, const SmplxModel& model, const
     backward.push_back(second);
     both.push_back(first + second);
   }
-  report(measured(workload, body, "forward", options.threads, std::move(forward)));
-  report(measured(workload, body, "backward", options.threads, std::move(backward)));
-  report(measured(workload, body, "both", options.threads, std::move(both)));
+  report(measured(workload, body, "forward", options.threads, forward));
+  report(measured(workload, body, "backward", options.threads, backward));
+  report(measured(workload, body, "both", options.threads, both));
 }
 
 // --- Gaussians -------------------------------------------------------------------------------------------------------
 
-constexpr const char* kPosing = "posing";
 constexpr Index kPosedGaussians = 50000;
 
 /// Nanoseconds that the nodes from rotations to posed Gaussians have taken so far, forward and backward.
@@ -181,7 +190,8 @@ std::array<double, 2> posing_time(const Tape<float>& tape) {
 }
 
 /// An avatar's means and axes by the pose, as a frame graph has them, beside a loss that looks at every number.
-void bench_posing(const SkinningBench& options, const std::function<void(const SkinningMeasurement&)>& report) {
+void bench_posing(const BodyWorkload& workload, const BenchOptions& options,
+                  const std::function<void(const SkinningMeasurement&)>& report) {
   const Avatar avatar = surface_avatar(procedural_body(), {.gaussians = kPosedGaussians});
   Tape<float> tape;
   const auto constant = [&tape](const char* name, const std::vector<float>& numbers, Index cols) {
@@ -221,45 +231,60 @@ void bench_posing(const SkinningBench& options, const std::function<void(const S
   }
   constexpr std::array<const char*, 3> kDirections = {"forward", "backward", "both"};
   for (std::size_t k = 0; k < 3; ++k) {
-    std::sort(seconds[k].begin(), seconds[k].end());
-    SkinningMeasurement m;
-    m.name = std::string("skinning/") + kPosing + "/" + kDirections[k];
-    m.threads = options.threads;
-    m.median_ms = 1e3 * seconds[k][seconds[k].size() / 2];
-    m.min_ms = 1e3 * seconds[k].front();
-    m.repeats = static_cast<int>(seconds[k].size());
+    SkinningMeasurement m{
+        bench_time(std::string("skinning/") + workload.name + "/" + kDirections[k], options.threads, seconds[k])};
     m.gaussians = kPosedGaussians;
     m.joints = kSmplxJoints;
     report(m);
   }
 }
 
-}  // namespace
-
-std::vector<std::string> skinning_workloads() {
-  std::vector<std::string> names;
-  for (const BodyWorkload& w : kBodyWorkloads) names.emplace_back(w.name);
-  names.emplace_back(kPosing);
-  return names;
+/// Of the correctives, by forward and backward; 0 where there are none.
+double bytes_read(const SkinningMeasurement& m) {
+  return (m.name.ends_with("/both") ? 2 : 1) * static_cast<double>(m.table_bytes);
 }
 
-void bench_skinning(const SkinningBench& options, const std::function<void(const SkinningMeasurement&)>& report) {
-  const std::vector<std::string> all = skinning_workloads();
-  for (const std::string& name : options.workloads) {
-    if (std::find(all.begin(), all.end(), name) == all.end())
-      throw UserError("hsi4d bench skinning: no workload \"" + name + "\"; known: " + joined(all) +
-                      did_you_mean(name, all));
-  }
-  const auto is_wanted = [&wanted = options.workloads](const char* name) {
-    return wanted.empty() || std::find(wanted.begin(), wanted.end(), name) != wanted.end();
+/// Billions of them a second.
+double rate(const SkinningMeasurement& m) { return m.median_ms > 0 ? bytes_read(m) / m.median_ms / 1e6 : 0; }
+
+std::string json_line(const SkinningMeasurement& m) {
+  nlohmann::ordered_json line = {{"gaussians", m.gaussians}, {"joints", m.joints}};
+  if (m.gaussians == 0)
+    line = {{"vertices", m.vertices},
+            {"joints", m.joints},
+            {"corrective_columns", m.corrective_columns},
+            {"table_bytes", m.table_bytes},
+            {"packing_error_m", m.packing_error_m},
+            {"gbytes_per_s", rate(m)}};
+  return bench_line(m, line.dump());
+}
+
+/// A body of 10,475 vertices and 486 correctives, made up from the procedural body, in float, with a fixed cotangent on
+/// the vertices; and "posing", an avatar of 50,000 Gaussians from its joints' rotations to means and axes, with
+/// cotangents on both.
+BenchText measure_skinning(const BenchOptions& options) {
+  std::string json;
+  Table table{.head = {"", "median ms", "least ms", "points", "columns", "MB read", "GB/s"}, .align = "lr"};
+  const auto report = [&](const SkinningMeasurement& m) {
+    table.rows.push_back({m.name, Cell(m.median_ms, 3), Cell(m.min_ms, 3), m.vertices + m.gaussians,
+                          m.corrective_columns, tenths(bytes_read(m) / 1e6), tenths(rate(m))});
+    json += json_line(m);
   };
   std::optional<SmplxModel> model;
-  for (const BodyWorkload& workload : kBodyWorkloads) {
-    if (!is_wanted(workload.name)) continue;
-    if (!model) model = made_up_model();
-    with_threads(options.threads, [&] { bench_workload(workload, *model, options, report); });
+  for (const BodyWorkload& workload : chosen_workloads("skinning", options.workloads, kBodyWorkloads)) {
+    if (!model && !workload.is_posing) model = made_up_model();
+    with_threads(options.threads, [&] {
+      if (workload.is_posing) return bench_posing(workload, options, report);
+      bench_body(workload, *model, options, report);
+    });
   }
-  if (is_wanted(kPosing)) with_threads(options.threads, [&] { bench_posing(options, report); });
+  return {table_text(table), std::move(json)};
 }
 
-}  // namespace hsi4d
+}  // namespace
+
+BenchTopic skinning_topic() {
+  return {"skinning", "Measure the body: skinning and its gradient, of vertices and of Gaussians", measure_skinning};
+}
+
+}  // namespace hsi4d::cli

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/machine.h"
+#include "bench/timing.h"
 #include "core/simd.h"
 #include "core/table.h"
 #include "pipelines/report/figure.h"
@@ -132,12 +133,7 @@ double StageCost::ms_each_of(double iterations) const {
   return 1e3 * (first + (iterations - 1) * later) / iterations;
 }
 
-double StageCost::median_ms() const {
-  if (ms_an_iteration.empty()) return 0;
-  std::vector<double> sorted = ms_an_iteration;
-  std::sort(sorted.begin(), sorted.end());
-  return sorted[sorted.size() / 2];
-}
+double StageCost::median_ms() const { return ms_an_iteration.empty() ? 0 : median_of(ms_an_iteration); }
 
 double StageCost::min_ms() const {
   return ms_an_iteration.empty() ? 0 : *std::min_element(ms_an_iteration.begin(), ms_an_iteration.end());

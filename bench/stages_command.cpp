@@ -1,8 +1,13 @@
-#include "bench/stages_command.h"
-
+// `hsi4d bench stages`: a run whose operators are timed.
 #include <chrono>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "bench/heap_counter.h"
+#include "bench/list.h"
 #include "bench/skips.h"
 #include "bench/stages.h"
 #include "core/file.h"
@@ -16,6 +21,15 @@
 namespace hsi4d::cli {
 
 namespace {
+
+struct BenchStagesOptions : BenchConfigOptions {
+  std::string out;       ///< folder of dataset and run; empty: runs/bench/NAME
+  int threads = 0;       ///< 0: what the config says
+  bool compare = false;  ///< run again without skips, and tell the ratio
+};
+
+/// Iterations of a stage in the run without skips, at most.
+constexpr int kIterationsWithoutSkips = 20;
 
 namespace fs = std::filesystem;
 
@@ -63,8 +77,9 @@ MeasuredRun measured_run(const RunConfig& config, const BenchStagesOptions& opti
   return {cost, result_text(summary, run.folder)};
 }
 
-}  // namespace
-
+/// Carries out a run of the config into the first free OUT/run, OUT/run-2, …; of a generated dataset, which is made in
+/// OUT/dataset unless it is there, where the config names no data; with `compare` then one without skips. Returns the
+/// tables.
 std::string bench_stages_command(const BenchStagesOptions& options, const std::vector<LossTerm>& losses) {
   const fs::path out = options.out.empty() ? fs::path("runs/bench") / options.config.stem() : fs::path(options.out);
   const RunConfig config = measured_config(options, losses, out);
@@ -79,6 +94,21 @@ std::string bench_stages_command(const BenchStagesOptions& options, const std::v
   if (!options.json.empty()) write_text_file(options.json, json);
   if (!options.plot.empty()) write_text_file(options.plot, cost_svg(with.cost, "an iteration of " + config.name));
   return table;
+}
+
+void add_stages(CLI::App& command, Program& program) {
+  BenchStagesOptions& stages = program.options<BenchStagesOptions>();
+  add_config(command, stages, "The config that is run", "configs/bench/paper_scale.json");
+  add_thread_count(command, stages.threads, "what the config says");
+  command.add_option("--out", stages.out, "Folder of dataset and runs; default: runs/bench/CONFIG")->type_name("DIR");
+  command.add_flag("--compare", stages.compare, "Run again without skips, and tell the ratio");
+  run_when_chosen(command, program, [&] { return bench_stages_command(stages, program.terms); });
+}
+
+}  // namespace
+
+BenchTopic stages_topic() {
+  return {.name = "stages", .summary = "Measure a run, operator by operator", .add = add_stages};
 }
 
 }  // namespace hsi4d::cli

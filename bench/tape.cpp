@@ -1,24 +1,39 @@
-#include "bench/tape.h"
-
+// `hsi4d bench tape`: what the tape itself costs: a node, and the gradient of a lambda loss over its value alone.
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <optional>
+
+#include <nlohmann/json.hpp>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/map.h"
 #include "autodiff/reduce.h"
+#include "bench/list.h"
 #include "bench/tape_operators.h"
-#include "core/check.h"
+#include "bench/timing.h"
+#include "core/formatted.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 #include "core/stopwatch.h"
-#include "core/suggest.h"
-#include "core/text.h"
+#include "core/table.h"
 
-namespace hsi4d {
+namespace hsi4d::cli {
 
 namespace {
+
+/// The time of one run of a work.
+struct TapeMeasurement : BenchTime {
+  Index nodes = 0, elements = 0;     ///< as the work's
+  std::optional<double> ratio = {};  ///< of medians, over `against`
+  std::string against = {};
+  std::optional<double> goal = {};  ///< as the work's
+
+  /// Nanoseconds a node of a chain, or an element of a loss, by the median.
+  double ns_each() const { return 1e6 * median_ms / static_cast<double>(std::max(nodes, elements)); }
+};
 
 // --- chains of nodes -------------------------------------------------------------------------------------------------
 
@@ -130,6 +145,14 @@ struct TapeWorkload {
   void (*add)(std::vector<TapeWork>& work);
 };
 
+/// What they measure, on one thread:
+///
+///   nodes, additions     1000 scalar operators in a row, forward and backward (`both`): a bare copy, and x + 1
+///   loss_of_4            `primal`: 2048 values of a robust residual with its own scale and weight, summed by the
+///                        fastest plain loop; `gradient`: sum_over of the same lambda, value and gradient of all inputs
+///   loss_of_10           the same of a robust distance of a point to a plane
+///   ssim, skinning, anomaly   operators with goals of their own (bench/tape_operators.h)
+///
 /// Goals: design.md's tape: 100 ns a node, twice the value for four inputs, three times for ten.
 constexpr std::array<TapeWorkload, 7> kWorkloads = {{
     {"nodes",
@@ -169,13 +192,8 @@ Index runs_of_a_round(const TapeWork& work) {
   return runs;
 }
 
-TapeMeasurement measured(const TapeWork& work, std::vector<double> seconds) {
-  std::sort(seconds.begin(), seconds.end());
-  TapeMeasurement m;
-  m.name = work.name;
-  m.median_ms = 1e3 * seconds[seconds.size() / 2];
-  m.min_ms = 1e3 * seconds.front();
-  m.repeats = static_cast<int>(seconds.size());
+TapeMeasurement measured(const TapeWork& work, const std::vector<double>& seconds) {
+  TapeMeasurement m{bench_time(work.name, 1, seconds)};
   m.nodes = work.nodes;
   m.elements = work.elements;
   m.against = work.against;
@@ -183,33 +201,10 @@ TapeMeasurement measured(const TapeWork& work, std::vector<double> seconds) {
   return m;
 }
 
-}  // namespace
-
-std::vector<std::string> tape_workloads() {
-  std::vector<std::string> names;
-  for (const TapeWorkload& workload : kWorkloads) names.emplace_back(workload.name);
-  return names;
-}
-
-std::vector<TapeWork> tape_work(const std::vector<std::string>& workloads) {
-  const std::vector<std::string> all = tape_workloads();
-  for (const std::string& name : workloads) {
-    if (std::find(all.begin(), all.end(), name) == all.end())
-      throw UserError("hsi4d bench tape: no workload \"" + name + "\"; known: " + joined(all) +
-                      did_you_mean(name, all));
-  }
+/// Measures every work, in rounds, so that noise meets all alike.
+std::vector<TapeMeasurement> bench_tape(const BenchOptions& options) {
   std::vector<TapeWork> work;
-  for (const TapeWorkload& workload : kWorkloads) {
-    if (workloads.empty() || std::find(workloads.begin(), workloads.end(), workload.name) != workloads.end())
-      workload.add(work);
-  }
-  return work;
-}
-
-double TapeMeasurement::ns_each() const { return 1e6 * median_ms / static_cast<double>(std::max(nodes, elements)); }
-
-std::vector<TapeMeasurement> bench_tape(const TapeBench& options) {
-  const std::vector<TapeWork> work = tape_work(options.workloads);
+  for (const TapeWorkload& workload : chosen_workloads("tape", options.workloads, kWorkloads)) workload.add(work);
   std::vector<std::vector<double>> seconds(work.size());
   with_threads(1, [&] {
     std::vector<Index> runs;
@@ -219,7 +214,7 @@ std::vector<TapeMeasurement> bench_tape(const TapeBench& options) {
     }
   });
   std::vector<TapeMeasurement> all;
-  for (std::size_t k = 0; k < work.size(); ++k) all.push_back(measured(work[k], std::move(seconds[k])));
+  for (std::size_t k = 0; k < work.size(); ++k) all.push_back(measured(work[k], seconds[k]));
   for (TapeMeasurement& m : all) {
     const auto base = std::find_if(all.begin(), all.end(), [&m](const auto& other) { return other.name == m.against; });
     if (base != all.end() && base->median_ms > 0) m.ratio = m.median_ms / base->median_ms;
@@ -227,4 +222,38 @@ std::vector<TapeMeasurement> bench_tape(const TapeBench& options) {
   return all;
 }
 
-}  // namespace hsi4d
+std::string json_line(const TapeMeasurement& m) {
+  nlohmann::ordered_json line = {{"nodes", m.nodes}, {"ns_per_node", m.ns_each()}};
+  if (m.nodes == 0) line = {{"elements", m.elements}, {"ns_per_element", m.ns_each()}};
+  if (m.ratio) line.update({{"against", m.against}, {"ratio", *m.ratio}});
+  if (m.goal) line["goal"] = *m.goal;
+  return bench_line(m, line.dump());
+}
+
+/// What was asked of a measurement, and what came of it; nothing where nothing was.
+std::string goal_text(const TapeMeasurement& m) {
+  if (!m.goal) return "";
+  return m.ratio ? formatted("%.2f of %s, at most %.3g", *m.ratio, m.against.c_str(), *m.goal)
+                 : formatted("at most %.3g ns", *m.goal);
+}
+
+BenchText measure_tape(const BenchOptions& options) {
+  std::string json;
+  Table table{.head = {"", "median us", "least us", "ns each", "of"}, .align = "lrrrrl"};
+  for (const TapeMeasurement& m : bench_tape(options)) {
+    table.rows.push_back({m.name, Cell(1e3 * m.median_ms, 3), Cell(1e3 * m.min_ms, 3), Cell(m.ns_each(), 2),
+                          m.nodes > 0 ? std::to_string(m.nodes) + " nodes" : std::to_string(m.elements) + " rows",
+                          goal_text(m)});
+    json += json_line(m);
+  }
+  return {table_text(table), std::move(json)};
+}
+
+}  // namespace
+
+BenchTopic tape_topic() {
+  return {"tape", "Measure what a node of the tape costs, and lambda losses against their values alone", measure_tape,
+          false};
+}
+
+}  // namespace hsi4d::cli

@@ -2,22 +2,16 @@
 #include <CLI/CLI.hpp>
 
 #include "pipelines/cli/options.h"
+#include "pipelines/cli/other_programs.h"
 #include "pipelines/cli/program_commands.h"
 #include "stress/command.h"
 
 namespace hsi4d::cli {
 namespace {
 
-struct StressCommands : ProgramCommands {
-  StressOptions stress;
-
-  StressCommands();
-};
-
-StressCommands::StressCommands() {
-  CLI::App* command = app->add_subcommand("stress",
-                                          "Try every known way to fail: a row each, with what was measured, what is "
-                                          "allowed, and what it would be without the remedy");
+void add_stress(CLI::App& app, Program& program) {
+  StressOptions& stress = program.options<StressOptions>();
+  CLI::App* command = app.add_subcommand(kStressProgram.command, kStressProgram.summary);
   command->add_option("--row", stress.rows, "Only these: A1, or a letter for its group; default: all")->type_name("ID");
   add_threads(*command, stress.threads);
   command->add_option("--json", stress.json, "File for the figures, one JSON object a row")->type_name("F");
@@ -28,12 +22,10 @@ StressCommands::StressCommands() {
       ->check(CLI::Range(Index(1000), Index(1) << 30))
       ->type_name("N");
   command->footer("Exit status: 1 when a row fails, or holds without its remedy too.");
-  command->callback([this] {
-    run = [this] {
-      StressOutcome outcome = stress_command(stress);
-      status = outcome.status;
-      return outcome.text;
-    };
+  run_when_chosen(*command, program, [&] {
+    StressOutcome outcome = stress_command(stress);
+    program.status = outcome.status;
+    return outcome.text;
   });
 }
 
@@ -42,5 +34,5 @@ StressCommands::StressCommands() {
 
 int main(int argc, char** argv) {
   using namespace hsi4d;
-  return cli::run_command_program("stress", argc, argv, [] { return std::make_unique<cli::StressCommands>(); });
+  return cli::run_command_program("stress", argc, argv, cli::add_stress);
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <CLI/CLI.hpp>
+
 #include "body/motion_edit.h"
 #include "body/pose_layout.h"
 #include "body/procedural_body.h"
@@ -11,7 +13,10 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "pipelines/avatar/import.h"
+#include "pipelines/cli/avatar_fit_command.h"
 #include "pipelines/cli/info_command.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/config/body_settings.h"
@@ -146,6 +151,54 @@ std::string avatar_info_command(const std::string& path) {
   text += "  body     " + body_text(avatar) + "\n";
   text += "  weights  " + weights_text(avatar) + "\n  colors   " + colors_text(avatar.color_net) + "\n";
   return text + statistics_text(s);
+}
+
+void add_avatar(CLI::App& app, Program& program) {
+  AvatarOptions& o = program.options<AvatarOptions>();
+  CLI::App& command = *app.add_subcommand("avatar", "Make, import, learn or describe the Gaussians of a body");
+  command.require_subcommand(1);
+  const auto add_body = [&o](CLI::App& sub) {
+    sub.add_option("--betas", o.betas, "Shape of the body model: the first betas; the mean shape without")
+        ->type_name("B,B,...");
+    sub.add_option("--out", o.out, "The avatar's file")->type_name("F.safetensors")->required();
+  };
+
+  CLI::App& make = *command.add_subcommand("make", "Dress a body in Gaussians, spread evenly over its surface");
+  make.add_option("--body-model", o.body_model, "A SMPL-X file; without, the body that comes with the program")
+      ->type_name("M.npz");
+  make.add_option("--gaussians", o.settings.gaussians, "How many; 20,000 to 300,000 are useful")
+      ->capture_default_str()
+      ->type_name("N");
+  make.add_option("--detail", o.settings.detail, "How much denser head, hands and feet are: 0 not at all, to 1")
+      ->capture_default_str()
+      ->type_name("X");
+  make.add_option("--cover", o.settings.cover, "Size along the surface over the distance of neighbours")
+      ->capture_default_str()
+      ->type_name("X");
+  make.add_option("--texture", o.settings.texture, "Contrast of the patterns, 0 to 1")
+      ->capture_default_str()
+      ->type_name("X");
+  make.add_option("--seed", o.settings.seed, "Seed of the places")
+      ->capture_default_str()
+      ->check(whole_number())
+      ->type_name("N");
+  add_body(make);
+  run_when_chosen(make, program, [&o] { return avatar_make_command(o); });
+
+  CLI::App& bind = *command.add_subcommand("import", "Bind the Gaussians of a file to a body model");
+  bind.add_option("PLY", o.in, "Gaussians in the rest pose of the body model, in its frame: .ply, .splat or .spz")
+      ->required();
+  bind.add_option("--body-model", o.body_model, "A SMPL-X file; without, the body that comes with the program")
+      ->type_name("M.npz");
+  add_body(bind);
+  run_when_chosen(bind, program, [&o] { return avatar_import_command(o); });
+
+  add_avatar_fit(command, program);
+
+  auto& file = program.options<std::string>();
+  CLI::App& info = *command.add_subcommand("info", "Tell what is in an avatar's file");
+  info.add_option("FILE", file, "An avatar")->required();
+  run_when_chosen(info, program, [&file] { return avatar_info_command(file); });
 }
 
 }  // namespace hsi4d::cli

@@ -1,9 +1,12 @@
 #include "pipelines/cli/avatar_fit_command.h"
 
+#include <CLI/CLI.hpp>
+
 #include "core/check.h"
 #include "core/parallel.h"
 #include "pipelines/avatar/fit.h"
 #include "pipelines/cli/interrupt.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
@@ -11,6 +14,13 @@
 namespace hsi4d::cli {
 
 namespace {
+
+struct AvatarFitArguments {
+  std::string config;
+  std::vector<std::string> overrides;
+  std::string out;
+  bool quiet = false;
+};
 
 constexpr const char* kOut = "hsi4d avatar fit: --out";
 
@@ -47,6 +57,17 @@ std::string avatar_fit_command(const std::filesystem::path& config, const std::v
                      ", " + rounded(result.stage.seconds, 4) + " s\n" + line_of("learnt", result.learnt);
   if (result.held.views > 0) text += line_of("held back", result.held);
   return text;
+}
+
+void add_avatar_fit(CLI::App& avatar, Program& program) {
+  AvatarFitArguments& a = program.options<AvatarFitArguments>();
+  CLI::App& fit = *avatar.add_subcommand("fit", "Learn the look of an avatar from pictures of known poses");
+  fit.add_option("CONFIG", a.config, "What is learnt from and how: configs/avatar/fit.json")->required();
+  fit.add_option("--out", a.out, "The avatar's file")->type_name("F.safetensors")->required();
+  add_overrides(fit, a.overrides);
+  fit.add_flag("--quiet", a.quiet, "No progress on stderr");
+  run_when_chosen(fit, program,
+                  [&] { return avatar_fit_command(a.config, a.overrides, a.out, a.quiet, program.terms); });
 }
 
 }  // namespace hsi4d::cli

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "optim/loss_term.h"
+#include "pipelines/cli/program_commands.h"
 
 namespace hsi4d::cli {
 
@@ -18,5 +19,8 @@ namespace hsi4d::cli {
 /// write_avatar.
 std::string avatar_fit_command(const std::filesystem::path& config, const std::vector<std::string>& overrides,
                                const std::filesystem::path& out, bool quiet, const std::vector<LossTerm>& terms);
+
+/// Adds the command to `hsi4d avatar`.
+void add_avatar_fit(CLI::App& avatar, Program& program);
 
 }  // namespace hsi4d::cli

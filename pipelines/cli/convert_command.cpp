@@ -3,9 +3,12 @@
 #include <cmath>
 #include <numbers>
 
+#include <CLI/CLI.hpp>
+
 #include "core/check.h"
 #include "core/file.h"
 #include "core/rotation.h"
+#include "pipelines/cli/list.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
 #include "splat/files/quantised.h"
@@ -112,6 +115,27 @@ std::string convert_command(const ConvertOptions& o) {
           std::to_string(encoded.bytes.size()) + " bytes\n";
   if (!encoded.losses.empty()) text += "  not held by the format: " + counts_text(encoded.losses) + "\n";
   return text;
+}
+
+void add_convert(CLI::App& app, Program& program) {
+  ConvertOptions& o = program.options<ConvertOptions>();
+  CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: .ply, .splat, .spz");
+  command.add_option("IN", o.in, "Gaussians: .ply (INRIA's or compressed), .splat or .spz")->required();
+  command.add_option("OUT", o.out, "Where to; the ending says how: .ply, .compressed.ply, .splat or .spz")->required();
+  command.add_option("--scale", o.scale, "Multiply lengths, about the origin, first")->type_name("S");
+  command.add_option("--rotate", o.rotate, "Turn about the origin, harmonics too: axis times angle in degrees")
+      ->type_name("x,y,z");
+  command.add_option("--translate", o.translate, "Move, last; metres")->type_name("x,y,z");
+  command.add_option("--matrix", o.matrix, "Instead of the three: a 4x4 matrix row by row, 16 numbers apart by commas")
+      ->type_name("M");
+  command.add_option("--crop", o.crop, "Keep the Gaussians whose means are in this box of IN's coordinates")
+      ->type_name("x0,y0,z0,x1,y1,z1");
+  command.add_option("--min-opacity", o.min_opacity, "Leave out fainter Gaussians")->type_name("O");
+  command.add_option("--sh-degree", o.sh_degree, "Degree of the harmonics, 0 to 3")->type_name("N");
+  command.add_option("--spz-version", o.spz_version, "Version of .spz to write: 2, 3 or 4; 3 without")->type_name("N");
+  command.add_option("--spz-sh-bits", o.spz_sh_bits, "Bits of harmonics in .spz, degree 1 and above; 8,8 without")
+      ->type_name("A,B");
+  run_when_chosen(command, program, [&] { return convert_command(o); });
 }
 
 }  // namespace hsi4d::cli

@@ -1,11 +1,18 @@
-#include "pipelines/cli/demo_command.h"
-
+// `hsi4d demo`: the method on a generated scene with ground truth.
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "core/check.h"
 #include "core/config_file.h"
+#include "optim/loss_term.h"
 #include "pipelines/cli/dataset.h"
 #include "pipelines/cli/demo_configs.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/config/run_problems.h"
@@ -13,6 +20,15 @@
 namespace hsi4d::cli {
 
 namespace {
+
+struct DemoArguments {
+  bool quick = false;
+  std::string out;  ///< empty: the first of runs/NAME, runs/NAME-2, … that is free
+  std::vector<std::string> overrides;
+  bool quiet = false;
+  bool resume = false;
+  std::optional<int> threads;  ///< 0: one a core; none: what the config says
+};
 
 namespace fs = std::filesystem;
 
@@ -25,8 +41,8 @@ RunConfig demo_config(const DemoArguments& arguments, const std::vector<LossTerm
   return read_run_config(tree, descriptions_of(losses), problems, ConfigUse::kStages);
 }
 
-}  // namespace
-
+/// Makes the dataset in OUT/dataset and reconstructs it into OUT/run. Returns the table of errors and where the report
+/// is.
 std::string demo_command(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
   if (arguments.resume && arguments.out.empty()) throw UserError("hsi4d demo: --resume needs --out, to know with what");
   RunConfig config = demo_config(arguments, losses);
@@ -52,6 +68,20 @@ std::string demo_command(const DemoArguments& arguments, const std::vector<LossT
   options.threads = run_threads(arguments.threads);
   options.observer = observer_on_terminal(arguments.quiet);
   return result_text(run_on_terminal(config, losses, options, folder.string()), options.folder);
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app, Program& program) {
+  DemoArguments& a = program.options<DemoArguments>();
+  CLI::App* command = app.add_subcommand("demo", "The method on a generated scene with ground truth");
+  command->add_flag("--quick", a.quick, "256x256 pixels and 8 frames: less than a minute");
+  command->add_option("--out", a.out, "Folder of dataset and run; default: the first free runs/demo, runs/demo-2, ...");
+  add_overrides(*command, a.overrides);
+  command->add_flag("--quiet", a.quiet, "No progress on stderr");
+  command->add_flag("--resume", a.resume, "Go on with the demo in --out; the result has the same bits");
+  add_threads(*command, a.threads);
+  run_when_chosen(*command, program, [&] { return demo_command(a, program.terms); });
 }
 
 }  // namespace hsi4d::cli

@@ -1,9 +1,12 @@
-#include "pipelines/cli/evaluate_command.h"
-
+// `hsi4d evaluate`: errors of runs and motions against the truth, and what of them needs none.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "core/check.h"
 #include "core/config_value.h"
@@ -11,16 +14,30 @@
 #include "core/json_text.h"
 #include "core/text.h"
 #include "pipelines/cli/evaluate_tables.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/evaluate/baseline_export.h"
+#include "pipelines/evaluate/evaluation.h"
 #include "pipelines/record/folder.h"
 #include "pipelines/record/published.h"
 #include "pipelines/synthetic/dataset.h"
 
 namespace hsi4d::cli {
 namespace {
+
+struct EvaluateOptions {
+  std::vector<std::string> inputs;           ///< folders of runs, runs of sweeps, motions (.npz), folders of SMPLer-X
+  EvaluationSettings settings;               ///< --truth, --data, --body-model, ...
+  std::vector<std::string> object_surfaces;  ///< --object-surface NAME=F
+  std::string align = "none";                ///< --align none|heading|rotation
+  std::string up;                            ///< --up y|z; empty: to be found
+  std::vector<std::string> clips;            ///< --clip F.npz, one for each input; none: RUN/clip.npz where it is there
+  std::string json;                          ///< --json F; empty: none
+  std::string export_folder;                 ///< --export DIR; empty: none
+};
 
 void remove_member(ConfigValue& object, std::string_view key) {
   std::erase_if(object.members, [key](const ConfigMember& member) { return member.key == key; });
@@ -252,8 +269,12 @@ std::vector<const Evaluation*> pointers_to(const std::vector<Evaluation>& result
   return pointers;
 }
 
-}  // namespace
-
+/// A table with a row for each metric of summary.json that can be measured, and a column for each input; for several
+/// repetitions their mean, standard deviation and diversity too. Runs of a sweep that differ in more than seeds have a
+/// row each, and the tables of the sweep's report. Then what was taken for the truth, the scene and the world of each,
+/// and the paper's figures beside ours. Writes the JSON file, and what other methods start from.
+///
+/// Throws UserError or DataError with one message for whatever is wrong with options and files.
 std::string evaluate_command(const EvaluateOptions& given) {
   const EvaluateInputs inputs = evaluate_inputs(given.inputs);
   EvaluateOptions options = given;
@@ -275,6 +296,82 @@ std::string evaluate_command(const EvaluateOptions& given) {
            published;
   return table_of_runs(results, spreads) + sweeps_text(inputs, results, stdout_columns()) +
          notes_of_runs(results, inputs) + published;
+}
+
+/// What is solid, and where objects are.
+void add_evaluate_scene(CLI::App& command, EvaluateOptions& o) {
+  EvaluationSettings& s = o.settings;
+  command.add_option("--surface", s.surface, "A mesh of what is solid (.obj, .ply, .glb)")->type_name("F");
+  command.add_option("--occupancy", s.occupancy, "A grid of voxels instead, free or occupied")->type_name("F.npz");
+  command.add_option("--scene", s.scene, "Gaussians instead, of what they show")->type_name("F.ply");
+  command
+      .add_option("--objects", s.objects, "Poses of objects in the scene beside a motion, z up, as a run's objects.npz")
+      ->type_name("F.npz");
+  command
+      .add_option("--object-surface", o.object_surfaces,
+                  "A mesh of an object, instead of what its Gaussians show; may be given several times")
+      ->type_name("NAME=F")
+      ->allow_extra_args(false);
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app, Program& program) {
+  EvaluateOptions& o = program.options<EvaluateOptions>();
+  EvaluationSettings& s = o.settings;
+  CLI::App* command =
+      app.add_subcommand("evaluate", "Errors of runs and motions against the truth, and what of them needs none");
+  command
+      ->add_option(
+          "RUN", o.inputs,
+          "Folders of runs, motions by AMASS's or SMPL-X's names (.npz), folders of SMPLer-X's files; of a sweep "
+          "its folder, for all runs that are done, or SWEEP/NAME, for those of that name: "
+          "runs/ablations/whole")
+      ->required();
+  command
+      ->add_option("--truth", s.truth,
+                   "What they are compared with: a dataset of hsi4d synth, a run, a motion; for runs what their config "
+                   "names, without")
+      ->type_name("PATH");
+  command->add_option("--data", s.data, "A dataset or run in whose scene the motions are, with its objects and avatar")
+      ->type_name("PATH");
+  command
+      ->add_option("--body-model", s.body_model,
+                   "A SMPL-X file: joints are those of this body, each motion's in its own shape")
+      ->type_name("M.npz");
+  command
+      ->add_option("--avatar", s.avatar,
+                   "Joints are those of this avatar; without either, of the avatar of the run or dataset")
+      ->type_name("F.safetensors");
+  add_evaluate_scene(*command, o);
+  command
+      ->add_option("--from-rate", s.from_rate,
+                   "Frames a second of the motions, instead of what they say; of a truth that does not say it too")
+      ->type_name("HZ");
+  command->add_option("--frame-rate", s.frame_rate, "Frames a second to measure at, instead of the slower ones")
+      ->type_name("HZ");
+  command
+      ->add_option(
+          "--up", o.up,
+          "Which axis of motions is up, y or z, instead of what is found; of a truth by other names than AMASS's "
+          "too")
+      ->type_name("AXIS");
+  command
+      ->add_option("--align", o.align,
+                   "How a motion is laid on frame 0 of the truth or the data: none, heading or rotation")
+      ->type_name("HOW");
+  command->add_option("--person", s.person, "Which person of a folder, from 0")->check(whole_number())->type_name("N");
+  command
+      ->add_option("--clip", o.clips,
+                   "Embeddings by CLIP, a file for each RUN; without, clip.npz in a run's folder where it is there")
+      ->type_name("F.npz")
+      ->allow_extra_args(false);
+  command->add_option("--json", o.json, "Write all numbers into a file, those of each frame too")->type_name("F");
+  command
+      ->add_option("--export", o.export_folder,
+                   "Write trajectories and initial states there, for TRUMANS, LINGO and CHOIS to start from")
+      ->type_name("DIR");
+  run_when_chosen(*command, program, [&] { return evaluate_command(o); });
 }
 
 }  // namespace hsi4d::cli

@@ -1,11 +1,14 @@
 #include "pipelines/cli/gradcheck_command.h"
 
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
 #include "core/formatted.h"
 #include "core/text.h"
 #include "pipelines/cli/failure.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/text.h"
 
@@ -73,6 +76,37 @@ std::string gradcheck_command(const GradcheckArguments& arguments, const std::ve
                     check.tolerance);
   if (!check.found.ok()) status = kRowsFailed;
   return text;
+}
+
+void add_gradcheck(CLI::App& app, Program& program) {
+  GradcheckArguments& a = program.options<GradcheckArguments>();
+  CLI::App* command = app.add_subcommand(
+      "gradcheck",
+      "Check the gradient of a stage, its whole loss by each parameter group, against differences in double");
+  command->add_option("CONFIG", a.config, "The config file, with its data")->required();
+  command->add_option("--stage", a.check.stage, "Which of its stages")->type_name("S")->required();
+  add_overrides(*command, a.overrides);
+  command->add_option("--frame", a.check.frame, "The frame, of a stage over frames; default: 3, or the last of fewer")
+      ->check(whole_number())
+      ->type_name("I");
+  command
+      ->add_option("--entries", a.check.entries,
+                   "Numbers that are tried of each array, at random; each takes six renders or more")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000))
+      ->type_name("N");
+  command->add_option("--seed", a.check.seed, "Which numbers these are, and the disturbance")
+      ->capture_default_str()
+      ->check(whole_number())
+      ->type_name("N");
+  add_threads(*command, a.threads);
+  command->add_option("--json", a.json, "File for the figures, one JSON object a group")->type_name("F");
+  command->footer(
+      "The state is that in which the frame would begin, every number of the groups disturbed by up to 0.01.\n"
+      "Numbers at a kink (Gaussians change places, a pixel is just reached) are told and judge nothing.\n"
+      "It is quick in small images: --set approx.longest_side_px=64.\n"
+      "Exit status: 1 when a gradient is wrong, or too many kinks leave it open.");
+  run_when_chosen(*command, program, [&] { return gradcheck_command(a, program.terms, program.status); });
 }
 
 }  // namespace hsi4d::cli

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include <CLI/CLI.hpp>
+
 #include "core/check.h"
 #include "core/exr.h"
 #include "core/image_io.h"
 #include "core/text.h"
+#include "pipelines/cli/list.h"
 #include "pipelines/cli/text.h"
 
 namespace hsi4d::cli {
@@ -128,6 +131,24 @@ std::string gradients_command(const GradientsOptions& options) {
   warn_if_nothing_drawn(shows_something(gradients.rendered), scene.gaussians.count());
   return options.out + ": loss " + number_text(gradients.loss) + ", gradients of " +
          count_text(scene.gaussians.count(), "Gaussian") + " and the camera\n";
+}
+
+void add_gradients(CLI::App& app, Program& program) {
+  GradientsOptions& gradients = program.options<GradientsOptions>();
+  CLI::App& command = *app.add_subcommand("gradients", "Differentiate the difference of a render from an image");
+  add_scene(command, gradients.shared)->required();
+  command.add_option("--target", gradients.target, "The image to compare with")
+      ->type_name("F.{exr,png,npz}")
+      ->required();
+  command.add_option("--out", gradients.out, "Where loss and gradients go")->type_name("F.npz")->required();
+  command.footer(
+      "Gradients are by the file's own numbers, its rows in order. They are 0 for what does not move the image: "
+      "rows\n"
+      "that the reader leaves out (a number that is not finite, a zero quaternion); log-scales and opacity logits\n"
+      "that it holds at -20 or 20; coefficients above render.sh_degree; what the camera does not see.\n"
+      "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
+      "render.cap_gradient is pass (render.compatibility=inria makes it so).");
+  run_when_chosen(command, program, [&] { return gradients_command(gradients); });
 }
 
 }  // namespace hsi4d::cli

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/camera_file.h"
@@ -12,6 +13,7 @@
 #include "core/npz.h"
 #include "core/safetensors.h"
 #include "core/suggest.h"
+#include "pipelines/cli/list.h"
 #include "pipelines/cli/text.h"
 #include "splat/files/info.h"
 #include "splat/files/splat_file.h"
@@ -209,6 +211,17 @@ std::string info_command(const std::string& path, bool json) {
   }
   throw UserError("hsi4d info: " + path + ": nothing is known of files that end in \"" + ending +
                   "\"; allowed: " + joined(known) + did_you_mean(ending, known));
+}
+
+void add_info(CLI::App& app, Program& program) {
+  auto& file = program.options<std::string>();
+  auto& json = program.options<bool>();
+  CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
+  info->add_option("FILE", file,
+                   "A .ply, .splat, .spz, .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg or .exr file")
+      ->required();
+  info->add_flag("--json", json, "Print one JSON object; for Gaussians");
+  run_when_chosen(*info, program, [&] { return info_command(file, json); });
 }
 
 }  // namespace hsi4d::cli

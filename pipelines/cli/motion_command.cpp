@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <filesystem>
 
+#include <CLI/CLI.hpp>
+
 #include "body/glb.h"
 #include "body/motion_edit.h"
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "core/log.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/input/body_files.h"
@@ -100,6 +104,29 @@ std::string motion_command(const MotionOptions& options) {
   }
   return options.out + ": " + count_text(std::ssize(motion.poses), "frame") + ", " + short_number(motion.frame_rate) +
          " a second\n";
+}
+
+void add_motion(CLI::App& app, Program& program) {
+  MotionOptions& motion = program.options<MotionOptions>();
+  CLI::App& command = *app.add_subcommand("motion", "Change a motion of a body: frame rate, up axis, format");
+  command.add_option("IN", motion.in, "A motion by AMASS's or SMPL-X's names (.npz), or a folder of SMPLer-X's files")
+      ->required();
+  command.add_option("OUT", motion.out, "A motion (.npz), or the body in motion (.glb)")->required();
+  command
+      .add_option("--from-rate", motion.from_rate,
+                  "Frames a second of IN, instead of what it says; of a folder 30 without")
+      ->type_name("HZ");
+  command.add_option("--frame-rate", motion.frame_rate, "Frames a second of OUT")->type_name("HZ");
+  command.add_flag("--y-up", motion.is_y_up, "IN's world has y up: turn it, about the pelvis");
+  command
+      .add_option("--body-model", motion.body_model,
+                  "The body, a SMPL-X file: where its pelvis is, its mean hands (to which SMPLer-X's add), and what a "
+                  "GLB shows; without, the mean SMPL-X pelvis, and the program's own body")
+      ->type_name("M.npz");
+  command.add_option("--person", motion.person, "Which person of a folder, from 0")
+      ->check(whole_number(std::numeric_limits<int>::max()))
+      ->type_name("N");
+  run_when_chosen(command, program, [&] { return motion_command(motion); });
 }
 
 }  // namespace hsi4d::cli

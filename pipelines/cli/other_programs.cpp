@@ -6,10 +6,17 @@
 #include <system_error>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
+
 #include "core/check.h"
 #include "core/system_message.h"
+#include "pipelines/cli/list.h"
 
 namespace hsi4d::cli {
+
+void add_other_programs(CLI::App& app, Program&) {
+  for (const OtherProgram& other : kOtherPrograms) app.add_subcommand(other.command, other.summary);
+}
 
 bool is_other_program(int argc, const char* const* argv) {
   if (argc < 2) return false;

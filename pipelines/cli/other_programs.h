@@ -11,13 +11,15 @@ struct OtherProgram {
   const char* summary;
 };
 
-inline constexpr std::array<OtherProgram, 2> kOtherPrograms = {
-    {{"bench",
-      "Measure the speed of the renderer, the body, the tape or a whole run, time against error, or the pixel filter: "
-      "a table, and one JSON object a measurement"},
-     {"stress",
-      "Try every known way to fail: a row each, with what was measured, what is allowed, and what it would be without "
-      "the remedy"}}};
+inline constexpr OtherProgram kBenchProgram = {
+    "bench",
+    "Measure the speed of the renderer, the body, the tape or a whole run, time against error, or the pixel filter: "
+    "a table, and one JSON object a measurement"};
+inline constexpr OtherProgram kStressProgram = {
+    "stress",
+    "Try every known way to fail: a row each, with what was measured, what is allowed, and what it would be without "
+    "the remedy"};
+inline constexpr std::array<OtherProgram, 2> kOtherPrograms = {kBenchProgram, kStressProgram};
 
 /// True where the command line names one of them.
 bool is_other_program(int argc, const char* const* argv);

@@ -1,10 +1,13 @@
 #include "pipelines/cli/pose_command.h"
 
+#include <CLI/CLI.hpp>
+
 #include "body/smplx_sequence.h"
 #include "core/check.h"
 #include "core/log.h"
 #include "core/npz.h"
 #include "core/suggest.h"
+#include "pipelines/cli/list.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/input/body_files.h"
@@ -64,6 +67,30 @@ std::string pose_command(const PoseOptions& options) {
   }
   return options.out + ": " + count_text(sequence.frames, "frame") + " of " + std::to_string(model.vertex_count()) +
          " vertices and " + std::to_string(model.joint_count()) + " joints\n";
+}
+
+void add_pose(CLI::App& app, Program& program) {
+  PoseOptions& pose = program.options<PoseOptions>();
+  CLI::App& command = *app.add_subcommand("pose", "Pose an SMPL-X body: vertices and joints of every frame");
+  command.add_option("--body-model", pose.body_model, "The body, a SMPL-X file")->type_name("M.npz")->required();
+  command
+      .add_option("--params", pose.params,
+                  "Its parameters by their names in smplx, [T,n] or [n]; what is not there is zero")
+      ->type_name("P.npz")
+      ->required();
+  command.add_option("--out", pose.out, "Where vertices [T,V,3] and joints [T,J,3] go")->type_name("F.npz")->required();
+  command.add_option("--precision", pose.precision, "float or double")->type_name("WORD");
+  command
+      .add_option("--hands", pose.hands,
+                  "What the numbers of a hand are: full, 15 rotations; pca, coefficients of the model's components; "
+                  "auto, rotations if there are 45 and else coefficients")
+      ->type_name("WORD");
+  command.add_flag("--flat-hand-mean", pose.flat_hand_mean,
+                   "Hands are flat where their numbers are 0, not in the model's mean pose");
+  command.footer(
+      "Names: betas, expression, global_orient, body_pose, jaw_pose, leye_pose, reye_pose, left_hand_pose,\n"
+      "right_hand_pose, transl. Rotations are axis-angle vectors in radians, lengths metres.");
+  run_when_chosen(command, program, [&] { return pose_command(pose); });
 }
 
 }  // namespace hsi4d::cli

@@ -3,6 +3,7 @@
 #include <csignal>
 #include <cstdio>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -36,8 +37,7 @@ CommandWords words_of(const CLI::App& command) {
   return words;
 }
 
-int parse_and_run(int argc, const char* const* argv, ProgramCommands& commands) {
-  CLI::App& app = *commands.app;
+int parse_and_run(int argc, const char* const* argv, CLI::App& app, Program& program) {
   check_words(argc, argv, words_of(app));
   try {
     app.parse(argc, argv);
@@ -53,22 +53,17 @@ int parse_and_run(int argc, const char* const* argv, ProgramCommands& commands) 
       command += " " + chosen.front()->get_name();
     throw UserError(command + ": " + mistake.what() + "; `" + command + " --help` explains its arguments");
   }
-  print(commands.run());
-  return commands.status;
+  print(program.run());
+  return program.status;
 }
 
 }  // namespace
 
-ProgramCommands::ProgramCommands()
-    : app(std::make_unique<CLI::App>("4D human-scene interaction from video by differentiable Gaussian splatting",
-                                     "hsi4d")) {
-  app->require_subcommand(1);
-  app->failure_message(CLI::FailureMessage::simple);
+void run_when_chosen(CLI::App& command, Program& program, std::function<std::string()> run) {
+  command.callback([&program, run = std::move(run)] { program.run = run; });
 }
 
-ProgramCommands::~ProgramCommands() = default;
-
-int run_commands(int argc, const char* const* argv, const MakeCommands& make) {
+int run_commands(int argc, const char* const* argv, const AddCommands& add, const std::vector<LossTerm>& terms) {
   try {
     const LogSink to_stderr = log_to(
         [](LogLevel level, std::string_view message) {
@@ -79,18 +74,24 @@ int run_commands(int argc, const char* const* argv, const MakeCommands& make) {
         LogLevel::kInfo);
     std::signal(SIGCHLD, SIG_DFL);  // whoever has started us may have it ignored: no program's end would be told us
     best_isa();                     // before any kernel runs
-    return parse_and_run(argc, argv, *make());
+    CLI::App app("4D human-scene interaction from video by differentiable Gaussian splatting", "hsi4d");
+    app.require_subcommand(1);
+    app.failure_message(CLI::FailureMessage::simple);
+    Program program{.terms = terms};
+    add(app, program);
+    return parse_and_run(argc, argv, app, program);
   } catch (...) {
     return complain(describe_failure(std::current_exception()));
   }
 }
 
-int run_command_program(const char* command, int argc, const char* const* argv, const MakeCommands& make) {
+int run_command_program(const char* command, int argc, const char* const* argv, const AddCommands& add,
+                        const std::vector<LossTerm>& terms) {
   std::vector<const char*> words = {"hsi4d", command};
   if (argc > 1) words.insert(words.end(), argv + 1, argv + argc);
   const int count = static_cast<int>(words.size());
   words.push_back(nullptr);
-  return run_commands(count, words.data(), make);
+  return run_commands(count, words.data(), add, terms);
 }
 
 }  // namespace hsi4d::cli

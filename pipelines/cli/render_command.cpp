@@ -2,9 +2,13 @@
 
 #include <filesystem>
 
+#include <CLI/CLI.hpp>
+
 #include "core/check.h"
 #include "core/image_io.h"
 #include "core/rotation.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/pixel_table.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/draw/posed_avatar.h"
@@ -166,6 +170,35 @@ std::string render_command(const RenderOptions& options) {
   return text + options.out + ": " + std::to_string(view.camera.width) + " x " + std::to_string(view.camera.height) +
          " pixels of " + count_text(count, "Gaussian") +
          (drawn ? ", " + std::to_string(*drawn) + " of them drawn" : "") + "\n";
+}
+
+void add_render(CLI::App& app, Program& program) {
+  RenderOptions& render = program.options<RenderOptions>();
+  CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image: a scene, objects, a body");
+  add_scene(command, render.shared);
+  add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
+      ->type_name("F.{ply,splat,spz}");
+  command
+      .add_option("--objects", render.object_poses,
+                  "Poses of a run's objects: each --object NAME.ply is drawn where NAME is in --frame")
+      ->type_name("O.npz");
+  command.add_option("--motion", render.motion, "Motion of a body that is drawn too")->type_name("M.npz");
+  command.add_option("--frame", render.frame, "Frame of motion and objects, from 0")
+      ->check(whole_number())
+      ->type_name("I");
+  command.add_option("--avatar", render.avatar, "Gaussians of the body")->type_name("F.safetensors");
+  command
+      .add_option("--color-net", render.color_net,
+                  "What colours the body in place of the avatar's own: a run's color_net.safetensors")
+      ->type_name("F.safetensors");
+  add_several(command, "--debug-pixel", render.pixels,
+              "Print the Gaussians that make the pixel of column X and row Y, front to back, what was skipped, where "
+              "it stopped, and the sums")
+      ->type_name("X,Y");
+  command.add_option("--out", render.out, "Where to: 8-bit PNG, OpenEXR, or arrays image, alpha, depth")
+      ->type_name("F.{png,exr,npz}")
+      ->required();
+  run_when_chosen(command, program, [&] { return render_command(render); });
 }
 
 }  // namespace hsi4d::cli

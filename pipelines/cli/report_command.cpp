@@ -1,9 +1,13 @@
-#include "pipelines/cli/report_command.h"
-
+// The subcommand `hsi4d report`.
 #include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "core/file.h"
 #include "pipelines/chain/report.h"
+#include "pipelines/cli/list.h"
 #include "pipelines/cli/sweep_text.h"
 #include "pipelines/record/folder.h"
 #include "pipelines/record/gradient_table.h"
@@ -29,8 +33,8 @@ std::string report_of_folder(const std::string& folder) {
   return is_chain_folder(folder) ? write_chain_report(folder) + "\n" : report_of_run(folder);
 }
 
-}  // namespace
-
+/// `hsi4d report RUN...`: writes report.html of each run folder; returns its path and table of errors, for each.
+/// Throws as write_report.
 std::string report_command(const std::vector<std::string>& runs) {
   std::string text;
   const auto add = [&text](const std::string& more) { text += (text.empty() ? "" : "\n") + more; };
@@ -45,6 +49,15 @@ std::string report_command(const std::vector<std::string>& runs) {
     }
   }
   return text;
+}
+
+}  // namespace
+
+void add_report(CLI::App& app, Program& program) {
+  auto& runs = program.options<std::vector<std::string>>();
+  CLI::App* report = app.add_subcommand("report", "Write report.html of runs and sweeps, and print their errors");
+  report->add_option("RUN", runs, "Folders of runs or sweeps; SWEEP/NAME: runs of a sweep by name")->required();
+  run_when_chosen(*report, program, [&] { return report_command(runs); });
 }
 
 }  // namespace hsi4d::cli

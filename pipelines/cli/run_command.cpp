@@ -1,5 +1,7 @@
 #include "pipelines/cli/run_command.h"
 
+#include <CLI/CLI.hpp>
+
 #include "core/check.h"
 #include "core/config_place.h"
 #include "core/log.h"
@@ -8,6 +10,8 @@
 #include "core/text.h"
 #include "pipelines/chain/chain.h"
 #include "pipelines/cli/interrupt.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/config/run_problems.h"
@@ -180,6 +184,21 @@ std::string run_command(const RunArguments& arguments, const std::vector<LossTer
   }
   if (arguments.dry_run) return plan(config, losses, options.folder, arguments.resume);
   return result_text(run_on_terminal(config, losses, options, options.folder), options.folder);
+}
+
+void add_run(CLI::App& app, Program& program) {
+  RunArguments& a = program.options<RunArguments>();
+  CLI::App* command = app.add_subcommand("run", "Reconstruct a clip as a config says, into a run folder");
+  command->add_option("CONFIG", a.config, "The config file")->required();
+  add_overrides(*command, a.overrides);
+  command->add_option("--out", a.out,
+                      "The run folder; default: the first free runs/NAME, runs/NAME-2, ... with the config's name");
+  command->add_flag("--resume", a.resume, "Go on with the run in the folder; the result has the same bits");
+  add_threads(*command, a.threads);
+  command->add_option("--seed", a.seed, "Seed, instead of the config's")->check(whole_number())->type_name("N");
+  command->add_flag("--dry-run", a.dry_run, "Check config and inputs, tell what would be done, write nothing");
+  command->add_flag("--print-config", a.print_config, "Print the config with every default filled in, and stop");
+  run_when_chosen(*command, program, [&] { return run_command(a, program.terms); });
 }
 
 }  // namespace hsi4d::cli

@@ -6,12 +6,15 @@
 #include <filesystem>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/config_file.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/suggest.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/text.h"
 
 namespace hsi4d::cli {
@@ -116,6 +119,22 @@ void check_writable(const std::string& path) {
   { const AtomicFile trial(path); }
   for (const fs::path& folder : missing)
     fs::remove(folder, error);  // it is made again with the file, if it comes to that
+}
+
+CLI::Option* add_scene(CLI::App& command, SceneOptions& options) {
+  CLI::Option* const scene = command.add_option("--scene", options.scene, "Gaussians")->type_name("F.{ply,splat,spz}");
+  command.add_option("--camera", options.camera, "A camera, or nerfstudio's transforms.json")
+      ->type_name("C.json")
+      ->required();
+  command.add_option("--camera-frame", options.camera_frame, "Which camera of a file with several, from 0")
+      ->check(whole_number())
+      ->type_name("I");
+  command.add_option("--background", options.background, "Colour behind everything; black without")->type_name("r,g,b");
+  command.add_option("--precision", options.precision, "float, double, or reference: brute force in double")
+      ->type_name("WORD");
+  add_several(command, "--set", options.settings, "Change a setting of the renderer: render.blur=0.1")
+      ->type_name("render.KEY=VALUE");
+  return scene;
 }
 
 }  // namespace hsi4d::cli

@@ -9,6 +9,11 @@
 #include "pipelines/draw/image_of_scene.h"
 #include "splat/files/splat_file.h"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace hsi4d::cli {
 
 /// Options as they stand on the command line.
@@ -20,6 +25,9 @@ struct SceneOptions {
   std::string precision = "float";    ///< --precision float|double|reference
   std::vector<std::string> settings;  ///< --set render.KEY=VALUE
 };
+
+/// Adds them to a command; returns the option --scene.
+CLI::Option* add_scene(CLI::App& command, SceneOptions& options);
 
 /// The camera, colours and settings that the options name.
 ///

@@ -1,13 +1,20 @@
-#include "pipelines/cli/select_camera_command.h"
-
+// `hsi4d select-camera`.
 #include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/image_io.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "optim/loss_description.h"
 #include "pipelines/cli/interrupt.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/config/run_config.h"
@@ -16,6 +23,15 @@
 
 namespace hsi4d::cli {
 namespace {
+
+/// Arguments of the command.
+struct SelectCameraOptions {
+  std::filesystem::path config;
+  std::vector<std::string> overrides;
+  std::string out;    ///< camera.json; empty: not written
+  std::string image;  ///< what the camera sees, .png, .jpg or .exr; empty: not written
+  bool quiet = false;
+};
 
 constexpr std::size_t kMostTold = 5;
 
@@ -50,8 +66,9 @@ void write_view(const std::string& file, const SceneSetup& setup, const Camera& 
               render_picture(first_frame(setup, center).all, {camera, config.background, config.render, {}}).image);
 }
 
-}  // namespace
-
+/// Chooses the camera of frame 0 (pipelines/draw/camera_selection.h), and returns the best candidates as a table. The
+/// config needs data.scene, avatar, initial and the objects; of data.camera, where it is given, size and focal lengths
+/// are taken. Throws UserError and DataError for its inputs, Interrupted.
 std::string select_camera_command(const SelectCameraOptions& options, const std::vector<LossDescription>& losses) {
   const RunConfig config = load_run_config(options.config, options.overrides, losses);
   check_camera_inputs(config.data);
@@ -67,6 +84,22 @@ std::string select_camera_command(const SelectCameraOptions& options, const std:
   });
   if (!options.out.empty()) write_camera(options.out, choice.camera);
   return table_of(choice);
+}
+
+}  // namespace
+
+void add_select_camera(CLI::App& app, Program& program) {
+  SelectCameraOptions& o = program.options<SelectCameraOptions>();
+  CLI::App* command = app.add_subcommand("select-camera", "Choose the camera of a clip's first frame");
+  command
+      ->add_option("CONFIG", o.config,
+                   "A config with scene, avatar and initial state; section camera_selection says how")
+      ->required();
+  add_overrides(*command, o.overrides);
+  command->add_option("--out", o.out, "Where to: a camera file")->type_name("F.json");
+  command->add_option("--image", o.image, "Image of what it sees")->type_name("F.{png,jpg,exr}");
+  command->add_flag("--quiet", o.quiet, "No progress on stderr");
+  run_when_chosen(*command, program, [&] { return select_camera_command(o, descriptions_of(program.terms)); });
 }
 
 }  // namespace hsi4d::cli

@@ -1,21 +1,41 @@
-#include "pipelines/cli/study_command.h"
-
+// `hsi4d study`: a page on which people choose between the videos of two methods, and what they chose.
+#include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "core/check.h"
 #include "core/file.h"
 #include "core/progress.h"
 #include "pipelines/cli/interrupt.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/record/summary.h"
+#include "pipelines/study/key.h"
 #include "pipelines/study/results.h"
 #include "pipelines/study/study.h"
 
 namespace hsi4d::cli {
 
 namespace {
+
+struct StudyOptions {
+  std::vector<std::string> runs;      ///< A B
+  std::string out;                    ///< --out DIR
+  std::string texts;                  ///< --texts F.json
+  std::optional<int> pairs;           ///< --pairs N, that a person is shown
+  std::optional<std::uint64_t> seed;  ///< --seed N
+  bool embed = false, quiet = false;  ///< --embed, --quiet
+  std::vector<std::string> answers;   ///< --answers F.json...
+  std::string key;                    ///< --key F.json
+  std::string csv, json;              ///< --csv F, --json F; of answers
+};
 
 namespace fs = std::filesystem;
 
@@ -108,10 +128,46 @@ std::string tell_results(const StudyOptions& o) {
          notes_text(study_cautions(shares)) + notes_text(answers.notes);
 }
 
-}  // namespace
-
+/// Makes the study of two runs, or of two folders of runs, and tells where page and key are; or, with answers, returns
+/// a table of the share that prefers A by question, and writes the files of --csv and --json.
+///
+/// Throws UserError for options that do not go together; as make_study, read_study_key and read_study_answers.
 std::string study_command(const StudyOptions& options) {
   return options.answers.empty() ? make_page(options) : tell_results(options);
+}
+
+}  // namespace
+
+void add_study(CLI::App& app, Program& program) {
+  StudyOptions& o = program.options<StudyOptions>();
+  CLI::App* command =
+      app.add_subcommand("study", "Make a page on which people choose between videos, or tell what they chose");
+  command
+      ->add_option("RUNS", o.runs,
+                   "A and B: two runs, two folders of runs with the same names, or runs of sweeps: SWEEP/NAME, as "
+                   "runs/ablations/whole")
+      ->expected(0, 2)
+      ->option_text("A B");
+  command->add_option("--out", o.out, "Where the page goes: a new or empty folder; the key goes beside it")
+      ->type_name("DIR");
+  command
+      ->add_option("--texts", o.texts,
+                   "What happens in the videos, {\"NAME\": \"text\"}; default: sources.prompt of the runs' configs")
+      ->type_name("F.json");
+  command->add_option("--pairs", o.pairs, "Pairs that a person is shown; default: " + std::to_string(kPairsPerPerson))
+      ->check(CLI::Range(1, 1000))
+      ->type_name("N");
+  command->add_option("--seed", o.seed, "Names of videos and pairs follow from it; default: they are random")
+      ->check(whole_number())
+      ->type_name("N");
+  command->add_flag("--embed", o.embed, "One file: the videos are in the page");
+  command->add_flag("--quiet", o.quiet, "No progress on stderr");
+  command->add_option("--answers", o.answers, "Files that people saved, or folders of them; A and B are then left out")
+      ->type_name("F.json");
+  command->add_option("--key", o.key, "Of answers: the study's key")->type_name("F.json");
+  command->add_option("--csv", o.csv, "Of answers: file for them, a line each")->type_name("F");
+  command->add_option("--json", o.json, "Of answers: file for all numbers")->type_name("F");
+  run_when_chosen(*command, program, [&] { return study_command(o); });
 }
 
 }  // namespace hsi4d::cli

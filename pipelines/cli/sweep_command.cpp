@@ -1,12 +1,16 @@
-#include "pipelines/cli/sweep_command.h"
-
+// The subcommands `hsi4d sweep` and `hsi4d run-one`: many runs from one file, and one of them.
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <set>
+#include <string>
 #include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "core/background_program.h"
 #include "core/check.h"
@@ -17,8 +21,11 @@
 #include "core/parallel.h"
 #include "core/suggest.h"
 #include "core/text.h"
+#include "optim/loss_term.h"
 #include "pipelines/cli/failure.h"
 #include "pipelines/cli/interrupt.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/cli/sweep_text.h"
 #include "pipelines/cli/terminal.h"
@@ -30,6 +37,27 @@
 namespace hsi4d::cli {
 
 namespace {
+
+struct SweepArguments {
+  std::string sweep;  ///< a sweep's file, the plan that a folder holds, or the folder
+  std::string out;    ///< empty: runs/NAME, or the folder of the plan
+  std::string launcher = "local";
+  int jobs = 0;                ///< 0: as many as there are threads for; of Slurm what the sweep says
+  std::optional<int> threads;  ///< of all runs together, of Slurm of each; none or 0: one a core
+  double memory_mb = 0;        ///< of all runs together; 0: most of what is free
+  bool fail_fast = false;
+  bool resume = false;
+  bool dry_run = false;
+};
+
+struct RunOneArguments {
+  std::string sweep;
+  std::int64_t index = 0;
+  std::string out;
+  std::optional<int> threads;
+  int parent = 0;        ///< the process that has started this one and with which it ends; 0: none
+  bool requeue = false;  ///< after SIGUSR1 the job of Slurm is put into the queue again
+};
 
 namespace fs = std::filesystem;
 
@@ -250,8 +278,8 @@ std::string claimed_run(const RunOneArguments& arguments, const PlacedPlan& plac
   }
 }
 
-}  // namespace
-
+/// Carries out a sweep, or submits it. Returns the tables of results, the plan with dry_run.
+/// @param status  receives the exit status where runs have failed
 std::string sweep_command(const SweepArguments& arguments, const std::vector<LossTerm>& losses, int& status) {
   const std::vector<std::string> launchers = {"local", "slurm"};
   if (std::find(launchers.begin(), launchers.end(), arguments.launcher) == launchers.end())
@@ -266,6 +294,8 @@ std::string sweep_command(const SweepArguments& arguments, const std::vector<Los
   return local_sweep(arguments, placed, status);
 }
 
+/// Carries out one run of a sweep. Returns its table of errors.
+/// @param status  receives the exit status where another process computes the run and nobody waits for that
 std::string run_one_command(const RunOneArguments& arguments, const std::vector<LossTerm>& losses, int& status) {
   if (arguments.parent > 0) end_with_parent(arguments.parent);
   const InterruptWatch watch;
@@ -286,6 +316,43 @@ std::string run_one_command(const RunOneArguments& arguments, const std::vector<
   }
   if (arguments.parent == 0) warn_of_other_programs(placed, {index});  // a launcher has told it of all runs
   return claimed_run(arguments, placed, index, *claim, losses, observer);
+}
+
+}  // namespace
+
+void add_sweep(CLI::App& app, Program& program) {
+  SweepArguments& a = program.options<SweepArguments>();
+  CLI::App* command = app.add_subcommand("sweep", "Many runs from one file: ablations, grids, clips, seeds");
+  command->add_option("SWEEP", a.sweep, "The sweep's file, or the folder of one that is to go on")->required();
+  command->add_option("--out", a.out, "The sweep's folder; default: runs/NAME with the sweep's name")->type_name("DIR");
+  command->add_option("--launcher", a.launcher, "local: processes here; slurm: a job array")
+      ->type_name("local|slurm")
+      ->capture_default_str();
+  command->add_option("--jobs", a.jobs, "The most runs at once; default: as many as there are threads for")
+      ->check(whole_number(std::numeric_limits<int>::max()))
+      ->type_name("N");
+  add_threads(*command, a.threads);
+  command->add_option("--memory", a.memory_mb, "Memory for all runs together, MB; default: 90 % of what is free")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("MB");
+  command->add_flag("--fail-fast", a.fail_fast, "Stop at the first run that fails, the others with their state saved");
+  command->add_flag("--resume", a.resume, "Go on with the sweep in the folder; runs that are done stay");
+  command->add_flag("--dry-run", a.dry_run, "Check every combination, print the table of runs, write nothing");
+  run_when_chosen(*command, program, [&] { return sweep_command(a, program.terms, program.status); });
+}
+
+void add_run_one(CLI::App& app, Program& program) {
+  RunOneArguments& a = program.options<RunOneArguments>();
+  CLI::App* command = app.add_subcommand("run-one", "One run of a sweep, by its index in the table of --dry-run");
+  command->add_option("SWEEP", a.sweep, "The sweep's file, or its folder")->required();
+  command->add_option("INDEX", a.index, "From 0")->check(whole_number())->required();
+  command->add_option("--out", a.out, "The sweep's folder; default: runs/NAME with the sweep's name")->type_name("DIR");
+  add_threads(*command, a.threads);
+  command->add_option("--parent", a.parent, "End, with the state saved, when this process does")
+      ->check(whole_number(std::numeric_limits<int>::max()))
+      ->type_name("PROCESS");
+  command->add_flag("--requeue", a.requeue, "On SIGUSR1 save the state and put this job of Slurm into the queue again");
+  run_when_chosen(*command, program, [&] { return run_one_command(a, program.terms, program.status); });
 }
 
 }  // namespace hsi4d::cli

@@ -6,6 +6,8 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "bench/list.h"
+#include "bench/pixel_filter_table.h"
 #include "core/check.h"
 #include "core/file.h"
 #include "core/simd.h"
@@ -22,7 +24,7 @@ TEST_CASE("bench rasterize measures every step and writes one object a measureme
   options.workloads = {"small"};
   options.repeats = 1;
   options.json = folder / "m.json";
-  const std::string table = cli::bench_rasterize_command(options);
+  const std::string table = cli::run_kernels({cli::rasterize_topic()}, options);
   std::istringstream lines(read_text_file(options.json));
   std::vector<std::string> names;
   std::vector<double> shares;
@@ -69,7 +71,7 @@ TEST_CASE("bench tells which workloads there are") {
   cli::BenchOptions options;
   options.workloads = {"smal"};
   CHECK_THROWS_WITH(
-      cli::bench_rasterize_command(options),
+      cli::run_kernels({cli::rasterize_topic()}, options),
       "hsi4d bench rasterize: no workload \"smal\"; known: avatar, scene, avatar_in_scene, small; did you "
       "mean \"small\"?");
 }
@@ -80,7 +82,7 @@ TEST_CASE("bench skinning measures a body and writes one object a measurement") 
   options.workloads = {"fixed_hands", "no_correctives"};
   options.repeats = 2;
   options.json = folder / "m.json";
-  const std::string table = cli::bench_skinning_command(options);
+  const std::string table = cli::run_kernels({cli::skinning_topic()}, options);
   std::istringstream lines(read_text_file(options.json));
   std::vector<std::string> names;
   for (std::string line; std::getline(lines, line);) {
@@ -103,7 +105,7 @@ TEST_CASE("bench skinning measures a body and writes one object a measurement") 
                                           "skinning/fixed_hands/both", "skinning/no_correctives/forward",
                                           "skinning/no_correctives/backward", "skinning/no_correctives/both"});
   options.workloads = {"posing"};
-  CHECK(cli::bench_skinning_command(options).find("skinning/posing/both") != std::string::npos);
+  CHECK(cli::run_kernels({cli::skinning_topic()}, options).find("skinning/posing/both") != std::string::npos);
   const auto posing =
       nlohmann::json::parse(read_text_file(options.json).substr(0, read_text_file(options.json).find('\n')));
   CHECK(posing.at("name") == "skinning/posing/forward");
@@ -112,7 +114,7 @@ TEST_CASE("bench skinning measures a body and writes one object a measurement") 
   CHECK_FALSE(posing.contains("corrective_columns"));
   CHECK(posing.at("min_ms") > 0);
   options.workloads = {"fixed_hand"};
-  CHECK_THROWS_WITH(cli::bench_skinning_command(options),
+  CHECK_THROWS_WITH(cli::run_kernels({cli::skinning_topic()}, options),
                     "hsi4d bench skinning: no workload \"fixed_hand\"; known: smplx, smplx_floats, fixed_hands, "
                     "fixed_hands_floats, no_correctives, posing; did you mean \"fixed_hands\"?");
 }
@@ -123,7 +125,7 @@ TEST_CASE("bench color_net measures forward and backward and writes one object a
   options.workloads = {"narrow", "view_direction"};
   options.repeats = 2;
   options.json = folder / "m.json";
-  const std::string table = cli::bench_color_net_command(options);
+  const std::string table = cli::run_kernels({cli::color_net_topic()}, options);
   std::istringstream lines(read_text_file(options.json));
   std::vector<std::string> names;
   for (std::string line; std::getline(lines, line);) {
@@ -151,7 +153,7 @@ TEST_CASE("bench color_net measures forward and backward and writes one object a
                                           "color_net/narrow/both", "color_net/narrow/pose"});
   options.workloads = {"wid"};
   CHECK_THROWS_WITH(
-      cli::bench_color_net_command(options),
+      cli::run_kernels({cli::color_net_topic()}, options),
       "hsi4d bench color_net: no workload \"wid\"; known: default, view_direction, narrow, wide, deep; did "
       "you mean \"wide\"?");
 }
@@ -161,7 +163,7 @@ TEST_CASE("bench tape measures nodes and lambda losses and writes one object a m
   cli::BenchOptions options;
   options.repeats = 3;
   options.json = folder / "m.json";
-  const std::string table = cli::bench_tape_command(options);
+  const std::string table = cli::run_kernels({cli::tape_topic()}, options);
   std::istringstream lines(read_text_file(options.json));
   std::map<std::string, nlohmann::json> found;
   for (std::string line; std::getline(lines, line);) {
@@ -195,10 +197,10 @@ TEST_CASE("bench tape measures nodes and lambda losses and writes one object a m
     CHECK_FALSE(primal.contains("ratio"));
   }
   options.workloads = {"loss_of_10"};
-  CHECK(cli::bench_tape_command(options).find("tape/loss_of_4") == std::string::npos);
+  CHECK(cli::run_kernels({cli::tape_topic()}, options).find("tape/loss_of_4") == std::string::npos);
   options.workloads = {"loss_of_5"};
   CHECK_THROWS_WITH(
-      cli::bench_tape_command(options),
+      cli::run_kernels({cli::tape_topic()}, options),
       "hsi4d bench tape: no workload \"loss_of_5\"; known: nodes, additions, loss_of_4, loss_of_10, ssim, skinning, "
       "anomaly; did "
       "you mean \"loss_of_4\"?");
@@ -219,11 +221,11 @@ TEST_CASE("bench without a topic measures the kernels", "[full]") {
 
 TEST_CASE("bench pixel_filter judges every filter at a height and writes one object a measurement", "[full]") {
   const ScratchFolder folder;
-  cli::BenchOptions options;
-  options.workloads = {"avatar_5000"};
+  PixelFilterBench options;
+  options.figures = {"avatar_5000"};
   options.heights_px = {16};
   options.json = folder / "m.json";
-  const std::string table = cli::bench_pixel_filter_command(options);
+  const std::string table = bench_pixel_filter(options);
   std::istringstream lines(read_text_file(options.json));
   std::map<std::string, nlohmann::json> found;
   for (std::string line; std::getline(lines, line);) {
@@ -252,15 +254,14 @@ TEST_CASE("bench pixel_filter judges every filter at a height and writes one obj
 }
 
 TEST_CASE("bench pixel_filter tells which figures and heights there are") {
-  cli::BenchOptions options;
-  options.workloads = {"avatar"};
-  CHECK_THROWS_WITH(cli::bench_pixel_filter_command(options),
+  PixelFilterBench options;
+  options.figures = {"avatar"};
+  CHECK_THROWS_WITH(bench_pixel_filter(options),
                     "hsi4d bench pixel_filter: no workload \"avatar\"; known: avatar_5000, avatar_40000; did you mean "
                     "\"avatar_5000\"?");
-  options.workloads = {};
+  options.figures = {};
   options.heights_px = {4};
-  CHECK_THROWS_WITH(cli::bench_pixel_filter_command(options),
-                    "hsi4d bench pixel_filter: a height of 4 px; allowed: 8 to 2048");
+  CHECK_THROWS_WITH(bench_pixel_filter(options), "hsi4d bench pixel_filter: a height of 4 px; allowed: 8 to 2048");
 }
 
 }  // namespace command_test

@@ -6,7 +6,6 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
-#include "bench/stages_command.h"
 #include "core/file.h"
 #include "core/text.h"
 #include "tests/bench/rows.h"

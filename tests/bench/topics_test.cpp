@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "bench/list.h"
 #include "tests/support/program.h"
 
 namespace topics_test {
@@ -47,8 +48,9 @@ TEST_CASE("bench refuses options of another topic, and tells which there are") {
 TEST_CASE("the help of a topic has its own options alone") {
   const TemporaryFolder here;
   const std::string all = help("");
-  for (const std::string topic :
-       {"rasterize", "skinning", "color_net", "tape", "pixel_filter", "stages", "scaling", "pareto"}) {
+#define HSI4D_BENCH_TOPIC(name) #name,
+  for (const std::string topic : {HSI4D_BENCH_TOPICS}) {
+#undef HSI4D_BENCH_TOPIC
     const std::string text = help(topic);
     INFO(text);
     CHECK_THAT(all, Contains(topic));

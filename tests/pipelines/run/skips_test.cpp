@@ -10,7 +10,7 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/image_io.h"
-#include "pipelines/cli/commands.h"
+#include "pipelines/cli/check_command.h"
 #include "pipelines/cli/run_command.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/input/state.h"

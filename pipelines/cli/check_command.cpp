@@ -1,25 +1,26 @@
-#include "pipelines/cli/commands.h"
+#include "pipelines/cli/check_command.h"
 
-#include <algorithm>
-#include <span>
+#include <CLI/CLI.hpp>
 
 #include "core/check.h"
 #include "core/config_file.h"
-#include "core/suggest.h"
 #include "pipelines/avatar/fit.h"
-#include "pipelines/cli/instances.h"
+#include "pipelines/cli/list.h"
+#include "pipelines/cli/options.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/config/config_kind.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/config/run_problems.h"
-#include "pipelines/config/synthetic_places.h"
-#include "pipelines/graph/frame_graph.h"
-#include "pipelines/graph/sequence_graph.h"
 #include "pipelines/sweep/plan.h"
-#include "pipelines/synthetic/motion.h"
 
 namespace hsi4d::cli {
 namespace {
+
+struct CheckArguments {
+  std::string config;
+  std::vector<std::string> overrides;
+  bool print_config = false;
+};
 
 template <class T>
 std::string names_of_choices(const ConfigMap<T>& map) {
@@ -71,49 +72,6 @@ std::string fit_summary(const std::filesystem::path& file, const AvatarFitSettin
   return text + stage_summary("avatar fit", fit.stage);
 }
 
-std::string list_losses(const std::vector<LossDescription>& losses) {
-  Table table;
-  for (const LossDescription& loss : losses) table.rows.push_back({loss.name, loss.summary});
-  return table_text(table);
-}
-
-std::string settings_table(const std::vector<ConfigSetting>& settings) {
-  Table table{.head = {"SETTING", "DEFAULT", "ALLOWED", "MEANING"}};
-  for (const ConfigSetting& setting : settings)
-    table.rows.push_back({setting.pointer, setting.initial, setting.allowed, setting.summary});
-  return table_text(table);
-}
-
-/// What a stage may move, by what it is over and what it draws.
-std::string list_stages() {
-  Table table{.head = {"OVER", "DRAW", "GROUP", "MOVES"}};
-  for (const char* over : {"first_frame", "frame"}) {
-    for (const ConfigChoice<Draw>& draw : kDraws) {
-      for (const std::string& group : state_group_names(draw.value))
-        table.rows.push_back({over, draw.name, group, state_group_summary(group)});
-    }
-  }
-  for (const std::string& group : sequence_group_names())
-    table.rows.push_back({"sequence", "", group, sequence_group_summary(group)});
-  return table_text(table);
-}
-
-/// What synthetic.scene, synthetic.motion and synthetic.object can be, and the instances of the benchmark.
-std::string list_scenes(const std::vector<LossDescription>& losses) {
-  Table table{.head = {"SYNTHETIC", "", "WHAT", "PLACES, OBJECTS"}};
-  for (const auto& kind : kSyntheticSceneKinds)
-    table.rows.push_back({"scene", kind.name, scene_summary(kind.value), place_names_of(kind.value)});
-  for (const auto& kind : kSyntheticMotionKinds)
-    table.rows.push_back({"motion", kind.name, motion_summary(kind.value), object_names_of(kind.value)});
-  for (const auto& kind : kSyntheticObjectKinds)
-    table.rows.push_back({"object", kind.name, object_summary(kind.value), ""});
-  const std::vector<std::vector<std::string>> instances = instance_rows(instance_folder(), losses);
-  if (instances.empty()) return table_text(table);
-  Table found{.head = {"INSTANCE", "PROMPT", "OBJECT", "DATA"}};
-  for (const auto& row : instances) found.rows.emplace_back(row.begin(), row.end());
-  return table_text(table) + "\n" + table_text(found);
-}
-
 /// A sweep has no settings of its own to override, and many configs.
 std::string check_sweep(const std::filesystem::path& file, const std::vector<std::string>& overrides, bool print_config,
                         const std::vector<LossDescription>& losses) {
@@ -140,26 +98,14 @@ std::string check_command(const std::filesystem::path& config, const std::vector
   return print_config ? resolved_config(run, losses) : summary(config, run);
 }
 
-std::vector<std::string> schema_kinds() { return {"run", "avatar_fit", "sweep"}; }
-
-std::string schema_command(const std::string& kind, const std::vector<LossDescription>& losses) {
-  if (kind == "run") return run_config_schema(losses);
-  if (kind == "avatar_fit") return avatar_fit_schema(losses);
-  if (kind == "sweep") return sweep_schema();
-  throw UserError("hsi4d schema: there are no configs of \"" + kind + "\"; known: " + joined(schema_kinds()) +
-                  did_you_mean(kind, schema_kinds()));
-}
-
-std::vector<std::string> list_topics() { return {"losses", "stages", "scenes", "settings", "avatar_fit"}; }
-
-std::string list_command(const std::string& topic, const std::vector<LossDescription>& losses) {
-  if (topic == "losses") return list_losses(losses);
-  if (topic == "stages") return list_stages();
-  if (topic == "scenes") return list_scenes(losses);
-  if (topic == "settings") return settings_table(run_config_settings(losses));
-  if (topic == "avatar_fit") return settings_table(avatar_fit_settings(losses));
-  throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + joined(list_topics()) +
-                  did_you_mean(topic, list_topics()));
+void add_check(CLI::App& app, Program& program) {
+  CheckArguments& a = program.options<CheckArguments>();
+  CLI::App* check = app.add_subcommand("check", "Check a config and everything that it extends; tells all problems");
+  check->add_option("CONFIG", a.config, "The config file")->required();
+  add_overrides(*check, a.overrides);
+  check->add_flag("--print-config", a.print_config, "Print the config with every default filled in");
+  run_when_chosen(*check, program,
+                  [&] { return check_command(a.config, a.overrides, a.print_config, descriptions_of(program.terms)); });
 }
 
 }  // namespace hsi4d::cli
