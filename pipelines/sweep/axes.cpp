@@ -57,8 +57,7 @@ class AxisChecks {
     for (const Named& other : named_) {
       const bool is_own = other.who == who && other.axis == axis;
       if (is_own && other.key == key) return;  // of another seed or ablation: 100,000 seeds name one key
-      if (is_own || !(is_within(key, other.key) || is_within(other.key, key)))
-        continue;
+      if (is_own || !(is_within(key, other.key) || is_within(other.key, key))) continue;
       // Seeds that are numbers have no place of their own.
       const ConfigOrigin& origin = setting.origin.source == nullptr ? other.origin : setting.origin;
       if (other.key == key)

@@ -15,10 +15,11 @@ namespace hsi4d::fuzz {
 
 /// A reader that is tried. Each READER_fuzz.cpp defines one, which adds itself to the program's list.
 struct Target {
-  Target(const char* target_name, std::vector<Bytes> (*target_corpus)(), bool (*target_accepts)(std::span<const uint8_t>));
+  Target(const char* target_name, std::vector<Bytes> (*target_corpus)(),
+         bool (*target_accepts)(std::span<const uint8_t>));
 
   const char* name;
-  std::vector<Bytes> (*corpus)();                   ///< small valid files, from which mutations start
+  std::vector<Bytes> (*corpus)();                  ///< small valid files, from which mutations start
   bool (*accepts)(std::span<const uint8_t> file);  ///< whether the reader takes these bytes; any exception but
                                                    ///< UserError and DataError leaves it, and is a finding
 };
