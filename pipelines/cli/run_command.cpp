@@ -16,6 +16,7 @@
 #include "pipelines/cli/text.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/draw/visibility.h"
+#include "pipelines/input/body_files.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/record/gradient_table.h"
 #include "pipelines/sources/sources.h"
