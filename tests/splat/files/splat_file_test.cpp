@@ -11,8 +11,8 @@
 #include "splat/files/io_ply.h"
 #include "splat/files/io_splat.h"
 #include "tests/support/larger.h"
-#include "tests/support/splat_files.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/splat_files.h"
 
 namespace splat_file_test {
 
