@@ -108,7 +108,7 @@ BodyModel made_body() {
 }  // namespace
 
 BodyModel procedural_body() {
-  static const BodyModel body = made_body();  // half a second, and always the same
+  static const BodyModel body = made_body();
   return body;
 }
 

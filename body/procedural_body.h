@@ -14,7 +14,8 @@ namespace hsi4d {
 /// The frame is that of SMPL-X: Y up, x to the body's left, z forward; the pelvis stands 0.35 m below the origin, about
 /// where SMPL-X has it, so that a motion made for SMPL-X puts this body in the same place within centimetres.
 ///
-/// @return  the same bits every time; left and right are mirror images. Takes a fraction of a second.
+/// @return  the same bits every time; left and right are mirror images. The first call makes it, in a fraction of a
+///          second; later ones copy it.
 BodyModel procedural_body();
 
 /// Numbers of the program's body's shape.
