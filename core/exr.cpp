@@ -19,7 +19,7 @@
 
 #include "core/check.h"
 #include "core/exr_header.h"
-#include "core/png.h"
+#include "core/packed_image.h"
 #include "core/text.h"
 
 namespace hsi4d {

@@ -11,23 +11,23 @@ namespace {
 // The program that links this library has the folder in its run path (CMakeLists.txt).
 constexpr const char* kModule = "libhsi4d_images.so";
 
-const ImageCodec* load() {
+ReadByCodec load() {
   const auto reason = [] {
     const char* const text = dlerror();
     return std::string(text == nullptr ? "no reason given" : text);
   };
   void* const module = dlopen(kModule, RTLD_NOW | RTLD_LOCAL);  // for as long as the program runs
-  if (module == nullptr) throw InternalError("images cannot be read or written: " + reason());
-  const auto codec = reinterpret_cast<const ImageCodec* (*)()>(dlsym(module, "hsi4d_image_codec"));
-  if (codec == nullptr) throw InternalError("images cannot be read or written: " + reason());
+  if (module == nullptr) throw InternalError("images of this kind cannot be read: " + reason());
+  const auto codec = reinterpret_cast<ReadByCodec (*)()>(dlsym(module, "hsi4d_image_codec"));
+  if (codec == nullptr) throw InternalError("images of this kind cannot be read: " + reason());
   return codec();
 }
 
 }  // namespace
 
-const ImageCodec& image_codec() {
-  static const ImageCodec* const codec = load();
-  return *codec;
+ReadByCodec image_codec() {
+  static const ReadByCodec codec = load();
+  return codec;
 }
 
 }  // namespace hsi4d

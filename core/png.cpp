@@ -3,8 +3,11 @@
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
+#include <new>
 #include <png.h>
+#include <utility>
 #include <vector>
+#include <zlib.h>
 
 #include "core/check.h"
 
@@ -71,21 +74,56 @@ bool read_pixels(Decoder& decoder, png_bytepp rows) {
   return true;
 }
 
-template <class Number>
-Image planar(const std::vector<uint8_t>& packed, int channels, int height, int width, float largest) {
-  Image image(channels, height, width);
-  for (int c = 0; c < channels; ++c) {
-    for (int y = 0; y < height; ++y) {
-      const uint8_t* in = packed.data() + (int64_t{y} * width * channels + c) * int64_t{sizeof(Number)};
-      float* out = image.row(c, y);
-      for (int x = 0; x < width; ++x) {
-        Number number;
-        std::memcpy(&number, in + int64_t{x} * channels * int64_t{sizeof(Number)}, sizeof(Number));
-        out[x] = static_cast<float>(number) / largest;
-      }
-    }
+/// libpng's objects of a file that is written, and the file so far.
+struct Encoder {
+  Bytes file;
+  bool has_memory = true;
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+
+  ~Encoder() { png_destroy_write_struct(&png, &info); }
+};
+
+[[noreturn]] void on_write_error(png_structp png, png_const_charp) { png_longjmp(png, 1); }
+
+void on_write(png_structp png, png_bytep data, size_t count) {
+  Encoder& encoder = *static_cast<Encoder*>(png_get_io_ptr(png));
+  try {
+    encoder.file.insert(encoder.file.end(), data, data + count);
+  } catch (const std::bad_alloc&) {
+    encoder.has_memory = false;
   }
-  return image;
+  if (!encoder.has_memory) png_error(png, "out of memory");
+}
+
+void on_flush(png_structp) {}
+
+bool write_pixels(Encoder& encoder, const PackedImage& image, png_bytepp rows) {
+  constexpr int kColors[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB, PNG_COLOR_TYPE_RGBA};
+  encoder.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &encoder, on_write_error, on_warning);
+  if (encoder.png == nullptr) return false;
+  if (setjmp(png_jmpbuf(encoder.png)) != 0) return false;
+  encoder.info = png_create_info_struct(encoder.png);
+  if (encoder.info == nullptr) return false;
+  png_set_write_fn(encoder.png, &encoder, on_write, on_flush);
+  // Only runs are sought: eight times faster than zlib's level 6, and rendered images and masks become no larger.
+  png_set_compression_level(encoder.png, 1);
+  png_set_compression_strategy(encoder.png, Z_RLE);
+  png_set_IHDR(encoder.png, encoder.info, static_cast<png_uint_32>(image.width), static_cast<png_uint_32>(image.height),
+               image.type == PackedType::kUint16 ? 16 : 8, kColors[image.channels - 1], PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(encoder.png, encoder.info);
+  png_set_swap(encoder.png);
+  png_write_image(encoder.png, rows);
+  png_write_end(encoder.png, nullptr);
+  return true;
+}
+
+/// Where each row begins.
+std::vector<png_bytep> row_pointers(Bytes& values, size_t row_bytes, size_t height) {
+  std::vector<png_bytep> rows(height);
+  for (size_t y = 0; y < height; ++y) rows[y] = values.data() + y * row_bytes;
+  return rows;
 }
 
 [[noreturn]] void fail_png(const std::string& name, const Decoder& decoder) {
@@ -93,15 +131,6 @@ Image planar(const std::vector<uint8_t>& packed, int channels, int height, int w
 }
 
 }  // namespace
-
-void check_packed_size(const std::string& name, int64_t height, int64_t width, int64_t file_bytes) {
-  // Deflate packs 1032 to 1, JPEG 1024 to 1, at best; eight pixels a byte at worst. OpenEXR's DWAB is below that but
-  // for images of one colour that are wider than 16384 pixels.
-  constexpr int64_t kDensest = 2048 * 8;
-  if (height * width <= kDensest * file_bytes) return;
-  throw DataError(name + ": its header claims " + std::to_string(width) + " x " + std::to_string(height) +
-                  " pixels, more than its " + std::to_string(file_bytes) + " bytes can hold");
-}
 
 Image decode_png(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
   Decoder decoder{.content = file};
@@ -113,14 +142,25 @@ Image decode_png(std::span<const uint8_t> file, const std::string& name, const I
   if (!choose_expansions(decoder)) fail_png(name, decoder);
   const int channels = png_get_channels(decoder.png, decoder.info);  // a palette's pixels have three or four
   check_image_size(name, channels, height, width, limits);
+  const bool wide = png_get_bit_depth(decoder.png, decoder.info) == 16;
+  PackedImage packed{
+      static_cast<int>(width), static_cast<int>(height), channels, wide ? PackedType::kUint16 : PackedType::kUint8, {}};
   const size_t row_bytes = png_get_rowbytes(decoder.png, decoder.info);
-  std::vector<uint8_t> packed(row_bytes * static_cast<size_t>(height));
-  std::vector<png_bytep> rows(static_cast<size_t>(height));
-  for (size_t y = 0; y < rows.size(); ++y) rows[y] = packed.data() + y * row_bytes;
+  packed.values.resize(row_bytes * static_cast<size_t>(height));
+  std::vector<png_bytep> rows = row_pointers(packed.values, row_bytes, static_cast<size_t>(height));
   if (!read_pixels(decoder, rows.data())) fail_png(name, decoder);
-  const int h = static_cast<int>(height), w = static_cast<int>(width);
-  if (png_get_bit_depth(decoder.png, decoder.info) == 16) return planar<uint16_t>(packed, channels, h, w, 65535.0f);
-  return planar<uint8_t>(packed, channels, h, w, 255.0f);
+  return unpacked(packed);
+}
+
+Bytes encode_png(const PackedImage& image) {
+  Encoder encoder;
+  Bytes values = image.values;  // libpng wants pointers to what it could change
+  const auto height = static_cast<size_t>(image.height);
+  std::vector<png_bytep> rows = row_pointers(values, values.size() / height, height);
+  const bool done = write_pixels(encoder, image, rows.data());
+  if (!encoder.has_memory) throw std::bad_alloc();
+  HSI4D_CHECK(done, "libpng writes no image of these sizes");
+  return std::move(encoder.file);
 }
 
 }  // namespace hsi4d

@@ -1,11 +1,11 @@
-// PNG decoding through libpng itself: OpenImageIO's reader lets libpng print its complaints.
+// PNG files by libpng.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <string>
 
-#include "core/image.h"
+#include "core/packed_image.h"
 
 namespace hsi4d {
 
@@ -16,7 +16,7 @@ namespace hsi4d {
 /// Throws DataError for a damaged, truncated or oversized image.
 Image decode_png(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits);
 
-/// Throws DataError when the header's pixels are more than `file_bytes` can hold, before memory is taken for them.
-void check_packed_size(const std::string& name, int64_t height, int64_t width, int64_t file_bytes);
+/// The PNG file of an 8-bit or 16-bit image of one to four channels: grey, grey and alpha, RGB, RGBA.
+Bytes encode_png(const PackedImage& image);
 
 }  // namespace hsi4d

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <iterator>
 #include <limits>
+#include <turbojpeg.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
@@ -110,6 +111,23 @@ TEST_CASE("JPEG comes back close, and closer with more quality") {
   const ImageFormat half{.jpeg_quality = 80, .jpeg_half_color = true};
   CHECK(10 * encode_image("a.jpg", image, half).size() < 9 * encode_image("a.jpg", image, {.jpeg_quality = 80}).size());
   CHECK(decode_image(encode_image("a.jpg", image, half), "a.jpg").width() == 48);
+}
+
+TEST_CASE("a JPEG of inks becomes RGB") {
+  // Four inks as Adobe's programs write them (255: none): blue, half black over all, of one block.
+  Bytes inks;
+  for (int i = 0; i < 64; ++i) inks.insert(inks.end(), {0, 51, 255, 128});
+  Bytes file(tjBufSize(8, 8, TJSAMP_444));
+  unsigned char* begin = file.data();
+  auto size = static_cast<unsigned long>(file.size());
+  const tjhandle codec = tjInitCompress();
+  REQUIRE(tjCompress2(codec, inks.data(), 8, 0, 8, TJPF_CMYK, &begin, &size, TJSAMP_444, 100, TJFLAG_NOREALLOC) == 0);
+  tjDestroy(codec);
+  const Image image = decode_image(std::span(file.data(), size), "a.jpg");
+  REQUIRE(image.channels() == 3);
+  CHECK(image(0, 4, 4) * 255 == Approx(0).margin(1.01));
+  CHECK(image(1, 4, 4) * 255 == Approx(51 * 128 / 255.0).margin(1.01));
+  CHECK(image(2, 4, 4) * 255 == Approx(128).margin(1.01));
 }
 
 TEST_CASE("OpenEXR images keep every float, half is rounded") {
@@ -228,7 +246,8 @@ TEST_CASE("a header that claims too much is refused before memory is taken") {
                     "a.jpg: 3 channels of 65535 x 65535 pixels need more than the 4294967296 bytes allowed");
   std::fill_n(at + 5, 4, uint8_t{0x40});
   CHECK_THROWS_WITH(decode_image(jpeg, "a.jpg"), Contains("a.jpg: its header claims 16448 x 16448 pixels, more than "));
-  CHECK_THROWS_WITH(decode_image(std::span(jpeg.data(), 8), "a.jpg"), "a.jpg: cannot be decoded: it has no JPEG frame");
+  CHECK_THROWS_WITH(decode_image(std::span(jpeg.data(), 8), "a.jpg"),
+                    "a.jpg: cannot be decoded as JPEG: it has no frame");
   CHECK_THROWS_WITH(
       decode_image(png_claiming(16000, 16000), "a.png"),
       Contains("a.png: its header claims 16000 x 16000 pixels, more than its ") && Contains(" bytes can hold"));
