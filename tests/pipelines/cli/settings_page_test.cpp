@@ -28,10 +28,22 @@ std::string told_as(const std::string& setting) {
   return std::regex_replace(std::regex_replace(setting, of_clip, "$1"), of_program, "/sources/video$2");
 }
 
-/// The cells of the table's row that begins with this setting; empty: there is none.
+/// Where the row of a setting begins in the page; npos: nowhere. The row stands below its section's heading. Its name
+/// leaves out the section and what follows it for a stage (NAME) or a clip (0).
+std::size_t place_of_row(const std::string& text, const std::string& setting) {
+  static const std::regex parts("^/(?:([^/]*)/)?(?:NAME/|0/)?(.*)$");
+  std::smatch found;
+  if (!std::regex_match(setting, found, parts)) return std::string::npos;
+  const std::string heading = found[1].length() == 0 ? "The config" : "`" + found[1].str() + "`";
+  const std::size_t section = text.find("\n## " + heading + "\n");
+  if (section == std::string::npos) return section;
+  const std::size_t at = text.find("\n| `" + found[2].str() + "` |", section);
+  return at < text.find("\n## ", section + 1) ? at : std::string::npos;
+}
+
+/// The cells of the table's row of this setting; empty: there is none.
 std::vector<std::string> row_of(const std::string& text, const std::string& setting) {
-  const std::string begin = "\n| `" + setting + "` |";
-  const std::size_t at = text.find(begin);
+  const std::size_t at = place_of_row(text, setting);
   if (at == std::string::npos) return {};
   const std::size_t end = text.find('\n', at + 1);
   std::string line = text.substr(at + 1, end - at - 1);
@@ -46,7 +58,7 @@ std::vector<std::string> row_of(const std::string& text, const std::string& sett
 /// The example below the table that has this setting; empty: there is none.
 std::string example_of(const std::string& text, const std::string& setting) {
   const std::string begin = "\n```json\n";
-  const std::size_t at = text.find(begin, text.find("\n| `" + setting + "` |"));
+  const std::size_t at = text.find(begin, place_of_row(text, setting));
   if (at == std::string::npos) return "";
   return text.substr(at + begin.size(), text.find("\n```\n", at + 1) - at - begin.size());
 }
