@@ -1,4 +1,4 @@
-// docs/settings.md tells every setting, as it is, with an example that is right.
+// docs/settings.md tells every setting, as it is, and examples that are right where defaults say little.
 #include <filesystem>
 #include <regex>
 #include <sstream>
@@ -74,6 +74,11 @@ bool has(const ConfigValue& tree, const std::string& pointer) {
   return at != nullptr;
 }
 
+/// Whether a default does not show what a value looks like.
+bool is_silent(const std::string& initial) {
+  return initial == "required" || initial == "\"\"" || initial == "[]" || initial == "null";
+}
+
 std::string escaped(std::string text) {
   for (std::size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) text.insert(at, "\\");
   return text;
@@ -93,9 +98,10 @@ TEST_CASE("the page of settings tells every setting as it is") {
   }
 }
 
-TEST_CASE("every setting is in an example of the page, and right there") {
+TEST_CASE("every setting whose default does not show its values is in an example of the page, and right there") {
   const std::string text = page();
   for (const ConfigSetting& setting : run_config_settings(all_losses())) {
+    if (!is_silent(setting.initial)) continue;
     const std::string pointer = told_as(setting.pointer);
     const std::string example = example_of(text, pointer);
     INFO(pointer << ": " << example);
