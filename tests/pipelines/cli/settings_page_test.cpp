@@ -21,11 +21,14 @@ std::vector<LossDescription> all_losses() { return descriptions_of(loss_terms())
 
 std::string page() { return test::file_text(std::filesystem::path(HSI4D_SOURCE_DIR) / "docs" / "settings.md"); }
 
-/// The setting whose row says what this one is: clips of a chain have the settings of `data`, and programs for masks
-/// and motion some of those for the video.
-std::string told_as(const std::string& setting) {
-  static const std::regex of_clip("^/chain/0(/data/.*)"), of_program("^/sources/(masks|motion)(/(timeout_s|retr).*)");
-  return std::regex_replace(std::regex_replace(setting, of_clip, "$1"), of_program, "/sources/video$2");
+/// The setting whose row says what this one is: clips of a chain have the settings of `data`, programs for masks and
+/// motion some of those for the video, and losses the weight of `photometric` where their default is the same.
+std::string told_as(const ConfigSetting& setting) {
+  static const std::regex of_clip("^/chain/0(/data/.*)"), of_program("^/sources/(masks|motion)(/(timeout_s|retr).*)"),
+      of_loss("^/stages/NAME/losses/[a-z0-9_]+/weight$");
+  if (setting.initial == "1" && std::regex_match(setting.pointer, of_loss))
+    return "/stages/NAME/losses/photometric/weight";
+  return std::regex_replace(std::regex_replace(setting.pointer, of_clip, "$1"), of_program, "/sources/video$2");
 }
 
 /// Where the row of a setting begins in the page; npos: nowhere. The row stands below its section's heading. Its name
@@ -90,7 +93,7 @@ TEST_CASE("the page of settings tells every setting as it is") {
   const std::string text = page();
   for (const ConfigSetting& setting : run_config_settings(all_losses())) {
     INFO(setting.pointer << ": tools/settings_page writes the page again");
-    const std::vector<std::string> cells = row_of(text, told_as(setting.pointer));
+    const std::vector<std::string> cells = row_of(text, told_as(setting));
     REQUIRE(cells.size() == 4);
     CHECK(cells[1] == "`" + escaped(setting.initial) + "`");
     CHECK(cells[2] == escaped(setting.allowed));
@@ -102,7 +105,7 @@ TEST_CASE("every setting whose default does not show its values is in an example
   const std::string text = page();
   for (const ConfigSetting& setting : run_config_settings(all_losses())) {
     if (!is_silent(setting.initial)) continue;
-    const std::string pointer = told_as(setting.pointer);
+    const std::string pointer = told_as(setting);
     const std::string example = example_of(text, pointer);
     INFO(pointer << ": " << example);
     ConfigProblems problems;
