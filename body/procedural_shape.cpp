@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <vector>
 
 #include "body/body_model.h"
 
@@ -83,52 +84,72 @@ struct Section {
   double half_u, half_v_plus, half_v_minus;
 };
 
-/// Cubic through the middle two of four values at places x, with the slopes of its neighbours.
-double cubic(const double* x, const double* y, double at) {
-  const double h = x[2] - x[1], t = (at - x[1]) / h;
+/// A cubic on [0, 1] by its coefficients.
+struct Cubic {
+  double cubed, squared, slope, start;
+
+  double at(double t) const { return ((cubed * t + squared) * t + slope) * t + start; }
+};
+
+/// Through the middle two of four values at places x, with the slopes of its neighbours.
+Cubic cubic(const double* x, const double* y) {
+  const double h = x[2] - x[1];
   const double slope1 = (y[2] - y[0]) / (x[2] - x[0]) * h;
   const double slope2 = (y[3] - y[1]) / (x[3] - x[1]) * h;
-  const double a = 2 * (y[1] - y[2]) + slope1 + slope2;
-  const double b = 3 * (y[2] - y[1]) - 2 * slope1 - slope2;
-  return ((a * t + b) * t + slope1) * t + y[1];
+  return {2 * (y[1] - y[2]) + slope1 + slope2, 3 * (y[2] - y[1]) - 2 * slope1 - slope2, slope1, y[1]};
 }
 
-Section section_at(std::span<const Section> sections, double along) {
-  const int last = static_cast<int>(sections.size()) - 1;
-  int i = 0;
-  while (i < last - 1 && sections[static_cast<std::size_t>(i + 1)].along < along) ++i;
-  double x[4], y[5][4];
-  for (int k = 0; k < 4; ++k) {
-    // Beyond the ends the outermost section goes on at the same distance.
-    const int from = std::clamp(i + k - 1, 0, last);
-    const Section& s = sections[static_cast<std::size_t>(from)];
-    x[k] = s.along + 0.02 * (i + k - 1 - from);
-    y[0][k] = s.u, y[1][k] = s.v, y[2][k] = s.half_u, y[3][k] = s.half_v_plus, y[4][k] = s.half_v_minus;
+/// A smooth tube through sections; its ends are flat.
+class Tube {
+ public:
+  explicit Tube(std::span<const Section> sections) : end_(sections.back().along) {
+    for (int i = 0; i + 1 < static_cast<int>(sections.size()); ++i) pieces_.push_back(piece(sections, i));
   }
-  return {along,
-          cubic(x, y[0], along),
-          cubic(x, y[1], along),
-          cubic(x, y[2], along),
-          cubic(x, y[3], along),
-          cubic(x, y[4], along)};
-}
 
-/// About the distance to a tube at place `along` its axis and (u, v) across; its ends are flat.
-double tube(std::span<const Section> sections, double along, double u, double v) {
-  const double inside = std::clamp(along, sections.front().along, sections.back().along);
-  const Section s = section_at(sections, inside);
-  const double half_v = v > s.v ? s.half_v_plus : s.half_v_minus;
-  const double qu = (u - s.u) / s.half_u, qv = (v - s.v) / half_v;
-  const double across = ellipse_distance(
-      qu * qu + qv * qv, qu * qu / (s.half_u * s.half_u) + qv * qv / (half_v * half_v), std::min(s.half_u, half_v));
-  const double beyond = std::abs(along - inside);
-  if (beyond == 0) return across;
-  return across <= 0 ? beyond : std::sqrt(across * across + beyond * beyond);
-}
+  /// About the distance to it, at place `along` its axis and (u, v) across.
+  double distance(double along, double u, double v) const {
+    const double inside = std::clamp(along, pieces_.front().begin, end_);
+    std::size_t i = 0;
+    while (i + 1 < pieces_.size() && pieces_[i + 1].begin < inside) ++i;
+    const Piece& piece = pieces_[i];
+    const double t = (inside - piece.begin) / piece.length;
+    const double off_u = u - piece.u.at(t), off_v = v - piece.v.at(t), half_u = piece.half_u.at(t);
+    const double half_v = (off_v > 0 ? piece.half_v_plus : piece.half_v_minus).at(t);
+    const double qu = off_u / half_u, qv = off_v / half_v;
+    const double across = ellipse_distance(qu * qu + qv * qv, qu * qu / (half_u * half_u) + qv * qv / (half_v * half_v),
+                                           std::min(half_u, half_v));
+    const double beyond = std::abs(along - inside);
+    if (beyond == 0) return across;
+    return across <= 0 ? beyond : std::sqrt(across * across + beyond * beyond);
+  }
+
+ private:
+  /// What is between a section and the next.
+  struct Piece {
+    double begin, length;
+    Cubic u, v, half_u, half_v_plus, half_v_minus;
+  };
+
+  static Piece piece(std::span<const Section> sections, int i) {
+    const int last = static_cast<int>(sections.size()) - 1;
+    double x[4], y[5][4];
+    for (int k = 0; k < 4; ++k) {
+      // Beyond the ends the outermost section goes on at the same distance.
+      const int from = std::clamp(i + k - 1, 0, last);
+      const Section& s = sections[static_cast<std::size_t>(from)];
+      x[k] = s.along + 0.02 * (i + k - 1 - from);
+      y[0][k] = s.u, y[1][k] = s.v, y[2][k] = s.half_u, y[3][k] = s.half_v_plus, y[4][k] = s.half_v_minus;
+    }
+    return {x[1], x[2] - x[1], cubic(x, y[0]), cubic(x, y[1]), cubic(x, y[2]), cubic(x, y[3]), cubic(x, y[4])};
+  }
+
+  std::vector<Piece> pieces_;
+  double end_;
+};
 
 // --- the tables; `along` is y for torso, neck and leg, x for arm and palm, z for the foot ----------------------------
 
-constexpr Section kTorso[] = {
+constexpr Section kTorsoSections[] = {
     // y, x, z, half width, front, back
     {0.800, 0, -0.005, 0.050, 0.045, 0.060}, {0.840, 0, -0.005, 0.115, 0.080, 0.095},
     {0.880, 0, -0.005, 0.155, 0.096, 0.118}, {0.930, 0, -0.007, 0.166, 0.102, 0.118},
@@ -140,13 +161,13 @@ constexpr Section kTorso[] = {
     {1.470, 0, -0.020, 0.040, 0.036, 0.040}, {1.490, 0, -0.016, 0.020, 0.020, 0.020},
 };
 
-constexpr Section kNeck[] = {
+constexpr Section kNeckSections[] = {
     {1.400, 0, -0.022, 0.058, 0.050, 0.056}, {1.450, 0, -0.018, 0.054, 0.052, 0.056},
     {1.490, 0, -0.012, 0.052, 0.053, 0.056}, {1.530, 0, -0.006, 0.053, 0.052, 0.060},
     {1.580, 0, -0.002, 0.050, 0.045, 0.060},
 };
 
-constexpr Section kLeg[] = {
+constexpr Section kLegSections[] = {
     {0.040, 0.100, -0.026, 0.020, 0.020, 0.022}, {0.065, 0.100, -0.023, 0.028, 0.032, 0.034},
     {0.090, 0.100, -0.021, 0.033, 0.036, 0.040}, {0.130, 0.100, -0.021, 0.032, 0.033, 0.036},
     {0.200, 0.100, -0.017, 0.037, 0.035, 0.041}, {0.280, 0.100, -0.011, 0.046, 0.041, 0.054},
@@ -158,7 +179,7 @@ constexpr Section kLeg[] = {
     {0.940, 0.076, -0.006, 0.040, 0.050, 0.060},
 };
 
-constexpr Section kFoot[] = {
+constexpr Section kFootSections[] = {
     // z, x, y, half width, up, down
     {-0.078, 0.100, 0.030, 0.020, 0.018, 0.022}, {-0.060, 0.100, 0.034, 0.029, 0.040, 0.034},
     {-0.030, 0.100, 0.036, 0.032, 0.062, 0.036}, {0.010, 0.102, 0.034, 0.034, 0.056, 0.036},
@@ -167,7 +188,7 @@ constexpr Section kFoot[] = {
     {0.178, 0.114, 0.017, 0.026, 0.015, 0.017},
 };
 
-constexpr Section kArm[] = {
+constexpr Section kArmSections[] = {
     // x, y, z, half height, front, back
     {0.100, 1.375, -0.020, 0.048, 0.046, 0.050}, {0.150, 1.388, -0.020, 0.056, 0.054, 0.056},
     {0.190, 1.394, -0.020, 0.059, 0.056, 0.055}, {0.240, 1.397, -0.021, 0.053, 0.051, 0.050},
@@ -178,11 +199,14 @@ constexpr Section kArm[] = {
     {0.720, 1.399, -0.018, 0.014, 0.022, 0.020}, {0.735, 1.399, -0.018, 0.008, 0.012, 0.012},
 };
 
-constexpr Section kPalm[] = {
+constexpr Section kPalmSections[] = {
     {0.680, 1.399, -0.018, 0.0120, 0.016, 0.014}, {0.705, 1.399, -0.018, 0.0175, 0.028, 0.026},
     {0.735, 1.399, -0.018, 0.0165, 0.036, 0.033}, {0.765, 1.399, -0.018, 0.0150, 0.040, 0.038},
     {0.785, 1.399, -0.018, 0.0125, 0.040, 0.039}, {0.800, 1.399, -0.018, 0.0090, 0.036, 0.034},
 };
+
+const Tube kTorso(kTorsoSections), kNeck(kNeckSections), kLeg(kLegSections), kFoot(kFootSections), kArm(kArmSections),
+    kPalm(kPalmSections);
 
 double head(const Vector& p) {  // p.x ≥ 0
   const double skull = ellipsoid(p, {0, 1.628, -0.010}, {0.074, 0.092, 0.096});
@@ -198,14 +222,27 @@ double head(const Vector& p) {  // p.x ≥ 0
   return smooth_union(d, ear, 0.012);
 }
 
+/// No more than a finger's field: it is straight, and widest at its base.
+double finger_bound(const Finger& finger, const Vector& p) {
+  const Vector to_middle = p - (finger.points[0] + finger.points[3]) * 0.5, along = finger.points[3] - finger.points[0];
+  constexpr double kRounding = 1e-9;
+  return std::sqrt(dot(to_middle, to_middle)) - std::sqrt(dot(along, along)) * 0.5 - finger.radii[0] - kRounding;
+}
+
 double hand(const Vector& p) {
+  constexpr double kReach = 0.008;
+  const double palm = kPalm.distance(p[0], p[1], p[2]);
   double fingers = 1;
-  for (const Finger& finger : left_fingers()) fingers = std::min(fingers, finger_field(finger, p));
-  return smooth_union(tube(kPalm, p[0], p[1], p[2]), fingers, 0.008);
+  for (const Finger& finger : left_fingers()) {
+    // A finger further away changes no bit of the union.
+    if (finger_bound(finger, p) < std::min(fingers, palm + kReach))
+      fingers = std::min(fingers, finger_field(finger, p));
+  }
+  return smooth_union(palm, fingers, kReach);
 }
 
 double foot(const Vector& p) {
-  const double shape = tube(kFoot, p[2], p[0], p[1]);
+  const double shape = kFoot.distance(p[2], p[0], p[1]);
   return -smooth_union(-shape, p[1], 0.010);  // flat below
 }
 
@@ -261,16 +298,16 @@ double body_field(const Vector3<double>& point) {
   const double x = p[0], y = p[1];
   // A part is left out where it is further away than any union reaches.
   constexpr double kFar = 0.3;
-  double d = y < 0.72 || x > 0.30 ? kFar : tube(kTorso, y, x, p[2]);
-  if (y > 1.33 && x < 0.20) d = smooth_union(d, tube(kNeck, y, x, p[2]), 0.030);
+  double d = y < 0.72 || x > 0.30 ? kFar : kTorso.distance(y, x, p[2]);
+  if (y > 1.33 && x < 0.20) d = smooth_union(d, kNeck.distance(y, x, p[2]), 0.030);
   if (y > 1.40 && x < 0.20) d = smooth_union(d, head(p), 0.014);
   if (y > 1.20 && x > 0.02) {
-    double arm = x > 0.82 ? kFar : tube(kArm, x, y, p[2]);
+    double arm = x > 0.82 ? kFar : kArm.distance(x, y, p[2]);
     if (x > 0.60) arm = smooth_union(arm, hand(p), 0.012);
     d = smooth_union(d, arm, 0.045);
   }
   if (y < 1.05) {
-    double leg = tube(kLeg, y, x, p[2]);
+    double leg = kLeg.distance(y, x, p[2]);
     if (y < 0.20) leg = smooth_union(leg, foot(p), 0.024);
     d = smooth_union(d, leg, 0.030);
   }

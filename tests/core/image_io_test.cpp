@@ -241,9 +241,9 @@ TEST_CASE("a header that claims too much is refused before memory is taken") {
   const uint8_t frame[] = {0xff, 0xc0, 0x00, 0x11, 0x08};
   const auto at = std::search(jpeg.begin(), jpeg.end(), std::begin(frame), std::end(frame));
   REQUIRE(at != jpeg.end());
-  std::fill_n(at + 5, 4, uint8_t{0xff});
+  for (int i = 0; i < 4; ++i) at[5 + i] = i % 2 == 0 ? 0xff : 0x00;  // libjpeg has a limit of 65500 of its own
   CHECK_THROWS_WITH(decode_image(jpeg, "a.jpg"),
-                    "a.jpg: 3 channels of 65535 x 65535 pixels need more than the 4294967296 bytes allowed");
+                    "a.jpg: 3 channels of 65280 x 65280 pixels need more than the 4294967296 bytes allowed");
   std::fill_n(at + 5, 4, uint8_t{0x40});
   CHECK_THROWS_WITH(decode_image(jpeg, "a.jpg"), Contains("a.jpg: its header claims 16448 x 16448 pixels, more than "));
   CHECK_THROWS_WITH(decode_image(std::span(jpeg.data(), 8), "a.jpg"),

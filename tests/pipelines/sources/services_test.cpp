@@ -228,13 +228,13 @@ TEST_CASE("a service that could not now is asked again", "[run]") {
   }
   SECTION("when it hangs") {
     services.add("video", {"--hang", "--fail-first", "1", "--count", "count.txt"});
-    services.part("video")["timeout_s"] = 8;
+    services.part("video")["timeout_s"] = 4;
     services.part("video")["retry_on"] = "any";
     const ProgramResult result = services.run("run");
     CHECK(result.status == 0);
     CHECK_THAT(result.err,
                Contains(program +
-                        ": was ended after 8 seconds, which is all the time it has:\nwaits for ever\nIt is run again"));
+                        ": was ended after 4 seconds, which is all the time it has:\nwaits for ever\nIt is run again"));
     CHECK(lines_in("count.txt") == 2);
   }
   SECTION("when it writes nothing") {

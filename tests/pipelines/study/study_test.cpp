@@ -3,11 +3,14 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <set>
+#include <tuple>
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/file.h"
 #include "core/image_io.h"
 #include "core/video.h"
 #include "tests/support/made_sweep.h"
@@ -36,11 +39,19 @@ Image bars(const std::vector<float>& greys, int width = 16, int height = 16) {
   return image;
 }
 
+/// Each video is encoded once and copied from then on.
 void write_video(const fs::path& file, const std::vector<float>& greys, int frames = 2, double rate = 10) {
-  const Image image = bars(greys);
-  VideoWriter video(file.string(), image.width(), image.height(), {.frame_rate = rate});
-  for (int t = 0; t < frames; ++t) video.add(image);
-  video.commit();
+  static std::map<std::tuple<std::vector<float>, int, double>, Bytes> encoded;
+  Bytes& content = encoded[{greys, frames, rate}];
+  if (content.empty()) {
+    const Image image = bars(greys);
+    VideoWriter video(file.string(), image.width(), image.height(), {.frame_rate = rate});
+    for (int t = 0; t < frames; ++t) video.add(image);
+    video.commit();
+    content = read_file(file.string());
+  } else {
+    write_file(file.string(), content);
+  }
 }
 
 /// A folder with a preview, as programs other than hsi4d leave one.

@@ -43,10 +43,18 @@ std::string resolved_file(const fs::path& file) {
   return resolved_config(load_run_config(file, {}, losses), losses);
 }
 
+/// The plan of a shipped sweep, made once: the largest takes seconds.
+const SweepPlan& plan_of(const fs::path& sweep) {
+  static std::map<fs::path, SweepPlan> plans;
+  const auto found = plans.find(sweep);
+  if (found != plans.end()) return found->second;
+  return plans.emplace(sweep, plan_sweep(sweep, descriptions_of(loss_terms()))).first->second;
+}
+
 /// By block and name, what the ablations of a shipped sweep make of the method.
 std::map<std::string, nlohmann::json> ablations_of(const std::string& sweep) {
   std::map<std::string, nlohmann::json> all;
-  for (const SweepRun& run : plan_sweep(shipped("sweeps/" + sweep), descriptions_of(loss_terms())).runs) {
+  for (const SweepRun& run : plan_of(shipped("sweeps/" + sweep)).runs) {
     const std::string name = (run.block.empty() ? "" : run.block + ", ") + run.ablation;
     if (!all.contains(name)) all[name] = method_of(run.config);
   }
@@ -62,7 +70,7 @@ TEST_CASE("every shipped sweep can be planned, and docs/sweeps.md tells its runs
   for (const auto& entry : fs::directory_iterator(shipped("sweeps"))) {
     if (entry.path().extension() != ".json") continue;
     INFO(entry.path());
-    const SweepPlan plan = plan_sweep(entry.path(), descriptions_of(loss_terms()));
+    const SweepPlan& plan = plan_of(entry.path());
     CHECK(plan.name == entry.path().stem().string());
     const std::string row = "\n| `" + plan.name + "` | " + std::to_string(distinct_runs(plan).size()) + " | ";
     INFO(row);
@@ -75,7 +83,7 @@ TEST_CASE("every shipped sweep can be planned, and docs/sweeps.md tells its runs
 TEST_CASE("the sweeps of AnyInteraction have the clips that the paper scores: all but those of Bicycle and Truck") {
   const auto clips_of = [](const std::string& sweep) {
     std::map<std::string, std::set<std::string>> seeds;
-    for (const SweepRun& run : plan_sweep(shipped("sweeps/" + sweep), descriptions_of(loss_terms())).runs)
+    for (const SweepRun& run : plan_of(shipped("sweeps/" + sweep)).runs)
       if (run.ablation.empty() || run.ablation == "whole") seeds[run.clip].insert(run.seed);
     return seeds;
   };
