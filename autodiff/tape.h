@@ -50,7 +50,8 @@ struct Var {
   Tape<S>& owner() const;
 };
 
-/// backward was asked for after a value had been written, or a parameter frozen, since the forward run.
+/// backward was asked for although, since the forward run, a value was written, a parameter frozen, or the forward of
+/// another result left an image with other squares than this result looks at.
 class StaleError : public InternalError {
  public:
   using InternalError::InternalError;
@@ -372,6 +373,7 @@ class Tape {
     struct Reader {
       std::uint32_t producer, node;
       int input;
+      std::uint64_t key;  // of what it looked at in the last forward
     };
     std::uint32_t result = 0;
     std::uint64_t structure = 0;
@@ -406,13 +408,14 @@ class Tape {
   void find_sole_readers(Plan& plan);
   void place_adjoints(Plan& plan);
   void activate(const Plan& plan);
-  void tell_needed(const Plan& plan);
+  void tell_needed(Plan& plan);
   void run_forward(Plan& plan);
   void run_backward(Plan& plan);
   void forward_node(NodeRecord& node);
   void backward_node(NodeRecord& node, std::uint64_t assign_mask);
   bool up_to_date(const NodeRecord& node) const;
   void check_leaves(const Plan& plan) const;
+  void check_needed(const Plan& plan) const;
   void invalidate(const std::vector<std::uint32_t>& nodes);
   void check_finite(std::uint32_t array, const NodeRecord* node, bool adjoint) const;
 

@@ -124,17 +124,18 @@ void Tape<S>::backward_node(NodeRecord& node, std::uint64_t assign_mask) {
 }
 
 template <class S>
-void Tape<S>::tell_needed(const Plan& plan) {
+void Tape<S>::tell_needed(Plan& plan) {
   for (const std::uint32_t n : plan.forward_nodes) {
     nodes_[n].needed = nullptr;
     nodes_[n].needed_key = kWhole;
   }
   if (!skips_.unread_pixels) return;
-  for (const auto& reader : plan.sole_readers) {
+  for (auto& reader : plan.sole_readers) {
     NodeIo<S> io = io_of(nodes_[reader.node]);
     NodeRecord& producer = nodes_[reader.producer];
     producer.needed = nodes_[reader.node].table->looks_at(nodes_[reader.node].op, io, reader.input);
     if (producer.needed != nullptr) producer.needed_key = key_of(*producer.needed);
+    reader.key = producer.needed_key;
   }
 }
 
@@ -207,6 +208,16 @@ void Tape<S>::check_leaves(const Plan& plan) const {
 }
 
 template <class S>
+void Tape<S>::check_needed(const Plan& plan) const {
+  for (const auto& reader : plan.sole_readers) {
+    const NodeRecord& producer = nodes_[reader.producer];
+    if (producer.made_key == kWhole || producer.made_key == reader.key) continue;
+    throw StaleError(std::string("Stale: the forward of another result made other squares of '") +
+                     producer.table->name + "' than this result looks at; run the forward of this one again");
+  }
+}
+
+template <class S>
 void Tape<S>::backward(Var<S> loss) {
   HSI4D_CHECK(shape(loss).is_scalar(), detail::both_values("a loss is one number; shape", shape(loss)));
   const S one = 1;
@@ -219,6 +230,7 @@ void Tape<S>::backward(Var<S> result, std::span<const S> cotangent) {
   HSI4D_CHECK_EQ(static_cast<Index>(cotangent.size()), arrays_[id].shape.count());
   Plan& plan = plan_for(id);
   check_leaves(plan);
+  check_needed(plan);
   activate(plan);
   const FlushDenormals flush;
   scratch_.reset();
@@ -298,11 +310,12 @@ void Tape<S>::check_finite(std::uint32_t id, const NodeRecord* node, bool adjoin
   template bool Tape<S>::up_to_date(const NodeRecord&) const;           \
   template void Tape<S>::forward_node(NodeRecord&);                     \
   template void Tape<S>::backward_node(NodeRecord&, std::uint64_t);     \
-  template void Tape<S>::tell_needed(const Plan&);                      \
+  template void Tape<S>::tell_needed(Plan&);                            \
   template void Tape<S>::run_forward(Plan&);                            \
   template void Tape<S>::run_backward(Plan&);                           \
   template void Tape<S>::invalidate(const std::vector<std::uint32_t>&); \
   template void Tape<S>::check_leaves(const Plan&) const;               \
+  template void Tape<S>::check_needed(const Plan&) const;               \
   template void Tape<S>::forward(Var<S>);                               \
   template void Tape<S>::backward(Var<S>);                              \
   template void Tape<S>::backward(Var<S>, std::span<const S>);          \

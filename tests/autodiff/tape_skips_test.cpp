@@ -178,4 +178,37 @@ TEST_CASE("an image that somebody asks for is made whole") {
   CHECK(scene.squares == 1);
 }
 
+TEST_CASE("of two results that look at different squares of one image, each wants a forward of its own") {
+  DemandScene some(true), all(false);
+  const auto other = [](DemandScene& scene) {
+    const Var<double> weight = scene.tape.constant("other weight", scene.shape);
+    const Array<double> w = scene.tape.write(weight);
+    for (Index r = 0; r < kRows; ++r) {
+      for (Index c = 0; c < kCols; ++c) w(0, r, c) = c >= 3 * kMaskSquare ? 1 : 0;
+    }
+    return l2(scene.image, scene.target, weight);
+  };
+  const Var<double> some_other = other(some), all_other = other(all);
+  const auto forward_both = [&] {
+    some.tape.forward(some.weighted), some.tape.forward(some_other);
+    all.tape.forward(all.weighted), all.tape.forward(all_other);
+  };
+  const auto gradients = [](DemandScene& scene, Var<double> result) {
+    scene.tape.backward(result);
+    return scene.tape.gradient(scene.x).scalar();
+  };
+  forward_both();
+  CHECK_THROWS_AS(some.tape.backward(some.weighted), StaleError);
+  const double of_all = gradients(all, all.weighted);  // whose image is whole
+  CHECK(of_all != 0);
+  CHECK(some.run(some.weighted).second == of_all);
+  CHECK_THROWS_AS(some.tape.backward(some_other), StaleError);
+  for (DemandScene* scene : {&some, &all}) scene->tape.set(scene->x, {0.7});
+  forward_both();
+  CHECK(gradients(some, some_other) == gradients(all, all_other));
+  // An image that was made whole between serves both.
+  some.tape.forward(some.weighted), some.tape.forward(some.whole);
+  CHECK(gradients(some, some.weighted) == gradients(all, all.weighted));
+}
+
 }  // namespace tape_skips_test
