@@ -97,8 +97,7 @@ std::string convert_command(const ConvertOptions& o) {
     throw UserError(kConvertCommand + "--sh-degree: " + std::to_string(o.sh_degree) + " is no degree; allowed: 0 to " +
                     std::to_string(kHighestShDegree));
   const Similarity similarity = similarity_of(o);
-  if (!has_splat_ending(o.out))
-    check_ending(o.out, kConvertCommand + "OUT", {".ply", ".compressed.ply", ".splat", ".spz"});
+  if (!has_splat_ending(o.out)) check_ending(o.out, kConvertCommand + "OUT", written_splat_endings());
   const SplatWriteOptions options = write_options(o);
   check_no_input(o.out, kConvertCommand + "OUT", {o.in});
   check_writable(o.out);
