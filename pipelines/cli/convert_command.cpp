@@ -118,9 +118,10 @@ std::string convert_command(const ConvertOptions& o) {
 
 void add_convert(CLI::App& app, Program& program) {
   ConvertOptions& o = program.options<ConvertOptions>();
-  CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: .ply, .splat, .spz");
-  command.add_option("IN", o.in, "Gaussians: .ply (INRIA's or compressed), .splat or .spz")->required();
-  command.add_option("OUT", o.out, "Where to; the ending says how: .ply, .compressed.ply, .splat or .spz")->required();
+  CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: " + joined(splat_endings()));
+  command.add_option("IN", o.in, "Gaussians: " + splat_formats_text(" or ", " or "))->required();
+  command.add_option("OUT", o.out, "Where to; the ending says how: " + joined(written_splat_endings(), " or "))
+      ->required();
   command.add_option("--scale", o.scale, "Multiply lengths, about the origin, first")->type_name("S");
   command.add_option("--rotate", o.rotate, "Turn about the origin, harmonics too: axis times angle in degrees")
       ->type_name("x,y,z");

@@ -221,9 +221,7 @@ void add_info(CLI::App& app, Program& program) {
   auto& file = program.options<std::string>();
   auto& json = program.options<bool>();
   CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
-  info->add_option("FILE", file,
-                   "A .ply, .splat, .spz, .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg or .exr file")
-      ->required();
+  info->add_option("FILE", file, "A " + joined(info_endings(), " or ") + " file")->required();
   info->add_flag("--json", json, "Print one JSON object; for Gaussians");
   run_when_chosen(*info, program, [&] { return info_command(file, json); });
 }

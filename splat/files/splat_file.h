@@ -10,19 +10,19 @@
 
 namespace hsi4d {
 
-/// Endings of files that are read: ".ply", ".splat", ".spz".
+/// Endings of files that are read: ".ply", ".splat", …
 std::vector<std::string> splat_endings();
 
-/// Endings of files that are written: ".ply", ".compressed.ply", ".splat", ".spz".
+/// Endings of files that are written: ".ply", ".compressed.ply", …
 std::vector<std::string> written_splat_endings();
 
-/// ".ply (INRIA's and compressed), .splat, .spz" for messages; with " or " for both ".ply (INRIA's or compressed),
-/// .splat or .spz".
+/// ".ply (INRIA's and compressed), …, .spz" for messages; with " or " for both ".ply (INRIA's or compressed), … or
+/// .spz".
 /// @param between  the kinds of an ending
 /// @param last     before the last ending
 std::string splat_formats_text(const std::string& between = " and ", const std::string& last = ", ");
 
-/// "F.{ply,splat,spz}" for options.
+/// "F.{ply,splat,…}" for options.
 std::string splat_type_name();
 
 /// Whether a path ends as a file of Gaussians does, in any case.

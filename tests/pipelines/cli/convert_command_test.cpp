@@ -226,7 +226,8 @@ TEST_CASE("render and gradients take any format, and draw what convert makes of 
   const Gaussians g = scene.gaussians();
   write_ply("in.ply", g);
   write_camera("camera.json", scene.camera);
-  for (const char* name : {"a.compressed.ply", "a.splat", "a.spz"}) {
+  for (const SplatFormat& format : splat_formats()) {
+    const std::string name = "a" + format.ending;
     INFO(name);
     cli::convert_command({.in = "in.ply", .out = name});
     cli::convert_command({.in = name, .out = "plain.ply"});

@@ -46,9 +46,10 @@ std::string fault(const Bytes& file, const std::string& name) {
 TEST_CASE("files of Gaussians are written by their ending and known by their content") {
   const ScratchFolder folder;
   const Gaussians g = plain_gaussians(50, 1);
-  std::set<std::string> told;
+  std::set<std::string> endings, told;
   for (const SplatFormat& format : splat_formats()) {
     INFO(format.ending);
+    CHECK(endings.insert(format.ending).second);
     CHECK(has_splat_ending("a" + format.ending));
     const std::string path = folder / ("a" + format.ending);
     const Counts losses = write_splats(path, g);
@@ -56,11 +57,18 @@ TEST_CASE("files of Gaussians are written by their ending and known by their con
     const SplatFile read = read_splats(path);
     CHECK(read.gaussians.count() == 50);
     CHECK(read.gaussians.sh_degree == written_sh_degree(path, g.sh_degree));
+    CHECK(read.report.repairs.empty());
     CHECK(told.insert(read.report.format).second);
     if (!format.magic.empty()) {
       const std::string other = folder / "renamed.bin";
       std::filesystem::rename(path, other);
       CHECK(read_splats(other).report.format == read.report.format);
+      CHECK((format.gzip || is_splat_file(other)));
+    }
+    for (const std::string& magic : format.magic) {
+      CHECK((!magic.empty() && magic.size() <= 16));
+      write_text_file(folder / "magic.bin", magic);
+      CHECK(is_splat_file(folder / "magic.bin"));
     }
   }
   const std::vector<std::pair<std::string, std::string>> others = {{"A.COMPRESSED.PLY", "compressed PLY"},
