@@ -137,12 +137,11 @@ void add_pareto(CLI::App& command, Program& program) {
   BenchParetoOptions& pareto = program.options<BenchParetoOptions>();
   add_workload(command, pareto.scenes, "of the scenes that are made up");
   command
-      .add_option(
-          "--scene", pareto.scene_files,
-          std::string("Gaussians of a file to measure too, or of all files in a folder, instead of all that are "
-                      "made up unless --workload names some; ") +
-              kSplatFormats)
-      ->type_name("F.ply|DIR");
+      .add_option("--scene", pareto.scene_files,
+                  "Gaussians of a file to measure too, or of all files in a folder, instead of all that are "
+                  "made up unless --workload names some; " +
+                      splat_formats_text())
+      ->type_name(splat_type_name() + "|DIR");
   command.add_option("--knob", pareto.knobs, "Only these and the default; default: all");
   add_thread_count(command, pareto.threads, "1");
   add_repeats(command, pareto.repeats);

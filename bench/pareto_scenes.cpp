@@ -166,7 +166,7 @@ std::vector<std::string> splat_files(const std::string& path) {
   std::vector<std::string> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(path))
     if (entry.is_regular_file() && has_splat_ending(entry.path().string())) files.push_back(entry.path().string());
-  if (files.empty()) throw UserError(path + ": has no files of Gaussians; they are read from " + kSplatFormats);
+  if (files.empty()) throw UserError(path + ": has no files of Gaussians; they are read from " + splat_formats_text());
   std::sort(files.begin(), files.end());
   return files;
 }

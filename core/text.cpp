@@ -7,9 +7,9 @@
 
 namespace hsi4d {
 
-std::string joined(std::span<const std::string> words) {
+std::string joined(std::span<const std::string> words, const std::string& last) {
   std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  for (const std::string& word : words) text += (text.empty() ? "" : &word == &words.back() ? last : ", ") + word;
   return text;
 }
 

@@ -9,7 +9,8 @@
 namespace hsi4d {
 
 /// "a, b, c"; empty for no words.
-std::string joined(std::span<const std::string> words);
+/// @param last  before the last word: with " or " it is "a, b or c"
+std::string joined(std::span<const std::string> words, const std::string& last = ", ");
 
 /// A number in that many significant digits, "0.01234", "123500" or "1e-08"; 0 for −0; "nan", "inf" or "-inf".
 std::string rounded(double value, int digits);

@@ -23,6 +23,7 @@
 #include "pipelines/draw/posed_avatar.h"
 #include "pipelines/input/body_files.h"
 #include "splat/files/info.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -186,7 +187,8 @@ void add_avatar(CLI::App& app, Program& program) {
   run_when_chosen(make, program, [&o] { return avatar_make_command(o); });
 
   CLI::App& bind = *command.add_subcommand("import", "Bind the Gaussians of a file to a body model");
-  bind.add_option("PLY", o.in, "Gaussians in the rest pose of the body model, in its frame: .ply, .splat or .spz")
+  bind.add_option("PLY", o.in,
+                  "Gaussians in the rest pose of the body model, in its frame: " + joined(splat_endings(), " or "))
       ->required();
   bind.add_option("--body-model", o.body_model, "A SMPL-X file; without, the body that comes with the program")
       ->type_name("M.npz");

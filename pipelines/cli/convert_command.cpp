@@ -97,8 +97,7 @@ std::string convert_command(const ConvertOptions& o) {
     throw UserError(kConvertCommand + "--sh-degree: " + std::to_string(o.sh_degree) + " is no degree; allowed: 0 to " +
                     std::to_string(kHighestShDegree));
   const Similarity similarity = similarity_of(o);
-  if (!has_splat_ending(o.out))
-    check_ending(o.out, kConvertCommand + "OUT", {".ply", ".compressed.ply", ".splat", ".spz"});
+  if (!has_splat_ending(o.out)) check_ending(o.out, kConvertCommand + "OUT", written_splat_endings());
   const SplatWriteOptions options = write_options(o);
   check_no_input(o.out, kConvertCommand + "OUT", {o.in});
   check_writable(o.out);
@@ -119,9 +118,10 @@ std::string convert_command(const ConvertOptions& o) {
 
 void add_convert(CLI::App& app, Program& program) {
   ConvertOptions& o = program.options<ConvertOptions>();
-  CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: .ply, .splat, .spz");
-  command.add_option("IN", o.in, "Gaussians: .ply (INRIA's or compressed), .splat or .spz")->required();
-  command.add_option("OUT", o.out, "Where to; the ending says how: .ply, .compressed.ply, .splat or .spz")->required();
+  CLI::App& command = *app.add_subcommand("convert", "Convert Gaussians between formats: " + joined(splat_endings()));
+  command.add_option("IN", o.in, "Gaussians: " + splat_formats_text(" or ", " or "))->required();
+  command.add_option("OUT", o.out, "Where to; the ending says how: " + joined(written_splat_endings(), " or "))
+      ->required();
   command.add_option("--scale", o.scale, "Multiply lengths, about the origin, first")->type_name("S");
   command.add_option("--rotate", o.rotate, "Turn about the origin, harmonics too: axis times angle in degrees")
       ->type_name("x,y,z");

@@ -24,6 +24,7 @@
 #include "pipelines/record/folder.h"
 #include "pipelines/record/published.h"
 #include "pipelines/synthetic/dataset.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d::cli {
 namespace {
@@ -303,7 +304,7 @@ void add_evaluate_scene(CLI::App& command, EvaluateOptions& o) {
   EvaluationSettings& s = o.settings;
   command.add_option("--surface", s.surface, "A mesh of what is solid (.obj, .ply, .glb)")->type_name("F");
   command.add_option("--occupancy", s.occupancy, "A grid of voxels instead, free or occupied")->type_name("F.npz");
-  command.add_option("--scene", s.scene, "Gaussians instead, of what they show")->type_name("F.ply");
+  command.add_option("--scene", s.scene, "Gaussians instead, of what they show")->type_name(splat_type_name());
   command
       .add_option("--objects", s.objects, "Poses of objects in the scene beside a motion, z up, as a run's objects.npz")
       ->type_name("F.npz");

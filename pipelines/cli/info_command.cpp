@@ -174,10 +174,9 @@ struct Kind {
   const char* ending;
   std::string (*info)(const std::string&);
 };
-constexpr Kind kKinds[] = {{".ply", splat_info},   {".splat", splat_info}, {".spz", splat_info},
-                           {".npz", npz_info},     {".npy", npy_info},     {".safetensors", safetensors_info},
-                           {".json", camera_info}, {".png", image_info},   {".jpg", image_info},
-                           {".jpeg", image_info},  {".exr", exr_info}};
+constexpr Kind kOtherKinds[] = {{".npz", npz_info},     {".npy", npy_info},   {".safetensors", safetensors_info},
+                                {".json", camera_info}, {".png", image_info}, {".jpg", image_info},
+                                {".jpeg", image_info},  {".exr", exr_info}};
 
 }  // namespace
 
@@ -197,18 +196,23 @@ std::string statistics_text(const GaussianStatistics& s) {
   return text + histogram_text("scale    ", s.scale_histogram);
 }
 
+std::vector<std::string> info_endings() {
+  std::vector<std::string> endings = splat_endings();
+  for (const Kind& kind : kOtherKinds) endings.emplace_back(kind.ending);
+  return endings;
+}
+
 std::string info_command(const std::string& path, bool json) {
   if (json) {
     if (is_splat_file(path)) return splat_json(path);
-    throw UserError("hsi4d info: --json tells of Gaussians; allowed: .ply, .splat, .spz");
+    throw UserError("hsi4d info: --json tells of Gaussians; allowed: " + joined(splat_endings()));
   }
   if (is_splat_file(path)) return splat_info(path);
   const std::string ending = file_ending(path);
-  std::vector<std::string> known;
-  for (const Kind& kind : kKinds) {
+  for (const Kind& kind : kOtherKinds) {
     if (ending == kind.ending) return kind.info(path);
-    known.emplace_back(kind.ending);
   }
+  const std::vector<std::string> known = info_endings();
   throw UserError("hsi4d info: " + path + ": nothing is known of files that end in \"" + ending +
                   "\"; allowed: " + joined(known) + did_you_mean(ending, known));
 }
@@ -217,9 +221,7 @@ void add_info(CLI::App& app, Program& program) {
   auto& file = program.options<std::string>();
   auto& json = program.options<bool>();
   CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
-  info->add_option("FILE", file,
-                   "A .ply, .splat, .spz, .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg or .exr file")
-      ->required();
+  info->add_option("FILE", file, "A " + joined(info_endings(), " or ") + " file")->required();
   info->add_flag("--json", json, "Print one JSON object; for Gaussians");
   run_when_chosen(*info, program, [&] { return info_command(file, json); });
 }

@@ -2,18 +2,20 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "splat/files/info.h"
 
 namespace hsi4d::cli {
 
-/// What a file holds, by its ending: Gaussians (.ply, .splat, .spz), arrays (.npz, .npy, .safetensors), cameras
-/// (.json), images
-/// (.png, .jpg, .jpeg, .exr). Returns what the command prints.
+/// Endings of the files that `info` describes: of Gaussians, arrays, cameras, images.
+std::vector<std::string> info_endings();
+
+/// What a file holds: Gaussians by content or ending, else by ending arrays, cameras, an image. Returns what the
+/// command prints.
 ///
 /// @param json  one JSON object instead of text: file, format, rows, count, sh_degree, faults, notes, suspicious,
-/// bounds,
-///              opacity and scale with their histograms. Gaussians only.
+///              bounds, opacity and scale with their histograms. Gaussians only.
 /// Throws UserError for another ending, and what the file's reader throws.
 std::string info_command(const std::string& path, bool json = false);
 

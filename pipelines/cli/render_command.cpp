@@ -14,6 +14,7 @@
 #include "pipelines/draw/posed_avatar.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/state.h"
+#include "splat/files/splat_file.h"
 #include "splat/files/transform.h"
 
 namespace hsi4d::cli {
@@ -177,7 +178,7 @@ void add_render(CLI::App& app, Program& program) {
   CLI::App& command = *app.add_subcommand("render", "Render Gaussians to an image: a scene, objects, a body");
   add_scene(command, render.shared);
   add_several(command, "--object", render.objects, "Gaussians drawn beside the scene, as they lie in their file")
-      ->type_name("F.{ply,splat,spz}");
+      ->type_name(splat_type_name());
   command
       .add_option("--objects", render.object_poses,
                   "Poses of a run's objects: each --object NAME.ply is drawn where NAME is in --frame")

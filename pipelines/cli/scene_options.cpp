@@ -122,7 +122,7 @@ void check_writable(const std::string& path) {
 }
 
 CLI::Option* add_scene(CLI::App& command, SceneOptions& options) {
-  CLI::Option* const scene = command.add_option("--scene", options.scene, "Gaussians")->type_name("F.{ply,splat,spz}");
+  CLI::Option* const scene = command.add_option("--scene", options.scene, "Gaussians")->type_name(splat_type_name());
   command.add_option("--camera", options.camera, "A camera, or nerfstudio's transforms.json")
       ->type_name("C.json")
       ->required();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/text.h"
 #include "splat/files/splat_file.h"
 
 namespace hsi4d {
@@ -29,12 +30,13 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
 
 void describe(ConfigFields& f, ObjectSettings& s) {
   f.path("gaussians", s.gaussians, {.must_exist = true},
-         "Its Gaussians (.ply, .splat or .spz), relative to the centroid of their means")
+         "Its Gaussians (" + joined(splat_endings(), " or ") + "), relative to the centroid of their means")
       .required();
 }
 
 void describe(ConfigFields& f, DataSettings& s) {
-  f.path("scene", s.scene, {.must_exist = true}, "The static scene (.ply, .splat or .spz), metres, z up");
+  f.path("scene", s.scene, {.must_exist = true},
+         "The static scene (" + joined(splat_endings(), " or ") + "), metres, z up");
   f.map("objects", s.objects, "Rigid objects that move, by name");
   f.path("avatar", s.avatar, {.must_exist = true}, "The human's Gaussians and skinning weights (.safetensors)");
   f.path("frames", s.frames, {.must_exist = true},

@@ -4,6 +4,7 @@
 
 #include "core/text.h"
 #include "pipelines/config/synthetic_places.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d {
 namespace {
@@ -31,7 +32,7 @@ void describe_noise(ConfigFields& f, SyntheticSettings& s) {
 
 void describe_files(ConfigFields& f, SyntheticSettings& s) {
   f.path("scene_file", s.scene_file, {.must_exist = true},
-         "Gaussians in place of the scene (.ply, .splat or .spz), z up; empty: the scene is made");
+         "Gaussians in place of the scene (" + joined(splat_endings(), " or ") + "), z up; empty: the scene is made");
   f.numbers("scene_place", s.scene_place, {.min = -1e6, .max = 1e6},
             "Floor point of scene_file where the person acts, after scene_scale, metres");
   f.number("scene_turn_deg", s.scene_turn_deg, {.min = -360, .max = 360},

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/check.h"
+#include "splat/files/list.h"
 #include "splat/files/splat_rows.h"
 #include "splat/sh_basis.h"
 
@@ -345,6 +346,14 @@ EncodedSplats encode_compressed_ply(const Gaussians& g) {
   add_loss(encoded.losses, "log-scales held within ±20", scales.count());
   add_loss(encoded.losses, "harmonics held within ±4", harmonics.count());
   return encoded;
+}
+
+SplatFormat compressed_ply_format() {
+  SplatFormat format = ply_format();  // whose reader knows both
+  format.ending = ".compressed.ply";
+  format.kind = "compressed";
+  format.encode = [](const Gaussians& g, const SplatWriteOptions&) { return encode_compressed_ply(g); };
+  return format;
 }
 
 }  // namespace hsi4d

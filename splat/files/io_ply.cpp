@@ -5,6 +5,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "splat/files/io_compressed_ply.h"
+#include "splat/files/list.h"
 #include "splat/files/ply_table.h"
 #include "splat/files/quantised.h"
 #include "splat/files/splat_rows.h"
@@ -153,5 +154,15 @@ std::vector<std::uint8_t> encode_ply(const Gaussians& gaussians) {
 }
 
 void write_ply(const std::string& path, const Gaussians& gaussians) { write_file(path, encode_ply(gaussians)); }
+
+SplatFormat ply_format() {
+  return {.ending = ".ply",
+          .kind = "INRIA's",
+          .magic = {"ply\n", "ply\r"},
+          .decode = decode_ply,
+          .encode = [](const Gaussians& g, const SplatWriteOptions&) {
+            return EncodedSplats{encode_ply(g), {}};
+          }};
+}
 
 }  // namespace hsi4d

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/check.h"
+#include "splat/files/list.h"
 #include "splat/files/splat_rows.h"
 #include "splat/sh_basis.h"
 
@@ -71,6 +72,13 @@ EncodedSplats encode_splat(const Gaussians& g) {
   add_loss(encoded.losses, "log-scales held within ±20", scales.count());
   add_loss(encoded.losses, "colours held within 0 to 1", colors.count());
   return encoded;
+}
+
+SplatFormat splat_format() {
+  return {.ending = ".splat",
+          .sh_degree = 0,
+          .decode = decode_splat,
+          .encode = [](const Gaussians& g, const SplatWriteOptions&) { return encode_splat(g); }};
 }
 
 }  // namespace hsi4d

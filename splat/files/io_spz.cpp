@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/check.h"
+#include "splat/files/list.h"
 #include "splat/files/splat_rows.h"
 #include "splat/files/spz_container.h"
 
@@ -291,6 +292,14 @@ EncodedSplats encode_spz(const Gaussians& gaussians, const SpzOptions& options) 
   header.fractional_bits = bits;
   encoded.bytes = pack_spz(header, attributes);
   return encoded;
+}
+
+SplatFormat spz_format() {
+  return {.ending = ".spz",
+          .magic = {"NGSP"},
+          .gzip = true,
+          .decode = decode_spz,
+          .encode = [](const Gaussians& g, const SplatWriteOptions& o) { return encode_spz(g, o.spz); }};
 }
 
 }  // namespace hsi4d

@@ -1,19 +1,31 @@
-// Files of Gaussians in any format that is known: .ply (INRIA's and compressed), .splat, .spz.
+// Files of Gaussians in any format of splat/files/list.h.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
-#include "splat/files/io_spz.h"
-#include "splat/files/splat_report.h"
+#include "splat/files/list.h"
 
 namespace hsi4d {
 
-/// "F.ply, .splat or .spz" for messages and help.
-inline constexpr const char* kSplatFormats = ".ply (INRIA's and compressed), .splat, .spz";
+/// Endings of files that are read: ".ply", ".splat", …
+std::vector<std::string> splat_endings();
 
-/// Whether a path ends in .ply, .splat or .spz, in any case.
+/// Endings of files that are written: ".ply", ".compressed.ply", …
+std::vector<std::string> written_splat_endings();
+
+/// ".ply (INRIA's and compressed), …, .spz" for messages; with " or " for both ".ply (INRIA's or compressed), … or
+/// .spz".
+/// @param between  the kinds of an ending
+/// @param last     before the last ending
+std::string splat_formats_text(const std::string& between = " and ", const std::string& last = ", ");
+
+/// "F.{ply,splat,…}" for options.
+std::string splat_type_name();
+
+/// Whether a path ends as a file of Gaussians does, in any case.
 bool has_splat_ending(const std::string& path);
 
 /// Whether read_splats takes a file for one of Gaussians, by its content or its ending, or knows why it cannot be read
@@ -23,21 +35,17 @@ bool is_splat_file(const std::string& path);
 /// Degree of the harmonics that a file of the path's ending holds, of Gaussians of degree `sh_degree`.
 int written_sh_degree(const std::string& path, int sh_degree);
 
-/// The Gaussians of a file. PLY and .spz are known by their content, .splat by the path's ending.
+/// The Gaussians of a file. Its format is known by its first bytes, else by the path's ending.
 ///
 /// @param path  UTF-8
 /// Throws UserError when the file cannot be read or is of no format that is known; DataError as the format's reader.
 SplatFile read_splats(const std::string& path);
 
 /// As read_splats, of a file in memory.
-/// @param name  the file's name: what error messages call it, and its ending tells a .splat
+/// @param name  the file's name: what error messages call it, and its ending says what the first bytes do not
 SplatFile decode_splats(std::span<const std::uint8_t> file, const std::string& name);
 
-struct SplatWriteOptions {
-  SpzOptions spz;
-};
-
-/// The bytes of a file in the format of the path's ending: .compressed.ply, .ply, .splat or .spz.
+/// The bytes of a file in the format of the path's ending.
 ///
 /// Throws UserError for another ending and for Gaussians that the format cannot hold; InternalError as check_sizes.
 EncodedSplats encode_splats(const std::string& path, const Gaussians& gaussians, const SplatWriteOptions& options = {});

@@ -11,6 +11,7 @@
 #include "core/file.h"
 #include "pipelines/draw/reference_render.h"
 #include "splat/files/io_ply.h"
+#include "splat/files/splat_file.h"
 #include "tests/bench/rows.h"
 #include "tests/support/temporary_folder.h"
 
@@ -380,7 +381,7 @@ TEST_CASE("scenes of the benchmark are files, or all that a folder has") {
   CHECK(names_of({"b/c", "b"}) == std::vector<std::string>{"two.ply", "one, or more.ply", "b/two.ply"});
   write_text_file("d/notes.txt", "none");
   CHECK_THROWS_WITH(pareto_scenes_of({"d"}),
-                    "d: has no files of Gaussians; they are read from .ply (INRIA's and compressed), .splat, .spz");
+                    "d: has no files of Gaussians; they are read from " + splat_formats_text());
   CHECK_THROWS_AS(pareto_scenes_of({"none.ply"}), UserError);
   ParetoRow row = made_up("one, or more.ply", "x", 1, 1e-3, 0.1);
   CHECK_THAT(pareto_csv({row}), Contains("\n\"one, or more.ply\",alpha_min,x,own,"));

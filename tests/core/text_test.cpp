@@ -15,6 +15,8 @@ TEST_CASE("words are joined by commas") {
   CHECK(joined({}).empty());
   CHECK(joined(std::vector<std::string>{"a"}) == "a");
   CHECK(joined(std::vector<std::string>{"a", "b", "c"}) == "a, b, c");
+  CHECK(joined(std::vector<std::string>{"a", "b", "c"}, " or ") == "a, b or c");
+  CHECK(joined(std::vector<std::string>{"a"}, " or ") == "a");
 }
 
 TEST_CASE("numbers are written in few digits, or in all that they need") {

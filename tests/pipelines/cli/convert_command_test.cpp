@@ -9,6 +9,7 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/npz.h"
+#include "core/text.h"
 #include "pipelines/cli/gradients_command.h"
 #include "pipelines/cli/info_command.h"
 #include "pipelines/cli/render_command.h"
@@ -139,7 +140,7 @@ TEST_CASE("what is wrong with convert's options is told, nothing is written") {
         "hsi4d convert: --spz-sh-bits: \"5,9\" are no numbers of bits; allowed: two whole numbers from 1 to 8, for "
         "example 5,4");
   CHECK(fault({.out = "out.ksplat"}) ==
-        "hsi4d convert: OUT: out.ksplat does not end as it must; allowed: .ply, .compressed.ply, .splat, .spz");
+        "hsi4d convert: OUT: out.ksplat does not end as it must; allowed: " + joined(written_splat_endings()));
   CHECK_THAT(fault({.out = "in.ply/out.ply"}), Contains("in.ply/out.ply: cannot be written: Not a directory"));
   CHECK_FALSE(std::filesystem::exists("out.ply"));
   CHECK(run_hsi4d({"convert", "in.ply"}).status == 2);
@@ -225,7 +226,8 @@ TEST_CASE("render and gradients take any format, and draw what convert makes of 
   const Gaussians g = scene.gaussians();
   write_ply("in.ply", g);
   write_camera("camera.json", scene.camera);
-  for (const char* name : {"a.compressed.ply", "a.splat", "a.spz"}) {
+  for (const SplatFormat& format : splat_formats()) {
+    const std::string name = "a" + format.ending;
     INFO(name);
     cli::convert_command({.in = "in.ply", .out = name});
     cli::convert_command({.in = name, .out = "plain.ply"});

@@ -12,7 +12,9 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/npz.h"
+#include "core/text.h"
 #include "splat/files/io_ply.h"
+#include "splat/files/splat_file.h"
 #include "tests/support/program.h"
 
 namespace info_command_test {
@@ -88,10 +90,10 @@ TEST_CASE("info tells what is in a file") {
   write_layers("i.exr", {{"R", "Z"}, Image(2, 3, 5), ""});
   CHECK(cli::info_command("i.exr") == "i.exr: 5 x 3 pixels, layers R Z\n");
 
-  CHECK_THROWS_MATCHES(
-      cli::info_command("a.plly"), UserError,
-      Message("hsi4d info: a.plly: nothing is known of files that end in \".plly\"; allowed: .ply, "
-              ".splat, .spz, .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg, .exr; did you mean \".ply\"?"));
+  CHECK_THROWS_MATCHES(cli::info_command("a.plly"), UserError,
+                       Message("hsi4d info: a.plly: nothing is known of files that end in \".plly\"; allowed: " +
+                               joined(splat_endings()) +
+                               ", .npz, .npy, .safetensors, .json, .png, .jpg, .jpeg, .exr; did you mean \".ply\"?"));
   const ProgramResult missing = run_hsi4d({"info", "missing.ply"});
   CHECK(missing.status == 2);
   CHECK(missing.out.empty());
@@ -120,8 +122,8 @@ TEST_CASE("info knows Gaussians by what is in the file, as render does, and says
   write_text_file("g.ksplat", "any bytes");
   for (const bool json : {false, true})
     CHECK_THROWS_MATCHES(cli::info_command("g.ksplat", json), UserError,
-                         Message("g.ksplat: .ksplat files are not read; Gaussians are read from .ply (INRIA's and "
-                                 "compressed), .splat, .spz, into which the tool that wrote it can convert it"));
+                         Message("g.ksplat: .ksplat files are not read; Gaussians are read from " +
+                                 splat_formats_text() + ", into which the tool that wrote it can convert it"));
   g.means = {NAN, 2, 3};
   write_ply("g.ply", g);
   CHECK_THAT(cli::info_command("g.ply"), Catch::Matchers::StartsWith("g.ply: 0 Gaussians, ") &&
@@ -181,7 +183,7 @@ TEST_CASE("info gives Gaussians as JSON") {
   write_ply("none.ply", Gaussians{});
   CHECK(nlohmann::json::parse(cli::info_command("none.ply", true))["count"] == 0);
   CHECK_THROWS_WITH(cli::info_command("a.npz", true),
-                    "hsi4d info: --json tells of Gaussians; allowed: .ply, .splat, .spz");
+                    "hsi4d info: --json tells of Gaussians; allowed: " + joined(splat_endings()));
 }
 
 }  // namespace info_command_test

@@ -2,11 +2,13 @@
 
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
 #include "core/file.h"
+#include "core/text.h"
 #include "splat/files/io_compressed_ply.h"
 #include "splat/files/io_ply.h"
 #include "splat/files/io_splat.h"
@@ -44,33 +46,55 @@ std::string fault(const Bytes& file, const std::string& name) {
 TEST_CASE("files of Gaussians are written by their ending and known by their content") {
   const ScratchFolder folder;
   const Gaussians g = plain_gaussians(50, 1);
-  const std::vector<std::pair<std::string, std::string>> kinds = {
-      {"a.ply", "INRIA PLY"},      {"a.compressed.ply", "compressed PLY"}, {"a.splat", ".splat"},
-      {"a.spz", ".spz version 3"}, {"A.COMPRESSED.PLY", "compressed PLY"}, {"b.Spz", ".spz version 3"}};
-  for (const auto& [name, format] : kinds) {
-    CHECK(has_splat_ending(name));
-    const std::string path = folder / name;
+  std::set<std::string> endings, told;
+  for (const SplatFormat& format : splat_formats()) {
+    INFO(format.ending);
+    CHECK(endings.insert(format.ending).second);
+    CHECK(has_splat_ending("a" + format.ending));
+    const std::string path = folder / ("a" + format.ending);
     const Counts losses = write_splats(path, g);
-    CHECK(losses.empty() == (format != ".splat"));
+    CHECK(losses.empty() == (format.sh_degree >= g.sh_degree));
     const SplatFile read = read_splats(path);
-    CHECK(read.report.format == format);
     CHECK(read.gaussians.count() == 50);
-    if (format != ".splat") {
+    CHECK(read.gaussians.sh_degree == written_sh_degree(path, g.sh_degree));
+    CHECK(read.report.repairs.empty());
+    CHECK(told.insert(read.report.format).second);
+    if (!format.magic.empty()) {
       const std::string other = folder / "renamed.bin";
       std::filesystem::rename(path, other);
-      CHECK(read_splats(other).report.format == format);
+      CHECK(read_splats(other).report.format == read.report.format);
+      CHECK((format.gzip || is_splat_file(other)));
     }
+    for (const std::string& magic : format.magic) {
+      CHECK((!magic.empty() && magic.size() <= 16));
+      write_text_file(folder / "magic.bin", magic);
+      CHECK(is_splat_file(folder / "magic.bin"));
+    }
+  }
+  const std::vector<std::pair<std::string, std::string>> others = {{"A.COMPRESSED.PLY", "compressed PLY"},
+                                                                   {"b.Spz", ".spz version 3"}};
+  for (const auto& [name, format] : others) {
+    CHECK(has_splat_ending(name));
+    write_splats(folder / name, g);
+    CHECK(read_splats(folder / name).report.format == format);
   }
   SplatWriteOptions options;
   options.spz.version = 4;
   write_splats(folder / "a.spz", g, options);
   CHECK(read_splats(folder / "a.spz").report.format == ".spz version 4");
   CHECK(same_numbers(decode_splats(encode_splats("a.ply", g).bytes, "a.ply").gaussians, g));
-  CHECK_THROWS_WITH(
-      write_splats(folder / "a.ksplat", g),
-      (folder / "a.ksplat") +
-          ": Gaussians are not written to files of this ending; allowed: .ply, .compressed.ply, .splat, .spz");
+  CHECK_THROWS_WITH(write_splats(folder / "a.ksplat", g),
+                    (folder / "a.ksplat") + ": Gaussians are not written to files of this ending; allowed: " +
+                        joined(written_splat_endings()));
   CHECK_FALSE(has_splat_ending("a.png"));
+}
+
+TEST_CASE("formats of Gaussians are named in the order of their list") {
+  CHECK(joined(splat_endings(), " or ") == ".ply, .splat or .spz");
+  CHECK(joined(written_splat_endings()) == ".ply, .compressed.ply, .splat, .spz");
+  CHECK(splat_formats_text() == ".ply (INRIA's and compressed), .splat, .spz");
+  CHECK(splat_formats_text(" or ", " or ") == ".ply (INRIA's or compressed), .splat or .spz");
+  CHECK(splat_type_name() == "F.{ply,splat,spz}");
 }
 
 TEST_CASE("a .splat whose first coordinate looks like gzip is still a .splat") {
@@ -83,11 +107,10 @@ TEST_CASE("a .splat whose first coordinate looks like gzip is still a .splat") {
 
 TEST_CASE("files that are none of Gaussians are refused by name") {
   CHECK(fault({1, 2, 3}, "a.bin") ==
-        "a.bin: is no file of Gaussians that is known; they are read from .ply (INRIA's and compressed), .splat, .spz");
-  CHECK(
-      fault({1, 2, 3}, "a.ksplat") ==
-      "a.ksplat: .ksplat files are not read; Gaussians are read from .ply (INRIA's and compressed), .splat, .spz, into "
-      "which the tool that wrote it can convert it");
+        "a.bin: is no file of Gaussians that is known; they are read from " + splat_formats_text());
+  CHECK(fault({1, 2, 3}, "a.ksplat") == "a.ksplat: .ksplat files are not read; Gaussians are read from " +
+                                            splat_formats_text() +
+                                            ", into which the tool that wrote it can convert it");
   CHECK(fault({1, 2, 3}, "a.ply") == "a.ply: this is no PLY file: it does not begin with a line \"ply\"");
   CHECK_THAT(fault({1, 2, 3}, "a.spz"), Contains("a.spz: this is no .spz file"));
   CHECK_THAT(fault({1, 2, 3}, "a.splat"), Contains("a.splat: a .splat file has 32 bytes for each Gaussian"));
