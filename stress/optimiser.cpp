@@ -7,11 +7,10 @@
 #include "autodiff/reduce.h"
 #include "core/random.h"
 #include "optim/adam.h"
-#include "stress/arithmetic.h"
 #include "stress/faded.h"
 #include "stress/measures.h"
-#include "stress/moving.h"
 #include "stress/plain_adam.h"
+#include "stress/rows.h"
 
 namespace hsi4d::stress {
 

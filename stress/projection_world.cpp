@@ -9,7 +9,7 @@
 #include "autodiff/reduce.h"
 #include "core/random.h"
 #include "stress/measures.h"
-#include "stress/projection_rows.h"
+#include "stress/rows.h"
 #include "stress/splat_scene.h"
 
 namespace hsi4d::stress {
