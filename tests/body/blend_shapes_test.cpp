@@ -7,7 +7,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
 #include "core/rotation.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/operator_check.h"
 #include "tests/support/random_numbers.h"
 

@@ -11,7 +11,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "tests/support/allocation_counter.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace adam_test {
 

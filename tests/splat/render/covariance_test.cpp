@@ -30,8 +30,8 @@ struct OneGaussian {
     if (cotangent.empty()) cotangent.assign(9, S(1));
     tape.backward(axes, cotangent);
   }
-  std::vector<double> value() { return wide_numbers<S>(tape.value(axes)); }
-  std::vector<double> d(Var<S> of) { return wide_numbers<S>(tape.gradient(of)); }
+  std::vector<double> value() { return numbers_of<S>(tape.value(axes)); }
+  std::vector<double> d(Var<S> of) { return numbers_of<S>(tape.gradient(of)); }
 };
 
 }  // namespace

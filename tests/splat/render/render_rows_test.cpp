@@ -213,9 +213,9 @@ TEST_CASE("gradients of one Gaussian over millions of pixels [F7]") {
     for (auto* numbers : {&splats.means, &splats.opacities, &splats.features}) {
       for (double& x : *numbers) x = static_cast<float>(x);
     }
-    const SplatView view = view_of_size(width, height, RenderSettings());
+    const SplatView view = front_view(width, height);
     const auto gradients = [&]<class S>(S) {
-      Flat<S> flat(splats, view);
+      FlatRender<S> flat(splats, view);
       std::vector<S> cotangent(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
       for (std::size_t i = 0; i < cotangent.size(); ++i) {
         const auto x = static_cast<float>(i % static_cast<std::size_t>(width)) / static_cast<float>(width);

@@ -6,7 +6,7 @@
 #include "autodiff/elementwise.h"
 #include "core/parallel.h"
 #include "tests/support/allocation_counter.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/operator_check.h"
 #include "tests/support/taped_splats.h"
 

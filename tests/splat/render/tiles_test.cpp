@@ -11,7 +11,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "splat/render/block_kernel.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace tiles_test {
 
