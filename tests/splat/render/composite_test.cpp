@@ -216,19 +216,6 @@ TEST_CASE("whether a transmittance equal to the threshold stops is a setting") {
   }
 }
 
-TEST_CASE("layers below alpha_min are missing as computed, without it nothing is [B5]") {
-  FlatSplats splats;
-  const double alpha = 0.0039;  // just below 1/255
-  for (int i = 0; i < 1000; ++i) splats.add(0.5, 0.5, 1 + i, 3, static_cast<float>(alpha), {1});
-  SplatView view = front_view(1, 1);
-  FlatRender<float> none(splats, view);
-  CHECK(none.value(none.out.channels)[0] == 0);
-  view.settings = uncut_settings();
-  FlatRender<float> all(splats, view);
-  CHECK(all.value(all.out.channels)[0] == Approx(1 - std::pow(1 - alpha, 1000)).margin(1e-5));
-  CHECK(all.out.counters->fragments == 1000);
-}
-
 TEST_CASE("shapes that do not fit are refused") {
   Tape<float> tape;
   const auto v = [&](Index rows, Index cols) { return tape.parameter("v", shape_of(rows, cols)); };
