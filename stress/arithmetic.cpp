@@ -1,7 +1,4 @@
-// Rows F: tape, Adam, arithmetic, determinism, build. Those of the arithmetic itself are here, the others by topic in
-// the files that arithmetic.h names.
-#include "stress/arithmetic.h"
-
+// Rows F5 and F10: the arithmetic itself.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -11,8 +8,9 @@
 #include "autodiff/finite.h"
 #include "core/parallel.h"
 #include "core/simd.h"
+#include "stress/rows.h"
 
-namespace hsi4d {
+namespace hsi4d::stress {
 
 namespace {
 
@@ -33,39 +31,6 @@ float compensated_sum(const std::vector<float>& values, Remedy remedy) {
     sum = next;
   }
   return sum;
-}
-
-/// F5: numbers that are none among a thousand, one at a time, and a sum whose order matters; in the flags of this
-/// build. Without: the comparisons that fast-math makes of isfinite where no number may be NaN.
-std::vector<StressFigure> fast_math(Remedy remedy) {
-  constexpr Index kNumbers = 1000;
-  double missed = 0;
-  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::quiet_NaN(),
-                          std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
-    for (const Index place : {Index(0), Index(3), Index(777), kNumbers - 1}) {
-      std::vector<float> numbers(kNumbers, 1.0f);
-      numbers[static_cast<std::size_t>(place)] = opaque(bad);
-      bool is_seen = false;
-      if (remedy == Remedy::kOn) {
-        is_seen = first_non_finite<float>({numbers.data(), shape_of(kNumbers, 1)}) == place;
-        Index counted = 0;
-        on_best_isa([&] {
-          for (const float x : numbers) counted += std::isfinite(x) ? 0 : 1;
-        });
-        is_seen = is_seen && counted == 1;
-      } else {
-        constexpr float kMax = std::numeric_limits<float>::max();
-        for (const float x : numbers) is_seen = is_seen || x > kMax || x < -kMax;
-      }
-      missed += is_seen ? 0 : 1;
-    }
-  }
-  // 2²⁴ is the first whole number whose float neighbours are 2 apart: adding 1 to it is lost every time.
-  std::vector<float> values(4097, opaque(1.0f));
-  values[0] = opaque(16777216.0f);
-  const double sum = static_cast<double>(compensated_sum(values, remedy));
-  return {{"numbers that are none and are not seen, of 16", missed, 0},
-          {"of 4096 ones, lost in a compensated sum", std::abs(sum - 16777216.0 - 4096.0), 0}};
 }
 
 /// a·b + c over arrays, compiled for an instruction set with fused multiply-add where there is one.
@@ -104,45 +69,45 @@ double contracted(Remedy remedy) {
   return different;
 }
 
+}  // namespace
+
+/// F5: numbers that are none among a thousand, one at a time, and a sum whose order matters; in the flags of this
+/// build. Without: the comparisons that fast-math makes of isfinite where no number may be NaN.
+std::vector<StressFigure> fast_math(Remedy remedy) {
+  constexpr Index kNumbers = 1000;
+  double missed = 0;
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::quiet_NaN(),
+                          std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
+    for (const Index place : {Index(0), Index(3), Index(777), kNumbers - 1}) {
+      std::vector<float> numbers(kNumbers, 1.0f);
+      numbers[static_cast<std::size_t>(place)] = opaque(bad);
+      bool is_seen = false;
+      if (remedy == Remedy::kOn) {
+        is_seen = first_non_finite<float>({numbers.data(), shape_of(kNumbers, 1)}) == place;
+        Index counted = 0;
+        on_best_isa([&] {
+          for (const float x : numbers) counted += std::isfinite(x) ? 0 : 1;
+        });
+        is_seen = is_seen && counted == 1;
+      } else {
+        constexpr float kMax = std::numeric_limits<float>::max();
+        for (const float x : numbers) is_seen = is_seen || x > kMax || x < -kMax;
+      }
+      missed += is_seen ? 0 : 1;
+    }
+  }
+  // 2²⁴ is the first whole number whose float neighbours are 2 apart: adding 1 to it is lost every time.
+  std::vector<float> values(4097, opaque(1.0f));
+  values[0] = opaque(16777216.0f);
+  const double sum = static_cast<double>(compensated_sum(values, remedy));
+  return {{"numbers that are none and are not seen, of 16", missed, 0},
+          {"of 4096 ones, lost in a compensated sum", std::abs(sum - 16777216.0 - 4096.0), 0}};
+}
+
 /// F10
 std::vector<StressFigure> contraction(Remedy remedy) {
   return {{"products in float that are not rounded", contracted<float>(remedy), 0},
           {"products in double that are not rounded", contracted<double>(remedy), 0}};
 }
 
-constexpr const char* kNoSplitting = "Gaussians are neither relocated nor split: their number never changes";
-
-}  // namespace
-
-std::span<const StressCase> arithmetic_cases() {
-  using namespace stress;
-  static constexpr std::array kCases = {
-      StressCase{"F1", "one bad gradient poisons Adam's moments", "gradients are looked at before a step",
-                 bad_gradients},
-      StressCase{"F2", "where Adam's eps stands, against tiny gradients", "eps is added to the root", place_of_eps},
-      StressCase{"F3", "1 - 0.999^t in float", "-expm1(t log beta) in double", bias_corrections},
-      StressCase{"F4", "moments that fade become denormal", "denormals are flushed", fading_moments},
-      StressCase{"F5", "fast-math removes isfinite and reorders sums", "no fast-math", fast_math},
-      StressCase{"F6", "sums in the order of threads", "partitions that the number of threads does not change",
-                 sums_by_threads, "", true, "200 Gaussians, 80 x 48 px"},
-      StressCase{"F7", "a gradient summed over millions of pixels in float", "double from tile to tile",
-                 sums_over_pixels, "", false, "1 Gaussian, 2048 x 1024 px"},
-      StressCase{"F8", "numbers kept in half precision", "float, or double", half_precision, "", false,
-                 "120 Gaussians, 64 x 48 px"},
-      StressCase{"F9", "a tape overwrites adjoints or counts them twice", "adjoints are added to, and cleared",
-                 products_with_vectors},
-      StressCase{"F10", "a product and a sum contracted on some processors", "-ffp-contract=off", contraction},
-      StressCase{"F11", "files of Gaussians that are broken", "every count and number is checked", broken_ply},
-      StressCase{"F12", "JSON with NaN, 1e999, or numbers cut short", "refused; the shortest text that reads back",
-                 numbers_in_json},
-      StressCase{"F13", "opacities after a split, 1 - (1 - o)^(1/n)", "", nullptr, kNoSplitting},
-      StressCase{"F14", "binomial sums of alternating sign", "", nullptr, kNoSplitting},
-      StressCase{"F15", "rows of culled Gaussians hold what memory held", "they are filled with zeros", rows_not_drawn,
-                 "", false, "60 Gaussians, 32 x 24 px"},
-      StressCase{"F16", "gradients that are finite and wrong pass a test", "errors relative to the gradient",
-                 wrong_but_finite},
-  };
-  return kCases;
-}
-
-}  // namespace hsi4d
+}  // namespace hsi4d::stress

@@ -3,9 +3,10 @@
 #include <array>
 #include <cmath>
 
-#include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
 #include "stress/measures.h"
+#include "stress/rows.h"
+#include "stress/textbook_splat.h"
 
 namespace hsi4d::stress {
 
@@ -19,8 +20,8 @@ std::vector<StressFigure> cap_gradient(Remedy remedy) {
   const double g = std::exp(-0.5 * (0.2 * 0.2 + 0.1 * 0.1) / (9 + kBlur));
   const auto run = [&](double opacity) {
     FlatSplats splats;
-    splats.add_round(0.7, 0.4, 1, 3, opacity, {1});
-    FlatRender<float> render(splats, plain_view(1, 1, settings));
+    splats.add(0.7, 0.4, 1, 3, opacity, {1});
+    FlatRender<float> render(splats, front_view(1, 1, settings));
     render.backward();
     std::vector<double> shape = render.d(render.means);
     const std::vector<double> factor = render.d(render.factors);
@@ -40,7 +41,7 @@ std::vector<StressFigure> cap_gradient(Remedy remedy) {
 std::vector<StressFigure> differences_across_cuts(Remedy remedy) {
   constexpr int kWidth = 35, kHeight = 20;
   constexpr double kStep = 0.02;  // pixels
-  const SplatView view = plain_view(kWidth, kHeight, remedy == Remedy::kOn ? uncut_settings() : RenderSettings());
+  const SplatView view = front_view(kWidth, kHeight, remedy == Remedy::kOn ? uncut_settings() : RenderSettings());
   FlatRender<double> render(random_splats(25, kWidth, kHeight, 1, 9), view);
   std::vector<double> weights(kWidth * kHeight);
   RandomSequence random(2, 1);
@@ -114,14 +115,12 @@ Weights program_weights(const FlatSplats& splats, const SplatView& view) {
 
 /// Alpha by the inverse of the covariance in float; contracted as a compiler may do it in one of two passes.
 float conic_alpha(const FlatSplats& splats, std::size_t n, bool contracted) {
-  const auto v = [&](std::size_t i) { return static_cast<float>(splats.factors[6 * n + i]); };
-  const auto blur = static_cast<float>(kBlur);
-  const float xx = v(0) * v(0) + v(1) * v(1) + blur, xy = v(0) * v(3) + v(1) * v(4),
-              yy = v(3) * v(3) + v(4) * v(4) + blur;
-  const float det = xx * yy - xy * xy, a = yy / det, b = -xy / det, c = xx / det;
+  std::array<float, 6> v;
+  std::copy_n(splats.factors.begin() + static_cast<Index>(6 * n), 6, v.begin());
+  const TextbookSplat<float> splat = textbook_splat(v, static_cast<float>(kBlur));
   const auto x = static_cast<float>(0.5 - splats.means[2 * n]), y = static_cast<float>(0.5 - splats.means[2 * n + 1]);
-  const float s = contracted ? std::fma(0.5f, std::fma(a * x, x, c * y * y), b * x * y)
-                             : 0.5f * (a * x * x + c * y * y) + b * x * y;
+  const float s =
+      contracted ? std::fma(0.5f, std::fma(splat.a * x, x, splat.c * y * y), splat.b * x * y) : splat.exponent(x, y);
   return std::min(0.99f, static_cast<float>(splats.opacities[n]) * std::exp(-s));
 }
 
@@ -153,12 +152,12 @@ double recovered_transmittance(const Weights& weights) {
 std::vector<StressFigure> recomputed_alpha(Remedy remedy) {
   const FlatSplats splats = needles_at_pixel(40);
   const Weights weights =
-      remedy == Remedy::kOn ? program_weights(splats, plain_view(1, 1, uncut_settings())) : contracted_weights(splats);
+      remedy == Remedy::kOn ? program_weights(splats, front_view(1, 1, uncut_settings())) : contracted_weights(splats);
   double one_pass = 0;
   for (std::size_t i = 0; i < weights.forward.size(); ++i) {
     one_pass += (weights.forward[i] != 0) != (weights.backward[i] != 0) ? 1 : 0;
   }
-  return {{"weights that differ, forward and backward", changed(weights.backward, weights.forward), 0},
+  return {{"weights that differ, forward and backward", unequal(weights.backward, weights.forward), 0},
           {"Gaussians that one of the passes has alone", one_pass, 0},
           {"T recovered in front of the first, off 1", std::abs(recovered_transmittance(weights) - 1), 0}};
 }
@@ -171,12 +170,11 @@ constexpr int kConicSide = 16;
 
 /// Σ weight · o exp(−½ dᵀ cov⁻¹ d) over an image, in long double. `factor` is 2×3 by rows.
 long double image_loss(const std::array<long double, 6>& f, long double opacity, const std::vector<double>& weights) {
-  const long double xx = f[0] * f[0] + f[1] * f[1] + f[2] * f[2] + kBlur, xy = f[0] * f[3] + f[1] * f[4] + f[2] * f[5];
-  const long double yy = f[3] * f[3] + f[4] * f[4] + f[5] * f[5] + kBlur, det = xx * yy - xy * xy;
+  const auto splat = textbook_splat<long double>(f, kBlur);
   long double sum = 0;
   for (int p = 0; p < kConicSide * kConicSide; ++p) {
     const long double x = p % kConicSide + 0.5L - 8, y = p / kConicSide + 0.5L - 8;
-    sum += weights[p] * opacity * std::exp(-0.5L * (yy * x * x - 2 * xy * x * y + xx * y * y) / det);
+    sum += weights[p] * opacity * std::exp(-splat.exponent(x, y));
   }
   return sum;
 }
@@ -184,14 +182,13 @@ long double image_loss(const std::array<long double, 6>& f, long double opacity,
 /// Gradient by the factor through the conic's three numbers (a, b, c) of ½ (a x² + c y²) + b x y, with half of that by
 /// b taken for an entry of the symmetric matrix, as if it were not yet halved.
 std::vector<double> halved_gradient(const FlatSplats& splats, const std::vector<double>& weights) {
-  const std::vector<double>& f = splats.factors;
-  const double xx = f[0] * f[0] + f[1] * f[1] + f[2] * f[2] + kBlur, xy = f[0] * f[3] + f[1] * f[4] + f[2] * f[5];
-  const double yy = f[3] * f[3] + f[4] * f[4] + f[5] * f[5] + kBlur, det = xx * yy - xy * xy;
-  const double a = yy / det, b = -xy / det, c = xx / det;
+  const std::array<double, 6> f = splats.factor(0);
+  const auto splat = textbook_splat(f, kBlur);
+  const double a = splat.a, b = splat.b, c = splat.c;
   double d_a = 0, d_b = 0, d_c = 0;
   for (int p = 0; p < kConicSide * kConicSide; ++p) {
     const double x = p % kConicSide + 0.5 - 8, y = p / kConicSide + 0.5 - 8;
-    const double d_s = -weights[p] * splats.opacities[0] * std::exp(-0.5 * (a * x * x + c * y * y) - b * x * y);
+    const double d_s = -weights[p] * splats.opacities[0] * std::exp(-splat.exponent(x, y));
     d_a += d_s * 0.5 * x * x;
     d_b += d_s * 0.5 * x * y;  // is x y
     d_c += d_s * 0.5 * y * y;
@@ -221,7 +218,7 @@ std::vector<StressFigure> conic_gradient(Remedy remedy) {
     std::vector<double> factor(6);
     for (double& x : factor) x = random.uniform(-3, 3);
     splats.add(8, 8, 1, factor, 0.7, {1});
-    FlatRender<double> render(splats, plain_view(kConicSide, kConicSide, uncut_settings()));
+    FlatRender<double> render(splats, front_view(kConicSide, kConicSide, uncut_settings()));
     render.backward(weights);
     const std::vector<double> computed =
         remedy == Remedy::kOn ? render.d(render.factors) : halved_gradient(splats, weights);

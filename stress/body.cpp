@@ -12,15 +12,13 @@
 #include "core/random.h"
 #include "splat/reference/reference.h"
 #include "splat/render/render.h"
-#include "stress/body_rows.h"
 #include "stress/rotation_measures.h"
-#include "stress/stress.h"
+#include "stress/rows.h"
+#include "stress/tape_numbers.h"
 
-namespace hsi4d {
+namespace hsi4d::stress {
 
 namespace {
-
-using namespace stress;
 
 std::vector<double> uniform_numbers(Index count, std::string_view stream) {
   const Random random(1, random_stream(stream));
@@ -70,36 +68,6 @@ std::vector<S> skinned(Remedy remedy, const SparseWeights& raw, const std::vecto
   std::vector<S> y(x.size());
   skin_points(SkinWeights<S>(normalized_weights(raw, "weights")), a.data(), x.data(), y.data());
   return y;
-}
-
-/// D1: the rest pose is its template, and a pose moved by a kilometre is the pose, a kilometre away.
-std::vector<StressFigure> weight_sums(Remedy remedy) {
-  constexpr Index kVertices = 300, kJoints = 5;
-  const SparseWeights raw = rounded_weights(kVertices, kJoints);
-  const std::vector<double> points = uniform_numbers(3 * kVertices, "stress.D1.points");
-  std::vector<double> rest;
-  for (Index j = 0; j < kJoints; ++j) rest.insert(rest.end(), {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
-  const std::vector<double> posed = uniform_numbers(12 * kJoints, "stress.D1.pose");
-  std::vector<double> moved = posed;
-  for (std::size_t i = 3; i < moved.size(); i += 4) moved[i] += 1000;
-  const std::vector<float> at_rest = skinned<float>(remedy, raw, rest, points);
-  const std::vector<double> here = skinned<double>(remedy, raw, posed, points);
-  const std::vector<double> there = skinned<double>(remedy, raw, moved, points);
-  double template_error = 0, drift = 0, accepted = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    template_error = larger(template_error, std::abs(static_cast<double>(at_rest[i]) - points[i]));
-    drift = larger(drift, std::abs(there[i] - here[i] - 1000));
-  }
-  SparseWeights wrong = raw;
-  for (std::size_t k = 0; k < 4; ++k) wrong.weights[k] *= 0.97;
-  try {
-    skinned<double>(remedy, wrong, rest, points);
-    ++accepted;
-  } catch (const DataError&) {
-  }
-  return {{"rest pose off its template, m", template_error, 1e-6},
-          {"pose moved by 1 km off itself, m", drift, 1e-5},
-          {"sums beyond 1 % accepted", accepted, 0}};
 }
 
 // --- D2
@@ -211,6 +179,38 @@ double flat_image_error(const Frame& axes, const Frame& bone, int& broken) {
   return error;
 }
 
+}  // namespace
+
+/// D1: the rest pose is its template, and a pose moved by a kilometre is the pose, a kilometre away.
+std::vector<StressFigure> weight_sums(Remedy remedy) {
+  constexpr Index kVertices = 300, kJoints = 5;
+  const SparseWeights raw = rounded_weights(kVertices, kJoints);
+  const std::vector<double> points = uniform_numbers(3 * kVertices, "stress.D1.points");
+  std::vector<double> rest;
+  for (Index j = 0; j < kJoints; ++j) rest.insert(rest.end(), {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0});
+  const std::vector<double> posed = uniform_numbers(12 * kJoints, "stress.D1.pose");
+  std::vector<double> moved = posed;
+  for (std::size_t i = 3; i < moved.size(); i += 4) moved[i] += 1000;
+  const std::vector<float> at_rest = skinned<float>(remedy, raw, rest, points);
+  const std::vector<double> here = skinned<double>(remedy, raw, posed, points);
+  const std::vector<double> there = skinned<double>(remedy, raw, moved, points);
+  double template_error = 0, drift = 0, accepted = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    template_error = larger(template_error, std::abs(static_cast<double>(at_rest[i]) - points[i]));
+    drift = larger(drift, std::abs(there[i] - here[i] - 1000));
+  }
+  SparseWeights wrong = raw;
+  for (std::size_t k = 0; k < 4; ++k) wrong.weights[k] *= 0.97;
+  try {
+    skinned<double>(remedy, wrong, rest, points);
+    ++accepted;
+  } catch (const DataError&) {
+  }
+  return {{"rest pose off its template, m", template_error, 1e-6},
+          {"pose moved by 1 km off itself, m", drift, 1e-5},
+          {"sums beyond 1 % accepted", accepted, 0}};
+}
+
 /// D2: two bones at half a turn, where the blend has rank 1.
 std::vector<StressFigure> opposite_bones(Remedy remedy) {
   const auto blended = remedy == Remedy::kOn ? blended_linearly : blended_by_rotation;
@@ -243,8 +243,7 @@ std::vector<StressFigure> small_offsets(Remedy remedy) {
   for (const double size : {1e-8, 1e-6, 1e-4, 1e-2}) {
     const Vector3<float> w = narrow(Vector3<double>(0.3 * size, -size, 0.7 * size));
     Tape<float> tape;
-    const Var<float> x = tape.parameter("w", shape_of(1, 3));
-    tape.set(x, {w[0], w[1], w[2]});
+    const Var<float> x = leaf(tape, "w", shape_of(1, 3), {w[0], w[1], w[2]});
     const Var<float> offsets =
         remedy == Remedy::kOn ? rotation_offsets_from_axis_angle(x) : rotation_offsets(rotations_from_axis_angle(x));
     tape.forward(offsets);
@@ -258,26 +257,4 @@ std::vector<StressFigure> small_offsets(Remedy remedy) {
   return {{"relative error of an entry of R - I", error, 1e-6}};
 }
 
-}  // namespace
-
-std::span<const StressCase> body_cases() {
-  static constexpr std::array kCases = {
-      StressCase{"D1", "weights that do not sum to 1 move points by their distance",
-                 "normalised when read, refused beyond 1 %", weight_sums},
-      StressCase{"D2", "a blend of rotations is none and may be singular", "the blended map itself: no rotation of it",
-                 opposite_bones},
-      StressCase{"D3", "R - I by subtraction is noise near the rest pose", "nothing is subtracted", small_offsets},
-      StressCase{"D4", "one bad step poisons everything after it", "a bad evaluation moves nothing", bad_steps},
-      StressCase{"D5", "the gradient of a distance at 0", "gradient 0 there", distances_at_zero},
-      StressCase{"D6", "neighbours change with rounding", "differences of coordinates, ties to the lowest",
-                 near_neighbours},
-      StressCase{"D7", "exp(x)^2 of joint limits overflows", "squares of the angle beyond the range", joint_ranges},
-      StressCase{"D8", "the likelihood of an unlikely pose underflows", "the logarithm of one normal distribution",
-                 unlikely_poses},
-      StressCase{"D9", "axis-angle vectors grow to a full turn, where exp is singular",
-                 "wrapped to half a turn, moments cleared", turns_beyond_half},
-  };
-  return kCases;
-}
-
-}  // namespace hsi4d
+}  // namespace hsi4d::stress

@@ -14,24 +14,12 @@
 #include "core/random.h"
 #include "core/rotation.h"
 #include "optim/stage.h"
-#include "stress/body_rows.h"
+#include "stress/plain_adam.h"
 #include "stress/rotation_measures.h"
+#include "stress/rows.h"
+#include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
-
-namespace {
-
-/// The definition, and nothing else.
-struct PlainRootAdam {
-  double m = 0, v = 0;
-  double step(double x, double g, double lr, int t) {
-    m = 0.9 * m + 0.1 * g;
-    v = 0.999 * v + 0.001 * g * g;
-    return x - lr * (m / (1 - std::pow(0.9, t))) / (std::sqrt(v / (1 - std::pow(0.999, t))) + 1e-8);
-  }
-};
-
-}  // namespace
 
 /// D4: towards five numbers, with one gradient that is not a number in iteration 7 and infinite ones in 20 and 21.
 std::vector<StressFigure> bad_steps(Remedy remedy) {
@@ -46,7 +34,7 @@ std::vector<StressFigure> bad_steps(Remedy remedy) {
   ParameterGroupSettings settings;
   settings.lr = kRate;
   Adam<double> adam(tape, {{{"all", {x}}, settings}}, {});
-  std::array<PlainRootAdam, 5> plain;
+  std::vector<PlainAdam<double>> plain(5, {.lr = kRate});
   const auto numbers = [&] {
     std::array<double, 5> now;
     std::copy_n(tape.value(x).data, 5, now.begin());
@@ -67,7 +55,10 @@ std::vector<StressFigure> bad_steps(Remedy remedy) {
       if (is_bad && !(report.rolled_back && report.bad && report.bad->group.empty())) ++untold;
     } else {
       std::array<double, 5> next;
-      for (std::size_t k = 0; k < 5; ++k) next[k] = plain[k].step(before[k], tape.gradient(x).data[k], kRate, i + 1);
+      for (std::size_t k = 0; k < 5; ++k) {
+        plain[k].step(tape.gradient(x).data[k]);
+        next[k] = plain[k].x;
+      }
       tape.set(x, next);
       untold += is_bad ? 1 : 0;
     }
@@ -93,8 +84,7 @@ std::vector<StressFigure> distances_at_zero(Remedy remedy) {
   std::vector<float> gradient(rows.size());
   if (remedy == Remedy::kOn) {
     Tape<float> tape;
-    const Var<float> x = tape.parameter("x", shape_of(count, 3));
-    tape.set(x, rows);
+    const Var<float> x = leaf(tape, "x", shape_of(count, 3), rows);
     const Var<float> loss = sum(norm_cols(x));
     tape.forward(loss);
     tape.backward(loss);
@@ -195,8 +185,7 @@ std::vector<StressFigure> joint_ranges(Remedy remedy) {
       continue;
     }
     Tape<float> tape;
-    const Var<float> x = tape.parameter("pose", shape_of(21, 3));
-    tape.set(x, pose);
+    const Var<float> x = leaf(tape, "pose", shape_of(21, 3), pose);
     const Var<float> loss = joint_limit_energy(rotations_from_axis_angle(x));
     tape.forward(loss);
     tape.backward(loss);
@@ -221,8 +210,7 @@ std::vector<StressFigure> unlikely_poses(Remedy remedy) {
     float energy;
     if (remedy == Remedy::kOn) {
       Tape<float> tape;
-      const Var<float> latents = tape.parameter("z", shape_of(1, prior.latents()));
-      tape.set(latents, z);
+      const Var<float> latents = leaf(tape, "z", shape_of(1, prior.latents()), z);
       const Var<float> loss = prior.energy(latents);
       tape.forward(loss);
       tape.backward(loss);
@@ -243,8 +231,7 @@ std::vector<StressFigure> unlikely_poses(Remedy remedy) {
 /// D9: a stage that turns a joint on and on, up to a full turn; and what wrapping does to rotations.
 std::vector<StressFigure> turns_beyond_half(Remedy remedy) {
   Tape<double> tape;
-  const Var<double> w = tape.parameter("w", shape_of(1, 3)), pull = tape.constant("pull", shape_of(1, 3));
-  tape.set(w, {3, 0, 0});
+  const Var<double> w = leaf(tape, "w", shape_of(1, 3), {3, 0, 0}), pull = tape.constant("pull", shape_of(1, 3));
   tape.set(pull, {-1, 0, 0});
   LossInputs<double> inputs;
   inputs.rendered = w * pull;

@@ -28,7 +28,7 @@ bool is_asked(const StressCase& row, const std::vector<std::string>& asked) {
 }
 
 std::vector<StressCase> asked_cases(const std::vector<std::string>& asked) {
-  const std::vector<StressCase> all = stress_cases();
+  const std::span<const StressCase> all = stress_cases();
   for (const std::string& name : asked) {
     if (std::any_of(all.begin(), all.end(), [&](const StressCase& row) { return is_asked(row, {name}); })) continue;
     throw UserError("there is no row \"" + name + "\"; allowed: A1 to " + all.back().id +

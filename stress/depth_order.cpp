@@ -7,8 +7,9 @@
 
 #include "core/check.h"
 #include "splat/render/tiles.h"
-#include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
+#include "stress/measures.h"
+#include "stress/rows.h"
 
 namespace hsi4d::stress {
 
@@ -91,7 +92,7 @@ std::vector<double> compared_image(const FlatSplats& splats) {
 }  // namespace
 
 std::vector<StressFigure> depth_sort(Remedy remedy) {
-  const SplatView view = plain_view(kImageSide, kImageSide, RenderSettings());
+  const SplatView view = front_view(kImageSide, kImageSide);
   const bool on = remedy == Remedy::kOn;
   const FlatSplats ties = layered_splats(100'000, 4), dealt = interleaved(ties, 4);
   FlatSplats broken = layered_splats(2000, 1000);
@@ -107,8 +108,8 @@ std::vector<StressFigure> depth_sort(Remedy remedy) {
     return on ? FlatRender<float>(splats, view).image() : compared_image(splats);
   };
   return {
-      {"colours changed: rows anew, ties in their order", changed(of_ties(dealt), of_ties(ties)), 0},
-      {"colours changed by rows whose depth is NaN", changed(of_broken(broken), of_broken(broken.picked(sound))), 0}};
+      {"colours changed: rows anew, ties in their order", unequal(of_ties(dealt), of_ties(ties)), 0},
+      {"colours changed by rows whose depth is NaN", unequal(of_broken(broken), of_broken(broken.picked(sound))), 0}};
 }
 
 // --- B9 --------------------------------------------------------------------------------------------------------------
@@ -185,8 +186,8 @@ std::vector<StressFigure> pair_counts(Remedy remedy) {
   constexpr Index kBillion = 1'000'000'000;
   // Gaussians that reach every one of 900 tiles.
   FlatSplats wide;
-  for (int i = 0; i < 30; ++i) wide.add_round(120, 120, 1 + i, 500, 0.01, {1});
-  SplatView view = plain_view(240, 240, RenderSettings());
+  for (int i = 0; i < 30; ++i) wide.add(120, 120, 1 + i, 500, 0.01, {1});
+  SplatView view = front_view(240, 240);
   view.settings.tile = 8;
   const FlatRender<float> render(wide, view);
   const MemoryRequests requests = memory_requests(remedy);

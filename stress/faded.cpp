@@ -10,7 +10,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "optim/adam.h"
-#include "stress/moving.h"
+#include "stress/plain_adam.h"
 
 namespace hsi4d::stress {
 

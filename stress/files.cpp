@@ -13,7 +13,7 @@
 #include "core/formatted.h"
 #include "core/random.h"
 #include "splat/files/io_ply.h"
-#include "stress/arithmetic.h"
+#include "stress/rows.h"
 
 namespace hsi4d::stress {
 

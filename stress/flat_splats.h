@@ -2,38 +2,19 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "core/random.h"
 #include "splat/render/composite.h"
 #include "splat/render/splat_records.h"
-#include "stress/measures.h"
+#include "stress/front_view.h"
 #include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
-
-/// A leaf that holds these numbers.
-template <class S>
-Var<S> leaf(Tape<S>& tape, std::string_view name, const Shape& shape, const std::vector<double>& numbers) {
-  const Var<S> var = tape.parameter(name, shape);
-  tape.set(var, std::vector<S>(numbers.begin(), numbers.end()));
-  return var;
-}
-
-inline double largest_size(const std::vector<double>& a) {
-  return largest_difference(a, std::vector<double>(a.size(), 0.0));
-}
-
-/// How many numbers are not the same.
-inline double changed(const std::vector<double>& a, const std::vector<double>& b) {
-  double count = 0;
-  for (std::size_t i = 0; i < b.size(); ++i) count += a[i] == b[i] ? 0 : 1;
-  return count;
-}
 
 /// Settings under which nothing is cut.
 inline RenderSettings uncut_settings() {
@@ -42,24 +23,17 @@ inline RenderSettings uncut_settings() {
   return settings;
 }
 
-/// A camera at the origin with the world's axes, its principal point in the middle, focal length = width.
-inline SplatView plain_view(int width, int height, const RenderSettings& settings) {
-  SplatView view;
-  view.camera.width = width;
-  view.camera.height = height;
-  view.camera.fx = view.camera.fy = width;
-  view.camera.cx = 0.5 * width;
-  view.camera.cy = 0.5 * height;
-  view.settings = settings;
-  return view;
-}
-
 /// Gaussians in the image, see SplatSet. All numbers are floats, so that every precision starts from equal ones.
 struct FlatSplats {
   Index channels = 1;
   std::vector<double> means, factors, depths, opacities, features;
 
   Index count() const { return static_cast<Index>(depths.size()); }
+  std::array<double, 6> factor(Index n) const {
+    std::array<double, 6> v;
+    std::copy_n(factors.begin() + 6 * n, 6, v.begin());
+    return v;
+  }
   void add(double x, double y, double depth, const std::vector<double>& factor, double opacity,
            const std::vector<double>& feature) {
     put(means, {x, y});
@@ -70,7 +44,7 @@ struct FlatSplats {
     channels = static_cast<Index>(feature.size());
   }
   /// A round Gaussian of radius `sigma`, without the blur.
-  void add_round(double x, double y, double depth, double sigma, double opacity, const std::vector<double>& feature) {
+  void add(double x, double y, double depth, double sigma, double opacity, const std::vector<double>& feature) {
     add(x, y, depth, {sigma, 0, 0, 0, sigma, 0}, opacity, feature);
   }
   /// These rows, in this order.
@@ -129,10 +103,8 @@ struct FlatRender {
     tape.forward(out.channels);
   }
   /// From ones in every channel.
-  void backward() { backward(std::vector<double>(static_cast<std::size_t>(out.channels.shape().count()), 1)); }
-  void backward(const std::vector<double>& cotangent) {
-    tape.backward(out.channels, std::vector<S>(cotangent.begin(), cotangent.end()));
-  }
+  void backward() { backward(std::vector<S>(static_cast<std::size_t>(out.channels.shape().count()), S(1))); }
+  void backward(const std::vector<S>& cotangent) { tape.backward(out.channels, cotangent); }
   std::vector<double> value(Var<S> of) const { return numbers_of<S>(tape.value(of)); }
   std::vector<double> d(Var<S> of) const { return numbers_of<S>(tape.gradient(of)); }
   std::vector<double> image() const { return value(out.channels); }

@@ -7,9 +7,10 @@
 #include "splat/render/project.h"
 #include "splat/render/render.h"
 #include "splat/render/tiles.h"
-#include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
 #include "stress/measures.h"
+#include "stress/rows.h"
+#include "stress/textbook_splat.h"
 
 namespace hsi4d::stress {
 
@@ -19,12 +20,9 @@ namespace {
 
 /// Exponent s of alpha = o exp(−s) at pixel (column, row), in double.
 double exponent_at(const FlatSplats& splats, Index n, Index column, Index row) {
-  const double* v = splats.factors.data() + 6 * n;
-  const double xx = v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + kBlur, xy = v[0] * v[3] + v[1] * v[4] + v[2] * v[5];
-  const double yy = v[3] * v[3] + v[4] * v[4] + v[5] * v[5] + kBlur;
-  const double x = static_cast<double>(column) + 0.5 - splats.means[2 * n];
-  const double y = static_cast<double>(row) + 0.5 - splats.means[2 * n + 1];
-  return 0.5 * (yy * x * x - 2 * xy * x * y + xx * y * y) / (xx * yy - xy * xy);
+  return textbook_splat(splats.factor(n), kBlur)
+      .exponent(static_cast<double>(column) + 0.5 - splats.means[2 * n],
+                static_cast<double>(row) + 0.5 - splats.means[2 * n + 1]);
 }
 
 /// Gaussians from specks to sheets, faint to opaque, in and around an image.
@@ -85,7 +83,7 @@ double error_of_opaque(const SplatView& view) {
   for (int i = 0; i < 60; ++i) {
     FlatSplats splats;
     const double x = random.uniform(0, view.camera.width), y = random.uniform(0, view.camera.height);
-    splats.add_round(x, y, 1, random.uniform(1, 12), 1, {1});
+    splats.add(x, y, 1, random.uniform(1, 12), 1, {1});
     const std::vector<double> image = FlatRender<double>(splats, view).image();
     for (std::size_t p = 0; p < image.size(); ++p) {
       const Index column = static_cast<Index>(p) % view.camera.width, row = static_cast<Index>(p) / view.camera.width;
@@ -99,7 +97,7 @@ double error_of_opaque(const SplatView& view) {
 }  // namespace
 
 std::vector<StressFigure> footprint(Remedy remedy) {
-  SplatView view = plain_view(75, 50, RenderSettings());
+  SplatView view = front_view(75, 50);
   if (remedy == Remedy::kOff) view.settings.footprint = Footprint::kSquare3Sigma;
   const TileChoices tiles = tile_choices(splats_around(5000, 75, 50), view);  // 20 tiles
   return {{"tiles left out with a pixel to draw, of 1e5 pairs", tiles.missed, 0},
@@ -139,7 +137,7 @@ Leftovers leftovers(Remedy remedy, Index n, int width, int height) {
   const Var<float> xi = leaf(tape, "xi", shape_of(1, 6), std::vector<double>(6, 0));
   const Var<float> background = tape.constant("background", shape_of(1, 3));
   tape.set(background, std::span<const float>(kBackground));
-  const Var<float> image = render(inputs, xi, background, plain_view(width, height, RenderSettings())).image;
+  const Var<float> image = render(inputs, xi, background, front_view(width, height)).image;
   const auto run = [&] {
     tape.forward(image);
     tape.backward(image, std::vector<float>(static_cast<std::size_t>(image.shape().count()), 1));
@@ -156,7 +154,7 @@ Leftovers leftovers(Remedy remedy, Index n, int width, int height) {
   }
   for (const Var<float> var : {inputs.means, inputs.axes, inputs.opacities, inputs.colors, xi}) {
     const std::vector<double> d = numbers_of<float>(tape.gradient(var));
-    left.gradients += changed(d, std::vector<double>(static_cast<std::size_t>(var.shape().count()), 0.0));
+    left.gradients += unequal(d, std::vector<double>(static_cast<std::size_t>(var.shape().count()), 0.0));
   }
   return left;
 }
@@ -166,8 +164,8 @@ Leftovers leftovers(Remedy remedy, Index n, int width, int height) {
 double empty_tiles_written(Remedy remedy) {
   constexpr int kSide = 40;
   FlatSplats splats;
-  splats.add_round(4, 4, 1, 30, 0.9, {1});
-  FlatRender<float> render(splats, plain_view(kSide, kSide, RenderSettings()));
+  splats.add(4, 4, 1, 30, 0.9, {1});
+  FlatRender<float> render(splats, front_view(kSide, kSide));
   if (remedy == Remedy::kOn) {
     render.tape.set(render.factors, {1, 0, 0, 0, 1, 0});
     render.tape.forward(render.out.channels);
@@ -237,7 +235,7 @@ std::vector<StressFigure> pixel_centres(Remedy remedy) {
   for (std::vector<double>* means : {&seen.means, &seen_mirrored.means}) {
     for (double& x : *means) x += on ? 0 : 0.5;
   }
-  const SplatView view = plain_view(kWidth, kHeight, RenderSettings());
+  const SplatView view = front_view(kWidth, kHeight);
   const std::vector<double> a = FlatRender<float>(seen, view).image(),
                             b = FlatRender<float>(seen_mirrored, view).image();
   // A part of a larger image; without the remedy what has its mean outside of the part is left out of it.
@@ -248,7 +246,7 @@ std::vector<StressFigure> pixel_centres(Remedy remedy) {
     x -= kRight, y -= kDown;
     if (on || (x >= 0 && x < kWidth && y >= 0 && y < kHeight)) inside.push_back(n);
   }
-  const SplatView around_view = plain_view(kWidth + 64, kHeight + 32, RenderSettings());
+  const SplatView around_view = front_view(kWidth + 64, kHeight + 32);
   const std::vector<double> c = FlatRender<float>(part.picked(inside), view).image();
   const std::vector<double> d = FlatRender<float>(around, around_view).image();
   double mirror = 0, padding = 0;

@@ -3,10 +3,8 @@
 
 #include "autodiff/dual.h"
 #include "core/vector_exp.h"
-#include "splat/limits.h"
-#include "splat/render/block_kernel.h"
-#include "splat/render/composite_kernel.h"
 #include "stress/function_table.h"
+#include "stress/pixel_powers.h"
 #include "stress/vector_targets.h"
 
 namespace hsi4d::stress {
@@ -54,12 +52,6 @@ void add_sines(FunctionTable& table, Index points) {
       [](long double x) { return std::cos(x); });
 }
 
-/// A function of the kernels of pixels: what it is given for a wanted argument, and its value.
-template <class S>
-struct Pixel {
-  S argument, value;
-};
-
 /// Adds a row for each set of vector instructions.
 /// @param f  of a wanted argument: a Pixel
 template <class S, class F, class G>
@@ -75,45 +67,6 @@ void add_pixels(FunctionTable& table, const FunctionRow& row, Index points, std:
     }
     add_row(table, row, isa, x, y, exact_values(x, exact));
   });
-}
-
-/// exp(−d²/2) of a row of pixels, for d = √(−2 x).
-template <class S>
-Pixel<S> row_exponential(S wanted) {
-  const double distance = std::sqrt(-2 * static_cast<double>(wanted));
-  detail::SplatRecord<S> record{};
-  record.l22 = record.opacity = 1;
-  record.y = 0.5 - distance;
-  detail::TileJob<S> job{};
-  job.width = job.height = 16;
-  const auto mean = static_cast<S>(record.y);
-  const S d = S(0.5) - mean;  // as the kernel has it
-  const detail::CompositeRules<S> rules{S(1), S(0), S(0), false, false};
-  return {S(-0.5) * (d * d), detail::pixel_alpha(record, rules, job, 0, 0).alpha};
-}
-
-/// 2ᵖ of a block of pixels: with L = 0 what is left of the exponent is log₂ o.
-Pixel<float> block_exponential(float p) {
-  detail::SplatRecord<float> record{};
-  record.opacity = 1;
-  record.log2_opacity = p;
-  const detail::CompositeRules<float> rules{1, kExactBelowAlpha, 1e-4f, false, false, 0.3f};
-  return {p, detail::block_pixel_alpha(16, record, rules, 0, 0, 0, 0).alpha};
-}
-
-/// Its better form, which settings without cuts have, as `reference`, and small blurs. There log₂ o is not in the
-/// exponent, which is −w² here: of a mean so far away, and an l22 so small, that where in the tile the pixel lies is
-/// lost beside it.
-Pixel<float> exact_block_exponential(float p) {
-  constexpr auto kScale = static_cast<float>(detail::kLog2Scale);
-  detail::SplatRecord<float> record{};
-  record.opacity = 1;
-  record.l22 = 0x1p-60f;
-  const double y = std::sqrt(-static_cast<double>(p)) / static_cast<double>(kScale);
-  record.y = -0x1p60 * y;
-  const auto w = static_cast<float>(static_cast<double>(kScale) * y);
-  const detail::CompositeRules<float> rules{1, kLeastAlpha, 0, false, false, 0.3f};
-  return {-(w * w), detail::block_pixel_alpha(16, record, rules, 0, 0, 0, 0).alpha};
 }
 
 void add_pixel_exponentials(FunctionTable& table, Index points) {
@@ -139,3 +92,9 @@ void add_exponentials(FunctionTable& table, Index points) {
 }
 
 }  // namespace hsi4d::stress
+
+std::vector<hsi4d::FunctionErrors> hsi4d::function_errors(Index points) {
+  std::vector<FunctionErrors> table;
+  for (const auto add : {stress::add_exponentials, stress::add_rotations, stress::add_harmonics}) add(table, points);
+  return table;
+}

@@ -9,19 +9,16 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
 #include "stress/faded.h"
-#include "stress/moving.h"
 #include "stress/plain_adam.h"
-#include "stress/small_scene.h"
-#include "stress/stress.h"
+#include "stress/rows.h"
+#include "stress/splat_scene.h"
 #include "stress/thread_order.h"
 
-namespace hsi4d {
+namespace hsi4d::stress {
 
 namespace {
 
-using namespace stress;
-
-constexpr int kSteps = 10000;
+constexpr int kLongSteps = 10000;
 constexpr int kBlindFrom =
     1000;                       ///< half of the image does not count from here on: what it alone shows has no gradient
 constexpr int kBadStep = 5000;  ///< the frame has a pixel that is no number
@@ -86,7 +83,7 @@ bool has_denormals(const Adam<S>& adam) {
 /// A scene that is fitted to the image of another.
 template <class S>
 struct Fit {
-  TapedSmallScene<S> taped{small_scene(16, kLongWidth, kLongHeight, 90)};
+  TapedScene<S> taped{small_scene(16, kLongWidth, kLongHeight, 90)};
   std::vector<Var<S>> leaves = taped.leaves();
   std::vector<double> frame = exact_image(small_scene(16, kLongWidth, kLongHeight, 91));
   Var<S> target, weight, loss;
@@ -121,14 +118,14 @@ Outcome run_steps(const Way& way) {
   Adam<S> adam(tape, {moving_at(fit.leaves, kLongRate)}, {});
   PlainStepper<S> plain;
   Outcome outcome;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kLongSteps; ++step) {
     fit.prepare(step, way);
     tape.forward(fit.loss);
     tape.backward(fit.loss);
     if (way.plain_adam) {
       plain.step(tape, fit.leaves);
     } else {
-      adam.step(step, kSteps, static_cast<double>(tape.value(fit.loss).scalar()));
+      adam.step(step, kLongSteps, static_cast<double>(tape.value(fit.loss).scalar()));
     }
     outcome.denormal_steps += (way.plain_adam ? plain.has_denormals() : has_denormals(adam)) ? 1 : 0;
   }
@@ -149,6 +146,8 @@ Outcome run_on_threads(const Way& way) {
   return outcome;
 }
 
+}  // namespace
+
 /// L1: float and double end alike, though the single parameters do not; a bad frame on the way does no harm.
 std::vector<StressFigure> to_the_end(Remedy remedy) {
   const Way way{.plain_adam = remedy == Remedy::kOff, .bad_step = true};
@@ -167,7 +166,7 @@ std::vector<StressFigure> to_the_end(Remedy remedy) {
 std::vector<StressFigure> without_denormals(Remedy remedy) {
   const Outcome outcome = run_on_threads<float>({.plain_adam = remedy == Remedy::kOff});
   return {{"steps of 10,000 with a denormal moment", outcome.denormal_steps, 0},
-          {"time of a step with faded moments over one with others", slowdown_of_faded(remedy, kSteps), 1.5}};
+          {"time of a step with faded moments over one with others", slowdown_of_faded(remedy, kLongSteps), 1.5}};
 }
 
 /// L3
@@ -184,19 +183,4 @@ std::vector<StressFigure> on_any_threads(Remedy remedy) {
   return {{"parameters that differ on 2, 3 or 8 threads", different, 0}};
 }
 
-}  // namespace
-
-std::span<const StressCase> long_run_cases() {
-  static constexpr std::array kCases = {
-      StressCase{"L1", "10,000 steps, one of them with a bad frame", "gradients are looked at before a step",
-                 to_the_end, "", false, "16 Gaussians, 32 x 24 px"},
-      StressCase{"L2", "moments that fade for thousands of steps become denormal", "denormals are flushed",
-                 without_denormals, "", false, "16 Gaussians, 32 x 24 px"},
-      StressCase{"L3", "10,000 steps end elsewhere on other threads",
-                 "partitions that the number of threads does not change", on_any_threads, "", true,
-                 "16 Gaussians, 32 x 24 px"},
-  };
-  return kCases;
-}
-
-}  // namespace hsi4d
+}  // namespace hsi4d::stress

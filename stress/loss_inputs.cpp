@@ -8,6 +8,7 @@
 #include "body/pose_layout.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
 
@@ -91,10 +92,7 @@ struct LeafMaker {
     return operator()(name, shape, numbers);
   }
   Var<S> operator()(const char* name, const Shape& shape, const std::vector<double>& numbers) {
-    const Var<S> leaf = tape.parameter(name, shape);
-    tape.set(leaf, std::vector<S>(numbers.begin(), numbers.end()));
-    leaves.push_back(leaf);
-    return leaf;
+    return leaves.emplace_back(leaf(tape, name, shape, numbers));
   }
 };
 

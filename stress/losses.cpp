@@ -12,13 +12,12 @@
 #include "core/random.h"
 #include "optim/metrics.h"
 #include "stress/rotation_measures.h"
-#include "stress/stress.h"
+#include "stress/rows.h"
+#include "stress/tape_numbers.h"
 
-namespace hsi4d {
+namespace hsi4d::stress {
 
 namespace {
-
-using namespace stress;
 
 // --- structural similarity
 
@@ -122,17 +121,8 @@ Similarity similarity_by_windows(const Picture<S>& x, const Picture<S>& y, bool 
   return result;
 }
 
-std::vector<double> numbers_of(const ConstArray<float>& image) {
-  std::vector<double> numbers;
-  for (Index r = 0; r < image.total_rows(); ++r)
-    numbers.insert(numbers.end(), image.row(r), image.row(r) + image.shape.cols);
-  return numbers;
-}
-
 Var<float> put(Tape<float>& tape, const Picture<float>& picture) {
-  const Var<float> image = tape.parameter("image", image_shape<float>(1, picture.rows, picture.cols));
-  tape.set(image, picture.numbers);
-  return image;
+  return leaf(tape, "image", image_shape<float>(1, picture.rows, picture.cols), picture.numbers);
 }
 
 Similarity similarity(const Picture<float>& x, const Picture<float>& y, double data_range = 1) {
@@ -142,21 +132,49 @@ Similarity similarity(const Picture<float>& x, const Picture<float>& y, double d
   const Var<float> loss = d_ssim(image, target, {data_range});
   tape.forward(loss);
   tape.backward(loss);
-  return {numbers_of(tape.value(map)), numbers_of(tape.gradient(image))};
+  return {numbers_of<float>(tape.value(map)), numbers_of<float>(tape.gradient(image))};
 }
 
 Picture<double> widened(const Picture<float>& x) { return {x.rows, x.cols, {x.numbers.begin(), x.numbers.end()}}; }
 
-double norm(const std::vector<double>& a) {
-  double sum = 0;
-  for (const double x : a) sum += x * x;
-  return std::sqrt(sum);
+// --- logarithms
+
+/// −z log o − (1 − z) log(1 − o) of o = 1/(1 + e⁻ˣ) and its derivative, as they stand.
+std::array<float, 2> plain_cross_entropy(float x, float z) {
+  const float o = 1 / (1 + std::exp(-x)), d_o = o * (1 - o);
+  return {-z * std::log(o) - (1 - z) * std::log(1 - o), (-z / o + (1 - z) / (1 - o)) * d_o};
 }
 
-double difference_norm(std::vector<double> a, const std::vector<double>& b) {
-  for (std::size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
-  return norm(a);
+/// By operators: softplus(x) − x z.
+std::array<float, 2> taped_cross_entropy(float x, float z) {
+  Tape<float> tape;
+  const Var<float> logit = leaf(tape, "x", kScalarShape, {x});
+  const Var<float> loss = softplus(logit) - logit * static_cast<double>(z);
+  tape.forward(loss);
+  tape.backward(loss);
+  return {tape.value(loss).scalar(), tape.gradient(logit).scalar()};
 }
+
+Image grey_image(float value) {
+  Image image(1, 4, 5);
+  for (int r = 0; r < 4; ++r) {
+    for (int c = 0; c < 5; ++c) image(0, r, c) = value;
+  }
+  return image;
+}
+
+/// A mean of floats in floats, each thread of `threads` its share.
+float plain_mean(const std::vector<float>& numbers, std::size_t threads) {
+  float total = 0;
+  for (std::size_t t = 0; t < threads; ++t) {
+    float sum = 0;
+    for (std::size_t i = t * numbers.size() / threads; i < (t + 1) * numbers.size() / threads; ++i) sum += numbers[i];
+    total += sum;
+  }
+  return total / static_cast<float>(numbers.size());
+}
+
+}  // namespace
 
 /// E1: flat images with little noise.
 std::vector<StressFigure> flat_areas(Remedy remedy) {
@@ -172,7 +190,7 @@ std::vector<StressFigure> flat_areas(Remedy remedy) {
         error = larger(error, std::abs(found.map[i] - truth.map[i]));
         above = larger(above, found.map[i] - 1);
       }
-      gradient = larger(gradient, difference_norm(found.d_x, truth.d_x) / norm(truth.d_x));
+      gradient = larger(gradient, relative_l2(found.d_x, truth.d_x));
       for (const double value : computed(x, x).map) same = larger(same, std::abs(value - 1));
     }
   }
@@ -198,33 +216,6 @@ std::vector<StressFigure> data_ranges(Remedy remedy) {
   }
   // A pixel's is right to 1e-6 in each of the two.
   return {{"difference of mean similarities", mean, 1e-6}, {"difference of a pixel's", pixel, 2e-6}};
-}
-
-// --- logarithms
-
-/// −z log o − (1 − z) log(1 − o) of o = 1/(1 + e⁻ˣ) and its derivative, as they stand.
-std::array<float, 2> plain_cross_entropy(float x, float z) {
-  const float o = 1 / (1 + std::exp(-x)), d_o = o * (1 - o);
-  return {-z * std::log(o) - (1 - z) * std::log(1 - o), (-z / o + (1 - z) / (1 - o)) * d_o};
-}
-
-/// By operators: softplus(x) − x z.
-std::array<float, 2> taped_cross_entropy(float x, float z) {
-  Tape<float> tape;
-  const Var<float> logit = tape.parameter("x", kScalarShape);
-  tape.set(logit, {x});
-  const Var<float> loss = softplus(logit) - logit * static_cast<double>(z);
-  tape.forward(loss);
-  tape.backward(loss);
-  return {tape.value(loss).scalar(), tape.gradient(logit).scalar()};
-}
-
-Image grey_image(float value) {
-  Image image(1, 4, 5);
-  for (int r = 0; r < 4; ++r) {
-    for (int c = 0; c < 5; ++c) image(0, r, c) = value;
-  }
-  return image;
 }
 
 /// E3: opacities that are 0 and 1 to rounding, and images without a difference.
@@ -258,8 +249,7 @@ std::vector<StressFigure> equal_numbers(Remedy remedy) {
   }
   if (remedy == Remedy::kOn) {
     Tape<float> tape;
-    const Var<float> x = tape.parameter("a", shape_of(1, kCount)), y = tape.constant("b", shape_of(1, kCount));
-    tape.set(x, a);
+    const Var<float> x = leaf(tape, "a", shape_of(1, kCount), a), y = tape.constant("b", shape_of(1, kCount));
     tape.set(y, b);
     const Var<float> loss = l1(x, y);
     tape.forward(loss);
@@ -278,17 +268,6 @@ std::vector<StressFigure> equal_numbers(Remedy remedy) {
     if (i % 3 != 1) elsewhere = larger(elsewhere, std::abs(d - (i % 3 == 0 ? 1 : -1)));
   }
   return {{"gradient where both are equal", at_zero, 0}, {"error of the gradient elsewhere", elsewhere, 1e-6}};
-}
-
-/// A mean of floats in floats, each thread of `threads` its share.
-float plain_mean(const std::vector<float>& numbers, std::size_t threads) {
-  float total = 0;
-  for (std::size_t t = 0; t < threads; ++t) {
-    float sum = 0;
-    for (std::size_t i = t * numbers.size() / threads; i < (t + 1) * numbers.size() / threads; ++i) sum += numbers[i];
-    total += sum;
-  }
-  return total / static_cast<float>(numbers.size());
 }
 
 /// E5: means over two million numbers, on 1 and on 16 threads.
@@ -329,19 +308,4 @@ std::vector<StressFigure> long_means(Remedy remedy) {
   return {{"relative error of the mean", error, 1e-7}, {"difference of 1 and 16 threads", threads, 0}};
 }
 
-}  // namespace
-
-std::span<const StressCase> loss_cases() {
-  static constexpr std::array kCases = {
-      StressCase{"E1", "variances as E[x^2] - E[x]^2: similarity above 1", "central moments of sum and difference",
-                 flat_areas},
-      StressCase{"E2", "constants for [0, 1] used with [0, 255]", "the range is an argument", data_ranges},
-      StressCase{"E3", "logarithms of 0: PSNR, cross entropy", "from logits; a mean square held at 1e-10",
-                 logarithms_of_zero},
-      StressCase{"E4", "the gradient of |x| at 0", "it is 0", equal_numbers},
-      StressCase{"E5", "a mean over millions of terms in float", "double partial sums in fixed order", long_means},
-  };
-  return kCases;
-}
-
-}  // namespace hsi4d
+}  // namespace hsi4d::stress

@@ -11,8 +11,13 @@
 
 namespace hsi4d::stress {
 
-/// The larger of two errors; what is not a number is larger than any.
-inline double larger(double a, double b) { return std::isnan(a) || b <= a ? a : b; }
+/// The larger of two errors; what is not a number is larger than any, and so breaks the bound that the largest is held
+/// to. (std::max(largest, NaN) is `largest`.)
+template <class T>
+T larger(T a, T b) {
+  return std::isnan(a) || b <= a ? a : b;
+}
+inline double larger(double a, double b) { return larger<double>(a, b); }
 
 /// The largest of some magnitudes; infinity if one of them is not a number.
 class Largest {
@@ -26,12 +31,19 @@ class Largest {
   double value_ = 0;
 };
 
-/// The largest |a − b|.
-inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+/// The largest |a − b|; infinity where one has more numbers.
+template <class S = double>
+double largest_difference(const std::vector<S>& a, const std::vector<S>& b) {
   Largest largest;
   if (a.size() != b.size()) largest.add(std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) largest.add(std::abs(a[i] - b[i]));
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+    largest.add(std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
   return largest.value();
+}
+
+/// The largest |a|.
+inline double largest_size(const std::vector<double>& a) {
+  return largest_difference(a, std::vector<double>(a.size(), 0.0));
 }
 
 /// |a − b| / |b| (L2); |a| where b is zero.

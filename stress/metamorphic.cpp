@@ -11,26 +11,90 @@
 #include "splat/files/sh_rotation.h"
 #include "stress/measures.h"
 #include "stress/pixel_walk.h"
+#include "stress/rows.h"
 #include "stress/splat_scene.h"
-#include "stress/stress.h"
 #include "stress/vector_targets.h"
 
-namespace hsi4d {
+namespace hsi4d::stress {
 
 namespace {
-
-using namespace stress;
-using Figures = std::vector<StressFigure>;
 
 std::vector<double> times(std::vector<double> numbers, double factor) {
   for (double& x : numbers) x *= factor;
   return numbers;
 }
 
-// --- world and camera together ---------------------------------------------------------------------------------------
+/// In front of a camera whose principal point is not its centre.
+Scene in_front(Index n, std::uint64_t seed) {
+  Scene scene = random_scene(n, seed, 48, 32);
+  scene.camera = front_camera(48, 32);
+  scene.camera.cx = 21.25;
+  for (std::size_t i = 2; i < scene.gaussians.means.size(); i += 3) scene.gaussians.means[i] += 4;
+  return scene;
+}
+
+/// The image, and the gradients by means where every pixel counts alike.
+struct OrderedImage {
+  std::vector<double> image, d_means;
+};
+
+/// @param by_depth  or in the order of the rows
+OrderedImage composited(const Scene& scene, bool by_depth) {
+  TapedScene<float> taped(scene);
+  Projected<float> projected = taped.rendered.projected;
+  if (!by_depth) {
+    projected.depths = taped.tape.constant("ones", projected.depths.shape());
+    projected.depth_low = taped.tape.constant("zeros", projected.depths.shape());
+    taped.tape.set(projected.depths, std::vector<float>(static_cast<std::size_t>(scene.gaussians.count()), 1.0F));
+  }
+  const Var<float> image =
+      composite(SplatSet<float>{projected, taped.opacities, taped.colors}, taped.view, taped.background).channels;
+  taped.tape.forward(image);
+  taped.tape.backward(image, std::vector<float>(static_cast<std::size_t>(image.shape().count()), 1.0F));
+  return {taped.value(image), taped.gradient(taped.means)};
+}
+
+/// Σ of rows of an image in float, cut into one piece a thread.
+std::vector<double> sums_by_thread(const std::vector<double>& image, int threads) {
+  std::vector<double> sums;
+  for (std::size_t row = 0; row + 48 <= image.size(); row += 48) {
+    float sum = 0;
+    for (int piece = 0; piece < threads; ++piece) {
+      float partial = 0;
+      for (int i = 48 * piece / threads; i < 48 * (piece + 1) / threads; ++i) {
+        partial += static_cast<float>(image[row + static_cast<std::size_t>(i)]);
+      }
+      sum += partial;
+    }
+    sums.push_back(sum);
+  }
+  return sums;
+}
+
+struct ExtremeKind {
+  double depth;            ///< metres
+  Vector3<double> scales;  ///< metres
+  double opacity_logit;
+};
+
+/// Huge, tiny, far, near, hardly opaque, saturated, long, flat.
+std::vector<ExtremeKind> extreme_kinds() {
+  return {{10, {1e6, 1e6, 1e6}, 0},       {2, {1e-5, 1e-5, 1e-5}, 2}, {1e6, {3e4, 3e4, 3e4}, 1},
+          {0.011, {1e-3, 1e-3, 1e-3}, 1}, {2, {0.3, 0.3, 0.3}, -5.2}, {2, {0.3, 0.3, 0.3}, 40},
+          {3, {1e3, 1e-4, 1e-4}, 3},      {3, {0.4, 0.4, 3e-9}, 1}};
+}
+
+/// What guards against extreme numbers reject.
+bool is_guarded(const ExtremeKind& kind) {
+  const double opacity = 1 / (1 + std::exp(-kind.opacity_logit));
+  return kind.depth > 1e4 || kind.scales.maxCoeff() > 100 || kind.scales.minCoeff() < 1e-4 || opacity < 0.01 ||
+         opacity > 1 - 1e-6;
+}
+
+}  // namespace
 
 /// R1: with a power of two no number is rounded otherwise.
-Figures scale(Remedy remedy) {
+std::vector<StressFigure> scaled_world(Remedy remedy) {
   const Scene scene = random_scene(60, 1, 48, 32);
   const std::vector<double> axes = [&] {
     TapedScene<float> taped(scene);
@@ -53,7 +117,7 @@ Figures scale(Remedy remedy) {
 }
 
 /// R2
-Figures translation(Remedy remedy) {
+std::vector<StressFigure> moved_world(Remedy remedy) {
   const Scene scene = random_scene(80, 2, 48, 32);
   const Rendering here = render_scene<float>(scene);
   Largest image, gradients;
@@ -67,7 +131,7 @@ Figures translation(Remedy remedy) {
 }
 
 /// R3
-Figures rotation(Remedy remedy) {
+std::vector<StressFigure> turned_world(Remedy remedy) {
   const Scene scene = random_scene(80, 3, 48, 32);
   const Vector4<double> turn = Random(3, random_stream("turn")).rotation(0);
   const Matrix3<double> r = quaternion_to_matrix(turn);
@@ -92,19 +156,8 @@ Figures rotation(Remedy remedy) {
           {"gradients turned back, relative", relative_l2(back, here.means), 1e-4}};
 }
 
-// --- the camera alone ------------------------------------------------------------------------------------------------
-
-/// In front of a camera whose principal point is not its centre.
-Scene in_front(Index n, std::uint64_t seed) {
-  Scene scene = random_scene(n, seed, 48, 32);
-  scene.camera = front_camera(48, 32);
-  scene.camera.cx = 21.25;
-  for (std::size_t i = 2; i < scene.gaussians.means.size(); i += 3) scene.gaussians.means[i] += 4;
-  return scene;
-}
-
 /// R4
-Figures mirror(Remedy remedy) {
+std::vector<StressFigure> mirror_image(Remedy remedy) {
   const Scene scene = in_front(80, 4);
   Scene mirrored = scene;
   const double last = remedy == Remedy::kOn ? 48 : 47;  // as if pixels' centres were whole numbers
@@ -128,7 +181,7 @@ Figures mirror(Remedy remedy) {
 }
 
 /// R5
-Figures crop(Remedy remedy) {
+std::vector<StressFigure> crop_of_render(Remedy remedy) {
   Scene scene = random_scene(60, 5, 48, 32);
   apply_quality(scene.settings, Quality::kReference);
   scene.settings.frustum_clamp = 100;  // the limits of the Jacobian belong to the image: here they hold nothing
@@ -138,32 +191,8 @@ Figures crop(Remedy remedy) {
   return {{"render of a crop, crop of the render", crop_difference(scene, part, 11, 7), 1e-5}};
 }
 
-// --- the rows
-// ----------------------------------------------------------------------------------------------------------
-
-/// The image, and the gradients by means where every pixel counts alike.
-struct OrderedImage {
-  std::vector<double> image, d_means;
-};
-
-/// @param by_depth  or in the order of the rows
-OrderedImage composited(const Scene& scene, bool by_depth) {
-  TapedScene<float> taped(scene);
-  Projected<float> projected = taped.rendered.projected;
-  if (!by_depth) {
-    projected.depths = taped.tape.constant("ones", projected.depths.shape());
-    projected.depth_low = taped.tape.constant("zeros", projected.depths.shape());
-    taped.tape.set(projected.depths, std::vector<float>(static_cast<std::size_t>(scene.gaussians.count()), 1.0F));
-  }
-  const Var<float> image =
-      composite(SplatSet<float>{projected, taped.opacities, taped.colors}, taped.view, taped.background).channels;
-  taped.tape.forward(image);
-  taped.tape.backward(image, std::vector<float>(static_cast<std::size_t>(image.shape().count()), 1.0F));
-  return {taped.value(image), taped.gradient(taped.means)};
-}
-
 /// R6
-Figures permutation(Remedy remedy) {
+std::vector<StressFigure> shuffled_rows(Remedy remedy) {
   const Scene scene = random_scene(300, 6, 48, 32);
   const std::vector<Index> order = Random(6, random_stream("order")).permutation(0, 300);
   Scene shuffled = scene;
@@ -179,7 +208,7 @@ Figures permutation(Remedy remedy) {
 }
 
 /// R7: 1 − (1 − a)(1 − b), for Gaussians so wide that they are equally opaque all over the image.
-Figures split(Remedy remedy) {
+std::vector<StressFigure> gaussians_in_two(Remedy remedy) {
   Scene scene = random_scene(40, 7, 48, 32);
   if (remedy == Remedy::kOn) apply_quality(scene.settings, Quality::kReference);
   Gaussians& g = scene.gaussians;
@@ -201,11 +230,8 @@ Figures split(Remedy remedy) {
            largest_difference(render_scene<float>(two).image, render_scene<float>(scene).image), 1e-6}};
 }
 
-// --- how it is computed
-// ------------------------------------------------------------------------------------------------
-
 /// R8: every Gaussian looked at in every pixel, by the compositor's own functions. Few large ones, some, and many.
-Figures culling(Remedy remedy) {
+std::vector<StressFigure> without_culling(Remedy remedy) {
   double bits = 0;
   Largest transmittance, image, gradient;
   for (const auto& [count, width, height] : {std::array{30, 33, 25}, {200, 75, 50}, {1500, 96, 64}}) {
@@ -228,25 +254,8 @@ Figures culling(Remedy remedy) {
           {"gradient by colours, relative", gradient.value(), 1e-6}};
 }
 
-/// Σ of rows of an image in float, cut into one piece a thread.
-std::vector<double> sums_by_thread(const std::vector<double>& image, int threads) {
-  std::vector<double> sums;
-  for (std::size_t row = 0; row + 48 <= image.size(); row += 48) {
-    float sum = 0;
-    for (int piece = 0; piece < threads; ++piece) {
-      float partial = 0;
-      for (int i = 48 * piece / threads; i < 48 * (piece + 1) / threads; ++i) {
-        partial += static_cast<float>(image[row + static_cast<std::size_t>(i)]);
-      }
-      sum += partial;
-    }
-    sums.push_back(sum);
-  }
-  return sums;
-}
-
 /// R9
-Figures threads(Remedy remedy) {
+std::vector<StressFigure> numbers_of_threads(Remedy remedy) {
   const Scene scene = random_scene(1500, 9, 48, 32);
   const auto numbers = [&](int count) {
     std::vector<double> all;
@@ -265,7 +274,7 @@ Figures threads(Remedy remedy) {
 }
 
 /// R10
-Figures tile_size(Remedy remedy) {
+std::vector<StressFigure> sizes_of_tiles(Remedy remedy) {
   Scene scene = random_scene(200, 10, 75, 50);
   const auto t = [&](int tile) {
     scene.settings.tile = tile;
@@ -276,7 +285,7 @@ Figures tile_size(Remedy remedy) {
 }
 
 /// R11
-Figures instruction_sets(Remedy remedy) {
+std::vector<StressFigure> instruction_sets(Remedy remedy) {
   const Scene scene = random_scene(120, 11, 49, 37);
   std::vector<Rendering> renderings;
   if (remedy == Remedy::kOn) {
@@ -298,7 +307,7 @@ Figures instruction_sets(Remedy remedy) {
 }
 
 /// R12: powers of two commute with every rounding.
-Figures loss_scale(Remedy remedy) {
+std::vector<StressFigure> scaled_loss(Remedy remedy) {
   const Scene scene = random_scene(100, 12, 48, 32);
   const auto gradients = [&](float factor) {
     TapedScene<float> taped(scene);
@@ -321,31 +330,8 @@ Figures loss_scale(Remedy remedy) {
   return {{"gradients with other bits, loss times 2^-30 to 2^30", other, 0}};
 }
 
-// --- what is extreme but valid
-// -----------------------------------------------------------------------------------------
-
-struct ExtremeKind {
-  double depth;            ///< metres
-  Vector3<double> scales;  ///< metres
-  double opacity_logit;
-};
-
-/// Huge, tiny, far, near, hardly opaque, saturated, long, flat.
-std::vector<ExtremeKind> extreme_kinds() {
-  return {{10, {1e6, 1e6, 1e6}, 0},       {2, {1e-5, 1e-5, 1e-5}, 2}, {1e6, {3e4, 3e4, 3e4}, 1},
-          {0.011, {1e-3, 1e-3, 1e-3}, 1}, {2, {0.3, 0.3, 0.3}, -5.2}, {2, {0.3, 0.3, 0.3}, 40},
-          {3, {1e3, 1e-4, 1e-4}, 3},      {3, {0.4, 0.4, 3e-9}, 1}};
-}
-
-/// What guards against extreme numbers reject.
-bool is_guarded(const ExtremeKind& kind) {
-  const double opacity = 1 / (1 + std::exp(-kind.opacity_logit));
-  return kind.depth > 1e4 || kind.scales.maxCoeff() > 100 || kind.scales.minCoeff() < 1e-4 || opacity < 0.01 ||
-         opacity > 1 - 1e-6;
-}
-
 /// R13
-Figures extremes(Remedy remedy) {
+std::vector<StressFigure> extremes(Remedy remedy) {
   double unseen = 0;
   Largest difference;
   for (const ExtremeKind& kind : extreme_kinds()) {
@@ -361,38 +347,4 @@ Figures extremes(Remedy remedy) {
           {"their images against brute force", difference.value(), 1e-5}};
 }
 
-}  // namespace
-
-std::span<const StressCase> metamorphic_cases() {
-  static constexpr std::array kCases = {
-      StressCase{"R1", "the picture depends on the unit of length", "no absolute epsilon", scale, "", false,
-                 "60 Gaussians, 48 x 32 px"},
-      StressCase{"R2", "the picture depends on where the world's origin is", "means relative to an origin in double",
-                 translation, "", false, "80 Gaussians, 48 x 32 px"},
-      StressCase{"R3", "the picture depends on how the world is turned", "harmonics turn along", rotation, "", false,
-                 "80 Gaussians, 48 x 32 px"},
-      StressCase{"R4", "left and right are not alike", "pixels' centres at one half", mirror, "", false,
-                 "80 Gaussians, 48 x 32 px"},
-      StressCase{"R5", "a crop shows something else", "pixels' centres at one half", crop, "", false,
-                 "60 Gaussians, 48 x 32 px, a crop of 21 x 19"},
-      StressCase{"R6", "the picture depends on the order of the rows", "sorted by depth", permutation, "", false,
-                 "300 Gaussians, 48 x 32 px"},
-      StressCase{"R7", "a Gaussian in two halves is another", "nothing is cut (quality reference)", split, "", false,
-                 "40 Gaussians, 48 x 32 px"},
-      StressCase{"R8", "culling changes pixels", "exact tile test instead of a square of 3 sigma", culling, "", false,
-                 "30, 200 and 1500 Gaussians, 33 x 25 to 96 x 64 px"},
-      StressCase{"R9", "results depend on the number of threads", "cuts by the data alone, sums in fixed order",
-                 threads, "", true, "1500 Gaussians, 48 x 32 px"},
-      StressCase{"R10", "results depend on the size of tiles", "each pixel cut by its own alpha", tile_size, "", false,
-                 "200 Gaussians, 75 x 50 px"},
-      StressCase{"R11", "results depend on the instruction set", "exact roots and quotients, not approximations",
-                 instruction_sets, "", false, "120 Gaussians, 49 x 37 px"},
-      StressCase{"R12", "gradients depend on the scale of the loss", "no absolute threshold", loss_scale, "", false,
-                 "100 Gaussians, 48 x 32 px"},
-      StressCase{"R13", "guards drop what is extreme but valid", "culled only at near and where not finite", extremes,
-                 "", false, "8 scenes of 1 Gaussian, 33 x 25 px"},
-  };
-  return kCases;
-}
-
-}  // namespace hsi4d
+}  // namespace hsi4d::stress

@@ -1,4 +1,5 @@
 // Rows F1 to F4: Adam.
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -7,11 +8,10 @@
 #include "autodiff/reduce.h"
 #include "core/random.h"
 #include "optim/adam.h"
-#include "stress/arithmetic.h"
 #include "stress/faded.h"
 #include "stress/measures.h"
-#include "stress/moving.h"
 #include "stress/plain_adam.h"
+#include "stress/rows.h"
 
 namespace hsi4d::stress {
 
@@ -156,8 +156,8 @@ double largest_relative_of_moments(const std::vector<double>& a, const std::vect
   return worst;
 }
 
-/// Two numbers that had one gradient of 1 and none after it, for as long as m takes to vanish; and how often a moment
-/// was denormal.
+/// Numbers that had one gradient of 1 and none after it, for as long as m takes to vanish; and in how many steps a
+/// moment was denormal.
 struct Fading {
   double denormals = 0;
   double x = 0;
@@ -167,12 +167,16 @@ Fading fade(Remedy remedy) {
   constexpr int kSteps = 100'000;  // 0.9^6700 is the least normal number, 0.9^7050 the least of all
   Fading result;
   if (remedy == Remedy::kOn) {
-    Slopes<float> problem(2, 0.01, 1e-8);
-    problem.step({1, 1});
+    constexpr Index kMany = 64;  // more than one vector
+    Slopes<float> problem(kMany, 0.01, 1e-8);
+    problem.step(std::vector<double>(kMany, 1));
+    const std::vector<double> none(kMany, 0);
     for (int i = 0; i < kSteps; ++i) {
-      problem.step({0, 0});
+      problem.step(none);
       const GroupMoments moments = problem.adam.moments("all");
-      result.denormals += is_denormal(moments.blocks[0].mean[0]) + is_denormal(moments.blocks[0].square[0]);
+      const GroupMoments::Block& block = moments.blocks[0];
+      result.denormals += std::any_of(block.mean.begin(), block.mean.end(), is_denormal) ||
+                          std::any_of(block.square.begin(), block.square.end(), is_denormal);
     }
     result.x = problem.numbers()[0];
   } else {

@@ -1,8 +1,12 @@
 // Adam as the textbook has it, number by number: in long double it is the truth, in float what goes wrong without a
-// look at the gradient and without flushing.
+// look at the gradient and without flushing. And leaves for the program's own.
 #pragma once
 
 #include <cmath>
+#include <utility>
+#include <vector>
+
+#include "optim/adam.h"
 
 namespace hsi4d::stress {
 
@@ -24,5 +28,15 @@ struct PlainAdam {
 };
 
 inline bool is_denormal(double x) { return std::fpclassify(x) == FP_SUBNORMAL; }
+
+/// The group "all".
+template <class S>
+OptimizerGroup<S> moving_at(std::vector<Var<S>> leaves, double lr) {
+  OptimizerGroup<S> group;
+  group.parameters.name = "all";
+  group.parameters.blocks = std::move(leaves);
+  group.settings.lr = lr;
+  return group;
+}
 
 }  // namespace hsi4d::stress

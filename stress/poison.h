@@ -30,8 +30,11 @@
 #include "autodiff/reduce.h"
 #include "core/check.h"
 #include "core/random.h"
-#include "stress/small_scene.h"
-#include "stress/stress.h"
+#include "core/rotation.h"
+#include "stress/measures.h"
+#include "stress/rows.h"
+#include "stress/splat_scene.h"
+#include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
 
@@ -65,15 +68,45 @@ struct PoisonInput {
 template <class S>
 using Vars = std::vector<Var<S>>;
 
+/// Records an operator: a function of its inputs that returns its result, or its results.
+template <class S>
+class PoisonRecord {
+ public:
+  template <class F>
+  PoisonRecord(F f)
+      : record_([f](const Vars<S>& in) {
+          if constexpr (std::is_same_v<decltype(f(in)), Var<S>>)
+            return Vars<S>{f(in)};
+          else
+            return f(in);
+        }) {}
+  Vars<S> operator()(const Vars<S>& in) const { return record_(in); }
+
+ private:
+  std::function<Vars<S>(const Vars<S>&)> record_;
+};
+
 /// An operator and how its arrays hang together.
 template <class S>
 struct PoisonedOperator {
   std::vector<PoisonInput> inputs;
-  std::function<Vars<S>(const Vars<S>&)> record;
+  PoisonRecord<S> record;
   std::vector<UnitOf> outputs = {};  ///< units; fewer than outputs: each row is one
   bool contains = false;             ///< nothing that is not finite gets from a row to what is shared
   Index reach = 0;                   ///< units as near as this do have to do with each other
 };
+
+/// Rotations by rows, [rows,9].
+inline std::vector<double> some_rotations(Index rows) {
+  std::vector<double> numbers;
+  RandomSequence random(78);
+  for (Index n = 0; n < rows; ++n) {
+    const Matrix3<double> r =
+        so3_exp(Vector3<double>(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)));
+    for (int i = 0; i < 9; ++i) numbers.push_back(r(i / 3, i % 3));
+  }
+  return numbers;
+}
 
 /// Operators by the names that they have on tapes.
 using OperatorNames = std::set<std::string>;
@@ -347,8 +380,7 @@ class PoisonTrial {
 
   static double not_finite(const PoisonResults& results) {
     double count = 0;
-    for (const std::vector<double>& numbers : results)
-      for (const double x : numbers) count += std::isfinite(x) ? 0 : 1;
+    for (const std::vector<double>& numbers : results) count += stress::not_finite(numbers);
     return count;
   }
 
@@ -362,7 +394,7 @@ class PoisonTrial {
       const UnitOf& unit = op_.inputs[i].unit;
       found.gradients += changed(gradients[i], gradients_[i], inputs_[i].shape().cols, unit, bad);
       if (!op_.contains || !is_not_finite || !is_shared(op_.inputs[i])) continue;
-      for (const double x : gradients[i]) found.shared += std::isfinite(x) ? 0 : 1;
+      found.shared += stress::not_finite(gradients[i]);
     }
   }
   double changed(const std::vector<double>& now, const std::vector<double>& before, Index cols, const UnitOf& unit,
@@ -428,27 +460,18 @@ void add_family_operators(const F& make, OperatorNames& names) {
     names.merge(OperatorNames(PoisonTrial<double>(op, Remedy::kOn).operators()));
 }
 
-// The families, by file.
-std::vector<StressFigure> poisoned_elements(Remedy remedy);   ///< poison_autodiff.cpp
-std::vector<StressFigure> poisoned_arrays(Remedy remedy);     ///< likewise
-std::vector<StressFigure> poisoned_networks(Remedy remedy);   ///< likewise
-std::vector<StressFigure> poisoned_splats(Remedy remedy);     ///< poison_splat.cpp
-std::vector<StressFigure> poisoned_composite(Remedy remedy);  ///< poison_render.cpp
-std::vector<StressFigure> poisoned_render(Remedy remedy);     ///< likewise
-std::vector<StressFigure> poisoned_skeletons(Remedy remedy);  ///< poison_body.cpp
-std::vector<StressFigure> poisoned_body_nets(Remedy remedy);  ///< likewise
-std::vector<StressFigure> poisoned_masks(Remedy remedy);      ///< poison_losses.cpp
-std::vector<StressFigure> poisoned_losses(Remedy remedy);     ///< likewise
-std::vector<StressFigure> poisoned_distances(Remedy remedy);  ///< poison_optim.cpp
+/// The operators of a family, beside the row that it is.
+using FamilyOperators = void(OperatorNames&);
+FamilyOperators add_autodiff_operators, add_splat_operators, add_render_operators, add_body_operators,
+    add_optim_operators;
 
-// Adds the operators of a file's families whose every input is poisoned.
-void add_autodiff_operators(OperatorNames& names);
-void add_splat_operators(OperatorNames& names);
-void add_render_operators(OperatorNames& names);
-void add_body_operators(OperatorNames& names);
-void add_optim_operators(OperatorNames& names);
-
-/// All of them.
-OperatorNames poisoned_operators();
+/// Those of all families, whose every input is poisoned.
+inline OperatorNames poisoned_operators() {
+  OperatorNames names;
+  for (const auto add :
+       {add_autodiff_operators, add_splat_operators, add_render_operators, add_body_operators, add_optim_operators})
+    add(names);
+  return names;
+}
 
 }  // namespace hsi4d::stress

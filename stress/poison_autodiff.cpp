@@ -8,7 +8,6 @@
 #include "autodiff/seam.h"
 #include "autodiff/ssim.h"
 #include "autodiff/weighted_image.h"
-#include "core/rotation.h"
 #include "stress/poison.h"
 
 namespace hsi4d::stress {
@@ -21,7 +20,7 @@ constexpr SeamMode kOrdinaryRun;
 /// An operator on one array [kRows,cols].
 template <class S, class F>
 PoisonedOperator<S> of_rows(Index cols, double low, double high, F f) {
-  return {{{shape_of(kRows, cols), {}, low, high}}, [f](const Vars<S>& in) { return Vars<S>{f(in[0])}; }};
+  return {{{shape_of(kRows, cols), {}, low, high}}, [f](const Vars<S>& in) { return f(in[0]); }};
 }
 
 /// An operator on two arrays [kRows,3], of which the second may be one row for all.
@@ -29,7 +28,7 @@ template <class S, class F>
 PoisonedOperator<S> of_pairs(bool is_shared, F f) {
   const PoisonInput other =
       is_shared ? PoisonInput{shape_of(1, 3), shared, 0.5, 2} : PoisonInput{shape_of(kRows, 3), {}, 0.5, 2};
-  return {{{shape_of(kRows, 3), {}, 0.5, 2}, other}, [f](const Vars<S>& in) { return Vars<S>{f(in[0], in[1])}; }};
+  return {{{shape_of(kRows, 3), {}, 0.5, 2}, other}, [f](const Vars<S>& in) { return f(in[0], in[1]); }};
 }
 
 /// One whose result is a number of all rows.
@@ -82,7 +81,7 @@ struct Elements {
 template <class S>
 PoisonedOperator<S> of_images(Index planes, Index height, Index width, const std::function<Var<S>(Var<S>, Var<S>)>& f) {
   const PoisonInput image{image_shape<S>(planes, height, width), {}, 0, 1};
-  return {{image, image}, [f](const Vars<S>& in) { return Vars<S>{f(in[0], in[1])}; }};
+  return {{image, image}, [f](const Vars<S>& in) { return f(in[0], in[1]); }};
 }
 
 struct Arrays {
@@ -112,8 +111,8 @@ struct Arrays {
     all.push_back(of_pairs<S>(false, [](V a, V b) { return concat_rows(std::span<const V>(std::array{a, b})); }));
     all.back().outputs = {[](Index row) { return row % kRows; }};
     all.push_back(of_pairs<S>(false, [](V a, V b) { return concat_cols(std::span<const V>(std::array{a, b})); }));
-    all.push_back({{{shape_of(kRows, 3)}, {shape_of(3, 5), shared}},
-                   [](const Vars<S>& in) { return Vars<S>{matmul(in[0], in[1])}; }});
+    all.push_back(
+        {{{shape_of(kRows, 3)}, {shape_of(3, 5), shared}}, [](const Vars<S>& in) { return matmul(in[0], in[1]); }});
     const auto two = [&](auto f) { all.push_back(to_scalar(of_pairs<S>(false, f))); };
     two([](V a, V b) { return l1(a, b); });
     two([](V a, V b) { return l2(a, b); });
@@ -132,33 +131,21 @@ struct Arrays {
     for (const Index height : {8, 24}) {  // as arrays, and as images with squares
       const PoisonInput image{image_shape<S>(1, height, 16), {}, 0, 1};
       const auto weighted = [&](auto f) {
-        all.push_back(
-            {{image, image, image}, [f](const Vars<S>& in) { return Vars<S>{f(in[0], in[1], in[2])}; }, {shared}});
+        all.push_back({{image, image, image}, [f](const Vars<S>& in) { return f(in[0], in[1], in[2]); }, {shared}});
       };
       weighted([](V a, V b, V w) { return l1(a, b, w); });
       weighted([](V a, V b, V w) { return l2(a, b, w); });
     }
     all.push_back(to_scalar(of_images<S>(1, 40, 16, [](V a, V b) { return d_ssim(a, b); })));
     all.back().reach = 10;  // two windows of 11
-    all.push_back({{{{image_shape<S>(4, 8, 16)}, units_of(8), 0, 1}},
-                   [](const Vars<S>& in) { return Vars<S>{centroids(in[0])}; }});
+    all.push_back(
+        {{{{image_shape<S>(4, 8, 16)}, units_of(8), 0, 1}}, [](const Vars<S>& in) { return centroids(in[0]); }});
     all.push_back({{{image_shape<S>(4, 8, 16), {}, 0, 1}},
-                   [](const Vars<S>& in) { return Vars<S>{slice_planes(in[0], 1, 2)}; },
+                   [](const Vars<S>& in) { return slice_planes(in[0], 1, 2); },
                    {[](Index row) { return row + 8; }}});
     return all;
   }
 };
-
-std::vector<double> some_rotations(Index rows) {
-  std::vector<double> numbers;
-  RandomSequence random(78);
-  for (Index n = 0; n < rows; ++n) {
-    const Matrix3<double> r =
-        so3_exp(Vector3<double>(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)));
-    for (int i = 0; i < 9; ++i) numbers.push_back(r(i / 3, i % 3));
-  }
-  return numbers;
-}
 
 struct Networks {
   template <class S>
@@ -185,7 +172,7 @@ struct Networks {
                       {shape_of(1, 3), shared}},
                      [output](const Vars<S>& in) {
                        const MlpLayer<S> layers[] = {{in[4], in[5]}, {in[6], in[7]}};
-                       return Vars<S>{mlp<S>({in[0], in[1], in[2], in[3]}, layers, output)};
+                       return mlp<S>({in[0], in[1], in[2], in[3]}, layers, output);
                      }});
     }
     return all;

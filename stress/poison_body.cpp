@@ -8,7 +8,6 @@
 #include "body/natural_pose.h"
 #include "body/skinning.h"
 #include "body/vposer.h"
-#include "core/rotation.h"
 #include "stress/poison.h"
 
 namespace hsi4d::stress {
@@ -16,17 +15,6 @@ namespace hsi4d::stress {
 namespace {
 
 constexpr Index kFrames = 4, kJoints = 6, kPoints = 60, kPoseJoints = 21;
-
-std::vector<double> some_rotations(Index rows) {
-  std::vector<double> numbers;
-  RandomSequence random(82);
-  for (Index n = 0; n < rows; ++n) {
-    const Matrix3<double> r =
-        so3_exp(Vector3<double>(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)));
-    for (int i = 0; i < 9; ++i) numbers.push_back(r(i / 3, i % 3));
-  }
-  return numbers;
-}
 
 PoisonInput rotations(Index rows, UnitOf unit = {}) {
   return {shape_of(rows, 9), std::move(unit), 0, 0, some_rotations(rows)};
@@ -65,18 +53,16 @@ struct Skeletons {
     all.push_back({{turns, places, {shape_of(kJoints, 3), shared}}, chain, {units_of(kJoints), units_of(kJoints)}});
     const SkinWeights<S> sparse(some_weights()), dense(spread_weights());
     const PoisonInput joints{shape_of(kJoints, 12)}, points{shape_of(kPoints, 3), joint_of};
-    all.push_back({{joints, points},
-                   [sparse](const Vars<S>& in) { return Vars<S>{skin_points(sparse, in[0], in[1])}; },
-                   {joint_of}});
+    all.push_back(
+        {{joints, points}, [sparse](const Vars<S>& in) { return skin_points(sparse, in[0], in[1]); }, {joint_of}});
     all.push_back({{joints, points, {shape_of(1, 3), shared}},
-                   [sparse](const Vars<S>& in) { return Vars<S>{skin_points(sparse, in[0], in[1], in[2])}; },
+                   [sparse](const Vars<S>& in) { return skin_points(sparse, in[0], in[1], in[2]); },
                    {joint_of}});
     all.push_back({{{shape_of(kJoints, 12), shared}, {shape_of(kPoints, 3)}},
-                   [dense](const Vars<S>& in) { return Vars<S>{skin_points(dense, in[0], in[1])}; }});
-    all.push_back(
-        {{joints}, [sparse](const Vars<S>& in) { return Vars<S>{blend_transforms(sparse, in[0])}; }, {joint_of}});
+                   [dense](const Vars<S>& in) { return skin_points(dense, in[0], in[1]); }});
+    all.push_back({{joints}, [sparse](const Vars<S>& in) { return blend_transforms(sparse, in[0]); }, {joint_of}});
     all.push_back({{{shape_of(kJoints, 12), shared}},
-                   [dense](const Vars<S>& in) { return Vars<S>{blend_transforms(dense, in[0])}; },
+                   [dense](const Vars<S>& in) { return blend_transforms(dense, in[0]); },
                    {shared}});
     all.push_back({{joints, points, {shape_of(kPoints, 9), joint_of}},
                    [sparse](const Vars<S>& in) {
@@ -85,9 +71,9 @@ struct Skeletons {
                    },
                    {joint_of, joint_of}});
     all.push_back({{{shape_of(kPoints, 12)}, {shape_of(kPoints, 3)}},
-                   [](const Vars<S>& in) { return Vars<S>{transform_points(in[0], in[1])}; }});
+                   [](const Vars<S>& in) { return transform_points(in[0], in[1]); }});
     all.push_back({{{shape_of(kPoints, 12)}, {shape_of(kPoints, 3)}, {shape_of(1, 3), shared}},
-                   [](const Vars<S>& in) { return Vars<S>{canonical_directions(in[0], in[1], in[2])}; },
+                   [](const Vars<S>& in) { return canonical_directions(in[0], in[1], in[2]); },
                    {},
                    true});
     return all;
@@ -129,19 +115,16 @@ struct BodyNets {
     std::vector<PoisonedOperator<S>> all;
     const UnitOf frames = units_of(kPoseJoints);
     const Index poses = kFrames * kPoseJoints;
-    all.push_back({{rotations(20)}, [](const Vars<S>& in) { return Vars<S>{rotation_offsets(in[0])}; }});
-    all.push_back(
-        {{{shape_of(20, 3)}}, [](const Vars<S>& in) { return Vars<S>{rotation_offsets_from_axis_angle(in[0])}; }});
-    all.push_back(
-        {{{shape_of(kFrames, 63)}}, [](const Vars<S>& in) { return Vars<S>{natural_decode(in[0])}; }, {frames}});
-    all.push_back({{rotations(poses, frames)}, [](const Vars<S>& in) { return Vars<S>{natural_encode(in[0])}; }});
-    all.push_back({{rotations(poses)}, [](const Vars<S>& in) { return Vars<S>{joint_limit_excess(in[0])}; }});
+    all.push_back({{rotations(20)}, [](const Vars<S>& in) { return rotation_offsets(in[0]); }});
+    all.push_back({{{shape_of(20, 3)}}, [](const Vars<S>& in) { return rotation_offsets_from_axis_angle(in[0]); }});
+    all.push_back({{{shape_of(kFrames, 63)}}, [](const Vars<S>& in) { return natural_decode(in[0]); }, {frames}});
+    all.push_back({{rotations(poses, frames)}, [](const Vars<S>& in) { return natural_encode(in[0]); }});
+    all.push_back({{rotations(poses)}, [](const Vars<S>& in) { return joint_limit_excess(in[0]); }});
     const Vposer<S> vposer(some_vposer());
-    all.push_back({{{shape_of(kFrames, 8)}},
-                   [vposer](const Vars<S>& in) { return Vars<S>{vposer_decode(vposer, in[0])}; },
-                   {frames}});
-    all.push_back({{{shape_of(poses, 3), frames}},
-                   [vposer](const Vars<S>& in) { return Vars<S>{vposer_encode(vposer, in[0])}; }});
+    all.push_back(
+        {{{shape_of(kFrames, 8)}}, [vposer](const Vars<S>& in) { return vposer_decode(vposer, in[0]); }, {frames}});
+    all.push_back(
+        {{{shape_of(poses, 3), frames}}, [vposer](const Vars<S>& in) { return vposer_encode(vposer, in[0]); }});
     std::vector<double> values(static_cast<std::size_t>(3 * kPoints * 9 * 2));
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = 0.01 * std::sin(static_cast<double>(i));
     const Directions<S> shapes(DirectionSource{values, kPoints, 18, {0}, 18});
@@ -149,17 +132,17 @@ struct BodyNets {
                    [shapes](const Vars<S>& in) {
                      const std::array<BlendTerm<S>, 1> terms = {{{shapes, in[0]}}};
                      static const std::vector<double> rest(static_cast<std::size_t>(3 * kPoints), 0.3);
-                     return Vars<S>{blend_shapes(rest, std::span<const BlendTerm<S>>(terms))};
+                     return blend_shapes(rest, std::span<const BlendTerm<S>>(terms));
                    },
                    {shared}});
     const PoseDirections<S> directions(values, kPoints, 1, 2, 0);
     all.push_back({{{shape_of(2, 9), shared}, {shape_of(kPoints, 3)}},
-                   [directions](const Vars<S>& in) { return Vars<S>{pose_correctives(directions, in[0], in[1])}; }});
+                   [directions](const Vars<S>& in) { return pose_correctives(directions, in[0], in[1]); }});
     all.push_back({{{shape_of(kPoints, 5)},
                     {shape_of(kPoints, 3), {}, 0.1, 0.9},
                     {shape_of(kPoints, 3)},
                     {shape_of(kJoints, 9), shared}},
-                   [](const Vars<S>& in) { return Vars<S>{colored<S>(in)}; }});
+                   [](const Vars<S>& in) { return colored<S>(in); }});
     return all;
   }
 };

@@ -1,10 +1,13 @@
-// Rows P9, P10: loss terms. What does not count is not looked at; what makes a loss into no number moves nothing.
+// Rows P9 to P11: loss terms and the operators of optim. What does not count is not looked at; what makes a loss into
+// no number moves nothing.
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
+#include "optim/solid/distance_grid.h"
 #include "stress/loss_inputs.h"
 #include "stress/measures.h"
-#include "stress/moving.h"
+#include "stress/plain_adam.h"
 #include "stress/poison.h"
 
 namespace hsi4d::stress {
@@ -239,6 +242,23 @@ void try_term(const LossTerm& of, Remedy remedy, Steps& steps) {
   }
 }
 
+/// Distances from a ball of 0.2 m, negative within.
+std::shared_ptr<DistanceGrid> ball() {
+  const auto distance = [](const Vector3<double>& place) { return place.norm() - 0.2; };
+  return std::make_shared<DistanceGrid>(distance, DistanceGrid::Settings{.cell = 0.05, .reach = 1, .name = "ball"});
+}
+
+struct Distances {
+  template <class S>
+  std::vector<PoisonedOperator<S>> operator()() const {
+    const auto grid = ball();
+    std::vector<PoisonedOperator<S>> all;
+    all.push_back(
+        {{{shape_of(40, 3), {}, -0.3, 0.3}}, [grid](const Vars<S>& in) { return sampled_distance(in[0], grid); }});
+    return all;
+  }
+};
+
 }  // namespace
 
 std::vector<StressFigure> poisoned_masks(Remedy remedy) {
@@ -264,5 +284,9 @@ std::vector<StressFigure> poisoned_losses(Remedy remedy) {
           {"NaN that matters and leaves all finite", steps.unheard, 0},
           {"share of poisoned inputs that leave all finite", 1 - steps.bad / steps.tried, 0.9}};
 }
+
+std::vector<StressFigure> poisoned_distances(Remedy remedy) { return family_leaks(Distances(), remedy); }
+
+void add_optim_operators(OperatorNames& names) { add_family_operators(Distances(), names); }
 
 }  // namespace hsi4d::stress

@@ -188,9 +188,7 @@ template <class S>
 FlatDrawing<S>::FlatDrawing() {
   const Flat flat;
   const auto leaf = [&](Index cols, const std::vector<double>& numbers) {
-    const Var<S> var = tape.parameter("input", shape_of(std::ssize(numbers) / cols, cols));
-    set_numbers(tape, var, numbers);
-    return var;
+    return stress::leaf(tape, "input", shape_of(std::ssize(numbers) / cols, cols), numbers);
   };
   means = leaf(2, flat.means);
   factors = leaf(6, flat.factors);
@@ -202,7 +200,7 @@ FlatDrawing<S>::FlatDrawing() {
   means_low = tape.constant("rest", shape_of(kRows, 2));
   set_numbers(tape, depths, flat.depths);
   const Composited<S> out = composite(SplatSet<S>{{means, factors, depths, depth_low, means_low}, opacities, features},
-                                      view_of({32, 24, 1, {}, {}, {}, {}, {}}), background);
+                                      front_view(32, 24), background);
   drawing.inputs = {means, factors, opacities, features, background};
   drawing.look_at({out.channels, out.transmittance});
 }
@@ -240,17 +238,17 @@ Vars<S> all_images(const Rendered<S>& out, bool with_depth) {
 ///                    depth are beyond the largest number
 template <class S>
 void try_render(bool with_depth, Changes& changes) {
-  const SmallScene scene = small_scene(kRows, 32, 24, 81);
-  TapedSmallScene<S> taped(scene, with_all(with_depth));
+  const Scene scene = small_scene(kRows, 32, 24, 81);
+  TapedScene<S> taped(scene, {}, with_all(with_depth));
   Drawing<S> drawing{taped.tape, taped.leaves()};
   drawing.look_at(all_images(taped.rendered, with_depth));
-  std::vector<double> behind = scene.means;
+  std::vector<double> behind(scene.gaussians.means.begin(), scene.gaussians.means.end());
   for (std::size_t i = 2; i < behind.size(); i += 3) behind[i] *= -1;
   try_poison<S>(drawing,
                 {{taped.means, true, with_depth},
                  {taped.quats},
                  {taped.log_scales, false},
-                 {taped.logits, false},
+                 {taped.opacity_logits, false},
                  {taped.sh, true, true}},
                 taped.means, behind, changes);
   try_shared<S>(drawing, {taped.xi, taped.background}, taped.background, changes);
@@ -327,7 +325,7 @@ std::vector<StressFigure> poisoned_render(Remedy remedy) {
 void add_render_operators(OperatorNames& names) {
   FlatDrawing<double> flat;
   add_poisoned_operators<double>(flat.tape, flat.poisoned(), flat.drawing.images, names);
-  TapedSmallScene<double> taped(small_scene(kRows, 32, 24, 81), with_all(true));
+  TapedScene<double> taped(small_scene(kRows, 32, 24, 81), {}, with_all(true));
   add_poisoned_operators<double>(taped.tape, taped.leaves(), all_images(taped.rendered, true), names);
 }
 

@@ -6,7 +6,7 @@
 
 #include "autodiff/dual.h"
 #include "stress/measures.h"
-#include "stress/projection_rows.h"
+#include "stress/rows.h"
 #include "stress/splat_scene.h"
 
 namespace hsi4d::stress {

@@ -9,7 +9,7 @@
 #include "autodiff/reduce.h"
 #include "core/random.h"
 #include "stress/measures.h"
-#include "stress/projection_rows.h"
+#include "stress/rows.h"
 #include "stress/splat_scene.h"
 
 namespace hsi4d::stress {
@@ -156,7 +156,7 @@ namespace {
 /// Pixels that a long, thin Gaussian along the view marks, `beside` half-widths of the view out. Its far end is outside
 /// of the view, too, by three standard deviations.
 double marked_pixels(int side, double beside, double z, double clamp) {
-  Scene scene = empty_scene(front_camera(48, 48));
+  Scene scene = empty_scene(front_camera(64, 64));
   scene.camera.cx += 6;
   scene.camera.cy -= 5;
   scene.settings.frustum_clamp = clamp;
@@ -222,8 +222,8 @@ double crop_error(Remedy remedy) {
 std::vector<StressFigure> beside_the_view(Remedy remedy) {
   double fan = 0;
   for (const int side : {0, 1, 2, 3}) {
-    for (const double z : {0.2, 30.0}) {
-      for (const double beside : {3.5, 10.0}) {
+    for (const double z : {0.2, 2.0, 30.0}) {
+      for (const double beside : {3.5, 5.0, 10.0}) {
         fan += marked_pixels(side, beside, z, remedy == Remedy::kOn ? kFrustumClamp : 100);
       }
     }

@@ -9,14 +9,14 @@
 #include "splat/files/io_splat.h"
 #include "splat/limits.h"
 #include "splat/reference/reference.h"
-#include "splat/render/block_kernel.h"
 #include "splat/render/covariance.h"
 #include "splat/render/opacity.h"
 #include "splat/render/render.h"
 #include "splat/render/sh.h"
-#include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
 #include "stress/measures.h"
+#include "stress/pixel_powers.h"
+#include "stress/rows.h"
 
 namespace hsi4d::stress {
 
@@ -41,7 +41,7 @@ PixelDepth program_depth(double opacity) {
   const Var<S> colors = tape.constant("colors", shape_of(2, 3)), background = tape.constant("b", shape_of(1, 3));
   const SplatInputs<S> inputs = {means, axes, opacities, colors};
   const Var<S> depth = render(inputs, tape.constant("xi", shape_of(1, 6)), background,
-                              plain_view(1, 1, uncut_settings()), {.depth = true, .groups = {}})
+                              front_view(1, 1, uncut_settings()), {.depth = true, .groups = {}})
                            .depth;
   tape.forward(depth);
   tape.backward(depth, std::vector<S>{1});
@@ -148,15 +148,6 @@ float exponent_exp(float x) {
   return std::bit_cast<float>(bits > 0 ? static_cast<std::int32_t>(bits) : 0);
 }
 
-/// 2ᵖ as the pixels of blocks compute it: alpha of a Gaussian whose log₂ opacity is p, at its centre.
-float block_power(float p) {
-  detail::SplatRecord<float> record{};
-  record.opacity = 1;
-  record.log2_opacity = p;
-  const detail::CompositeRules<float> rules{1, kExactBelowAlpha, 1e-4f, false, false, 0.3f};
-  return detail::block_pixel_alpha(16, record, rules, 0, 0, 0, 0).alpha;
-}
-
 struct Banding {
   double ulps = 0, relative = 0, rises = 0;
 };
@@ -185,7 +176,7 @@ Banding banding(const F& function, const G& exact, double lowest) {
 std::vector<StressFigure> quick_exponential(Remedy remedy) {
   const bool on = remedy == Remedy::kOn;
   const auto e = [on](float x) { return on ? vector_exp(x) : exponent_exp(x); };
-  const auto power = [on](float p) { return on ? block_power(p) : exponent_exp(0.6931472f * p); };
+  const auto power = [on](float p) { return on ? block_exponential(p).value : exponent_exp(0.6931472f * p); };
   const Banding rows = banding(
       e, [](float x) { return std::exp(static_cast<double>(x)); }, -87);
   const Banding blocks = banding(
@@ -210,8 +201,7 @@ std::vector<StressFigure> held_color(Remedy remedy) {
   if (remedy == Remedy::kOn) {
     Tape<float> tape;
     const Var<float> of = leaf(tape, "sh", shape_of(2, 3), sh), means = tape.constant("means", shape_of(2, 3));
-    const Var<float> result =
-        sh_colors(of, means, tape.constant("xi", shape_of(1, 6)), plain_view(4, 4, RenderSettings()));
+    const Var<float> result = sh_colors(of, means, tape.constant("xi", shape_of(1, 6)), front_view(4, 4));
     tape.forward(result);
     tape.backward(result, std::vector<float>(6, 1));
     colors = numbers_of<float>(tape.value(result));
@@ -295,7 +285,7 @@ double broken_at_centre(Remedy remedy) {
   if (remedy == Remedy::kOn) {
     Tape<float> tape;
     const Var<float> of = leaf(tape, "sh", shape_of(1, 12), sh), mean = leaf(tape, "mean", shape_of(1, 3), {0, 0, 0});
-    const Var<float> color = sh_colors(of, mean, tape.constant("xi", shape_of(1, 6)), plain_view(4, 4, {}));
+    const Var<float> color = sh_colors(of, mean, tape.constant("xi", shape_of(1, 6)), front_view(4, 4));
     tape.forward(color);
     tape.backward(color, std::vector<float>(3, 1));
     return not_finite(numbers_of<float>(tape.value(color))) + not_finite(numbers_of<float>(tape.gradient(of))) +
@@ -311,7 +301,7 @@ double broken_at_centre(Remedy remedy) {
 }  // namespace
 
 std::vector<StressFigure> color_direction(Remedy remedy) {
-  const SplatView view = plain_view(kWidth, kHeight, uncut_settings());
+  const SplatView view = front_view(kWidth, kHeight, uncut_settings());
   const reference::Scene<double> scene = colorful_scene(40);
   std::vector<double> weights(3 * kWidth * kHeight);
   RandomSequence random(9, 1);

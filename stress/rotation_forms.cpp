@@ -15,7 +15,8 @@
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
 #include "stress/rotation_measures.h"
-#include "stress/rotation_rows.h"
+#include "stress/rows.h"
+#include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
 
@@ -214,8 +215,7 @@ std::vector<StressFigure> dead_branches(Remedy remedy) {
   const std::vector<float> numbers = {0, -1, 0.25f, kNaN, -kInfinity, 3, -1e-30f, 1e-30f};
   const auto count = static_cast<Index>(numbers.size());
   Tape<float> tape;
-  const Var<float> x = tape.parameter("x", shape_of(1, count));
-  tape.set(x, numbers);
+  const Var<float> x = leaf(tape, "x", shape_of(1, count), numbers);
   const auto blended = [](const auto& v) {  // both branches, weighted by 1 and 0
     const float taken = value_of(v) > 0 ? 1.0f : 0.0f;
     return v * log(v) * taken + v * 2.0f * (1 - taken);
@@ -251,8 +251,7 @@ std::vector<StressFigure> chains(Remedy remedy) {
       for (int i = 0; i < 9; ++i) rotations.push_back(r(i / 3, i % 3));
     }
     Tape<float> tape;
-    const Var<float> r = tape.parameter("r", shape_of(kJoints, 9));
-    tape.set(r, rotations);
+    const Var<float> r = leaf(tape, "r", shape_of(kJoints, 9), rotations);
     const auto posed = kinematic_chain(r, tape.constant("transl", shape_of(1, 3)), parents, rest);
     tape.forward(posed.transforms);
     Matrix3<double> exact = Matrix3<double>::Identity();
@@ -287,7 +286,7 @@ std::vector<StressFigure> chains(Remedy remedy) {
 }
 
 /// Axes by cross products alone.
-Rigid<double> plain_view(const Vector3<double>& eye, const Vector3<double>& target, const Vector3<double>& up) {
+Rigid<double> front_view(const Vector3<double>& eye, const Vector3<double>& target, const Vector3<double>& up) {
   const Vector3<double> z = (target - eye).normalized();
   Vector3<double> x = cross(z, up);
   x /= x.norm();
@@ -300,7 +299,7 @@ Rigid<double> plain_view(const Vector3<double>& eye, const Vector3<double>& targ
 /// C13: views along all axes with each axis for up, and a little beside them; then a view that swings around.
 std::vector<StressFigure> views_along_up(Remedy remedy) {
   const auto look = [remedy](const Vector3<double>& eye, const Vector3<double>& target, const Vector3<double>& up) {
-    return remedy == Remedy::kOn ? look_at(eye, target, up) : plain_view(eye, target, up);
+    return remedy == Remedy::kOn ? look_at(eye, target, up) : front_view(eye, target, up);
   };
   RandomSequence random(60, random_stream("stress.C13"));
   const Vector3<double> eye(0.3, -0.2, 0.7), above = Vector3<double>::UnitZ();

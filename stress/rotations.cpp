@@ -11,14 +11,12 @@
 #include "core/rotation.h"
 #include "core/stumpff.h"
 #include "stress/rotation_measures.h"
-#include "stress/rotation_rows.h"
-#include "stress/stress.h"
+#include "stress/rows.h"
+#include "stress/tape_numbers.h"
 
-namespace hsi4d {
+namespace hsi4d::stress {
 
 namespace {
-
-using namespace stress;
 
 /// A rotation by rows, and its derivative by the axis-angle vector.
 struct Turn {
@@ -29,8 +27,7 @@ struct Turn {
 /// By the operator.
 Turn taped_turn(const Vector3<float>& w) {
   Tape<float> tape;
-  const Var<float> x = tape.parameter("w", shape_of(1, 3));
-  tape.set(x, {w[0], w[1], w[2]});
+  const Var<float> x = leaf(tape, "w", shape_of(1, 3), {w[0], w[1], w[2]});
   const Var<float> r = rotations_from_axis_angle(x);
   tape.forward(r);
   Turn turn;
@@ -95,6 +92,53 @@ constexpr auto kBareRoot = [](const auto& x) {
 /// The root with the gradient 0 at 0.
 constexpr auto kGuardedRoot = [](const auto& x) { return sqrt(x); };
 
+/// The first terms of c_k, as many as do for small angles.
+double short_series(int k, double x) {
+  double sum = 0, term = detail::inverse_factorial<double>(k);
+  for (int j = 0; j < 4; ++j) {
+    sum += term;
+    term *= -x / ((2 * j + k + 1) * (2 * j + k + 2));
+  }
+  return sum;
+}
+
+/// The 26 directions to the faces, edges and corners of a cube.
+std::vector<Vector3<double>> cube_directions() {
+  std::vector<Vector3<double>> all;
+  for (int i = 0; i < 27; ++i) {
+    const Vector3<double> v(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    if (!v.isZero()) all.push_back(v.normalized());
+  }
+  return all;
+}
+
+/// acos of the trace, the axis from the skew part over sin t.
+Vector3<float> textbook_log(const Matrix3<float>& r) {
+  const float t = std::acos(std::clamp((r.trace() - 1) / 2, -1.0f, 1.0f));
+  return axial(r) * (t / (2 * std::sin(t)));
+}
+
+/// (1 − t/2 cot(t/2))/t² = Σ_n 2 ζ(2n) x^(n−1) / (2π)^(2n), or its derivative by x = t².
+long double cotangent_series(long double x, bool derivative) {
+  static const auto kScales = [] {
+    constexpr long double kFull = 2 * std::numbers::pi_v<long double>;
+    std::array<long double, 60> scales{kFull * kFull / 24};  // ζ(2), which converges slowly
+    for (std::size_t n = 2; n <= scales.size(); ++n) {
+      for (int i = 400; i >= 1; --i) scales[n - 1] += std::pow(static_cast<long double>(i), -2.0L * n);
+    }
+    for (std::size_t n = 1; n <= scales.size(); ++n) scales[n - 1] *= 2 * std::pow(kFull, -2.0L * n);
+    return scales;
+  }();
+  long double sum = 0, power = 1;
+  for (std::size_t n = derivative ? 1 : 0; n < kScales.size(); ++n) {
+    sum += kScales[n] * power * (derivative ? n : 1);
+    power *= x;
+  }
+  return sum;
+}
+
+}  // namespace
+
 /// C1: at no rotation and near it.
 std::vector<StressFigure> gradient_at_identity(Remedy remedy) {
   double value = 0, at_zero = 0, near_zero = 0;
@@ -155,16 +199,6 @@ std::vector<StressFigure> coefficients(Remedy remedy) {
   return {{"relative error of (1 - cos t)/t^2", value, 4 * 1.19e-7}, {"relative error of its derivative", slope, 1e-5}};
 }
 
-/// The first terms of c_k, as many as do for small angles.
-double short_series(int k, double x) {
-  double sum = 0, term = detail::inverse_factorial<double>(k);
-  for (int j = 0; j < 4; ++j) {
-    sum += term;
-    term *= -x / ((2 * j + k + 1) * (2 * j + k + 2));
-  }
-  return sum;
-}
-
 /// C4: the formulas on either side of each switch, from half of it to twice.
 std::vector<StressFigure> switches(Remedy remedy) {
   const bool on = remedy == Remedy::kOn;
@@ -202,22 +236,6 @@ std::vector<StressFigure> switches(Remedy remedy) {
           {"jump of c2 at the switch to sines, ulp", step, 2}};
 }
 
-/// The 26 directions to the faces, edges and corners of a cube.
-std::vector<Vector3<double>> cube_directions() {
-  std::vector<Vector3<double>> all;
-  for (int i = 0; i < 27; ++i) {
-    const Vector3<double> v(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-    if (!v.isZero()) all.push_back(v.normalized());
-  }
-  return all;
-}
-
-/// acos of the trace, the axis from the skew part over sin t.
-Vector3<float> textbook_log(const Matrix3<float>& r) {
-  const float t = std::acos(std::clamp((r.trace() - 1) / 2, -1.0f, 1.0f));
-  return axial(r) * (t / (2 * std::sin(t)));
-}
-
 /// C5: angle and axis of rotations at and near half a turn.
 std::vector<StressFigure> log_near_half_turn(Remedy remedy) {
   double angle_error = 0, axis_error = 0, round_trip = 0;
@@ -238,25 +256,6 @@ std::vector<StressFigure> log_near_half_turn(Remedy remedy) {
   return {{"error of the angle, rad", angle_error, 2 * 1.19e-7 * kPi},
           {"error of the axis", axis_error, 1e-6},
           {"exp(log R) - R, units of eps", round_trip / 1.19e-7, 4}};
-}
-
-/// (1 − t/2 cot(t/2))/t² = Σ_n 2 ζ(2n) x^(n−1) / (2π)^(2n), or its derivative by x = t².
-long double cotangent_series(long double x, bool derivative) {
-  static const auto kScales = [] {
-    constexpr long double kFull = 2 * std::numbers::pi_v<long double>;
-    std::array<long double, 60> scales{kFull * kFull / 24};  // ζ(2), which converges slowly
-    for (std::size_t n = 2; n <= scales.size(); ++n) {
-      for (int i = 400; i >= 1; --i) scales[n - 1] += std::pow(static_cast<long double>(i), -2.0L * n);
-    }
-    for (std::size_t n = 1; n <= scales.size(); ++n) scales[n - 1] *= 2 * std::pow(kFull, -2.0L * n);
-    return scales;
-  }();
-  long double sum = 0, power = 1;
-  for (std::size_t n = derivative ? 1 : 0; n < kScales.size(); ++n) {
-    sum += kScales[n] * power * (derivative ? n : 1);
-    power *= x;
-  }
-  return sum;
 }
 
 /// C6: the coefficient of the inverse Jacobian and its derivative in float, 0 to π.
@@ -283,34 +282,4 @@ std::vector<StressFigure> inverse_jacobian(Remedy remedy) {
   return {{"relative error of the coefficient", value, 1e-5}, {"relative error of its derivative", slope, 1e-5}};
 }
 
-}  // namespace
-
-std::span<const StressCase> rotation_cases() {
-  static constexpr std::array kCases = {
-      StressCase{"C1", "the gradient of axis-angle at 0 is infinity times 0", "one operator in the squared angle",
-                 gradient_at_identity},
-      StressCase{"C2", "a guarded norm makes the gradient at 0 exactly 0", "the gradient's value at 0: the generators",
-                 gradient_leaves_identity},
-      StressCase{"C3", "1 - cos t cancels, its derivative more so", "series and half angles", coefficients},
-      StressCase{"C4", "a series is used too far", "switches where both formulas are right", switches},
-      StressCase{"C5", "near half a turn acos and a vanishing difference lose angle and axis",
-                 "largest-pivot quaternion and atan2", log_near_half_turn},
-      StressCase{"C6", "the inverse Jacobian's coefficient is 0/0 at 0 and near pi", "series and half angles",
-                 inverse_jacobian},
-      StressCase{"C7", "q and -q give angles that differ by a turn", "the sign is fixed first", quaternion_signs},
-      StressCase{"C8", "zero, tiny and huge quaternions divide by zero", "scaling by the largest entry",
-                 quaternion_lengths},
-      StressCase{"C9", "parallel columns give a singular matrix without an error", "another axis, and a flag",
-                 parallel_columns},
-      StressCase{"C10", "square roots of a matrix's pivots have infinite gradients", "only the largest pivot's branch",
-                 pivots},
-      StressCase{"C11", "what is not a number passes from a branch not taken", "only the branch taken counts",
-                 dead_branches},
-      StressCase{"C12", "rotations composed along a chain drift", "the chain runs in double", chains},
-      StressCase{"C13", "a view along its up direction has no axes", "another axis, an error where eye is target",
-                 views_along_up},
-  };
-  return kCases;
-}
-
-}  // namespace hsi4d
+}  // namespace hsi4d::stress

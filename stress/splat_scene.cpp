@@ -40,16 +40,6 @@ void Scene::add(const Vector3<double>& mean, const Vector3<double>& scales, doub
   gaussians.sh.resize(gaussians.opacity_logits.size() * static_cast<std::size_t>(3 * gaussians.sh_coefficients()));
 }
 
-Camera front_camera(int width, int height) {
-  Camera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.fx = camera.fy = width;
-  camera.cx = 0.5 * width;
-  camera.cy = 0.5 * height;
-  return camera;
-}
-
 Camera tilted_camera(int width, int height) {
   Camera camera = front_camera(width, height);
   camera.camera_from_world = look_at({1.2, -3.6, 1.3}, {0, 0, 0});
@@ -83,6 +73,29 @@ Scene random_scene(Index n, std::uint64_t seed, int width, int height) {
   return scene;
 }
 
+Scene small_scene(Index n, int width, int height, std::uint64_t seed) {
+  Scene scene = empty_scene(front_camera(width, height));
+  scene.background = {0.2F, 0.3F, 0.4F};
+  Gaussians& g = scene.gaussians;
+  g.sh_degree = 1;
+  RandomSequence random(seed);
+  const auto add = [&](std::vector<float>& to, double low, double high) {
+    to.push_back(static_cast<float>(random.uniform(low, high)));
+  };
+  for (Index i = 0; i < n; ++i) {
+    const double z = random.uniform(2, 5), half = 0.5 * z, aspect = static_cast<double>(height) / width;
+    add(g.means, -half, half);
+    add(g.means, -half * aspect, half * aspect);
+    add(g.means, z, z + 1e-3);
+    for (int k = 0; k < 4; ++k) add(g.quats, -1, 1);
+    const double pixel = z / width;
+    for (int k = 0; k < 3; ++k) add(g.log_scales, std::log(pixel), std::log(5 * pixel));
+    add(g.opacity_logits, -1, 3);
+    for (int k = 0; k < 12; ++k) add(g.sh, k < 3 ? -1 : -0.2, k < 3 ? 1.5 : 0.2);
+  }
+  return scene;
+}
+
 Scene scaled(Scene scene, double factor) {
   for (float& x : scene.gaussians.means) x = static_cast<float>(x * factor);
   for (float& x : scene.gaussians.log_scales) x = static_cast<float>(x + std::log(factor));
@@ -107,26 +120,24 @@ Scene in_world(Scene scene) {
 }
 
 template <class S>
-TapedScene<S>::TapedScene(const Scene& scene, const std::vector<double>& given_axes)
+TapedScene<S>::TapedScene(const Scene& scene, const std::vector<double>& given_axes, const RenderRequest& request)
     : view{scene.camera, scene.gaussians.origin_world, scene.settings} {
   const Gaussians& g = scene.gaussians;
   const Index n = g.count();
+  const auto leaf = [this](const char* name, const Shape& shape, const auto& numbers) {
+    return stress::leaf(tape, name, shape, numbers);
+  };
   means = leaf("means", shape_of(n, 3), g.means);
   quats = leaf("quats", shape_of(n, 4), g.quats);
   log_scales = leaf("log_scales", shape_of(n, 3), g.log_scales);
   opacity_logits = leaf("opacity_logits", shape_of(n, 1), g.opacity_logits);
   sh = leaf("sh", shape_of(n, 3 * g.sh_coefficients()), g.sh);
   xi = tape.parameter("xi", shape_of(1, 6));
-  background = leaf("background", shape_of(1, 3), {scene.background.begin(), scene.background.end()});
-  if (given_axes.empty()) {
-    axes = gaussian_axes(quats, log_scales);
-  } else {
-    axes = tape.parameter("axes", shape_of(n, 9));
-    tape.set(axes, std::vector<S>(given_axes.begin(), given_axes.end()));
-  }
+  background = leaf("background", shape_of(1, 3), scene.background);
+  axes = given_axes.empty() ? gaussian_axes(quats, log_scales) : leaf("axes", shape_of(n, 9), given_axes);
   opacities = gaussian_opacities(opacity_logits);
   colors = sh_colors(sh, means, xi, view);
-  rendered = render<S>({means, axes, opacities, colors}, xi, background, view);
+  rendered = render<S>({means, axes, opacities, colors}, xi, background, view, request);
   loss = weighted_sum(rendered.image, 1) + weighted_sum(rendered.transmittance, 2);
 }
 
@@ -144,13 +155,6 @@ std::vector<double> TapedScene<S>::value(Var<S> of) const {
 template <class S>
 std::vector<double> TapedScene<S>::gradient(Var<S> of) const {
   return tape.has_gradient(of) ? numbers_of<S>(tape.gradient(of)) : std::vector<double>{};
-}
-
-template <class S>
-Var<S> TapedScene<S>::leaf(const char* name, const Shape& shape, const std::vector<float>& numbers) {
-  const Var<S> var = tape.parameter(name, shape);
-  tape.set(var, std::vector<S>(numbers.begin(), numbers.end()));
-  return var;
 }
 
 template struct TapedScene<float>;
@@ -176,6 +180,12 @@ Rendering render_scene(const Scene& scene, const std::vector<double>& axes) {
 
 template Rendering render_scene<float>(const Scene&, const std::vector<double>&);
 template Rendering render_scene<double>(const Scene&, const std::vector<double>&);
+
+std::vector<double> exact_image(const Scene& scene) {
+  TapedScene<double> taped(scene);
+  taped.tape.forward(taped.rendered.image);
+  return taped.value(taped.rendered.image);
+}
 
 double crop_difference(const Scene& whole, const Scene& part, int left, int top) {
   const std::vector<double> image = render_scene<float>(whole).image, window = render_scene<float>(part).image;

@@ -9,6 +9,7 @@
 #include "splat/gaussians.h"
 #include "splat/reference/reference.h"
 #include "splat/render/render.h"
+#include "stress/front_view.h"
 
 namespace hsi4d::stress {
 
@@ -23,8 +24,6 @@ struct Scene {
            const std::array<double, 3>& color);
 };
 
-/// A camera at the origin with the world's axes as its own: p_camera = p_world. Focal length = width.
-Camera front_camera(int width, int height);
 /// A camera in general position that looks at the origin from about 4 m away.
 Camera tilted_camera(int width, int height);
 
@@ -32,6 +31,9 @@ Camera tilted_camera(int width, int height);
 Scene empty_scene(const Camera& camera);
 /// Gaussians of all shapes in a ball that fills the tilted camera's view; degree 3. Every number is a float.
 Scene random_scene(Index n, std::uint64_t seed, int width, int height);
+
+/// Gaussians all over the front camera's image, 2 to 5 m away, from 2 to 10 pixels wide; degree 1.
+Scene small_scene(Index n, int width, int height, std::uint64_t seed);
 
 /// The scene and its camera, `factor` times as large.
 Scene scaled(Scene scene, double factor);
@@ -51,15 +53,13 @@ struct TapedScene {
   Var<S> loss;  ///< Σ of image and transmittance, times weights in [−1, 1]
 
   /// @param axes  [N,9] metres, instead of those of quaternions and log-scales; empty: these
-  explicit TapedScene(const Scene& scene, const std::vector<double>& axes = {});
+  explicit TapedScene(const Scene& scene, const std::vector<double>& axes = {}, const RenderRequest& request = {});
 
   /// Forward and backward.
   void run();
   std::vector<double> value(Var<S> of) const;
   std::vector<double> gradient(Var<S> of) const;
-
- private:
-  Var<S> leaf(const char* name, const Shape& shape, const std::vector<float>& numbers);
+  std::vector<Var<S>> leaves() const { return {means, quats, log_scales, opacity_logits, sh, xi, background}; }
 };
 
 /// What becomes of a scene, in double.
@@ -73,6 +73,9 @@ struct Rendering {
 
 template <class S>
 Rendering render_scene(const Scene& scene, const std::vector<double>& axes = {});
+
+/// The image of a scene, in double.
+std::vector<double> exact_image(const Scene& scene);
 
 /// The largest difference of the image of `part` and the window of the image of `whole` at (left, top), in float.
 double crop_difference(const Scene& whole, const Scene& part, int left, int top);

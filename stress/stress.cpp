@@ -30,16 +30,6 @@ bool StressResult::holds() const { return error.empty() && !with.empty() && all_
 
 bool StressResult::would_fail() const { return error_without.empty() && !all_hold(without); }
 
-std::vector<StressCase> stress_cases() {
-  std::vector<StressCase> all;
-  for (const auto cases : {projection_cases, blending_cases, rotation_cases, body_cases, loss_cases, arithmetic_cases,
-                           poison_cases, metamorphic_cases, long_run_cases}) {
-    const std::span<const StressCase> group = cases();
-    all.insert(all.end(), group.begin(), group.end());
-  }
-  return all;
-}
-
 std::vector<StressResult> run_stress(std::span<const StressCase> cases,
                                      const std::function<void(const StressResult&)>& done, int threads) {
   std::vector<StressResult> results;

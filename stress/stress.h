@@ -33,9 +33,9 @@ struct StressCase {
   /// The figures, the same ones in the same order for both. The same in every run but for times; seconds at most. What
   /// it throws counts as a figure that does not hold, and without the remedy proves nothing.
   std::vector<StressFigure> (*run)(Remedy);
+  const char* tried_on = "";  ///< the scenes by their sizes, where there are such: "60 Gaussians, 48 x 32 px"
   const char* exempt = "";    ///< why this row cannot apply here; then `run` is null
   bool own_threads = false;   ///< it compares numbers of threads, so it runs beside any limit
-  const char* tried_on = "";  ///< the scenes by their sizes, where there are such: "60 Gaussians, 48 x 32 px"
 };
 
 /// What became of a case.
@@ -53,25 +53,12 @@ struct StressResult {
 };
 
 /// All cases, in the order of the catalogue: rows A1 to F16, then those beyond it (poison, metamorphic, long runs).
-std::vector<StressCase> stress_cases();
+std::span<const StressCase> stress_cases();
 
 /// Runs cases in order.
 /// @param done     called after each of them; may be empty
 /// @param threads  at most so many for all but those which compare numbers of them; 0: one a core
 std::vector<StressResult> run_stress(std::span<const StressCase> cases,
                                      const std::function<void(const StressResult&)>& done = {}, int threads = 0);
-
-// --- the cases, by file
-// ------------------------------------------------------------------------------------------------
-
-std::span<const StressCase> projection_cases();   ///< A: projection, covariance
-std::span<const StressCase> blending_cases();     ///< B: alpha, blending, sorting
-std::span<const StressCase> rotation_cases();     ///< C
-std::span<const StressCase> body_cases();         ///< D: skinning, priors, contacts
-std::span<const StressCase> loss_cases();         ///< E
-std::span<const StressCase> arithmetic_cases();   ///< F: tape, Adam, arithmetic, determinism, build
-std::span<const StressCase> poison_cases();       ///< P: what is not a number, in every slot of every operator
-std::span<const StressCase> metamorphic_cases();  ///< R: relations that a render has to keep
-std::span<const StressCase> long_run_cases();     ///< L: 10,000 steps
 
 }  // namespace hsi4d

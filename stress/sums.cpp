@@ -3,9 +3,10 @@
 #include <cmath>
 
 #include "autodiff/difference.h"
-#include "stress/arithmetic.h"
-#include "stress/moving.h"
-#include "stress/small_scene.h"
+#include "stress/plain_adam.h"
+#include "stress/rows.h"
+#include "stress/splat_scene.h"
+#include "stress/tape_numbers.h"
 #include "stress/thread_order.h"
 
 namespace hsi4d::stress {
@@ -16,8 +17,8 @@ namespace {
 std::vector<double> fitted(int threads, Remedy remedy) {
   std::vector<double> all;
   with_threads(threads, [&] {
-    const SmallScene scene = small_scene(200, 80, 48, 6);
-    TapedSmallScene<float> taped(scene);
+    const Scene scene = small_scene(200, 80, 48, 6);
+    TapedScene<float> taped(scene);
     const Var<float> offset = taped.tape.parameter("offset", kScalarShape);
     const Var<float> image = taped.rendered.image, target = taped.tape.constant("target", image.shape());
     set_numbers(taped.tape, target, exact_image(small_scene(200, 80, 48, 7)));
@@ -57,15 +58,13 @@ WideGradients wide_gradients() {
   using G = WideGaussian;
   Tape<S> tape;
   const auto leaf = [&](const char* name, const std::vector<double>& numbers) {
-    const Var<S> var = tape.parameter(name, shape_of(1, std::ssize(numbers)));
-    set_numbers(tape, var, numbers);
-    return var;
+    return stress::leaf(tape, name, shape_of(1, std::ssize(numbers)), numbers);
   };
   const Var<S> means = leaf("means", {G::kX, G::kY}), opacity = leaf("opacity", {static_cast<float>(G::kOpacity)}),
                colour = leaf("colour", {static_cast<float>(0.8)});
   const Projected<S> projected{means, leaf("factors", {G::kSigma, 0, 0, 0, G::kSigma, 0}), leaf("depths", {2}),
                                tape.constant("rest", shape_of(1, 1)), tape.constant("rest", shape_of(1, 2))};
-  SplatView view = view_of({G::kWidth, G::kHeight, 1, {}, {}, {}, {}, {}});
+  const SplatView view = front_view(G::kWidth, G::kHeight);
   const Composited<S> out = composite(SplatSet<S>{projected, opacity, colour}, view);
   std::vector<S> cotangent(static_cast<std::size_t>(G::kWidth) * G::kHeight);
   for (std::size_t i = 0; i < cotangent.size(); ++i) cotangent[i] = static_cast<S>(G::cotangent(static_cast<Index>(i)));
@@ -98,9 +97,9 @@ WideGradients naive_wide_gradients() {
 }
 
 /// The number with 11 bits of significand, as half precision keeps it.
-double halved(double x) {
+float halved(float x) {
   int exponent = 0;
-  const double significand = std::frexp(x, &exponent);
+  const float significand = std::frexp(x, &exponent);
   return std::ldexp(std::nearbyint(significand * 2048) / 2048, exponent);
 }
 
@@ -126,11 +125,12 @@ std::vector<StressFigure> sums_over_pixels(Remedy remedy) {
 }
 
 std::vector<StressFigure> half_precision(Remedy remedy) {
-  const SmallScene scene = small_scene(120, 64, 48, 8);
-  SmallScene kept = scene;
+  const Scene scene = small_scene(120, 64, 48, 8);
+  Scene kept = scene;
   if (remedy == Remedy::kOff) {
-    for (auto* numbers : {&kept.means, &kept.quats, &kept.log_scales, &kept.logits, &kept.sh}) {
-      for (double& x : *numbers) x = halved(x);
+    Gaussians& g = kept.gaussians;
+    for (auto* numbers : {&g.means, &g.quats, &g.log_scales, &g.opacity_logits, &g.sh}) {
+      for (float& x : *numbers) x = halved(x);
     }
   }
   const auto run = [](auto& taped) {
@@ -138,8 +138,8 @@ std::vector<StressFigure> half_precision(Remedy remedy) {
     taped.tape.forward(loss);
     taped.tape.backward(loss);
   };
-  TapedSmallScene<double> exact(scene);
-  TapedSmallScene<float> computed(kept);
+  TapedScene<double> exact(scene);
+  TapedScene<float> computed(kept);
   run(exact);
   run(computed);
   return {{"error of the image, of 1",

@@ -4,8 +4,9 @@
 
 #include "autodiff/complex_step.h"
 #include "autodiff/gradcheck.h"
-#include "stress/arithmetic.h"
-#include "stress/small_scene.h"
+#include "stress/rows.h"
+#include "stress/splat_scene.h"
+#include "stress/tape_numbers.h"
 
 namespace hsi4d::stress {
 
@@ -185,21 +186,22 @@ std::vector<StressFigure> products_with_vectors(Remedy remedy) {
 // A third of the Gaussians goes behind the camera after an iteration in which it was before it: their rows hold what
 // they held then, and the adjoints NaN.
 std::vector<StressFigure> rows_not_drawn(Remedy remedy) {
-  SmallScene scene = small_scene(60, 32, 24, 15);
-  TapedSmallScene<float> taped(scene);
+  Scene scene = small_scene(60, 32, 24, 15);
+  TapedScene<float> taped(scene);
+  const Index count = scene.gaussians.count();
   std::vector<Index> behind;
-  for (Index n = 0; n < scene.count; n += 3) {
-    scene.means[static_cast<std::size_t>(3 * n + 2)] *= -1;
+  for (Index n = 0; n < count; n += 3) {
+    scene.gaussians.means[static_cast<std::size_t>(3 * n + 2)] *= -1;
     behind.push_back(n);
   }
   Tape<float>& tape = taped.tape;
   if (remedy == Remedy::kOff) {
     const Var<float> places =
-        tape.record(ProjectingOnlyTheVisible{}, {taped.means}, shape_of(scene.count, 2), Source::current());
+        tape.record(ProjectingOnlyTheVisible{}, {taped.means}, shape_of(count, 2), Source::current());
     const auto numbers = static_cast<std::size_t>(places.shape().count());
     tape.forward(places);
     tape.backward(places, std::vector<float>(numbers, std::numeric_limits<float>::quiet_NaN()));
-    set_numbers(tape, taped.means, scene.means);
+    tape.set(taped.means, scene.gaussians.means);
     tape.forward(places);
     tape.backward(places, std::vector<float>(numbers, 1));
     return {{"numbers of culled rows that are not 0", not_zero_at(taped.value(places), behind, 2), 0},
@@ -209,14 +211,14 @@ std::vector<StressFigure> rows_not_drawn(Remedy remedy) {
   const auto pixels = static_cast<std::size_t>(image.shape().count());
   tape.forward(image);
   tape.backward(image, std::vector<float>(pixels, std::numeric_limits<float>::quiet_NaN()));
-  set_numbers(tape, taped.means, scene.means);
+  tape.set(taped.means, scene.gaussians.means);
   tape.forward(image);
   tape.backward(image, std::vector<float>(pixels, 1));
   const Projected<float>& projected = taped.rendered.projected;
   double gradients = 0;
   for (const auto& [leaf, cols] :
        {std::pair(taped.means, Index(3)), std::pair(taped.quats, Index(4)), std::pair(taped.log_scales, Index(3)),
-        std::pair(taped.logits, Index(1)), std::pair(taped.sh, Index(12))}) {
+        std::pair(taped.opacity_logits, Index(1)), std::pair(taped.sh, Index(12))}) {
     gradients += not_zero_at(taped.gradient(leaf), behind, cols);
   }
   return {

@@ -7,9 +7,9 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "splat/reference/debug_pixel.h"
-#include "stress/blending_rows.h"
 #include "stress/flat_splats.h"
 #include "stress/measures.h"
+#include "stress/rows.h"
 
 namespace hsi4d::stress {
 
@@ -17,10 +17,10 @@ namespace {
 
 constexpr double kSumOf60 = 60 * 1.19e-7;  // rounding of as many terms up to 1
 
-SplatView one_pixel(const RenderSettings& settings) { return plain_view(1, 1, settings); }
+SplatView one_pixel(const RenderSettings& settings) { return front_view(1, 1, settings); }
 
 void add_layer(FlatSplats& stack, double alpha, double color) {
-  stack.add_round(0.5, 0.5, 1 + static_cast<double>(stack.count()), 3, alpha, {color});
+  stack.add(0.5, 0.5, 1 + static_cast<double>(stack.count()), 3, alpha, {color});
 }
 
 /// T in front of every layer, and the gradients of the pixel by the alphas.
@@ -161,7 +161,7 @@ std::vector<StressFigure> stop_rule(Remedy remedy) {
 /// A thousand layers just below 1/255, which together are nearly opaque.
 std::vector<StressFigure> faint_layers(Remedy remedy) {
   FlatSplats stack;
-  for (int i = 0; i < 1000; ++i) stack.add_round(0.5, 0.5, 1 + i, 3, 0.0039, {1, 1, 1});
+  for (int i = 0; i < 1000; ++i) stack.add(0.5, 0.5, 1 + i, 3, 0.0039, {1, 1, 1});
   const double exact = 1 - std::pow(1 - stack.opacities[0], 1000);
   const SplatView cut = one_pixel(RenderSettings()), whole = one_pixel(uncut_settings());
   const FlatRender<float> standard(stack, cut), uncut(stack, whole);
@@ -193,7 +193,7 @@ std::vector<StressFigure> million_on_one_pixel(Remedy remedy) {
   FlatSplats stack;
   const std::vector<double> round = {0.2, 0, 0, 0, 0.2, 0}, front = {1, 1, 1}, back = {0, 1, 1};
   for (int i = 0; i < count; ++i) stack.add(8.5, 8.5, 2, round, 0.3, i < 8 ? front : back);
-  const SplatView view = plain_view(17, 17, settings);
+  const SplatView view = front_view(17, 17, settings);
   FlatRender<float> render(stack, view);
   const std::vector<float> ones(static_cast<std::size_t>(render.out.channels.shape().count()), 1);
   double seconds = 0;

@@ -35,7 +35,7 @@ void add_carpet(SceneKit& kit) {
     const auto ring = static_cast<std::size_t>(std::clamp((v + petal) * 5.0, 0.0, 4.99));
     return Rgb(tones[ring] * (1 + 0.08 * kit.noise(Point(u * 180, v * 20, 2))));
   };
-  kit.model.add({[disc](double u, double v) { return disc(1 - u, v); }, rings, 2.6, 0, {}});
+  kit.model.add({[disc](double u, double v) { return disc(1 - u, v); }, rings, 2.6});
 }
 
 void add_bedroom_walls(SceneKit& kit) {
@@ -78,10 +78,7 @@ void add_quilt(SceneKit& kit) {
                    const Point p(left + u * (right - left), front + v * (back - front), 0);
                    return Point(p.x(), p.y(), 0.47 + 0.018 * kit.noise(p * 5));
                  },
-                 [=](double u, double v) { return patch(u * (right - left), v * (back - front) + 0.32, 0); },
-                 2.4,
-                 0,
-                 {}});
+                 [=](double u, double v) { return patch(u * (right - left), v * (back - front) + 0.32, 0); }, 2.4});
   const auto fold = [](double x) { return std::sin(21 * x) * 0.6 + std::sin(47 * x) * 0.4; };
   kit.model.add({[=](double u, double v) {
                    const double x = left + u * (right - left), drop = 0.3 + 0.02 * std::sin(9 * x);
@@ -91,9 +88,7 @@ void add_quilt(SceneKit& kit) {
                    const double x = u * (right - left);
                    return patch(x, v * 0.32, fold(left + x) * (1 - v));
                  },
-                 2.4,
-                 0,
-                 {}});
+                 2.4});
 }
 
 void add_pillow(SceneKit& kit, const Point& center, const Point& half, const Rgb& color, bool striped) {
@@ -105,7 +100,7 @@ void add_pillow(SceneKit& kit, const Point& center, const Point& half, const Rgb
   const Paint paint = [=](double u, double v) {
     return striped && std::abs(std::remainder(u * 7, 1.0)) < 0.2 ? Rgb(color * 0.55) : Rgb(color * (0.86 + 0.14 * v));
   };
-  kit.model.add({shape, paint, 2, 0, {}});
+  kit.model.add({shape, paint, 2});
 }
 
 void add_bed(SceneKit& kit) {
@@ -192,7 +187,7 @@ void add_bunting(SceneKit& kit) {
     const SheetShape flag = [=](double u, double v) {
       return Point(p + along * (0.5 + (u - 0.5) * v * 0.9) + Point(0, -0.01, -0.13 * (1 - v)));
     };
-    kit.model.add({flag, plain(flags[static_cast<std::size_t>(i % 4)]), 2.5, 0, {}});
+    kit.model.add({flag, plain(flags[static_cast<std::size_t>(i % 4)]), 2.5});
   }
 }
 

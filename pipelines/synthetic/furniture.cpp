@@ -62,10 +62,7 @@ void Piece::cushion(const Point& center, const Point& half, const Paint& paint, 
                    const double n = std::pow(d.x(), 4) + std::pow(d.y(), 4) + std::pow(d.z(), 4);
                    return ground.point(center + (d * std::pow(n, -0.25)).cwiseProduct(half));
                  },
-                 paint,
-                 detail,
-                 0,
-                 {}});
+                 paint, detail});
 }
 
 void Piece::ring(const Point& center, double radius, double thick, const Rgb& color, double detail) const {
@@ -85,10 +82,7 @@ void Piece::disc(const Point& center, double radius, double side, const Paint& p
                    const double angle = 2 * kPi * u * side, r = radius * v;
                    return ground.point(center + Point(0, r * std::cos(angle), r * std::sin(angle)));
                  },
-                 paint,
-                 detail,
-                 0,
-                 {}});
+                 paint, detail});
 }
 
 void add_sofa(SceneKit& kit, const Ground& ground, const SofaSize& size, const Rgb& cloth) {

@@ -54,7 +54,7 @@ void add_path(SceneKit& kit) {
       const double x = v * std::cos(2 * kPi * u), y = v * std::sin(2 * kPi * u);
       return Rgb(tone * (1 + 0.22 * kit.rough(Point(x * 4, y * 4, shift))) * (v > 0.9 ? 0.72 : 1));
     };
-    kit.model.add({stone, paint, 1.6, 0, {}});
+    kit.model.add({stone, paint, 1.6});
   }
 }
 
@@ -65,10 +65,7 @@ void add_flower_bed(SceneKit& kit, double left, double right, double front, doub
                    const double rim = std::min({u, 1 - u, v, 1 - v});
                    return Point(p.x(), p.y(), 0.015 + 0.05 * ramp(0, 0.3, rim) + 0.02 * kit.noise(p * 9));
                  },
-                 kit.mottled(earth, 0.4, 0.06, right - left, back - front),
-                 1,
-                 0,
-                 {}});
+                 kit.mottled(earth, 0.4, 0.06, right - left, back - front), 1});
   for (int i = 0; i < flowers; ++i) {
     const double x = left + (right - left) * (0.06 + 0.88 * kit.random.uniform());
     const double y = front + (back - front) * (0.1 + 0.8 * (i + kit.random.uniform()) / flowers);

@@ -31,6 +31,23 @@ struct KeyPose {
   HandKey left = {}, right = {};
 };
 
+// Rows of tables of keys.
+/// Hands that hold nothing.
+inline KeyPose free_hands(double seconds, const Vector3<double>& pelvis, const Vector3<double>& pelvis_turn,
+                          const Vector3<double>& spine, const Vector3<double>& head, const HandKey& left,
+                          const HandKey& right) {
+  KeyPose key{seconds, pelvis, pelvis_turn, spine, head};
+  key.left = left, key.right = right;
+  return key;
+}
+/// Hands that hold the object, or one that does beside a free one.
+inline KeyPose holding(double seconds, const Vector3<double>& pelvis, const Vector3<double>& pelvis_turn,
+                       const Vector3<double>& spine, const Vector3<double>& head, const Vector3<double>& object,
+                       const Vector3<double>& object_turn = {0, 0, 0}, double grip = 60, const HandKey& left = {},
+                       const HandKey& right = {}, const Vector3<double>& away = {0, 0, 0}) {
+  return {seconds, pelvis, pelvis_turn, spine, head, object, object_turn, away, grip, left, right};
+}
+
 /// A motion as keys, and what is the same in all of them.
 struct KeyedMotion {
   std::vector<KeyPose> keys;

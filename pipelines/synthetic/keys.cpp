@@ -24,50 +24,16 @@ KeyedMotion pour_motion() {
   motion.ground = kBesideTable;
   motion.feet = {planted_foot(0.15, 0.08, 14), planted_foot(-0.15, -0.08, -16)};
   motion.hands_hang = motion.shares_turn = false;
-  motion.keys = {{.seconds = 0,
-                  .pelvis = {-0.02, 0.07, -0.12},
-                  .pelvis_turn = {14, -6, 0},
-                  .spine = {26, -10, 2},
-                  .head = {14, -6, 0},
-                  .object = {-0.1, 0.58, 0.92},
-                  .grip = 52,
-                  .left = {{0.27, 0.2, 0.78}, {0, 0, 0}, 14}},
-                 {.seconds = 0.7,
-                  .pelvis = {0.04, -0.05, -0.02},
-                  .pelvis_turn = {2, 6, 1},
-                  .spine = {4, 8, -2},
-                  .head = {16, 4, 0},
-                  .object = {-0.08, 0.4, 1.06},
-                  .object_turn = {20, 0, 6},
-                  .grip = 62,
-                  .left = {{0.22, 0.25, 1.05}, {12, 0, 16}, 42}},
-                 {.seconds = 1.5,
-                  .pelvis = {0.07, -0.02, -0.03},
-                  .pelvis_turn = {3, 14, 3},
-                  .spine = {6, 22, -3},
-                  .head = {20, 10, 0},
-                  .object = {0.02, 0.42, 1.1},
-                  .object_turn = {42, 0, 16},
-                  .grip = 64,
-                  .left = {{0.28, 0.27, 1.07}, {10, 0, 10}, 30}},
-                 {.seconds = 2.3,
-                  .pelvis = {0.1, 0.02, -0.05},
-                  .pelvis_turn = {6, 16, 3},
-                  .spine = {12, 20, -4},
-                  .head = {24, 10, 0},
-                  .object = {0.06, 0.46, 1.06},
-                  .object_turn = {52, 0, 22},
-                  .grip = 64,
-                  .left = {{0.3, 0.27, 1.03}, {6, 0, 4}, 22}},
-                 {.seconds = kClipSeconds,
-                  .pelvis = {0.03, -0.04, -0.02},
-                  .pelvis_turn = {2, 4, 0},
-                  .spine = {2, 4, 0},
-                  .head = {8, 0, 0},
-                  .object = {-0.06, 0.38, 1.02},
-                  .object_turn = {6, 0, 4},
-                  .grip = 60,
-                  .left = {{0.22, 0.25, 1}, {8, 0, 6}, 36}}};
+  motion.keys = {holding(0, {-0.02, 0.07, -0.12}, {14, -6, 0}, {26, -10, 2}, {14, -6, 0}, {-0.1, 0.58, 0.92}, {0, 0, 0},
+                         52, {{0.27, 0.2, 0.78}, {0, 0, 0}, 14}),
+                 holding(0.7, {0.04, -0.05, -0.02}, {2, 6, 1}, {4, 8, -2}, {16, 4, 0}, {-0.08, 0.4, 1.06}, {20, 0, 6},
+                         62, {{0.22, 0.25, 1.05}, {12, 0, 16}, 42}),
+                 holding(1.5, {0.07, -0.02, -0.03}, {3, 14, 3}, {6, 22, -3}, {20, 10, 0}, {0.02, 0.42, 1.1},
+                         {42, 0, 16}, 64, {{0.28, 0.27, 1.07}, {10, 0, 10}, 30}),
+                 holding(2.3, {0.1, 0.02, -0.05}, {6, 16, 3}, {12, 20, -4}, {24, 10, 0}, {0.06, 0.46, 1.06},
+                         {52, 0, 22}, 64, {{0.3, 0.27, 1.03}, {6, 0, 4}, 22}),
+                 holding(kClipSeconds, {0.03, -0.04, -0.02}, {2, 4, 0}, {2, 4, 0}, {8, 0, 0}, {-0.06, 0.38, 1.02},
+                         {6, 0, 4}, 60, {{0.22, 0.25, 1}, {8, 0, 6}, 36})};
   return motion;
 }
 
@@ -80,61 +46,21 @@ KeyedMotion lift_motion(double begin, bool two_hands) {
   KeyedMotion motion;
   motion.ground = kBesideTable;
   motion.feet = {planted_foot(0.15, 0.06, 12), planted_foot(-0.15, -0.05, -14)};
-  motion.keys = {{.seconds = 0,
-                  .pelvis = {-0.01, 0.03, -0.05 - 0.04 * stoop},
-                  .pelvis_turn = {7, -3, 0},
-                  .spine = {14 + 6 * stoop, -5, 1},
-                  .head = {16, -4, 0},
-                  .object = there,
-                  .object_turn = begin_turn,
-                  .away = {two_hands ? 0.0 : -0.04, -0.11, 0.13},
-                  .grip = 16,
-                  .left = {{0.02, 0.06 + 0.1 * stoop, 0.02 - 0.12 * stoop}, {0, 0, 0}, 22}},
-                 {.seconds = 0.55,
-                  .pelvis = {-0.02, 0.06, -0.1 - 0.09 * stoop},
-                  .pelvis_turn = {13, -6, 0},
-                  .spine = {23 + 9 * stoop, -9, 2},
-                  .head = {14, -6, 0},
-                  .object = there,
-                  .object_turn = begin_turn,
-                  .grip = 30,
-                  .left = {{0.05 - 0.06 * stoop, 0.12 + 0.16 * stoop, 0.06 - 0.3 * stoop}, {0, 0, 0}, 24}},
-                 {.seconds = 0.85,  // the fingers close, the knees give
-                  .pelvis = {-0.02, 0.05, -0.125 - 0.1 * stoop},
-                  .pelvis_turn = {14, -6, 0},
-                  .spine = {24 + 9 * stoop, -9, 2},
-                  .head = {12, -6, 0},
-                  .object = there,
-                  .object_turn = begin_turn,
-                  .grip = 60,
-                  .left = {{0.05 - 0.06 * stoop, 0.12 + 0.16 * stoop, 0.06 - 0.3 * stoop}, {0, 0, 0}, 26}},
-                 {.seconds = 1.6,
-                  .pelvis = {0.02, -0.05, -0.03},
-                  .pelvis_turn = {2, 2, 0},
-                  .spine = {0, 2, -2},
-                  .head = {16, 2, 0},
-                  .object = {0.8 * left, 0.4, 1.1},
-                  .object_turn = {-6, 0, 4 + 36 * across},
-                  .grip = 64,
-                  .left = {{0.06, 0.03, 0.03}, {0, 0, 0}, 28}},
-                 {.seconds = 2.25,
-                  .pelvis = {0.04, -0.03, -0.025},
-                  .pelvis_turn = {1, 14, 2},
-                  .spine = {-2, 18, -2},
-                  .head = {2, 8, 0},
-                  .object = {left + 0.14, 0.37, high - 0.03},
-                  .object_turn = {-10, 0, 26 + 54 * across},
-                  .grip = 64,
-                  .left = {{0.05, 0.02, 0.02}, {0, 0, 0}, 26}},
-                 {.seconds = kClipSeconds,
-                  .pelvis = {0.03, -0.03, -0.025},
-                  .pelvis_turn = {1, 12, 1},
-                  .spine = {-3, 15, -1},
-                  .head = {-2, 6, 0},
-                  .object = {left + 0.1, 0.38, high},
-                  .object_turn = {6, 0, 20 + 56 * across},
-                  .grip = 64,
-                  .left = {{0.05, 0.02, 0.02}, {0, 0, 0}, 26}}};
+  motion.keys = {
+      holding(0, {-0.01, 0.03, -0.05 - 0.04 * stoop}, {7, -3, 0}, {14 + 6 * stoop, -5, 1}, {16, -4, 0}, there,
+              begin_turn, 16, {{0.02, 0.06 + 0.1 * stoop, 0.02 - 0.12 * stoop}, {0, 0, 0}, 22}, {},
+              {two_hands ? 0.0 : -0.04, -0.11, 0.13}),
+      holding(0.55, {-0.02, 0.06, -0.1 - 0.09 * stoop}, {13, -6, 0}, {23 + 9 * stoop, -9, 2}, {14, -6, 0}, there,
+              begin_turn, 30, {{0.05 - 0.06 * stoop, 0.12 + 0.16 * stoop, 0.06 - 0.3 * stoop}, {0, 0, 0}, 24}),
+      // the fingers close, the knees give
+      holding(0.85, {-0.02, 0.05, -0.125 - 0.1 * stoop}, {14, -6, 0}, {24 + 9 * stoop, -9, 2}, {12, -6, 0}, there,
+              begin_turn, 60, {{0.05 - 0.06 * stoop, 0.12 + 0.16 * stoop, 0.06 - 0.3 * stoop}, {0, 0, 0}, 26}),
+      holding(1.6, {0.02, -0.05, -0.03}, {2, 2, 0}, {0, 2, -2}, {16, 2, 0}, {0.8 * left, 0.4, 1.1},
+              {-6, 0, 4 + 36 * across}, 64, {{0.06, 0.03, 0.03}, {0, 0, 0}, 28}),
+      holding(2.25, {0.04, -0.03, -0.025}, {1, 14, 2}, {-2, 18, -2}, {2, 8, 0}, {left + 0.14, 0.37, high - 0.03},
+              {-10, 0, 26 + 54 * across}, 64, {{0.05, 0.02, 0.02}, {0, 0, 0}, 26}),
+      holding(kClipSeconds, {0.03, -0.03, -0.025}, {1, 12, 1}, {-3, 15, -1}, {-2, 6, 0}, {left + 0.1, 0.38, high},
+              {6, 0, 20 + 56 * across}, 64, {{0.05, 0.02, 0.02}, {0, 0, 0}, 26})};
   return motion;
 }
 
@@ -146,41 +72,16 @@ KeyedMotion heavy_lift_motion(const FigureSizes& sizes, double begin) {
   KeyedMotion motion;
   motion.ground = {{0, 0.7}, -28};
   motion.feet = {planted_foot(0.15, 0, 14), planted_foot(-0.15, 0, -14)};
-  motion.keys = {{.seconds = 0,
-                  .pelvis = {0, -0.24, -0.36},
-                  .pelvis_turn = {42, 0, 0},
-                  .spine = {34, 0, 0},
-                  .head = {-34, 0, 0},
-                  .object = floor,
-                  .grip = 62},
-                 {.seconds = 0.35,  // the hips go down before the bar comes up
-                  .pelvis = {0, -0.25, -0.39},
-                  .pelvis_turn = {41, 0, 0},
-                  .spine = {33, 0, 0},
-                  .head = {-34, 0, 0},
-                  .object = floor,
-                  .grip = 66},
-                 {.seconds = 1.2,
-                  .pelvis = {0, -0.17, -0.16},
-                  .pelvis_turn = {33, 0, 0},
-                  .spine = {24, 0, 0},
-                  .head = {-26, 0, 0},
-                  .object = {0, 0.18, 0.5 * (begin + hangs) + 0.05},
-                  .grip = 66},
-                 {.seconds = 2.1,
-                  .pelvis = {0, 0.01, -0.012},
-                  .pelvis_turn = {-1, 0, 0},
-                  .spine = {0, 0, 0},
-                  .head = {0, 0, 0},
-                  .object = {0, 0.14, hangs + 0.035},
-                  .grip = 66},
-                 {.seconds = kClipSeconds,  // leans back a little under the weight
-                  .pelvis = {0, 0.03, -0.014},
-                  .pelvis_turn = {-3, 0, 0},
-                  .spine = {-4, 0, 0},
-                  .head = {2, 4, 0},
-                  .object = {0, 0.14, hangs + 0.05},
-                  .grip = 66}};
+  motion.keys = {
+      holding(0, {0, -0.24, -0.36}, {42, 0, 0}, {34, 0, 0}, {-34, 0, 0}, floor, {0, 0, 0}, 62),
+      // the hips go down before the bar comes up
+      holding(0.35, {0, -0.25, -0.39}, {41, 0, 0}, {33, 0, 0}, {-34, 0, 0}, floor, {0, 0, 0}, 66),
+      holding(1.2, {0, -0.17, -0.16}, {33, 0, 0}, {24, 0, 0}, {-26, 0, 0}, {0, 0.18, 0.5 * (begin + hangs) + 0.05},
+              {0, 0, 0}, 66),
+      holding(2.1, {0, 0.01, -0.012}, {-1, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0.14, hangs + 0.035}, {0, 0, 0}, 66),
+      // leans back a little under the weight
+      holding(kClipSeconds, {0, 0.03, -0.014}, {-3, 0, 0}, {-4, 0, 0}, {2, 4, 0}, {0, 0.14, hangs + 0.05}, {0, 0, 0},
+              66)};
   return motion;
 }
 
@@ -195,48 +96,19 @@ KeyedMotion sit_motion(double seat, double chair_grip) {
   const auto on_thigh = [&](double left, double forward, double up) {
     return HandKey{{left, forward, up}, {45, 0, 0}, 24};
   };
-  motion.keys = {{.seconds = 0, .pelvis = {0, 0, -0.012}, .spine = {1, 0, 0}, .object = chair},
-                 {.seconds = 0.4,  // the trunk goes forward first
-                  .pelvis = {0, -0.1, -0.06},
-                  .pelvis_turn = {16, 0, 0},
-                  .spine = {14, 0, 0},
-                  .head = {-6, 0, 0},
-                  .object = chair,
-                  .left = {{-0.01, 0.14, 0.06}, {6, 0, 0}, 20},
-                  .right = {{0.01, 0.14, 0.06}, {6, 0, 0}, 20}},
-                 {.seconds = 1.25,
-                  .pelvis = {0, -0.35, seat + 0.05},
-                  .pelvis_turn = {24, 0, 0},
-                  .spine = {22, 0, 0},
-                  .head = {-18, 0, 0},
-                  .object = chair,
-                  .left = left_leans,
-                  .right = right_leans},
-                 {.seconds = 1.6,
-                  .pelvis = {0, -0.395, seat},
-                  .pelvis_turn = {8, 0, 0},
-                  .spine = {12, 0, 0},
-                  .head = {-8, 0, 0},
-                  .object = chair,
-                  .left = on_thigh(-0.1, -0.06, -0.25),
-                  .right = on_thigh(0.1, -0.06, -0.25)},
-                 {.seconds = 2.1,
-                  .pelvis = {0, -0.415, seat},
-                  .pelvis_turn = {-8, 0, 0},
-                  .spine = {3, 0, 0},
-                  .head = {2, 0, 0},
-                  .object = chair,
-                  .left = on_thigh(-0.1, -0.1, -0.25),
-                  .right = on_thigh(0.1, -0.1, -0.25)},
-                 {.seconds = kClipSeconds,  // turns on the seat
-                  .pelvis = {0, -0.415, seat},
-                  .pelvis_turn = {-8, 17, 0},
-                  .spine = {3, 8, 0},
-                  .head = {4, 14, 0},
-                  .object = chair,
-                  .object_turn = {0, 0, 17},
-                  .left = on_thigh(-0.13, -0.13, -0.25),
-                  .right = on_thigh(0.06, -0.05, -0.25)}};
+  motion.keys = {holding(0, {0, 0, -0.012}, {0, 0, 0}, {1, 0, 0}, {0, 0, 0}, chair),
+                 // the trunk goes forward first
+                 holding(0.4, {0, -0.1, -0.06}, {16, 0, 0}, {14, 0, 0}, {-6, 0, 0}, chair, {0, 0, 0}, 60,
+                         {{-0.01, 0.14, 0.06}, {6, 0, 0}, 20}, {{0.01, 0.14, 0.06}, {6, 0, 0}, 20}),
+                 holding(1.25, {0, -0.35, seat + 0.05}, {24, 0, 0}, {22, 0, 0}, {-18, 0, 0}, chair, {0, 0, 0}, 60,
+                         left_leans, right_leans),
+                 holding(1.6, {0, -0.395, seat}, {8, 0, 0}, {12, 0, 0}, {-8, 0, 0}, chair, {0, 0, 0}, 60,
+                         on_thigh(-0.1, -0.06, -0.25), on_thigh(0.1, -0.06, -0.25)),
+                 holding(2.1, {0, -0.415, seat}, {-8, 0, 0}, {3, 0, 0}, {2, 0, 0}, chair, {0, 0, 0}, 60,
+                         on_thigh(-0.1, -0.1, -0.25), on_thigh(0.1, -0.1, -0.25)),
+                 // turns on the seat
+                 holding(kClipSeconds, {0, -0.415, seat}, {-8, 17, 0}, {3, 8, 0}, {4, 14, 0}, chair, {0, 0, 17}, 60,
+                         on_thigh(-0.13, -0.13, -0.25), on_thigh(0.06, -0.05, -0.25))};
   return motion;
 }
 
@@ -248,49 +120,18 @@ KeyedMotion lean_motion(bool on_chair, double chair_grip) {
   const auto on_knee = [&](double left, double forward, double up) {
     return HandKey{{left, forward, up}, {50, 0, 0}, 26};
   };
-  motion.keys = {{.seconds = 0,
-                  .pelvis = {0, -0.01, -0.02},
-                  .pelvis_turn = {3, 0, 0},
-                  .spine = {5, 0, 0},
-                  .head = {6, 0, 0},
-                  .object = {0, far, chair_grip},
-                  .grip = 48},
-                 {.seconds = 0.3,  // back before forward
-                  .pelvis = {0, -0.03, -0.03},
-                  .pelvis_turn = {1, 0, 0},
-                  .spine = {2, 0, 0},
-                  .head = {4, 0, 0},
-                  .object = {0, far - 0.01, chair_grip},
-                  .grip = 54},
-                 {.seconds = 1.15,
-                  .pelvis = {0.02, -0.16, -0.07},
-                  .pelvis_turn = {on_chair ? 26.0 : 34.0, 0, 2},
-                  .spine = {on_chair ? 24.0 : 30.0, 0, -2},
-                  .head = {on_chair ? -16.0 : -22.0, 0, 0},
-                  .object = {0, far + 0.07, chair_grip},
-                  .grip = 58,
-                  .left = on_knee(-0.1, 0.2, -0.16),
-                  .right = on_knee(0.1, 0.2, -0.16)},
-                 {.seconds = 2.0,
-                  .pelvis = {0.055, -0.15, -0.075},
-                  .pelvis_turn = {on_chair ? 27.0 : 35.0, 5, 5},
-                  .spine = {on_chair ? 23.0 : 28.0, 7, -6},
-                  .head = {on_chair ? -18.0 : -24.0, 22, 0},
-                  .object = {0.03, far + 0.1, chair_grip},
-                  .object_turn = {0, 0, 12},
-                  .grip = 58,
-                  .left = on_knee(-0.09, 0.2, -0.16),
-                  .right = on_knee(0.11, 0.2, -0.16)},
-                 {.seconds = kClipSeconds,
-                  .pelvis = {-0.02, -0.1, -0.05},
-                  .pelvis_turn = {15, -3, -2},
-                  .spine = {16, -4, 2},
-                  .head = {-8, -12, 0},
-                  .object = {-0.02, far + 0.05, chair_grip},
-                  .object_turn = {0, 0, -8},
-                  .grip = 56,
-                  .left = on_knee(-0.05, 0.12, 0.0),
-                  .right = on_knee(0.05, 0.12, 0.0)}};
+  motion.keys = {
+      holding(0, {0, -0.01, -0.02}, {3, 0, 0}, {5, 0, 0}, {6, 0, 0}, {0, far, chair_grip}, {0, 0, 0}, 48),
+      // back before forward
+      holding(0.3, {0, -0.03, -0.03}, {1, 0, 0}, {2, 0, 0}, {4, 0, 0}, {0, far - 0.01, chair_grip}, {0, 0, 0}, 54),
+      holding(1.15, {0.02, -0.16, -0.07}, {on_chair ? 26.0 : 34.0, 0, 2}, {on_chair ? 24.0 : 30.0, 0, -2},
+              {on_chair ? -16.0 : -22.0, 0, 0}, {0, far + 0.07, chair_grip}, {0, 0, 0}, 58, on_knee(-0.1, 0.2, -0.16),
+              on_knee(0.1, 0.2, -0.16)),
+      holding(2.0, {0.055, -0.15, -0.075}, {on_chair ? 27.0 : 35.0, 5, 5}, {on_chair ? 23.0 : 28.0, 7, -6},
+              {on_chair ? -18.0 : -24.0, 22, 0}, {0.03, far + 0.1, chair_grip}, {0, 0, 12}, 58,
+              on_knee(-0.09, 0.2, -0.16), on_knee(0.11, 0.2, -0.16)),
+      holding(kClipSeconds, {-0.02, -0.1, -0.05}, {15, -3, -2}, {16, -4, 2}, {-8, -12, 0},
+              {-0.02, far + 0.05, chair_grip}, {0, 0, -8}, 56, on_knee(-0.05, 0.12, 0.0), on_knee(0.05, 0.12, 0.0))};
   return motion;
 }
 
@@ -298,30 +139,14 @@ KeyedMotion wave_motion(const Vector& carried) {
   KeyedMotion motion;
   motion.ground = {{0.1, 0.7}, -20};
   motion.feet = {planted_foot(0.12, 0.03, 10), planted_foot(-0.12, -0.02, -12)};
-  motion.keys = {{.seconds = 0, .pelvis = {0, 0, -0.012}, .spine = {2, 0, 0}, .object = carried},
-                 {.seconds = 0.25,  // the weight goes to the other leg
-                  .pelvis = {-0.02, 0, -0.016},
-                  .pelvis_turn = {0, 0, 1},
-                  .spine = {3, 0, 1},
-                  .object = carried,
-                  .left = {{0.01, -0.03, 0.005}, {0, 0, 0}, 24}},
-                 {.seconds = 0.95,
-                  .pelvis = {-0.035, -0.01, -0.018},
-                  .pelvis_turn = {0, 3, 2},
-                  .spine = {-2, 5, 4},
-                  .head = {-3, 6, -4},
-                  .object = carried + Vector(-0.01, 0, 0.01)},
-                 {.seconds = 2.2,
-                  .pelvis = {-0.03, -0.01, -0.018},
-                  .pelvis_turn = {0, 4, 2},
-                  .spine = {-2, 6, 5},
-                  .head = {-3, 8, 4},
-                  .object = carried + Vector(-0.01, 0, 0.015)},
-                 {.seconds = kClipSeconds,
-                  .pelvis = {-0.01, 0, -0.014},
-                  .spine = {0, 2, 1},
-                  .head = {2, 3, 0},
-                  .object = carried}};
+  motion.keys = {
+      holding(0, {0, 0, -0.012}, {0, 0, 0}, {2, 0, 0}, {0, 0, 0}, carried),
+      // the weight goes to the other leg
+      holding(0.25, {-0.02, 0, -0.016}, {0, 0, 1}, {3, 0, 1}, {0, 0, 0}, carried, {0, 0, 0}, 60,
+              {{0.01, -0.03, 0.005}, {0, 0, 0}, 24}),
+      holding(0.95, {-0.035, -0.01, -0.018}, {0, 3, 2}, {-2, 5, 4}, {-3, 6, -4}, carried + Vector(-0.01, 0, 0.01)),
+      holding(2.2, {-0.03, -0.01, -0.018}, {0, 4, 2}, {-2, 6, 5}, {-3, 8, 4}, carried + Vector(-0.01, 0, 0.015)),
+      holding(kClipSeconds, {-0.01, 0, -0.014}, {0, 0, 0}, {0, 2, 1}, {2, 3, 0}, carried)};
   return motion;
 }
 

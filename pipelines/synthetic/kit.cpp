@@ -152,7 +152,7 @@ void SceneKit::add_curtain(double left, double right, double low, double high, c
     const double hem = v < 0.05 ? 0.8 : 1;
     return Rgb(cloth * hem * (0.86 + 0.16 * fold(u)));
   };
-  model.add({shape, paint, 2.5, 0, {}});
+  model.add({shape, paint, 2.5});
 }
 
 void SceneKit::add_plant(const Point& foot, double size) {
@@ -185,7 +185,7 @@ void SceneKit::add_plant(const Point& foot, double size) {
       const double vein = std::exp(-std::pow((u - 0.5) / 0.09, 2));
       return mixed(Rgb(green * (0.75 + 0.35 * v)), Rgb(0.68, 0.8, 0.45), 0.6 * vein);
     };
-    model.add({leaf, paint, 3, 0.04, {}});
+    model.add({leaf, paint, 3, 0.04});
   }
 }
 

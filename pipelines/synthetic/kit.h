@@ -82,41 +82,20 @@ class SceneKit {
   SmoothNoise noise_;
 };
 
+using MakeScene = void(SceneKit& kit);
+using SceneLight = double(const ScenePlan& plan, const Point& p, const Point& normal);
+
 /// A scene's maker, its light and what it is.
 struct SceneMaker {
   SyntheticSceneKind kind;
   const char* summary;
-  void (*make)(SceneKit& kit);
-  double (*light)(const ScenePlan& plan, const Point& p, const Point& normal);
+  MakeScene* make;
+  SceneLight* light;
 };
 
-void make_living_room(SceneKit& kit);
-double living_room_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_kitchen(SceneKit& kit);
-double kitchen_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_bedroom(SceneKit& kit);
-double bedroom_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_garden(SceneKit& kit);
-double garden_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_terrace(SceneKit& kit);
-double terrace_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_gym(SceneKit& kit);
-double gym_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_bar(SceneKit& kit);
-double bar_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_playground(SceneKit& kit);
-double playground_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_greenhouse(SceneKit& kit);
-double greenhouse_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_cafe(SceneKit& kit);
-double cafe_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_store(SceneKit& kit);
-double store_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_bicycle(SceneKit& kit);
-double bicycle_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_room(SceneKit& kit);
-double room_light(const ScenePlan& plan, const Point& p, const Point& normal);
-void make_truck(SceneKit& kit);
-double truck_light(const ScenePlan& plan, const Point& p, const Point& normal);
+MakeScene make_living_room, make_kitchen, make_bedroom, make_garden, make_terrace, make_gym, make_bar, make_playground,
+    make_greenhouse, make_cafe, make_store, make_bicycle, make_room, make_truck;
+SceneLight living_room_light, kitchen_light, bedroom_light, garden_light, terrace_light, gym_light, bar_light,
+    playground_light, greenhouse_light, cafe_light, store_light, bicycle_light, room_light, truck_light;
 
 }  // namespace hsi4d::detail

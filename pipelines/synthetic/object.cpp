@@ -98,7 +98,7 @@ void add_vase(SurfaceModel& model) {
     const double r = radius(1 - 0.4 * v) - 0.004, angle = -2 * kPi * u;
     return Point(r * std::cos(angle), r * std::sin(angle), kHeight * (1 - 0.4 * v));
   };
-  model.add({inside, plain(Rgb(0.3, 0.33, 0.42)), 0.5, 0, {}});
+  model.add({inside, plain(Rgb(0.3, 0.33, 0.42)), 0.5});
   model.add_revolution(
       Point::Zero(), [=](double v) { return Vector2<double>(radius(0) * v, 0.002); }, plain(Rgb(0.35, 0.33, 0.3)), 0.4);
 }
@@ -133,24 +133,15 @@ void add_guitar(SurfaceModel& model) {
     return Rgb(mahogany * (1 + 0.1 * std::sin(60 * y) + 0.06 * std::sin(23 * v)));
   };
   const Paint band = [=](double u, double) { return std::abs(u - 0.5) > 0.42 ? ivory : mahogany; };
-  model.add({[=](double u, double v) { return Point(kDeep, (2 * u - 1) * guitar_half(v * kBody), v * kBody); },
-             top,
-             1.2,
-             0.08,
-             {}});
-  model.add({[=](double u, double v) { return Point(-kDeep, (1 - 2 * u) * guitar_half(v * kBody), v * kBody); },
-             back,
-             0.7,
-             0.08,
-             {}});
+  model.add({[=](double u, double v) { return Point(kDeep, (2 * u - 1) * guitar_half(v * kBody), v * kBody); }, top,
+             1.2, 0.08});
+  model.add({[=](double u, double v) { return Point(-kDeep, (1 - 2 * u) * guitar_half(v * kBody), v * kBody); }, back,
+             0.7, 0.08});
   for (const double side : {1.0, -1.0}) {
     model.add({[=](double u, double v) {
                  return Point(side * (1 - 2 * u) * kDeep, side * guitar_half(v * kBody), v * kBody);
                },
-               band,
-               0.8,
-               0.05,
-               {}});
+               band, 0.8, 0.05});
   }
   const Paint fret_board = [=](double, double v) {
     return std::abs(std::remainder(v * 17, 1.0)) < 0.09 ? Rgb(0.75, 0.7, 0.55) : ebony;
@@ -193,10 +184,7 @@ void add_cushion(SurfaceModel& model, const Point& center, const Point& half, co
                    d[(axis + 2) % 3] = 2 * v - 1;
                    return rounded(d);
                  },
-                 weave,
-                 1,
-                 0,
-                 {}});
+                 weave, 1});
 }
 
 void add_office_chair(SurfaceModel& model) {

@@ -23,10 +23,9 @@ void add_drum(SurfaceModel& model, const Point& center, double radius, double ha
     const double angle = 2 * kPi * u;
     return Point(center + Point(r * std::cos(angle), y, r * std::sin(angle)));
   };
-  model.add({[=](double u, double v) { return at(u, radius, half_width * (1 - 2 * v)); }, plain(rim), 1, 0, {}});
+  model.add({[=](double u, double v) { return at(u, radius, half_width * (1 - 2 * v)); }, plain(rim), 1});
   for (const double side : {-1.0, 1.0})
-    model.add(
-        {[=](double u, double v) { return at(side > 0 ? 1 - u : u, radius * v, side * half_width); }, face, 1, 0, {}});
+    model.add({[=](double u, double v) { return at(side > 0 ? 1 - u : u, radius * v, side * half_width); }, face, 1});
 }
 
 }  // namespace
@@ -91,7 +90,7 @@ void add_shopping_cart(SurfaceModel& model) {
     const bool is_wire = std::abs(std::remainder(u * 12, 1.0)) < 0.2 || std::abs(std::remainder(v * 12, 1.0)) < 0.2;
     return is_wire ? Rgb(0.65, 0.66, 0.69) : Rgb(0.35, 0.36, 0.38);
   };
-  model.add({[=](double u, double v) { return floor(back + (front - back) * v, 1 - 2 * u); }, mesh, 0.6, 0, {}});
+  model.add({[=](double u, double v) { return floor(back + (front - back) * v, 1 - 2 * u); }, mesh, 0.6});
   model.add_box(
       Point(0.2, 0.03, low + 0.12), Point(0.11, 0.08, 0.1), 0.3,
       [](int face) { return plain(face == 5 ? Rgb(0.9, 0.75, 0.3) : Rgb(0.93, 0.62, 0.16)); }, 0.7);

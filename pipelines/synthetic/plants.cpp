@@ -38,12 +38,12 @@ void add_sky(SceneKit& kit) {
     const double cloud = ramp(0.08, 0.5, kit.rough(Point(x * 0.55, v * 7, 12)));
     return mixed(sky, Rgb(0.99, 0.99, 0.98), 0.85 * cloud * ramp(0.26, 0.36, v));
   };
-  kit.model.add({dome, paint, 0.03, 0, {}});
+  kit.model.add({dome, paint, 0.03});
   const SheetShape behind = [dome](double u, double v) {  // what shows between the Gaussians of the first
     const Point p = dome(u, v);
     return Point(1.04 * p.x(), 1.5 + 1.04 * (p.y() - 1.5), p.z());
   };
-  kit.model.add({behind, paint, 0.01, 0, {}});
+  kit.model.add({behind, paint, 0.01});
 }
 
 void add_bush(SceneKit& kit, const Point& center, const Point& half, const Rgb& green, double rough, double detail) {
@@ -59,7 +59,7 @@ void add_bush(SceneKit& kit, const Point& center, const Point& half, const Rgb& 
   const Paint paint = [=, &kit](double u, double v) {
     return Rgb(foliage(kit, green, place(u, v), size) * (0.72 + 0.34 * v));
   };
-  kit.model.add({place, paint, detail, 0, {}});
+  kit.model.add({place, paint, detail});
 }
 
 void add_hedge(SceneKit& kit, double left, double right, double front, double depth, double height) {
@@ -73,16 +73,13 @@ void add_hedge(SceneKit& kit, double left, double right, double front, double de
     return bumped(Point(left + u * length, front + round, height * v), Point(0, -1, 0));
   };
   kit.model.add(
-      {side,
-       [=, &kit](double u, double v) { return Rgb(foliage(kit, green, side(u, v), 0.085) * (0.62 + 0.45 * v)); },
-       1.1,
-       0,
-       {}});
+      {side, [=, &kit](double u, double v) { return Rgb(foliage(kit, green, side(u, v), 0.085) * (0.62 + 0.45 * v)); },
+       1.1});
   const SheetShape top = [=](double u, double v) {
     return bumped(Point(left + u * length, front + 0.1 + v * depth, height), Point(0, 0, 1));
   };
   kit.model.add(
-      {top, [=, &kit](double u, double v) { return Rgb(foliage(kit, green, top(u, v), 0.085) * 1.12); }, 0.8, 0, {}});
+      {top, [=, &kit](double u, double v) { return Rgb(foliage(kit, green, top(u, v), 0.085) * 1.12); }, 0.8});
 }
 
 void add_tree(SceneKit& kit, const Point& foot, double size) {
@@ -128,7 +125,7 @@ void add_flower(SceneKit& kit, const Point& foot, double height) {
       return Point(foot + out * (0.16 * height / 0.35 * v) + Point(0, 0, height * (0.1 + 0.62 * v * (1.4 - v))) +
                    w * across);
     };
-    kit.model.add({leaf, plain(green * (0.9 + 0.25 * i)), 1.2, 0, {}});
+    kit.model.add({leaf, plain(green * (0.9 + 0.25 * i)), 1.2});
   }
   const double r = 0.035 + 0.02 * kit.random.uniform();
   const SheetShape blossom = [=](double u, double v) {  // a cup that looks at the camera
@@ -136,7 +133,7 @@ void add_flower(SceneKit& kit, const Point& foot, double height) {
     const Point side(1, 0, 0), up = Point(0, 0.45, 0.9), front = Point(0, -0.9, 0.45);
     return Point(tip + radius * (std::cos(angle) * side + std::sin(angle) * up) + 0.4 * r * v * v * front);
   };
-  kit.model.add({blossom, [petal](double, double v) { return v < 0.3 ? Rgb(0.85, 0.65, 0.15) : petal; }, 3, 0, {}});
+  kit.model.add({blossom, [petal](double, double v) { return v < 0.3 ? Rgb(0.85, 0.65, 0.15) : petal; }, 3});
 }
 
 }  // namespace hsi4d::detail

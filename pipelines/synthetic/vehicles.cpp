@@ -17,14 +17,14 @@ void add_wheel(const Piece& piece, const Point& center, double radius, double ha
     return ground.point(center + Point(r * std::cos(angle), forward, r * std::sin(angle)));
   };
   piece.kit.model.add(
-      {[=](double u, double v) { return around(u, radius, half_width * (1 - 2 * v)); }, plain(kRubber), 1, 0, {}});
+      {[=](double u, double v) { return around(u, radius, half_width * (1 - 2 * v)); }, plain(kRubber), 1});
   const Paint face = [](double u, double v) {
     if (v > 0.62) return std::abs(std::remainder(u * 40, 1.0)) < 0.1 ? Rgb(0.13, 0.13, 0.14) : kRubber;
     if (v > 0.54) return kChrome;
     if (v < 0.14) return Rgb(0.5, 0.51, 0.54);
     return std::abs(std::remainder(u * 6, 1.0)) < 0.17 ? Rgb(0.2, 0.2, 0.22) : Rgb(0.66, 0.67, 0.7);
   };
-  piece.kit.model.add({[=](double u, double v) { return around(1 - u, radius * v, half_width); }, face, 1.6, 0, {}});
+  piece.kit.model.add({[=](double u, double v) { return around(1 - u, radius * v, half_width); }, face, 1.6});
 }
 
 /// Side windows: glass that shows the sky, a dark frame.

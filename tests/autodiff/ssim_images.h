@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "autodiff/ssim.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/operator_check.h"
 
 namespace hsi4d::test {
@@ -140,10 +140,4 @@ inline double norm(const std::vector<double>& a) {
   for (const double v : a) sum += v * v;
   return std::sqrt(sum);
 }
-inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  double worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = larger(worst, std::fabs(a[i] - b[i]));
-  return worst;
-}
-
 }  // namespace hsi4d::test

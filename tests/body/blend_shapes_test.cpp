@@ -7,7 +7,7 @@
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
 #include "core/rotation.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/operator_check.h"
 #include "tests/support/random_numbers.h"
 
@@ -103,29 +103,6 @@ TEST_CASE("correctives of some joints are those columns of the whole") {
   tape.forward(split);
   const auto a = numbers_of(tape.value(whole)), b = numbers_of(tape.value(split));
   for (std::size_t i = 0; i < a.size(); ++i) CHECK(std::abs(a[i] - b[i]) < 1e-14);
-}
-
-TEST_CASE("D3: the offsets of tiny rotations are accurate to rounding of their own size") {
-  for (const double size : {1e-6, 1e-4, 1e-2}) {
-    Tape<float> tape;
-    const auto w = tape.parameter("w", shape_of(1, 3));
-    tape.set(w, {static_cast<float>(0.3 * size), static_cast<float>(-size), static_cast<float>(0.7 * size)});
-    const auto offsets = rotation_offsets_from_axis_angle(w), rotations = rotations_from_axis_angle(w);
-    const auto subtracted = rotation_offsets(rotations);
-    tape.forward(offsets);
-    tape.forward(subtracted);
-    const float* x = tape.value(w).data;
-    const Matrix3<double> exact = so3_exp_minus_identity(
-        Vector3<double>(static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])));
-    double error = 0, error_subtracted = 0;
-    for (int i = 0; i < 9; ++i) {
-      error = larger(error, std::abs(static_cast<double>(tape.value(offsets).data[i]) / exact(i / 3, i % 3) - 1));
-      error_subtracted = std::max(error_subtracted,
-                                  std::abs(static_cast<double>(tape.value(subtracted).data[i]) - exact(i / 3, i % 3)));
-    }
-    CHECK(error < 1e-6);
-    CHECK(error_subtracted < 1e-7);
-  }
 }
 
 TEST_CASE("arrays that do not fit the directions are refused") {

@@ -10,7 +10,7 @@
 #include "body/procedural_body.h"
 #include "core/random.h"
 #include "core/rotation.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/temporary_folder.h"
 
 namespace glb_test {

@@ -12,7 +12,7 @@
 #include "core/random.h"
 #include "core/rotation.h"
 #include "tests/support/allocation_counter.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/operator_check.h"
 
 namespace kinematics_test {
@@ -94,13 +94,6 @@ struct Taped {
 template <class S>
 Numbers numbers_of(const ConstArray<S>& array) {
   return {array.data, array.data + array.shape.count()};
-}
-
-double largest_difference(const Numbers& a, const Numbers& b) {
-  REQUIRE(a.size() == b.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::fabs(a[i] - b[i]));
-  return largest;
 }
 
 }  // namespace

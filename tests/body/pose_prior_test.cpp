@@ -8,6 +8,7 @@
 #include "body/body_model.h"
 #include "body/natural_pose.h"
 #include "core/rotation.h"
+#include "tests/support/measures.h"
 #include "tests/support/operator_check.h"
 #include "tests/support/vposer_checkpoint.h"
 
@@ -77,16 +78,6 @@ Numbers plain_decode(const VposerCheckpoint& c, const Numbers& z) {
 template <class S>
 Numbers numbers_of(const ConstArray<S>& array) {
   return {array.data, array.data + array.shape.count()};
-}
-
-double largest_difference(const Numbers& a, const Numbers& b) {
-  REQUIRE(a.size() == b.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double difference = std::abs(a[i] - b[i]);
-    largest = difference <= largest ? largest : difference;  // NaN stays
-  }
-  return largest;
 }
 
 template <class S>

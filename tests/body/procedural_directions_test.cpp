@@ -11,7 +11,7 @@
 #include "body/procedural_shape.h"
 #include "body/smplx_body.h"
 #include "core/random.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace procedural_directions_test {
 

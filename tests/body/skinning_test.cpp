@@ -10,7 +10,7 @@
 #include "core/parallel.h"
 #include "core/simd.h"
 #include "tests/support/allocation_counter.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/operator_check.h"
 
 namespace skinning_test {

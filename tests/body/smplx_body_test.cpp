@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/measures.h"
 #include "tests/support/operator_check.h"
 #include "tests/support/smplx_reference.h"
 
@@ -23,16 +24,6 @@ using Numbers = std::vector<double>;
 
 SmplxModel model_of(const SmplxArrays& arrays, const SmplxFileOptions& options = {}) {
   return decode_smplx(smplx_writer(arrays).encode(), "body.npz", options);
-}
-
-double largest_difference(const Numbers& a, const Numbers& b) {
-  REQUIRE(a.size() == b.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double difference = std::abs(a[i] - b[i]);
-    largest = difference <= largest ? largest : difference;  // NaN stays
-  }
-  return largest;
 }
 
 template <class S>

@@ -10,6 +10,7 @@
 
 #include "core/linear.h"
 #include "core/random.h"
+#include "stress/rotation_measures.h"
 #include "tests/support/seeds.h"
 
 namespace hsi4d::testing {
@@ -35,32 +36,10 @@ Matrix3<S> square(const Column<S, 9>& v) {
   return v.reshaped(3, 3);
 }
 
-/// Casts that are not inlined: g++ 12's vectoriser (-ftree-slp-vectorize) sometimes turns double → float → double
-/// within one function into nothing, which would compare the wrong numbers.
-template <int R, int C>
-[[gnu::noinline]] Eigen::Matrix<float, R, C> narrow(const Eigen::Matrix<double, R, C>& m) {
-  return m.template cast<float>();
-}
-template <class S, int R, int C>
-[[gnu::noinline]] Eigen::Matrix<double, R, C> widen(const Eigen::Matrix<S, R, C>& m) {
-  return m.template cast<double>();
-}
-
-/// Distance in units in the last place of `reference`.
-template <class S, class R>
-double ulps(S value, R reference) {
-  const auto exact = static_cast<long double>(reference);
-  const long double unit = std::ldexp(1.0L, std::ilogb(exact) + 1 - std::numeric_limits<S>::digits);
-  return static_cast<double>(std::fabs(static_cast<long double>(value) - exact) / unit);
-}
-
-/// Largest entry of |R Rᵀ − I|, computed in double, in units of S's epsilon.
-template <class S>
-double orthogonality_error(const Matrix3<S>& r) {
-  const Matrix3<double> d = widen(r);
-  return (d * d.transpose() - Matrix3<double>::Identity()).cwiseAbs().maxCoeff() /
-         static_cast<double>(std::numeric_limits<S>::epsilon());
-}
+using stress::narrow;
+using stress::orthogonality_error;
+using stress::ulps;
+using stress::widen;
 
 /// Gradient of g · f(x) by complex step.
 template <int N, class F, int M>

@@ -12,7 +12,7 @@
 
 #include "core/check.h"
 #include "tests/crc32.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/scratch_folder.h"
 
 namespace image_io_test {

@@ -19,10 +19,6 @@ Vector3<S> tail(const Column<S, 6>& x) {
   return x.template tail<3>();
 }
 
-double triple_product(const Matrix3<double>& r) {
-  return dot(Vector3<double>(r.col(0)), cross(Vector3<double>(r.col(1)), Vector3<double>(r.col(2))));
-}
-
 const auto kForward = []<class S>(const Column<S, 6>& x) { return flat(rotation_from_6d(head(x), tail(x))); };
 const auto kAdjoint = [](const Column<double, 6>& x, const Column<double, 9>& g, Column<double, 6>& d_x) {
   Vector3<double> d_a = head(d_x), d_b = tail(d_x);
@@ -66,7 +62,7 @@ TEMPLATE_TEST_CASE("C9: 6D gives a rotation at every angle between the columns a
       const Matrix3<S> r = rotation_from_6d(a, b, &degenerate);
       CAPTURE(angle, repeat);
       CHECK(orthogonality_error(r) <= 4);
-      CHECK(triple_product(widen(r)) == Approx(1).epsilon(1e-6));
+      CHECK(stress::determinant(widen(r)) == Approx(1).epsilon(1e-6));
       if (digit != 4) CHECK(degenerate == (digit > 4));
       Vector3<S> d_a = Vector3<S>::Zero(), d_b = Vector3<S>::Zero();
       rotation_from_6d_adjoint(a, b, Matrix3<S>(Matrix3<S>::Ones()), d_a, d_b);

@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace vector_exp_test {
 

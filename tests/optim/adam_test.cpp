@@ -1,6 +1,5 @@
 #include "optim/adam.h"
 
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -9,9 +8,8 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
 #include "core/parallel.h"
-#include "core/stopwatch.h"
 #include "tests/support/allocation_counter.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace adam_test {
 
@@ -303,40 +301,6 @@ TEST_CASE("the learning rate falls geometrically to its final share") {
   CHECK(scheduled_rate(settings, 50, 101) == Approx(0.002).epsilon(1e-14));
   CHECK(scheduled_rate(settings, 100, 101) == Approx(0.0002).epsilon(1e-14));
   CHECK(scheduled_rate(settings, 0, 1) == 0.02);
-}
-
-TEST_CASE("moments that fade away never become denormal") {
-  Slopes<float> problem(shape_of(64, 16));
-  ParameterGroupSettings settings;
-  settings.lr = 0.01;
-  Adam<float> adam(problem.tape, {problem.group(settings)}, {});
-  problem.tape.set(problem.slopes, std::vector<float>(1024, 0.3f));
-  problem.step(adam, 0, 200000);
-  problem.tape.set(problem.slopes, std::vector<float>(1024, 0));
-  problem.tape.forward(problem.loss);
-  problem.tape.backward(problem.loss);
-  const auto seconds_of = [&](int steps, Index first) {
-    const auto start = std::chrono::steady_clock::now();
-    for (int i = 0; i < steps; ++i) {
-      // The gradient is the same zero; only the optimiser runs.
-      problem.tape.forward(problem.loss);
-      problem.tape.backward(problem.loss);
-      adam.step(first + i, 200000, 0);
-    }
-    return seconds_since(start);
-  };
-  const double early = seconds_of(6000, 1);      // m is still normal: 0.9^6000 = 1e-275
-  const double fading = seconds_of(1500, 6001);  // m passes the smallest normal number after 6700 steps
-  seconds_of(92500, 7501);
-  for (const GroupMoments::Block& block : adam.moments("all").blocks) {
-    for (std::size_t k = 0; k < block.mean.size(); ++k) {
-      CHECK_FALSE(std::fpclassify(block.mean[k]) == FP_SUBNORMAL);
-      CHECK_FALSE(std::fpclassify(block.square[k]) == FP_SUBNORMAL);
-    }
-    CHECK(block.mean[0] == 0);
-  }
-  for (const float x : problem.numbers()) CHECK_FALSE(std::fpclassify(x) == FP_SUBNORMAL);
-  CHECK(fading / 1500 < 5 * early / 6000);  // wide: shared machines; denormals cost tens of times
 }
 
 TEST_CASE("steps are the same for any number of threads", "[parallel]") {

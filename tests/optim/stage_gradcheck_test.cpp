@@ -7,7 +7,7 @@
 
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace stage_gradcheck_test {
 

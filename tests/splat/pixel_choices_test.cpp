@@ -17,7 +17,7 @@ namespace {
 
 /// The choices, their number checked against the compositor's counter.
 PixelChoices choices_of(const FlatSplats& splats, const SplatView& view) {
-  Flat<float> flat(splats, view);
+  FlatRender<float> flat(splats, view);
   const PixelChoices choices = pixel_choices(flat.tape, flat.projected, flat.opacities, view);
   CHECK(choices.fragments == flat.out.counters->fragments);
   return choices;
@@ -32,7 +32,7 @@ bool flips(const FlatSplats& splats, const SplatView& view, const std::function<
 }  // namespace
 
 TEST_CASE("pixel choices: what is a flip and what is none") {
-  const SplatView view = view_of_size(1, 1, RenderSettings());
+  const SplatView view = front_view(1, 1);
   FlatSplats splats;
   for (int i = 0; i < 4; ++i) splats.add(0.5, 0.5, 1 + i, 3, 0.5, {1});
   CHECK_FALSE(flips(splats, view, [](FlatSplats& s) { s.opacities[1] = 0.9; }));
@@ -51,7 +51,7 @@ TEST_CASE("pixel choices: what is a flip and what is none") {
 }
 
 TEST_CASE("pixel choices: counts, and only the pixels that change") {
-  SplatView view = view_of_size(40, 30, RenderSettings());
+  SplatView view = front_view(40, 30);
   const FlatSplats splats = random_flat(60, 40, 30, 3, 5);
   FlatSplats changed = splats;
   changed.add(20.5, 10.5, 0.5, 0.2, 2 * kAlphaMin, {1, 1, 1});  // reaches one pixel in front of all

@@ -39,7 +39,7 @@ TEST_CASE(
   const StressCase no_number{"X5", "no number", "nothing", [](Remedy r) {
                                return Figures{{"a", r == Remedy::kOn ? kNone : 3, 2}};
                              }};
-  const StressCase exempt{"X6", "exempt", "nothing", nullptr, "cannot be"};
+  const StressCase exempt{"X6", "exempt", "nothing", nullptr, "", "cannot be"};
   const ScratchFolder folder;
   const auto outcome_of = [&](const std::vector<StressCase>& cases) {
     return run_cases(cases, {.rows = {}, .threads = 1, .json = folder / "rows.jsonl"});

@@ -15,9 +15,11 @@ using namespace hsi4d;
 
 namespace {
 
-void check_group(std::span<const StressCase> cases) {
+void check_group(char letter) {
+  std::vector<StressCase> cases;
+  for (const StressCase& row : stress_cases())
+    if (row.id[0] == letter && row.run != nullptr) cases.push_back(row);
   run_stress(cases, [](const StressResult& result) {
-    if (result.row->run == nullptr) return;
     INFO("row " << result.row->id << ": " << result.row->failure);
     INFO("thrown: \"" << result.error << "\", without the remedy \"" << result.error_without << "\"");
     CHECK_FALSE(result.with.empty());
@@ -104,14 +106,14 @@ TEST_CASE("rows that compare numbers of threads run beside a limit, all others w
   CHECK(ids == std::vector<std::string>{"F6", "R9", "L3"});
 }
 
-TEST_CASE("rows A hold, and would not without their remedies") { check_group(projection_cases()); }
-TEST_CASE("rows B hold, and would not without their remedies") { check_group(blending_cases()); }
-TEST_CASE("rows C hold, and would not without their remedies") { check_group(rotation_cases()); }
-TEST_CASE("rows D hold, and would not without their remedies") { check_group(body_cases()); }
-TEST_CASE("rows E hold, and would not without their remedies") { check_group(loss_cases()); }
-TEST_CASE("rows F hold, and would not without their remedies", "[release]") { check_group(arithmetic_cases()); }
-TEST_CASE("what is not a number is caught in every slot", "[release]") { check_group(poison_cases()); }
-TEST_CASE("relations of renders hold", "[release]") { check_group(metamorphic_cases()); }
-TEST_CASE("10,000 steps end well", "[release]") { check_group(long_run_cases()); }
+TEST_CASE("rows A hold, and would not without their remedies") { check_group('A'); }
+TEST_CASE("rows B hold, and would not without their remedies") { check_group('B'); }
+TEST_CASE("rows C hold, and would not without their remedies") { check_group('C'); }
+TEST_CASE("rows D hold, and would not without their remedies") { check_group('D'); }
+TEST_CASE("rows E hold, and would not without their remedies") { check_group('E'); }
+TEST_CASE("rows F hold, and would not without their remedies", "[release]") { check_group('F'); }
+TEST_CASE("what is not a number is caught in every slot", "[release]") { check_group('P'); }
+TEST_CASE("relations of renders hold", "[release]") { check_group('R'); }
+TEST_CASE("10,000 steps end well", "[release]") { check_group('L'); }
 
 }  // namespace stress_test

@@ -6,7 +6,7 @@
 
 #include "core/parallel.h"
 #include "tests/support/isa.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/seeds.h"
 
 namespace hsi4d::test {

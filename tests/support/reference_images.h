@@ -8,7 +8,7 @@
 #include <catch2/catch.hpp>
 
 #include "splat/reference/reference.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/splat_scenes.h"
 
 namespace hsi4d::test {

@@ -12,7 +12,7 @@
 #include "core/quaternion.h"
 #include "splat/gaussians.h"
 #include "splat/sh_basis.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace hsi4d::test {
 
@@ -41,14 +41,6 @@ inline Gaussians plain_gaussians(Index n, int degree, unsigned seed = 7) {
     }
   }
   return g;
-}
-
-inline double largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
-  HSI4D_CHECK_EQ(a.size(), b.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    largest = larger(largest, std::fabs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
-  return largest;
 }
 
 inline double opacity_of(float logit) { return 1 / (1 + std::exp(-static_cast<double>(logit))); }

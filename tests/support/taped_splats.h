@@ -14,6 +14,8 @@
 #include "splat/render/opacity.h"
 #include "splat/render/render.h"
 #include "splat/render/sh.h"
+#include "stress/tape_numbers.h"
+#include "tests/support/measures.h"
 #include "tests/support/splat_scenes.h"
 
 namespace hsi4d::test {
@@ -38,17 +40,6 @@ struct NamedNumbers {
   std::vector<double> numbers;
 };
 
-/// |a − b| / |b| (L2); |a| where b is zero.
-inline double relative_l2(const std::vector<double>& a, const std::vector<double>& b) {
-  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
-  double difference = 0, size = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    difference += (a[i] - b[i]) * (a[i] - b[i]);
-    size += b[i] * b[i];
-  }
-  return std::sqrt(difference) / (size > 0 ? std::sqrt(size) : 1);
-}
-
 /// Relative L2 errors of gradients, by class. That of quaternions is zero but for rounding where Gaussians are round:
 /// if it is below 1e-6 of the log-scales', it is measured against that.
 inline std::vector<NamedNumbers> gradient_errors(const std::vector<NamedNumbers>& computed,
@@ -71,19 +62,7 @@ inline std::vector<NamedNumbers> gradient_errors(const std::vector<NamedNumbers>
   return errors;
 }
 
-inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
-  double worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = !(std::abs(a[i] - b[i]) <= worst) ? std::abs(a[i] - b[i]) : worst;
-  return worst;
-}
-
-template <class S>
-std::vector<double> wide_numbers(const ConstArray<S>& a) {
-  std::vector<double> result;
-  for (Index r = 0; r < a.total_rows(); ++r) result.insert(result.end(), a.row(r), a.row(r) + a.shape.cols);
-  return result;
-}
+using stress::numbers_of;
 
 /// Every family of settings whose numbers differ, applied to those of a scene; the scene's `near` is not lowered.
 struct SettingsVariant {
@@ -187,8 +166,8 @@ class TapedSplats {
     tape.backward(loss);
   }
 
-  std::vector<double> value(Var<S> of) const { return wide_numbers<S>(tape.value(of)); }
-  std::vector<double> gradient(Var<S> of) const { return wide_numbers<S>(tape.gradient(of)); }
+  std::vector<double> value(Var<S> of) const { return numbers_of<S>(tape.value(of)); }
+  std::vector<double> gradient(Var<S> of) const { return numbers_of<S>(tape.gradient(of)); }
 
   std::vector<NamedNumbers> gradients() const {
     std::vector<NamedNumbers> all;
@@ -203,9 +182,7 @@ class TapedSplats {
 
  private:
   Var<S> leaf(const char* name, const Shape& shape, const std::vector<float>& numbers) {
-    const Var<S> var = tape.parameter(name, shape);
-    tape.set(var, std::vector<S>(numbers.begin(), numbers.end()));
-    return var;
+    return stress::leaf(tape, name, shape, numbers);
   }
   void add_term(Var<S> image, const std::vector<double>& weights) {
     if (weights.empty()) return;

@@ -10,7 +10,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "tests/optim/solid/meshes.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/temporary_folder.h"
 
 namespace occupancy_grid_test {

@@ -9,7 +9,7 @@
 #include "pipelines/draw/posed_avatar.h"
 #include "pipelines/synthetic/object.h"
 #include "splat/files/io_ply.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/temporary_folder.h"
 
 namespace import_test {
@@ -37,13 +37,6 @@ std::vector<double> dense(const SparseWeights& w) {
     result[static_cast<std::size_t>(i / w.per_vertex * w.joints + w.indices[at])] += w.weights[at];
   }
   return result;
-}
-
-double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  REQUIRE(a.size() == b.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::abs(a[i] - b[i]));
-  return largest;
 }
 
 }  // namespace

@@ -107,11 +107,12 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
 
   const ProgramResult table = run_hsi4d({"evaluate", "one", "three"});
   CHECK(table.err.empty());
-  CHECK_THAT(table.out, StartsWith("                         one") && Contains("mean ± std\nMPJPE [mm] ") &&
-                            Contains("\n\none: frames 1 to 3 at 10 a second, against " + data("truth") + "\n") &&
-                            Contains("one: penetration by the mesh " + data("truth/surface.ply") +
-                                     ", of 500 points of the body\n") &&
-                            Contains("\ndiversity [mm] ") && Contains("  0.835  ") && Contains("  CHOIS 0.687, LINGO 0.699\n"));
+  CHECK_THAT(
+      table.out,
+      StartsWith("                         one") && Contains("mean ± std\nMPJPE [mm] ") &&
+          Contains("\n\none: frames 1 to 3 at 10 a second, against " + data("truth") + "\n") &&
+          Contains("one: penetration by the mesh " + data("truth/surface.ply") + ", of 500 points of the body\n") &&
+          Contains("\ndiversity [mm] ") && Contains("  0.835  ") && Contains("  CHOIS 0.687, LINGO 0.699\n"));
   // Two repetitions: one pair.
   CHECK(both["mean"]["diversity_mm"].get<double>() > 0);
   CHECK_FALSE(one.contains("diversity_mm"));

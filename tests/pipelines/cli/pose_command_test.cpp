@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/npz.h"
+#include "tests/support/measures.h"
 #include "tests/support/program.h"
 #include "tests/support/smplx_reference.h"
 
@@ -39,16 +40,6 @@ NpzWriter params_of(const SmplxPose& pose) {
   add("right_hand_pose", part(120, 45));
   add("transl", {pose.transl.begin(), pose.transl.end()});
   return file;
-}
-
-double largest_difference(const Numbers& a, const Numbers& b) {
-  REQUIRE(a.size() == b.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double difference = std::abs(a[i] - b[i]);
-    largest = difference <= largest ? largest : difference;
-  }
-  return largest;
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include "core/npz.h"
 #include "pipelines/cli/render_command.h"
 #include "splat/files/io_ply.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/program.h"
 
 namespace posed_avatar_test {
@@ -174,14 +174,6 @@ TEST_CASE("render draws a body of a motion, in every precision") {
 }
 
 namespace {
-
-/// The largest difference of two images' numbers.
-double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  REQUIRE(a.size() == b.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::fabs(a[i] - b[i]));
-  return largest;
-}
 
 Camera camera_at(const Vector3<double>& place) {
   Camera camera;

@@ -15,8 +15,8 @@
 #include "optim/loss_term.h"
 #include "pipelines/graph/camera_increment.h"
 #include "pipelines/graph/frame_masks.h"
-#include "tests/support/larger.h"
 #include "tests/support/loss_terms.h"
+#include "tests/support/measures.h"
 #include "tests/support/small_clip.h"
 
 namespace frame_graph_test {

@@ -11,7 +11,7 @@
 #include "optim/loss_term.h"
 #include "pipelines/draw/tape_image.h"
 #include "pipelines/graph/frame_graph.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/small_clip.h"
 
 namespace frame_motion_test {

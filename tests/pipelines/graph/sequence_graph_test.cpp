@@ -12,7 +12,7 @@
 #include "core/rotation.h"
 #include "optim/metrics.h"
 #include "optim/stage.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/small_clip.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/vposer_checkpoint.h"

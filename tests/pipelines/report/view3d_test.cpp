@@ -9,7 +9,7 @@
 #include "core/check.h"
 #include "core/quaternion.h"
 #include "core/rotation.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/small_clip.h"
 #include "tests/support/temporary_folder.h"
 
@@ -55,13 +55,6 @@ std::vector<double> transforms_of(const Safetensors& file, const std::string& na
     }
   }
   return transforms;
-}
-
-double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  REQUIRE(a.size() == b.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = larger(largest, std::fabs(a[i] - b[i]));
-  return largest;
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include "core/check.h"
 #include "core/rotation.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/small_clip.h"
 
 namespace frame_start_test {

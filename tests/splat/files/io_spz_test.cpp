@@ -9,7 +9,7 @@
 #include "core/check.h"
 #include "core/compression.h"
 #include "splat/sh_basis.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/splat_files.h"
 
 namespace io_spz_test {

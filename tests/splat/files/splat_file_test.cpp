@@ -12,7 +12,7 @@
 #include "splat/files/io_compressed_ply.h"
 #include "splat/files/io_ply.h"
 #include "splat/files/io_splat.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/splat_files.h"
 

@@ -10,7 +10,7 @@
 #include "splat/files/sh_rotation.h"
 #include "splat/reference/reference.h"
 #include "splat/sh_basis.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/splat_files.h"
 #include "tests/support/splat_scenes.h"
 

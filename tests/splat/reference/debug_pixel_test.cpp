@@ -75,8 +75,8 @@ TEST_CASE("a pixel's Gaussians sum to the image, with its T and fragments: all s
 
 TEST_CASE("a pixel's Gaussians in float with more features than blocks take") {
   const FlatSplats splats = random_flat(50, 20, 20, 20, 3);
-  const SplatView view = view_of_size(20, 20, RenderSettings());
-  Flat<float> flat(splats, view);
+  const SplatView view = front_view(20, 20);
+  FlatRender<float> flat(splats, view);
   const std::vector<double> channels = flat.value(flat.out.channels);
   Index fragments = 0;
   for (int p = 0; p < 400; ++p) {
@@ -91,7 +91,7 @@ TEST_CASE("a pixel's Gaussians in float with more features than blocks take") {
 
 TEST_CASE("what a pixel's trace says of each Gaussian") {
   // At the centre of pixel (1, 2): G = 1, so that α before the cap is o.
-  SplatView view = view_of_size(4, 4, RenderSettings());
+  SplatView view = front_view(4, 4);
   view.settings.alpha_cap = 0.75;
   view.settings.transmittance_stop = 0.15;
   FlatSplats splats;
@@ -102,7 +102,7 @@ TEST_CASE("what a pixel's trace says of each Gaussian") {
   splats.add(4.5, 2.5, 1.2, 1, 0.01, {1, 1, 1});  // 4: another miss
   splats.add(1.5, 2.5, 3, 1, 0.5, {0, 0, 1});     // 5: takes T from 0.1875 to 0.09375
   const auto check = [&]<class S>(S) {
-    Flat<S> flat(splats, view);
+    FlatRender<S> flat(splats, view);
     const PixelTrace trace = trace_pixel(flat.tape, flat.projected, flat.opacities, flat.features, view, {1, 2});
     const bool exclusive = view.settings.stop_rule == StopRule::kExclusive;
     REQUIRE(trace.composited.size() == (exclusive ? 2U : 3U));
@@ -135,7 +135,7 @@ TEST_CASE("what a pixel's trace says of each Gaussian") {
     check(double());
   }
   view.settings.transmittance_stop = 0;
-  Flat<double> flat(splats, view);
+  FlatRender<double> flat(splats, view);
   const PixelTrace trace = trace_pixel(flat.tape, flat.projected, flat.opacities, flat.features, view, {1, 2});
   CHECK(trace.composited.size() == 4);
   CHECK_FALSE(trace.stopped);

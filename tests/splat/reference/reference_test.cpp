@@ -11,7 +11,7 @@
 #include "core/check.h"
 #include "core/random.h"
 #include "splat/reference/reference_gaussian.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/reference_images.h"
 
 namespace reference_test {

@@ -198,7 +198,7 @@ TEST_CASE("colours have the gradients of complex steps") {
 TEST_CASE("compositing has the gradients of complex steps") {
   constexpr int kWidth = 11, kHeight = 7;
   const FlatSplats splats = random_flat(8, kWidth, kHeight, 3, 5);
-  const SplatView view = view_of_size(kWidth, kHeight, smooth_settings());
+  const SplatView view = front_view(kWidth, kHeight, uncut_settings());
   check_complex_step(
       {{"means", shape_of(8, 2), 0, 0, splats.means},
        {"factors", shape_of(8, 6), 0, 0, splats.factors},
@@ -218,7 +218,7 @@ TEST_CASE("compositing has the gradients of complex steps") {
 
 TEST_CASE("depth has the gradients of complex steps") {
   SplatView view = view_from_aside();
-  view.settings = smooth_settings();
+  view.settings = uncut_settings();
   view.settings.blur = 300;  // wide enough that the depth has a gradient in every pixel
   RenderRequest request;
   request.depth = true;

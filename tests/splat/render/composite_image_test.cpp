@@ -11,7 +11,7 @@
 #include "splat/reference/debug_pixel.h"
 #include "splat/render/composite.h"
 #include "tests/support/flat_splats.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace composite_image_test {
 
@@ -22,7 +22,7 @@ TEST_CASE("nothing to draw, and images of every edge: exact zeros [B11]") {
   for (const int width : {1, 8, 15, 16, 17}) {
     for (const int height : {1, 16, 17}) {
       for (const int tile : {8, 16}) {
-        SplatView view = view_of_size(width, height, RenderSettings());
+        SplatView view = front_view(width, height);
         view.settings.tile = tile;
         INFO(width << " x " << height << ", tiles of " << tile);
         FlatSplats none, behind, drawn;
@@ -34,8 +34,8 @@ TEST_CASE("nothing to draw, and images of every edge: exact zeros [B11]") {
         behind.add(std::nan(""), 3, 2, 1, 0.9, {1, 1, 1});  // broken
         behind.add(3, 3, 2, 1, 0.9, {1, std::nan(""), 1});  // broken
         for (const FlatSplats* splats : {&none, &behind}) {
-          Flat<float> flat(*splats, view);
-          flat.backward_ones();
+          FlatRender<float> flat(*splats, view);
+          flat.backward();
           for (const double x : flat.value(flat.out.channels)) CHECK(x == 0);
           for (const double t : flat.value(flat.out.transmittance)) CHECK(t == 1);
           for (const auto& d :
@@ -46,8 +46,8 @@ TEST_CASE("nothing to draw, and images of every edge: exact zeros [B11]") {
           CHECK((counters.visible == 0 && counters.pairs == 0 && counters.fragments == 0 && counters.tiles == 0));
         }
         drawn.add(width / 2.0, height / 2.0, 2, 30, 0.9, {1, 2, 3});
-        Flat<double> flat(drawn, view);
-        flat.backward_ones();
+        FlatRender<double> flat(drawn, view);
+        flat.backward();
         CHECK(flat.out.counters->fragments == width * height);
         CHECK(flat.d(flat.features)[0] == Approx(flat.d(flat.features)[1]));
       }
@@ -63,9 +63,9 @@ TEST_CASE(
     return stack;
   };
   const FlatSplats splats = stack_of(1000000);
-  SplatView view = view_of_size(17, 17, RenderSettings());
-  Flat<float> flat(splats, view);
-  flat.backward_ones();
+  SplatView view = front_view(17, 17);
+  FlatRender<float> flat(splats, view);
+  flat.backward();
   const auto channels = flat.value(flat.out.channels), t = flat.value(flat.out.transmittance);
   for (std::size_t p = 0; p < t.size(); ++p) {
     CHECK((t[p] >= 0 && t[p] <= 1));
@@ -85,8 +85,8 @@ TEST_CASE(
   // log(transmittance_stop)/log(1 − alpha_min) layers finish any pixel that one of them is drawn in; 5×5 pixels are.
   // What lies behind them costs nothing, however much it is.
   CHECK(flat.out.counters->fragments < 25 * 2360);
-  Flat<float> fewer(stack_of(20000), view);
-  fewer.backward_ones();
+  FlatRender<float> fewer(stack_of(20000), view);
+  fewer.backward();
   CHECK(fewer.out.counters->fragments == flat.out.counters->fragments);
   CHECK(fewer.out.counters->reached == flat.out.counters->reached);
   CHECK(fewer.out.counters->adjoint_tiles == flat.out.counters->adjoint_tiles);
@@ -99,9 +99,9 @@ TEMPLATE_TEST_CASE("an opaque wall leaks what the cap lets through [B16]", "[isa
   splats.add(8, 8, 1, 1e5, 1, {0});
   splats.add(8, 8, 2, 1e5, 1, {1});
   for (const double cap : {0.99, kAlphaCap}) {
-    SplatView view = view_of_size(16, 16, smooth_settings());
+    SplatView view = front_view(16, 16, uncut_settings());
     view.settings.alpha_cap = cap;
-    Flat<S> flat(splats, view);
+    FlatRender<S> flat(splats, view);
     const auto held = static_cast<double>(static_cast<S>(cap));
     const double leak = (1 - held) * held, rounding = static_cast<double>(std::numeric_limits<S>::epsilon());
     for (const double x : flat.value(flat.out.channels)) CHECK(x == Approx(leak).epsilon(rounding));
@@ -122,9 +122,9 @@ TEMPLATE_TEST_CASE("a mirrored scene makes a mirrored image, and a padded image 
     shifted.means[2 * n] += 32;
     shifted.means[2 * n + 1] += 16;
   }
-  const SplatView view = view_of_size(width, height, RenderSettings());
-  Flat<S> plain(splats, view), mirror(mirrored, view);
-  Flat<S> padded(shifted, view_of_size(width + 50, height + 40, RenderSettings()));
+  const SplatView view = front_view(width, height);
+  FlatRender<S> plain(splats, view), mirror(mirrored, view);
+  FlatRender<S> padded(shifted, front_view(width + 50, height + 40));
   const auto a = plain.tape.value(plain.out.channels), b = mirror.tape.value(mirror.out.channels);
   const auto c = padded.tape.value(padded.out.channels);
   double mirror_error = 0, padding_error = 0;
@@ -143,41 +143,21 @@ TEMPLATE_TEST_CASE("a mirrored scene makes a mirrored image, and a padded image 
 
 TEST_CASE("the size of tiles changes nothing but rounding [B7]") {
   const FlatSplats splats = random_flat(200, 61, 45, 3, 8);
-  SplatView view = view_of_size(61, 45, RenderSettings());
-  Flat<float> large(splats, view);
+  SplatView view = front_view(61, 45);
+  FlatRender<float> large(splats, view);
   view.settings.tile = 8;
-  Flat<float> small(splats, view);
+  FlatRender<float> small(splats, view);
   CHECK(largest_difference(large.value(large.out.channels), small.value(small.out.channels)) <= 1e-6);
   CHECK(large.out.counters->fragments == small.out.counters->fragments);
-  large.backward_ones();
-  small.backward_ones();
+  large.backward();
+  small.backward();
   CHECK(relative_l2(small.d(small.factors), large.d(large.factors)) <= 1e-5);
-}
-
-TEST_CASE("the order of the rows does not matter where depths differ [B8]") {
-  const FlatSplats splats = random_flat(60, 33, 20, 2, 10);
-  FlatSplats turned;
-  const Index n = splats.count();
-  for (Index i = n - 1; i >= 0; --i) {
-    const auto at = [&](const std::vector<double>& from, std::vector<double>& to, Index size) {
-      to.insert(to.end(), from.begin() + i * size, from.begin() + (i + 1) * size);
-    };
-    at(splats.means, turned.means, 2);
-    at(splats.factors, turned.factors, 6);
-    at(splats.depths, turned.depths, 1);
-    at(splats.opacities, turned.opacities, 1);
-    at(splats.features, turned.features, 2);
-  }
-  turned.channels = 2;
-  const SplatView view = view_of_size(33, 20, RenderSettings());
-  Flat<float> a(splats, view), b(turned, view);
-  CHECK(a.value(a.out.channels) == b.value(b.out.channels));
 }
 
 TEMPLATE_TEST_CASE("rows in another order, equal depths in the same, make the same bits [B8]", "", float, double) {
   using S = TestType;
   const Index n = 20000;
-  FlatSplats splats = random_flat(n, 64, 48, 2, 14), shuffled;
+  FlatSplats splats = random_flat(n, 64, 48, 2, 14);
   for (std::size_t i = 0; i < splats.depths.size(); ++i) splats.depths[i] = 2 + 0.5 * static_cast<double>(i * i % 4);
   // The layers are interleaved anew at random; within each the rows keep their order.
   std::vector<Index> layers[4], order;
@@ -189,24 +169,14 @@ TEMPLATE_TEST_CASE("rows in another order, equal depths in the same, make the sa
     order.push_back(layer.back());
     layer.pop_back();
   }
-  for (const Index i : order) {
-    const auto at = [&](const std::vector<double>& from, std::vector<double>& to, Index size) {
-      to.insert(to.end(), from.begin() + i * size, from.begin() + (i + 1) * size);
-    };
-    at(splats.means, shuffled.means, 2);
-    at(splats.factors, shuffled.factors, 6);
-    at(splats.depths, shuffled.depths, 1);
-    at(splats.opacities, shuffled.opacities, 1);
-    at(splats.features, shuffled.features, 2);
-  }
-  shuffled.channels = 2;
+  const FlatSplats shuffled = splats.picked(order);
   CHECK(shuffled.depths != splats.depths);
-  const SplatView view = view_of_size(64, 48, RenderSettings());
-  Flat<S> a(splats, view), b(shuffled, view);
+  const SplatView view = front_view(64, 48);
+  FlatRender<S> a(splats, view), b(shuffled, view);
   const bool same_image = a.value(a.out.channels) == b.value(b.out.channels);
   CHECK(same_image);
-  a.backward_ones();
-  b.backward_ones();
+  a.backward();
+  b.backward();
   const auto expected = a.d(a.opacities), d = b.d(b.opacities);
   Index different = 0;
   for (std::size_t k = 0; k < order.size(); ++k) different += d[k] != expected[static_cast<std::size_t>(order[k])];
@@ -219,9 +189,9 @@ TEMPLATE_TEST_CASE("what is skipped changes a pixel by no more than its alphas' 
   FlatSplats splats = random_flat(400, width, height, 3, 16);
   for (double& x : splats.opacities) x *= 0.03;  // many layers around alpha_min
   for (double& x : splats.features) x = 0.5 + 0.5 * x;
-  SplatView cut = view_of_size(width, height, RenderSettings()), whole = cut;
+  SplatView cut = front_view(width, height), whole = cut;
   whole.settings.alpha_min = 0;
-  Flat<S> flat(splats, cut), exact(splats, whole);
+  FlatRender<S> flat(splats, cut), exact(splats, whole);
   const auto a = flat.value(flat.out.channels), b = exact.value(exact.out.channels);
   const std::size_t pixels = a.size() / 3;
   double largest_sum = 0, largest_error = 0;
@@ -248,8 +218,8 @@ TEST_CASE("what is kept from forward to backward is at most 12 bytes a pixel bes
   for (const double radius : {1.0, 4.0}) {
     FlatSplats splats = random_flat(8000, side, side, 3, 17);
     for (double& x : splats.factors) x *= radius / 3;
-    const SplatView view = view_of_size(side, side, RenderSettings());
-    Flat<float> flat(splats, view);
+    const SplatView view = front_view(side, side);
+    FlatRender<float> flat(splats, view);
     const RenderCounters& counters = *flat.out.counters;
     const double per_pixel = static_cast<double>(counters.kept_bytes) / (side * side);
     INFO("radius " << radius << ": " << per_pixel << " bytes a pixel, "
@@ -268,9 +238,9 @@ TEMPLATE_TEST_CASE("long lists are composited over many segments as over one", "
     const double x = number(0, 16), y = number(0, 16), opacity = number(0.001, 0.02);
     splats.add(x, y, 1 + i, 4, opacity, {number(0, 1)});
   }
-  const SplatView view = view_of_size(16, 16, smooth_settings());
-  Flat<S> flat(splats, view);
-  flat.backward_ones();
+  const SplatView view = front_view(16, 16, uncut_settings());
+  FlatRender<S> flat(splats, view);
+  flat.backward();
   // v_i by its definition, at every pixel, for a few Gaussians.
   const auto d = flat.d(flat.opacities);
   for (const std::size_t i : {std::size_t(0), std::size_t(63), std::size_t(64), std::size_t(500), std::size_t(699)}) {

@@ -59,7 +59,7 @@ void check_composite(const std::string& name, const FlatSplats& splats, const Sp
 /// The operator checks on an image that every cut takes part in.
 void check_composite_with_cuts(const std::string& name, const SplatView& view, const OperatorCheck& options) {
   const FlatSplats splats = with_cuts(checked_splats(view, 3));
-  Flat<double> flat(splats, view);
+  FlatRender<double> flat(splats, view);
   const PixelChoices choices = pixel_choices(flat.tape, flat.projected, flat.opacities, view);
   CHECK(choices.fragments == flat.out.counters->fragments);
   INFO(name);
@@ -74,9 +74,9 @@ void check_composite_with_cuts(const std::string& name, const SplatView& view, c
 TEST_CASE("compositing passes the operator checks where nothing is cut [B6, B21]", "[parallel][isa]") {
   OperatorCheck options;
   options.entries = is_held_isa() ? 6 : 24;
-  SplatView view = view_of_size(35, 20, smooth_settings());
+  SplatView view = front_view(35, 20, uncut_settings());
   check_composite("composite", checked_splats(view, 3), view, options);
-  view = view_of_size(19, 17, smooth_settings());
+  view = front_view(19, 17, uncut_settings());
   view.settings.tile = 8;
   check_composite("composite, small tiles, 5 channels", checked_splats(view, 5), view, options);
   view.settings.antialias = true;
@@ -92,7 +92,7 @@ TEST_CASE("compositing passes the operator checks with every cut", "[release][pa
   options.kink_share = 0.05;
   options.float_tolerance = 3e-4;  // a pixel may be cut in one precision alone
   if (is_held_isa()) options.entries = 6;
-  SplatView view = view_of_size(35, 20, RenderSettings());
+  SplatView view = front_view(35, 20);
   check_composite_with_cuts("composite, default", view, options);
   apply_compatibility(view.settings, Compatibility::kGsplat);
   check_composite_with_cuts("composite, gsplat", view, options);
@@ -108,15 +108,15 @@ TEST_CASE("transmittance is kept, not recovered: stacks down to 1e-8 [B1, B2]") 
       for (int i = 0; i < layers; ++i) {
         splats.add(8.5, 8.5, 1 + i, 3, static_cast<float>(alpha), {static_cast<float>(random.uniform(0, 1))});
       }
-      SplatView view = view_of_size(17, 17, smooth_settings());
+      SplatView view = front_view(17, 17, uncut_settings());
       view.settings.transmittance_stop = stop;
-      Flat<float> fast(splats, view);
-      Flat<double> exact(splats, view);
+      FlatRender<float> fast(splats, view);
+      FlatRender<double> exact(splats, view);
       const double t = exact.value(exact.out.transmittance)[8 * 17 + 8];
       INFO("T down to " << end << ", stop " << stop);
       CHECK(std::abs(fast.value(fast.out.transmittance)[8 * 17 + 8] / t - 1) < 1e-5);
-      fast.backward_ones();
-      exact.backward_ones();
+      fast.backward();
+      exact.backward();
       CHECK(relative_l2(fast.d(fast.opacities), exact.d(exact.opacities)) < 1e-4);
       CHECK(relative_l2(fast.d(fast.factors), exact.d(exact.factors)) < 1e-4);
     }
@@ -131,11 +131,11 @@ TEST_CASE("opaque Gaussians have finite and right gradients without a cap [B2]")
       splats.add(8.5, 8.5, 1 + i, 2, i % 3 == 1 ? static_cast<float>(opacity) : 0.5f,
                  {static_cast<float>(random.uniform(0, 1))});
     }
-    const SplatView view = view_of_size(17, 17, smooth_settings());
-    Flat<float> fast(splats, view);
-    Flat<double> exact(splats, view);
-    fast.backward_ones();
-    exact.backward_ones();
+    const SplatView view = front_view(17, 17, uncut_settings());
+    FlatRender<float> fast(splats, view);
+    FlatRender<double> exact(splats, view);
+    fast.backward();
+    exact.backward();
     INFO("opacity 1 - " << 1 - opacity);
     const auto computed = fast.d(fast.opacities), expected = exact.d(exact.opacities);
     const double largest = std::abs(*std::max_element(expected.begin(), expected.end(),
@@ -149,22 +149,22 @@ TEMPLATE_TEST_CASE("where the cap holds alpha there is no gradient, or all of it
   const double rounding = 8 * static_cast<double>(std::numeric_limits<S>::epsilon());
   FlatSplats splats;
   splats.add(0.5, 0.5, 1, 3, 0.9999, {1});  // the image is its centre pixel
-  SplatView view = view_of_size(1, 1, RenderSettings());
-  Flat<S> held(splats, view);
-  held.backward_ones();
+  SplatView view = front_view(1, 1);
+  FlatRender<S> held(splats, view);
+  held.backward();
   CHECK(held.value(held.out.channels)[0] == view.settings.alpha_cap);
   for (const auto& d : {held.d(held.opacities), held.d(held.means), held.d(held.factors)}) {
     CHECK(std::all_of(d.begin(), d.end(), [](double x) { return x == 0; }));
   }
   CHECK(held.d(held.features)[0] == view.settings.alpha_cap);
   view.settings.cap_gradient = CapGradient::kPass;
-  Flat<S> passed(splats, view);
-  passed.backward_ones();
+  FlatRender<S> passed(splats, view);
+  passed.backward();
   CHECK(passed.d(passed.opacities)[0] == Approx(1).epsilon(rounding));
   splats.opacities[0] = view.settings.alpha_cap * (1 - rounding);
   view.settings.cap_gradient = CapGradient::kZero;
-  Flat<S> below(splats, view);
-  below.backward_ones();
+  FlatRender<S> below(splats, view);
+  below.backward();
   CHECK(below.d(below.opacities)[0] == Approx(1).epsilon(rounding));
 }
 
@@ -175,13 +175,13 @@ TEMPLATE_TEST_CASE("an inclusive stop loses at most the threshold, an exclusive 
   splats.add(0.5, 0.5, 1, 3, 1 - 0.0999, {0});
   splats.add(0.5, 0.5, 2, 3, 0.9995, {1});
   splats.add(0.5, 0.5, 3, 3, 0.9, {1});
-  SplatView view = view_of_size(1, 1, RenderSettings());
+  SplatView view = front_view(1, 1);
   view.settings.alpha_cap = 0.9999;
-  Flat<S> inclusive(splats, view);
+  FlatRender<S> inclusive(splats, view);
   CHECK(std::abs(inclusive.value(inclusive.out.channels)[0] - 0.0999) < 1.1e-4);
   CHECK(inclusive.out.counters->fragments == 2);
   view.settings.stop_rule = StopRule::kExclusive;
-  Flat<S> exclusive(splats, view);
+  FlatRender<S> exclusive(splats, view);
   CHECK(exclusive.value(exclusive.out.channels)[0] == 0);
   CHECK(exclusive.out.counters->fragments == 1);
   CHECK(exclusive.value(exclusive.out.transmittance)[0] == Approx(0.0999));
@@ -192,10 +192,10 @@ TEMPLATE_TEST_CASE("an inclusive stop loses at most the threshold, an exclusive 
   for (int i = 0; i < 50; ++i) {
     FlatSplats stack;
     for (int k = 0; k < 60; ++k) stack.add(0.5, 0.5, 1 + k, 3, random.uniform(0, 1), {random.uniform(0, 1)});
-    SplatView endless = view_of_size(1, 1, RenderSettings());
-    Flat<S> stopped(stack, endless);
+    SplatView endless = front_view(1, 1);
+    FlatRender<S> stopped(stack, endless);
     endless.settings.transmittance_stop = 0;
-    Flat<S> whole(stack, endless);
+    FlatRender<S> whole(stack, endless);
     CHECK(largest_difference(stopped.value(stopped.out.channels), whole.value(whole.out.channels)) <= bound);
   }
 }
@@ -203,36 +203,23 @@ TEMPLATE_TEST_CASE("an inclusive stop loses at most the threshold, an exclusive 
 TEST_CASE("whether a transmittance equal to the threshold stops is a setting") {
   FlatSplats splats;
   for (int i = 0; i < 4; ++i) splats.add(0.5, 0.5, 1 + i, 3, 0.5, {1});
-  SplatView view = view_of_size(1, 1, RenderSettings());
+  SplatView view = front_view(1, 1);
   view.settings.transmittance_stop = 0.25;  // exactly what two of them leave
   for (const bool at : {false, true}) {
     for (const bool exclusive : {false, true}) {
       view.settings.stop_when = at ? StopWhen::kAtOrBelow : StopWhen::kBelow;
       view.settings.stop_rule = exclusive ? StopRule::kExclusive : StopRule::kInclusive;
       const Index fragments = (at ? 2 : 3) - (exclusive ? 1 : 0);
-      CHECK(Flat<double>(splats, view).out.counters->fragments == fragments);
-      CHECK(Flat<float>(splats, view).out.counters->fragments == fragments);
+      CHECK(FlatRender<double>(splats, view).out.counters->fragments == fragments);
+      CHECK(FlatRender<float>(splats, view).out.counters->fragments == fragments);
     }
   }
-}
-
-TEST_CASE("layers below alpha_min are missing as computed, without it nothing is [B5]") {
-  FlatSplats splats;
-  const double alpha = 0.0039;  // just below 1/255
-  for (int i = 0; i < 1000; ++i) splats.add(0.5, 0.5, 1 + i, 3, static_cast<float>(alpha), {1});
-  SplatView view = view_of_size(1, 1, RenderSettings());
-  Flat<float> none(splats, view);
-  CHECK(none.value(none.out.channels)[0] == 0);
-  view.settings = smooth_settings();
-  Flat<float> all(splats, view);
-  CHECK(all.value(all.out.channels)[0] == Approx(1 - std::pow(1 - alpha, 1000)).margin(1e-5));
-  CHECK(all.out.counters->fragments == 1000);
 }
 
 TEST_CASE("shapes that do not fit are refused") {
   Tape<float> tape;
   const auto v = [&](Index rows, Index cols) { return tape.parameter("v", shape_of(rows, cols)); };
-  const SplatView view = view_of_size(16, 16, RenderSettings());
+  const SplatView view = front_view(16, 16);
   const auto set = [&](Index opacities, Index features) {
     return SplatSet<float>{{v(3, 2), v(3, 6), v(3, 1), v(3, 1), v(3, 2)}, v(opacities, 1), v(3, features)};
   };
@@ -247,9 +234,9 @@ TEST_CASE("shapes that do not fit are refused") {
 
 TEST_CASE("tiles without a cotangent are left out of the adjoint, which keeps its bits") {
   const FlatSplats splats = random_flat(600, 100, 60, 3, 21);
-  SplatView all = view_of_size(100, 60, {}), some = all;
+  SplatView all = front_view(100, 60, {}), some = all;
   all.skip.zero_cotangent = false;
-  Flat<float> full(splats, all), skipped(splats, some);
+  FlatRender<float> full(splats, all), skipped(splats, some);
   std::vector<float> cotangent(3 * 100 * 60, 0.0f);
   for (std::size_t i = 0; i < cotangent.size(); ++i) {
     if (i % 100 < 40) cotangent[i] = std::sin(static_cast<float>(i));
@@ -258,7 +245,7 @@ TEST_CASE("tiles without a cotangent are left out of the adjoint, which keeps it
     full.backward(cotangent);
     skipped.backward(cotangent);
     for (const auto var : {0, 1, 2, 3}) {
-      const auto of = [var](Flat<float>& f) {
+      const auto of = [var](FlatRender<float>& f) {
         return f.d(std::array{f.means, f.factors, f.opacities, f.features}[var]);
       };
       CHECK(of(skipped) == of(full));

@@ -40,8 +40,8 @@ struct Run {
     tape.forward(all);
   }
   void backward() { tape.backward(all, std::vector<S>(static_cast<std::size_t>(all.shape().count()), S(1))); }
-  std::vector<double> value(Var<S> of) { return wide_numbers<S>(tape.value(of)); }
-  std::vector<double> d(Var<S> of) { return wide_numbers<S>(tape.gradient(of)); }
+  std::vector<double> value(Var<S> of) { return numbers_of<S>(tape.value(of)); }
+  std::vector<double> d(Var<S> of) { return numbers_of<S>(tape.gradient(of)); }
 
  private:
   Var<S> leaf(const char* name, Index cols, const std::vector<double>& numbers) {
@@ -273,7 +273,7 @@ TEST_CASE("intrinsics on the tape are those of a camera, and are checked in ever
   const Var<double> all = side_by_side(project(means, axes, xi, view_of_camera(camera), intrinsics));
   tape.forward(all);
   Run<double> expected(view_of_camera(other), mean, kAxes, kNoUpdate);
-  CHECK(wide_numbers<double>(tape.value(all)) == expected.value(expected.all));
+  CHECK(numbers_of<double>(tape.value(all)) == expected.value(expected.all));
   tape.set(intrinsics, std::vector<double>{61, 0, 11, 22});
   CHECK_THROWS_AS(tape.forward(all), UserError);
   CHECK_THROWS_AS(project(means, axes, xi, view_of_camera(camera), xi), InternalError);

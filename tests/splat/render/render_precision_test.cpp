@@ -14,7 +14,7 @@
 #include "splat/render/conic.h"
 #include "tests/support/failed_images.h"
 #include "tests/support/isa.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 #include "tests/support/pixel_choices.h"
 #include "tests/support/real_splats.h"
 #include "tests/support/taped_splats.h"

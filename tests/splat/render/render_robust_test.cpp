@@ -104,7 +104,7 @@ struct LargeImage {
     CHECK(counters->visible == 3);
     CHECK(counters->fragments > static_cast<Index>(0.15 * pixels));
     CHECK(counters->fragments < static_cast<Index>(0.5 * pixels));
-    const std::vector<double> d = wide_numbers<float>(tape.gradient(means));
+    const std::vector<double> d = numbers_of<float>(tape.gradient(means));
     CHECK(all_finite(d));
     CHECK(d[2] < 0);  // farther is smaller
     // Image and its three channels, T and their adjoints: 14 numbers a pixel; what the tiles keep comes to less.

@@ -1,4 +1,4 @@
-// Rows of docs/numerics/failures.md that take a whole render, several of them, or a fit.
+// Rows of docs/numerics/failures.md that take fits, or a large image.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -7,7 +7,6 @@
 
 #include "core/parallel.h"
 #include "tests/support/flat_splats.h"
-#include "tests/support/taped_splats.h"
 
 namespace render_rows_test {
 
@@ -86,35 +85,6 @@ double fit(SplatScene& scene, const std::vector<double>& target, int steps) {
 
 }  // namespace
 
-TEST_CASE("a Gaussian that reaches far along the view leaves nothing in the image that it lies beside [A3]") {
-  // Half of the view is 0.5 z wide. The Gaussians are `beside` times as far out, and with 0.4 z along the view, so that
-  // their far ends are outside too, at 3 sigma. By J at their means they would reach into the image, as a fan.
-  const auto opaque_pixels = [](int axis, double beside, double z, double clamp) {
-    SplatScene scene;
-    scene.camera = plain_camera({64, 64});
-    scene.camera.cx += 6;  // each side has its own limit
-    scene.camera.cy -= 5;
-    scene.settings.frustum_clamp = clamp;
-    std::array<double, 3> mean = {0, 0, z};
-    mean[static_cast<std::size_t>(axis % 2)] = (axis < 2 ? 0.5 : -0.5) * beside * z;
-    scene.add(mean, 0.01 * z, 8, {1, 1, 1});
-    scene.log_scales[2] = static_cast<float>(std::log(0.4 * z));
-    TapedSplats<float> taped(scene, cotangent_of(scene.camera));
-    taped.tape.forward(taped.rendered.transmittance);
-    const std::vector<double> t = taped.value(taped.rendered.transmittance);
-    return std::count_if(t.begin(), t.end(), [&](double x) { return 1 - x >= scene.settings.alpha_min; });
-  };
-  for (const int axis : {0, 1, 2, 3}) {
-    for (const double z : {0.2, 2.0, 30.0}) {
-      for (const double beside : {3.5, 5.0, 10.0}) {
-        INFO("axis " << axis << ", z " << z << ", beside by " << beside);
-        CHECK(opaque_pixels(axis, beside, z, kFrustumClamp) == 0);
-        CHECK(opaque_pixels(axis, beside, z, 100) > 20);  // that the limit is what does it
-      }
-    }
-  }
-}
-
 TEST_CASE("what is fitted at half of the size and drawn at the whole is told by how many decibels [A9]") {
   SplatScene truth = random_splats(150, 35, {96, 72});
   for (float& x : truth.log_scales) x -= 1.5F;  // smaller than pixels, most of them
@@ -134,39 +104,6 @@ TEST_CASE("what is fitted at half of the size and drawn at the whole is told by 
     CHECK(at_half > 25);
   }
   CHECK(drop[true] < drop[false] - 2);
-}
-
-TEST_CASE("the frame of a camera turned by 1e-3 rad: how much changes, in both renderers [A11]") {
-  // 0.1 pixels, and the order of some Gaussians whose depths are nearly equal.
-  SplatScene scene = random_splats(300, 36, {96, 64});
-  const SplatCotangent cotangent = cotangent_of(scene.camera);
-  SplatScene turned = scene;
-  turned.camera.camera_from_world =
-      se3_update(Vector6<double>{0, 0, 0, 0.6e-3, 0.8e-3, 0}, scene.camera.camera_from_world);
-  const auto depth_order = [](const SplatScene& of) {
-    std::vector<std::pair<double, Index>> order;
-    for (Index n = 0; n < of.count(); ++n) {
-      const float* const p = of.means.data() + 3 * n;
-      order.push_back({(of.camera.camera_from_world.rotation * Vector3<double>(p[0], p[1], p[2]))[2], n});
-    }
-    std::sort(order.begin(), order.end());
-    return order;
-  };
-  const auto before = depth_order(scene), after = depth_order(turned);
-  Index moved = 0;
-  for (std::size_t i = 0; i < before.size(); ++i) moved += before[i].second != after[i].second;
-  const std::vector<double> a = image_of(scene), b = image_of(turned);
-  const std::vector<double> exact_a = reference_result(scene, cotangent).image;
-  const std::vector<double> exact_b = reference_result(turned, cotangent).image;
-  const double mean = std::sqrt(mean_square(a, b)), largest = largest_difference(a, b);
-  std::printf(
-      "a camera turned by 1e-3 rad: the image changes by %.2g (root mean square), at most by %.2g; "
-      "%td of %td Gaussians have another place in the order\n",
-      mean, largest, moved, scene.count());
-  CHECK(moved > 0);
-  CHECK(mean < 0.02);
-  CHECK(largest_difference(a, exact_a) < 1e-10);
-  CHECK(largest_difference(b, exact_b) < 1e-10);
 }
 
 TEST_CASE("fifty steps of a fit give the same bits on 1, 2, 3 and 16 threads, each time [F6]", "[parallel]") {
@@ -213,9 +150,9 @@ TEST_CASE("gradients of one Gaussian over millions of pixels [F7]") {
     for (auto* numbers : {&splats.means, &splats.opacities, &splats.features}) {
       for (double& x : *numbers) x = static_cast<float>(x);
     }
-    const SplatView view = view_of_size(width, height, RenderSettings());
+    const SplatView view = front_view(width, height);
     const auto gradients = [&]<class S>(S) {
-      Flat<S> flat(splats, view);
+      FlatRender<S> flat(splats, view);
       std::vector<S> cotangent(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
       for (std::size_t i = 0; i < cotangent.size(); ++i) {
         const auto x = static_cast<float>(i % static_cast<std::size_t>(width)) / static_cast<float>(width);

@@ -35,8 +35,8 @@ struct Run {
     tape.forward(colors);
     tape.backward(colors, std::vector<S>(static_cast<std::size_t>(colors.shape().count()), S(1)));
   }
-  std::vector<double> value() { return wide_numbers<S>(tape.value(colors)); }
-  std::vector<double> d(Var<S> of) { return wide_numbers<S>(tape.gradient(of)); }
+  std::vector<double> value() { return numbers_of<S>(tape.value(colors)); }
+  std::vector<double> d(Var<S> of) { return numbers_of<S>(tape.gradient(of)); }
 
  private:
   Var<S> leaf(const char* name, Index cols, const std::vector<double>& numbers) {

@@ -11,7 +11,7 @@
 #include "tests/support/allocation_counter.h"
 #include "tests/support/flat_splats.h"
 #include "tests/support/isa.h"
-#include "tests/support/larger.h"
+#include "tests/support/measures.h"
 
 namespace static_layer_test {
 
@@ -90,11 +90,11 @@ struct TwoSets {
     const std::vector<double> numbers = random_cotangent(of.channels.shape().count(), 3);
     return {numbers.begin(), numbers.end()};
   }
-  std::vector<double> image() const { return wide_numbers<S>(tape.value(out.channels)); }
-  std::vector<double> transmittance() const { return wide_numbers<S>(tape.value(out.transmittance)); }
+  std::vector<double> image() const { return numbers_of<S>(tape.value(out.channels)); }
+  std::vector<double> transmittance() const { return numbers_of<S>(tape.value(out.transmittance)); }
   std::vector<std::vector<double>> gradients(const std::vector<Var<S>>& of) const {
     std::vector<std::vector<double>> all;
-    for (const std::size_t i : {0, 1, 3, 4}) all.push_back(wide_numbers<S>(tape.gradient(of[i])));
+    for (const std::size_t i : {0, 1, 3, 4}) all.push_back(numbers_of<S>(tape.gradient(of[i])));
     return all;
   }
 
@@ -113,7 +113,7 @@ struct TwoSets {
 /// The same as one set, without anything skipped.
 template <class S>
 struct OneSet {
-  Flat<S> flat;
+  FlatRender<S> flat;
   Index second;
   OneSet(const Sets& sets, const SplatView& view) : flat(sets.both(), view), second(sets.still.count()) {
     flat.tape.forward(flat.out.transmittance);
@@ -133,7 +133,7 @@ struct OneSet {
 };
 
 SplatView view_with(const RenderSettings& settings, bool tiles, bool layer) {
-  SplatView view = view_of_size(kWidth, kHeight, settings);
+  SplatView view = front_view(kWidth, kHeight, settings);
   view.skip = {tiles, layer, true, true};
   return view;
 }
@@ -235,7 +235,7 @@ TEST_CASE("what moves out of sight leaves what stands still") {
   two.run();
   two.move(gone);
   two.run();
-  Flat<float> still(here.still, view_with({}, false, false));
+  FlatRender<float> still(here.still, view_with({}, false, false));
   CHECK(two.image() == still.value(still.out.channels));
   CHECK(two.out.counters->tiles > 0);
   for (const auto& d : two.gradients(two.moving))
@@ -305,7 +305,7 @@ TEST_CASE("with a gradient in what stands still, two sets are one") {
 
 TEST_CASE("counters of a render with static layers") {
   const Sets sets = made_sets(60, 50, 30);
-  Flat<float> all(sets.both(), view_with({}, false, false));
+  FlatRender<float> all(sets.both(), view_with({}, false, false));
   TwoSets<float> tiles(sets, view_with({}, true, false)), layers(sets, view_with({}, true, true));
   const Index whole = all.out.counters->fragments, every = all.out.counters->tiles;
   for (TwoSets<float>* two : {&tiles, &layers}) {

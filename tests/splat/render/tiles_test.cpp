@@ -11,7 +11,6 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "splat/render/block_kernel.h"
-#include "tests/support/larger.h"
 
 namespace tiles_test {
 
@@ -20,10 +19,7 @@ using namespace hsi4d::detail;
 
 namespace {
 
-const double kInf = std::numeric_limits<double>::infinity(), kNan = std::numeric_limits<double>::quiet_NaN();
-
-/// Random factor of a needle of the given length and width, turned by any angle; numbers are those of S.
-template <class S>
+/// Random factor of a needle of the given length and width, turned by any angle; numbers are floats.
 std::array<double, 6> needle(RandomSequence& random, double length, double width) {
   const double angle = random.uniform(0, 3.141592653589793), mix = random.uniform(0, 6.283185307179586);
   const double c = std::cos(angle), s = std::sin(angle);
@@ -31,35 +27,10 @@ std::array<double, 6> needle(RandomSequence& random, double length, double width
   const double a[3] = {std::cos(mix), std::sin(mix), 0}, b[3] = {-0.6 * std::sin(mix), 0.6 * std::cos(mix), 0.8};
   std::array<double, 6> v;
   for (std::size_t k = 0; k < 3; ++k) {
-    v[k] = static_cast<S>(c * length * a[k] - s * width * b[k]);
-    v[3 + k] = static_cast<S>(s * length * a[k] + c * width * b[k]);
+    v[k] = static_cast<float>(c * length * a[k] - s * width * b[k]);
+    v[3 + k] = static_cast<float>(s * length * a[k] + c * width * b[k]);
   }
   return v;
-}
-
-long double exact_determinant(const std::array<double, 6>& v, long double blur) {
-  const auto minor = [&](std::size_t i, std::size_t j) {
-    return static_cast<long double>(v[i]) * v[3 + j] - static_cast<long double>(v[j]) * v[3 + i];
-  };
-  const long double m01 = minor(0, 1), m02 = minor(0, 2), m12 = minor(1, 2);
-  long double trace = 0;
-  for (const double x : v) trace += static_cast<long double>(x) * x;
-  return m01 * m01 + m02 * m02 + m12 * m12 + blur * trace + blur * blur;
-}
-
-/// ½ dᵀ cov⁻¹ d.
-long double exact_exponent(const std::array<double, 6>& v, long double blur, long double dx, long double dy) {
-  long double xx = blur, yy = blur, xy = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    xx += static_cast<long double>(v[k]) * v[k];
-    yy += static_cast<long double>(v[3 + k]) * v[3 + k];
-    xy += static_cast<long double>(v[k]) * v[3 + k];
-  }
-  // As a sum of squares, pivot on the larger.
-  const long double det = exact_determinant(v, blur);
-  if (xx < yy) std::swap(xx, yy), std::swap(dx, dy);
-  const long double across = dy - xy / xx * dx;
-  return 0.5L * (dx * dx / xx + across * across * xx / det);
 }
 
 template <class S>
@@ -94,83 +65,13 @@ PixelAlpha<S> alpha_at(const SplatRecord<S>& record, const RenderSettings& setti
 
 }  // namespace
 
-TEST_CASE("the determinant of needles is right, in double from factors of float [A1]") {
-  RandomSequence random(1, 2);
-  double worst = 0;
-  for (int i = 0; i < 20000; ++i) {
-    const double length = std::pow(10, random.uniform(0, 5));
-    const auto v = needle<float>(random, length, 0.01);
-    for (const double blur : {0., 0.1, 0.3}) {
-      Conic conic;
-      REQUIRE(conic_of(v.data(), blur, conic));
-      const long double exact = exact_determinant(v, blur);
-      worst = test::larger(worst, static_cast<double>(std::abs(conic.determinant - exact) / exact));
-    }
-  }
-  CHECK(worst < 1e-12);
-}
-
-TEST_CASE("the exponent of needles is right in float and never negative [A1]") {
-  RandomSequence random(2, 2);
-  double worst = 0;
-  RenderSettings settings;
-  settings.alpha_min = 0;
-  settings.alpha_cap = 1;
-  for (int i = 0; i < 20000; ++i) {
-    const double length = std::pow(10, random.uniform(0, 4));
-    const auto v = needle<float>(random, length, 0.01);
-    for (const double blur : {0.1, 0.3}) {
-      Conic conic;
-      REQUIRE(conic_of(v.data(), blur, conic));
-      // A pixel near the axis, within the image that the needle reaches over.
-      const double norm = std::hypot(conic.xx, conic.xy), along = random.uniform(-1, 1) * std::min(length, 1000.0);
-      const double x = 500 + random.uniform(0, 1), y = 500 + random.uniform(0, 1);
-      const Index col = static_cast<Index>(std::clamp(x + along * conic.xx / norm + random.uniform(-2, 2), 0., 999.));
-      const Index row = static_cast<Index>(std::clamp(y + along * conic.xy / norm + random.uniform(-2, 2), 0., 999.));
-      const long double exact =
-          exact_exponent(v, blur, static_cast<long double>(col) + 0.5L - x, static_cast<long double>(row) + 0.5L - y);
-      const float g = alpha_at(record_of<float>(conic, x, y, 1), settings, row, col).alpha;
-      REQUIRE(g <= 1);
-      if (exact < 10)
-        worst = test::larger(worst, std::abs(-std::log(static_cast<double>(g)) - static_cast<double>(exact)));
-    }
-  }
-  CHECK(worst < 1e-3);
-}
-
-TEST_CASE("the antialias factor and its gradient are right at every size [A7]") {
-  RandomSequence random(3, 2);
-  const double blur = 0.3;
-  const auto exact = [&](const std::array<double, 6>& v) {
-    return std::sqrt(exact_determinant(v, 0) / exact_determinant(v, blur));
-  };
-  for (double size = 1e-8; size < 11; size *= 10) {
-    for (int i = 0; i < 100; ++i) {
-      const auto v = needle<double>(random, size, size * random.uniform(0.01, 1));
-      Conic conic;
-      REQUIRE(conic_of(v.data(), blur, conic));
-      CHECK(static_cast<double>(std::abs(blur_compensation(conic) / exact(v) - 1)) < 1e-12);
-      std::array<double, 6> d{};
-      blur_compensation_adjoint(v.data(), blur, conic, 1, d.data());
-      double error = 0, norm = 0;
-      for (std::size_t k = 0; k < 6; ++k) {
-        std::array<double, 6> up = v, down = v;
-        up[k] += 1e-5 * size * 0.01, down[k] -= 1e-5 * size * 0.01;
-        const double slope =
-            static_cast<double>((exact(up) - exact(down)) / (static_cast<long double>(up[k]) - down[k]));
-        error = test::larger(error, std::abs(slope - d[k]));
-        norm = std::max(norm, std::abs(slope));
-      }
-      CHECK(error < 1e-5 * norm);
-    }
-  }
-  // A Gaussian without area has the factor 0 and no gradient.
+TEST_CASE("a Gaussian without area has the antialias factor 0 and no gradient, and nothing without a blur [A7]") {
   const std::array<double, 6> flat = {1, 0, 0, 2, 0, 0};
   Conic conic;
-  REQUIRE(conic_of(flat.data(), blur, conic));
+  REQUIRE(conic_of(flat.data(), 0.3, conic));
   CHECK(blur_compensation(conic) == 0);
   std::array<double, 6> d{};
-  blur_compensation_adjoint(flat.data(), blur, conic, 1, d.data());
+  blur_compensation_adjoint(flat.data(), 0.3, conic, 1, d.data());
   CHECK(d == std::array<double, 6>{});
   CHECK_FALSE(conic_of(flat.data(), 0, conic));
 }
@@ -183,7 +84,7 @@ TEST_CASE("a factor that is left out of a tile has no pixel there that it would 
   for (int i = 0; i < 12000; ++i) {
     settings.alpha_min = i % 3 == 0 ? 1e-5 : 1.0 / 255;
     const double length = std::pow(10, random.uniform(-1, 2)), width = length * std::pow(10, random.uniform(-3, 0));
-    const auto v = needle<float>(random, length, width);
+    const auto v = needle(random, length, width);
     const double x = static_cast<float>(random.uniform(-40, 115)), y = static_cast<float>(random.uniform(-40, 90));
     const double opacity =
         static_cast<float>(i % 5 == 0 ? settings.alpha_min * random.uniform(0.9, 1.5) : random.uniform(0, 1));
@@ -216,39 +117,6 @@ TEST_CASE("a factor that is left out of a tile has no pixel there that it would 
   }
   CHECK(left_out > 50000);
   CHECK(static_cast<double>(empty) < 0.1 * static_cast<double>(kept));  // and the test is sharp
-}
-
-TEST_CASE("extents of wild numbers stay inside of the image [A6]") {
-  const TileGrid grid = tile_grid(40, 30, 8);
-  for (const double size : {0., 1e-300, 1e-8, 1., 1e8, 1e150, 1e300, kInf, kNan}) {
-    for (const double at : {-kInf, -1e300, -1e20, -1., 0., 20., 1e10, 1e300, kInf, kNan}) {
-      for (const double opacity : {0., 1e-30, 0.5, 1., kInf, kNan}) {
-        for (const hsi4d::Footprint kind : {hsi4d::Footprint::kExact, hsi4d::Footprint::kSquare3Sigma}) {
-          for (const double alpha_min : {0., 1.0 / 255}) {
-            RenderSettings settings;
-            settings.footprint = kind;
-            settings.alpha_min = alpha_min;
-            const std::array<double, 6> v = {size, 0.1 * size, 0, 0, size, -0.1 * size};
-            Conic conic;
-            if (!conic_of(v.data(), 0.3, conic)) continue;
-            const Extent e = extent_of(conic, at, at, opacity, grid, settings, 1e-7);
-            CHECK((e.row_begin >= 0 && e.row_end <= grid.height));
-            if (e.row_begin >= e.row_end) continue;
-            for (std::int32_t first = 0; first < 16; first += kBands) {
-              BandSpans spans;
-              band_spans(e, grid, first, spans);
-              for (Index i = 0; i < kBands; ++i) {
-                if (spans.begin[i] < spans.end[i]) CHECK((spans.begin[i] >= 0 && spans.end[i] <= 2 * grid.cols));
-              }
-            }
-            for_each_tile(e, grid, [&](Index tile, std::uint32_t blocks) {
-              CHECK((tile >= 0 && tile < grid.count() && blocks > 0 && blocks < 16));
-            });
-          }
-        }
-      }
-    }
-  }
 }
 
 TEST_CASE("depth keys are in the order of the depths [B9]") {
@@ -301,7 +169,7 @@ TEST_CASE("tile lists hold every pair once, in depth order, on any number of thr
   RenderSettings settings;
   std::vector<Extent> extents;
   for (int i = 0; i < 5000; ++i) {
-    const auto v = needle<double>(random, random.uniform(0.1, 10), random.uniform(0.1, 3));
+    const auto v = needle(random, random.uniform(0.1, 10), random.uniform(0.1, 3));
     Conic conic;
     REQUIRE(conic_of(v.data(), 0.3, conic));
     extents.push_back(extent_of(conic, random.uniform(-10, 160), random.uniform(-10, 100), random.uniform(0, 1), grid,

@@ -29,15 +29,9 @@ struct Unculled {
 template <class S>
 class Everything {
  public:
-  Everything(const Flat<S>& flat, const SplatView& view)
+  Everything(const FlatRender<S>& flat, const SplatView& view)
       : width_(view.camera.width), height_(view.camera.height), channels_(flat.features.shape().cols) {
-    const hsi4d::detail::SplatArrays<S> splats = {flat.tape.value(flat.means),
-                                                  flat.tape.value(flat.factors),
-                                                  flat.tape.value(flat.depths),
-                                                  flat.tape.value(flat.projected.depth_low),
-                                                  flat.tape.value(flat.projected.means_low),
-                                                  flat.tape.value(flat.opacities),
-                                                  flat.tape.value(flat.features)};
+    const hsi4d::detail::SplatArrays<S> splats = flat.arrays();
     const Index n = splats.rows();
     records_.resize(static_cast<std::size_t>(n));
     std::vector<hsi4d::detail::Extent> extents(records_.size());
@@ -144,12 +138,12 @@ TEMPLATE_TEST_CASE("without culling the image has the same bits [B7]", "[isa]", 
   for (std::size_t n = 0; n < splats.opacities.size(); n += 3)
     splats.opacities[n] = 0.006 + 1e-4 * static_cast<double>(n);
   for (const SettingsVariant& variant : settings_variants()) {
-    SplatView view = view_of_size(45, 30, RenderSettings());
+    SplatView view = front_view(45, 30);
     variant.apply(view.settings);
     // The square of 3σ is part of the result there, not a way to it; and this harness has tiles of one size.
     if (view.settings.footprint == hsi4d::Footprint::kSquare3Sigma || view.settings.tile != 16) continue;
     INFO(variant.name);
-    Flat<S> flat(splats, view);
+    FlatRender<S> flat(splats, view);
     flat.tape.forward(flat.out.transmittance);
     const FlushDenormals flush;  // as in the renderer
     const Unculled<S> all = Everything<S>(flat, view).run();
@@ -165,8 +159,8 @@ TEST_CASE("flushing denormals changes nothing above 1e-30 [F4]", "[isa]") {
   // Gaussians whose rims fade to nothing, and stacks down to a T far below float's least normal number.
   FlatSplats splats = random_flat(60, 16, 16, 3, 13);
   for (int i = 0; i < 300; ++i) splats.add(8, 8, 6 + i, 3, 0.4, {0.5, 1, 0.25});
-  SplatView view = view_of_size(16, 16, smooth_settings());
-  Flat<float> flat(splats, view);
+  SplatView view = front_view(16, 16, uncut_settings());
+  FlatRender<float> flat(splats, view);
   const auto run = [&](bool flush) {
     Everything<float> all(flat, view);
     if (!flush) return all.run();

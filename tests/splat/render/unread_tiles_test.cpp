@@ -17,7 +17,7 @@ constexpr Index kSquares = 7 * 4;
 /// A weighted difference of an image, and what it depends on.
 template <class S>
 struct WeightedRender {
-  Flat<S> flat;
+  FlatRender<S> flat;
   Var<S> target, weight, loss;
 
   WeightedRender(const FlatSplats& splats, const SplatView& view, bool skips) : flat(splats, view) {
@@ -58,7 +58,7 @@ TEMPLATE_TEST_CASE("tiles that the loss has no weight for are not composited and
   for (const int tile : {8, 16}) {
     RenderSettings settings;
     settings.tile = tile;
-    const SplatView view = view_of_size(kWidth, kHeight, settings);
+    const SplatView view = front_view(kWidth, kHeight, settings);
     WeightedRender<TestType> all(splats, view, false), some(splats, view, true);
     const RenderCounters &of_all = *all.flat.out.counters, &of_some = *some.flat.out.counters;
     // Columns of squares that count in part: 3, then 6, then 1, then all 7.
