@@ -9,9 +9,11 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/reduce.h"
 #include "stress/faded.h"
+#include "stress/measures.h"
 #include "stress/plain_adam.h"
 #include "stress/rows.h"
 #include "stress/splat_scene.h"
+#include "stress/tape_numbers.h"
 #include "stress/thread_order.h"
 
 namespace hsi4d::stress {

@@ -3,6 +3,9 @@
 #include <cmath>
 
 #include "autodiff/difference.h"
+#include "autodiff/elementwise.h"
+#include "autodiff/reduce.h"
+#include "stress/measures.h"
 #include "stress/plain_adam.h"
 #include "stress/rows.h"
 #include "stress/splat_scene.h"

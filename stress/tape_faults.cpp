@@ -3,7 +3,9 @@
 #include <limits>
 
 #include "autodiff/complex_step.h"
+#include "autodiff/elementwise.h"
 #include "autodiff/gradcheck.h"
+#include "core/random.h"
 #include "stress/rows.h"
 #include "stress/splat_scene.h"
 #include "stress/tape_numbers.h"
