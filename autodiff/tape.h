@@ -373,12 +373,12 @@ class Tape {
     struct Reader {
       std::uint32_t producer, node;
       int input;
-      std::uint64_t key;  // of what it looked at in the last forward
     };
     std::uint32_t result = 0;
     std::uint64_t structure = 0;
     std::uint64_t forward_at = 0;  // clock when forward finished; 0: never, or not since the structure changed
     std::vector<std::uint32_t> leaves, forward_nodes, backward_nodes;
+    std::vector<std::uint64_t> needed_keys;   // of forward_nodes, in the last forward
     std::vector<std::uint64_t> assign_masks;  // of backward_nodes: which inputs they meet first, and assign
     std::vector<Reader> sole_readers;         // that say what they look at, of nodes that nothing else reads
     std::vector<Slot> adjoints;
@@ -408,7 +408,7 @@ class Tape {
   void find_sole_readers(Plan& plan);
   void place_adjoints(Plan& plan);
   void activate(const Plan& plan);
-  void tell_needed(Plan& plan);
+  void tell_needed(const Plan& plan);
   void run_forward(Plan& plan);
   void run_backward(Plan& plan);
   void forward_node(NodeRecord& node);

@@ -124,18 +124,17 @@ void Tape<S>::backward_node(NodeRecord& node, std::uint64_t assign_mask) {
 }
 
 template <class S>
-void Tape<S>::tell_needed(Plan& plan) {
+void Tape<S>::tell_needed(const Plan& plan) {
   for (const std::uint32_t n : plan.forward_nodes) {
     nodes_[n].needed = nullptr;
     nodes_[n].needed_key = kWhole;
   }
   if (!skips_.unread_pixels) return;
-  for (auto& reader : plan.sole_readers) {
+  for (const auto& reader : plan.sole_readers) {
     NodeIo<S> io = io_of(nodes_[reader.node]);
     NodeRecord& producer = nodes_[reader.producer];
     producer.needed = nodes_[reader.node].table->looks_at(nodes_[reader.node].op, io, reader.input);
     if (producer.needed != nullptr) producer.needed_key = key_of(*producer.needed);
-    reader.key = producer.needed_key;
   }
 }
 
@@ -143,6 +142,8 @@ template <class S>
 void Tape<S>::run_forward(Plan& plan) {
   plan.forward_at = 0;
   tell_needed(plan);
+  plan.needed_keys.clear();
+  for (const std::uint32_t n : plan.forward_nodes) plan.needed_keys.push_back(nodes_[n].needed_key);
   counters_.forward_nodes = 0;
   if (anomaly_) {
     for (const std::uint32_t leaf : plan.leaves) check_finite(leaf, nullptr, false);
@@ -209,11 +210,11 @@ void Tape<S>::check_leaves(const Plan& plan) const {
 
 template <class S>
 void Tape<S>::check_needed(const Plan& plan) const {
-  for (const auto& reader : plan.sole_readers) {
-    const NodeRecord& producer = nodes_[reader.producer];
-    if (producer.made_key == kWhole || producer.made_key == reader.key) continue;
-    throw StaleError(std::string("Stale: the forward of another result made other squares of '") +
-                     producer.table->name + "' than this result looks at; run the forward of this one again");
+  for (std::size_t k = 0; k < plan.forward_nodes.size(); ++k) {
+    const NodeRecord& node = nodes_[plan.forward_nodes[k]];
+    if (node.made_key == kWhole || node.made_key == plan.needed_keys[k]) continue;
+    throw StaleError(std::string("Stale: the forward of another result made other squares of '") + node.table->name +
+                     "' than this result looks at; run the forward of this one again");
   }
 }
 
@@ -310,7 +311,7 @@ void Tape<S>::check_finite(std::uint32_t id, const NodeRecord* node, bool adjoin
   template bool Tape<S>::up_to_date(const NodeRecord&) const;           \
   template void Tape<S>::forward_node(NodeRecord&);                     \
   template void Tape<S>::backward_node(NodeRecord&, std::uint64_t);     \
-  template void Tape<S>::tell_needed(Plan&);                            \
+  template void Tape<S>::tell_needed(const Plan&);                      \
   template void Tape<S>::run_forward(Plan&);                            \
   template void Tape<S>::run_backward(Plan&);                           \
   template void Tape<S>::invalidate(const std::vector<std::uint32_t>&); \

@@ -216,7 +216,7 @@ std::string cost_json(const RunCost& cost) {
                     {"mfragments_per_s", mfragments_per_s(stage)},
                     {"adjoint_tiles", per_iteration(sum.counters.adjoint_tiles, stage)},
                     {"layers", per_iteration(sum.counters.layers, stage)},
-                    {"told_squares", per_iteration(sum.counters.told_squares, stage)},
+                    {"dirty_tiles", per_iteration(sum.counters.dirty_tiles, stage)},
                     {"composite_ms", composite_steps(stage)}});
     if (sum.counted > 0) entry["allocations"] = allocations_each(stage);
     text += bench_line(entry.dump());

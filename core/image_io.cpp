@@ -84,6 +84,10 @@ Bytes encode_as_jpeg(const std::string& path, const Image& image, const ImageFor
   if (quality < 1 || quality > 100) {
     throw UserError(path + ": JPEG with quality " + std::to_string(quality) + "; 1 to 100 is allowed");
   }
+  if (std::max(image.width(), image.height()) > kLargestJpegSide) {
+    throw UserError(path + ": a JPEG has at most " + std::to_string(kLargestJpegSide) + " pixels a side, not " +
+                    std::to_string(image.width()) + " x " + std::to_string(image.height()));
+  }
   return encode_jpeg(packed(path, image, PackedType::kUint8), quality, format.jpeg_half_color);
 }
 

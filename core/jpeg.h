@@ -15,7 +15,10 @@ namespace hsi4d {
 /// Throws DataError for a damaged, truncated or oversized image.
 Image decode_jpeg(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits);
 
-/// The JPEG file of an 8-bit image of one or three channels.
+/// What libjpeg takes, pixels.
+inline constexpr int kLargestJpegSide = 65500;
+
+/// The JPEG file of an 8-bit image of one or three channels, of at most kLargestJpegSide.
 /// @param quality     1 to 100
 /// @param half_color  colour in half the resolution (4:2:0)
 Bytes encode_jpeg(const PackedImage& image, int quality, bool half_color);

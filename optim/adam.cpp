@@ -1,5 +1,6 @@
 #include "optim/adam.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <sstream>
@@ -15,6 +16,9 @@ namespace {
 
 /// Numbers of one parallel chunk.
 constexpr Index kChunk = 8192;
+
+/// What a good step makes of the factor of the rates: 2^(1/8), so that eight make up for a bad one.
+constexpr double kRecovery = 1.0905077326652577;
 
 /// Calls run(offset in memory, offset without padding, count) for runs that together are all numbers of an array, in
 /// parallel.
@@ -142,7 +146,7 @@ StepReport Adam<S>::step(Index iteration, Index iterations, double loss) {
   if (report.rolled_back) {
     ++rollbacks_;
     rate_ *= 0.5;
-    report.undone = last_was_bad_ && undo();
+    report.undone = undo();
   } else {
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const double rate = reports_[g].moved ? rate_ * scheduled_rate(groups_[g].settings, iteration, iterations) : 0.0;
@@ -151,8 +155,8 @@ StepReport Adam<S>::step(Index iteration, Index iterations, double loss) {
       if (reports_[g].moved) move(groups_[g], rate);
     }
     can_undo_ = true;
+    rate_ = std::min(1.0, rate_ * kRecovery);
   }
-  last_was_bad_ = report.rolled_back;
   report.rollbacks = rollbacks_;
   report.groups = reports_;
   return report;
@@ -294,14 +298,13 @@ void Adam<S>::set_moments(std::string_view name, const GroupMoments& moments) {
 }
 
 template <class S>
-void Adam<S>::clear_moments(Var<S> var, Index row) {
+void Adam<S>::clear_mean(Var<S> var, Index row) {
   for (Group& group : groups_) {
     for (Block& block : group.blocks) {
       if (block.var.id != var.id) continue;
       const Shape& shape = tape_.shape(var);
       HSI4D_CHECK(row >= 0 && row < shape.planes * shape.rows, "row " + std::to_string(row));
       std::fill_n(block.mean.begin() + row * shape.cols, shape.cols, 0.0);
-      std::fill_n(block.square.begin() + row * shape.cols, shape.cols, 0.0);
       return;
     }
   }

@@ -10,6 +10,7 @@
 // which gradients steps become small; scaling a loss by c and ε by c gives the same steps.
 #pragma once
 
+#include <cmath>
 #include <map>
 #include <optional>
 #include <span>
@@ -69,8 +70,8 @@ struct GroupStep {
 
 /// What a step did. Views are good until the next step.
 struct StepReport {
-  bool rolled_back = false;      ///< nothing moved: a number was not finite
-  bool undone = false;           ///< and the step before it was taken back as well
+  bool rolled_back = false;      ///< no step: a number was not finite
+  bool undone = false;           ///< and the step before it was taken back; false where there was none
   std::optional<BadNumber> bad;  ///< when rolled_back
   Index rollbacks = 0;           ///< so far
   std::span<const GroupStep> groups;
@@ -92,10 +93,9 @@ double bias_correction(double beta, Index steps);
 /// The optimiser of one stage. Steps are bitwise the same for any number of threads and allocate nothing.
 ///
 /// A bad evaluation (a loss that is not finite, or a gradient of a moving group that is not or is beyond
-/// kLargestGradient) changes neither parameters nor moments; it is counted and halves the learning rate of all groups
-/// from then on (rows D4, F1). When the very next evaluation is bad too, the fault is in the parameters themselves: the
-/// last step is taken back, bitwise, to where all was finite. Denormal gradients count as zero, moments never become
-/// denormal (row F4: denormals).
+/// kLargestGradient) is the fault of the step that led there (rows D4, F1): that step is taken back, bitwise, moments
+/// included, and the learning rates of all groups are halved. Without a step to take back nothing moves. Eight good
+/// steps make up for one bad one. Denormal gradients count as zero, moments never become denormal (row F4: denormals).
 template <class S>
 class Adam {
  public:
@@ -116,17 +116,20 @@ class Adam {
   bool undo();
 
   Index rollbacks() const { return rollbacks_; }
-  /// Factor of all learning rates: 2^−rollbacks.
+  /// Factor of all learning rates, at most 1.
   double rate() const { return rate_; }
+  /// More bad evaluations than that which no good step has made up for.
+  bool is_lost(int max_rollbacks) const { return rate_ < std::exp2(-max_rollbacks); }
 
   /// The moments of a group. Throws InternalError for an unknown name.
   GroupMoments moments(std::string_view group) const;
   /// Goes on from moments that were read before; undo has nothing to take back then. Throws InternalError for an
   /// unknown name, DataError naming the group when the sizes are of other parameters.
   void set_moments(std::string_view group, const GroupMoments& moments);
-  /// Forgets the moments of one row of a block, whose numbers were given another meaning since the last step. That step
-  /// can still be taken back, to the numbers and moments from before it.
-  void clear_moments(Var<S> block, Index row);
+  /// Forgets the mean gradient of one row of a block, whose numbers were given another meaning since the last step: the
+  /// next steps are shorter, not longer, for the mean square stays. The last step can still be taken back, to the
+  /// numbers and moments from before it.
+  void clear_mean(Var<S> block, Index row);
 
  private:
   struct Block {
@@ -156,7 +159,6 @@ class Adam {
   std::vector<GroupStep> reports_;
   double rate_ = 1;
   Index rollbacks_ = 0;
-  bool last_was_bad_ = false;
   bool can_undo_ = false;
 };
 

@@ -33,8 +33,8 @@ std::vector<std::string> names_of(const std::vector<ParameterGroup<S>>& groups) 
 }
 
 /// Replaces each row of an axis-angle leaf by the one of the same rotation with |w| ≤ π (row D9: angles grow
-/// past a turn). To be called between steps; an optimiser that goes on then clears the moments of these rows
-/// (Adam::clear_moments), which belong to the old chart.
+/// past a turn). To be called between steps; an optimiser that goes on then clears the mean gradient of these
+/// rows (Adam::clear_mean), which belongs to the old chart.
 ///
 /// @param axis_angles  [J,3] radians, a leaf; written only if a row changes
 /// @return             the rows that changed

@@ -151,13 +151,13 @@ class StageRun {
     return gradient_shares<S>(tape_, terms, groups_, iteration);
   }
 
-  /// Row D9: beyond a whole turn the derivative of an axis-angle vanishes, so none gets that far. What Adam knew of the
-  /// row belongs to the numbers that it had.
+  /// Row D9: beyond a whole turn the derivative of an axis-angle vanishes, so none gets that far. The mean
+  /// gradient belongs to the numbers that a row had; squares are alike on both sides of half a turn.
   void wrap_rotations(const StepReport& step) {
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       if (!groups_[g].parameters.are_axis_angles || !step.groups[g].moved) continue;
       for (const Var<S> block : groups_[g].parameters.blocks) {
-        for (const Index row : wrap_axis_angles(block)) optimizer_.adam()->clear_moments(block, row);
+        for (const Index row : wrap_axis_angles(block)) optimizer_.adam()->clear_mean(block, row);
       }
     }
   }
@@ -207,7 +207,8 @@ class StageRun {
 
   void note_rollback(const BadNumber& bad, Index iteration) {
     if (offender_.empty()) offender_ = bad.text() + first_bad_node();
-    if (optimizer_.rollbacks() <= settings_.optimizer.max_rollbacks) return;
+    const int most = settings_.optimizer.max_rollbacks;
+    if (optimizer_.adam() != nullptr ? !optimizer_.adam()->is_lost(most) : optimizer_.rollbacks() <= most) return;
     throw_diverged("iteration " + std::to_string(iteration));
   }
 

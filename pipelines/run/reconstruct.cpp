@@ -332,7 +332,7 @@ class Reconstruction {
                                       {"groups", counters.groups},
                                       {"fragments", counters.fragments},
                                       {"layers", counters.layers},
-                                      {"told_squares", counters.told_squares},
+                                      {"dirty_tiles", counters.dirty_tiles},
                                       {"adjoint_tiles", counters.adjoint_tiles}}) {
       record.counters.emplace_back(name, static_cast<double>(count));
     }

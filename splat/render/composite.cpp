@@ -340,7 +340,7 @@ struct Composite {
     const int outputs = images_of(io).rest ? 3 : 2;
     for (int output = 0; output < outputs; ++output)
       io.set_dirty_tiles(output, &changed, is_read_everywhere ? nullptr : &read);
-    counters->told_squares = changed.count();
+    counters->dirty_tiles = changed.count();
   }
 
   /// What is known before the tiles are composited.

@@ -24,7 +24,7 @@ struct RenderCounters {
   Index tiles = 0;          ///< tiles of which something was composited
   Index reached = 0;        ///< pairs up to the last one of each tile that is composited: those that have an adjoint
   Index layers = 0;         ///< tiles whose static layer was made anew
-  Index told_squares = 0;   ///< of kMaskSquare² pixels that losses were told to look at again; 0: all
+  Index dirty_tiles = 0;    ///< of kMaskSquare² pixels that losses read again; 0: all
   Index adjoint_tiles = 0;  ///< tiles that the backward run visited
   Index kept_bytes = 0;     ///< of the pixels, from forward to backward, beside the outputs
   RenderTimes times;
@@ -44,7 +44,7 @@ inline RenderCounters& RenderCounters::operator+=(const RenderCounters& other) {
   for (const auto count :
        {&RenderCounters::gaussians, &RenderCounters::visible, &RenderCounters::pairs, &RenderCounters::groups,
         &RenderCounters::fragments, &RenderCounters::tiles, &RenderCounters::reached, &RenderCounters::layers,
-        &RenderCounters::told_squares, &RenderCounters::adjoint_tiles, &RenderCounters::kept_bytes})
+        &RenderCounters::dirty_tiles, &RenderCounters::adjoint_tiles, &RenderCounters::kept_bytes})
     this->*count += other.*count;
   times += other.times;
   return *this;

@@ -209,6 +209,10 @@ TEST_CASE("of two results that look at different squares of one image, each want
   // An image that was made whole between serves both.
   some.tape.forward(some.weighted), some.tape.forward(some.whole);
   CHECK(gradients(some, some.weighted) == gradients(all, all.weighted));
+  // Made again in part, it no longer serves a result that looks at all of it.
+  some.tape.set_skips({.unchanged_inputs = false});
+  some.tape.forward(some.whole), some.tape.forward(some.weighted);
+  CHECK_THROWS_AS(some.tape.backward(some.whole), StaleError);
 }
 
 }  // namespace tape_skips_test

@@ -84,7 +84,7 @@ TEST_CASE("bench stages tells where the time of every stage goes", "[run]") {
   CHECK(stages["camera"]["tiles_of_image"] == 9);
   CHECK(stages["camera"]["pixels"] == 48 * 48);
   CHECK(stages["interaction"]["tiles"].get<double>() <= 9);
-  CHECK(stages["interaction"]["told_squares"].get<double>() <= 9);
+  CHECK(stages["interaction"]["dirty_tiles"].get<double>() <= 9);
   CHECK_FALSE(stages["refinement"].contains("tiles"));
   CHECK(lines.back()["peak_memory_bytes"] > 0);
   CHECK(lines.back()["name"] == "stages");

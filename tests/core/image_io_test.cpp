@@ -165,6 +165,8 @@ TEST_CASE("images that cannot be written say why") {
   const Image image = steps(3, 2, 2, 255);
   CHECK_THROWS_WITH(encode_image("a.gif", image), "a.gif: images are written as .png, .jpg, .jpeg or .exr");
   CHECK_THROWS_WITH(encode_image("dir.png/a", image), "dir.png/a: images are written as .png, .jpg, .jpeg or .exr");
+  CHECK_THROWS_WITH(encode_image("a.jpg", Image(1, 1, 65501)),
+                    "a.jpg: a JPEG has at most 65500 pixels a side, not 65501 x 1");
   CHECK_THROWS_WITH(encode_image("a.png", image, {.png_bits = 12}), "a.png: PNG with 12 bits; 8 and 16 are allowed");
   CHECK_THROWS_WITH(encode_image("a.jpg", image, {.jpeg_quality = 0}),
                     "a.jpg: JPEG with quality 0; 1 to 100 is allowed");

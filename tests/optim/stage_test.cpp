@@ -160,7 +160,7 @@ TEST_CASE("a stage by gauss_newton gets over evaluations that are not finite", "
   CHECK(result.loss < 0.1 * first);
 }
 
-TEST_CASE("a stage keeps axis-angles within half a turn, and forgets what it knew of the old numbers") {
+TEST_CASE("a stage keeps axis-angles within half a turn, and forgets the direction of the old numbers") {
   // Pulled along one axis, past half a turn: the loss is linear in the angle that was added up, so it goes on falling
   // while the row jumps from pi to -pi.
   struct Result {
@@ -192,7 +192,7 @@ TEST_CASE("a stage keeps axis-angles within half a turn, and forgets what it kne
   const Result wrapped = turn(true, 3);
   CHECK(wrapped.w == Approx(3.15 - 2 * std::numbers::pi));
   CHECK(wrapped.moments.blocks[0].mean[0] == 0);
-  CHECK(wrapped.moments.blocks[0].square[0] == 0);
+  CHECK(wrapped.moments.blocks[0].square[0] != 0);
   CHECK(wrapped.moments.blocks[0].mean[3] != 0);
   CHECK(turn(false, 3).moments.blocks[0].mean[0] != 0);
   CHECK(turn(true, 5).w > wrapped.w);  // and on from there
@@ -347,8 +347,8 @@ TEST_CASE("stages that can not run say why") {
                     Contains("groups \"base\" and \"objects\" share the parameter 'base'"));
 }
 
-// Row D4: a NaN in iteration 7 leaves the numbers of iteration 6, and the report names the operator.
-TEST_CASE("a fault that passes costs one iteration") {
+// Row D4: a NaN in iteration 7 leaves the numbers of iteration 5, and the report names the operator.
+TEST_CASE("a fault that passes costs two iterations") {
   Picture<double> picture;
   StageSettings settings = usual_stage();
   settings.losses = {{"fault", weighted(1)}};
@@ -370,7 +370,8 @@ TEST_CASE("a fault that passes costs one iteration") {
       },
       {}, terms);
   CHECK(result.rollbacks == 1);
-  CHECK(states[7] == states[6]);
+  CHECK(states[7] == states[5]);
+  CHECK(states[7] != states[6]);
   CHECK(states[8] != states[7]);
   CHECK(std::isfinite(result.loss));
 }

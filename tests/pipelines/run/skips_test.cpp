@@ -101,9 +101,9 @@ TEST_CASE("skips that are set in a config leave the result's bits, or nearly, an
   CHECK(cotangent.objects == off.objects);
   CHECK(pixels.motion == off.motion);
   CHECK(pixels.objects == off.objects);
-  CHECK(pixels.counted("told_squares") == 0);
-  CHECK(cotangent.counted("told_squares") > 0);
-  CHECK(cotangent.counted("told_squares") < off.counted("tiles"));
+  CHECK(pixels.counted("dirty_tiles") == 0);
+  CHECK(cotangent.counted("dirty_tiles") > 0);
+  CHECK(cotangent.counted("dirty_tiles") < off.counted("tiles"));
   // An image that is 1e-7 off turns the sign of an L1 difference here and there, and Adam's first steps are as long as
   // the rate however small the gradient: an angle that few pixels tell may part a little more.
   const std::vector<double> near = differences(on, off);
