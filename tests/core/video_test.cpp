@@ -208,7 +208,7 @@ TEST_CASE("a colour a pixel is closer to the picture than one for four, and keep
   CHECK(mean_difference(shared, sharp) > 3 * mean_difference(each, sharp));
 }
 
-TEST_CASE("colours are those of the matrix and range that the file names", "[video]") {
+TEST_CASE("colours are those of the matrix and range that the file names") {
   const TemporaryFolder here;
   const Vector3<double> color(200, 31, 60);
   const Warnings warnings;
@@ -223,7 +223,7 @@ TEST_CASE("colours are those of the matrix and range that the file names", "[vid
   CHECK(warnings.texts.empty());
 }
 
-TEST_CASE("a video that names no matrix has BT.709's from 720 lines or 1280 columns on", "[video]") {
+TEST_CASE("a video that names no matrix has BT.709's from 720 lines or 1280 columns on") {
   const TemporaryFolder here;
   const Vector3<double> color(200, 31, 60);
   struct Case {
@@ -245,7 +245,7 @@ TEST_CASE("a video that names no matrix has BT.709's from 720 lines or 1280 colu
   }
 }
 
-TEST_CASE("our own videos of any size name their matrix", "[video]") {
+TEST_CASE("our own videos of any size name their matrix") {
   const TemporaryFolder here;
   Image image(3, 720, 64);
   for (int c = 0; c < 3; ++c) {
@@ -259,7 +259,7 @@ TEST_CASE("our own videos of any size name their matrix", "[video]") {
   CHECK(warnings.texts.empty());
 }
 
-TEST_CASE("videos whose colours or shape would be read wrongly are refused", "[video]") {
+TEST_CASE("videos whose colours or shape would be read wrongly are refused") {
   const TemporaryFolder here;
   write_frames("a.mp4", 3, 48, 64);
   const auto refusal = [](const std::vector<std::string>& words, const std::string& file = "b.mp4") -> std::string {
@@ -290,7 +290,7 @@ TEST_CASE("videos whose colours or shape would be read wrongly are refused", "[v
   for (const char* fine : {"bt709", "smpte170m", "iec61966-2-1"}) CHECK(refusal({"-color_trc", fine}).empty());
 }
 
-TEST_CASE("a video that is to be turned is read upright", "[video]") {
+TEST_CASE("a video that is to be turned is read upright") {
   const TemporaryFolder here;
   write_frames("a.mp4", 3, 48, 64, {.quality = 1});
   remake("a.mp4", {"-c", "copy", "-metadata:s:v", "rotate=90"}, "b.mp4");
@@ -304,7 +304,7 @@ TEST_CASE("a video that is to be turned is read upright", "[video]") {
   CHECK(difference / (48 * 64) < 0.02);
 }
 
-TEST_CASE("a picture before the video is passed over, and of several videos the first is read", "[video]") {
+TEST_CASE("a picture before the video is passed over, and of several videos the first is read") {
   const TemporaryFolder here;
   write_frames("a.mp4", 5, 48, 64);
   write_frames("b.mp4", 4, 16, 32);
@@ -333,7 +333,7 @@ TEST_CASE("a picture before the video is passed over, and of several videos the 
                                                    "1 (32x16, 4 frames)"});
 }
 
-TEST_CASE("times are those of the time stamps", "[video]") {
+TEST_CASE("times are those of the time stamps") {
   const TemporaryFolder here;
   write_frames("even.mp4", 12, 16, 16, {.frame_rate = 30});
   const auto check_times = [](const std::string& path, const std::vector<double>& wanted) {
@@ -359,7 +359,7 @@ TEST_CASE("times are those of the time stamps", "[video]") {
   CHECK_FALSE(are_even(VideoReader("pause.mp4").times()));
 }
 
-TEST_CASE("a frame that is read again is the same", "[video]") {
+TEST_CASE("a frame that is read again is the same") {
   const TemporaryFolder here;
   write_frames("a.mp4", 4, 32, 48);
   VideoReader video("a.mp4");
