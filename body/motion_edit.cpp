@@ -51,7 +51,7 @@ std::map<std::int64_t, std::string> files_of(const std::string& folder, int pers
   std::error_code error;
   std::vector<std::string> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (entry.path().extension() == ".npz") paths.push_back(entry.path().string());
+    if (entry.path().extension() == ".npz" && !is_hidden(entry.path().string())) paths.push_back(entry.path().string());
   }
   if (error) throw UserError(folder + ": cannot be read as a folder: " + error.message());
   std::sort(paths.begin(), paths.end());

@@ -113,6 +113,11 @@ std::string path_beside(const std::string& naming_file, const std::string& path)
   return (std::filesystem::path(naming_file).parent_path() / path).lexically_normal().string();
 }
 
+bool is_hidden(std::string_view path) {
+  const std::size_t slash = path.find_last_of('/');  // npos + 1 is 0
+  return path.substr(slash + 1).starts_with('.');
+}
+
 AtomicFile::AtomicFile(const std::string& path) : path_(path), target_(follow_link(path)) {
   struct stat status {};
   if (::stat(target_.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {

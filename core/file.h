@@ -39,6 +39,10 @@ void write_text_file(const std::string& path, std::string_view content);
 ///   ("runs/a/config.json", "../scene.ply") -> "runs/scene.ply"
 std::string path_beside(const std::string& naming_file, const std::string& path);
 
+/// Whether a file's name begins with a dot: systems and editors leave such files beside others ("._0002.png"). They are
+/// no frames, masks or poses.
+bool is_hidden(std::string_view path);
+
 /// A file that comes into being when it is complete: it is written under a temporary name in the same folder and
 /// renamed by commit(), which replaces an older file in one step. Without commit() the temporary is removed and an
 /// older file stays as it was. A link is followed, so that its target is replaced and the link stays.

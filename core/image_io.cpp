@@ -18,7 +18,7 @@ enum class FileKind { png, jpeg, exr, other };
 
 FileKind image_kind(std::span<const uint8_t> start) {
   const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
-  if (text.starts_with("\x89PNG\r\n\x1a\n")) return FileKind::png;
+  if (is_png(start)) return FileKind::png;
   if (text.starts_with("\xff\xd8\xff")) return FileKind::jpeg;
   if (text.starts_with("\x76\x2f\x31\x01")) return FileKind::exr;
   return FileKind::other;

@@ -67,6 +67,15 @@ bool choose_expansions(Decoder& decoder) {
   return true;
 }
 
+/// A byte for each index, however few bits the file has.
+bool choose_indices(Decoder& decoder) {
+  if (setjmp(png_jmpbuf(decoder.png)) != 0) return false;
+  png_set_packing(decoder.png);
+  png_set_interlace_handling(decoder.png);
+  png_read_update_info(decoder.png, decoder.info);
+  return true;
+}
+
 bool read_pixels(Decoder& decoder, png_bytepp rows) {
   if (setjmp(png_jmpbuf(decoder.png)) != 0) return false;
   png_read_image(decoder.png, rows);
@@ -130,7 +139,40 @@ std::vector<png_bytep> row_pointers(Bytes& values, size_t row_bytes, size_t heig
   throw DataError(name + ": cannot be decoded as PNG: " + decoder.error);
 }
 
+/// Opaque where the file does not say otherwise.
+std::vector<PaletteColor> palette_of(Decoder& decoder) {
+  png_colorp colors = nullptr;
+  png_bytep alphas = nullptr;
+  int count = 0, alpha_count = 0;
+  png_get_PLTE(decoder.png, decoder.info, &colors, &count);
+  png_get_tRNS(decoder.png, decoder.info, &alphas, &alpha_count, nullptr);
+  std::vector<PaletteColor> palette;
+  for (int i = 0; i < count; ++i)
+    palette.push_back({colors[i].red, colors[i].green, colors[i].blue, i < alpha_count ? alphas[i] : uint8_t{255}});
+  return palette;
+}
+
 }  // namespace
+
+bool is_png(std::span<const uint8_t> start) {
+  return start.size() >= 8 && std::memcmp(start.data(), "\x89PNG\r\n\x1a\n", 8) == 0;
+}
+
+PaletteImage decode_palette(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
+  Decoder decoder{.content = file};
+  if (!read_header(decoder)) fail_png(name, decoder);
+  if (png_get_color_type(decoder.png, decoder.info) != PNG_COLOR_TYPE_PALETTE) return {};
+  const int64_t height = png_get_image_height(decoder.png, decoder.info);
+  const int64_t width = png_get_image_width(decoder.png, decoder.info);
+  check_image_size(name, 1, height, width, limits);
+  check_packed_size(name, height, width, std::ssize(file));
+  if (!choose_indices(decoder)) fail_png(name, decoder);
+  PaletteImage image{static_cast<int>(width), static_cast<int>(height), {}, palette_of(decoder)};
+  image.indices.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
+  std::vector<png_bytep> rows = row_pointers(image.indices, static_cast<size_t>(width), static_cast<size_t>(height));
+  if (!read_pixels(decoder, rows.data())) fail_png(name, decoder);
+  return image;
+}
 
 Image decode_png(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
   Decoder decoder{.content = file};

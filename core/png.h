@@ -1,9 +1,11 @@
 // PNG files by libpng.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/packed_image.h"
 
@@ -15,6 +17,23 @@ namespace hsi4d {
 /// @param name  what error messages call the file
 /// Throws DataError for a damaged, truncated or oversized image.
 Image decode_png(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits);
+
+/// Whether a file begins as a PNG does.
+/// @param start  its first eight bytes
+bool is_png(std::span<const uint8_t> start);
+
+/// Red, green, blue, alpha.
+using PaletteColor = std::array<uint8_t, 4>;
+
+/// A PNG with a palette as its file has it.
+struct PaletteImage {
+  int width = 0, height = 0;
+  Bytes indices;                     ///< row by row
+  std::vector<PaletteColor> colors;  ///< by index; empty: the PNG has no palette
+};
+
+/// The indices and the palette of a PNG; nothing of one without a palette. Errors as decode_png.
+PaletteImage decode_palette(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits);
 
 /// The PNG file of an 8-bit or 16-bit image of one to four channels: grey, grey and alpha, RGB, RGBA.
 Bytes encode_png(const PackedImage& image);

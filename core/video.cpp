@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <sstream>
 #include <utility>
 
 #include "core/check.h"
@@ -28,46 +26,21 @@ std::string lower_ending(const std::string& path) {
   return ending;
 }
 
-/// "file:" keeps names that begin like options or protocols from being taken for such.
-std::string input_of(const std::string& path) { return "file:" + path; }
-
-/// What ffprobe tells of the first video stream, a line "KEY=VALUE" each.
-std::string probe(const std::string& path) {
-  try {
-    return run_process({"ffprobe", "-v", "error", "-protocol_whitelist", "file", "-select_streams", "v:0",
-                        "-count_frames", "-show_entries", "stream=avg_frame_rate,nb_read_frames", "-of",
-                        "default=noprint_wrappers=1", input_of(path)});
-  } catch (const ProgramNotStartedError&) {
-    throw;
-  } catch (const UserError& error) {
-    throw DataError(path + ": is not a video that can be read: " + error.what());
-  }
-}
-
-std::string fact(const std::string& facts, const std::string& key) {
-  std::istringstream lines(facts);
-  for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with(key + "=")) return line.substr(key.size() + 1);
-  }
-  return "";
-}
-
-/// 0 where it is none.
-Index read_whole(const std::string& text) {
-  Index number = 0;
-  const auto end = std::from_chars(text.data(), text.data() + text.size(), number);
-  return end.ec == std::errc() && end.ptr == text.data() + text.size() && number > 0 ? number : 0;
-}
-
 /// Conversion between RGB and the colours of a video. Without it swscale takes the nearest colour of 4:2:0 for all four
 /// pixels and rounds coarsely, which costs 4 to 6 dB (docs/numerics.md).
 constexpr const char* kConversion = "accurate_rnd+full_chroma_int+bicubic";
 
-std::vector<std::string> decoder_command(const std::string& path) {
-  return {"ffmpeg",      "-nostdin",   "-hide_banner", "-loglevel", "error", "-protocol_whitelist",
-          "file",        "-i",         input_of(path), "-map",      "0:v:0", "-fps_mode",
-          "passthrough", "-sws_flags", kConversion,    "-pix_fmt",  "rgb24", "-c:v",
-          "ppm",         "-f",         "image2pipe",   "pipe:1"};
+std::vector<std::string> decoder_command(const std::string& path, const VideoFacts& facts) {
+  const std::string stream = "0:" + std::to_string(facts.stream),
+                    filter = facts.set_matrix.empty() ? "null" : "setparams=colorspace=" + facts.set_matrix;
+  return {"ffmpeg",     "-nostdin",   "-hide_banner",
+          "-loglevel",  "error",      "-protocol_whitelist",
+          "file",       "-i",         ffmpeg_input(path),
+          "-map",       stream,       "-vf",
+          filter,       "-fps_mode",  "passthrough",
+          "-sws_flags", kConversion,  "-pix_fmt",
+          "rgb24",      "-c:v",       "ppm",
+          "-f",         "image2pipe", "pipe:1"};
 }
 
 std::vector<std::string> encoder_command(const std::string& path, int width, int height, const VideoFormat& format) {
@@ -81,38 +54,38 @@ std::vector<std::string> encoder_command(const std::string& path, int width, int
           "-vf", is_shared ? "pad=ceil(iw/2)*2:ceil(ih/2)*2" : "null", "-sws_flags", kConversion, "-c:v", "libx264",
           "-threads", "1", "-pix_fmt", is_shared ? "yuv420p" : "yuv444p", "-crf", std::to_string(format.quality),
           "-movflags", "+faststart", "-colorspace", "smpte170m", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-f",
-          "mp4", input_of(path)};
+          "mp4", ffmpeg_input(path)};
 }
 
 }  // namespace
 
 VideoReader::VideoReader(const std::string& path) : path_(path) {
   read_file_start(path, 1);  // tells what is wrong with the path
-  const std::string facts = probe(path);
-  const std::string rate = fact(facts, "avg_frame_rate"), count = fact(facts, "nb_read_frames");
-  frames_ = read_whole(count);
-  if (frames_ < 1) throw DataError(path + ": holds no video that can be read");
-  if (frames_ == 1) throw DataError(path + ": holds one picture and no video");
-  const std::size_t slash = rate.find('/');
-  if (slash == std::string::npos) return;
-  const Index over = read_whole(rate.substr(0, slash)), under = read_whole(rate.substr(slash + 1));
-  if (over > 0 && under > 0) frame_rate_ = static_cast<double>(over) / static_cast<double>(under);
+  facts_ = probe_video(path);
 }
 
 Image VideoReader::read(Index frame) {
-  HSI4D_CHECK(frame >= 0 && frame < frames_, "frame " + std::to_string(frame) + " of " + std::to_string(frames_));
-  if (!decoder_ || next_ > frame) {
-    decoder_ = std::make_unique<ChildProcess>(decoder_command(path_), ChildOutput::kRead);
+  HSI4D_CHECK(frame >= 0 && frame < frames(), "frame " + std::to_string(frame) + " of " + std::to_string(frames()));
+  const bool is_at_hand = decoder_ && next_ == frame + 1;
+  if (!decoder_ || next_ > frame + 1) {
+    decoder_ = std::make_unique<ChildProcess>(decoder_command(path_, facts_), ChildOutput::kRead);
     next_ = 0;
   }
-  while (next_ < frame) next_frame();
-  return next_frame();
+  while (!is_at_hand && next_ <= frame) decode_next();
+  Image image(3, height_, width_);
+  const uint8_t* value = pixels_.data();
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      for (int c = 0; c < 3; ++c) image(c, y, x) = static_cast<float>(*value++) / 255.0F;
+    }
+  }
+  return image;
 }
 
 /// PPM, one after the other: "P6\n<width> <height>\n255\n", then the pixels.
-Image VideoReader::next_frame() {
+void VideoReader::decode_next() {
   const auto fail = [this](const std::string& why) {
-    std::string text = path_ + ": frame " + std::to_string(next_) + " of " + std::to_string(frames_) + " " + why;
+    std::string text = path_ + ": frame " + std::to_string(next_) + " of " + std::to_string(frames()) + " " + why;
     try {
       const std::string said = std::exchange(decoder_, nullptr)->finish();
       if (!said.empty()) text += ": " + said;
@@ -123,25 +96,22 @@ Image VideoReader::next_frame() {
   };
   std::string header;
   for (uint8_t byte = 0; header.size() < kLongestHeader && std::count(header.begin(), header.end(), '\n') < 3;) {
-    if (decoder_->read({&byte, 1}) == 0) fail("cannot be read: the video ends before it");
+    if (decoder_->read({&byte, 1}) == 0)
+      fail("cannot be read: ffprobe counts " + std::to_string(frames()) + " frames, ffmpeg gives " +
+           std::to_string(next_));
     header += static_cast<char>(byte);
   }
-  int width = 0, height = 0, largest = 0;
-  if (std::sscanf(header.c_str(), "P6\n%d %d\n%d\n", &width, &height, &largest) != 3 || largest != 255 || width < 1 ||
-      height < 1 || width > kLargestVideoSide || height > kLargestVideoSide)
+  int largest = 0;
+  if (std::sscanf(header.c_str(), "P6\n%d %d\n%d\n", &width_, &height_, &largest) != 3 || largest != 255 ||
+      width_ < 1 || height_ < 1 || width_ > kLargestVideoSide || height_ > kLargestVideoSide)
     fail("has no size from 1x1 to " + std::to_string(kLargestVideoSide) + "x" + std::to_string(kLargestVideoSide) +
          " pixels");
-  Bytes pixels(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  if (decoder_->read(pixels) != pixels.size()) fail("cannot be read: the video ends in it");
+  pixels_.resize(3 * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  if (decoder_->read(pixels_) != pixels_.size()) fail("cannot be read: the video ends in it");
   ++next_;
-  Image image(3, height, width);
-  const uint8_t* value = pixels.data();
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      for (int c = 0; c < 3; ++c) image(c, y, x) = static_cast<float>(*value++) / 255.0F;
-    }
-  }
-  return image;
+  uint8_t more = 0;
+  if (next_ == frames() && decoder_->read({&more, 1}) == 1)
+    throw DataError(path_ + ": ffprobe counts " + std::to_string(frames()) + " frames, ffmpeg gives more");
 }
 
 bool is_video_name(const std::string& path) {

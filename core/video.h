@@ -8,6 +8,7 @@
 #include "core/file.h"
 #include "core/image.h"
 #include "core/process.h"
+#include "core/video_probe.h"
 
 namespace hsi4d {
 
@@ -15,27 +16,32 @@ namespace hsi4d {
 /// time.
 class VideoReader {
  public:
-  /// Throws UserError when the file cannot be read or ffmpeg is missing, DataError naming it when it holds no video.
+  /// Throws UserError when the file cannot be read or ffmpeg is missing, DataError naming it when it holds no video, or
+  /// one whose colours or shape would be read wrongly (probe_video).
   /// @param path  UTF-8: .mp4, .mov, .avi, .mkv, .webm, ... whatever ffmpeg reads
   explicit VideoReader(const std::string& path);
 
   const std::string& path() const { return path_; }
   /// As the file says; reading may show that the last ones are not there.
-  Index frames() const { return frames_; }
+  Index frames() const { return facts_.frames; }
   /// Frames a second, the mean; 0 where the file does not say.
-  double frame_rate() const { return frame_rate_; }
+  double frame_rate() const { return facts_.frame_rate; }
+  /// When each frame is shown; empty where the file does not say.
+  const FrameTimes& times() const { return facts_.times; }
 
-  /// [3,H,W], upright, 8-bit numbers v/255. Throws DataError naming file and frame when it is damaged or not there.
+  /// [3,H,W], upright, 8-bit numbers v/255. Throws DataError naming file and frame when it is damaged or not there, or
+  /// when others come after the last one.
   Image read(Index frame);
 
  private:
-  Image next_frame();
+  void decode_next();
 
   std::string path_;
-  Index frames_ = 0;
-  double frame_rate_ = 0;
+  VideoFacts facts_;
   std::unique_ptr<ChildProcess> decoder_;  // null: not begun
   Index next_ = 0;                         // the frame that the decoder gives next
+  int width_ = 0, height_ = 0;             // of the frame before it
+  Bytes pixels_;
 };
 
 /// Whether the name of a file ends like that of a video: .mp4, .mov, .avi, .mkv, .webm, .m4v, in any case.

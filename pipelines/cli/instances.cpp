@@ -22,7 +22,7 @@ std::vector<std::vector<std::string>> instance_rows(const fs::path& folder,
   std::vector<fs::path> files;
   std::error_code error;  // no such folder: no instances
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
+    if (entry.path().extension() == ".json" && !is_hidden(entry.path().string())) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   std::vector<std::vector<std::string>> rows;
   for (const fs::path& file : files) {

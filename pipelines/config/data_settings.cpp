@@ -22,7 +22,8 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
   if (fs::exists(base / "truth" / "surface.ply")) data.surface = base / "truth" / "surface.ply";
   std::error_code error;  // no such folder: no objects
   for (const fs::directory_entry& entry : fs::directory_iterator(base / "objects", error)) {
-    if (has_splat_ending(entry.path().string())) data.objects.push_back({entry.path().stem().string(), {entry.path()}});
+    if (has_splat_ending(entry.path().string()) && !is_hidden(entry.path().string()))
+      data.objects.push_back({entry.path().stem().string(), {entry.path()}});
   }
   std::sort(data.objects.begin(), data.objects.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   return data;

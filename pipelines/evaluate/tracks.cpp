@@ -268,7 +268,7 @@ void check_holds_track(const std::string& path, const std::string& member) {
   const fs::path folder = path;
   if (fs::exists(folder / "truth", error) || fs::exists(folder / "initial.json", error)) return;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (entry.path().extension() == ".npz") return;
+    if (entry.path().extension() == ".npz" && !is_hidden(entry.path().string())) return;
   }
   const fs::path inner = folder / member;
   const bool is_meant = member == "run" ? is_run_folder(inner.string()) : fs::exists(inner / "truth", error);

@@ -134,13 +134,21 @@ MaskSource open_masks(const fs::path& folder, const std::string& name, const Fra
   return masks;
 }
 
-/// False for a mask that nowhere reaches the threshold.
-bool shows_something(const Image& mask, double threshold) {
+float largest_value(const Image& mask) {
+  float largest = 0;
   for (int y = 0; y < mask.height(); ++y) {
     const float* row = mask.row(0, y);
-    if (std::any_of(row, row + mask.width(), [&](float m) { return static_cast<double>(m) >= threshold; })) return true;
+    largest = std::max(largest, *std::max_element(row, row + mask.width()));
   }
-  return false;
+  return largest;
+}
+
+/// What is told of masks that reach no threshold but hold something as small as numbers of labels; else empty.
+std::string label_text(float largest) {
+  constexpr float kMostLabels = 16.0F / 255;
+  if (largest <= 0 || largest > kMostLabels) return "";
+  return " (the largest value is " + rounded(255 * static_cast<double>(largest), 3) +
+         " of 255: labels are read from images with a palette, grey is the share of the pixel)";
 }
 
 /// What hidden masks do to the losses, as the end of a message.
@@ -207,13 +215,13 @@ bool fits_camera(const Image& frame, const Camera& camera) {
 }
 
 void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses) {
-  std::vector<std::vector<bool>> is_seen(static_cast<std::size_t>(clip.frames()));  // [frame][human, then objects]
+  std::vector<std::vector<float>> largest(static_cast<std::size_t>(clip.frames()));  // [frame][human, then objects]
   const auto look = [&](Index begin, Index end) {
     for (Index index = begin; index < end; ++index) {
-      std::vector<bool>& seen = is_seen[static_cast<std::size_t>(index)];
+      std::vector<float>& of_frame = largest[static_cast<std::size_t>(index)];
       const ClipFrame frame = read_frame(clip, index);
-      seen.push_back(shows_something(frame.human_mask, data.mask_threshold));
-      for (const Image& mask : frame.object_masks) seen.push_back(shows_something(mask, data.mask_threshold));
+      of_frame.push_back(largest_value(frame.human_mask));
+      for (const Image& mask : frame.object_masks) of_frame.push_back(largest_value(mask));
     }
   };
   const bool has_videos =
@@ -227,13 +235,16 @@ void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMa
   const auto warn_if_hidden = [&](std::size_t mask, const std::string& name, const std::string& what,
                                   const std::vector<std::string>& off) {
     std::vector<Index> hidden;
-    for (std::size_t t = 1; t < is_seen.size(); ++t) {  // frame 0 is given
-      if (!is_seen[t][mask]) hidden.push_back(static_cast<Index>(t));
+    float most = 0;
+    for (std::size_t t = 1; t < largest.size(); ++t) {  // frame 0 is given
+      if (static_cast<double>(largest[t][mask]) >= data.mask_threshold) continue;
+      hidden.push_back(static_cast<Index>(t));
+      most = std::max(most, largest[t][mask]);
     }
     if (hidden.empty()) return;
     log_warning((data.masks / name).string() + ": " + what + " is hidden in " +
                 (hidden.size() == 1 ? "frame " : "frames ") + frame_ranges(hidden) +
-                ": no pixel reaches data.mask_threshold" + off_text(off));
+                ": no pixel reaches data.mask_threshold" + label_text(most) + off_text(off));
   };
   warn_if_hidden(0, kHumanMasks, "the human", losses.human);
   for (std::size_t o = 0; o < clip.objects.size(); ++o)

@@ -7,8 +7,10 @@
 #include <optional>
 
 #include "core/check.h"
+#include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
+#include "core/mask_image.h"
 #include "core/text.h"
 #include "core/video.h"
 
@@ -108,12 +110,13 @@ std::string unread_text(const std::map<std::string, Index>& count_of_ending) {
   return text.empty() ? "" : text + " files are not read";
 }
 
-/// The .png files of a folder, in the order of their names.
+/// The .png files of a folder, but for hidden ones, in the order of their names.
 std::vector<std::string> png_names(const fs::path& folder) {
   std::vector<std::string> names;
   std::map<std::string, Index> others;  // by ending
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (is_hidden(entry.path().string())) continue;
     const std::string ending = entry.path().extension().string();
     if (ending == ".png") names.push_back(entry.path().filename().string());
     if (ending != ".png" && !ending.empty() && is_plain_text(ending)) ++others[ending];
@@ -144,14 +147,43 @@ std::vector<Index> kept_frames(Index count, double video, double kept) {
 /// The rate of the video, where frames are to be chosen by it.
 double rate_of_video(const fs::path& path, double of_file, const FrameRates& rates) {
   const double video = rates.video > 0 ? rates.video : of_file;
-  if (rates.kept == 0) return video;
-  if (video == 0)
+  if (rates.kept > 0 && video == 0)
     throw UserError(path.string() + ": does not say how many frames a second it has, so that " +
                     number_text(rates.kept) + " of them cannot be kept; data.video_rate says it");
-  if (rates.kept > video)
-    throw UserError(path.string() + ": has " + number_text(video) + " frames a second; data.frame_rate, " +
-                    number_text(rates.kept) + ", cannot be more");
   return video;
+}
+
+/// @param video  frames a second, where they follow each other as usual
+void check_kept_rate(const fs::path& path, double video, double kept) {
+  if (kept > video * (1 + 1e-9))
+    throw UserError(path.string() + ": has " + rounded(video, 8) + " frames a second; data.frame_rate, " +
+                    number_text(kept) + ", cannot be more");
+}
+
+/// "but frame 4 comes 0.2333 s after frame 3", as the frames before do not.
+std::string gap_text(const FrameTimes& times) {
+  const TimeStep widest = widest_step(times);
+  return "follow each other after " + rounded(usual_step(times), 4) + " s, but frame " +
+         std::to_string(widest.before + 1) + " comes " + rounded(widest.seconds, 4) + " s after frame " +
+         std::to_string(widest.before);
+}
+
+/// The frames of a video that are nearest to the moments of the kept rate, where they are not equally far apart in
+/// time.
+std::vector<Index> frames_by_time(const fs::path& path, const FrameTimes& times, double kept) {
+  if (kept == 0)
+    throw UserError(path.string() + ": its frames " + gap_text(times) +
+                    "; set data.frame_rate, for which the nearest ones in time are taken, or data.video_rate, if they "
+                    "are equally far apart in truth");
+  check_kept_rate(path, 1 / usual_step(times), kept);
+  const std::vector<Index> numbers = nearest_frames(times, kept);
+  Index repeated = 0;
+  for (std::size_t t = 1; t < numbers.size(); ++t) repeated += numbers[t] == numbers[t - 1] ? 1 : 0;
+  log_warning(path.string() + ": its frames " + gap_text(times) + "; the nearest in time are taken" +
+              (repeated == 0 ? ""
+                             : ", one ahead of it again for " + std::to_string(repeated) + " of " +
+                                   std::to_string(numbers.size())));
+  return numbers;
 }
 
 /// The video called `name` in a folder; empty: there is none. Throws UserError where there are two.
@@ -166,6 +198,19 @@ fs::path video_in(const fs::path& folder, const std::string& name) {
     video = entry.path();
   }
   return video;
+}
+
+/// What is behind a transparent pixel is not known.
+void check_opaque(const Image& image, const std::string& place) {
+  const int alpha = image.channels() - 1;
+  if (image.channels() != 2 && image.channels() != 4) return;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      if (image(alpha, y, x) >= 1) continue;
+      throw DataError(place + ": row " + std::to_string(y) + ", column " + std::to_string(x) + " has alpha " +
+                      rounded(static_cast<double>(image(alpha, y, x)), 3) + "; a frame is opaque");
+    }
+  }
 }
 
 std::string frame_of(const fs::path& video, Index number) {
@@ -185,7 +230,13 @@ FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(
   }
   video_count_ = video_ ? video_->reader.frames() : std::ssize(files);
   video_rate_ = rate_of_video(path, video_ ? video_->reader.frame_rate() : 0, rates);
-  numbers_ = kept_frames(video_count_, video_rate_, rates.kept);
+  is_uneven_ = video_ && rates.video == 0 && !are_even(video_->reader.times());
+  if (is_uneven_) {
+    numbers_ = frames_by_time(path, video_->reader.times(), rates.kept);
+  } else {
+    if (rates.kept > 0) check_kept_rate(path, video_rate_, rates.kept);
+    numbers_ = kept_frames(video_count_, video_rate_, rates.kept);
+  }
   frame_rate_ = rates.kept > 0 ? rates.kept : video_rate_;
   for (const Index number : numbers_)
     names_.push_back(video_ ? four_digits(number) + ".png" : files[static_cast<std::size_t>(number)]);
@@ -204,7 +255,17 @@ std::string FrameSource::place(Index frame) const {
   return video_ ? frame_of(path_, number(frame)) : (path_ / names_[static_cast<std::size_t>(frame)]).string();
 }
 
-Image FrameSource::read(Index frame) const { return video_ ? video_->read(number(frame)) : read_image(place(frame)); }
+double FrameSource::time(Index frame) const {
+  if (is_uneven_) return video_->reader.times().seconds[static_cast<std::size_t>(number(frame))];
+  return static_cast<double>(number(frame)) / video_rate_;
+}
+
+Image FrameSource::read(Index frame) const {
+  if (video_) return video_->read(number(frame));
+  Image image = read_image(place(frame));
+  check_opaque(image, place(frame));
+  return image;
+}
 
 MaskSource::MaskSource(const fs::path& folder, const std::string& name) : path_(folder / name) {
   const fs::path video = video_in(folder, name);
@@ -235,7 +296,7 @@ MaskSource::Count MaskSource::count(const FrameSource& frames) const {
   Count count;
   std::error_code ignored;  // single masks that cannot be read are told when they are
   for (const fs::directory_entry& entry : fs::directory_iterator(path_, ignored)) {
-    if (entry.path().extension() != ".png") continue;
+    if (entry.path().extension() != ".png" || is_hidden(entry.path().string())) continue;
     ++count.all;
     count.unused += frames.has_name(entry.path().filename().string()) ? 0 : 1;
   }
@@ -252,7 +313,8 @@ std::string MaskSource::place(const FrameSource& frames, Index frame) const {
 
 Image MaskSource::read(const FrameSource& frames, Index frame) const {
   if (!video_ && !fs::exists(file(frames, frame))) return {};
-  return take_channels(video_ ? video_->read(frames.number(frame)) : read_image(place(frames, frame)), 0, 1);
+  const std::string name = place(frames, frame);
+  return video_ ? mask_of(video_->read(frames.number(frame)), name) : read_mask_image(name);
 }
 
 }  // namespace hsi4d

@@ -27,11 +27,14 @@ struct OpenVideo;
 /// frames are read in order.
 class FrameSource {
  public:
-  /// Opens a video file, or lists a folder: its .png files in the order of their names.
+  /// Opens a video file, or lists a folder: its .png files, but for hidden ones, in the order of their names.
   ///
   /// Frame t of the clip is frame round(t · video / kept) of the video.   [method.md, §1: of 153 frames 0, 3, ..., 150]
+  /// If a video's time stamps are not even and rates.video does not say that its frames are, it is the frame nearest to
+  /// t / kept by them, which may be one for two; the log warns of that.
   /// Throws UserError or DataError naming the path: no such file or folder, no video, names that are no plain text or
-  /// have different numbers of digits; rates without which frames cannot be chosen; fewer than two frames.
+  /// have different numbers of digits; rates without which frames cannot be chosen; uneven times of which all frames
+  /// are kept; fewer than two frames.
   FrameSource(const std::filesystem::path& path, const FrameRates& rates);
 
   Index count() const { return std::ssize(names_); }
@@ -49,10 +52,13 @@ class FrameSource {
   std::filesystem::path file() const { return video_ ? path_ : std::filesystem::path(); }
   /// Number of a frame in the video; of a folder its place.
   Index number(Index frame) const { return numbers_[static_cast<std::size_t>(frame)]; }
+  /// Seconds from the first frame of the video to this one; only where the rate of the video is known.
+  double time(Index frame) const;
   /// Which picture it is, for messages: "clip.mp4: frame 3", "frames/0003.png".
   std::string place(Index frame) const;
 
-  /// [C,H,W]; RGB of a video. Throws as read_image and VideoReader::read.
+  /// [C,H,W]; RGB of a video. Throws as read_image and VideoReader::read; DataError for a picture that is transparent
+  /// somewhere.
   Image read(Index frame) const;
 
  private:
@@ -60,6 +66,7 @@ class FrameSource {
   std::shared_ptr<detail::OpenVideo> video_;  // null: a folder
   std::vector<std::string> names_;
   std::vector<Index> numbers_;
+  bool is_uneven_ = false;  // chosen by the time stamps of the video
   Index video_count_ = 0;
   double video_rate_ = 0, frame_rate_ = 0;
 };
@@ -85,7 +92,7 @@ class MaskSource {
   /// The file of a frame's mask, there or not; empty for a video.
   std::filesystem::path file(const FrameSource& frames, Index frame) const;
   std::string place(const FrameSource& frames, Index frame) const;
-  /// [1,H,W], the first channel; an empty image where there is no mask.
+  /// [1,H,W], as read_mask_image; an empty image where there is no mask.
   Image read(const FrameSource& frames, Index frame) const;
 
  private:
@@ -109,7 +116,7 @@ std::vector<T> kept_frames(std::vector<T> all, const FrameSource& frames, const 
         (frames.count() == frames.video_count() ? "" : ", of which the clip keeps " + std::to_string(frames.count())) +
         "; allowed: that many" + (frames.count() == frames.video_count() ? "" : ", of either") + or_else);
   std::vector<T> some;
-  for (Index t = 0; t < frames.count(); ++t) some.push_back(std::move(all[static_cast<std::size_t>(frames.number(t))]));
+  for (Index t = 0; t < frames.count(); ++t) some.push_back(all[static_cast<std::size_t>(frames.number(t))]);
   return some;
 }
 

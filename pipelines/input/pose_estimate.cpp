@@ -26,7 +26,7 @@ BodyPose pose_at(const Motion& motion, double seconds) {
 /// Whether a motion of another rate than the video's goes on to the clip's last frame, but for half a frame of its own.
 bool covers(const Motion& motion, const FrameSource& frames) {
   if (!motion.says_frame_rate || frames.video_rate() == 0) return false;
-  const double end = static_cast<double>(frames.number(frames.count() - 1)) / frames.video_rate();
+  const double end = frames.time(frames.count() - 1);
   return end <= (static_cast<double>(motion.poses.size()) - 0.5) / motion.frame_rate;
 }
 
@@ -50,8 +50,7 @@ std::vector<BodyPose> poses_of_frames(const Motion& motion, const fs::path& file
     return kept_frames(motion.poses, frames, file.string(), "poses", or_else);
   warn_of_rest(motion, file, frames);
   std::vector<BodyPose> poses;
-  for (Index t = 0; t < frames.count(); ++t)
-    poses.push_back(pose_at(motion, static_cast<double>(frames.number(t)) / frames.video_rate()));
+  for (Index t = 0; t < frames.count(); ++t) poses.push_back(pose_at(motion, frames.time(t)));
   return poses;
 }
 

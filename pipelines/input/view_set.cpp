@@ -4,6 +4,7 @@
 #include "core/check.h"
 #include "core/config_file.h"
 #include "core/image_io.h"
+#include "core/mask_image.h"
 
 namespace hsi4d {
 
@@ -49,8 +50,8 @@ void check_numbers(const ViewSet& set) {
   }
 }
 
-Image read_sized(const fs::path& file, const Camera& camera) {
-  Image image = read_image(file.string());
+/// The image, unless it has another size than its camera.
+Image sized(Image image, const fs::path& file, const Camera& camera) {
   if (image.width() == camera.width && image.height() == camera.height) return image;
   throw DataError(file.string() + ": is " + std::to_string(image.width()) + "x" + std::to_string(image.height()) +
                   " pixels; its camera has " + std::to_string(camera.width) + "x" + std::to_string(camera.height));
@@ -99,11 +100,11 @@ std::string view_set_json(const std::string& motion, const std::string& cameras,
 
 ViewImage view_image(const ViewSet& set, const PosedView& view, const Vector3<double>& background) {
   const Camera& camera = set.cameras[static_cast<std::size_t>(view.camera)];
-  const Image image = read_sized(view.image, camera);
+  const Image image = sized(read_image(view.image.string()), view.image, camera);
   if (image.channels() < 3) throw DataError(view.image.string() + ": is grey; a picture has three channels");
   ViewImage result{take_channels(image, 0, 3), {}};
   if (!view.mask.empty()) {
-    result.mask = take_channels(read_sized(view.mask, camera), 0, 1);
+    result.mask = sized(read_mask_image(view.mask.string()), view.mask, camera);
   } else if (image.channels() == 4) {
     result.mask = take_channels(image, 3, 1);
   }

@@ -7,7 +7,7 @@
 //
 // Names are relative to it. A view's camera is one of cameras.json (core/camera_file.h), its frame one of the motion
 // (body/motion_io.h). The share of each pixel that shows the human is the picture's alpha (PNG, not premultiplied), or
-// the mask, 8 bit grey; without both the picture has to show the human before the background of the fit.
+// the mask (core/mask_image.h); without both the picture has to show the human before the background of the fit.
 #pragma once
 
 #include <filesystem>

@@ -229,6 +229,7 @@ TEST_CASE("a folder of SMPLer-X files is a motion, and frames without a file are
   write_smplerx("smplx/00012_0.npz", 1.5);
   write_smplerx("smplx/00009_1.npz", 9);
   folder.write("smplx/notes.txt", "");
+  folder.write("smplx/._00009_0.npz", "left by another system");
   const PoseFolder read = read_pose_folder("smplx", 30);
   CHECK(read.files == 3);
   CHECK(read.filled == 2);

@@ -1,7 +1,9 @@
 // PNG and JPEG.
 #include "core/image_io.h"
+#include "core/png.h"
 #include "tests/crc32.h"
 #include "tests/fuzz/fuzz.h"
+#include "tests/support/palette_png.h"
 
 namespace hsi4d::fuzz::image_fuzz {
 namespace {
@@ -37,21 +39,26 @@ Bytes repaired_png(std::span<const uint8_t> file) {
   return result;
 }
 
-bool is_png(std::span<const uint8_t> file) { return file.size() > 8 && file[0] == 0x89 && file[1] == 'P'; }
-
 }  // namespace
 
 std::vector<Bytes> corpus() {
   return {
-      encode_image("a.png", gradient(3, 5, 7)),   encode_image("a.png", gradient(2, 9, 3), {.png_bits = 16}),
-      encode_image("a.png", gradient(1, 8, 8)),   encode_image("a.png", gradient(4, 4, 6)),
-      encode_image("a.jpg", gradient(3, 17, 19)), encode_image("a.jpg", gradient(1, 8, 24), {.jpeg_quality = 30}),
+      encode_image("a.png", gradient(3, 5, 7)),
+      encode_image("a.png", gradient(2, 9, 3), {.png_bits = 16}),
+      encode_image("a.png", gradient(1, 8, 8)),
+      encode_image("a.png", gradient(4, 4, 6)),
+      encode_image("a.jpg", gradient(3, 17, 19)),
+      encode_image("a.jpg", gradient(1, 8, 24), {.jpeg_quality = 30}),
+      test::palette_png(3, 2, {0, 1, 2, 2, 1, 0}, {{0, 0, 0, 255}, {128, 0, 0, 255}, {0, 128, 0, 7}}),
   };
 }
 
 bool accepts(std::span<const uint8_t> file) {
   const ImageLimits limits{.max_bytes = int64_t{32} << 20};  // what takes long to clear is no finding
-  if (is_png(file)) is_read([&] { decode_image(repaired_png(file), "fuzz", limits); });
+  if (is_png(file)) {
+    is_read([&] { decode_image(repaired_png(file), "fuzz", limits); });
+    is_read([&] { decode_palette(repaired_png(file), "fuzz", limits); });
+  }
   return is_read([&] { decode_image(file, "fuzz", limits); });
 }
 

@@ -53,6 +53,11 @@ def size_of(path):
     return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
 
 
+def matrix_of(path):
+    asked = ["ffprobe", "-v", "error", "-show_entries", "stream=color_space", "-of", "csv=p=0", str(path)]
+    return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+
+
 def test_programs():
     for program in PROGRAMS:
         check(run(program, "--help"), 0, "usage:", "--out")
@@ -119,6 +124,10 @@ def test_fit(folder):
     picture(folder / "near.mp4", "130x96")
     check(fit(folder / "near.mp4"), 0)
     assert size_of(out) == "64,48", size_of(out)
+    assert matrix_of(out) == "smpte170m", matrix_of(out)
+    picture(folder / "high.mp4", "1280x960")  # BT.709, as it names none
+    check(fit(folder / "high.mp4"), 0)
+    assert matrix_of(out) == "bt709", matrix_of(out)
     picture(folder / "wide.mp4", "132x96")
     check(fit(folder / "wide.mp4"), 1, "the model's video is 132x96, the first frame 64x48: their shapes differ by 3.1 %, at most 2 %")
     check(fit(folder / "wide.mp4", ", 0.035"), 0)

@@ -27,7 +27,7 @@ import service
 def frame_files(video, pattern, folder):
     """The frames as PNG files, in order: those of a folder, or of a video, taken out by ffmpeg."""
     if pathlib.Path(video).is_dir():
-        return sorted(pathlib.Path(video).glob(pattern))
+        return service.visible(video, pattern)
     service.run(["ffmpeg", "-v", "error", "-i", video, "-fps_mode", "passthrough", pathlib.Path(folder) / "%06d.png"])
     return sorted(pathlib.Path(folder).glob("*.png"))
 
@@ -120,7 +120,7 @@ def rate_of(folder):
 def embed_runs(a):
     tasks = []
     for folder in (run for given in a.runs for run in runs_in(service.need(given, "folder"))):
-        files = sorted((folder / "frames").glob("*_render.png"))
+        files = service.visible(folder / "frames", "*_render.png")
         if not files:
             service.fail(f"{folder / 'frames'}: has no file *_render.png", service.ASKED_WRONGLY)
         out = folder / "clip.npz"
@@ -148,7 +148,7 @@ def embed_video(a):
         service.fail("--text: is empty", service.ASKED_WRONGLY)
     if not 0.01 <= a.frame_rate <= 1e5:
         service.fail(f"--frame-rate: {a.frame_rate} is out of range; allowed: 0.01 to 100000", service.ASKED_WRONGLY)
-    if pathlib.Path(a.video).is_dir() and not any(pathlib.Path(a.video).glob(a.pattern)):
+    if pathlib.Path(a.video).is_dir() and not service.visible(a.video, a.pattern):
         service.fail(f"{a.video}: has no file {a.pattern}", service.ASKED_WRONGLY)
     if a.dry_run:
         print(f"{a.model} on {a.device}: embeds the frames of {a.video} and \"{a.text}\" into {a.out}")

@@ -62,14 +62,18 @@ def png_size(path):
     return struct.unpack(">II", head[16:24])
 
 
-def probed(video, *words):
-    """What ffprobe tells of the first stream of a video, as numbers; those that it does not know are left out."""
+def probed_words(video, *words):
+    """What ffprobe tells of the first stream of a video."""
     command = ["ffprobe", "-v", "error", *words, "-select_streams", "v:0", "-of", "csv=p=0", "-i", str(video)]
     try:
-        told = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip().split(",")
+        return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip().split(",")
     except OSError as error:
         fail(f"ffprobe: cannot be run: {error.strerror}", ASKED_WRONGLY)
-    return [int(number) for number in told if number.isdigit()]
+
+
+def probed(video, *words):
+    """As probed_words, as numbers; those that it does not know are left out."""
+    return [int(number) for number in probed_words(video, *words) if number.isdigit()]
 
 
 def video_size(path):
@@ -78,6 +82,14 @@ def video_size(path):
     if len(told) < 2 or 0 in told:
         fail(f"{path}: is no video that ffprobe can read")
     return told[0], told[1]
+
+
+def matrix_words(video, size):
+    """ffmpeg's words that keep the colours of a video which is scaled: one that does not name its matrix is taken for
+    BT.709 or BT.601 by its size (core/video_probe.h), so its copy in another size names it."""
+    if probed_words(video, "-show_entries", "stream=color_space")[0] not in ("unknown", "reserved", ""):
+        return []
+    return ["-colorspace", "bt709" if size[0] >= 1280 or size[1] >= 720 else "smpte170m"]
 
 
 def fit_video(video, image, out, most_stretch=0.02):
@@ -92,13 +104,19 @@ def fit_video(video, image, out, most_stretch=0.02):
         fail(f"the model's video is {found[0]}x{found[1]}, the first frame {size[0]}x{size[1]}: their shapes differ by "
              f"{100 * (max(stretch, 1 / stretch) - 1):.1f} %, at most {100 * most_stretch:g} % are scaled away")
     scale = f"scale={size[0]}:{size[1]}:flags=lanczos"
-    run(["ffmpeg", "-v", "error", "-y", "-i", video, "-an", "-vf", scale, "-crf", "12", "-pix_fmt", "yuv444p", out])
+    run(["ffmpeg", "-v", "error", "-y", "-i", video, "-an", "-vf", scale, "-crf", "12", "-pix_fmt", "yuv444p",
+         *matrix_words(video, found), out])
+
+
+def visible(folder, pattern):
+    """The files of a folder, in order, but for hidden ones, which are no frames ("._0002.png")."""
+    return sorted(path for path in pathlib.Path(folder).glob(pattern) if not path.name.startswith("."))
 
 
 def frame_names(video):
     """The names that masks of a video have: those of a folder's frames, or numbers. Counted by ffprobe."""
     if pathlib.Path(video).is_dir():
-        return sorted(path.name for path in pathlib.Path(video).glob("*.png"))
+        return [path.name for path in visible(video, "*.png")]
     told = probed(video, "-count_frames", "-show_entries", "stream=nb_read_frames")
     if not told:
         fail(f"{video}: is no video that ffprobe can read")
@@ -120,7 +138,7 @@ def as_video(video, rate, folder, dry_run=False):
     made = pathlib.Path(folder).resolve() / "video.mp4"
     words, place = input_of(video)
     run(["ffmpeg", "-v", "error", "-y", "-framerate", rate, *words, "-crf", "10", "-pix_fmt", "yuv420p",
-         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", made], place, dry_run)
+         "-colorspace", "smpte170m", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", made], place, dry_run)
     return made
 
 

@@ -193,6 +193,10 @@ TEST_CASE("a picture's alpha is its mask, and views that make no sense are refus
   };
   const PosedView good{"images/0000.png", {}, 0, 0};
   CHECK(fault({good}) == "");
+  Image blue(3, grey.mask.height(), grey.mask.width());
+  blue(2, 5, 6) = 1;
+  write_image((file.parent_path() / "blue.png").string(), blue);
+  CHECK_THAT(fault({{"images/0000.png", "blue.png", 0, 0}}), Catch::Contains("blue.png: is a colour mask: row 5"));
   CHECK_THAT(fault({}), Catch::Contains("there is no view"));
   CHECK_THAT(fault({good, {"images/0000.png", {}, 4, 0}}),
              Catch::Contains("/views/1/camera: 4; there are 4, counted from 0"));

@@ -54,7 +54,8 @@ TEST_CASE("a dataset's folder tells its inputs") {
   REQUIRE(data.objects.size() == 1);
   CHECK(data.objects[0].first == kTinyObject);
   CHECK(data.objects[0].second.gaussians == base / "objects" / "watering_can.ply");
-  for (const char* name : {"objects/b.ply", "objects/a.ply", "objects/c.spz", "objects/d.splat", "objects/notes.txt"})
+  for (const char* name :
+       {"objects/b.ply", "objects/a.ply", "objects/c.spz", "objects/d.splat", "objects/notes.txt", "objects/._a.ply"})
     here.write(std::string("d/") + name, "");
   const DataSettings other = dataset_inputs("d");  // relative, nothing there but objects
   CHECK(other.scene == here.path() / "d" / "scene.ply");
@@ -191,13 +192,16 @@ TEST_CASE("a motion of another body model stands where its file has it, estimate
   CHECK(clip.first.body.transl == clip.estimate[0].transl);
 }
 
-TEST_CASE("frames may have alpha, masks may have colours or be missing") {
+TEST_CASE("frames may have alpha that is full, masks may have three channels or be missing") {
   const CopiedDataset dataset;
-  Image with_alpha(4, kTinyPixels, kTinyPixels), coloured(3, kTinyPixels, kTinyPixels);
-  with_alpha(0, 1, 2) = with_alpha(3, 1, 2) = 1;
-  coloured(0, 5, 6) = 1;
-  write_image((dataset.path / "frames/0001.png").string(), with_alpha);
-  write_image((dataset.path / "masks/human/0001.png").string(), coloured);
+  Image with_alpha(4, kTinyPixels, kTinyPixels), mask(3, kTinyPixels, kTinyPixels);
+  for (int y = 0; y < kTinyPixels; ++y) std::fill_n(with_alpha.row(3, y), kTinyPixels, 1.0F);
+  with_alpha(0, 1, 2) = 1;
+  for (int c = 0; c < 3; ++c) mask(c, 5, 6) = 1;
+  const std::string frame_file = (dataset.path / "frames/0001.png").string(),
+                    mask_file = (dataset.path / "masks/human/0001.png").string();
+  write_image(frame_file, with_alpha);
+  write_image(mask_file, mask);
   fs::remove(dataset.path / "masks/watering_can/0001.png");
   const DataSettings data = dataset_inputs(dataset.path);
   const Clip clip = read_clip(data);
@@ -210,6 +214,31 @@ TEST_CASE("frames may have alpha, masks may have colours or be missing") {
   for (int y = 0; y < kTinyPixels; ++y) {
     for (int x = 0; x < kTinyPixels; ++x) REQUIRE(frame.object_masks[0](0, y, x) == 0);
   }
+  mask(1, 5, 6) = 0;
+  write_image(mask_file, mask);
+  CHECK_THAT(message_of([&] { read_frame(clip, 1); }),
+             Contains(mask_file + ": is a colour mask: row 5, column 6 is (255, 0, 255)"));
+  with_alpha(3, 4, 3) = 0.8F;
+  write_image(frame_file, with_alpha);
+  CHECK(message_of([&] { read_frame(clip, 1); }) == frame_file + ": row 4, column 3 has alpha 0.8; a frame is opaque");
+  write_image(frame_file, Image(1, kTinyPixels, kTinyPixels));
+  CHECK_THAT(message_of([&] { read_frame(clip, 1); }), Contains(" with 1 channels; the camera's image is "));
+}
+
+TEST_CASE("grey masks that hold labels are told from masks that show nothing") {
+  const CopiedDataset dataset;
+  Image labels(1, kTinyPixels, kTinyPixels);
+  labels(0, 3, 3) = 1.0F / 255;
+  const fs::path human = dataset.path / "masks/human";
+  for (const char* name : {"0001.png", "0002.png"}) write_image((human / name).string(), labels);
+  std::vector<std::string> told;
+  const LogSink sink = log_to([&](LogLevel, std::string_view text) { told.emplace_back(text); }, LogLevel::kWarning);
+  const DataSettings data = dataset_inputs(dataset.path);
+  check_frames(data, read_clip(data), {});
+  CHECK(told == std::vector<std::string>{
+                    human.string() +
+                    ": the human is hidden in frames 1-2: no pixel reaches data.mask_threshold (the largest value is 1 "
+                    "of 255: labels are read from images with a palette, grey is the share of the pixel)"});
 }
 
 TEST_CASE("masks that are missing are warned of, a missing folder is an error") {

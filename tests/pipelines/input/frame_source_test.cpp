@@ -6,9 +6,12 @@
 
 #include "core/check.h"
 #include "core/image_io.h"
+#include "core/log.h"
+#include "core/process.h"
 #include "core/text.h"
 #include "core/video.h"
 #include "pipelines/input/clip.h"
+#include "tests/support/palette_png.h"
 #include "tests/support/tiny_run.h"
 
 namespace frame_source_test {
@@ -24,12 +27,12 @@ namespace {
 Image numbered(int number, int height = 16, int width = 24) {
   Image image(3, height, width);
   for (int c = 0; c < 3; ++c) {
-    for (int y = 0; y < height; ++y) std::fill_n(image.row(c, y), width, static_cast<float>(number) / 40);
+    for (int y = 0; y < height; ++y) std::fill_n(image.row(c, y), width, static_cast<float>(number) / 50);
   }
   return image;
 }
 
-int number_of(const Image& image) { return static_cast<int>(std::lround(40 * image(1, 3, 3))); }
+int number_of(const Image& image) { return static_cast<int>(std::lround(50 * image(1, 3, 3))); }
 
 void write_numbered_video(const std::string& path, int frames, double rate) {
   VideoWriter video(path, 24, 16, {.frame_rate = rate, .quality = 1});
@@ -88,6 +91,76 @@ TEST_CASE("rates that cannot be kept are told") {
                        Message("a.mp4: gives 1 of its 5 frames; a clip needs at least 2"));
 }
 
+TEST_CASE("frames of a video with pauses are chosen by their times") {
+  const TemporaryFolder here;
+  write_numbered_video("even.mp4", 44, 30);
+  // Frames 0-3, 10-13, 20-31 and 40-43 of 30 a second.
+  run_process({"ffmpeg", "-v", "error", "-nostdin", "-i", "even.mp4", "-vf",
+               "select=between(n\\,0\\,3)+between(n\\,10\\,13)+between(n\\,20\\,31)+between(n\\,40\\,43)", "-fps_mode",
+               "vfr", "-crf", "1", "a.mp4"});
+  const std::string gap =
+      "a.mp4: its frames follow each other after 0.03333 s, but frame 20 comes 0.3 s after frame 19";
+  CHECK_THROWS_MATCHES(
+      FrameSource("a.mp4", {}), UserError,
+      Message(gap + "; set data.frame_rate, for which the nearest ones in time are taken, or data.video_rate, if they "
+                    "are equally far apart in truth"));
+  CHECK_THROWS_MATCHES(FrameSource("a.mp4", {0, 40}), UserError,
+                       Message("a.mp4: has 30 frames a second; data.frame_rate, 40, cannot be more"));
+  std::vector<std::string> told;
+  const LogSink sink = log_to([&](LogLevel, std::string_view text) { told.emplace_back(text); }, LogLevel::kWarning);
+  const FrameSource frames("a.mp4", {0, 10});
+  CHECK(told == std::vector<std::string>{gap + "; the nearest in time are taken, one ahead of it again for 2 of 15"});
+  // The nearest to 0, 3, 6, ... 42 of those that are there.
+  CHECK(numbers_of(frames) == std::vector<int>{0, 3, 3, 10, 12, 13, 20, 21, 24, 27, 30, 31, 40, 40, 42});
+  CHECK(frames.names()[3] == "0004.png");
+  CHECK(frames.frame_rate() == 10);
+  CHECK(frames.video_count() == 24);
+  CHECK(frames.time(3) == Approx(10 / 30.0));
+  std::vector<Index> all(24);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<Index>(i);
+  CHECK(kept_frames(all, frames, "a.npz", "poses") ==
+        std::vector<Index>{0, 3, 3, 4, 6, 7, 8, 9, 12, 15, 18, 19, 20, 20, 22});
+  // Its rate is known better: a slow film.
+  const FrameSource counted("a.mp4", {120, 60});
+  CHECK(counted.count() == 12);
+  CHECK(counted.number(11) == 22);
+  CHECK(counted.time(11) == Approx(22 / 120.0));
+}
+
+TEST_CASE("hidden files are no frames and no masks") {
+  const TemporaryFolder here;
+  write_numbered_folder("a", 3);
+  write_numbered_folder("masks/human", 3);
+  for (const char* name : {"a/.0001.png", "a/._0002.png", "masks/human/._0000.png", "masks/._human.mp4"})
+    here.write(name, "no picture");
+  const FrameSource frames("a", {});
+  CHECK(frames.names() == std::vector<std::string>{"0000.png", "0001.png", "0002.png"});
+  const MaskSource masks("masks", "human");
+  CHECK(masks.count(frames).all == 3);
+  CHECK(masks.count(frames).unused == 0);
+}
+
+TEST_CASE("masks of a folder and of a video are read as masks, not as their first channel") {
+  const TemporaryFolder here;
+  write_numbered_folder("a", 2);
+  const FrameSource frames("a", {});
+  Bytes indices(16 * 24, 0);
+  indices[3 * 24 + 5] = 1;
+  fs::create_directories("masks/human");
+  write_file("masks/human/0000.png", palette_png(24, 16, indices, {{0, 0, 0, 255}, {128, 0, 0, 255}}));
+  const Image mask = MaskSource("masks", "human").read(frames, 0);
+  CHECK(mask.channels() == 1);
+  CHECK(mask(0, 3, 5) == 1);
+  CHECK(mask(0, 3, 6) == 0);
+  Image blue(3, 16, 24);
+  for (int y = 4; y < 12; ++y) std::fill_n(blue.row(2, y) + 6, 12, 1.0F);
+  VideoWriter video("masks/can.mp4", 24, 16, {.quality = 1});
+  for (int t = 0; t < 2; ++t) video.add(blue);
+  video.commit();
+  CHECK_THROWS_WITH(MaskSource("masks", "can").read(frames, 1),
+                    Catch::Matchers::StartsWith("masks/can.mp4: frame 1: is a colour mask: row "));
+}
+
 TEST_CASE("masks are a folder or a video of the human or the object") {
   const TemporaryFolder here;
   write_numbered_video("a.mp4", 12, 30);
@@ -103,7 +176,7 @@ TEST_CASE("masks are a folder or a video of the human or the object") {
   CHECK(can.missing(frames) == 0);
   CHECK(can.is_video());
   for (const Index t : {0, 1, 3})
-    CHECK(std::lround(40 * can.read(frames, t)(0, 3, 3)) == std::lround(40 * frames.read(t)(0, 3, 3)));
+    CHECK(std::lround(50 * can.read(frames, t)(0, 3, 3)) == std::lround(50 * frames.read(t)(0, 3, 3)));
   CHECK_THROWS_MATCHES(MaskSource("masks", "short").missing(frames), DataError,
                        Message("masks/short.mp4: has 9 frames, the clip needs the first 10"));
   CHECK_THROWS_MATCHES(MaskSource("masks", "cup"), DataError, Message("masks/cup: there is no such folder of masks"));

@@ -31,7 +31,7 @@ def main():
         (shutil.copytree if pathlib.Path(a.clip).is_dir() else shutil.copyfile)(a.clip, out)
     elif out.suffix:
         subprocess.run(["ffmpeg", "-v", "error", "-loop", "1", "-framerate", str(a.rate), "-i", a.image, "-frames:v",
-                        str(a.frames), "-crf", "10", "-pix_fmt", "yuv444p", str(out)], check=True)
+                        str(a.frames), "-crf", "10", "-pix_fmt", "yuv444p", "-colorspace", "smpte170m", str(out)], check=True)
     else:
         out.mkdir()
         for number in range(a.frames):
