@@ -4,8 +4,9 @@
 //   {"format": "hsi4d cameras", "version": 1, "cameras": [{...}, ...]}                 several
 //   {"w", "h", "fl_x", "fl_y", "cx", "cy", "frames": [{"transform_matrix": 4×4, ...}]}  nerfstudio's transforms.json
 //
-// The first two are used as given. Unknown keys are errors in them and passed over in the third, whose intrinsics may
-// also stand in a frame, and whose matrices take OpenGL camera axes (y up, z backward) to the world.
+// The first two are used as given. Unknown keys are errors in them and passed over in the third, unless they say that a
+// picture is of no pinhole (a lens that bends, a panorama, a rolling shutter): these are refused. Its intrinsics may
+// also stand in a frame; its matrices take OpenGL camera axes (y up, z backward) to the world.
 #pragma once
 
 #include <span>
