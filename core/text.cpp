@@ -86,6 +86,12 @@ bool is_plain_text(std::string_view text) {
   return true;
 }
 
+bool is_file_name(std::string_view text) {
+  constexpr std::size_t kLongest = 200;  // of 255, so that endings and numbers have room
+  return !text.empty() && text.size() <= kLongest && text != "." && text != ".." && is_plain_text(text) &&
+         text.find_first_of("/\\") == std::string_view::npos;
+}
+
 std::string with_escapes(std::string_view text) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string escaped;

@@ -30,6 +30,13 @@ std::size_t count_characters(std::string_view text);
 /// Whether it is UTF-8 without control characters: something that every terminal, file and JSON text can hold.
 bool is_plain_text(std::string_view text);
 
+/// Whether it can be the name of a file or folder that stays in the folder where it is put: plain text of 1 to 200
+/// bytes without / and \, and neither . nor ..
+bool is_file_name(std::string_view text);
+/// What is_file_name allows, for messages.
+inline constexpr const char* kFileNameText =
+    "a name of at most 200 bytes without /, \\ and control characters, not . or ..";
+
 /// The text with every byte that is not of a plain character as \xNN.
 std::string with_escapes(std::string_view text);
 

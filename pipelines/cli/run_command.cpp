@@ -34,6 +34,9 @@ fs::path run_folder(const std::string& name, int number) {
 std::string folder_of(const RunArguments& arguments, const RunConfig& config) {
   if (!arguments.out.empty()) return arguments.out;
   const std::string name = config.name.empty() ? arguments.config.stem().string() : config.name;
+  if (!is_file_name(name))
+    throw UserError("hsi4d run: " + arguments.config.string() + ": the run would be called " + json_string(name) +
+                    " after it; allowed: " + kFileNameText);
   if (!arguments.resume) return free_run_folder(name);
   if (fs::exists(run_folder(name, 2)))
     throw UserError("hsi4d run: --resume needs --out: there are several runs called " + name + ", from " +
