@@ -20,6 +20,7 @@
 #include "pipelines/input/clip.h"
 #include "pipelines/record/gradient_table.h"
 #include "pipelines/sources/sources.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d::cli {
 
@@ -86,6 +87,7 @@ std::string plan_without_clip(const RunConfig& config, const std::string& identi
                               bool resume, const std::string& sources) {
   look_at_run_folder(folder, identity, resume);
   const SceneSetup setup = read_scene_setup(config.data);
+  warn_of_antialiasing(setup.antialiased, config.render.antialias);
   return "would write " + folder + "\n" + sources + "  scene of " + count_text(setup.scene.count(), "Gaussian") +
          ", human of " + std::to_string(setup.avatar.count()) + "\n" + stages_text(config);
 }

@@ -70,11 +70,10 @@ SceneView view_of(const SceneOptions& options, const std::string& command) {
   return view;
 }
 
-SplatFile read_scene(const std::string& path) {
-  SplatFile scene = read_splats(path);
-  const std::string text = summary_text(scene.report);
-  if (!text.empty()) log_warning(path + ": " + text);
-  return scene;
+SplatFile read_drawn(const std::string& path, const RenderSettings& settings) {
+  SplatFile file = read_splats_with_warnings(path);
+  if (file.report.antialiased) warn_of_antialiasing({&path, 1}, settings.antialias);
+  return file;
 }
 
 void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,

@@ -42,8 +42,9 @@ RenderSettings render_settings(const std::vector<std::string>& overrides);
 /// Three finite numbers "r,g,b". @param where  starts the message: "hsi4d render: --background"
 std::array<double, 3> parse_color(const std::string& text, const std::string& where);
 
-/// Gaussians of a file; what the reader left out or put right goes to the log as a warning.
-SplatFile read_scene(const std::string& path);
+/// Gaussians of a file that are drawn with these settings; what the reader left out or put right, its cautions, and
+/// that they were trained for other settings go to the log as warnings.
+SplatFile read_drawn(const std::string& path, const RenderSettings& settings);
 
 /// Warns of an image in which no Gaussian is drawn: because there is none, or because the camera looks away, most often
 /// since its axes are of another convention, which the warning names.

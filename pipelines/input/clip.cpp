@@ -167,6 +167,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   clip.scene = std::move(setup.scene);
   clip.avatar = std::move(setup.avatar);
   clip.objects = std::move(setup.objects);
+  clip.antialiased = std::move(setup.antialiased);
   clip.first.camera_from_world = clip.camera.camera_from_world;
   clip.first.objects = setup.poses;
   std::vector<std::string> names;

@@ -5,6 +5,8 @@
 
 #include "core/check.h"
 #include "core/file.h"
+#include "core/log.h"
+#include "splat/files/far_means.h"
 #include "splat/files/io_compressed_ply.h"
 #include "splat/files/io_ply.h"
 #include "splat/files/io_splat.h"
@@ -46,15 +48,36 @@ bool is_splat_file(const std::string& path) {
 
 int written_sh_degree(const std::string& path, int sh_degree) { return ends_in(path, ".splat") ? 0 : sh_degree; }
 
-SplatFile read_splats(const std::string& path) { return decode_splats(read_file(path), path); }
+SplatFile read_splats(const std::string& path, const Vector3<double>& origin_world) {
+  return decode_splats(read_file(path), path, origin_world);
+}
 
-SplatFile decode_splats(std::span<const std::uint8_t> file, const std::string& name) {
-  if (begins_with(file, "ply\n") || begins_with(file, "ply\r")) return decode_ply(file, name);
-  if (begins_with(file, "NGSP")) return decode_spz(file, name);
-  if (ends_in(name, ".splat")) return decode_splat(file, name);  // any bytes: its first are a coordinate
-  if (begins_with(file, "\x1f\x8b")) return decode_spz(file, name);
-  if (ends_in(name, ".ply")) return decode_ply(file, name);  // which says what is wrong with its first line
-  if (ends_in(name, ".spz")) return decode_spz(file, name);
+SplatFile read_splats_with_warnings(const std::string& path, const Vector3<double>& origin_world) {
+  SplatFile file = read_splats(path, origin_world);
+  const std::string text = summary_text(file.report);
+  if (!text.empty()) log_warning(path + ": " + text);
+  for (const std::string& caution : file.report.cautions) log_warning(path + ": " + caution);
+  return file;
+}
+
+void warn_of_antialiasing(std::span<const std::string> files, bool antialias) {
+  for (const std::string& file : files) {
+    if (!antialias)
+      log_warning(file +
+                  ": its Gaussians were trained with antialiasing and are drawn without it, too opaque where they "
+                  "are small; render.antialias=true draws them as they were trained");
+  }
+}
+
+SplatFile decode_splats(std::span<const std::uint8_t> file, const std::string& name,
+                        const Vector3<double>& origin_world) {
+  if (begins_with(file, "ply\n") || begins_with(file, "ply\r")) return decode_ply(file, name, origin_world);
+  if (begins_with(file, "NGSP")) return decode_spz(file, name, origin_world);
+  if (ends_in(name, ".splat")) return decode_splat(file, name, origin_world);  // any bytes: its first are a coordinate
+  if (begins_with(file, "\x1f\x8b")) return decode_spz(file, name, origin_world);
+  if (ends_in(name, ".ply"))
+    return decode_ply(file, name, origin_world);  // which says what is wrong with its first line
+  if (ends_in(name, ".spz")) return decode_spz(file, name, origin_world);
   if (ends_in(name, ".ksplat"))
     throw UserError(name + ": .ksplat files are not read; Gaussians are read from " + kSplatFormats +
                     ", into which the tool that wrote it can convert it");
@@ -63,7 +86,12 @@ SplatFile decode_splats(std::span<const std::uint8_t> file, const std::string& n
 
 EncodedSplats encode_splats(const std::string& path, const Gaussians& gaussians, const SplatWriteOptions& options) {
   if (ends_in(path, ".compressed.ply")) return encode_compressed_ply(gaussians);
-  if (ends_in(path, ".ply")) return {encode_ply(gaussians), {}};
+  if (ends_in(path, ".ply")) {
+    EncodedSplats encoded{encode_ply(gaussians), {}};
+    add_loss(encoded.losses, "means in steps wider than their Gaussian",
+             far_means(gaussians, gaussians.origin_world).count);
+    return encoded;
+  }
   if (ends_in(path, ".splat")) return encode_splat(gaussians);
   if (ends_in(path, ".spz")) return encode_spz(gaussians, options.spz);
   throw UserError(path +
