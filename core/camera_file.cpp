@@ -339,8 +339,18 @@ Camera camera_of(const NerfCamera& read, const std::string& pointer) {
   return camera;
 }
 
+/// The path of the picture that an entry is of.
+std::string read_picture(const ConfigValue& frame, const std::string& pointer, ConfigProblems& problems) {
+  const ConfigValue* const path = find_member(frame, "file_path");
+  if (path == nullptr || path->kind == Kind::kNull) return "";
+  if (path->kind == Kind::kString) return path->text;
+  problems.add(path->origin, child_pointer(pointer, "file_path"),
+               shown(*path) + " is " + kind_name(*path) + ", not a string");
+  return "";
+}
+
 void read_frame(const ConfigValue& top, const NerfCamera& globals, ConfigValue& frame, const std::string& pointer,
-                ConfigProblems& problems, std::vector<Camera>& cameras) {
+                ConfigProblems& problems, std::vector<PictureCamera>& cameras) {
   const std::size_t before = problems.size();
   flatten_matrix(frame, "transform_matrix", pointer, problems);
   NerfCamera read = globals;
@@ -353,10 +363,11 @@ void read_frame(const ConfigValue& top, const NerfCamera& globals, ConfigValue& 
   refuse_distortion(frame, read, pointer, problems);
   refuse_other_cameras(frame, pointer, problems);
   if (problems.size() > before) return;
-  add_failure(frame, problems, [&] { cameras.push_back(camera_of(read, pointer)); });
+  const std::string picture = read_picture(frame, pointer, problems);
+  add_failure(frame, problems, [&] { cameras.push_back({camera_of(read, pointer), picture}); });
 }
 
-std::vector<Camera> read_transforms(ConfigValue& tree, ConfigProblems& problems) {
+std::vector<PictureCamera> read_transforms(ConfigValue& tree, ConfigProblems& problems) {
   NerfCamera globals;
   ConfigFields fields;
   describe_intrinsics(fields, globals);
@@ -367,15 +378,13 @@ std::vector<Camera> read_transforms(ConfigValue& tree, ConfigProblems& problems)
   problems.throw_if_any();
   refuse_distortion(tree, globals, "", problems);
   refuse_other_cameras(tree, "", problems);
-  std::vector<Camera> cameras;
+  std::vector<PictureCamera> cameras;
   for (std::size_t i = 0; i < frames.items.size(); ++i)
     read_frame(tree, globals, frames.items[i], "/frames/" + std::to_string(i), problems, cameras);
   return cameras;
 }
 
-}  // namespace
-
-std::vector<Camera> decode_cameras(const std::string& text, const std::string& name) {
+std::vector<PictureCamera> decode(const std::string& text, const std::string& name) {
   auto source = std::make_shared<ConfigSource>();
   source->name = name;
   ConfigProblems problems;
@@ -386,16 +395,34 @@ std::vector<Camera> decode_cameras(const std::string& text, const std::string& n
   problems.throw_if_any();
   const bool is_transforms = find_member(tree, "frames") != nullptr;
   const bool is_list = find_member(tree, "format") || find_member(tree, "cameras");
-  std::vector<Camera> cameras = is_transforms ? read_transforms(tree, problems)
-                                : is_list     ? read_list(tree, problems)
-                                              : read_single(tree, problems);
+  std::vector<PictureCamera> cameras;
+  if (is_transforms) {
+    cameras = read_transforms(tree, problems);
+  } else {
+    for (const Camera& camera : is_list ? read_list(tree, problems) : read_single(tree, problems))
+      cameras.push_back({camera, ""});
+  }
   problems.throw_if_any();
   return cameras;
 }
 
-std::vector<Camera> read_cameras(const std::string& path) {
-  return decode_cameras(read_text_file(path, kLargestCameraFile), path);
+std::vector<Camera> without_pictures(const std::vector<PictureCamera>& cameras) {
+  std::vector<Camera> all;
+  for (const PictureCamera& one : cameras) all.push_back(one.camera);
+  return all;
 }
+
+}  // namespace
+
+std::vector<Camera> decode_cameras(const std::string& text, const std::string& name) {
+  return without_pictures(decode(text, name));
+}
+
+std::vector<PictureCamera> read_picture_cameras(const std::string& path) {
+  return decode(read_text_file(path, kLargestCameraFile), path);
+}
+
+std::vector<Camera> read_cameras(const std::string& path) { return without_pictures(read_picture_cameras(path)); }
 
 Camera read_camera(const std::string& path, int frame) {
   const std::vector<Camera> cameras = read_cameras(path);

@@ -26,6 +26,15 @@ Camera read_camera(const std::string& path, int frame = 0);
 /// All cameras of a file of any of the three kinds. Errors as read_camera.
 std::vector<Camera> read_cameras(const std::string& path);
 
+/// A camera, and the picture that it took.
+struct PictureCamera {
+  Camera camera;
+  std::string picture;  ///< nerfstudio's file_path; empty: the file names none
+};
+
+/// As read_cameras, with what the file says of their pictures. Nerfstudio's entries are in any order.
+std::vector<PictureCamera> read_picture_cameras(const std::string& path);
+
 /// As read_cameras, of text in memory.
 /// @param name  what error messages call it
 std::vector<Camera> decode_cameras(const std::string& text, const std::string& name);

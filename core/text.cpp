@@ -108,4 +108,11 @@ std::string with_escapes(std::string_view text) {
   return escaped;
 }
 
+std::string few_names(std::span<const std::string> names) {
+  constexpr std::size_t kMost = 6;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, names.size()); ++i) text += (i == 0 ? "" : ", ") + with_escapes(names[i]);
+  return names.size() <= kMost ? text : text + " and " + std::to_string(names.size() - kMost) + " more";
+}
+
 }  // namespace hsi4d

@@ -11,6 +11,9 @@ namespace hsi4d {
 /// "a, b, c"; empty for no words.
 std::string joined(std::span<const std::string> words);
 
+/// "a, b, c, d, e, f and 2 more", of names that a file may have in any number; bytes that are no plain text as \xNN.
+std::string few_names(std::span<const std::string> names);
+
 /// A number in that many significant digits, "0.01234", "123500" or "1e-08"; 0 for −0; "nan", "inf" or "-inf".
 std::string rounded(double value, int digits);
 

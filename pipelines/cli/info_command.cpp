@@ -149,9 +149,13 @@ std::string camera_line(const Camera& camera) {
 }
 
 std::string camera_info(const std::string& path) {
-  const std::vector<Camera> cameras = read_cameras(path);
+  const std::vector<PictureCamera> cameras = read_picture_cameras(path);
   std::string text = path + ": " + std::to_string(cameras.size()) + (cameras.size() == 1 ? " camera\n" : " cameras\n");
-  for (std::size_t i = 0; i < cameras.size(); ++i) text += "  " + std::to_string(i) + "  " + camera_line(cameras[i]);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::string& picture = cameras[i].picture;
+    text += "  " + std::to_string(i) + "  " + (picture.empty() ? "" : with_escapes(picture) + "  ") +
+            camera_line(cameras[i].camera);
+  }
   return text;
 }
 

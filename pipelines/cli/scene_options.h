@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,11 +19,11 @@ namespace hsi4d::cli {
 
 /// Options as they stand on the command line.
 struct SceneOptions {
-  std::string scene;                  ///< --scene F.ply
-  std::string camera;                 ///< --camera C.json
-  int camera_frame = 0;               ///< --camera-frame I, of a file with several
-  std::string background = "0,0,0";   ///< --background r,g,b
-  std::string precision = "float";    ///< --precision float|double|reference
+  std::string scene;                 ///< --scene F.ply
+  std::string camera;                ///< --camera C.json
+  std::optional<int> camera_frame;   ///< --camera-frame I, of a file with several; not given: the first, with a warning
+  std::string background = "0,0,0";  ///< --background r,g,b
+  std::string precision = "float";   ///< --precision float|double|reference
   std::vector<std::string> settings;  ///< --set render.KEY=VALUE
 };
 

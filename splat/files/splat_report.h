@@ -33,9 +33,6 @@ std::string summary_text(const SplatReport& report);
 /// "reason: 3, reason: 4".
 std::string counts_text(const Counts& counts);
 
-/// "a, b, c and 4 more", of names that a file may have in any number.
-std::string few_names(const std::vector<std::string>& names);
-
 /// A file's Gaussians, kept rows in the file's order, relative to the origin that was asked for, 0 if none was.
 struct SplatFile {
   Gaussians gaussians;

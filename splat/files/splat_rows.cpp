@@ -48,13 +48,6 @@ std::string summary_text(const SplatReport& report) {
   return text;
 }
 
-std::string few_names(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 6;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(kMost, names.size()); ++i) text += (i == 0 ? "" : ", ") + with_escapes(names[i]);
-  return names.size() <= kMost ? text : text + " and " + std::to_string(names.size() - kMost) + " more";
-}
-
 void caution_of_others(const std::vector<std::string>& names, SplatRows& rows) {
   if (!names.empty())
     rows.add_caution("not known, and passed over, though the picture may depend on it: " + few_names(names));

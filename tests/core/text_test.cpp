@@ -12,6 +12,8 @@ namespace text_test {
 using namespace hsi4d;
 
 TEST_CASE("words are joined by commas") {
+  CHECK(few_names(std::vector<std::string>{"a", "b\n", "c", "d", "e", "f", "g", "h"}) ==
+        "a, b\\x0a, c, d, e, f and 2 more");
   CHECK(joined({}).empty());
   CHECK(joined(std::vector<std::string>{"a"}) == "a");
   CHECK(joined(std::vector<std::string>{"a", "b", "c"}) == "a, b, c");
