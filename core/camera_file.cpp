@@ -1,5 +1,6 @@
 #include "core/camera_file.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -190,7 +191,34 @@ std::vector<Camera> read_list(ConfigValue& tree, ConfigProblems& problems) {
 enum class Model { kPinhole, kSimplePinhole, kOpencv };
 constexpr std::array<ConfigChoice<Model>, 3> kModels = {
     {{Model::kPinhole, "PINHOLE"}, {Model::kSimplePinhole, "SIMPLE_PINHOLE"}, {Model::kOpencv, "OPENCV"}}};
-constexpr std::array<const char*, 6> kDistortions = {"k1", "k2", "k3", "k4", "p1", "p2"};
+constexpr std::array<const char*, 12> kDistortions = {"k1", "k2", "k3", "k4", "k5", "k6",
+                                                      "p1", "p2", "s1", "s2", "s3", "s4"};
+
+/// A part of the names by which nerfstudio, instant-ngp and their exporters say that a picture is not of a pinhole.
+struct OtherCamera {
+  const char* part;
+  const char* what;
+};
+constexpr OtherCamera kOtherCameras[] = {
+    {"fisheye", "a fisheye lens"},
+    {"ftheta", "a fisheye lens"},
+    {"latlong", "a panorama"},
+    {"equirect", "a panorama"},
+    {"panorama", "a panorama"},
+    {"spherical", "a panorama"},
+    {"omnidirectional", "a panorama"},
+    {"orthographic", "a camera without perspective"},
+    {"ortho_scale", "a camera without perspective"},
+    {"rolling", "a rolling shutter"},
+    {"transform_matrix_start", "a camera that moves within a frame"},
+    {"transform_matrix_end", "a camera that moves within a frame"},
+    {"skew", "a skewed sensor"},
+    {"distort", "a lens distortion"},
+    {"from_mitsuba", "other camera axes"},
+};
+/// Keys whose text names the kind of a camera, beside camera_model, and texts that mean a pinhole.
+constexpr const char* kKindKeys[] = {"camera_type", "lens_model", "lens_type", "projection", "projection_type"};
+constexpr const char* kPinholeTexts[] = {"pinhole", "simple_pinhole", "perspective", "opencv", "none", ""};
 
 struct NerfCamera {
   Camera camera;
@@ -235,6 +263,60 @@ void refuse_distortion(const ConfigValue& object, const NerfCamera& read, const 
   }
 }
 
+/// Whether a member says no, or 0 all through.
+bool says_nothing(const ConfigValue& value) {
+  const auto is_nothing = [](const ConfigValue& item) { return says_nothing(item); };
+  switch (value.kind) {
+    case Kind::kNull:
+      return true;
+    case Kind::kBoolean:
+      return !value.boolean;
+    case Kind::kNumber:
+      return value.text.find_first_of("123456789") >= value.text.find_first_of("eE");  // 0, -0.0, 0e5
+    case Kind::kString:
+      return value.text.empty() || value.text == "none";
+    case Kind::kArray:
+      return std::all_of(value.items.begin(), value.items.end(), is_nothing);
+    case Kind::kObject:
+      return std::all_of(value.members.begin(), value.members.end(),
+                         [](const ConfigMember& member) { return says_nothing(member.value); });
+  }
+  return false;
+}
+
+std::string in_lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return text;
+}
+
+/// What a member says of the camera that is not drawn; null: nothing.
+const char* other_camera(const std::string& key, const ConfigValue& value) {
+  const std::string name = in_lower_case(key);
+  const bool names_kind = std::find(std::begin(kKindKeys), std::end(kKindKeys), name) != std::end(kKindKeys);
+  if (names_kind && value.kind == Kind::kString) {
+    const bool is_pinhole = std::find(std::begin(kPinholeTexts), std::end(kPinholeTexts), in_lower_case(value.text)) !=
+                            std::end(kPinholeTexts);
+    return is_pinhole ? nullptr : "a camera that is no pinhole";
+  }
+  if (says_nothing(value) || name.find("undistort") != std::string::npos) return nullptr;
+  for (const OtherCamera& other : kOtherCameras) {
+    if (name.find(other.part) != std::string::npos) return other.what;
+  }
+  return nullptr;
+}
+
+/// Keys that are passed over must not say that the picture is of another lens or shutter.
+void refuse_other_cameras(const ConfigValue& object, const std::string& pointer, ConfigProblems& problems) {
+  for (const ConfigMember& member : object.members) {
+    const char* const what = other_camera(member.key, member.value);
+    if (what == nullptr) continue;
+    problems.add(member.value.origin, child_pointer(pointer, member.key),
+                 shown(member.value) + " says that this is " + what +
+                     "; pinhole cameras alone are drawn: undistort the images first");
+  }
+}
+
 void require_intrinsics(const ConfigValue& top, const ConfigValue& frame, const std::string& pointer,
                         ConfigProblems& problems) {
   for (const char* key : {"w", "h", "fl_x", "fl_y", "cx", "cy"}) {
@@ -257,8 +339,18 @@ Camera camera_of(const NerfCamera& read, const std::string& pointer) {
   return camera;
 }
 
+/// The path of the picture that an entry is of.
+std::string read_picture(const ConfigValue& frame, const std::string& pointer, ConfigProblems& problems) {
+  const ConfigValue* const path = find_member(frame, "file_path");
+  if (path == nullptr || path->kind == Kind::kNull) return "";
+  if (path->kind == Kind::kString) return path->text;
+  problems.add(path->origin, child_pointer(pointer, "file_path"),
+               shown(*path) + " is " + kind_name(*path) + ", not a string");
+  return "";
+}
+
 void read_frame(const ConfigValue& top, const NerfCamera& globals, ConfigValue& frame, const std::string& pointer,
-                ConfigProblems& problems, std::vector<Camera>& cameras) {
+                ConfigProblems& problems, std::vector<PictureCamera>& cameras) {
   const std::size_t before = problems.size();
   flatten_matrix(frame, "transform_matrix", pointer, problems);
   NerfCamera read = globals;
@@ -269,11 +361,13 @@ void read_frame(const ConfigValue& top, const NerfCamera& globals, ConfigValue& 
   if (problems.size() > before) return;
   require_intrinsics(top, frame, pointer, problems);
   refuse_distortion(frame, read, pointer, problems);
+  refuse_other_cameras(frame, pointer, problems);
   if (problems.size() > before) return;
-  add_failure(frame, problems, [&] { cameras.push_back(camera_of(read, pointer)); });
+  const std::string picture = read_picture(frame, pointer, problems);
+  add_failure(frame, problems, [&] { cameras.push_back({camera_of(read, pointer), picture}); });
 }
 
-std::vector<Camera> read_transforms(ConfigValue& tree, ConfigProblems& problems) {
+std::vector<PictureCamera> read_transforms(ConfigValue& tree, ConfigProblems& problems) {
   NerfCamera globals;
   ConfigFields fields;
   describe_intrinsics(fields, globals);
@@ -283,15 +377,14 @@ std::vector<Camera> read_transforms(ConfigValue& tree, ConfigProblems& problems)
     problems.add(frames.origin, "/frames", shown(frames) + " is " + kind_name(frames) + ", not an array");
   problems.throw_if_any();
   refuse_distortion(tree, globals, "", problems);
-  std::vector<Camera> cameras;
+  refuse_other_cameras(tree, "", problems);
+  std::vector<PictureCamera> cameras;
   for (std::size_t i = 0; i < frames.items.size(); ++i)
     read_frame(tree, globals, frames.items[i], "/frames/" + std::to_string(i), problems, cameras);
   return cameras;
 }
 
-}  // namespace
-
-std::vector<Camera> decode_cameras(const std::string& text, const std::string& name) {
+std::vector<PictureCamera> decode(const std::string& text, const std::string& name) {
   auto source = std::make_shared<ConfigSource>();
   source->name = name;
   ConfigProblems problems;
@@ -302,16 +395,34 @@ std::vector<Camera> decode_cameras(const std::string& text, const std::string& n
   problems.throw_if_any();
   const bool is_transforms = find_member(tree, "frames") != nullptr;
   const bool is_list = find_member(tree, "format") || find_member(tree, "cameras");
-  std::vector<Camera> cameras = is_transforms ? read_transforms(tree, problems)
-                                : is_list     ? read_list(tree, problems)
-                                              : read_single(tree, problems);
+  std::vector<PictureCamera> cameras;
+  if (is_transforms) {
+    cameras = read_transforms(tree, problems);
+  } else {
+    for (const Camera& camera : is_list ? read_list(tree, problems) : read_single(tree, problems))
+      cameras.push_back({camera, ""});
+  }
   problems.throw_if_any();
   return cameras;
 }
 
-std::vector<Camera> read_cameras(const std::string& path) {
-  return decode_cameras(read_text_file(path, kLargestCameraFile), path);
+std::vector<Camera> without_pictures(const std::vector<PictureCamera>& cameras) {
+  std::vector<Camera> all;
+  for (const PictureCamera& one : cameras) all.push_back(one.camera);
+  return all;
 }
+
+}  // namespace
+
+std::vector<Camera> decode_cameras(const std::string& text, const std::string& name) {
+  return without_pictures(decode(text, name));
+}
+
+std::vector<PictureCamera> read_picture_cameras(const std::string& path) {
+  return decode(read_text_file(path, kLargestCameraFile), path);
+}
+
+std::vector<Camera> read_cameras(const std::string& path) { return without_pictures(read_picture_cameras(path)); }
 
 Camera read_camera(const std::string& path, int frame) {
   const std::vector<Camera> cameras = read_cameras(path);

@@ -4,8 +4,9 @@
 //   {"format": "hsi4d cameras", "version": 1, "cameras": [{...}, ...]}                 several
 //   {"w", "h", "fl_x", "fl_y", "cx", "cy", "frames": [{"transform_matrix": 4×4, ...}]}  nerfstudio's transforms.json
 //
-// The first two are used as given. Unknown keys are errors in them and passed over in the third, whose intrinsics may
-// also stand in a frame, and whose matrices take OpenGL camera axes (y up, z backward) to the world.
+// The first two are used as given. Unknown keys are errors in them and passed over in the third, unless they say that a
+// picture is of no pinhole (a lens that bends, a panorama, a rolling shutter): these are refused. Its intrinsics may
+// also stand in a frame; its matrices take OpenGL camera axes (y up, z backward) to the world.
 #pragma once
 
 #include <span>
@@ -24,6 +25,15 @@ Camera read_camera(const std::string& path, int frame = 0);
 
 /// All cameras of a file of any of the three kinds. Errors as read_camera.
 std::vector<Camera> read_cameras(const std::string& path);
+
+/// A camera, and the picture that it took.
+struct PictureCamera {
+  Camera camera;
+  std::string picture;  ///< nerfstudio's file_path; empty: the file names none
+};
+
+/// As read_cameras, with what the file says of their pictures. Nerfstudio's entries are in any order.
+std::vector<PictureCamera> read_picture_cameras(const std::string& path);
 
 /// As read_cameras, of text in memory.
 /// @param name  what error messages call it

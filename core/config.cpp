@@ -71,6 +71,14 @@ bool expect_kind(const ConfigValue& value, Kind kind, const char* wanted, const 
   return false;
 }
 
+/// True for a string without the character 0, at which names of files and arguments of programs end.
+bool expect_text(const ConfigValue& value, const std::string& pointer, ConfigProblems& problems) {
+  if (!expect_kind(value, Kind::kString, "a string", "", pointer, problems)) return false;
+  if (value.text.find('\0') == std::string::npos) return true;
+  report(value, pointer, problems, shown(value) + " holds the character 0 (\\u0000), which no text here can have", "");
+  return false;
+}
+
 template <class T>
 bool read_number(const ConfigValue& value, const NumberRange& range, const std::string& pointer,
                  ConfigProblems& problems, T& number) {
@@ -224,7 +232,7 @@ ConfigField& ConfigFields::string(std::string_view name, std::string& value, std
   field.allowed = "text";
   field.schema = typed_schema("string");
   field.read = [&value](const ConfigValue& written, const std::string& pointer, ConfigProblems& problems) {
-    if (expect_kind(written, Kind::kString, "a string", "", pointer, problems)) value = written.text;
+    if (expect_text(written, pointer, problems)) value = written.text;
   };
   field.write = [&value] { return ConfigValue::make_string(value); };
   return field;
@@ -329,8 +337,7 @@ ConfigField& ConfigFields::strings(std::string_view name, std::vector<std::strin
     std::vector<std::string> read;
     for (std::size_t i = 0; i < value.items.size(); ++i) {
       const ConfigValue& item = value.items[i];
-      if (expect_kind(item, Kind::kString, "a string", "", child_pointer(pointer, std::to_string(i)), problems))
-        read.push_back(item.text);
+      if (expect_text(item, child_pointer(pointer, std::to_string(i)), problems)) read.push_back(item.text);
     }
     values = std::move(read);
   };

@@ -156,6 +156,7 @@ class ConfigFields {
   }
 
   ConfigField& boolean(std::string_view name, bool& value, std::string_view summary);
+  /// Text without the character 0.
   ConfigField& string(std::string_view name, std::string& value, std::string_view summary);
 
   /// A file or folder; a relative one is relative to the file that names it, or to the current folder in `--set`. The
@@ -192,7 +193,7 @@ class ConfigFields {
   /// A list of numbers.
   ConfigField& numbers(std::string_view name, std::vector<double>& values, NumberRange range, std::string_view summary,
                        ListSize size = {});
-  /// A list of strings.
+  /// A list of strings without the character 0.
   ConfigField& strings(std::string_view name, std::vector<std::string>& values, std::string_view summary,
                        ListSize size = {});
 

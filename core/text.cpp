@@ -86,6 +86,12 @@ bool is_plain_text(std::string_view text) {
   return true;
 }
 
+bool is_file_name(std::string_view text) {
+  constexpr std::size_t kLongest = 200;  // of 255, so that endings and numbers have room
+  return !text.empty() && text.size() <= kLongest && text != "." && text != ".." && is_plain_text(text) &&
+         text.find_first_of("/\\") == std::string_view::npos;
+}
+
 std::string with_escapes(std::string_view text) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string escaped;
@@ -100,6 +106,13 @@ std::string with_escapes(std::string_view text) {
     text.remove_prefix(std::max<std::size_t>(length, 1));
   }
   return escaped;
+}
+
+std::string few_names(std::span<const std::string> names) {
+  constexpr std::size_t kMost = 6;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, names.size()); ++i) text += (i == 0 ? "" : ", ") + with_escapes(names[i]);
+  return names.size() <= kMost ? text : text + " and " + std::to_string(names.size() - kMost) + " more";
 }
 
 }  // namespace hsi4d

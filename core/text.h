@@ -12,6 +12,9 @@ namespace hsi4d {
 /// @param last  before the last word: with " or " it is "a, b or c"
 std::string joined(std::span<const std::string> words, const std::string& last = ", ");
 
+/// "a, b, c, d, e, f and 2 more", of names that a file may have in any number; bytes that are no plain text as \xNN.
+std::string few_names(std::span<const std::string> names);
+
 /// A number in that many significant digits, "0.01234", "123500" or "1e-08"; 0 for −0; "nan", "inf" or "-inf".
 std::string rounded(double value, int digits);
 
@@ -30,6 +33,13 @@ std::size_t count_characters(std::string_view text);
 
 /// Whether it is UTF-8 without control characters: something that every terminal, file and JSON text can hold.
 bool is_plain_text(std::string_view text);
+
+/// Whether it can be the name of a file or folder that stays in the folder where it is put: plain text of 1 to 200
+/// bytes without / and \, and neither . nor ..
+bool is_file_name(std::string_view text);
+/// What is_file_name allows, for messages.
+inline constexpr const char* kFileNameText =
+    "a name of at most 200 bytes without /, \\ and control characters, not . or ..";
 
 /// The text with every byte that is not of a plain character as \xNN.
 std::string with_escapes(std::string_view text);

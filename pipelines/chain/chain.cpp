@@ -16,6 +16,7 @@
 #include "pipelines/input/body_files.h"
 #include "pipelines/report/report.h"
 #include "pipelines/run/frame_start.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d {
 
@@ -48,6 +49,7 @@ ClipFacts check_clip(const RunConfig& chain, std::size_t index) {
   facts.motion = setup.motion;
   facts.object_tracks = setup.object_tracks;
   Clip clip = make_clip(data, std::move(setup));
+  warn_of_antialiasing(clip.antialiased, chain.render.antialias);
   set_image_size(clip, chain);
   check_start(chain.start, clip);
   if (index == 0) check_first_view(clip, data.camera.string());

@@ -127,7 +127,11 @@ std::string avatar_import_command(const AvatarOptions& o) {
   const std::string command = "hsi4d avatar import: ";
   check_out(o, command);
   const BodyModel body = body_of(o, command);
-  const SplatFile file = read_scene(o.in);
+  const SplatFile file = read_splats_with_warnings(o.in);
+  if (file.report.antialiased)
+    log_warning(o.in +
+                ": its Gaussians were trained with antialiasing, which an avatar's file cannot say; "
+                "render.antialias=true draws them as they were trained");
   const AvatarImport import = import_avatar(file.gaussians, body, o.in);
   write_avatar(o.out, import.avatar);
   if (import.far > 0)

@@ -98,10 +98,13 @@ std::string convert_command(const ConvertOptions& o) {
                     std::to_string(kHighestShDegree));
   const Similarity similarity = similarity_of(o);
   if (!has_splat_ending(o.out)) check_ending(o.out, kConvertCommand + "OUT", written_splat_endings());
-  const SplatWriteOptions options = write_options(o);
+  SplatWriteOptions options = write_options(o);
   check_no_input(o.out, kConvertCommand + "OUT", {o.in});
   check_writable(o.out);
-  const SplatFile file = read_scene(o.in);
+  Vector3<double> origin = Vector3<double>::Zero();  // what the transform brings there, so that digits are kept
+  if (!similarity.translation.isZero(0)) origin = inverse(similarity).translation;
+  const SplatFile file = read_splats_with_warnings(o.in, origin);
+  options.spz.antialiased = file.report.antialiased;
   const std::vector<Index> rows = kept_rows(file.gaussians, o);
   const bool all = std::ssize(rows) == file.gaussians.count();
   Gaussians g = transformed(all ? file.gaussians : selected(file.gaussians, rows), similarity);
@@ -113,6 +116,9 @@ std::string convert_command(const ConvertOptions& o) {
   text += ", harmonics of degree " + std::to_string(written_sh_degree(o.out, g.sh_degree)) + ", " +
           std::to_string(encoded.bytes.size()) + " bytes\n";
   if (!encoded.losses.empty()) text += "  not held by the format: " + counts_text(encoded.losses) + "\n";
+  if (file.report.antialiased && file_ending(o.out) != ".spz")
+    text +=
+        "  not held by the format: trained with antialiasing; render.antialias=true draws them as they were trained\n";
   return text;
 }
 

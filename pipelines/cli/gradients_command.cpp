@@ -124,7 +124,7 @@ std::string gradients_command(const GradientsOptions& options) {
   check_no_input(options.out, "hsi4d gradients: --out", {options.target, options.shared.scene, options.shared.camera});
   check_writable(options.out);
   const std::vector<double> target = read_target(options.target, view.camera.height, view.camera.width);
-  const SplatFile scene = read_scene(options.shared.scene);
+  const SplatFile scene = read_drawn(options.shared.scene, view.settings);
   SceneGradients gradients = scene_gradients(scene.gaussians, view, target);
   zero_held(gradients, scene.report);
   write_gradients(options.out, gradients, scene, view.precision);

@@ -69,6 +69,8 @@ std::string splat_info(const std::string& path) {
                      std::to_string(s.sh_degree) + ", " + file.report.format + "\n";
   const std::string faults = summary_text(file.report);
   text += "  faults   " + (faults.empty() ? "none" : faults) + "\n";
+  for (const std::string& caution : file.report.cautions) text += "  caution  " + caution + "\n";
+  if (file.report.antialiased) text += "  note     trained with antialiasing: render.antialias=true draws it so\n";
   for (const std::string& note : file.report.notes) text += "  note     " + note + "\n";
   if (s.count == 0)
     return text + "  notice   " + (file.report.rows == 0 ? "the file holds no Gaussians" : "no Gaussian is left") +
@@ -99,6 +101,8 @@ std::string splat_json(const std::string& path) {
       {"file", path}, {"format", report.format}, {"rows", report.rows}, {"count", s.count}, {"sh_degree", s.sh_degree}};
   json["faults"] = {
       {"rejected", report.rejected}, {"rejections", json_of(report.rejections)}, {"repairs", json_of(report.repairs)}};
+  json["cautions"] = report.cautions;
+  json["antialiased"] = report.antialiased;
   json["notes"] = report.notes;
   json["suspicious"] = {{"duplicates", s.suspicions.duplicates},
                         {"transparent", s.suspicions.transparent},
@@ -145,9 +149,13 @@ std::string camera_line(const Camera& camera) {
 }
 
 std::string camera_info(const std::string& path) {
-  const std::vector<Camera> cameras = read_cameras(path);
+  const std::vector<PictureCamera> cameras = read_picture_cameras(path);
   std::string text = path + ": " + std::to_string(cameras.size()) + (cameras.size() == 1 ? " camera\n" : " cameras\n");
-  for (std::size_t i = 0; i < cameras.size(); ++i) text += "  " + std::to_string(i) + "  " + camera_line(cameras[i]);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::string& picture = cameras[i].picture;
+    text += "  " + std::to_string(i) + "  " + (picture.empty() ? "" : with_escapes(picture) + "  ") +
+            camera_line(cameras[i].camera);
+  }
   return text;
 }
 

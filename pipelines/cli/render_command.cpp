@@ -88,16 +88,16 @@ struct Parts {
     rows.push_back({file, begin, begin + part.gaussians.count(), std::move(row_of)});
     gaussians.push_back(std::move(part));
   }
-  void add_file(const std::string& path) {
-    SplatFile file = read_scene(path);
+  void add_file(const std::string& path, const RenderSettings& settings) {
+    SplatFile file = read_drawn(path, settings);
     add(path, {std::move(file.gaussians), {}}, std::move(file.report.row_of));
   }
 };
 
-void add_objects(const RenderOptions& options, Parts& parts) {
+void add_objects(const RenderOptions& options, const RenderSettings& settings, Parts& parts) {
   std::vector<std::string> names;
   for (const std::string& object : options.objects) {
-    parts.add_file(object);
+    parts.add_file(object, settings);
     names.push_back(std::filesystem::path(object).stem().string());
   }
   if (options.object_poses.empty()) return;
@@ -110,11 +110,11 @@ void add_objects(const RenderOptions& options, Parts& parts) {
 }
 
 /// Scene, objects and body, as far as they are given.
-Parts read_all(const RenderOptions& options, const Camera& camera) {
+Parts read_all(const RenderOptions& options, const SceneView& view) {
   Parts parts;
-  if (!options.shared.scene.empty()) parts.add_file(options.shared.scene);
-  add_objects(options, parts);
-  if (!options.motion.empty()) parts.add(options.avatar, read_body(options, camera_center_world(camera)));
+  if (!options.shared.scene.empty()) parts.add_file(options.shared.scene, view.settings);
+  add_objects(options, view.settings, parts);
+  if (!options.motion.empty()) parts.add(options.avatar, read_body(options, camera_center_world(view.camera)));
   return parts;
 }
 
@@ -145,7 +145,7 @@ std::string render_command(const RenderOptions& options) {
                                options.avatar, options.color_net});
   check_no_input(options.out, "hsi4d render: --out", inputs);
   check_writable(options.out);
-  Parts parts = read_all(options, view.camera);
+  Parts parts = read_all(options, view);
   const PosedGaussians scene =
       parts.gaussians.size() == 1 ? std::move(parts.gaussians.front()) : concatenated(parts.gaussians);
   const Index count = scene.gaussians.count();

@@ -20,6 +20,7 @@
 #include "pipelines/input/clip.h"
 #include "pipelines/record/gradient_table.h"
 #include "pipelines/sources/sources.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d::cli {
 
@@ -34,6 +35,9 @@ fs::path run_folder(const std::string& name, int number) {
 std::string folder_of(const RunArguments& arguments, const RunConfig& config) {
   if (!arguments.out.empty()) return arguments.out;
   const std::string name = config.name.empty() ? arguments.config.stem().string() : config.name;
+  if (!is_file_name(name))
+    throw UserError("hsi4d run: " + arguments.config.string() + ": the run would be called " + json_string(name) +
+                    " after it; allowed: " + kFileNameText);
   if (!arguments.resume) return free_run_folder(name);
   if (fs::exists(run_folder(name, 2)))
     throw UserError("hsi4d run: --resume needs --out: there are several runs called " + name + ", from " +
@@ -83,6 +87,7 @@ std::string plan_without_clip(const RunConfig& config, const std::string& identi
                               bool resume, const std::string& sources) {
   look_at_run_folder(folder, identity, resume);
   const SceneSetup setup = read_scene_setup(config.data);
+  warn_of_antialiasing(setup.antialiased, config.render.antialias);
   return "would write " + folder + "\n" + sources + "  scene of " + count_text(setup.scene.count(), "Gaussian") +
          ", human of " + std::to_string(setup.avatar.count()) + "\n" + stages_text(config);
 }

@@ -36,6 +36,15 @@ Precision parse_precision(const std::string& word, const std::string& where) {
   throw UserError(where + ": \"" + word + "\" is no precision; allowed: " + joined(known) + did_you_mean(word, known));
 }
 
+/// That the first of several cameras is taken.
+void tell_of_other_cameras(const std::string& path) {
+  const std::vector<PictureCamera> cameras = read_picture_cameras(path);
+  if (cameras.size() < 2) return;
+  const std::string& picture = cameras.front().picture;
+  log_warning(path + ": holds " + std::to_string(cameras.size()) + " cameras; the first" +
+              (picture.empty() ? "" : ", of " + with_escapes(picture) + ",") + " is taken (--camera-frame)");
+}
+
 }  // namespace
 
 RenderSettings render_settings(const std::vector<std::string>& overrides) {
@@ -66,15 +75,15 @@ SceneView view_of(const SceneOptions& options, const std::string& command) {
   view.background = parse_color(options.background, command + ": --background");
   view.precision = parse_precision(options.precision, command + ": --precision");
   view.settings = render_settings(options.settings);
-  view.camera = read_camera(options.camera, options.camera_frame);
+  view.camera = read_camera(options.camera, options.camera_frame.value_or(0));
+  if (!options.camera_frame) tell_of_other_cameras(options.camera);
   return view;
 }
 
-SplatFile read_scene(const std::string& path) {
-  SplatFile scene = read_splats(path);
-  const std::string text = summary_text(scene.report);
-  if (!text.empty()) log_warning(path + ": " + text);
-  return scene;
+SplatFile read_drawn(const std::string& path, const RenderSettings& settings) {
+  SplatFile file = read_splats_with_warnings(path);
+  if (file.report.antialiased) warn_of_antialiasing({&path, 1}, settings.antialias);
+  return file;
 }
 
 void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,11 +19,11 @@ namespace hsi4d::cli {
 
 /// Options as they stand on the command line.
 struct SceneOptions {
-  std::string scene;                  ///< --scene F.ply
-  std::string camera;                 ///< --camera C.json
-  int camera_frame = 0;               ///< --camera-frame I, of a file with several
-  std::string background = "0,0,0";   ///< --background r,g,b
-  std::string precision = "float";    ///< --precision float|double|reference
+  std::string scene;                 ///< --scene F.ply
+  std::string camera;                ///< --camera C.json
+  std::optional<int> camera_frame;   ///< --camera-frame I, of a file with several; not given: the first, with a warning
+  std::string background = "0,0,0";  ///< --background r,g,b
+  std::string precision = "float";   ///< --precision float|double|reference
   std::vector<std::string> settings;  ///< --set render.KEY=VALUE
 };
 
@@ -42,8 +43,9 @@ RenderSettings render_settings(const std::vector<std::string>& overrides);
 /// Three finite numbers "r,g,b". @param where  starts the message: "hsi4d render: --background"
 std::array<double, 3> parse_color(const std::string& text, const std::string& where);
 
-/// Gaussians of a file; what the reader left out or put right goes to the log as a warning.
-SplatFile read_scene(const std::string& path);
+/// Gaussians of a file that are drawn with these settings; what the reader left out or put right, its cautions, and
+/// that they were trained for other settings go to the log as warnings.
+SplatFile read_drawn(const std::string& path, const RenderSettings& settings);
 
 /// Warns of an image in which no Gaussian is drawn: because there is none, or because the camera looks away, most often
 /// since its axes are of another convention, which the warning names.

@@ -19,6 +19,7 @@
 #include "pipelines/cli/text.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/draw/camera_selection.h"
+#include "pipelines/input/frame_cameras.h"
 #include "pipelines/record/summary.h"
 
 namespace hsi4d::cli {
@@ -77,7 +78,7 @@ std::string select_camera_command(const SelectCameraOptions& options, const std:
   with_threads(config.threads > 0 ? config.threads : thread_count(), [&] {
     const SceneSetup setup = read_scene_setup(config.data);
     std::optional<Camera> intrinsics;
-    if (!config.data.camera.empty()) intrinsics = read_camera(config.data.camera.string());
+    if (!config.data.camera.empty()) intrinsics = camera_for_size(config.data.camera);
     choice =
         select_camera(setup, config.camera_selection, config.render, intrinsics, observer_on_terminal(options.quiet));
     if (!options.image.empty()) write_view(options.image, setup, choice.camera, config);

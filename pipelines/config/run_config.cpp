@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/config_file.h"
+#include "core/text.h"
 #include "optim/loss_term.h"
 #include "pipelines/config/config_fields.h"
 #include "pipelines/config/config_kind.h"
@@ -65,6 +66,11 @@ void describe(ConfigFields& f, ApproxSettings& s) {
 
 void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>& losses) {
   f.string("name", s.name, "Name of the run; its default folder is named after it");
+  f.rule({"name"}, [&s] {
+    return s.name.empty() || is_file_name(s.name)
+               ? ""
+               : json_string(s.name) + " cannot be the name of a folder; allowed: " + kFileNameText;
+  });
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed},
             "Seed of a new color net; generated datasets have synthetic.seed");
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},

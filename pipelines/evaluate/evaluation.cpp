@@ -134,7 +134,7 @@ void lay_on(const std::optional<Rigid<double>>& pelvis, Measurement& m) {
 
 /// The mean of the centres in an object's file, about which its poses act.
 Vector3<double> centroid_in_file(const std::string& file) {
-  const Gaussians gaussians = read_splats(file).gaussians;
+  const Gaussians gaussians = read_splats_with_warnings(file).gaussians;
   Vector3<double> sum = Vector3<double>::Zero();
   for (Index g = 0; g < gaussians.count(); ++g) sum += Vector3<float>(gaussians.means.data() + 3 * g).cast<double>();
   return gaussians.count() == 0
@@ -269,7 +269,7 @@ Solid scene_solid(const std::vector<std::string>& folders, Measurement& m) {
         "penetration is not measured: nothing says what is solid (--surface, --occupancy, --scene, --data)");
     return {};
   }
-  Solid solid = gaussian_solid(read_splats(scene).gaussians, free_places(m), scene);
+  Solid solid = gaussian_solid(read_splats_with_warnings(scene).gaussians, free_places(m), scene);
   if (!solid.distance)
     m.result.notes.push_back("penetration is not measured: no Gaussian of " + scene +
                              " is opaque, flat, not alone and seen from the first frame");

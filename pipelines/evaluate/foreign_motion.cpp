@@ -73,12 +73,8 @@ std::vector<std::vector<ObjectPose>> read_unnamed(const NpyArray& rotations, con
 
 /// Files are called by objects' names.
 void check_object_name(const std::string& name, const std::string& path) {
-  const bool is_fit = !name.empty() && name != "." && name != ".." &&
-                      std::none_of(name.begin(), name.end(),
-                                   [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' '; });
-  if (!is_fit)
-    throw DataError(path + ": has an object called " + json_string(name) +
-                    "; allowed are names that a file may have, without / and \\");
+  if (!is_file_name(name))
+    throw DataError(path + ": has an object called " + json_string(name) + "; allowed: " + kFileNameText);
 }
 
 /// The root's rotation in frame 0.

@@ -51,8 +51,13 @@ Track read_track_folder(const fs::path& folder, const std::string& name) {
   track.motion = read_motion_with_warnings(file("motion.npz"));
   if (fs::exists(file("objects.npz"))) take_objects(file("objects.npz"), TrackOptions{}.object_name, track);
   if (fs::exists(file("cameras.json"))) {
-    for (const Camera& camera : read_cameras(file("cameras.json")))
-      track.camera_from_world.push_back(camera.camera_from_world);
+    for (const PictureCamera& one : read_picture_cameras(file("cameras.json"))) {
+      if (!one.picture.empty())
+        throw DataError(file("cameras.json") +
+                        ": names pictures (file_path), and the frames of a motion have no names; " +
+                        "needed: {\"format\": \"hsi4d cameras\", ...}, a camera a frame in order");
+      track.camera_from_world.push_back(one.camera.camera_from_world);
+    }
     check_count(file("cameras.json"), track.camera_from_world.size(), "cameras", track);
   }
   return track;

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "body/motion_edit.h"
-#include "core/camera_file.h"
 #include "core/check.h"
 #include "core/log.h"
 #include "core/parallel.h"
@@ -13,6 +12,7 @@
 #include "optim/solid/mesh_distance.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/input/body_files.h"
+#include "pipelines/input/frame_cameras.h"
 #include "pipelines/input/pose_estimate.h"
 
 namespace hsi4d {
@@ -51,8 +51,7 @@ std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std
   const auto file = [&folder](const char* name) { return (folder / name).string(); };
   const std::vector<BodyPose> bodies =
       kept_frames(read_motion_for(file("motion.npz"), avatar).poses, frames, file("motion.npz"), "poses");
-  const std::vector<Camera> cameras =
-      kept_frames(read_cameras(file("cameras.json")), frames, file("cameras.json"), "cameras");
+  const std::vector<Camera> cameras = cameras_of_frames(file("cameras.json"), frames);
   std::vector<std::vector<ObjectPose>> objects(bodies.size());
   if (!names.empty())
     objects = kept_frames(read_object_tracks(file("objects.npz"), names), frames, file("objects.npz"), "frames");
@@ -171,10 +170,11 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   Clip clip;
   auto video = std::make_shared<ClipVideo>(ClipVideo{{data.frames, {data.video_rate, data.frame_rate}}, {}});
   clip.frame_files = video->frames.names();
-  clip.camera = read_camera(data.camera.string());
+  clip.camera = first_camera(data.camera, video->frames);
   clip.scene = std::move(setup.scene);
   clip.avatar = std::move(setup.avatar);
   clip.objects = std::move(setup.objects);
+  clip.antialiased = std::move(setup.antialiased);
   clip.first.camera_from_world = clip.camera.camera_from_world;
   clip.first.objects = setup.poses;
   std::vector<std::string> names;

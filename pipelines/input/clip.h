@@ -46,7 +46,8 @@ struct Clip {
   std::optional<std::vector<SceneState>> truth;
   std::shared_ptr<const MeshDistance> surface;  ///< of data.surface; null: not known
   std::string surface_file;
-  std::vector<ClipFile> files;  ///< read for it, but for the truth, which no result depends on
+  std::vector<std::string> antialiased;  ///< files that say that their Gaussians were trained with antialiasing
+  std::vector<ClipFile> files;           ///< read for it, but for the truth, which no result depends on
 
   Index frames() const { return static_cast<Index>(frame_files.size()); }
 };

@@ -4,7 +4,6 @@
 
 #include "core/check.h"
 #include "core/config_file.h"
-#include "core/log.h"
 #include "pipelines/input/body_files.h"
 #include "splat/files/splat_file.h"
 
@@ -45,12 +44,15 @@ InitialSettings read_initial(const fs::path& file) {
   return read_settings<InitialSettings>(tree, problems);
 }
 
-/// The Gaussians of a file; what its reader rejected or held is told in the log.
-Gaussians read_gaussians(const fs::path& file) {
-  SplatFile read = read_splats(file.string());
-  const std::string remarks = summary_text(read.report);
-  if (!remarks.empty()) log_warning(file.string() + ": " + remarks);
+/// The Gaussians of a file, and what it says of them, which is told in the log.
+SplatFile read_gaussians(const fs::path& file) {
+  SplatFile read = read_splats_with_warnings(file.string());
   if (read.gaussians.count() == 0) throw DataError(file.string() + ": holds no Gaussians that can be used");
+  return read;
+}
+
+Gaussians take_gaussians(SplatFile read, const fs::path& file, std::vector<std::string>& antialiased) {
+  if (read.report.antialiased) antialiased.push_back(file.string());
   return std::move(read.gaussians);
 }
 
@@ -77,13 +79,13 @@ ObjectPose initial_pose(const InitialSettings& initial, const std::string& name,
 
 }  // namespace
 
-Gaussians read_object(const fs::path& file) { return centred(read_gaussians(file)); }
+Gaussians read_object(const fs::path& file) { return centred(read_gaussians(file).gaussians); }
 
 fs::path initial_motion_file(const DataSettings& data) { return read_initial(data.initial).motion; }
 
 SceneSetup read_scene_setup(const DataSettings& data) {
   SceneSetup setup;
-  setup.scene = read_gaussians(data.scene);
+  setup.scene = take_gaussians(read_gaussians(data.scene), data.scene, setup.antialiased);
   setup.avatar = read_avatar(data.avatar.string());
   if (setup.avatar.parents.size() != static_cast<std::size_t>(kSmplxJoints)) {
     throw DataError(data.avatar.string() + ": has " + std::to_string(setup.avatar.parents.size()) +
@@ -91,7 +93,8 @@ SceneSetup read_scene_setup(const DataSettings& data) {
   }
   const InitialSettings initial = read_initial(data.initial);
   for (const auto& [name, object] : data.objects) {
-    setup.objects.push_back({name, read_object(object.gaussians)});
+    SplatFile read = read_gaussians(object.gaussians);
+    setup.objects.push_back({name, centred(take_gaussians(std::move(read), object.gaussians, setup.antialiased))});
     setup.poses.push_back(initial_pose(initial, name, data.initial));
   }
   setup.motion_file = initial.motion;

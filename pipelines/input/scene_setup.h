@@ -24,6 +24,7 @@ struct SceneSetup {
   std::vector<ClipObject> objects;
   std::vector<ObjectPose> poses;  ///< of the objects in frame 0
   Avatar avatar;
+  std::vector<std::string> antialiased;  ///< files that say that their Gaussians were trained with antialiasing
   Motion motion;  ///< of the avatar's body: frame 0 exact, the others, where there are any, estimates
   std::filesystem::path motion_file;
   std::filesystem::path

@@ -16,6 +16,7 @@
 #include "pipelines/report/report.h"
 #include "pipelines/run/frame_start.h"
 #include "pipelines/sources/sources.h"
+#include "splat/files/splat_file.h"
 
 namespace hsi4d {
 
@@ -98,6 +99,7 @@ void set_image_size(Clip& clip, const RunConfig& config) {
 
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
   Clip clip = read_clip(config.data);
+  warn_of_antialiasing(clip.antialiased, config.render.antialias);
   set_image_size(clip, config);
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});

@@ -17,6 +17,7 @@
 #include "pipelines/draw/camera_selection.h"
 #include "pipelines/draw/image_of_scene.h"
 #include "pipelines/input/clip.h"
+#include "pipelines/input/frame_cameras.h"
 #include "pipelines/input/pose_estimate.h"
 #include "pipelines/sources/lock.h"
 #include "pipelines/sources/record.h"
@@ -33,7 +34,7 @@ constexpr double kLongestDoubled = 3600.0;  // seconds that a wait may become by
 // ---- The first frame ----
 
 SceneView first_view(const RunConfig& config) {
-  return {read_camera(config.data.camera.string()), config.background, config.render, {}};
+  return {only_camera(config.data.camera), config.background, config.render, {}};
 }
 
 /// Rows [begin, end) white and all others black: an image is then what share of a pixel they are.
@@ -58,7 +59,7 @@ void check_video(const RunConfig& config, const fs::path& path) {
   if (wanted > 0 && frames.video_count() != wanted)
     throw DataError("has " + std::to_string(frames.video_count()) + " frames; sources.video.frames asks for " +
                     std::to_string(wanted));
-  const Camera camera = read_camera(data.camera.string());
+  const Camera camera = first_camera(data.camera, frames);
   for (Index t = 0; t < frames.count(); ++t) {
     const Image frame = frames.read(t);
     if (frame.channels() >= 3 && fits_camera(frame, camera)) continue;

@@ -80,6 +80,9 @@ class Reader {
     refuse_unknown(tree, kFileKeys, "");
     const SweepBlock whole = read_block(tree, "", SweepBlock{});
     sweep.name = whole.name.empty() ? file.stem().string() : whole.name;
+    if (!is_file_name(sweep.name))
+      add(tree.origin, "/name",
+          json_string(sweep.name) + ", after the file, cannot be the name of a folder; allowed: " + kFileNameText);
     ConfigFields fields;
     describe(fields, sweep);
     read_config(with_members(tree, {"threads", "memory_mb", "slurm"}), fields, problems_);

@@ -5,6 +5,7 @@
 
 #include "core/angles.h"
 #include "core/check.h"
+#include "core/log.h"
 #include "core/rotation.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/synthetic/kit.h"
@@ -351,7 +352,11 @@ SyntheticObject object_of_file(const SyntheticSettings& settings) {
   if (name == kHumanMasks)
     throw UserError(path + ": an object is called by its file's name, and masks of \"" + name +
                     "\" are those of the person; rename the file");
-  SplatFile file = read_splats(path);
+  SplatFile file = read_splats_with_warnings(path);
+  if (file.report.antialiased)
+    log_warning(path +
+                ": its Gaussians were trained with antialiasing, which the dataset's files cannot say; "
+                "render.antialias=true draws them as they were trained");
   if (file.gaussians.count() == 0) throw DataError(path + ": holds no Gaussians that can be used");
   Similarity placed;
   placed.scale = settings.object_scale;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/check.h"
+#include "core/log.h"
 #include "core/rotation.h"
 #include "pipelines/synthetic/kit.h"
 #include "pipelines/synthetic/variation.h"
@@ -86,7 +87,11 @@ Gaussians synthetic_scene(SyntheticSceneKind kind, Index most, const ScenePlan& 
 Gaussians synthetic_scene(const SyntheticSettings& settings, const ScenePlan& plan) {
   const auto seed = static_cast<std::uint64_t>(settings.seed);
   if (settings.scene_file.empty()) return made_scene(settings, plan);
-  const SplatFile file = read_splats(settings.scene_file.string());
+  const SplatFile file = read_splats_with_warnings(settings.scene_file.string());
+  if (file.report.antialiased)
+    log_warning(settings.scene_file.string() +
+                ": its Gaussians were trained with antialiasing, which the dataset's files cannot say; "
+                "render.antialias=true draws them as they were trained");
   if (file.gaussians.count() == 0)
     throw DataError(settings.scene_file.string() + ": holds no Gaussians that can be used");
   Similarity placed;

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/check.h"
+#include "splat/files/far_means.h"
 #include "splat/files/list.h"
 #include "splat/files/splat_rows.h"
 #include "splat/sh_basis.h"
@@ -16,6 +17,7 @@ namespace {
 
 constexpr Index kChunk = 256;
 constexpr double kMostHarmonic = 4;
+constexpr int kMostRest = 45;  // f_rest_ of degree 3
 
 /// Bounds of a chunk: least x y z, greatest x y z of positions, log-scales and colours.
 using Bounds = std::array<float, 18>;
@@ -166,7 +168,7 @@ SplatRow unpacked(const std::array<std::uint32_t, 4>& packed, const Bounds& boun
                   std::span<const std::uint8_t> rest) {
   SplatRow row;
   for (std::size_t c = 0; c < 3; ++c) {
-    row.mean[c] = static_cast<float>(between(bounds, kPositions, c, kTriple[c].share(packed[0])));
+    row.mean[c] = between(bounds, kPositions, c, kTriple[c].share(packed[0]));
     row.log_scale[c] = static_cast<float>(between(bounds, kScales, c, kTriple[c].share(packed[2])));
     const double color = between(bounds, kColors, c, kBytes[c].share(packed[3]));
     row.sh[c] = static_cast<float>((color - 0.5) / kShC0);
@@ -265,7 +267,8 @@ bool is_compressed_ply(const PlyHeader& header) {
   return vertex >= 0 && header.elements[static_cast<std::size_t>(vertex)].find("packed_position") >= 0;
 }
 
-SplatFile decode_compressed_ply(std::span<const std::uint8_t> file, const PlyHeader& header, const std::string& name) {
+SplatFile decode_compressed_ply(std::span<const std::uint8_t> file, const PlyHeader& header, const std::string& name,
+                                const Vector3<double>& origin_world) {
   const Table table = find_table(header, "vertex", packed_names(), PlyType::kUint32, "uint", name);
   const std::vector<Bounds> bounds = read_bounds(file, header, name);
   const Index chunks = table.rows / kChunk + (table.rows % kChunk > 0 ? 1 : 0);
@@ -275,7 +278,10 @@ SplatFile decode_compressed_ply(std::span<const std::uint8_t> file, const PlyHea
   int degree = 0;
   const Bytes levels = read_harmonics(file, header, table.rows, degree, name);
   const std::size_t rest_count = table.rows == 0 ? 0 : levels.size() / static_cast<std::size_t>(table.rows);
-  SplatRows rows(table.rows, degree, "compressed PLY");
+  SplatRows rows(table.rows, degree, "compressed PLY", origin_world);
+  const std::array known = {PlyNames{"chunk", bound_names()}, PlyNames{"vertex", packed_names()},
+                            PlyNames{"sh", rest_names(kMostRest)}};
+  caution_of_others(names_beside(header, known), rows);
   read_ply_rows(file, header, name, table.element, table.columns, [&](Index row, std::span<const double> values) {
     std::array<std::uint32_t, 4> packed{};
     for (std::size_t i = 0; i < 4; ++i) packed[i] = whole(values[i], 4294967295.0, row, name);
@@ -343,6 +349,7 @@ EncodedSplats encode_compressed_ply(const Gaussians& g) {
       for (int k = 1; k < k_count; ++k) encoded.bytes.push_back(harmonic_level(harmonics.hold(sh[3 * k + c])));
     }
   }
+  add_loss(encoded.losses, "means in steps wider than their Gaussian", far_means(g, g.origin_world).count);
   add_loss(encoded.losses, "log-scales held within ±20", scales.count());
   add_loss(encoded.losses, "harmonics held within ±4", harmonics.count());
   return encoded;

@@ -32,9 +32,11 @@ bool is_compressed_ply(const PlyHeader& header);
 /// The Gaussians of a compressed PLY file. Rows with numbers that are not finite are left out and counted, as in
 /// splat/files/splat_rows.h.
 ///
+/// @param origin_world  what means become relative to before they are rounded
 /// Throws DataError naming the file: an element or property missing or of another type, numbers of chunks or harmonics
 /// that do not fit the number of Gaussians, fewer or more bytes than the header's counts need.
-SplatFile decode_compressed_ply(std::span<const std::uint8_t> file, const PlyHeader& header, const std::string& name);
+SplatFile decode_compressed_ply(std::span<const std::uint8_t> file, const PlyHeader& header, const std::string& name,
+                                const Vector3<double>& origin_world = Vector3<double>::Zero());
 
 /// Gaussians in the order in which encode_compressed_ply writes them, so that chunks are small boxes: along a Z-order
 /// curve through the means' bounds, equal places by index.

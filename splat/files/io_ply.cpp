@@ -1,9 +1,12 @@
 #include "splat/files/io_ply.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "core/check.h"
 #include "core/file.h"
+#include "splat/files/far_means.h"
 #include "splat/files/io_compressed_ply.h"
 #include "splat/files/list.h"
 #include "splat/files/ply_table.h"
@@ -25,6 +28,15 @@ std::vector<std::string> column_names(int rest_count, int kept) {
   for (int c = 0; c < 3; ++c) {
     for (int k = 0; k < kept; ++k) names.push_back(numbered("f_rest_", c * (rest_count / 3) + k));
   }
+  return names;
+}
+
+constexpr const char* kFilter = "filter_3D";  // of Mip-Splatting, before it is fused
+
+/// Properties that are read, or say nothing of the picture: INRIA's normals are zero.
+std::vector<std::string> known_names(int rest_count) {
+  std::vector<std::string> names = column_names(rest_count, rest_count / 3);
+  names.insert(names.end(), {"nx", "ny", "nz", kFilter});
   return names;
 }
 
@@ -53,21 +65,45 @@ const PlyElement& vertex_of(const PlyHeader& header, const std::string& name) {
   return header.elements[static_cast<std::size_t>(place)];
 }
 
+/// The place of a property, or -1. Throws DataError for a list.
+int column_of(const PlyElement& vertex, const std::string& wanted, const std::string& name) {
+  const int column = vertex.find(wanted);
+  if (column >= 0 && vertex.properties[static_cast<std::size_t>(column)].count_type)
+    throw DataError(name + ": property \"" + wanted + "\" is a list; it must be one number");
+  return column;
+}
+
 /// The places of the wanted properties. Throws DataError with all that are missing.
 std::vector<int> columns_of(const PlyElement& vertex, int rest_count, int kept, const std::string& name) {
   std::vector<int> columns;
   std::string missing;
   for (const std::string& wanted : column_names(rest_count, kept)) {
-    columns.push_back(vertex.find(wanted));
-    if (columns.back() < 0) {
-      missing += (missing.empty() ? "" : ", ") + wanted;
-    } else if (vertex.properties[static_cast<std::size_t>(columns.back())].count_type) {
-      throw DataError(name + ": property \"" + wanted + "\" is a list; it must be one number");
-    }
+    columns.push_back(column_of(vertex, wanted, name));
+    if (columns.back() < 0) missing += (missing.empty() ? "" : ", ") + wanted;
   }
   if (missing.empty()) return columns;
   throw DataError(name + ": element \"vertex\" has no property " + missing +
                   "; a file of Gaussians has x, y, z, f_dc_0 to 2, opacity, scale_0 to 2, rot_0 to 3");
+}
+
+/// A row with Mip-Splatting's filter of radius `filter` laid over it, as its authors fuse it.     [Yu et al. 2024,
+/// §4.1]
+///
+///   s' = sqrt(s² + f²),   o' = o Π s/s'
+void fuse_filter(double filter, SplatRow& row) {
+  if (filter == 0) return;
+  const double log_filter = std::log(std::fabs(filter));  // not finite: the scales become so, and the row is left out
+  double log_share = 0;
+  for (float& log_scale : row.log_scale) {
+    const double s = log_scale;
+    const double fused = std::max(s, log_filter) + 0.5 * std::log1p(std::exp(-2 * std::fabs(s - log_filter)));
+    log_share += s - fused;
+    log_scale = static_cast<float>(fused);
+  }
+  const double x = row.opacity_logit, opacity = 1 / (1 + std::exp(-x));
+  const double log_opacity = log_share - (x < 0 ? std::log1p(std::exp(x)) - x : std::log1p(std::exp(-x)));
+  row.opacity_logit =
+      static_cast<float>(log_opacity - std::log(1 / (1 + std::exp(x)) - opacity * std::expm1(log_share)));
 }
 
 /// A row of columns, in the order of column_names.
@@ -75,7 +111,7 @@ SplatRow row_of(std::span<const double> values, int coefficients) {
   const auto number = [&](std::size_t column) { return static_cast<float>(values[column]); };
   SplatRow row;
   for (std::size_t c = 0; c < 3; ++c) {
-    row.mean[c] = number(kMean + c);
+    row.mean[c] = values[kMean + c];
     row.log_scale[c] = number(kScale + c);
   }
   for (std::size_t c = 0; c < 4; ++c) row.quat[c] = number(kQuat + c);
@@ -90,9 +126,9 @@ SplatRow row_of(std::span<const double> values, int coefficients) {
 
 }  // namespace
 
-SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name) {
+SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name, const Vector3<double>& origin_world) {
   const PlyHeader header = read_ply_header(file, name);
-  if (is_compressed_ply(header)) return decode_compressed_ply(file, header, name);
+  if (is_compressed_ply(header)) return decode_compressed_ply(file, header, name, origin_world);
   const PlyElement& vertex = vertex_of(header, name);
   const int rest_count = count_rest(vertex);
   const int degree = degree_of(rest_count);
@@ -100,11 +136,22 @@ SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name
     throw DataError(name + ": there are " + std::to_string(rest_count) +
                     " properties f_rest_; allowed: 0, 9, 24, 45 or 72 (spherical harmonics of degree 0 to 4)");
   const int kept_degree = std::min(degree, kHighestShDegree), kept = rest_of(kept_degree);
-  const std::vector<int> columns = columns_of(vertex, rest_count, kept, name);
-  SplatRows rows(vertex.rows, kept_degree, "INRIA PLY");
+  std::vector<int> columns = columns_of(vertex, rest_count, kept, name);
+  const bool has_filter = vertex.find(kFilter) >= 0;
+  if (has_filter) columns.push_back(column_of(vertex, kFilter, name));
+  SplatRows rows(vertex.rows, kept_degree, "INRIA PLY", origin_world);
+  caution_of_others(names_beside(header, std::array{PlyNames{"vertex", known_names(rest_count)}}), rows);
+  if (has_filter) {
+    rows.add_note("filter_3D is fused into scales and opacities, as Mip-Splatting does; it draws with render.blur=0.1");
+    rows.set_antialiased();
+  }
   if (degree > kept_degree) rows.add_repair(kWithoutDegree4, vertex.rows);
   const int coefficients = kept + 1;
-  const auto take = [&](Index, std::span<const double> values) { rows.take(row_of(values, coefficients)); };
+  const auto take = [&](Index, std::span<const double> values) {
+    SplatRow row = row_of(values, coefficients);
+    if (has_filter) fuse_filter(values.back(), row);
+    rows.take(row);
+  };
   read_ply_rows(file, header, name, header.find("vertex"), columns, take);
   return rows.finish();
 }
@@ -161,7 +208,9 @@ SplatFormat ply_format() {
           .magic = {"ply\n", "ply\r"},
           .decode = decode_ply,
           .encode = [](const Gaussians& g, const SplatWriteOptions&) {
-            return EncodedSplats{encode_ply(g), {}};
+            EncodedSplats encoded{encode_ply(g), {}};
+            add_loss(encoded.losses, "means in steps wider than their Gaussian", far_means(g, g.origin_world).count);
+            return encoded;
           }};
 }
 

@@ -19,9 +19,10 @@ namespace hsi4d {
 
 /// The Gaussians of a PLY file.
 ///
-/// Binary of both byte orders, and ascii. Other elements and properties are passed over. A row is left out, and
-/// counted, when a number of it is not finite (an opacity of ±inf is) or its quaternion is zero; opacity logits and
-/// log-scales beyond ±kOpacityLogitLimit and ±kLogScaleLimit are held there, and counted. A compressed PLY
+/// Binary of both byte orders, and ascii. Other elements and properties are passed over, with a caution but for
+/// normals; `filter_3D` of Mip-Splatting is fused into scales and opacities. A row is left out, and counted, when a
+/// number of it is not finite (an opacity of ±inf is) or its quaternion is zero; opacity logits and log-scales beyond
+/// ±kOpacityLogitLimit and ±kLogScaleLimit are held there, and counted. A compressed PLY
 /// (splat/files/io_compressed_ply.h) is known by its properties and read too.
 ///
 /// @param path  UTF-8
@@ -32,7 +33,9 @@ SplatFile read_ply(const std::string& path);
 
 /// As read_ply, of a file in memory.
 /// @param name  what error messages call it
-SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name);
+/// @param origin_world  what means become relative to before they are rounded
+SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name,
+                     const Vector3<double>& origin_world = Vector3<double>::Zero());
 
 /// Writes Gaussians as binary little-endian floats, INRIA's properties in INRIA's order, normals zero; in one step (see
 /// AtomicFile). An origin is added to the means.

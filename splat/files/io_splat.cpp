@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/check.h"
+#include "splat/files/far_means.h"
 #include "splat/files/list.h"
 #include "splat/files/splat_rows.h"
 #include "splat/sh_basis.h"
@@ -38,12 +39,13 @@ std::uint8_t quat_byte(double value) {
 
 }  // namespace
 
-SplatFile decode_splat(std::span<const std::uint8_t> file, const std::string& name) {
+SplatFile decode_splat(std::span<const std::uint8_t> file, const std::string& name,
+                       const Vector3<double>& origin_world) {
   if (file.size() % kRowBytes != 0)
     throw DataError(name + ": a .splat file has 32 bytes for each Gaussian; this one has " +
                     std::to_string(file.size()) + " bytes, " + std::to_string(file.size() % kRowBytes) +
                     " too many: it was cut short, or it is no .splat file");
-  SplatRows rows(static_cast<Index>(file.size() / kRowBytes), 0, ".splat");
+  SplatRows rows(static_cast<Index>(file.size() / kRowBytes), 0, ".splat", origin_world);
   for (std::size_t at = 0; at < file.size(); at += kRowBytes) rows.take(row_at(file.data() + at));
   return rows.finish();
 }
@@ -69,6 +71,7 @@ EncodedSplats encode_splat(const Gaussians& g) {
     for (int c = 0; c < 4; ++c) file.push_back(quat_byte(quat[c]));
   }
   if (g.sh_degree > 0) add_loss(encoded.losses, "Gaussians without their harmonics of degree 1 and more", g.count());
+  add_loss(encoded.losses, "means in steps wider than their Gaussian", far_means(g, g.origin_world).count);
   add_loss(encoded.losses, "log-scales held within ±20", scales.count());
   add_loss(encoded.losses, "colours held within 0 to 1", colors.count());
   return encoded;

@@ -17,8 +17,10 @@ namespace hsi4d {
 /// The Gaussians of a .splat file, degree 0. Rows with numbers that are not finite, scales below 0 or a quaternion that
 /// is zero are left out and counted; a scale of 0 is held at the smallest that is read, as in splat/files/splat_rows.h.
 ///
+/// @param origin_world  what means become relative to before they are rounded
 /// Throws DataError naming the file when its size is not a multiple of 32 bytes.
-SplatFile decode_splat(std::span<const std::uint8_t> file, const std::string& name);
+SplatFile decode_splat(std::span<const std::uint8_t> file, const std::string& name,
+                       const Vector3<double>& origin_world = Vector3<double>::Zero());
 
 /// The bytes of a .splat file, the origin added to the means, rows in order. Harmonics of degree 1 and more are lost.
 ///

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/check.h"
+#include "splat/files/far_means.h"
 #include "splat/files/list.h"
 #include "splat/files/splat_rows.h"
 #include "splat/files/spz_container.h"
@@ -67,7 +68,7 @@ Axes read_extensions(const SpzContent& content, SplatRows& rows, const std::stri
     if (type == kAxesExtension && size >= 4) {
       axes = axes_named(load_uint(&bytes[at + 8], 4), name);
     } else {
-      rows.add_note("an extension of type " + std::to_string(type) + " is passed over");
+      rows.add_caution("an extension of type " + std::to_string(type) + " is passed over");
     }
     at += 8 + static_cast<std::size_t>(size);
   }
@@ -134,7 +135,7 @@ class Decoder {
       const double value = content_.header.version == 1
                                ? half(load_uint(position + 2 * c, 2))
                                : std::ldexp(fixed_point(position + 3 * c), -content_.header.fractional_bits);
-      row.mean[c] = static_cast<float>(value * axes_[c]);
+      row.mean[c] = value * axes_[c];
       row.log_scale[c] = static_cast<float>(at(kSpzScales, n)[c] / 16.0 - 10);
       row.sh[c] = static_cast<float>((at(kSpzColors, n)[c] / 255.0 - 0.5) / kColorScale);
     }
@@ -264,14 +265,14 @@ std::array<Bytes, kSpzAttributes> attributes_of(const Gaussians& g, const SpzOpt
 
 }  // namespace
 
-SplatFile decode_spz(std::span<const std::uint8_t> file, const std::string& name) {
+SplatFile decode_spz(std::span<const std::uint8_t> file, const std::string& name, const Vector3<double>& origin_world) {
   const SpzContent content = unpack_spz(file, name);
   const SpzHeader& header = content.header;
   SplatRows rows(static_cast<Index>(header.count), std::min(header.degree, kHighestShDegree),
-                 ".spz version " + std::to_string(header.version));
-  if ((header.flags & kSpzAntialiased) != 0) rows.add_note("trained with antialiasing");
+                 ".spz version " + std::to_string(header.version), origin_world);
+  if ((header.flags & kSpzAntialiased) != 0) rows.set_antialiased();
   if ((header.flags & ~(kSpzAntialiased | kSpzHasExtensions)) != 0)
-    rows.add_note("the header's flags are " + std::to_string(header.flags) + "; those above 3 are not known");
+    rows.add_caution("the header's flags are " + std::to_string(header.flags) + "; those above 3 are not known");
   if (header.degree > kHighestShDegree) rows.add_repair(kWithoutDegree4, static_cast<Index>(header.count));
   const Decoder decoder(content, read_extensions(content, rows, name));
   for (std::size_t n = 0; n < header.count; ++n) rows.take(decoder.row(n));
@@ -290,6 +291,9 @@ EncodedSplats encode_spz(const Gaussians& gaussians, const SpzOptions& options) 
   header.count = static_cast<std::uint64_t>(gaussians.count());
   header.degree = gaussians.sh_degree;
   header.fractional_bits = bits;
+  if (options.antialiased) header.flags |= kSpzAntialiased;
+  add_loss(encoded.losses, "means in steps wider than their Gaussian",
+           means_narrower_than(std::ldexp(1, -bits), gaussians).count);
   encoded.bytes = pack_spz(header, attributes);
   return encoded;
 }

@@ -38,14 +38,17 @@ struct SpzOptions {
   int version = 3;           ///< 2, 3 or 4
   int sh1_bits = 8;          ///< of harmonics of degree 1, 1 to 8: fewer pack smaller
   int sh_rest_bits = 8;      ///< of those above
+  bool antialiased = false;  ///< the flag that the Gaussians were trained with antialiasing
   int fractional_bits = -1;  ///< of positions, 0 to 23; −1: as many as the farthest one leaves, at most 20
 };
 
 /// The Gaussians of a .spz file. Harmonics of degree 4 are left out and counted.
 ///
+/// @param origin_world  what means become relative to before they are rounded
 /// Throws DataError naming the file: no .spz file, a version, degree or axes that are not read, sizes that contradict
 /// each other, damage. No more memory is taken than the file's size makes credible.
-SplatFile decode_spz(std::span<const std::uint8_t> file, const std::string& name);
+SplatFile decode_spz(std::span<const std::uint8_t> file, const std::string& name,
+                     const Vector3<double>& origin_world = Vector3<double>::Zero());
 
 /// The bytes of a .spz file, the origin added to the means, rows in order.
 ///

@@ -33,7 +33,9 @@ struct SplatFormat {
   std::vector<std::string> magic = {};  ///< first bytes, 16 at most; without, a file is known by its ending alone
   bool gzip = false;                    ///< files may be gzip streams; one format alone can say so
   int sh_degree = kHighestShDegree;     ///< of the harmonics that a file can hold
-  SplatFile (*decode)(std::span<const std::uint8_t> file, const std::string& name) = nullptr;
+  /// @param origin_world  what means become relative to, as in read_splats
+  SplatFile (*decode)(std::span<const std::uint8_t> file, const std::string& name,
+                      const Vector3<double>& origin_world) = nullptr;
   EncodedSplats (*encode)(const Gaussians& gaussians, const SplatWriteOptions& options) = nullptr;
 };
 

@@ -391,6 +391,23 @@ PlyHeader read_ply_header(std::span<const std::uint8_t> file, const std::string&
   return header;
 }
 
+std::vector<std::string> names_beside(const PlyHeader& header, std::span<const PlyNames> known) {
+  std::vector<std::string> others;
+  for (const PlyElement& element : header.elements) {
+    const auto names = std::find_if(known.begin(), known.end(),
+                                    [&element](const PlyNames& one) { return one.element == element.name; });
+    if (names == known.end()) {
+      others.push_back("element " + element.name);
+      continue;
+    }
+    for (const PlyProperty& property : element.properties) {
+      if (std::find(names->properties.begin(), names->properties.end(), property.name) == names->properties.end())
+        others.push_back(element.name + "." + property.name);
+    }
+  }
+  return others;
+}
+
 void read_ply_rows(std::span<const std::uint8_t> file, const PlyHeader& header, const std::string& name, int element,
                    std::span<const int> columns, FunctionRef<void(Index, std::span<const double>)> take) {
   RowReader reader(file, header, name);

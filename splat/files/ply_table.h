@@ -46,6 +46,15 @@ struct PlyHeader {
 /// short for the rows that it names.
 PlyHeader read_ply_header(std::span<const std::uint8_t> file, const std::string& name);
 
+/// An element and properties of it.
+struct PlyNames {
+  std::string element;
+  std::vector<std::string> properties;
+};
+
+/// What a header has beside names that are known: "element face", and of known elements properties, "vertex.label".
+std::vector<std::string> names_beside(const PlyHeader& header, std::span<const PlyNames> known);
+
 /// Reads the rows of one element in order, and walks over all others, so that the whole file is checked.
 ///
 /// @param element  its place in the header

@@ -6,7 +6,9 @@
 
 #include "core/check.h"
 #include "core/file.h"
+#include "core/log.h"
 #include "core/text.h"
+#include "splat/files/far_means.h"
 
 namespace hsi4d {
 namespace {
@@ -120,10 +122,30 @@ int written_sh_degree(const std::string& path, int sh_degree) {
   return format == nullptr ? sh_degree : std::min(sh_degree, format->sh_degree);
 }
 
-SplatFile read_splats(const std::string& path) { return decode_splats(read_file(path), path); }
+SplatFile read_splats(const std::string& path, const Vector3<double>& origin_world) {
+  return decode_splats(read_file(path), path, origin_world);
+}
 
-SplatFile decode_splats(std::span<const std::uint8_t> file, const std::string& name) {
-  if (const SplatFormat* format = format_of_file(file, name)) return format->decode(file, name);
+SplatFile read_splats_with_warnings(const std::string& path, const Vector3<double>& origin_world) {
+  SplatFile file = read_splats(path, origin_world);
+  const std::string text = summary_text(file.report);
+  if (!text.empty()) log_warning(path + ": " + text);
+  for (const std::string& caution : file.report.cautions) log_warning(path + ": " + caution);
+  return file;
+}
+
+void warn_of_antialiasing(std::span<const std::string> files, bool antialias) {
+  for (const std::string& file : files) {
+    if (!antialias)
+      log_warning(file +
+                  ": its Gaussians were trained with antialiasing and are drawn without it, too opaque where they "
+                  "are small; render.antialias=true draws them as they were trained");
+  }
+}
+
+SplatFile decode_splats(std::span<const std::uint8_t> file, const std::string& name,
+                        const Vector3<double>& origin_world) {
+  if (const SplatFormat* format = format_of_file(file, name)) return format->decode(file, name, origin_world);
   if (ends_in(name, kUnreadEnding))
     throw UserError(name + ": " + kUnreadEnding + " files are not read; Gaussians are read from " +
                     splat_formats_text() + ", into which the tool that wrote it can convert it");

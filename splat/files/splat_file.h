@@ -37,13 +37,22 @@ int written_sh_degree(const std::string& path, int sh_degree);
 
 /// The Gaussians of a file. Its format is known by its first bytes, else by the path's ending.
 ///
-/// @param path  UTF-8
+/// @param path          UTF-8
+/// @param origin_world  what means become relative to, metres, in the file's digits, before they are rounded to floats
 /// Throws UserError when the file cannot be read or is of no format that is known; DataError as the format's reader.
-SplatFile read_splats(const std::string& path);
+SplatFile read_splats(const std::string& path, const Vector3<double>& origin_world = Vector3<double>::Zero());
+
+/// As read_splats; what the reader left out or put right, and its cautions, go to the log as warnings.
+SplatFile read_splats_with_warnings(const std::string& path,
+                                    const Vector3<double>& origin_world = Vector3<double>::Zero());
+
+/// Warns of files whose Gaussians were trained with antialiasing (SplatReport::antialiased) and are drawn without it.
+void warn_of_antialiasing(std::span<const std::string> files, bool antialias);
 
 /// As read_splats, of a file in memory.
 /// @param name  the file's name: what error messages call it, and its ending says what the first bytes do not
-SplatFile decode_splats(std::span<const std::uint8_t> file, const std::string& name);
+SplatFile decode_splats(std::span<const std::uint8_t> file, const std::string& name,
+                        const Vector3<double>& origin_world = Vector3<double>::Zero());
 
 /// The bytes of a file in the format of the path's ending.
 ///

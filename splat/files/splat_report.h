@@ -19,6 +19,8 @@ struct SplatReport {
   Index rejected = 0;                      ///< rows that are left out
   Counts rejections;                       ///< reason, rows; a row counts under its first reason
   Counts repairs;                          ///< what was put right, numbers
+  bool antialiased = false;                ///< the file says: trained with opacities compensated for the blur
+  std::vector<std::string> cautions;       ///< why the Gaussians may be others than the file means
   std::vector<std::string> notes;          ///< what else the file says, without effect on the Gaussians
   std::vector<Index> row_of;               ///< the file's row of every kept Gaussian, ascending
   std::vector<Index> held_log_scales;      ///< places in log_scales [N,3] of numbers held at a limit, ascending
@@ -31,7 +33,7 @@ std::string summary_text(const SplatReport& report);
 /// "reason: 3, reason: 4".
 std::string counts_text(const Counts& counts);
 
-/// A file's Gaussians, kept rows in the file's order, origin at 0.
+/// A file's Gaussians, kept rows in the file's order, relative to the origin that was asked for, 0 if none was.
 struct SplatFile {
   Gaussians gaussians;
   SplatReport report;

@@ -5,6 +5,9 @@
 #include <limits>
 #include <span>
 
+#include "core/text.h"
+#include "splat/files/far_means.h"
+
 namespace hsi4d {
 namespace {
 
@@ -45,7 +48,13 @@ std::string summary_text(const SplatReport& report) {
   return text;
 }
 
-SplatRows::SplatRows(Index rows, int sh_degree, std::string format) {
+void caution_of_others(const std::vector<std::string>& names, SplatRows& rows) {
+  if (!names.empty())
+    rows.add_caution("not known, and passed over, though the picture may depend on it: " + few_names(names));
+}
+
+SplatRows::SplatRows(Index rows, int sh_degree, std::string format, const Vector3<double>& origin_world) {
+  file_.gaussians.origin_world = origin_world;
   file_.gaussians.sh_degree = sh_degree;
   resize(rows);
   file_.report.format = std::move(format);
@@ -55,12 +64,17 @@ SplatRows::SplatRows(Index rows, int sh_degree, std::string format) {
 
 void SplatRows::take(const SplatRow& row) {
   const Index file_row = next_row_++;
-  const int reason = why_rejected(row);
+  std::array<float, 3> mean{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    mean[c] = static_cast<float>(row.mean[c] - file_.gaussians.origin_world[static_cast<Index>(c)]);
+    is_finer_ = is_finer_ || static_cast<double>(static_cast<float>(row.mean[c])) != row.mean[c];
+  }
+  const int reason = why_rejected(row, mean);
   if (reason >= 0) {
     ++rejections_[static_cast<std::size_t>(reason)];
     return;
   }
-  store(row, static_cast<Index>(file_.report.row_of.size()));
+  store(row, mean, static_cast<Index>(file_.report.row_of.size()));
   file_.report.row_of.push_back(file_row);
 }
 
@@ -73,12 +87,14 @@ SplatFile SplatRows::finish() {
   add_count(report.repairs, "log-scales held within ±20", std::ssize(report.held_log_scales));
   add_count(report.repairs, "opacity logits held within ±20", std::ssize(report.held_opacity_logits));
   report.repairs.insert(report.repairs.end(), more_repairs_.begin(), more_repairs_.end());
+  const FarMeans far = far_means(file_.gaussians, Vector3<double>::Zero());
+  if (far.count > 0) report.cautions.push_back(far_means_text(far, kept, is_finer_));
   return std::move(file_);
 }
 
 /// The first reason against the row, or -1.
-int SplatRows::why_rejected(const SplatRow& row) const {
-  if (!all_finite(row.mean)) return 0;
+int SplatRows::why_rejected(const SplatRow& row, const std::array<float, 3>& mean) const {
+  if (!all_finite(mean)) return 0;
   if (!all_finite(row.log_scale)) return 1;
   if (!all_finite(row.quat)) return 2;
   const bool zero = std::all_of(row.quat.begin(), row.quat.end(),
@@ -90,10 +106,10 @@ int SplatRows::why_rejected(const SplatRow& row) const {
   return -1;
 }
 
-void SplatRows::store(const SplatRow& row, Index n) {
+void SplatRows::store(const SplatRow& row, const std::array<float, 3>& mean, Index n) {
   Gaussians& g = file_.gaussians;
   SplatReport& report = file_.report;
-  std::copy(row.mean.begin(), row.mean.end(), g.means.begin() + 3 * n);
+  std::copy(mean.begin(), mean.end(), g.means.begin() + 3 * n);
   std::copy(row.quat.begin(), row.quat.end(), g.quats.begin() + 4 * n);
   for (Index c = 0; c < 3; ++c) {
     const float value = row.log_scale[static_cast<std::size_t>(c)];

@@ -213,4 +213,35 @@ TEST_CASE("transforms that cannot be used are refused") {
         "c.json:1: /frames: {} is an object, not an array");
 }
 
+TEST_CASE("transforms of another lens or shutter are refused, whoever's word for it they use") {
+  const auto fault_of = [](const std::string& top, const std::string& frame = "") {
+    return fault("{" + top + "\"w\": 8, \"h\": 6, \"fl_x\": 7, \"fl_y\": 7, \"cx\": 4, \"cy\": 3, \"frames\": [\n{" +
+                 frame + "\"transform_matrix\": " + kIdentity + "}]}");
+  };
+  CHECK(fault_of("\"is_fisheye\": true, ") ==
+        "c.json:1: /is_fisheye: true says that this is a fisheye lens; pinhole cameras alone are drawn: undistort the "
+        "images first");
+  CHECK(
+      fault_of("", "\"rolling_shutter_time\": 0.012, ") ==
+      "c.json:2: /frames/0/rolling_shutter_time: 0.012 says that this is a rolling shutter; pinhole cameras alone are "
+      "drawn: undistort the images first");
+  for (const char* other :
+       {"\"ftheta_p0\": 1e-9, ", "\"fisheye_crop_radius\": 300, ", "\"latlong\": true, ", "\"equirectangular\": 1, ",
+        "\"is_orthographic\": true, ", "\"ortho_scale\": 2.5, ", "\"rolling_shutter\": [0, 0.5, 0, 0], ",
+        "\"camera_type\": \"equirectangular\", ", "\"lens_type\": \"FISHEYE\", ", "\"distortion\": {\"k\": [0.1]}, ",
+        "\"k5\": 0.1, ", "\"s1\": 0.1, ", "\"from_mitsuba\": true, ", "\"skew\": 0.3, "}) {
+    INFO(other);
+    CHECK(fault_of(other) != "no fault");
+    CHECK(fault_of("", other) != "no fault");
+  }
+  for (const char* pinhole :
+       {"\"is_fisheye\": false, ", "\"rolling_shutter_time\": 0.0, ", "\"rolling_shutter\": [0, 0, -0.0, 0e7], ",
+        "\"ortho_scale\": null, ", "\"camera_type\": \"perspective\", ", "\"distortion_model\": \"none\", ",
+        "\"undistorted\": true, ", "\"k6\": 0, ", "\"shutter_speed\": 0.01, ", "\"aabb_scale\": 16, "}) {
+    INFO(pinhole);
+    CHECK(fault_of(pinhole) == "no fault");
+    CHECK(fault_of("", pinhole) == "no fault");
+  }
+}
+
 }  // namespace camera_file_test

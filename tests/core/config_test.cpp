@@ -199,6 +199,10 @@ TEST_CASE("a wrong value is named with what is allowed") {
   CHECK_THAT(fault(R"({"small": 256})"), Equals("a.json:1: /small: 256 is out of range; allowed: 0 to 255"));
   CHECK_THAT(fault(R"({"on": 1})"), Equals("a.json:1: /on: 1 is a number, not a boolean; allowed: true or false"));
   CHECK_THAT(fault(R"({"text": 1})"), Equals("a.json:1: /text: 1 is a number, not a string"));
+  CHECK_THAT(fault(R"({"text": "x\u0000y"})"),
+             Equals(R"(a.json:1: /text: "x\u0000y" holds the character 0 (\u0000), which no text here can have)"));
+  CHECK_THAT(fault(R"({"names": ["a", "\u0000"]})"),
+             Equals(R"(a.json:1: /names/1: "\u0000" holds the character 0 (\u0000), which no text here can have)"));
   CHECK_THAT(
       fault(R"({"colour": "blu"})"),
       Equals(

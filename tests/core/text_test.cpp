@@ -12,6 +12,8 @@ namespace text_test {
 using namespace hsi4d;
 
 TEST_CASE("words are joined by commas") {
+  CHECK(few_names(std::vector<std::string>{"a", "b\n", "c", "d", "e", "f", "g", "h"}) ==
+        "a, b\\x0a, c, d, e, f and 2 more");
   CHECK(joined({}).empty());
   CHECK(joined(std::vector<std::string>{"a"}) == "a");
   CHECK(joined(std::vector<std::string>{"a", "b", "c"}) == "a, b, c");
@@ -63,6 +65,16 @@ TEST_CASE("text that is UTF-8 without control characters is told from what is no
   }
   CHECK(utf8_length("") == 0);
   CHECK(utf8_length("\xe2\x82\xac.") == 3);
+}
+
+TEST_CASE("names of files that stay in their folder are told from others") {
+  for (const char* name : {"walk-2", "a b", "\xc3\xa4", "...", ".x", "x..y"}) CHECK(is_file_name(name));
+  CHECK(is_file_name(std::string(200, 'a')));
+  CHECK_FALSE(is_file_name(std::string(201, 'a')));
+  for (const std::string& name :
+       {std::string("x\0y", 3), std::string(), std::string("."), std::string(".."), std::string("../../evil"),
+        std::string("/tmp"), std::string("a\\b"), std::string("a\nb"), std::string("\xff")})
+    CHECK_FALSE(is_file_name(name));
 }
 
 }  // namespace text_test

@@ -70,6 +70,39 @@ TEST_CASE("convert writes every format and says what is lost") {
             .starts_with("back.compressed.ply: 12 Gaussians, spherical harmonics of degree 1, compressed PLY\n"));
 }
 
+TEST_CASE("convert moves far means before it rounds them, and says what it cannot keep") {
+  const TemporaryFolder folder;
+  std::string text = "ply\nformat ascii 1.0\nelement vertex 1\n";
+  for (const char* name : {"x", "y", "z"}) text += std::string("property double ") + name + "\n";
+  for (const char* name :
+       {"scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0", "f_dc_1", "f_dc_2"})
+    text += std::string("property float ") + name + "\n";
+  folder.write("in.ply", text + "end_header\n431250.1234567 5411873.7654321 12.5 -4 -4 -9 1 0 0 0 0.5 0.1 0.2 0.3\n");
+  const Gaussians moved = converted({.translate = "-431250,-5411870,1"});
+  CHECK(moved.means == std::vector<float>{static_cast<float>(431250.1234567 - 431250),
+                                          static_cast<float>(5411873.7654321 - 5411870), 13.5F});
+  const Gaussians turned = converted({.scale = 2, .rotate = "0,0,90", .translate = "10823740,-862500,0"});
+  CHECK(turned.means[0] == Approx(-2 * 3.7654321).margin(1e-6));  // x' = -2 y + t, y' = 2 x + t
+  CHECK(turned.means[1] == Approx(2 * 0.1234567).margin(1e-6));
+  CHECK_THAT(cli::convert_command({.in = "in.ply", .out = "out.ply"}),
+             Contains("  not held by the format: means in steps wider than their Gaussian: 1\n"));
+}
+
+TEST_CASE("convert keeps the flag of antialiasing in .spz and says where it is lost") {
+  const TemporaryFolder folder;
+  SplatWriteOptions options;
+  options.spz.antialiased = true;
+  write_splats("a.spz", plain_gaussians(4, 0), options);
+  CHECK_THAT(cli::convert_command({.in = "a.spz", .out = "b.spz"}), !Contains("not held"));
+  CHECK(read_splats("b.spz").report.antialiased);
+  CHECK_THAT(
+      cli::convert_command({.in = "b.spz", .out = "c.ply"}),
+      Contains("  not held by the format: trained with antialiasing; render.antialias=true draws them as they were "
+               "trained\n"));
+  CHECK_THAT(cli::info_command("b.spz"), Contains("  note     trained with antialiasing: render.antialias=true"));
+  CHECK(cli::info_command("b.spz", true).find("\"antialiased\": true") != std::string::npos);
+}
+
 TEST_CASE("convert scales, then turns, then moves, a matrix says the same") {
   const TemporaryFolder folder;
   const Gaussians g = plain_gaussians(12, 3);

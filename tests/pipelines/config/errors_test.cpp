@@ -45,6 +45,18 @@ std::string stage(const std::string& inside) { return "{\"stages\": {\"camera\":
 
 }  // namespace
 
+TEST_CASE("names of runs that are no names of folders") {
+  CHECK_THAT(fault(R"({"name": "x\u0000y"})"),
+             Equals(R"(a.json:1: /name: "x\u0000y" holds the character 0 (\u0000), which no text here can have)"));
+  CHECK_THAT(
+      fault(R"({"name": "../../evil"})"),
+      Equals("a.json:1: /name: \"../../evil\" cannot be the name of a folder; allowed: a name of at most 200 bytes "
+             "without /, \\ and control characters, not . or .."));
+  for (const char* name : {"/tmp/x", "..", ".", "a/b", "a\\\\b", "a\\nb"})
+    CHECK_THAT(fault("{\"name\": \"" + std::string(name) + "\"}"), StartsWith("a.json:1: /name: "));
+  CHECK(fault(R"({"name": "Walk 2, with \u00e4"})") == "no fault");
+}
+
 TEST_CASE("unknown keys") {
   CHECK_THAT(fault(R"({"sede": 1})"), Equals("a.json:1: /sede: unknown key; did you mean \"seed\"?"));
   CHECK_THAT(fault(R"({"render": {"alpha_mim": 0.1}})"),

@@ -110,6 +110,73 @@ TEST_CASE("Gaussians are written to PLY and read back bitwise") {
   CHECK(read_ply(folder / "none.ply").gaussians.count() == 0);
 }
 
+TEST_CASE("Mip-Splatting's filter_3D is fused as its authors do") {
+  // By Python: s' = sqrt(exp(s)² + f²); the opacity times sqrt(Π exp(s)² / Π s'²), as a logit.
+  std::vector<std::string> names = least_names();
+  names.push_back("filter_3D");
+  const std::string row = "1 2 3 -1 -2 -3 1 0 0 0 OPACITY 0.1 0.2 0.3 FILTER\n";
+  const auto read = [&](const std::string& opacity, const std::string& filter) {
+    std::string one = row;
+    one.replace(one.find("OPACITY"), 7, opacity).replace(one.find("FILTER"), 6, filter);
+    return decode(ply_text("ascii", 1, floats(names), one));
+  };
+  const SplatFile fused = read("0.5", "0.2");
+  CHECK(fused.gaussians.log_scales[0] == Approx(-0.8705276169265054).margin(1e-7));
+  CHECK(fused.gaussians.log_scales[1] == Approx(-1.4209424865387899).margin(1e-7));
+  CHECK(fused.gaussians.log_scales[2] == Approx(-1.5793756384260749).margin(1e-7));
+  CHECK(fused.gaussians.opacity_logits[0] == Approx(-2.5263135130329477).margin(1e-6));
+  CHECK(fused.report.antialiased);
+  CHECK(fused.report.cautions.empty());
+  CHECK(fused.report.notes.size() == 1);
+  const SplatFile none = read("0.5", "0");
+  CHECK(none.gaussians.log_scales == std::vector<float>{-1, -2, -3});
+  CHECK(none.gaussians.opacity_logits == std::vector<float>{0.5F});
+  CHECK(read("19", "0.2").gaussians.opacity_logits[0] == Approx(-2.0025271628).margin(1e-5));
+  CHECK(read("inf", "0.2").gaussians.opacity_logits[0] == Approx(-2.00252715644).margin(1e-5));
+  CHECK(read("-17", "0.2").gaussians.opacity_logits[0] == Approx(-19.1291542946).margin(1e-5));
+  CHECK(read("0.5", "nan").report.rejections == Counts{{"a scale that is not finite", 1}});
+  CHECK(fault("ply\nformat ascii 1.0\nelement vertex 0\n" +
+              [&] {
+                std::string text;
+                for (const std::string& name : floats(least_names())) text += "property " + name + "\n";
+                return text;
+              }() +
+              "property list uchar float filter_3D\nend_header\n") ==
+        "a.ply: property \"filter_3D\" is a list; it must be one number");
+}
+
+TEST_CASE("properties and elements that are not known are named") {
+  std::vector<std::string> names = least_names();
+  for (const char* more : {"nx", "ny", "nz", "segment", "motion_0"}) names.emplace_back(more);
+  std::string text = ply_text("ascii", 1, floats(names), kRow.substr(0, kRow.size() - 1) + " 0 0 0 7 0.5\n3\n");
+  text.insert(text.find("end_header"), "element color_space 1\nproperty uchar id\n");
+  const SplatFile read = decode(text);
+  CHECK(read.report.cautions ==
+        std::vector<std::string>{"not known, and passed over, though the picture may depend on it: vertex.segment, "
+                                 "vertex.motion_0, element color_space"});
+  CHECK(read.gaussians.count() == 1);
+}
+
+TEST_CASE("means in doubles lose no digit to an origin, and are warned of without one") {
+  std::vector<std::string> properties = floats(least_names());
+  for (std::size_t c = 0; c < 3; ++c) properties[c].replace(0, 5, "double");
+  const std::string rest = " -4 -4 -9 1 0 0 0 0.5 0.1 0.2 0.3\n";
+  const std::string text = ply_text("ascii", 2, properties,
+                                    "431250.1234567 5411873.7654321 12.5" + rest + "431251.5 5411872.25 11.5" + rest);
+  const auto bytes = std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+  const SplatFile near = decode_ply(bytes, "a.ply", {431250, 5411873, 0});
+  CHECK(near.gaussians.origin_world == Vector3<double>(431250, 5411873, 0));
+  CHECK(near.gaussians.means[0] == static_cast<float>(431250.1234567 - 431250));
+  CHECK(near.gaussians.means[1] == static_cast<float>(5411873.7654321 - 5411873));
+  CHECK(near.gaussians.means[4] == -0.75F);
+  CHECK(near.report.cautions.empty());
+  // Floats are half a metre apart there; the Gaussians are exp(-4) = 1.8 cm wide.
+  CHECK(decode_ply(bytes, "a.ply").report.cautions ==
+        std::vector<std::string>{"2 of 2 Gaussians are narrower than the steps, up to 0.5 m, that floats have where "
+                                 "their means are; `hsi4d convert --translate -431251,-5411873,-12` brings them near "
+                                 "the origin, by the file's own digits"});
+}
+
 TEST_CASE("an origin is added to the means that are written") {
   Gaussians g = random_gaussians(1, 0);
   g.means = {0.25F, -1, 3};

@@ -204,8 +204,8 @@ TEST_CASE("extensions of .spz: axes are heeded, others passed over, what changes
   w.extensions = record(0xADBE0002U, Bytes(12));
   for (const Bytes& file : {w.plain(), w.gzip(), w.frames()}) {
     const SplatFile read = decode_spz(file, "a.spz");
-    CHECK(read.report.notes ==
-          std::vector<std::string>{"trained with antialiasing", "an extension of type 2914910210 is passed over"});
+    CHECK(read.report.antialiased);
+    CHECK(read.report.cautions == std::vector<std::string>{"an extension of type 2914910210 is passed over"});
     CHECK(read.gaussians.means[1] == 2);
   }
   const Bytes axes = record(0xADBE0003U, {6, 0, 0, 0});  // RDF, as ours
@@ -228,6 +228,21 @@ TEST_CASE("extensions of .spz: axes are heeded, others passed over, what changes
   w.extensions = record(7, {1, 2});
   w.extensions[4] = 3;
   CHECK(fault(w.plain()) == "a.spz: the record of an extension 0 bytes into them does not fit: 10 bytes are left");
+}
+
+TEST_CASE("the flag of antialiasing is written where it is asked for") {
+  const Gaussians g = plain_gaussians(3, 1);
+  for (const int version : {2, 3, 4}) {
+    CHECK(decode_spz(encode_spz(g, {.version = version, .antialiased = true}).bytes, "a.spz").report.antialiased);
+    CHECK_FALSE(decode_spz(encode_spz(g, {.version = version}).bytes, "a.spz").report.antialiased);
+  }
+}
+
+TEST_CASE("steps of positions that are wider than their Gaussian are counted") {
+  Gaussians g = plain_gaussians(3, 0);
+  g.log_scales = {-1, -5, -9, -5, -5, -5, -1, -1, -9};  // second longest: 6.7 mm, 6.7 mm, 0.37 m
+  g.means[0] = 1e5F;                                    // leaves 6 fractional bits, 1.6 cm
+  CHECK(encode_spz(g).losses == Counts{{"means in steps wider than their Gaussian", 2}});
 }
 
 TEST_CASE("Gaussians come back from .spz within its rounding") {
