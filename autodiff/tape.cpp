@@ -297,8 +297,7 @@ void Tape<S>::find_sole_readers(Plan& plan) {
     if (nodes_[n].table->looks_at == nullptr) continue;
     for (std::uint32_t i = 0; i < nodes_[n].edge_count; ++i) {
       const std::uint32_t producer = arrays_[edges_[nodes_[n].first_edge + i]].producer;
-      if (producer != kLeaf && readers_[producer] == 1)
-        plan.sole_readers.push_back({producer, n, static_cast<int>(i)});
+      if (producer != kLeaf && readers_[producer] == 1) plan.sole_readers.push_back({producer, n, static_cast<int>(i)});
     }
   }
 }

@@ -46,7 +46,8 @@ Image decode_jpeg(std::span<const uint8_t> file, const std::string& name, const 
   packed.values.resize(static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(packed.channels));
   const int format = grey ? TJPF_GRAY : inks ? TJPF_CMYK : TJPF_RGB;
   // A truncated file is a warning to libjpeg, which fills the rest with grey.
-  if (tjDecompress2(codec.get(), file.data(), bytes, packed.values.data(), width, 0, height, format, TJFLAG_LIMITSCANS) != 0) {
+  if (tjDecompress2(codec.get(), file.data(), bytes, packed.values.data(), width, 0, height, format,
+                    TJFLAG_LIMITSCANS) != 0) {
     fail_jpeg(name, codec);
   }
   return unpacked(inks ? rgb_of_inks(packed) : packed);

@@ -145,6 +145,7 @@ StepReport Adam<S>::step(Index iteration, Index iterations, double loss) {
   report.rolled_back = report.bad.has_value();
   if (report.rolled_back) {
     ++rollbacks_;
+    ++bad_in_a_row_;
     rate_ *= 0.5;
     report.undone = undo();
   } else {
@@ -155,6 +156,7 @@ StepReport Adam<S>::step(Index iteration, Index iterations, double loss) {
       if (reports_[g].moved) move(groups_[g], rate);
     }
     can_undo_ = true;
+    bad_in_a_row_ = 0;
     rate_ = std::min(1.0, rate_ * kRecovery);
   }
   report.rollbacks = rollbacks_;

@@ -10,7 +10,6 @@
 // which gradients steps become small; scaling a loss by c and ε by c gives the same steps.
 #pragma once
 
-#include <cmath>
 #include <map>
 #include <optional>
 #include <span>
@@ -118,8 +117,8 @@ class Adam {
   Index rollbacks() const { return rollbacks_; }
   /// Factor of all learning rates, at most 1.
   double rate() const { return rate_; }
-  /// More bad evaluations than that which no good step has made up for.
-  bool is_lost(int max_rollbacks) const { return rate_ < std::exp2(-max_rollbacks); }
+  /// Bad evaluations since the last good one.
+  Index bad_in_a_row() const { return bad_in_a_row_; }
 
   /// The moments of a group. Throws InternalError for an unknown name.
   GroupMoments moments(std::string_view group) const;
@@ -158,7 +157,7 @@ class Adam {
   std::vector<Group> groups_;
   std::vector<GroupStep> reports_;
   double rate_ = 1;
-  Index rollbacks_ = 0;
+  Index rollbacks_ = 0, bad_in_a_row_ = 0;
   bool can_undo_ = false;
 };
 

@@ -207,8 +207,9 @@ class StageRun {
 
   void note_rollback(const BadNumber& bad, Index iteration) {
     if (offender_.empty()) offender_ = bad.text() + first_bad_node();
-    const int most = settings_.optimizer.max_rollbacks;
-    if (optimizer_.adam() != nullptr ? !optimizer_.adam()->is_lost(most) : optimizer_.rollbacks() <= most) return;
+    const Adam<S>* const adam = optimizer_.adam();
+    const Index count = adam != nullptr ? adam->bad_in_a_row() : optimizer_.rollbacks();
+    if (count <= settings_.optimizer.max_rollbacks) return;
     throw_diverged("iteration " + std::to_string(iteration));
   }
 

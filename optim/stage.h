@@ -89,8 +89,8 @@ struct StageOptions {
   std::vector<HeldOutput> held = {};
 };
 
-/// A stage was given up: more evaluations than max_rollbacks were not finite. Not a bug: the message says which
-/// numbers.
+/// A stage was given up: more evaluations than max_rollbacks were not finite, with Adam in a row. Not a bug: the
+/// message says which numbers.
 class StageDivergedError : public UserError {
  public:
   using UserError::UserError;

@@ -50,7 +50,8 @@ void describe(ConfigFields& f, OptimizerSettings& s) {
   f.number("beta2", s.beta2, {.min = 0, .below = 1}, "Decay of the second moment");
   f.number("eps", s.eps, {.min = 1e-30, .max = 1}, "Added to the root of the second moment");
   f.integer("max_rollbacks", s.max_rollbacks, {.min = 0, .max = kMostIterations},
-            "Steps undone because a number was not finite, less one for eight that were good; one more is an error");
+            "Steps that may be undone because a number was not finite, in a row with adam, else in a stage; one more "
+            "is an error");
   f.integer("products", s.products, {.min = 1, .max = 100},
             "gauss_newton: curvature products per step at most, an evaluation each");
   f.boolean("keep_curvature", s.keep_curvature,

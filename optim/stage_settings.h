@@ -25,7 +25,7 @@ struct OptimizerSettings {
   double beta1 = 0.9;
   double beta2 = 0.999;
   double eps = 1e-8;
-  int max_rollbacks = 10;       ///< bad steps of a stage that good ones have not made up for; one more is an error
+  int max_rollbacks = 10;       ///< bad steps in a row (in all, but with adam) that are undone; one more is an error
   int products = 10;            ///< of a direction with the curvature, at most so many in a step
   bool keep_curvature = false;  ///< a frame begins with what was learnt in the frame before
 };

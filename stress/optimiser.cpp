@@ -56,7 +56,7 @@ std::vector<double> some_gradient(Index count, int step) {
 
 /// What one bad number among good gradients does.
 struct Damage {
-  double changed = 0;  ///< numbers of the state that the step with it changed
+  double changed = 0;  ///< numbers of the state that are not as before the step that led to it
   double stuck = 0;    ///< numbers that the next good step does not move
   double lost = 0;     ///< numbers that twenty good steps after it do not move far, or that are none
   double counted = 0;  ///< bad evaluations that are told
@@ -73,8 +73,9 @@ Damage damage_of(double bad, const std::function<double(const std::vector<double
                  const std::function<std::vector<double>()>& state) {
   constexpr Index kCount = 30;
   Damage damage;
-  for (int i = 0; i < 6; ++i) step(some_gradient(kCount, i));
+  for (int i = 0; i < 5; ++i) step(some_gradient(kCount, i));
   const std::vector<double> before = state();
+  step(some_gradient(kCount, 5));
   std::vector<double> gradient = some_gradient(kCount, 6);
   gradient[10] = bad;
   step(gradient);
@@ -204,7 +205,7 @@ std::vector<StressFigure> bad_gradients(Remedy remedy) {
   }
   // The least denormal is a gradient like any other.
   const Damage least = remedy == Remedy::kOn ? damage_to_adam(1e-45) : damage_to_plain_adam(1e-45);
-  return {{"numbers that a step with one bad gradient changed", sum.changed, 0},
+  return {{"numbers that one bad gradient does not take back", sum.changed, 0},
           {"parameters that the next good step does not move", sum.stuck, 0},
           {"parameters that are lost or stand still in the end", sum.lost, 0},
           {"bad evaluations counted, off one each, of 4", miscounted, 0},
