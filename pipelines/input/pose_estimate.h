@@ -14,7 +14,8 @@ namespace hsi4d {
 
 /// Estimated poses of the clip's frames: those of the motion when it has more than frame 0, else none. It has a pose
 /// for each frame that the clip keeps, or each of the video, or a rate of its own, at which it reaches to the clip's
-/// end.
+/// end. One that begins with a later frame of the video (Motion::first_frame) is put there; poses before it are its
+/// first step carried back, for two frames at most, which a warning says.
 ///
 /// @param file  what messages call it
 /// Throws DataError for another number of poses.
