@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "body/motion_edit.h"
+#include "core/check.h"
 #include "core/log.h"
 #include "core/rotation.h"
 #include "core/text.h"
@@ -81,6 +82,27 @@ std::vector<BodyPose> poses_of_frames(const Motion& read, const fs::path& file, 
   return poses;
 }
 
+/// The motion in a world with z up, by the axis that lies along the vertical of the human of frame 0.
+Motion with_z_up(const Motion& motion, const fs::path& file, const BodyPose& first,
+                 const Vector3<double>& pelvis_rest) {
+  constexpr double kNear = 0.7;  // of an axis to the vertical
+  const Vector3<double> upright = so3_exp(first.rotation_of(0)).row(2);
+  const Matrix3<double> root = so3_exp(motion.poses.front().rotation_of(0));
+  const double y = dot(Vector3<double>(root.row(1)), upright), z = dot(Vector3<double>(root.row(2)), upright);
+  if (-y >= kNear && -y > z)
+    throw DataError(
+        file.string() +
+        ": y points down, by how the body is in frame 0, as in a camera's frame; a motion in a world with z up "
+        "is needed, or data.motion_align=rotation where the camera stands still");
+  if (y >= kNear && y > z) {
+    log_warning(file.string() + ": y is up, as the body is in frame 0: turned to z up");
+    return transformed(motion, z_up_from_y_up(), pelvis_rest);
+  }
+  if (z < kNear)
+    log_warning(file.string() + ": no axis is up as the body is in frame 0; z is taken for up, which may be wrong");
+  return motion;
+}
+
 /// R of world_laid_on.
 Matrix3<double> world_turn(const Matrix3<double>& e, const Matrix3<double>& f, MotionAlign align) {
   if (align == MotionAlign::kRotation) return f * e.transpose();
@@ -96,8 +118,10 @@ std::vector<BodyPose> estimated_poses(const Motion& motion, const fs::path& file
   return poses_of_frames(motion, file, frames, ", or frame 0 alone");
 }
 
-std::vector<BodyPose> read_estimate(const fs::path& file, const Avatar& avatar, const FrameSource& frames) {
-  const Motion motion = read_motion_for(file.string(), avatar);
+std::vector<BodyPose> read_estimate(const fs::path& file, const Avatar& avatar, const FrameSource& frames,
+                                    const BodyPose& first, MotionAlign align) {
+  Motion motion = read_motion_for(file.string(), avatar);
+  if (align != MotionAlign::kRotation) motion = with_z_up(motion, file, first, pelvis_of(avatar.joints));
   return poses_of_frames(motion, file, frames, "");
 }
 

@@ -1,5 +1,7 @@
 #include "pipelines/input/pose_estimate.h"
 
+#include <numbers>
+
 #include <catch2/catch.hpp>
 
 #include "body/pose.h"
@@ -68,6 +70,37 @@ TEST_CASE("an estimate of another rate that begins later is put there too") {
   fast.first_frame = 2.5;
   fast.poses.push_back(fast.poses.back());
   CHECK(places(estimated_poses(fast, "m.npz", here.frames))[1] == Approx(1.5));
+}
+
+TEST_CASE("which way is up in an estimate the human of frame 0 tells") {
+  Here here;
+  constexpr double kQuarter = std::numbers::pi / 2;
+  BodyPose first = rest_pose(kSmplxJoints);
+  first.set_rotation(0, Vector3<double>(kQuarter, 0, 0));  // stands, z up
+  Avatar avatar;
+  avatar.body = "somebody";
+  avatar.joints.assign(3 * kSmplxJoints, 0.0);
+  const auto read = [&](const Vector3<double>& root, MotionAlign align) {
+    Motion motion = walk(0, 6);
+    for (BodyPose& pose : motion.poses) {
+      pose.set_rotation(0, root);
+      pose.transl = {0, 1, 2};
+    }
+    write_motion("m.npz", motion);  // by AMASS's names
+    return read_estimate("m.npz", avatar, here.frames, first, align);
+  };
+  CHECK(read({kQuarter, 0, 0}, MotionAlign::kHeading)[3].transl == Vector3<double>(0, 1, 2));
+  CHECK(here.told.empty());
+  const BodyPose turned = read({0, 0, 0}, MotionAlign::kHeading)[3];  // y up
+  CHECK((turned.transl - Vector3<double>(0, -2, 1)).norm() < 1e-12);
+  CHECK((turned.rotation_of(0) - Vector3<double>(kQuarter, 0, 0)).norm() < 1e-12);
+  REQUIRE(here.told.size() == 1);
+  CHECK(here.told[0] == "m.npz: y is up, as the body is in frame 0: turned to z up");
+  CHECK_THROWS_WITH(read({std::numbers::pi, 0, 0}, MotionAlign::kHeading),
+                    Catch::StartsWith("m.npz: y points down, by how the body is in frame 0"));
+  CHECK(read({std::numbers::pi, 0, 0}, MotionAlign::kRotation).size() == 6);
+  read({0, 0, kQuarter}, MotionAlign::kNone);
+  CHECK(here.told.back() == "m.npz: no axis is up as the body is in frame 0; z is taken for up, which may be wrong");
 }
 
 }  // namespace pose_estimate_test
