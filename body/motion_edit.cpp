@@ -47,7 +47,8 @@ NameNumbers numbers_of(const std::string& stem) {
 }
 
 /// The files of one person, by frame.
-std::map<std::int64_t, std::string> files_of(const std::string& folder, int person) {
+/// @param others  receives which other people there are files of
+std::map<std::int64_t, std::string> files_of(const std::string& folder, int person, std::set<std::int64_t>& others) {
   std::error_code error;
   std::vector<std::string> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
@@ -58,6 +59,7 @@ std::map<std::int64_t, std::string> files_of(const std::string& folder, int pers
   std::map<std::int64_t, std::string> files;
   for (const std::string& path : paths) {
     const NameNumbers numbers = numbers_of(std::filesystem::path(path).stem().string());
+    if (numbers.frame >= 0 && numbers.person != person) others.insert(numbers.person);
     if (numbers.frame < 0 || numbers.person != person) continue;
     const auto [place, is_new] = files.emplace(numbers.frame, path);
     if (!is_new) {
@@ -107,6 +109,7 @@ Motion resampled(const Motion& motion, double frame_rate) {
   check_rate(frame_rate);
   Motion result = motion;
   result.frame_rate = frame_rate;
+  result.first_frame = motion.first_frame / motion.frame_rate * frame_rate;
   result.poses.clear();
   const double step = motion.frame_rate / frame_rate;  // frames of `motion` from one frame to the next
   const auto last = static_cast<double>(motion.poses.size() - 1);
@@ -236,8 +239,11 @@ Motion motion_of(const SmplxSequence& sequence, double frame_rate) {
 }
 
 PoseFolder read_pose_folder(const std::string& folder, double frame_rate, int person) {
-  const auto files = files_of(folder, person);
   PoseFolder result;
+  const auto files = files_of(folder, person, result.other_people);
+  const std::int64_t first = files.begin()->first;
+  result.counts_from_one = first == 1;
+  result.motion.first_frame = result.counts_from_one ? 0 : static_cast<double>(first);
   result.motion.frame_rate = frame_rate;
   result.files = static_cast<Index>(files.size());
   std::vector<BodyPose>& poses = result.motion.poses;

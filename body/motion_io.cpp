@@ -20,6 +20,8 @@ namespace {
 /// transl_aligned), of WHAM (*_world).
 constexpr const char* kTranslationNames[] = {"trans", "transl", "human_transl", "transl_aligned", "trans_world"};
 constexpr const char* kPosesNames[] = {"poses", "pose_world"};
+constexpr double kSameRate = 1e-5;  // float against double
+constexpr const char* kFrameNames[] = {"frame_ids", "frame_id"};
 constexpr const char* kRateNames[] = {"mocap_frame_rate", "mocap_framerate", "frame_rate", "fps"};
 
 /// A run of joints that files keep in an array of its own.
@@ -116,6 +118,15 @@ const NpyArray* find_first(const Npz& file, std::span<const char* const> names) 
   return nullptr;
 }
 
+/// Why what is looked for may be there and not be read; nothing where all arrays are.
+std::string objects_text(const Npz& file) {
+  std::vector<std::string> names;
+  for (const Npz::Skipped& member : file.skipped()) names.push_back(member.name);
+  if (names.empty()) return "";
+  return "; not read: " + few_names(names) + ", as it " + file.skipped().front().reason +
+         "; save an array of numbers for each name";
+}
+
 void put_joints(const Rows& rows, std::size_t from, std::size_t to, std::size_t joints, Motion& motion) {
   for (std::size_t t = 0; t < motion.poses.size(); ++t) {
     for (std::size_t i = 0; i < 3 * joints; ++i) motion.poses[t].axis_angle[3 * to + i] = rows.at(t, 3 * from + i);
@@ -172,17 +183,25 @@ void read_parts(const Npz& file, Motion& motion) {
     if (array != nullptr) {
       read_joints(*array, part.joint, part.joints, motion);
     } else if (part.needed) {
-      throw DataError(file.source() + ": there is neither 'poses' nor '" + part.names[0] + "'");
+      throw DataError(file.source() + ": there is neither 'poses' nor '" + part.names[0] + "'" + objects_text(file));
     } else {
       read_halves(file, part, motion);
     }
   }
 }
 
+/// Throws DataError for names that say different rates.
 double read_frame_rate(const Npz& file) {
   const NpyArray* array = find_first(file, kRateNames);
   if (array == nullptr) return Motion{}.frame_rate;
   const double rate = array->scalar<double>();
+  for (const char* const name : kRateNames) {
+    const NpyArray* const other = find(file, name);
+    const double its = other == nullptr ? rate : other->scalar<double>();
+    if (std::isfinite(rate) && !(std::abs(its - rate) <= kSameRate * std::abs(rate)))
+      throw DataError(array->source() + ": is " + number_text(rate) + ", '" + name + "' " + number_text(its) +
+                      "; they say one thing, the frames a second");
+  }
   if (!(rate >= kSlowestMotion && rate <= kFastestMotion)) {
     throw DataError(array->source() + ": is " + number_text(rate) +
                     " frames a second; allowed: " + number_text(kSlowestMotion) + " to " + rounded(kFastestMotion, 6));
@@ -255,6 +274,27 @@ std::optional<Vector3<double>> read_pelvis(const Npz& file) {
   return Vector3<double>(x[0], x[1], x[2]);
 }
 
+/// Which frame of its video the motion begins with. Throws DataError for frames that do not follow one another.
+double read_first_frame(const Npz& file, int64_t frames) {
+  constexpr double kLatest = 1e7;
+  const NpyArray* array = find(file, "first_frame");
+  const NpyArray* const numbers = find_first(file, kFrameNames);
+  const NpyArray* const named = array == nullptr ? numbers : array;
+  if (named == nullptr) return 0;
+  const std::vector<double> ids = array == nullptr ? numbers->as<double>() : std::vector{array->scalar<double>()};
+  if (array == nullptr && std::ssize(ids) != frames)
+    throw DataError(named->source() + ": has shape " + shape_text(named->shape()) + "; allowed: [" +
+                    std::to_string(frames) + "], a number a frame");
+  if (!(ids.front() >= 0 && ids.front() <= kLatest))
+    throw DataError(named->source() + ": begins with frame " + number_text(ids.front()) + "; allowed: 0 to 1e7");
+  for (std::size_t i = 1; i < ids.size(); ++i) {
+    if (ids[i] != ids[i - 1] + 1)
+      throw DataError(named->source() + ": frame " + number_text(ids[i - 1]) + " is followed by frame " +
+                      number_text(ids[i]) + "; allowed: the next one (tools/export_motion.py fills gaps)");
+  }
+  return ids.front();
+}
+
 /// The same movement of the neutral SMPL-X of mean shape: of the other model's shape it knows nothing.
 Motion converted(Motion motion, Model model) {
   motion = with_pelvis(motion, motion.pelvis_rest.value_or(pelvis_of(model)), kSmplxPelvis);
@@ -268,13 +308,14 @@ Motion converted(Motion motion, Model model) {
 Motion motion_of(const Npz& file) {
   refuse_other_contents(file, {"a motion", "parameters of smplx"});
   const NpyArray* trans = find_first(file, kTranslationNames);
-  if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'");
+  if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'" + objects_text(file));
   const int64_t frames = trans->require_shape({-1, 3}).shape()[0];
   if (frames == 0) throw DataError(trans->source() + ": holds no frame");
   const Rows places = rows_of(*trans, frames, 3, kPlaces);
   Motion motion;
   motion.says_frame_rate = find_first(file, kRateNames) != nullptr;
   motion.frame_rate = read_frame_rate(file);
+  motion.first_frame = read_first_frame(file, frames);
   motion.betas = read_betas(file, frames);
   motion.gender = read_text(file, "gender").value_or(motion.gender);
   motion.pelvis_rest = read_pelvis(file);
@@ -329,6 +370,7 @@ void write_motion(const std::string& path, const Motion& motion) {
     const Vector3<double>& pelvis = *motion.pelvis_rest;
     file.add<double>("pelvis_rest", {3}, {pelvis[0], pelvis[1], pelvis[2]});
   }
+  if (motion.first_frame != 0) file.add_scalar("first_frame", motion.first_frame);
   file.add_text("gender", motion.gender);
   file.add_text("surface_model_type", "smplx");
   file.add_scalar("mocap_frame_rate", motion.frame_rate);

@@ -22,6 +22,7 @@ struct Motion {
   std::optional<Vector3<double>> pelvis_rest = {};
   std::string converted_from = {};  ///< "SMPL-H" or "SMPL", of whose poses these were made; empty: SMPL-X's own
   bool lost_shape = false;          ///< the file's betas are of that model, and left out
+  double first_frame = 0;           ///< frame of its video, at frame_rate, from 0, that the first pose is of
   bool says_frame_rate = true;      ///< false: the file that it was read from does not; frame_rate is the default
 };
 
@@ -38,7 +39,7 @@ inline constexpr double kSlowestMotion = 0.01, kFastestMotion = 1e5;
 /// root_orient and pose_body must be there. Where a file says a thing twice, `poses` wins over its parts, and
 /// `pose_eye` and `pose_hand` win over their halves. The frame rate is `mocap_frame_rate` (or `mocap_framerate`); 10
 /// where neither is there. `betas` is [B], [1,B] or [T,B], of which the mean is taken; `gender` a text. `pelvis_rest`
-/// [3] is Motion::pelvis_rest.
+/// [3] is Motion::pelvis_rest. `first_frame`, or the first of `frame_ids` [T] (WHAM), is Motion::first_frame.
 ///
 /// Other names are read too, each as the one that it stands for: `human_transl` and `transl_aligned`, `human_orient`,
 /// `human_pose` (the data sets of TRUMANS and LINGO), `trans_world` and `pose_world` (WHAM, SMPL); `frame_rate` and

@@ -37,8 +37,9 @@ constexpr SequenceField kFields[] = {
 };
 
 /// What goes along with parameters in files of others and says nothing about the pose.
-constexpr const char* kNotes[] = {"gender",          "model_type",        "surface_model_type", "mocap_frame_rate",
-                                  "mocap_framerate", "mocap_time_length", "frame_rate",         "fps"};
+constexpr const char* kNotes[] = {"gender",           "model_type",      "surface_model_type",
+                                  "mocap_frame_rate", "mocap_framerate", "mocap_time_length",
+                                  "first_frame",      "frame_rate",      "fps"};
 
 std::string allowed_shapes(const SequenceField& field) {
   std::string text;

@@ -76,6 +76,17 @@ struct LossInputs {
 template <class S>
 LossInputs<S> with_seams(LossInputs<S> inputs, const SeamMode& mode);
 
+/// The inputs without those made on demand, or kept whole, for terms that declare them, so that a term reads none that
+/// it does not declare.
+template <class S>
+LossInputs<S> only_declared(LossInputs<S> inputs, const std::vector<LossInput>& needs) {
+  const auto lacks = [&needs](LossInput need) { return std::find(needs.begin(), needs.end(), need) == needs.end(); };
+  if (lacks(LossInput::kObjectDepth)) inputs.object_depth = inputs.object_depth_target = {};
+  if (lacks(LossInput::kObjectOpacity)) inputs.object_opacity = {};
+  if (lacks(LossInput::kHumanOpacity)) inputs.human_opacity = {};
+  return inputs;
+}
+
 /// A loss term: its description, and the function that records it on a tape and returns a scalar, or an empty Var where
 /// it cannot: the term is off then, and the stage reports it. Of a term that declares what it needs the function is
 /// called only where some of that is given.
@@ -87,15 +98,15 @@ struct LossTerm {
   /// Records the term. `prepared` is prepared_loss of its settings; of most terms those are the settings themselves.
   template <class S>
   Var<S> record(const LossInputs<S>& inputs, const std::any& prepared) const {
-    if (description.needs) {
-      const std::vector<LossInput> needs = description.needs(prepared);
-      const auto is_given = [&inputs](LossInput need) { return inputs.gives(need); };
-      if (std::none_of(needs.begin(), needs.end(), is_given)) return {};
-    }
+    const std::vector<LossInput> needs =
+        description.needs ? description.needs(prepared) : std::vector{LossInput::kImage};
+    const auto is_given = [&inputs](LossInput need) { return inputs.gives(need); };
+    if (description.needs && std::none_of(needs.begin(), needs.end(), is_given)) return {};
+    const LossInputs<S> declared = only_declared(inputs, needs);
     if constexpr (std::is_same_v<S, float>) {
-      return record_float(inputs, prepared);
+      return record_float(declared, prepared);
     } else {
-      return record_double(inputs, prepared);
+      return record_double(declared, prepared);
     }
   }
   /// As above by the default settings.

@@ -17,12 +17,14 @@ With --in-camera it is in the camera's frame of every frame (x right, y down, z 
 |           |        | with an estimate of gravity. Older versions have the first camera's  |
 |           |        | world alone, y down: z is then up only as far as it was level        |
 | LINGO,    | SMPL-X | y up; a dictionary of transl, global_orient and body_pose, at 30     |
-| TRUMANS   |        | frames a second (10 that are made, interpolated). Hands are flat     |
+| TRUMANS   |        | frames a second (10 that are made, interpolated). Hands are flat, or |
+|           |        | left_hand_pose and right_hand_pose, taken as turns of a flat hand    |
 
 A body turns about its pelvis, so turning a motion needs the pelvis of the estimator's body at rest: by default that of
 the neutral body of mean shape; --pelvis x,y,z for another. SMPL's pelvis stands elsewhere than SMPL-X's; the translation
 is corrected, so that the pelvis stays where the estimator has it; the file says where it stands at rest (pelvis_rest)
-where that is known. Frames that an estimator left out are interpolated.
+where that is known. Frames that an estimator left out are interpolated. A motion that begins with a later frame of the
+video says which (first_frame, from 0). Other people of the input, and what of LINGO's is not read, are printed.
 
 Needs Python with NumPy, and joblib for WHAM or PyTorch for GVHMR and TRAM (for LINGO where its arrays are tensors).
 CHOIS writes no such file: save trans, root_orient, pose_body, obj_rot_mat and obj_com_pos of its results with
@@ -52,6 +54,10 @@ def module(name):
 def array(np, value, what, width):
     """Rows of `width` finite numbers, float64."""
     value = value.detach().cpu().numpy() if hasattr(value, "detach") else np.asarray(value)
+    if value.dtype == object and any(np.size(row) != width for row in value.reshape(-1)):
+        fail(f"{what}: is an array of Python objects that are no rows of {width} numbers")
+    if value.dtype == object:
+        value = np.stack([np.asarray(row, dtype=np.float64).reshape(-1) for row in value.reshape(-1)])
     value = value.astype(np.float64).reshape(len(value), -1) if value.size else value.reshape(0, width)
     if value.shape[0] == 0 or value.shape[1] != width:
         fail(f"{what}: has shape {list(value.shape)}; [frames,{width}] is needed")
@@ -122,7 +128,15 @@ def slerp(np, a, b, u):
     return vector_of_quaternion(np, mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))
 
 
-# --- estimators: pose [T,3J], trans [T,3], betas [T,B], frame numbers, whether the body is SMPL-X, world --------------
+# --- estimators: pose [T,3J] (of SMPL-X body, and both hands where they are known), trans [T,3], betas [T,B], frame numbers, whether the body is SMPL-X, world --------------
+
+
+def frames_text(np, person):
+    """Which frames of the video somebody is in."""
+    if not hasattr(person, "keys") or "frame_ids" not in person or not len(person["frame_ids"]):
+        return "frames not said"
+    frames = np.asarray(person["frame_ids"]).reshape(-1)
+    return f"frames {int(frames.min())} to {int(frames.max())}"
 
 
 def read_wham(np, path, arguments):
@@ -139,6 +153,9 @@ def read_wham(np, path, arguments):
     trans = array(np, need(one, "trans" + suffix, what), f"{what}: trans{suffix}", 3)
     betas = array(np, need(one, "betas", what), f"{what}: betas", 10)
     frames = one["frame_ids"] if "frame_ids" in one else range(len(pose))
+    others = [f"{key} ({frames_text(np, people[key])})" for key in keys if key != keys[arguments.person]]
+    if others:
+        print(f"{path}: person {keys[arguments.person]} is read ({frames_text(np, one)}), not {', '.join(others)}")
     return pose, trans, betas, frames, False, "y up"
 
 
@@ -162,6 +179,9 @@ def read_tram(np, path, arguments):
     trans = array(np, need(one, "pred_trans", path), f"{path}: pred_trans", 3)
     betas = array(np, need(one, "pred_shape", path), f"{path}: pred_shape", 10)
     frames = np.asarray(need(one, "frame", path)).reshape(-1)
+    others = sorted(other.name for other in path.parent.glob("hps_track_*.npy") if other.name != path.name)
+    if others:
+        print(f"{path}: is read, not {', '.join(others)} beside it")
     pose = vector_of_matrix(np, rotations).reshape(-1, 72)
     if arguments.in_camera:
         return pose, trans, betas, frames, False, "camera"
@@ -192,7 +212,18 @@ def read_lingo(np, path, arguments):
     trans = array(np, need(one, "transl", path), f"{path}: transl", 3)
     if not len(root) == len(body) == len(trans):
         fail(f"{path}: global_orient has {len(root)} frames, body_pose {len(body)}, transl {len(trans)}")
-    return np.concatenate([root, body], axis=1), trans, np.zeros((1, 10)), range(len(root)), True, "y up"
+    parts, hands = [root, body], ("left_hand_pose", "right_hand_pose")
+    if any(name in one for name in hands):
+        for name in hands:
+            hand = array(np, one[name], f"{path}: {name}", 45) if name in one else np.zeros((len(root), 45))
+            if len(hand) != len(root):
+                fail(f"{path}: global_orient has {len(root)} frames, {name} {len(hand)}")
+            parts.append(hand)
+        print(f"{path}: hands are taken as turns of a flat hand, not of the body model's mean hand")
+    unread = sorted(str(key) for key in one if key not in ("global_orient", "body_pose", "transl", *hands))
+    if unread:
+        print(f"{path}: not read: {', '.join(unread)}")
+    return np.concatenate(parts, axis=1), trans, np.zeros((1, 10)), range(len(root)), True, "y up"
 
 
 READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram, "lingo": read_lingo}
@@ -215,12 +246,14 @@ def moved(np, pose, trans, turns, places, pelvis):
 
 
 def filled(np, pose, trans, frames, what):
-    """A row for every frame from the first to the last; those between neighbours are interpolated."""
+    """A row for every frame from the first to the last, those between neighbours interpolated; the first, how many."""
     frames = np.asarray(frames, dtype=np.int64).reshape(-1)
     if len(frames) != len(pose) or len(trans) != len(pose):
         fail(f"{what}: has {len(pose)} poses, {len(trans)} translations and {len(frames)} frame numbers")
     order = np.argsort(frames, kind="stable")
     pose, trans, frames = pose[order], trans[order], frames[order]
+    if frames[0] < 0:
+        fail(f"{what}: begins with frame {int(frames[0])}; frames are counted from 0")
     if (np.diff(frames) <= 0).any():
         fail(f"{what}: has frame {int(frames[np.argwhere(np.diff(frames) <= 0)[0][0]])} twice")
     if len(frames) > 1 and np.diff(frames).max() > 1000:
@@ -234,7 +267,7 @@ def filled(np, pose, trans, frames, what):
             places.append((1 - u) * trans[i - 1] + u * trans[i])
         poses.append(pose[i])
         places.append(trans[i])
-    return np.stack(poses), np.stack(places), len(poses) - len(frames)
+    return np.stack(poses), np.stack(places), int(frames[0]), len(poses) - len(frames)
 
 
 def parsed_pelvis(text):
@@ -277,7 +310,7 @@ def main():
         fail(f"{arguments.input}: is not what {source} writes: {fault}")
     except Exception as fault:  # whatever an unpickler raises
         fail(f"{arguments.input}: cannot be read: {fault}")
-    pose, trans, added = filled(np, pose, trans, frames, str(arguments.input))
+    pose, trans, first, added = filled(np, pose, trans, frames, str(arguments.input))
     pelvis = pelvis_of(np, arguments, is_smplx)
     if not arguments.in_camera:
         sign = 1 if world == "y up" else -1
@@ -290,9 +323,12 @@ def main():
     # Of a body of SMPL-X in a shape it is not known.
     is_known = not is_smplx or arguments.pelvis or not shape.any()
     rest = {"pelvis_rest": pelvis if is_smplx else np.array(SMPLX_PELVIS)} if is_known else {}
+    hands = {"pose_hand": pose[:, 66:156]} if is_smplx and pose.shape[1] == 156 else {}
     np.savez(
         arguments.output,
         **rest,
+        **hands,
+        **({"first_frame": np.array(float(first))} if first else {}),
         trans=trans,
         root_orient=pose[:, :3],
         pose_body=pose[:, 3:66],
@@ -303,6 +339,7 @@ def main():
         mocap_framerate=np.array(arguments.fps),
     )
     note = f", {added} of them interpolated" if added else ""
+    note += f", from frame {first} of the video" if first else ""
     print(f"{arguments.output}: {len(pose)} frames{note}, {source}")
 
 

@@ -33,9 +33,8 @@ Motion read_any(const MotionOptions& options, bool& is_of_folder) {
     motion.frame_rate = options.from_rate.value_or(motion.frame_rate);
     return motion;
   }
-  PoseFolder folder = read_pose_folder(options.in, options.from_rate.value_or(kPoseFolderRate), options.person);
-  if (folder.filled > 0)
-    log_warning(options.in + ": frames without a file, interpolated: " + std::to_string(folder.filled));
+  PoseFolder folder =
+      read_pose_folder_with_warnings(options.in, options.from_rate.value_or(kPoseFolderRate), options.person);
   return std::move(folder.motion);
 }
 
@@ -103,7 +102,8 @@ std::string motion_command(const MotionOptions& options) {
     write_motion(options.out, motion);
   }
   return options.out + ": " + count_text(std::ssize(motion.poses), "frame") + ", " + short_number(motion.frame_rate) +
-         " a second\n";
+         " a second" +
+         (motion.first_frame > 0 ? ", from frame " + short_number(motion.first_frame) + " of its video" : "") + "\n";
 }
 
 void add_motion(CLI::App& app, Program& program) {

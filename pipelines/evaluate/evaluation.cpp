@@ -124,8 +124,16 @@ std::optional<Rigid<double>> initial_pelvis(const std::string& avatar, const std
 }
 
 /// Lays the estimate's frame 0 on a pelvis: all that it holds moves alike.
-void lay_on(const std::optional<Rigid<double>>& pelvis, Measurement& m) {
+/// @param truth  has the pelvis later too, where the estimate begins later; null: there is none
+void lay_on(std::optional<Rigid<double>> pelvis, const Track* truth, Measurement& m) {
   if (m.settings.align == MotionAlign::kNone) return;
+  const double begin = m.estimate.motion.first_frame / m.estimate.motion.frame_rate;
+  if (begin > 0 && truth != nullptr) {
+    pelvis = world_pelvis(body_at(*truth, begin), *truth->motion.pelvis_rest);
+  } else if (begin > 0 && pelvis) {
+    m.result.notes.push_back("begins with frame " + number_text(m.estimate.motion.first_frame) +
+                             ", and is laid on the human of frame 0 there, as no truth says where the human is then");
+  }
   if (!pelvis)
     throw UserError("hsi4d evaluate: --align: " + m.input +
                     ": there is no frame 0 to lay it on; --truth or --data has one");
@@ -376,8 +384,9 @@ std::optional<Track> take_truth(const std::vector<std::string>& truths, const st
 
 /// The estimate on its body, in the world of the truth.
 /// @param begin  the pelvis that it should begin with
-void take_estimate(const std::optional<Rigid<double>>& begin, const std::vector<std::string>& folders,
-                   const std::string& avatar, Measurement& m) {
+/// @param truth  null: there is none
+void take_estimate(const std::optional<Rigid<double>>& begin, const Track* truth,
+                   const std::vector<std::string>& folders, const std::string& avatar, Measurement& m) {
   std::optional<Vector3<double>> upright;
   if (begin) upright = Vector3<double>(begin->rotation.row(2));
   m.estimate = read_track(m.input, track_options(m.settings, folders, upright));
@@ -385,7 +394,11 @@ void take_estimate(const std::optional<Rigid<double>>& begin, const std::vector<
   note_world(m.estimate, m, "");
   if (m.estimate.objects_stay)
     m.result.notes.push_back("the objects of " + m.settings.objects + " are in the scene's world, z up");
-  lay_on(begin, m);
+  if (truth != nullptr) {
+    m.estimate.motion.frame_rate = rate_beside(m.estimate, *truth);
+    m.estimate.motion.says_frame_rate = true;
+  }
+  lay_on(begin, truth, m);
   check_object_surfaces(m);
   place_objects(folders, m, m.estimate);
 }
@@ -396,7 +409,8 @@ void read_tracks(const std::vector<std::string>& truths, const std::vector<std::
     throw UserError("hsi4d evaluate: --objects is for a motion (.npz); " + m.input + " has objects of its own");
   const std::string avatar = avatar_for(m.settings, m.input, folders);
   const std::optional<Track> truth = take_truth(truths, folders, avatar, m);
-  take_estimate(truth ? first_pelvis(*truth) : initial_pelvis(avatar, folders, m), folders, avatar, m);
+  take_estimate(truth ? first_pelvis(*truth) : initial_pelvis(avatar, folders, m), truth ? &*truth : nullptr, folders,
+                avatar, m);
   m.result.has_objects = !m.estimate.objects.empty() || (truth && !truth->objects.empty()) ||
                          !first_of(folders, object_names_of_track).empty();
   if (!truth) {
@@ -406,9 +420,10 @@ void read_tracks(const std::vector<std::string>& truths, const std::vector<std::
     m.result.notes.emplace_back("there is no truth: errors are not measured (--truth names one)");
     return;
   }
-  m.estimate.motion.frame_rate = rate_beside(m.estimate, *truth);
-  m.estimate.motion.says_frame_rate = true;
   m.tracks = aligned(m.estimate, m.body->skeleton(), *truth, m.truth_body->skeleton(), m.settings.frame_rate);
+  if (m.tracks.first > 0)
+    m.result.notes.push_back("frames are compared from frame " + std::to_string(m.tracks.first) +
+                             " of the video on, the first that both motions have");
   read_objects(folders, m);
   measure_errors(*truth, m);
 }

@@ -106,6 +106,15 @@ UpFinding up_by_posture(const std::string& path, const Motion& motion) {
   return {UpAxis::kZ, "z is taken for up: the posture does not tell (--up y if y is)"};
 }
 
+/// z, as AMASS has it, unless the body of frame 0 is known to be otherwise. Others use its names for other worlds.
+UpFinding up_of_amass(const Motion& motion, const std::optional<UpFinding>& known) {
+  if (known) return known->up == UpAxis::kZ ? UpFinding{} : *known;
+  const Vector3<double> up = mean_upright(motion);
+  if (!(std::fabs(up[1]) >= kUprightShare * up.norm() && up.norm() > 0)) return {};
+  return {UpAxis::kZ, std::string("z is taken for up, as in files by AMASS's names, but the body stands along ") +
+                          (up[1] < 0 ? "-y, as in a camera's frame" : "y") + " (--up says which)"};
+}
+
 }  // namespace
 
 UpFinding find_up(const std::string& path, const Motion& motion, const UpHints& hints) {
@@ -113,8 +122,8 @@ UpFinding find_up(const std::string& path, const Motion& motion, const UpHints& 
   const bool is_of_amass = file.has("mocap_frame_rate") || file.has("mocap_framerate");
   if (hints.wanted && !(hints.fills_in && is_of_amass))
     return {*hints.wanted, *hints.wanted == UpAxis::kY ? "y is up, as --up says: turned" : ""};
-  if (is_of_amass) return {};
   const std::optional<UpFinding> known = hints.upright ? up_as_known(path, motion, *hints.upright) : std::nullopt;
+  if (is_of_amass) return up_of_amass(motion, known);
   return known ? *known : up_by_posture(path, motion);
 }
 

@@ -30,8 +30,9 @@ struct UpFinding {
 /// A mean direction of the body's own up so far along an axis tells that this axis is up.
 inline constexpr double kUprightShare = 0.7;
 
-/// Which way is up in a motion's world: what is asked for; else z of a file by AMASS's names (one that says
-/// `mocap_frame_rate` or `mocap_framerate`), as AMASS has it; else as `upright` has it, which tells of who lies too:
+/// Which way is up in a motion's world: what is asked for; else as `upright` has it, which tells of who lies too; else
+/// z of a file by AMASS's names (one that says `mocap_frame_rate` or `mocap_framerate`), as AMASS has it, which is told
+/// where the posture speaks against it. By `upright`:
 /// of z, y and −y the axis e whose R_0ᵀ e in frame 0 is nearest to it, where that makes kUprightShare; else by the
 /// posture: the axis that the mean over frames of R_0 (0, 1, 0), from pelvis to head, lies along by kUprightShare of
 /// its length at least. Where no axis does, as mostly of who lies, it is z.

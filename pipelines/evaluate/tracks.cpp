@@ -64,8 +64,8 @@ Track read_track_folder(const fs::path& folder, const std::string& name) {
 }
 
 Track read_pose_track(const std::string& path, const TrackOptions& options) {
-  PoseFolder folder = read_pose_folder(path, options.frame_rate.value_or(kPoseFolderRate), options.person);
-  if (folder.filled > 0) log_warning(path + ": frames without a file, interpolated: " + std::to_string(folder.filled));
+  PoseFolder folder =
+      read_pose_folder_with_warnings(path, options.frame_rate.value_or(kPoseFolderRate), options.person);
   Track track;
   track.name = path;
   track.motion = std::move(folder.motion);
@@ -397,6 +397,12 @@ std::string initial_of_track(const std::string& path) {
   return !data.initial.empty() && fs::exists(data.initial) ? initial_motion_file(data).string() : "";
 }
 
+BodyPose body_at(const Track& track, double seconds) {
+  return at_place(
+      track.frames(), seconds * track.motion.frame_rate - track.motion.first_frame,
+      [&track](std::size_t t) { return track.motion.poses[t]; }, interpolated);
+}
+
 std::vector<SceneState> object_states(const Track& track, double frame_rate, Index count) {
   std::vector<SceneState> states;
   if (track.object_poses.empty()) return states;
@@ -443,17 +449,21 @@ AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, 
   AlignedTracks tracks;
   tracks.frame_rate =
       compared_rate(std::min(estimate_rate, truth_rate), frame_rate, estimate.name + " or " + truth.name);
-  const double end = std::min(static_cast<double>(estimate.frames() - 1) / estimate_rate,
-                              static_cast<double>(truth.frames() - 1) / truth_rate);
+  const double estimate_first = estimate.motion.first_frame, truth_first = truth.motion.first_frame;
+  const double begin = std::max(estimate_first / estimate_rate, truth_first / truth_rate),
+               end = std::min((estimate_first + static_cast<double>(estimate.frames() - 1)) / estimate_rate,
+                              (truth_first + static_cast<double>(truth.frames() - 1)) / truth_rate);
   const Index count = count_of_moments(end, tracks.frame_rate);
-  if (count < 2)
+  tracks.first = static_cast<Index>(std::ceil(begin * tracks.frame_rate - kSameMoment));
+  if (count - tracks.first < 2)
     throw UserError(estimate.name + ": has " + std::to_string(estimate.frames()) + " frames and " + truth.name + " " +
                     std::to_string(truth.frames()) + "; errors are those of the frames after the first that both have");
-  for (Index k = 0; k < count; ++k) {
+  for (Index k = tracks.first; k < count; ++k) {
     const double seconds = static_cast<double>(k) / tracks.frame_rate;
-    tracks.estimate.push_back(state_at(estimate, estimate_body, objects, seconds * estimate_rate));
-    tracks.states.push_back(all_at(estimate, seconds * estimate_rate));
-    tracks.truth.push_back(state_at(truth, truth_body, true_objects, seconds * truth_rate));
+    const double place = seconds * estimate_rate - estimate_first, true_place = seconds * truth_rate - truth_first;
+    tracks.estimate.push_back(state_at(estimate, estimate_body, objects, place));
+    tracks.states.push_back(all_at(estimate, place));
+    tracks.truth.push_back(state_at(truth, truth_body, true_objects, true_place));
   }
   return tracks;
 }

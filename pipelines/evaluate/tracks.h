@@ -91,6 +91,9 @@ std::string scene_of_track(const std::string& path);
 /// The motion that begins with the state of frame 0 of a dataset or run; empty where there is none.
 std::string initial_of_track(const std::string& path);
 
+/// The body of a track at a moment of its video, seconds; where it has begun, and not ended.
+BodyPose body_at(const Track& track, double seconds);
+
 /// A skeleton in its rest pose.
 struct RestSkeleton {
   std::vector<int> parents;
@@ -104,6 +107,7 @@ double rate_beside(const Track& track, const Track& other);
 /// Two tracks at the same moments.
 struct AlignedTracks {
   double frame_rate = 0;  ///< frames a second of both
+  Index first = 0;        ///< the frame, at this rate, that both have first
   std::vector<FrameState> estimate, truth;
   std::vector<SceneState> states;  ///< the estimate's bodies and all of its objects; no cameras
 };

@@ -7,6 +7,7 @@
 #include "body/procedural_body.h"
 #include "body/smplx_file.h"
 #include "core/log.h"
+#include "core/text.h"
 
 namespace hsi4d {
 
@@ -40,6 +41,22 @@ Motion read_motion_with_warnings(const std::string& path) {
   if (motion.lost_shape)
     log_warning(path + ": is of " + motion.converted_from + ", whose betas are no shape of SMPL-X: they are left out");
   return motion;
+}
+
+PoseFolder read_pose_folder_with_warnings(const std::string& folder, double frame_rate, int person) {
+  PoseFolder read = read_pose_folder(folder, frame_rate, person);
+  if (read.filled > 0) log_warning(folder + ": frames without a file, interpolated: " + std::to_string(read.filled));
+  if (read.counts_from_one)
+    log_info(folder + ": begins with the file of frame 1, which is taken for the first frame of the video");
+  if (read.motion.first_frame > 0)
+    log_warning(folder + ": begins with frame " + number_text(read.motion.first_frame) +
+                " of the video, counted from 0, by the names of its files");
+  std::vector<std::string> others;
+  for (const std::int64_t other : read.other_people) others.push_back(std::to_string(other));
+  if (!others.empty())
+    log_warning(folder + ": person " + std::to_string(person) + " is read; there are files of the people " +
+                few_names(others) + " too (--person)");
+  return read;
 }
 
 Motion read_motion_for(const std::string& path, const Avatar& avatar) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "body/avatar.h"
+#include "body/motion_edit.h"
 #include "body/motion_io.h"
 #include "body/smplx_file.h"
 #include "pipelines/config/body_settings.h"
@@ -40,6 +41,9 @@ SmplxModel read_model_for(const std::string& path, const std::string& motion, co
 
 /// Reads a motion, and tells what of it is left out because it is of another body model. Throws as read_motion.
 Motion read_motion_with_warnings(const std::string& path);
+
+/// As read_pose_folder; frames that are filled in, where it begins and people that are not read are told in the log.
+PoseFolder read_pose_folder_with_warnings(const std::string& folder, double frame_rate, int person);
 
 /// As read_motion_with_warnings, moved to the avatar's body (for_body): its pelvis is where the file has it.
 Motion read_motion_for(const std::string& path, const Avatar& avatar);

@@ -25,7 +25,8 @@ namespace fs = std::filesystem;
 std::vector<BodyPose> estimate_of(const DataSettings& data, const SceneSetup& setup, const Avatar& avatar,
                                   const FrameSource& frames) {
   if (data.motion.empty()) return estimated_poses(setup.motion, setup.motion_file, frames);
-  return laid_on(read_estimate(data.motion, avatar, frames), setup.motion.poses.front(), pelvis_of(avatar.joints),
+  const BodyPose& first = setup.motion.poses.front();
+  return laid_on(read_estimate(data.motion, avatar, frames, first, data.motion_align), first, pelvis_of(avatar.joints),
                  data.motion_align);
 }
 

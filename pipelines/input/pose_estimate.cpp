@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "body/motion_edit.h"
+#include "core/check.h"
 #include "core/log.h"
 #include "core/rotation.h"
 #include "core/text.h"
@@ -15,9 +16,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The pose at a moment of a motion, in seconds.
+constexpr double kMostBack = 2;  // frames of the motion
+
+/// The pose some frames before a motion begins: its first step, carried back by kMostBack frames at most.
+BodyPose pose_before(const Motion& motion, double frames) {
+  if (motion.poses.size() == 1) return motion.poses.front();
+  return interpolated(motion.poses[0], motion.poses[1], -std::min(frames, kMostBack));
+}
+
+/// The pose at a moment of the video, in seconds.
 BodyPose pose_at(const Motion& motion, double seconds) {
-  const double place = std::min(seconds * motion.frame_rate, static_cast<double>(motion.poses.size() - 1));
+  const double place =
+      std::min(seconds * motion.frame_rate - motion.first_frame, static_cast<double>(motion.poses.size() - 1));
+  if (place < 0) return pose_before(motion, -place);
   const auto before = static_cast<std::size_t>(place);
   if (before + 1 == motion.poses.size()) return motion.poses.back();
   return interpolated(motion.poses[before], motion.poses[before + 1], place - static_cast<double>(before));
@@ -27,13 +38,13 @@ BodyPose pose_at(const Motion& motion, double seconds) {
 bool covers(const Motion& motion, const FrameSource& frames) {
   if (!motion.says_frame_rate || frames.video_rate() == 0) return false;
   const double end = frames.time(frames.count() - 1);
-  return end <= (static_cast<double>(motion.poses.size()) - 0.5) / motion.frame_rate;
+  return end <= (motion.first_frame + static_cast<double>(motion.poses.size()) - 0.5) / motion.frame_rate;
 }
 
 /// Tells of poses from a moment on that would be that of another frame of the video.
 void warn_of_rest(const Motion& motion, const fs::path& file, const FrameSource& frames) {
   constexpr double kSameMoment = 1e-9;  // seconds
-  const double last = static_cast<double>(motion.poses.size() - 1) / motion.frame_rate,
+  const double last = (motion.first_frame + static_cast<double>(motion.poses.size() - 1)) / motion.frame_rate,
                end = static_cast<double>(frames.video_count()) / frames.video_rate();
   if (last < end - kSameMoment) return;
   log_warning(file.string() + ": holds " + std::to_string(motion.poses.size()) + " poses at " +
@@ -41,17 +52,54 @@ void warn_of_rest(const Motion& motion, const fs::path& file, const FrameSource&
               " frames at " + rounded(frames.video_rate(), 4) + "; poses after its end are not used");
 }
 
+/// The motion from the video's first frame on, where it begins with a whole later one.
+Motion from_first_frame(const Motion& motion, const fs::path& file) {
+  if (motion.first_frame == 0) return motion;
+  log_warning(file.string() + ": begins with frame " + rounded(motion.first_frame, 6) +
+              " of the video; the poses before it are a guess, its first step carried back");
+  const double missing = std::round(motion.first_frame);
+  if (missing != motion.first_frame) return motion;
+  Motion whole = motion;
+  whole.first_frame = 0;
+  whole.poses.clear();
+  for (double frame = missing; frame > 0; --frame) whole.poses.push_back(pose_before(motion, frame));
+  whole.poses.insert(whole.poses.end(), motion.poses.begin(), motion.poses.end());
+  return whole;
+}
+
 /// A pose for each frame of the clip.
 /// @param or_else  what is allowed beside as many as frames
-std::vector<BodyPose> poses_of_frames(const Motion& motion, const fs::path& file, const FrameSource& frames,
+std::vector<BodyPose> poses_of_frames(const Motion& read, const fs::path& file, const FrameSource& frames,
                                       const char* or_else) {
+  const Motion motion = from_first_frame(read, file);
   const Index count = std::ssize(motion.poses);
-  if (count == frames.count() || count == frames.video_count() || !covers(motion, frames))
-    return kept_frames(motion.poses, frames, file.string(), "poses", or_else);
+  const bool is_by_frame = motion.first_frame == 0 && (count == frames.count() || count == frames.video_count());
+  if (is_by_frame || !covers(motion, frames)) return kept_frames(motion.poses, frames, file.string(), "poses", or_else);
   warn_of_rest(motion, file, frames);
   std::vector<BodyPose> poses;
   for (Index t = 0; t < frames.count(); ++t) poses.push_back(pose_at(motion, frames.time(t)));
   return poses;
+}
+
+/// The motion in a world with z up, by the axis that lies along the vertical of the human of frame 0.
+Motion with_z_up(const Motion& motion, const fs::path& file, const BodyPose& first,
+                 const Vector3<double>& pelvis_rest) {
+  constexpr double kNear = 0.7;  // of an axis to the vertical
+  const Vector3<double> upright = so3_exp(first.rotation_of(0)).row(2);
+  const Matrix3<double> root = so3_exp(motion.poses.front().rotation_of(0));
+  const double y = dot(Vector3<double>(root.row(1)), upright), z = dot(Vector3<double>(root.row(2)), upright);
+  if (-y >= kNear && -y > z)
+    throw DataError(
+        file.string() +
+        ": y points down, by how the body is in frame 0, as in a camera's frame; a motion in a world with z up "
+        "is needed, or data.motion_align=rotation where the camera stands still");
+  if (y >= kNear && y > z) {
+    log_warning(file.string() + ": y is up, as the body is in frame 0: turned to z up");
+    return transformed(motion, z_up_from_y_up(), pelvis_rest);
+  }
+  if (z < kNear)
+    log_warning(file.string() + ": no axis is up as the body is in frame 0; z is taken for up, which may be wrong");
+  return motion;
 }
 
 /// R of world_laid_on.
@@ -69,8 +117,10 @@ std::vector<BodyPose> estimated_poses(const Motion& motion, const fs::path& file
   return poses_of_frames(motion, file, frames, ", or frame 0 alone");
 }
 
-std::vector<BodyPose> read_estimate(const fs::path& file, const Avatar& avatar, const FrameSource& frames) {
-  const Motion motion = read_motion_for(file.string(), avatar);
+std::vector<BodyPose> read_estimate(const fs::path& file, const Avatar& avatar, const FrameSource& frames,
+                                    const BodyPose& first, MotionAlign align) {
+  Motion motion = read_motion_for(file.string(), avatar);
+  if (align != MotionAlign::kRotation) motion = with_z_up(motion, file, first, pelvis_of(avatar.joints));
   return poses_of_frames(motion, file, frames, "");
 }
 

@@ -14,16 +14,23 @@ namespace hsi4d {
 
 /// Estimated poses of the clip's frames: those of the motion when it has more than frame 0, else none. It has a pose
 /// for each frame that the clip keeps, or each of the video, or a rate of its own, at which it reaches to the clip's
-/// end.
+/// end. One that begins with a later frame of the video (Motion::first_frame) is put there; poses before it are its
+/// first step carried back, for two frames at most, which a warning says.
 ///
 /// @param file  what messages call it
 /// Throws DataError for another number of poses.
 std::vector<BodyPose> estimated_poses(const Motion& motion, const std::filesystem::path& file,
                                       const FrameSource& frames);
 
-/// Reads an estimate for the body of an avatar: a pose for each frame of the clip. Throws as read_motion and
-/// estimated_poses, for a motion of one pose too.
-std::vector<BodyPose> read_estimate(const std::filesystem::path& file, const Avatar& avatar, const FrameSource& frames);
+/// Reads an estimate for the body of an avatar: a pose for each frame of the clip, in a world with z up. Which axis is
+/// up the body of frame 0 tells; a motion with y up is turned, and a warning says so. Of one that is laid by `rotation`
+/// it does not matter.
+///
+/// @param first  the human of frame 0
+/// Throws as read_motion and estimated_poses, for a motion of one pose too; DataError where y points down, as in a
+/// camera's frame.
+std::vector<BodyPose> read_estimate(const std::filesystem::path& file, const Avatar& avatar, const FrameSource& frames,
+                                    const BodyPose& first, MotionAlign align);
 
 /// A pelvis in the world: the root's rotation, and its place r_0 + t.
 /// @param pelvis_rest  r_0, of the body that the pose is of, metres

@@ -4,6 +4,7 @@
 
 #include "core/check.h"
 #include "core/config_file.h"
+#include "core/text.h"
 #include "pipelines/input/body_files.h"
 #include "splat/files/splat_file.h"
 
@@ -101,6 +102,9 @@ SceneSetup read_scene_setup(const DataSettings& data) {
   setup.object_tracks = initial.object_tracks;
   setup.motion = read_motion_for(initial.motion.string(), setup.avatar);
   if (setup.motion.poses.empty()) throw DataError(initial.motion.string() + ": holds no frames");
+  if (setup.motion.first_frame != 0)
+    throw DataError(initial.motion.string() + ": begins with frame " + number_text(setup.motion.first_frame) +
+                    " of its video; the exact state of frame 0 is needed (an estimate belongs in data.motion)");
   return setup;
 }
 

@@ -88,7 +88,8 @@ void check_masks(const DataSettings& data, const fs::path& folder) {
 }
 
 void check_motion(const DataSettings& data, const fs::path& file) {
-  read_estimate(file, read_avatar(data.avatar.string()), frames_of(data));
+  // Laid freely, as no human of frame 0 is read here: the run finds which way is up.
+  read_estimate(file, read_avatar(data.avatar.string()), frames_of(data), {}, MotionAlign::kRotation);
 }
 
 // ---- Making it ----

@@ -10,6 +10,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/process.h"
+#include "core/text.h"
 #include "optim/checkpoint.h"
 
 namespace hsi4d {
@@ -162,10 +163,7 @@ std::vector<ArrayPart> array_parts(const std::vector<std::size_t>& runs) {
 std::string submit(std::vector<std::string> options, const std::string& script) {
   options.insert(options.begin(), {"sbatch", "--parsable"});
   options.push_back(script);
-  const std::string told = trimmed(run_process(options));
-  const std::size_t line = told.rfind('\n');  // warnings come before it
-  const std::string id = told.substr(line == std::string::npos ? 0 : line + 1);
-  return id.substr(0, id.find(';'));  // of several clusters the name follows
+  return job_number(run_process(options));
 }
 
 /// The script that a sweep's folder has under a name, written.
@@ -212,6 +210,23 @@ std::string submit_results(const SweepPaths& paths, const SweepPlan& plan, const
 int most_at_once(const SweepPlan& plan, int jobs) { return jobs > 0 ? jobs : plan.slurm.at_once; }
 
 }  // namespace
+
+std::string job_number(const std::string& told) {
+  std::vector<std::string> numbers;
+  std::istringstream lines(told);
+  for (std::string line; std::getline(lines, line);) {
+    const std::string text = trimmed(line), number = text.substr(0, text.find(';'));
+    const bool is_number =
+        !number.empty() && std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
+    const bool has_cluster =
+        number.size() == text.size() ||
+        (text.size() > number.size() + 1 && text.find_first_of("; \t", number.size() + 1) == std::string::npos);
+    if (is_number && has_cluster) numbers.push_back(number);
+  }
+  if (numbers.size() == 1) return numbers.front();
+  throw UserError("sbatch --parsable: printed " + std::string(numbers.empty() ? "no" : "more than one") +
+                  " job's number on a line of its own: \"" + with_escapes(trimmed(told)) + "\"");
+}
 
 std::string array_text(const std::vector<std::size_t>& indices) {
   std::string text;

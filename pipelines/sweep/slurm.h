@@ -16,6 +16,10 @@ struct SlurmJobs {
   std::string results;              ///< id of the job for the results; empty: none
 };
 
+/// The job's number in what `sbatch --parsable` prints: the one line that is NUMBER or NUMBER;CLUSTER; others are
+/// warnings of the site. Throws UserError with what was printed where there is none, or more.
+std::string job_number(const std::string& told);
+
 /// Indices as --array takes them: {0, 1, 2, 5} is "0-2,5".
 std::string array_text(const std::vector<std::size_t>& indices);
 

@@ -246,7 +246,16 @@ TEST_CASE("a folder of SMPLer-X files is a motion, and frames without a file are
     CHECK(pose.rotation_of(25)[0] == 0.25);
     CHECK(pose.rotation_of(54)[2] == -0.25);
   }
+  CHECK(read.motion.first_frame == 8);
+  CHECK_FALSE(read.counts_from_one);
+  CHECK(read.other_people == std::set<std::int64_t>{1});
   CHECK(read_pose_folder("smplx", 30, 1).motion.poses.size() == 1);
+  CHECK(read_pose_folder("smplx", 30, 1).motion.first_frame == 9);
+  CHECK(resampled(read.motion, 15).first_frame == 4);
+  std::filesystem::create_directory("from_one");
+  write_smplerx("from_one/00001_0.npz", 0.5);
+  CHECK(read_pose_folder("from_one", 30).motion.first_frame == 0);
+  CHECK(read_pose_folder("from_one", 30).counts_from_one);
 }
 
 TEST_CASE("faults of folders are named") {

@@ -368,6 +368,54 @@ TEST_CASE("a motion says of what model it is, and where its pelvis stands") {
   CHECK_FALSE(Npz::read(folder / "m.npz").has("pelvis_rest"));
 }
 
+TEST_CASE("a motion says with which frame of its video it begins") {
+  const auto with = [](const std::function<void(NpzWriter&)>& more) {
+    return [more](NpzWriter& f) {
+      f.add<double>("trans", {2, 3}, counted(2, 3)), f.add<double>("poses", {2, 165}, Numbers(330));
+      more(f);
+    };
+  };
+  const auto first_of = [&](const std::function<void(NpzWriter&)>& more) {
+    NpzWriter file;
+    with(more)(file);
+    return decode_motion(file.encode(), "m.npz").first_frame;
+  };
+  CHECK(first_of([](NpzWriter&) {}) == 0);
+  CHECK(first_of([](NpzWriter& f) { f.add_scalar("first_frame", 3.0); }) == 3);
+  CHECK(first_of([](NpzWriter& f) { f.add<std::int64_t>("frame_ids", {2}, std::vector<std::int64_t>{7, 8}); }) == 7);
+  CHECK(message_for(with([](NpzWriter& f) {
+          f.add<std::int64_t>("frame_ids", {2}, std::vector<std::int64_t>{7, 9});
+        })) ==
+        "m.npz: array 'frame_ids': frame 7 is followed by frame 9; allowed: the next one (tools/export_motion.py "
+        "fills gaps)");
+  CHECK(message_for(with([](NpzWriter& f) {
+          f.add<double>("frame_ids", {3}, {1, 2, 3});
+        })) == "m.npz: array 'frame_ids': has shape [3]; allowed: [2], a number a frame");
+  CHECK(message_for(with([](NpzWriter& f) { f.add_scalar("first_frame", -1.0); })) ==
+        "m.npz: array 'first_frame': begins with frame -1; allowed: 0 to 1e7");
+}
+
+TEST_CASE("two rates in a file are refused, naming both") {
+  const auto rows = [](double fps) {
+    return [fps](NpzWriter& f) {
+      f.add<double>("trans", {1, 3}, Numbers(3)), f.add<double>("poses", {1, 165}, Numbers(165));
+      f.add_scalar("mocap_frame_rate", 30.0), f.add_scalar("fps", fps);
+    };
+  };
+  CHECK(message_for(rows(25)) ==
+        "m.npz: array 'mocap_frame_rate': is 30, 'fps' 25; they say one thing, the frames a second");
+  NpzWriter same;
+  rows(static_cast<double>(29.9999995F))(same);
+  CHECK(decode_motion(same.encode(), "m.npz").frame_rate == 30);
+}
+
+TEST_CASE("a file of Python objects is named as one") {
+  const std::vector<ZipMember> members = {{"results.npy", pickled_npy()}};
+  CHECK_THROWS_WITH(decode_motion(archive_of(members, false), "m.npz"),
+                    "m.npz: there is no array 'trans'; not read: results, as it holds Python objects (dtype '|O'), "
+                    "which are not unpickled; save an array of numbers for each name");
+}
+
 TEST_CASE("numbers of motion files are bounded") {
   const auto with_trans = [](double x) {
     return [x](NpzWriter& f) {

@@ -112,8 +112,13 @@ def wham():
         "betas": np.ones((4, 10)),
         "frame_ids": np.array([3, 4, 6, 7]),
     }
+    save("two.pkl", {"a": {**one, "frame_ids": np.array([0, 1, 2, 3])}, "b": one})
+    said = export("export_motion.py", "two.pkl", "b.npz")
+    assert "person a is read (frames 0 to 3), not b (frames 3 to 7)" in said, said
+    assert "first_frame" not in np.load("b.npz")
     save("wham_output.pkl", {0: one})
-    assert "5 frames, 1 of them interpolated" in export("export_motion.py", "wham_output.pkl", "w.npz")
+    said = export("export_motion.py", "wham_output.pkl", "w.npz")
+    assert "5 frames, 1 of them interpolated, from frame 3 of the video" in said, said
     out = np.load("w.npz")
     rows = [0, 1, 3, 4]
     places = (one["trans_world"] + em.SMPL_PELVIS) @ Z_UP.T
@@ -121,6 +126,7 @@ def wham():
     close(out["trans"][2], (out["trans"][1] + out["trans"][3]) / 2)
     close(out["pose_body"][rows], one["pose_world"][:, 3:66])
     assert not out["betas"].any()  # SMPL's numbers are not SMPL-X's
+    assert out["first_frame"] == 3
     close(out["pelvis_rest"], em.SMPLX_PELVIS, 0)
     reads("w.npz")
     refused("has 1 people; --person can be 0 to 0", "export_motion.py", "wham_output.pkl", "w.npz", "--person", 3)
@@ -147,6 +153,24 @@ def lingo():
     close(out["pelvis_rest"], em.SMPLX_PELVIS, 0)
     reads("n.npz")
     refused("there is no camera", "export_motion.py", "output__demo__0.pkl", "n.npz", "--from", "lingo", "--in-camera")
+    hands = {"left_hand_pose": tensor(rng.normal(size=(6, 45))), "right_hand_pose": rng.normal(size=(6, 15, 3))}
+    save("hands.pkl", {**one, **hands})
+    said = export("export_motion.py", "hands.pkl", "h.npz", "--from", "lingo")
+    assert "turns of a flat hand" in said and "not read: raw_text, scene_name" in said, said
+    out = np.load("h.npz")
+    close(out["pose_hand"], np.concatenate([hands["left_hand_pose"].array, hands["right_hand_pose"].reshape(6, 45)], 1))
+    close(out["pose_body"], one["body_pose"])
+    reads("h.npz")
+    save("hands.pkl", {**one, "left_hand_pose": np.zeros((5, 45))})
+    refused("global_orient has 6 frames, left_hand_pose 5", "export_motion.py", "hands.pkl", "h.npz", "--from", "lingo")
+    rows = np.empty(6, dtype=object)
+    rows[:] = list(one["transl"])
+    save("rows.pkl", {**one, "transl": rows})
+    export("export_motion.py", "rows.pkl", "r.npz", "--from", "lingo")
+    close(np.load("r.npz")["trans"], np.load("n.npz")["trans"], 1e-12)
+    rows[2] = "lost"
+    save("rows.pkl", {**one, "transl": rows})
+    refused("transl: is an array of Python objects", "export_motion.py", "rows.pkl", "r.npz", "--from", "lingo")
     save("short.pkl", {**one, "transl": one["transl"][:5]})
     refused("global_orient has 6 frames, body_pose 6, transl 5", "export_motion.py", "short.pkl", "n.npz", "--from", "lingo")
 

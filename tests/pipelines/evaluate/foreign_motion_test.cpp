@@ -110,7 +110,16 @@ TEST_CASE("which way is up can be told, is that of AMASS by its names, and may s
   const TemporaryFolder here;
   const Layout names{"trans", "root_orient", "pose_body"};
   write_standing("amass.npz", names, Vector3<double>::Zero(), false, "mocap_frame_rate");
-  CHECK(read_track("amass.npz").world.empty());
+  CHECK(read_track("amass.npz").up == UpAxis::kZ);
+  CHECK(read_track("amass.npz").world ==
+        "z is taken for up, as in files by AMASS's names, but the body stands along y (--up says which)");
+  CHECK(read_track("amass.npz", {.upright = Vector3<double>(0, 0, 1)}).world.empty());
+  const Track turned = read_track("amass.npz", {.upright = Vector3<double>(0, 1, 0)});
+  CHECK(turned.up == UpAxis::kY);
+  CHECK(turned.world == "y is up, as the body is in frame 0: turned (--up z if it is not)");
+  write_standing("down.npz", names, Vector3<double>(std::numbers::pi, 0, 0), false, "mocap_frame_rate");
+  CHECK_THROWS_WITH(read_track("down.npz", {.upright = Vector3<double>(0, 1, 0)}),
+                    Contains("down.npz: y points down, by how the body is in frame 0"));
   CHECK(read_track("amass.npz", {.up = UpAxis::kY}).world == "y is up, as --up says: turned");
   write_standing("lying.npz", names, Vector3<double>(0, 0, kQuarter));
   CHECK(read_track("lying.npz").world == "z is taken for up: the posture does not tell (--up y if y is)");

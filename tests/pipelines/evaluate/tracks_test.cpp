@@ -81,6 +81,27 @@ TEST_CASE("tracks of different rates are compared at the moments of the slower o
   }
 }
 
+TEST_CASE("a track that begins later is compared from where it begins") {
+  const RestSkeleton body = skeleton();
+  const Track truth = moving_track(10, 8);
+  Track late = moving_track(10, 8);
+  late.motion.poses.erase(late.motion.poses.begin(), late.motion.poses.begin() + 3);
+  late.object_poses.erase(late.object_poses.begin(), late.object_poses.begin() + 3);
+  late.camera_from_world.clear();
+  late.motion.first_frame = 3;
+  for (const bool is_estimate : {true, false}) {
+    const AlignedTracks both = is_estimate ? aligned(late, body, truth, body) : aligned(truth, body, late, body);
+    CHECK(both.first == 3);
+    REQUIRE(both.truth.size() == 5);
+    CHECK(both.estimate[0].joints == pose_joints(body.parents, body.joints, truth.motion.poses[3]));
+    const MetricValues errors = sequence_summary(both.estimate, both.truth, both.frame_rate);
+    CHECK(*find_metric(errors, "world_mpjpe_mm") == 0);
+  }
+  CHECK(body_at(late, 0.35).transl[0] == Approx(0.35));
+  late.motion.first_frame = 7;
+  CHECK_THROWS_AS(aligned(late, body, truth, body), UserError);
+}
+
 TEST_CASE("what one of two tracks does not have is not measured") {
   const Track truth = moving_track(10, 5);
   Track track = moving_track(10, 5);

@@ -154,4 +154,14 @@ TEST_CASE("a sweep that does not say a whole number of MB asks for enough") {
   CHECK(std::find(options.begin(), options.end(), "--mem=1M") != options.end());
 }
 
+TEST_CASE("a job's number is taken from a line of its own") {
+  CHECK(job_number("123\n") == "123");
+  CHECK(job_number("123;cluster\n") == "123");
+  CHECK(job_number("sbatch: a warning\n 45 \nsbatch: 2 nodes are drained\n") == "45");
+  for (const char* none : {"", "Submitted batch job 12", "12 13", "12;", "12;a b", "-3", "1\n2\n"}) {
+    INFO(none);
+    CHECK_THROWS_WITH(job_number(none), Catch::Contains("job's number on a line of its own"));
+  }
+}
+
 }  // namespace slurm_test
