@@ -194,11 +194,10 @@ Image decode_png(std::span<const uint8_t> file, const std::string& name, const I
   return unpacked(packed);
 }
 
-Bytes encode_png(const PackedImage& image) {
+Bytes encode_png(PackedImage image) {  // libpng wants pointers to what it could change
   Encoder encoder;
-  Bytes values = image.values;  // libpng wants pointers to what it could change
   const auto height = static_cast<size_t>(image.height);
-  std::vector<png_bytep> rows = row_pointers(values, values.size() / height, height);
+  std::vector<png_bytep> rows = row_pointers(image.values, image.values.size() / height, height);
   const bool done = write_pixels(encoder, image, rows.data());
   if (!encoder.has_memory) throw std::bad_alloc();
   HSI4D_CHECK(done, "libpng writes no image of these sizes");

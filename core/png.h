@@ -36,6 +36,6 @@ struct PaletteImage {
 PaletteImage decode_palette(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits);
 
 /// The PNG file of an 8-bit or 16-bit image of one to four channels: grey, grey and alpha, RGB, RGBA.
-Bytes encode_png(const PackedImage& image);
+Bytes encode_png(PackedImage image);
 
 }  // namespace hsi4d

@@ -4,11 +4,22 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "core/linear.h"
 #include "stress/measures.h"
 
 namespace hsi4d::stress {
+
+/// The 26 directions to the faces, edges and corners of a cube.
+inline std::vector<Vector3<double>> cube_directions() {
+  std::vector<Vector3<double>> all;
+  for (int i = 0; i < 27; ++i) {
+    const Vector3<double> v(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    if (!v.isZero()) all.push_back(v.normalized());
+  }
+  return all;
+}
 
 /// |value − exact| / |exact|.
 inline double relative(long double value, long double exact) {

@@ -102,16 +102,6 @@ double short_series(int k, double x) {
   return sum;
 }
 
-/// The 26 directions to the faces, edges and corners of a cube.
-std::vector<Vector3<double>> cube_directions() {
-  std::vector<Vector3<double>> all;
-  for (int i = 0; i < 27; ++i) {
-    const Vector3<double> v(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-    if (!v.isZero()) all.push_back(v.normalized());
-  }
-  return all;
-}
-
 /// acos of the trace, the axis from the skew part over sin t.
 Vector3<float> textbook_log(const Matrix3<float>& r) {
   const float t = std::acos(std::clamp((r.trace() - 1) / 2, -1.0f, 1.0f));

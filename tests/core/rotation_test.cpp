@@ -3,26 +3,18 @@
 #include <numbers>
 #include <vector>
 
+#include "stress/rotation_measures.h"
 #include "tests/core/adjoint_check.h"
 
 namespace rotation_test {
 
 using namespace hsi4d;
 using namespace hsi4d::testing;
+using stress::cube_directions;
 
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-/// The 26 directions to the faces, edges and corners of a cube.
-std::vector<Vector3<double>> cube_directions() {
-  std::vector<Vector3<double>> all;
-  for (int i = 0; i < 27; ++i) {
-    const Vector3<double> v(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-    if (!v.isZero()) all.push_back(v.normalized());
-  }
-  return all;
-}
 
 const std::vector<double> kAngles{0, 1e-30,  1e-12, 1e-8, 1e-5, 1e-3, 0.1, 0.49999, 0.5, 0.6,
                                   1, 1.9999, 2,     2.5,  3,    3.14, 4.5, 7,       9};
