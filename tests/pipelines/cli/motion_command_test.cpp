@@ -152,7 +152,7 @@ TEST_CASE("motion warns of what it does not know of hands, and of repaired weigh
   file.add<double>("global_orient", {1, 3}, std::vector<double>(3));
   file.add<double>("body_pose", {21, 3}, std::vector<double>(63));
   file.add<double>("left_hand_pose", {15, 3}, std::vector<double>(45, 0.25));
-  file.write("frames/1.npz");
+  file.write("frames/0.npz");
   SmplxArrays arrays = random_smplx({.vertices = 30, .seed = 92});
   for (std::size_t j = 0; j < 55; ++j) arrays.weights[j] *= 1.009;
   smplx_writer(arrays).write("m.npz");
