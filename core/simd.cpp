@@ -19,7 +19,7 @@ namespace {
 constexpr std::array kAll = {Isa::kBaseline, Isa::kAvx2, Isa::kAvx512};
 
 Isa supported_isa() {
-#if defined(HSI4D_ISA_CLONES)
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
       __builtin_cpu_supports("avx512bw")) {
     return Isa::kAvx512;

@@ -3,6 +3,8 @@
 // `on_best_isa(f)` calls f inside a function that is compiled for the best instruction set of the processor; the
 // compiler inlines f there and vectorises its loops with it. Results do not depend on the choice: contraction is off
 // and the order of every sum is written out. Kernels that need explicit vectors use Highway instead.
+//
+// Under AddressSanitizer there is one version of f: the others would read and write the same places.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +24,7 @@ const char* isa_name(Isa isa);
 
 namespace detail {
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
 #define HSI4D_ISA_CLONES 1
 template <class F>
 [[gnu::target("avx512f,avx512dq,avx512vl,avx512bw,avx2,fma,prefer-vector-width=512"), gnu::flatten, gnu::noinline]] void
@@ -72,11 +74,9 @@ void on_best_isa_for(F&& f) {
 template <class F>
 void with_best_lanes(F&& f) {
   auto four = [&] { f(std::integral_constant<std::ptrdiff_t, 4>()); };
-#if defined(HSI4D_ISA_CLONES)
   auto eight = [&] { f(std::integral_constant<std::ptrdiff_t, 8>()); };
-  if (best_isa() == Isa::kAvx512) return detail::on_avx512(eight);
-  if (best_isa() == Isa::kAvx2) return detail::on_avx2(four);
-#endif
+  if (best_isa() == Isa::kAvx512) return on_isa(Isa::kAvx512, eight);
+  if (best_isa() == Isa::kAvx2) return on_isa(Isa::kAvx2, four);
   four();
 }
 
