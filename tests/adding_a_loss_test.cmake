@@ -1,6 +1,7 @@
 # cmake -DROOT=source tree -DSCRATCH=folder -DGENERATOR=… -DCOMPILER=… -P adding_a_loss_test.cmake
 # Does to a copy of the source tree what docs/adding_a_loss.md says, to the letter: one new file, one line of the list,
-# one config. Builds the program and the tests of the terms, runs these, and a short run with the new term.
+# one config. Builds the program and the tests of the terms, runs these and a short run with the new term, then what else
+# a new term meets: the other tests of its layer, the tools that write its rows of pages, and the tests of these pages.
 #
 # Only git's files are copied, with what was changed in them; the build folder lies in the copy as build/release does in
 # a source tree, so that a compiler cache that knows relative paths (CCACHE_BASEDIR) has most objects already.
@@ -119,4 +120,17 @@ endforeach()
 run("Building the tests of the terms" ${CMAKE_COMMAND} --build ${build} --parallel 2 --target hsi4d_test_optim)
 run("The tests of the terms" ${build}/bin/hsi4d_test_optim "*loss term*")
 expect("What the tests print" "${output}" "All tests passed")
+run("All tests of their layer" ${build}/bin/hsi4d_test_optim "~[full]")
+# The pages that tests compare with the program: both tests fail before their tools have run.
+expect("docs/adding_a_loss.md" "${doc}" "tools/settings_page && tools/gradient_audit --losses")
+run("tools/settings_page" ${source}/tools/settings_page)
+run("tools/gradient_audit --losses" ${source}/tools/gradient_audit --losses)
+expect("What the audit prints" "${output}" "all within their bounds")
+run("The test of the audit" ${CMAKE_COMMAND} -DROOT=${source} -DSCRATCH=${SCRATCH}/audit
+    -P ${source}/tests/gradient_audit_test.cmake)
+run("Building the test of the page of settings" ${CMAKE_COMMAND} --build ${build} --parallel 2
+    --target hsi4d_test_pipelines_cli)
+run("The test of the page of settings" ${build}/bin/hsi4d_test_pipelines_cli
+    "the page of settings tells every setting as it is,every setting whose default does not show*")
+expect("What the test of the page prints" "${output}" "All tests passed")
 file(REMOVE_RECURSE ${SCRATCH})

@@ -22,8 +22,10 @@ expect("all there" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | rows | 1e-7 | 3e-
 expect("an operator is missing" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `center` | y | 1e-7 | 3e-9 | 0 |\n" "mlp has no row")
 expect("a loss term is missing" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | rows | 1e-7 | 3e-9 | 0 |\n" "center has no row")
 expect("no figures" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | | | | |\n| `center` | y | 1e-7 | 3e-9 | 0 |\n" "mlp lacks a figure")
-expect("no complex step" "| `exp` | x | 1e-7 | 3e-9 | |\n| `mlp` | y | 1e-7 | 3e-9 | 0 |\n| `center` | y | 1e-7 | 3e-9 | | |\n"
-       "exp lacks a figure" "center lacks a figure")
+expect("no complex step, which a loss term may lack" "| `exp` | x | 1e-7 | 3e-9 | |\n| `mlp` | y | 1e-7 | 3e-9 | 0 |\n| `center` | y | 1e-7 | 3e-9 | | |\n"
+       "exp lacks a figure")
+expect("no differences" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | y | 1e-7 | 3e-9 | 0 |\n| `center` | y | 1e-7 | | | |\n"
+       "center lacks a figure")
 expect("one too many" "| `exp` | x | 1e-7 | 3e-9 | 0 |\n| `mlp` | y | 0 | 0 | 0 |\n| `center` | y | 1e-7 | 3e-9 | 0 |\n| `old` | z | 0 | 0 | 0 |\n" "there is no old")
 file(REMOVE_RECURSE ${SCRATCH})
 

@@ -128,7 +128,7 @@ std::string gradients_command(const GradientsOptions& options) {
   SceneGradients gradients = scene_gradients(scene.gaussians, view, target);
   zero_held(gradients, scene.report);
   write_gradients(options.out, gradients, scene, view.precision);
-  warn_if_nothing_drawn(shows_something(gradients.rendered), scene.gaussians.count());
+  warn_if_nothing_drawn(shows_something(gradients.rendered), scene.gaussians, view.settings.alpha_min);
   return options.out + ": loss " + number_text(gradients.loss) + ", gradients of " +
          count_text(scene.gaussians.count(), "Gaussian") + " and the camera\n";
 }

@@ -42,10 +42,14 @@ bool InterruptWatch::requested() { return interrupt_requested != 0; }
 
 TimeLimitWatch::TimeLimitWatch() {
   time_is_up = 0;
-  std::signal(SIGUSR1, note_time_limit);
+  before_ = std::signal(SIGUSR1, note_time_limit);
+  sigset_t warning;
+  sigemptyset(&warning);
+  sigaddset(&warning, SIGUSR1);
+  pthread_sigmask(SIG_UNBLOCK, &warning, nullptr);  // one that waited comes now
 }
 
-TimeLimitWatch::~TimeLimitWatch() { std::signal(SIGUSR1, SIG_DFL); }
+TimeLimitWatch::~TimeLimitWatch() { std::signal(SIGUSR1, before_); }
 
 bool TimeLimitWatch::requested() { return time_is_up != 0; }
 

@@ -16,7 +16,8 @@ class InterruptWatch {
   static bool requested();
 };
 
-/// While it lives, SIGUSR1 is noted instead of ending the program: Slurm sends it before a job's time is over. One at a
+/// While it lives, SIGUSR1 is noted instead of ending the program: Slurm sends it before a job's time is over. One that
+/// came before and was blocked is noted too. Later it does what it did before, but is not blocked any more. One at a
 /// time.
 class TimeLimitWatch {
  public:
@@ -27,6 +28,9 @@ class TimeLimitWatch {
 
   /// True once the signal has come.
   static bool requested();
+
+ private:
+  void (*before_)(int);
 };
 
 }  // namespace hsi4d::cli

@@ -159,13 +159,13 @@ std::string render_command(const RenderOptions& options) {
     } else {
       write_picture(options.out, rendered);
     }
-    warn_if_nothing_drawn(shows_something(rendered), count);
+    warn_if_nothing_drawn(shows_something(rendered), scene.gaussians, view.settings.alpha_min);
     for (const PixelTrace& trace : rendered.traces) text += pixel_table(trace, rendered, view, parts.rows) + "\n";
     drawn = rendered.drawn;
   } else {
     const ScenePicture picture = render_picture(scene, view);
     write_image(options.out, picture.image);
-    warn_if_nothing_drawn(picture.shows_something, count);
+    warn_if_nothing_drawn(picture.shows_something, scene.gaussians, view.settings.alpha_min);
     drawn = picture.drawn;
   }
   return text + options.out + ": " + std::to_string(view.camera.width) + " x " + std::to_string(view.camera.height) +

@@ -102,9 +102,15 @@ std::string check_ending(const std::string& path, const std::string& where, cons
   throw UserError(where + ": " + path + " does not end as it must; allowed: " + joined(allowed));
 }
 
-void warn_if_nothing_drawn(bool shows_something, Index count) {
+void warn_if_nothing_drawn(bool shows_something, const Gaussians& gaussians, double alpha_min) {
   if (shows_something) return;
+  const Index count = gaussians.count();
   if (count == 0) return log_warning("no Gaussian is drawn: the files hold none");
+  const std::vector<float>& logits = gaussians.opacity_logits;
+  const double highest = 1 / (1 + std::exp(-static_cast<double>(*std::max_element(logits.begin(), logits.end()))));
+  if (highest < alpha_min)
+    return log_warning("no Gaussian is drawn: the opacity of all " + std::to_string(count) + " is at most " +
+                       rounded(highest, 3) + ", below render.alpha_min, " + rounded(alpha_min, 3));
   log_warning("no Gaussian is drawn: the camera sees none of " + std::to_string(count) +
               ". Its pose must be camera_from_world in OpenCV's axes (x right, y down, z forward), in metres");
 }

@@ -47,12 +47,12 @@ std::array<double, 3> parse_color(const std::string& text, const std::string& wh
 /// that they were trained for other settings go to the log as warnings.
 SplatFile read_drawn(const std::string& path, const RenderSettings& settings);
 
-/// Warns of an image in which no Gaussian is drawn: because there is none, or because the camera looks away, most often
-/// since its axes are of another convention, which the warning names.
+/// Warns of an image in which no Gaussian is drawn: because there is none, because all are too faint, or because the
+/// camera looks away, most often since its axes are of another convention, which the warning names.
 ///
 /// @param shows_something  alpha is above 0 somewhere in the image
-/// @param count            of the Gaussians
-void warn_if_nothing_drawn(bool shows_something, Index count);
+/// @param alpha_min        of the render settings
+void warn_if_nothing_drawn(bool shows_something, const Gaussians& gaussians, double alpha_min);
 
 /// Adds an array of numbers, float32 where the precision is float, else float64.
 void add_numbers(NpzWriter& npz, Precision precision, const std::string& name, const std::vector<int64_t>& shape,

@@ -30,8 +30,10 @@ void describe(ConfigFields& f, SweepSlurm& s) {
   f.strings("options", s.options, "More options of sbatch");
 }
 
+constexpr std::int64_t kEarlyWarning = 60;  // seconds: so much earlier than asked for Slurm may send its warning
+
 /// Seconds of a time as sbatch takes it: MINUTES, MINUTES:SECONDS, HOURS:MINUTES:SECONDS, DAYS-HOURS and so on; 0 for
-/// what is none of these, or none at all.
+/// what is none of these, or none at all. Slurm gives whole minutes.
 std::int64_t slurm_seconds(const std::string& time) {
   constexpr std::int64_t kMinute = 60, kHour = 3600, kDay = 86400;
   const std::size_t dash = time.find('-');
@@ -52,7 +54,7 @@ std::int64_t slurm_seconds(const std::string& time) {
                                                                 : std::vector{kMinute, std::int64_t{1}};
   std::int64_t seconds = 0;
   for (std::size_t i = 0; i < std::min(numbers.size(), units.size()); ++i) seconds += numbers[i] * units[i];
-  return seconds;
+  return (seconds + kMinute - 1) / kMinute * kMinute;
 }
 
 bool is_name(const std::string& text) {
@@ -405,11 +407,14 @@ class Reader {
 
   void check_slurm(const ConfigValue& tree, const SweepSlurm& slurm) {
     const auto at = [&tree](const std::string& pointer) { return origin_at(tree, pointer); };
-    const std::int64_t seconds = slurm_seconds(slurm.time);
-    if (seconds > 0 && slurm.grace_s >= seconds)
+    const std::int64_t seconds = slurm_seconds(slurm.time), most = seconds - kEarlyWarning - 1;
+    if (seconds > 0 && slurm.grace_s > most)
       add(at("/slurm/grace_s"), "/slurm/grace_s",
-          std::to_string(slurm.grace_s) + " s before the end of its time a run would save its state, and it has " +
-              std::to_string(seconds) + " s (/slurm/time); give it more, or a shorter grace_s");
+          std::to_string(slurm.grace_s) +
+              " s before the end of its time, or up to a minute earlier, Slurm tells a run " +
+              "to save its state; of " + std::to_string(seconds) + " s (/slurm/time) none may be left to work in; " +
+              (most > 0 ? "allowed: 1 to " + std::to_string(most) + ", or " : "give it ") + "a time of more than " +
+              std::to_string(slurm.grace_s + kEarlyWarning) + " s");
     for (std::size_t i = 0; i < slurm.options.size(); ++i) {
       const std::string place = "/slurm/options/" + std::to_string(i);
       if (!slurm.options[i].starts_with("-"))

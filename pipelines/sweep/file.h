@@ -67,7 +67,7 @@ struct SweepSlurm {
   int memory_mb = 0;                 ///< 0: memory_mb of the sweep, or what the partition gives
   int at_once = 0;                   ///< 0: as many as there is room for
   std::string partition;             ///< empty: the default one
-  int grace_s = 120;                 ///< before the end of its time a run saves its state
+  int grace_s = 120;                 ///< before the end of its time a run saves its state; Slurm: up to 60 s earlier
   std::vector<std::string> options;  ///< more of sbatch
 };
 

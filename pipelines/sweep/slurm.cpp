@@ -20,6 +20,13 @@ namespace fs = std::filesystem;
 
 constexpr const char* kScriptHead = "#!/bin/sh\n# Written by hsi4d sweep.\n";
 
+// Slurm may warn before the program can note it. A shell cannot block a signal, and one that is ignored is lost; env of
+// coreutils 8.31 or later blocks it, so that it waits for the program. Elsewhere the program is at least not killed.
+constexpr const char* kKeepWarning =
+    "trap '' USR1\n"
+    "hold='env --block-signal=USR1'\n"
+    "$hold true 2>/dev/null || hold=\n";
+
 fs::path slurm_folder(const SweepPaths& paths) { return fs::absolute(paths.folder).lexically_normal() / "slurm"; }
 
 /// A word of a shell command.
@@ -167,9 +174,9 @@ std::string submit(std::vector<std::string> options, const std::string& script) 
 }
 
 /// The script that a sweep's folder has under a name, written.
-std::string script(const SweepPaths& paths, const std::string& name, const std::string& command) {
+std::string script(const SweepPaths& paths, const std::string& name, const std::string& commands) {
   const std::string file = (slurm_folder(paths) / name).string();
-  write_text_file(file, std::string(kScriptHead) + "exec " + command + "\n");
+  write_text_file(file, kScriptHead + commands + "\n");
   return file;
 }
 
@@ -180,13 +187,13 @@ std::string submit_array(const SweepPaths& paths, const SweepPlan& plan, const A
   const ArraySource source = {fs::path(paths.frozen_plan(plan)).filename().string(), part.first};
   const std::string first = std::to_string(part.first);
   const std::string index = part.first == 0 ? "$SLURM_ARRAY_TASK_ID" : "$((SLURM_ARRAY_TASK_ID + " + first + "))";
-  const std::string command = quoted(program) + " run-one " + quoted(whole + "/plans/" + source.plan_file) + " \"" +
-                              index + "\" --out " + quoted(whole) + " --threads " + std::to_string(threads) +
-                              " --requeue";
+  const std::string commands = std::string(kKeepWarning) + "exec $hold " + quoted(program) + " run-one " +
+                               quoted(whole + "/plans/" + source.plan_file) + " \"" + index + "\" --out " +
+                               quoted(whole) + " --threads " + std::to_string(threads) + " --requeue";
   std::vector<std::string> options = array_options(paths, plan, part.runs, jobs, threads, part.first);
   if (!after.empty()) options.push_back("--dependency=afterany:" + after);
   const std::string name = part.first == 0 ? "run.sh" : "run_from_" + first + ".sh";
-  const std::string job = submit(std::move(options), script(paths, name, command));
+  const std::string job = submit(std::move(options), script(paths, name, commands));
   const std::string known = (slurm_folder(paths) / "jobs.txt").string();
   write_text_file(known, (fs::exists(known) ? read_text_file(known) : "") + job + " " + source.text() + "\n");
   return job;
@@ -203,8 +210,9 @@ std::string submit_results(const SweepPaths& paths, const SweepPlan& plan, const
                                       "--output=" + without_patterns(folder.string()) + "/results_%j.txt", "--requeue"};
   if (!plan.slurm.partition.empty()) options.push_back("--partition=" + plan.slurm.partition);
   options.insert(options.end(), plan.slurm.options.begin(), plan.slurm.options.end());
-  return submit(std::move(options),
-                script(paths, "results.sh", quoted(program) + " report " + quoted(folder.parent_path().string())));
+  return submit(
+      std::move(options),
+      script(paths, "results.sh", "exec " + quoted(program) + " report " + quoted(folder.parent_path().string())));
 }
 
 int most_at_once(const SweepPlan& plan, int jobs) { return jobs > 0 ? jobs : plan.slurm.at_once; }
@@ -294,8 +302,11 @@ SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std
 
 void requeue_this_job() {
   const char* const job = std::getenv("SLURM_JOB_ID");
+  const char* const array = std::getenv("SLURM_ARRAY_JOB_ID");
+  const char* const task = std::getenv("SLURM_ARRAY_TASK_ID");
   if (job == nullptr) throw UserError("hsi4d run-one: --requeue is for jobs of Slurm, and this is none");
-  run_process({"scontrol", "requeue", job});
+  const bool is_task = array != nullptr && task != nullptr;
+  run_process({"scontrol", "requeue", is_task ? std::string(array) + "_" + task : job});
 }
 
 }  // namespace hsi4d

@@ -41,7 +41,8 @@ std::vector<std::string> array_options(const SweepPaths& paths, const SweepPlan&
 SlurmJobs submit_sweep(const SweepPaths& paths, const SweepPlan& plan, const std::string& program, int jobs,
                        int threads);
 
-/// Puts the job that this process is into the queue again. Throws UserError outside of a job, or with what Slurm says.
+/// Puts the job that this process is into the queue again, of an array this task alone: the number of the job of its
+/// last task is the array's own. Throws UserError outside of a job, or with what Slurm says.
 void requeue_this_job();
 
 }  // namespace hsi4d

@@ -1,4 +1,4 @@
-"""A sweep on a cluster of Slurm with two nodes on this machine, one of which is lost in the middle.
+"""Sweeps on a cluster of Slurm with two nodes on this machine: one is lost in the middle, and times are over.
 
     python3 tests/tools/slurm_sweep_test.py TOOLS HSI4D CONFIGS [--keep DIR]
 
@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -159,15 +160,72 @@ def lost_node():
     local("start-node", "node2")
 
 
+def kinds_of(sweep, index):
+    return [a["event"] for a in attempts(sweep, ids(sweep)[index])]
+
+
+def warned_task():
+    """Of three runs that compute, the last one is told that its time is up: it alone is queued again, and goes on."""
+    sweep = write_sweep("warned", iterations=1200, seeds=3, ablations={"whole": {}})
+    run(program, "sweep", sweep, "--out", folder / "warned_local")
+    print(run(program, "sweep", sweep, "--out", folder / "warned", "--launcher", "slurm").strip())
+    array = (folder / "warned" / "slurm" / "jobs.txt").read_text().split()[0]
+    runs = [folder / "warned" / "runs" / i for i in ids(folder / "warned")]
+
+    def has_frames():
+        return all(list((r / "frames").glob("*")) for r in runs)
+
+    wait_for("three runs have finished a frame", has_frames, 200)
+    assert [kinds_of(folder / "warned", i) for i in range(3)] == [["start"]] * 3
+    run("scancel", "--batch", "--signal=USR1", f"{array}_2")
+    wait_for("the three runs", queue_is_empty, 300)
+    assert [kinds_of(folder / "warned", i) for i in range(2)] == [["start", "done"]] * 2, kinds_of(folder / "warned", 0)
+    assert kinds_of(folder / "warned", 2) == ["start", "interrupted", "start", "done"], kinds_of(folder / "warned", 2)
+    check_once(folder / "warned")
+    check_same(folder / "warned_local", folder / "warned")
+
+
+def process_of(sweep):
+    """The process that is, or is about to become, hsi4d with a run of this sweep; 0: none."""
+    for entry in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+        except OSError:  # it has ended
+            continue
+        if b"run-one" in words and str(sweep).encode() in words:
+            return int(entry.name)
+    return 0
+
+
+def early_warning():
+    """A warning in the first moment of a run does not kill it: the run says that it has had no time.
+
+    slurmd sends it to the batch script's process; by scancel it would come too late for this.
+    """
+    sweep = write_sweep("early", seeds=1, ablations={"whole": {}})
+    run(program, "sweep", sweep, "--out", folder / "early", "--launcher", "slurm")
+    array = (folder / "early" / "slurm" / "jobs.txt").read_text().split()[0]
+    begin = time.monotonic()
+    while (process := process_of(folder / "early")) == 0:
+        assert time.monotonic() - begin < 60
+    time.sleep(0.005)  # env has blocked it, and hsi4d is being loaded
+    os.kill(process, signal.SIGUSR1)
+    wait_for("a run that is warned at its start", queue_is_empty, 100)
+    noted = attempts(folder / "early", ids(folder / "early")[0])
+    told = (folder / "early" / "slurm" / f"{array}_0.txt").read_text()
+    assert noted and noted[-1]["event"] == "failed" and "before a frame was finished" in told, (noted, told)
+
+
 def time_limit():
-    """A run that needs more time than it has saves its state, is queued again and goes on.
+    """Of two runs, the one that needs more time than it has saves its state, is queued again by itself and goes on.
 
     Slurm warns up to a minute early, so a time of a minute and grace would leave none to compute in.
     """
     clip = folder / "clip.json"
     clip.write_text(json.dumps({"synthetic": {"frames": 60, "size_px": 128, "scene_gaussians": 4000, "avatar_gaussians": 2000}}))
     run(program, "synth", clip, "--out", folder / "clip")
-    sweep = write_sweep("limit", seeds=1, ablations={"whole": {}}, clips={"clip": str(folder / "clip" / "config.json")},
+    sweep = write_sweep("limit", seeds=1, ablations={"short": {"stages.interaction.iterations": 5, "stages.refinement": None}, "whole": {}},
+                        clips={"clip": str(folder / "clip" / "config.json")},
                         set={"stages.interaction.iterations": 900}, slurm={"time": "00:02:00", "grace_s": 35})
     print(run(program, "sweep", sweep, "--out", folder / "limit", "--launcher", "slurm").strip())
     wait_for("a run of more than its time", queue_is_empty, 900)
@@ -180,8 +238,10 @@ def time_limit():
     assert "before a frame was finished, and would be again" in told, told
     noted = attempts(folder / "hopeless", ids(folder / "hopeless")[0])[-1]
     assert noted["event"] == "failed" and noted["message"] in told, noted
-    kinds = [a["event"] for a in attempts(folder / "limit", ids(folder / "limit")[0])]
+    kinds = kinds_of(folder / "limit", 1)
     assert kinds.count("interrupted") >= 1 and kinds[-1] == "done", kinds
+    short = "".join(f.read_text() for f in (folder / "limit" / "slurm").glob("*_0.txt"))
+    assert short.count("report: ") == 1, short  # once done it is not started again
     print("the run's attempts: " + ", ".join(kinds))
 
 
@@ -189,6 +249,8 @@ try:
     print(local("start").strip())
     smoke_is_the_same()
     lost_node()
+    warned_task()
+    early_warning()
     time_limit()
     print("passed")
 finally:

@@ -190,6 +190,21 @@ TEST_CASE("a camera that sees nothing is warned of, with the convention") {
   }
 }
 
+TEST_CASE("Gaussians that are all too faint are warned of, and not the camera") {
+  const Files files;
+  Gaussians faint = test_gaussians();
+  std::fill(faint.opacity_logits.begin(), faint.opacity_logits.end(), -13.8155106F);  // 1e-6
+  write_ply("scene.ply", faint);
+  for (const char* word : kWords) {
+    INFO(word);
+    std::string told;
+    const LogSink sink = log_to([&told](LogLevel, std::string_view message) { told = message; });
+    cli::render_command(render_options("a.npz", word));
+    CHECK(told.find("no Gaussian is drawn: the opacity of all 9 is at most 1e-06, below render.alpha_min, 0.0039") ==
+          0);
+  }
+}
+
 TEST_CASE("a scene without Gaussians is its background") {
   const Files files;
   write_ply("scene.ply", Gaussians{});

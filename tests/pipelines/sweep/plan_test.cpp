@@ -238,10 +238,16 @@ TEST_CASE("mistakes of a sweep's file are told with their place") {
                  {"skip", {{{"ablation", "b"}, {"render.blur", 2}}}},
                  {"compare", {{"ablation", "b"}, {"render.blur", 2}}}}) ==
         "sweep.json:23: /compare: no run has all of these values");
-  CHECK(refused({{"slurm", {{"time", "0-00:02"}}}}) ==
-        "sweep.json:4: /slurm/grace_s: 120 s before the end of its time a run would save its state, and it has 120 s "
-        "(/slurm/time); give it more, or a shorter grace_s");
-  CHECK(refused({{"slurm", {{"time", "2:30"}, {"grace_s", 149}, {"options", {"--account", "hsi"}}}}}) ==
+  CHECK(
+      refused({{"slurm", {{"time", "0-00:02"}}}}) ==
+      "sweep.json:4: /slurm/grace_s: 120 s before the end of its time, or up to a minute earlier, Slurm tells a run to "
+      "save its state; of 120 s (/slurm/time) none may be left to work in; allowed: 1 to 59, or a time of more than "
+      "180 s");
+  CHECK(
+      refused({{"slurm", {{"time", "1"}, {"grace_s", 48}}}}) ==
+      "sweep.json:6: /slurm/grace_s: 48 s before the end of its time, or up to a minute earlier, Slurm tells a run to "
+      "save its state; of 60 s (/slurm/time) none may be left to work in; give it a time of more than 108 s");
+  CHECK(refused({{"slurm", {{"time", "2:30"}, {"grace_s", 119}, {"options", {"--account", "hsi"}}}}}) ==
         "sweep.json:9: /slurm/options/1: \"hsi\" is no option of sbatch, which begin with '-'; a value belongs to its "
         "option: --account=hsi");
   CHECK(refused({{"ablations", {{"a", Json::object()}}}, {"compare", {{"ablation", "b"}}}}) ==

@@ -2,6 +2,7 @@
 // cluster.
 #include "pipelines/sweep/slurm.h"
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
@@ -9,7 +10,9 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "core/process.h"
 #include "optim/checkpoint.h"
+#include "pipelines/cli/interrupt.h"
 #include "tests/support/made_sweep.h"
 
 namespace slurm_test {
@@ -62,6 +65,33 @@ struct StandInCluster {
   }
 };
 
+/// A variable of the environment while it lives.
+struct Environment {
+  std::string name;
+
+  Environment(const std::string& variable, const std::string& value) : name(variable) {
+    ::setenv(name.c_str(), value.c_str(), 1);
+  }
+  ~Environment() { ::unsetenv(name.c_str()); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+};
+
+/// While it lives, SIGUSR1 is blocked where nothing unblocks it, and does what it did before afterwards.
+struct Held {
+  sigset_t before;
+
+  Held() {
+    sigset_t warning;
+    sigemptyset(&warning);
+    sigaddset(&warning, SIGUSR1);
+    pthread_sigmask(SIG_BLOCK, &warning, &before);
+  }
+  ~Held() { pthread_sigmask(SIG_SETMASK, &before, nullptr); }
+  Held(const Held&) = delete;
+  Held& operator=(const Held&) = delete;
+};
+
 }  // namespace
 
 TEST_CASE("a sweep is submitted as an array and a job for its results") {
@@ -74,7 +104,40 @@ TEST_CASE("a sweep is submitted as an array and a job for its results") {
              Contains("--array=0-3 ") && Contains("--comment=" + cluster.comment(cluster.plan_name())));
   CHECK_THAT(cluster.asked()[1], Contains("--dependency=afterany:101 ") && Contains(cluster.comment("results")));
   CHECK(file_text("made/slurm/jobs.txt") == "101 " + cluster.plan_name() + "\n");
-  CHECK_THAT(file_text("made/slurm/run.sh"), Contains("exec '/opt/hsi4d' run-one '") && Contains(" --requeue\n"));
+  CHECK_THAT(file_text("made/slurm/run.sh"), Contains("exec $hold '/opt/hsi4d' run-one '") && Contains(" --requeue\n"));
+}
+
+TEST_CASE("a warning that comes before the program can note it waits for it") {
+  const StandInCluster cluster;
+  // A program that gets the warning first of all, and tells which signals wait for it; a child would change that.
+  cluster.script("hsi4d", "kill -USR1 $$; while read -r line; do echo \"$line\"; done < /proc/$$/status > waiting.txt");
+  submit_sweep(cluster.made.paths(), cluster.made.plan(), fs::absolute("bin/hsi4d").string(), 0, 1);
+  run_process({"sh", "made/slurm/run.sh"});
+  CHECK_THAT(file_text("waiting.txt"), Contains("ShdPnd:\t0000000000000200"));  // the bit of signal 10
+
+  const Held held;
+  ::raise(SIGUSR1);
+  const cli::TimeLimitWatch watch;
+  CHECK(cli::TimeLimitWatch::requested());
+}
+
+TEST_CASE("where env cannot block the warning, it does not kill the program at least") {
+  const StandInCluster cluster;
+  cluster.script("hsi4d", "kill -USR1 $$; echo alive > alive.txt");
+  cluster.script("env", "exit 125");
+  submit_sweep(cluster.made.paths(), cluster.made.plan(), fs::absolute("bin/hsi4d").string(), 0, 1);
+  run_process({"sh", "made/slurm/run.sh"});
+  CHECK(file_text("alive.txt") == "alive\n");
+}
+
+TEST_CASE("a task of an array puts itself alone into the queue again") {
+  const StandInCluster cluster;
+  cluster.script("scontrol", "echo \"$*\" >> scontrol.txt");
+  const Environment job("SLURM_JOB_ID", "7");
+  requeue_this_job();
+  const Environment array("SLURM_ARRAY_JOB_ID", "7"), task("SLURM_ARRAY_TASK_ID", "2");  // the last: the array's number
+  requeue_this_job();
+  CHECK(file_text("scontrol.txt") == "requeue 7\nrequeue 7_2\n");
 }
 
 TEST_CASE("more runs than Slurm takes in an array are several, whose tasks count from their first run") {
