@@ -53,7 +53,15 @@ struct WeightedRender {
 };
 
 /// How a difference is weighed.
-enum class Weighing { kGiven, kLearned, kComputed, kOfBoth };
+struct Weighing {
+  const char* name;
+  bool of_image;  ///< the image is multiplied, not its difference
+  bool computed;  ///< by the square of a leaf, not by the leaf
+};
+constexpr Weighing kWeighings[] = {{"difference", false, false},
+                                   {"difference, computed", false, true},
+                                   {"image", true, false},
+                                   {"image, computed", true, true}};
 
 /// Gaussians in the left half of an image over a background, and a weighted difference from a target: of everything
 /// that skips or of nothing.
@@ -69,10 +77,9 @@ struct OverBackground {
     tape.set_skips({skips, skips, skips});
     target = tape.constant("target", flat.out.channels.shape());
     tape.set(target, std::vector<S>(static_cast<std::size_t>(target.shape().count()), S(0.3)));
-    weight = weighs == Weighing::kGiven ? tape.constant("weight", flat.out.transmittance.shape())
-                                        : tape.parameter("weight", flat.out.transmittance.shape());
-    loss = weighs == Weighing::kOfBoth ? l2(weighted_image(flat.out.channels, weight), target)
-                                       : l2(flat.out.channels, target, given_weight());
+    weight = tape.parameter("weight", flat.out.transmittance.shape());
+    const Var<S> by = weighs.computed ? square(weight) : weight;
+    loss = weighs.of_image ? l2(weighted_image(flat.out.channels, by), target) : l2(flat.out.channels, target, by);
   }
   static SplatView view_of(int tile, bool skips) {
     RenderSettings settings;
@@ -81,8 +88,6 @@ struct OverBackground {
     view.skip = {skips, skips, skips, skips, skips};
     return view;
   }
-  Var<S> given_weight() { return weighing == Weighing::kComputed ? square(weight) : weight; }
-
   /// Pixels of columns [left, right) count, a little more from row to row.
   void weigh(Index left, Index right) {
     const Array<S> w = flat.tape.write(weight);
@@ -112,16 +117,11 @@ struct OverBackground {
     std::vector<double> d_background(3, 0.0), d_weight(t.size(), 0.0);
     for (std::size_t i = 0; i < image.size(); ++i) {
       const std::size_t p = i % t.size();
-      const double each = 1 / static_cast<double>(image.size()), x = image[i], target_x = S(0.3);
-      if (weighing == Weighing::kOfBoth) {
-        const double slope = 2 * each * (w[p] * x - target_x);
-        d_background[i / t.size()] += slope * w[p] * t[p];
-        d_weight[p] += slope * x;
-      } else {
-        const double by_leaf = weighing == Weighing::kComputed ? 2 * w[p] : 1, d = x - target_x;
-        d_background[i / t.size()] += 2 * each * (weighing == Weighing::kComputed ? w[p] * w[p] : w[p]) * d * t[p];
-        d_weight[p] += each * d * d * by_leaf;
-      }
+      const double each = 1 / static_cast<double>(image.size()), target_x = S(0.3);
+      const double by = weighing.computed ? w[p] * w[p] : w[p], d_by = weighing.computed ? 2 * w[p] : 1;
+      const double d = weighing.of_image ? by * image[i] - target_x : image[i] - target_x;
+      d_background[i / t.size()] += 2 * each * d * by * t[p];
+      d_weight[p] += each * d_by * (weighing.of_image ? 2 * d * image[i] : d * d);
     }
     return {d_background, d_weight};
   }
@@ -135,28 +135,29 @@ TEMPLATE_TEST_CASE("a background and a learned weight have their gradients from 
                    double) {
   using S = TestType;
   const double rounding = 100 * static_cast<double>(std::numeric_limits<S>::epsilon());
-  for (const Weighing weighing : {Weighing::kGiven, Weighing::kLearned, Weighing::kComputed, Weighing::kOfBoth}) {
+  for (const Weighing& weighing : kWeighings) {
     for (const int tile : {8, 16}) {
       OverBackground<S> all(weighing, tile, false), some(weighing, tile, true);
       // The weights cover everything, then what is empty, what is not, both in part, one column, nothing.
       for (const auto& [left, right] :
            {std::pair{0, 100}, {70, 100}, {0, 40}, {20, 75}, {99, 100}, {50, 50}, {0, 64}}) {
-        for (const bool behind : {true, false, true}) {
-          INFO(static_cast<int>(weighing) << ", tiles of " << tile << " px, columns " << left << " to " << right
-                                          << (behind ? ", with" : ", without") << " a background's gradient");
+        for (const auto& [behind, learned] : {std::pair{false, false}, {false, true}, {true, false}, {true, true}}) {
+          INFO(weighing.name << ", tiles of " << tile << " px, columns " << left << " to " << right
+                             << (behind ? ", the background's gradient" : "") << (learned ? ", the weight's" : ""));
           std::vector<std::vector<double>> expected, computed;
           for (OverBackground<S>* render : {&all, &some}) {
+            Tape<S>& tape = render->flat.tape;
             render->weigh(left, right);
             render->move(0.25);
-            behind ? render->flat.tape.unfreeze(render->flat.background)
-                   : render->flat.tape.freeze(render->flat.background);
+            behind ? tape.unfreeze(render->flat.background) : tape.freeze(render->flat.background);
+            learned ? tape.unfreeze(render->weight) : tape.freeze(render->weight);
             (render == &all ? expected : computed) = render->run();
           }
           const bool has_the_bits = computed == expected;
           CHECK(has_the_bits);
           const auto [d_background, d_weight] = all.plain_gradients();
           if (behind) CHECK(largest_difference(computed[kOfBackground], d_background) <= rounding);
-          if (weighing != Weighing::kGiven) CHECK(relative_l2(computed[kOfWeight], d_weight) <= rounding);
+          if (learned) CHECK(relative_l2(computed[kOfWeight], d_weight) <= rounding);
         }
       }
     }
