@@ -86,11 +86,12 @@ inline FlatSplats random_splats(Index n, int width, int height, Index channels, 
 template <class S>
 struct FlatRender {
   Tape<S> tape;
-  Var<S> means, factors, depths, opacities, features;
+  Var<S> means, factors, depths, opacities, features, background;
   Projected<S> projected;
   Composited<S> out;
 
-  FlatRender(const FlatSplats& splats, const SplatView& view) {
+  /// @param behind  the background; empty: none
+  FlatRender(const FlatSplats& splats, const SplatView& view, const std::vector<double>& behind = {}) {
     const Index n = splats.count();
     means = leaf(tape, "means", shape_of(n, 2), splats.means);
     factors = leaf(tape, "factors", shape_of(n, 6), splats.factors);
@@ -99,7 +100,8 @@ struct FlatRender {
     features = leaf(tape, "features", shape_of(n, splats.channels), splats.features);
     projected = {means, factors, depths, tape.constant("rest", shape_of(n, 1)),
                  tape.constant("means rest", shape_of(n, 2))};
-    out = composite(SplatSet<S>{projected, opacities, features}, view);
+    if (!behind.empty()) background = leaf(tape, "background", shape_of(1, static_cast<Index>(behind.size())), behind);
+    out = composite(SplatSet<S>{projected, opacities, features}, view, background);
     tape.forward(out.channels);
   }
   /// From ones in every channel.

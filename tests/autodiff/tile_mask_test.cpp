@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "tests/autodiff/ssim_images.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/operator_check.h"
 #include "tests/support/patched_image.h"
 
 namespace tile_mask_test {
@@ -28,12 +29,13 @@ struct PatchScene {
   std::shared_ptr<Patch> patch = std::make_shared<Patch>();
   Tape<S> tape;
   Var<S> base = tape.constant("base", shape), target = tape.constant("target", shape);
-  Var<S> weight = tape.constant("weight", image_shape<S>(1, 150, 1210)), x = tape.parameter("x", kScalarShape);
+  Var<S> weight = tape.parameter("weight", image_shape<S>(1, 150, 1210)), x = tape.parameter("x", kScalarShape);
   Var<S> image = patched_image(base, x, patch);
   std::vector<Var<S>> losses;
 
   explicit PatchScene(bool tells) {
     patch->tells = tells;
+    tape.freeze(weight);
     TestRandom random{9};
     for (const Var<S>& var : {base, target}) {
       const PaddedImage<S> numbers = random_image<S>(shape, random);
@@ -88,6 +90,33 @@ TEMPLATE_TEST_CASE("losses of squares that changed have the bits of those of the
       CHECK(value == all);
       CHECK(derivative == all_derivative);
     }
+  }
+}
+
+TEMPLATE_TEST_CASE("a weight that is learned has its gradient at all pixels, whatever changed of the image", "", float,
+                   double) {
+  PatchScene<TestType> told(true), whole(false);
+  for (PatchScene<TestType>* scene : {&told, &whole}) scene->tape.unfreeze(scene->weight);
+  const auto gradient = [](PatchScene<TestType>& scene, Loss loss) {
+    scene.run(loss);
+    return hsi4d::test::detail::numbers<TestType>(scene.tape.gradient(scene.weight));
+  };
+  for (const Loss loss : {Loss::kWeightedL1, Loss::kWeightedL2, Loss::kWeightedDSsim}) {
+    for (const Place p : kPlaces) {
+      INFO("loss " << static_cast<int>(loss) << ", square of " << p.side << " at " << p.row << "," << p.col);
+      told.place(p.row, p.col, p.side);
+      whole.place(p.row, p.col, p.side);
+      const bool has_the_bits = gradient(told, loss) == gradient(whole, loss);
+      CHECK(has_the_bits);
+    }
+  }
+  // And they are those of the formula: Σ over planes of |a − b|, over all numbers.
+  gradient(told, Loss::kWeightedL1);
+  const ConstArray<TestType> a = told.tape.value(told.image), b = told.tape.value(told.target);
+  for (const Index col : {3, 300, 1000}) {  // in the hole of the weights too
+    TestType sum = 0;
+    for (Index plane = 0; plane < 2; ++plane) sum += std::abs(a(plane, 60, col) - b(plane, 60, col));
+    CHECK(told.tape.gradient(told.weight)(0, 60, col) * 2 * 150 * 1210 == Approx(sum).epsilon(1e-5));
   }
 }
 

@@ -253,4 +253,36 @@ TEST_CASE("functions of poses have the gradients of complex steps") {
       });
 }
 
+TEST_CASE("excess beyond ranges has the gradients of complex steps on both sides of where its series ends") {
+  // The slope of the swing is a series where tan(swing/2) ≤ 0.1, up to 11.42°. Knees may be bent 8° the wrong way and
+  // elbows 10°, so that these joints alone are beyond their ranges there.
+  constexpr double kRadians = 3.14159265358979323846 / 180;
+  std::vector<double> swings;
+  for (const double degrees : {8.5, 9.0, 9.7, 10.3, 11.0, 11.4, 11.45, 12.0, 14.0})
+    swings.push_back(degrees * kRadians);
+  for (const double beside : {-1e-3, -1e-9, 1e-9, 1e-3}) swings.push_back(2 * std::atan(0.1) * (1 + beside));
+  for (const double swing : swings) {
+    INFO("swings of " << swing / kRadians << " degrees");
+    std::vector<double> matrices;
+    for (const NaturalJoint& joint : natural_joints()) {
+      const std::string name = joint.name;
+      Vector3<double> across(0.3, 0.2, 0.1), along = Vector3<double>::Zero();
+      if (name.ends_with("knee")) across = {-1, 0, 0.05};
+      if (name.ends_with("elbow")) across = {0, name.starts_with("left") ? 1.0 : -1.0, 0.05};
+      across[joint.twist_axis] = 0;
+      along[joint.twist_axis] = 0.1;
+      const Matrix3<double> r = so3_exp(Vector3<double>(swing * across.normalized())) * so3_exp(along);
+      for (int i = 0; i < 9; ++i) matrices.push_back(r(i / 3, i % 3));
+    }
+    check_complex_step(
+        {{"rotations", shape_of(21, 9), 0, 0, matrices}}, [](const Vars& in) { return joint_limit_excess(in[0]); },
+        [](const ComplexInputs& in) {
+          Complexes y;
+          for (std::size_t n = 0; n < 21; ++n) y.push_back(plain_excess(matrix_at(in[0], n), natural_joints()[n]));
+          return y;
+        },
+        {.tolerance = 1e-11});
+  }
+}
+
 }  // namespace complex_step_test

@@ -199,6 +199,18 @@ SplatScene stack(Index n, double alpha, std::uint64_t seed, const SceneSize& siz
   return painter.scene;
 }
 
+SplatScene crowded(Index n, std::uint64_t seed, const SceneSize& size) {
+  Painter painter("crowded", 0, plain_camera(size), seed);
+  for (Index i = 0; i < n; ++i) {
+    const double z = painter.between(2, 4), pixel = z / size.width,
+                 aspect = static_cast<double>(size.height) / size.width;
+    painter.add({painter.between(-0.5, 0.5) * z, painter.between(-0.5, 0.5) * aspect * z, z},
+                {painter.scale_between(0.4, 1.2) * pixel, painter.scale_between(0.4, 1.2) * pixel, 0.5 * pixel},
+                painter.between(-4, -2.5));
+  }
+  return painter.scene;
+}
+
 SplatScene broken_numbers(std::uint64_t seed, const SceneSize& size) {
   Painter painter("broken numbers", 1, tilted_camera(size), seed);
   const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();

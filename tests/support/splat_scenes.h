@@ -64,6 +64,9 @@ SplatScene depth_ties(std::uint64_t seed, const SceneSize& size = {});
 /// n Gaussians one behind the other on the ray of the central pixel's centre, of α there about `alpha` each (before the
 /// cap), in shuffled order, colours different; plain camera.
 SplatScene stack(Index n, double alpha, std::uint64_t seed, const SceneSize& size = {});
+/// n faint Gaussians of about a pixel all over the image, at depths 2 to 4; plain camera. In an image of 20 × 20 pixels
+/// two thirds of them reach the first tile.
+SplatScene crowded(Index n, std::uint64_t seed, const SceneSize& size = {20, 20});
 /// Log-scales 0, ±20, ±40, ±88, ±200, ±inf, NaN, means and quaternions that are not finite, zero quaternions, among
 /// good Gaussians.
 SplatScene broken_numbers(std::uint64_t seed, const SceneSize& size = {});

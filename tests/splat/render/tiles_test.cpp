@@ -63,6 +63,64 @@ PixelAlpha<S> alpha_at(const SplatRecord<S>& record, const RenderSettings& setti
   return pixel_alpha(record, rules, job, row - job.top, col - job.left);
 }
 
+/// A projected Gaussian with its covariance, blur included.
+struct Ellipse {
+  std::array<double, 6> v;
+  double x, y, opacity;
+  double xx, xy, yy;
+
+  /// 2 log(o/alpha_min): α ≥ alpha_min where dᵀ cov⁻¹ d is at most this.
+  double squared_reach(const RenderSettings& settings) const { return 2 * std::log(opacity / settings.alpha_min); }
+  /// dᵀ cov⁻¹ d at a pixel's centre.
+  double squared_distance(Index row, Index col) const {
+    const double dx = static_cast<double>(col) + 0.5 - x, dy = static_cast<double>(row) + 0.5 - y;
+    return (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
+  }
+};
+
+/// Anywhere, or with a pixel's centre just within the ellipse where it reaches farthest up, down, left or right.
+Ellipse random_ellipse(RandomSequence& random, const TileGrid& grid, const RenderSettings& settings) {
+  const double length = std::pow(10, random.uniform(-1, 1.5)), width = length * std::pow(10, random.uniform(-1.5, 0));
+  Ellipse e{};
+  e.v = needle(random, length, width);
+  for (std::size_t k = 0; k < 3; ++k) {
+    e.xx += e.v[k] * e.v[k], e.xy += e.v[k] * e.v[3 + k], e.yy += e.v[3 + k] * e.v[3 + k];
+  }
+  e.xx += settings.blur, e.yy += settings.blur;
+  e.opacity = static_cast<float>(random.uniform(0.01, 1));
+  e.x = random.uniform(-10, static_cast<double>(grid.width + 10));
+  e.y = random.uniform(-10, static_cast<double>(grid.height + 10));
+  const std::uint64_t kind = random.below(5);
+  if (kind == 0) return e;
+  const double col = static_cast<double>(random.below(static_cast<std::uint64_t>(grid.width))) + 0.5;
+  const double row = static_cast<double>(random.below(static_cast<std::uint64_t>(grid.height))) + 0.5;
+  const double within = 1 - std::pow(10, random.uniform(-9, -3)), side = kind % 2 == 0 ? within : -within;
+  const double reach = side * std::sqrt(e.squared_reach(settings));
+  const double root = std::sqrt(kind < 3 ? e.yy : e.xx);
+  e.x = col - reach * (kind < 3 ? e.xy : e.xx) / root;
+  e.y = row - reach * (kind < 3 ? e.yy : e.xy) / root;
+  return e;
+}
+
+/// Blocks of every tile that entries name, of each row: [rows][tiles].
+std::vector<std::uint32_t> listed_blocks(const std::vector<Extent>& extents, const TileGrid& grid) {
+  Index bound = 0;
+  std::vector<DepthKeyed> order;
+  for (std::size_t n = 0; n < extents.size(); ++n) {
+    bound += tiles_around(extents[n], grid);
+    if (extents[n].row_begin < extents[n].row_end) order.push_back({0, static_cast<std::int32_t>(n)});
+  }
+  TileLists lists;
+  lists.find(extents, grid, bound, bound);
+  lists.deal(order, grid, 0);
+  std::vector<std::uint32_t> blocks(extents.size() * static_cast<std::size_t>(grid.count()), 0);
+  for (Index tile = 0; tile < grid.count(); ++tile) {
+    for (Index at = lists.tile_begin[tile]; at < lists.tile_begin[tile + 1]; ++at)
+      blocks[static_cast<std::size_t>(lists.entries[at].index * grid.count() + tile)] = lists.entries[at].blocks;
+  }
+  return blocks;
+}
+
 }  // namespace
 
 TEST_CASE("a Gaussian without area has the antialias factor 0 and no gradient, and nothing without a blur [A7]") {
@@ -117,6 +175,57 @@ TEST_CASE("a factor that is left out of a tile has no pixel there that it would 
   }
   CHECK(left_out > 50000);
   CHECK(static_cast<double>(empty) < 0.1 * static_cast<double>(kept));  // and the test is sharp
+}
+
+TEST_CASE("a pixel that a footprint only just reaches is in the lists [B7]") {
+  RandomSequence random(8, 2);
+  const RenderSettings settings;
+  // Of renders in float, and in double, whose extents have less room for other rounding.
+  for (const auto& [side, epsilon] : {std::pair{Index(8), 1.2e-7}, {Index(16), 1.2e-7}, {Index(16), 2.2e-16}}) {
+    const TileGrid grid = tile_grid(150, 90, side);
+    std::vector<Ellipse> ellipses;
+    std::vector<Extent> extents;
+    for (int i = 0; i < 8000; ++i) {
+      const Ellipse& e = ellipses.emplace_back(random_ellipse(random, grid, settings));
+      Conic conic;
+      REQUIRE(conic_of(e.v.data(), settings.blur, conic));
+      extents.push_back(extent_of(conic, e.x, e.y, e.opacity, grid, settings, epsilon));
+    }
+    const std::vector<std::uint32_t> listed = listed_blocks(extents, grid);
+    std::vector<std::uint32_t> drawn(listed.size(), 0), plain(listed.size(), 0);
+    const auto at = [&grid](std::size_t n, Index tile) {
+      return n * static_cast<std::size_t>(grid.count()) + static_cast<std::size_t>(tile);
+    };
+    for (std::size_t n = 0; n < ellipses.size(); ++n) {
+      const Ellipse& e = ellipses[n];
+      const auto visit = [&](Index tile, std::uint32_t blocks) { plain[at(n, tile)] = blocks; };
+      for_each_tile(extents[n], grid, visit);
+      const double reach = e.squared_reach(settings);
+      const double high = std::sqrt(reach * e.yy) + 2, wide = std::sqrt(reach * e.xx) + 2;
+      const Pixels rows = pixels_within(e.y - high, e.y + high, grid.height);
+      const Pixels cols = pixels_within(e.x - wide, e.x + wide, grid.width);
+      for (Index row = rows.begin; row < rows.end; ++row) {
+        for (Index col = cols.begin; col < cols.end; ++col) {
+          if (e.squared_distance(row, col) > reach) continue;
+          const Index block = row % side / kBlockSide * (side / kBlockSide) + col % side / kBlockSide;
+          drawn[at(n, row / side * grid.cols + col / side)] |= 1u << block;
+        }
+      }
+    }
+    Index missed = 0, missed_plain = 0, needed = 0, beside = 0;
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+      missed += std::popcount(drawn[i] & ~listed[i]);
+      missed_plain += std::popcount(drawn[i] & ~plain[i]);
+      needed += std::popcount(drawn[i]);
+      beside += std::popcount(listed[i] & ~drawn[i]);
+    }
+    INFO("tiles of " << side << " px, epsilon " << epsilon << ": " << needed << " blocks, " << beside
+                     << " beside them");
+    CHECK(missed == 0);
+    CHECK(missed_plain == 0);
+    CHECK(needed > 100000);
+    CHECK(static_cast<double>(beside) < 0.1 * static_cast<double>(needed));  // and the lists are sharp
+  }
 }
 
 TEST_CASE("depth keys are in the order of the depths [B9]") {
