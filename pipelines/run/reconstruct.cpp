@@ -16,6 +16,7 @@
 #include "pipelines/record/results.h"
 #include "pipelines/report/view3d.h"
 #include "pipelines/run/checkpoint.h"
+#include "pipelines/run/frame_start.h"
 #include "pipelines/run/reconstruct_stage.h"
 #include "pipelines/run/stage_log.h"
 #include "pipelines/run/start_choice.h"
