@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "core/check.h"
+#include "core/simd.h"
 #include "optim/checkpoint.h"
 
 namespace hsi4d {
@@ -45,6 +46,7 @@ std::vector<MetricValues> stored_errors(const char* kind, std::size_t frames, co
   return errors;
 }
 
+constexpr const char* kIsa = "instruction_set";
 constexpr const char* kLeftOut = "left_out";
 
 /// A line each: "STAGE FRAME OBJECT TERM<tab>REASON".
@@ -273,6 +275,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
+  checkpoint.set(kIsa, std::string(isa_name(best_isa())));
   if (!progress.left_out.empty()) checkpoint.set(kLeftOut, left_out_text(progress.left_out));
   if (!progress.still.empty()) checkpoint.set(kStill, still_text(progress.still));
   if (progress.start.seconds > 0) store_start(progress.start, checkpoint);
@@ -321,6 +324,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);
   progress.inputs = checkpoint.text("inputs");
+  if (checkpoint.has(kIsa)) progress.isa = checkpoint.text(kIsa);
   progress.start = stored_start(checkpoint);
   progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
   const Index first_frame = first_stages > 0 ? 0 : 1;

@@ -55,6 +55,7 @@ struct RunProgress {
   StartTotals start;                                 ///< where the best start was chosen
   ColorState colors;                                 ///< after the last frame done
   double seconds = 0;                                ///< of the frames done
+  std::string isa;  ///< isa_name of who wrote the checkpoint; empty: not read from one, or from an older one
 
   /// Frames done, frame 0 included.
   Index frames_done() const { return after_stage.empty() ? 0 : static_cast<Index>(after_stage.front().size()); }
@@ -81,7 +82,7 @@ const std::vector<SceneState>& result_of(const RunProgress& progress, const Refi
 /// @param net  with which the run begins, if it has one
 RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net = {});
 
-/// Writes the checkpoint of a run, in one step.
+/// Writes the checkpoint of a run, in one step, with the name of the instruction set of now.
 /// @param config  the text to which the checkpoint belongs: the config, without what no result depends on
 void save_progress(const std::string& file, const std::string& config, const RunProgress& progress);
 

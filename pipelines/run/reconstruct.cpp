@@ -7,6 +7,7 @@
 
 #include "core/image_io.h"
 #include "core/log.h"
+#include "core/simd.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "pipelines/draw/frame_images.h"
@@ -58,6 +59,14 @@ RunProgress read_checkpoint(const std::string& file, const std::string& identity
   }
   check_unchanged(progress.inputs, files, file);
   return progress;
+}
+
+/// The kernels of another instruction set round otherwise. (Another precision is another config, which is refused.)
+void warn_of_other_isa(const std::string& before) {
+  const std::string now = isa_name(best_isa());
+  if (!before.empty() && before != now)
+    log_warning("resumed with instruction set " + now + ", the frames so far were made with " + before +
+                ": the bits will differ from those of a run that was never stopped");
 }
 
 /// What is told of a run that was stopped in frame `frame` of `frames`, or after the last of them: those before it are
@@ -133,6 +142,7 @@ class Reconstruction {
     const std::string file = checkpoint_file(folder_.paths());
     if (folder_.resumed_from() && std::filesystem::exists(file)) {
       progress_ = read_checkpoint(file, identity_, config_, clip_);
+      warn_of_other_isa(progress_.isa);
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
       add_covered(read_frame(clip_, 0), config_.data, progress_.covered);

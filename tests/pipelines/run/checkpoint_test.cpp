@@ -9,6 +9,7 @@
 #include "body/body_model.h"
 #include "core/check.h"
 #include "core/random.h"
+#include "core/simd.h"
 #include "optim/checkpoint.h"
 #include "tests/support/temporary_folder.h"
 
@@ -155,6 +156,23 @@ TEST_CASE("progress survives its checkpoint bit for bit") {
       CHECK(read.covered(0, y, x) == saved.covered(0, y, x));
     }
   }
+}
+
+TEST_CASE("a checkpoint names its instruction set, and one of a version that did not is read") {
+  const TemporaryFolder here;
+  const Clip clip = three_frames();
+  save_progress(kFile, kConfig, random_progress(clip));
+  CHECK(load_progress(kFile, kConfig, clip, kStages).isa == isa_name(best_isa()));
+  std::string bytes = file_text(kFile);
+  const std::string name = "instruction_set";
+  int places = 0;  // of the name in the archive, which has no sum over it
+  for (std::size_t at = 0; (at = bytes.find(name, at)) != std::string::npos; ++places)
+    bytes.replace(at, name.size(), "something_older");
+  CHECK(places == 2);
+  here.write(kFile, bytes);
+  const RunProgress read = load_progress(kFile, kConfig, clip, kStages);
+  CHECK(read.isa.empty());
+  CHECK(read.frames_done() == 2);
 }
 
 TEST_CASE("frames without a foreground keep that they have none") {
