@@ -35,6 +35,14 @@ struct StillGroup {
   std::string group;
 };
 
+/// A stage of a frame in which what a setting of `approx` takes for small was not: the view of a part turned further
+/// (view_turn_deg) than the colours are held for, or than Gaussians are kept for that it may show.
+struct LeftRange {
+  std::size_t stage = 0;
+  Index frame = 0;
+  std::string setting;  ///< of `approx`
+};
+
 /// Frame 0 after a stage over the first frame.
 struct FirstFrameState {
   SceneState state;
@@ -52,6 +60,7 @@ struct RunProgress {
   Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
   std::vector<LeftOutInFrame> left_out;              ///< in the order in which it happened
   std::vector<StillGroup> still;                     ///< likewise
+  std::vector<LeftRange> left_ranges;                ///< likewise
   StartTotals start;                                 ///< where the best start was chosen
   ColorState colors;                                 ///< after the last frame done
   double seconds = 0;                                ///< of the frames done

@@ -11,6 +11,7 @@
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "pipelines/draw/frame_images.h"
+#include "pipelines/draw/view_turn.h"
 #include "pipelines/draw/visibility.h"
 #include "pipelines/input/input_hashes.h"
 #include "pipelines/metrics/sequence_errors.h"
@@ -107,6 +108,7 @@ class Reconstruction {
     bar_.finish();
     warn_of_left_out(progress_.left_out, config_, clip_);
     warn_of_still_groups(progress_.still, config_);
+    warn_of_left_ranges(progress_.left_ranges, config_);
     warn_of_what_is_out_of_view(clip_, result());
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
     RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
@@ -276,8 +278,10 @@ class Reconstruction {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
       note(frame.index, s, report, &counters, &totals);
     };
+    const SceneState before = state;
     const StageResult result =
         run_frame_stage({config_, clip_, losses_, s, observer_.stages}, frame, state, colors, note_iteration);
+    if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
@@ -290,6 +294,16 @@ class Reconstruction {
     }
     for (const std::string& group : gradients.still_groups()) progress_.still.push_back({s, frame.index, group});
     folder_.note("frame " + std::to_string(frame.index) + ", " + stage_text(name, result, begin, clip_));
+  }
+
+  /// What approximations took for small when the stage began.
+  void note_left_ranges(std::size_t s, Index frame, const SceneState& before, const SceneState& after) {
+    const ApproxSettings& approx = config_.approx;
+    if (!approx.hold_colors && approx.seen_within_deg == 0) return;
+    const double turn = view_turn_deg(clip_, before, after);
+    if (approx.hold_colors && turn > kHeldColorsDeg) progress_.left_ranges.push_back({s, frame, "hold_colors"});
+    if (approx.seen_within_deg > 0 && turn > approx.seen_within_deg)
+      progress_.left_ranges.push_back({s, frame, "seen_within_deg"});
   }
 
   /// @param frame     none: all at once

@@ -253,6 +253,21 @@ TEST_CASE("groups without a gradient are in a checkpoint, and nothing that is no
   }
 }
 
+TEST_CASE("stages that left the range of an approximation are in a checkpoint, and nothing that is not of the clip") {
+  const TemporaryFolder here;
+  const Clip clip = three_frames();
+  RunProgress progress = random_progress(clip);
+  progress.left_ranges = {{0, 1, "hold_colors"}, {1, 2, "seen_within_deg"}};
+  save_progress(kFile, kConfig, progress);
+  const std::vector<LeftRange> read = load_progress(kFile, kConfig, clip, kStages).left_ranges;
+  REQUIRE(read.size() == 2);
+  CHECK((read[0].stage == 0 && read[0].frame == 1 && read[0].setting == "hold_colors"));
+  CHECK((read[1].stage == 1 && read[1].frame == 2 && read[1].setting == "seen_within_deg"));
+  save_with(clip, "left_ranges", "2 1 hold_colors\n");
+  CHECK(loading_error(clip) ==
+        kFile + ": \"left_ranges\" holds \"2 1 hold_colors\", which is no stage, frame and setting of this clip");
+}
+
 TEST_CASE("what losses left out is in a checkpoint, and nothing that is not of the clip") {
   const TemporaryFolder here;
   const Clip clip = three_frames();
