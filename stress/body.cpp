@@ -232,8 +232,8 @@ std::vector<StressFigure> opposite_bones(Remedy remedy) {
   int broken = 0;
   const double image = flat_image_error(at.frame, second_bone(kPi), broken);
   return {{"jump of axes as a bone turns by 2e-6 rad, share", jump, 3e-6},
-          {"gradient off differences, of 0.1 m", gradient, 1e-4},
-          {"flat Gaussian's image off brute force", image, 1e-5},
+          {"gradient off differences, of 0.1 m", gradient, 1e-11},
+          {"flat Gaussian's image off brute force", image, 5e-7},
           {"gradients of the image that are not finite", static_cast<double>(broken), 0}};
 }
 

@@ -1,4 +1,4 @@
-// Rows D4 to D9: bad steps, distances, neighbours, priors, wraps.
+// Rows D4 to D7 and D9: bad steps, distances, neighbours, joint ranges, wraps.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -196,38 +196,6 @@ std::vector<StressFigure> joint_ranges(Remedy remedy) {
   }
   // A joint is at most half a turn about each of three axes beyond a range that holds 0.
   return {{"energy of a pose, rad^2", energy, 63 * kPi * kPi}, {"largest gradient", gradient, 1e3}};
-}
-
-/// D8: latents from likely to 1e15: −2 log of a normal distribution, up to its constant, and the way back.
-std::vector<StressFigure> unlikely_poses(Remedy remedy) {
-  const PosePrior prior = natural_pose_prior();
-  const auto count = static_cast<std::size_t>(prior.latents());
-  RandomSequence random(10, random_stream("stress.D8"));
-  double energy_error = 0, gradient_error = 0;
-  for (const double far : {0.1, 1.0, 10.0, 1e3, 1e8, 1e15}) {
-    std::vector<float> z, d_z(count);
-    for (std::size_t i = 0; i < count; ++i) z.push_back(static_cast<float>(far * random.uniform(0.5, 1)));
-    double squares = 0;
-    for (const float x : z) squares += static_cast<double>(x) * static_cast<double>(x);
-    float energy;
-    if (remedy == Remedy::kOn) {
-      Tape<float> tape;
-      const Var<float> latents = leaf(tape, "z", shape_of(1, prior.latents()), z);
-      const Var<float> loss = prior.energy(latents);
-      tape.forward(loss);
-      tape.backward(loss);
-      energy = tape.value(loss).scalar();
-      std::copy_n(tape.gradient(latents).data, count, d_z.begin());
-    } else {  // −2 log p, p = exp(−‖z‖²/2), d p = −z p
-      const float p = std::exp(-static_cast<float>(squares) / 2);
-      energy = -2 * std::log(p);
-      for (std::size_t i = 0; i < count; ++i) d_z[i] = -2 / p * (-z[i] * p);
-    }
-    energy_error = larger(energy_error, relative(energy, squares));
-    for (std::size_t i = 0; i < count; ++i) gradient_error = larger(gradient_error, relative(d_z[i], 2.0L * z[i]));
-  }
-  return {{"relative error of the energy", energy_error, 1e-5},
-          {"relative error of its gradient", gradient_error, 1e-6}};
 }
 
 /// D9: a stage that turns a joint on and on, up to a full turn; and what wrapping does to rotations.

@@ -93,15 +93,16 @@ struct RowClass {
   char letter;
   const char* name;
 };
-constexpr std::array<RowClass, 9> kClasses = {{{'A', "projection, covariance"},
-                                               {'B', "alpha, blending, sorting"},
-                                               {'C', "rotations"},
-                                               {'D', "skinning, priors, contacts"},
-                                               {'E', "losses"},
-                                               {'F', "tape, Adam, arithmetic, files"},
-                                               {'P', "what is not a number, in every input"},
-                                               {'R', "relations that a render keeps"},
-                                               {'L', "10,000 steps"}}};
+constexpr std::array<RowClass, 10> kClasses = {{{'A', "projection, covariance"},
+                                                {'B', "alpha, blending, sorting"},
+                                                {'C', "rotations"},
+                                                {'D', "skinning, priors, contacts"},
+                                                {'E', "losses"},
+                                                {'F', "tape, Adam, arithmetic, files"},
+                                                {'G', "caches, long ways, what is read"},
+                                                {'P', "what is not a number, in every input"},
+                                                {'R', "relations that a render keeps"},
+                                                {'L', "10,000 steps"}}};
 
 /// What became of some rows.
 struct RowCounts {

@@ -1,4 +1,4 @@
-// What moments that fade cost: rows F4 and L2.
+// What moments that fade cost: row F4.
 #pragma once
 
 #include "stress/stress.h"

@@ -7,6 +7,7 @@
 #include "autodiff/difference.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/ssim.h"
+#include "autodiff/weighted_image.h"
 #include "core/image.h"
 #include "core/parallel.h"
 #include "core/random.h"
@@ -306,6 +307,70 @@ std::vector<StressFigure> long_means(Remedy remedy) {
   const double threads =
       larger(std::abs(static_cast<double>(one[0] - many[0])), std::abs(static_cast<double>(one[1] - many[1])));
   return {{"relative error of the mean", error, 1e-7}, {"difference of 1 and 16 threads", threads, 0}};
+}
+
+namespace {
+
+/// A disc that a mask shows, where two pictures are alike or `off` apart; outside they have nothing in common.
+struct MaskedPictures {
+  Picture<float> x = flat_picture(0.5, 0.3, 1, 5), y = x, mask = x;
+
+  explicit MaskedPictures(float off) {
+    const Picture<float> other = flat_picture(0.5, 0.5, 1, 6);
+    for (Index r = 0; r < x.rows; ++r) {
+      for (Index c = 0; c < x.cols; ++c) {
+        const auto i = static_cast<std::size_t>(r * x.cols + c);
+        const bool is_seen = (r - 9) * (r - 9) + (c - 15) * (c - 15) < 50;
+        mask.numbers[i] = is_seen ? 1 : 0;
+        y.numbers[i] = is_seen ? x.numbers[i] + off : other.numbers[i];
+      }
+    }
+  }
+  /// Black where the mask is 0.
+  Picture<double> seen(const Picture<float>& of) const {
+    Picture<double> result = widened(of);
+    for (std::size_t i = 0; i < result.numbers.size(); ++i) result.numbers[i] *= static_cast<double>(mask.numbers[i]);
+    return result;
+  }
+};
+
+/// 1 − ssim of pictures under their mask, and its gradient by the first.
+std::pair<double, std::vector<double>> masked_difference(const MaskedPictures& of, Remedy remedy) {
+  Tape<float> tape;
+  const Var<float> x = put(tape, of.x), y = put(tape, of.y), mask = put(tape, of.mask);
+  tape.freeze(mask);
+  const bool on = remedy == Remedy::kOn;
+  const Var<float> loss = d_ssim(on ? weighted_image(x, mask) : x, on ? weighted_image(y, mask) : y);
+  tape.forward(loss);
+  tape.backward(loss);
+  return {static_cast<double>(tape.value(loss).scalar()), numbers_of<float>(tape.gradient(x))};
+}
+
+}  // namespace
+
+/// G11: at a mask's edge and at the image's border what is not there is black in both pictures. Known: nothing where
+/// they are alike under the mask, and the definition, window by window, where they are not.
+std::vector<StressFigure> masks_and_borders(Remedy remedy) {
+  const auto [alike, d_alike] = masked_difference(MaskedPictures(0), remedy);
+  double slope = 0;
+  for (const double d : d_alike) slope = larger(slope, std::abs(d));
+  const MaskedPictures pictures(0.2f);
+  const auto [found, d_found] = masked_difference(pictures, remedy);
+  const Similarity exact = similarity_by_windows(pictures.seen(pictures.x), pictures.seen(pictures.y), false);
+  double sum = 0, outside = 0;
+  std::vector<double> d_exact = exact.d_x;
+  for (std::size_t i = 0; i < exact.map.size(); ++i) {
+    sum += 1 - exact.map[i];
+    if (pictures.mask.numbers[i] > 0) continue;
+    d_exact[i] = 0;
+    outside += d_found[i] == 0 ? 0 : 1;
+  }
+  const double mean = sum / static_cast<double>(exact.map.size());
+  return {{"difference of pictures that are alike under the mask", alike, 0},
+          {"its largest gradient", slope, 0},
+          {"difference off its definition, relative", std::abs(found - mean) / mean, 1e-6},
+          {"gradient off its definition, relative", relative_l2(d_found, d_exact), 1e-5},
+          {"pixels of weight 0 with a gradient", outside, 0}};
 }
 
 }  // namespace hsi4d::stress

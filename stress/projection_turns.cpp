@@ -75,53 +75,85 @@ Scene disc(int k) {
   return scene;
 }
 
-/// |dG/dm| of pixels of the central row, per metre; and what is not finite.
-struct RaySlopes {
-  Largest slope;
+/// α of pixels of the central row and its gradient by x and z of the mean, per metre, for each disc.
+struct EdgeOn {
+  std::vector<double> alphas, slopes;
   double not_finite = 0;
+  Largest steepest;
+
+  void add(double alpha, double d_x, double d_z) {
+    alphas.push_back(alpha);
+    slopes.insert(slopes.end(), {d_x, d_z});
+    steepest.add(std::hypot(d_x, d_z));
+  }
 };
 
-void add_slopes(const Scene& scene, RaySlopes& slopes) {
+constexpr std::size_t kSide = 33, kFirstPixel = 8, kLastPixel = 24;
+const double kDiscOpacity = 1 / (1 + std::exp(-2.0));
+
+std::size_t in_central_row(std::size_t col) { return kSide / 2 * kSide + col; }
+
+void add_by_program(const Scene& scene, EdgeOn& found) {
   TapedScene<float> taped(scene);
   taped.tape.forward(taped.rendered.transmittance);
-  const double opacity = 1 / (1 + std::exp(-2.0));
-  for (std::size_t col = 8; col <= 24; ++col) {
-    std::vector<float> cotangent(33 * 33, 0.0F);
-    cotangent[16 * 33 + col] = 1;
+  const std::vector<double> t = taped.value(taped.rendered.transmittance);
+  for (std::size_t col = kFirstPixel; col <= kLastPixel; ++col) {
+    std::vector<float> cotangent(kSide * kSide, 0.0F);
+    cotangent[in_central_row(col)] = -1;
     taped.tape.backward(taped.rendered.transmittance, cotangent);
     const std::vector<double> d = taped.gradient(taped.means);
-    for (const Var<float> var : {taped.means, taped.quats, taped.log_scales}) {
-      slopes.not_finite += not_finite(taped.gradient(var));
-    }
-    slopes.slope.add(std::hypot(d[0], d[1], d[2]) / opacity);
+    for (const Var<float> var : {taped.means, taped.quats, taped.log_scales})
+      found.not_finite += not_finite(taped.gradient(var));
+    found.add(1 - t[in_central_row(col)], d[0], d[2]);
   }
 }
 
-/// Where the ray of a pixel meets the disc's plane, t = n·m / n·r, and G there.
-void add_slopes_of_rays(int k, RaySlopes& slopes) {
+void add_by_brute_force(const Scene& scene, EdgeOn& found) {
+  const reference::Scene<double> gaussian = reference_scene(scene);
+  const reference::Pinhole<double> camera = reference_pinhole(scene.camera);
+  const auto image = reference::render(gaussian, camera, {0, 0, 0}, scene.settings);
+  reference::Image<double> cotangent;
+  cotangent.color.assign(3 * kSide * kSide, 0);
+  cotangent.depth_sum.assign(kSide * kSide, 0);
+  for (std::size_t col = kFirstPixel; col <= kLastPixel; ++col) {
+    cotangent.transmittance.assign(kSide * kSide, 0);
+    cotangent.transmittance[in_central_row(col)] = -1;
+    const std::vector<double> d = reference::gradients(gaussian, camera, {0, 0, 0}, scene.settings, cotangent).means;
+    found.add(1 - image.transmittance[in_central_row(col)], d[0], d[2]);
+  }
+}
+
+/// Where the ray of a pixel meets the disc's plane, t = n·m / n·r, and α there.
+void add_by_rays(int k, EdgeOn& found) {
   const auto [c, s] = turn_of(k);
-  const double focal = 33;
-  for (int col = 8; col <= 24; ++col) {
-    const double r = (col - 16) / focal;  // the ray (r, 0, 1)
+  const double focal = kSide;
+  for (std::size_t col = kFirstPixel; col <= kLastPixel; ++col) {
+    const double r = (static_cast<double>(col) - 16) / focal;  // the ray (r, 0, 1)
     const auto x = dual_variable<0>(kDiscOffset);
     const auto z = dual_variable<1>(kDiscDepth);
     const auto t = (s * x + c * z) / (s * r + c);
     const auto along = (c * (t * r - x) - s * (t - z)) / kDiscRadius;
-    const auto g = exp(-0.5 * square(along));
-    slopes.not_finite += not_finite(std::array{g.value, g.partial(0), g.partial(1)});
-    slopes.slope.add(std::hypot(g.partial(0), g.partial(1)));
+    const auto g = kDiscOpacity * exp(-0.5 * square(along));
+    found.not_finite += not_finite(std::array{g.value, g.partial(0), g.partial(1)});
+    found.add(g.value, g.partial(0), g.partial(1));
   }
 }
 
 }  // namespace
 
 std::vector<StressFigure> edge_on(Remedy remedy) {
-  RaySlopes slopes;
-  for (int k = 0; k <= 8; ++k) remedy == Remedy::kOn ? add_slopes(disc(k), slopes) : add_slopes_of_rays(k, slopes);
+  EdgeOn found, exact;
+  for (int k = 0; k <= 8; ++k) {
+    remedy == Remedy::kOn ? add_by_program(disc(k), found) : add_by_rays(k, found);
+    add_by_brute_force(disc(k), exact);
+  }
   // In the image no Gaussian is narrower than the blur: |dG/du| ≤ exp(−½)/sqrt(blur) a pixel.
-  const double steepest = std::exp(-0.5) / std::sqrt(kBlur) * 33 / kDiscDepth;
-  return {{"gradients that are not finite", slopes.not_finite, 0},
-          {"steepest slope by the mean, of that of the blur", slopes.slope.value() / steepest, 1.1}};
+  const double steepest = kDiscOpacity * std::exp(-0.5) / std::sqrt(kBlur) * 33 / kDiscDepth;
+  return {{"gradients that are not finite", found.not_finite, 0},
+          {"alpha off brute force", largest_difference(found.alphas, exact.alphas), 3e-7},
+          {"gradient by the mean off brute force, of the steepest",
+           largest_difference(found.slopes, exact.slopes) / steepest, 1e-6},
+          {"steepest slope by the mean, of that of the blur", found.steepest.value() / steepest, 1}};
 }
 
 // --- A13: quaternions of any length --------------------------------------------------------------------------------

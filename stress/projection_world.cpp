@@ -145,8 +145,8 @@ std::vector<StressFigure> held_ratios(Remedy remedy) {
     return worst.value();
   };
   return {
-      {"relative error of gradients, double", error(projection_gradients<double>(camera, gaussians, weights)), 1e-9},
-      {"relative error of gradients, float", error(projection_gradients<float>(camera, gaussians, weights)), 1e-4}};
+      {"relative error of gradients, double", error(projection_gradients<double>(camera, gaussians, weights)), 2e-15},
+      {"relative error of gradients, float", error(projection_gradients<float>(camera, gaussians, weights)), 3e-7}};
 }
 
 // --- A3: beside the view -------------------------------------------------------------------------------------------
@@ -358,9 +358,9 @@ std::vector<StressFigure> far_from_the_origin(Remedy remedy) {
     gradient.add(relative_l2(there.gradients(), here.gradients()));
     pixels.add(misplaced_px(wide, moved(wide), offset, remedy));
   }
-  return {{"pixels off, f = 1000 px, up to 1000 km", pixels.value(), 2e-4},
-          {"image, up to 1000 km", image.value(), 1e-4},
-          {"gradients, up to 1000 km, relative", gradient.value(), 1e-3}};
+  return {{"pixels off, f = 1000 px, up to 1000 km", pixels.value(), 7e-5},
+          {"image, up to 1000 km", image.value(), 6e-7},
+          {"gradients, up to 1000 km, relative", gradient.value(), 5e-7}};
 }
 
 }  // namespace hsi4d::stress

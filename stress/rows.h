@@ -18,20 +18,25 @@ Row depth_sort, depth_keys, pair_counts;                                        
 Row gradient_at_identity, gradient_leaves_identity, coefficients, switches, log_near_half_turn,
     inverse_jacobian;  // rotations
 Row quaternion_signs, quaternion_lengths, parallel_columns, pivots, dead_branches, chains,
-    views_along_up;                                                                                  // rotation_forms
-Row weight_sums, opposite_bones, small_offsets;                                                      // body
-Row bad_steps, distances_at_zero, near_neighbours, joint_ranges, unlikely_poses, turns_beyond_half;  // body_robustness
-Row flat_areas, data_ranges, logarithms_of_zero, equal_numbers, long_means;                          // losses
-Row fast_math, contraction;                                                                          // arithmetic
-Row bad_gradients, place_of_eps, bias_corrections, fading_moments;                                   // optimiser
-Row sums_by_threads, sums_over_pixels, half_precision;                                               // sums
-Row products_with_vectors, rows_not_drawn, wrong_but_finite;                                         // tape_faults
-Row broken_ply, numbers_in_json;                                                                     // files
-Row poisoned_elements, poisoned_arrays, poisoned_networks;                                           // poison_autodiff
-Row poisoned_splats;                                                                                 // poison_splat
-Row poisoned_composite, poisoned_render;                                                             // poison_render
-Row poisoned_skeletons, poisoned_body_nets;                                                          // poison_body
-Row poisoned_masks, poisoned_losses, poisoned_distances;                                             // poison_losses
+    views_along_up;                                                                  // rotation_forms
+Row weight_sums, opposite_bones, small_offsets;                                      // body
+Row bad_steps, distances_at_zero, near_neighbours, joint_ranges, turns_beyond_half;  // body_robustness
+Row flat_areas, data_ranges, logarithms_of_zero, equal_numbers, long_means;          // losses
+Row masks_and_borders;                                                               // losses
+Row fast_math, contraction;                                                          // arithmetic
+Row bad_gradients, place_of_eps, bias_corrections, fading_moments;                   // optimiser
+Row sums_by_threads, sums_over_pixels, half_precision;                               // sums
+Row products_with_vectors, rows_not_drawn, wrong_but_finite;                         // tape_faults
+Row broken_ply, numbers_in_json;                                                     // files
+Row unusual_sequences, two_results, transmittance_through_layers;                    // lists_and_layers
+Row long_lists, rows_of_little_energy;                                               // lists_and_layers
+Row steps_after_wrap, bad_evaluations, growing_norms, nearly_equal_starts;           // steps
+Row videos_as_players_show_them, resumed_elsewhere, left_ranges;                     // inputs
+Row poisoned_elements, poisoned_arrays, poisoned_networks;                           // poison_autodiff
+Row poisoned_splats;                                                                 // poison_splat
+Row poisoned_composite, poisoned_render;                                             // poison_render
+Row poisoned_skeletons, poisoned_body_nets;                                          // poison_body
+Row poisoned_masks, poisoned_losses, poisoned_distances;                             // poison_losses
 Row scaled_world, moved_world, turned_world, mirror_image, crop_of_render, shuffled_rows,
     gaussians_in_two;                                                                              // metamorphic
 Row without_culling, numbers_of_threads, sizes_of_tiles, instruction_sets, scaled_loss, extremes;  // metamorphic

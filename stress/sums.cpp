@@ -127,28 +127,52 @@ std::vector<StressFigure> sums_over_pixels(Remedy remedy) {
           {"gradient by the mean, relative", relative_l2(computed[2], exact[2]), 1e-6}};
 }
 
-std::vector<StressFigure> half_precision(Remedy remedy) {
-  const Scene scene = small_scene(120, 64, 48, 8);
-  Scene kept = scene;
-  if (remedy == Remedy::kOff) {
-    Gaussians& g = kept.gaussians;
-    for (auto* numbers : {&g.means, &g.quats, &g.log_scales, &g.opacity_logits, &g.sh}) {
-      for (float& x : *numbers) x = halved(x);
-    }
-  }
-  const auto run = [](auto& taped) {
-    const auto loss = mean(square(taped.rendered.image));
+namespace {
+
+/// The parameters of a scene, by kind.
+std::array<std::vector<float>*, 5> kinds_of(Gaussians& g) {
+  return {&g.means, &g.quats, &g.log_scales, &g.opacity_logits, &g.sh};
+}
+
+/// The image of a scene and the gradients of its mean square.
+template <class S>
+struct SquaredImage {
+  std::vector<double> image;
+  std::array<std::vector<double>, 5> gradients;  ///< as kinds_of
+
+  explicit SquaredImage(const Scene& scene) {
+    TapedScene<S> taped(scene);
+    const Var<S> loss = mean(square(taped.rendered.image));
     taped.tape.forward(loss);
     taped.tape.backward(loss);
+    image = taped.value(taped.rendered.image);
+    const std::array leaves = {taped.means, taped.quats, taped.log_scales, taped.opacity_logits, taped.sh};
+    for (std::size_t k = 0; k < leaves.size(); ++k) gradients[k] = taped.gradient(leaves[k]);
+  }
+};
+
+}  // namespace
+
+/// F8: without the remedy one kind of parameter at a time is kept in half precision, or the image's gradient is; told
+/// is what does the least, so that none could be without breaking the bound.
+std::vector<StressFigure> half_precision(Remedy remedy) {
+  const Scene scene = small_scene(120, 64, 48, 8);
+  const SquaredImage<double> exact(scene);
+  const auto errors = [&](const Scene& kept) {
+    const SquaredImage<float> computed(kept);
+    Largest gradient;
+    for (std::size_t k = 0; k < 5; ++k) gradient.add(relative_l2(computed.gradients[k], exact.gradients[k]));
+    return std::array{largest_difference(computed.image, exact.image), gradient.value()};
   };
-  TapedScene<double> exact(scene);
-  TapedScene<float> computed(kept);
-  run(exact);
-  run(computed);
-  return {{"error of the image, of 1",
-           largest_difference(computed.value(computed.rendered.image), exact.value(exact.rendered.image)), 1e-4},
-          {"gradient by means, relative", relative_l2(computed.gradient(computed.means), exact.gradient(exact.means)),
-           1e-4}};
+  std::array<double, 2> least = errors(scene);
+  for (std::size_t kind = 0; remedy == Remedy::kOff && kind < 5; ++kind) {
+    Scene kept = scene;
+    for (float& x : *kinds_of(kept.gaussians)[kind]) x = halved(x);
+    const std::array<double, 2> of_kind = errors(kept);
+    least = kind == 0 ? of_kind : std::array{std::min(least[0], of_kind[0]), std::min(least[1], of_kind[1])};
+  }
+  return {{"error of the image, of 1", least[0], 1e-6},
+          {"gradient by any kind of parameter, relative", least[1], 2e-6}};
 }
 
 }  // namespace hsi4d::stress

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "core/check.h"
+#include "core/simd.h"
 #include "optim/checkpoint.h"
 
 namespace hsi4d {
@@ -45,6 +46,7 @@ std::vector<MetricValues> stored_errors(const char* kind, std::size_t frames, co
   return errors;
 }
 
+constexpr const char* kIsa = "instruction_set";
 constexpr const char* kLeftOut = "left_out";
 
 /// A line each: "STAGE FRAME OBJECT TERM<tab>REASON".
@@ -82,31 +84,38 @@ std::vector<LeftOutInFrame> left_out_of(const Checkpoint& checkpoint, const Clip
 }
 
 constexpr const char* kStill = "still";
+constexpr const char* kLeftRanges = "left_ranges";
 
-/// A line each: "STAGE FRAME GROUP".
-std::string still_text(const std::vector<StillGroup>& still) {
+/// A line each: "STAGE FRAME NAME".
+template <class Entry>
+std::string names_text(const std::vector<Entry>& entries) {
   std::string text;
-  for (const StillGroup& entry : still)
-    text += std::to_string(entry.stage) + " " + std::to_string(entry.frame) + " " + entry.group + "\n";
+  for (const auto& [stage, frame, name] : entries)
+    text += std::to_string(stage) + " " + std::to_string(frame) + " " + name + "\n";
   return text;
 }
 
+/// @param key    of the entry, which need not be there
+/// @param what   the name is
 /// @param stages, first_frame  as left_out_of
-std::vector<StillGroup> still_of(const Checkpoint& checkpoint, const Clip& clip, std::size_t stages,
-                                 Index first_frame) {
-  std::vector<StillGroup> still;
-  if (!checkpoint.has(kStill)) return still;
-  std::istringstream lines(checkpoint.text(kStill));
+template <class Entry>
+std::vector<Entry> names_of(const Checkpoint& checkpoint, const char* key, const char* what, const Clip& clip,
+                            std::size_t stages, Index first_frame) {
+  std::vector<Entry> entries;
+  if (!checkpoint.has(key)) return entries;
+  std::istringstream lines(checkpoint.text(key));
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);
-    StillGroup entry;
-    words >> entry.stage >> entry.frame >> entry.group;
-    if (!words || entry.stage >= stages || entry.frame < first_frame || entry.frame >= clip.frames())
-      throw DataError(checkpoint.source() + ": \"" + kStill + "\" holds \"" + line +
-                      "\", which is no stage, frame and group of this clip");
-    still.push_back(entry);
+    std::size_t stage = 0;
+    Index frame = 0;
+    std::string name;
+    words >> stage >> frame >> name;
+    if (!words || stage >= stages || frame < first_frame || frame >= clip.frames())
+      throw DataError(checkpoint.source() + ": \"" + key + "\" holds \"" + line + "\", which is no stage, frame and " +
+                      what + " of this clip");
+    entries.push_back({stage, frame, name});
   }
-  return still;
+  return entries;
 }
 
 /// One state as numbers: camera [R | t] (12), then 6 an object, then the body's transl (3) and axis-angles (165).
@@ -273,8 +282,10 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
+  checkpoint.set(kIsa, std::string(isa_name(best_isa())));
   if (!progress.left_out.empty()) checkpoint.set(kLeftOut, left_out_text(progress.left_out));
-  if (!progress.still.empty()) checkpoint.set(kStill, still_text(progress.still));
+  if (!progress.still.empty()) checkpoint.set(kStill, names_text(progress.still));
+  if (!progress.left_ranges.empty()) checkpoint.set(kLeftRanges, names_text(progress.left_ranges));
   if (progress.start.seconds > 0) store_start(progress.start, checkpoint);
   store_color_state(progress.colors, checkpoint);
   store_errors("image_errors", progress.image_errors, checkpoint);
@@ -321,11 +332,14 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);
   progress.inputs = checkpoint.text("inputs");
+  if (checkpoint.has(kIsa)) progress.isa = checkpoint.text(kIsa);
   progress.start = stored_start(checkpoint);
   progress.colors = stored_color_state(checkpoint, std::move(progress.colors));
   const Index first_frame = first_stages > 0 ? 0 : 1;
   progress.left_out = left_out_of(checkpoint, clip, first_stages + stages, first_frame);
-  progress.still = still_of(checkpoint, clip, first_stages + stages, first_frame);
+  progress.still = names_of<StillGroup>(checkpoint, kStill, "group", clip, first_stages + stages, first_frame);
+  progress.left_ranges =
+      names_of<LeftRange>(checkpoint, kLeftRanges, "setting", clip, first_stages + stages, first_frame);
   progress.image_errors = stored_errors("image_errors", done, checkpoint);
   progress.start_errors = stored_errors("start_errors", done, checkpoint);
   return progress;

@@ -35,6 +35,14 @@ struct StillGroup {
   std::string group;
 };
 
+/// A stage of a frame in which what a setting of `approx` takes for small was not: the view of a part turned further
+/// (view_turn_deg) than the colours are held for, or than Gaussians are kept for that it may show.
+struct LeftRange {
+  std::size_t stage = 0;
+  Index frame = 0;
+  std::string setting;  ///< of `approx`
+};
+
 /// Frame 0 after a stage over the first frame.
 struct FirstFrameState {
   SceneState state;
@@ -52,9 +60,11 @@ struct RunProgress {
   Image covered;                                     ///< [1,H,W] 1 where the human or an object has been so far
   std::vector<LeftOutInFrame> left_out;              ///< in the order in which it happened
   std::vector<StillGroup> still;                     ///< likewise
+  std::vector<LeftRange> left_ranges;                ///< likewise
   StartTotals start;                                 ///< where the best start was chosen
   ColorState colors;                                 ///< after the last frame done
   double seconds = 0;                                ///< of the frames done
+  std::string isa;  ///< isa_name of who wrote the checkpoint; empty: not read from one, or from an older one
 
   /// Frames done, frame 0 included.
   Index frames_done() const { return after_stage.empty() ? 0 : static_cast<Index>(after_stage.front().size()); }
@@ -81,7 +91,7 @@ const std::vector<SceneState>& result_of(const RunProgress& progress, const Refi
 /// @param net  with which the run begins, if it has one
 RunProgress first_progress(const Clip& clip, std::size_t stages, std::optional<ColorNet> net = {});
 
-/// Writes the checkpoint of a run, in one step.
+/// Writes the checkpoint of a run, in one step, with the name of the instruction set of now.
 /// @param config  the text to which the checkpoint belongs: the config, without what no result depends on
 void save_progress(const std::string& file, const std::string& config, const RunProgress& progress);
 

@@ -7,9 +7,11 @@
 
 #include "core/image_io.h"
 #include "core/log.h"
+#include "core/simd.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "pipelines/draw/frame_images.h"
+#include "pipelines/draw/view_turn.h"
 #include "pipelines/draw/visibility.h"
 #include "pipelines/input/input_hashes.h"
 #include "pipelines/metrics/sequence_errors.h"
@@ -61,6 +63,14 @@ RunProgress read_checkpoint(const std::string& file, const std::string& identity
   return progress;
 }
 
+/// The kernels of another instruction set round otherwise. (Another precision is another config, which is refused.)
+void warn_of_other_isa(const std::string& before) {
+  const std::string now = isa_name(best_isa());
+  if (!before.empty() && before != now)
+    log_warning("resumed with instruction set " + now + ", the frames so far were made with " + before +
+                ": the bits will differ from those of a run that was never stopped");
+}
+
 /// What is told of a run that was stopped in frame `frame` of `frames`, or after the last of them: those before it are
 /// kept.
 /// @param first  the first frame that is worked on: 1, or 0 where frame 0 is not as given
@@ -99,6 +109,7 @@ class Reconstruction {
     bar_.finish();
     warn_of_left_out(progress_.left_out, config_, clip_);
     warn_of_still_groups(progress_.still, config_);
+    warn_of_left_ranges(progress_.left_ranges, config_);
     warn_of_what_is_out_of_view(clip_, result());
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
     RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
@@ -134,6 +145,7 @@ class Reconstruction {
     const std::string file = checkpoint_file(folder_.paths());
     if (folder_.resumed_from() && std::filesystem::exists(file)) {
       progress_ = read_checkpoint(file, identity_, config_, clip_);
+      warn_of_other_isa(progress_.isa);
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
       add_covered(read_frame(clip_, 0), config_.data, progress_.covered);
@@ -267,8 +279,10 @@ class Reconstruction {
       if (report.iteration == 0) begin = loss_text(report.loss, report.terms);
       note(frame.index, s, report, &counters, &totals);
     };
+    const SceneState before = state;
     const StageResult result =
         run_frame_stage({config_, clip_, losses_, s, observer_.stages}, frame, state, colors, note_iteration);
+    if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
     totals.seconds += result.seconds;
@@ -281,6 +295,16 @@ class Reconstruction {
     }
     for (const std::string& group : gradients.still_groups()) progress_.still.push_back({s, frame.index, group});
     folder_.note("frame " + std::to_string(frame.index) + ", " + stage_text(name, result, begin, clip_));
+  }
+
+  /// What approximations took for small when the stage began.
+  void note_left_ranges(std::size_t s, Index frame, const SceneState& before, const SceneState& after) {
+    const ApproxSettings& approx = config_.approx;
+    if (!approx.hold_colors && approx.seen_within_deg == 0) return;
+    const double turn = view_turn_deg(clip_, before, after);
+    if (approx.hold_colors && turn > kHeldColorsDeg) progress_.left_ranges.push_back({s, frame, "hold_colors"});
+    if (approx.seen_within_deg > 0 && turn > approx.seen_within_deg)
+      progress_.left_ranges.push_back({s, frame, "seen_within_deg"});
   }
 
   /// @param frame     none: all at once

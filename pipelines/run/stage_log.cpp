@@ -4,6 +4,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "pipelines/draw/view_turn.h"
 
 namespace hsi4d {
 
@@ -69,6 +70,20 @@ void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConf
                               clip.objects[static_cast<std::size_t>(entry.object)].name + "\" (" + entry.reason +
                               "), in some iterations at least, in ";
     messages.add(begin, entry.frame);
+  }
+  messages.log();
+}
+
+void warn_of_left_ranges(const std::vector<LeftRange>& left_ranges, const RunConfig& config) {
+  FramesOfMessages messages;
+  for (const LeftRange& entry : left_ranges) {
+    const bool is_of_colors = entry.setting == "hold_colors";
+    messages.add("stage " + config.stages[entry.stage].first + ": the view of a part turned by more than " +
+                     rounded(is_of_colors ? kHeldColorsDeg : config.approx.seen_within_deg, 3) + " degrees, so that " +
+                     (is_of_colors ? "colours held by approx.hold_colors are out of date"
+                                   : "Gaussians left out by approx.seen_within_deg may be seen") +
+                     ", in ",
+                 entry.frame);
   }
   messages.log();
 }

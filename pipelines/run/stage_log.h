@@ -27,6 +27,9 @@ void warn_of_left_out(const std::vector<LeftOutInFrame>& left_out, const RunConf
 /// often hidden, as an information.
 void warn_of_still_groups(const std::vector<StillGroup>& still, const RunConfig& config);
 
+/// Every stage that turned something further than a setting of `approx` allows for: one warning, with its frames.
+void warn_of_left_ranges(const std::vector<LeftRange>& left_ranges, const RunConfig& config);
+
 /// Sees the iterations of a stage.
 class GradientWatch {
  public:

@@ -9,6 +9,7 @@
 #include "body/body_model.h"
 #include "core/check.h"
 #include "core/random.h"
+#include "core/simd.h"
 #include "optim/checkpoint.h"
 #include "tests/support/temporary_folder.h"
 
@@ -157,6 +158,23 @@ TEST_CASE("progress survives its checkpoint bit for bit") {
   }
 }
 
+TEST_CASE("a checkpoint names its instruction set, and one of a version that did not is read") {
+  const TemporaryFolder here;
+  const Clip clip = three_frames();
+  save_progress(kFile, kConfig, random_progress(clip));
+  CHECK(load_progress(kFile, kConfig, clip, kStages).isa == isa_name(best_isa()));
+  std::string bytes = file_text(kFile);
+  const std::string name = "instruction_set";
+  int places = 0;  // of the name in the archive, which has no sum over it
+  for (std::size_t at = 0; (at = bytes.find(name, at)) != std::string::npos; ++places)
+    bytes.replace(at, name.size(), "something_older");
+  CHECK(places == 2);
+  here.write(kFile, bytes);
+  const RunProgress read = load_progress(kFile, kConfig, clip, kStages);
+  CHECK(read.isa.empty());
+  CHECK(read.frames_done() == 2);
+}
+
 TEST_CASE("frames without a foreground keep that they have none") {
   const TemporaryFolder here;
   const Clip clip = three_frames();
@@ -233,6 +251,21 @@ TEST_CASE("groups without a gradient are in a checkpoint, and nothing that is no
     CHECK(loading_error(clip) ==
           kFile + ": \"still\" holds \"" + line + "\", which is no stage, frame and group of this clip");
   }
+}
+
+TEST_CASE("stages that left the range of an approximation are in a checkpoint, and nothing that is not of the clip") {
+  const TemporaryFolder here;
+  const Clip clip = three_frames();
+  RunProgress progress = random_progress(clip);
+  progress.left_ranges = {{0, 1, "hold_colors"}, {1, 2, "seen_within_deg"}};
+  save_progress(kFile, kConfig, progress);
+  const std::vector<LeftRange> read = load_progress(kFile, kConfig, clip, kStages).left_ranges;
+  REQUIRE(read.size() == 2);
+  CHECK((read[0].stage == 0 && read[0].frame == 1 && read[0].setting == "hold_colors"));
+  CHECK((read[1].stage == 1 && read[1].frame == 2 && read[1].setting == "seen_within_deg"));
+  save_with(clip, "left_ranges", "2 1 hold_colors\n");
+  CHECK(loading_error(clip) ==
+        kFile + ": \"left_ranges\" holds \"2 1 hold_colors\", which is no stage, frame and setting of this clip");
 }
 
 TEST_CASE("what losses left out is in a checkpoint, and nothing that is not of the clip") {

@@ -3,6 +3,9 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "core/npz.h"
+#include "core/simd.h"
+#include "optim/checkpoint.h"
 #include "pipelines/cli/interrupt.h"
 #include "tests/support/program.h"
 #include "tests/support/running_program.h"
@@ -107,6 +110,32 @@ TEST_CASE("a run with approximations that was stopped and resumed has the bits o
     execute_tiny(config, run, 2, true);
     CHECK(differences("whole", run) == kNone);
   }
+}
+
+TEST_CASE("a run resumed with another instruction set says that the bits will differ", "[run]") {
+  const TemporaryFolder here;
+  const RunConfig config = tiny_config();
+  const std::string checkpoint = "run/checkpoint/progress.npz", now = isa_name(best_isa());
+  int count = 0;
+  CHECK_THROWS_AS(execute_tiny(config, "run", 1, false, [&] { return ++count == kPerFrame + 3; }), Interrupted);
+  const std::string hash = Npz::read(checkpoint).array("config_hash").text();
+  Checkpoint other = load_checkpoint(checkpoint, hash);
+  CHECK(other.text("instruction_set") == now);
+  fs::copy("run", "same", fs::copy_options::recursive);
+  other.set("instruction_set", std::string("sse9"));
+  other.save(checkpoint, hash);
+  execute_tiny(config, "run", 1, true);
+  execute_tiny(config, "same", 1, true);
+  CHECK(state_of("run") == "done");
+  CHECK(differences("same", "run") == kNone);  // the processor is the same after all
+  CHECK(load_checkpoint(checkpoint, hash).text("instruction_set") == now);
+  const std::string told = "resumed with instruction set " + now +
+                           ", the frames so far were made with sse9: the bits will differ from those of a run that "
+                           "was never stopped\n";
+  const std::string log = file_text("run/log.txt");
+  CHECK_THAT(log, Contains(told));
+  CHECK(log.find("instruction set") == log.rfind("instruction set"));
+  CHECK_THAT(file_text("same/log.txt"), !Contains("instruction set"));
 }
 
 TEST_CASE("a run can be stopped and resumed again and again", "[run]") {
