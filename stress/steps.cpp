@@ -215,14 +215,15 @@ TurnedColumns turned_columns(double rate) {
 
 /// Steps that a color net takes to come back to grey after thousands of steps towards black and white.
 double steps_back_to_grey() {
-  constexpr Index kRows = 6, kJoints = 22;
+  constexpr Index kColored = 6, kPosed = 22;
   const std::vector<float> means = {0, 0, 0, 0.1F, 0.2F, 0, 0.3F, 0, 0.1F, 0, 0.5F, 0, 0.2F, 0.2F, 0.2F, 0.4F, 0, 0.3F};
-  const ColorNet net = new_color_net(means, kJoints, {.features = 4, .hidden_width = 8, .hidden_layers = 1});
+  const ColorNet net = new_color_net(means, kPosed, {.features = 4, .hidden_width = 8, .hidden_layers = 1});
   Tape<double> tape;
   const ColorNetVars<double> vars = color_net_leaves(tape, net);
-  const Var<double> base = tape.constant("base", shape_of(kRows, 3)), target = tape.constant("t", shape_of(kRows, 3));
+  const Var<double> base = tape.constant("base", shape_of(kColored, 3)),
+                    target = tape.constant("t", shape_of(kColored, 3));
   const Var<double> code = tape.constant("code", shape_of(1, net.code_size()));
-  tape.set(base, std::vector<double>(3 * kRows, 0.5));
+  tape.set(base, std::vector<double>(3 * kColored, 0.5));
   const Var<double> colors = color_net(vars, base, code, {}), loss = mean(square(colors - target));
   std::vector<Var<double>> leaves = {vars.features};
   for (const MlpLayer<double>& layer : vars.layers) leaves.insert(leaves.end(), {layer.weights, layer.bias});
@@ -233,11 +234,11 @@ double steps_back_to_grey() {
     adam.step(i, 2 * kGrowthSteps, tape.value(loss).scalar());
     return tape.value(loss).scalar();
   };
-  for (Index r = 0; r < kRows; ++r) {
+  for (Index r = 0; r < kColored; ++r) {
     for (Index c = 0; c < 3; ++c) tape.write(target)(r, c) = r % 2 == 0 ? 1 : 0;
   }
   for (int i = 0; i < kGrowthSteps; ++i) step(i);
-  tape.set(target, std::vector<double>(3 * kRows, 0.5));
+  tape.set(target, std::vector<double>(3 * kColored, 0.5));
   for (int i = 0; i < kGrowthSteps; ++i) {
     if (step(kGrowthSteps + i) < 1e-4) return i;  // within 0.01 of grey
   }
