@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 
 #include "body/body_model.h"
@@ -46,9 +47,13 @@ NameNumbers numbers_of(const std::string& stem) {
   return found;
 }
 
-/// The files of one person, by frame.
-/// @param others  receives which other people there are files of
-std::map<std::int64_t, std::string> files_of(const std::string& folder, int person, std::set<std::int64_t>& others) {
+struct FolderFiles {
+  std::map<std::int64_t, std::string> by_frame;  ///< of one person
+  std::set<std::int64_t> others;                 ///< of whom there are files too
+  bool begin_with_one = false;                   ///< the least number of a frame, of anybody's files, is 1
+};
+
+FolderFiles files_of(const std::string& folder, int person) {
   std::error_code error;
   std::vector<std::string> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
@@ -56,17 +61,23 @@ std::map<std::int64_t, std::string> files_of(const std::string& folder, int pers
   }
   if (error) throw UserError(folder + ": cannot be read as a folder: " + error.message());
   std::sort(paths.begin(), paths.end());
-  std::map<std::int64_t, std::string> files;
+  FolderFiles files;
+  std::int64_t least = std::numeric_limits<std::int64_t>::max();
   for (const std::string& path : paths) {
     const NameNumbers numbers = numbers_of(std::filesystem::path(path).stem().string());
-    if (numbers.frame >= 0 && numbers.person != person) others.insert(numbers.person);
-    if (numbers.frame < 0 || numbers.person != person) continue;
-    const auto [place, is_new] = files.emplace(numbers.frame, path);
+    if (numbers.frame < 0) continue;
+    least = std::min<std::int64_t>(least, numbers.frame);
+    if (numbers.person != person) {
+      files.others.insert(numbers.person);
+      continue;
+    }
+    const auto [place, is_new] = files.by_frame.emplace(numbers.frame, path);
     if (!is_new) {
       throw DataError(path + ": is of frame " + std::to_string(numbers.frame) + ", as is " + place->second);
     }
   }
-  if (files.empty()) {
+  files.begin_with_one = least == 1;
+  if (files.by_frame.empty()) {
     throw UserError(folder + ": holds no file FRAME.npz or FRAME_PERSON.npz of person " + std::to_string(person));
   }
   return files;
@@ -240,10 +251,11 @@ Motion motion_of(const SmplxSequence& sequence, double frame_rate) {
 
 PoseFolder read_pose_folder(const std::string& folder, double frame_rate, int person) {
   PoseFolder result;
-  const auto files = files_of(folder, person, result.other_people);
-  const std::int64_t first = files.begin()->first;
-  result.counts_from_one = first == 1;
-  result.motion.first_frame = result.counts_from_one ? 0 : static_cast<double>(first);
+  const FolderFiles found = files_of(folder, person);
+  const auto& files = found.by_frame;
+  result.other_people = found.others;
+  result.counts_from_one = found.begin_with_one;
+  result.motion.first_frame = static_cast<double>(files.begin()->first - (found.begin_with_one ? 1 : 0));
   result.motion.frame_rate = frame_rate;
   result.files = static_cast<Index>(files.size());
   std::vector<BodyPose>& poses = result.motion.poses;

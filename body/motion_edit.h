@@ -75,9 +75,9 @@ Motion motion_of(const SmplxSequence& sequence, double frame_rate);
 /// What read_pose_folder found.
 struct PoseFolder {
   Motion motion;
-  Index files = 0;                           ///< that were read
-  Index filled = 0;                          ///< frames without a file, interpolated between their neighbours
-  bool counts_from_one = false;              ///< the first file is of frame 1, which is taken for the video's first
+  Index files = 0;               ///< that were read
+  Index filled = 0;              ///< frames without a file, interpolated between their neighbours
+  bool counts_from_one = false;  ///< the folder's first file, of anybody, is of frame 1, which is the video's first
   std::set<std::int64_t> other_people = {};  ///< of whom there are files that are not read
 };
 
@@ -88,7 +88,7 @@ inline constexpr double kPoseFolderRate = 30;
 /// TEXT_FRAME…; FRAME is the first run of digits, PERSON one after it. See read_smplx_sequence for what is in them. The
 /// shape is the mean of all frames. As everything of SMPLer-X it is in the camera's frame (see transformed), and hands
 /// are relative to the model's mean hands (see with_hand_means). The number of the first file is Motion::first_frame,
-/// counted from 0; but for a folder that begins with 1, as SMPLer-X counts, which begins with the video.
+/// counted from 0; from 1 in a folder whose first file, of anybody, is of frame 1, as SMPLer-X counts.
 ///
 /// @param person  files of others are passed over; files without a person are those of 0
 /// Throws UserError when the folder cannot be read or has no such file; DataError as read_smplx_sequence, for a file

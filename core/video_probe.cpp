@@ -38,7 +38,7 @@ std::string probed_lines(const std::string& path) {
       {"ffprobe", "-v", "error", "-protocol_whitelist", "file", "-select_streams", "v", "-show_entries",
        "stream=index,pix_fmt,width,height,color_space,color_transfer,color_primaries,"
        "sample_aspect_ratio,field_order,avg_frame_rate,time_base:stream_disposition=attached_pic:"
-       "stream_side_data=dv_profile:frame=stream_index,best_effort_timestamp,interlaced_frame",
+       "stream_side_data=dv_profile:stream_tags=alpha_mode:frame=stream_index,best_effort_timestamp,interlaced_frame",
        "-of", "compact", ffmpeg_input(path)},
       ChildOutput::kRead);
   std::string lines;
@@ -154,6 +154,7 @@ bool is_among(const std::string& value, const std::array<std::string_view, N>& w
 constexpr std::array<std::string_view, 12> kTransfers = {"bt709",        "smpte170m", "smpte240m", "bt470m",
                                                          "bt470bg",      "gamma22",   "gamma28",   "iec61966-2-1",
                                                          "iec61966-2-4", "bt1361e",   "bt2020-10", "bt2020-12"};
+constexpr std::array<std::string_view, 5> kPrimaries = {"bt709", "smpte170m", "smpte240m", "bt470m", "bt470bg"};
 constexpr std::array<std::string_view, 6> kMatrices = {"bt709", "smpte170m", "bt470bg", "fcc", "smpte240m", "gbr"};
 
 bool has_part(const std::string& text, const std::vector<std::string>& parts) {
@@ -162,7 +163,7 @@ bool has_part(const std::string& text, const std::vector<std::string>& parts) {
 }
 
 bool has_alpha(const std::string& pixels) {
-  return has_part(pixels, {"yuva", "gbrap", "rgba", "bgra", "argb", "abgr", "ya8", "ya16"});
+  return has_part(pixels, {"yuva", "vuya", "ayuv", "gbrap", "rgba", "bgra", "argb", "abgr", "ya8", "ya16"});
 }
 
 /// Whether colours are made from brightness and two differences, for which a matrix is needed.
@@ -185,9 +186,11 @@ void check_colors(const std::string& path, const Facts& facts) {
     throw DataError(path + ": is Dolby Vision of profile 5 (HDR)" + kWay);
   if (!is_unknown(matrix) && !is_among(matrix, kMatrices))
     throw DataError(path + ": has the colour matrix " + matrix + kWay);
-  if (primaries == "bt2020") throw DataError(path + ": has the primaries bt2020" + kWay);
-  if (has_alpha(pixels))
-    throw DataError(path + ": has an alpha channel (" + pixels +
+  if (!is_unknown(primaries) && !is_among(primaries, kPrimaries))
+    throw DataError(path + ": has the primaries " + primaries + kWay);
+  const bool has_second_stream = fact(facts, "tag:alpha_mode") == "1";  // WebM
+  if (has_alpha(pixels) || has_second_stream)
+    throw DataError(path + ": has an alpha channel (" + (has_second_stream ? "alpha_mode 1" : pixels) +
                     "), which is not read; make a video without (ffmpeg's -pix_fmt yuv444p), of masks the alpha as "
                     "grey (-vf alphaextract)");
 }

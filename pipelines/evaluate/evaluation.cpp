@@ -123,13 +123,24 @@ std::optional<Rigid<double>> initial_pelvis(const std::string& avatar, const std
   return first_pelvis(first);
 }
 
-/// Lays the estimate's frame 0 on a pelvis: all that it holds moves alike.
-/// @param truth  has the pelvis later too, where the estimate begins later; null: there is none
+/// The second of the video at which a track begins.
+double begin_of(const Track& track) { return track.motion.first_frame / track.motion.frame_rate; }
+
+/// The pelvis in the world at a second of the video, of a track on its body.
+Rigid<double> pelvis_at(const Track& track, double second) {
+  return world_pelvis(body_at(track, second), *track.motion.pelvis_rest);
+}
+
+/// Lays the estimate on a pelvis, that of its own first pose: all that it holds moves alike.
+/// @param truth  has the pelvis later too, and the two are laid on each other where both have begun; null: there is
+/// none
 void lay_on(std::optional<Rigid<double>> pelvis, const Track* truth, Measurement& m) {
   if (m.settings.align == MotionAlign::kNone) return;
-  const double begin = m.estimate.motion.first_frame / m.estimate.motion.frame_rate;
+  Rigid<double> own = first_pelvis(m.estimate);
+  const double begin = std::max(begin_of(m.estimate), truth == nullptr ? 0 : begin_of(*truth));
   if (begin > 0 && truth != nullptr) {
-    pelvis = world_pelvis(body_at(*truth, begin), *truth->motion.pelvis_rest);
+    own = pelvis_at(m.estimate, begin);
+    pelvis = pelvis_at(*truth, begin);
   } else if (begin > 0 && pelvis) {
     m.result.notes.push_back("begins with frame " + number_text(m.estimate.motion.first_frame) +
                              ", and is laid on the human of frame 0 there, as no truth says where the human is then");
@@ -137,7 +148,7 @@ void lay_on(std::optional<Rigid<double>> pelvis, const Track* truth, Measurement
   if (!pelvis)
     throw UserError("hsi4d evaluate: --align: " + m.input +
                     ": there is no frame 0 to lay it on; --truth or --data has one");
-  move_world(world_laid_on(first_pelvis(m.estimate), *pelvis, m.settings.align), m.estimate);
+  move_world(world_laid_on(own, *pelvis, m.settings.align), m.estimate);
 }
 
 /// The mean of the centres in an object's file, about which its poses act.

@@ -160,6 +160,7 @@ std::vector<fs::path> dataset_folders(const fs::path& path) {
 /// @param between  as interpolated
 template <class Value, class Between>
 auto at_place(Index count, double place, Value value, Between between) {
+  HSI4D_CHECK(place > -kSameMoment, "frame " + number_text(place) + " of a motion");
   const double nearest = std::round(place), last = static_cast<double>(count - 1);
   if (std::fabs(place - nearest) < kSameMoment || place >= last)
     return value(static_cast<std::size_t>(std::clamp(nearest, 0.0, last)));

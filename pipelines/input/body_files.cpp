@@ -47,7 +47,7 @@ PoseFolder read_pose_folder_with_warnings(const std::string& folder, double fram
   PoseFolder read = read_pose_folder(folder, frame_rate, person);
   if (read.filled > 0) log_warning(folder + ": frames without a file, interpolated: " + std::to_string(read.filled));
   if (read.counts_from_one)
-    log_info(folder + ": begins with the file of frame 1, which is taken for the first frame of the video");
+    log_info(folder + ": its files count from frame 1, which is taken for the first frame of the video");
   if (read.motion.first_frame > 0)
     log_warning(folder + ": begins with frame " + number_text(read.motion.first_frame) +
                 " of the video, counted from 0, by the names of its files");

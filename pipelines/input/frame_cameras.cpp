@@ -17,6 +17,12 @@ namespace fs = std::filesystem;
 /// "images/frame_0003.jpg" and "frame_0003.png" are of one frame.
 std::string name_of_picture(const std::string& path) { return fs::path(path).stem().string(); }
 
+std::vector<Camera> without_pictures(const std::vector<PictureCamera>& cameras) {
+  std::vector<Camera> all;
+  for (const PictureCamera& one : cameras) all.push_back(one.camera);
+  return all;
+}
+
 std::vector<std::string> pictures_of(const std::vector<PictureCamera>& cameras) {
   std::vector<std::string> pictures;
   for (const PictureCamera& one : cameras) pictures.push_back(one.picture);
@@ -46,6 +52,21 @@ std::map<std::string, std::size_t> entries_by_name(const std::vector<PictureCame
   return entries;
 }
 
+bool have_one_lens(const Camera& a, const Camera& b) {
+  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy;
+}
+
+/// Throws DataError for a zoom: the frames of a clip have one size and focal length.
+void check_one_lens(const std::vector<Camera>& cameras, const fs::path& file, const std::string& reason) {
+  for (std::size_t i = 1; i < cameras.size(); ++i) {
+    if (!have_one_lens(cameras[i], cameras[0]))
+      throw DataError(file.string() + ": camera " + std::to_string(i) +
+                      " has another size, focal length or principal point than camera 0, and " + reason);
+  }
+}
+
+constexpr const char* kOneLens = "all frames of a clip are drawn with that of frame 0; allowed: one for all";
+
 /// The names of frames without an entry; entries of no frame are warned of.
 std::vector<std::string> compare_names(const std::map<std::string, std::size_t>& entries, const FrameSource& frames,
                                        const std::vector<PictureCamera>& cameras, const fs::path& file) {
@@ -70,9 +91,11 @@ Camera first_camera(const fs::path& file, const FrameSource& frames) {
     if (cameras.size() > 1)
       log_info(file.string() + ": holds " + std::to_string(cameras.size()) +
                " cameras without names of pictures; the first is that of frame 0, the others are not used");
+    check_one_lens(without_pictures(cameras), file, kOneLens);
     return kept_frames(cameras, frames, file.string(), "cameras", ", or 1").front().camera;
   }
   const std::map<std::string, std::size_t> entries = entries_by_name(cameras, file);
+  check_one_lens(without_pictures(cameras), file, kOneLens);
   const std::vector<std::string> without = compare_names(entries, frames, cameras, file);
   const auto entry = entries.find(name_of_picture(frames.names().front()));
   if (entry == entries.end())
@@ -110,15 +133,8 @@ Camera only_camera(const fs::path& file) {
 Camera camera_for_size(const fs::path& file) {
   const std::vector<Camera> cameras = read_cameras(file.string());
   if (cameras.empty()) throw DataError(file.string() + ": holds no camera");
-  const Camera& first = cameras.front();
-  for (std::size_t i = 1; i < cameras.size(); ++i) {
-    const Camera& other = cameras[i];
-    if (other.width != first.width || other.height != first.height || other.fx != first.fx || other.fy != first.fy ||
-        other.cx != first.cx || other.cy != first.cy)
-      throw DataError(file.string() + ": camera " + std::to_string(i) +
-                      " has another size or focal length than camera 0, and one is to be chosen for both");
-  }
-  return first;
+  check_one_lens(cameras, file, "one is to be chosen for both");
+  return cameras.front();
 }
 
 }  // namespace hsi4d

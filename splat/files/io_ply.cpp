@@ -124,6 +124,18 @@ SplatRow row_of(std::span<const double> values, int coefficients) {
   return row;
 }
 
+/// What trainers write of their Gaussians as comments: Brush "SplatRenderMode: mip" and "Vertical axis: y", Postshot
+/// "antialiased 1".
+void read_comments(const PlyHeader& header, SplatRows& rows) {
+  constexpr std::string_view kUp = "Vertical axis: ";
+  for (const std::string& comment : header.comments) {
+    if (comment == "SplatRenderMode: mip" || comment == "antialiased 1" || comment == "antialiased true")
+      rows.set_antialiased();
+    if (comment.starts_with(kUp) && comment.size() == kUp.size() + 1 && comment.back() != 'z')
+      rows.add_note("its up axis is " + comment.substr(kUp.size()) + ", by a comment; here it is z");
+  }
+}
+
 }  // namespace
 
 SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name, const Vector3<double>& origin_world) {
@@ -141,6 +153,7 @@ SplatFile decode_ply(std::span<const std::uint8_t> file, const std::string& name
   if (has_filter) columns.push_back(column_of(vertex, kFilter, name));
   SplatRows rows(vertex.rows, kept_degree, "INRIA PLY", origin_world);
   caution_of_others(names_beside(header, std::array{PlyNames{"vertex", known_names(rest_count)}}), rows);
+  read_comments(header, rows);
   if (has_filter) {
     rows.add_note("filter_3D is fused into scales and opacities, as Mip-Splatting does; it draws with render.blur=0.1");
     rows.set_antialiased();

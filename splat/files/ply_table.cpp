@@ -90,7 +90,11 @@ class HeaderParser {
     next_line();
     while (true) {
       const std::vector<std::string_view> words = words_of(next_line());
-      if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
+      if (words.empty() || words[0] == "obj_info") continue;
+      if (words[0] == "comment") {
+        header_.comments.emplace_back(current_.substr(std::min(current_.size(), current_.find("comment") + 8)));
+        continue;
+      }
       if (words[0] == "end_header" && words.size() == 1) break;
       parse_line(words);
     }

@@ -34,13 +34,14 @@ struct PlyElement {
 struct PlyHeader {
   PlyFormat format = PlyFormat::kAscii;
   std::vector<PlyElement> elements;
-  std::size_t data_begin = 0;  ///< first byte after the header
+  std::vector<std::string> comments;  ///< what stands behind "comment ", in order
+  std::size_t data_begin = 0;         ///< first byte after the header
 
   /// The place of an element, or -1.
   int find(std::string_view element) const;
 };
 
-/// The header of a PLY file. Lines end in LF or CR LF; comments are passed over.
+/// The header of a PLY file. Lines end in LF or CR LF.
 /// @param name  what error messages call the file
 /// Throws DataError "NAME:LINE: ..." for anything that is no header of PLY 1.0, and "NAME: ..." when the file is too
 /// short for the rows that it names.

@@ -256,6 +256,8 @@ TEST_CASE("a folder of SMPLer-X files is a motion, and frames without a file are
   write_smplerx("from_one/00001_0.npz", 0.5);
   CHECK(read_pose_folder("from_one", 30).motion.first_frame == 0);
   CHECK(read_pose_folder("from_one", 30).counts_from_one);
+  write_smplerx("from_one/00005_1.npz", 0.5);  // who comes later counts as the first one does
+  CHECK(read_pose_folder("from_one", 30, 1).motion.first_frame == 4);
 }
 
 TEST_CASE("faults of folders are named") {

@@ -287,6 +287,10 @@ TEST_CASE("videos whose colours or shape would be read wrongly are refused") {
         "b.mp4: is interlaced (field order tt); allowed are whole pictures, which ffmpeg's -vf yadif makes");
   CHECK_THAT(refusal({"-vf", "format=yuva444p", "-c:v", "ffv1"}, "b.mkv"),
              StartsWith("b.mkv: has an alpha channel (yuva444p), which is not read; "));
+  CHECK(refusal({"-vf", "format=yuva420p", "-c:v", "libvpx-vp9"}, "b.webm") ==
+        "b.webm: has an alpha channel (alpha_mode 1), which is not read; make a video without (ffmpeg's -pix_fmt "
+        "yuv444p), of masks the alpha as grey (-vf alphaextract)");
+  CHECK_THAT(refusal({"-color_primaries", "smpte432"}), StartsWith("b.mp4: has the primaries smpte432; "));
   for (const char* fine : {"bt709", "smpte170m", "iec61966-2-1"}) CHECK(refusal({"-color_trc", fine}).empty());
 }
 

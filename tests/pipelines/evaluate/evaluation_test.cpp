@@ -185,6 +185,29 @@ TEST_CASE("who lies along y is not taken to stand with y up, where it is known h
   }
 }
 
+TEST_CASE("motions that begin at other frames are laid on each other where both have begun") {
+  const TemporaryFolder here;
+  const Motion motion = for_others(true_motion());
+  const auto from = [&motion](std::size_t first, double frame_rate) {
+    Motion late = resampled(motion, frame_rate);
+    late.poses.erase(late.poses.begin(), late.poses.begin() + static_cast<std::ptrdiff_t>(first));
+    late.first_frame = static_cast<double>(first);
+    return late;
+  };
+  EvaluationSettings settings;
+  settings.avatar = data("avatar.safetensors");
+  settings.align = MotionAlign::kRotation;
+  settings.truth = "truth.npz";
+  const double rate = motion.frame_rate;
+  for (const auto& [truth, estimate] :
+       {std::pair{from(2, rate), from(0, rate)}, std::pair{from(0, rate), from(2, rate)},
+        std::pair{from(1, rate), from(0, 2 * rate)}}) {
+    write_motion("truth.npz", truth);
+    write_motion("m.npz", transformed(estimate, kElsewhere, kSmplxPelvis));
+    CHECK(value(evaluate(settings, "m.npz", ""), "world_mpjpe_mm") < 1e-6);
+  }
+}
+
 TEST_CASE("rate and up reach the truth where its file leaves them open") {
   const TemporaryFolder here;
   Motion motion = transformed(for_others(true_motion()), kYUp, kSmplxPelvis);

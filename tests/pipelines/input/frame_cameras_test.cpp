@@ -108,4 +108,15 @@ TEST_CASE("cameras without names are in the order of frames, and as many") {
         "c.json: holds 2 cameras, the video has 3 frames; allowed: that many, or 1");
 }
 
+TEST_CASE("cameras of a zoom are refused, as frames are drawn with one lens") {
+  Here here;
+  std::string wide = entry("frame_00003.png", 3);
+  wide.insert(1, "\"fl_x\": 9, ");
+  const std::string file = here.write({entry("frame_00001.png", 1), entry("frame_00002.png", 2), wide});
+  const std::string refused = "c.json: camera 2 has another size, focal length or principal point than camera 0, and ";
+  CHECK(fault([&] { first_camera(file, here.frames); }) ==
+        refused + "all frames of a clip are drawn with that of frame 0; allowed: one for all");
+  CHECK(fault([&] { camera_for_size(file); }) == refused + "one is to be chosen for both");
+}
+
 }  // namespace frame_cameras_test

@@ -403,6 +403,21 @@ TEST_CASE("lists that claim more than the file holds are refused") {
              Contains("the length of a list is \"float\"; allowed: a type of whole numbers"));
 }
 
+TEST_CASE("what trainers write in comments of how their Gaussians are drawn is read") {
+  const std::vector<std::uint8_t> plain = encode_ply(random_gaussians(10, 1));
+  const auto report = [&plain](const std::string& comment) {
+    std::string text(plain.begin(), plain.end());
+    text.insert(text.find("element vertex"), "comment " + comment + "\n");
+    return decode_ply(std::vector<std::uint8_t>(text.begin(), text.end()), "a.ply").report;
+  };
+  CHECK(report("SplatRenderMode: mip").antialiased);
+  CHECK(report("antialiased 1").antialiased);
+  CHECK_FALSE(report("SplatRenderMode: default").antialiased);
+  CHECK(report("").notes.empty());
+  CHECK(report("Vertical axis: y").notes == std::vector<std::string>{"its up axis is y, by a comment; here it is z"});
+  CHECK(report("Vertical axis: z").notes.empty());
+}
+
 TEST_CASE("real scenes are read whole") {
   const std::string folder = std::string(HSI4D_SOURCE_DIR) + "/../shared/data/splats";
   if (!std::filesystem::exists(folder)) {
