@@ -17,12 +17,6 @@ namespace fs = std::filesystem;
 /// "images/frame_0003.jpg" and "frame_0003.png" are of one frame.
 std::string name_of_picture(const std::string& path) { return fs::path(path).stem().string(); }
 
-std::vector<Camera> without_pictures(const std::vector<PictureCamera>& cameras) {
-  std::vector<Camera> all;
-  for (const PictureCamera& one : cameras) all.push_back(one.camera);
-  return all;
-}
-
 std::vector<std::string> pictures_of(const std::vector<PictureCamera>& cameras) {
   std::vector<std::string> pictures;
   for (const PictureCamera& one : cameras) pictures.push_back(one.picture);
@@ -57,9 +51,9 @@ bool have_one_lens(const Camera& a, const Camera& b) {
 }
 
 /// Throws DataError for a zoom: the frames of a clip have one size and focal length.
-void check_one_lens(const std::vector<Camera>& cameras, const fs::path& file, const std::string& reason) {
+void check_one_lens(const std::vector<PictureCamera>& cameras, const fs::path& file, const std::string& reason) {
   for (std::size_t i = 1; i < cameras.size(); ++i) {
-    if (!have_one_lens(cameras[i], cameras[0]))
+    if (!have_one_lens(cameras[i].camera, cameras[0].camera))
       throw DataError(file.string() + ": camera " + std::to_string(i) +
                       " has another size, focal length or principal point than camera 0, and " + reason);
   }
@@ -91,11 +85,11 @@ Camera first_camera(const fs::path& file, const FrameSource& frames) {
     if (cameras.size() > 1)
       log_info(file.string() + ": holds " + std::to_string(cameras.size()) +
                " cameras without names of pictures; the first is that of frame 0, the others are not used");
-    check_one_lens(without_pictures(cameras), file, kOneLens);
+    check_one_lens(cameras, file, kOneLens);
     return kept_frames(cameras, frames, file.string(), "cameras", ", or 1").front().camera;
   }
   const std::map<std::string, std::size_t> entries = entries_by_name(cameras, file);
-  check_one_lens(without_pictures(cameras), file, kOneLens);
+  check_one_lens(cameras, file, kOneLens);
   const std::vector<std::string> without = compare_names(entries, frames, cameras, file);
   const auto entry = entries.find(name_of_picture(frames.names().front()));
   if (entry == entries.end())
@@ -131,10 +125,10 @@ Camera only_camera(const fs::path& file) {
 }
 
 Camera camera_for_size(const fs::path& file) {
-  const std::vector<Camera> cameras = read_cameras(file.string());
+  const std::vector<PictureCamera> cameras = read_picture_cameras(file.string());
   if (cameras.empty()) throw DataError(file.string() + ": holds no camera");
   check_one_lens(cameras, file, "one is to be chosen for both");
-  return cameras.front();
+  return cameras.front().camera;
 }
 
 }  // namespace hsi4d
