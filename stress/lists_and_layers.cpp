@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "autodiff/difference.h"
@@ -194,6 +195,15 @@ std::vector<StressFigure> two_results(Remedy remedy) {
           {"gradients after a forward run of its own, refused or other", refused, 0}};
 }
 
+namespace {
+
+/// Rows of a gradient below this are nothing: a thousandth of the largest.
+double least_row(const std::vector<double>& gradient, std::size_t rows) {
+  return 1e-3 * largest_size(row_norms(gradient, rows));
+}
+
+}  // namespace
+
 // --- G6 --------------------------------------------------------------------------------------------------------------
 
 namespace {
@@ -204,22 +214,6 @@ std::array<std::vector<double>, 4> dense_gradients(const FlatSplats& splats, con
   FlatRender<S> flat(splats, front_view(16, 16, settings));
   flat.backward();
   return {flat.d(flat.means), flat.d(flat.factors), flat.d(flat.opacities), flat.d(flat.features)};
-}
-
-/// The largest error of a row, of the row's size, where that is a thousandth of the largest at least.
-double worst_row(const std::vector<double>& a, const std::vector<double>& b, std::size_t cols) {
-  std::vector<double> errors, sizes;
-  for (std::size_t i = 0; i + cols <= b.size(); i += cols) {
-    double error = 0, size = 0;
-    for (std::size_t c = i; c < i + cols; ++c) error = std::hypot(error, a[c] - b[c]), size = std::hypot(size, b[c]);
-    errors.push_back(error), sizes.push_back(size);
-  }
-  const double largest = *std::max_element(sizes.begin(), sizes.end());
-  double worst = 0;
-  for (std::size_t n = 0; n < sizes.size(); ++n) {
-    if (sizes[n] >= 1e-3 * largest) worst = larger(worst, errors[n] / sizes[n]);
-  }
-  return worst;
 }
 
 FlatSplats dense_splats() {
@@ -240,11 +234,11 @@ std::vector<StressFigure> long_lists(Remedy remedy) {
   const FlatSplats splats = dense_splats();
   const auto exact = dense_gradients<double>(splats, uncut_settings());
   auto found = dense_gradients<float>(splats, uncut_settings());
-  constexpr std::array<std::size_t, 4> kCols = {2, 6, 1, 3};
+  const auto rows = static_cast<std::size_t>(splats.count());
   double worst = 0, all = 0;
   for (std::size_t kind = 0; kind < 4; ++kind) {
     if (remedy == Remedy::kOff) std::rotate(found[kind].begin(), found[kind].end() - 1024, found[kind].end());
-    worst = larger(worst, worst_row(found[kind], exact[kind], kCols[kind]));
+    worst = larger(worst, worst_row_error(found[kind], exact[kind], rows, least_row(exact[kind], rows)));
     all = larger(all, relative_l2(found[kind], exact[kind]));
   }
   return {{"worst row of a gradient, relative", worst, 1e-4}, {"gradients, relative", all, 1e-6}};
@@ -263,27 +257,19 @@ std::vector<StressFigure> rows_of_little_energy(Remedy remedy) {
   exact.run();
   const std::vector<double> truth = exact.gradient(exact.means);
   std::vector<double> found = single.gradient(single.means);
-  std::vector<std::pair<double, std::size_t>> sizes;
-  for (std::size_t n = 0; n < truth.size() / 3; ++n) {
-    const double* d = truth.data() + 3 * n;
-    sizes.emplace_back(std::hypot(d[0], d[1], d[2]), n);
-  }
-  std::sort(sizes.begin(), sizes.end());
-  const auto seen =
-      std::find_if(sizes.begin(), sizes.end(), [&](const auto& row) { return row.first >= 1e-3 * sizes.back().first; });
+  const std::size_t rows = truth.size() / 3;
+  const double least = least_row(truth, rows);
+  std::vector<double> sizes = row_norms(truth, rows);
+  for (double& size : sizes) size = size < least ? std::numeric_limits<double>::infinity() : size;
+  const auto faint = static_cast<std::size_t>(std::min_element(sizes.begin(), sizes.end()) - sizes.begin());
   if (remedy == Remedy::kOff) {
-    for (std::size_t c = 0; c < 3; ++c) found[3 * seen->second + c] /= 2;
+    for (std::size_t c = 0; c < 3; ++c) found[3 * faint + c] /= 2;
   }
-  std::vector<double> errors;
-  for (auto row = seen; row != sizes.end(); ++row) {
-    const std::size_t i = 3 * row->second;
-    errors.push_back(std::hypot(found[i] - truth[i], found[i + 1] - truth[i + 1], found[i + 2] - truth[i + 2]) /
-                     row->first);
-  }
-  std::sort(errors.begin(), errors.end());
+  const std::vector<double> errors = row_errors(found, truth, rows, least);
+  const double worst = largest_size(errors);
   return {{"gradient by means, relative L2", relative_l2(found, truth), 2.5e-6},
-          {"worst row", errors.back(), 3e-5},
-          {"worst row over median row", errors.back() / errors[errors.size() / 2], 60}};
+          {"worst row", worst, 3e-5},
+          {"worst row over median row", worst / median_row(errors, rows), 60}};
 }
 
 }  // namespace hsi4d::stress
