@@ -6,8 +6,8 @@
 
 namespace hsi4d {
 
-/// Held colours (approx.hold_colors) are told of as out of date from this far on, degrees: harmonics of degree 3 change
-/// by a few levels there.
+/// Held colours (approx.hold_colors) are told of as out of date from this far on, degrees: a twelfth of the period of
+/// harmonics of degree 3.
 inline constexpr double kHeldColorsDeg = 10;
 
 /// Degrees between the directions in which the camera is seen before and after, in the axes of each object and of each

@@ -14,8 +14,8 @@ namespace hsi4d {
 /// The camera of frame 0, of a file with one or with those of all frames. What is not used of it is told in the log.
 ///
 /// Throws as read_cameras; DataError naming the file when frame 0 has no entry or several, when an entry among several
-/// names no picture and others do, when cameras differ in size, focal length or principal point, or when cameras without
-/// names are not as many as frames.
+/// names no picture and others do, when cameras differ in size, focal length or principal point, or when cameras
+/// without names are not as many as frames.
 Camera first_camera(const std::filesystem::path& file, const FrameSource& frames);
 
 /// The camera of every frame, each with a lens of its own. Throws otherwise as first_camera, naming all frames without
