@@ -69,10 +69,6 @@ double contracted(Remedy remedy) {
   return different;
 }
 
-}  // namespace
-
-namespace {
-
 /// Rules of arithmetic that one part of fast-math each sets aside, broken in loops compiled for `isa`: sums reordered,
 /// quotients by reciprocals, 0·x as 0, −0 as 0, denormals as 0.
 double broken_rules(Isa isa, Remedy remedy) {

@@ -15,6 +15,7 @@
 #include "core/rotation.h"
 #include "optim/stage.h"
 #include "stress/plain_adam.h"
+#include "stress/pulled_turn.h"
 #include "stress/rotation_measures.h"
 #include "stress/rows.h"
 #include "stress/tape_numbers.h"
@@ -200,22 +201,10 @@ std::vector<StressFigure> joint_ranges(Remedy remedy) {
 
 /// D9: a stage that turns a joint on and on, up to a full turn; and what wrapping does to rotations.
 std::vector<StressFigure> turns_beyond_half(Remedy remedy) {
-  Tape<double> tape;
-  const Var<double> w = leaf(tape, "w", shape_of(1, 3), {3, 0, 0}), pull = tape.constant("pull", shape_of(1, 3));
-  tape.set(pull, {-1, 0, 0});
-  LossInputs<double> inputs;
-  inputs.rendered = w * pull;
-  const std::vector<LossTerm> terms = {
-      make_loss_term("pull", "Turns about the first axis", [](const auto& in) { return sum(in.rendered); })};
-  StageSettings settings;
-  settings.iterations = 66;  // of 0.05: to 6.3, just beyond 2π
-  settings.optimize = {{"w", {}}};
-  settings.optimize[0].second.lr = 0.05;
-  settings.losses = {{"pull", {}}};
-  const std::vector<ParameterGroup<double>> groups = {{"w", {w}, remedy == Remedy::kOn}};
   double angle = 0, jacobian = 0, change = 0;
-  run_stage<double>(tape, settings, terms, inputs, groups, [&](const IterationReport&) {
-    const Vector3<double> now(tape.value(w).data);
+  // 66 steps of 0.05 go from 3 to 6.3, just beyond 2π.
+  pull_turn({.start = 3, .rate = 0.05, .iterations = 66, .wraps = remedy == Remedy::kOn}, [&](int, const double* w) {
+    const Vector3<double> now(w);
     angle = larger(angle, now.norm());
     jacobian = larger(jacobian, largest(so3_left_jacobian_inverse(now)));
   });

@@ -1,9 +1,7 @@
 // Rows G about what a run reads and looks at: videos, the checkpoint that it goes on from, ranges of approximations.
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <string>
-#include <unistd.h>
 #include <vector>
 
 #include "body/body_model.h"
@@ -18,28 +16,11 @@
 #include "pipelines/run/checkpoint.h"
 #include "stress/measures.h"
 #include "stress/rows.h"
+#include "stress/scratch_folder.h"
 
 namespace hsi4d::stress {
 
 namespace {
-
-/// A folder of this process, removed at the end.
-class Folder {
- public:
-  Folder() : path_(std::filesystem::temp_directory_path() / ("hsi4d_stress_" + std::to_string(::getpid()))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  std::string operator/(const char* name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 // --- G7 --------------------------------------------------------------------------------------------------------------
 
@@ -68,7 +49,7 @@ void run_ffmpeg(std::vector<std::string> words) {
 }
 
 /// Twelve frames of kSomeColor that do not name their matrix, without loss.
-void write_untagged(const Folder& folder, int width, int height, const ColorMatrix& matrix) {
+void write_untagged(const ScratchFolder& folder, int width, int height, const ColorMatrix& matrix) {
   const std::array<double, 3> yuv = in_matrix(matrix, kSomeColor);
   Bytes planes;
   for (int frame = 0; frame < 12; ++frame) {
@@ -91,7 +72,7 @@ double off_color(const std::array<double, 3>& rgb) {
   return worst;
 }
 
-double color_error(const Folder& folder, int width, int height, const ColorMatrix& matrix) {
+double color_error(const ScratchFolder& folder, int width, int height, const ColorMatrix& matrix) {
   write_untagged(folder, width, height, matrix);
   const Image image = VideoReader(folder / "untagged.mp4").read(1);
   std::array<double, 3> rgb;
@@ -112,7 +93,7 @@ const std::array<double, 7> kUnevenTimes = {0, 1 / 30.0, 2 / 30.0, 3 / 30.0, 9 /
 
 /// Of the video that is there, four that are to be refused, and one of which frames are left out: in one go, as ffmpeg
 /// takes long to start.
-void write_variants(const Folder& folder) {
+void write_variants(const ScratchFolder& folder) {
   const std::vector<std::vector<std::string>> variants = {
       {"-color_trc", "smpte2084", "-color_primaries", "bt2020", "-colorspace", "bt2020nc", folder / "refused0.mp4"},
       {"-color_trc", "arib-std-b67", folder / "refused1.mp4"},
@@ -136,7 +117,7 @@ std::vector<StressFigure> videos_as_players_show_them(Remedy remedy) {
     read = 4;
   } else {
     const LogSink silence = log_to([](LogLevel, std::string_view) {}, LogLevel::kWarning);
-    const Folder folder;
+    const ScratchFolder folder;
     color = larger(color_error(folder, 16, 720, kMatrix709), color_error(folder, 64, 48, kMatrix601));
     write_variants(folder);
     times = largest_difference(probe_video(folder / "uneven.mp4").times.seconds,
@@ -157,7 +138,7 @@ std::vector<StressFigure> resumed_elsewhere(Remedy remedy) {
   clip.camera.width = clip.camera.height = 4;
   clip.first.body = rest_pose(kSmplxJoints);
   clip.frame_files = {"0000.png"};
-  const Folder folder;
+  const ScratchFolder folder;
   double unnamed = 0;
   for (const Isa isa : {Isa::kBaseline, Isa::kAvx2, Isa::kAvx512}) {
     if (isa > best_isa()) continue;

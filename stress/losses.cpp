@@ -368,8 +368,8 @@ std::vector<StressFigure> masks_and_borders(Remedy remedy) {
   const double mean = sum / static_cast<double>(exact.map.size());
   return {{"difference of pictures that are alike under the mask", alike, 0},
           {"its largest gradient", slope, 0},
-          {"difference off its definition, relative", std::abs(found - mean) / mean, 1e-6},
-          {"gradient off its definition, relative", relative_l2(d_found, d_exact), 1e-5},
+          {"difference off its definition, relative", std::abs(found - mean) / mean, 3e-8},
+          {"gradient off its definition, relative", relative_l2(d_found, d_exact), 5e-7},
           {"pixels of weight 0 with a gradient", outside, 0}};
 }
 

@@ -1,4 +1,4 @@
-// A folder of a test's own, removed when the test ends.
+// A folder of a row's or test's own, removed at its end.
 #pragma once
 
 #include <atomic>
@@ -13,7 +13,7 @@ class ScratchFolder {
   ScratchFolder() {
     static std::atomic<int> counter{0};
     path_ = std::filesystem::temp_directory_path() /
-            ("hsi4d_test_" + std::to_string(::getpid()) + "_" + std::to_string(counter.fetch_add(1)));
+            ("hsi4d_scratch_" + std::to_string(::getpid()) + "_" + std::to_string(counter.fetch_add(1)));
     std::filesystem::create_directories(path_);
   }
   ~ScratchFolder() {

@@ -12,6 +12,7 @@
 #include "optim/stage.h"
 #include "stress/measures.h"
 #include "stress/plain_adam.h"
+#include "stress/pulled_turn.h"
 #include "stress/rows.h"
 #include "stress/splat_scene.h"
 #include "stress/tape_numbers.h"
@@ -33,26 +34,13 @@ constexpr int kAfterWrap = 60;
 
 /// A stage that turns a joint at a constant pull, and passes half a turn in step `wrap`.
 StepsAfterWrap steps_of_stage(int wrap) {
-  Tape<double> tape;
-  const double start = kPi - kTurnRate * (wrap - 0.5);
-  const Var<double> w = leaf(tape, "w", shape_of(1, 3), {start, 0, 0}), pull = tape.constant("pull", shape_of(1, 3));
-  tape.set(pull, {-1, 0, 0});
-  LossInputs<double> inputs;
-  inputs.rendered = w * pull;
-  const std::vector<LossTerm> terms = {
-      make_loss_term("pull", "Turns about the first axis", [](const auto& in) { return sum(in.rendered); })};
-  StageSettings settings;
-  settings.iterations = wrap + kAfterWrap;
-  settings.optimize = {{"w", {}}};
-  settings.optimize[0].second.lr = kTurnRate;
-  settings.losses = {{"pull", {}}};
   StepsAfterWrap steps;
-  double last = start;
-  run_stage<double>(tape, settings, terms, inputs, {{"w", {w}, true}}, [&](const IterationReport& report) {
-    const double now = tape.value(w).data[0], step = std::remainder(now - last, 2 * kPi) / kTurnRate;
+  double last = kPi - kTurnRate * (wrap - 0.5);
+  pull_turn({.start = last, .rate = kTurnRate, .iterations = wrap + kAfterWrap}, [&](int iteration, const double* w) {
+    const double step = std::remainder(w[0] - last, 2 * kPi) / kTurnRate;
     steps.longest = larger(steps.longest, std::abs(step));
-    if (report.iteration >= wrap) steps.lost += 1 - step;
-    last = now;
+    if (iteration >= wrap) steps.lost += 1 - step;
+    last = w[0];
   });
   return steps;
 }
@@ -100,8 +88,11 @@ struct BesideRoot {
 constexpr int kRootIterations = 300;
 constexpr double kRootGoal = 1, kRootRate = 0.05;
 
-/// @param pull  of x: x − 0.2 √x is least at 0.01, and momentum carries it over the edge; √x pulls it over the edge
-enum class Pull { kBack, kOver };
+/// The loss of x.
+enum class Pull {
+  kBack,  ///< x − 0.2 √x is least at 0.01; momentum carries x over the edge
+  kOver   ///< √x pulls x over the edge
+};
 
 BesideRoot stage_beside_root(OptimizerKind kind, Pull pull) {
   Tape<double> tape;

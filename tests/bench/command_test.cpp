@@ -11,8 +11,8 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/simd.h"
+#include "stress/scratch_folder.h"
 #include "tests/bench/rows.h"
-#include "tests/support/scratch_folder.h"
 
 namespace command_test {
 

@@ -10,7 +10,7 @@
 #include "body/procedural_body.h"
 #include "core/npz.h"
 #include "core/quaternion.h"
-#include "tests/support/scratch_folder.h"
+#include "stress/scratch_folder.h"
 
 namespace avatar_test {
 

@@ -104,6 +104,18 @@ std::array<Complexes, 2> plain_chain(const ComplexInputs& in, const std::vector<
   return out;
 }
 
+/// joint_limit_excess of rotations [21,9].
+void check_excess(const std::vector<double>& matrices) {
+  check_complex_step(
+      {{"rotations", shape_of(21, 9), 0, 0, matrices}}, [](const Vars& in) { return joint_limit_excess(in[0]); },
+      [](const ComplexInputs& in) {
+        Complexes y;
+        for (std::size_t n = 0; n < 21; ++n) y.push_back(plain_excess(matrix_at(in[0], n), natural_joints()[n]));
+        return y;
+      },
+      {.tolerance = 1e-11});
+}
+
 }  // namespace
 
 TEST_CASE("skinning has the gradients of complex steps") {
@@ -212,14 +224,7 @@ TEST_CASE("functions of poses have the gradients of complex steps") {
     const Matrix3<double> r = so3_exp(Vector3<double>(axis_angle[3 * j], axis_angle[3 * j + 1], axis_angle[3 * j + 2]));
     for (int i = 0; i < 9; ++i) matrices.push_back(r(i / 3, i % 3));
   }
-  check_complex_step(
-      {{"rotations", shape_of(21, 9), 0, 0, matrices}}, [](const Vars& in) { return joint_limit_excess(in[0]); },
-      [](const ComplexInputs& in) {
-        Complexes y;
-        for (std::size_t n = 0; n < 21; ++n) y.push_back(plain_excess(matrix_at(in[0], n), natural_joints()[n]));
-        return y;
-      },
-      {.tolerance = 1e-11});
+  check_excess(matrices);
   // Its last operator is turn_rows, by which the pose at ease is put before.
   check_complex_step(
       {{"latents", shape_of(1, 63)}}, [](const Vars& in) { return natural_decode(in[0]); },
@@ -274,14 +279,7 @@ TEST_CASE("excess beyond ranges has the gradients of complex steps on both sides
       const Matrix3<double> r = so3_exp(Vector3<double>(swing * across.normalized())) * so3_exp(along);
       for (int i = 0; i < 9; ++i) matrices.push_back(r(i / 3, i % 3));
     }
-    check_complex_step(
-        {{"rotations", shape_of(21, 9), 0, 0, matrices}}, [](const Vars& in) { return joint_limit_excess(in[0]); },
-        [](const ComplexInputs& in) {
-          Complexes y;
-          for (std::size_t n = 0; n < 21; ++n) y.push_back(plain_excess(matrix_at(in[0], n), natural_joints()[n]));
-          return y;
-        },
-        {.tolerance = 1e-11});
+    check_excess(matrices);
   }
 }
 

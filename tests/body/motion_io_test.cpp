@@ -11,7 +11,7 @@
 #include "body/pose_layout.h"
 #include "core/npz.h"
 #include "core/random.h"
-#include "tests/support/scratch_folder.h"
+#include "stress/scratch_folder.h"
 #include "tests/zip_archive.h"
 
 namespace motion_io_test {

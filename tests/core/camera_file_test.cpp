@@ -8,7 +8,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/rotation.h"
-#include "tests/support/scratch_folder.h"
+#include "stress/scratch_folder.h"
 
 namespace camera_file_test {
 

@@ -17,7 +17,7 @@
 
 #include "core/check.h"
 #include "core/image_io.h"
-#include "tests/support/scratch_folder.h"
+#include "stress/scratch_folder.h"
 
 namespace exr_test {
 

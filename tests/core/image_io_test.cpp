@@ -11,9 +11,9 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "stress/scratch_folder.h"
 #include "tests/crc32.h"
 #include "tests/support/measures.h"
-#include "tests/support/scratch_folder.h"
 
 namespace image_io_test {
 

@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
-#include "tests/support/scratch_folder.h"
+#include "stress/scratch_folder.h"
 #include "tests/zip_archive.h"
 
 namespace npz_test {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "stress/scratch_folder.h"
 #include "tests/fuzz/fuzz.h"
-#include "tests/support/scratch_folder.h"
 
 namespace hsi4d::fuzz {
 

@@ -8,7 +8,7 @@
 
 #include "core/check.h"
 #include "core/file.h"
-#include "tests/support/scratch_folder.h"
+#include "stress/scratch_folder.h"
 
 namespace command_test {
 

@@ -9,9 +9,9 @@
 #include "core/config_file.h"
 #include "core/file.h"
 #include "optim/loss_term.h"
+#include "stress/scratch_folder.h"
 #include "tests/optim/solid/meshes.h"
 #include "tests/optim/solid/surface_of_test.h"
-#include "tests/support/scratch_folder.h"
 
 namespace penetration_test {
 

@@ -8,8 +8,8 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/random.h"
+#include "stress/scratch_folder.h"
 #include "tests/optim/solid/meshes.h"
-#include "tests/support/scratch_folder.h"
 
 namespace mesh_distance_test {
 

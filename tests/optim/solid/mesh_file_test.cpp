@@ -8,8 +8,8 @@
 
 #include "core/check.h"
 #include "core/file.h"
+#include "stress/scratch_folder.h"
 #include "tests/optim/solid/meshes.h"
-#include "tests/support/scratch_folder.h"
 
 namespace mesh_file_test {
 

@@ -15,7 +15,7 @@
 #include "pipelines/input/body_files.h"
 #include "pipelines/synthetic/dataset.h"
 #include "pipelines/synthetic/views.h"
-#include "tests/support/scratch_folder.h"
+#include "stress/scratch_folder.h"
 
 namespace fit_test {
 

@@ -11,7 +11,7 @@
 
 #include "core/check.h"
 #include "core/file.h"
-#include "tests/support/scratch_folder.h"
+#include "stress/scratch_folder.h"
 
 namespace io_ply_test {
 

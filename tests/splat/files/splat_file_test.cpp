@@ -12,8 +12,8 @@
 #include "splat/files/io_compressed_ply.h"
 #include "splat/files/io_ply.h"
 #include "splat/files/io_splat.h"
+#include "stress/scratch_folder.h"
 #include "tests/support/measures.h"
-#include "tests/support/scratch_folder.h"
 #include "tests/support/splat_files.h"
 
 namespace splat_file_test {
