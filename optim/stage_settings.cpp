@@ -58,6 +58,18 @@ void describe(ConfigFields& f, OptimizerSettings& s) {
             "bfgs, gauss_newton: begin with the curvature of the frame before, for fewer evaluations");
 }
 
+std::vector<std::string> idle_settings(const OptimizerSettings& s) {
+  const OptimizerSettings usual;
+  const bool is_adam = s.kind == OptimizerKind::kAdam;
+  std::vector<std::string> idle;
+  if (is_adam && s.keep_curvature) idle.emplace_back("keep_curvature");
+  if (!is_adam && s.beta1 != usual.beta1) idle.emplace_back("beta1");
+  if (!is_adam && s.beta2 != usual.beta2) idle.emplace_back("beta2");
+  if (!is_adam && s.eps != usual.eps) idle.emplace_back("eps");
+  if (s.kind != OptimizerKind::kGaussNewton && s.products != usual.products) idle.emplace_back("products");
+  return idle;
+}
+
 void describe(ConfigFields& f, ParameterGroupSettings& s) {
   const IntegerRange iterations = {.min = 0, .max = kMostIterations};
   f.number("lr", s.lr, {.min = 0, .max = 1000}, "Learning rate").required();

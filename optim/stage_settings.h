@@ -30,6 +30,9 @@ struct OptimizerSettings {
   bool keep_curvature = false;  ///< a frame begins with what was learnt in the frame before
 };
 
+/// Names of settings that are not the usual ones and that this kind of optimiser does not look at.
+std::vector<std::string> idle_settings(const OptimizerSettings& settings);
+
 /// When and how far one group of parameters moves.
 struct ParameterGroupSettings {
   double lr = 0;

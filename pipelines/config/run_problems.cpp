@@ -239,19 +239,12 @@ void add_chain_problems(const std::vector<ChainClip>& chain, ConfigUse use, std:
 std::vector<RunNote> optimizer_notes(const RunConfig& config) {
   std::vector<RunNote> notes;
   for (const auto& [name, stage] : config.stages) {
-    const OptimizerSettings& own = stage.optimizer;
-    const OptimizerSettings usual;
-    const bool is_adam = own.kind == OptimizerKind::kAdam;
-    std::vector<std::string> idle;
-    if (is_adam && own.keep_curvature) idle.emplace_back("keep_curvature");
-    if (!is_adam && own.beta1 != usual.beta1) idle.emplace_back("beta1");
-    if (!is_adam && own.beta2 != usual.beta2) idle.emplace_back("beta2");
-    if (!is_adam && own.eps != usual.eps) idle.emplace_back("eps");
-    if (own.kind != OptimizerKind::kGaussNewton && own.products != usual.products) idle.emplace_back("products");
+    const std::vector<std::string> idle = idle_settings(stage.optimizer);
     if (!idle.empty())
-      notes.push_back({LogLevel::kWarning, "stages." + name + ".optimizer: " + joined(idle) +
-                                               (idle.size() == 1 ? " does" : " do") + " nothing with kind " +
-                                               std::string(choice_name<OptimizerKind>(kOptimizerKinds, own.kind))});
+      notes.push_back(
+          {LogLevel::kWarning, "stages." + name + ".optimizer: " + joined(idle) + (idle.size() == 1 ? " does" : " do") +
+                                   " nothing with kind " +
+                                   std::string(choice_name<OptimizerKind>(kOptimizerKinds, stage.optimizer.kind))});
   }
   return notes;
 }
