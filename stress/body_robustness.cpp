@@ -203,7 +203,7 @@ std::vector<StressFigure> joint_ranges(Remedy remedy) {
 std::vector<StressFigure> turns_beyond_half(Remedy remedy) {
   double angle = 0, jacobian = 0, change = 0;
   // 66 steps of 0.05 go from 3 to 6.3, just beyond 2π.
-  pull_turn({.start = 3, .rate = 0.05, .iterations = 66, .wraps = remedy == Remedy::kOn}, [&](int, const double* w) {
+  pull_turn({.start = 3, .rate = 0.05, .iterations = 66, .wraps = remedy == Remedy::kOn}, [&](Index, const double* w) {
     const Vector3<double> now(w);
     angle = larger(angle, now.norm());
     jacobian = larger(jacobian, largest(so3_left_jacobian_inverse(now)));

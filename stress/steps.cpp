@@ -36,7 +36,7 @@ constexpr int kAfterWrap = 60;
 StepsAfterWrap steps_of_stage(int wrap) {
   StepsAfterWrap steps;
   double last = kPi - kTurnRate * (wrap - 0.5);
-  pull_turn({.start = last, .rate = kTurnRate, .iterations = wrap + kAfterWrap}, [&](int iteration, const double* w) {
+  pull_turn({.start = last, .rate = kTurnRate, .iterations = wrap + kAfterWrap}, [&](Index iteration, const double* w) {
     const double step = std::remainder(w[0] - last, 2 * kPi) / kTurnRate;
     steps.longest = larger(steps.longest, std::abs(step));
     if (iteration >= wrap) steps.lost += 1 - step;
