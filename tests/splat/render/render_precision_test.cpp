@@ -27,11 +27,15 @@ using namespace hsi4d::test;
 
 namespace {
 
-constexpr double kMostFlips = 1e-3;           // of the pixels
-constexpr double kMeanImage = 2e-6;           // mean difference of images
-constexpr double kGradients = 3e-4;           // relative L2 of every class, all pixels; see Summary::check
-constexpr double kGradientsElsewhere = 1e-5;  // likewise, away from pixels that flip
-constexpr double kRows = 30;                  // the worst row there, times as much; needles come to 14
+constexpr double kMostFlips = 1e-3;  // of the pixels
+constexpr double kMeanImage = 2e-6;  // mean difference of images
+constexpr double kGradients = 3e-4;  // relative L2 of every class, all pixels; see Summary::check
+
+/// Of gradients away from pixels that flip: the relative L2 of a class, and the worst row.
+struct Bounds {
+  double all, row;
+};
+constexpr Bounds kElsewhere{1e-5, 3e-4};
 
 /// The class of gradients that is off most, and the row.
 struct WorstClass {
@@ -138,7 +142,7 @@ struct Summary {
   /// One flip is an α of alpha_min there or not there. How much of a class's gradient that is depends on the class and
   /// the pixel: at the end of a needle it turns the needle by its lever, and the camera's six numbers are what is left
   /// of a sum over all pixels whose terms cancel. Which pixels flip differs between instruction sets. So one comparison
-  /// may be above kGradients; without a flip none can be, for then kGradientsElsewhere holds.
+  /// may be above kGradients; without a flip none can be, for then kElsewhere holds.
   void check(const char* what) const {
     print(what);
     if (above > 0) std::printf("  above %.0e with its flips: %zu of %zu comparisons\n", kGradients, above, comparisons);
@@ -147,30 +151,31 @@ struct Summary {
 };
 
 /// Checks one comparison; Summary::check the gradients over all pixels.
-FloatErrors check_float(const SplatScene& scene, double bound, Summary& summary) {
+FloatErrors check_float(const SplatScene& scene, Bounds bounds, Summary& summary) {
   const FloatErrors errors = float_errors(scene);
   INFO(errors.flips << " of " << errors.pixels << " pixels flip; away from them " << errors.elsewhere.name
                     << " is off by " << errors.elsewhere.error << ", a row of " << errors.elsewhere.row_name << " by "
                     << errors.elsewhere.row);
   CHECK(static_cast<double>(errors.flips) <= kMostFlips * static_cast<double>(errors.pixels));
   CHECK(errors.mean_image <= kMeanImage);
-  CHECK(errors.elsewhere.error <= bound);
-  CHECK(errors.elsewhere.row <= kRows * bound);
+  CHECK(errors.elsewhere.error <= bounds.all);
+  CHECK(errors.elsewhere.row <= bounds.row);
   summary.add(errors);
   return errors;
 }
 
-/// The one comparison that is farther off than all others: 1.85e-5 of the camera's gradient. Six numbers of norm 197
-/// are what is left of sums that cancel 20-fold; the means' gradient beside them has norm 3600, the blur is a hundredth
-/// of a pixel, and nothing is cut.
+/// The one comparison that is farther off than all others: 1.85e-5 of the camera's gradient, 1.7e-3 of a row. The
+/// camera's six numbers of norm 197 are what is left of sums that cancel 20-fold; the means' gradient beside them has
+/// norm 3600, and nothing is cut. The row is a Gaussian a tenth of a pixel thin: its centre is rounded to 3e-5 of its
+/// width, which at the one pixel that it reaches, four widths away, is 1e-4 of its α.
 struct Exception {
   std::string scene = "playbot_object_robot.ply", settings = "antialias, reference, hardly any blur";
-  double bound = 2.5e-5;
+  Bounds bounds{2.5e-5, 2.5e-3};
 };
 
-double bound_of(const SplatScene& scene, const SettingsVariant& variant) {
+Bounds bounds_of(const SplatScene& scene, const SettingsVariant& variant) {
   const Exception exception;
-  return scene.name == exception.scene && variant.name == exception.settings ? exception.bound : kGradientsElsewhere;
+  return scene.name == exception.scene && variant.name == exception.settings ? exception.bounds : kElsewhere;
 }
 
 void check_all_settings(const SplatScene& scene, Summary& summary) {
@@ -178,7 +183,7 @@ void check_all_settings(const SplatScene& scene, Summary& summary) {
     INFO(scene.name << ", " << variant.name);
     SplatScene changed = scene;
     variant.apply(changed.settings);
-    check_float(changed, bound_of(scene, variant), summary);
+    check_float(changed, bounds_of(scene, variant), summary);
   }
 }
 
@@ -229,9 +234,9 @@ TEST_CASE("float agrees with double at the same depth keys: lists of several chu
 
 TEST_CASE("float agrees with double at the same depth keys: where cuts flip, only there", "[isa]") {
   Summary summary;
-  const FloatErrors errors = check_float(at_the_cut(40), kGradientsElsewhere, summary);
+  const FloatErrors errors = check_float(at_the_cut(40), kElsewhere, summary);
   CHECK(errors.flips > 0);
-  CHECK(errors.gradients.error > kGradientsElsewhere);  // the flips are what is left out, not nothing
+  CHECK(errors.gradients.error > kElsewhere.all);  // the flips are what is left out, not nothing
   summary.print("alphas at the cut");
 }
 
@@ -242,6 +247,7 @@ TEST_CASE("float agrees with double at the same depth keys: needles, to 1.2e-7 t
   // is allowed, and what round Gaussians have beside.
   const double rounding = 0.5 * static_cast<double>(std::numeric_limits<float>::epsilon());
   Summary summary;
+  constexpr double kRowsOfNeedles = 30;  // the worst row comes to 14 times the bound of all
   double largest_share = 0;
   for (const double aspect : {1e1, 1e2, 1e3, 1e4}) {
     for (const double blur : {0.3, 1e-2, 1e-4, 1e-6, 0.0}) {
@@ -253,7 +259,8 @@ TEST_CASE("float agrees with double at the same depth keys: needles, to 1.2e-7 t
         exact.run();
         const double bound = 1e-6 + 2 * rounding * longest_needle(exact);
         INFO("aspect " << aspect << ", blur " << blur << ", bound " << bound);
-        largest_share = std::max(largest_share, check_float(scene, bound, summary).elsewhere.error / bound);
+        largest_share = std::max(largest_share,
+                                 check_float(scene, {bound, kRowsOfNeedles * bound}, summary).elsewhere.error / bound);
       }
     }
   }
@@ -286,7 +293,7 @@ TEST_CASE("float agrees with double at the same depth keys: a whole real scene",
       return;
     }
     INFO("from " << view.from.transpose());
-    check_float(scene, kGradientsElsewhere, summary);
+    check_float(scene, kElsewhere, summary);
   }
   summary.check("a whole scene");
 }
