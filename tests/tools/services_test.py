@@ -121,18 +121,40 @@ def test_fit(folder):
         return subprocess.run([sys.executable, "-c", code], cwd=services, capture_output=True, text=True, check=False,
                               env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **environment})
 
-    picture(folder / "near.mp4", "130x96")
+    picture(folder / "near.mp4", "130x96", 2)
     check(fit(folder / "near.mp4"), 0)
     assert size_of(out) == "64,48", size_of(out)
     assert matrix_of(out) == "smpte170m", matrix_of(out)
-    picture(folder / "high.mp4", "1280x960")  # BT.709, as it names none
+    picture(folder / "high.mp4", "1280x960", 2)  # BT.709, as it names none
     check(fit(folder / "high.mp4"), 0)
     assert matrix_of(out) == "bt709", matrix_of(out)
-    picture(folder / "wide.mp4", "132x96")
+    picture(folder / "wide.mp4", "132x96", 2)
     check(fit(folder / "wide.mp4"), 1, "the model's video is 132x96, the first frame 64x48: their shapes differ by 3.1 %, at most 2 %")
     check(fit(folder / "wide.mp4", ", 0.035"), 0)
     check(fit(folder / "near.mp4", PATH=str(folder)), 2, "ffprobe: cannot be run")
     check(fit(image.parent / "nothing.mp4"), 1, "is no video that ffprobe can read")
+
+
+def test_streams(folder):
+    """The stream that hsi4d reads is taken: no cover picture, and of several the first, which is told."""
+    cover, film = folder / "image.png", folder / "long.mp4"
+    picture(film, "132x96", 5)
+    picture(folder / "other.mp4", "64x48", 7)
+    covered, two, out = folder / "covered.mkv", folder / "two.mkv", folder / "first.mp4"
+    both = ["-map", "0:v", "-map", "1:v", "-c", "copy"]
+    for words in (["-i", cover, "-i", film, *both, "-disposition:v:0", "attached_pic", covered], ["-i", film, "-i", folder / "other.mp4", *both, two]):
+        subprocess.run(["ffmpeg", "-v", "error", *map(str, words)], check=True)
+
+    def asked(code):
+        return subprocess.run([sys.executable, "-c", "import service; " + code], cwd=services, capture_output=True, text=True,
+                              check=False, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"})
+
+    told = asked(f"print(len(service.frame_names({str(covered)!r})), service.stream_words({str(covered)!r}))")
+    check(told, 0, "5 ['-map', '0:1']")
+    assert not told.stderr, told.stderr
+    told = asked(f"print(len(service.frame_names({str(two)!r}))); service.fit_video({str(two)!r}, {str(cover)!r}, {str(out)!r}, 0.035)")
+    check(told, 0, "5\n", "two.mkv: holds 2 videos; stream 0 is read, not 1")
+    assert size_of(out) == "64,48", size_of(out)
 
 
 def test_end(folder):
@@ -293,6 +315,7 @@ with tempfile.TemporaryDirectory() as temporary:
     test_dry_runs(pathlib.Path(temporary))
     test_names(pathlib.Path(temporary))
     test_fit(pathlib.Path(temporary))
+    test_streams(pathlib.Path(temporary))
     test_end(pathlib.Path(temporary))
     test_example(pathlib.Path(temporary))
     test_kling(pathlib.Path(temporary))

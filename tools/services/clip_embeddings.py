@@ -28,7 +28,8 @@ def frame_files(video, pattern, folder):
     """The frames as PNG files, in order: those of a folder, or of a video, taken out by ffmpeg."""
     if pathlib.Path(video).is_dir():
         return service.visible(video, pattern)
-    service.run(["ffmpeg", "-v", "error", "-i", video, "-fps_mode", "passthrough", pathlib.Path(folder) / "%06d.png"])
+    words, _ = service.input_of(video)
+    service.run(["ffmpeg", "-v", "error", *words, "-fps_mode", "passthrough", pathlib.Path(folder) / "%06d.png"])
     return sorted(pathlib.Path(folder).glob("*.png"))
 
 

@@ -4,6 +4,8 @@ A service is a program that hsi4d runs for a part of its inputs; docs/services.m
 """
 
 import argparse
+import functools
+import json
 import os
 import pathlib
 import shlex
@@ -62,32 +64,36 @@ def png_size(path):
     return struct.unpack(">II", head[16:24])
 
 
-def probed_words(video, *words):
-    """What ffprobe tells of the first stream of a video."""
-    command = ["ffprobe", "-v", "error", *words, "-select_streams", "v:0", "-of", "csv=p=0", "-i", str(video)]
+@functools.cache
+def video_stream(video):
+    """What ffprobe tells of the stream that hsi4d reads of a video: the first that is no attached picture and has more
+    than one frame (core/video_probe.h). Tells of others."""
+    command = ["ffprobe", "-v", "error", "-count_frames", "-select_streams", "v", "-show_entries",
+               "stream=index,width,height,color_space,nb_read_frames:stream_disposition=attached_pic", "-of", "json",
+               "-i", str(video)]
     try:
-        return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip().split(",")
+        told = subprocess.run(command, capture_output=True, text=True, check=False).stdout
     except OSError as error:
         fail(f"ffprobe: cannot be run: {error.strerror}", ASKED_WRONGLY)
+    streams = json.loads(told or "{}").get("streams", [])
+    videos = [one for one in streams if not one["disposition"]["attached_pic"] and int(one.get("nb_read_frames", 0)) > 1]
+    if not videos:
+        fail(f"{video}: is no video that ffprobe can read")
+    if len(videos) > 1:
+        others = ", ".join(str(one["index"]) for one in videos[1:])
+        print(f"{video}: holds {len(videos)} videos; stream {videos[0]['index']} is read, not {others}", file=sys.stderr)
+    return videos[0]
 
 
-def probed(video, *words):
-    """As probed_words, as numbers; those that it does not know are left out."""
-    return [int(number) for number in probed_words(video, *words) if number.isdigit()]
-
-
-def video_size(path):
-    """Width and height of a video."""
-    told = probed(path, "-show_entries", "stream=width,height")
-    if len(told) < 2 or 0 in told:
-        fail(f"{path}: is no video that ffprobe can read")
-    return told[0], told[1]
+def stream_words(video):
+    """ffmpeg's words that choose this stream of its one input."""
+    return ["-map", f"0:{video_stream(video)['index']}"]
 
 
 def matrix_words(video, size):
     """ffmpeg's words that keep the colours of a video which is scaled: one that does not name its matrix is taken for
     BT.709 or BT.601 by its size (core/video_probe.h), so its copy in another size names it."""
-    if probed_words(video, "-show_entries", "stream=color_space")[0] not in ("unknown", "reserved", ""):
+    if video_stream(video).get("color_space", "unknown") not in ("unknown", "reserved"):
         return []
     return ["-colorspace", "bt709" if size[0] >= 1280 or size[1] >= 720 else "smpte170m"]
 
@@ -95,7 +101,8 @@ def matrix_words(video, size):
 def fit_video(video, image, out, most_stretch=0.02):
     """Writes a video at `out` whose frames are as large as the image: what a model wrote, in another size, is scaled.
     Fails where that would stretch it by more than `most_stretch`: the model has then shown something else."""
-    size, found = png_size(image), video_size(video)
+    stream, size = video_stream(video), png_size(image)
+    found = stream["width"], stream["height"]
     if found == size:
         shutil.copyfile(video, out)
         return
@@ -104,7 +111,7 @@ def fit_video(video, image, out, most_stretch=0.02):
         fail(f"the model's video is {found[0]}x{found[1]}, the first frame {size[0]}x{size[1]}: their shapes differ by "
              f"{100 * (max(stretch, 1 / stretch) - 1):.1f} %, at most {100 * most_stretch:g} % are scaled away")
     scale = f"scale={size[0]}:{size[1]}:flags=lanczos"
-    run(["ffmpeg", "-v", "error", "-y", "-i", video, "-an", "-vf", scale, "-crf", "12", "-pix_fmt", "yuv444p",
+    run(["ffmpeg", "-v", "error", "-y", "-i", video, *stream_words(video), "-vf", scale, "-crf", "12", "-pix_fmt", "yuv444p",
          *matrix_words(video, found), out])
 
 
@@ -117,10 +124,7 @@ def frame_names(video):
     """The names that masks of a video have: those of a folder's frames, or numbers. Counted by ffprobe."""
     if pathlib.Path(video).is_dir():
         return [path.name for path in visible(video, "*.png")]
-    told = probed(video, "-count_frames", "-show_entries", "stream=nb_read_frames")
-    if not told:
-        fail(f"{video}: is no video that ffprobe can read")
-    return [f"{number:04d}.png" for number in range(told[0])]
+    return [f"{number:04d}.png" for number in range(int(video_stream(video)["nb_read_frames"]))]
 
 
 def input_of(video):
@@ -128,12 +132,14 @@ def input_of(video):
     folder itself would have a meaning."""
     if pathlib.Path(video).is_dir():
         return ["-pattern_type", "glob", "-i", "*.png"], video
-    return ["-i", str(video)], None
+    return ["-i", str(video), *stream_words(video)], None
 
 
 def as_video(video, rate, folder, dry_run=False):
-    """The video as one file: itself, or one made of a folder's frames."""
+    """The video as one file: itself, or one made of a folder's frames. Of several streams the other program chooses."""
     if pathlib.Path(video).is_file():
+        if not dry_run:
+            video_stream(video)  # tells of others
         return pathlib.Path(video)
     made = pathlib.Path(folder).resolve() / "video.mp4"
     words, place = input_of(video)
