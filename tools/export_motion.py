@@ -24,7 +24,7 @@ A body turns about its pelvis, so turning a motion needs the pelvis of the estim
 the neutral body of mean shape; --pelvis x,y,z for another. SMPL's pelvis stands elsewhere than SMPL-X's; the translation
 is corrected, so that the pelvis stays where the estimator has it; the file says where it stands at rest (pelvis_rest)
 where that is known. Frames that an estimator left out are interpolated. A motion that begins with a later frame of the
-video says which (first_frame, from 0). Other people of the input, and what of LINGO's is not read, are printed.
+video says which (first_frame, from 0). Other people of the input, and what of it is not read, are printed.
 
 Needs Python with NumPy, and joblib for WHAM or PyTorch for GVHMR and TRAM (for LINGO where its arrays are tensors).
 CHOIS writes no such file: save trans, root_orient, pose_body, obj_rot_mat and obj_com_pos of its results with
@@ -38,6 +38,7 @@ import sys
 
 SMPL_PELVIS = (-0.00217368, -0.24078917, 0.02858379)
 SMPLX_PELVIS = (0.00312326, -0.35140747, 0.01203655)
+USUAL_RATE = 30  # frames a second
 
 
 def fail(message):
@@ -71,6 +72,13 @@ def need(table, key, what):
         known = ", ".join(map(str, table.keys())) if hasattr(table, "keys") else type(table).__name__
         fail(f"{what}: there is no {key!r}; there is {known}")
     return table[key]
+
+
+def tell_unread(path, table, read):
+    """Prints the keys of a table that are not read: more of the motion may be in them."""
+    unread = sorted(str(key) for key in table if key not in read)
+    if unread:
+        print(f"{path}: not read: {', '.join(unread)}")
 
 
 # --- rotations, by quaternions (w, x, y, z), one a row ----------------------------------------------------------------
@@ -153,6 +161,7 @@ def read_wham(np, path, arguments):
     trans = array(np, need(one, "trans" + suffix, what), f"{what}: trans{suffix}", 3)
     betas = array(np, need(one, "betas", what), f"{what}: betas", 10)
     frames = one["frame_ids"] if "frame_ids" in one else range(len(pose))
+    tell_unread(what, one, ("pose" + suffix, "trans" + suffix, "betas", "frame_ids"))
     others = [f"{key} ({frames_text(np, people[key])})" for key in keys if key != keys[arguments.person]]
     if others:
         print(f"{path}: person {keys[arguments.person]} is read ({frames_text(np, one)}), not {', '.join(others)}")
@@ -168,6 +177,7 @@ def read_gvhmr(np, path, arguments):
     body = array(np, need(one, "body_pose", what), f"{what}: body_pose", 63)
     trans = array(np, need(one, "transl", what), f"{what}: transl", 3)
     betas = array(np, need(one, "betas", what), f"{what}: betas", 10)
+    tell_unread(what, one, ("global_orient", "body_pose", "transl", "betas"))
     return np.concatenate([root, body], axis=1), trans, betas, range(len(root)), True, "y up"
 
 
@@ -179,6 +189,7 @@ def read_tram(np, path, arguments):
     trans = array(np, need(one, "pred_trans", path), f"{path}: pred_trans", 3)
     betas = array(np, need(one, "pred_shape", path), f"{path}: pred_shape", 10)
     frames = np.asarray(need(one, "frame", path)).reshape(-1)
+    tell_unread(path, one, ("pred_rotmat", "pred_trans", "pred_shape", "frame"))
     others = sorted(other.name for other in path.parent.glob("hps_track_*.npy") if other.name != path.name)
     if others:
         print(f"{path}: is read, not {', '.join(others)} beside it")
@@ -220,9 +231,7 @@ def read_lingo(np, path, arguments):
                 fail(f"{path}: global_orient has {len(root)} frames, {name} {len(hand)}")
             parts.append(hand)
         print(f"{path}: hands are taken as turns of a flat hand, not of the body model's mean hand")
-    unread = sorted(str(key) for key in one if key not in ("global_orient", "body_pose", "transl", *hands))
-    if unread:
-        print(f"{path}: not read: {', '.join(unread)}")
+    tell_unread(path, one, ("global_orient", "body_pose", "transl", *hands))
     return np.concatenate(parts, axis=1), trans, np.zeros((1, 10)), range(len(root)), True, "y up"
 
 
@@ -285,7 +294,7 @@ def main():
     parser.add_argument("input", metavar="IN", type=pathlib.Path)
     parser.add_argument("output", metavar="OUT.npz", type=pathlib.Path)
     parser.add_argument("--from", dest="source", choices=READERS, help="the estimator; default: by IN's ending")
-    parser.add_argument("--fps", type=float, default=30, help="frames a second of the video; default: 30")
+    parser.add_argument("--fps", type=float, help=f"frames a second of the video; default: {USUAL_RATE}, which is told")
     parser.add_argument("--person", type=int, default=0, help="which of WHAM's people, from 0")
     parser.add_argument("--camera", type=pathlib.Path, help="TRAM's camera.npy; default: beside the folder of IN")
     parser.add_argument("--in-camera", action="store_true", help="in the camera's frame, not turned")
@@ -294,6 +303,9 @@ def main():
     arguments = parser.parse_args()
     if arguments.output.suffix != ".npz":
         fail(f"{arguments.output}: allowed ending: .npz")
+    if arguments.fps is None:
+        arguments.fps = USUAL_RATE
+        print(f"{arguments.input}: taken for {USUAL_RATE} frames a second, as --fps does not say otherwise")
     if not arguments.fps > 0 or arguments.fps == float("inf"):
         fail(f"--fps: {arguments.fps} is out of range; allowed: above 0")
     if arguments.person < 0:

@@ -89,7 +89,8 @@ def gvhmr():
         "betas": tensor(np.full((frames, 10), 0.5)),
     }
     save("hmr4d_results.pt", {"smpl_params_global": one, "smpl_params_incam": one})
-    assert "7 frames, gvhmr" in export("export_motion.py", "hmr4d_results.pt", "g.npz", "--fps", 25)
+    said = export("export_motion.py", "hmr4d_results.pt", "g.npz", "--fps", 25)
+    assert "7 frames, gvhmr" in said and "not read" not in said and "taken for" not in said, said
     out = np.load("g.npz")
     pelvis = np.array(em.SMPLX_PELVIS)
     close(out["trans"] + pelvis, (one["transl"].array + pelvis) @ Z_UP.T)
@@ -101,6 +102,8 @@ def gvhmr():
     reads("g.npz")
     export("export_motion.py", "hmr4d_results.pt", "p.npz", "--pelvis=0.01,-0.3,0.02")
     close(np.load("p.npz")["pelvis_rest"], [0.01, -0.3, 0.02], 0)
+    save("more.pt", {"smpl_params_global": {**one, "expression": 0}})
+    assert "smpl_params_global: not read: expression" in export("export_motion.py", "more.pt", "m.npz")
     export("export_motion.py", "hmr4d_results.pt", "c.npz", "--in-camera")
     close(np.load("c.npz")["trans"], one["transl"].array)
 
@@ -112,6 +115,8 @@ def wham():
         "betas": np.ones((4, 10)),
         "frame_ids": np.array([3, 4, 6, 7]),
     }
+    save("more.pkl", {0: {**one, "verts": np.zeros((4, 3)), "pose": one["pose_world"]}})
+    assert "person 0: not read: pose, verts" in export("export_motion.py", "more.pkl", "w.npz")
     save("two.pkl", {"a": {**one, "frame_ids": np.array([0, 1, 2, 3])}, "b": one})
     said = export("export_motion.py", "two.pkl", "b.npz")
     assert "person a is read (frames 0 to 3), not b (frames 3 to 7)" in said, said
@@ -119,6 +124,7 @@ def wham():
     save("wham_output.pkl", {0: one})
     said = export("export_motion.py", "wham_output.pkl", "w.npz")
     assert "5 frames, 1 of them interpolated, from frame 3 of the video" in said, said
+    assert "taken for 30 frames a second, as --fps does not say otherwise" in said, said
     out = np.load("w.npz")
     rows = [0, 1, 3, 4]
     places = (one["trans_world"] + em.SMPL_PELVIS) @ Z_UP.T
@@ -186,7 +192,7 @@ def tram():
     np.save("clip/hps/hps_track_0.npy", content)
     refused("camera.npy", "export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
     np.save("clip/camera.npy", {"pred_cam_R": turns, "pred_cam_T": places})
-    export("export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
+    assert "not read" not in export("export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
     out = np.load("t.npz")
     pelvis = np.einsum("tij,tj->ti", turns[frames], trans[:, 0] + em.SMPL_PELVIS) + places[frames]
     # The camera's y is down and z forward: x, z, −y of it are x, y, z of a world with z up.
