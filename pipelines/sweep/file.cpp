@@ -30,6 +30,17 @@ void describe(ConfigFields& f, SweepSlurm& s) {
   f.strings("options", s.options, "More options of sbatch");
 }
 
+/// Why an option of sbatch would undo what a sweep asks of Slurm; null: it does not.
+const char* reason_against(const std::string& option) {
+  const auto is = [&option](const std::string& name) { return option == name || option.starts_with(name + "="); };
+  if (is("--time") || option.starts_with("-t")) return "/slurm/time says it, with which /slurm/grace_s is compared";
+  if (is("--time-min")) return "Slurm may then give less than /slurm/time, with which /slurm/grace_s is compared";
+  if (is("--signal")) return "/slurm/grace_s says when a run is told that its time ends";
+  if (is("--array") || option.starts_with("-a")) return "which runs an array has the sweep says";
+  if (is("--no-requeue")) return "a run whose time ends puts itself into the queue again";
+  return nullptr;
+}
+
 constexpr std::int64_t kEarlyWarning = 60;  // seconds: so much earlier than asked for Slurm may send its warning
 
 /// Seconds of a time as sbatch takes it: MINUTES, MINUTES:SECONDS, HOURS:MINUTES:SECONDS, DAYS-HOURS and so on; 0 for
@@ -422,6 +433,8 @@ class Reader {
             json_string(slurm.options[i]) +
                 " is no option of sbatch, which begin with '-'; a value belongs to its "
                 "option: --account=hsi");
+      const char* const reason = reason_against(slurm.options[i]);
+      if (reason != nullptr) add(at(place), place, json_string(slurm.options[i]) + " is not for here: " + reason);
     }
   }
 

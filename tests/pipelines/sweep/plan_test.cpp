@@ -250,6 +250,11 @@ TEST_CASE("mistakes of a sweep's file are told with their place") {
   CHECK(refused({{"slurm", {{"time", "2:30"}, {"grace_s", 119}, {"options", {"--account", "hsi"}}}}}) ==
         "sweep.json:9: /slurm/options/1: \"hsi\" is no option of sbatch, which begin with '-'; a value belongs to its "
         "option: --account=hsi");
+  for (const char* option :
+       {"--time=1:00:00", "-t30", "--time-min=5", "--signal=USR2@30", "--array=0-3", "--no-requeue"}) {
+    CHECK_THAT(refused({{"slurm", {{"options", {"--account=hsi", option}}}}}),
+               Catch::StartsWith("sweep.json:7: /slurm/options/1: \"" + std::string(option) + "\" is not for here: "));
+  }
   CHECK(refused({{"ablations", {{"a", Json::object()}}}, {"compare", {{"ablation", "b"}}}}) ==
         "sweep.json:8: /compare/ablation: no run has \"b\" there");
   CHECK(refused({{"base", "bsae.json"}}) == "sweep.json:3: /base: \"bsae.json\" does not exist (looked for bsae.json)");
