@@ -220,6 +220,10 @@ constexpr OtherCamera kOtherCameras[] = {
 constexpr const char* kKindKeys[] = {"camera_type", "lens_model", "lens_type", "projection", "projection_type"};
 constexpr const char* kPinholeTexts[] = {"pinhole", "simple_pinhole", "perspective", "opencv", "none", ""};
 
+/// Keys whose text says much, and that of another lens or shutter by a part of kOtherCameras.
+constexpr const char* kTextKeys[] = {"lens", "lens_name", "shutter", "shutter_type", "camera", "model"};
+constexpr const char* kOmnidirectional = "xi";  // Mei's model
+
 struct NerfCamera {
   Camera camera;
   Model model = Model::kPinhole;
@@ -284,6 +288,19 @@ bool says_nothing(const ConfigValue& value) {
   return false;
 }
 
+template <std::size_t N>
+bool is_one_of(const std::string& text, const char* const (&words)[N]) {
+  return std::find(std::begin(words), std::end(words), text) != std::end(words);
+}
+
+/// What a part of a text says of the camera that is not drawn; null: nothing.
+const char* other_camera_in(const std::string& text) {
+  for (const OtherCamera& other : kOtherCameras) {
+    if (text.find(other.part) != std::string::npos) return other.what;
+  }
+  return nullptr;
+}
+
 std::string in_lower_case(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
@@ -293,17 +310,11 @@ std::string in_lower_case(std::string text) {
 /// What a member says of the camera that is not drawn; null: nothing.
 const char* other_camera(const std::string& key, const ConfigValue& value) {
   const std::string name = in_lower_case(key);
-  const bool names_kind = std::find(std::begin(kKindKeys), std::end(kKindKeys), name) != std::end(kKindKeys);
-  if (names_kind && value.kind == Kind::kString) {
-    const bool is_pinhole = std::find(std::begin(kPinholeTexts), std::end(kPinholeTexts), in_lower_case(value.text)) !=
-                            std::end(kPinholeTexts);
-    return is_pinhole ? nullptr : "a camera that is no pinhole";
-  }
+  if (is_one_of(name, kKindKeys) && value.kind == Kind::kString)
+    return is_one_of(in_lower_case(value.text), kPinholeTexts) ? nullptr : "a camera that is no pinhole";
+  if (is_one_of(name, kTextKeys) && value.kind == Kind::kString) return other_camera_in(in_lower_case(value.text));
   if (says_nothing(value) || name.find("undistort") != std::string::npos) return nullptr;
-  for (const OtherCamera& other : kOtherCameras) {
-    if (name.find(other.part) != std::string::npos) return other.what;
-  }
-  return nullptr;
+  return name == kOmnidirectional ? "an omnidirectional camera" : other_camera_in(name);
 }
 
 /// Keys that are passed over must not say that the picture is of another lens or shutter.

@@ -225,11 +225,26 @@ TEST_CASE("transforms of another lens or shutter are refused, whoever's word for
       fault_of("", "\"rolling_shutter_time\": 0.012, ") ==
       "c.json:2: /frames/0/rolling_shutter_time: 0.012 says that this is a rolling shutter; pinhole cameras alone are "
       "drawn: undistort the images first");
-  for (const char* other :
-       {"\"ftheta_p0\": 1e-9, ", "\"fisheye_crop_radius\": 300, ", "\"latlong\": true, ", "\"equirectangular\": 1, ",
-        "\"is_orthographic\": true, ", "\"ortho_scale\": 2.5, ", "\"rolling_shutter\": [0, 0.5, 0, 0], ",
-        "\"camera_type\": \"equirectangular\", ", "\"lens_type\": \"FISHEYE\", ", "\"distortion\": {\"k\": [0.1]}, ",
-        "\"k5\": 0.1, ", "\"s1\": 0.1, ", "\"from_mitsuba\": true, ", "\"skew\": 0.3, "}) {
+  for (const char* other : {"\"ftheta_p0\": 1e-9, ",
+                            "\"fisheye_crop_radius\": 300, ",
+                            "\"latlong\": true, ",
+                            "\"equirectangular\": 1, ",
+                            "\"is_orthographic\": true, ",
+                            "\"ortho_scale\": 2.5, ",
+                            "\"rolling_shutter\": [0, 0.5, 0, 0], ",
+                            "\"camera_type\": \"equirectangular\", ",
+                            "\"lens_type\": \"FISHEYE\", ",
+                            "\"distortion\": {\"k\": [0.1]}, ",
+                            "\"shutter_type\": \"ROLLING_TOP_TO_BOTTOM\", ",
+                            "\"lens\": \"GoPro, Fisheye\", ",
+                            "\"xi\": 0.7, ",
+                            "\"camera_model\": \"OPENCV_FISHEYE\", ",
+                            "\"camera_model\": \"fisheye\", ",
+                            "\"model\": \"fisheye624\", ",
+                            "\"k5\": 0.1, ",
+                            "\"s1\": 0.1, ",
+                            "\"from_mitsuba\": true, ",
+                            "\"skew\": 0.3, "}) {
     INFO(other);
     CHECK(fault_of(other) != "no fault");
     CHECK(fault_of("", other) != "no fault");
@@ -237,7 +252,8 @@ TEST_CASE("transforms of another lens or shutter are refused, whoever's word for
   for (const char* pinhole :
        {"\"is_fisheye\": false, ", "\"rolling_shutter_time\": 0.0, ", "\"rolling_shutter\": [0, 0, -0.0, 0e7], ",
         "\"ortho_scale\": null, ", "\"camera_type\": \"perspective\", ", "\"distortion_model\": \"none\", ",
-        "\"undistorted\": true, ", "\"k6\": 0, ", "\"shutter_speed\": 0.01, ", "\"aabb_scale\": 16, "}) {
+        "\"undistorted\": true, ", "\"k6\": 0, ", "\"shutter_speed\": 0.01, ", "\"shutter_type\": \"GLOBAL\", ",
+        "\"lens\": \"24 mm f/1.8\", ", "\"xi\": 0, ", "\"aabb_scale\": 16, "}) {
     INFO(pinhole);
     CHECK(fault_of(pinhole) == "no fault");
     CHECK(fault_of("", pinhole) == "no fault");
