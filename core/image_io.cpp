@@ -10,6 +10,7 @@
 #include "core/image_codec.h"
 #include "core/jpeg.h"
 #include "core/png.h"
+#include "core/text.h"
 
 namespace hsi4d {
 namespace {
@@ -118,6 +119,18 @@ Image read_image(const std::string& path, const ImageLimits& limits) {
   const Bytes start = read_file_start(path, 8);
   if (start.empty()) fail_image(path, "is empty");
   return image_kind(start) == FileKind::other ? read_other(path, limits) : decode_image(read_file(path), path, limits);
+}
+
+void check_opaque(const Image& image, const std::string& name, const char* what) {
+  const int alpha = image.channels() - 1;
+  if (image.channels() != 2 && image.channels() != 4) return;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      if (image(alpha, y, x) >= 1) continue;
+      fail_image(name, "row " + std::to_string(y) + ", column " + std::to_string(x) + " has alpha " +
+                           rounded(static_cast<double>(image(alpha, y, x)), 3) + "; " + what + " is opaque");
+    }
+  }
 }
 
 Bytes encode_image(const std::string& path, const Image& image, const ImageFormat& format) {

@@ -35,6 +35,11 @@ Image read_image(const std::string& path, const ImageLimits& limits = {});
 /// @param name  what error messages call it
 Image decode_image(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits = {});
 
+/// Throws DataError naming the first pixel of an image that is transparent somewhere: what is behind it is not known.
+/// @param name  what error messages call it
+/// @param what  what it is read as: "a frame"
+void check_opaque(const Image& image, const std::string& name, const char* what);
+
 /// Writes an image; the path's ending says how: .png (1 to 4 channels), .jpg or .jpeg (1 or 3), .exr (1 to 4).
 ///
 /// PNG and JPEG: clamped to [0, 1], times the largest integer, rounded to nearest. OpenEXR: float as it is, half

@@ -1,10 +1,13 @@
 #include "core/png.h"
 
+#include <algorithm>
+#include <array>
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
 #include <new>
 #include <png.h>
+#include <string_view>
 #include <utility>
 #include <vector>
 #include <zlib.h>
@@ -135,6 +138,45 @@ std::vector<png_bytep> row_pointers(Bytes& values, size_t row_bytes, size_t heig
   return rows;
 }
 
+std::size_t big_endian(std::span<const uint8_t> four) {
+  std::size_t value = 0;
+  for (const uint8_t byte : four) value = value << 8 | byte;
+  return value;
+}
+
+/// The content of the first chunk of this type before the pixels; empty where there is none.
+std::span<const uint8_t> chunk_before_pixels(std::span<const uint8_t> file, std::string_view wanted) {
+  constexpr std::size_t kSignature = 8, kHead = 8, kChecksum = 4;
+  for (std::size_t at = kSignature; at + kHead <= file.size();) {
+    const std::size_t length = big_endian(file.subspan(at, 4));
+    const std::string_view type(reinterpret_cast<const char*>(file.data()) + at + 4, 4);
+    const std::size_t rest = file.size() - at - kHead;
+    if (type == wanted) return file.subspan(at + kHead, std::min(length, rest));
+    if (type == "IDAT" || length > rest) return {};
+    at += kHead + length + kChecksum;
+  }
+  return {};
+}
+
+/// Refuses colours that sRGB's transfer and primaries would show wrongly. Numbers are those of ITU-T H.273; allowed are
+/// those of videos (core/video_probe.cpp).
+void check_cicp(std::span<const uint8_t> file, const std::string& name) {
+  constexpr std::array<uint8_t, 6> kPrimaries = {1, 2, 4, 5, 6, 7};
+  constexpr std::array<uint8_t, 11> kTransfers = {1, 2, 4, 5, 6, 7, 11, 12, 13, 14, 15};
+  constexpr uint8_t kPq = 16, kHlg = 18;
+  const std::span<const uint8_t> cicp = chunk_before_pixels(file, "cICP");
+  if (cicp.size() != 4) return;
+  const uint8_t primaries = cicp[0], transfer = cicp[1];
+  const auto refuse = [&name](const char* what, uint8_t number, const char* words) {
+    throw DataError(name + ": has the " + what + " " + std::to_string(number) + words +
+                    " by its chunk cICP (numbers of H.273); allowed are colours of sRGB, BT.709 or BT.601");
+  };
+  if (std::find(kTransfers.begin(), kTransfers.end(), transfer) == kTransfers.end())
+    refuse("transfer", transfer, transfer == kPq ? " (PQ, HDR)" : transfer == kHlg ? " (HLG, HDR)" : "");
+  if (std::find(kPrimaries.begin(), kPrimaries.end(), primaries) == kPrimaries.end())
+    refuse("primaries", primaries, primaries == 9 ? " (BT.2020)" : primaries == 12 ? " (Display P3)" : "");
+}
+
 [[noreturn]] void fail_png(const std::string& name, const Decoder& decoder) {
   throw DataError(name + ": cannot be decoded as PNG: " + decoder.error);
 }
@@ -158,6 +200,16 @@ bool is_png(std::span<const uint8_t> start) {
   return start.size() >= 8 && std::memcmp(start.data(), "\x89PNG\r\n\x1a\n", 8) == 0;
 }
 
+std::string wide_profile(std::span<const uint8_t> start) {
+  const std::span<const uint8_t> profile = chunk_before_pixels(start, "iCCP");
+  const auto end = std::find(profile.begin(), profile.end(), uint8_t{0});
+  const std::string name(profile.begin(), end);
+  for (const char* wide : {"P3", "Adobe", "ProPhoto", "2020", "2100", "Wide"}) {
+    if (name.find(wide) != std::string::npos) return name;
+  }
+  return "";
+}
+
 PaletteImage decode_palette(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
   Decoder decoder{.content = file};
   if (!read_header(decoder)) fail_png(name, decoder);
@@ -177,6 +229,7 @@ PaletteImage decode_palette(std::span<const uint8_t> file, const std::string& na
 Image decode_png(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits) {
   Decoder decoder{.content = file};
   if (!read_header(decoder)) fail_png(name, decoder);
+  check_cicp(file, name);
   const int64_t height = png_get_image_height(decoder.png, decoder.info);
   const int64_t width = png_get_image_width(decoder.png, decoder.info);
   check_image_size(name, png_get_channels(decoder.png, decoder.info), height, width, limits);

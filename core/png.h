@@ -15,8 +15,13 @@ namespace hsi4d {
 /// transparent colour becomes alpha; gamma and profiles are ignored.
 ///
 /// @param name  what error messages call the file
-/// Throws DataError for a damaged, truncated or oversized image.
+/// Throws DataError for a damaged, truncated or oversized image, and for colours that are not those of a usual screen
+/// by the chunk cICP: PQ, HLG, BT.2020, Display P3.
 Image decode_png(std::span<const uint8_t> file, const std::string& name, const ImageLimits& limits);
+
+/// The name of the colour profile in a PNG (chunk iCCP), where it is that of a wider gamut than sRGB's; else empty.
+/// @param start  of the file; the profile is before the pixels
+std::string wide_profile(std::span<const uint8_t> start);
 
 /// Whether a file begins as a PNG does.
 /// @param start  its first eight bytes

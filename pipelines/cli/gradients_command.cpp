@@ -37,6 +37,7 @@ std::vector<double> png_values(const std::string& path, const Image& image) {
   if (image.channels() < 3)
     throw DataError(path + ": the image has " + std::to_string(image.channels()) +
                     (image.channels() == 1 ? " channel" : " channels") + "; 3 or 4 are needed: RGB, RGBA");
+  check_opaque(image, path, "a target");
   std::vector<double> values = wide(take_channels(image, 0, 3));
   for (double& value : values) value = std::round(value * 65535) / 65535;
   return values;

@@ -1,6 +1,7 @@
 #include "core/image_io.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <iterator>
@@ -11,9 +12,11 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "core/png.h"
 #include "stress/scratch_folder.h"
 #include "tests/crc32.h"
 #include "tests/support/measures.h"
+#include "tests/support/png_chunk.h"
 
 namespace image_io_test {
 
@@ -201,6 +204,37 @@ TEST_CASE("a truncated image is an error at any length") {
   const Bytes png = encode_image("a.png", image);
   CHECK_THROWS_WITH(decode_image(std::span(png.data(), png.size() / 2), "a.png"),
                     "a.png: cannot be decoded as PNG: the file ends early");
+}
+
+TEST_CASE("a PNG whose chunk cICP names HDR or a wide gamut is refused") {
+  const Bytes png = encode_image("a.png", steps(3, 4, 4, 255));
+  const auto refusal = [&png](char primaries, char transfer) -> std::string {
+    const std::array<char, 4> content = {primaries, transfer, 0, 1};
+    try {
+      decode_image(test::with_png_chunk(png, "cICP", {content.data(), content.size()}), "a.png");
+    } catch (const DataError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string way = " by its chunk cICP (numbers of H.273); allowed are colours of sRGB, BT.709 or BT.601";
+  CHECK(refusal(9, 16) == "a.png: has the transfer 16 (PQ, HDR)" + way);
+  CHECK(refusal(1, 18) == "a.png: has the transfer 18 (HLG, HDR)" + way);
+  CHECK(refusal(1, 8) == "a.png: has the transfer 8" + way);
+  CHECK(refusal(12, 13) == "a.png: has the primaries 12 (Display P3)" + way);
+  CHECK(refusal(1, 13).empty());
+  CHECK(refusal(2, 2).empty());
+}
+
+TEST_CASE("a profile of a wide gamut is found in a PNG") {
+  const Bytes png = encode_image("a.png", steps(3, 4, 4, 255));
+  const auto found = [&png](std::string_view name) {
+    return wide_profile(test::with_png_chunk(png, "iCCP", std::string(name) + std::string("\0\0x", 3)));
+  };
+  CHECK(found("Display P3") == "Display P3");
+  CHECK(found("sRGB IEC61966-2.1").empty());
+  CHECK(wide_profile(png).empty());
+  CHECK(wide_profile({}).empty());
 }
 
 TEST_CASE("a damaged PNG is noticed") {

@@ -184,6 +184,7 @@ TEST_CASE("harmonics above the degree that is used have gradient zero") {
 TEST_CASE("targets are read as they are") {
   const TemporaryFolder folder;
   Image image(4, 2, 3);
+  for (int y = 0; y < 2; ++y) std::fill_n(image.row(3, y), 3, 1.0F);
   std::vector<double> bytes, words;
   for (int y = 0; y < 2; ++y) {
     for (int x = 0; x < 3; ++x) {
@@ -217,6 +218,10 @@ TEST_CASE("targets are read as they are") {
   CHECK(fault([] { cli::read_target("a.png", 2, 4); }) == "a.png: the image is 3 x 2 pixels; the camera's is 4 x 2");
   CHECK(fault([] { cli::read_target("c.exr", 3, 3); }) == "c.exr: the image is 3 x 2 pixels; the camera's is 3 x 3");
   CHECK(fault([] { cli::read_target("d.npz", 1, 1); }) == "d.npz: the image is 3 x 2 pixels; the camera's is 1 x 1");
+  image(3, 1, 2) = 0.5F;
+  write_image("glass.png", image);
+  CHECK(fault([] { cli::read_target("glass.png", 2, 3); }) ==
+        "glass.png: row 1, column 2 has alpha 0.502; a target is opaque");
   write_image("grey.png", Image(1, 2, 3));
   CHECK(fault([] { cli::read_target("grey.png", 2, 3); }) ==
         "grey.png: the image has 1 channel; 3 or 4 are needed: RGB, RGBA");
