@@ -363,6 +363,18 @@ TEST_CASE("times are those of the time stamps") {
   CHECK_FALSE(are_even(VideoReader("pause.mp4").times()));
 }
 
+TEST_CASE("a decoder that gives another number of frames than were counted is told") {
+  const TemporaryFolder here;
+  for (const auto& [frames, what] :
+       {std::pair{4, "frame 4 of 6 cannot be read: ffprobe counts 6 frames, ffmpeg gives 4"},
+        {8, "ffprobe counts 6 frames, ffmpeg gives more"}}) {
+    write_frames("a.mp4", 6, 32, 48);
+    VideoReader video("a.mp4");
+    write_frames("a.mp4", frames, 32, 48);  // what the decoder then finds
+    CHECK_THROWS_MATCHES(video.read(5), DataError, Message(std::string("a.mp4: ") + what));
+  }
+}
+
 TEST_CASE("a frame that is read again is the same") {
   const TemporaryFolder here;
   write_frames("a.mp4", 4, 32, 48);
