@@ -295,6 +295,34 @@ double read_first_frame(const Npz& file, int64_t frames) {
   return ids.front();
 }
 
+// What AMASS and write_motion say again in other words.
+constexpr const char* kSaidAgain[] = {"mocap_time_length", "num_betas"};
+// Poses of the object of CHOIS and OMOMO, which `hsi4d evaluate` reads.
+constexpr const char* kOfObjects[] = {"obj_rot_mat", "obj_rot", "obj_com_pos", "window_obj_com_pos", "obj_trans"};
+
+bool is_among(std::string_view name, std::span<const char* const> names) {
+  return std::any_of(names.begin(), names.end(), [&](const char* one) { return one != nullptr && name == one; });
+}
+
+bool is_read(const std::string& name) {
+  constexpr const char* kSingle[] = {"first_frame", "betas", "gender", "pelvis_rest", "surface_model_type"};
+  return is_among(name, kTranslationNames) || is_among(name, kPosesNames) || is_among(name, kFrameNames) ||
+         is_among(name, kRateNames) || is_among(name, kSingle) || is_among(name, kSaidAgain) ||
+         is_among(name, kOfObjects) ||
+         std::any_of(std::begin(kParts), std::end(kParts), [&](const Part& p) { return is_among(name, p.names); }) ||
+         std::any_of(std::begin(kHalves), std::end(kHalves), [&](const Half& half) { return name == half.name; });
+}
+
+/// Soft tissue (dmpls), markers, faces; and texts that are Python objects.
+std::vector<std::string> unread_of(const Npz& file) {
+  std::vector<std::string> unread;
+  for (const std::string& name : file.names()) {
+    if (!is_read(name)) unread.push_back(name);
+  }
+  for (const Npz::Skipped& member : file.skipped()) unread.push_back(member.name);
+  return unread;
+}
+
 /// The same movement of the neutral SMPL-X of mean shape: of the other model's shape it knows nothing.
 Motion converted(Motion motion, Model model) {
   motion = with_pelvis(motion, motion.pelvis_rest.value_or(pelvis_of(model)), kSmplxPelvis);
@@ -319,6 +347,7 @@ Motion motion_of(const Npz& file) {
   motion.betas = read_betas(file, frames);
   motion.gender = read_text(file, "gender").value_or(motion.gender);
   motion.pelvis_rest = read_pelvis(file);
+  motion.unread = unread_of(file);
   motion.poses.assign(static_cast<std::size_t>(frames), rest_pose(kSmplxJoints));
   const std::optional<Model> named = read_model(file);
   Model model = named.value_or(Model::kSmplx);

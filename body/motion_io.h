@@ -20,10 +20,11 @@ struct Motion {
   /// Where the pelvis of the body that the translations are for stands in its rest pose, metres: in the world it is at
   /// pelvis_rest + transl. None: the file does not say; a body of SMPL-X with these betas.
   std::optional<Vector3<double>> pelvis_rest = {};
-  std::string converted_from = {};  ///< "SMPL-H" or "SMPL", of whose poses these were made; empty: SMPL-X's own
-  bool lost_shape = false;          ///< the file's betas are of that model, and left out
-  double first_frame = 0;           ///< frame of its video, at frame_rate, from 0, that the first pose is of
-  bool says_frame_rate = true;      ///< false: the file that it was read from does not; frame_rate is the default
+  std::string converted_from = {};       ///< "SMPL-H" or "SMPL", of whose poses these were made; empty: SMPL-X's own
+  bool lost_shape = false;               ///< the file's betas are of that model, and left out
+  double first_frame = 0;                ///< frame of its video, at frame_rate, from 0, that the first pose is of
+  std::vector<std::string> unread = {};  ///< arrays of the file that are not read and may say more, in its order
+  bool says_frame_rate = true;           ///< false: the file that it was read from does not; frame_rate is the default
 };
 
 /// Frame rates of motion files, frames a second.

@@ -6,6 +6,7 @@
 
 #include "core/check.h"
 #include "core/image_io.h"
+#include "core/log.h"
 #include "core/rotation.h"
 #include "pipelines/cli/list.h"
 #include "pipelines/cli/options.h"
@@ -50,6 +51,9 @@ PosedGaussians read_body(const RenderOptions& options, const Vector3<double>& ce
   if (!options.color_net.empty())
     avatar.color_net = read_color_net(options.color_net, avatar.count(), avatar.joint_count());
   const Motion motion = read_motion_for(options.motion, avatar);
+  if (motion.first_frame != 0)
+    log_warning(options.motion + ": begins with frame " + number_text(motion.first_frame) +
+                " of its video; --frame counts its poses, from 0");
   const BodyPose& pose = at_frame(motion.poses, options.frame, options.motion);
   if (pose.joints() != avatar.joint_count())
     throw DataError(options.avatar + ": the avatar has " + std::to_string(avatar.joint_count()) +

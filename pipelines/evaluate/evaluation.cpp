@@ -119,6 +119,7 @@ std::optional<Rigid<double>> initial_pelvis(const std::string& avatar, const std
   Track first;
   first.name = initial;
   first.motion = read_motion_with_warnings(initial);
+  check_begins_with_frame_0(first.motion, initial, "the human of frame 0 is needed");
   put_on_body(m.settings, avatar, first);
   return first_pelvis(first);
 }

@@ -1,11 +1,13 @@
 #include "pipelines/input/body_files.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "body/motion_edit.h"
 #include "body/pose_layout.h"
 #include "body/procedural_body.h"
 #include "body/smplx_file.h"
+#include "core/check.h"
 #include "core/log.h"
 #include "core/text.h"
 
@@ -37,10 +39,19 @@ SmplxModel read_model_for(const std::string& path, const std::string& motion, co
 }
 
 Motion read_motion_with_warnings(const std::string& path) {
+  if (std::filesystem::is_directory(path))
+    throw UserError(path + ": is a folder; of one of SMPLer-X's results `hsi4d motion " + path +
+                    " OUT.npz` makes a motion");
   Motion motion = read_motion(path);
+  if (!motion.unread.empty()) log_warning(path + ": arrays that are not read: " + few_names(motion.unread));
   if (motion.lost_shape)
     log_warning(path + ": is of " + motion.converted_from + ", whose betas are no shape of SMPL-X: they are left out");
   return motion;
+}
+
+void check_begins_with_frame_0(const Motion& motion, const std::string& file, const std::string& needed) {
+  if (motion.first_frame == 0) return;
+  throw DataError(file + ": begins with frame " + number_text(motion.first_frame) + " of its video; " + needed);
 }
 
 PoseFolder read_pose_folder_with_warnings(const std::string& folder, double frame_rate, int person) {

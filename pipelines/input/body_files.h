@@ -39,8 +39,13 @@ BodyModel rest_body(const BodySettings& settings);
 /// @param motion  the file that the betas are of, for messages
 SmplxModel read_model_for(const std::string& path, const std::string& motion, const std::vector<double>& betas);
 
-/// Reads a motion, and tells what of it is left out because it is of another body model. Throws as read_motion.
+/// Reads a motion, and tells what of it is left out because it is of another body model, and arrays that are not read.
+/// Throws as read_motion; UserError for a folder.
 Motion read_motion_with_warnings(const std::string& path);
+
+/// Throws DataError naming the file of a motion that begins with a later frame of its video than 0.
+/// @param needed  what it is read for, and what is allowed instead
+void check_begins_with_frame_0(const Motion& motion, const std::string& file, const std::string& needed);
 
 /// As read_pose_folder; frames that are filled in, where it begins and people that are not read are told in the log.
 PoseFolder read_pose_folder_with_warnings(const std::string& folder, double frame_rate, int person);

@@ -16,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMostBack = 2;  // frames of the motion
+constexpr double kMostBack = 2;       // frames of the motion
+constexpr double kSameMoment = 1e-9;  // seconds
 
 /// The pose some frames before a motion begins: its first step, carried back by kMostBack frames at most.
 BodyPose pose_before(const Motion& motion, double frames) {
@@ -43,13 +44,31 @@ bool covers(const Motion& motion, const FrameSource& frames) {
 
 /// Tells of poses from a moment on that would be that of another frame of the video.
 void warn_of_rest(const Motion& motion, const fs::path& file, const FrameSource& frames) {
-  constexpr double kSameMoment = 1e-9;  // seconds
   const double last = (motion.first_frame + static_cast<double>(motion.poses.size() - 1)) / motion.frame_rate,
                end = static_cast<double>(frames.video_count()) / frames.video_rate();
   if (last < end - kSameMoment) return;
   log_warning(file.string() + ": holds " + std::to_string(motion.poses.size()) + " poses at " +
               rounded(motion.frame_rate, 4) + " a second, the video has " + std::to_string(frames.video_count()) +
               " frames at " + rounded(frames.video_rate(), 4) + "; poses after its end are not used");
+}
+
+/// Throws DataError for a motion that begins after the clip's last frame: each of its poses would be a guess.
+void check_begin(const Motion& motion, const fs::path& file, const FrameSource& frames) {
+  const bool has_times = motion.says_frame_rate && frames.video_rate() > 0;
+  const Index last_frame = frames.number(frames.count() - 1);
+  const double last = motion.first_frame + static_cast<double>(motion.poses.size() - 1),
+               seconds = has_times ? frames.time(frames.count() - 1) : 0;
+  if (has_times ? motion.first_frame / motion.frame_rate <= seconds + kSameMoment
+                : motion.first_frame <= static_cast<double>(last_frame))
+    return;
+  const auto range = [has_times](double from, double to, double from_s, double to_s) {
+    return rounded(from, 8) + " to " + rounded(to, 8) +
+           (has_times ? " (" + rounded(from_s, 6) + " to " + rounded(to_s, 6) + " s)" : "");
+  };
+  throw DataError(file.string() + ": its poses are of frames " +
+                  range(motion.first_frame, last, motion.first_frame / motion.frame_rate, last / motion.frame_rate) +
+                  " of a video, the clip's frames are " + range(0, static_cast<double>(last_frame), 0, seconds) +
+                  "; allowed: a motion that begins with the clip's last frame at the latest");
 }
 
 /// The motion from the video's first frame on, where it begins with a whole later one.
@@ -71,10 +90,18 @@ Motion from_first_frame(const Motion& motion, const fs::path& file) {
 /// @param or_else  what is allowed beside as many as frames
 std::vector<BodyPose> poses_of_frames(const Motion& read, const fs::path& file, const FrameSource& frames,
                                       const char* or_else) {
+  const double count = read.first_frame + static_cast<double>(read.poses.size());
+  const bool is_by_frame =
+      count == static_cast<double>(frames.count()) || count == static_cast<double>(frames.video_count());
+  if (!is_by_frame) check_begin(read, file, frames);
   const Motion motion = from_first_frame(read, file);
-  const Index count = std::ssize(motion.poses);
-  const bool is_by_frame = motion.first_frame == 0 && (count == frames.count() || count == frames.video_count());
-  if (is_by_frame || !covers(motion, frames)) return kept_frames(motion.poses, frames, file.string(), "poses", or_else);
+  if (is_by_frame || !covers(motion, frames)) {
+    if (motion.first_frame != 0)
+      throw DataError(file.string() + ": begins with frame " + number_text(motion.first_frame) +
+                      " of the video; between two frames it can begin only where its rate and the video's are known "
+                      "and it goes on to the clip's end");
+    return kept_frames(motion.poses, frames, file.string(), "poses", or_else);
+  }
   warn_of_rest(motion, file, frames);
   std::vector<BodyPose> poses;
   for (Index t = 0; t < frames.count(); ++t) poses.push_back(pose_at(motion, frames.time(t)));

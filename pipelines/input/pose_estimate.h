@@ -18,7 +18,7 @@ namespace hsi4d {
 /// first step carried back, for two frames at most, which a warning says.
 ///
 /// @param file  what messages call it
-/// Throws DataError for another number of poses.
+/// Throws DataError for another number of poses, and for a motion that begins after the clip's last frame.
 std::vector<BodyPose> estimated_poses(const Motion& motion, const std::filesystem::path& file,
                                       const FrameSource& frames);
 

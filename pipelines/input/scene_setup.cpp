@@ -102,9 +102,8 @@ SceneSetup read_scene_setup(const DataSettings& data) {
   setup.object_tracks = initial.object_tracks;
   setup.motion = read_motion_for(initial.motion.string(), setup.avatar);
   if (setup.motion.poses.empty()) throw DataError(initial.motion.string() + ": holds no frames");
-  if (setup.motion.first_frame != 0)
-    throw DataError(initial.motion.string() + ": begins with frame " + number_text(setup.motion.first_frame) +
-                    " of its video; the exact state of frame 0 is needed (an estimate belongs in data.motion)");
+  check_begins_with_frame_0(setup.motion, initial.motion.string(),
+                            "the exact state of frame 0 is needed (an estimate belongs in data.motion)");
   return setup;
 }
 

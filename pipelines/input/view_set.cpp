@@ -5,6 +5,7 @@
 #include "core/config_file.h"
 #include "core/image_io.h"
 #include "core/mask_image.h"
+#include "pipelines/input/body_files.h"
 
 namespace hsi4d {
 
@@ -72,9 +73,14 @@ ViewSet read_view_set(const fs::path& file) {
   ConfigProblems problems;
   const ConfigValue tree = load_config(file, {}, problems);
   const ViewSetFile read = read_settings<ViewSetFile>(tree, problems);
-  ViewSet set{
-      file,        read_motion(read.motion.string()), read_cameras(read.cameras.string()), read.views, read.motion,
-      read.cameras};
+  ViewSet set{file,
+              read_motion_with_warnings(read.motion.string()),
+              read_cameras(read.cameras.string()),
+              read.views,
+              read.motion,
+              read.cameras};
+  check_begins_with_frame_0(set.motion, read.motion.string(),
+                            "views count its poses from 0 (\"frame\"), so one that begins there is needed");
   check_numbers(set);
   return set;
 }

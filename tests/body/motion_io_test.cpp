@@ -395,6 +395,25 @@ TEST_CASE("a motion says with which frame of its video it begins") {
         "m.npz: array 'first_frame': begins with frame -1; allowed: 0 to 1e7");
 }
 
+TEST_CASE("arrays that no reader wants are named, what says a thing again is not") {
+  NpzWriter file;
+  file.add<double>("trans", {2, 3}, counted(2, 3));
+  file.add<double>("poses", {2, 156}, Numbers(312));
+  file.add<double>("dmpls", {2, 8}, Numbers(16));
+  for (const char* name : {"root_orient", "leye_pose", "obj_trans"}) file.add<double>(name, {2, 3}, Numbers(6));
+  file.add_scalar("mocap_frame_rate", 30.0);
+  file.add_scalar("mocap_time_length", 0.1);
+  file.add_scalar("fps_of_the_camera", 25.0);
+  CHECK(decode_motion(file.encode(), "m.npz").unread == std::vector<std::string>{"dmpls", "fps_of_the_camera"});
+  const ScratchFolder folder;
+  Motion motion;
+  motion.poses = {rest_pose(kSmplxJoints)};
+  motion.first_frame = 2;
+  motion.pelvis_rest = Vector3<double>(0, 0, 0);
+  write_motion(folder / "m.npz", motion);
+  CHECK(read_motion(folder / "m.npz").unread.empty());
+}
+
 TEST_CASE("two rates in a file are refused, naming both") {
   const auto rows = [](double fps) {
     return [fps](NpzWriter& f) {

@@ -198,6 +198,12 @@ TEST_CASE("a picture's alpha is its mask, and views that make no sense are refus
   write_image((file.parent_path() / "blue.png").string(), blue);
   CHECK_THAT(fault({{"images/0000.png", "blue.png", 0, 0}}), Catch::Contains("blue.png: is a colour mask: row 5"));
   CHECK_THAT(fault({}), Catch::Contains("there is no view"));
+  const std::string poses = (file.parent_path() / "motion.npz").string();
+  Motion late = read_motion(poses);
+  late.first_frame = 3;
+  write_motion((file.parent_path() / "late.npz").string(), late);
+  write_text_file(file, view_set_json("late.npz", "cameras.json", {good}));
+  CHECK_THROWS_WITH(read_view_set(file), Catch::Contains("late.npz: begins with frame 3 of its video; views count"));
   CHECK_THAT(fault({good, {"images/0000.png", {}, 4, 0}}),
              Catch::Contains("/views/1/camera: 4; there are 4, counted from 0"));
   CHECK_THAT(fault({{"images/0000.png", {}, 0, 2}}), Catch::Contains("/views/0/frame: 2; there are 2"));

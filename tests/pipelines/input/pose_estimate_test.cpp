@@ -62,6 +62,34 @@ TEST_CASE("an estimate that begins later is put where it says") {
                     Catch::StartsWith("m.npz: holds 4 poses, the video has 6 frames"));
 }
 
+TEST_CASE(
+    "an estimate that begins after the clip's last frame is refused before poses are made for the time before it") {
+  Here here;
+  const std::string allowed = "; allowed: a motion that begins with the clip's last frame at the latest";
+  CHECK(places(estimated_poses(walk(5, 2), "m.npz", here.frames)) == std::vector<double>{3, 3, 3, 3, 4, 5});
+  CHECK_THROWS_WITH(estimated_poses(walk(6, 9), "m.npz", here.frames),
+                    "m.npz: its poses are of frames 6 to 14 (0.6 to 1.4 s) of a video, the clip's frames are 0 to 5 (0 "
+                    "to 0.5 s)" +
+                        allowed);
+  Motion fast = walk(11, 6);  // 20 a second: 0.55 s
+  fast.frame_rate = 20;
+  CHECK_THROWS_WITH(estimated_poses(fast, "m.npz", here.frames), Catch::StartsWith("m.npz: its poses are of frames"));
+  Motion far = walk(10'000'000, 2);
+  far.says_frame_rate = false;
+  CHECK_THROWS_WITH(
+      estimated_poses(far, "m.npz", here.frames),
+      "m.npz: its poses are of frames 10000000 to 10000001 of a video, the clip's frames are 0 to 5" + allowed);
+}
+
+TEST_CASE("an estimate that begins between two frames needs a rate") {
+  Here here;
+  Motion motion = walk(0, 6);  // as many as frames, which are not those
+  motion.first_frame = 2.5;
+  motion.says_frame_rate = false;
+  CHECK_THROWS_WITH(estimated_poses(motion, "m.npz", here.frames),
+                    Catch::StartsWith("m.npz: begins with frame 2.5 of the video; between two frames"));
+}
+
 TEST_CASE("an estimate of another rate that begins later is put there too") {
   Here here;
   Motion fast = walk(2, 9);  // 20 a second: frame 2 is that of 0.1 s, frame 10 that of 0.5 s
