@@ -63,4 +63,14 @@ std::vector<Index> nearest_frames(const FrameTimes& times, double rate) {
   }
 }
 
+Index nearest_frame(const FrameTimes& times, double seconds) {
+  HSI4D_CHECK(!times.seconds.empty(), "no frames");
+  const auto& all = times.seconds;
+  const auto later = std::upper_bound(all.begin(), all.end(), seconds);
+  if (later == all.begin()) return 0;
+  const auto before = later - 1;
+  const bool is_before = later == all.end() || seconds - *before < *later - seconds - kSameTime;
+  return (is_before ? before : later) - all.begin();
+}
+
 }  // namespace hsi4d

@@ -35,4 +35,9 @@ TimeStep widest_step(const FrameTimes& times);
 /// @param rate  moments a second, > 0
 std::vector<Index> nearest_frames(const FrameTimes& times, double rate);
 
+/// The frame that is nearest to a moment in time; of two that are equally near the later.
+/// Throws InternalError where there is none.
+/// @param seconds  after the first frame
+Index nearest_frame(const FrameTimes& times, double seconds);
+
 }  // namespace hsi4d

@@ -182,6 +182,25 @@ Image mask_of(const Image& image, const std::string& name) {
   throw DataError(name + ": both its colours and its alpha vary, and either could be the mask" + kAllowed);
 }
 
+std::vector<int> label_greys(const Image& mask) {
+  constexpr int kWhite = 255, kNear = 16, kMostGreys = 8;
+  std::array<Index, kWhite + 1> pixels{};
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x)
+      ++pixels[static_cast<std::size_t>(std::lround(std::clamp(mask(0, y, x), 0.0F, 1.0F) * kWhite))];
+  }
+  std::vector<int> greys;
+  Index seen = 0, between = 0;
+  for (int grey = 1; grey <= kWhite; ++grey) {
+    const Index count = pixels[static_cast<std::size_t>(grey)];
+    if (count > 0) greys.push_back(grey);
+    seen += count;
+    if (grey > kNear && grey < kWhite - kNear) between += count;
+  }
+  if (std::ssize(greys) > kMostGreys || 4 * between < seen) greys.clear();
+  return greys;
+}
+
 Image read_mask_image(const std::string& path, const ImageLimits& limits) {
   if (is_png(read_file_start(path, 8))) {
     if (std::optional<Image> mask = mask_of_palette(decode_palette(read_file(path), path, limits), path)) return *mask;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/image.h"
 
@@ -22,6 +23,10 @@ Image read_mask_image(const std::string& path, const ImageLimits& limits = {});
 /// As read_mask_image, of an image that is decoded: grey, grey and alpha, RGB or RGBA.
 /// @param name  what error messages call it
 Image mask_of(const Image& image, const std::string& name);
+
+/// The greys of a mask, 1 to 255 and ascending, where they look like numbers of labels and not like shares of pixels:
+/// at most eight, and a quarter of all that is not black neither nearly black nor nearly white. Else nothing.
+std::vector<int> label_greys(const Image& mask);
 
 /// How far channels of a grey picture may differ, and colours that count as one: more than JPEG and videos make of it.
 inline constexpr float kGreyTolerance = 1.0F / 16;

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 
 #include "body/motion_edit.h"
 #include "core/check.h"
 #include "core/log.h"
+#include "core/mask_image.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "optim/solid/mesh_distance.h"
@@ -50,8 +52,9 @@ double rate_of(const FrameSource& frames, const SceneSetup& setup) {
 std::vector<SceneState> read_truth(const fs::path& folder, const std::vector<std::string>& names, const Avatar& avatar,
                                    const FrameSource& frames) {
   const auto file = [&folder](const char* name) { return (folder / name).string(); };
-  const std::vector<BodyPose> bodies =
-      kept_frames(read_motion_for(file("motion.npz"), avatar).poses, frames, file("motion.npz"), "poses");
+  const Motion motion = read_motion_for(file("motion.npz"), avatar);
+  check_begins_with_frame_0(motion, file("motion.npz"), "a truth is of all frames from 0 on");
+  const std::vector<BodyPose> bodies = kept_frames(motion.poses, frames, file("motion.npz"), "poses");
   const std::vector<Camera> cameras = cameras_of_frames(file("cameras.json"), frames);
   std::vector<std::vector<ObjectPose>> objects(bodies.size());
   if (!names.empty())
@@ -109,14 +112,52 @@ void check_finite(const Image& image, const std::string& place) {
   }
 }
 
+/// Sees each mask of a frame as it is read, before it is reduced: of the human (0), then of each object.
+using MaskLook = std::function<void(std::size_t mask, const Image& image)>;
+
 /// A mask that is as large as the frame of the video, in the camera's size; empty where there is none.
-Image read_mask(const MaskSource& source, const Clip& clip, Index index, const Image& frame) {
+Image read_mask(std::size_t m, const Clip& clip, Index index, const Image& frame, const MaskLook& look) {
+  const MaskSource& source = clip.video->masks[m];
   const Image mask = source.read(clip.video->frames, index);
   if (mask.width() == 0) return Image(1, clip.camera.height, clip.camera.width);
   check_finite(mask, source.place(clip.video->frames, index));
+  if (look) look(m, mask);
   if (mask.height() == frame.height() && mask.width() == frame.width()) return reduced(mask, clip.camera);
   throw DataError(source.place(clip.video->frames, index) + ": is " + size_text(mask) + " pixels, " +
                   (has_size_of(frame, clip.camera) ? "the camera's image " : "the video's frame ") + size_text(frame));
+}
+
+/// As read_frame.
+ClipFrame read_looking(const Clip& clip, Index index, const MaskLook& look) {
+  const FrameSource& frames = clip.video->frames;
+  const Image read = frames.read(index);
+  if (read.channels() < 3 || !fits_camera(read, clip.camera)) {
+    throw DataError(frames.place(index) + ": is " + size_text(read) + " with " + std::to_string(read.channels()) +
+                    " channels; the camera's image is " + size_text(clip.camera) + " with 3");
+  }
+  ClipFrame frame;
+  const Image colors = take_channels(read, 0, 3);
+  check_finite(colors, frames.place(index));
+  frame.target = reduced(colors, clip.camera);
+  frame.human_mask = read_mask(0, clip, index, read, look);
+  for (std::size_t m = 1; m < clip.video->masks.size(); ++m)
+    frame.object_masks.push_back(read_mask(m, clip, index, read, look));
+  return frame;
+}
+
+/// Tells of masks whose greys look like labels.
+/// @param greys  by frame; empty where they do not
+void warn_of_labels(const MaskSource& masks, const std::vector<std::vector<int>>& greys) {
+  std::vector<Index> alike;
+  for (std::size_t t = 0; t < greys.size(); ++t) {
+    if (!greys[t].empty()) alike.push_back(static_cast<Index>(t));
+  }
+  if (alike.empty()) return;
+  std::vector<std::string> numbers;
+  for (const int grey : greys[static_cast<std::size_t>(alike.front())]) numbers.push_back(std::to_string(grey));
+  log_warning(masks.path().string() + ": holds few greys as labels would, " + joined(numbers) + " of 255 in frame " +
+              std::to_string(alike.front()) + (alike.size() == 1 ? "" : " (alike: " + frame_ranges(alike) + ")") +
+              "; they count as shares of the pixel, and labels are read from images with a palette");
 }
 
 /// A folder of masks that is not there is a wrong name. Single masks may be missing: nothing is seen in that frame.
@@ -126,11 +167,15 @@ MaskSource open_masks(const fs::path& folder, const std::string& name, const Fra
   if (missing > 0)
     log_warning(masks.path().string() + ": has no mask for " + std::to_string(missing) + " of " +
                 std::to_string(frames.count()) + " frames; these count as empty");
+  const std::string other_times = masks.other_times(frames);
+  if (!other_times.empty()) log_warning(other_times);
   const MaskSource::Count count = masks.count(frames);
   if (count.unused > 0)
     log_warning(masks.path().string() + ": holds " + std::to_string(count.all) + " masks, the video has " +
                 std::to_string(frames.video_count()) + " frames; " + std::to_string(count.unused) +
                 " of the masks belong to no frame and are not used");
+  if (!count.others.empty())
+    log_warning(masks.path().string() + ": what is no .png is not read: " + few_names(count.others));
   return masks;
 }
 
@@ -217,10 +262,14 @@ bool fits_camera(const Image& frame, const Camera& camera) {
 
 void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses) {
   std::vector<std::vector<float>> largest(static_cast<std::size_t>(clip.frames()));  // [frame][human, then objects]
+  std::vector<std::vector<std::vector<int>>> greys(clip.video->masks.size(),
+                                                   std::vector<std::vector<int>>(largest.size()));  // [mask][frame]
   const auto look = [&](Index begin, Index end) {
     for (Index index = begin; index < end; ++index) {
-      std::vector<float>& of_frame = largest[static_cast<std::size_t>(index)];
-      const ClipFrame frame = read_frame(clip, index);
+      const auto t = static_cast<std::size_t>(index);
+      std::vector<float>& of_frame = largest[t];
+      const ClipFrame frame =
+          read_looking(clip, index, [&](std::size_t m, const Image& mask) { greys[m][t] = label_greys(mask); });
       of_frame.push_back(largest_value(frame.human_mask));
       for (const Image& mask : frame.object_masks) of_frame.push_back(largest_value(mask));
     }
@@ -233,6 +282,7 @@ void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMa
   } else {
     look(0, clip.frames());  // videos are decoded in order
   }
+  for (std::size_t m = 0; m < greys.size(); ++m) warn_of_labels(clip.video->masks[m], greys[m]);
   const auto warn_if_hidden = [&](std::size_t mask, const std::string& name, const std::string& what,
                                   const std::vector<std::string>& off) {
     std::vector<Index> hidden;
@@ -275,21 +325,6 @@ std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, In
   return files;
 }
 
-ClipFrame read_frame(const Clip& clip, Index index) {
-  const FrameSource& frames = clip.video->frames;
-  const Image read = frames.read(index);
-  if (read.channels() < 3 || !fits_camera(read, clip.camera)) {
-    throw DataError(frames.place(index) + ": is " + size_text(read) + " with " + std::to_string(read.channels()) +
-                    " channels; the camera's image is " + size_text(clip.camera) + " with 3");
-  }
-  ClipFrame frame;
-  const Image colors = take_channels(read, 0, 3);
-  check_finite(colors, frames.place(index));
-  frame.target = reduced(colors, clip.camera);
-  frame.human_mask = read_mask(clip.video->masks.front(), clip, index, read);
-  for (std::size_t m = 1; m < clip.video->masks.size(); ++m)
-    frame.object_masks.push_back(read_mask(clip.video->masks[m], clip, index, read));
-  return frame;
-}
+ClipFrame read_frame(const Clip& clip, Index index) { return read_looking(clip, index, {}); }
 
 }  // namespace hsi4d

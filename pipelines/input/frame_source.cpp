@@ -5,12 +5,14 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 
 #include "core/check.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/mask_image.h"
+#include "core/png.h"
 #include "core/text.h"
 #include "core/video.h"
 
@@ -37,6 +39,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr Index kFewestFrames = 2;
+/// Frames that a clip has at most for each of its video, where one stands for the pauses after it. Screen recordings of
+/// something that stands still come near to it; beyond, a time stamp is wrong.
+constexpr double kMostRepeats = 10;
 
 bool is_number(const std::string& text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -102,11 +107,20 @@ void warn_of_gaps(const std::vector<std::string>& names, const fs::path& folder)
                 "\"; frames count as equally far apart in time, so one seems to be missing");
 }
 
-/// What else is in a folder that may have been meant for frames: "; its 12 .jpg files are not read".
+/// Colours are taken for sRGB's; the first frame tells of all.
+void warn_of_profile(const fs::path& frame) {
+  constexpr std::int64_t kMostHead = 1 << 16;  // bytes; a profile's name stands near the beginning
+  const std::string profile = wide_profile(read_file_start(frame.string(), kMostHead));
+  if (!profile.empty())
+    log_warning(frame.string() + ": has the colour profile \"" + with_escapes(profile) +
+                "\", which is passed over: colours are taken for sRGB's");
+}
+
+/// What else is in a folder that may have been meant for frames: "its 12 .jpg files are not read".
 std::string unread_text(const std::map<std::string, Index>& count_of_ending) {
   std::string text;
   for (const auto& [ending, count] : count_of_ending)
-    text += (text.empty() ? "; its " : ", ") + std::to_string(count) + " " + ending;
+    text += (text.empty() ? "its " : ", ") + std::to_string(count) + " " + ending;
   return text.empty() ? "" : text + " files are not read";
 }
 
@@ -125,10 +139,12 @@ std::vector<std::string> png_names(const fs::path& folder) {
   std::sort(names.begin(), names.end());
   check_characters(names, folder);
   check_numbering(names, folder);
+  const std::string unread = unread_text(others);
   if (std::ssize(names) < kFewestFrames) {
     throw UserError(folder.string() + ": holds " + std::to_string(names.size()) +
-                    " .png files; a clip needs at least 2 frames" + unread_text(others));
+                    " .png files; a clip needs at least 2 frames" + (unread.empty() ? "" : "; " + unread));
   }
+  if (!unread.empty()) log_warning(folder.string() + ": " + unread);
   warn_of_gaps(names, folder);
   return names;
 }
@@ -176,6 +192,13 @@ std::vector<Index> frames_by_time(const fs::path& path, const FrameTimes& times,
                     "; set data.frame_rate, for which the nearest ones in time are taken, or data.video_rate, if they "
                     "are equally far apart in truth");
   check_kept_rate(path, 1 / usual_step(times), kept);
+  const double count = std::floor(times.seconds.back() * kept) + 1,
+               most = kMostRepeats * static_cast<double>(times.seconds.size());
+  if (count > most)
+    throw DataError(path.string() + ": its frames " + gap_text(times) + ", so that " + number_text(kept) +
+                    " a second would make " + rounded(count, 6) + " of its " + std::to_string(times.seconds.size()) +
+                    "; allowed: at most " + rounded(most, 6) +
+                    ". Cut the video there, or set data.video_rate if its frames are equally far apart in truth");
   const std::vector<Index> numbers = nearest_frames(times, kept);
   Index repeated = 0;
   for (std::size_t t = 1; t < numbers.size(); ++t) repeated += numbers[t] == numbers[t - 1] ? 1 : 0;
@@ -200,17 +223,20 @@ fs::path video_in(const fs::path& folder, const std::string& name) {
   return video;
 }
 
-/// What is behind a transparent pixel is not known.
-void check_opaque(const Image& image, const std::string& place) {
-  const int alpha = image.channels() - 1;
-  if (image.channels() != 2 && image.channels() != 4) return;
-  for (int y = 0; y < image.height(); ++y) {
-    for (int x = 0; x < image.width(); ++x) {
-      if (image(alpha, y, x) >= 1) continue;
-      throw DataError(place + ": row " + std::to_string(y) + ", column " + std::to_string(x) + " has alpha " +
-                      rounded(static_cast<double>(image(alpha, y, x)), 3) + "; a frame is opaque");
-    }
-  }
+/// Of a folder, or a video without time stamps.
+FrameTimes even_times(Index count, double rate) {
+  FrameTimes times;
+  for (Index i = 0; rate > 0 && i < count; ++i) times.seconds.push_back(static_cast<double>(i) / rate);
+  return times;
+}
+
+/// Whether a moment, in seconds, is near enough to that of a frame to be of it.
+bool is_within(const FrameTimes& times, Index frame, double moment, double most) {
+  return std::fabs(times.seconds[static_cast<std::size_t>(frame)] - moment) <= most;
+}
+
+std::string moment_text(const FrameTimes& times, Index frame) {
+  return "frame " + std::to_string(frame) + " at " + rounded(times.seconds[static_cast<std::size_t>(frame)], 4) + " s";
 }
 
 std::string frame_of(const fs::path& video, Index number) {
@@ -223,6 +249,7 @@ FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(
   std::vector<std::string> files;
   if (fs::is_directory(path)) {
     files = png_names(path);
+    warn_of_profile(path / files.front());
   } else if (is_video_name(path.string())) {
     video_ = std::make_shared<detail::OpenVideo>(path);
   } else {
@@ -238,6 +265,8 @@ FrameSource::FrameSource(const fs::path& path, const FrameRates& rates) : path_(
     numbers_ = kept_frames(video_count_, video_rate_, rates.kept);
   }
   frame_rate_ = rates.kept > 0 ? rates.kept : video_rate_;
+  if (video_) times_ = video_->reader.times();
+  if (times_.seconds.empty()) times_ = even_times(video_count_, video_rate_);
   for (const Index number : numbers_)
     names_.push_back(video_ ? four_digits(number) + ".png" : files[static_cast<std::size_t>(number)]);
   if (std::ssize(numbers_) < kFewestFrames)
@@ -263,7 +292,7 @@ double FrameSource::time(Index frame) const {
 Image FrameSource::read(Index frame) const {
   if (video_) return video_->read(number(frame));
   Image image = read_image(place(frame));
-  check_opaque(image, place(frame));
+  check_opaque(image, place(frame), "a frame");
   return image;
 }
 
@@ -285,21 +314,75 @@ Index MaskSource::missing(const FrameSource& frames) const {
     for (Index t = 0; t < frames.count(); ++t) missing += fs::exists(file(frames, t)) ? 0 : 1;
     return missing;
   }
-  const Index needed = frames.number(frames.count() - 1) + 1;
-  if (video_->reader.frames() >= needed) return 0;
-  throw DataError(path_.string() + ": has " + std::to_string(video_->reader.frames()) +
-                  " frames, the clip needs the first " + std::to_string(needed));
+  const Index count = video_->reader.frames();
+  if (count == frames.video_count()) return 0;
+  const FrameTimes &masks = video_->reader.times(), &times = frames.times();
+  if (goes_by_number(frames))
+    throw DataError(path_.string() + ": has " + std::to_string(count) + " frames, the video has " +
+                    std::to_string(frames.video_count()) +
+                    "; allowed: as many, as times by which masks could be found are not known of both");
+  const double most = usual_step(times) / 2;
+  for (Index t = 0; t < frames.count(); ++t) {
+    const Index frame = frames.number(t), nearest = number(frames, t);
+    if (is_within(masks, nearest, times.seconds[static_cast<std::size_t>(frame)], most)) continue;
+    throw DataError(path_.string() + ": has no mask for the video's " + moment_text(times, frame) +
+                    "; the nearest is its " + moment_text(masks, nearest) + ", allowed: within " + rounded(most, 4) +
+                    " s, or as many frames as the video, " + std::to_string(frames.video_count()));
+  }
+  return 0;
+}
+
+std::string MaskSource::other_times(const FrameSource& frames) const {
+  if (!video_ || video_->reader.frames() != frames.video_count()) return "";
+  const FrameTimes &masks = video_->reader.times(), &times = frames.times();
+  if (masks.seconds.empty() || times.seconds.empty()) return "";
+  const double most = usual_step(times) / 2;
+  for (Index i = 0; i < frames.video_count(); ++i) {
+    if (is_within(masks, i, times.seconds[static_cast<std::size_t>(i)], most)) continue;
+    return path_.string() + ": its " + moment_text(masks, i) + " is taken for the video's " + moment_text(times, i) +
+           ", as both have " + std::to_string(frames.video_count()) + " frames";
+  }
+  return "";
+}
+
+bool MaskSource::goes_by_number(const FrameSource& frames) const {
+  return video_->reader.frames() == frames.video_count() || video_->reader.times().seconds.empty() ||
+         frames.times().seconds.empty();
+}
+
+Index MaskSource::number(const FrameSource& frames, Index frame) const {
+  const Index number = frames.number(frame);
+  if (goes_by_number(frames)) return number;
+  return nearest_frame(video_->reader.times(), frames.times().seconds[static_cast<std::size_t>(number)]);
 }
 
 MaskSource::Count MaskSource::count(const FrameSource& frames) const {
-  if (video_) return {video_->reader.frames(), std::max<Index>(0, video_->reader.frames() - frames.video_count())};
   Count count;
+  if (video_) {
+    count.all = video_->reader.frames();
+    if (goes_by_number(frames)) return count;
+    const FrameTimes& masks = video_->reader.times();
+    const double most = usual_step(frames.times()) / 2;
+    std::set<Index> used;
+    for (const double moment : frames.times().seconds) {
+      const Index nearest = nearest_frame(masks, moment);
+      if (is_within(masks, nearest, moment, most)) used.insert(nearest);
+    }
+    count.unused = count.all - std::ssize(used);
+    return count;
+  }
   std::error_code ignored;  // single masks that cannot be read are told when they are
   for (const fs::directory_entry& entry : fs::directory_iterator(path_, ignored)) {
-    if (entry.path().extension() != ".png" || is_hidden(entry.path().string())) continue;
+    if (is_hidden(entry.path().string())) continue;
+    const std::string name = entry.path().filename().string();
+    if (entry.path().extension() != ".png") {
+      count.others.push_back(name);
+      continue;
+    }
     ++count.all;
-    count.unused += frames.has_name(entry.path().filename().string()) ? 0 : 1;
+    count.unused += frames.has_name(name) ? 0 : 1;
   }
+  std::sort(count.others.begin(), count.others.end());
   return count;
 }
 
@@ -308,13 +391,13 @@ fs::path MaskSource::file(const FrameSource& frames, Index frame) const {
 }
 
 std::string MaskSource::place(const FrameSource& frames, Index frame) const {
-  return video_ ? frame_of(path_, frames.number(frame)) : file(frames, frame).string();
+  return video_ ? frame_of(path_, number(frames, frame)) : file(frames, frame).string();
 }
 
 Image MaskSource::read(const FrameSource& frames, Index frame) const {
   if (!video_ && !fs::exists(file(frames, frame))) return {};
   const std::string name = place(frames, frame);
-  return video_ ? mask_of(video_->read(frames.number(frame)), name) : read_mask_image(name);
+  return video_ ? mask_of(video_->read(number(frames, frame)), name) : read_mask_image(name);
 }
 
 }  // namespace hsi4d

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/check.h"
+#include "core/frame_times.h"
 #include "core/image.h"
 #include "core/types.h"
 
@@ -34,7 +35,7 @@ class FrameSource {
   /// t / kept by them, which may be one for two; the log warns of that.
   /// Throws UserError or DataError naming the path: no such file or folder, no video, names that are no plain text or
   /// have different numbers of digits; rates without which frames cannot be chosen; uneven times of which all frames
-  /// are kept; fewer than two frames.
+  /// are kept, or by which there would be more than ten times as many; fewer than two frames.
   FrameSource(const std::filesystem::path& path, const FrameRates& rates);
 
   Index count() const { return std::ssize(names_); }
@@ -54,6 +55,9 @@ class FrameSource {
   Index number(Index frame) const { return numbers_[static_cast<std::size_t>(frame)]; }
   /// Seconds from the first frame of the video to this one; only where the rate of the video is known.
   double time(Index frame) const;
+  /// When the frames of the video, kept or not, are shown: by its own time stamps, whatever data.video_rate says; of a
+  /// folder by that. Empty: nobody says.
+  const FrameTimes& times() const { return times_; }
   /// Which picture it is, for messages: "clip.mp4: frame 3", "frames/0003.png".
   std::string place(Index frame) const;
 
@@ -69,21 +73,28 @@ class FrameSource {
   bool is_uneven_ = false;  // chosen by the time stamps of the video
   Index video_count_ = 0;
   double video_rate_ = 0, frame_rate_ = 0;
+  FrameTimes times_;
 };
 
 /// Masks of the human or of an object: a folder with images of the frames' names, of which some may be missing, or a
-/// video with the frames of the video.
+/// video. Its frames are those of the video's that have the same numbers, where it has as many; else the nearest in
+/// time.
 class MaskSource {
  public:
   /// @param folder  of the masks: NAME/ is in it, or NAME.mp4 (or another video)
   /// Throws DataError when neither is there.
   MaskSource(const std::filesystem::path& folder, const std::string& name);
 
-  /// How many of the frames have no mask. Throws DataError naming a video that has too few frames.
+  /// How many of the frames have no mask. Of a video none: it throws DataError naming the first frame that has none
+  /// within half a step of the frames' video, or both numbers of frames where they differ and times are not known.
   Index missing(const FrameSource& frames) const;
-  /// How many masks there are, and how many of these belong to no frame of the video, kept or not.
+  /// What the log is to tell of a video that has as many frames as the video and other times; else empty.
+  std::string other_times(const FrameSource& frames) const;
+  /// How many masks there are, how many of these belong to no frame of the video, kept or not, and what else a folder
+  /// holds that is not read, in order.
   struct Count {
     Index all = 0, unused = 0;
+    std::vector<std::string> others = {};
   };
   Count count(const FrameSource& frames) const;
   /// The folder or the video.
@@ -96,6 +107,10 @@ class MaskSource {
   Image read(const FrameSource& frames, Index frame) const;
 
  private:
+  bool goes_by_number(const FrameSource& frames) const;
+  /// The frame of the mask video that is of a frame of the clip.
+  Index number(const FrameSource& frames, Index frame) const;
+
   std::filesystem::path path_;
   std::shared_ptr<detail::OpenVideo> video_;  // null: a folder
 };

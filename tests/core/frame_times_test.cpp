@@ -58,6 +58,18 @@ TEST_CASE("the usual and the widest step") {
   CHECK(usual_step(at_multiples({0}, 30)) == 0);
 }
 
+TEST_CASE("the frame that is nearest to a moment") {
+  const FrameTimes times = at_multiples({0, 1, 2, 10}, 10);
+  const auto at = [&times](double seconds) { return nearest_frame(times, seconds); };
+  CHECK(at(-1) == 0);
+  CHECK(at(0.04) == 0);
+  CHECK(at(0.05) == 1);  // equally near: the later
+  CHECK(at(0.1) == 1);
+  CHECK(at(0.59) == 2);
+  CHECK(at(0.61) == 3);
+  CHECK(at(99) == 3);
+}
+
 TEST_CASE("frames are the nearest in time") {
   CHECK(nearest_frames(at_multiples(kPauses, 30), 10) ==
         std::vector<Index>{0, 3, 3, 4, 6, 7, 8, 9, 12, 15, 18, 19, 20, 20, 22});

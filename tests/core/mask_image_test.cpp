@@ -102,6 +102,21 @@ TEST_CASE("a grey mask is its grey") {
   CHECK(read_mask_image("w.png") == wide);
 }
 
+TEST_CASE("few greys that are neither black nor white look like labels") {
+  const auto greys_of = [](const std::vector<int>& values) {
+    Image mask(1, 1, static_cast<int>(values.size()));
+    for (std::size_t x = 0; x < values.size(); ++x)
+      mask(0, 0, static_cast<int>(x)) = static_cast<float>(values[x]) / 255;
+    return label_greys(mask);
+  };
+  CHECK(greys_of({0, 0, 50, 100, 150, 50}) == std::vector<int>{50, 100, 150});
+  CHECK(greys_of({0, 128}) == std::vector<int>{128});
+  CHECK(greys_of({0, 0, 0}).empty());
+  CHECK(greys_of({0, 255, 250, 1}).empty());
+  CHECK(greys_of({0, 255, 255, 255, 255, 128}).empty());                    // an edge
+  CHECK(greys_of({20, 40, 60, 80, 100, 120, 140, 160, 180, 255}).empty());  // a soft edge
+}
+
 TEST_CASE("a mask whose shape is in its alpha is the alpha") {
   const Image mask = square({0.6F}, {0});
   CHECK(mask_of(square({1, 1, 1, 0.6F}, {1, 1, 1, 0}), "m") == mask);

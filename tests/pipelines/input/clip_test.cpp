@@ -170,6 +170,19 @@ TEST_CASE("one frame of a motion is no estimate, no truth is no truth") {
   CHECK(clip.first.body.axis_angle == motion.poses[0].axis_angle);
 }
 
+TEST_CASE("truth and initial motion that begin later than frame 0 are refused") {
+  for (const auto& [name, needed] :
+       {std::pair{"truth/motion.npz", "a truth is of all frames from 0 on"},
+        {"initial_motion.npz", "the exact state of frame 0 is needed (an estimate belongs in data.motion)"}}) {
+    const CopiedDataset dataset;
+    const std::string file = (dataset.path / name).string();
+    Motion motion = read_motion(file);
+    motion.first_frame = 2;
+    write_motion(file, motion);
+    CHECK(message_of([&] { dataset.read(); }) == file + ": begins with frame 2 of its video; " + needed);
+  }
+}
+
 TEST_CASE("a motion of another body model stands where its file has it, estimate and truth alike") {
   const CopiedDataset dataset;
   const Clip plain = dataset.read();
@@ -241,6 +254,34 @@ TEST_CASE("grey masks that hold labels are told from masks that show nothing") {
                     "of 255: labels are read from images with a palette, grey is the share of the pixel)"});
 }
 
+TEST_CASE("grey masks of few greys are told, with the frames") {
+  const CopiedDataset dataset;
+  Image labels(1, kTinyPixels, kTinyPixels);
+  std::fill_n(labels.row(0, 5), kTinyPixels, 100.0F / 255);
+  std::fill_n(labels.row(0, 6), kTinyPixels, 200.0F / 255);
+  const fs::path object = dataset.path / "masks" / kTinyObject;
+  for (const char* name : {"0001.png", "0003.png"}) write_image((object / name).string(), labels);
+  std::vector<std::string> told;
+  const LogSink sink = log_to([&](LogLevel, std::string_view text) { told.emplace_back(text); }, LogLevel::kWarning);
+  const DataSettings data = dataset_inputs(dataset.path);
+  check_frames(data, read_clip(data), {});
+  CHECK(told == std::vector<std::string>{
+                    object.string() +
+                    ": holds few greys as labels would, 100, 200 of 255 in frame 1 (alike: 1, 3); they count as shares "
+                    "of the pixel, and labels are read from images with a palette"});
+}
+
+TEST_CASE("a motion that is a folder is told with what makes a file of it") {
+  const CopiedDataset dataset;
+  DataSettings data = dataset_inputs(dataset.path);
+  data.motion = dataset.path / "smplerx";
+  fs::create_directories(data.motion);
+  CHECK(message_of([&] { read_clip(data); }) == data.motion.string() +
+                                                    ": is a folder; of one of SMPLer-X's results `hsi4d "
+                                                    "motion " +
+                                                    data.motion.string() + " OUT.npz` makes a motion");
+}
+
 TEST_CASE("masks that are missing are warned of, a missing folder is an error") {
   const CopiedDataset dataset;
   std::vector<std::string> messages;
@@ -257,6 +298,19 @@ TEST_CASE("masks that are missing are warned of, a missing folder is an error") 
                                              ": has no mask for 2 of 4 frames; these count as empty"});
   fs::remove_all(folder);
   CHECK(message_of([&] { dataset.read(); }) == folder.string() + ": there is no such folder of masks");
+}
+
+TEST_CASE("files beside masks and frames that nobody reads are told") {
+  const CopiedDataset dataset;
+  std::vector<std::string> messages;
+  const LogSink sink = log_to([&](LogLevel, std::string_view text) { messages.emplace_back(text); });
+  const fs::path masks = dataset.path / "masks" / "human", frames = dataset.path / "frames";
+  for (const char* name : {"0000.PNG", "0001.jpg", ".hidden", "notes"}) std::ofstream(masks / name) << "no mask";
+  for (const char* name : {"0000.jpg", "0001.jpg", "0000.PNG"}) std::ofstream(frames / name) << "no frame";
+  dataset.read();
+  CHECK(messages ==
+        std::vector<std::string>{frames.string() + ": its 1 .PNG, 2 .jpg files are not read",
+                                 masks.string() + ": what is no .png is not read: 0000.PNG, 0001.jpg, notes"});
 }
 
 TEST_CASE("masks and poses beyond the video are warned of with both numbers") {
@@ -282,12 +336,18 @@ TEST_CASE("masks and poses beyond the video are warned of with both numbers") {
     video.commit();
   };
   fs::remove_all(human);
-  write_video(dataset.path / "masks/human.mp4", 5);
-  CHECK(told(data) ==
-        std::vector<std::string>{(dataset.path / "masks/human.mp4").string() + ": holds 5" + of_four + "1" + unused});
+  const fs::path film = dataset.path / "masks/human.mp4";
+  write_video(film, 5);
+  CHECK(message_of([&] { read_clip(data); }) ==
+        film.string() +
+            ": has 5 frames, the video has 4; allowed: as many, as times by which masks could be found are "
+            "not known of both");
+  data.video_rate = 10;
+  CHECK(told(data) == std::vector<std::string>{film.string() + ": holds 5" + of_four + "1" + unused});
 
   // A video of two frames, with four masks and four poses.
-  write_video(dataset.path / "masks/human.mp4", 2);
+  data.video_rate = 0;
+  write_video(film, 2);
   write_video(dataset.path / "short.mp4", 2);
   data.frames = dataset.path / "short.mp4";
   data.truth.clear();

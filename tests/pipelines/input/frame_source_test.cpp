@@ -12,6 +12,7 @@
 #include "core/video.h"
 #include "pipelines/input/clip.h"
 #include "tests/support/palette_png.h"
+#include "tests/support/png_chunk.h"
 #include "tests/support/tiny_run.h"
 
 namespace frame_source_test {
@@ -127,6 +128,35 @@ TEST_CASE("frames of a video with pauses are chosen by their times") {
   CHECK(counted.time(11) == Approx(22 / 120.0));
 }
 
+TEST_CASE("a time stamp that would make a frame into many is refused") {
+  const TemporaryFolder here;
+  write_numbered_video("even.mp4", 8, 30);
+  const auto with_last_at = [](const std::string& second) {
+    run_process({"ffmpeg", "-v", "error", "-nostdin", "-y", "-i", "even.mp4", "-vf",
+                 "setpts=if(eq(N\\,7)\\," + second + "/TB\\,PTS)", "-fps_mode", "passthrough", "-crf", "1", "a.mkv"});
+    return FrameSource("a.mkv", {0, 10}).count();
+  };
+  CHECK(with_last_at("7.8") == 79);
+  CHECK_THROWS_MATCHES(
+      with_last_at("400000"), DataError,
+      Message(
+          "a.mkv: its frames follow each other after 0.033 s, but frame 7 comes 400000 s after frame 6, so that 10 a "
+          "second would make 4000000 of its 8; allowed: at most 80. Cut the video there, or set data.video_rate if "
+          "its frames are equally far apart in truth"));
+}
+
+TEST_CASE("a wide profile of frames is warned of once") {
+  const TemporaryFolder here;
+  write_numbered_folder("a", 3);
+  for (const char* name : {"a/0000.png", "a/0001.png"})
+    write_file(name, with_png_chunk(read_file(name), "iCCP", std::string_view("Display P3\0\0x", 13)));
+  std::vector<std::string> told;
+  const LogSink sink = log_to([&](LogLevel, std::string_view text) { told.emplace_back(text); }, LogLevel::kWarning);
+  const FrameSource frames("a", {});
+  CHECK(told == std::vector<std::string>{"a/0000.png: has the colour profile \"Display P3\", which is passed over: "
+                                         "colours are taken for sRGB's"});
+}
+
 TEST_CASE("hidden files are no frames and no masks") {
   const TemporaryFolder here;
   write_numbered_folder("a", 3);
@@ -178,8 +208,47 @@ TEST_CASE("masks are a folder or a video of the human or the object") {
   for (const Index t : {0, 1, 3})
     CHECK(std::lround(50 * can.read(frames, t)(0, 3, 3)) == std::lround(50 * frames.read(t)(0, 3, 3)));
   CHECK_THROWS_MATCHES(MaskSource("masks", "short").missing(frames), DataError,
-                       Message("masks/short.mp4: has 9 frames, the clip needs the first 10"));
+                       Message("masks/short.mp4: has no mask for the video's frame 9 at 0.3 s; the nearest is its "
+                               "frame 8 at 0.2667 s, allowed: within 0.01667 s, or as many frames as the video, 12"));
   CHECK_THROWS_MATCHES(MaskSource("masks", "cup"), DataError, Message("masks/cup: there is no such folder of masks"));
+}
+
+TEST_CASE("masks of a video of another length are the nearest in time") {
+  const TemporaryFolder here;
+  fs::create_directories("masks");
+  write_numbered_video("a.mp4", 12, 30);
+  const FrameSource frames("a.mp4", {0, 10});
+  const auto numbers = [&frames](const MaskSource& masks) {
+    std::vector<Index> all;
+    for (Index t = 0; t < frames.count(); ++t) all.push_back(std::lround(50 * masks.read(frames, t)(0, 3, 3)));
+    return all;
+  };
+  write_numbered_video("masks/fast.mp4", 30, 60);
+  const MaskSource fast("masks", "fast");
+  CHECK(fast.missing(frames) == 0);
+  CHECK(numbers(fast) == std::vector<Index>{0, 6, 12, 18});
+  CHECK(fast.place(frames, 1) == "masks/fast.mp4: frame 6");
+  CHECK(fast.count(frames).unused == 18);
+  write_numbered_video("masks/kept.mp4", 4, 10);  // of the clip's frames alone
+  const MaskSource kept("masks", "kept");
+  CHECK(kept.missing(frames) == 0);
+  CHECK(numbers(kept) == std::vector<Index>{0, 1, 2, 3});
+  CHECK(kept.count(frames).unused == 0);
+  write_numbered_video("masks/other.mp4", 13, 25);
+  CHECK_THROWS_MATCHES(MaskSource("masks", "other").missing(frames), DataError,
+                       Message("masks/other.mp4: has no mask for the video's frame 3 at 0.1 s; the nearest is its "
+                               "frame 3 at 0.12 s, allowed: within 0.01667 s, or as many frames as the video, 12"));
+  write_numbered_video("masks/equal.mp4", 12, 10);  // by number, which is told
+  const MaskSource equal("masks", "equal");
+  CHECK(equal.missing(frames) == 0);
+  CHECK(numbers(equal) == std::vector<Index>{0, 3, 6, 9});
+  CHECK(equal.other_times(frames) ==
+        "masks/equal.mp4: its frame 1 at 0.1 s is taken for the video's frame 1 at 0.03333 s, as both have 12 frames");
+  CHECK(fast.other_times(frames).empty());
+  write_numbered_folder("timeless", 12);
+  CHECK_THROWS_MATCHES(fast.missing(FrameSource("timeless", {})), DataError,
+                       Message("masks/fast.mp4: has 30 frames, the video has 12; allowed: as many, as times by which "
+                               "masks could be found are not known of both"));
 }
 
 TEST_CASE("a clip of videos at twice the size is that of its images, nearly") {
