@@ -128,7 +128,7 @@ constexpr StressCase kCases[] = {
     {"G5", "T's gradient is lost in layers before a background", "what is seen behind them",
      transmittance_through_layers, "320 Gaussians, 80 x 48 px"},
     {"G6", "lists of several chunks: slots of an earlier one", "slots by chunk", long_lists,
-     "3000 Gaussians, 16 x 16 px"},
+     "3000 Gaussians, 16 x 16 px; 40, 8192 x 2112 px"},
     {"G7", "videos with wrong colours, times or shapes", "matrix by size, time stamps, refusals",
      videos_as_players_show_them},
     {"G8", "a run resumed on other vectors has other bits", "the checkpoint names the set", resumed_elsewhere},

@@ -11,6 +11,7 @@
 #include "core/held_isa.h"
 #include "core/log.h"
 #include "core/process.h"
+#include "core/rotation.h"
 #include "core/video.h"
 #include "pipelines/draw/view_turn.h"
 #include "pipelines/run/checkpoint.h"
@@ -155,8 +156,8 @@ std::vector<StressFigure> resumed_elsewhere(Remedy remedy) {
 
 // --- G12 -------------------------------------------------------------------------------------------------------------
 
-/// G12: an object and a joint that are turned against the camera, which approximations suppose not to be. Without:
-/// nobody looks.
+/// G12: an object and a joint that are turned against the camera, an object that is moved aside, and a camera that goes
+/// around, which approximations suppose not to be. Without: nobody looks.
 std::vector<StressFigure> left_ranges(Remedy remedy) {
   Clip clip;
   clip.avatar.parents = {-1, 0};
@@ -165,16 +166,28 @@ std::vector<StressFigure> left_ranges(Remedy remedy) {
   before.camera_from_world.translation = {0, 0, 4};
   before.objects.resize(1);
   before.body = rest_pose(2);
-  double error = 0;
+  const auto error_of = [&](const SceneState& after, double degrees) {
+    return std::abs((remedy == Remedy::kOn ? view_turn_deg(clip, before, after) : 0) - degrees);
+  };
+  double turned = 0, around = 0, aside = 0;
   for (const double degrees : {0.0, 2.0, 15.0, 90.0, 170.0}) {
     for (const bool is_object : {true, false}) {
       SceneState after = before;
       (is_object ? after.objects[0].rotation[0] : after.body.axis_angle[0]) = degrees * kDegree;
-      const double told = remedy == Remedy::kOn ? view_turn_deg(clip, before, after) : 0;
-      error = larger(error, std::abs(told - degrees));
+      turned = larger(turned, error_of(after, degrees));
     }
+    SceneState after = before;
+    after.camera_from_world.rotation = so3_exp(Vector3<double>(0, degrees * kDegree, 0));
+    around = larger(around, error_of(after, degrees));
   }
-  return {{"turns against the camera off what is told, degrees", error, 1e-9}};
+  for (const double degrees : {2.0, 15.0, 80.0}) {
+    SceneState after = before;
+    after.objects[0].translation[0] = 4 * std::tan(degrees * kDegree);
+    aside = larger(aside, error_of(after, degrees));
+  }
+  return {{"turns against the camera off what is told, degrees", turned, 1e-9},
+          {"ways of the camera around things, likewise", around, 1e-9},
+          {"ways of an object aside, likewise", aside, 1e-9}};
 }
 
 }  // namespace hsi4d::stress

@@ -119,7 +119,7 @@ BesideRoot stage_beside_root(OptimizerKind kind, Pull pull) {
 }
 
 /// A bad step is evaluated once more before it is undone, and each costs a quarter of the rate for good.
-BesideRoot adam_with_second_look() {
+BesideRoot adam_with_second_look(Pull pull) {
   PlainAdam<double> x{.lr = kRootRate}, y{.lr = kRootRate};
   x.x = 1;
   PlainAdam<double> x_before = x, y_before = y;
@@ -128,7 +128,7 @@ BesideRoot adam_with_second_look() {
   for (int i = 0; i < kRootIterations; ++i) {
     if (x.x >= 0) {
       x_before = x, y_before = y;
-      x.step(1 - 0.1 / std::sqrt(x.x));
+      x.step(pull == Pull::kBack ? 1 - 0.1 / std::sqrt(x.x) : 0.5 / std::sqrt(x.x));
       y.step(2 * (y.x - kRootGoal));
       continue;
     }
@@ -149,17 +149,18 @@ BesideRoot adam_with_second_look() {
 /// G4
 std::vector<StressFigure> bad_evaluations(Remedy remedy) {
   const bool on = remedy == Remedy::kOn;
-  const BesideRoot adam = on ? stage_beside_root(OptimizerKind::kAdam, Pull::kBack) : adam_with_second_look();
+  const BesideRoot adam =
+      on ? stage_beside_root(OptimizerKind::kAdam, Pull::kBack) : adam_with_second_look(Pull::kBack);
   const BesideRoot bfgs = on ? stage_beside_root(OptimizerKind::kBfgs, Pull::kBack) : adam;
-  const BesideRoot pulled = stage_beside_root(OptimizerKind::kAdam, Pull::kOver);
+  const BesideRoot pulled =
+      on ? stage_beside_root(OptimizerKind::kAdam, Pull::kOver) : adam_with_second_look(Pull::kOver);
   return {{"Adam: bad evaluations that are not undone at once", adam.kept, 0},
           {"Adam: evaluations lost, of 300", adam.bad, 10},
           {"Adam: x and y off their goals", larger(std::abs(adam.x - 0.01), std::abs(adam.y - kRootGoal)), 2e-6},
           {"BFGS: bad evaluations after which a shorter step is bad too", bfgs.kept, 3},
           {"BFGS: evaluations lost", bfgs.bad, 6},
-          {"BFGS: x and y off their goals", larger(std::abs(bfgs.x - 0.01), std::abs(bfgs.y - kRootGoal)), 6e-3},
-          {"Adam: evaluations lost where the loss pulls over the edge", pulled.bad, 150},
-          {"Adam: y off its goal there (told, not bounded)", std::abs(pulled.y - kRootGoal), 10}};
+          {"BFGS: x and y off their goals", larger(std::abs(bfgs.x - 0.01), std::abs(bfgs.y - kRootGoal)), 2e-3},
+          {"Adam: evaluations lost where the loss pulls over the edge", pulled.bad, 150}};
 }
 
 // --- G9: norms that grow, colours that saturate ----------------------------------------------------------------------
