@@ -79,7 +79,8 @@ if(HSI4D_BUILD_FUZZERS)
 endif()
 
 # Files with vector code are compiled with -O3 and each by itself; all others with -O2 and, where unity builds are on,
-# a room at once, so that a header is read once a room.
+# a room at once, so that a header is read once a room. AddressSanitizer does not watch scopes there: vectors are many
+# short-lived variables, and block_kernel.cpp took 92 s to compile instead of 42.
 set(hsi4d_vector_code "foreach_target|on_best_isa|with_best_lanes|autodiff/map\\.h")
 
 # hsi4d_use_headers(TARGET): the target reads cmake/headers.h as it was compiled once for all.
@@ -100,6 +101,9 @@ function(hsi4d_set_sources target)
     file(STRINGS ${source} found REGEX "${hsi4d_vector_code}" LIMIT_COUNT 1)
     if(found)
       set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
+      if("${HSI4D_SANITIZE}" MATCHES "address")
+        set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS -fno-sanitize-address-use-after-scope)
+      endif()
       set_property(SOURCE ${source} PROPERTY SKIP_UNITY_BUILD_INCLUSION ON)
     endif()
   endforeach()
