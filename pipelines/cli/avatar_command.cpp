@@ -160,7 +160,7 @@ std::string avatar_info_command(const std::string& path) {
 
 void add_avatar(CLI::App& app, Program& program) {
   AvatarOptions& o = program.options<AvatarOptions>();
-  CLI::App& command = *app.add_subcommand("avatar", "Make, import, learn or describe the Gaussians of a body");
+  CLI::App& command = *app.add_subcommand("avatar", "Make, import, fit the Gaussians of a body, or list what they are");
   command.require_subcommand(1);
   const auto add_body = [&o](CLI::App& sub) {
     sub.add_option("--betas", o.betas, "Shape of the body model: the first betas; the mean shape without")

@@ -160,16 +160,31 @@ void warn_of_labels(const MaskSource& masks, const std::vector<std::vector<int>>
               "; they count as shares of the pixel, and labels are read from images with a palette");
 }
 
+/// Names of another kind, or another numbering: as many masks as frames and not theirs, or not one that is a frame's.
+/// @param missing  of the frames that the clip keeps
+bool are_misnamed(const MaskSource::Count& count, Index missing, const FrameSource& frames) {
+  const bool is_none = missing == frames.count() && (count.unused > 0 || !count.others.empty());
+  return is_none || (missing > 0 && count.unused > 0 && count.all == frames.video_count());
+}
+
 /// A folder of masks that is not there is a wrong name. Single masks may be missing: nothing is seen in that frame.
+/// Throws DataError for masks with names that are not those of frames.
 MaskSource open_masks(const fs::path& folder, const std::string& name, const FrameSource& frames) {
   const MaskSource masks(folder, name);
   const Index missing = masks.missing(frames);
+  const MaskSource::Count count = masks.count(frames);
+  if (are_misnamed(count, missing, frames))
+    throw DataError(masks.path().string() + ": has no mask for " + std::to_string(missing) + " of " +
+                    std::to_string(frames.count()) + " frames, and " + std::to_string(count.unused) + " of its " +
+                    std::to_string(count.all) +
+                    " masks belong to no frame; allowed: a mask has the name of its frame, " + "the first \"" +
+                    masks.file(frames, 0).filename().string() + "\"" +
+                    (count.others.empty() ? "" : "; what is no .png is not read: " + few_names(count.others)));
   if (missing > 0)
     log_warning(masks.path().string() + ": has no mask for " + std::to_string(missing) + " of " +
                 std::to_string(frames.count()) + " frames; these count as empty");
   const std::string other_times = masks.other_times(frames);
   if (!other_times.empty()) log_warning(other_times);
-  const MaskSource::Count count = masks.count(frames);
   if (count.unused > 0)
     log_warning(masks.path().string() + ": holds " + std::to_string(count.all) + " masks, the video has " +
                 std::to_string(frames.video_count()) + " frames; " + std::to_string(count.unused) +

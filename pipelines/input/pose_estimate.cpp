@@ -52,6 +52,16 @@ void warn_of_rest(const Motion& motion, const fs::path& file, const FrameSource&
               " frames at " + rounded(frames.video_rate(), 4) + "; poses after its end are not used");
 }
 
+/// Tells of poses that are taken one a frame although their rate says otherwise.
+void warn_of_rate(const Motion& motion, const fs::path& file, const FrameSource& frames) {
+  constexpr double kAlike = 0.01;
+  const double rate = frames.video_rate();
+  if (!motion.says_frame_rate || rate <= 0 || std::abs(motion.frame_rate - rate) <= kAlike * rate) return;
+  log_warning(file.string() + ": its poses, " + rounded(motion.frame_rate, 4) +
+              " a second as it says, are taken one a frame of the video, which has " + rounded(rate, 4) +
+              " a second, as they are as many");
+}
+
 /// Throws DataError for a motion that begins after the clip's last frame: each of its poses would be a guess.
 void check_begin(const Motion& motion, const fs::path& file, const FrameSource& frames) {
   const bool has_times = motion.says_frame_rate && frames.video_rate() > 0;
@@ -93,7 +103,7 @@ std::vector<BodyPose> poses_of_frames(const Motion& read, const fs::path& file, 
   const double count = read.first_frame + static_cast<double>(read.poses.size());
   const bool is_by_frame =
       count == static_cast<double>(frames.count()) || count == static_cast<double>(frames.video_count());
-  if (!is_by_frame) check_begin(read, file, frames);
+  is_by_frame ? warn_of_rate(read, file, frames) : check_begin(read, file, frames);
   const Motion motion = from_first_frame(read, file);
   if (is_by_frame || !covers(motion, frames)) {
     if (motion.first_frame != 0)

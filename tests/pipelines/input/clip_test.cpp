@@ -300,6 +300,30 @@ TEST_CASE("masks that are missing are warned of, a missing folder is an error") 
   CHECK(message_of([&] { dataset.read(); }) == folder.string() + ": there is no such folder of masks");
 }
 
+TEST_CASE("masks whose names are not those of frames are refused") {
+  const auto message_after = [](const auto& rename) {
+    const CopiedDataset dataset;
+    rename(dataset.path / "masks" / "human");
+    const std::string text = message_of([&] { dataset.read(); }), path = (dataset.path / "masks" / "human").string();
+    CHECK(text.starts_with(path));
+    return text.substr(std::min(text.size(), path.size()));
+  };
+  const std::string allowed = "; allowed: a mask has the name of its frame, the first \"0000.png\"";
+  const auto later = [](const fs::path& folder) { fs::rename(folder / "0000.png", folder / "0004.png"); };
+  CHECK(message_after(later) == ": has no mask for 1 of 4 frames, and 1 of its 4 masks belong to no frame" + allowed);
+  const auto renamed = [](const fs::path& folder) {
+    for (const char* name : {"0000.png", "0001.png", "0002.png", "0003.png"})
+      fs::rename(folder / name, folder / (std::string("frame_") + name));
+  };
+  CHECK(message_after(renamed) == ": has no mask for 4 of 4 frames, and 4 of its 4 masks belong to no frame" + allowed);
+  const auto others = [](const fs::path& folder) {
+    for (const char* name : {"0000.png", "0001.png", "0002.png", "0003.png"})
+      fs::rename(folder / name, (folder / name).replace_extension("jpg"));
+  };
+  CHECK(message_after(others) == ": has no mask for 4 of 4 frames, and 0 of its 0 masks belong to no frame" + allowed +
+                                     "; what is no .png is not read: 0000.jpg, 0001.jpg, 0002.jpg, 0003.jpg");
+}
+
 TEST_CASE("files beside masks and frames that nobody reads are told") {
   const CopiedDataset dataset;
   std::vector<std::string> messages;
@@ -382,7 +406,7 @@ TEST_CASE("frames whose names are not text are refused when the folder is read")
               "\" is not UTF-8 text without control characters; rename the frame, and its masks with it");
   }
   const CopiedDataset dataset;
-  for (const char* folder : {"frames", "masks/human"})
+  for (const fs::path& folder : {fs::path("frames"), fs::path("masks/human"), fs::path("masks") / kTinyObject})
     fs::rename(dataset.path / folder / "0003.png", dataset.path / folder / "0003\xc3\xa4.png");
   CHECK(message_of([&] { dataset.read(); }) == "no error");
 }
@@ -399,7 +423,8 @@ TEST_CASE("frames whose names sort otherwise than their numbers are refused") {
 TEST_CASE("frames with numbers behind a text are held to the same digits, and their gaps are told") {
   const CopiedDataset dataset;
   const fs::path frames = dataset.path / "frames";
-  for (const fs::path& folder : {frames, dataset.path / "masks/human"}) {
+  const std::vector<fs::path> folders = {frames, dataset.path / "masks/human", dataset.path / "masks" / kTinyObject};
+  for (const fs::path& folder : folders) {
     std::vector<fs::path> files;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
     for (const fs::path& file : files) fs::rename(file, folder / ("shot2_" + file.filename().string()));
@@ -412,10 +437,10 @@ TEST_CASE("frames with numbers behind a text are held to the same digits, and th
       LogLevel::kWarning);
   CHECK(message_of([&] { dataset.read(); }) == "no error");
   CHECK(gaps == 0);
-  fs::rename(frames / "shot2_0001.png", frames / "shot2_0009.png");
+  for (const fs::path& folder : folders) fs::rename(folder / "shot2_0001.png", folder / "shot2_0009.png");
   CHECK(message_of([&] { dataset.read(); }) == "no error");
   CHECK(gaps == 1);
-  fs::rename(frames / "shot2_0009.png", frames / "shot2_0001.png");
+  for (const fs::path& folder : folders) fs::rename(folder / "shot2_0009.png", folder / "shot2_0001.png");
   fs::rename(frames / "shot2_0003.png", frames / "shot2_10.png");
   CHECK(message_of([&] { dataset.read(); }) ==
         frames.string() +

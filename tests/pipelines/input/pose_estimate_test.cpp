@@ -100,6 +100,21 @@ TEST_CASE("an estimate of another rate that begins later is put there too") {
   CHECK(places(estimated_poses(fast, "m.npz", here.frames))[1] == Approx(1.5));
 }
 
+TEST_CASE("as many poses as frames are taken one a frame, and another rate is told") {
+  Here here;
+  Motion motion = walk(0, 6);
+  motion.frame_rate = 30;
+  const std::vector<double> all = {0, 1, 2, 3, 4, 5};
+  CHECK(places(estimated_poses(motion, "m.npz", here.frames)) == all);
+  CHECK(here.told == std::vector<std::string>{
+                         "m.npz: its poses, 30 a second as it says, are taken one a frame of the video, which has 10 a "
+                         "second, as they are as many"});
+  here.told.clear();
+  motion.says_frame_rate = false;
+  CHECK(places(estimated_poses(motion, "m.npz", here.frames)) == all);
+  CHECK(here.told.empty());
+}
+
 TEST_CASE("which way is up in an estimate the human of frame 0 tells") {
   Here here;
   constexpr double kQuarter = std::numbers::pi / 2;
