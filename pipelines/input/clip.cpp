@@ -164,7 +164,8 @@ void warn_of_labels(const MaskSource& masks, const std::vector<std::vector<int>>
 /// @param missing  of the frames that the clip keeps
 bool are_misnamed(const MaskSource::Count& count, Index missing, const FrameSource& frames) {
   const bool is_none = missing == frames.count() && (count.unused > 0 || !count.others.empty());
-  return is_none || (missing > 0 && count.unused > 0 && count.all == frames.video_count());
+  const bool is_as_many = count.all == frames.video_count() || count.all == frames.count();
+  return is_none || (missing > 0 && count.unused > 0 && is_as_many);
 }
 
 /// A folder of masks that is not there is a wrong name. Single masks may be missing: nothing is seen in that frame.
