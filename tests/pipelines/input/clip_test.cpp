@@ -392,7 +392,8 @@ TEST_CASE("every frame can be checked at once") {
   const DataSettings data = dataset_inputs(dataset.path);
   const Clip clip = read_clip(data);
   CHECK(message_of([&] { check_frames(data, clip, {}); }) == "no error");
-  for (const char* name : {"frames/0003.png", "frames/0002.png"}) std::ofstream(dataset.path / name) << "text";
+  for (const char* name : {"frames/0003.png", "frames/0002.png"})
+    std::ofstream(dataset.path / name) << "\x89PNG\r\n\x1a\ntext";
   CHECK_THAT(message_of([&] { check_frames(data, clip, {}); }), Contains((dataset.path / "frames/0002.png").string()));
 }
 
