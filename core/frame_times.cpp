@@ -51,15 +51,10 @@ std::vector<Index> nearest_frames(const FrameTimes& times, double rate) {
   std::vector<Index> frames;
   if (times.seconds.empty()) return frames;
   const double end = times.seconds.back() + usual_step(times) / 2;
-  Index nearest = 0;
   for (Index t = 0;; ++t) {
     const double moment = static_cast<double>(t) / rate;
     if (t > 0 && moment > end - kSameTime) return frames;
-    const auto distance = [&](Index frame) {
-      return std::fabs(times.seconds[static_cast<std::size_t>(frame)] - moment);
-    };
-    while (nearest + 1 < std::ssize(times.seconds) && distance(nearest + 1) <= distance(nearest) + kSameTime) ++nearest;
-    frames.push_back(nearest);
+    frames.push_back(nearest_frame(times, moment));
   }
 }
 
