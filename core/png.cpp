@@ -1,7 +1,6 @@
 #include "core/png.h"
 
 #include <algorithm>
-#include <array>
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
@@ -13,6 +12,7 @@
 #include <zlib.h>
 
 #include "core/check.h"
+#include "core/screen_colors.h"
 
 namespace hsi4d {
 namespace {
@@ -158,11 +158,8 @@ std::span<const uint8_t> chunk_before_pixels(std::span<const uint8_t> file, std:
   return {};
 }
 
-/// Refuses colours that sRGB's transfer and primaries would show wrongly. Numbers are those of ITU-T H.273; allowed are
-/// those of videos (core/video_probe.cpp).
+/// Refuses colours that sRGB's transfer and primaries would show wrongly.
 void check_cicp(std::span<const uint8_t> file, const std::string& name) {
-  constexpr std::array<uint8_t, 6> kPrimaries = {1, 2, 4, 5, 6, 7};
-  constexpr std::array<uint8_t, 11> kTransfers = {1, 2, 4, 5, 6, 7, 11, 12, 13, 14, 15};
   constexpr uint8_t kPq = 16, kHlg = 18;
   const std::span<const uint8_t> cicp = chunk_before_pixels(file, "cICP");
   if (cicp.size() != 4) return;
@@ -171,9 +168,9 @@ void check_cicp(std::span<const uint8_t> file, const std::string& name) {
     throw DataError(name + ": has the " + what + " " + std::to_string(number) + words +
                     " by its chunk cICP (numbers of H.273); allowed are colours of sRGB, BT.709 or BT.601");
   };
-  if (std::find(kTransfers.begin(), kTransfers.end(), transfer) == kTransfers.end())
+  if (!has_number(kScreenTransfers, transfer))
     refuse("transfer", transfer, transfer == kPq ? " (PQ, HDR)" : transfer == kHlg ? " (HLG, HDR)" : "");
-  if (std::find(kPrimaries.begin(), kPrimaries.end(), primaries) == kPrimaries.end())
+  if (!has_number(kScreenPrimaries, primaries))
     refuse("primaries", primaries, primaries == 9 ? " (BT.2020)" : primaries == 12 ? " (Display P3)" : "");
 }
 

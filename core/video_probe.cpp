@@ -14,6 +14,7 @@
 #include "core/check.h"
 #include "core/log.h"
 #include "core/process.h"
+#include "core/screen_colors.h"
 #include "core/text.h"
 
 namespace hsi4d {
@@ -150,11 +151,7 @@ bool is_among(const std::string& value, const std::array<std::string_view, N>& w
   return std::find(words.begin(), words.end(), value) != words.end();
 }
 
-// As ffmpeg calls them: those of pictures for a usual screen.
-constexpr std::array<std::string_view, 12> kTransfers = {"bt709",        "smpte170m", "smpte240m", "bt470m",
-                                                         "bt470bg",      "gamma22",   "gamma28",   "iec61966-2-1",
-                                                         "iec61966-2-4", "bt1361e",   "bt2020-10", "bt2020-12"};
-constexpr std::array<std::string_view, 5> kPrimaries = {"bt709", "smpte170m", "smpte240m", "bt470m", "bt470bg"};
+// As ffmpeg calls them.
 constexpr std::array<std::string_view, 6> kMatrices = {"bt709", "smpte170m", "bt470bg", "fcc", "smpte240m", "gbr"};
 
 bool has_part(const std::string& text, const std::vector<std::string>& parts) {
@@ -175,7 +172,7 @@ void check_colors(const std::string& path, const Facts& facts) {
   constexpr const char* kWay = "; allowed are colours of BT.709 or BT.601, which ffmpeg's zscale and tonemap make";
   const std::string transfer = fact(facts, "color_transfer"), matrix = fact(facts, "color_space"),
                     primaries = fact(facts, "color_primaries"), pixels = fact(facts, "pix_fmt");
-  if (!is_unknown(transfer) && !is_among(transfer, kTransfers)) {
+  if (!is_unknown(transfer) && !has_name(kScreenTransfers, transfer)) {
     const char* name = transfer == "smpte2084" ? " (PQ, HDR)" : transfer == "arib-std-b67" ? " (HLG, HDR)" : "";
     throw DataError(path + ": has the transfer " + transfer + name + kWay);
   }
@@ -186,7 +183,7 @@ void check_colors(const std::string& path, const Facts& facts) {
     throw DataError(path + ": is Dolby Vision of profile 5 (HDR)" + kWay);
   if (!is_unknown(matrix) && !is_among(matrix, kMatrices))
     throw DataError(path + ": has the colour matrix " + matrix + kWay);
-  if (!is_unknown(primaries) && !is_among(primaries, kPrimaries))
+  if (!is_unknown(primaries) && !has_name(kScreenPrimaries, primaries))
     throw DataError(path + ": has the primaries " + primaries + kWay);
   const bool has_second_stream = fact(facts, "tag:alpha_mode") == "1";  // WebM
   if (has_alpha(pixels) || has_second_stream)
