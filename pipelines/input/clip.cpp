@@ -178,7 +178,7 @@ MaskSource open_masks(const fs::path& folder, const std::string& name, const Fra
     throw DataError(masks.path().string() + ": has no mask for " + std::to_string(missing) + " of " +
                     std::to_string(frames.count()) + " frames, and " + std::to_string(count.unused) + " of its " +
                     std::to_string(count.all) +
-                    " masks belong to no frame; allowed: a mask has the name of its frame, " + "the first \"" +
+                    " masks belong to no frame; allowed: a mask has the name of its frame, the first \"" +
                     masks.file(frames, 0).filename().string() + "\"" +
                     (count.others.empty() ? "" : "; what is no .png is not read: " + few_names(count.others)));
   if (missing > 0)

@@ -230,6 +230,9 @@ FrameTimes even_times(Index count, double rate) {
   return times;
 }
 
+/// How far from a frame's moment another may be and still be of it, seconds.
+double reach_of_frames(const FrameTimes& times) { return usual_step(times) / 2; }
+
 /// Whether a moment, in seconds, is near enough to that of a frame to be of it.
 bool is_within(const FrameTimes& times, Index frame, double moment, double most) {
   return std::fabs(times.seconds[static_cast<std::size_t>(frame)] - moment) <= most;
@@ -321,7 +324,7 @@ Index MaskSource::missing(const FrameSource& frames) const {
     throw DataError(path_.string() + ": has " + std::to_string(count) + " frames, the video has " +
                     std::to_string(frames.video_count()) +
                     "; allowed: as many, as times by which masks could be found are not known of both");
-  const double most = usual_step(times) / 2;
+  const double most = reach_of_frames(times);
   for (Index t = 0; t < frames.count(); ++t) {
     const Index frame = frames.number(t), nearest = number(frames, t);
     if (is_within(masks, nearest, times.seconds[static_cast<std::size_t>(frame)], most)) continue;
@@ -336,7 +339,7 @@ std::string MaskSource::other_times(const FrameSource& frames) const {
   if (!video_ || video_->reader.frames() != frames.video_count()) return "";
   const FrameTimes &masks = video_->reader.times(), &times = frames.times();
   if (masks.seconds.empty() || times.seconds.empty()) return "";
-  const double most = usual_step(times) / 2;
+  const double most = reach_of_frames(times);
   for (Index i = 0; i < frames.video_count(); ++i) {
     if (is_within(masks, i, times.seconds[static_cast<std::size_t>(i)], most)) continue;
     return path_.string() + ": its " + moment_text(masks, i) + " is taken for the video's " + moment_text(times, i) +
@@ -362,7 +365,7 @@ MaskSource::Count MaskSource::count(const FrameSource& frames) const {
     count.all = video_->reader.frames();
     if (goes_by_number(frames)) return count;
     const FrameTimes& masks = video_->reader.times();
-    const double most = usual_step(frames.times()) / 2;
+    const double most = reach_of_frames(frames.times());
     std::set<Index> used;
     for (const double moment : frames.times().seconds) {
       const Index nearest = nearest_frame(masks, moment);
