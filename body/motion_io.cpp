@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "body/body_model.h"
@@ -127,6 +128,12 @@ std::string objects_text(const Npz& file) {
          "; save an array of numbers for each name";
 }
 
+/// What is there where something is missing.
+std::string names_text(const Npz& file) {
+  std::vector<std::string> names = file.names();
+  return (names.empty() ? "" : "; there is " + few_names(names)) + objects_text(file);
+}
+
 void put_joints(const Rows& rows, std::size_t from, std::size_t to, std::size_t joints, Motion& motion) {
   for (std::size_t t = 0; t < motion.poses.size(); ++t) {
     for (std::size_t i = 0; i < 3 * joints; ++i) motion.poses[t].axis_angle[3 * to + i] = rows.at(t, 3 * from + i);
@@ -183,11 +190,29 @@ void read_parts(const Npz& file, Motion& motion) {
     if (array != nullptr) {
       read_joints(*array, part.joint, part.joints, motion);
     } else if (part.needed) {
-      throw DataError(file.source() + ": there is neither 'poses' nor '" + part.names[0] + "'" + objects_text(file));
+      throw DataError(file.source() + ": there is neither 'poses' nor '" + part.names[0] + "'" + names_text(file));
     } else {
       read_halves(file, part, motion);
     }
   }
+}
+
+/// Throws DataError for angles in degrees: half of the turned joints of the body are turned by more than half a circle.
+void require_radians(const Npz& file, const Motion& motion) {
+  std::vector<double> angles;
+  for (const BodyPose& pose : motion.poses) {
+    for (std::size_t joint = 1; joint < kBodyJoints; ++joint) {
+      const double* v = pose.axis_angle.data() + 3 * joint;
+      const double angle = std::hypot(v[0], v[1], v[2]);
+      if (angle > 0) angles.push_back(angle);
+    }
+  }
+  if (angles.empty()) return;
+  const auto middle = angles.begin() + std::ssize(angles) / 2;
+  std::nth_element(angles.begin(), middle, angles.end());
+  if (*middle <= std::numbers::pi) return;
+  throw DataError(file.source() + ": half of the joints are turned by " + rounded(*middle, 3) +
+                  " or more; angles are radians, and these look like degrees");
 }
 
 /// Throws DataError for names that say different rates.
@@ -336,7 +361,7 @@ Motion converted(Motion motion, Model model) {
 Motion motion_of(const Npz& file) {
   refuse_other_contents(file, {"a motion", "parameters of smplx"});
   const NpyArray* trans = find_first(file, kTranslationNames);
-  if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'" + objects_text(file));
+  if (trans == nullptr) throw DataError(file.source() + ": there is no array 'trans'" + names_text(file));
   const int64_t frames = trans->require_shape({-1, 3}).shape()[0];
   if (frames == 0) throw DataError(trans->source() + ": holds no frame");
   const Rows places = rows_of(*trans, frames, 3, kPlaces);
@@ -356,6 +381,7 @@ Motion motion_of(const Npz& file) {
   } else {
     read_parts(file, motion);
   }
+  require_radians(file, motion);
   for (std::size_t t = 0; t < motion.poses.size(); ++t) {
     motion.poses[t].transl = {places.at(t, 0), places.at(t, 1), places.at(t, 2)};
   }

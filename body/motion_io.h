@@ -53,7 +53,8 @@ inline constexpr double kSlowestMotion = 0.01, kFastestMotion = 1e5;
 ///
 /// Throws UserError when the file cannot be read; DataError naming file and array: a file of something else, an array
 /// missing or of Python objects, a shape that does not fit, no frame, a number that is not finite or beyond 1e6 (of
-/// translations 1e7; of betas kLargestBeta), more than kMostBetas betas, a frame rate outside kSlowestMotion to
+/// translations 1e7; of betas kLargestBeta), angles in degrees (half of the body's joints that are turned are turned by
+/// more than half a circle), more than kMostBetas betas, a frame rate outside kSlowestMotion to
 /// kFastestMotion.
 Motion read_motion(const std::string& path);
 /// As read_motion, of a file in memory. @param name  what messages call it

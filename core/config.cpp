@@ -378,6 +378,27 @@ ConfigField& ConfigFields::add_optional(ConfigFields inner, std::function<bool()
   return field;
 }
 
+void ConfigFields::or_word(std::string_view name, std::string word, bool& is_word) {
+  const auto field = std::find_if(fields_.begin(), fields_.end(), [&](const ConfigField& f) { return f.name == name; });
+  HSI4D_CHECK(field != fields_.end() && field->kind == ConfigField::Kind::kValue,
+              "no number '" + std::string(name) + "'");
+  const ConfigValue text = ConfigValue::make_string(word);
+  field->allowed += ", or " + json_string(word);
+  ConfigValue words = ConfigValue::make_object(), schema = ConfigValue::make_object();
+  words.add("enum", ConfigValue::make_array({text}));
+  schema.add("anyOf", ConfigValue::make_array({std::move(field->schema), std::move(words)}));
+  field->schema = std::move(schema);
+  field->read = [read = field->read, allowed = field->allowed, word, &is_word](
+                    const ConfigValue& written, const std::string& pointer, ConfigProblems& problems) {
+    is_word = written.kind == Kind::kString && written.text == word;
+    if (is_word) return;
+    if (written.kind != Kind::kString) return read(written, pointer, problems);
+    report(written, pointer, problems, shown(written) + " is not a number",
+           allowed + did_you_mean(written.text, {word}));
+  };
+  field->write = [write = field->write, text, &is_word] { return is_word ? text : write(); };
+}
+
 ConfigField& ConfigFields::add_object(std::string_view name, std::shared_ptr<ConfigFields> children,
                                       std::string_view summary) {
   ConfigField& field = add_field(ConfigField::Kind::kObject, name, summary);

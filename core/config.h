@@ -216,6 +216,9 @@ class ConfigFields {
     return add_optional(std::move(inner), has, load, store);
   }
 
+  /// One word that may stand for the value of a number above: `is_word` says whether it does.
+  void or_word(std::string_view name, std::string word, bool& is_word);
+
   /// A nested struct.
   template <class S, class Describe = ByName>
   ConfigField& object(std::string_view name, S& value, std::string_view summary, Describe describe_value = {}) {

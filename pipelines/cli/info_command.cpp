@@ -1,6 +1,7 @@
 #include "pipelines/cli/info_command.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -9,7 +10,9 @@
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/exr.h"
+#include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/npz.h"
 #include "core/safetensors.h"
 #include "core/suggest.h"
@@ -159,6 +162,24 @@ std::string camera_info(const std::string& path) {
   return text;
 }
 
+/// Whether an object has a member that only files of cameras have.
+bool is_of_cameras(const ConfigValue& object) {
+  const ConfigValue* const frames = find_member(object, "frames");
+  const auto has = [&](const char* key) { return find_member(object, key) != nullptr; };
+  return (frames != nullptr && frames->kind == ConfigValue::Kind::kArray) || has("format") || has("cameras") ||
+         has("width") || has("world_to_camera");
+}
+
+/// Cameras, or of another object the names of its members.
+std::string json_info(const std::string& path) {
+  const ConfigValue tree = parse_json_text(read_text_file(path), path);
+  if (tree.kind != ConfigValue::Kind::kObject || tree.members.empty() || is_of_cameras(tree)) return camera_info(path);
+  const bool is_config = find_member(tree, "stages") != nullptr || find_member(tree, "data") != nullptr;
+  std::string text = path + ": " + (is_config ? "a config (`hsi4d check` tells its faults)" : "JSON") + " with";
+  for (const ConfigMember& member : tree.members) text += " " + with_escapes(member.key);
+  return text + "\n";
+}
+
 std::string size_text(const Image& image) {
   return std::to_string(image.width()) + " x " + std::to_string(image.height()) + " pixels";
 }
@@ -182,9 +203,9 @@ struct Kind {
   const char* ending;
   std::string (*info)(const std::string&);
 };
-constexpr Kind kOtherKinds[] = {{".npz", npz_info},     {".npy", npy_info},   {".safetensors", safetensors_info},
-                                {".json", camera_info}, {".png", image_info}, {".jpg", image_info},
-                                {".jpeg", image_info},  {".exr", exr_info}};
+constexpr Kind kOtherKinds[] = {{".npz", npz_info},    {".npy", npy_info},   {".safetensors", safetensors_info},
+                                {".json", json_info},  {".png", image_info}, {".jpg", image_info},
+                                {".jpeg", image_info}, {".exr", exr_info}};
 
 }  // namespace
 
@@ -211,6 +232,11 @@ std::vector<std::string> info_endings() {
 }
 
 std::string info_command(const std::string& path, bool json) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    throw UserError("hsi4d info: " + path +
+                    " is a folder; allowed: a file (`hsi4d report` and `hsi4d evaluate` tell of "
+                    "the folder of a run)");
   if (json) {
     if (is_splat_file(path)) return splat_json(path);
     throw UserError("hsi4d info: --json tells of Gaussians; allowed: " + joined(splat_endings()));
@@ -228,7 +254,7 @@ std::string info_command(const std::string& path, bool json) {
 void add_info(CLI::App& app, Program& program) {
   auto& file = program.options<std::string>();
   auto& json = program.options<bool>();
-  CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image");
+  CLI::App* info = app.add_subcommand("info", "Tell what is in a file: Gaussians, arrays, cameras, an image, a config");
   info->add_option("FILE", file, "A " + joined(info_endings(), " or ") + " file")->required();
   info->add_flag("--json", json, "Print one JSON object; for Gaussians");
   run_when_chosen(*info, program, [&] { return info_command(file, json); });

@@ -183,7 +183,7 @@ std::string run_command(const RunArguments& arguments, const std::vector<LossTer
   options.folder = folder_of(arguments, config);
   options.resume = arguments.resume;
   options.threads = run_threads(arguments.threads);
-  options.observer = observer_on_terminal(false);
+  options.observer = observer_on_terminal(arguments.quiet);
   if (!config.chain.empty()) {
     if (arguments.dry_run) return chain_plan(config, losses, options.folder, arguments.resume);
     return chain_result_text(run_chain_on_terminal(config, losses, options), options.folder);
@@ -201,6 +201,7 @@ void add_run(CLI::App& app, Program& program) {
                       "The run folder; default: the first free runs/NAME, runs/NAME-2, ... with the config's name");
   command->add_flag("--resume", a.resume, "Go on with the run in the folder; the result has the same bits");
   add_threads(*command, a.threads);
+  command->add_flag("--quiet", a.quiet, "No progress on stderr");
   command->add_option("--seed", a.seed, "Seed, instead of the config's")->check(whole_number())->type_name("N");
   command->add_flag("--dry-run", a.dry_run, "Check config and inputs, tell what would be done, write nothing");
   command->add_flag("--print-config", a.print_config, "Print the config with every default filled in, and stop");

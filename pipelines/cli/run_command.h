@@ -18,6 +18,7 @@ struct RunArguments {
   std::vector<std::string> overrides;
   std::string out;  ///< empty: the first of runs/NAME, runs/NAME-2, … that is free
   bool resume = false;
+  bool quiet = false;
   std::optional<int> threads;  ///< 0: one a core; none: what the config says
   std::optional<std::int64_t> seed;
   bool dry_run = false;

@@ -89,7 +89,10 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
   f.object("color_net", s.color_net, "How the human's colours follow its pose");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
-  f.object("render", s.render, "How Gaussians become pixels");
+  f.object("render", s.render, "How Gaussians become pixels", [&s](ConfigFields& inner, RenderSettings& render) {
+    describe(inner, render);
+    inner.or_word("blur", "estimate", s.estimate_blur);
+  });
   f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");
   f.object("approx", s.approx, "What may be computed nearly, and faster");
   f.map("stages", s.stages,

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <functional>
+#include <numeric>
 
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/log.h"
 #include "core/rotation.h"
+#include "core/text.h"
+#include "optim/metrics.h"
 #include "pipelines/draw/posed_avatar.h"
 #include "splat/limits.h"
 
@@ -65,6 +68,19 @@ void warn_of_none(const std::string& what, Index of_all, const std::vector<Parts
               " Gaussians has its centre in the image, which tells nothing of it there");
 }
 
+/// Of its mean colour everywhere.
+Image plain_of(const Image& image) {
+  Image plain(image.channels(), image.height(), image.width());
+  for (int c = 0; c < image.channels(); ++c) {
+    double sum = 0;
+    for (int y = 0; y < image.height(); ++y)
+      sum = std::accumulate(image.row(c, y), image.row(c, y) + image.width(), sum);
+    const auto mean = static_cast<float>(sum / (static_cast<double>(image.height()) * image.width()));
+    for (int y = 0; y < image.height(); ++y) std::fill_n(plain.row(c, y), image.width(), mean);
+  }
+  return plain;
+}
+
 }  // namespace
 
 PartsInView parts_in_view(const Clip& clip, const SceneState& state) {
@@ -89,6 +105,15 @@ void check_first_view(const Clip& clip, const std::string& camera_file) {
                     "camera_from_world in OpenCV's axes (x right, y down, z forward), in metres");
   log_warning(camera_file + ": none of the scene's " + std::to_string(clip.scene.count()) +
               " Gaussians is in view in frame 0; what a stage is to find by the scene, it cannot");
+}
+
+void warn_of_other_first_frame(const Image& drawn, const Image& frame) {
+  const Image plain = plain_of(frame);
+  const double psnr = psnr_db(drawn, frame), of_plain = psnr_db(plain, frame);
+  if (psnr > of_plain) return;
+  log_warning("frame 0 as it is drawn from what is given has a PSNR of " + rounded(psnr, 3) +
+              " dB against the video's, no more than its mean colour has (" + rounded(of_plain, 3) +
+              " dB): scene, camera and the state of frame 0 may not be in one world (metres, z up)");
 }
 
 void warn_of_what_is_out_of_view(const Clip& clip, const std::vector<SceneState>& states) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/image.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/input/state.h"
 
@@ -23,6 +24,10 @@ PartsInView parts_in_view(const Clip& clip, const SceneState& state);
 /// Throws DataError naming the file of the camera when it has nothing at all in view in frame 0, which is given. Warns
 /// when it has nothing of the scene.
 void check_first_view(const Clip& clip, const std::string& camera_file);
+
+/// Warns when frame 0 as it is drawn from what is given, [3,H,W], is no nearer to the video's frame 0 than the mean
+/// colour of that is: a scene that is turned, scaled or of another place than the camera and the state.
+void warn_of_other_first_frame(const Image& drawn, const Image& frame);
 
 /// One warning for the scene, the human, and each object that is out of view in some of the frames, with these.
 /// @param states  by frame, frame 0 included

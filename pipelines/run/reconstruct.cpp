@@ -148,7 +148,9 @@ class Reconstruction {
       warn_of_other_isa(progress_.isa);
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
-      add_covered(read_frame(clip_, 0), config_.data, progress_.covered);
+      const ClipFrame frame = read_frame(clip_, 0);
+      warn_of_other_first_frame(render_state(config_, clip_, clip_.first, start_colors_), frame.target);
+      add_covered(frame, config_.data, progress_.covered);
       progress_.inputs = input_hashes(clip_.files) + input_hashes(frame_files(config_.data, clip_, 0));
     }
     folder_.take_over_config();

@@ -15,6 +15,7 @@
 #include "pipelines/input/body_files.h"
 #include "pipelines/report/report.h"
 #include "pipelines/run/frame_start.h"
+#include "pipelines/run/pixel_filter.h"
 #include "pipelines/sources/sources.h"
 #include "splat/files/splat_file.h"
 
@@ -60,6 +61,22 @@ std::string closing(const RunSummary& summary) {
     if (value != nullptr) text += ", " + std::string(name) + " " + rounded(*value, 4);
   }
   return text;
+}
+
+/// Tells what it finds, where the config asks for it.
+void estimate_blur(RunConfig& config, const Clip& clip) {
+  if (!config.estimate_blur) return;
+  const PixelFilter filter = estimated_pixel_filter(config, clip);
+  if (filter.is_widest) {
+    log_warning(
+        "render.blur \"estimate\": frame 0, drawn as it is given, is the nearer to the video's the more it is "
+        "blurred, so it tells no filter; avatar, objects or the state of frame 0 may not be the video's. Used: " +
+        number_text(config.render.blur) + " px^2");
+    return;
+  }
+  config.render.blur = filter.blur;
+  log_message(LogLevel::kInfo, "render.blur estimated from frame 0: " + number_text(filter.blur) +
+                                   " px^2 (PSNR of its foreground " + rounded(filter.psnr_db, 4) + " dB)");
 }
 
 RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Clip& clip,
@@ -129,6 +146,7 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   const Clip clip = read_run_clip(config, losses);                       // before anything is written
   if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);  // what is wrong with it shows now
   check_run_clip(config, clip);
+  on_threads(options.threads > 0 ? options.threads : config.threads, [&] { estimate_blur(config, clip); });
   identity.seed = config.seed;
   const int threads = options.threads > 0 ? options.threads : config.threads;
   identity.threads = threads > 0 ? threads : thread_count();

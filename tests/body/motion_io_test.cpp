@@ -42,6 +42,14 @@ Numbers counted(std::size_t frames, std::size_t width) {
   return numbers;
 }
 
+/// As counted, in steps that a body's joints may be turned by, radians.
+constexpr double kTurn = 1.0 / 256;
+Numbers turns(std::size_t frames, std::size_t width) {
+  Numbers numbers = counted(frames, width);
+  for (double& x : numbers) x *= kTurn;
+  return numbers;
+}
+
 Motion decoded(const std::function<void(NpzWriter&)>& add) {
   NpzWriter file;
   add(file);
@@ -107,23 +115,23 @@ TEST_CASE("poses of SMPL-X, SMPL-H and SMPL are mapped") {
   const auto with_poses = [](std::size_t width) {
     return decoded([width](NpzWriter& f) {
       f.add<double>("trans", {2, 3}, counted(2, 3));
-      f.add<double>("poses", {2, static_cast<int64_t>(width)}, counted(2, width));
+      f.add<double>("poses", {2, static_cast<int64_t>(width)}, turns(2, width));
       f.add_scalar("mocap_framerate", 120.0);
     });
   };
   const Motion x = with_poses(165);
   CHECK(x.frame_rate == 120);
   CHECK(x.poses[1].transl == Vector3<double>(4, 5, 6));
-  CHECK(x.poses[0].axis_angle == counted(1, 165));
+  CHECK(x.poses[0].axis_angle == turns(1, 165));
   const Motion h = with_poses(156);
-  CHECK(angle(h, 0, "right_wrist", 2) == 66);
+  CHECK(angle(h, 0, "right_wrist", 2) == 66 * kTurn);
   CHECK(angle(h, 0, "jaw", 0) == 0);
   CHECK(angle(h, 0, "right_eye_smplhf", 2) == 0);
-  CHECK(angle(h, 0, "left_index1", 0) == 67);
-  CHECK(angle(h, 1, "right_thumb3", 2) == 312);
+  CHECK(angle(h, 0, "left_index1", 0) == 67 * kTurn);
+  CHECK(angle(h, 1, "right_thumb3", 2) == 312 * kTurn);
   const Motion smpl = with_poses(72);
-  CHECK(angle(smpl, 0, "right_wrist", 2) == 66);
-  CHECK(angle(smpl, 1, "pelvis", 0) == 73);
+  CHECK(angle(smpl, 0, "right_wrist", 2) == 66 * kTurn);
+  CHECK(angle(smpl, 1, "pelvis", 0) == 73 * kTurn);
   CHECK(angle(smpl, 0, "left_index1", 0) == 0);
   CHECK(angle(smpl, 1, "jaw", 1) == 0);
 }
@@ -132,13 +140,13 @@ TEST_CASE("poses in parts are read, missing parts are zero") {
   const Motion motion = decoded([](NpzWriter& f) {
     f.add<float>("transl", {1, 3}, {1, 2, 3});
     f.add<float>("global_orient", {1, 3}, {4, 5, 6});
-    f.add<double>("body_pose", {1, 63}, counted(1, 63));
+    f.add<double>("body_pose", {1, 63}, turns(1, 63));
     f.add<double>("pose_hand", {1, 90}, counted(1, 90));
   });
   CHECK(motion.frame_rate == 10);
   CHECK(motion.poses[0].transl == Vector3<double>(1, 2, 3));
   CHECK(angle(motion, 0, "pelvis", 1) == 5);
-  CHECK(angle(motion, 0, "left_hip", 0) == 1);
+  CHECK(angle(motion, 0, "left_hip", 0) == kTurn);
   CHECK(angle(motion, 0, "jaw", 0) == 0);
   CHECK(angle(motion, 0, "left_index1", 0) == 1);
   CHECK(angle(motion, 0, "right_index1", 0) == 46);
@@ -159,7 +167,7 @@ TEST_CASE("shape and gender go along") {
   const auto with_betas = [](std::initializer_list<std::int64_t> shape, const Numbers& numbers) {
     return [=, shape = std::vector<std::int64_t>(shape)](NpzWriter& f) {
       f.add<double>("trans", {2, 3}, counted(2, 3));
-      f.add<double>("poses", {2, 165}, counted(2, 165));
+      f.add<double>("poses", {2, 165}, turns(2, 165));
       f.add<double>("betas", std::span<const std::int64_t>(shape), std::span<const double>(numbers));
     };
   };
@@ -179,8 +187,9 @@ TEST_CASE("faults of motion files are named") {
   const auto trans = [](NpzWriter& f) { f.add<double>("trans", {2, 3}, counted(2, 3)); };
   CHECK(message_for([](NpzWriter& f) {
           f.add<double>("poses", {2, 72}, counted(2, 72));
-        }) == "m.npz: there is no array 'trans'");
-  CHECK(message_for([&](NpzWriter& f) { trans(f); }) == "m.npz: there is neither 'poses' nor 'root_orient'");
+        }) == "m.npz: there is no array 'trans'; there is poses");
+  CHECK(message_for([&](NpzWriter& f) { trans(f); }) ==
+        "m.npz: there is neither 'poses' nor 'root_orient'; there is trans");
   CHECK(message_for([&](NpzWriter& f) {
           trans(f), f.add<double>("poses", {2, 75}, counted(2, 75));
         }) ==
@@ -222,7 +231,7 @@ TEST_CASE("eyes and hands are also read as the halves that SMPL-X names") {
     return [add_more](NpzWriter& f) {
       f.add<double>("transl", {2, 3}, counted(2, 3));
       f.add<double>("global_orient", {2, 3}, counted(2, 3));
-      f.add<double>("body_pose", {2, 63}, counted(2, 63));
+      f.add<double>("body_pose", {2, 63}, turns(2, 63));
       add_more(f);
     };
   };
@@ -342,7 +351,7 @@ TEST_CASE("a motion says of what model it is, and where its pelvis stands") {
     return [type](NpzWriter& f) {
       f.add<double>("trans", {1, 3}, {1, 2, 3});
       f.add<double>("root_orient", {1, 3}, {0, 0, 0});
-      f.add<double>("pose_body", {1, 63}, counted(1, 63));
+      f.add<double>("pose_body", {1, 63}, turns(1, 63));
       f.add_text("surface_model_type", type);
     };
   };
@@ -455,6 +464,21 @@ TEST_CASE("numbers of motion files are bounded") {
     CHECK(message_for(rows_of(165, [hertz](NpzWriter& f) { f.add_scalar("mocap_framerate", hertz); })) ==
           "m.npz: array 'mocap_framerate': is " + std::string(text) + " frames a second; allowed: 0.01 to 100000");
   }
+}
+
+TEST_CASE("angles in degrees are refused, single odd joints are not") {
+  const auto turned = [](std::size_t joints, double angle) {
+    return [=](NpzWriter& f) {
+      Numbers poses(165);
+      for (std::size_t joint = 1; joint < 22; ++joint) poses[3 * joint + 1] = joint <= joints ? angle : 0.1;
+      f.add<double>("trans", {1, 3}, {0, 0, 0});
+      f.add<double>("poses", {1, 165}, poses);
+    };
+  };
+  CHECK(message_for(turned(21, 25)) ==
+        "m.npz: half of the joints are turned by 25 or more; angles are radians, and these look like degrees");
+  CHECK(decoded(turned(5, 25)).poses[0].axis_angle[4] == 25);
+  CHECK(decoded(turned(21, 3.1)).poses[0].axis_angle[4] == 3.1);
 }
 
 TEST_CASE("arrays of Python objects are named as such") {

@@ -130,6 +130,19 @@ TEST_CASE("info knows Gaussians by what is in the file, as render does, and says
                                              Catch::Matchers::EndsWith("\n  notice   no Gaussian is left\n"));
 }
 
+TEST_CASE("info tells what other JSON is, and that a folder is none of its files") {
+  const TemporaryFolder folder;
+  folder.write("run.json", R"({"name": "x", "stages": {}})");
+  folder.write("summary.json", R"({"name": "x", "frames": 4})");
+  folder.write("wrong.json", R"({"width": 4})");
+  CHECK(cli::info_command("run.json") == "run.json: a config (`hsi4d check` tells its faults) with name stages\n");
+  CHECK(cli::info_command("summary.json") == "summary.json: JSON with name frames\n");
+  CHECK_THROWS(cli::info_command("wrong.json"));
+  CHECK_THROWS_WITH(cli::info_command("."),
+                    "hsi4d info: . is a folder; allowed: a file (`hsi4d report` and `hsi4d "
+                    "evaluate` tell of the folder of a run)");
+}
+
 TEST_CASE("info names what is allowed and seldom meant") {
   const TemporaryFolder folder;
   Gaussians g;

@@ -1,4 +1,5 @@
 // What a run tells of itself beside its result: warnings, steps that were not taken, the log.
+#include <numbers>
 #include <regex>
 
 #include <catch2/catch.hpp>
@@ -7,7 +8,11 @@
 #include "autodiff/reduce.h"
 #include "core/check.h"
 #include "core/log.h"
+#include "core/rotation.h"
 #include "optim/stage.h"
+#include "splat/files/io_ply.h"
+#include "splat/files/splat_file.h"
+#include "splat/files/transform.h"
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
@@ -157,6 +162,18 @@ TEST_CASE("a run in which every loss is on warns of nothing", "[run]") {
   const Warnings warnings;
   execute_tiny(tiny_config(), "run");
   CHECK(warnings.all().empty());
+}
+
+TEST_CASE("a scene that is turned against the camera is told before the first step", "[run]") {
+  const TemporaryFolder here;
+  const RunConfig config = tiny_config();
+  Similarity half_turn;
+  half_turn.rotation = so3_exp(Vector3<double>(0, 0, std::numbers::pi));
+  write_ply("turned.ply", transformed(read_splats(config.data.scene.string()).gaussians, half_turn));
+  const Warnings warnings;
+  const RunConfig turned = tiny_config({"data.scene=" + fs::absolute("turned.ply").string()});
+  CHECK_THROWS(execute_tiny(turned, "run", 1, false, [] { return true; }));
+  CHECK(warnings.holding("scene, camera and the state of frame 0 may not be in one world") == 1);
 }
 
 TEST_CASE("steps that were not taken are told, counted and lived with", "[run]") {

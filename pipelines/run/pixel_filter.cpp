@@ -1,0 +1,86 @@
+#include "pipelines/run/pixel_filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "optim/metrics.h"
+#include "pipelines/draw/frame_images.h"
+#include "pipelines/run/reconstruct_stage.h"
+
+namespace hsi4d {
+
+namespace {
+
+constexpr int kSteps = 12;          // of the first look at all widths
+constexpr int kMarginPx = 2;        // around silhouettes
+constexpr double kFineness = 1000;  // of what is told: steps a squared pixel
+constexpr double kFinest = 0.25 / kFineness;
+
+/// Pixels that the masks of frame 0 show, and those around; all where there are none.
+Image looked_at(const RunConfig& config, const ClipFrame& frame) {
+  DataSettings data = config.data;
+  data.mask_margin_px = kMarginPx;
+  Image pixels(1, frame.target.height(), frame.target.width());
+  add_covered(frame, data, pixels);
+  const auto is_set = [](float x) { return x > 0; };
+  if (std::none_of(pixels.data().begin(), pixels.data().end(), is_set)) {
+    for (int y = 0; y < pixels.height(); ++y) std::fill_n(pixels.row(0, y), pixels.width(), 1.0F);
+  }
+  return pixels;
+}
+
+/// Frame 0 beside its drawings with one filter after another.
+class Comparison {
+ public:
+  Comparison(const RunConfig& config, const Clip& clip)
+      : config_(config), clip_(clip), frame_(read_frame(clip, 0)), pixels_(looked_at(config, frame_)) {
+    colors_.net = first_color_net(config.color_net, clip.avatar, config.seed);
+  }
+
+  /// @param width  standard deviation, pixels
+  double psnr_db(double width) {
+    config_.render.blur = width * width;
+    return *hsi4d::psnr_db(render_state(config_, clip_, clip_.first, colors_), frame_.target, pixels_);
+  }
+
+ private:
+  RunConfig config_;
+  const Clip& clip_;
+  ClipFrame frame_;
+  Image pixels_;
+  ColorState colors_;
+};
+
+}  // namespace
+
+/// All widths in steps, then golden sections about the best [Kiefer 1953].
+PixelFilter estimated_pixel_filter(const RunConfig& config, const Clip& clip) {
+  Comparison comparison(config, clip);
+  const auto width_of = [](int step) { return kWidestFilter * step / kSteps; };
+  int best = 0;
+  double most = -HUGE_VAL;
+  for (int step = 0; step <= kSteps; ++step) {
+    const double psnr = comparison.psnr_db(width_of(step));
+    if (psnr > most) best = step, most = psnr;
+  }
+  double low = width_of(std::max(0, best - 1)), high = width_of(std::min(kSteps, best + 1));
+  constexpr double kGolden = 1 / std::numbers::phi;
+  double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
+  double at_left = comparison.psnr_db(left), at_right = comparison.psnr_db(right);
+  while (high * high - low * low > kFinest) {
+    if (at_left > at_right) {
+      high = right, right = left, at_right = at_left;
+      left = high - kGolden * (high - low);
+      at_left = comparison.psnr_db(left);
+    } else {
+      low = left, left = right, at_left = at_right;
+      right = low + kGolden * (high - low);
+      at_right = comparison.psnr_db(right);
+    }
+  }
+  const double width = 0.5 * (low + high), blur = std::round(width * width * kFineness) / kFineness;
+  return {blur, comparison.psnr_db(std::sqrt(blur)), high >= kWidestFilter};
+}
+
+}  // namespace hsi4d
