@@ -392,9 +392,8 @@ void ConfigFields::or_word(std::string_view name, std::string word, bool& is_wor
                     const ConfigValue& written, const std::string& pointer, ConfigProblems& problems) {
     is_word = written.kind == Kind::kString && written.text == word;
     if (is_word) return;
-    if (written.kind != Kind::kString) return read(written, pointer, problems);
-    report(written, pointer, problems, shown(written) + " is not a number",
-           allowed + did_you_mean(written.text, {word}));
+    if (written.kind == Kind::kNumber) return read(written, pointer, problems);
+    expect_kind(written, Kind::kNumber, "a number", allowed, pointer, problems);
   };
   field->write = [write = field->write, text, &is_word] { return is_word ? text : write(); };
 }

@@ -63,20 +63,20 @@ std::string closing(const RunSummary& summary) {
   return text;
 }
 
-/// Tells what it finds, where the config asks for it.
-void estimate_blur(RunConfig& config, const Clip& clip) {
-  if (!config.estimate_blur) return;
+/// Sets render.blur where the config asks for an estimate. Returns what the log tells of it.
+std::string estimate_blur(RunConfig& config, const Clip& clip) {
+  if (!config.estimate_blur) return "";
   const PixelFilter filter = estimated_pixel_filter(config, clip);
   if (filter.is_widest) {
     log_warning(
         "render.blur \"estimate\": frame 0, drawn as it is given, is the nearer to the video's the more it is "
         "blurred, so it tells no filter; avatar, objects or the state of frame 0 may not be the video's. Used: " +
         number_text(config.render.blur) + " px^2");
-    return;
+    return "";
   }
   config.render.blur = filter.blur;
-  log_message(LogLevel::kInfo, "render.blur estimated from frame 0: " + number_text(filter.blur) +
-                                   " px^2 (PSNR of its foreground " + rounded(filter.psnr_db, 4) + " dB)");
+  return "render.blur estimated from frame 0: " + number_text(filter.blur) + " px^2 (PSNR of its foreground " +
+         rounded(filter.psnr_db, 4) + " dB)";
 }
 
 RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Clip& clip,
@@ -146,7 +146,8 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   const Clip clip = read_run_clip(config, losses);                       // before anything is written
   if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);  // what is wrong with it shows now
   check_run_clip(config, clip);
-  on_threads(options.threads > 0 ? options.threads : config.threads, [&] { estimate_blur(config, clip); });
+  std::string blur;
+  on_threads(options.threads > 0 ? options.threads : config.threads, [&] { blur = estimate_blur(config, clip); });
   identity.seed = config.seed;
   const int threads = options.threads > 0 ? options.threads : config.threads;
   identity.threads = threads > 0 ? threads : thread_count();
@@ -154,6 +155,7 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   RunFolder folder(options.folder, identity, options.resume);
   folder.note(opening(config, clip, identity));
   early.move_to(folder);
+  if (!blur.empty()) folder.note(blur);
   return reconstruct_into(folder, config, clip, losses, options);
 }
 

@@ -98,9 +98,9 @@ TEST_CASE("wrong types") {
       fault(stage(R"("iterations": true)")),
       Equals("a.json:2: /stages/camera/iterations: true is a boolean, not a whole number; allowed: 1 to 1000000"));
   CHECK_THAT(fault(R"({"render": {"blur": true}})"),
-             Equals("a.json:1: /render/blur: true is a boolean, not a number; allowed: 0 to 100"));
+             Equals("a.json:1: /render/blur: true is a boolean, not a number; allowed: 0 to 100, or \"estimate\""));
   CHECK_THAT(fault(R"({"render": {"blur": "0.3"}})"),
-             Equals("a.json:1: /render/blur: \"0.3\" is a string, not a number; allowed: 0 to 100"));
+             Equals("a.json:1: /render/blur: \"0.3\" is a string, not a number; allowed: 0 to 100, or \"estimate\""));
   CHECK_THAT(fault(R"({"render": {"antialias": 0}})"),
              Equals("a.json:1: /render/antialias: 0 is a number, not a boolean; allowed: true or false"));
   CHECK_THAT(fault(R"({"render": []})"), Equals("a.json:1: /render: [] is an array, not an object"));
@@ -219,9 +219,9 @@ TEST_CASE("overrides name the command line") {
       Equals("--set stages.camera.iterations=2.7: /stages/camera/iterations: 2.7 is not a whole number; allowed: 1 to "
              "1000000"));
   CHECK_THAT(fault(good, {"render.blur=wide"}),
-             Equals("--set render.blur=wide: /render/blur: wide is not a number; allowed: 0 to 100"));
+             Equals("--set render.blur=wide: /render/blur: wide is not a number; allowed: 0 to 100, or \"estimate\""));
   CHECK_THAT(fault(good, {"render.blur=NaN"}),
-             Equals("--set render.blur=NaN: /render/blur: NaN is not a number; allowed: 0 to 100"));
+             Equals("--set render.blur=NaN: /render/blur: NaN is not a number; allowed: 0 to 100, or \"estimate\""));
   CHECK_THAT(fault(good, {"rendr.blur=1"}),
              Equals("--set rendr.blur=1: /rendr: unknown key; did you mean \"render\"?"));
   CHECK_THAT(fault(good, {"extends=b.json"}),
@@ -233,7 +233,7 @@ TEST_CASE("overrides may be JSON pointers") {
   const std::string good = stage(R"("iterations": 30, "losses": {"photo": {}})");
   CHECK(fault(good, {"/render/blur=0.1", "/stages/camera/losses/photo/weight=2"}) == "no fault");
   CHECK_THAT(fault(good, {"/render/blur=wide"}),
-             Equals("--set /render/blur=wide: /render/blur: wide is not a number; allowed: 0 to 100"));
+             Equals("--set /render/blur=wide: /render/blur: wide is not a number; allowed: 0 to 100, or \"estimate\""));
   CHECK_THAT(fault(good, {"/a~1b~0=1"}), Equals("--set /a~1b~0=1: /a~1b~0: unknown key; known here: " + kSections));
   for (const char* bad : {"/=1", "=1", "/render//blur=1", "render..blur=1", "render.blur"}) {
     CHECK_THAT(fault(good, {bad}),
@@ -305,9 +305,10 @@ TEST_CASE("the program prints the same text and exits with 2") {
   const ProgramResult wrong = run_hsi4d({"check", "a.json", "--set", "render.blur=x"});
   CHECK(wrong.status == 2);
   CHECK(wrong.out.empty());
-  CHECK_THAT(wrong.err, Equals("3 problems:\na.json:1: /sede: unknown key; did you mean \"seed\"?\n"
-                               "a.json:2: /threads: -1 is out of range; allowed: 0 to 1024\n"
-                               "--set render.blur=x: /render/blur: x is not a number; allowed: 0 to 100\n"));
+  CHECK_THAT(wrong.err,
+             Equals("3 problems:\na.json:1: /sede: unknown key; did you mean \"seed\"?\n"
+                    "a.json:2: /threads: -1 is out of range; allowed: 0 to 1024\n"
+                    "--set render.blur=x: /render/blur: x is not a number; allowed: 0 to 100, or \"estimate\"\n"));
   folder.write("configs/default.json", "{}");
   const ProgramResult missing = run_hsi4d({"check", "configs/defualt.json"});
   CHECK(missing.status == 2);

@@ -49,7 +49,7 @@ TEST_CASE("the filter that a clip was filmed with is found by its frame 0") {
   }
 }
 
-TEST_CASE("a filter wider than any that is looked for is told and not used; without masks the whole image counts") {
+TEST_CASE("a filter wider than any that is looked for is told and not used, without masks the whole image counts") {
   const TemporaryFolder here;
   const RunConfig wide = filmed_with(9);
   CHECK(estimated_pixel_filter(wide, clip_of(wide)).is_widest);
@@ -58,13 +58,6 @@ TEST_CASE("a filter wider than any that is looked for is told and not used; with
   RunConfig unseen = filmed_with(0.2);
   unseen.data.mask_threshold = 2;
   CHECK(estimated_pixel_filter(unseen, clip_of(unseen)).blur == Approx(0.2).margin(0.004));
-}
-
-TEST_CASE("generated videos have the filter of their supersampling") {
-  const RunConfig config = tiny_config({"render.blur=estimate"});
-  const int samples = TinyDataset::settings().supersample;
-  const double blur = video_render_settings().blur / (samples * samples) + (1 - 1.0 / (samples * samples)) / 12;
-  CHECK(estimated_pixel_filter(config, clip_of(config)).blur == Approx(blur).margin(0.03));
 }
 
 TEST_CASE("a run with the estimate is the run with its number, and says so", "[run]") {
