@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kSteps = 12;          // of the first look at all widths
 constexpr int kMarginPx = 2;        // around silhouettes
-constexpr double kFineness = 1000;  // of what is told: steps a squared pixel
+constexpr double kFineness = 1000;  // steps of what is told in a squared pixel
 constexpr double kFinest = 0.25 / kFineness;
 
 /// Pixels that the masks of frame 0 show, and those around; all where there are none.
@@ -35,7 +35,7 @@ class Comparison {
  public:
   Comparison(const RunConfig& config, const Clip& clip)
       : config_(config), clip_(clip), frame_(read_frame(clip, 0)), pixels_(looked_at(config, frame_)) {
-    colors_.net = first_color_net(config.color_net, clip.avatar, config.seed);
+    colors_.net = first_net(config, clip);
   }
 
   /// @param width  standard deviation, pixels

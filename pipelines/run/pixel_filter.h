@@ -20,8 +20,7 @@ inline constexpr double kWidestFilter = 1.2;
 /// where the masks show the human or an object, or two pixels around, for silhouettes say how far a filter spreads
 /// them; of the whole image where the masks show nothing. To a thousandth of a squared pixel, whatever the threads.
 ///
-/// A filter that is too wide fattens what is drawn, which then seems to be further away: about 15 mm at 4 m for 0.3 in
-/// place of 0.05.
+/// A filter that is too wide fattens what is drawn, which then seems to be further away (docs/numerics/renderer.md).
 PixelFilter estimated_pixel_filter(const RunConfig& config, const Clip& clip);
 
 }  // namespace hsi4d

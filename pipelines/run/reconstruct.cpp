@@ -35,10 +35,6 @@ std::string checkpoint_identity(const RunConfig& config, const std::vector<LossT
   return to_json(sections_beside_data(config, descriptions_of(losses)));
 }
 
-std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
-  return first_color_net(config.color_net, clip.avatar, config.seed);
-}
-
 std::size_t count_stages(const RunConfig& config, StageScope over) {
   const auto is_over = [over](const auto& entry) { return entry.second.over == over; };
   return static_cast<std::size_t>(std::count_if(config.stages.begin(), config.stages.end(), is_over));

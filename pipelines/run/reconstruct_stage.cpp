@@ -252,6 +252,10 @@ StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<Sce
   return check_stage_gradient(tape, stage, task.losses, graph.loss_inputs(), graph.groups(), name, options);
 }
 
+std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
+  return first_color_net(config.color_net, clip.avatar, config.seed);
+}
+
 Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {
   return config.precision == RunPrecision::kFloat ? render_state_in<float>(config, clip, state, colors)
                                                   : render_state_in<double>(config, clip, state, colors);

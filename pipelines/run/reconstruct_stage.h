@@ -63,6 +63,9 @@ StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, 
 StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,
                                     const StageGradcheckOptions& options = {});
 
+/// The color net that a run begins with, if it has one.
+std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip);
+
 /// The image [3,H,W] of a state, from its own camera.
 Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors);
 

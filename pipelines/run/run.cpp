@@ -138,7 +138,8 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   for (const RunNote& note : run_notes(config)) log_message(note.level, note.text);
   RunIdentity identity;
   identity.config = resolved_config(config, descriptions_of(losses));  // without what programs outside make
-  on_threads(options.threads > 0 ? options.threads : config.threads, [&] {
+  const int threads = options.threads > 0 ? options.threads : config.threads;
+  on_threads(threads, [&] {
     if (!has_sources(config.sources)) return;
     look_at_run_folder(options.folder, identity.config, options.resume);  // before anything is made for nothing
     config.data = make_sources(config, options.observer);
@@ -147,9 +148,8 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);  // what is wrong with it shows now
   check_run_clip(config, clip);
   std::string blur;
-  on_threads(options.threads > 0 ? options.threads : config.threads, [&] { blur = estimate_blur(config, clip); });
+  on_threads(threads, [&] { blur = estimate_blur(config, clip); });
   identity.seed = config.seed;
-  const int threads = options.threads > 0 ? options.threads : config.threads;
   identity.threads = threads > 0 ? threads : thread_count();
   identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
   RunFolder folder(options.folder, identity, options.resume);
