@@ -110,9 +110,9 @@ void check_first_view(const Clip& clip, const std::string& camera_file) {
 void warn_of_other_first_frame(const Image& drawn, const Image& frame) {
   const Image plain = plain_of(frame);
   const double psnr = psnr_db(drawn, frame), of_plain = psnr_db(plain, frame);
-  if (psnr > of_plain) return;
+  if (psnr >= of_plain) return;
   log_warning("frame 0 as it is drawn from what is given has a PSNR of " + rounded(psnr, 3) +
-              " dB against the video's, no more than its mean colour has (" + rounded(of_plain, 3) +
+              " dB against the video's, less than its mean colour has (" + rounded(of_plain, 3) +
               " dB): scene, camera and the state of frame 0 may not be in one world (metres, z up)");
 }
 

@@ -25,7 +25,7 @@ PartsInView parts_in_view(const Clip& clip, const SceneState& state);
 /// when it has nothing of the scene.
 void check_first_view(const Clip& clip, const std::string& camera_file);
 
-/// Warns when frame 0 as it is drawn from what is given, [3,H,W], is no nearer to the video's frame 0 than the mean
+/// Warns when frame 0 as it is drawn from what is given, [3,H,W], is farther from the video's frame 0 than the mean
 /// colour of that is: a scene that is turned, scaled or of another place than the camera and the state.
 void warn_of_other_first_frame(const Image& drawn, const Image& frame);
 
