@@ -130,8 +130,7 @@ std::string objects_text(const Npz& file) {
 
 /// What is there where something is missing.
 std::string names_text(const Npz& file) {
-  std::vector<std::string> names = file.names();
-  return (names.empty() ? "" : "; there is " + few_names(names)) + objects_text(file);
+  return (file.names().empty() ? "" : "; there is " + few_names(file.names())) + objects_text(file);
 }
 
 void put_joints(const Rows& rows, std::size_t from, std::size_t to, std::size_t joints, Motion& motion) {
@@ -201,9 +200,8 @@ void read_parts(const Npz& file, Motion& motion) {
 void require_radians(const Npz& file, const Motion& motion) {
   std::vector<double> angles;
   for (const BodyPose& pose : motion.poses) {
-    for (std::size_t joint = 1; joint < kBodyJoints; ++joint) {
-      const double* v = pose.axis_angle.data() + 3 * joint;
-      const double angle = std::hypot(v[0], v[1], v[2]);
+    for (Index joint = 1; joint < kBodyJoints; ++joint) {
+      const double angle = pose.rotation_of(joint).norm();
       if (angle > 0) angles.push_back(angle);
     }
   }
