@@ -297,7 +297,8 @@ TEST_CASE("masks that are missing are warned of, a missing folder is an error") 
   CHECK(messages == std::vector<std::string>{"warning " + folder.string() +
                                              ": has no mask for 2 of 4 frames; these count as empty"});
   fs::remove_all(folder);
-  CHECK(message_of([&] { dataset.read(); }) == folder.string() + ": there is no such folder of masks");
+  CHECK(message_of([&] { dataset.read(); }) ==
+        folder.string() + ": there is no such folder of masks, nor a video \"" + folder.filename().string() + ".mp4\"");
 }
 
 TEST_CASE("masks whose names are not those of frames are refused") {
