@@ -79,6 +79,8 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.choice("rotations", s.rotations, kRotationParameters,
            "How rotations are optimised: two columns of the matrix, or axis times angle");
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind everything");
+  f.boolean("remove_depth_bias", s.remove_depth_bias,
+            "Fit frame 0 too, and move human and objects of all others by what that does to their given distance");
   f.object("camera", s.camera, "How cameras are optimised");
   f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");
   f.object("start", s.start, "Where the stages of a frame begin");

@@ -86,7 +86,8 @@ struct RunConfig {
   ColorNetSettings color_net;
   SyntheticSettings synthetic;
   RenderSettings render;
-  bool estimate_blur = false;  ///< render.blur is what frame 0 says, found as the run begins
+  bool remove_depth_bias = false;  ///< see pipelines/run/depth_bias.h
+  bool estimate_blur = false;      ///< render.blur is what frame 0 says, found as the run begins
   SkipSettings skip;
   ApproxSettings approx;
   ConfigMap<StageSettings> stages;  ///< in the order written

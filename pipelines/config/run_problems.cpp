@@ -270,15 +270,17 @@ void throw_if_any(const std::vector<RunProblem>& found) {
   throw UserError(text);
 }
 
-/// The filter is found by frame 0 as it is given.
-void add_filter_problems(const RunConfig& config, std::vector<RunProblem>& found) {
-  if (!config.estimate_blur) return;
+/// What compares with frame 0 as it is given.
+void add_given_frame_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   for (const auto& [name, stage] : config.stages) {
     if (stage.over != StageScope::kFirst) continue;
-    found.push_back({"/render/blur",
-                     "\"estimate\" looks at frame 0 as it is given, which stage " + json_string(name) +
-                         " has yet to find; allowed: a number",
-                     {"/render/blur", "/stages"}});
+    const std::string given =
+        " frame 0 as it is given, which stage " + json_string(name) + " has yet to find; allowed: ";
+    if (config.estimate_blur)
+      found.push_back({"/render/blur", "\"estimate\" looks at" + given + "a number", {"/render/blur", "/stages"}});
+    if (config.remove_depth_bias)
+      found.push_back(
+          {"/remove_depth_bias", "the bias is that of" + given + "false", {"/remove_depth_bias", "/stages"}});
     return;
   }
 }
@@ -297,7 +299,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   }
   add_order_problems(config.stages, found);
   add_start_problems(config, found);
-  add_filter_problems(config, found);
+  add_given_frame_problems(config, found);
   if (!config.chain.empty()) {
     if (has_sources(config.sources))
       found.push_back({"/sources",

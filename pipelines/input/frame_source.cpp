@@ -306,7 +306,8 @@ MaskSource::MaskSource(const fs::path& folder, const std::string& name) : path_(
       throw UserError(path_.string() + ", " + video.string() + ": both hold masks of \"" + name + "\"; remove one");
     return;
   }
-  if (video.empty()) throw DataError(path_.string() + ": there is no such folder of masks, nor a video \"" + name + ".mp4\"");
+  if (video.empty())
+    throw DataError(path_.string() + ": there is no such folder of masks, nor a video \"" + name + ".mp4\"");
   path_ = video;
   video_ = std::make_shared<detail::OpenVideo>(video);
 }

@@ -18,6 +18,7 @@
 #include "pipelines/record/results.h"
 #include "pipelines/report/view3d.h"
 #include "pipelines/run/checkpoint.h"
+#include "pipelines/run/depth_bias.h"
 #include "pipelines/run/frame_start.h"
 #include "pipelines/run/reconstruct_stage.h"
 #include "pipelines/run/stage_log.h"
@@ -101,6 +102,7 @@ class Reconstruction {
     resume();
     if (progress_.frames_done() == 0) run_first_frame();
     while (progress_.frames_done() < clip_.frames()) run_frame(progress_.frames_done());
+    if (config_.remove_depth_bias) remove_bias();
     if (sequence_stage() < config_.stages.size()) refine();
     bar_.finish();
     warn_of_left_out(progress_.left_out, config_, clip_);
@@ -135,7 +137,17 @@ class Reconstruction {
     if (frame == 0) return 0;
     return steps_of(StageScope::kFirst) + steps_of(StageScope::kFrame) * (frame - 1);
   }
-  std::int64_t total_steps() const { return steps_before(clip_.frames()) + steps_of(StageScope::kSequence); }
+  std::int64_t total_steps() const {
+    return steps_before(clip_.frames()) + steps_of_bias() + steps_of(StageScope::kSequence);
+  }
+  /// Of a fit of frame 0.
+  std::int64_t steps_of_bias() const {
+    std::int64_t steps = 0;
+    for (std::size_t s = first_stages_; config_.remove_depth_bias && s < sequence_stage(); ++s)
+      steps += fits_what_moves(s) ? config_.stages[s].second.iterations : 0;
+    return steps;
+  }
+  bool fits_what_moves(std::size_t s) const { return config_.stages[s].second.draw == Draw::kAll; }
 
   void resume() {
     const std::string file = checkpoint_file(folder_.paths());
@@ -222,6 +234,40 @@ class Reconstruction {
     save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
   }
 
+  /// Takes what a fit of frame 0 does to the given distances from all later frames. The checkpoint keeps these as they
+  /// were: a run that is resumed finds the same.
+  void remove_bias() {
+    const ClipFrame frame = read_frame(clip_, 0);
+    SceneState fitted = clip_.first;
+    ColorState colors = progress_.colors;
+    for (std::size_t s = first_stages_; s < sequence_stage(); ++s) {
+      if (!fits_what_moves(s)) continue;
+      run_frame_stage({config_, clip_, losses_, s, nullptr}, {0, frame, progress_.covered, {}}, fitted, colors,
+                      [this](const IterationReport& report, const RenderCounters&) {
+                        show(report);
+                        stop_if_asked(clip_.frames());
+                      });
+    }
+    const DepthBias bias = depth_bias(clip_, frame, config_.data.mask_threshold, clip_.first, fitted);
+    folder_.note("frame 0, fitted too: distances times " + depth_bias_text(clip_, bias) +
+                 "; taken from all later frames");
+    std::vector<SceneState>& states = progress_.after_stage.back();
+    for (Index t = 1; t < clip_.frames(); ++t)
+      hsi4d::remove_depth_bias(clip_, bias, states[static_cast<std::size_t>(t)]);
+    if (sequence_stage() < config_.stages.size()) return;  // these write the images
+    progress_.image_errors.resize(1);
+    write_results_of_frames(progress_.image_errors);
+  }
+
+  /// Images of all frames but the given one, and their errors.
+  void write_results_of_frames(std::vector<MetricValues>& errors) {
+    for (Index t = 1; t < clip_.frames(); ++t) {
+      stop_if_asked(clip_.frames());
+      const ClipFrame frame = read_frame(clip_, t);
+      write_result(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), errors);
+    }
+  }
+
   /// The stages over the whole sequence, each from where the one before ended.
   void refine() {
     const auto begin = std::chrono::steady_clock::now();
@@ -231,11 +277,7 @@ class Reconstruction {
       refinement_.stages.push_back({std::move(states), totals});
     }
     refinement_.image_errors.resize(1);
-    for (Index t = 1; t < clip_.frames(); ++t) {
-      stop_if_asked(clip_.frames());
-      const ClipFrame frame = read_frame(clip_, t);
-      write_result(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), refinement_.image_errors);
-    }
+    write_results_of_frames(refinement_.image_errors);
     refinement_.seconds = seconds_since(begin);
   }
 

@@ -210,7 +210,8 @@ TEST_CASE("masks are a folder or a video of the human or the object") {
   CHECK_THROWS_MATCHES(MaskSource("masks", "short").missing(frames), DataError,
                        Message("masks/short.mp4: has no mask for the video's frame 9 at 0.3 s; the nearest is its "
                                "frame 8 at 0.2667 s, allowed: within 0.01667 s, or as many frames as the video, 12"));
-  CHECK_THROWS_MATCHES(MaskSource("masks", "cup"), DataError, Message("masks/cup: there is no such folder of masks, nor a video \"cup.mp4\""));
+  CHECK_THROWS_MATCHES(MaskSource("masks", "cup"), DataError,
+                       Message("masks/cup: there is no such folder of masks, nor a video \"cup.mp4\""));
 }
 
 TEST_CASE("masks of a video of another length are the nearest in time") {

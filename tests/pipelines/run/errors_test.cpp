@@ -247,7 +247,8 @@ TEST_CASE("a folder of masks that is not there is an error, a mask that is not t
                                   ": has no mask for 1 of 4 frames; these count as empty\n"));
   fs::remove_all("run");
   fs::remove_all(dataset.file("masks/watering_can"));
-  check_failure(dataset, dataset.file("masks/watering_can") + ": there is no such folder of masks, nor a video \"watering_can.mp4\"");
+  check_failure(dataset, dataset.file("masks/watering_can") +
+                             ": there is no such folder of masks, nor a video \"watering_can.mp4\"");
 }
 
 TEST_CASE("a folder that holds a run is not run into, and resumed with its own config only", "[run]") {

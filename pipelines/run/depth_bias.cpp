@@ -1,0 +1,65 @@
+#include "pipelines/run/depth_bias.h"
+
+#include <cmath>
+
+#include "core/text.h"
+#include "pipelines/graph/frame_masks.h"
+
+namespace hsi4d {
+
+namespace {
+
+Vector3<double> camera_center(const SceneState& state) {
+  const Rigid<double>& camera = state.camera_from_world;
+  return -(camera.rotation.transpose() * camera.translation);
+}
+
+/// Where the pelvis is: the body turns about it, and the translation comes last.
+Vector3<double> pelvis_of(const Clip& clip, const SceneState& state) {
+  return Vector3<double>(clip.avatar.joints.data()) + state.body.transl;
+}
+
+/// Distance along the line of sight of `given`, as a factor.
+double factor_of(const Vector3<double>& center, const Vector3<double>& given, const Vector3<double>& fitted) {
+  const Vector3<double> sight = given - center;
+  const double factor = (fitted - center).dot(sight) / sight.squaredNorm();
+  return std::abs(factor - 1) <= kMostDepthBias ? factor : 1;  // also where it is not a number
+}
+
+bool is_seen(const Image& mask, double threshold) { return mask.empty() || mask_center(mask, threshold)[2] != 0; }
+
+}  // namespace
+
+DepthBias depth_bias(const Clip& clip, const ClipFrame& frame, double mask_threshold, const SceneState& given,
+                     const SceneState& fitted) {
+  const Vector3<double> center = camera_center(given);
+  DepthBias bias;
+  if (is_seen(frame.human_mask, mask_threshold))
+    bias.human = factor_of(center, pelvis_of(clip, given), pelvis_of(clip, fitted));
+  for (std::size_t o = 0; o < given.objects.size(); ++o) {
+    const bool seen = o >= frame.object_masks.size() || is_seen(frame.object_masks[o], mask_threshold);
+    bias.objects.push_back(seen ? factor_of(center, given.objects[o].translation, fitted.objects[o].translation) : 1.0);
+  }
+  return bias;
+}
+
+void remove_depth_bias(const Clip& clip, const DepthBias& bias, SceneState& state) {
+  const Vector3<double> center = camera_center(state);
+  const auto shift = [&](const Vector3<double>& place, double factor) -> Vector3<double> {
+    return (place - center) * (1 / factor - 1);
+  };
+  state.body.transl += shift(pelvis_of(clip, state), bias.human);
+  for (std::size_t o = 0; o < state.objects.size(); ++o) {
+    Vector3<double>& place = state.objects[o].translation;
+    place += shift(place, bias.objects[o]);
+  }
+}
+
+std::string depth_bias_text(const Clip& clip, const DepthBias& bias) {
+  std::string text = "human " + rounded(bias.human, 6);
+  for (std::size_t o = 0; o < bias.objects.size(); ++o)
+    text += ", " + clip.objects[o].name + " " + rounded(bias.objects[o], 6);
+  return text;
+}
+
+}  // namespace hsi4d
