@@ -170,6 +170,7 @@ struct Absolute {
 template <class S>
 struct Square {
   static constexpr const char* kName = "square";
+  static constexpr S kCurvature = 2;
   S value(S x) const { return x * x; }
   template <class>
   S partials(S* p, S x) const {

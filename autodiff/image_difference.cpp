@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "autodiff/curvature_weights.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 
@@ -28,7 +29,7 @@ struct ImageDifference {
   Buffer<double> sums = {};  ///< [planes][rows of squares][squares of a row]
   WeighedSquares<S> weighed = {};
 
-  static const S* weights(const NodeIo<S>& io, Index plane, Index row) {
+  static const S* weights_at(const NodeIo<S>& io, Index plane, Index row) {
     if (io.inputs() <= kWeight) return nullptr;
     const ConstArray<S> weight = io.in(kWeight);
     return &weight(weight.shape.planes == 1 ? 0 : plane, row, 0);
@@ -67,7 +68,7 @@ struct ImageDifference {
           std::fill_n(mine + run.begin, (end - first) * kMaskSquare, 0.0);
           const Index last_row = std::min((square_row + 1) * kMaskSquare, a.shape.rows);
           for (Index r = square_row * kMaskSquare; r < last_row; ++r)
-            add_row(&a(plane, r, 0), &b(plane, r, 0), weights(io, plane, r), run, mine);
+            add_row(&a(plane, r, 0), &b(plane, r, 0), weights_at(io, plane, r), run, mine);
           for (Index c = first; c < end; ++c) sums[chunk * cols + c] = column_sum(mine + c * kMaskSquare);
         });
       });
@@ -107,7 +108,7 @@ struct ImageDifference {
   static void differentiate_row(const NodeIo<S>& io, Index plane, Index row, const PixelRun& run) {
     const S g = io.d_out().scalar();
     const S *const a = &io.in(kA)(plane, row, 0), *const b = &io.in(kB)(plane, row, 0);
-    const S* const w = weights(io, plane, row);
+    const S* const w = weights_at(io, plane, row);
     for (const int i : {kA, kB}) {
       if (!io.wants(i)) continue;
       const S sign = i == kA ? g : -g;
@@ -139,6 +140,29 @@ struct ImageDifference {
 #pragma GCC ivdep
       for (Index c = run.begin; c < run.end; ++c) d[c] += term(c);
     }
+  }
+
+  /// w_a += g w f''(a − b), where it has a gradient; not of b, which is a frame.
+  bool weigh(NodeIo<S>& io, CurvatureWeights<S>& weights) {
+    const S g = io.d_out().scalar();
+    if (!io.wants(kA) || !(g > S(0))) return true;
+    const ConstArray<S> a = io.in(kA), b = io.in(kB);
+    const Array<S> to = weights.of_input(io, kA);
+    run_chunks(mask_squares(a.shape.rows), [&](Index square_row) {
+      const Index last_row = std::min((square_row + 1) * kMaskSquare, a.shape.rows);
+      for_runs(to_differentiate(io), square_row, a.shape.cols, [&](const PixelRun& run) {
+        for (Index plane = 0; plane < a.shape.planes; ++plane) {
+          for (Index r = square_row * kMaskSquare; r < last_row; ++r) {
+            const S* const w = weights_at(io, plane, r);
+            for (Index c = run.begin; c < run.end; ++c) {
+              const S d = a(plane, r, c) - b(plane, r, c), each = w == nullptr ? S(1) : w[c];
+              if (counts(each, F::value(d))) to(plane, r, c) += g * each * F::curvature(d);
+            }
+          }
+        }
+      });
+    });
+    return true;
   }
 
   Index saved_bytes() const { return sums.capacity_bytes() + weighed.capacity_bytes(); }

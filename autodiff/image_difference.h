@@ -2,6 +2,8 @@
 // difference.h; not part of the public interface.
 #pragma once
 
+#include <algorithm>
+
 #include "autodiff/tape.h"
 
 namespace hsi4d::detail {
@@ -17,7 +19,11 @@ bool are_images(Var<S> a, Var<S> b, Var<S> weight) {
   return w.rows == image.rows && w.cols == image.cols && (w.planes == 1 || w.planes == image.planes);
 }
 
-/// |d|; its derivative is 0 at 0.
+/// Differences that count as squares where a curvature is asked for: what rounding to grey levels leaves, and some.
+inline constexpr double kLeastDifference = 0.01;
+
+/// |d|; its derivative is 0 at 0. Its curvature is that of the parabola that touches it at d and −d, the weight of
+/// iteratively reweighted least squares, 1/|d|.
 struct AbsoluteDifference {
   template <class S>
   static S value(S d) {
@@ -26,6 +32,10 @@ struct AbsoluteDifference {
   template <class S>
   static S derivative(S d) {
     return d > S(0) ? S(1) : d < S(0) ? S(-1) : d;  // 0, or not a number
+  }
+  template <class S>
+  static S curvature(S d) {
+    return S(1) / std::max(value(d), S(kLeastDifference));
   }
 };
 
@@ -38,6 +48,10 @@ struct SquaredDifference {
   template <class S>
   static S derivative(S d) {
     return d + d;
+  }
+  template <class S>
+  static S curvature(S) {
+    return S(2);
   }
 };
 

@@ -10,6 +10,7 @@
 #include "autodiff/adjoint_run.h"
 #include "autodiff/block_sum.h"
 #include "autodiff/blocks.h"
+#include "autodiff/curvature_weights.h"
 #include "autodiff/dual.h"
 #include "autodiff/tape.h"
 #include "core/simd.h"
@@ -174,7 +175,8 @@ Shape broadcast_all(const Var<S>* inputs) {
 
 }  // namespace detail
 
-/// y = f(x_1, …, x_K) elementwise. F has `value(x...)` and `partials<S>(S* partial, x...)`.
+/// y = f(x_1, …, x_K) elementwise. F has `value(x...)` and `partials<S>(S* partial, x...)`; a function of one argument
+/// whose second derivative is a number ≥ 0 tells it as kCurvature.
 template <class S, std::size_t K, class F>
 struct MapOp {
   static constexpr const char* kName = F::kName;
@@ -214,6 +216,16 @@ struct MapOp {
       });
     });
     sink.finish();
+  }
+
+  /// w_x += f'' d_y, of squares.
+  bool weigh(NodeIo<S>& io, CurvatureWeights<S>& weights) requires(K == 1 && requires { F::kCurvature; }) {
+    const ConstArray<S> d_y = io.d_out();
+    const Array<S> to = weights.of_input(io, 0);
+    for (Index r = 0; r < to.total_rows(); ++r) {
+      for (Index c = 0; c < to.shape.cols; ++c) to.row(r)[c] += F::kCurvature * std::max(d_y.row(r)[c], S(0));
+    }
+    return true;
   }
 };
 
@@ -255,6 +267,31 @@ struct SumOverOp {
       });
     });
     sink.finish();
+  }
+
+  /// w_x += d_sum f'²/(2 f), which is the curvature of f = r² by a linear r: of squares. Where only one operand moves,
+  /// and is not broadcast.
+  bool weigh(NodeIo<S>& io, CurvatureWeights<S>& weights) {
+    const auto walk = detail::walk_inputs<S, K>(io, shape);
+    const S d_sum = io.d_out().scalar();
+    std::size_t moving = K;
+    for (std::size_t k = 0; k < K; ++k) {
+      if (!io.wants(static_cast<int>(k))) continue;
+      if (moving != K || walk.broadcast(k)) return true;
+      moving = k;
+    }
+    if (moving == K || !(d_sum > S(0))) return true;
+    const Array<S> to = weights.of_input(io, static_cast<int>(moving));
+    S* kept = saved.data();
+    walk.run(0, walk.partition().n, [&](const Block<S, K>& block) {
+      alignas(kAlignment) S values[kBlock];
+      detail::block_values(f, block, values);
+      const S* const slope = next_runs(kept, block.n)[moving];
+      for (Index i = 0; i < block.n; ++i) {
+        if (values[i] > S(0)) to.data[block.in[moving] + i] += d_sum * slope[i] * slope[i] / (2 * values[i]);
+      }
+    });
+    return true;
   }
 
  private:

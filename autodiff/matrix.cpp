@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "autodiff/curvature_weights.h"
+#include "autodiff/twists.h"
 #include "core/parallel.h"
 
 namespace hsi4d {
@@ -142,6 +144,27 @@ struct ConcatOp {
       }
     });
   }
+
+  /// Rows follow the movers of their part.
+  void push(NodeIo<S>& io, Movers<S>& movers) {
+    Index per_row = 0, dims = 0;
+    for (int i = 0; along_rows && i < io.inputs(); ++i) {
+      const Twists<S>* const part = movers.of_input(io, i);
+      if (part == nullptr) continue;
+      per_row = std::max(per_row, part->per_row);
+      dims = part->dims;
+    }
+    if (per_row == 0) return;
+    Twists<S>& all = movers.of_output(io, 0, io.out().shape.rows, per_row, dims);
+    for_rows(io, [&](int i, Index row, Index, Index begin, Index end) {
+      const Twists<S>* const part = movers.of_input(io, i);
+      if (part == nullptr) return;
+      for (Index r = begin; r < end; ++r) {
+        std::copy_n(&part->movers[r * part->per_row], part->per_row, &all.mover(row + r, 0));
+        std::copy_n(part->rate(r, 0), part->per_row * dims * kTwist, all.rate(row + r, 0));
+      }
+    });
+  }
 };
 
 /// y_i = x_{index[i]}.   d_x_j = Σ_{i: index[i] = j} d_y_i, by the transposed index: users_[starts_[j] … starts_[j+1]).
@@ -225,6 +248,15 @@ struct SlicePlanesOp {
       S* to = d.row(first * g.shape.rows + r);
       for (Index x = 0; x < g.shape.cols; ++x) to[x] += g.row(r)[x];
     }
+  }
+  bool weigh(NodeIo<S>& io, CurvatureWeights<S>& weights) {
+    const ConstArray<S> w = weights.of_output(io);
+    if (!w || !io.wants(0)) return true;
+    const Array<S> to = weights.of_input(io, 0);
+    for (Index r = 0; r < w.total_rows(); ++r) {
+      for (Index x = 0; x < w.shape.cols; ++x) to.row(first * w.shape.rows + r)[x] += w.row(r)[x];
+    }
+    return true;
   }
 };
 

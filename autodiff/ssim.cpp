@@ -4,8 +4,10 @@
 #include <array>
 #include <atomic>
 
+#include "autodiff/curvature_weights.h"
 #include "autodiff/elementwise.h"
 #include "autodiff/ssim_kernel.h"
+#include "autodiff/ssim_weights.h"
 #include "core/buffer.h"
 #include "core/parallel.h"
 #include "core/simd.h"
@@ -222,6 +224,15 @@ struct DSsimOp {
       const Buffer<S>& gradient = gradients[static_cast<std::size_t>(i)];
       evaluation.add_gradient(io.d_out().scalar(), gradient, io.d_in(i), io.must_assign(i));
     }
+  }
+
+  bool weigh(NodeIo<S>& io, CurvatureWeights<S>& weights) {
+    const S g = io.d_out().scalar();
+    if (io.wants(0) && g > S(0)) {
+      const S scale = g / static_cast<S>(io.in(0).shape.count());
+      detail::add_ssim_weights(io.in(0), io.in(1), io.read(0), settings.data_range, scale, weights.of_input(io, 0));
+    }
+    return true;
   }
 
   Index saved_bytes() const { return gradients[0].capacity_bytes() + gradients[1].capacity_bytes(); }

@@ -37,6 +37,12 @@ template <class S>
 class Tape;
 template <class S>
 class TapeInspector;
+template <class S>
+class Curvature;
+template <class S>
+class CurvatureWeights;
+template <class S>
+class Movers;
 
 /// Handle of an array on a tape: plain data, copied freely, valid until the tape is rewound past it.
 template <class S>
@@ -147,6 +153,9 @@ class NodeIo {
  private:
   friend class Tape<S>;
   friend class TapeInspector<S>;
+  friend class Curvature<S>;
+  friend class CurvatureWeights<S>;
+  friend class Movers<S>;
   Tape<S>* tape_ = nullptr;
   const std::uint32_t* input_ids_ = nullptr;
   std::uint32_t input_count_ = 0;
@@ -165,9 +174,12 @@ struct OperatorTable {
   void (*destroy)(void*);
   std::uint64_t (*state_key)(void*, NodeIo<S>&);  // null: no state is kept between runs
   void (*build_state)(void*, NodeIo<S>&);
-  void (*add_signature)(void*, Signature&, NodeIo<S>&);  // null: no discrete choices
-  Index (*saved_bytes)(const void*);                     // null: nothing saved
-  const TileMask* (*looks_at)(void*, NodeIo<S>&, int);   // null: at all of every input
+  void (*add_signature)(void*, Signature&, NodeIo<S>&);    // null: no discrete choices
+  Index (*saved_bytes)(const void*);                       // null: nothing saved
+  const TileMask* (*looks_at)(void*, NodeIo<S>&, int);     // null: at all of every input
+  bool (*weigh)(void*, NodeIo<S>&, CurvatureWeights<S>&);  // these three: see autodiff/curvature.h
+  void (*push)(void*, NodeIo<S>&, Movers<S>&);
+  void (*collect)(void*, NodeIo<S>&, const CurvatureWeights<S>&, const Movers<S>&, double*);
   bool persistent_outputs;
   bool assigns;
 };
@@ -249,6 +261,7 @@ class Tape {
   ///   `Index saved_bytes() const`                   memory held between forward and backward, for statistics.
   ///   `const TileMask* looks_at(NodeIo<S>&, int i)`  squares of input i, an image, on which forward and backward
   ///       depend; null: all. Asked before forward, when only leaves are up to date.
+  ///   `bool weigh(…)`, `void push(…)`, `void collect(…)`  its part in a curvature (autodiff/curvature.h).
   ///   `static constexpr bool kPersistentOutputs = true`  outputs are updated in place, not rewritten.
   ///   `static constexpr bool kAssigns = true`  its adjoint asks io.must_assign(i), and then assigns every number of
   ///       d_in(i): saves clearing that memory and reading it back.
@@ -331,6 +344,9 @@ class Tape {
  private:
   friend class NodeIo<S>;
   friend class TapeInspector<S>;
+  friend class Curvature<S>;
+  friend class CurvatureWeights<S>;
+  friend class Movers<S>;
 
   struct ArrayRecord {
     Shape shape;
@@ -477,6 +493,19 @@ constexpr OperatorTable<S> make_operator_table() {
   }
   if constexpr (requires(Op op, NodeIo<S> io) { op.looks_at(io, 0); }) {
     table.looks_at = [](void* op, NodeIo<S>& io, int i) { return static_cast<Op*>(op)->looks_at(io, i); };
+  }
+  if constexpr (requires(Op op, NodeIo<S> io, CurvatureWeights<S> & weights) { op.weigh(io, weights); }) {
+    table.weigh = [](void* op, NodeIo<S>& io, CurvatureWeights<S>& weights) {
+      return static_cast<Op*>(op)->weigh(io, weights);
+    };
+  }
+  if constexpr (requires(Op op, NodeIo<S> io, Movers<S> & movers) { op.push(io, movers); }) {
+    table.push = [](void* op, NodeIo<S>& io, Movers<S>& movers) { static_cast<Op*>(op)->push(io, movers); };
+  }
+  if constexpr (requires(Op op, NodeIo<S> io, const CurvatureWeights<S>& weights, const Movers<S>& movers,
+                         double* sum) { op.collect(io, weights, movers, sum); }) {
+    table.collect = [](void* op, NodeIo<S>& io, const CurvatureWeights<S>& weights, const Movers<S>& movers,
+                       double* sum) { static_cast<Op*>(op)->collect(io, weights, movers, sum); };
   }
   if constexpr (requires { Op::kPersistentOutputs; }) table.persistent_outputs = Op::kPersistentOutputs;
   if constexpr (requires { Op::kAssigns; }) table.assigns = Op::kAssigns;

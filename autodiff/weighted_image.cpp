@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autodiff/curvature_weights.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 
@@ -69,6 +70,16 @@ struct WeightedImage {
 #pragma GCC ivdep
       for (Index c = run.begin; c < run.end; ++c) to[c] += weight[c] * from[c];
     });
+  }
+
+  bool weigh(NodeIo<S>& io, CurvatureWeights<S>& weights) {
+    const ConstArray<S> of_out = weights.of_output(io), w = io.in(kWeight);
+    if (!of_out || !io.wants(kImage)) return true;
+    const Array<S> to = weights.of_input(io, kImage);
+    for_rows(to.shape, io.read(kImage), squares(io), [&](Index plane, Index r, const PixelRun& run) {
+      for (Index c = run.begin; c < run.end; ++c) to(plane, r, c) += w(0, r, c) * w(0, r, c) * of_out(plane, r, c);
+    });
+    return true;
   }
 
   static void differentiate_weight(const NodeIo<S>& io) {

@@ -9,11 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "autodiff/curvature_weights.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 #include "core/stopwatch.h"
 #include "core/workspaces.h"
 #include "splat/render/block_kernel.h"
+#include "splat/render/composite_curvature.h"
 #include "splat/render/composite_io.h"
 #include "splat/render/composite_kernel.h"
 #include "splat/render/pixel_step.h"
@@ -463,6 +465,60 @@ struct Composite {
     detail::reduce_slots<kCount>(sums, rows.moving, view.settings,
                                  {middle - rows.second, middle, middle - planned.moving.first}, after - middle,
                                  records.data() + middle, gradients_of(io, 0));
+  }
+
+  // --- curvature -----------------------------------------------------------------------------------------------------
+
+  /// By shares of the tiles that the number of threads does not change; every kShares-th is of one share, so that all
+  /// have as much of what is dense.
+  void collect(NodeIo<S>& io, const CurvatureWeights<S>& weights, const Movers<S>& movers, double* sum) {
+    constexpr Index kShares = 16;
+    const TileGrid tiles = grid();
+    const Index size = kTwist * movers.count(), numbers = size * size;
+    const detail::CurvatureScene<S> scene = curvature_scene(io, weights, movers);
+    const std::span<double> shares = io.template scratch<double>(kShares * numbers);
+    run_chunks(kShares, [&](Index share) {
+      detail::CurvatureWorkspace<S> workspace;
+      double* const mine = shares.data() + share * numbers;
+      std::fill_n(mine, numbers, 0.0);
+      for (Index tile = share; tile < tiles.count(); tile += kShares) {
+        if (tile_counts[tile].end > 0) detail::add_tile_curvature(scene, curvature_tile(tiles, tile), workspace, mine);
+      }
+    });
+    parallel_for(numbers, kGrain, [&](Index begin, Index end) {
+      for (Index share = 0; share < kShares; ++share) {
+        const double* const from = shares.data() + share * numbers;
+        for (Index i = begin; i < end; ++i) sum[i] += from[i];
+      }
+    });
+  }
+
+  detail::CurvatureScene<S> curvature_scene(const NodeIo<S>& io, const CurvatureWeights<S>& weights,
+                                            const Movers<S>& movers) const {
+    HSI4D_CHECK(channels_of(io) <= detail::kMostBlockChannels,
+                "a curvature of " + std::to_string(channels_of(io)) + " channels");
+    const bool split = static_cast<bool>(images_of(io).rest);
+    movers.check(io, kMeans);
+    if (has_still(io)) movers.check(io, kStill + kMeans);
+    return {scene_of(io),
+            {has_still(io) ? movers.of_input(io, kStill + kMeans) : nullptr, movers.of_input(io, kMeans)},
+            images_of(io),
+            {weights.of_output(io, kChannels), split ? weights.of_output(io, kMoreChannels) : ConstArray<S>{},
+             weights.of_output(io, kTransmittance)},
+            movers.count()};
+  }
+
+  detail::CurvatureTile<S> curvature_tile(const TileGrid& tiles, Index tile) const {
+    detail::CurvatureTile<S> job{};
+    place_job(tiles, tile, job);
+    job.side = tiles.tile;
+    // None that follows is drawn.
+    job.entries = planned.plans[tile].entries.first(static_cast<std::size_t>(tile_counts[tile].end));
+    if constexpr (std::is_same_v<S, float>) {
+      const detail::TileLayer& layer = planned.layer(tile);
+      job.start = layer.made && layer.first > 0 ? layer.front.data() : nullptr;
+    }
+    return job;
   }
 
   // --- the rest ------------------------------------------------------------------------------------------------------

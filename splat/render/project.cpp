@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autodiff/twists.h"
 #include "core/lanes.h"
 #include "core/parallel.h"
 #include "core/simd.h"
@@ -338,6 +339,55 @@ struct Project {
       sums.delta[i].add(row, rows ? d.p[i] : zero);
       sums.delta[3 + i].add(row, rows ? turn : zero);
     }
+  }
+
+  /// Places in the image follow points and the camera: d (u, v) = J (W d m + ρ + φ × p).
+  void push(NodeIo<S>& io, Movers<S>& movers) {
+    const Twists<S>* const points = movers.of_input(io, kMeansIn);
+    const bool camera = io.wants(kXi);
+    if (points == nullptr && !camera) return;
+    const Lens lens = this->lens(io);
+    const std::int32_t viewer = camera ? movers.add(io, kXi, 0, camera_cotangents(io.in(kXi))) : -1;
+    const ConstArray<S> means = io.in(kMeansIn), factors = io.out(kFactors);
+    const Index of_points = points != nullptr ? points->per_row : 0;
+    Twists<S>& places = movers.of_output(io, kMeans, means.shape.rows, of_points + (camera ? 1 : 0), 2);
+    parallel_for(means.shape.rows, kGrain, [&](Index begin, Index end) {
+      for (Index n = begin; n < end; ++n) {
+        const S* const factor = factors.row(n);
+        if (std::all_of(factor, factor + 6, [](S v) { return v == S(0); })) continue;  // not drawn
+        double mean[3], p[3];
+        std::copy_n(means.row(n), 3, mean);
+        point_in_camera(lens, mean, p);
+        const double u = lens.fx / p[2], v = lens.fy / p[2];
+        Eigen::Matrix<double, 2, 3> jacobian;
+        jacobian << u, 0, -u * p[0] / p[2], 0, v, -v * p[1] / p[2];
+        for (Index k = 0; k < of_points; ++k) {
+          places.mover(n, k) = points->mover(n, k);
+          if (places.mover(n, k) < 0) continue;
+          const Eigen::Map<const RatesOf<3>> rates(points->rate(n, k));
+          Eigen::Map<RatesOf<2>>(places.rate(n, k)) =
+              (jacobian * lens.camera.rotation * rates.template cast<double>()).template cast<S>();
+        }
+        if (!camera) continue;
+        places.mover(n, of_points) = viewer;
+        Eigen::Matrix<double, 3, kTwist> turn;
+        turn << Matrix3<double>::Identity(), -hat(Vector3<double>(p[0], p[1], p[2]));
+        Eigen::Map<RatesOf<2>>(places.rate(n, of_points)) = (jacobian * turn).template cast<S>();
+      }
+    });
+  }
+  template <int kDims>
+  using RatesOf = Eigen::Matrix<S, kDims, kTwist, Eigen::RowMajor>;
+
+  /// What ξ is multiplied with to give a change of the moved camera from the left.
+  static std::array<std::vector<double>, kTwist> camera_cotangents(const ConstArray<S>& xi) {
+    std::array<std::vector<double>, kTwist> cotangents;
+    for (Index k = 0; k < kTwist; ++k) {
+      Vector6<double> d = Vector6<double>::Zero();
+      detail::moved_camera_adjoint(detail::camera_update(xi), Vector6<double>::Unit(k), d);
+      cotangents[static_cast<std::size_t>(k)].assign(d.data(), d.data() + kTwist);
+    }
+    return cotangents;
   }
 
   /// What is drawn, and which ratios are held.
