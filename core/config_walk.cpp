@@ -12,7 +12,7 @@ using Kind = ConfigValue::Kind;
 using FieldKind = ConfigField::Kind;
 
 constexpr std::size_t kMostSuggested = 50;  // problems after which nobody reads suggestions any more
-constexpr std::size_t kMostListed = 20;     // keys that a message lists
+constexpr std::size_t kMostListed = 24;     // keys that a message lists
 
 bool is_free_key(const std::string& key) {
   return !key.empty() && std::all_of(key.begin(), key.end(), [](char c) {

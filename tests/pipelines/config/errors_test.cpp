@@ -32,7 +32,8 @@ std::string fault(const std::string& text, const std::vector<std::string>& overr
 }
 
 const std::string kSections =
-    "name, seed, threads, precision, rotations, background, camera, camera_selection, start, instance, data, sources, "
+    "name, seed, threads, precision, rotations, background, remove_depth_bias, camera, camera_selection, start, "
+    "instance, data, sources, "
     "chain, "
     "body, "
     "color_net, "

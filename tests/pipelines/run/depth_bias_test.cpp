@@ -42,8 +42,7 @@ std::pair<double, double> told_factors(const std::string& folder) {
   const std::size_t at = log.find(before);
   REQUIRE(at != std::string::npos);
   const std::string of_object = ", " + kTinyObject + " ";
-  return {std::stod(log.substr(at + before.size())),
-          std::stod(log.substr(log.find(of_object, at) + of_object.size()))};
+  return {std::stod(log.substr(at + before.size())), std::stod(log.substr(log.find(of_object, at) + of_object.size()))};
 }
 
 }  // namespace
