@@ -138,8 +138,8 @@ struct Evaluation {
       job.cols = shape.cols;
       job.x_stride = shape.stride;
       job.y_stride = y.shape.stride;
-      job.c1 = static_cast<S>(1e-4 * range2);
-      job.c2 = static_cast<S>(9e-4 * range2);
+      job.c1 = static_cast<S>(detail::kSsimC1 * range2);
+      job.c2 = static_cast<S>(detail::kSsimC2 * range2);
       job.sums = unit.sums;
       job.tile_sums = tile_sums.data() + plane * tiles;
       job.tile_stride = tile_cols;

@@ -127,7 +127,7 @@ class Sweep {
   void set_weights() {
     double gaussian[kRadius + 1], sum = 0;
     for (Index j = 0; j <= kRadius; ++j) {
-      gaussian[j] = std::exp(-static_cast<double>(j * j) / (2 * 1.5 * 1.5));
+      gaussian[j] = std::exp(-static_cast<double>(j * j) / (2 * kSsimSigma * kSsimSigma));
       sum += (j == 0 ? 1 : 2) * gaussian[j];
     }
     weights_[0] = 1;

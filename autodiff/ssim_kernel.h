@@ -9,6 +9,10 @@ namespace hsi4d::detail {
 inline constexpr Index kSsimTile = 16;
 /// The window reaches this many pixels to each side.
 inline constexpr Index kSsimRadius = 5;
+/// Standard deviation of its Gaussian, pixels.
+inline constexpr double kSsimSigma = 1.5;
+/// C1 and C2 for values in [0, 1].
+inline constexpr double kSsimC1 = 1e-4, kSsimC2 = 9e-4;
 
 /// Pixels [row_begin, row_end) × [col_begin, col_end).
 struct SsimRect {

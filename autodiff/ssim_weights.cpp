@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "autodiff/ssim_kernel.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 
@@ -12,7 +13,7 @@ namespace hsi4d::detail {
 
 namespace {
 
-constexpr Index kRadius = 5;
+constexpr Index kRadius = kSsimRadius;
 
 /// The window's weights, by distance.
 std::array<double, kRadius + 1> window() {
@@ -20,7 +21,7 @@ std::array<double, kRadius + 1> window() {
   double sum = 0;
   for (Index j = 0; j <= kRadius; ++j) {
     const double x = static_cast<double>(j);
-    weights[static_cast<std::size_t>(j)] = std::exp(-x * x / (2 * 1.5 * 1.5));
+    weights[static_cast<std::size_t>(j)] = std::exp(-x * x / (2 * kSsimSigma * kSsimSigma));
     sum += (j == 0 ? 1 : 2) * weights[static_cast<std::size_t>(j)];
   }
   for (double& w : weights) w /= sum;
@@ -117,7 +118,7 @@ void add_ssim_weights(const ConstArray<S>& image, const ConstArray<S>& target, c
   const Area area = bounds(squares, image.shape);
   if (area.rows() <= 0 || area.cols() <= 0) return;
   const Area around = area.grown(kRadius, image.shape);
-  const S c2 = static_cast<S>(9e-4 * data_range * data_range);
+  const S c2 = static_cast<S>(kSsimC2 * data_range * data_range);
   for (Index plane = 0; plane < image.shape.planes; ++plane) {
     Plane<S> inverse = variance(image, plane, around);
     const Plane<S> of_target = variance(target, plane, around);
