@@ -48,6 +48,7 @@ struct SweepArguments {
   bool fail_fast = false;
   bool resume = false;
   bool dry_run = false;
+  bool quiet = false;
 };
 
 struct RunOneArguments {
@@ -175,7 +176,7 @@ void requeue_and_wait() {
 
 std::string local_sweep(const SweepArguments& arguments, const PlacedPlan& placed, int& status) {
   const InterruptWatch watch;
-  const Observer observer = observer_on_terminal(false);
+  const Observer observer = observer_on_terminal(arguments.quiet);
   const bool is_terminal = stderr_is_terminal();
   const LogSink log = log_to_file(placed.paths.log());
   warn_of_other_programs(placed, distinct_runs(placed.plan));
@@ -190,7 +191,7 @@ std::string local_sweep(const SweepArguments& arguments, const PlacedPlan& place
   if (is_terminal) launch.progress = observer.progress;
   launch.tell = [&](const std::string& line) {
     log.write(LogLevel::kInfo, line);
-    std::fprintf(stderr, "%s%s\n", is_terminal ? "\r\x1b[K" : "", line.c_str());
+    if (!arguments.quiet) std::fprintf(stderr, "%s%s\n", is_terminal ? "\r\x1b[K" : "", line.c_str());
   };
   SweepOutcome outcome;
   try {
@@ -225,6 +226,8 @@ void refuse_local_options(const SweepArguments& arguments) {
     throw UserError(
         "hsi4d sweep: --memory is of the launcher \"local\"; of Slurm, memory_mb of the sweep's file is "
         "what a run gets");
+  if (arguments.quiet)
+    throw UserError("hsi4d sweep: --quiet is of the launcher \"local\"; of Slurm, each run has a log of its own");
 }
 
 std::string slurm_sweep(const SweepArguments& arguments, const PlacedPlan& placed) {
@@ -336,6 +339,7 @@ void add_sweep(CLI::App& app, Program& program) {
       ->check(CLI::NonNegativeNumber)
       ->type_name("MB");
   command->add_flag("--fail-fast", a.fail_fast, "Stop at the first run that fails, the others with their state saved");
+  command->add_flag("--quiet", a.quiet, "No progress on stderr; the log has it");
   command->add_flag("--resume", a.resume, "Go on with the sweep in the folder; runs that are done stay");
   command->add_flag("--dry-run", a.dry_run, "Check every combination, print the table of runs, write nothing");
   run_when_chosen(*command, program, [&] { return sweep_command(a, program.terms, program.status); });

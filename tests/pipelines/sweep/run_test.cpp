@@ -144,6 +144,7 @@ TEST_CASE("a sweep is computed, recognised and reported", "[release]") {
   CHECK(again.status == 0);
   CHECK(again.err == "2 of 2 runs are done already\n");
   CHECK(again.out == first.out);
+  CHECK(run_hsi4d({"sweep", "out", "--resume", "--quiet"}).err.empty());
   const fs::path report = fs::path(SweepPaths{"out"}.run(ids_of("out")[0])) / "report.html";
   fs::remove(report);  // killed after its results, before its report
   CHECK(run_sweep("out").status == 0);
@@ -261,6 +262,8 @@ TEST_CASE("options that Slurm's launcher would pass over are refused") {
   CHECK(run_hsi4d({"sweep", "sweep.json", "--launcher", "slurm", "--memory", "9"}).err ==
         "hsi4d sweep: --memory is of the launcher \"local\"; of Slurm, memory_mb of the sweep's file is what a run "
         "gets\n");
+  CHECK(run_hsi4d({"sweep", "sweep.json", "--launcher", "slurm", "--quiet"}).err ==
+        "hsi4d sweep: --quiet is of the launcher \"local\"; of Slurm, each run has a log of its own\n");
   CHECK_FALSE(fs::exists("runs"));
 }
 
