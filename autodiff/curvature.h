@@ -34,7 +34,9 @@
 
 namespace hsi4d {
 
-/// The curvature of one loss. Computed in an order that does not depend on the number of threads.
+/// The curvature of one loss. A term whose operators have no `weigh`, and a sum over lambdas of which several operands
+/// move, have no part in it: they are followed by their gradient alone. Computed in an order that does not depend on
+/// the number of threads.
 template <class S>
 class Curvature {
  public:

@@ -1,6 +1,8 @@
 // The bias of depths that frame 0 tells, and runs that remove it.
 #include "pipelines/run/depth_bias.h"
 
+#include <limits>
+
 #include <catch2/catch.hpp>
 
 #include "body/motion_io.h"
@@ -100,7 +102,6 @@ TEST_CASE("a run takes the bias of frame 0 from all later frames, with the same 
     CHECK(((moved[t][0].translation - center) * object - thing).norm() < 1e-5 * thing.norm());
     CHECK(kept.poses[t].axis_angle == removed.poses[t].axis_angle);
   }
-  CHECK(file_text("kept/metrics.jsonl").size() > 0);
   int asked = 0;
   const int late = (kTinyFrames - 1) * kPerFrame + 3;  // in the fit of frame 0
   CHECK_THROWS_AS(execute_tiny(config, "stopped", 1, false, [&] { return ++asked > late; }), Interrupted);
