@@ -224,10 +224,14 @@ constexpr const char* kPinholeTexts[] = {"pinhole", "simple_pinhole", "perspecti
 constexpr const char* kTextKeys[] = {"lens", "lens_name", "shutter", "shutter_type", "camera", "model"};
 constexpr const char* kOmnidirectional = "xi";  // Mei's model
 
+/// What of transforms.json is taken: of what is drawn, or of pictures that can be straightened.
+enum class Lenses { kNone, kStraightened };
+
 struct NerfCamera {
   Camera camera;
   Model model = Model::kPinhole;
   std::array<double, kDistortions.size()> distortion{};
+  double angle_x = 0;
   Numbers16 transform_matrix{};
 };
 
@@ -242,6 +246,7 @@ void describe_intrinsics(ConfigFields& f, NerfCamera& s) {
   f.number("cy", c.cy, {}, "Principal point from the image's top edge, pixels");
   for (std::size_t i = 0; i < kDistortions.size(); ++i)
     f.number(kDistortions[i], s.distortion[i], {}, "Lens distortion; only 0 can be read");
+  f.number("camera_angle_x", s.angle_x, {}, "Horizontal field of view, radians");
 }
 
 /// Reads the members that are described, and passes over all others.
@@ -256,11 +261,26 @@ void read_known(const ConfigValue& object, const ConfigFields& fields, ConfigPro
   read_config(known, fields, problems, pointer);
 }
 
-void refuse_distortion(const ConfigValue& object, const NerfCamera& read, const std::string& pointer,
+double distortion_of(const NerfCamera& read, std::string_view name) {
+  const auto at = std::find(kDistortions.begin(), kDistortions.end(), name);
+  return read.distortion[static_cast<std::size_t>(at - kDistortions.begin())];
+}
+
+Lens lens_of(const NerfCamera& read) {
+  return {distortion_of(read, "k1"), distortion_of(read, "k2"), distortion_of(read, "k3"), distortion_of(read, "p1"),
+          distortion_of(read, "p2")};
+}
+
+bool is_of_lens(std::string_view name) {
+  return name == "k1" || name == "k2" || name == "k3" || name == "p1" || name == "p2";
+}
+
+void refuse_distortion(const ConfigValue& object, const NerfCamera& read, Lenses lenses, const std::string& pointer,
                        ConfigProblems& problems) {
   for (std::size_t i = 0; i < kDistortions.size(); ++i) {
     const ConfigValue* value = find_member(object, kDistortions[i]);
     if (!value || read.distortion[i] == 0) continue;
+    if (lenses == Lenses::kStraightened && is_of_lens(kDistortions[i])) continue;
     problems.add(
         value->origin, child_pointer(pointer, kDistortions[i]),
         shown(*value) + " is a lens distortion, which is not rendered: undistort the images first; allowed: 0");
@@ -336,6 +356,12 @@ void require_intrinsics(const ConfigValue& top, const ConfigValue& frame, const 
   }
 }
 
+/// Whether the field of view stands for intrinsics that neither place gives.
+bool has_angle_alone(const ConfigValue& top, const ConfigValue& frame, const NerfCamera& read, Lenses lenses) {
+  return lenses == Lenses::kStraightened && read.angle_x > 0 && !find_member(frame, "fl_x") &&
+         !find_member(top, "fl_x");
+}
+
 /// x_camera = diag(1, −1, −1) (world_from_gl)⁻¹ x_world: OpenGL's camera has y up and z backward.
 Camera camera_of(const NerfCamera& read, const std::string& pointer) {
   const std::string place = child_pointer(pointer, "transform_matrix");
@@ -350,18 +376,26 @@ Camera camera_of(const NerfCamera& read, const std::string& pointer) {
   return camera;
 }
 
-/// The path of the picture that an entry is of.
-std::string read_picture(const ConfigValue& frame, const std::string& pointer, ConfigProblems& problems) {
-  const ConfigValue* const path = find_member(frame, "file_path");
+/// A path that an entry names: of its picture, mask or depths.
+std::string read_path(const ConfigValue& frame, const char* key, const std::string& pointer, ConfigProblems& problems) {
+  const ConfigValue* const path = find_member(frame, key);
   if (path == nullptr || path->kind == Kind::kNull) return "";
   if (path->kind == Kind::kString) return path->text;
-  problems.add(path->origin, child_pointer(pointer, "file_path"),
-               shown(*path) + " is " + kind_name(*path) + ", not a string");
+  problems.add(path->origin, child_pointer(pointer, key), shown(*path) + " is " + kind_name(*path) + ", not a string");
   return "";
 }
 
-void read_frame(const ConfigValue& top, const NerfCamera& globals, ConfigValue& frame, const std::string& pointer,
-                ConfigProblems& problems, std::vector<PictureCamera>& cameras) {
+/// As camera_of, of an entry whose intrinsics the picture's size will give.
+Camera pose_alone(NerfCamera read, const std::string& pointer) {
+  read.camera.width = read.camera.height = 1;
+  read.camera.fx = read.camera.fy = 1;
+  Camera camera;
+  camera.camera_from_world = camera_of(read, pointer).camera_from_world;
+  return camera;
+}
+
+void read_frame(const ConfigValue& top, const NerfCamera& globals, Lenses lenses, ConfigValue& frame,
+                const std::string& pointer, ConfigProblems& problems, std::vector<PictureCamera>& cameras) {
   const std::size_t before = problems.size();
   flatten_matrix(frame, "transform_matrix", pointer, problems);
   NerfCamera read = globals;
@@ -370,15 +404,24 @@ void read_frame(const ConfigValue& top, const NerfCamera& globals, ConfigValue& 
   fields.numbers("transform_matrix", read.transform_matrix, {}, "World from camera, OpenGL camera axes").required();
   read_known(frame, fields, problems, pointer);
   if (problems.size() > before) return;
-  require_intrinsics(top, frame, pointer, problems);
-  refuse_distortion(frame, read, pointer, problems);
+  const bool has_angle = has_angle_alone(top, frame, read, lenses);
+  if (!has_angle) require_intrinsics(top, frame, pointer, problems);
+  refuse_distortion(frame, read, lenses, pointer, problems);
   refuse_other_cameras(frame, pointer, problems);
   if (problems.size() > before) return;
-  const std::string picture = read_picture(frame, pointer, problems);
-  add_failure(frame, problems, [&] { cameras.push_back({camera_of(read, pointer), picture}); });
+  PictureCamera result;
+  result.picture = read_path(frame, "file_path", pointer, problems);
+  result.mask = read_path(frame, "mask_path", pointer, problems);
+  result.depth = read_path(frame, "depth_file_path", pointer, problems);
+  result.lens = lens_of(read);
+  result.angle_x = has_angle ? read.angle_x : 0;
+  add_failure(frame, problems, [&] {
+    result.camera = has_angle ? pose_alone(read, pointer) : camera_of(read, pointer);
+    cameras.push_back(result);
+  });
 }
 
-std::vector<PictureCamera> read_transforms(ConfigValue& tree, ConfigProblems& problems) {
+std::vector<PictureCamera> read_transforms(ConfigValue& tree, Lenses lenses, ConfigProblems& problems) {
   NerfCamera globals;
   ConfigFields fields;
   describe_intrinsics(fields, globals);
@@ -387,15 +430,15 @@ std::vector<PictureCamera> read_transforms(ConfigValue& tree, ConfigProblems& pr
   if (frames.kind != Kind::kArray)
     problems.add(frames.origin, "/frames", shown(frames) + " is " + kind_name(frames) + ", not an array");
   problems.throw_if_any();
-  refuse_distortion(tree, globals, "", problems);
+  refuse_distortion(tree, globals, lenses, "", problems);
   refuse_other_cameras(tree, "", problems);
   std::vector<PictureCamera> cameras;
   for (std::size_t i = 0; i < frames.items.size(); ++i)
-    read_frame(tree, globals, frames.items[i], "/frames/" + std::to_string(i), problems, cameras);
+    read_frame(tree, globals, lenses, frames.items[i], "/frames/" + std::to_string(i), problems, cameras);
   return cameras;
 }
 
-std::vector<PictureCamera> decode(const std::string& text, const std::string& name) {
+std::vector<PictureCamera> decode(const std::string& text, const std::string& name, Lenses lenses) {
   auto source = std::make_shared<ConfigSource>();
   source->name = name;
   ConfigProblems problems;
@@ -408,7 +451,7 @@ std::vector<PictureCamera> decode(const std::string& text, const std::string& na
   const bool is_list = find_member(tree, "format") || find_member(tree, "cameras");
   std::vector<PictureCamera> cameras;
   if (is_transforms) {
-    cameras = read_transforms(tree, problems);
+    cameras = read_transforms(tree, lenses, problems);
   } else {
     for (const Camera& camera : is_list ? read_list(tree, problems) : read_single(tree, problems))
       cameras.push_back({camera, ""});
@@ -426,11 +469,19 @@ std::vector<Camera> without_pictures(const std::vector<PictureCamera>& cameras) 
 }  // namespace
 
 std::vector<Camera> decode_cameras(const std::string& text, const std::string& name) {
-  return without_pictures(decode(text, name));
+  return without_pictures(decode(text, name, Lenses::kNone));
 }
 
 std::vector<PictureCamera> read_picture_cameras(const std::string& path) {
-  return decode(read_text_file(path, kLargestCameraFile), path);
+  return decode(read_text_file(path, kLargestCameraFile), path, Lenses::kNone);
+}
+
+std::vector<PictureCamera> decode_photo_cameras(const std::string& text, const std::string& name) {
+  return decode(text, name, Lenses::kStraightened);
+}
+
+std::vector<PictureCamera> read_photo_cameras(const std::string& path) {
+  return decode_photo_cameras(read_text_file(path, kLargestCameraFile), path);
 }
 
 std::vector<Camera> read_cameras(const std::string& path) { return without_pictures(read_picture_cameras(path)); }

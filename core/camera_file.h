@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/camera.h"
+#include "core/lens.h"
 
 namespace hsi4d {
 
@@ -29,11 +30,22 @@ std::vector<Camera> read_cameras(const std::string& path);
 /// A camera, and the picture that it took.
 struct PictureCamera {
   Camera camera;
-  std::string picture;  ///< nerfstudio's file_path; empty: the file names none
+  std::string picture;                ///< nerfstudio's file_path; empty: the file names none
+  std::string mask = {}, depth = {};  ///< its mask_path and depth_file_path; empty: none
+  Lens lens = {};                     ///< of read_photo_cameras
+  double angle_x = 0;  ///< radians, of read_photo_cameras: the horizontal field of view, where the file says no more of
+                       ///< the intrinsics; the camera has none then, and no size
 };
 
 /// As read_cameras, with what the file says of their pictures. Nerfstudio's entries are in any order.
 std::vector<PictureCamera> read_picture_cameras(const std::string& path);
+
+/// As read_picture_cameras, for a reader of the pictures, who can straighten them and knows their size: nerfstudio's
+/// k1, k2, k3, p1, p2 are taken, and so is `camera_angle_x` in place of intrinsics, as Blender's exporters write it.
+std::vector<PictureCamera> read_photo_cameras(const std::string& path);
+
+/// As read_photo_cameras, of text in memory.
+std::vector<PictureCamera> decode_photo_cameras(const std::string& text, const std::string& name);
 
 /// As read_cameras, of text in memory.
 /// @param name  what error messages call it

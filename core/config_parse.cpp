@@ -328,8 +328,9 @@ Diagnosis diagnose(const std::string& text, const Stop& stop) {
   return {here == '"' && stop.end > 0 ? stop.end - 1 : stop.start, "not valid JSON: " + stop.reason};
 }
 
-/// The line of text around an offset, and below it a caret.
+/// The line of text around an offset, and below it a caret; of no text, nothing.
 std::string line_with_caret(const std::string& text, std::size_t at) {
+  if (text.empty()) return "";
   const auto continues = [&](std::size_t i) { return (static_cast<unsigned char>(text[i]) & 0xC0U) == 0x80U; };
   std::size_t begin = at, end = at;
   while (begin > 0 && text[begin - 1] != '\n' && (at - begin < kMostBefore || continues(begin))) --begin;

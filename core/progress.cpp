@@ -93,6 +93,8 @@ void Progress::skip(std::int64_t steps) {
   last_done_ += steps;
 }
 
+void Progress::drop(std::int64_t steps) { total_ = std::max<std::int64_t>(total_ - steps, 0); }
+
 void Progress::step(std::int64_t steps) { count(steps, {}); }
 
 void Progress::step_with(const char* name, double value, std::span<const ProgressPart> parts) {

@@ -53,6 +53,8 @@ class Progress {
 
   /// `steps` were done by an earlier process: they count as done, but tell nothing of how fast this one is.
   void skip(std::int64_t steps);
+  /// `steps` of the total will not be needed.
+  void drop(std::int64_t steps);
   /// `steps` more are done.
   void step(std::int64_t steps = 1);
   /// As step(), with a number worth watching; `name` must outlive the task (a literal), `parts` only the call.

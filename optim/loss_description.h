@@ -25,6 +25,7 @@ enum class LossInput {
   kPose,           ///< body_rotations
   kMotion,         ///< joints, joints_start, motion, body_points
   kObjectMotion,   ///< object_points, and motion with objects
+  kGaussians,      ///< gaussian_opacities, gaussian_log_scales: where Gaussians themselves are made
 };
 
 /// What a term reads once from its settings; see LossDescription::prepare.

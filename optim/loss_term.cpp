@@ -19,6 +19,8 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(joints) && motion;
     case LossInput::kObjectMotion:
       return object_points && motion && !motion->objects.empty();
+    case LossInput::kGaussians:
+      return given(gaussian_opacities) && given(gaussian_log_scales);
   }
   return false;
 }

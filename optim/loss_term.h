@@ -62,6 +62,9 @@ struct LossInputs {
   std::function<Var<S>(const std::vector<BodyPoint>& points)> body_points;
   std::function<Var<S>(const std::vector<ObjectPoint>& points)> object_points;
 
+  Var<S> gaussian_opacities;   ///< [N,1] of all Gaussians that are made, 0 to 1
+  Var<S> gaussian_log_scales;  ///< [N,3] natural logarithm of metres
+
   const SeamMode* seams = nullptr;  ///< of all that has a gradient here, in a stage by gauss_newton; else null
 
   std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
@@ -84,6 +87,7 @@ LossInputs<S> only_declared(LossInputs<S> inputs, const std::vector<LossInput>& 
   if (lacks(LossInput::kObjectDepth)) inputs.object_depth = inputs.object_depth_target = {};
   if (lacks(LossInput::kObjectOpacity)) inputs.object_opacity = {};
   if (lacks(LossInput::kHumanOpacity)) inputs.human_opacity = {};
+  if (lacks(LossInput::kGaussians)) inputs.gaussian_opacities = inputs.gaussian_log_scales = {};
   return inputs;
 }
 

@@ -33,6 +33,8 @@ const char* words_of(LossInput need) {
       return "objects";
     case LossInput::kHumanOpacity:
       return "the body in an image";
+    case LossInput::kGaussians:
+      return "Gaussians that are made";
     case LossInput::kPose:
     case LossInput::kMotion:
     case LossInput::kObjectMotion:

@@ -126,6 +126,8 @@ LossLeaves<S> loss_leaves(Tape<S>& tape) {
   in.human_opacity = leaf("human_opacity", image(1), 0, 1);
   in.human_mask = leaf("human_mask", image(1), 0, 1);
   in.human_seen = leaf("human_seen", kScalarShape, {1});
+  in.gaussian_opacities = leaf("gaussian_opacities", shape_of(9, 1), 0, 1);
+  in.gaussian_log_scales = leaf("gaussian_log_scales", shape_of(9, 3), -4, 0);
   in.body_rotations = leaf("body_rotations", shape_of(21, 9), some_pose());
   in.joints = leaf("joints", shape_of(kLossFrames, 66), -1, 1);
   in.joints_start = leaf("joints_start", shape_of(kLossFrames, 66), -1, 1);

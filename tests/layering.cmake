@@ -12,9 +12,10 @@ set(stands_on
     "pipelines/metrics: pipelines/input" "pipelines/record: pipelines/metrics" "pipelines/graph: pipelines/draw"
     "pipelines/sources: pipelines/draw" "pipelines/avatar: pipelines/draw" "pipelines/synthetic: pipelines/draw"
     "pipelines/report: pipelines/draw pipelines/record" "pipelines/evaluate: pipelines/record"
+    "pipelines/photos: core" "pipelines/scan: pipelines/photos pipelines/report"
     "pipelines/run: pipelines/graph pipelines/sources pipelines/report" "pipelines/chain: pipelines/run"
     "pipelines/sweep: pipelines/chain pipelines/synthetic" "pipelines/study: pipelines/sweep pipelines/evaluate"
-    "pipelines/cli: pipelines/study pipelines/avatar"
+    "pipelines/cli: pipelines/study pipelines/avatar pipelines/scan"
     "bench: pipelines/cli" "stress: pipelines/cli")
 
 set(rooms "")

@@ -6,20 +6,22 @@
 
 // clang-format off
 #define HSI4D_LOSSES        \
-  HSI4D_LOSS(photometric)   \
-  HSI4D_LOSS(masked_l2)     \
-  HSI4D_LOSS(center)        \
-  HSI4D_LOSS(depth)         \
-  HSI4D_LOSS(mask)          \
-  HSI4D_LOSS(fit)           \
-  HSI4D_LOSS(contact)       \
-  HSI4D_LOSS(smooth)        \
-  HSI4D_LOSS(object_smooth) \
-  HSI4D_LOSS(ground)        \
-  HSI4D_LOSS(foot_sliding)  \
-  HSI4D_LOSS(penetration)   \
-  HSI4D_LOSS(joint_limits)  \
-  HSI4D_LOSS(pose_prior)
+  HSI4D_LOSS(photometric)      \
+  HSI4D_LOSS(masked_l2)        \
+  HSI4D_LOSS(center)           \
+  HSI4D_LOSS(depth)            \
+  HSI4D_LOSS(mask)             \
+  HSI4D_LOSS(fit)              \
+  HSI4D_LOSS(contact)          \
+  HSI4D_LOSS(smooth)           \
+  HSI4D_LOSS(object_smooth)    \
+  HSI4D_LOSS(ground)           \
+  HSI4D_LOSS(foot_sliding)     \
+  HSI4D_LOSS(penetration)      \
+  HSI4D_LOSS(joint_limits)     \
+  HSI4D_LOSS(pose_prior)       \
+  HSI4D_LOSS(gaussian_opacity) \
+  HSI4D_LOSS(gaussian_scale)
 // clang-format on
 
 namespace hsi4d {

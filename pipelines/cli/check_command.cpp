@@ -11,6 +11,7 @@
 #include "pipelines/config/config_kind.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/config/run_problems.h"
+#include "pipelines/scan/settings.h"
 #include "pipelines/sweep/plan.h"
 
 namespace hsi4d::cli {
@@ -73,6 +74,14 @@ std::string fit_summary(const std::filesystem::path& file, const AvatarFitSettin
   return text + stage_summary("avatar fit", fit.stage);
 }
 
+std::string scan_summary(const std::filesystem::path& file, const ScanSettings& scan) {
+  std::string text = file.generic_string() + ": OK, a config of `hsi4d reconstruct`\n";
+  text += "  pictures: " +
+          (scan.photos.path.empty() ? "not given; --set photos.path=DIR" : scan.photos.path.generic_string()) + "\n";
+  text += "  at most " + count_text(scan.density.most, "Gaussian") + "\n";
+  return text + stage_summary("reconstruct", scan.stage);
+}
+
 /// A sweep has no settings of its own to override, and many configs.
 std::string check_sweep(const std::filesystem::path& file, const std::vector<std::string>& overrides, bool print_config,
                         const std::vector<LossDescription>& losses) {
@@ -94,6 +103,10 @@ std::string check_command(const std::filesystem::path& config, const std::vector
   if (config_kind(tree) == ConfigKind::kAvatarFit) {
     const AvatarFitSettings fit = read_avatar_fit(tree, config, losses, problems, false);
     return print_config ? resolved_avatar_fit(fit, losses) : fit_summary(config, fit);
+  }
+  if (config_kind(tree) == ConfigKind::kScan) {
+    const ScanSettings scan = read_scan(tree, config, losses, problems, false);
+    return print_config ? resolved_scan(scan, losses) : scan_summary(config, scan);
   }
   const RunConfig run = read_run_config(tree, losses, problems, ConfigUse::kStages);
   return print_config ? resolved_config(run, losses) : summary(config, run);

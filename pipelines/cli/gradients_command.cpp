@@ -149,7 +149,8 @@ void add_gradients(CLI::App& app, Program& program) {
       "that it holds at -20 or 20; coefficients above render.sh_degree; what the camera does not see.\n"
       "A pixel where alpha is held at render.alpha_cap adds nothing through that alpha, unless\n"
       "render.cap_gradient is pass (render.compatibility=inria makes it so).");
-  run_when_chosen(command, program, [&] { return gradients_command(gradients); });
+  run_when_chosen(command, program,
+                  [&] { return run_on_threads(gradients.shared, [&] { return gradients_command(gradients); }); });
 }
 
 }  // namespace hsi4d::cli

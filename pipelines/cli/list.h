@@ -10,6 +10,7 @@
   HSI4D_COMMAND(run)            \
   HSI4D_COMMAND(demo)           \
   HSI4D_COMMAND(synth)          \
+  HSI4D_COMMAND(reconstruct)    \
   HSI4D_COMMAND(select_camera)  \
   HSI4D_COMMAND(evaluate)       \
   HSI4D_COMMAND(report)         \

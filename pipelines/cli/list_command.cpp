@@ -12,13 +12,16 @@
 #include "pipelines/config/synthetic_places.h"
 #include "pipelines/graph/frame_graph.h"
 #include "pipelines/graph/sequence_graph.h"
+#include "pipelines/scan/settings.h"
 #include "pipelines/synthetic/motion.h"
 
 namespace hsi4d::cli {
 namespace {
 
 /// What `hsi4d list` can list.
-std::vector<std::string> list_topics() { return {"losses", "stages", "scenes", "settings", "avatar_fit"}; }
+std::vector<std::string> list_topics() {
+  return {"losses", "stages", "scenes", "settings", "avatar_fit", "reconstruct"};
+}
 
 std::string list_losses(const std::vector<LossDescription>& losses) {
   Table table;
@@ -71,6 +74,7 @@ std::string list_command(const std::string& topic, const std::vector<LossDescrip
   if (topic == "scenes") return list_scenes(losses);
   if (topic == "settings") return settings_table(run_config_settings(losses));
   if (topic == "avatar_fit") return settings_table(avatar_fit_settings(losses));
+  if (topic == "reconstruct") return settings_table(scan_settings(losses));
   throw UserError("hsi4d list: there is nothing called \"" + topic + "\" to list; known: " + joined(list_topics()) +
                   did_you_mean(topic, list_topics()));
 }

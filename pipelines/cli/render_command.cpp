@@ -203,7 +203,8 @@ void add_render(CLI::App& app, Program& program) {
   command.add_option("--out", render.out, "Where to: 8-bit PNG, OpenEXR, or arrays image, alpha, depth")
       ->type_name("F.{png,exr,npz}")
       ->required();
-  run_when_chosen(command, program, [&] { return render_command(render); });
+  run_when_chosen(command, program,
+                  [&] { return run_on_threads(render.shared, [&] { return render_command(render); }); });
 }
 
 }  // namespace hsi4d::cli

@@ -70,6 +70,13 @@ std::array<double, 3> parse_color(const std::string& text, const std::string& wh
   return color;
 }
 
+std::string run_on_threads(const SceneOptions& options, FunctionRef<std::string()> command) {
+  const int asked = options.threads.value_or(0);
+  std::string printed;
+  with_threads(asked > 0 ? asked : thread_count(), [&] { printed = command(); });
+  return printed;
+}
+
 SceneView view_of(const SceneOptions& options, const std::string& command) {
   SceneView view;
   view.background = parse_color(options.background, command + ": --background");
@@ -149,6 +156,7 @@ CLI::Option* add_scene(CLI::App& command, SceneOptions& options) {
       ->type_name("WORD");
   add_several(command, "--set", options.settings, "Change a setting of the renderer: render.blur=0.1")
       ->type_name("render.KEY=VALUE");
+  add_threads(command, options.threads);
   return scene;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/npz.h"
+#include "core/parallel.h"
 #include "pipelines/draw/image_of_scene.h"
 #include "splat/files/splat_file.h"
 
@@ -25,10 +26,14 @@ struct SceneOptions {
   std::string background = "0,0,0";  ///< --background r,g,b
   std::string precision = "float";   ///< --precision float|double|reference
   std::vector<std::string> settings;  ///< --set render.KEY=VALUE
+  std::optional<int> threads;         ///< --threads N
 };
 
 /// Adds them to a command; returns the option --scene.
 CLI::Option* add_scene(CLI::App& command, SceneOptions& options);
+
+/// What the command prints, run on the threads that the options give.
+std::string run_on_threads(const SceneOptions& options, FunctionRef<std::string()> command);
 
 /// The camera, colours and settings that the options name.
 ///

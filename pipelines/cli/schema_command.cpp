@@ -10,18 +10,20 @@
 #include "pipelines/avatar/fit.h"
 #include "pipelines/cli/list.h"
 #include "pipelines/config/run_config.h"
+#include "pipelines/scan/settings.h"
 #include "pipelines/sweep/file.h"
 
 namespace hsi4d::cli {
 namespace {
 
-/// Of `hsi4d run`, `hsi4d avatar fit` and `hsi4d sweep`.
-std::vector<std::string> schema_kinds() { return {"run", "avatar_fit", "sweep"}; }
+/// Of `hsi4d run`, `hsi4d avatar fit`, `hsi4d reconstruct` and `hsi4d sweep`.
+std::vector<std::string> schema_kinds() { return {"run", "avatar_fit", "reconstruct", "sweep"}; }
 
 /// Throws UserError for another kind.
 std::string schema_command(const std::string& kind, const std::vector<LossDescription>& losses) {
   if (kind == "run") return run_config_schema(losses);
   if (kind == "avatar_fit") return avatar_fit_schema(losses);
+  if (kind == "reconstruct") return scan_schema(losses);
   if (kind == "sweep") return sweep_schema();
   throw UserError("hsi4d schema: there are no configs of \"" + kind + "\"; known: " + joined(schema_kinds()) +
                   did_you_mean(kind, schema_kinds()));

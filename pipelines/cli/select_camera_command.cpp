@@ -31,6 +31,7 @@ struct SelectCameraOptions {
   std::vector<std::string> overrides;
   std::string out;    ///< camera.json; empty: not written
   std::string image;  ///< what the camera sees, .png, .jpg or .exr; empty: not written
+  std::optional<int> threads;
   bool quiet = false;
 };
 
@@ -71,7 +72,8 @@ void write_view(const std::string& file, const SceneSetup& setup, const Camera& 
 /// config needs data.scene, avatar, initial and the objects; of data.camera, where it is given, size and focal lengths
 /// are taken. Throws UserError and DataError for its inputs, Interrupted.
 std::string select_camera_command(const SelectCameraOptions& options, const std::vector<LossDescription>& losses) {
-  const RunConfig config = load_run_config(options.config, options.overrides, losses);
+  RunConfig config = load_run_config(options.config, options.overrides, losses);
+  config.threads = options.threads.value_or(config.threads);
   check_camera_inputs(config.data);
   const InterruptWatch watch;
   CameraChoice choice;
@@ -97,6 +99,7 @@ void add_select_camera(CLI::App& app, Program& program) {
                    "A config with scene, avatar and initial state; section camera_selection says how")
       ->required();
   add_overrides(*command, o.overrides);
+  add_threads(*command, o.threads);
   command->add_option("--out", o.out, "Where to: a camera file")->type_name("F.json");
   command->add_option("--image", o.image, "Image of what it sees")->type_name("F.{png,jpg,exr}");
   command->add_flag("--quiet", o.quiet, "No progress on stderr");

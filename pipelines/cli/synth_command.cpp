@@ -12,6 +12,7 @@
 #include "pipelines/cli/terminal.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/synthetic/dataset.h"
+#include "pipelines/synthetic/photos.h"
 #include "pipelines/synthetic/views.h"
 
 namespace hsi4d::cli {
@@ -22,6 +23,7 @@ struct SynthArguments {
   std::string config;
   std::vector<std::string> overrides;
   std::string out;  ///< a new or empty folder; it appears when everything in it is complete
+  std::optional<int> threads;
   bool quiet = false;
 };
 
@@ -32,17 +34,22 @@ struct SynthArguments {
 /// Interrupted after Ctrl-C.
 std::string synth_command(const SynthArguments& a, const std::vector<LossDescription>& losses) {
   const std::filesystem::path out = a.out;
-  const RunConfig run = load_run_config(a.config, a.overrides, losses);
+  RunConfig run = load_run_config(a.config, a.overrides, losses);
+  run.threads = a.threads.value_or(run.threads);
   const InterruptWatch watch;
   const bool of_views = run.synthetic.kind == SyntheticKind::kViews;
+  const bool of_photos = run.synthetic.kind == SyntheticKind::kPhotos;
   with_threads(run.threads > 0 ? run.threads : thread_count(), [&] {
     if (of_views)
       return write_views(run.synthetic, video_render_settings(), out, observer_on_terminal(a.quiet), run.body);
+    if (of_photos) return write_photos(run.synthetic, video_render_settings(), out, observer_on_terminal(a.quiet));
     write_dataset(run.synthetic, video_render_settings(), out, observer_on_terminal(a.quiet),
                   dataset_sections(run, losses), run.body);
   });
   const std::string size =
       std::to_string(run.synthetic.size_px) + " x " + std::to_string(run.synthetic.size_px) + " pixels";
+  if (of_photos)
+    return out.generic_string() + ": pictures of " + size + " with cameras and depths for hsi4d reconstruct\n";
   if (of_views) {
     return out.generic_string() + ": " + std::to_string(run.synthetic.views_cameras * run.synthetic.views_poses) +
            " views of " + size + " for hsi4d avatar fit\n";
@@ -61,6 +68,7 @@ void add_synth(CLI::App& app, Program& program) {
       ->required();
   synth->add_option("--out", a.out, "Where to: a new or empty folder")->type_name("DIR")->required();
   add_overrides(*synth, a.overrides);
+  add_threads(*synth, a.threads);
   synth->add_flag("--quiet", a.quiet, "No progress on stderr");
   run_when_chosen(*synth, program, [&] { return synth_command(a, descriptions_of(program.terms)); });
 }

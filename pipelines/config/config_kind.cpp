@@ -23,6 +23,7 @@ bool is_of_sweep(const ConfigValue& tree) {
 ConfigKind config_kind(const ConfigValue& tree) {
   if (is_of_run(tree)) return ConfigKind::kRun;
   if (is_of_sweep(tree)) return ConfigKind::kSweep;
+  if (has_one(tree, {"photos", "density"})) return ConfigKind::kScan;
   return has_one(tree, {"views", "stage"}) ? ConfigKind::kAvatarFit : ConfigKind::kRun;
 }
 
@@ -38,6 +39,16 @@ void require_kind(const ConfigValue& tree, ConfigKind wanted, const std::filesys
                     ": is a config of `hsi4d avatar fit`, which learns an avatar from pictures: hsi4d avatar "
                     "fit " +
                     name + " --out F.safetensors");
+  }
+  if (wanted != ConfigKind::kScan && kind == ConfigKind::kScan) {
+    throw UserError(name +
+                    ": is a config of `hsi4d reconstruct`, which makes Gaussians from pictures: hsi4d reconstruct " +
+                    name + " --out DIR");
+  }
+  if (wanted == ConfigKind::kScan && kind != ConfigKind::kScan) {
+    throw UserError(name +
+                    ": is no config of `hsi4d reconstruct`: it has neither \"photos\" nor \"density\"; "
+                    "configs/reconstruct/scene.json is one");
   }
   if (wanted == ConfigKind::kAvatarFit && kind == ConfigKind::kRun && is_of_run(tree)) {
     throw UserError(name +

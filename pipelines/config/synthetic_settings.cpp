@@ -130,13 +130,14 @@ void describe(ConfigFields& f, SyntheticMaskNoise& s) {
 
 void describe(ConfigFields& f, SyntheticSettings& s) {
   f.choice("kind", s.kind, kSyntheticKinds,
-           "A clip in a scene, or views: pictures of the human alone in several poses, for `hsi4d avatar fit`");
+           "A clip in a scene; views: pictures of the human alone in several poses, for `hsi4d avatar fit`; photos: "
+           "pictures of a scene or an object with their cameras, for `hsi4d reconstruct`");
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed}, "Seed of textures, arrangement and noise");
   f.integer("frames", s.frames, {.min = 2, .max = 100000}, "Frames of the clip");
   f.integer("clips", s.clips, {.min = 1, .max = 1000},
             "Number of consecutive clips, each with its own camera: a chain");
   f.rule({"clips", "kind"}, [&s]() -> std::string {
-    return s.clips > 1 && s.kind == SyntheticKind::kViews ? "views are of no clip" : "";
+    return s.clips > 1 && s.kind != SyntheticKind::kClip ? "views and photos are of no clip" : "";
   });
   f.number("frame_rate", s.frame_rate, {.min = 1, .max = 1000},
            "Frames per second; fewer: larger steps between frames");
@@ -185,6 +186,8 @@ void describe(ConfigFields& f, SyntheticSettings& s) {
   f.object("faults", s.faults, "Faults of generated videos");
   f.integer("views_cameras", s.views_cameras, {.min = 1, .max = 1000}, "Cameras in a ring (kind views)");
   f.integer("views_poses", s.views_poses, {.min = 1, .max = 1000}, "Poses that each of them sees (kind views)");
+  f.integer("photos", s.photos, {.min = 1, .max = 100000}, "Pictures at most (kind photos)");
+  f.choice("photos_of", s.photos_of, kSyntheticSubjects, "What they show (kind photos)");
 }
 
 std::string synthetic_settings_json(const SyntheticSettings& settings, const BodySettings& body) {

@@ -119,10 +119,15 @@ const std::vector<SyntheticObjectKind>& objects_of(SyntheticMotionKind motion);
 std::string object_names_of(SyntheticMotionKind motion);
 
 /// What is made.
-enum class SyntheticKind { kClip, kViews };
+enum class SyntheticKind { kClip, kViews, kPhotos };
 
-inline constexpr std::array<ConfigChoice<SyntheticKind>, 2> kSyntheticKinds = {
-    {{SyntheticKind::kClip, "clip"}, {SyntheticKind::kViews, "views"}}};
+inline constexpr std::array<ConfigChoice<SyntheticKind>, 3> kSyntheticKinds = {
+    {{SyntheticKind::kClip, "clip"}, {SyntheticKind::kViews, "views"}, {SyntheticKind::kPhotos, "photos"}}};
+
+/// What photos show.
+enum class SyntheticSubject { kScene, kObject };
+inline constexpr std::array<ConfigChoice<SyntheticSubject>, 2> kSyntheticSubjects = {
+    {{SyntheticSubject::kScene, "scene"}, {SyntheticSubject::kObject, "object"}}};
 
 /// How the frames of a clip are kept.
 enum class SyntheticVideo {
@@ -202,6 +207,8 @@ struct SyntheticSettings {
   SyntheticFaults faults;
   Index views_cameras = 6;  ///< of kind views
   Index views_poses = 4;
+  Index photos = 100;  ///< of kind photos, at most
+  SyntheticSubject photos_of = SyntheticSubject::kScene;
 };
 
 /// Describes the section: every setting with its range.

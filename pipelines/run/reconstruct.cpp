@@ -242,11 +242,13 @@ class Reconstruction {
     ColorState colors = progress_.colors;
     for (std::size_t s = first_stages_; s < sequence_stage(); ++s) {
       if (!fits_what_moves(s)) continue;
-      run_frame_stage({config_, clip_, losses_, s, nullptr}, {0, frame, progress_.covered, {}}, fitted, colors,
-                      [this](const IterationReport& report, const RenderCounters&) {
-                        show(report);
-                        stop_if_asked(clip_.frames());
-                      });
+      const StageResult found =
+          run_frame_stage({config_, clip_, losses_, s, nullptr}, {0, frame, progress_.covered, {}}, fitted, colors,
+                          [this](const IterationReport& report, const RenderCounters&) {
+                            show(report);
+                            stop_if_asked(clip_.frames());
+                          });
+      drop_what_is_left(s, found);
     }
     const DepthBias bias = depth_bias(clip_, frame, config_.data.mask_threshold, clip_.first, fitted);
     folder_.note("frame 0, fitted too: distances times " + depth_bias_text(clip_, bias) +
@@ -290,6 +292,7 @@ class Reconstruction {
     };
     const StageResult result =
         run_sequence_stage({config_, clip_, losses_, s, observer_.stages}, states, note_iteration);
+    drop_what_is_left(s, result);
     warn_of_terms_off(result.off, name, stage);
     warn_of_idle_terms(result.notes, name);
     folder_.note("all frames, " + stage_text(name, result, begin, clip_));
@@ -322,6 +325,7 @@ class Reconstruction {
     const SceneState before = state;
     const StageResult result =
         run_frame_stage({config_, clip_, losses_, s, observer_.stages}, frame, state, colors, note_iteration);
+    drop_what_is_left(s, result);
     if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;
     totals.rollbacks += result.rollbacks;
@@ -379,6 +383,11 @@ class Reconstruction {
     terms_.clear();
     for (const LossValue& term : report.terms) terms_.push_back({term.name, term.value});
     bar_.step_with("loss", report.loss, terms_);
+  }
+
+  /// A stage that ended before its last iteration leaves none to wait for.
+  void drop_what_is_left(std::size_t s, const StageResult& result) {
+    bar_.drop(config_.stages[s].second.iterations - result.iterations);
   }
 
   /// @param frame  the one at hand; that beyond the last: all are done

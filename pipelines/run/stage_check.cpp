@@ -9,6 +9,7 @@
 #include "pipelines/config/run_problems.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/input/color_state.h"
+#include "pipelines/run/frame_start.h"
 #include "pipelines/run/reconstruct_stage.h"
 #include "pipelines/run/run.h"
 #include "pipelines/sources/sources.h"

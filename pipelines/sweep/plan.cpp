@@ -314,8 +314,10 @@ class Planner {
 
   static void check_generated(const fs::path& base, const RunConfig& config) {
     const std::string name = base.generic_string();
-    if (config.synthetic.kind == SyntheticKind::kViews)
-      throw UserError(name + ": /synthetic/kind: \"views\" are for hsi4d avatar fit; a run needs a clip");
+    if (config.synthetic.kind != SyntheticKind::kClip)
+      throw UserError(name +
+                      ": /synthetic/kind: a run needs a clip; views are for hsi4d avatar fit, photos for hsi4d "
+                      "reconstruct");
     if (config.stages.empty()) throw UserError(name + ": /stages: a run needs at least one stage");
   }
 

@@ -111,13 +111,13 @@ std::vector<Camera> ring_of_cameras(Index count, int size_px) {
   return cameras;
 }
 
-Image picture_with_alpha(const Avatar& avatar, const BodyPose& pose, const Camera& camera, const RenderSettings& render,
+Image picture_with_alpha(const PosedGaussians& posed, const Camera& camera, const RenderSettings& render,
                          Precision precision, int supersample) {
   SceneView view;
   view.camera = resized(camera, camera.width * supersample, camera.height * supersample);
   view.settings = render;
   view.precision = precision;
-  const SceneImage large = render_scene(posed_avatar(avatar, pose), view);
+  const SceneImage large = render_scene(posed, view);
   Image planes(4, large.height, large.width);
   for (int y = 0; y < large.height; ++y) {
     for (int x = 0; x < large.width; ++x) {
@@ -137,6 +137,16 @@ Image picture_with_alpha(const Avatar& avatar, const BodyPose& pose, const Camer
     }
   }
   return small;
+}
+
+Image before_black(const Image& picture) {
+  Image color = take_channels(picture, 0, 3);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < color.height(); ++y) {
+      for (int x = 0; x < color.width(); ++x) color(c, y, x) *= picture(3, y, x);
+    }
+  }
+  return color;
 }
 
 void write_views(const SyntheticSettings& settings, const RenderSettings& render, const std::filesystem::path& folder,
@@ -159,7 +169,7 @@ void write_views(const SyntheticSettings& settings, const RenderSettings& render
     for (Index camera = 0; camera < settings.views_cameras; ++camera) {
       if (observer.wants_stop()) throw Interrupted("interrupted while views were made; nothing is left of them");
       const std::string name = "images/" + four_digits(static_cast<std::int64_t>(views.size())) + ".png";
-      write_image(out.file(name), picture_with_alpha(avatar, motion.poses[static_cast<std::size_t>(pose)],
+      write_image(out.file(name), picture_with_alpha(posed_avatar(avatar, motion.poses[static_cast<std::size_t>(pose)]),
                                                      cameras[static_cast<std::size_t>(camera)], render,
                                                      Precision::kFloat, settings.supersample));
       views.push_back({name, {}, camera, pose});

@@ -19,10 +19,13 @@ std::vector<BodyPose> view_poses(const BodyModel& body, Index count);
 /// fills most of the picture.
 std::vector<Camera> ring_of_cameras(Index count, int size_px);
 
-/// A posed avatar as a camera sees it: 4 channels, colours and alpha, not premultiplied.
+/// Gaussians as a camera sees them: 4 channels, colours and alpha, not premultiplied.
 /// @param supersample  rendered at this multiple of the size and reduced
-Image picture_with_alpha(const Avatar& avatar, const BodyPose& pose, const Camera& camera, const RenderSettings& render,
+Image picture_with_alpha(const PosedGaussians& posed, const Camera& camera, const RenderSettings& render,
                          Precision precision, int supersample);
+
+/// The colours of such a picture before black.
+Image before_black(const Image& picture);
 
 /// Writes views.json, motion.npz, cameras.json, the pictures and the avatar that they show (truth/avatar.safetensors):
 /// settings.views_cameras × settings.views_poses pictures. The same bytes for the same settings.

@@ -70,6 +70,20 @@ TEST_CASE("steps of an earlier process count as done, and not as speed") {
   CHECK(shown.back().rate == Approx(10).epsilon(0.01));
 }
 
+TEST_CASE("steps that are dropped are not waited for") {
+  now = 0;
+  std::vector<std::string> lines;
+  {
+    Progress progress(
+        "run", 1000, [&](const ProgressState& state) { lines.push_back(progress_line(state)); }, 1, fake_clock);
+    progress.step(900);
+    progress.drop(60);
+    now = 9;
+    progress.step(40);
+  }
+  CHECK(lines.back() == "run 940/940, 100%, 104 steps/s, took 9 s");
+}
+
 TEST_CASE("the rate follows a change of speed") {
   now = 0;
   std::vector<Shown> shown;

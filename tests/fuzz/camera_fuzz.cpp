@@ -21,14 +21,21 @@ std::vector<Bytes> corpus() {
       bytes_of(R"({"camera_model": "OPENCV", "w": 8, "h": 6, "fl_x": 7, "fl_y": 7, "cx": 4, "cy": 3, "k1": 0, "frames":
  [{"file_path": "a", "transform_matrix": [[1, 0, 0, 0], [0, 0, -1, -5], [0, 1, 0, 1], [0, 0, 0, 1]]},
   {"w": 9, "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]})"),
+      bytes_of(R"({"camera_angle_x": 0.7, "k1": 0.1, "frames":
+ [{"file_path": "a", "mask_path": "m", "transform_matrix": [[1, 0, 0, 0], [0, 0, -1, -5], [0, 1, 0, 1], [0, 0, 0, 1]]}]})"),
   };
 }
 
 bool accepts(std::span<const uint8_t> file) {
   return is_read([&] {
-    for (const Camera& camera : decode_cameras(std::string(file.begin(), file.end()), "fuzz.json"))
-      check_camera(camera, "an accepted camera");
-  });
+           for (const Camera& camera : decode_cameras(std::string(file.begin(), file.end()), "fuzz.json"))
+             check_camera(camera, "an accepted camera");
+         }) |
+         is_read([&] {  // both, always
+           for (const PictureCamera& one : decode_photo_cameras(std::string(file.begin(), file.end()), "fuzz.json")) {
+             if (one.angle_x == 0) check_camera(one.camera, "an accepted camera of a picture");
+           }
+         });
 }
 
 const Target target("camera", corpus, accepts);

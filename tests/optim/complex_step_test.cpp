@@ -322,6 +322,25 @@ TEST_CASE("loss terms of joints have the gradients of complex steps") {
       });
 }
 
+TEST_CASE("loss terms of Gaussians have the gradients of complex steps") {
+  const std::vector<OperatorInput> inputs = {{"gaussian_opacities", shape_of(7, 1), 0, 1},
+                                             {"gaussian_log_scales", shape_of(7, 3), -4, 0}};
+  const auto fill = [](Inputs& given, const Vars& in) {
+    given.gaussian_opacities = in[0];
+    given.gaussian_log_scales = in[1];
+  };
+  check_loss("gaussian_opacity", inputs, fill, [](const ComplexInputs& in) {
+    Complex sum = 0;
+    for (const Complex& opacity : in[0]) sum += opacity;
+    return sum / 7.0;
+  });
+  check_loss("gaussian_scale", inputs, fill, [](const ComplexInputs& in) {
+    Complex sum = 0;
+    for (const Complex& size : in[1]) sum += std::exp(size);
+    return sum / 21.0;
+  });
+}
+
 TEST_CASE("loss terms of poses have the gradients of complex steps") {
   std::vector<double> matrices;
   for (int j = 0; j < 21; ++j) {

@@ -51,7 +51,9 @@ std::vector<OperatorInput> all_inputs() {
           {"body_places", shape_of((kFrames - kStill) * kBodyRows, 3)},
           {"object_places", shape_of((kFrames - kStill) * 2 * kObjectRows, 3)},
           {"human_seen", kScalarShape, 0, 0, {1}},
-          {"object_seen", {kObjects, 1, 1, 1}, 0, 0, {1, 1, 0}}};
+          {"object_seen", {kObjects, 1, 1, 1}, 0, 0, {1, 1, 0}},
+          {"gaussian_opacities", shape_of(9, 1), 0, 1},
+          {"gaussian_log_scales", shape_of(9, 3), -4, 0}};
 }
 
 template <class S>
@@ -72,6 +74,8 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.joints_start = in[12];
   inputs.human_seen = in[15];
   inputs.object_seen = in[16];
+  inputs.gaussian_opacities = in[17];
+  inputs.gaussian_log_scales = in[18];
   inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;

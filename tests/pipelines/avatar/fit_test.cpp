@@ -323,7 +323,7 @@ TEST_CASE("an avatar of a real body, learnt from the reference's pictures, is ri
       PosedView& view = views[static_cast<std::size_t>(v)];
       view.image = "images/" + std::to_string(v) + ".png";
       write_image(folder / view.image.string(),
-                  picture_with_alpha(shown, motion.poses[static_cast<std::size_t>(view.frame)],
+                  picture_with_alpha(posed_avatar(shown, motion.poses[static_cast<std::size_t>(view.frame)]),
                                      cameras[static_cast<std::size_t>(view.camera)], video_render_settings(),
                                      Precision::kReference, 2));
     }

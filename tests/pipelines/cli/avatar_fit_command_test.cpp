@@ -97,7 +97,8 @@ TEST_CASE("configs of avatar fit are known to the other commands") {
         "--set gausians=3: /gausians: unknown key; did you mean \"gaussians\"?\n");
   CHECK_THAT(told({"schema", "avatar_fit"}), Contains("hsi4d avatar fit config"));
   CHECK_THAT(told({"schema"}), Contains("hsi4d run config"));
-  CHECK(told({"schema", "fit"}, 2) == "hsi4d schema: there are no configs of \"fit\"; known: run, avatar_fit, sweep\n");
+  CHECK(told({"schema", "fit"}, 2) ==
+        "hsi4d schema: there are no configs of \"fit\"; known: run, avatar_fit, reconstruct, sweep\n");
   CHECK_THAT(told({"list", "avatar_fit"}), Contains("/held_cameras"));
   const std::string other =
       "fit.json: is a config of `hsi4d avatar fit`, which learns an avatar from pictures: hsi4d avatar "

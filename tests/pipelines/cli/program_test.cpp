@@ -174,7 +174,7 @@ TEST_CASE("list tells losses and settings") {
   CHECK_THROWS_MATCHES(
       cli::list_command("loses", test_losses()), UserError,
       Catch::Matchers::Message("hsi4d list: there is nothing called \"loses\" to list; known: losses, stages, scenes, "
-                               "settings, avatar_fit; did you mean \"losses\"?"));
+                               "settings, avatar_fit, reconstruct; did you mean \"losses\"?"));
   const std::string stages = cli::list_command("stages", test_losses());
   CHECK_THAT(stages, Contains("\nframe        scene  camera           Six numbers of the camera") &&
                          Contains("\nframe        all    body_pose        21 joints of the body\n"));

@@ -544,10 +544,12 @@ TEST_CASE("every shipped config has a test") {
     if (entry.is_regular_file() && place.has_parent_path()) files.insert(place.generic_string());
   }
   // Those at the top, of ablations/, anyinteraction/, bench/, synthetic/ and synthetic/clips/ are looked for by the
-  // tests above, those of sources/ by sources_test.cpp, and each of synthetic/ by synthetic_test.cpp too.
+  // tests above, those of sources/ by sources_test.cpp, those of reconstruct/ by scan_test.cpp, and each of synthetic/
+  // by synthetic_test.cpp too.
   std::erase_if(files, [](const std::string& file) {
     return file.starts_with("synthetic/") || file.starts_with("bench/") || file.starts_with("anyinteraction/") ||
-           file.starts_with("ablations/") || file.starts_with("sweeps/") ||  // sweep_configs_test.cpp
+           file.starts_with("ablations/") || file.starts_with("reconstruct/") ||
+           file.starts_with("sweeps/") ||  // sweep_configs_test.cpp
            (file.starts_with("sources/") && file.ends_with(".json"));
   });
   CHECK(files == std::set<std::string>{"avatar/fit.json", "avatar/views.json",  // avatar_fit_test.cpp

@@ -1,0 +1,34 @@
+// Where Gaussians are, and how many: the scheme of "3D Gaussian splatting as Markov chain Monte Carlo" [Kheradmand et
+// al. 2024]. Nothing is cut away; what has become faint goes to where something is seen, and shares its place.
+#pragma once
+
+#include "pipelines/scan/settings.h"
+#include "pipelines/scan/state.h"
+
+namespace hsi4d {
+
+/// What one change of the density did.
+struct DensityChange {
+  Index moved = 0;  ///< faint Gaussians that share another's place now
+  Index added = 0;
+};
+
+/// Moves Gaussians of at most settings.least_opacity to others, and adds settings.growth − 1 of all, up to
+/// settings.most. Whom they join is drawn by opacity; those at one place share its opacity and size (splat/density.h),
+/// so that the image hardly changes. They begin with no moments. A function of the arguments alone.
+///
+/// @param seed  and state.iteration: of the draws
+DensityChange change_density(const DensitySettings& settings, std::int64_t seed, ScanState& state);
+
+/// Whether the density changes after an iteration, counted from 0.
+bool changes_density_after(const DensitySettings& settings, Index iteration);
+
+/// How far places tremble: N(0, Σ²) · noise · rate · σ(100 (0.005 − o)), so that what is faint looks around and what is
+/// seen stands still [eq. 11 of the paper, in its code's form].
+///
+/// @param means  [N,3] rows that are moved
+/// @param rate   of the means in this iteration
+void add_noise(const DensitySettings& settings, std::int64_t seed, Index iteration, double rate,
+               const Gaussians& shapes, float* means);
+
+}  // namespace hsi4d

@@ -1,0 +1,144 @@
+#include "pipelines/scan/scan.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include <Eigen/Geometry>
+
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "core/log.h"
+#include "core/memory.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
+#include "core/text.h"
+#include "pipelines/scan/report.h"
+#include "pipelines/scan/start.h"
+#include "splat/files/splat_file.h"
+
+namespace hsi4d {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kConfig = "config.json";
+constexpr const char* kCheckpoint = "checkpoint.npz";
+constexpr const char* kSummary = "summary.json";
+
+std::vector<Photo> read_photos(const PosedImages& set, const PhotoRules& rules) {
+  std::vector<Photo> photos(set.images.size());
+  parallel_for(std::ssize(photos), 1, [&](Index begin, Index end) {
+    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i)
+      photos[i] = read_photo(set.images[i], rules);
+  });
+  return photos;
+}
+
+std::vector<Camera> cameras_of(const std::vector<Photo>& photos) {
+  std::vector<Camera> cameras;
+  for (const Photo& photo : photos) cameras.push_back(photo.camera);
+  return cameras;
+}
+
+/// Pictures from nearly one place and direction say nothing of depth.
+void warn_of_one_side(const std::vector<Photo>& photos, const PosedImages& set) {
+  constexpr double kLeastAngle = 5;  // degrees between two lines of sight to what is looked at
+  const std::vector<Camera> cameras = cameras_of(photos);
+  const Vector3<double> target = looked_at(cameras);
+  double widest = 0;
+  const Vector3<double> first = camera_center_world(cameras.front()) - target;
+  for (const Camera& camera : cameras) {
+    const Vector3<double> other = camera_center_world(camera) - target;
+    widest = std::max(widest, std::atan2(first.cross(other).norm(), first.dot(other)));
+  }
+  const double degrees = widest * 180 / std::numbers::pi;
+  if (degrees < kLeastAngle)
+    log_warning(set.file.string() + ": all pictures are taken from one side, within " + rounded(degrees, 2) +
+                " degrees: depths will be guessed, and other sides stay empty");
+}
+
+/// Makes the folder, or says why not.
+void begin_folder(const ScanSettings& settings, const fs::path& folder, bool resume, const std::string& config) {
+  const fs::path file = folder / kConfig;
+  if (resume) {
+    if (!fs::exists(file))
+      throw UserError(folder.string() + ": there is nothing to go on with; without --resume it is begun");
+    if (read_text_file(file.string()) != config)
+      throw UserError(file.string() + ": was begun with other settings than those of " + settings.file.string() +
+                      "; go on with the same, or begin in another folder");
+    if (fs::exists(folder / kSummary)) throw UserError(folder.string() + ": is done; nothing is left to go on with");
+    return;
+  }
+  if (fs::exists(folder) && (!fs::is_directory(folder) || !fs::is_empty(folder)))
+    throw UserError(folder.string() + ": is not empty; --out names a new or empty folder, or --resume goes on with it");
+  write_text_file(file.string(), config);
+}
+
+ScanState first_state(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos) {
+  ScanState state;
+  state.gaussians = first_gaussians(settings, set, photos);
+  return state;
+}
+
+ScanSummary write_result(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos,
+                         const ScanState& state, const fs::path& folder, double seconds) {
+  ScanSummary summary;
+  summary.name = fs::weakly_canonical(folder).filename().string();
+  summary.gaussians = state.gaussians.count();
+  summary.iterations = state.iteration;
+  summary.width = photos.front().camera.width;
+  summary.height = photos.front().camera.height;
+  summary.seconds = seconds;
+  summary.curve = state.curve;
+  for (const PosedImage& image : set.images) summary.names.push_back(image.name);
+  write_splats(scan_result(settings, folder).string(), state.gaussians);
+  write_cameras((folder / "cameras.json").string(), cameras_of(photos));
+  const Vector3<double> background(settings.background.data());
+  summary.pictures = score_scan(settings, photos, state.gaussians, [&](const ScanPicture& picture, const Image& image) {
+    if (!picture.held) return;
+    const std::string& name = summary.names[picture.photo];
+    write_image((folder / "views" / view_file(name)).string(), image);
+    write_image((folder / "views" / photo_file(name)).string(), before_color(photos[picture.photo], background));
+  });
+  summary.learnt = mean_score(summary.pictures, false);
+  summary.held = mean_score(summary.pictures, true);
+  write_text_file((folder / "report.html").string(), scan_report_page(summary));
+  write_text_file((folder / kSummary).string(), scan_summary_json(summary));
+  return summary;
+}
+
+}  // namespace
+
+fs::path scan_result(const ScanSettings& settings, const fs::path& folder) {
+  return folder / (settings.kind == ScanKind::kScene ? "scene.ply" : "object.ply");
+}
+
+ScanSummary run_scan(const ScanSettings& settings, const fs::path& folder, bool resume, std::span<const LossTerm> terms,
+                     const Observer& observer) {
+  const std::vector<LossTerm> all(terms.begin(), terms.end());
+  const std::string config = resolved_scan(settings, descriptions_of(all));
+  const PosedImages set = read_posed_images(settings.photos.path, settings.photos.pictures);
+  const std::vector<Photo> photos = read_photos(set, settings.photos.rules);
+  warn_of_one_side(photos, set);
+  begin_folder(settings, folder, resume, config);
+  const std::string checkpoint = (folder / kCheckpoint).string();
+  ScanState state =
+      resume && fs::exists(checkpoint) ? load_scan_state(checkpoint, config) : first_state(settings, set, photos);
+  const auto begin = std::chrono::steady_clock::now();
+  const ScanWatch watch{observer, [&](const ScanState& now) { save_scan_state(checkpoint, now, config); }};
+  fit_scan(settings, photos, extent_of(cameras_of(photos)), terms, watch, state);
+  if (state.refused > 0)
+    log_warning(std::to_string(state.refused) +
+                " rows of gradients were no numbers, or too large; these Gaussians stood still then");
+  ScanSummary summary = write_result(settings, set, photos, state, folder, seconds_since(begin));
+  fs::remove(checkpoint);
+  return summary;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,68 @@
+#include "pipelines/scan/state.h"
+
+#include "core/check.h"
+#include "optim/checkpoint.h"
+#include "pipelines/scan/settings.h"
+
+namespace hsi4d {
+
+namespace {
+
+std::string moments_name(std::size_t group, const char* what) { return scan_groups()[group] + "." + what; }
+
+}  // namespace
+
+std::array<Index, kScanGroups> ScanState::columns() const { return {3, 4, 3, 1, 3 * gaussians.sh_coefficients()}; }
+
+void save_scan_state(const std::string& file, const ScanState& state, const std::string& identity) {
+  Checkpoint checkpoint;
+  const Gaussians& g = state.gaussians;
+  checkpoint.set("state", std::vector<std::int64_t>{state.iteration, state.refused, g.sh_degree});
+  checkpoint.set("curve", state.curve);
+  checkpoint.set("curve_sum", std::vector<double>{state.curve_sum});
+  checkpoint.set("origin", std::vector<double>(g.origin_world.data(), g.origin_world.data() + 3));
+  checkpoint.set("means", g.means);
+  checkpoint.set("quats", g.quats);
+  checkpoint.set("log_scales", g.log_scales);
+  checkpoint.set("opacity_logits", g.opacity_logits);
+  checkpoint.set("sh", g.sh);
+  for (std::size_t i = 0; i < kScanGroups; ++i) {
+    const RowMoments<float>& moments = state.moments[i];
+    checkpoint.set(moments_name(i, "mean"), moments.mean);
+    checkpoint.set(moments_name(i, "square"), moments.square);
+    checkpoint.set(moments_name(i, "steps"), std::vector<std::int64_t>(moments.steps.begin(), moments.steps.end()));
+  }
+  checkpoint.save(file, text_hash(identity));
+}
+
+ScanState load_scan_state(const std::string& file, const std::string& identity) {
+  const Checkpoint checkpoint = load_checkpoint(file, text_hash(identity));
+  ScanState state;
+  const std::vector<std::int64_t>& numbers = checkpoint.integers("state");
+  const std::vector<double>&origin = checkpoint.doubles("origin"), &sum = checkpoint.doubles("curve_sum");
+  if (numbers.size() != 3 || origin.size() != 3 || sum.size() != 1)
+    throw DataError(file + ": is no checkpoint of a reconstruction");
+  state.iteration = numbers[0];
+  state.refused = numbers[1];
+  state.curve = checkpoint.doubles("curve");
+  state.curve_sum = sum[0];
+  Gaussians& g = state.gaussians;
+  g.sh_degree = static_cast<int>(numbers[2]);
+  g.origin_world = Vector3<double>(origin.data());
+  g.means = checkpoint.floats("means");
+  g.quats = checkpoint.floats("quats");
+  g.log_scales = checkpoint.floats("log_scales");
+  g.opacity_logits = checkpoint.floats("opacity_logits");
+  g.sh = checkpoint.floats("sh");
+  for (std::size_t i = 0; i < kScanGroups; ++i) {
+    RowMoments<float>& moments = state.moments[i];
+    moments.mean = checkpoint.floats(moments_name(i, "mean"));
+    moments.square = checkpoint.floats(moments_name(i, "square"));
+    const std::vector<std::int64_t>& steps = checkpoint.integers(moments_name(i, "steps"));
+    moments.steps.assign(steps.begin(), steps.end());
+  }
+  check_sizes(g);
+  return state;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,287 @@
+#include "pipelines/scan/scan.h"
+
+#include <filesystem>
+#include <map>
+
+#include <catch2/catch.hpp>
+
+#include "core/check.h"
+#include "core/file.h"
+#include "core/parallel.h"
+#include "pipelines/config/run_config.h"
+#include "pipelines/scan/density.h"
+#include "pipelines/scan/report.h"
+#include "pipelines/scan/start.h"
+#include "pipelines/synthetic/dataset.h"
+#include "pipelines/synthetic/photos.h"
+#include "splat/files/splat_file.h"
+#include "stress/scratch_folder.h"
+
+namespace scan_test {
+
+using namespace hsi4d;
+
+namespace fs = std::filesystem;
+
+namespace {
+
+ScratchFolder& scratch() {
+  static ScratchFolder folder;
+  return folder;
+}
+
+/// Pictures of a watering can, made once for all tests.
+const fs::path& made_photos() {
+  static const fs::path file = [] {
+    SyntheticSettings settings;
+    settings.kind = SyntheticKind::kPhotos;
+    settings.photos_of = SyntheticSubject::kObject;
+    settings.photos = 12;
+    settings.size_px = 64;
+    write_photos(settings, video_render_settings(), fs::path(scratch().path()) / "photos");
+    return fs::path(scratch().path()) / "photos" / "transforms.json";
+  }();
+  return file;
+}
+
+ScanSettings quick_scan(int iterations) {
+  const std::vector<LossDescription> losses = descriptions_of(loss_terms());
+  ScanSettings settings;
+  settings.kind = ScanKind::kObject;
+  settings.photos.path = made_photos();
+  settings.photos.hold_every = 6;
+  settings.start.count = 600;
+  settings.density.most = 800;
+  settings.density.from = 20;
+  settings.density.every = 20;
+  settings.sh_degree = 1;
+  settings.sh_every = 50;
+  settings.save_every = 40;
+  settings.random_background = true;
+  settings.stage.iterations = iterations;
+  for (const auto& [name, lr] :
+       {std::pair{"means", 5e-4}, {"quats", 1e-3}, {"log_scales", 5e-3}, {"opacity_logits", 5e-2}, {"sh", 1e-2}}) {
+    ParameterGroupSettings group;
+    group.lr = lr;
+    settings.stage.optimize.emplace_back(name, group);
+  }
+  for (const LossDescription& loss : losses) {
+    if (loss.name == "photometric") settings.stage.losses.emplace_back(loss.name, default_settings(loss));
+  }
+  return settings;
+}
+
+std::string bytes_of(const ScanSettings& settings, const fs::path& folder) {
+  return read_text_file(scan_result(settings, folder).string());
+}
+
+fs::path folder_named(const char* name) { return fs::path(scratch().path()) / name; }
+
+/// Wants to stop after so many questions.
+struct Impatient {
+  int left;
+  Observer observer() {
+    Observer result;
+    result.stop_requested = [this] { return --left < 0; };
+    return result;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("an object is made from pictures with depths, and shown from where nobody stood") {
+  const ScanSettings settings = quick_scan(300);
+  const ScanSummary summary = run_scan(settings, folder_named("object"), false, loss_terms());
+  CHECK(summary.held.pictures == 2);
+  CHECK(summary.learnt.pictures == 10);
+  CHECK(summary.held.psnr_db > 24);
+  CHECK(summary.learnt.psnr_db > 27);
+  CHECK(summary.curve.size() == 3);
+  CHECK(summary.curve.back() > summary.curve.front() + 3);
+  CHECK(summary.gaussians == 800);
+  const Gaussians made = read_splats((folder_named("object") / "object.ply").string()).gaussians;
+  CHECK(made.count() == 800);
+  CHECK(made.sh_degree == 1);
+  for (const char* file : {"summary.json", "report.html", "cameras.json", "config.json", "views/images_0000.png"})
+    CHECK(fs::exists(folder_named("object") / file));
+  CHECK_FALSE(fs::exists(folder_named("object") / "checkpoint.npz"));
+}
+
+TEST_CASE("a reconstruction has the same bits on any number of threads", "[parallel]") {
+  const ScanSettings settings = quick_scan(60);
+  std::vector<std::string> results;
+  for (const int threads : {1, 2, 3}) {
+    const fs::path folder = folder_named(("threads" + std::to_string(threads)).c_str());
+    with_threads(threads, [&] { run_scan(settings, folder, false, loss_terms()); });
+    results.push_back(bytes_of(settings, folder));
+  }
+  CHECK(results[1] == results[0]);
+  CHECK(results[2] == results[0]);
+}
+
+TEST_CASE("a reconstruction that was stopped anywhere and resumed has the bits of one that was not") {
+  const ScanSettings settings = quick_scan(90);
+  run_scan(settings, folder_named("whole"), false, loss_terms());
+  const std::string whole = bytes_of(settings, folder_named("whole"));
+  for (const int after : {3, 25, 55, 70}) {
+    const fs::path folder = folder_named(("stopped" + std::to_string(after)).c_str());
+    Impatient impatient{after};
+    CHECK_THROWS_AS(run_scan(settings, folder, false, loss_terms(), impatient.observer()), Interrupted);
+    run_scan(settings, folder, true, loss_terms());
+    CHECK(bytes_of(settings, folder) == whole);
+  }
+}
+
+TEST_CASE("a reconstruction goes on only with what it was begun with") {
+  const ScanSettings settings = quick_scan(5);
+  const fs::path folder = folder_named("again");
+  CHECK_THROWS_AS(run_scan(settings, folder, true, loss_terms()), UserError);
+  run_scan(settings, folder, false, loss_terms());
+  CHECK_THROWS_AS(run_scan(settings, folder, false, loss_terms()), UserError);
+  CHECK_THROWS_WITH(run_scan(settings, folder, true, loss_terms()), Catch::Matchers::Contains("is done"));
+  CHECK_THROWS_WITH(run_scan(quick_scan(6), folder, true, loss_terms()), Catch::Matchers::Contains("other settings"));
+}
+
+TEST_CASE("every shipped config of reconstruct is read, and those that make pictures make them") {
+  const fs::path configs = fs::path(HSI4D_SOURCE_DIR) / "configs" / "reconstruct";
+  const std::vector<LossDescription> losses = descriptions_of(loss_terms());
+  int scans = 0, datasets = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(configs)) {
+    INFO(entry.path().string());
+    if (entry.path().filename().string().starts_with("photos")) {
+      const RunConfig made = load_run_config(entry.path(),
+                                             {"synthetic.size_px=32", "synthetic.photos=3",
+                                              "synthetic.scene_gaussians=3000", "synthetic.object_gaussians=300"},
+                                             losses);
+      const fs::path folder = folder_named(("made" + std::to_string(datasets++)).c_str());
+      write_photos(made.synthetic, video_render_settings(), folder);
+      CHECK(read_posed_images(folder).images.size() > 1);
+    } else {
+      const ScanSettings scan = load_scan(
+          entry.path(), {"photos.path=" + made_photos().string(), "stage.iterations=3", "start.count=100"}, losses);
+      const fs::path folder = folder_named(("shipped" + std::to_string(scans++)).c_str());
+      CHECK(run_scan(scan, folder, false, loss_terms()).iterations == 3);
+    }
+  }
+  CHECK(scans == 2);
+  CHECK(datasets == 2);
+}
+
+TEST_CASE("a config of reconstruct that makes no sense is refused") {
+  const std::vector<LossDescription> losses = descriptions_of(loss_terms());
+  const auto refusal = [&](const std::string& text) -> std::string {
+    const fs::path file = folder_named("refused.json");
+    write_text_file(file.string(), text);
+    try {
+      load_scan(file, {}, losses);
+    } catch (const UserError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  using Catch::Matchers::Contains;
+  const std::string photos = R"("photos": {"path": ")" + made_photos().string() + "\"}";
+  const auto stage = [&](const std::string& text) { return refusal("{" + photos + R"(, "stage": )" + text + "}"); };
+  CHECK_THAT(refusal(R"({"density": {}, "stage": {"iterations": 1, "optimize": {"sh": {"lr": 1}}}})"),
+             Contains("/photos/path: not given"));
+  CHECK_THAT(refusal(R"({"data": {}})"), Contains("is no config of `hsi4d reconstruct`"));
+  CHECK_THAT(stage(R"({"iterations": 1, "optimize": {"body_pose": {"lr": 1}}})"),
+             Contains("there is no parameter group"));
+  CHECK_THAT(stage(R"({"iterations": 1, "optimize": {"sh": {"lr": 1}}, "draw": "scene"})"), Contains("/stage/draw"));
+  CHECK_THAT(stage(R"({"iterations": 1, "optimize": {"sh": {"lr": 1}}, "losses": {"mask": {}}})"),
+             Contains("/stage/losses/mask"));
+  CHECK_THAT(stage(R"({"iterations": 1, "optimize": {"sh": {"lr": 1}}, "optimizer": {"kind": "bfgs"}})"),
+             Contains("/stage/optimizer/kind"));
+}
+
+TEST_CASE("places of depths are on what was seen") {
+  const PosedImages set = read_posed_images(made_photos());
+  std::vector<Photo> photos;
+  for (const PosedImage& image : set.images) photos.push_back(read_photo(image, {}));
+  ScanStart start;
+  start.count = 500;
+  const std::vector<ColoredPoint> points = points_of_depths(start, photos);
+  REQUIRE(points.size() > 200);
+  CHECK(points.size() <= 500);
+  const Gaussians truth = read_splats((made_photos().parent_path() / "truth" / "object.ply").string()).gaussians;
+  Index far = 0;
+  for (const ColoredPoint& point : points) {
+    double nearest = 1e9;
+    for (Index i = 0; i < truth.count(); ++i) {
+      const Vector3<double> place = Vector3<float>(truth.means.data() + 3 * i).cast<double>() + truth.origin_world;
+      nearest = std::min(nearest, (place - point.place).norm());
+    }
+    if (nearest > 0.03) ++far;
+  }
+  CHECK(far < std::ssize(points) / 20);  // where a pixel shows an edge, its depth lies between two surfaces
+}
+
+TEST_CASE("a start from points, from random places and without any") {
+  ScanSettings settings = quick_scan(5);
+  const PosedImages set = read_posed_images(made_photos());
+  std::vector<Photo> photos;
+  for (const PosedImage& image : set.images) photos.push_back(read_photo(image, {}));
+  settings.start.from = ScanStartKind::kPoints;
+  CHECK_THROWS_WITH(first_gaussians(settings, set, photos), Catch::Matchers::Contains("no point to begin with"));
+  const fs::path cloud = folder_named("cloud.ply");
+  write_text_file(cloud.string(),
+                  "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+                  "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+                  "0 0 0 255 0 51\n1 0 0 0 0 0\n0 1 0 0 0 0\n0 0 1 0 0 0\n");
+  settings.start.points = cloud;
+  const Gaussians at_points = first_gaussians(settings, set, photos);
+  CHECK(at_points.count() == 4);
+  CHECK(at_points.sh[0] == Approx(0.5 / 0.28209479177387814));
+  CHECK(std::exp(at_points.log_scales[0]) == Approx(1));  // three neighbours at distance 1
+  settings.start.from = ScanStartKind::kRandom;
+  settings.start.box = {1, 2, 3, 2, 3, 4};
+  const Gaussians random = first_gaussians(settings, set, photos);
+  CHECK(random.count() == settings.start.count);
+  for (Index i = 0; i < random.count(); ++i) {
+    for (Index k = 0; k < 3; ++k) {
+      const double x = random.means[static_cast<std::size_t>(3 * i + k)] + random.origin_world[k];
+      CHECK((x > static_cast<double>(k) + 1 - 1e-5 && x < static_cast<double>(k) + 2 + 1e-5));
+    }
+  }
+}
+
+TEST_CASE("faint Gaussians share places of others, and the number grows to its bound") {
+  ScanState state;
+  ColoredPoint point;
+  std::vector<ColoredPoint> points;
+  for (int i = 0; i < 100; ++i) {
+    point.place = Vector3<double>(i, 0, 0);
+    points.push_back(point);
+  }
+  state.gaussians = gaussians_at(points, {}, 0, Vector3<double>::Zero());
+  for (std::size_t i = 0; i < 30; ++i) state.gaussians.opacity_logits[i] = -10;
+  const auto columns = state.columns();
+  for (std::size_t g = 0; g < kScanGroups; ++g) {
+    state.moments[g].resize(100, columns[g]);
+    std::fill(state.moments[g].mean.begin(), state.moments[g].mean.end(), 1.0F);
+    std::fill(state.moments[g].steps.begin(), state.moments[g].steps.end(), 7);
+  }
+  DensitySettings settings;
+  settings.most = 103;
+  const DensityChange change = change_density(settings, 1, state);
+  CHECK(change.moved == 30);
+  CHECK(change.added == 3);
+  CHECK(state.gaussians.count() == 103);
+  check_sizes(state.gaussians);
+  // Nobody is faint any more, all are where a seen one was, and those that share a place have shared its opacity.
+  std::map<float, std::vector<std::size_t>> at;
+  for (std::size_t i = 0; i < 103; ++i) at[state.gaussians.means[3 * i]].push_back(i);
+  CHECK(at.size() == 70);
+  for (const auto& [x, rows] : at) {
+    CHECK(x >= 30);
+    double transmitted = 1;
+    for (const std::size_t row : rows) {
+      const double o = 1 / (1 + std::exp(-static_cast<double>(state.gaussians.opacity_logits[row])));
+      transmitted *= 1 - o;
+      CHECK((rows.size() == 1 ? state.moments[0].steps[row] == 7 : state.moments[0].steps[row] == 0));
+    }
+    CHECK(transmitted == Approx(0.5).epsilon(1e-5));
+  }
+}
+
+}  // namespace scan_test
