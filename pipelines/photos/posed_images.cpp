@@ -53,12 +53,25 @@ struct Source {
 
 fs::path folder_if_there(const fs::path& folder) { return fs::is_directory(folder) ? folder : fs::path(); }
 
-/// Gives every image the files of its name. Returns what is wrong.
-std::vector<std::string> look_for_files(const Source& source, std::vector<PosedImage>& images) {
-  std::vector<std::string> no_picture, no_mask, no_depth, problems;
+/// Gives every image its picture. Cameras without one are left out, which the log tells.
+void look_for_pictures(const Source& source, std::vector<PosedImage>& images) {
+  std::vector<std::string> missing;
   for (PosedImage& image : images) {
     image.image = picture_at(source.pictures / image.name);
-    if (image.image.empty()) no_picture.push_back(image.name);
+    if (image.image.empty()) missing.push_back(image.name);
+  }
+  if (missing.empty()) return;
+  const std::string text = source.file.string() + ": " + std::to_string(missing.size()) + " of " +
+                           std::to_string(images.size()) + " cameras have no picture in " + source.pictures.string();
+  if (missing.size() == images.size()) throw UserError(text + ": " + few_names(missing));
+  log_warning(text + " and are left out: " + few_names(missing));
+  std::erase_if(images, [](const PosedImage& image) { return image.image.empty(); });
+}
+
+/// Gives every image the mask and the depths of its name. Returns what is wrong.
+std::vector<std::string> look_for_files(const Source& source, std::vector<PosedImage>& images) {
+  std::vector<std::string> no_mask, no_depth, problems;
+  for (PosedImage& image : images) {
     if (!source.masks.empty() && image.mask.empty()) {
       image.mask = beside_picture(source.masks, image.name);
       if (image.mask.empty()) no_mask.push_back(image.name);
@@ -71,10 +84,9 @@ std::vector<std::string> look_for_files(const Source& source, std::vector<PosedI
   const auto add = [&](const std::vector<std::string>& names, const std::string& what, const fs::path& folder) {
     if (names.empty()) return;
     problems.push_back(source.file.string() + ": " + std::to_string(names.size()) + " of " +
-                       std::to_string(images.size()) + " cameras have no " + what + " in " + folder.string() + ": " +
+                       std::to_string(images.size()) + " pictures have no " + what + " in " + folder.string() + ": " +
                        few_names(names));
   };
-  add(no_picture, "picture", source.pictures);
   add(no_mask, "mask", source.masks);
   add(no_depth, "depth", source.depths);
   return problems;
@@ -131,6 +143,7 @@ void tell_left_out(const Source& source, const std::vector<PosedImage>& images) 
 
 PosedImages checked(const Source& source, PosedImages set) {
   if (set.images.empty()) throw UserError(source.file.string() + ": holds no camera of a picture");
+  look_for_pictures(source, set.images);
   std::vector<std::string> problems = named_twice(source.file, set.images);
   for (const auto& more : {look_for_named(source.file, set.images), look_for_files(source, set.images)})
     problems.insert(problems.end(), more.begin(), more.end());

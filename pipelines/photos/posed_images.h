@@ -45,14 +45,14 @@ struct PosedImages {
   std::vector<ColoredPoint> points;  ///< none where the file has none
 };
 
-/// Reads cameras and looks for their pictures, whose headers alone are read. What is left out is told in the log:
-/// pictures without a camera.
+/// Reads cameras and looks for their pictures. What is left out is told in the log: pictures without a camera, cameras
+/// without a picture.
 ///
 /// @param path      a folder, or one of the files above
 /// @param pictures  the folder of the pictures, where it is not beside the cameras; empty: where the file says
-/// Throws UserError naming file and place, all problems at once: nothing that is read, cameras without a picture,
-/// lenses that cannot be straightened, sizes that differ from the camera's, two cameras of one picture; DataError for
-/// damaged files.
+/// Throws UserError naming file and place, all problems at once: nothing that is read, no picture of any camera,
+/// masks or depths of some pictures alone, lenses that cannot be straightened, two cameras of one picture; DataError
+/// for damaged files.
 PosedImages read_posed_images(const std::filesystem::path& path, const std::filesystem::path& pictures = {});
 
 /// A picture in memory, straightened.

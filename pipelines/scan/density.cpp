@@ -150,14 +150,15 @@ void add_noise(const DensitySettings& settings, std::int64_t seed, Index iterati
                const Gaussians& shapes, float* means) {
   if (settings.method != DensityMethod::kMcmc || settings.noise == 0) return;
   constexpr double kSteepness = 100, kFaint = 0.005;
-  constexpr double kStill = 1e-5;  // shares of noise below: none
+  constexpr double kStill = 1e-5;                                                // shares of noise below: none
+  const float still = logit_of(kFaint + std::log(1 / kStill - 1) / kSteepness);  // what is as opaque stands still
   const double scale = settings.noise * rate;
   const Random random = random_of(seed, "scan.noise", iteration);
   parallel_for(shapes.count(), 4096, [&](Index begin, Index end) {
     for (Index row = begin; row < end; ++row) {
       const auto at = static_cast<std::size_t>(row);
+      if (!(shapes.opacity_logits[at] < still)) continue;
       const double share = 1 / (1 + std::exp(kSteepness * (opacity_of(shapes.opacity_logits[at]) - kFaint)));
-      if (!(share > kStill)) continue;
       const auto [first, second] = random.normal_pair(2 * at);
       const Vector3<double> normal(first, second, random.normal(2 * at + 1));
       const Matrix3<double> axes =

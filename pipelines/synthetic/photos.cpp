@@ -50,7 +50,8 @@ Subject object_of(const SyntheticSettings& settings) {
 
 Subject scene_of(const SyntheticSettings& settings) {
   Subject subject;
-  subject.gaussians = synthetic_scene(settings, ScenePlan{});
+  subject.gaussians = settings.scene_file.empty() ? synthetic_scene(settings, ScenePlan{})
+                                                  : read_splats(settings.scene_file.string()).gaussians;
   subject.cameras = cameras_in_scene(settings.photos, settings.size_px, static_cast<std::uint64_t>(settings.seed));
   return subject;
 }

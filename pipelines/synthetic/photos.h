@@ -22,9 +22,10 @@ std::vector<Camera> cameras_in_scene(Index count, int size_px, std::uint64_t see
 /// Whether a picture is worth taking: the camera is in nothing, and most of what it sees is there.
 bool is_good_view(const SceneImage& picture);
 
-/// Writes transforms.json (OpenGL axes, as nerfstudio's), images/, depths/ (EXR, metres) and what they show
-/// (truth/scene.ply or truth/object.ply): at most settings.photos pictures, of an object with alpha. Views that
-/// is_good_view refuses are left out. The same bytes for the same settings.
+/// Writes pictures of the scene or the object of the settings; a scene_file is taken as it is. Writes transforms.json
+/// (OpenGL axes, as nerfstudio's), images/, depths/ (EXR, metres) and what they show (truth/scene.ply or
+/// truth/object.ply): at most settings.photos pictures, of an object with alpha. Views that is_good_view refuses are
+/// left out. The same bytes for the same settings.
 ///
 /// @param folder  new or empty; it appears when everything in it is complete
 /// Throws as write_dataset.
