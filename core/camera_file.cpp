@@ -14,6 +14,7 @@
 #include "core/config_parse.h"
 #include "core/file.h"
 #include "core/image.h"
+#include "core/log.h"
 
 namespace hsi4d {
 namespace {
@@ -231,7 +232,7 @@ struct NerfCamera {
   Camera camera;
   Model model = Model::kPinhole;
   std::array<double, kDistortions.size()> distortion{};
-  double angle_x = 0;
+  double angle_x = 0, angle_y = 0;
   Numbers16 transform_matrix{};
 };
 
@@ -247,6 +248,7 @@ void describe_intrinsics(ConfigFields& f, NerfCamera& s) {
   for (std::size_t i = 0; i < kDistortions.size(); ++i)
     f.number(kDistortions[i], s.distortion[i], {}, "Lens distortion; only 0 can be read");
   f.number("camera_angle_x", s.angle_x, {}, "Horizontal field of view, radians");
+  f.number("camera_angle_y", s.angle_y, {}, "Vertical field of view, radians");
 }
 
 /// Reads the members that are described, and passes over all others.
@@ -385,12 +387,13 @@ std::string read_path(const ConfigValue& frame, const char* key, const std::stri
   return "";
 }
 
-/// As camera_of, of an entry whose intrinsics the picture's size will give.
-Camera pose_alone(NerfCamera read, const std::string& pointer) {
-  read.camera.width = read.camera.height = 1;
-  read.camera.fx = read.camera.fy = 1;
-  Camera camera;
-  camera.camera_from_world = camera_of(read, pointer).camera_from_world;
+/// As camera_of, of an entry whose intrinsics the picture's size will complete.
+Camera incomplete_camera(const NerfCamera& read, const std::string& pointer) {
+  NerfCamera whole = read;
+  whole.camera.width = whole.camera.height = 1;
+  whole.camera.fx = whole.camera.fy = 1;
+  Camera camera = read.camera;
+  camera.camera_from_world = camera_of(whole, pointer).camera_from_world;
   return camera;
 }
 
@@ -414,11 +417,26 @@ void read_frame(const ConfigValue& top, const NerfCamera& globals, Lenses lenses
   result.mask = read_path(frame, "mask_path", pointer, problems);
   result.depth = read_path(frame, "depth_file_path", pointer, problems);
   result.lens = lens_of(read);
-  result.angle_x = has_angle ? read.angle_x : 0;
+  if (has_angle) {
+    result.angle_x = read.angle_x;
+    result.angle_y = read.angle_y;
+  }
   add_failure(frame, problems, [&] {
-    result.camera = has_angle ? pose_alone(read, pointer) : camera_of(read, pointer);
+    result.camera = has_angle ? incomplete_camera(read, pointer) : camera_of(read, pointer);
     cameras.push_back(result);
   });
+}
+
+/// What readers of pictures could want and does not come along.
+void tell_of_unread(const ConfigValue& tree, const ConfigValue& frames) {
+  const std::string name = tree.origin.source == nullptr ? "" : tree.origin.source->name + ": ";
+  if (find_member(tree, "ply_file_path") != nullptr)
+    log_warning(name + "the points of \"ply_file_path\" are not read here; /start/points names such a file");
+  for (const ConfigValue& frame : frames.items) {
+    if (find_member(frame, "depth_path") == nullptr) continue;
+    log_warning(name + "depths of \"depth_path\" are not read; allowed: \"depth_file_path\"");
+    return;
+  }
 }
 
 std::vector<PictureCamera> read_transforms(ConfigValue& tree, Lenses lenses, ConfigProblems& problems) {
@@ -432,6 +450,7 @@ std::vector<PictureCamera> read_transforms(ConfigValue& tree, Lenses lenses, Con
   problems.throw_if_any();
   refuse_distortion(tree, globals, lenses, "", problems);
   refuse_other_cameras(tree, "", problems);
+  if (lenses == Lenses::kStraightened) tell_of_unread(tree, frames);
   std::vector<PictureCamera> cameras;
   for (std::size_t i = 0; i < frames.items.size(); ++i)
     read_frame(tree, globals, lenses, frames.items[i], "/frames/" + std::to_string(i), problems, cameras);

@@ -33,8 +33,9 @@ struct PictureCamera {
   std::string picture;                ///< nerfstudio's file_path; empty: the file names none
   std::string mask = {}, depth = {};  ///< its mask_path and depth_file_path; empty: none
   Lens lens = {};                     ///< of read_photo_cameras
-  double angle_x = 0;  ///< radians, of read_photo_cameras: the horizontal field of view, where the file says no more of
-                       ///< the intrinsics; the camera has none then, and no size
+  double angle_x = 0;  ///< radians, of read_photo_cameras: the horizontal field of view where there is no fl_x, which
+                       ///< is then 0, and so is what else the file does not say: width, height, fy, cx, cy
+  double angle_y = 0;  ///< likewise the vertical one
 };
 
 /// As read_cameras, with what the file says of their pictures. Nerfstudio's entries are in any order.

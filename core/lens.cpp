@@ -52,7 +52,7 @@ double valid_radius_squared(const Lens& lens) {
   return std::numeric_limits<double>::infinity();
 }
 
-StraightImage straightened(const Image& image, const Camera& camera, const Lens& lens) {
+StraightImage straightened(const Image& image, const Camera& camera, const Lens& lens, Sampling sampling) {
   HSI4D_CHECK_EQ(image.width(), camera.width);
   HSI4D_CHECK_EQ(image.height(), camera.height);
   StraightImage result{Image(image.channels(), image.height(), image.width()), Image(1, image.height(), image.width())};
@@ -63,8 +63,9 @@ StraightImage straightened(const Image& image, const Camera& camera, const Lens&
         const Vector2<double> point((col + 0.5 - camera.cx) / camera.fx, (row + 0.5 - camera.cy) / camera.fy);
         if (point.squaredNorm() >= valid) continue;
         const Vector2<double> bent = bent_by(lens, point);
-        const double u = camera.fx * bent[0] + camera.cx, v = camera.fy * bent[1] + camera.cy;
+        double u = camera.fx * bent[0] + camera.cx, v = camera.fy * bent[1] + camera.cy;
         if (!is_between_centres(u, image.width()) || !is_between_centres(v, image.height())) continue;
+        if (sampling == Sampling::kNearest) u = std::floor(u) + 0.5, v = std::floor(v) + 0.5;
         sample(image, u, v, row, col, result.image);
         result.seen(0, row, col) = 1;
       }

@@ -35,10 +35,14 @@ struct StraightImage {
   Image seen;   ///< [1,H,W] 1, or 0 where the picture does not show the direction
 };
 
-/// The picture that a pinhole with the camera's intrinsics takes, bilinear between pixel centres.
+/// Between pixel centres, or at the nearest one, for numbers that have no mean.
+enum class Sampling { kBilinear, kNearest };
+
+/// The picture that a pinhole with the camera's intrinsics takes.
 ///
 /// @param image  [C,H,W] of the camera's size, taken through the lens
 /// Throws InternalError for another size.
-StraightImage straightened(const Image& image, const Camera& camera, const Lens& lens);
+StraightImage straightened(const Image& image, const Camera& camera, const Lens& lens,
+                           Sampling sampling = Sampling::kBilinear);
 
 }  // namespace hsi4d

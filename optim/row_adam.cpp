@@ -54,9 +54,9 @@ void RowMoments<S>::clear_row(Index row, Index cols) {
   steps[static_cast<std::size_t>(row)] = 0;
 }
 
-std::vector<double> bias_corrections(double beta) {
-  std::vector<double> corrections(kMostRowSteps + 1, 0.0);
-  for (Index t = 1; t <= kMostRowSteps; ++t) corrections[static_cast<std::size_t>(t)] = bias_correction(beta, t);
+std::vector<double> bias_corrections(double beta, Index steps) {
+  std::vector<double> corrections(static_cast<std::size_t>(steps + 1), 0.0);
+  for (Index t = 1; t <= steps; ++t) corrections[static_cast<std::size_t>(t)] = bias_correction(beta, t);
   return corrections;
 }
 
@@ -71,6 +71,8 @@ RowAdamReport step_rows(Var<S> leaf, RowMoments<S>& moments, const RowAdamRule& 
   HSI4D_CHECK_EQ(std::ssize(moments.mean), rows * cols);
   HSI4D_CHECK_EQ(std::ssize(moments.steps), rows);
   HSI4D_CHECK(rule.column_shares.empty() || std::ssize(rule.column_shares) == cols, "a share a column");
+  HSI4D_CHECK(first.size() > 1 && first.size() == second.size(), "corrections of a step");
+  const auto most = static_cast<std::int32_t>(first.size() - 1);
   const Partition part{rows, kGrain};
   std::vector<RowAdamReport> reports(static_cast<std::size_t>(part.chunks()));
   parallel_chunks(part, [&](Index chunk, Index begin, Index end) {
@@ -85,7 +87,7 @@ RowAdamReport step_rows(Var<S> leaf, RowMoments<S>& moments, const RowAdamRule& 
           continue;
         }
         std::int32_t& steps = moments.steps[static_cast<std::size_t>(row)];
-        steps = std::min(steps + 1, kMostRowSteps);
+        steps = std::min(steps + 1, most);
         const auto at = static_cast<std::size_t>(steps);
         move_row(g, parameter.row(row), moments.mean.data() + row * cols, moments.square.data() + row * cols, cols,
                  rule, static_cast<S>(rule.rate / first[at]), static_cast<S>(1 / second[at]));

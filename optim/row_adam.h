@@ -18,7 +18,7 @@ namespace hsi4d {
 template <class S>
 struct RowMoments {
   std::vector<S> mean, square;
-  std::vector<std::int32_t> steps;  ///< of each row; at most kMostRowSteps
+  std::vector<std::int32_t> steps;  ///< of each row
 
   /// Of `rows` rows of `cols` numbers: what is there stays, rows that are new have nothing.
   void resize(Index rows, Index cols);
@@ -26,9 +26,6 @@ struct RowMoments {
   void clear_row(Index row, Index cols);
   bool operator==(const RowMoments&) const = default;
 };
-
-/// From here on the corrections of a row's bias are 1 to the last digit of float.
-inline constexpr std::int32_t kMostRowSteps = 20000;
 
 /// How rows move.
 struct RowAdamRule {
@@ -43,15 +40,15 @@ struct RowAdamReport {
   Index refused = 0;  ///< rows whose gradient was no number to go by
 };
 
-/// Corrections 1 − βᵗ for t = 0 … kMostRowSteps.
-std::vector<double> bias_corrections(double beta);
+/// Corrections 1 − βᵗ for t = 0 … `steps`.
+std::vector<double> bias_corrections(double beta, Index steps);
 
 /// One step of all rows of a leaf, by the gradient of the tape's last backward; without one nothing moves. Bitwise the
 /// same for any number of threads.
 ///
 /// @param leaf                    [N,C]
 /// @param moments                 of N rows
-/// @param first, second           bias_corrections of beta1 and beta2
+/// @param first, second           bias_corrections of beta1 and beta2, of as many steps as a row may have
 /// Throws InternalError for moments or shares of other sizes.
 template <class S>
 RowAdamReport step_rows(Var<S> leaf, RowMoments<S>& moments, const RowAdamRule& rule, std::span<const double> first,

@@ -12,7 +12,7 @@ struct SharedShape {
   double scale = 1;  ///< factor of the three scales
 };
 
-/// At most so many share a place in one step.
+/// With more the formula is taken for so many: their opacities hardly change any more.
 inline constexpr Index kMostCopies = 51;
 /// The opacity above which a Gaussian is taken for this opaque: of 1 all copies would be 1.
 inline constexpr double kMostSharedOpacity = 1 - 1e-6;

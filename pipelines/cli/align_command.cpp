@@ -31,7 +31,7 @@ struct AlignArguments {
   std::string distance;                 ///< two points and the metres between them
   std::string height;                   ///< a point and its metres over the ground
   std::optional<double> camera_height;  ///< metres over the ground, the cameras' median
-  int picture = 0;                      ///< camera of ground.png
+  std::optional<int> picture;           ///< camera of ground.png; none: the first
 };
 
 const std::string kAlignCommand = "hsi4d align: ";
@@ -129,8 +129,10 @@ std::string align_command(const AlignArguments& a) {
   const SplatFile file = read_splats_with_warnings(a.scene);
   std::vector<Camera> cameras;
   if (!a.cameras.empty()) cameras = read_cameras(a.cameras);
-  if (!cameras.empty() && a.picture >= static_cast<int>(cameras.size()))
-    throw UserError(kAlignCommand + "--picture: " + a.cameras + " has no camera " + std::to_string(a.picture) +
+  if (a.picture && cameras.empty()) throw UserError(kAlignCommand + "--picture needs --cameras");
+  const auto picture = static_cast<std::size_t>(a.picture.value_or(0));
+  if (a.picture && picture >= cameras.size())
+    throw UserError(kAlignCommand + "--picture: " + a.cameras + " has no camera " + std::to_string(picture) +
                     "; allowed: 0 to " + std::to_string(cameras.size() - 1));
   const std::vector<Vector3<double>> points = solid_points(file.gaussians);
   const Vector3<double> up = first_up(a, cameras);
@@ -142,7 +144,7 @@ std::string align_command(const AlignArguments& a) {
   write_splats(out.file("scene.ply"), moved);
   if (!cameras.empty()) {
     write_cameras(out.file("cameras.json"), cameras);
-    write_picture_of_ground(out.file("ground.png"), moved, cameras[static_cast<std::size_t>(a.picture)]);
+    write_picture_of_ground(out.file("ground.png"), moved, cameras[picture]);
   }
   write_text_file(out.file("alignment.json"), alignment_json(ground, similarity));
   out.commit();

@@ -83,9 +83,10 @@ PosedImage image_of(const std::array<double, 7>& pose, std::int64_t camera, std:
   const auto found = cameras.find(camera);
   if (found == cameras.end())
     throw DataError(where + ": is of camera " + std::to_string(camera) + ", which the cameras' file does not have");
+  constexpr double kLengthTolerance = 0.01;  // of files that are written in few digits
   const Vector4<double> quaternion(pose[0], pose[1], pose[2], pose[3]);
   const bool is_finite = std::all_of(pose.begin(), pose.end(), [](double x) { return std::isfinite(x); });
-  if (!is_finite || !(quaternion.norm() > 0.1))
+  if (!is_finite || !(std::abs(quaternion.norm() - 1) < kLengthTolerance))
     throw DataError(where +
                     ": its pose is not finite, or no rotation; allowed: a quaternion of length 1, a translation");
   PosedImage image;
@@ -95,6 +96,7 @@ PosedImage image_of(const std::array<double, 7>& pose, std::int64_t camera, std:
   image.lens = found->second.lens;
   image.camera.camera_from_world = {quaternion_to_matrix(Vector4<double>(quaternion.normalized())),
                                     Vector3<double>(pose[4], pose[5], pose[6])};
+  check_camera(image.camera, where);
   return image;
 }
 
@@ -312,6 +314,20 @@ IntrinsicsById text_cameras(const NamedBytes& file) {
   return cameras;
 }
 
+/// The line behind that of an image: x, y and the point's number, again and again, or nothing. In a file without these
+/// lines every other image would be passed over.
+void check_observations(TextLines& lines) {
+  const auto line = lines.next(true);
+  if (!line) return;
+  Words words(*line, lines.where());
+  int count = 0;
+  for (; !words.is_empty(); ++count) words.word();
+  if (count % 3 != 0)
+    throw DataError(lines.where() +
+                    ": is no line of observations, of three numbers each (it may be blank); each image "
+                    "has one behind its own line");
+}
+
 std::vector<PosedImage> text_images(const NamedBytes& file, const IntrinsicsById& cameras) {
   TextLines lines(file);
   std::vector<PosedImage> images;
@@ -322,7 +338,7 @@ std::vector<PosedImage> text_images(const NamedBytes& file, const IntrinsicsById
     for (double& number : pose) number = words.number<double>();
     const auto camera = words.number<std::int64_t>();
     images.push_back(image_of(pose, camera, words.rest(), cameras, words.where()));
-    lines.next(true);  // its observations
+    check_observations(lines);
   }
   return images;
 }
@@ -344,39 +360,41 @@ std::vector<ColoredPoint> text_points(const NamedBytes& file) {
 
 bool is_binary(const NamedBytes& file) { return file.name.ends_with(".bin"); }
 
-/// A file of the model under one of its two names; empty: it has neither.
-fs::path model_file(const fs::path& folder, const std::string& name) {
+/// The ending of a folder's model, of cameras and images alike; empty: there is none.
+std::string model_ending(const fs::path& folder) {
   for (const char* ending : {".bin", ".txt"}) {
-    const fs::path file = folder / (name + ending);
-    if (fs::is_regular_file(file)) return file;
+    if (fs::is_regular_file(folder / (std::string("cameras") + ending)) &&
+        fs::is_regular_file(folder / (std::string("images") + ending)))
+      return ending;
   }
-  return {};
+  return "";
 }
 
 }  // namespace
 
 fs::path colmap_folder(const fs::path& folder) {
   for (const fs::path& place : {folder, folder / "sparse" / "0", folder / "sparse"}) {
-    if (!model_file(place, "cameras").empty() && !model_file(place, "images").empty()) return place;
+    if (!model_ending(place).empty()) return place;
   }
   return {};
 }
 
 ColmapModel read_colmap(const fs::path& folder) {
-  std::array<fs::path, 3> files = {model_file(folder, "cameras"), model_file(folder, "images"),
-                                   model_file(folder, "points3D")};
-  std::array<Bytes, 3> bytes;
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (!files[i].empty()) bytes[i] = read_file(files[i].string(), kMaxFile);
-  }
-  return decode_colmap({files[0].string(), bytes[0]}, {files[1].string(), bytes[1]}, {files[2].string(), bytes[2]});
+  const std::string ending = model_ending(folder);
+  const fs::path cameras = folder / ("cameras" + ending), images = folder / ("images" + ending),
+                 points = folder / ("points3D" + ending);
+  const Bytes camera_bytes = read_file(cameras.string(), kMaxFile), image_bytes = read_file(images.string(), kMaxFile);
+  const bool has_points = fs::is_regular_file(points);
+  const Bytes point_bytes = has_points ? read_file(points.string(), kMaxFile) : Bytes();
+  return decode_colmap({cameras.string(), camera_bytes}, {images.string(), image_bytes},
+                       {has_points ? points.string() : "", point_bytes});
 }
 
 ColmapModel decode_colmap(const NamedBytes& cameras, const NamedBytes& images, const NamedBytes& points) {
   const IntrinsicsById by_id = is_binary(cameras) ? binary_cameras(cameras) : text_cameras(cameras);
   ColmapModel model;
   model.images = is_binary(images) ? binary_images(images, by_id) : text_images(images, by_id);
-  if (!points.bytes.empty()) model.points = is_binary(points) ? binary_points(points) : text_points(points);
+  if (!points.name.empty()) model.points = is_binary(points) ? binary_points(points) : text_points(points);
   return model;
 }
 

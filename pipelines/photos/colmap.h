@@ -32,7 +32,7 @@ ColmapModel read_colmap(const std::filesystem::path& folder);
 
 /// Decodes a model. Cameras: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV; others are refused by name.
 ///
-/// @param points  no bytes: none
+/// @param points  without a name: none
 /// Throws DataError naming the file and the byte or line: it ends too early, has more, a camera is named that is not
 /// there, a number is not finite or out of its range; UserError for a camera model that is not read.
 ColmapModel decode_colmap(const NamedBytes& cameras, const NamedBytes& images, const NamedBytes& points);

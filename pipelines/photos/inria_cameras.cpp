@@ -37,8 +37,12 @@ void flatten_rotation(ConfigValue& entry) {
   for (ConfigMember& member : entry.members) {
     if (member.key != "rotation" || member.value.kind != ConfigValue::Kind::kArray) continue;
     std::vector<ConfigValue> numbers;
-    for (const ConfigValue& row : member.value.items) numbers.insert(numbers.end(), row.items.begin(), row.items.end());
-    if (member.value.items.size() == 3) member.value.items = std::move(numbers);
+    bool is_square = member.value.items.size() == 3;
+    for (const ConfigValue& row : member.value.items) {
+      is_square = is_square && row.items.size() == 3;
+      numbers.insert(numbers.end(), row.items.begin(), row.items.end());
+    }
+    if (is_square) member.value.items = std::move(numbers);
   }
 }
 

@@ -55,23 +55,4 @@ struct PosedImages {
 /// for damaged files.
 PosedImages read_posed_images(const std::filesystem::path& path, const std::filesystem::path& pictures = {});
 
-/// A picture in memory, straightened.
-struct Photo {
-  Image color;   ///< [3,H,W]; where alpha is known, not multiplied by it
-  Image alpha;   ///< [1,H,W] share of the pixel that shows what is wanted, by alpha and mask; empty: 1
-  Image weight;  ///< [1,H,W] 0 where the lens shows nothing, else 1; empty: 1
-  Image depth;   ///< [1,H,W] camera z, 0 where it is not known; empty: not known at all
-  Camera camera;
-};
-
-/// How pictures are read.
-struct PhotoRules {
-  int longest_side = 0;       ///< pixels, larger pictures are reduced by area; 0: as they are
-  double depth_unit = 0.001;  ///< of a depth image of whole numbers; floats are in the world's units
-};
-
-/// Reads a picture. Throws DataError naming the file: another size than the camera's, neither grey nor colour, depths
-/// that are negative or of another size.
-Photo read_photo(const PosedImage& posed, const PhotoRules& rules);
-
 }  // namespace hsi4d

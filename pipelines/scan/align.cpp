@@ -122,7 +122,8 @@ GroundPlane find_ground(std::span<const Vector3<double>> points, const Vector3<d
   constexpr int kRefits = 10;
   for (int i = 0; best_worth > 0 && i < kRefits; ++i) best = refitted(points, best);
   if (best_worth > 0) count_points(points, best);
-  if (best.share >= kLeastGroundShare) return best;
+  const bool is_level = best.up.dot(up) > least_cosine && best.below <= kMostBelowGround;
+  if (best.share >= kLeastGroundShare && is_level) return best;
   throw UserError("no ground is found: of level planes with little under them the best holds " +
                   rounded(100 * best.share, 2) + " % of the points; a ground holds " +
                   rounded(100 * kLeastGroundShare, 2) + " % or more. Is --up right?");

@@ -120,7 +120,7 @@ Index move_faint(const DensitySettings& settings, std::int64_t seed, ScanState& 
 
 Index add_some(const DensitySettings& settings, std::int64_t seed, ScanState& state) {
   const Index before = state.gaussians.count();
-  const auto grown = static_cast<Index>(settings.growth * static_cast<double>(before));
+  const auto grown = static_cast<Index>(std::ceil(settings.growth * static_cast<double>(before)));
   const Index after = std::max(before, std::min(settings.most, grown));
   if (after == before) return 0;
   const std::vector<double> weights = opacities_of(state.gaussians);

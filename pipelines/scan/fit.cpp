@@ -75,18 +75,29 @@ class ScanGraph {
     tape_.forward(inputs_.rendered);
     return held_image(tape_.value(inputs_.rendered), 0, 3);
   }
-  /// Of the last forward run, not clamped, of all pixels.
+  /// Of the last forward run, not clamped, of the pixels that count.
   double psnr() const {
     const ConstArray<S> image = tape_.value(inputs_.rendered), target = tape_.value(inputs_.target);
-    const double squares = parallel_sum(image.total_rows(), 64, [&](Index begin, Index end) {
-      double sum = 0;
-      for (Index r = begin; r < end; ++r) {
-        const S *a = image.row(r), *b = target.row(r);
-        for (Index c = 0; c < image.shape.cols; ++c) sum += static_cast<double>((a[c] - b[c]) * (a[c] - b[c]));
-      }
-      return sum;
-    });
-    return std::min(kLargestPsnrDb, -10 * std::log10(squares / static_cast<double>(image.shape.count())));
+    const bool has_weight = inputs_.weight.tape != nullptr;
+    const Index rows = image.shape.rows, cols = image.shape.cols;
+    const auto sum_of = [&](bool of_squares) {
+      return parallel_sum(rows, 16, [&](Index begin, Index end) {
+        double sum = 0;
+        for (Index r = begin; r < end; ++r) {
+          const S* const w = has_weight ? tape_.value(inputs_.weight).row(r) : nullptr;
+          for (Index plane = 0; plane < image.shape.planes; ++plane) {
+            const S *a = image.row(plane * rows + r), *b = target.row(plane * rows + r);
+            for (Index c = 0; c < cols; ++c) {
+              const double weight = w == nullptr ? 1 : static_cast<double>(w[c]);
+              sum += of_squares ? weight * static_cast<double>((a[c] - b[c]) * (a[c] - b[c])) : weight;
+            }
+          }
+        }
+        return sum;
+      });
+    };
+    const double weights = has_weight ? sum_of(false) : static_cast<double>(image.shape.count());
+    return weights > 0 ? std::min(kLargestPsnrDb, -10 * std::log10(sum_of(true) / weights)) : kLargestPsnrDb;
   }
 
   /// What the leaves of the first groups hold, back into the Gaussians.
@@ -141,14 +152,22 @@ class PhotoOrder {
   Index round_ = -1;
 };
 
-void check_sizes_of(const ScanSettings& settings, const std::vector<Photo>& photos) {
+void check_sizes_of(const std::vector<Photo>& photos) {
   for (const Photo& photo : photos) {
-    const Camera &camera = photo.camera, &first = photos.front().camera;
-    if (camera.width == first.width && camera.height == first.height) continue;
-    throw UserError(settings.photos.path.string() + ": pictures of " + std::to_string(first.width) + " x " +
-                    std::to_string(first.height) + " and of " + std::to_string(camera.width) + " x " +
-                    std::to_string(camera.height) + " pixels; allowed: one size");
+    HSI4D_CHECK_EQ(photo.camera.width, photos.front().camera.width);
+    HSI4D_CHECK_EQ(photo.camera.height, photos.front().camera.height);
   }
+}
+
+/// What counts of an image, black elsewhere, as the loss sees it.
+Image weighted(Image image, const Image& weight) {
+  if (weight.empty()) return image;
+  for (int c = 0; c < image.channels(); ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) image(c, y, x) *= weight(0, y, x);
+    }
+  }
+  return image;
 }
 
 bool any_weight(const std::vector<Photo>& photos) {
@@ -167,8 +186,8 @@ class ScanFit {
         watch_(watch),
         state_(state),
         order_(learnt(), settings.seed),
-        first_(bias_corrections(settings.stage.optimizer.beta1)),
-        second_(bias_corrections(settings.stage.optimizer.beta2)) {
+        first_(bias_corrections(settings.stage.optimizer.beta1, settings.stage.iterations)),
+        second_(bias_corrections(settings.stage.optimizer.beta2, settings.stage.iterations)) {
     const auto columns = state.columns();
     column_shares_.assign(static_cast<std::size_t>(columns.back()), static_cast<float>(settings.sh_share));
     std::fill_n(column_shares_.begin(), 3, 1.0F);
@@ -186,6 +205,10 @@ class ScanFit {
       if (changes_density_after(settings_.density, state_.iteration - 1))
         change_density(settings_.density, settings_.seed, state_);
       if (state_.iteration % settings_.save_every == 0) save();
+      if (state_.iteration < settings_.stage.iterations && watch_.observer.wants_stop()) {
+        save();
+        throw_interrupted();
+      }
     }
     save();
     progress.finish();
@@ -237,7 +260,8 @@ class ScanFit {
 
   void iterate(ScanGraph& graph, RecordedLoss<S>& loss, Progress& progress) {
     const Index i = state_.iteration;
-    graph.show(photos_[order_.at(i)], background_at(i));
+    const Photo& photo = photos_[order_.at(i)];
+    graph.show(photo, photo.alpha.empty() ? Vector3<double>(settings_.background.data()) : background_at(i));
     Tape<S>& tape = graph.tape();
     tape.forward(loss.total);
     loss.read_values();
@@ -269,8 +293,8 @@ class ScanFit {
   }
 
   void tremble(ScanGraph& graph) {
-    const bool is_on = rule_of(0) != nullptr && settings_.density.method == DensityMethod::kMcmc &&
-                       state_.iteration < settings_.density.until;
+    const bool is_on = rule_of(0) != nullptr && moves_in(*rule_of(0), state_.iteration) &&
+                       settings_.density.method == DensityMethod::kMcmc && state_.iteration < settings_.density.until;
     if (!is_on) return;
     constexpr std::size_t kShapes = 4;  // all but the harmonics
     graph.read(state_.gaussians, kShapes);
@@ -301,9 +325,11 @@ class ScanFit {
   }
 
   void stop_if_asked() const {
-    if (watch_.observer.wants_stop())
-      throw Interrupted("interrupted in iteration " + std::to_string(state_.iteration) + " of " +
-                        std::to_string(settings_.stage.iterations) + "; --resume goes on");
+    if (watch_.observer.wants_stop()) throw_interrupted();
+  }
+  [[noreturn]] void throw_interrupted() const {
+    throw Interrupted("interrupted in iteration " + std::to_string(state_.iteration) + " of " +
+                      std::to_string(settings_.stage.iterations) + "; --resume goes on");
   }
 
   void save() const {
@@ -347,14 +373,14 @@ std::vector<bool> held_photos(const ScanPhotos& settings, std::size_t count) {
 void fit_scan(const ScanSettings& settings, const std::vector<Photo>& photos, double extent,
               std::span<const LossTerm> terms, const ScanWatch& watch, ScanState& state) {
   HSI4D_CHECK(!photos.empty(), "no photos");
-  check_sizes_of(settings, photos);
+  check_sizes_of(photos);
   ScanFit(settings, photos, extent, terms, watch, state).run();
 }
 
 std::vector<ScanPicture> score_scan(const ScanSettings& settings, const std::vector<Photo>& photos,
                                     const Gaussians& gaussians,
                                     const std::function<void(const ScanPicture&, const Image&)>& take) {
-  check_sizes_of(settings, photos);
+  check_sizes_of(photos);
   ScanGraph graph(gaussians, photos.front().camera, settings.render, settings.sh_degree, false);
   const Vector3<double> background(settings.background.data());
   const std::vector<bool> held = held_photos(settings.photos, photos.size());
@@ -367,8 +393,13 @@ std::vector<ScanPicture> score_scan(const ScanSettings& settings, const std::vec
     picture.photo = i;
     picture.held = held[i];
     const Image& weight = photos[i].weight;
-    picture.psnr_db = weight.empty() ? psnr_db(image, target) : psnr_db(image, target, weight).value_or(0);
-    picture.ssim = image_ssim(image, target);
+    const std::optional<double> psnr = weight.empty() ? psnr_db(image, target) : psnr_db(image, target, weight);
+    if (!psnr) {
+      pictures.pop_back();  // nothing of it counts
+      continue;
+    }
+    picture.psnr_db = *psnr;
+    picture.ssim = image_ssim(weighted(image, weight), weighted(target, weight));
     if (take) take(picture, image);
   }
   return pictures;

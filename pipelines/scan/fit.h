@@ -42,13 +42,14 @@ struct ScanWatch {
 
 /// Goes on from a state until the stage's iterations are done. Stopped, it saves, and throws Interrupted.
 ///
-/// @param photos  of one size
+/// @param photos  of one size, or else InternalError
 /// @param extent  rates of places are shares of it, metres
-/// Throws UserError: photos of several sizes, none that is learnt from, a loss that is not finite; as record_loss.
+/// Throws UserError: no photo that is learnt from, a loss that is not finite; as record_loss.
 void fit_scan(const ScanSettings& settings, const std::vector<Photo>& photos, double extent,
               std::span<const LossTerm> terms, const ScanWatch& watch, ScanState& state);
 
-/// All pictures, before settings.background, and how near they are to what was seen. @param take  called with each
+/// All pictures of which something counts, before settings.background, and how near they are to what was seen.
+/// @param take  called with each
 /// picture's image; may be empty
 std::vector<ScanPicture> score_scan(const ScanSettings& settings, const std::vector<Photo>& photos,
                                     const Gaussians& gaussians,

@@ -30,6 +30,10 @@ std::string flat_name(const std::string& name) {
   return flat;
 }
 
+std::string stem_of(std::size_t photo, const std::string& name) {
+  return four_digits(static_cast<std::int64_t>(photo)) + "_" + flat_name(name);
+}
+
 Table figures_of(const ScanSummary& summary) {
   Table table{.title = "Pictures", .head = {"", "pictures", "PSNR [dB]", "SSIM"}};
   for (const auto& [name, score] : {std::pair{"learnt from", &summary.learnt}, {"held back", &summary.held}}) {
@@ -62,8 +66,8 @@ std::string pictures_section(const ScanSummary& summary) {
       return "<img loading=\"lazy\" style=\"width:49%\" src=\"views/" + html_escape(file) + "\" alt=\"\">";
     };
     text += "<figure><figcaption>" + html_escape(name) + ": " + fixed_number(picture.psnr_db, 2) + " dB, SSIM " +
-            fixed_number(picture.ssim, 4) + "</figcaption>\n" + image(photo_file(name)) + "\n" +
-            image(view_file(name)) + "</figure>\n";
+            fixed_number(picture.ssim, 4) + "</figcaption>\n" + image(photo_file(picture.photo, name)) + "\n" +
+            image(view_file(picture.photo, name)) + "</figure>\n";
   }
   if (text.empty()) return "";
   return "<section><h2>Pictures that were held back</h2>\n<p>Left: the picture. Right: the result.</p>\n" + text +
@@ -72,8 +76,8 @@ std::string pictures_section(const ScanSummary& summary) {
 
 }  // namespace
 
-std::string view_file(const std::string& name) { return flat_name(name) + ".png"; }
-std::string photo_file(const std::string& name) { return flat_name(name) + "_photo.png"; }
+std::string view_file(std::size_t photo, const std::string& name) { return stem_of(photo, name) + ".png"; }
+std::string photo_file(std::size_t photo, const std::string& name) { return stem_of(photo, name) + "_photo.png"; }
 
 std::string scan_summary_json(const ScanSummary& summary) {
   ConfigValue file = ConfigValue::make_object();

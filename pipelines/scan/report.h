@@ -17,7 +17,8 @@ std::string scan_summary_json(const ScanSummary& summary);
 std::string scan_report_page(const ScanSummary& summary);
 
 /// The names, in the folder `views`, of a picture as it is shown and as it was taken.
-std::string view_file(const std::string& name);
-std::string photo_file(const std::string& name);
+/// @param photo  its place in the order of names, so that no two are alike
+std::string view_file(std::size_t photo, const std::string& name);
+std::string photo_file(std::size_t photo, const std::string& name);
 
 }  // namespace hsi4d

@@ -2,21 +2,17 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <numbers>
 #include <optional>
-
-#include <Eigen/Geometry>
 
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
-#include "core/memory.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "pipelines/scan/photo_checks.h"
 #include "pipelines/scan/report.h"
 #include "pipelines/scan/start.h"
 #include "splat/files/splat_file.h"
@@ -46,38 +42,23 @@ std::vector<Camera> cameras_of(const std::vector<Photo>& photos) {
   return cameras;
 }
 
-/// Pictures from nearly one place and direction say nothing of depth.
-void warn_of_one_side(const std::vector<Photo>& photos, const PosedImages& set) {
-  constexpr double kLeastAngle = 5;  // degrees between two lines of sight to what is looked at
-  const std::vector<Camera> cameras = cameras_of(photos);
-  const Vector3<double> target = looked_at(cameras);
-  double widest = 0;
-  const Vector3<double> first = camera_center_world(cameras.front()) - target;
-  for (const Camera& camera : cameras) {
-    const Vector3<double> other = camera_center_world(camera) - target;
-    widest = std::max(widest, std::atan2(first.cross(other).norm(), first.dot(other)));
-  }
-  const double degrees = widest * 180 / std::numbers::pi;
-  if (degrees < kLeastAngle)
-    log_warning(set.file.string() + ": all pictures are taken from one side, within " + rounded(degrees, 2) +
-                " degrees: depths will be guessed, and other sides stay empty");
-}
-
-/// Makes the folder, or says why not.
-void begin_folder(const ScanSettings& settings, const fs::path& folder, bool resume, const std::string& config) {
+/// What can be wrong with the folder, before anything is read.
+void check_folder(const ScanSettings& settings, const fs::path& folder, bool resume, const std::string& config) {
   const fs::path file = folder / kConfig;
-  if (resume) {
-    if (!fs::exists(file))
-      throw UserError(folder.string() + ": there is nothing to go on with; without --resume it is begun");
-    if (read_text_file(file.string()) != config)
-      throw UserError(file.string() + ": was begun with other settings than those of " + settings.file.string() +
-                      "; go on with the same, or begin in another folder");
-    if (fs::exists(folder / kSummary)) throw UserError(folder.string() + ": is done; nothing is left to go on with");
+  if (!resume) {
+    if (fs::exists(folder) && (!fs::is_directory(folder) || !fs::is_empty(folder)))
+      throw UserError(folder.string() +
+                      ": is not empty; --out names a new or empty folder, or --resume goes on with it");
     return;
   }
-  if (fs::exists(folder) && (!fs::is_directory(folder) || !fs::is_empty(folder)))
-    throw UserError(folder.string() + ": is not empty; --out names a new or empty folder, or --resume goes on with it");
-  write_text_file(file.string(), config);
+  if (!fs::exists(file))
+    throw UserError(folder.string() + ": there is nothing to go on with; without --resume it is begun");
+  if (read_text_file(file.string()) != config)
+    throw UserError(file.string() + ": was begun with other settings than those of " + settings.file.string() +
+                    "; go on with the same, or begin in another folder");
+  if (!fs::exists(folder / kSummary)) return;
+  fs::remove(folder / kCheckpoint);  // where it was killed before that
+  throw UserError(folder.string() + ": is done; nothing is left to go on with");
 }
 
 ScanState first_state(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos) {
@@ -103,8 +84,9 @@ ScanSummary write_result(const ScanSettings& settings, const PosedImages& set, c
   summary.pictures = score_scan(settings, photos, state.gaussians, [&](const ScanPicture& picture, const Image& image) {
     if (!picture.held) return;
     const std::string& name = summary.names[picture.photo];
-    write_image((folder / "views" / view_file(name)).string(), image);
-    write_image((folder / "views" / photo_file(name)).string(), before_color(photos[picture.photo], background));
+    write_image((folder / "views" / view_file(picture.photo, name)).string(), image);
+    write_image((folder / "views" / photo_file(picture.photo, name)).string(),
+                before_color(photos[picture.photo], background));
   });
   summary.learnt = mean_score(summary.pictures, false);
   summary.held = mean_score(summary.pictures, true);
@@ -123,15 +105,19 @@ ScanSummary run_scan(const ScanSettings& settings, const fs::path& folder, bool 
                      const Observer& observer) {
   const std::vector<LossTerm> all(terms.begin(), terms.end());
   const std::string config = resolved_scan(settings, descriptions_of(all));
+  check_folder(settings, folder, resume, config);
   const PosedImages set = read_posed_images(settings.photos.path, settings.photos.pictures);
-  const std::vector<Photo> photos = read_photos(set, settings.photos.rules);
-  warn_of_one_side(photos, set);
-  begin_folder(settings, folder, resume, config);
-  const std::string checkpoint = (folder / kCheckpoint).string();
+  check_photo_cameras(settings, set);
+  PhotoRules rules = settings.photos.rules;
+  rules.masks = settings.kind == ScanKind::kObject ? MaskMeaning::kWanted : MaskMeaning::kCounts;
+  const std::vector<Photo> photos = read_photos(set, rules);
+  warn_of_background(settings, set, photos);
+  const std::string checkpoint = (folder / kCheckpoint).string(), identity = config + photo_identity(set);
   ScanState state =
-      resume && fs::exists(checkpoint) ? load_scan_state(checkpoint, config) : first_state(settings, set, photos);
+      resume && fs::exists(checkpoint) ? load_scan_state(checkpoint, identity) : first_state(settings, set, photos);
+  write_text_file((folder / kConfig).string(), config);
   const auto begin = std::chrono::steady_clock::now();
-  const ScanWatch watch{observer, [&](const ScanState& now) { save_scan_state(checkpoint, now, config); }};
+  const ScanWatch watch{observer, [&](const ScanState& now) { save_scan_state(checkpoint, now, identity); }};
   fit_scan(settings, photos, extent_of(cameras_of(photos)), terms, watch, state);
   if (state.refused > 0)
     log_warning(std::to_string(state.refused) +

@@ -4,7 +4,7 @@
 //   checkpoint.npz       where it goes on (`--resume`); not there any more when it is done
 //   scene.ply            or object.ply: the Gaussians
 //   cameras.json         of the pictures, straightened and reduced as they were seen, in the order of names
-//   views/NAME.png       how the result shows the pictures that were held back, beside NAME_photo.png
+//   views/NNNN_NAME.png  how the result shows the pictures that were held back, beside NNNN_NAME_photo.png
 //   summary.json         sizes, times, PSNR and SSIM
 //   report.html          the same for people
 #pragma once

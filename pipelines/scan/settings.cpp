@@ -31,6 +31,10 @@ void add_stage_faults(const ConfigValue& tree, const ScanSettings& settings, Con
     add("/weight", "all pixels of a picture count that its mask does not leave out");
   if (stage.gradient_shares != 0) add("/gradient_shares", "a reconstruction does not measure them");
   if (stage.optimizer.kind != OptimizerKind::kAdam) add("/optimizer/kind", "a reconstruction moves by adam");
+  for (const std::string& idle : idle_settings(stage.optimizer)) add("/optimizer/" + idle, "has no meaning with adam");
+  if (stage.optimizer.max_rollbacks != OptimizerSettings{}.max_rollbacks)
+    add("/optimizer/max_rollbacks",
+        "a reconstruction takes no step back: Gaussians without a usable gradient stand still");
 }
 
 void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProblems& problems) {
@@ -57,15 +61,24 @@ void describe(ConfigFields& f, ScanPhotos& s) {
 
 void describe(ConfigFields& f, ScanStart& s) {
   f.choice("from", s.from, kScanStartKinds,
-           "What Gaussians begin as; auto: depths where all pictures have them, else points, else random places");
+           "What Gaussians begin as; auto: points where there are some, else depths where all pictures have them, else "
+           "random places");
   f.path("points", s.points, {.must_exist = true}, "A PLY of points; without: those of the cameras' file");
   f.integer("count", s.count, {.min = 1, .max = kMostGaussians}, "Of depths at most, of random places just so many");
-  f.number("voxel", s.voxel, {.above = 0}, "Depths: one Gaussian in each cube of this side, metres");
+  f.number("voxel", s.voxel, {.min = 1e-6, .max = 1e6}, "Depths: one Gaussian in each cube of this side, metres");
   f.optional(s.box, [](ConfigFields& inner, std::array<double, 6>& box) {
     inner.numbers("box", box, {}, "Random places: x, y, z of two corners; null: by the cameras");
   });
   f.number("opacity", s.opacity, {.above = 0, .below = 1}, "Their opacity");
   f.number("size", s.size, {.above = 0, .max = 10}, "Their size, of the mean distance to three neighbours");
+  f.rule({"points", "from"}, [&s]() -> std::string {
+    const bool is_idle = s.from == ScanStartKind::kDepth || s.from == ScanStartKind::kRandom;
+    return !s.points.empty() && is_idle ? "is not read: from asks for another start" : "";
+  });
+  f.rule({"box", "from"}, [&s]() -> std::string {
+    const bool is_idle = s.from == ScanStartKind::kDepth || s.from == ScanStartKind::kPoints;
+    return s.box && is_idle ? "is of random places; from asks for another start" : "";
+  });
 }
 
 void describe(ConfigFields& f, DensitySettings& s) {
@@ -78,7 +91,7 @@ void describe(ConfigFields& f, DensitySettings& s) {
   f.integer("every", s.every, {.min = 1, .max = kMostIterations}, "It changes after every n-th iteration");
   f.number("growth", s.growth, {.min = 1, .max = 10},
            "Factor of the number each time, until there are as many as allowed");
-  f.number("least_opacity", s.least_opacity, {.min = 0, .below = 1}, "Fainter ones move to where others are");
+  f.number("least_opacity", s.least_opacity, {.min = 0, .max = 0.5}, "Fainter ones move to where others are");
   f.number("noise", s.noise, {.min = 0}, "How much places of faint ones tremble, in rates of the means");
 }
 
@@ -104,7 +117,8 @@ void describe(ConfigFields& f, ScanSettings& s, const std::vector<LossDescriptio
   f.object("stage", s.stage, "What moves, and which losses count; the rate of means is a share of the scene's extent",
            [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });
   f.rule({"density", "start"}, [&s] {
-    return s.start.count <= s.density.most || s.density.method == DensityMethod::kNone
+    const bool is_counted = s.start.from != ScanStartKind::kPoints && s.start.points.empty();
+    return s.start.count <= s.density.most || s.density.method == DensityMethod::kNone || !is_counted
                ? ""
                : "most is " + std::to_string(s.density.most) + ", fewer than /start/count, " +
                      std::to_string(s.start.count);

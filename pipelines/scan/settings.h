@@ -11,7 +11,7 @@
 #include "core/config_value.h"
 #include "optim/loss_description.h"
 #include "optim/stage_settings.h"
-#include "pipelines/photos/posed_images.h"
+#include "pipelines/photos/photo.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d {
@@ -37,7 +37,7 @@ inline constexpr std::array<ConfigChoice<ScanStartKind>, 4> kScanStartKinds = {{
                                                                                 {ScanStartKind::kRandom, "random"}}};
 
 struct ScanStart {
-  ScanStartKind from = ScanStartKind::kAuto;  ///< auto: depth where all pictures have it, else points, else random
+  ScanStartKind from = ScanStartKind::kAuto;  ///< auto: points where there are some, else depths, else random
   std::filesystem::path points;               ///< a PLY of points; empty: those of the cameras' file
   Index count = 100000;                       ///< of depth and random: at most, and so many
   double voxel = 0.01;                        ///< of depth: one point in each, metres

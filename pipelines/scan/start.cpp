@@ -77,8 +77,27 @@ struct Voxel {
   double count = 0;
 };
 
+/// A point that a pixel shows, and how far away.
+struct SeenPoint {
+  ColoredPoint point;
+  double depth = 0;
+};
+
+/// A cube of a grid: of which grid, and where.
+using Cell = std::array<std::int64_t, 4>;
+
+/// Grids are twice as coarse for each doubling of the depth beyond `near`, as pixels are.
+Cell cell_of(const SeenPoint& seen, double voxel, double near) {
+  const int level = std::max(0, static_cast<int>(std::ceil(std::log2(seen.depth / near))));
+  Cell cell{level};
+  for (std::size_t k = 0; k < 3; ++k)
+    cell[k + 1] =
+        static_cast<std::int64_t>(std::floor(seen.point.place[static_cast<Index>(k)] / std::ldexp(voxel, level)));
+  return cell;
+}
+
 struct CellHash {
-  std::size_t operator()(const std::array<std::int64_t, 3>& cell) const {
+  std::size_t operator()(const Cell& cell) const {
     std::uint64_t hash = 0;
     for (const std::int64_t x : cell) hash = (hash ^ static_cast<std::uint64_t>(x)) * 0x9E3779B97F4A7C15u;
     return hash ^ hash >> 31;
@@ -86,16 +105,14 @@ struct CellHash {
 };
 
 /// One point a voxel, in the order in which voxels were met first; nothing where there are more than `most`.
-std::vector<ColoredPoint> thinned(const std::vector<ColoredPoint>& points, double voxel, Index most) {
-  std::unordered_map<std::array<std::int64_t, 3>, std::size_t, CellHash> rows;
+std::vector<ColoredPoint> thinned(const std::vector<SeenPoint>& points, double voxel, double near, Index most) {
+  std::unordered_map<Cell, std::size_t, CellHash> rows;
   std::vector<Voxel> voxels;
-  for (const ColoredPoint& point : points) {
-    std::array<std::int64_t, 3> cell{};
-    for (std::size_t k = 0; k < 3; ++k)
-      cell[k] = static_cast<std::int64_t>(std::floor(point.place[static_cast<Index>(k)] / voxel));
-    const auto [at, is_new] = rows.emplace(cell, voxels.size());
+  for (const SeenPoint& seen : points) {
+    const auto [at, is_new] = rows.emplace(cell_of(seen, voxel, near), voxels.size());
     if (is_new) voxels.emplace_back();
     if (std::ssize(voxels) > most) return {};
+    const ColoredPoint& point = seen.point;
     Voxel& sum = voxels[at->second];
     sum.place += point.place;
     sum.color += Vector3<double>(point.color[0], point.color[1], point.color[2]);
@@ -111,12 +128,12 @@ std::vector<ColoredPoint> thinned(const std::vector<ColoredPoint>& points, doubl
 }
 
 /// Places of pixels that have a depth, of every n-th where there are too many to look at.
-std::vector<ColoredPoint> places_of_pixels(const std::vector<Photo>& photos) {
+std::vector<SeenPoint> places_of_pixels(const std::vector<Photo>& photos) {
   std::size_t pixels = 0;
   for (const Photo& photo : photos)
     pixels += static_cast<std::size_t>(photo.camera.width) * static_cast<std::size_t>(photo.camera.height);
   const std::size_t stride = pixels / kMostDepths + 1;
-  std::vector<ColoredPoint> points;
+  std::vector<SeenPoint> points;
   std::size_t pixel = 0;
   for (const Photo& photo : photos) {
     const Rigid<double> world_from_camera = inverse(photo.camera.camera_from_world);
@@ -126,12 +143,22 @@ std::vector<ColoredPoint> places_of_pixels(const std::vector<Photo>& photos) {
         const double depth = photo.depth(0, y, x);
         if (!(depth > 0) || (!photo.alpha.empty() && photo.alpha(0, y, x) <= 0.5F)) continue;
         const Vector3<double> in_camera = unproject_pixel(photo.camera, Vector2<double>(x + 0.5, y + 0.5), depth);
-        points.push_back({world_from_camera.rotation * in_camera + world_from_camera.translation,
-                          {photo.color(0, y, x), photo.color(1, y, x), photo.color(2, y, x)}});
+        points.push_back({{world_from_camera.rotation * in_camera + world_from_camera.translation,
+                           {photo.color(0, y, x), photo.color(1, y, x), photo.color(2, y, x)}},
+                          depth});
       }
     }
   }
   return points;
+}
+
+double median_depth(const std::vector<SeenPoint>& points) {
+  if (points.empty()) return 1;
+  std::vector<double> depths;
+  for (const SeenPoint& seen : points) depths.push_back(seen.depth);
+  const auto middle = depths.begin() + std::ssize(depths) / 2;
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
 }
 
 /// A box of random places: of a scene as far as its cameras see sharply, of an object what all of them look at.
@@ -141,7 +168,7 @@ std::array<Vector3<double>, 2> box_of(const ScanSettings& settings, const std::v
     return {Vector3<double>(b[0], b[1], b[2]), Vector3<double>(b[3], b[4], b[5])};
   }
   const double extent = extent_of(cameras);
-  constexpr double kOfScene = 3, kOfObject = 0.5;  // extents
+  constexpr double kOfScene = 1.5, kOfObject = 0.5;  // extents
   const Vector3<double> center = looked_at(cameras);
   const Vector3<double> half =
       Vector3<double>::Constant(extent * (settings.kind == ScanKind::kScene ? kOfScene : kOfObject));
@@ -169,8 +196,8 @@ bool all_have_depth(const std::vector<Photo>& photos) {
 ScanStartKind kind_of_start(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos) {
   if (settings.start.from != ScanStartKind::kAuto) return settings.start.from;
   if (!settings.start.points.empty()) return ScanStartKind::kPoints;
-  if (all_have_depth(photos)) return ScanStartKind::kDepth;
-  return set.points.empty() ? ScanStartKind::kRandom : ScanStartKind::kPoints;
+  if (!set.points.empty()) return ScanStartKind::kPoints;
+  return all_have_depth(photos) ? ScanStartKind::kDepth : ScanStartKind::kRandom;
 }
 
 }  // namespace
@@ -236,11 +263,11 @@ std::vector<ColoredPoint> read_point_cloud(const std::filesystem::path& file) {
 }
 
 std::vector<ColoredPoint> points_of_depths(const ScanStart& settings, const std::vector<Photo>& photos) {
-  const std::vector<ColoredPoint> places = places_of_pixels(photos);
-  const double cube_root = std::cbrt(2.0);
+  const std::vector<SeenPoint> places = places_of_pixels(photos);
+  const double cube_root = std::cbrt(2.0), near = median_depth(places);
   double voxel = settings.voxel;
-  std::vector<ColoredPoint> points = thinned(places, voxel, settings.count);
-  while (points.empty() && !places.empty()) points = thinned(places, voxel *= cube_root, settings.count);
+  std::vector<ColoredPoint> points = thinned(places, voxel, near, settings.count);
+  while (points.empty() && !places.empty()) points = thinned(places, voxel *= cube_root, near, settings.count);
   if (voxel > settings.voxel)
     log_info("start: voxels of " + rounded(voxel, 3) + " m in place of " + rounded(settings.voxel, 3) +
              ", for at most " + std::to_string(settings.count) + " Gaussians");
@@ -272,7 +299,8 @@ Gaussians first_gaussians(const ScanSettings& settings, const PosedImages& set, 
   std::vector<Camera> cameras;
   for (const Photo& photo : photos) cameras.push_back(photo.camera);
   std::vector<ColoredPoint> points;
-  switch (kind_of_start(settings, set, photos)) {
+  const ScanStartKind kind = kind_of_start(settings, set, photos);
+  switch (kind) {
     case ScanStartKind::kDepth:
       if (!all_have_depth(photos))
         throw UserError(settings.file.string() + ": /start/from: not every picture of " + set.file.string() +
@@ -289,6 +317,11 @@ Gaussians first_gaussians(const ScanSettings& settings, const PosedImages& set, 
     throw UserError(set.file.string() +
                     ": there is no point to begin with; /start/points names a PLY of points, "
                     "/start/from \"random\" takes random places");
+  log_info("start: " + std::to_string(points.size()) + " Gaussians from " +
+           std::string(choice_name<ScanStartKind>(kScanStartKinds, kind)));
+  if (settings.density.method != DensityMethod::kNone && std::ssize(points) > settings.density.most)
+    throw UserError(settings.file.string() + ": /density/most: is " + std::to_string(settings.density.most) +
+                    "; the start has " + std::to_string(points.size()) + " points already");
   return gaussians_at(points, settings.start, settings.sh_degree, mean_of(centers_of(cameras)));
 }
 

@@ -20,7 +20,8 @@ Vector3<double> looked_at(const std::vector<Camera>& cameras);
 std::vector<ColoredPoint> read_point_cloud(const std::filesystem::path& file);
 
 /// Points from the depths of pictures: one a voxel that some pixel of alpha above ½ falls in, its mean place and
-/// colour. Where there would be more than settings.count, voxels are larger; the log says so.
+/// colour. Voxels are twice as large for each doubling of the depth beyond the median. Where there would be more than
+/// settings.count, all are larger; the log says so.
 std::vector<ColoredPoint> points_of_depths(const ScanStart& settings, const std::vector<Photo>& photos);
 
 /// Round Gaussians at points: as large as the mean distance to the three nearest, times settings.size.
@@ -29,8 +30,8 @@ std::vector<ColoredPoint> points_of_depths(const ScanStart& settings, const std:
 Gaussians gaussians_at(const std::vector<ColoredPoint>& points, const ScanStart& settings, int sh_degree,
                        const Vector3<double>& origin);
 
-/// By the settings. Throws UserError: points are asked for and there are none, depths and a picture has none; DataError
-/// as read_point_cloud.
+/// By the settings; the log tells which start it was. Throws UserError: more than settings.density.most, points are
+/// asked for and there are none, depths and a picture has none; DataError as read_point_cloud.
 /// @param photos  in memory, those of `set`
 Gaussians first_gaussians(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos);
 

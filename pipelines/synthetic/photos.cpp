@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
 #include "core/folder_in_making.h"
@@ -181,6 +182,9 @@ void write_photos(const SyntheticSettings& settings, const RenderSettings& rende
     write_image(out.file(depth), depth_image(plain));
     frames.items.push_back(frame_of(camera, image, depth));
   }
+  if (frames.items.empty())
+    throw UserError("/synthetic: no camera of " + std::to_string(subject.cameras.size()) +
+                    " sees enough of what is to be shown, or all are inside of it");
   ConfigValue transforms = transforms_of(subject.cameras.front());
   transforms.add("frames", std::move(frames));
   write_text_file(out.file("transforms.json"), to_json(transforms));

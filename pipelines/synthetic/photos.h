@@ -28,7 +28,7 @@ bool is_good_view(const SceneImage& picture);
 /// left out. The same bytes for the same settings.
 ///
 /// @param folder  new or empty; it appears when everything in it is complete
-/// Throws as write_dataset.
+/// Throws as write_dataset; UserError where no view is good.
 void write_photos(const SyntheticSettings& settings, const RenderSettings& render, const std::filesystem::path& folder,
                   const Observer& observer = {});
 

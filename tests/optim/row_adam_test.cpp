@@ -42,11 +42,11 @@ struct Slopes {
 };
 
 const std::vector<double>& first() {
-  static const std::vector<double> table = bias_corrections(0.9);
+  static const std::vector<double> table = bias_corrections(0.9, 100);
   return table;
 }
 const std::vector<double>& second() {
-  static const std::vector<double> table = bias_corrections(0.999);
+  static const std::vector<double> table = bias_corrections(0.999, 100);
   return table;
 }
 

@@ -149,6 +149,10 @@ TEST_CASE("what is wrong with a model of COLMAP is named with its place") {
   CHECK_THAT(refusal("9 PINHOLE 10 10 1 1 3 4\n"), Contains("i.txt:2: is of camera 1"));
   CHECK_THAT(refusal(kCameras, "7 0 0 0 0 1 2 3 1 b.jpg\n\n"),
              Contains("i.txt:1: its pose is not finite, or no rotation"));
+  CHECK_THAT(refusal(kCameras, "7 2 0 0 0 1 2 3 1 b.jpg\n\n"), Contains("allowed: a quaternion of length 1"));
+  CHECK_THAT(refusal(kCameras, "7 1e200 1e200 0 0 1 2 3 1 b.jpg\n\n"), Contains("no rotation"));
+  CHECK_THAT(refusal(kCameras, "7 1 0 0 0 1 2 3 1 a.jpg\n8 1 0 0 0 1 2 3 1 b.jpg\n"),
+             Contains("i.txt:2: is no line of observations"));
   CHECK_THAT(refusal(kCameras, "7 1 0 0 0 1 2 3 1\n\n"), Contains("i.txt:1: has no name"));
   CHECK_THAT(refusal(kCameras, kImages, "1 0 0 inf 1 1 1 0\n"), Contains("p.txt:1: its place is not finite"));
   CHECK_THAT(refusal(kCameras, kImages, "1 0 0 0 1 256 1 0\n"), Contains("p.txt:1: the colour 256"));

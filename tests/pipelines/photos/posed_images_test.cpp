@@ -1,5 +1,3 @@
-#include "pipelines/photos/posed_images.h"
-
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -8,6 +6,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "pipelines/photos/photo.h"
 #include "stress/scratch_folder.h"
 
 namespace posed_images_test {
@@ -67,12 +66,20 @@ std::string message(F&& call) {
 }  // namespace
 
 TEST_CASE("pictures of transforms.json, with lens, mask and depth, by name") {
-  const Pictures made({"images/b.png", "images/a.png", "masks/a.png", "depths/a.png"});
+  const Pictures made({"images/b.png", "images/a.png", "masks/a.png", "depths/c.png"});
+  Image mask(1, 6, 8);  // whole, but for column 4
+  for (int y = 0; y < 6; ++y) {
+    for (int x = 0; x < 8; ++x) mask(0, y, x) = x == 4 ? 0.5F : 1.0F;
+  }
+  write_image(made.path("masks/a.png").string(), mask, {.png_bits = 16});
+  made.write("depths/a.png", 1, 0.5F);
+  made.write("depths/b.png", 1, 0.5F);
   const fs::path file = made.text(
       "transforms.json",
-      transforms(kIntrinsics + R"(, "k1": 0.1, "p2": 0.01)",
-                 {entry("images/b.png", R"("k1": 0.2, )"),
-                  entry("./images/a", R"("mask_path": "masks/a.png", "depth_file_path": "depths/a.png", )")}));
+      transforms(
+          kIntrinsics + R"(, "k1": 0.1, "p2": 0.01)",
+          {entry("images/b.png", R"("k1": 0.2, "mask_path": "masks/a.png", "depth_file_path": "depths/b.png", )"),
+           entry("./images/a", R"("mask_path": "masks/a.png", "depth_file_path": "depths/a.png", )")}));
   const PosedImages set = read_posed_images(file);
   REQUIRE(set.images.size() == 2);
   CHECK(set.images[0].name == "./images/a");
@@ -80,14 +87,23 @@ TEST_CASE("pictures of transforms.json, with lens, mask and depth, by name") {
   CHECK(set.images[0].mask.filename() == "a.png");
   CHECK(set.images[0].lens == Lens{.k1 = 0.1, .p2 = 0.01});
   CHECK(set.images[1].lens == Lens{.k1 = 0.2, .p2 = 0.01});
-  CHECK(set.images[1].depth.empty());
   // OpenGL looks along −z, OpenCV along z.
   CHECK(set.images[0].camera.camera_from_world.rotation(2, 2) == -1);
   CHECK_THROWS_AS(read_cameras(file.string()), UserError);  // nobody straightens there
-  const Photo photo = read_photo(set.images[0], {.depth_unit = 0.002});
-  CHECK(photo.weight.width() == 8);
-  CHECK(photo.alpha(0, 3, 4) == Approx(0.5).epsilon(1e-4));
+  PhotoRules rules;
+  rules.depth_unit = 0.002;
+  Photo photo = read_photo(set.images[0], rules);
+  CHECK(photo.weight(0, 3, 4) == Approx(0.5).margin(0.05));  // half of it counts; the lens bends a little
+  CHECK(photo.weight(0, 3, 2) == Approx(1));
+  CHECK(photo.alpha.empty());
   CHECK(photo.depth(0, 3, 4) == Approx(0.002 * std::round(0.5 * 65535)).epsilon(1e-6));
+  rules.masks = MaskMeaning::kWanted;
+  photo = read_photo(set.images[0], rules);
+  CHECK(photo.weight(0, 3, 4) == 1);  // the lens shows it
+  CHECK(photo.alpha(0, 3, 4) == Approx(0.5).margin(0.05));
+  PosedImage colored = set.images[0];
+  colored.depth = made.path("depths/c.png");
+  CHECK_THAT(message([&] { read_photo(colored, rules); }), Contains("allowed: a grey PNG of 16 bits, OpenEXR"));
 }
 
 TEST_CASE("a field of view stands for intrinsics that a file does not have") {
@@ -100,6 +116,67 @@ TEST_CASE("a field of view stands for intrinsics that a file does not have") {
   CHECK(set.images[0].camera.fx == Approx(4 / std::tan(0.5)));
   CHECK(set.images[0].camera.cy == 3);
   CHECK_THAT(message([&] { read_cameras(file.string()); }), Contains("w is missing"));
+}
+
+TEST_CASE("what else a file says of intrinsics counts beside a field of view") {
+  const Pictures made({"a.png"});
+  const auto camera = [&](const std::string& top) {
+    return read_posed_images(made.text("transforms.json", transforms(top, {entry("a.png")}))).images[0].camera;
+  };
+  const Camera given = camera(R"("camera_angle_x": 1.0, "camera_angle_y": 0.5, "cx": 3.5, "w": 8)");
+  CHECK(given.cx == 3.5);
+  CHECK(given.cy == 3);
+  CHECK(given.fy == Approx(3 / std::tan(0.25)));
+  const PosedImages other = read_posed_images(
+      made.text("transforms.json", transforms(R"("camera_angle_x": 1.0, "w": 16)", {entry("a.png")})));
+  CHECK_THAT(message([&] { read_photo(other.images[0], {}); }), Contains("its camera has 16 x 6"));
+}
+
+TEST_CASE("what is transparent has no part in colours that are made smaller or straightened") {
+  const Pictures made({});
+  Image picture(4, 6, 8);  // red on the left, and on the right a blue that nobody sees
+  for (int y = 0; y < 6; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      picture(0, y, x) = x < 3 ? 1.0F : 0.0F;
+      picture(2, y, x) = x < 3 ? 0.0F : 1.0F;
+      picture(3, y, x) = x < 3 ? 1.0F : 0.0F;
+    }
+  }
+  write_image(made.path("p.png").string(), picture);
+  Image multiplied(4, 6, 8);  // as OpenEXR has colours: half of a grey
+  for (int c = 0; c < 4; ++c) {
+    for (int y = 0; y < 6; ++y) std::fill_n(multiplied.row(c, y), 8, c == 3 ? 0.5F : 0.25F);
+  }
+  write_image(made.path("p.exr").string(), multiplied);
+  PosedImage posed;
+  posed.image = made.path("p.png");
+  posed.camera.width = 8;
+  posed.camera.height = 6;
+  posed.camera.fx = posed.camera.fy = 10;
+  posed.camera.cx = 4;
+  posed.camera.cy = 3;
+  PhotoRules rules;
+  rules.longest_side = 4;
+  Photo photo = read_photo(posed, rules);
+  CHECK(photo.color(0, 1, 1) == 1);  // columns 2 and 3: one of them counts
+  CHECK(photo.color(2, 1, 1) == 0);
+  CHECK(photo.alpha(0, 1, 1) == 0.5F);
+  rules.longest_side = 0;
+  PosedImage exr = posed;
+  exr.image = made.path("p.exr");
+  CHECK(read_photo(exr, rules).color(0, 2, 2) == 0.5F);
+  CHECK(read_photo(exr, rules).alpha(0, 2, 2) == 0.5F);
+  multiplied(1, 4, 5) = std::nanf("");
+  write_image(made.path("p.exr").string(), multiplied);
+  CHECK_THAT(message([&] { read_photo(exr, rules); }), Contains("the pixel of row 4 and column 5 is not finite"));
+  posed.lens.k1 = 0.5;
+  photo = read_photo(posed, rules);
+  for (int x = 0; x < 8; ++x) {
+    if (photo.weight(0, 3, x) > 0 && photo.alpha(0, 3, x) > 0) {
+      CHECK(photo.color(0, 3, x) == Approx(1));
+      CHECK(photo.color(2, 3, x) == 0);
+    }
+  }
 }
 
 TEST_CASE("pictures of INRIA's cameras.json") {
@@ -135,7 +212,7 @@ TEST_CASE("pictures of a folder of COLMAP") {
   CHECK(set.points.size() == 1);
   CHECK(set.images[0].lens.k1 == 0.1);
   fs::remove(made.path("masks/a.png"));
-  CHECK_THAT(message([&] { read_posed_images(made.folder.path()); }), Contains("1 of 2 pictures have no mask in"));
+  CHECK_THAT(message([&] { read_posed_images(made.folder.path()); }), Contains("1 of 2 pictures have no mask: a.png"));
   fs::remove(made.path("images/a.png"));
   CHECK(read_posed_images(made.folder.path()).images.size() == 1);  // the other camera is left out
   fs::remove(made.path("images/b.png"));
@@ -149,6 +226,7 @@ TEST_CASE("sets of pictures that make no sense are refused") {
     return message([&] { read_posed_images(made.text("transforms.json", transforms(top, entries))); });
   };
   CHECK_THAT(refused(kIntrinsics, {entry("a.png"), entry("a.png")}), Contains("two cameras are of one picture: a.png"));
+  CHECK_THAT(refused(kIntrinsics, {entry("a.png"), entry("./a")}), Contains("two cameras are of one picture: ./a"));
   CHECK_THAT(refused(kIntrinsics, {entry("z.png")}), Contains("1 of 1 cameras have no picture in"));
   CHECK_THAT(refused(kIntrinsics, {entry("a.png", R"("mask_path": "m.png", )")}),
              Contains("names m.png, which is not there"));
@@ -174,7 +252,9 @@ TEST_CASE("a picture is read as its camera says") {
   posed.image = made.path("grey.png");
   CHECK(read_photo(posed, {}).color.channels() == 3);
   posed.image = made.path("alpha.png");
-  const Photo photo = read_photo(posed, {.longest_side = 4});
+  PhotoRules rules;
+  rules.longest_side = 4;
+  const Photo photo = read_photo(posed, rules);
   CHECK(photo.camera.width == 4);
   CHECK(photo.camera.height == 3);
   CHECK(photo.camera.fx == 5);

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/scan/density.h"
+#include "pipelines/scan/photo_checks.h"
 #include "pipelines/scan/report.h"
 #include "pipelines/scan/start.h"
 #include "pipelines/synthetic/dataset.h"
@@ -102,7 +103,7 @@ TEST_CASE("an object is made from pictures with depths, and shown from where nob
   const Gaussians made = read_splats((folder_named("object") / "object.ply").string()).gaussians;
   CHECK(made.count() == 800);
   CHECK(made.sh_degree == 1);
-  for (const char* file : {"summary.json", "report.html", "cameras.json", "config.json", "views/images_0000.png"})
+  for (const char* file : {"summary.json", "report.html", "cameras.json", "config.json", "views/0000_images_0000.png"})
     CHECK(fs::exists(folder_named("object") / file));
   CHECK_FALSE(fs::exists(folder_named("object") / "checkpoint.npz"));
 }
@@ -140,6 +141,67 @@ TEST_CASE("a reconstruction goes on only with what it was begun with") {
   CHECK_THROWS_AS(run_scan(settings, folder, false, loss_terms()), UserError);
   CHECK_THROWS_WITH(run_scan(settings, folder, true, loss_terms()), Catch::Matchers::Contains("is done"));
   CHECK_THROWS_WITH(run_scan(quick_scan(6), folder, true, loss_terms()), Catch::Matchers::Contains("other settings"));
+}
+
+TEST_CASE("a reconstruction that saves after every iteration stops too, and leaves nothing behind when it is done") {
+  ScanSettings settings = quick_scan(9);
+  settings.save_every = 1;
+  const fs::path folder = folder_named("saving");
+  Impatient impatient{4};
+  CHECK_THROWS_AS(run_scan(settings, folder, false, loss_terms(), impatient.observer()), Interrupted);
+  CHECK(fs::exists(folder / "checkpoint.npz"));
+  run_scan(settings, folder, true, loss_terms());
+  write_text_file((folder / "checkpoint.npz").string(), "left by a kill");
+  CHECK_THROWS_WITH(run_scan(settings, folder, true, loss_terms()), Catch::Matchers::Contains("is done"));
+  CHECK_FALSE(fs::exists(folder / "checkpoint.npz"));
+}
+
+TEST_CASE("a checkpoint is of its pictures") {
+  const ScanSettings original = quick_scan(9);
+  const fs::path copy = folder_named("changed_photos");
+  fs::copy(made_photos().parent_path(), copy, fs::copy_options::recursive);
+  ScanSettings settings = original;
+  settings.photos.path = copy / "transforms.json";
+  settings.save_every = 1;
+  const fs::path folder = folder_named("changed");
+  Impatient impatient{4};
+  CHECK_THROWS_AS(run_scan(settings, folder, false, loss_terms(), impatient.observer()), Interrupted);
+  std::string text = read_text_file(settings.photos.path.string());
+  text.replace(text.find("\"fl_x\": ") + 8, 1, "9");
+  write_text_file(settings.photos.path.string(), text);
+  CHECK_THROWS_AS(run_scan(settings, folder, true, loss_terms()), DataError);
+}
+
+TEST_CASE("pictures that make no scene are refused before any is read") {
+  ScanSettings settings = quick_scan(5);
+  PosedImages set = read_posed_images(made_photos());
+  CHECK_NOTHROW(check_photo_cameras(settings, set));
+  PosedImages sizes = set;
+  sizes.images[3].camera.width = 65;
+  CHECK_THROWS_WITH(check_photo_cameras(settings, sizes),
+                    Catch::Matchers::Contains("images/0000.png has 64 x 64 pixels, images/0003.png has 65 x 64"));
+  PosedImages one_place = set;
+  for (PosedImage& image : one_place.images)
+    image.camera.camera_from_world.translation = -image.camera.camera_from_world.rotation * Vector3<double>(1, 2, 3);
+  CHECK_THROWS_WITH(check_photo_cameras(settings, one_place),
+                    Catch::Matchers::Contains("pictures from one place tell"));
+  PosedImages one = set;
+  one.images.resize(1);
+  CHECK_THROWS_WITH(check_photo_cameras(settings, one), Catch::Matchers::Contains("1 picture tells nothing of depth"));
+  PosedImages huge = set;
+  for (PosedImage& image : huge.images) image.camera.width = image.camera.height = 65536;
+  CHECK_THROWS_WITH(check_photo_cameras(settings, huge),
+                    Catch::Matchers::Contains("/photos/longest_side reduces them"));
+  settings.density.most = 10;
+  settings.start.count = 10;
+  settings.start.points = folder_named("many.ply");
+  settings.start.from = ScanStartKind::kPoints;
+  std::string cloud =
+      "ply\nformat ascii 1.0\nelement vertex 20\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+  for (int i = 0; i < 20; ++i) cloud += std::to_string(i) + " 0 0\n";
+  write_text_file(settings.start.points.string(), cloud);
+  CHECK_THROWS_WITH(first_gaussians(settings, set, {read_photo(set.images[0], {})}),
+                    Catch::Matchers::Contains("/density/most: is 10; the start has 20 points already"));
 }
 
 TEST_CASE("every shipped config of reconstruct is read, and those that make pictures make them") {

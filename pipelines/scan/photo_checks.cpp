@@ -1,0 +1,118 @@
+#include "pipelines/scan/photo_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
+
+#include "core/check.h"
+#include "core/log.h"
+#include "core/memory.h"
+#include "core/text.h"
+#include "pipelines/scan/start.h"
+
+namespace hsi4d {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string size_text(const Camera& camera) {
+  return std::to_string(camera.width) + " x " + std::to_string(camera.height);
+}
+
+void check_one_size(const ScanSettings& settings, const PosedImages& set) {
+  const PosedImage& first = set.images.front();
+  const Camera wanted = photo_camera(first, settings.photos.rules);
+  for (const PosedImage& image : set.images) {
+    const Camera camera = photo_camera(image, settings.photos.rules);
+    if (camera.width == wanted.width && camera.height == wanted.height) continue;
+    throw UserError(set.file.string() + ": " + first.name + " has " + size_text(wanted) + " pixels, " + image.name +
+                    " has " + size_text(camera) + "; allowed: one size");
+  }
+}
+
+/// Colour, alpha, weight and depth of all pictures, as floats.
+void check_memory(const ScanSettings& settings, const PosedImages& set) {
+  double numbers = 0;
+  for (const PosedImage& image : set.images) {
+    const Camera camera = photo_camera(image, settings.photos.rules);
+    const int planes = 4 + (image.mask.empty() && image.lens.is_straight() ? 0 : 1) + (image.depth.empty() ? 0 : 1);
+    numbers += static_cast<double>(planes) * camera.width * camera.height;
+  }
+  const double asked = numbers * sizeof(float) / kBytesPerMb, there = available_memory_mb();
+  if (there == 0 || asked < there) return;
+  throw UserError(set.file.string() + ": " + std::to_string(set.images.size()) + " pictures of " +
+                  size_text(photo_camera(set.images.front(), settings.photos.rules)) + " pixels take " +
+                  rounded(asked, 3) + " MB; " + rounded(there, 3) + " MB are there. /photos/longest_side reduces them");
+}
+
+/// The widest angle between lines from cameras to what they look at, degrees.
+double widest_angle(const std::vector<Vector3<double>>& ways) {
+  double widest = 0;
+  for (const Vector3<double>& a : ways) {
+    for (const Vector3<double>& b : ways) widest = std::max(widest, std::atan2(a.cross(b).norm(), a.dot(b)));
+  }
+  return widest * 180 / std::numbers::pi;
+}
+
+void check_places(const PosedImages& set) {
+  constexpr double kOnePlace = 1e-6;  // of the distance to what is looked at
+  constexpr double kOneSide = 5;      // degrees
+  std::vector<Camera> cameras;
+  for (const PosedImage& image : set.images) cameras.push_back(image.camera);
+  const Vector3<double> target = looked_at(cameras), first = camera_center_world(cameras.front());
+  std::vector<Vector3<double>> ways;
+  double spread = 0, distance = 0;
+  for (const Camera& camera : cameras) {
+    const Vector3<double> center = camera_center_world(camera);
+    ways.push_back(center - target);
+    spread = std::max(spread, (center - first).norm());
+    distance = std::max(distance, ways.back().norm());
+  }
+  if (!(spread > kOnePlace * std::max(distance, kOnePlace)))
+    throw UserError(set.file.string() + ": " + std::to_string(cameras.size()) +
+                    (cameras.size() == 1 ? " picture tells" : " pictures from one place tell") +
+                    " nothing of depth; allowed: pictures from several places");
+  const double degrees = widest_angle(ways);
+  if (degrees < kOneSide)
+    log_warning(set.file.string() + ": all pictures are taken from one side, within " + rounded(degrees, 2) +
+                " degrees: depths will be guessed, and other sides stay empty");
+}
+
+std::string size_of(const fs::path& file) { return file.empty() ? "-" : std::to_string(fs::file_size(file)); }
+
+}  // namespace
+
+void check_photo_cameras(const ScanSettings& settings, const PosedImages& set) {
+  check_one_size(settings, set);
+  check_places(set);
+  check_memory(settings, set);
+}
+
+void warn_of_background(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos) {
+  if (settings.kind != ScanKind::kObject) return;
+  const auto without =
+      std::count_if(photos.begin(), photos.end(), [](const Photo& photo) { return photo.alpha.empty(); });
+  if (without > 0)
+    log_warning(set.file.string() + ": " + std::to_string(without) + " of " + std::to_string(photos.size()) +
+                " pictures have neither alpha nor mask: what is behind the object becomes a part of it");
+}
+
+std::string photo_identity(const PosedImages& set) {
+  std::string text;
+  for (const PosedImage& image : set.images) {
+    text += image.name + " " + size_of(image.image) + " " + size_of(image.mask) + " " + size_of(image.depth);
+    const Camera& c = image.camera;
+    for (const double number :
+         {c.fx, c.fy, c.cx, c.cy, image.lens.k1, image.lens.k2, image.lens.k3, image.lens.p1, image.lens.p2})
+      text += " " + number_text(number);
+    const Matrix4<double> matrix = matrix_from_rigid(c.camera_from_world);
+    for (Index i = 0; i < 12; ++i) text += " " + number_text(matrix(i / 4, i % 4));
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace hsi4d

@@ -1,0 +1,22 @@
+// What pictures must be before a reconstruction begins, and what of them is told.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipelines/photos/photo.h"
+#include "pipelines/scan/settings.h"
+
+namespace hsi4d {
+
+/// Before any picture is read: throws UserError for pictures of several sizes (it names two), for more than memory
+/// holds, and for cameras that are all at one place. Warns in the log where all look from one side.
+void check_photo_cameras(const ScanSettings& settings, const PosedImages& set);
+
+/// Warns of pictures of an object in which nothing says what is behind it.
+void warn_of_background(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos);
+
+/// What a checkpoint belongs to, beside its config: names, cameras and sizes of the files of all pictures.
+std::string photo_identity(const PosedImages& set);
+
+}  // namespace hsi4d
