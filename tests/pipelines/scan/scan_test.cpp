@@ -9,6 +9,7 @@
 #include "core/file.h"
 #include "core/parallel.h"
 #include "pipelines/config/run_config.h"
+#include "pipelines/draw/image_of_scene.h"
 #include "pipelines/scan/density.h"
 #include "pipelines/scan/photo_checks.h"
 #include "pipelines/scan/report.h"
@@ -305,6 +306,30 @@ TEST_CASE("a start from points, from random places and without any") {
       CHECK((x > static_cast<double>(k) + 1 - 1e-5 && x < static_cast<double>(k) + 2 + 1e-5));
     }
   }
+}
+
+TEST_CASE("the picture stays when faint Gaussians go to others") {
+  ScanState state;
+  state.gaussians = read_splats((made_photos().parent_path() / "truth" / "object.ply").string()).gaussians;
+  // A tenth of them shows nothing; the others are half transparent, as in the middle of a reconstruction.
+  for (std::size_t i = 0; i < state.gaussians.opacity_logits.size(); ++i)
+    state.gaussians.opacity_logits[i] = i % 10 == 0 ? -7.0F : -0.5F;
+  SceneView view;
+  view.camera = read_posed_images(made_photos()).images[0].camera;
+  view.background = {0.5, 0.5, 0.5};
+  const Image before = render_picture({state.gaussians, {}}, view).image;
+  DensitySettings settings;
+  settings.growth = 1;
+  CHECK(change_density(settings, 3, state).moved > 100);
+  const Image after = render_picture({state.gaussians, {}}, view).image;
+  float largest = 0;
+  double sum = 0;
+  for (std::size_t i = 0; i < before.data().size(); ++i) {
+    largest = std::max(largest, std::abs(before.data()[i] - after.data()[i]));
+    sum += std::abs(before.data()[i] - after.data()[i]);
+  }
+  CAPTURE(largest, sum / static_cast<double>(before.data().size()));
+  CHECK(largest < 2.0F / 255);
 }
 
 TEST_CASE("faint Gaussians share places of others, and the number grows to its bound") {
