@@ -1,5 +1,5 @@
 // Mean opacity of the Gaussians: what a scene can do without fades, and goes where it is needed. [Kheradmand et al.
-// 2024, eq. 12]
+// 2024]
 #include "autodiff/reduce.h"
 #include "optim/losses/list.h"
 

@@ -149,7 +149,8 @@ std::string align_command(const AlignArguments& a) {
   write_text_file(out.file("alignment.json"), alignment_json(ground, similarity));
   out.commit();
   std::string text = a.out + ": the ground holds " + rounded(100 * ground.share, 3) + " % of " +
-                     count_text(std::ssize(points), "Gaussian") + "; scale " + rounded(similarity.scale, 5) + "\n";
+                     count_text(std::ssize(points), "Gaussian") + " of opacity above 0.5; scale " +
+                     rounded(similarity.scale, 5) + "\n";
   if (!cameras.empty())
     text += "  cameras are " + rounded(median_height(cameras, {}), 3) + " m over the ground; ground.png shows it\n";
   if (similarity.scale == 1 && a.distance.empty() && a.height.empty() && !a.camera_height)

@@ -38,7 +38,7 @@ StandingPlace parse_place(const std::string& text, const std::string& option) {
   const auto commas = static_cast<std::size_t>(std::count(text.begin(), text.end(), ','));
   const bool has_ground = commas == 3;
   const std::vector<double> n = parse_numbers(text, has_ground ? 4 : 3, kPlaceCommand + option,
-                                              has_ground ? "x,y,heading,ground" : "x,y,heading");
+                                              has_ground ? "x,y,heading,z" : "x,y,heading, or x,y,heading,z");
   return {n[0], n[1], n[2], has_ground ? n[3] : 0.0};
 }
 

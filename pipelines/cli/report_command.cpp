@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/check.h"
 #include "core/file.h"
 #include "pipelines/chain/report.h"
 #include "pipelines/cli/list.h"
@@ -13,6 +14,7 @@
 #include "pipelines/record/gradient_table.h"
 #include "pipelines/report/data.h"
 #include "pipelines/report/page.h"
+#include "pipelines/scan/scan.h"
 #include "pipelines/sweep/selection.h"
 
 namespace hsi4d::cli {
@@ -30,6 +32,10 @@ std::string report_of_run(const std::string& run) {
 }
 
 std::string report_of_folder(const std::string& folder) {
+  if (is_scan_folder(folder))
+    throw UserError(folder +
+                    ": is of `hsi4d reconstruct`, which has written its report.html; this command writes those "
+                    "of runs and sweeps");
   return is_chain_folder(folder) ? write_chain_report(folder) + "\n" : report_of_run(folder);
 }
 

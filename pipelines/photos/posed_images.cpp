@@ -24,6 +24,10 @@ namespace {
 constexpr const char* kPictureEndings[] = {".png",  ".jpg", ".jpeg", ".PNG",  ".JPG",
                                            ".JPEG", ".exr", ".tif",  ".tiff", ".webp"};
 
+constexpr const char* kAllowed =
+    "a folder with a model of COLMAP (here, in sparse/0 or in sparse) or a transforms.json, a transforms.json, INRIA's "
+    "cameras.json";
+
 bool is_picture(const fs::path& file) {
   return std::any_of(std::begin(kPictureEndings), std::end(kPictureEndings),
                      [&](const char* ending) { return file.extension() == ending; });
@@ -65,6 +69,14 @@ void look_for_pictures(const Source& source, std::vector<PosedImage>& images) {
   if (missing.size() == images.size()) throw UserError(text + ": " + few_names(missing));
   log_warning(text + " and are left out: " + few_names(missing));
   std::erase_if(images, [](const PosedImage& image) { return image.image.empty(); });
+}
+
+/// A folder of masks or depths that fits no picture. Returns what is wrong.
+std::vector<std::string> fits_none(const fs::path& folder, const std::vector<PosedImage>& images,
+                                   fs::path PosedImage::*kind) {
+  const auto has = [kind](const PosedImage& image) { return !(image.*kind).empty(); };
+  if (folder.empty() || fs::is_empty(folder) || std::any_of(images.begin(), images.end(), has)) return {};
+  return {folder.string() + ": no file there has the name of a picture, such as " + images.front().name};
 }
 
 /// Gives every image the mask and the depths of its name, where there are folders of them.
@@ -140,9 +152,12 @@ PosedImages checked(const Source& source, PosedImages set) {
   if (set.images.empty()) throw UserError(source.file.string() + ": holds no camera of a picture");
   look_for_pictures(source, set.images);
   std::vector<std::string> problems = named_twice(source.file, set.images);
-  std::vector<std::string> unnamed = look_for_named(source.file, set.images);
+  const std::vector<std::string> unnamed = look_for_named(source.file, set.images);
   look_for_files(source, set.images);
-  for (const auto& more : {unnamed, only_some(source.file, set.images, &PosedImage::mask, "mask"),
+  if (!unnamed.empty()) throw UserError(joined(unnamed, "\n"));
+  for (const auto& more : {fits_none(source.masks, set.images, &PosedImage::mask),
+                           fits_none(source.depths, set.images, &PosedImage::depth),
+                           only_some(source.file, set.images, &PosedImage::mask, "mask"),
                            only_some(source.file, set.images, &PosedImage::depth, "depths")})
     problems.insert(problems.end(), more.begin(), more.end());
   if (!problems.empty()) throw UserError(joined(problems, "\n"));
@@ -185,7 +200,9 @@ PosedImages read_transforms_images(const fs::path& file, const fs::path& picture
   PosedImages set{file, {}, {}};
   const fs::path folder = pictures.empty() ? file.parent_path() : pictures;
   for (const PictureCamera& one : read_photo_cameras(file.string())) {
-    if (one.picture.empty()) throw UserError(file.string() + ": an entry has no file_path; which picture is it of?");
+    if (one.picture.empty())
+      throw UserError(file.string() +
+                      ": an entry names no picture (file_path), as in a file of cameras alone; allowed: " + kAllowed);
     PosedImage image{one.picture, {}, one.mask, one.depth, one.camera, one.lens};
     if (one.angle_x > 0) complete_intrinsics(image, one, folder);
     set.images.push_back(std::move(image));
@@ -209,10 +226,9 @@ PosedImages read_posed_images(const fs::path& path, const fs::path& pictures) {
     for (const char* name : {"transforms.json", "transforms_train.json"}) {
       if (fs::is_regular_file(path / name)) return read_transforms_images(path / name, pictures);
     }
-    throw UserError(path.string() +
-                    ": no cameras are there; looked for: cameras and images of COLMAP (.bin or .txt; here, in sparse/0 "
-                    "and in sparse), transforms.json");
+    throw UserError(path.string() + ": no cameras are there; allowed: " + kAllowed);
   }
+  if (is_picture(path)) throw UserError(path.string() + ": is a picture; allowed: " + kAllowed);
   const std::string text = read_text_file(path.string());
   if (is_inria_cameras(text)) return read_inria_images(path, text, pictures);
   return read_transforms_images(path, pictures);

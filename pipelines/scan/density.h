@@ -24,7 +24,7 @@ DensityChange change_density(const DensitySettings& settings, std::int64_t seed,
 bool changes_density_after(const DensitySettings& settings, Index iteration);
 
 /// How far places tremble: N(0, Σ²) · noise · rate · σ(100 (0.005 − o)), so that what is faint looks around and what is
-/// seen stands still [eq. 11 of the paper, in its code's form].
+/// seen stands still [the paper's noise, as its code has it].
 ///
 /// @param means  [N,3] rows that are moved
 /// @param rate   of the means in this iteration

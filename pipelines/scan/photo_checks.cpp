@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/memory.h"
 #include "core/text.h"
+#include "pipelines/scan/fit.h"
 #include "pipelines/scan/start.h"
 
 namespace hsi4d {
@@ -81,17 +82,41 @@ void check_places(const PosedImages& set) {
                 " degrees: depths will be guessed, and other sides stay empty");
 }
 
+void check_some_learnt(const ScanSettings& settings, const PosedImages& set) {
+  const std::vector<bool> held = held_photos(settings.photos, set.images.size());
+  if (std::find(held.begin(), held.end(), false) != held.end()) return;
+  throw UserError(settings.file.string() + ": /photos/hold_every: " + std::to_string(settings.photos.hold_every) +
+                  " holds back all of " + std::to_string(held.size()) +
+                  " pictures; allowed: 0 for none, or 2 and more");
+}
+
+/// Whether an image that is there is 0 everywhere.
+bool is_black(const Image& image) {
+  const std::span<const float> numbers = image.data();
+  return !image.empty() && std::all_of(numbers.begin(), numbers.end(), [](float x) { return x == 0; });
+}
+
 std::string size_of(const fs::path& file) { return file.empty() ? "-" : std::to_string(fs::file_size(file)); }
 
 }  // namespace
 
 void check_photo_cameras(const ScanSettings& settings, const PosedImages& set) {
+  check_some_learnt(settings, set);
   check_one_size(settings, set);
   check_places(set);
   check_memory(settings, set);
 }
 
-void warn_of_background(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos) {
+void check_what_counts(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos) {
+  std::vector<std::string> empty;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    if (is_black(photos[i].alpha) || is_black(photos[i].weight)) empty.push_back(set.images[i].name);
+  }
+  const std::string text =
+      set.file.string() + ": " + std::to_string(empty.size()) + " of " + std::to_string(photos.size()) + " pictures ";
+  if (empty.size() == photos.size())
+    throw UserError(text + "show nothing that counts: masks or alpha are black everywhere. White is what counts");
+  if (!empty.empty()) log_warning(text + "show nothing that counts, by mask or alpha: " + few_names(empty));
   if (settings.kind != ScanKind::kObject) return;
   const auto without =
       std::count_if(photos.begin(), photos.end(), [](const Photo& photo) { return photo.alpha.empty(); });

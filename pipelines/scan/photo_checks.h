@@ -9,12 +9,14 @@
 
 namespace hsi4d {
 
-/// Before any picture is read: throws UserError for pictures of several sizes (it names two), for more than memory
-/// holds, and for cameras that are all at one place. Warns in the log where all look from one side.
+/// Before any picture is read: throws UserError where all pictures are held back, for pictures of several sizes (it
+/// names two), for more than memory holds, and for cameras that are all at one place. Warns in the log where all look
+/// from one side.
 void check_photo_cameras(const ScanSettings& settings, const PosedImages& set);
 
-/// Warns of pictures of an object in which nothing says what is behind it.
-void warn_of_background(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos);
+/// Throws UserError where nothing of any picture counts or is wanted. Warns of single pictures of that kind, and of
+/// pictures of an object in which nothing says what is behind it.
+void check_what_counts(const ScanSettings& settings, const PosedImages& set, const std::vector<Photo>& photos);
 
 /// What a checkpoint belongs to, beside its config: names, cameras and sizes of the files of all pictures.
 std::string photo_identity(const PosedImages& set);

@@ -35,7 +35,7 @@ std::string stem_of(std::size_t photo, const std::string& name) {
 }
 
 Table figures_of(const ScanSummary& summary) {
-  Table table{.title = "Pictures", .head = {"", "pictures", "PSNR [dB]", "SSIM"}};
+  Table table{.title = "Pictures", .caption = "Means over pictures", .head = {"", "pictures", "PSNR [dB]", "SSIM"}};
   for (const auto& [name, score] : {std::pair{"learnt from", &summary.learnt}, {"held back", &summary.held}}) {
     if (score->pictures > 0)
       table.rows.push_back(

@@ -8,10 +8,12 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "pipelines/config/config_kind.h"
 #include "pipelines/scan/photo_checks.h"
 #include "pipelines/scan/report.h"
 #include "pipelines/scan/start.h"
@@ -97,6 +99,12 @@ ScanSummary write_result(const ScanSettings& settings, const PosedImages& set, c
 
 }  // namespace
 
+bool is_scan_folder(const fs::path& folder) {
+  const std::string file = (folder / kConfig).string();
+  if (!fs::is_regular_file(file)) return false;
+  return config_kind(parse_json_text(read_text_file(file), file)) == ConfigKind::kScan;
+}
+
 fs::path scan_result(const ScanSettings& settings, const fs::path& folder) {
   return folder / (settings.kind == ScanKind::kScene ? "scene.ply" : "object.ply");
 }
@@ -111,7 +119,7 @@ ScanSummary run_scan(const ScanSettings& settings, const fs::path& folder, bool 
   PhotoRules rules = settings.photos.rules;
   rules.masks = settings.kind == ScanKind::kObject ? MaskMeaning::kWanted : MaskMeaning::kCounts;
   const std::vector<Photo> photos = read_photos(set, rules);
-  warn_of_background(settings, set, photos);
+  check_what_counts(settings, set, photos);
   const std::string checkpoint = (folder / kCheckpoint).string(), identity = config + photo_identity(set);
   ScanState state =
       resume && fs::exists(checkpoint) ? load_scan_state(checkpoint, identity) : first_state(settings, set, photos);

@@ -37,6 +37,9 @@ struct ScanSummary {
 ScanSummary run_scan(const ScanSettings& settings, const std::filesystem::path& folder, bool resume,
                      std::span<const LossTerm> terms, const Observer& observer = {});
 
+/// Whether a folder is of a reconstruction, by its config. Throws as read_text_file.
+bool is_scan_folder(const std::filesystem::path& folder);
+
 /// Where the Gaussians are.
 std::filesystem::path scan_result(const ScanSettings& settings, const std::filesystem::path& folder);
 

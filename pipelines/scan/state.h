@@ -14,7 +14,7 @@ namespace hsi4d {
 inline constexpr std::size_t kScanGroups = 5;
 
 /// Iterations that make one point of the curve.
-inline constexpr Index kCurveEvery = 100;
+inline constexpr Index kCurveEvery = 20;
 
 /// Gaussians on their way.
 struct ScanState {

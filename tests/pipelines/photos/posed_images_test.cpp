@@ -213,6 +213,12 @@ TEST_CASE("pictures of a folder of COLMAP") {
   CHECK(set.images[0].lens.k1 == 0.1);
   fs::remove(made.path("masks/a.png"));
   CHECK_THAT(message([&] { read_posed_images(made.folder.path()); }), Contains("1 of 2 pictures have no mask: a.png"));
+  fs::remove(made.path("masks/b.png.png"));
+  made.write("masks/other.png", 1, 1);
+  CHECK_THAT(message([&] { read_posed_images(made.folder.path()); }),
+             Contains("masks: no file there has the name of a picture, such as b.png"));
+  CHECK_THAT(message([&] { read_posed_images(made.path("images/a.png")); }), Contains("is a picture; allowed: "));
+  fs::remove_all(made.path("masks"));
   fs::remove(made.path("images/a.png"));
   CHECK(read_posed_images(made.folder.path()).images.size() == 1);  // the other camera is left out
   fs::remove(made.path("images/b.png"));
@@ -221,7 +227,8 @@ TEST_CASE("pictures of a folder of COLMAP") {
 
 TEST_CASE("sets of pictures that make no sense are refused") {
   const Pictures made({"a.png"});
-  CHECK_THAT(message([&] { read_posed_images(made.folder.path()); }), Contains("no cameras are there; looked for"));
+  CHECK_THAT(message([&] { read_posed_images(made.folder.path()); }),
+             Contains("no cameras are there; allowed: a folder with a model of COLMAP"));
   const auto refused = [&](const std::string& top, const std::vector<std::string>& entries) {
     return message([&] { read_posed_images(made.text("transforms.json", transforms(top, entries))); });
   };
@@ -233,7 +240,7 @@ TEST_CASE("sets of pictures that make no sense are refused") {
   CHECK_THAT(refused(kIntrinsics + R"(, "k4": 0.1)", {entry("a.png")}), Contains("/k4"));
   CHECK_THAT(refused(kIntrinsics + R"(, "is_fisheye": true)", {entry("a.png")}), Contains("/is_fisheye"));
   CHECK_THAT(refused(kIntrinsics, {}), Contains("holds no camera of a picture"));
-  CHECK_THAT(refused(kIntrinsics, {"{" + kIdentity + "}"}), Contains("no file_path"));
+  CHECK_THAT(refused(kIntrinsics, {"{" + kIdentity + "}"}), Contains("names no picture (file_path)"));
 }
 
 TEST_CASE("a picture is read as its camera says") {

@@ -98,7 +98,7 @@ TEST_CASE("an object is made from pictures with depths, and shown from where nob
   CHECK(summary.learnt.pictures == 10);
   CHECK(summary.held.psnr_db > 24);
   CHECK(summary.learnt.psnr_db > 27);
-  CHECK(summary.curve.size() == 3);
+  CHECK(summary.curve.size() == 15);
   CHECK(summary.curve.back() > summary.curve.front() + 3);
   CHECK(summary.gaussians == 800);
   const Gaussians made = read_splats((folder_named("object") / "object.ply").string()).gaussians;
@@ -157,6 +157,24 @@ TEST_CASE("a reconstruction that saves after every iteration stops too, and leav
   CHECK_FALSE(fs::exists(folder / "checkpoint.npz"));
 }
 
+TEST_CASE("pictures of which nothing counts are refused, or told") {
+  const ScanSettings settings = quick_scan(5);
+  const PosedImages set = read_posed_images(made_photos());
+  std::vector<Photo> photos;
+  for (const PosedImage& image : set.images) photos.push_back(read_photo(image, {}));
+  CHECK_NOTHROW(check_what_counts(settings, set, photos));
+  for (Photo& photo : photos) photo.weight = Image(1, photo.camera.height, photo.camera.width);
+  CHECK_THROWS_WITH(check_what_counts(settings, set, photos),
+                    Catch::Matchers::Contains("12 of 12 pictures show nothing that counts"));
+}
+
+TEST_CASE("the report of a reconstruction is not written over by that of a run") {
+  const fs::path folder = folder_named("kept");
+  run_scan(quick_scan(3), folder, false, loss_terms());
+  CHECK(is_scan_folder(folder));
+  CHECK_FALSE(is_scan_folder(folder_named("nothing_there")));
+}
+
 TEST_CASE("a checkpoint is of its pictures") {
   const ScanSettings original = quick_scan(9);
   const fs::path copy = folder_named("changed_photos");
@@ -181,11 +199,16 @@ TEST_CASE("pictures that make no scene are refused before any is read") {
   sizes.images[3].camera.width = 65;
   CHECK_THROWS_WITH(check_photo_cameras(settings, sizes),
                     Catch::Matchers::Contains("images/0000.png has 64 x 64 pixels, images/0003.png has 65 x 64"));
+  ScanSettings all_held = settings;
+  all_held.photos.hold_every = 1;
+  CHECK_THROWS_WITH(check_photo_cameras(all_held, set),
+                    Catch::Matchers::Contains("/photos/hold_every: 1 holds back all of"));
   PosedImages one_place = set;
   for (PosedImage& image : one_place.images)
     image.camera.camera_from_world.translation = -image.camera.camera_from_world.rotation * Vector3<double>(1, 2, 3);
   CHECK_THROWS_WITH(check_photo_cameras(settings, one_place),
                     Catch::Matchers::Contains("pictures from one place tell"));
+  settings.photos.hold_every = 0;
   PosedImages one = set;
   one.images.resize(1);
   CHECK_THROWS_WITH(check_photo_cameras(settings, one), Catch::Matchers::Contains("1 picture tells nothing of depth"));
