@@ -33,7 +33,6 @@ class ScanGraph {
   ScanGraph(const Gaussians& g, const Camera& camera, const RenderSettings& settings, int degree, bool has_weight)
       : view_{camera, g.origin_world, settings} {
     view_.settings.sh_degree = std::min(degree, settings.sh_degree);
-    const Index n = g.count();
     groups_ = {{"means", {leaf("means", g.means, 3)}},
                {"quats", {leaf("quats", g.quats, 4)}},
                {"log_scales", {leaf("log_scales", g.log_scales, 3)}},
@@ -46,7 +45,6 @@ class ScanGraph {
     inputs_.gaussian_log_scales = group(2);
     const SplatInputs<S> splats = {group(0), gaussian_axes(group(1), group(2)), inputs_.gaussian_opacities,
                                    sh_colors(group(4), group(0), xi_, view_)};
-    HSI4D_CHECK_EQ(splats.means.shape().rows, n);
     inputs_.rendered = render(splats, xi_, background_, view_, {}, intrinsics_).image;
     inputs_.target = tape_.constant("target", inputs_.rendered.shape());
     if (!has_weight) return;
@@ -62,7 +60,11 @@ class ScanGraph {
     for (Index i = 0; i < 3; ++i) background_array(0, i) = static_cast<S>(background[i]);
     tape_.set(intrinsics_, std::array<S, 4>{static_cast<S>(camera.fx), static_cast<S>(camera.fy),
                                             static_cast<S>(camera.cx), static_cast<S>(camera.cy)});
-    write_image(inputs_.target, photo.alpha.empty() ? photo.color : before_color(photo, background));
+    if (photo.alpha.empty()) {
+      write_image(inputs_.target, photo.color);  // no copy of it
+    } else {
+      write_image(inputs_.target, before_color(photo, background));
+    }
     if (inputs_.weight.tape == nullptr) return;
     if (photo.weight.empty()) {
       fill(inputs_.weight, S(1));

@@ -49,8 +49,7 @@ void fit_scan(const ScanSettings& settings, const std::vector<Photo>& photos, do
               std::span<const LossTerm> terms, const ScanWatch& watch, ScanState& state);
 
 /// All pictures of which something counts, before settings.background, and how near they are to what was seen.
-/// @param take  called with each
-/// picture's image; may be empty
+/// @param take  called with each picture's image; may be empty
 std::vector<ScanPicture> score_scan(const ScanSettings& settings, const std::vector<Photo>& photos,
                                     const Gaussians& gaussians,
                                     const std::function<void(const ScanPicture&, const Image&)>& take = {});

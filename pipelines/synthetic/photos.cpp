@@ -21,6 +21,8 @@ namespace hsi4d {
 
 namespace {
 
+constexpr double kSeen = 0.5;  // alpha from which a pixel shows something
+
 Camera camera_at(const Vector3<double>& eye, const Vector3<double>& target, double focal_share, int size_px) {
   Camera camera;
   camera.width = camera.height = size_px;
@@ -63,7 +65,6 @@ Image depth_image(const SceneImage& picture) {
     for (int x = 0; x < depth.width(); ++x) {
       const std::size_t at =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width()) + static_cast<std::size_t>(x);
-      constexpr double kSeen = 0.5;
       depth(0, y, x) = picture.alpha[at] > kSeen ? static_cast<float>(picture.depth[at]) : 0.0F;
     }
   }
@@ -145,7 +146,7 @@ std::vector<Camera> cameras_in_scene(Index count, int size_px, std::uint64_t see
 }
 
 bool is_good_view(const SceneImage& picture) {
-  constexpr double kSeen = 0.5, kNearest = 0.25;         // alpha; metres
+  constexpr double kNearest = 0.25;                      // metres
   constexpr double kMostNear = 0.02, kLeastSeen = 0.02;  // shares of pixels
   std::size_t near = 0, seen = 0;
   for (std::size_t i = 0; i < picture.alpha.size(); ++i) {
