@@ -127,7 +127,7 @@ function(hsi4d_add_room path)
     string(APPEND name "_top")
   endif()
   file(${glob} sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${path}/*.cpp)
-  list(FILTER sources EXCLUDE REGEX "/(main|image_module)\\.cpp$")
+  list(FILTER sources EXCLUDE REGEX "(/main|_module)\\.cpp$")
   list(TRANSFORM arg_DEPENDS REPLACE "/" "_")
   list(TRANSFORM arg_DEPENDS PREPEND hsi4d::)
   add_library(hsi4d_${name} STATIC ${sources})
@@ -147,19 +147,27 @@ function(hsi4d_add_room path)
   set_property(GLOBAL APPEND PROPERTY HSI4D_LAYERS hsi4d_${name})
 endfunction()
 
-# The library that OpenImageIO is in (core/image_codec.h). Programs that link hsi4d::core find it by their run path.
-function(hsi4d_add_image_module)
-  add_library(hsi4d_images MODULE ${PROJECT_SOURCE_DIR}/core/image_module.cpp)
-  set_target_properties(hsi4d_images PROPERTIES PREFIX lib CXX_VISIBILITY_PRESET hidden
-                                                LIBRARY_OUTPUT_DIRECTORY ${CMAKE_RUNTIME_OUTPUT_DIRECTORY})
-  target_include_directories(hsi4d_images PRIVATE ${PROJECT_SOURCE_DIR})
-  target_link_libraries(hsi4d_images PRIVATE PkgConfig::OpenImageIO hsi4d_warnings)
-  add_dependencies(hsi4d_core hsi4d_images)
-  target_link_libraries(hsi4d_core PRIVATE ${CMAKE_DL_LIBS})
+# hsi4d_add_module(NAME SOURCE ROOM LINK...): libhsi4d_NAME.so from one file, SOURCE_module.cpp, which alone sees the
+# libraries that it links to. The room loads it when it is first needed (core/loaded_library.h); programs find it by
+# their run path.
+function(hsi4d_add_module name source room)
+  add_library(hsi4d_${name} MODULE ${PROJECT_SOURCE_DIR}/${source}_module.cpp)
+  set_target_properties(hsi4d_${name} PROPERTIES PREFIX lib CXX_VISIBILITY_PRESET hidden
+                                                 LIBRARY_OUTPUT_DIRECTORY ${CMAKE_RUNTIME_OUTPUT_DIRECTORY})
+  target_include_directories(hsi4d_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(hsi4d_${name} PRIVATE ${ARGN} hsi4d_warnings)
+  add_dependencies(hsi4d_${room} hsi4d_${name})
+  set_property(GLOBAL APPEND PROPERTY HSI4D_MODULES hsi4d_${name})
+endfunction()
+
+# hsi4d_find_modules(ROOM): programs that link the room look for modules beside themselves, or where they are installed.
+function(hsi4d_find_modules room)
+  target_link_libraries(hsi4d_${room} PRIVATE ${CMAKE_DL_LIBS})
   # An old run path counts for libraries that others open in the program's name too, as sanitizers do.
-  target_link_options(hsi4d_core INTERFACE LINKER:--disable-new-dtags
-                                           $<BUILD_INTERFACE:LINKER:-rpath,${CMAKE_RUNTIME_OUTPUT_DIRECTORY}>
-                                           $<INSTALL_INTERFACE:LINKER:-rpath,$<INSTALL_PREFIX>/${CMAKE_INSTALL_LIBDIR}>)
+  target_link_options(hsi4d_${room} INTERFACE
+    LINKER:--disable-new-dtags
+    $<BUILD_INTERFACE:LINKER:-rpath,${CMAKE_RUNTIME_OUTPUT_DIRECTORY}>
+    $<INSTALL_INTERFACE:LINKER:-rpath,$<INSTALL_PREFIX>/${CMAKE_INSTALL_LIBDIR}>)
 endfunction()
 
 # hsi4d_add_layer(NAME ROOM...): hsi4d::NAME, all its rooms.
