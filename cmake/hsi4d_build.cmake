@@ -152,7 +152,7 @@ endfunction()
 # their run path.
 function(hsi4d_add_module name source room)
   add_library(hsi4d_${name} MODULE ${PROJECT_SOURCE_DIR}/${source}_module.cpp)
-  set_target_properties(hsi4d_${name} PROPERTIES PREFIX lib CXX_VISIBILITY_PRESET hidden
+  set_target_properties(hsi4d_${name} PROPERTIES PREFIX lib
                                                  LIBRARY_OUTPUT_DIRECTORY ${CMAKE_RUNTIME_OUTPUT_DIRECTORY})
   target_include_directories(hsi4d_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(hsi4d_${name} PRIVATE ${ARGN} hsi4d_warnings)

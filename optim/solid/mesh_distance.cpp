@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <numeric>
 #include <unordered_map>
 
 #include "body/surface_index.h"
 #include "core/check.h"
 #include "core/log.h"
+#include "optim/solid/mesh_topology.h"
 
 namespace hsi4d {
 
@@ -70,53 +69,6 @@ struct PieceBox {
   }
   double distance(const Point& p) const { return (low - p).cwiseMax(p - high).cwiseMax(0.0).norm(); }
 };
-
-/// Six times the volume that a closed surface holds; negative where it is turned inwards.
-double signed_volume(const TriangleMesh& mesh) {
-  const Point origin = mesh.vertices.front();
-  double sum = 0;
-  for (const Face& face : mesh.faces) {
-    const Point a = vertex_of(mesh, face[0]) - origin, b = vertex_of(mesh, face[1]) - origin,
-                c = vertex_of(mesh, face[2]) - origin;
-    sum += dot(a, cross(b, c));
-  }
-  return sum;
-}
-
-/// Triangles that hang together by their corners, each part with its own vertices.
-std::vector<TriangleMesh> connected_parts(const TriangleMesh& mesh) {
-  std::vector<std::int32_t> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&parent](std::int32_t v) {
-    while (parent[static_cast<std::size_t>(v)] != v) {
-      std::int32_t& up = parent[static_cast<std::size_t>(v)];
-      up = parent[static_cast<std::size_t>(up)];
-      v = up;
-    }
-    return v;
-  };
-  for (const Face& face : mesh.faces) {
-    for (std::size_t i = 1; i < 3; ++i) parent[static_cast<std::size_t>(root(face[i]))] = root(face[0]);
-  }
-  std::map<std::int32_t, std::size_t> part_of_root;
-  std::vector<TriangleMesh> parts;
-  std::vector<std::int32_t> number(mesh.vertices.size(), -1);
-  for (Face face : mesh.faces) {
-    const auto [entry, is_new] = part_of_root.try_emplace(root(face[0]), parts.size());
-    if (is_new) parts.emplace_back();
-    TriangleMesh& part = parts[entry->second];
-    for (std::int32_t& corner : face) {
-      std::int32_t& to = number[static_cast<std::size_t>(corner)];
-      if (to < 0) {
-        to = static_cast<std::int32_t>(part.vertices.size());
-        part.vertices.push_back(vertex_of(mesh, corner));
-      }
-      corner = to;
-    }
-    part.faces.push_back(face);
-  }
-  return parts;
-}
 
 void append(const TriangleMesh& more, TriangleMesh& mesh) {
   const auto first = static_cast<std::int32_t>(mesh.vertices.size());

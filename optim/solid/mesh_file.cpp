@@ -18,13 +18,6 @@ namespace {
 
 constexpr std::size_t kMostVertices = std::numeric_limits<std::int32_t>::max();
 
-std::string lower_ending(const std::string& name) {
-  const std::size_t dot_at = name.rfind('.');
-  std::string ending = dot_at == std::string::npos ? "" : name.substr(dot_at);
-  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return ending;
-}
-
 // --- OBJ -------------------------------------------------------------------------------------------------------------
 
 /// Reads the lines of an OBJ file that say where vertices and faces are.
@@ -196,6 +189,15 @@ void detail::add_polygon(std::span<const std::int32_t> corners, TriangleMesh& me
   for (std::size_t i = 2; i < corners.size(); ++i) mesh.faces.push_back({corners[0], corners[i - 1], corners[i]});
 }
 
+std::string mesh_ending(const std::string& path) {
+  const std::size_t dot_at = path.rfind('.');
+  std::string ending = dot_at == std::string::npos ? "" : path.substr(dot_at);
+  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  if (ending != ".obj" && ending != ".ply" && ending != ".glb")
+    throw UserError(path + ": a mesh ends in .obj, .ply or .glb");
+  return ending;
+}
+
 TriangleMesh cleaned(const TriangleMesh& mesh, const std::string& name) {
   check_mesh(mesh, name);
   const std::vector<std::int32_t> first = first_at_place(mesh.vertices);
@@ -220,29 +222,13 @@ TriangleMesh cleaned(const TriangleMesh& mesh, const std::string& name) {
 }
 
 TriangleMesh parse_mesh(std::span<const std::uint8_t> file, const std::string& name) {
-  const std::string ending = lower_ending(name);
+  const std::string ending = mesh_ending(name);
   if (ending == ".obj")
     return cleaned(ObjParser({reinterpret_cast<const char*>(file.data()), file.size()}, name).parse(), name);
   if (ending == ".ply") return cleaned(parse_ply_mesh(file, name), name);
-  if (ending == ".glb") return cleaned(detail::parse_glb_mesh(file, name), name);
-  throw UserError(name + ": a mesh ends in .obj, .ply or .glb");
+  return cleaned(detail::parse_glb_mesh(file, name), name);
 }
 
 TriangleMesh read_mesh(const std::string& path) { return parse_mesh(read_file(path), path); }
-
-void write_mesh(const std::string& path, const TriangleMesh& mesh) {
-  std::string text = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.vertices.size()) +
-                     "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-                     std::to_string(mesh.faces.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
-  const auto add = [&text](const auto& value) { text.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
-  for (const Vector3<double>& vertex : mesh.vertices) {
-    for (int i = 0; i < 3; ++i) add(vertex[i]);
-  }
-  for (const std::array<std::int32_t, 3>& face : mesh.faces) {
-    add(std::uint8_t{3});
-    for (const std::int32_t corner : face) add(corner);
-  }
-  write_text_file(path, text);
-}
 
 }  // namespace hsi4d

@@ -40,8 +40,12 @@ TriangleMesh read_mesh(const std::string& path);
 /// The same from a file's bytes. @param name  what messages call it; its ending says what it is
 TriangleMesh parse_mesh(std::span<const std::uint8_t> file, const std::string& name);
 
-/// Writes a mesh as binary little-endian PLY, vertices as doubles. Errors as write_file (core/file.h).
+/// Writes a mesh: .ply, binary, little-endian, vertices as doubles; .obj; .glb, vertices as floats, y up, so that
+/// read_mesh turns it back. Errors as write_file (core/file.h); UserError for another ending.
 void write_mesh(const std::string& path, const TriangleMesh& mesh);
+
+/// The ending of a mesh's file in lower case: .obj, .ply or .glb. Throws UserError naming the file for another.
+std::string mesh_ending(const std::string& path);
 
 namespace detail {
 

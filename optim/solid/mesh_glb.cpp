@@ -9,6 +9,7 @@
 #include "core/check.h"
 #include "core/config_parse.h"
 #include "core/quaternion.h"
+#include "optim/solid/glb.h"
 #include "optim/solid/mesh_file.h"
 
 namespace hsi4d {
@@ -18,9 +19,6 @@ namespace {
 using Kind = ConfigValue::Kind;
 using Transform = Eigen::Matrix<double, 3, 4>;
 
-constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
-constexpr int kFloat = 5126, kUnsignedByte = 5121, kUnsignedShort = 5123, kUnsignedInt = 5125;
-constexpr int kTriangles = 4;     // primitive.mode
 constexpr int kDeepestNode = 64;  // nodes in nodes
 constexpr std::size_t kMostPieces = 1000000;
 
@@ -53,7 +51,7 @@ class GlbParser {
   }
 
   void read_chunks() {
-    if (word_at(0) != kMagic) fail("this is no .glb file: it does not begin with \"glTF\"");
+    if (word_at(0) != glb::kMagic) fail("this is no .glb file: it does not begin with \"glTF\"");
     if (word_at(4) != 2) fail("glTF version " + std::to_string(word_at(4)) + " is not known; version 2 is");
     for (std::size_t at = 12; at < file_.size();) {
       const std::size_t length = word_at(at);
@@ -62,8 +60,8 @@ class GlbParser {
       if (length > file_.size() - at)
         fail("a chunk of " + std::to_string(length) + " bytes goes beyond the file's end");
       const auto chunk = file_.subspan(at, length);
-      if (type == kJsonChunk && json_.kind == Kind::kNull) parse_json(chunk);
-      if (type == kBinaryChunk && binary_.empty()) binary_ = chunk;
+      if (type == glb::kJsonChunk && json_.kind == Kind::kNull) parse_json(chunk);
+      if (type == glb::kBinaryChunk && binary_.empty()) binary_ = chunk;
       at += length;
     }
     if (json_.kind != Kind::kObject) fail("there is no JSON chunk");
@@ -153,7 +151,7 @@ class GlbParser {
     const ConfigValue* const primitives = find_member(mesh, "primitives");
     if (primitives == nullptr) return;
     for (const ConfigValue& primitive : primitives->items) {
-      if (whole(primitive, "mode", kTriangles) != kTriangles) continue;  // points, lines, strips
+      if (whole(primitive, "mode", glb::kTriangles) != glb::kTriangles) continue;  // points, lines, strips
       if (++primitives_ > kMostPieces) fail("there are more than a million pieces of meshes");
       const ConfigValue* const attributes = find_member(primitive, "attributes");
       if (attributes != nullptr && find_member(*attributes, "POSITION") != nullptr)
@@ -164,7 +162,7 @@ class GlbParser {
   void add_primitive(const ConfigValue& primitive, const ConfigValue& attributes, const Transform& world) {
     const std::size_t first = mesh_.vertices.size();
     read_accessor(whole(attributes, "POSITION"), "VEC3", [&](int component, const std::uint8_t* at) {
-      if (component != kFloat) fail("places of vertices are no floats");
+      if (component != glb::kFloat) fail("places of vertices are no floats");
       std::array<float, 3> x{};
       std::memcpy(x.data(), at, sizeof(x));
       const Eigen::Vector3d local(static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2]));
@@ -195,8 +193,8 @@ class GlbParser {
   }
 
   static std::size_t index_at(int component, const std::uint8_t* at) {
-    if (component == kUnsignedByte) return *at;
-    if (component == kUnsignedShort) {
+    if (component == glb::kUnsignedByte) return *at;
+    if (component == glb::kUnsignedShort) {
       std::uint16_t index = 0;
       std::memcpy(&index, at, sizeof(index));
       return index;
@@ -215,10 +213,11 @@ class GlbParser {
     if (find_member(accessor, "sparse") != nullptr) fail("sparse accessors are not read");
     const auto component = static_cast<int>(whole(accessor, "componentType"));
     const bool is_vector = std::string_view(type) == "VEC3";
-    const std::size_t bytes = component == kUnsignedByte ? 1 : component == kUnsignedShort ? 2 : 4;
-    if (component != kFloat && component != kUnsignedByte && component != kUnsignedShort && component != kUnsignedInt)
+    const std::size_t bytes = component == glb::kUnsignedByte ? 1 : component == glb::kUnsignedShort ? 2 : 4;
+    if (component != glb::kFloat && component != glb::kUnsignedByte && component != glb::kUnsignedShort &&
+        component != glb::kUnsignedInt)
       fail("accessor " + std::to_string(index) + " has the component type " + std::to_string(component));
-    if (!is_vector && component == kFloat) fail("corners of triangles are floats");
+    if (!is_vector && component == glb::kFloat) fail("corners of triangles are floats");
     const ConfigValue& view = entry("bufferViews", whole(accessor, "bufferView"));
     if (whole(view, "buffer") != 0) fail("numbers are read of the file's own buffer alone, which is buffer 0");
     const std::size_t element = is_vector ? 3 * bytes : bytes, count = whole(accessor, "count");

@@ -146,6 +146,16 @@ OccupancyGrid decode_occupancy(std::span<const std::uint8_t> file, const std::st
   return grid_of(Npz::decode(file, name, kMostBytes));
 }
 
+void write_occupancy(const std::string& path, const OccupancyGrid& grid) {
+  HSI4D_CHECK_EQ(std::ssize(grid.occupied), grid.cells[0] * grid.cells[1] * grid.cells[2]);
+  NpzWriter file;
+  file.add("occupancy", {grid.cells[0], grid.cells[1], grid.cells[2]}, grid.occupied);
+  file.add("origin", {3}, std::vector<double>(grid.origin.data(), grid.origin.data() + 3));
+  file.add_scalar("voxel_size", grid.voxel_size);
+  file.add_text("up", grid.is_y_up ? "y" : "z");
+  file.write(path, NpzPacking::deflated);
+}
+
 std::vector<std::int32_t> squared_voxel_distances(const std::vector<std::uint8_t>& set,
                                                   const std::array<Index, 3>& cells) {
   const Index voxels = cells[0] * cells[1] * cells[2];

@@ -36,6 +36,10 @@ OccupancyGrid read_occupancy(const std::string& path);
 /// As read_occupancy, of a file in memory. @param name  what messages call it
 OccupancyGrid decode_occupancy(std::span<const std::uint8_t> file, const std::string& name);
 
+/// Writes a grid so that read_occupancy gives the same: `occupancy` as bytes of 0 and 1, deflated; in one step. Throws
+/// InternalError for an array that is not of the grid's size; UserError as write_file (core/file.h).
+void write_occupancy(const std::string& path, const OccupancyGrid& grid);
+
 /// The squared distance of every voxel to the nearest one of the set, in voxels, between centres: exact integers.
 ///
 ///   D(p) = min_{q ∈ S} |p − q|²                    [Felzenszwalb and Huttenlocher 2012, one axis after the other]

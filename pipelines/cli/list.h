@@ -13,6 +13,7 @@
   HSI4D_COMMAND(reconstruct)    \
   HSI4D_COMMAND(align)          \
   HSI4D_COMMAND(place)          \
+  HSI4D_COMMAND(mesh)           \
   HSI4D_COMMAND(select_camera)  \
   HSI4D_COMMAND(evaluate)       \
   HSI4D_COMMAND(report)         \

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/camera_rig.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
@@ -46,7 +47,8 @@ Subject object_of(const SyntheticSettings& settings) {
   double radius = 0;
   for (Index i = 0; i < g.count(); ++i)
     radius = std::max(radius, Vector3<float>(g.means.data() + 3 * i).cast<double>().norm());
-  subject.cameras = cameras_around(g.origin_world, radius, settings.photos, settings.size_px);
+  constexpr double kLowest = -0.6;  // an object that stands is not seen from straight below
+  subject.cameras = cameras_around({g.origin_world, radius, settings.photos, settings.size_px, kLowest});
   subject.has_alpha = true;
   return subject;
 }
@@ -106,21 +108,6 @@ ConfigValue frame_of(const Camera& camera, const std::string& image, const std::
 }
 
 }  // namespace
-
-std::vector<Camera> cameras_around(const Vector3<double>& center, double radius, Index count, int size_px) {
-  constexpr double kFocal = 1.2, kFill = 0.8;  // of the picture's width
-  const double distance = radius * 2 * kFocal / kFill;
-  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
-  std::vector<Camera> cameras;
-  for (Index k = 0; k < count; ++k) {
-    constexpr double kLowest = -0.6;
-    const double z = 1 - (1 - kLowest) * (static_cast<double>(k) + 0.5) / static_cast<double>(count);
-    const double across = std::sqrt(1 - z * z), angle = golden * static_cast<double>(k);
-    const Vector3<double> way(across * std::cos(angle), across * std::sin(angle), z);
-    cameras.push_back(camera_at(center + distance * way, center, kFocal, size_px));
-  }
-  return cameras;
-}
 
 std::vector<Camera> cameras_in_scene(Index count, int size_px, std::uint64_t seed) {
   constexpr double kFocal = 0.8;
