@@ -11,10 +11,6 @@
 
 namespace hsi4d {
 
-/// Cameras on a sphere around a point, evenly [Fibonacci lattice], looking at it; none from straight below.
-/// @param radius  of what is to be in the picture, metres
-std::vector<Camera> cameras_around(const Vector3<double>& center, double radius, Index count, int size_px);
-
 /// Cameras in a scene that is open towards −y, at the heights of eyes and hands, looking at its middle from all places
 /// where somebody could stand with a camera.
 std::vector<Camera> cameras_in_scene(Index count, int size_px, std::uint64_t seed);
