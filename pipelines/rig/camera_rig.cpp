@@ -15,14 +15,14 @@ namespace hsi4d {
 
 namespace {
 
-constexpr double kFocal = 0.8;                      // of the picture's width
+constexpr double kFocal = 0.8;                         // of the picture's width
 constexpr double kLowestEye = 0.6, kHighestEye = 1.9;  // metres over the floor
-constexpr int kProbes = 64;                         // rays around a place
-constexpr int kProbeSize = 24;                      // pixels of a view that is judged
-constexpr double kMostNear = 0.02;                  // share of a view that may be near
-constexpr double kNearMiddle = 2;                   // of `nearest`: half of a view is farther away than that
-constexpr Index kSpare = 3;                         // good views for each that is taken
-constexpr Index kTries = 30;                        // places for each good view that is wanted
+constexpr int kProbes = 64;                            // rays around a place
+constexpr int kProbeSize = 24;                         // pixels of a view that is judged
+constexpr double kMostNear = 0.02;                     // share of a view that may be near
+constexpr double kNearMiddle = 2;                      // of `nearest`: half of a view is farther away than that
+constexpr Index kSpare = 3;                            // good views for each that is taken
+constexpr Index kTries = 30;                           // places for each good view that is wanted
 
 std::array<Vector3<double>, 2> bounds_of(const TexturedMesh& mesh, const RigSettings& settings) {
   if (!settings.box) return {mesh.low, mesh.high};
@@ -68,8 +68,7 @@ class Seeker {
     Outlook view;
     Vector3<double> eye;
     if (!find_eye(at, eye)) return view;
-    std::vector<MeshHit> around;
-    mesh_.cast(rays_from(eye), around);
+    const std::vector<MeshHit> around = mesh_.cast(rays_from(eye));
     if (!has_room(around)) return view;
     view.camera = camera_at(eye, eye + direction_of(k, at, around), kFocal, settings_.size);
     judge(view);
@@ -82,11 +81,10 @@ class Seeker {
     const Vector3<double> size = bounds_[1] - bounds_[0];
     for (Index i = 0; i < 3; ++i)
       eye[i] = bounds_[0][i] + size[i] * random_.uniform(at + static_cast<std::uint64_t>(i));
-    std::vector<MeshHit> under;
     const WorldRay down{eye, Vector3<double>(0, 0, -1)};
-    mesh_.cast({&down, 1}, under);
-    if (under[0].face < 0) return false;
-    eye[2] += random_.uniform(at + 3, kLowestEye, kHighestEye) - under[0].distance;
+    const MeshHit under = mesh_.cast({&down, 1}).front();
+    if (under.face < 0) return false;
+    eye[2] += random_.uniform(at + 3, kLowestEye, kHighestEye) - under.distance;
     return eye[2] < bounds_[1][2];
   }
 
@@ -130,12 +128,11 @@ class Seeker {
   }
 
   void judge(Outlook& view) const {
-    const Camera small = resized(view.camera, kProbeSize, kProbeSize);
+    const PictureRays small(resized(view.camera, kProbeSize, kProbeSize));
     std::vector<WorldRay> rays;
     for (int i = 0; i < kProbeSize * kProbeSize; ++i)
-      rays.push_back(ray_through(small, i % kProbeSize + 0.5, i / kProbeSize + 0.5));
-    std::vector<MeshHit> hits;
-    mesh_.cast(rays, hits);
+      rays.push_back(small.through(i % kProbeSize + 0.5, i / kProbeSize + 0.5));
+    const std::vector<MeshHit> hits = mesh_.cast(rays);
     Index near = 0, near_middle = 0, backs = 0, seen = 0;
     for (std::size_t i = 0; i < hits.size(); ++i) {
       if (hits[i].face < 0) continue;
@@ -146,10 +143,10 @@ class Seeker {
       view.cells.push_back(cell_of(hits[i], rays[i]));
     }
     const auto share = [&](Index count) { return static_cast<double>(count) / static_cast<double>(hits.size()); };
-    view.fate = share(seen) < settings_.least_seen                             ? Fate::kLittle
-                : share(near) > kMostNear || share(near_middle) > 0.5          ? Fate::kNear
-                : share(backs) > settings_.most_backs                          ? Fate::kBacks
-                                                                               : Fate::kGood;
+    view.fate = share(seen) < settings_.least_seen                    ? Fate::kLittle
+                : share(near) > kMostNear || share(near_middle) > 0.5 ? Fate::kNear
+                : share(backs) > settings_.most_backs                 ? Fate::kBacks
+                                                                      : Fate::kGood;
     std::sort(view.cells.begin(), view.cells.end());
     view.cells.erase(std::unique(view.cells.begin(), view.cells.end()), view.cells.end());
   }

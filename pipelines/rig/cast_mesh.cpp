@@ -16,7 +16,8 @@ std::array<double, N> mixed(const TexturedMesh& mesh, const std::vector<std::arr
   const std::array<std::int32_t, 3>& corners = mesh.faces[row_of(face)];
   std::array<double, N> result;
   for (std::size_t k = 0; k < N; ++k)
-    result[k] = (1 - u - v) * rows[row_of(corners[0])][k] + u * rows[row_of(corners[1])][k] + v * rows[row_of(corners[2])][k];
+    result[k] =
+        (1 - u - v) * rows[row_of(corners[0])][k] + u * rows[row_of(corners[1])][k] + v * rows[row_of(corners[2])][k];
   return result;
 }
 
@@ -29,16 +30,40 @@ bool stops_ray(const void* context, std::int32_t face, float u, float v, float t
 
 RayScene* scene_of(const TexturedMesh& mesh) {
   std::string error;
-  RayScene* const scene =
-      mesh_library().make_scene({mesh.places, mesh.faces, mesh.opaque, stops_ray, &mesh}, error);
+  RayScene* const scene = mesh_library().make_scene({mesh.places, mesh.faces, mesh.opaque, stops_ray, &mesh}, error);
   if (scene == nullptr) throw UserError("rays at a mesh of " + std::to_string(mesh.faces.size()) + " faces: " + error);
   return scene;
 }
 
-/// The hit in double, of the triangle that the library found in float [Möller and Trumbore 1997].
-MeshHit exact_hit(const TexturedMesh& mesh, std::int32_t face, const WorldRay& ray) {
+}  // namespace
+
+CastMesh::CastMesh(TexturedMesh mesh) : mesh_(std::move(mesh)), scene_(scene_of(mesh_), mesh_library().free_scene) {}
+
+std::vector<std::int32_t> CastMesh::faces_met(std::span<const WorldRay> rays) const {
+  std::vector<MeshRay> asked(rays.size());
+  std::vector<std::int32_t> faces(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    for (Index k = 0; k < 3; ++k) {
+      asked[i].origin[row_of(static_cast<std::int32_t>(k))] = static_cast<float>(rays[i].origin[k] - mesh_.origin[k]);
+      asked[i].direction[row_of(static_cast<std::int32_t>(k))] = static_cast<float>(rays[i].direction[k]);
+    }
+    asked[i].threshold = rays[i].threshold;
+  }
+  mesh_library().cast(*scene_, asked, faces);
+  return faces;
+}
+
+std::vector<MeshHit> CastMesh::cast(std::span<const WorldRay> rays) const {
+  const std::vector<std::int32_t> faces = faces_met(rays);
+  std::vector<MeshHit> hits;
+  for (std::size_t i = 0; i < rays.size(); ++i) hits.push_back(hit_on(mesh_, faces[i], rays[i]));
+  return hits;
+}
+
+MeshHit hit_on(const TexturedMesh& mesh, std::int32_t face, const WorldRay& ray) {
   MeshHit hit{face};
   if (face < 0) return hit;
+  // Möller and Trumbore 1997
   const Vector3<double> a = corner_of(mesh, face, 0), ab = corner_of(mesh, face, 1) - a;
   const Vector3<double> ac = corner_of(mesh, face, 2) - a, from = ray.origin - mesh.origin - a;
   const Vector3<double> normal = cross(ab, ac), p = cross(ray.direction, ac), q = cross(from, ab);
@@ -50,29 +75,6 @@ MeshHit exact_hit(const TexturedMesh& mesh, std::int32_t face, const WorldRay& r
   hit.distance = dot(reach, ray.direction) / dot(ray.direction, ray.direction);
   hit.cosine = dot(normal, ray.direction) / scale;
   return hit;
-}
-
-}  // namespace
-
-CastMesh::CastMesh(TexturedMesh mesh)
-    : mesh_(std::move(mesh)), scene_(scene_of(mesh_), mesh_library().free_scene) {}
-
-void CastMesh::cast(std::span<const WorldRay> rays, std::vector<MeshHit>& hits) const {
-  std::vector<MeshRay> asked(rays.size());
-  std::vector<std::int32_t> faces(rays.size());
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Vector3<float> origin = (rays[i].origin - mesh_.origin).cast<float>();
-    const Vector3<float> direction = rays[i].direction.cast<float>();
-    asked[i] = {{origin[0], origin[1], origin[2]}, {direction[0], direction[1], direction[2]}, rays[i].threshold};
-  }
-  mesh_library().cast(*scene_, asked, faces);
-  hits.resize(rays.size());
-  for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = exact_hit(mesh_, faces[i], rays[i]);
-}
-
-WorldRay ray_through(const Camera& camera, double x, double y) {
-  const Matrix3<double>& turn = camera.camera_from_world.rotation;
-  return {camera_center_world(camera), turn.transpose() * unproject_pixel(camera, Vector2<double>(x, y), 1.0)};
 }
 
 float alpha_at(const TexturedMesh& mesh, std::int32_t face, double u, double v) {

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/LU>
+
 #include "core/camera.h"
 #include "pipelines/rig/textured_mesh.h"
 
@@ -34,16 +36,37 @@ class CastMesh {
 
   const TexturedMesh& mesh() const { return mesh_; }
 
-  /// What each ray meets first. Rays that are side by side should be near each other.
-  void cast(std::span<const WorldRay> rays, std::vector<MeshHit>& hits) const;
+  /// The face that each ray meets first, -1: none. Rays that are side by side should be near each other.
+  std::vector<std::int32_t> faces_met(std::span<const WorldRay> rays) const;
+
+  /// What each ray meets first.
+  std::vector<MeshHit> cast(std::span<const WorldRay> rays) const;
 
  private:
   TexturedMesh mesh_;
   std::unique_ptr<RayScene, void (*)(RayScene*)> scene_;
 };
 
-/// The ray through a place in the picture; its distances are camera z.
-WorldRay ray_through(const Camera& camera, double x, double y);
+/// Where a ray meets the plane of a face, held within the face. In double; a face without an area: nowhere.
+MeshHit hit_on(const TexturedMesh& mesh, std::int32_t face, const WorldRay& ray);
+
+/// Rays through places in a picture; their distances are camera z.
+class PictureRays {
+ public:
+  explicit PictureRays(const Camera& camera)
+      : camera_(camera),
+        center_(camera_center_world(camera)),
+        world_from_camera_(camera.camera_from_world.rotation.inverse()) {}
+
+  WorldRay through(double x, double y, float threshold = 0.5F) const {
+    return {center_, world_from_camera_ * unproject_pixel(camera_, Vector2<double>(x, y), 1.0), threshold};
+  }
+
+ private:
+  Camera camera_;
+  Vector3<double> center_;
+  Matrix3<double> world_from_camera_;
+};
 
 /// Alpha of a face at (u, v): of its material, its texture and its vertices.
 float alpha_at(const TexturedMesh& mesh, std::int32_t face, double u, double v);

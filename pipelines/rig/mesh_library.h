@@ -30,8 +30,8 @@ struct MeshMaterial {
 
 /// A picture that materials name: a file, or what the mesh's file holds.
 struct MeshTexture {
-  std::string file;           ///< as the mesh names it; of one that is inside, what messages call it
-  Bytes bytes;                ///< of an image file inside the mesh's; empty: `file` is beside the mesh
+  std::string file;  ///< as the mesh names it; of one that is inside, what messages call it
+  Bytes bytes;       ///< of an image file inside the mesh's; empty: `file` is beside the mesh
   bool is_inside = false;
 };
 
@@ -73,7 +73,8 @@ struct RayScene;
 struct MeshLibrary {
   /// Reads .glb, .obj, .ply. Returns what was wrong, or "".
   std::string (*read)(const std::string& path, LoadedMesh& mesh);
-  /// Prepares triangles for rays; null, and the reason in `error`, where that fails. The same for any number of threads.
+  /// Prepares triangles for rays; null, and the reason in `error`, where that fails. The same for any number of
+  /// threads.
   RayScene* (*make_scene)(const RayTarget& target, std::string& error);
   void (*free_scene)(RayScene* scene);
   /// The first face that each ray meets, -1: none. For several threads at once.

@@ -1,17 +1,16 @@
 // libhsi4d_meshes.so: the only file that includes Assimp and Embree. It links nothing of this project.
+#include <assimp/DefaultLogger.hpp>
 #include <assimp/GltfMaterial.h>
+#include <assimp/Importer.hpp>
+#include <assimp/LogStream.hpp>
 #include <assimp/config.h>
 #include <assimp/material.h>
 #include <assimp/mesh.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
-#include <embree3/rtcore.h>
-
-#include <assimp/DefaultLogger.hpp>
-#include <assimp/Importer.hpp>
-#include <assimp/LogStream.hpp>
 #include <bit>
 #include <cstring>
+#include <embree3/rtcore.h>
 #include <map>
 
 #include "pipelines/rig/mesh_library.h"
@@ -110,6 +109,7 @@ class SceneReader {
     uv_sets_.push_back(uv >= 0 && uv < AI_MAX_NUMBER_OF_TEXTURECOORDS ? uv : 0);
     aiColor4D color(1, 1, 1, 1);
     if (from.Get(AI_MATKEY_BASE_COLOR, color) != AI_SUCCESS) from.Get(AI_MATKEY_COLOR_DIFFUSE, color);
+    if (from.GetName() == aiString(AI_DEFAULT_MATERIAL_NAME)) color = aiColor4D(1, 1, 1, 1);  // Assimp's own, a grey
     float opacity = 1;
     if (!is_glb_ && from.Get(AI_MATKEY_OPACITY, opacity) == AI_SUCCESS) color.a = opacity;
     material.color = {color.r, color.g, color.b, color.a};
@@ -182,8 +182,9 @@ std::string read_mesh_file(const std::string& path, LoadedMesh& mesh) try {
   const Listening listening(mesh.notes);
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  const aiScene* const scene = importer.ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType |
-                                                           aiProcess_TransformUVCoords | aiProcess_ValidateDataStructure);
+  const aiScene* const scene =
+      importer.ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_TransformUVCoords |
+                                  aiProcess_ValidateDataStructure);
   if (scene == nullptr || scene->mRootNode == nullptr) return importer.GetErrorString();
   SceneReader(*scene, path.ends_with(".glb") || path.ends_with(".GLB"), mesh).read();
   return "";
@@ -211,8 +212,8 @@ void filter_hits(const RTCFilterFunctionNArguments* args) {
 void add_geometry(RayScene& made, const RayTarget& target, Index first, Index end, unsigned id) {
   if (first == end) return;
   RTCGeometry geometry = rtcNewGeometry(made.device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  void* const places = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12,
-                                               target.places.size());
+  void* const places =
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, target.places.size());
   void* const faces = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12,
                                               static_cast<std::size_t>(end - first));
   if (places != nullptr && faces != nullptr) {

@@ -41,8 +41,8 @@ MeshPhotos prepare_mesh_photos(const std::string& path, const RigSettings& setti
   MeshPhotos photos;
   photos.mesh = std::make_unique<CastMesh>(read_textured_mesh(path));
   const TexturedMesh& mesh = photos.mesh->mesh();
-  log_info(path + ": " + std::to_string(mesh.faces.size()) + " faces, " +
-           std::to_string(mesh.textures.size()) + " textures, " + size_text(mesh));
+  log_info(path + ": " + std::to_string(mesh.faces.size()) + " faces, " + std::to_string(mesh.textures.size()) +
+           " textures, " + size_text(mesh));
   photos.rig = is_object ? rig_around(mesh, settings) : rig_inside(*photos.mesh, settings, seed, path);
   if (!is_object) log_info(path + ": " + rig_text(photos.rig));
   photos.light = settings.light;

@@ -24,7 +24,8 @@ struct MeshPhotos {
 MeshPhotos prepare_mesh_photos(const std::string& path, const RigSettings& settings, bool is_object,
                                std::uint64_t seed);
 
-/// Writes transforms.json, images/ and depths/ (pipelines/photos/photo_set.h). The same bytes for any number of threads.
+/// Writes transforms.json, images/ and depths/ (pipelines/photos/photo_set.h). The same bytes for any number of
+/// threads.
 ///
 /// @param folder  new or empty; it appears when everything in it is complete
 /// Throws Interrupted; UserError as write_image.

@@ -23,7 +23,8 @@ Vector3<double> normal_at(const TexturedMesh& mesh, const MeshHit& hit, const Ve
     normal += weights[k] * Vector3<float>(mesh.normals[row_of(corners[k])].data()).cast<double>();
   if (!(normal.norm() > 0.1)) {
     const Vector3<double> a = corner_of(mesh, hit.face, 0);
-    normal = cross(Vector3<double>(corner_of(mesh, hit.face, 1) - a), Vector3<double>(corner_of(mesh, hit.face, 2) - a));
+    normal =
+        cross(Vector3<double>(corner_of(mesh, hit.face, 1) - a), Vector3<double>(corner_of(mesh, hit.face, 2) - a));
   }
   normal.normalize();
   return dot(normal, direction) > 0 ? Vector3<double>(-normal) : normal;
@@ -32,7 +33,7 @@ Vector3<double> normal_at(const TexturedMesh& mesh, const MeshHit& hit, const Ve
 /// Colour of what a ray meets.
 /// @param width  of what it stands for, metres across the ray at distance 1
 Rgb color_at(const TexturedMesh& mesh, const MeshHit& hit, const Vector3<double>& direction, double width,
-               double shade) {
+             double shade) {
   const std::array<std::int32_t, 3>& corners = mesh.faces[row_of(hit.face)];
   const MeshMaterial& material = mesh.materials[row_of(mesh.materials_of_faces[row_of(hit.face)])];
   const std::array<double, 3> weights = weights_of(hit);
@@ -64,44 +65,94 @@ float threshold_of(int ray, int rays) {
   return (static_cast<float>(ray * step % rays) + 0.5F) / static_cast<float>(rays);
 }
 
-/// Rays of a row: `side` × `side` a pixel, a pixel's together.
-std::vector<WorldRay> rays_of_row(const Camera& camera, int y, int side) {
-  std::vector<WorldRay> rays;
-  rays.reserve(static_cast<std::size_t>(camera.width * side * side));
-  for (int x = 0; x < camera.width; ++x) {
-    for (int k = 0; k < side * side; ++k) {
-      rays.push_back(ray_through(camera, x + (k % side + 0.5) / side, y + (k / side + 0.5) / side));
-      rays.back().threshold = threshold_of(k, side * side);
+/// Rays of a pixel that meet one face, in one quarter of it: they are shaded as one, through their middle.
+struct RayGroup {
+  std::int32_t face = -1;
+  int count = 0;
+  double x = 0, y = 0;  ///< sums
+};
+
+/// The groups of a quarter of a pixel; rays that meet nothing are left out.
+/// @param faces  of the pixel's rays, [side][side]
+void find_groups(std::span<const std::int32_t> faces, int side, int quarter, std::vector<RayGroup>& groups) {
+  groups.clear();
+  const int half = (side + 1) / 2, left = quarter % 2 * half, top = quarter / 2 * half;
+  for (int row = top; row < std::min(top + half, side); ++row) {
+    for (int col = left; col < std::min(left + half, side); ++col) {
+      const std::int32_t face = faces[row_of(row * side + col)];
+      if (face < 0) continue;
+      auto group = std::find_if(groups.begin(), groups.end(), [&](const RayGroup& g) { return g.face == face; });
+      if (group == groups.end()) group = groups.insert(groups.end(), RayGroup{face});
+      ++group->count;
+      group->x += (col + 0.5) / side;
+      group->y += (row + 0.5) / side;
     }
   }
-  return rays;
 }
 
-void draw_row(const CastMesh& mesh, const Camera& camera, const MeshLight& light, int y, MeshPicture& picture) {
-  std::vector<MeshHit> hits;
-  mesh.cast(rays_of_row(camera, y, 1), hits);
-  for (int x = 0; x < camera.width; ++x) {
-    const MeshHit& hit = hits[row_of(x)];
-    picture.depth(0, y, x) = hit.face < 0 ? 0.0F : static_cast<float>(hit.distance);
+/// Draws the rows of one picture.
+class Drawing {
+ public:
+  Drawing(const CastMesh& mesh, const Camera& camera, const MeshLight& light, MeshPicture& picture)
+      : mesh_(mesh),
+        side_(light.supersample),
+        shade_(light.shade),
+        width_((light.supersample > 1 ? 0.5 : 1.0) / camera.fx),
+        rays_(camera),
+        picture_(picture) {}
+
+  void draw_row(int y) const {
+    draw_depths(y);
+    const std::vector<std::int32_t> faces = mesh_.faces_met(rays_of_row(y, side_));
+    for (int x = 0; x < picture_.color.width(); ++x)
+      draw_pixel(std::span(faces).subspan(row_of(x * side_ * side_), row_of(side_ * side_)), x, y);
   }
-  const int side = light.supersample, count = side * side;
-  const std::vector<WorldRay> rays = rays_of_row(camera, y, side);
-  mesh.cast(rays, hits);
-  const double width = 1 / (camera.fx * side);
-  for (int x = 0; x < camera.width; ++x) {
+
+ private:
+  /// Rays of a row: `side` × `side` a pixel, a pixel's together.
+  std::vector<WorldRay> rays_of_row(int y, int side) const {
+    std::vector<WorldRay> rays;
+    const int count = side * side, width = picture_.color.width();
+    rays.reserve(row_of(width * count));
+    for (int x = 0; x < width; ++x) {
+      for (int k = 0; k < count; ++k)
+        rays.push_back(rays_.through(x + (k % side + 0.5) / side, y + (k / side + 0.5) / side, threshold_of(k, count)));
+    }
+    return rays;
+  }
+
+  void draw_depths(int y) const {
+    const std::vector<MeshHit> hits = mesh_.cast(rays_of_row(y, 1));
+    for (std::size_t x = 0; x < hits.size(); ++x)
+      picture_.depth.row(0, y)[x] = hits[x].face < 0 ? 0.0F : static_cast<float>(hits[x].distance);
+  }
+
+  void draw_pixel(std::span<const std::int32_t> faces, int x, int y) const {
+    thread_local std::vector<RayGroup> groups;
     Rgb sum{};
     int met = 0;
-    for (int i = x * count; i < (x + 1) * count; ++i) {
-      if (hits[row_of(i)].face < 0) continue;
-      ++met;
-      const Rgb color = color_at(mesh.mesh(), hits[row_of(i)], rays[row_of(i)].direction, width, light.shade);
-      for (std::size_t c = 0; c < 3; ++c) sum[c] += color[c];
+    for (int quarter = 0; quarter < (side_ > 1 ? 4 : 1); ++quarter) {
+      find_groups(faces, side_, quarter, groups);
+      for (const RayGroup& group : groups) {
+        const WorldRay ray = rays_.through(x + group.x / group.count, y + group.y / group.count);
+        const MeshHit hit = hit_on(mesh_.mesh(), group.face, ray);
+        if (hit.face < 0) continue;
+        const Rgb color = color_at(mesh_.mesh(), hit, ray.direction, width_, shade_);
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += static_cast<float>(group.count) * color[c];
+        met += group.count;
+      }
     }
-    if (met == 0) continue;
-    for (int c = 0; c < 3; ++c) picture.color(c, y, x) = sum[row_of(c)] / static_cast<float>(met);
-    picture.alpha(0, y, x) = static_cast<float>(met) / static_cast<float>(count);
+    if (met == 0) return;
+    for (int c = 0; c < 3; ++c) picture_.color(c, y, x) = sum[row_of(c)] / static_cast<float>(met);
+    picture_.alpha(0, y, x) = static_cast<float>(met) / static_cast<float>(faces.size());
   }
-}
+
+  const CastMesh& mesh_;
+  int side_;
+  double shade_, width_;
+  PictureRays rays_;
+  MeshPicture& picture_;
+};
 
 }  // namespace
 
@@ -113,8 +164,9 @@ double sky_shade(const Vector3<double>& normal, double shade) {
 MeshPicture mesh_picture(const CastMesh& mesh, const Camera& camera, const MeshLight& light) {
   MeshPicture picture{Image(3, camera.height, camera.width), Image(1, camera.height, camera.width),
                       Image(1, camera.height, camera.width)};
+  const Drawing drawing(mesh, camera, light, picture);
   parallel_for(camera.height, 8, [&](Index begin, Index end) {
-    for (auto y = static_cast<int>(begin); y < end; ++y) draw_row(mesh, camera, light, y, picture);
+    for (auto y = static_cast<int>(begin); y < end; ++y) drawing.draw_row(y);
   });
   return picture;
 }

@@ -17,11 +17,14 @@ struct MeshPicture {
   Image depth;  ///< [1,H,W] camera z through the pixel's centre, metres; 0: nothing
 };
 
-/// Draws a mesh. Both sides of its faces are seen. A material that blends stops as large a share of a pixel's rays as
-/// its alpha says. Colours are averaged as the file has them. A function of its arguments, for any number of threads.
+/// Draws a mesh. Each ray asks what it meets; those of a quarter of a pixel that meet the same face are shaded as one,
+/// through their middle, with the texture as sharp as that is wide. Both sides of its faces are seen. A material that
+/// blends stops as large a share of a pixel's rays as its alpha says. Colours are averaged as the file has them. A
+/// function of its arguments, for any number of threads.
 MeshPicture mesh_picture(const CastMesh& mesh, const Camera& camera, const MeshLight& light);
 
-/// The factor of a colour by the normal, turned to who looks: 1 towards a place high in the sky, 1 − shade away from it.
+/// The factor of a colour by the normal, turned to who looks: 1 towards a place high in the sky, 1 − shade away from
+/// it.
 ///
 ///   1 − shade (1 − n·l)/2
 double sky_shade(const Vector3<double>& normal, double shade);

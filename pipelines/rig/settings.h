@@ -18,10 +18,10 @@ struct RigSettings {
   int size = 512;   ///< pixels, width and height
   MeshLight light;
   // Of a scene, whose places are sought.
-  double nearest = 0.25;                            ///< of what a camera sees and what is around it, metres
-  double least_seen = 0.3;                          ///< share of a picture that shows something
-  double most_backs = 0.05;                         ///< share of a picture that shows backs of faces
-  std::optional<std::array<double, 6>> box = {};    ///< x, y, z of two corners; none: the mesh's bounds
+  double nearest = 0.25;                          ///< of what a camera sees and what is around it, metres
+  double least_seen = 0.3;                        ///< share of a picture that shows something
+  double most_backs = 0.05;                       ///< share of a picture that shows backs of faces
+  std::optional<std::array<double, 6>> box = {};  ///< x, y, z of two corners; none: the mesh's bounds
 };
 
 }  // namespace hsi4d

@@ -54,13 +54,7 @@ void check_places(const LoadedMesh& mesh, const std::string& name) {
 }
 
 /// What a format's numbers mean becomes what pictures have.
-void take_conventions(const std::string& ending, LoadedMesh& mesh) {
-  const bool is_glb = ending == ".glb", is_ply = ending == ".ply";
-  for (MeshMaterial& material : mesh.materials) {
-    if (is_glb) encode(material.color);
-    // Of MTL's Kd, exporters write 0 or 0.8 beside a texture that is meant as it is; PLY has none.
-    if (is_ply || (!is_glb && material.texture >= 0)) material.color = {1, 1, 1, material.color[3]};
-  }
+void take_conventions(bool is_glb, LoadedMesh& mesh) {
   for (std::array<float, 4>& color : mesh.colors) {
     if (!is_finite(color)) color = {1, 1, 1, 1};
     if (is_glb) encode(color);
@@ -77,7 +71,9 @@ void take_conventions(const std::string& ending, LoadedMesh& mesh) {
 }
 
 void take_places(const LoadedMesh& from, TexturedMesh& mesh) {
-  const auto at = [&](std::size_t v) -> Vector3<double> { return Vector3<float>(from.places[v].data()).cast<double>(); };
+  const auto at = [&](std::size_t v) -> Vector3<double> {
+    return Vector3<float>(from.places[v].data()).cast<double>();
+  };
   mesh.low = mesh.high = at(static_cast<std::size_t>(from.faces.front()[0]));
   for (const std::array<std::int32_t, 3>& face : from.faces) {
     for (const std::int32_t corner : face) {
@@ -98,7 +94,8 @@ std::optional<Texture> decoded(const MeshTexture& texture, const std::string& na
   std::replace(file.begin(), file.end(), '\\', '/');
   const fs::path path = fs::path(file).is_absolute() ? fs::path(file) : fs::path(name).parent_path() / file;
   try {
-    Image image = texture.is_inside ? decode_image(texture.bytes, name + ": " + texture.file) : read_image(path.string());
+    Image image =
+        texture.is_inside ? decode_image(texture.bytes, name + ": " + texture.file) : read_image(path.string());
     if (!alpha_counts && image.channels() % 2 == 0) image = take_channels(image, 0, image.channels() - 1);
     return texture_from(image);
   } catch (const std::exception& error) {
@@ -125,6 +122,16 @@ void take_textures(const LoadedMesh& from, const std::string& name, TexturedMesh
   for (MeshMaterial& material : mesh.materials) {
     for (int* texture : {&material.texture, &material.opacity_texture})
       *texture = *texture < 0 ? -1 : numbers[static_cast<std::size_t>(*texture)];
+  }
+}
+
+/// Colours of materials as pictures have them.
+void take_colors(const std::string& ending, std::vector<MeshMaterial>& materials) {
+  const bool is_glb = ending == ".glb", is_ply = ending == ".ply";
+  for (MeshMaterial& material : materials) {
+    if (is_glb) encode(material.color);
+    // Of MTL's Kd, exporters write 0 or 0.8 beside a texture that is meant as it is; PLY has none.
+    if (is_ply || (!is_glb && material.texture >= 0)) material.color = {1, 1, 1, material.color[3]};
   }
 }
 
@@ -171,15 +178,16 @@ void take_faces(const LoadedMesh& from, TexturedMesh& mesh) {
 
 }  // namespace
 
-TexturedMesh detail::textured(LoadedMesh loaded, const std::string& name) {
+TexturedMesh textured_mesh(LoadedMesh loaded, const std::string& name) {
   check_places(loaded, name);
-  take_conventions(ending_of(name), loaded);
+  take_conventions(ending_of(name) == ".glb", loaded);
   TexturedMesh mesh;
   take_places(loaded, mesh);
   mesh.normals = std::move(loaded.normals);
   mesh.uvs = std::move(loaded.uvs);
   mesh.colors = std::move(loaded.colors);
   take_textures(loaded, name, mesh);
+  take_colors(ending_of(name), mesh.materials);
   take_faces(loaded, mesh);
   return mesh;
 }
@@ -195,7 +203,7 @@ TexturedMesh read_textured_mesh(const std::string& path) {
   const std::string fault = mesh_library().read(path, loaded);
   if (!fault.empty()) throw DataError(path + ": " + fault);
   for (const std::string& note : loaded.notes) log_warning(path + ": " + note);
-  return detail::textured(std::move(loaded), path);
+  return textured_mesh(std::move(loaded), path);
 }
 
 }  // namespace hsi4d

@@ -15,10 +15,10 @@ struct TexturedMesh {
   Vector3<double> origin = Vector3<double>::Zero();  ///< of places, in the world; the middle of the bounds
   Vector3<double> low, high;                         ///< bounds in the world, metres
   std::vector<std::array<float, 3>> places;
-  std::vector<std::array<float, 3>> normals;         ///< unit, or 0: that of the face
-  std::vector<std::array<float, 2>> uvs;             ///< v up
-  std::vector<std::array<float, 4>> colors;          ///< of vertices
-  std::vector<std::array<std::int32_t, 3>> faces;    ///< those that nothing is seen through come first
+  std::vector<std::array<float, 3>> normals;       ///< unit, or 0: that of the face
+  std::vector<std::array<float, 2>> uvs;           ///< v up
+  std::vector<std::array<float, 4>> colors;        ///< of vertices
+  std::vector<std::array<std::int32_t, 3>> faces;  ///< those that nothing is seen through come first
   std::vector<std::int32_t> materials_of_faces;
   std::vector<float> densities;  ///< of faces: √(area in uv / area in m²)
   std::vector<MeshMaterial> materials;
@@ -50,11 +50,9 @@ bool is_mesh_file(const std::string& path);
 /// Throws as read_mesh (optim/solid/mesh_file.h), which looks at the file first.
 TexturedMesh read_textured_mesh(const std::string& path);
 
-namespace detail {
-
-/// A mesh as read_textured_mesh makes it of what a file has. Throws DataError as it.
-TexturedMesh textured(LoadedMesh loaded, const std::string& name);
-
-}  // namespace detail
+/// A mesh as read_textured_mesh makes it of what a file has.
+/// @param name  what messages call it; its ending says what numbers mean
+/// Throws DataError: a place that is not finite or beyond kFarthestVertex, no faces.
+TexturedMesh textured_mesh(LoadedMesh loaded, const std::string& name);
 
 }  // namespace hsi4d

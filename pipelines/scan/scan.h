@@ -33,8 +33,8 @@ struct ScanSummary {
 /// Makes the Gaussians. Returns what it came to.
 ///
 /// @param folder  new or empty; with `resume` one that was begun by the same config
-/// Throws UserError for folders that are not so, and as read_posed_images, prepare_mesh_photos, read_photo, first_gaussians,
-/// fit_scan; Interrupted, when what was done so far can be resumed.
+/// Throws UserError for folders that are not so, and as read_posed_images, prepare_mesh_photos, read_photo,
+/// first_gaussians, fit_scan; Interrupted, when what was done so far can be resumed.
 ScanSummary run_scan(const ScanSettings& settings, const std::filesystem::path& folder, bool resume,
                      std::span<const LossTerm> terms, const Observer& observer = {});
 

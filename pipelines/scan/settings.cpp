@@ -18,7 +18,8 @@ constexpr Index kMostPictures = 10000;
 constexpr Index kMostGaussians = 20000000;
 
 constexpr const char* kNoPhotos =
-    "not given; pictures whose cameras are known are needed: a folder of COLMAP, a transforms.json, a cameras.json, or a mesh: "
+    "not given; pictures whose cameras are known are needed: a folder of COLMAP, a transforms.json, a cameras.json, or "
+    "a mesh: "
     ".glb, .obj, .ply. "
     "`hsi4d synth configs/reconstruct/photos.json --out DIR` makes some; then --set photos.path=DIR/transforms.json";
 
@@ -54,14 +55,13 @@ void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProble
 
 void describe(ConfigFields& f, RigSettings& s) {
   f.integer("count", s.count, {.min = 0, .max = kMostPictures},
-            "Pictures; 0: " + std::to_string(kPicturesOfObject) + " of an object, " +
-                std::to_string(kPicturesOfScene) + " of a scene");
+            "Pictures; 0: " + std::to_string(kPicturesOfObject) + " of an object, " + std::to_string(kPicturesOfScene) +
+                " of a scene");
   f.integer("size", s.size, {.min = 16, .max = kLongestSide}, "Width and height of the pictures, pixels");
   f.integer("supersample", s.light.supersample, {.min = 1, .max = 16}, "Rays along each side of a pixel");
   f.number("shade", s.light.shade, {.min = 0, .max = 1},
            "How much darker a side is that looks away from the sky; 0: the mesh's colours as they are");
-  f.number("nearest", s.nearest, {.min = 0, .max = 1e6},
-           "Scenes: a camera is so far from everything at least, metres");
+  f.number("nearest", s.nearest, {.min = 0, .max = 1e6}, "Scenes: a camera is so far from everything at least, metres");
   f.number("least_seen", s.least_seen, {.min = 0, .max = 1}, "Scenes: a picture shows something in so large a share");
   f.number("most_backs", s.most_backs, {.min = 0, .max = 1},
            "Scenes: share of a picture that may show backs of faces, as from inside a thing");
