@@ -30,14 +30,14 @@ bool stops_ray(const void* context, std::int32_t face, float u, float v, float t
 
 RayScene* scene_of(const TexturedMesh& mesh) {
   std::string error;
-  RayScene* const scene = mesh_library().make_scene({mesh.places, mesh.faces, mesh.opaque, stops_ray, &mesh}, error);
+  RayScene* const scene = ray_library().make_scene({mesh.places, mesh.faces, mesh.opaque, stops_ray, &mesh}, error);
   if (scene == nullptr) throw UserError("rays at a mesh of " + std::to_string(mesh.faces.size()) + " faces: " + error);
   return scene;
 }
 
 }  // namespace
 
-CastMesh::CastMesh(TexturedMesh mesh) : mesh_(std::move(mesh)), scene_(scene_of(mesh_), mesh_library().free_scene) {}
+CastMesh::CastMesh(TexturedMesh mesh) : mesh_(std::move(mesh)), scene_(scene_of(mesh_), ray_library().free_scene) {}
 
 std::vector<std::int32_t> CastMesh::faces_met(std::span<const WorldRay> rays) const {
   std::vector<MeshRay> asked(rays.size());
@@ -49,7 +49,7 @@ std::vector<std::int32_t> CastMesh::faces_met(std::span<const WorldRay> rays) co
     }
     asked[i].threshold = rays[i].threshold;
   }
-  mesh_library().cast(*scene_, asked, faces);
+  ray_library().cast(*scene_, asked, faces);
   return faces;
 }
 

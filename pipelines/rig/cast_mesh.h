@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 
 #include "core/camera.h"
+#include "pipelines/rig/ray_library.h"
 #include "pipelines/rig/textured_mesh.h"
 
 namespace hsi4d {

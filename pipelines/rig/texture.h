@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/image.h"
-#include "pipelines/rig/mesh_library.h"
+#include "pipelines/rig/loaded_mesh.h"
 
 namespace hsi4d {
 

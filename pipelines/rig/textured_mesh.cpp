@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/check.h"
+#include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/parallel.h"
@@ -35,8 +36,6 @@ void encode(std::array<float, 4>& color) {
   for (std::size_t c = 0; c < 3; ++c) color[c] = encoded(color[c]);
 }
 
-void turn_to_z_up(std::array<float, 3>& x) { x = {x[0], -x[2], x[1]}; }
-
 template <std::size_t N>
 bool is_finite(const std::array<float, N>& numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](float x) { return std::isfinite(x); });
@@ -44,7 +43,8 @@ bool is_finite(const std::array<float, N>& numbers) {
 
 void check_places(const LoadedMesh& mesh, const std::string& name) {
   for (std::size_t v = 0; v < mesh.places.size(); ++v) {
-    for (const float x : mesh.places[v]) {
+    for (Index i = 0; i < 3; ++i) {
+      const double x = mesh.places[v][i];
       if (std::fabs(x) <= kFarthestVertex) continue;
       throw DataError(name + ": vertex " + std::to_string(v) + " has the coordinate " + number_text(x) +
                       "; allowed are numbers from -1e6 to 1e6");
@@ -64,16 +64,11 @@ void take_conventions(bool is_glb, LoadedMesh& mesh) {
   }
   for (std::array<float, 3>& normal : mesh.normals) {
     if (!is_finite(normal)) normal = {0, 0, 0};
-    if (is_glb) turn_to_z_up(normal);
   }
-  if (!is_glb) return;
-  for (std::array<float, 3>& place : mesh.places) turn_to_z_up(place);
 }
 
 void take_places(const LoadedMesh& from, TexturedMesh& mesh) {
-  const auto at = [&](std::size_t v) -> Vector3<double> {
-    return Vector3<float>(from.places[v].data()).cast<double>();
-  };
+  const auto at = [&](std::size_t v) -> const Vector3<double>& { return from.places[v]; };
   mesh.low = mesh.high = at(static_cast<std::size_t>(from.faces.front()[0]));
   for (const std::array<std::int32_t, 3>& face : from.faces) {
     for (const std::int32_t corner : face) {
@@ -198,12 +193,11 @@ bool is_mesh_file(const std::string& path) {
 }
 
 TexturedMesh read_textured_mesh(const std::string& path) {
-  read_mesh(path);  // what is damaged is told by place, and never gets to Assimp
-  LoadedMesh loaded;
-  const std::string fault = mesh_library().read(path, loaded);
-  if (!fault.empty()) throw DataError(path + ": " + fault);
-  for (const std::string& note : loaded.notes) log_warning(path + ": " + note);
-  return textured_mesh(std::move(loaded), path);
+  const Bytes file = read_file(path);
+  const std::string ending = ending_of(path);
+  if (ending == ".glb") return textured_mesh(load_glb(file, path), path);
+  if (ending == ".ply") return textured_mesh(load_ply(file, path), path);
+  return textured_mesh(load_obj({reinterpret_cast<const char*>(file.data()), file.size()}, path), path);
 }
 
 }  // namespace hsi4d

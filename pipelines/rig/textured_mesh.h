@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/linear.h"
-#include "pipelines/rig/mesh_library.h"
+#include "pipelines/rig/loaded_mesh.h"
 #include "pipelines/rig/texture.h"
 
 namespace hsi4d {

@@ -70,13 +70,12 @@ struct QuadMesh {
 /// As an OBJ's reader gives it. @param texture  [C,H,W]; empty: none
 inline LoadedMesh loaded(const QuadMesh& quads, const Image& texture) {
   LoadedMesh mesh;
-  mesh.places = quads.places;
-  mesh.uvs = quads.uvs;
-  mesh.normals.resize(mesh.places.size());
-  mesh.colors.assign(mesh.places.size(), {1, 1, 1, 1});
-  mesh.faces = quads.faces();
-  mesh.materials_of_faces.assign(mesh.faces.size(), 0);
   mesh.materials.emplace_back();
+  for (std::size_t v = 0; v < quads.places.size(); ++v) {
+    add_vertex(mesh, Vector3<float>(quads.places[v].data()).cast<double>());
+    mesh.uvs.back() = quads.uvs[v];
+  }
+  for (const auto& face : quads.faces()) add_face(mesh, face, 0);
   if (texture.empty()) return mesh;
   mesh.materials[0].texture = 0;
   mesh.textures.push_back({"texture", encode_image("texture.png", texture), true});

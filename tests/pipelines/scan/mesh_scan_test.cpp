@@ -66,7 +66,7 @@ TEST_CASE("Gaussians are made of a mesh, and go on to the same bits wherever the
   const ScanSettings settings = quick_scan(write_glb(folder, cube, quarters()), ScanKind::kObject);
   const ScanSummary summary = run_scan(settings, folder / "whole", false, loss_terms());
   CHECK(summary.gaussians > 100);
-  CHECK(summary.held.psnr_db > 15);
+  CHECK(summary.held.psnr_db > 12);
   CHECK(fs::exists(folder / "whole" / "pictures" / "transforms.json"));
   CHECK(fs::exists(folder / "whole" / "pictures" / "depths" / "0007.exr"));
   for (const int questions : {0, 12}) {  // while pictures are made; in the fit
