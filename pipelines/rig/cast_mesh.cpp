@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/LU>
+
 #include "core/check.h"
 
 namespace hsi4d {
@@ -75,6 +77,13 @@ MeshHit hit_on(const TexturedMesh& mesh, std::int32_t face, const WorldRay& ray)
   hit.distance = dot(reach, ray.direction) / dot(ray.direction, ray.direction);
   hit.cosine = dot(normal, ray.direction) / scale;
   return hit;
+}
+
+PictureRays::PictureRays(const Camera& camera) : center_(camera_center_world(camera)) {
+  Matrix3<double> camera_from_pixel = Matrix3<double>::Identity();
+  camera_from_pixel.row(0) << 1 / camera.fx, 0, -camera.cx / camera.fx;
+  camera_from_pixel.row(1) << 0, 1 / camera.fy, -camera.cy / camera.fy;
+  direction_ = camera.camera_from_world.rotation.inverse() * camera_from_pixel;
 }
 
 float alpha_at(const TexturedMesh& mesh, std::int32_t face, double u, double v) {

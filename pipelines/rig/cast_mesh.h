@@ -5,8 +5,6 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/LU>
-
 #include "core/camera.h"
 #include "pipelines/rig/ray_library.h"
 #include "pipelines/rig/textured_mesh.h"
@@ -54,19 +52,15 @@ MeshHit hit_on(const TexturedMesh& mesh, std::int32_t face, const WorldRay& ray)
 /// Rays through places in a picture; their distances are camera z.
 class PictureRays {
  public:
-  explicit PictureRays(const Camera& camera)
-      : camera_(camera),
-        center_(camera_center_world(camera)),
-        world_from_camera_(camera.camera_from_world.rotation.inverse()) {}
+  explicit PictureRays(const Camera& camera);
 
   WorldRay through(double x, double y, float threshold = 0.5F) const {
-    return {center_, world_from_camera_ * unproject_pixel(camera_, Vector2<double>(x, y), 1.0), threshold};
+    return {center_, direction_ * Vector3<double>(x, y, 1), threshold};
   }
 
  private:
-  Camera camera_;
   Vector3<double> center_;
-  Matrix3<double> world_from_camera_;
+  Matrix3<double> direction_;  ///< of a place in pixels, (x, y, 1)
 };
 
 /// Alpha of a face at (u, v): of its material, its texture and its vertices.

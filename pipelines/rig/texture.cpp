@@ -13,9 +13,9 @@ using Rgba = std::array<float, 4>;
 struct Blend {
   Rgba sum = {};
   void add(const std::uint8_t* texel, float weight) {
-    constexpr float kLargest = 255;
-    const float alpha = static_cast<float>(texel[3]) / kLargest * weight;
-    for (std::size_t c = 0; c < 3; ++c) sum[c] += static_cast<float>(texel[c]) / kLargest * alpha;
+    constexpr float kUnit = 1 / 255.0F;
+    const float alpha = static_cast<float>(texel[3]) * kUnit * weight, share = alpha * kUnit;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += static_cast<float>(texel[c]) * share;
     sum[3] += alpha;
   }
 };
@@ -59,6 +59,7 @@ Texture::Level level_of(const Image& image) {
 }
 
 int wrapped(int x, int size, TextureWrap wrap) {
+  if (x >= 0 && x < size) return x;
   if (wrap == TextureWrap::kClamp) return std::clamp(x, 0, size - 1);
   const int period = wrap == TextureWrap::kMirror ? 2 * size : size;
   x %= period;
@@ -76,14 +77,14 @@ void add_bilinear(const Texture::Level& level, double u, double v, TextureWrap w
                   Blend& blend) {
   const double x = u * level.width - 0.5, y = (1 - v) * level.height - 0.5;
   const double left = std::floor(x), top = std::floor(y);
-  const auto right_share = static_cast<float>(x - left), bottom_share = static_cast<float>(y - top);
-  for (int k = 0; k < 4; ++k) {
-    const int col = wrapped(static_cast<int>(left) + k % 2, level.width, wrap_u);
-    const int row = wrapped(static_cast<int>(top) + k / 2, level.height, wrap_v);
-    const float across = k % 2 == 0 ? 1 - right_share : right_share;
-    const float down = k / 2 == 0 ? 1 - bottom_share : bottom_share;
-    blend.add(level.rgba.data() + texel_at(level, col, row), weight * across * down);
-  }
+  const auto right_share = static_cast<float>(x - left), below_share = static_cast<float>(y - top);
+  const int cols[2] = {wrapped(static_cast<int>(left), level.width, wrap_u),
+                       wrapped(static_cast<int>(left) + 1, level.width, wrap_u)};
+  const int rows[2] = {wrapped(static_cast<int>(top), level.height, wrap_v),
+                       wrapped(static_cast<int>(top) + 1, level.height, wrap_v)};
+  const float across[2] = {1 - right_share, right_share}, down[2] = {1 - below_share, below_share};
+  for (int k = 0; k < 4; ++k)
+    blend.add(level.rgba.data() + texel_at(level, cols[k % 2], rows[k / 2]), weight * across[k % 2] * down[k / 2]);
 }
 
 }  // namespace
