@@ -44,7 +44,11 @@ MeshPhotos prepare_mesh_photos(const std::string& path, const RigSettings& setti
   log_info(path + ": " + std::to_string(mesh.faces.size()) + " faces, " + std::to_string(mesh.textures.size()) +
            " textures, " + size_text(mesh));
   photos.rig = is_object ? rig_around(mesh, settings) : rig_inside(*photos.mesh, settings, seed, path);
+  const Index asked = settings.count > 0 ? settings.count : kPicturesOfScene;
   if (!is_object) log_info(path + ": " + rig_text(photos.rig));
+  if (!is_object && std::ssize(photos.rig.cameras) < asked)
+    log_warning(path + ": only " + std::to_string(photos.rig.cameras.size()) + " of " + std::to_string(asked) +
+                " views were found; is it a scene in metres, z up, its faces' fronts inside?");
   photos.light = settings.light;
   photos.has_alpha = is_object;
   return photos;

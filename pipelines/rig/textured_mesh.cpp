@@ -188,7 +188,11 @@ TexturedMesh textured_mesh(LoadedMesh loaded, const std::string& name) {
 }
 
 bool is_mesh_file(const std::string& path) {
+  constexpr std::string_view kOthers[] = {".gltf", ".fbx", ".dae",  ".stl", ".off",
+                                          ".3ds",  ".usd", ".usdz", ".abc", ".blend"};
   const std::string ending = ending_of(path);
+  if (std::find(std::begin(kOthers), std::end(kOthers), ending) != std::end(kOthers))
+    throw UserError(path + ": meshes are read from .glb, .obj and .ply; export it as .glb");
   return ending == ".glb" || ending == ".obj" || ending == ".ply";
 }
 

@@ -35,6 +35,7 @@ inline Vector3<double> corner_of(const TexturedMesh& mesh, std::int32_t face, st
 }
 
 /// Whether a path names a mesh, by its ending: .glb, .obj, .ply.
+/// Throws UserError for endings of other kinds of meshes, naming these.
 bool is_mesh_file(const std::string& path);
 
 /// Reads a mesh. A .glb, which is y up by its standard, is turned as read_mesh does it: (x, y, z) becomes (x, −z, y).

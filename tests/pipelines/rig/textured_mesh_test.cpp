@@ -116,6 +116,8 @@ TEST_CASE("files that hold no mesh are refused in words") {
       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
       "property float z\nend_header\n0 0 0\n";
   CHECK_THAT(fault_of(written("points.ply", points)), Catch::Contains("points, not a mesh"));
+  CHECK_THROWS_WITH(is_mesh_file("chair.FBX"), Catch::Contains("export it as .glb"));
+  CHECK_FALSE(is_mesh_file("runs/photos/transforms.json"));
   CHECK_THAT(fault_of(written("empty.obj", "v 0 0 0\n")), Catch::Contains("no faces"));
   CHECK_THAT(fault_of(written("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")), Catch::Contains("nan"));
   CHECK_THAT(fault_of(written("text.glb", "hello there")), Catch::Contains("text.glb"));
