@@ -2,6 +2,7 @@
 // [glTF 2.0, Khronos Group: chapters 3.6, 3.7, 4]
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>

@@ -1,7 +1,10 @@
 // Meshes in Wavefront OBJ with their materials (MTL): Kd, map_Kd, d, Tr, map_d; colours behind a vertex's place.
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <unordered_map>
 
 #include "core/check.h"
@@ -56,7 +59,7 @@ class TextWords {
     const std::string_view digits = text.starts_with('+') ? text.substr(1) : text;
     double x = 0;
     const auto read = std::from_chars(digits.data(), digits.data() + digits.size(), x);
-    if (read.ec != std::errc() || read.ptr != digits.data() + digits.size())
+    if (read.ec != std::errc() || read.ptr != digits.data() + digits.size() || !std::isfinite(x))
       fail("a number is wanted, not \"" + with_escapes(text) + "\"");
     return x;
   }
@@ -133,7 +136,7 @@ class ObjLoader {
 
   void take_normal() {
     Vector3<double> normal;
-    for (Index i = 0; i < 3; ++i) normal[i] = words_.number().value_or(0);
+    for (int i = 0; i < 3; ++i) normal[i] = words_.number().value_or(0);
     normal.normalize();
     normals_.push_back({static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])});
   }
@@ -194,7 +197,8 @@ class ObjLoader {
 
   void read_materials(const std::string& file) {
     const fs::path path = fs::path(name_).parent_path() / file;
-    if (!fs::is_regular_file(path)) {
+    std::error_code fault;  // a name that is too long, for one
+    if (!fs::is_regular_file(path, fault)) {
       log_warning(name_ + ": names materials in " + file + ", which is not there");
       return;
     }

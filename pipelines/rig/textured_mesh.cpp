@@ -141,6 +141,13 @@ double triangle_area(const Vector3<double>& a, const Vector3<double>& b, const V
   return 0.5 * cross(Vector3<double>(b - a), Vector3<double>(c - a)).norm();
 }
 
+void check_areas(const TexturedMesh& mesh, const std::string& name) {
+  for (std::int32_t f = 0; f < std::ssize(mesh.faces); ++f) {
+    if (triangle_area(corner_of(mesh, f, 0), corner_of(mesh, f, 1), corner_of(mesh, f, 2)) > 0) return;
+  }
+  throw DataError(name + ": none of the mesh's " + std::to_string(mesh.faces.size()) + " triangles has an area");
+}
+
 float density_of(const TexturedMesh& mesh, std::int32_t face) {
   std::array<Vector3<double>, 3> places, uvs;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -184,6 +191,7 @@ TexturedMesh textured_mesh(LoadedMesh loaded, const std::string& name) {
   take_textures(loaded, name, mesh);
   take_colors(ending_of(name), mesh.materials);
   take_faces(loaded, mesh);
+  check_areas(mesh, name);
   return mesh;
 }
 

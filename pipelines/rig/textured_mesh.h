@@ -48,12 +48,12 @@ bool is_mesh_file(const std::string& path);
 /// be read is told in the log, and its material's colour counts alone.
 ///
 /// @param path  UTF-8
-/// Throws as read_mesh (optim/solid/mesh_file.h), which looks at the file first.
+/// Throws UserError where it cannot be read; DataError naming file and place: damaged, or as textured_mesh.
 TexturedMesh read_textured_mesh(const std::string& path);
 
 /// A mesh as read_textured_mesh makes it of what a file has.
 /// @param name  what messages call it; its ending says what numbers mean
-/// Throws DataError: a place that is not finite or beyond kFarthestVertex, no faces.
+/// Throws DataError: a place that is not finite or beyond kFarthestVertex, no faces, none with an area.
 TexturedMesh textured_mesh(LoadedMesh loaded, const std::string& name);
 
 }  // namespace hsi4d

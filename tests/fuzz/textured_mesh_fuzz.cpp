@@ -1,5 +1,7 @@
-// Any bytes as a mesh in GLB, OBJ or PLY, or as an OBJ's materials, with textures. The first byte says which.
-#include "pipelines/rig/textured_mesh.h"
+// Any bytes as a mesh in GLB, OBJ or PLY, or as an OBJ's materials, with textures, of which a picture is
+// taken. The first byte says which.
+#include "pipelines/rig/camera_rig.h"
+#include "pipelines/rig/mesh_picture.h"
 #include "tests/fuzz/scratch.h"
 #include "tests/pipelines/rig/mesh_files.h"
 
@@ -35,12 +37,18 @@ bool accepts(std::span<const uint8_t> input) {
   const std::size_t choice = input.empty() ? 0 : input[0] % kKinds;
   scratch().try_file(input);
   return is_read([&] {
-    const TexturedMesh mesh = read_textured_mesh(scratch() / (choice == 3 ? "mesh.obj" : kNames[choice]));
+    TexturedMesh mesh = read_textured_mesh(scratch() / (choice == 3 ? "mesh.obj" : kNames[choice]));
     HSI4D_CHECK(!mesh.faces.empty(), "a mesh without faces was taken");
     for (const auto& face : mesh.faces) {
       for (const std::int32_t corner : face)
         HSI4D_CHECK(corner >= 0 && row_of(corner) < mesh.places.size(), "a corner is no vertex");
     }
+    RigSettings few;
+    few.count = 1;
+    few.size = 8;
+    const Camera camera = rig_around(mesh, few).cameras.front();
+    const MeshPicture picture = mesh_picture(CastMesh(std::move(mesh)), camera, {2, 0.3});
+    for (const float x : picture.color.data()) HSI4D_CHECK(x >= 0 && x <= 1, "a colour is none");
   });
 }
 

@@ -119,6 +119,7 @@ TEST_CASE("files that hold no mesh are refused in words") {
   CHECK_THROWS_WITH(is_mesh_file("chair.FBX"), Catch::Contains("export it as .glb"));
   CHECK_FALSE(is_mesh_file("runs/photos/transforms.json"));
   CHECK_THAT(fault_of(written("empty.obj", "v 0 0 0\n")), Catch::Contains("no faces"));
+  CHECK_THAT(fault_of(written("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")), Catch::Contains("area"));
   CHECK_THAT(fault_of(written("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")), Catch::Contains("nan"));
   CHECK_THAT(fault_of(written("text.glb", "hello there")), Catch::Contains("text.glb"));
   CHECK_THAT(fault_of((folder / "none.glb").string()), Catch::Contains("none.glb"));
