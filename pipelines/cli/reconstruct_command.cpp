@@ -55,8 +55,8 @@ std::string reconstruct_command(const ReconstructArguments& a, const std::vector
 
 void add_reconstruct(CLI::App& app, Program& program) {
   ReconstructArguments& a = program.options<ReconstructArguments>();
-  CLI::App* command =
-      app.add_subcommand("reconstruct", "Make Gaussians of a scene or an object from pictures with cameras");
+  CLI::App* command = app.add_subcommand(
+      "reconstruct", "Make Gaussians of a scene or an object from pictures with cameras, or from a mesh");
   command->add_option("CONFIG", a.config, "The config; configs/reconstruct/ has some")->required();
   command->add_option("--out", a.out, "Where to: a new or empty folder")->type_name("DIR")->required();
   command->add_flag("--resume", a.resume, "Go on with what was begun in --out, to the same bits");

@@ -14,6 +14,7 @@
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "pipelines/config/config_kind.h"
+#include "pipelines/rig/mesh_photos.h"
 #include "pipelines/scan/photo_checks.h"
 #include "pipelines/scan/report.h"
 #include "pipelines/scan/start.h"
@@ -27,6 +28,7 @@ namespace {
 
 constexpr const char* kConfig = "config.json";
 constexpr const char* kCheckpoint = "checkpoint.npz";
+constexpr const char* kPictures = "pictures";
 constexpr const char* kSummary = "summary.json";
 
 std::vector<Photo> read_photos(const PosedImages& set, const PhotoRules& rules) {
@@ -42,6 +44,22 @@ std::vector<Camera> cameras_of(const std::vector<Photo>& photos) {
   std::vector<Camera> cameras;
   for (const Photo& photo : photos) cameras.push_back(photo.camera);
   return cameras;
+}
+
+/// Pictures of a mesh are taken once, into the folder; nothing is begun before cameras are found.
+PosedImages pictures_of(const ScanSettings& settings, const fs::path& folder, const std::string& config,
+                        const Observer& observer) {
+  const fs::path& path = settings.photos.path;
+  if (!is_mesh_file(path.string())) return read_posed_images(path, settings.photos.pictures);
+  const fs::path pictures = folder / kPictures;
+  if (!fs::exists(pictures)) {
+    const MeshPhotos photos =
+        prepare_mesh_photos(path.string(), settings.photos.rig, settings.kind == ScanKind::kObject,
+                            static_cast<std::uint64_t>(settings.seed));
+    write_text_file((folder / kConfig).string(), config);  // from here on it can be resumed
+    write_mesh_photos(photos, pictures, observer);
+  }
+  return read_posed_images(pictures / "transforms.json");
 }
 
 /// What can be wrong with the folder, before anything is read.
@@ -114,7 +132,7 @@ ScanSummary run_scan(const ScanSettings& settings, const fs::path& folder, bool 
   const std::vector<LossTerm> all(terms.begin(), terms.end());
   const std::string config = resolved_scan(settings, descriptions_of(all));
   check_folder(settings, folder, resume, config);
-  const PosedImages set = read_posed_images(settings.photos.path, settings.photos.pictures);
+  const PosedImages set = pictures_of(settings, folder, config, observer);
   check_photo_cameras(settings, set);
   PhotoRules rules = settings.photos.rules;
   rules.masks = settings.kind == ScanKind::kObject ? MaskMeaning::kWanted : MaskMeaning::kCounts;

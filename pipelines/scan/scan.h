@@ -1,6 +1,7 @@
 // A reconstruction from its config to its folder.
 //
 //   config.json          every setting
+//   pictures/            of a mesh, with their cameras (pipelines/rig/mesh_photos.h)
 //   checkpoint.npz       where it goes on (`--resume`); not there any more when it is done
 //   scene.ply            or object.ply: the Gaussians
 //   cameras.json         of the pictures, straightened and reduced as they were seen, in the order of names
@@ -32,8 +33,8 @@ struct ScanSummary {
 /// Makes the Gaussians. Returns what it came to.
 ///
 /// @param folder  new or empty; with `resume` one that was begun by the same config
-/// Throws UserError for folders that are not so, and as read_posed_images, read_photo, first_gaussians, fit_scan;
-/// Interrupted, when what was done so far can be resumed.
+/// Throws UserError for folders that are not so, and as read_posed_images, prepare_mesh_photos, read_photo,
+/// first_gaussians, fit_scan; Interrupted, when what was done so far can be resumed.
 ScanSummary run_scan(const ScanSettings& settings, const std::filesystem::path& folder, bool resume,
                      std::span<const LossTerm> terms, const Observer& observer = {});
 

@@ -5,6 +5,7 @@
 #include "pipelines/config/config_fields.h"
 #include "pipelines/config/config_kind.h"
 #include "pipelines/config/removed_keys.h"
+#include "pipelines/rig/textured_mesh.h"
 #include "splat/limits.h"
 
 namespace hsi4d {
@@ -13,10 +14,13 @@ namespace {
 
 constexpr int kMostThreads = 1024;
 constexpr int kMostIterations = 1000000;
+constexpr Index kMostPictures = 10000;
 constexpr Index kMostGaussians = 20000000;
 
 constexpr const char* kNoPhotos =
-    "not given; pictures whose cameras are known are needed: a folder of COLMAP, a transforms.json, a cameras.json. "
+    "not given; pictures whose cameras are known are needed: a folder of COLMAP, a transforms.json, a cameras.json, or "
+    "a mesh: "
+    ".glb, .obj, .ply. "
     "`hsi4d synth configs/reconstruct/photos.json --out DIR` makes some; then --set photos.path=DIR/transforms.json";
 
 void add_stage_faults(const ConfigValue& tree, const ScanSettings& settings, ConfigProblems& problems) {
@@ -49,14 +53,36 @@ void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProble
 
 }  // namespace
 
+void describe(ConfigFields& f, RigSettings& s) {
+  f.integer("count", s.count, {.min = 0, .max = kMostPictures},
+            "Pictures; 0: " + std::to_string(kPicturesOfObject) + " of an object, " + std::to_string(kPicturesOfScene) +
+                " of a scene");
+  f.integer("size", s.size, {.min = 16, .max = kLongestSide}, "Width and height of the pictures, pixels");
+  f.integer("supersample", s.light.supersample, {.min = 1, .max = 16}, "Rays along each side of a pixel");
+  f.number("shade", s.light.shade, {.min = 0, .max = 1},
+           "How much darker a side is that looks away from the sky; 0: the mesh's colours as they are");
+  f.number("nearest", s.nearest, {.min = 0, .max = 1e6}, "Scenes: a camera is so far from everything at least, metres");
+  f.number("least_seen", s.least_seen, {.min = 0, .max = 1}, "Scenes: a picture shows something in so large a share");
+  f.number("most_backs", s.most_backs, {.min = 0, .max = 1},
+           "Scenes: share of a picture that may show backs of faces, as from inside a thing");
+  f.optional(s.box, [](ConfigFields& inner, std::array<double, 6>& box) {
+    inner.numbers("box", box, {}, "Scenes: x, y, z of two corners between which cameras are; null: the mesh's bounds");
+  });
+}
+
 void describe(ConfigFields& f, ScanPhotos& s) {
-  f.path("path", s.path, {.must_exist = true}, "A folder of COLMAP, or a transforms.json or cameras.json");
+  f.path("path", s.path, {.must_exist = true},
+         "A folder of COLMAP, a transforms.json or cameras.json; or a mesh: .glb, .obj, .ply");
   f.path("pictures", s.pictures, {.must_exist = true}, "The pictures' folder, where it is not beside the cameras");
   f.integer("longest_side", s.rules.longest_side, {.min = 0, .max = kLongestSide},
             "Larger pictures are reduced to so many pixels; 0: as they are");
   f.number("depth_unit", s.rules.depth_unit, {.above = 0}, "What 1 is in a depth image of whole numbers, metres");
   f.integer("hold_every", s.hold_every, {.min = 0, .max = 100000},
             "One of so many pictures is not learnt from, but measured; 0: none");
+  f.object("rig", s.rig, "Pictures of a mesh, where path names one");
+  f.rule({"pictures", "path"}, [&s]() -> std::string {
+    return !s.pictures.empty() && is_mesh_file(s.path.string()) ? "is not read: path names a mesh" : "";
+  });
 }
 
 void describe(ConfigFields& f, ScanStart& s) {

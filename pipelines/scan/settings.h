@@ -12,6 +12,7 @@
 #include "optim/loss_description.h"
 #include "optim/stage_settings.h"
 #include "pipelines/photos/photo.h"
+#include "pipelines/rig/settings.h"
 #include "splat/render_settings.h"
 
 namespace hsi4d {
@@ -23,10 +24,11 @@ inline constexpr std::array<ConfigChoice<ScanKind>, 2> kScanKinds = {
 
 /// Which pictures, and how they are read.
 struct ScanPhotos {
-  std::filesystem::path path;      ///< as read_posed_images has it; empty: not given yet
+  std::filesystem::path path;      ///< as read_posed_images has it, or a mesh; empty: not given yet
   std::filesystem::path pictures;  ///< their folder, where it is not beside the cameras
   PhotoRules rules;
   int hold_every = 8;  ///< every so many pictures, in the order of names, one is not learnt from; 0: none
+  RigSettings rig;     ///< of a mesh
 };
 
 /// Where Gaussians begin.
@@ -84,6 +86,7 @@ struct ScanSettings {
 std::vector<std::string> scan_groups();
 
 /// Describe the sections.
+void describe(ConfigFields& fields, RigSettings& settings);
 void describe(ConfigFields& fields, ScanPhotos& settings);
 void describe(ConfigFields& fields, ScanStart& settings);
 void describe(ConfigFields& fields, DensitySettings& settings);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/camera_rig.h"
+#include "core/camera_places.h"
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -109,7 +109,7 @@ std::vector<Camera> cameras_around_object(const Gaussians& gaussians, const Surf
   if (points.empty()) throw UserError("there is no Gaussian of opacity above 0.5: nothing is solid");
   const Box box = box_around(points);
   const Vector3<double> center = 0.5 * (box.low + box.high);
-  return cameras_around({center, 0.5 * (box.high - box.low).norm(), settings.more_views, settings.size_px});
+  return cameras_around(center, 0.5 * (box.high - box.low).norm(), settings.more_views, settings.size_px, kAllSides);
 }
 
 void append(std::vector<DepthView> more, std::vector<DepthView>& views) {

@@ -4,14 +4,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/camera_rig.h"
 #include "core/check.h"
-#include "core/config_value.h"
 #include "core/file.h"
 #include "core/folder_in_making.h"
-#include "core/image_io.h"
 #include "core/random.h"
-#include "core/text.h"
+#include "core/camera_places.h"
+#include "pipelines/photos/photo_set.h"
 #include "pipelines/synthetic/dataset.h"
 #include "pipelines/synthetic/object.h"
 #include "pipelines/synthetic/scene.h"
@@ -23,15 +21,6 @@ namespace hsi4d {
 namespace {
 
 constexpr double kSeen = 0.5;  // alpha from which a pixel shows something
-
-Camera camera_at(const Vector3<double>& eye, const Vector3<double>& target, double focal_share, int size_px) {
-  Camera camera;
-  camera.width = camera.height = size_px;
-  camera.fx = camera.fy = focal_share * size_px;
-  camera.cx = camera.cy = 0.5 * size_px;
-  camera.camera_from_world = look_at(eye, target);
-  return camera;
-}
 
 /// What the pictures show.
 struct Subject {
@@ -47,8 +36,7 @@ Subject object_of(const SyntheticSettings& settings) {
   double radius = 0;
   for (Index i = 0; i < g.count(); ++i)
     radius = std::max(radius, Vector3<float>(g.means.data() + 3 * i).cast<double>().norm());
-  constexpr double kLowest = -0.6;  // an object that stands is not seen from straight below
-  subject.cameras = cameras_around({g.origin_world, radius, settings.photos, settings.size_px, kLowest});
+  subject.cameras = cameras_around(g.origin_world, radius, settings.photos, settings.size_px, kMostSides);
   subject.has_alpha = true;
   return subject;
 }
@@ -71,40 +59,6 @@ Image depth_image(const SceneImage& picture) {
     }
   }
   return depth;
-}
-
-ConfigValue matrix_value(const Camera& camera) {
-  const Rigid<double> world_from_camera = inverse(camera.camera_from_world);
-  Matrix4<double> matrix = matrix_from_rigid(world_from_camera);
-  matrix.col(1) *= -1;  // OpenGL's camera has y up and z backward
-  matrix.col(2) *= -1;
-  ConfigValue rows = ConfigValue::make_array();
-  for (int i = 0; i < 4; ++i) {
-    ConfigValue row = ConfigValue::make_array();
-    for (int j = 0; j < 4; ++j) row.items.push_back(ConfigValue::make_number(matrix(i, j)));
-    rows.items.push_back(std::move(row));
-  }
-  return rows;
-}
-
-ConfigValue transforms_of(const Camera& camera) {
-  ConfigValue file = ConfigValue::make_object();
-  file.add("camera_model", ConfigValue::make_string("PINHOLE"));
-  file.add("w", ConfigValue::make_integer(camera.width));
-  file.add("h", ConfigValue::make_integer(camera.height));
-  file.add("fl_x", ConfigValue::make_number(camera.fx));
-  file.add("fl_y", ConfigValue::make_number(camera.fy));
-  file.add("cx", ConfigValue::make_number(camera.cx));
-  file.add("cy", ConfigValue::make_number(camera.cy));
-  return file;
-}
-
-ConfigValue frame_of(const Camera& camera, const std::string& image, const std::string& depth) {
-  ConfigValue frame = ConfigValue::make_object();
-  frame.add("file_path", ConfigValue::make_string(image));
-  frame.add("depth_file_path", ConfigValue::make_string(depth));
-  frame.add("transform_matrix", matrix_value(camera));
-  return frame;
 }
 
 }  // namespace
@@ -151,7 +105,7 @@ void write_photos(const SyntheticSettings& settings, const RenderSettings& rende
   const bool is_object = settings.photos_of == SyntheticSubject::kObject;
   const Subject subject = is_object ? object_of(settings) : scene_of(settings);
   write_splats(out.file(is_object ? "truth/object.ply" : "truth/scene.ply"), subject.gaussians);
-  ConfigValue frames = ConfigValue::make_array();
+  std::vector<Camera> taken;
   Progress shown("pictures", std::ssize(subject.cameras), observer.progress, observer.progress_interval);
   for (const Camera& camera : subject.cameras) {
     if (observer.wants_stop()) throw Interrupted("interrupted while pictures were made; nothing is left of them");
@@ -163,19 +117,14 @@ void write_photos(const SyntheticSettings& settings, const RenderSettings& rende
     view.precision = Precision::kFloat;
     const SceneImage plain = render_scene(posed, view);
     if (!is_good_view(plain)) continue;
-    const std::string number = four_digits(std::ssize(frames.items));
-    const std::string image = "images/" + number + ".png", depth = "depths/" + number + ".exr";
     const Image picture = picture_with_alpha(posed, camera, render, Precision::kFloat, settings.supersample);
-    write_image(out.file(image), subject.has_alpha ? picture : before_black(picture));
-    write_image(out.file(depth), depth_image(plain));
-    frames.items.push_back(frame_of(camera, image, depth));
+    write_photo(out, std::ssize(taken), subject.has_alpha ? picture : before_black(picture), depth_image(plain));
+    taken.push_back(camera);
   }
-  if (frames.items.empty())
+  if (taken.empty())
     throw UserError("/synthetic: no camera of " + std::to_string(subject.cameras.size()) +
                     " sees enough of what is to be shown, or all are inside of it");
-  ConfigValue transforms = transforms_of(subject.cameras.front());
-  transforms.add("frames", std::move(frames));
-  write_text_file(out.file("transforms.json"), to_json(transforms));
+  write_photo_cameras(out, taken);
   write_text_file(out.file(kSyntheticFile), synthetic_settings_json(settings));
   out.commit();
 }

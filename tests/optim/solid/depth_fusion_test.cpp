@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "core/camera_rig.h"
+#include "core/camera_places.h"
 #include "core/check.h"
 #include "core/parallel.h"
 
@@ -53,7 +53,7 @@ DepthView room_view(const Camera& camera) {
 
 std::vector<DepthView> ball_views(Index count, int size_px) {
   std::vector<DepthView> views;
-  for (const Camera& camera : cameras_around({Vector3<double>::Zero(), kRadius, count, size_px}))
+  for (const Camera& camera : cameras_around(Vector3<double>::Zero(), kRadius, count, size_px, kAllSides))
     views.push_back(ball_view(camera));
   return views;
 }

@@ -5,10 +5,10 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
-#include "core/camera_rig.h"
 #include "core/check.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "core/camera_places.h"
 #include "pipelines/synthetic/photos.h"
 #include "pipelines/synthetic/scene.h"
 
@@ -87,7 +87,7 @@ TEST_CASE("a scene that was turned, moved and scaled is put back on its ground")
 
 TEST_CASE("a camera that goes along sees the same") {
   const Similarity similarity = random_similarity(3);
-  const Camera camera = cameras_around({Vector3<double>(1, 2, 3), 1, 5, 64})[3];
+  const Camera camera = cameras_around(Vector3<double>(1, 2, 3), 1, 5, 64, kMostSides)[3];
   const Camera moved = moved_camera(camera, similarity);
   for (const Vector3<double>& point : {Vector3<double>(1, 2, 3), Vector3<double>(1.3, 1.8, 2.5)}) {
     const Vector3<double> before = transform_point(camera.camera_from_world, point);

@@ -1,14 +1,14 @@
-#include "core/camera_rig.h"
+#include "core/camera_places.h"
 
 #include <catch2/catch.hpp>
 
-namespace camera_rig_test {
+namespace camera_places_test {
 
 using namespace hsi4d;
 
 TEST_CASE("cameras around a place see it in their middle, from all sides, and a ball of the radius whole") {
   const Vector3<double> center(1, -2, 3);
-  const std::vector<Camera> cameras = cameras_around({center, 0.5, 60, 100});
+  const std::vector<Camera> cameras = cameras_around(center, 0.5, 60, 100, kAllSides);
   REQUIRE(cameras.size() == 60);
   Vector3<double> mean = Vector3<double>::Zero();
   for (const Camera& camera : cameras) {
@@ -22,7 +22,7 @@ TEST_CASE("cameras around a place see it in their middle, from all sides, and a 
   CHECK(mean.norm() < 0.02);
   const auto lowest = [&](double limit) {
     double z = 1;
-    for (const Camera& camera : cameras_around({center, 0.5, 60, 100, limit}))
+    for (const Camera& camera : cameras_around(center, 0.5, 60, 100, limit))
       z = std::min(z, (camera_center_world(camera) - center).normalized()[2]);
     return z;
   };
@@ -47,4 +47,4 @@ TEST_CASE("six cameras see every direction once") {
   }
 }
 
-}  // namespace camera_rig_test
+}  // namespace camera_places_test

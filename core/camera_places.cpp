@@ -1,11 +1,9 @@
-#include "core/camera_rig.h"
+#include "core/camera_places.h"
 
 #include <cmath>
 #include <numbers>
 
 namespace hsi4d {
-
-namespace {
 
 Camera camera_at(const Vector3<double>& eye, const Vector3<double>& target, double focal_share, int size_px) {
   Camera camera;
@@ -16,18 +14,17 @@ Camera camera_at(const Vector3<double>& eye, const Vector3<double>& target, doub
   return camera;
 }
 
-}  // namespace
-
-std::vector<Camera> cameras_around(const CameraSphere& sphere) {
+std::vector<Camera> cameras_around(const Vector3<double>& center, double radius, Index count, int size_px,
+                                   double lowest) {
   constexpr double kFocal = 1.2, kFill = 0.8;  // of the picture's width
-  const double distance = sphere.radius * 2 * kFocal / kFill;
+  const double distance = radius * 2 * kFocal / kFill;
   const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
   std::vector<Camera> cameras;
-  for (Index k = 0; k < sphere.count; ++k) {
-    const double z = 1 - (1 - sphere.lowest) * (static_cast<double>(k) + 0.5) / static_cast<double>(sphere.count);
+  for (Index k = 0; k < count; ++k) {
+    const double z = 1 - (1 - lowest) * (static_cast<double>(k) + 0.5) / static_cast<double>(count);
     const double across = std::sqrt(1 - z * z), angle = golden * static_cast<double>(k);
     const Vector3<double> way(across * std::cos(angle), across * std::sin(angle), z);
-    cameras.push_back(camera_at(sphere.center + distance * way, sphere.center, kFocal, sphere.size_px));
+    cameras.push_back(camera_at(center + distance * way, center, kFocal, size_px));
   }
   return cameras;
 }
