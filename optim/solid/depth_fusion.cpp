@@ -17,9 +17,10 @@ namespace hsi4d {
 namespace {
 
 constexpr float kEndless = std::numeric_limits<float>::infinity();
-constexpr double kNear = 1e-3;       // metres: boxes that reach nearer to a camera are looked at node by node
-constexpr std::int32_t kCoarse = 4;  // blocks along a side of what is looked at first
-constexpr double kMostSlope = 2;     // truncations between four pixels that are still one surface
+constexpr double kNear = 1e-3;        // metres: boxes that reach nearer to a camera are looked at node by node
+constexpr std::int32_t kCoarse = 4;   // blocks along a side of what is looked at first
+constexpr double kLeastSlant = 0.25;  // flatter ones count as this
+constexpr double kMostSlope = 2;      // truncations between four pixels that are still one surface
 
 /// The smallest and the largest number of squares of pixels, each level of half the size of the one below.
 struct Range {
@@ -38,7 +39,7 @@ struct PixelBox {
 /// Sums over the views, of the nodes of a block.
 struct NodeSums {
   std::array<double, kSolidBlockNodes> said{};  ///< metres
-  std::array<std::int32_t, kSolidBlockNodes> count{};
+  std::array<double, kSolidBlockNodes> weight{};
 };
 
 /// A view made ready for many questions.
@@ -52,6 +53,11 @@ class SeenDepths {
     for (std::size_t i = 0; i < pixels; ++i) {
       depths_[i] = view.depths[i] > 0 ? view.depths[i] : kEndless;
       ranges[i] = {depths_[i], depths_[i]};
+    }
+    slants_.resize(pixels);
+    for (Index y = 0; y < camera_.height; ++y) {
+      for (Index x = 0; x < camera_.width; ++x)
+        slants_[static_cast<std::size_t>(y * camera_.width + x)] = slant_at(x, y);
     }
     levels_.push_back({camera_.width, camera_.height, std::move(ranges)});
     while (levels_.back().width > 1 || levels_.back().height > 1) levels_.push_back(halved(levels_.back()));
@@ -80,8 +86,9 @@ class SeenDepths {
     if (right <= 0 || bottom <= 0 || left >= camera_.width || top >= camera_.height) return Says::kNothing;
     const bool is_inside = left >= 0 && top >= 0 && right < camera_.width && bottom < camera_.height;
     const Range range = range_of(pixel_box(left, top, right, bottom));
-    if (z_low > static_cast<double>(range.high) + truncation_) return Says::kNothing;
-    if (is_inside && z_high + truncation_ <= static_cast<double>(range.low)) return Says::kFree;
+    const double most = truncation_ / kLeastSlant;  // along z
+    if (z_low > static_cast<double>(range.high) + most) return Says::kNothing;
+    if (is_inside && z_high + most <= static_cast<double>(range.low)) return Says::kFree;
     return Says::kPartly;
   }
 
@@ -104,10 +111,34 @@ class SeenDepths {
     if (!(p[2] > kNear)) return;
     const Vector2<double> pixel = project_point(camera_, p);
     if (!(pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera_.width && pixel[1] < camera_.height)) return;
-    const double before = depth_at(pixel) - p[2];
+    const std::size_t own = static_cast<std::size_t>(pixel[1]) * static_cast<std::size_t>(camera_.width) +
+                            static_cast<std::size_t>(pixel[0]);
+    const double slant = static_cast<double>(slants_[own]), before = slant * (depth_at(pixel) - p[2]);
     if (before < -truncation_) return;
-    sums.said[n] += std::min(before, truncation_);
-    ++sums.count[n];
+    const double weight = before >= truncation_ ? 1 : slant * slant;
+    sums.said[n] += weight * std::min(before, truncation_);
+    sums.weight[n] += weight;
+  }
+
+  /// How far from a surface a point is that lies 1 m before it along z: the cosine of the angle between the ray and the
+  /// surface's normal, times the length of the ray for z = 1, held to [kLeastSlant, 1]. Of the neighbours the nearer
+  /// ones are taken.
+  float slant_at(Index x, Index y) const {
+    const auto seen = [&](Index i, Index j) {
+      const double depth = depth_of(std::clamp(i, Index{0}, Index{camera_.width} - 1),
+                                    std::clamp(j, Index{0}, Index{camera_.height} - 1));
+      return unproject_pixel(camera_, Vector2<double>(static_cast<double>(i) + 0.5, static_cast<double>(j) + 0.5),
+                             depth);
+    };
+    const Vector3<double> own = seen(x, y);
+    if (!std::isfinite(own[2])) return 1;
+    const auto across = [&](Index i, Index j) {
+      const Vector3<double> before = own - seen(x - i, y - j), behind = seen(x + i, y + j) - own;
+      return std::abs(before[2]) < std::abs(behind[2]) ? before : behind;
+    };
+    const Vector3<double> normal = cross(across(1, 0), across(0, 1));
+    const double slant = std::abs(normal.dot(Vector3<double>(own / own[2]))) / normal.norm();
+    return std::isfinite(slant) ? static_cast<float>(std::clamp(slant, kLeastSlant, 1.0)) : 1.0F;
   }
 
   struct Level {
@@ -150,11 +181,10 @@ class SeenDepths {
   /// Between pixel centres where four of them show one surface; else the nearest of them: beside an edge a pixel says
   /// nothing of what lies behind the edge.
   double depth_at(const Vector2<double>& pixel) const {
-    const Index width = camera_.width, height = camera_.height;
-    const double own = depth_of(static_cast<Index>(pixel[0]), static_cast<Index>(pixel[1]));
     const double u = pixel[0] - 0.5, v = pixel[1] - 0.5;
     const auto x = static_cast<Index>(std::floor(u)), y = static_cast<Index>(std::floor(v));
-    if (x < 0 || y < 0 || x + 1 >= width || y + 1 >= height) return own;
+    if (x < 0 || y < 0 || x + 1 >= camera_.width || y + 1 >= camera_.height)
+      return depth_of(static_cast<Index>(pixel[0]), static_cast<Index>(pixel[1]));
     const double a = depth_of(x, y), b = depth_of(x + 1, y), c = depth_of(x, y + 1), d = depth_of(x + 1, y + 1);
     const double low = std::min({a, b, c, d}), high = std::max({a, b, c, d});
     if (!(high - low <= kMostSlope * truncation_)) return low;
@@ -168,7 +198,7 @@ class SeenDepths {
 
   Camera camera_;
   double truncation_;  // metres
-  std::vector<float> depths_;
+  std::vector<float> depths_, slants_;
   std::vector<Level> levels_;
 };
 
@@ -200,11 +230,11 @@ FusedBlock fused_block(const SolidGrid& grid, const NodePlace& place, const Verd
   const double truncation = grid.truncation * grid.voxel;
   NodeSums sums;
   sums.said.fill(static_cast<double>(verdict.free) * truncation);
-  sums.count.fill(static_cast<std::int32_t>(verdict.free));
+  sums.weight.fill(static_cast<double>(verdict.free));
   for (const SeenDepths* view : verdict.partly) view->add_to(grid, place, sums);
   bool some_free = false, some_solid = false;
   for (std::size_t n = 0; n < kSolidBlockNodes; ++n) {
-    const double mean = sums.count[n] == 0 ? -grid.truncation : sums.said[n] / sums.count[n] / grid.voxel;
+    const double mean = sums.weight[n] == 0 ? -grid.truncation : sums.said[n] / sums.weight[n] / grid.voxel;
     result.values[n] = static_cast<float>(mean);
     some_free |= mean > -grid.truncation;
     some_solid |= mean < grid.truncation;

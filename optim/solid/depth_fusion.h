@@ -1,13 +1,15 @@
 // One solid from depths that many cameras saw.
 //
-// At a node x of the grid each view v that sees it says how far it lies in front of what the pixel shows,
+// At a node x of the grid each view v that sees it says how far it lies before the surface that the pixel shows,
 //
-//   s_v = D_v(π_v(x)) − z_v(x),
+//   s_v = c (D_v(π_v(x)) − z_v(x)),   c = |n·r|,
 //
-// held to the truncation t where it is more; what is more than t behind the surface says nothing, for it is hidden.
-// The signed distance is the mean of what the views say [Curless and Levoy 1996], −t where none says anything: what
-// nobody has seen is solid. A pixel without a surface says t all along its ray. D is interpolated
-// between four pixels that show one surface; else it is the smallest of the four.
+// r the pixel's ray for z = 1, n the normal of what the pixel and its neighbours show; c is held to [¼, 1]. s is held
+// to the truncation t where it is more; what is more than t behind the surface says nothing, for it is hidden. The
+// signed distance is the mean of what the views say [Curless and Levoy 1996], c² their weight, 1 where they say t; −t
+// where none says anything: what nobody has seen is solid. A pixel without a surface says t all along its ray. D is
+// interpolated between four pixels that show one surface; else it is the smallest of the four, so that a pixel beside
+// an edge says nothing of what is behind it.
 #pragma once
 
 #include <span>

@@ -198,7 +198,8 @@ void GlbFile::read_accessor(std::size_t index, const char* type,
   const auto component = static_cast<int>(whole(accessor, "componentType"));
   const std::size_t columns = columns_of(type);
   const std::size_t bytes = component == glb::kUnsignedByte ? 1 : component == glb::kUnsignedShort ? 2 : 4;
-  if (component != glb::kFloat && component != glb::kUnsignedByte && component != glb::kUnsignedShort && component != glb::kUnsignedInt)
+  if (component != glb::kFloat && component != glb::kUnsignedByte && component != glb::kUnsignedShort &&
+      component != glb::kUnsignedInt)
     fail("accessor " + std::to_string(index) + " has the component type " + std::to_string(component));
   if (columns == 1 && component == glb::kFloat) fail("corners of triangles are floats");
   const ConfigValue& view = entry("bufferViews", whole(accessor, "bufferView"));

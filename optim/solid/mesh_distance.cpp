@@ -94,6 +94,7 @@ std::vector<TriangleMesh> solids_of(const TriangleMesh& mesh) {
     parts.push_back(std::move(entry));
   }
   std::vector<TriangleMesh> solids;
+  TriangleMesh everything;  // in which hollows without a solid are
   std::vector<std::size_t> solid_of_part(parts.size());
   const auto is_hollow = [](const Part& part) { return !part.is_open && part.volume < 0; };
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -108,12 +109,9 @@ std::vector<TriangleMesh> solids_of(const TriangleMesh& mesh) {
       if (part.is_open || is_hollow(part) || !part.box.holds(hollow.box)) continue;
       if (holder == parts.size() || part.volume < parts[holder].volume) holder = i;
     }
-    if (holder < parts.size()) {
-      append(hollow.mesh, solids[solid_of_part[holder]]);
-    } else {
-      solids.push_back(hollow.mesh);
-    }
+    append(hollow.mesh, holder < parts.size() ? solids[solid_of_part[holder]] : everything);
   }
+  if (!everything.faces.empty()) solids.push_back(everything);
   return solids;
 }
 

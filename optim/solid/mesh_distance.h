@@ -7,8 +7,8 @@
 //
 // A mesh may have several pieces (triangles that share no corner). Each closed one is a solid of its own, and the union
 // of all counts: the distance is the least of theirs, exact outside, and no deeper than the truth where pieces overlap.
-// A closed piece turned inwards is a hollow of the smallest solid whose box holds it; without one, what lies outside of
-// it is solid, as of the walls of a room.
+// A closed piece turned inwards is a hollow of the smallest solid whose box holds it; what lies outside of all those
+// without one is solid, as of the walls of rooms.
 //
 // An open piece bounds nothing. It then is a slab: behind it, where the nearest place does not lie on its border, is
 // solid down to `thickness`; deeper is unknown.

@@ -5,11 +5,11 @@
 #include <map>
 #include <numbers>
 
+#include "core/camera_places.h"
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/text.h"
-#include "core/camera_places.h"
 
 namespace hsi4d {
 

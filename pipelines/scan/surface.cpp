@@ -87,8 +87,16 @@ Box box_around(const Points& points) {
   return {box.low - Vector3<double>::Constant(more), box.high + Vector3<double>::Constant(more)};
 }
 
+/// With the given cameras, around which something is free.
 Box box_of(const SurfaceSettings& settings, const std::vector<DepthView>& views) {
-  if (!settings.box) return box_around(seen_points(views));
+  if (!settings.box) {
+    Box box = box_around(seen_points(views));
+    for (const Camera& camera : settings.cameras) {
+      box.low = box.low.cwiseMin(camera_center_world(camera));
+      box.high = box.high.cwiseMax(camera_center_world(camera));
+    }
+    return box;
+  }
   const std::array<double, 6>& b = *settings.box;
   return {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
 }

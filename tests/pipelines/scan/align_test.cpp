@@ -5,10 +5,10 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
+#include "core/camera_places.h"
 #include "core/check.h"
 #include "core/random.h"
 #include "core/rotation.h"
-#include "core/camera_places.h"
 #include "pipelines/synthetic/photos.h"
 #include "pipelines/synthetic/scene.h"
 
