@@ -232,12 +232,13 @@ FusedBlock fused_block(const SolidGrid& grid, const NodePlace& place, const Verd
   sums.said.fill(static_cast<double>(verdict.free) * truncation);
   sums.weight.fill(static_cast<double>(verdict.free));
   for (const SeenDepths* view : verdict.partly) view->add_to(grid, place, sums);
+  const auto limit = static_cast<float>(grid.truncation);  // rounded, so that sums that round are all free or all solid
   bool some_free = false, some_solid = false;
   for (std::size_t n = 0; n < kSolidBlockNodes; ++n) {
     const double mean = sums.weight[n] == 0 ? -grid.truncation : sums.said[n] / sums.weight[n] / grid.voxel;
     result.values[n] = static_cast<float>(mean);
-    some_free |= mean > -grid.truncation;
-    some_solid |= mean < grid.truncation;
+    some_free |= result.values[n] > -limit;
+    some_solid |= result.values[n] < limit;
   }
   if (some_free) result.kind = some_solid ? 0 : SolidGrid::kFree;
   return result;

@@ -11,7 +11,7 @@ namespace hsi4d {
 
 namespace {
 
-/// Makes the free nodes of the cell around a place solid, those that change least. Returns whether there were any.
+/// Makes the free nodes of the cell around a place solid. Returns whether there were any.
 bool fill_cell(SolidGrid& grid, const Vector3<double>& place) {
   const Vector3<double> at = (place - grid.origin) / grid.voxel;
   bool some = false;

@@ -9,7 +9,8 @@ namespace hsi4d {
 /// The surface between free space and solid: closed, a manifold, counter-clockwise seen from the free side.
 ///
 /// Where two edges of the solid touch in a line or a point, the surface would be none: free nodes beside such a place
-/// become solid in `grid` until there is none.
+/// become solid in `grid` until there is none; where that does not help, all triangles stay small. A passage of one
+/// node may be closed by it.
 ///
 /// @param grid        clean_up has been called
 /// @param adaptivity  0: all triangles are about a voxel large; to 1: larger where the surface is flat

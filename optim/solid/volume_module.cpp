@@ -1,5 +1,7 @@
 // libhsi4d_volumes.so: the only file that includes OpenVDB. It links nothing of this project.
-#include <openvdb/io/File.h>
+#include <cmath>
+#include <fstream>
+#include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetRebuild.h>
 #include <openvdb/tools/VolumeToMesh.h>
@@ -65,24 +67,33 @@ void make_mesh(const SolidGrid& solid, double adaptivity, TriangleMesh& mesh) {
   }
 }
 
-std::string write_distances(const SolidGrid& solid, double reach, const std::string& path) {
-  const float sign = solid.is_outside_free ? 1.0F : -1.0F;
-  const FloatGrid::Ptr grid = openvdb::tools::levelSetRebuild(*grid_of(solid, sign), 0.0F, static_cast<float>(reach),
-                                                              static_cast<float>(reach));
-  const float scale = sign * static_cast<float>(solid.voxel);
-  for (auto value = grid->beginValueAll(); value; ++value) value.setValue(scale * *value);
-  openvdb::tools::changeBackground(grid->tree(), scale * grid->background());
+/// Distances of the surface with the signs of the grid: the rebuilt level set takes all within the outermost surface
+/// for one side, also what hangs in a room.
+FloatGrid::Ptr distances_of(const SolidGrid& solid, float reach) {
+  const float outwards = solid.is_outside_free ? 1.0F : -1.0F, voxel = static_cast<float>(solid.voxel);
+  const FloatGrid::Ptr signs = grid_of(solid, 1);
+  const FloatGrid::Ptr grid = openvdb::tools::levelSetRebuild(*grid_of(solid, outwards), 0.0F, reach, reach);
+  const FloatGrid::ConstAccessor sign_at = signs->getConstAccessor();
+  for (auto value = grid->beginValueAll(); value; ++value)
+    value.setValue(std::copysign(voxel * *value, sign_at.getValue(value.getCoord())));
+  openvdb::tools::changeBackground(grid->tree(), outwards * voxel * reach);
   const openvdb::math::Transform::Ptr place = openvdb::math::Transform::createLinearTransform(solid.voxel);
   place->postTranslate({solid.origin[0], solid.origin[1], solid.origin[2]});
   grid->setTransform(place);
   grid->setName("signed_distance");
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  return grid;
+}
+
+std::string write_distances(const SolidGrid& solid, double reach, const std::string& path) {
   try {
-    openvdb::io::File(path).write({grid});
-  } catch (const openvdb::Exception& error) {
+    std::ofstream file(path, std::ios::binary);
+    openvdb::io::Stream(file).write(openvdb::GridCPtrVec{distances_of(solid, static_cast<float>(reach))});
+    file.close();
+    return file ? "" : "the disk may be full";
+  } catch (const std::exception& error) {
     return error.what();
   }
-  return "";
 }
 
 }  // namespace

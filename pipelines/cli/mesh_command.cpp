@@ -16,6 +16,7 @@
 #include "pipelines/cli/interrupt.h"
 #include "pipelines/cli/list.h"
 #include "pipelines/cli/options.h"
+#include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/scan/surface.h"
@@ -80,33 +81,48 @@ std::string pieces_text(const TriangleMesh& mesh) {
             " m3, " + count_text(std::ssize(parts[i].faces), "triangle") + ", genus " +
             std::to_string(genus(parts[i])) + "\n";
   }
-  if (parts.size() > kShown) text += "  and " + count_text(std::ssize(parts) - 5, "smaller piece") + "\n";
+  if (parts.size() > kShown)
+    text += "  and " + count_text(static_cast<std::int64_t>(parts.size() - kShown), "smaller piece") + "\n";
   return text;
 }
 
 std::string cleaned_text(const CleanUp& cleaned) {
   std::string text;
   if (cleaned.closed_pockets > 0)
-    text += "  filled: " + count_text(cleaned.closed_pockets, "pocket") + " that no camera reaches\n";
+    text += "  filled: " + count_text(cleaned.closed_pockets, "pocket") + " of free space, not to be reached\n";
   if (cleaned.removed_specks > 0)
-    text += "  left out: " + count_text(cleaned.removed_specks, "small piece") + " that hangs in free space\n";
+    text += "  left out: " + count_text(cleaned.removed_specks, "small piece") + " in free space\n";
   return text;
+}
+
+/// Throws UserError unless all that is asked for can be written, and replaces nothing that is read.
+void check_outputs(const MeshArguments& a) {
+  if (!a.distances.empty()) check_ending(a.distances, kMeshCommand + "--distances", {".vdb"});
+  if (!a.occupancy.empty()) check_ending(a.occupancy, kMeshCommand + "--occupancy", {".npz"});
+  if (a.occupancy.empty() && (a.occupancy_voxel || a.up != "z"))
+    throw UserError(kMeshCommand + "--occupancy-voxel and --up are of the grid of --occupancy, which is not asked for");
+  for (const std::string& file : {a.out, a.distances, a.occupancy}) {
+    if (file.empty()) continue;
+    check_no_input(file, kMeshCommand, {a.gaussians, a.cameras});
+    check_writable(file);
+  }
 }
 
 /// Writes the mesh and what else is asked for. Returns what the command prints.
 /// Throws UserError for options and files, and as scanned_solid and surface_of.
 std::string make_mesh(const MeshArguments& a) {
   mesh_ending(a.out);
+  check_outputs(a);
   if (a.up != "y" && a.up != "z") throw UserError(kMeshCommand + "--up: " + a.up + "; allowed: y, z");
   Stopwatch watch;
   const SurfaceSettings settings = settings_of(a);
   const SplatFile file = read_splats_with_warnings(a.gaussians);
   ScannedSolid solid = scanned_solid(file.gaussians, settings, observer_on_terminal(a.quiet));
   const TriangleMesh mesh = surface_of(solid.grid, a.adaptivity);
-  write_mesh(a.out, mesh);
-  if (!a.distances.empty()) write_distances(a.distances, solid.grid, kDistanceReach);
   if (!a.occupancy.empty())
     write_occupancy(a.occupancy, occupancy_of(solid.grid, a.occupancy_voxel.value_or(solid.grid.voxel), a.up == "y"));
+  if (!a.distances.empty()) write_distances(a.distances, solid.grid, kDistanceReach);
+  write_mesh(a.out, mesh);
   return a.out + ": " + std::to_string(mesh.vertices.size()) + " vertices, " +
          count_text(std::ssize(mesh.faces), "triangle") + ", from " + count_text(std::ssize(solid.views), "view") +
          ", voxels of " + short_number(1000 * solid.grid.voxel) + " mm, in " + duration_text(watch.lap()) + "\n" +
@@ -116,7 +132,8 @@ std::string make_mesh(const MeshArguments& a) {
 std::string mesh_command(const MeshArguments& a) {
   const InterruptWatch watch;
   std::string text;
-  with_threads(a.threads.value_or(thread_count()), [&] { text = make_mesh(a); });
+  const int threads = a.threads.value_or(0);
+  with_threads(threads > 0 ? threads : thread_count(), [&] { text = make_mesh(a); });
   return text;
 }
 
@@ -138,7 +155,8 @@ void add_mesh(CLI::App& app, Program& program) {
   command.add_option("--views", a.more_views, "Cameras that are placed beside the given ones; 144 without")
       ->check(whole_number(100000))
       ->type_name("N");
-  command.add_option("--size", a.size_px, "Pixels along a side of their pictures; 512 without")->type_name("PX");
+  command.add_option("--size", a.size_px, "Pixels along the longest side of what cameras see; 512 without")
+      ->type_name("PX");
   command.add_option("--smallest", a.smallest, "Voxels of a piece in free space that is kept; 512 without")
       ->check(whole_number(1000000000))
       ->type_name("N");

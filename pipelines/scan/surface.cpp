@@ -6,6 +6,7 @@
 
 #include "core/camera_places.h"
 #include "core/check.h"
+#include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "pipelines/draw/median_depth.h"
@@ -24,15 +25,15 @@ struct Box {
 
 /// Depths of all cameras, in turn.
 std::vector<DepthView> depths_of(const Gaussians& gaussians, const std::vector<Camera>& cameras,
-                                 const RenderSettings& render, const Observer& observer) {
+                                 const SurfaceSettings& settings, const Observer& observer) {
   Progress shown("views", std::ssize(cameras), observer.progress, observer.progress_interval);
   std::vector<DepthView> views;
   for (const Camera& camera : cameras) {
     if (observer.wants_stop()) throw Interrupted("interrupted while depths were made; nothing is left of them");
     SceneView view;
-    view.camera = camera;
-    view.settings = render;
-    views.push_back({camera, median_depths(gaussians, view)});
+    view.camera = reduced_camera(camera, settings.size_px);
+    view.settings = settings.render;
+    views.push_back({view.camera, median_depths(gaussians, view)});
     shown.step();
   }
   return views;
@@ -91,7 +92,7 @@ Box box_around(const Points& points) {
 Box box_of(const SurfaceSettings& settings, const std::vector<DepthView>& views) {
   if (!settings.box) {
     Box box = box_around(seen_points(views));
-    for (const Camera& camera : settings.cameras) {
+    for (const Camera& camera : settings.is_object ? std::vector<Camera>{} : settings.cameras) {
       box.low = box.low.cwiseMin(camera_center_world(camera));
       box.high = box.high.cwiseMax(camera_center_world(camera));
     }
@@ -165,7 +166,7 @@ ScannedSolid object_solid_of(const Gaussians& gaussians, const SurfaceSettings& 
   ScannedSolid result;
   std::vector<Camera> cameras = settings.cameras;
   for (const Camera& camera : cameras_around_object(gaussians, settings)) cameras.push_back(camera);
-  result.views = depths_of(gaussians, cameras, settings.render, observer);
+  result.views = depths_of(gaussians, cameras, settings, observer);
   result.grid = fused(result.views, fusion_of(settings, box_of(settings, result.views)));
   return result;
 }
@@ -177,20 +178,24 @@ ScannedSolid room_solid_of(const Gaussians& gaussians, const SurfaceSettings& se
   if (settings.cameras.empty())
     throw UserError("where is free space? A scene needs the cameras that took its pictures");
   ScannedSolid result;
-  result.views = depths_of(gaussians, settings.cameras, settings.render, observer);
+  result.views = depths_of(gaussians, settings.cameras, settings, observer);
   const Box box = box_of(settings, result.views);
   FusionSettings fusion = fusion_of(settings, box);
-  if (settings.more_views >= kSides) {
+  if (settings.more_views > 0) {
     FusionSettings first = fusion;
     first.voxel *= kCoarse;
     SolidGrid coarse = fused(result.views, first);
     clean_up(coarse, centers_of(result.views), 0);
     const double clearance = kClearance * (box.high - box.low).maxCoeff();
     std::vector<Camera> cameras;
-    for (const Vector3<double>& eye : more_eyes(coarse, settings.cameras, settings.more_views / kSides, clearance)) {
+    for (const Vector3<double>& eye :
+         more_eyes(coarse, settings.cameras, (settings.more_views + kSides - 1) / kSides, clearance)) {
       for (const Camera& camera : cameras_to_all_sides(eye, settings.size_px)) cameras.push_back(camera);
     }
-    append(depths_of(gaussians, cameras, settings.render, observer), result.views);
+    if (std::ssize(cameras) < settings.more_views)
+      log_warning("there is room for " + std::to_string(cameras.size()) +
+                  " more views in free space; asked for: " + std::to_string(settings.more_views));
+    append(depths_of(gaussians, cameras, settings, observer), result.views);
   }
   result.grid = fused(result.views, fusion);
   return result;

@@ -23,7 +23,7 @@ struct SurfaceSettings {
   std::optional<double> voxel;               ///< metres; without: by the box's longest side
   std::optional<std::array<double, 6>> box;  ///< low and high corner, metres; without: what the cameras see
   Index more_views = 144;                    ///< that are placed beside the given ones
-  int size_px = 512;                         ///< of these
+  int size_px = 512;                         ///< longest side of all views; given ones are reduced to it
   Index smallest = 512;                      ///< nodes of a piece that is kept
   RenderSettings render;
 };

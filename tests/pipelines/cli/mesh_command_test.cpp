@@ -17,9 +17,9 @@ using namespace hsi4d::test;
 TEST_CASE("hsi4d mesh writes a closed mesh, distances and what is occupied") {
   const TemporaryFolder folder;
   write_splats("object.ply", synthetic_object(SyntheticSettings{}).gaussians);
-  const ProgramResult run =
-      run_hsi4d({"mesh", "object.ply", "--object", "--views", "30", "--size", "96", "--voxel", "0.01", "--out", "m.glb",
-                 "--distances", "m.vdb", "--occupancy", "m.npz", "--up", "y", "--quiet"});
+  const ProgramResult run = run_hsi4d(
+      {"mesh",  "object.ply",  "--object", "--views",     "30",    "--size", "96", "--voxel",   "0.01", "--out",
+       "m.glb", "--distances", "m.vdb",    "--occupancy", "m.npz", "--up",   "y",  "--threads", "0",    "--quiet"});
   CAPTURE(run.err);
   REQUIRE(run.status == 0);
   CHECK_THAT(run.out, Catch::Contains("m.glb: ") && Catch::Contains("from 30 views") && Catch::Contains("a solid of"));
@@ -49,6 +49,12 @@ TEST_CASE("hsi4d mesh refuses what it cannot do before it begins") {
   CHECK_THAT(error({"--out", "m.ply", "--object", "--up", "x", "--occupancy", "o.npz"}),
              Catch::Contains("allowed: y, z"));
   CHECK_THAT(error({"--out", "m.ply", "--object", "--adaptivity", "2"}), Catch::Contains("--adaptivity: 2"));
+  CHECK_THAT(error({"--out", "object.ply", "--object"}), Catch::Contains("object.ply"));
+  CHECK_THAT(error({"--out", "m.ply", "--object", "--up", "y"}),
+             Catch::Contains("--occupancy, which is not asked for"));
+  CHECK_THAT(error({"--out", "m.ply", "--object", "--distances", "d.npz"}), Catch::Contains(".vdb"));
+  CHECK_THAT(error({"--out", "object.ply/m.ply", "--object"}), Catch::Contains("object.ply/m.ply"));
+  CHECK_THAT(error({"--out", "m.ply", "--object", "--distances", "object.ply/m.vdb"}), Catch::Contains("m.vdb"));
   CHECK_FALSE(std::filesystem::exists("m.ply"));
 }
 

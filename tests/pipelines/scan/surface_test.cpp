@@ -171,7 +171,9 @@ TEST_CASE("an object from all around becomes a solid of its size") {
   CHECK(static_cast<double>(near) > 0.9 * static_cast<double>(g.count()));
   ScannedSolid again;
   with_threads(1, [&] { again = scanned_solid(g, settings); });
-  CHECK(surface_of(again.grid, 0).vertices == mesh.vertices);
+  const TriangleMesh same = surface_of(again.grid, 0);
+  CHECK(same.vertices == mesh.vertices);
+  CHECK(same.faces == mesh.faces);
 }
 
 TEST_CASE("a scene without cameras, cameras that see nothing, and nothing opaque are refused in words") {
