@@ -125,10 +125,22 @@ void append(std::vector<DepthView> more, std::vector<DepthView>& views) {
   views.insert(views.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
 }
 
-Points centers_of(const std::vector<DepthView>& views) {
-  Points centers;
-  for (const DepthView& view : views) centers.push_back(camera_center_world(view.camera));
-  return centers;
+/// Halfway to what some pixels of each view show: a camera itself may stand where no view looks.
+Points free_places(const std::vector<DepthView>& views) {
+  constexpr Index kAcross = 4;  // pixels of a row
+  Points places;
+  for (const DepthView& view : views) {
+    const Camera& camera = view.camera;
+    const Rigid<double> world_from_camera = inverse(camera.camera_from_world);
+    for (Index n = 0; n < kAcross * kAcross; ++n) {
+      const Index x = (2 * (n % kAcross) + 1) * camera.width / (2 * kAcross),
+                  y = (2 * (n / kAcross) + 1) * camera.height / (2 * kAcross);
+      const double depth = static_cast<double>(view.depths[static_cast<std::size_t>(y * camera.width + x)]);
+      const Vector2<double> pixel(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
+      if (depth > 0) places.push_back(transform_point(world_from_camera, unproject_pixel(camera, pixel, 0.5 * depth)));
+    }
+  }
+  return places;
 }
 
 /// Whether nothing solid is within `clearance`, as far as 26 directions tell.
@@ -185,7 +197,7 @@ ScannedSolid room_solid_of(const Gaussians& gaussians, const SurfaceSettings& se
     FusionSettings first = fusion;
     first.voxel *= kCoarse;
     SolidGrid coarse = fused(result.views, first);
-    clean_up(coarse, centers_of(result.views), 0);
+    clean_up(coarse, free_places(result.views), 0);
     const double clearance = kClearance * (box.high - box.low).maxCoeff();
     std::vector<Camera> cameras;
     for (const Vector3<double>& eye :
@@ -224,7 +236,7 @@ std::vector<Vector3<double>> more_eyes(const SolidGrid& grid, const std::vector<
 ScannedSolid scanned_solid(const Gaussians& gaussians, const SurfaceSettings& settings, const Observer& observer) {
   ScannedSolid result = settings.is_object ? object_solid_of(gaussians, settings, observer)
                                            : room_solid_of(gaussians, settings, observer);
-  result.cleaned = clean_up(result.grid, centers_of(result.views), settings.smallest);
+  result.cleaned = clean_up(result.grid, free_places(result.views), settings.smallest);
   return result;
 }
 

@@ -190,6 +190,15 @@ TEST_CASE("a scene without cameras, cameras that see nothing, and nothing opaque
   CHECK_THROWS_WITH(scanned_solid(faint, settings), Catch::Contains("opacity above 0.5"));
 }
 
+TEST_CASE("one camera is enough: behind it nothing is known") {
+  SurfaceSettings settings = room_settings();
+  settings.cameras.resize(1);
+  settings.more_views = 12;
+  ScannedSolid solid = scanned_solid(synthetic_scene(SyntheticSceneKind::kLivingRoom, 12000, {}, 0), settings);
+  CHECK(solid.views.size() == 13);
+  check_closed(surface_of(solid.grid, 0));
+}
+
 TEST_CASE("eyes are placed in free space, far from each other") {
   SolidGrid grid;
   grid.voxel = 0.1;
