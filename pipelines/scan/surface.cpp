@@ -7,8 +7,6 @@
 #include "core/camera_places.h"
 #include "core/check.h"
 #include "core/log.h"
-#include "core/parallel.h"
-#include "core/text.h"
 #include "pipelines/draw/median_depth.h"
 #include "pipelines/scan/align.h"
 

@@ -145,7 +145,7 @@ TEST_CASE("a made room becomes one closed hollow that agrees with its furniture"
   CHECK(signed_volume(mesh) < -20);
   const Agreement result = agreement(mesh, synthetic_solids(made, {}), solid.views, 0.03, 0.04);
   CAPTURE(result.near, result.solid, result.free);
-  CHECK(result.near > 0.87);  // cloth and plants lie on some of what is certainly solid
+  CHECK(result.near > 0.87);
   CHECK(result.solid > 0.97);
   CHECK(result.free > 0.99);
 }
