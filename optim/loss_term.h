@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "autodiff/seam.h"
+#include "autodiff/tape.h"
 #include "optim/loss_description.h"
 #include "optim/motion_start.h"
 
@@ -62,10 +62,13 @@ struct LossInputs {
   std::function<Var<S>(const std::vector<BodyPoint>& points)> body_points;
   std::function<Var<S>(const std::vector<ObjectPoint>& points)> object_points;
 
+  Var<S> depth_moments;  ///< [2,H,W] Σ w z and Σ w z² of the Gaussians in a pixel, camera z, metres; for terms that
+                         ///< need kDepths, as the next two
+  Var<S> transmittance;  ///< [1,H,W] 1 − Σ w
+  Var<S> depth_target;   ///< [1,H,W] camera z of what the picture shows, metres; 0 where it is not known
+
   Var<S> gaussian_opacities;   ///< [N,1] of all Gaussians that are made, 0 to 1
   Var<S> gaussian_log_scales;  ///< [N,3] natural logarithm of metres
-
-  const SeamMode* seams = nullptr;  ///< of all that has a gradient here, in a stage by gauss_newton; else null
 
   std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
   std::vector<LossNote>* notes = nullptr;    ///< where it tells what it found; null: nobody asks
@@ -73,11 +76,6 @@ struct LossInputs {
   static bool given(Var<S> input) { return input.tape != nullptr; }
   bool gives(LossInput need) const;
 };
-
-/// The same inputs behind seams (autodiff/seam.h), what functions record of them too.
-/// @param mode  has to outlive the recording
-template <class S>
-LossInputs<S> with_seams(LossInputs<S> inputs, const SeamMode& mode);
 
 /// The inputs without those made on demand, or kept whole, for terms that declare them, so that a term reads none that
 /// it does not declare.
@@ -87,6 +85,7 @@ LossInputs<S> only_declared(LossInputs<S> inputs, const std::vector<LossInput>& 
   if (lacks(LossInput::kObjectDepth)) inputs.object_depth = inputs.object_depth_target = {};
   if (lacks(LossInput::kObjectOpacity)) inputs.object_opacity = {};
   if (lacks(LossInput::kHumanOpacity)) inputs.human_opacity = {};
+  if (lacks(LossInput::kDepths)) inputs.depth_moments = inputs.transmittance = inputs.depth_target = {};
   if (lacks(LossInput::kGaussians)) inputs.gaussian_opacities = inputs.gaussian_log_scales = {};
   return inputs;
 }

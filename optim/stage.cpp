@@ -33,8 +33,8 @@ class StageRun {
         settings_(settings),
         options_(options),
         groups_(named_groups(settings, available, options.name)),
-        loss_(record_loss(settings, terms, inputs_of(settings, inputs), options.name)),
-        optimizer_(tape, groups_, settings.optimizer, seams_) {
+        loss_(record_loss(settings, terms, inputs, options.name)),
+        optimizer_(tape, groups_, settings.optimizer) {
     for (const ParameterGroup<S>& group : available) set_frozen(tape, group, true);
     for (const OptimizerGroup<S>& group : groups_) {
       hold(group.parameters);
@@ -99,10 +99,6 @@ class StageRun {
     if (!callback) return;
     callback({i, settings_.iterations, loss, loss_.values, step.groups, step.rolled_back, step.rollbacks, offender_,
               seconds_since(start), counters, shares_});
-  }
-
-  LossInputs<S> inputs_of(const StageSettings& settings, const LossInputs<S>& inputs) {
-    return settings.optimizer.kind == OptimizerKind::kGaussNewton ? with_seams(inputs, seams_) : inputs;
   }
 
   /// Held outputs that the loss depends on; what it does not is never computed.
@@ -281,7 +277,6 @@ class StageRun {
   const StageSettings& settings_;
   const StageOptions& options_;
   std::vector<OptimizerGroup<S>> groups_;
-  SeamMode seams_;  // of the loss's inputs
   RecordedLoss<S> loss_;
   Optimizer<S> optimizer_;
   Index undone_at_end_ = 0;

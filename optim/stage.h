@@ -82,8 +82,7 @@ struct StageOptions {
   /// Groups named here go on from these moments (none yet: an entry without blocks), and leave theirs here at the end.
   /// All others start afresh.
   AdamState* kept = nullptr;
-  /// bfgs and gauss_newton go on from this curvature (none yet: empty), and leave there what they have learnt. Null:
-  /// they start afresh.
+  /// bfgs goes on from this curvature (none yet: empty), and leaves there what it has learnt. Null: it starts afresh.
   std::vector<double>* curvature = nullptr;
   bool profile = false;  ///< measure the time of every node
   std::vector<HeldOutput> held = {};

@@ -33,6 +33,8 @@ const char* words_of(LossInput need) {
       return "objects";
     case LossInput::kHumanOpacity:
       return "the body in an image";
+    case LossInput::kDepths:
+      return "depths of pictures";
     case LossInput::kGaussians:
       return "Gaussians that are made";
     case LossInput::kPose:
@@ -46,18 +48,15 @@ const char* words_of(LossInput need) {
 }  // namespace
 
 void describe(ConfigFields& f, OptimizerSettings& s) {
-  f.choice("kind", s.kind, kOptimizerKinds,
-           "Adam, or for few numbers such as the camera's: BFGS with a line search, or damped Gauss-Newton");
+  f.choice("kind", s.kind, kOptimizerKinds, "Adam, or for few numbers such as the camera's: BFGS with a line search");
   f.number("beta1", s.beta1, {.min = 0, .below = 1}, "Decay of the first moment");
   f.number("beta2", s.beta2, {.min = 0, .below = 1}, "Decay of the second moment");
   f.number("eps", s.eps, {.min = 1e-30, .max = 1}, "Added to the root of the second moment");
   f.integer("max_rollbacks", s.max_rollbacks, {.min = 0, .max = kMostIterations},
             "Steps that may be undone because a number was not finite, in a row with adam, else in a stage; one more "
             "is an error");
-  f.integer("products", s.products, {.min = 1, .max = 100},
-            "gauss_newton: curvature products per step at most, an evaluation each");
   f.boolean("keep_curvature", s.keep_curvature,
-            "bfgs, gauss_newton: begin with the curvature of the frame before, for fewer evaluations");
+            "bfgs: begin with the curvature of the frame before, for fewer evaluations");
 }
 
 std::vector<std::string> idle_settings(const OptimizerSettings& s) {
@@ -68,7 +67,6 @@ std::vector<std::string> idle_settings(const OptimizerSettings& s) {
   if (!is_adam && s.beta1 != usual.beta1) idle.emplace_back("beta1");
   if (!is_adam && s.beta2 != usual.beta2) idle.emplace_back("beta2");
   if (!is_adam && s.eps != usual.eps) idle.emplace_back("eps");
-  if (s.kind != OptimizerKind::kGaussNewton && s.products != usual.products) idle.emplace_back("products");
   return idle;
 }
 
@@ -114,11 +112,6 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
                "\" have no meaning";
     }
     return "";
-  });
-  f.rule({"optimizer", "gradient_shares"}, [&s]() -> std::string {
-    return s.optimizer.kind == OptimizerKind::kGaussNewton && s.gradient_shares != 0
-               ? "gauss_newton evaluates changes of gradients, of which terms have no shares; allowed: 0"
-               : "";
   });
   f.rule({"optimizer", "over"}, [&s]() -> std::string {
     if (!s.optimizer.keep_curvature) return "";

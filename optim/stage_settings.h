@@ -14,19 +14,18 @@
 
 namespace hsi4d {
 
-enum class OptimizerKind { kAdam, kBfgs, kGaussNewton };
+enum class OptimizerKind { kAdam, kBfgs };
 
-inline constexpr std::array<ConfigChoice<OptimizerKind>, 3> kOptimizerKinds = {
-    {{OptimizerKind::kAdam, "adam"}, {OptimizerKind::kBfgs, "bfgs"}, {OptimizerKind::kGaussNewton, "gauss_newton"}}};
+inline constexpr std::array<ConfigChoice<OptimizerKind>, 2> kOptimizerKinds = {
+    {{OptimizerKind::kAdam, "adam"}, {OptimizerKind::kBfgs, "bfgs"}}};
 
-/// How gradients become steps. beta1, beta2 and eps are Adam's, products those of gauss_newton.
+/// How gradients become steps. beta1, beta2 and eps are Adam's.
 struct OptimizerSettings {
   OptimizerKind kind = OptimizerKind::kAdam;
   double beta1 = 0.9;
   double beta2 = 0.999;
   double eps = 1e-8;
   int max_rollbacks = 10;       ///< bad steps in a row (in all, but with adam) that are undone; one more is an error
-  int products = 10;            ///< of a direction with the curvature, at most so many in a step
   bool keep_curvature = false;  ///< a frame begins with what was learnt in the frame before
 };
 

@@ -5,7 +5,6 @@
 #include "autodiff/map.h"
 #include "autodiff/mlp.h"
 #include "autodiff/rotations.h"
-#include "autodiff/seam.h"
 #include "autodiff/ssim.h"
 #include "autodiff/weighted_image.h"
 #include "stress/poison.h"
@@ -15,7 +14,6 @@ namespace hsi4d::stress {
 namespace {
 
 constexpr Index kRows = 40;
-constexpr SeamMode kOrdinaryRun;
 
 /// An operator on one array [kRows,cols].
 template <class S, class F>
@@ -102,7 +100,6 @@ struct Arrays {
     one([](V x) { return reshape(x, 3 * kRows, 1); }).outputs = {units_of(3)};
     one([](V x) { return slice_rows(x, 5, 20); }).outputs = {[](Index row) { return row + 5; }};
     one([](V x) { return slice_cols(x, 1, 2); });
-    one([](V x) { return seam(x, kOrdinaryRun); });
     one([](V x) {
       return gather_rows(x, {7, 3, 3, 30, 0, 39});
     }).outputs = {[](Index row) {
@@ -118,7 +115,6 @@ struct Arrays {
     two([](V a, V b) { return l2(a, b); });
     two([](V a, V b) { return huber(a, b, 0.3); });
     two([](V a, V b) { return charbonnier(a, b, 0.1); });
-    two([](V a, V b) { return reweighted_l1(a, b, 0.1, kOrdinaryRun); });
     two([](V a, V b) {
       return sum_over({a, b}, [](auto x, auto y) {
         using namespace hsi4d;

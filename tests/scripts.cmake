@@ -25,6 +25,10 @@ if(NOT HSI4D_SANITIZE)
                              -DGENERATOR=${CMAKE_GENERATOR} -DCOMPILER=${CMAKE_CXX_COMPILER}
                              -P ${CMAKE_CURRENT_SOURCE_DIR}/adding_a_loss_test.cmake)
   set_tests_properties(adding_a_loss PROPERTIES LABELS full TIMEOUT 3600)
+  add_test(NAME "the tutorial's scene and object from pictures"
+    COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/tutorial
+                             -DPROGRAM=$<TARGET_FILE:hsi4d> -P ${CMAKE_CURRENT_SOURCE_DIR}/tutorial_test.cmake)
+  set_tests_properties("the tutorial's scene and object from pictures" PROPERTIES LABELS full TIMEOUT 3600)
 endif()
 
 add_test(NAME "the commit of a build"

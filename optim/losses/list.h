@@ -21,7 +21,8 @@
   HSI4D_LOSS(joint_limits)     \
   HSI4D_LOSS(pose_prior)       \
   HSI4D_LOSS(gaussian_opacity) \
-  HSI4D_LOSS(gaussian_scale)
+  HSI4D_LOSS(gaussian_scale)   \
+  HSI4D_LOSS(depth_spread)
 // clang-format on
 
 namespace hsi4d {

@@ -19,14 +19,10 @@ void describe(ConfigFields& fields, PhotometricSettings& settings) {
                 "Share of the structural term: (1 - share) L1 + share (1 - SSIM)");
 }
 
-/// Differences that count as squares where a stage asks for curvatures: what rounding to grey levels leaves, and some.
-constexpr double kLeastDifference = 0.01;
-
-/// @param seams  null: nobody asks for curvatures
 template <class S>
-Var<S> difference(Var<S> a, Var<S> b, double ssim_share, const SeamMode* seams) {
+Var<S> difference(Var<S> a, Var<S> b, double ssim_share) {
   if (ssim_share == 1) return d_ssim(a, b);
-  const Var<S> distance = seams == nullptr ? l1(a, b) : reweighted_l1(a, b, kLeastDifference, *seams);
+  const Var<S> distance = l1(a, b);
   if (ssim_share == 0) return distance;
   return distance * (1 - ssim_share) + d_ssim(a, b) * ssim_share;
 }
@@ -39,9 +35,9 @@ LossTerm photometric_loss() {
       make_loss_term<PhotometricSettings>(
           "photometric", "L1 and structural difference of the rendered image and the frame where the weight says so",
           [](const auto& in, const PhotometricSettings& settings) {
-            if (!in.given(in.weight)) return difference(in.rendered, in.target, settings.ssim_share, in.seams);
+            if (!in.given(in.weight)) return difference(in.rendered, in.target, settings.ssim_share);
             return difference(weighted_image(in.rendered, in.weight), weighted_image(in.target, in.weight),
-                              settings.ssim_share, in.seams);
+                              settings.ssim_share);
           }));
 }
 

@@ -7,22 +7,13 @@
 #include "core/check.h"
 #include "core/parallel.h"
 #include "core/quaternion.h"
-#include "core/random.h"
+#include "pipelines/scan/density_adc.h"
+#include "pipelines/scan/density_rows.h"
 #include "splat/density.h"
 
 namespace hsi4d {
 
 namespace {
-
-double opacity_of(float logit) { return 1 / (1 + std::exp(-static_cast<double>(logit))); }
-float logit_of(double opacity) { return static_cast<float>(std::log(opacity / (1 - opacity))); }
-
-/// Random numbers of one purpose in one iteration.
-Random random_of(std::int64_t seed, const char* purpose, Index iteration) {
-  constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15u;
-  return Random(static_cast<std::uint64_t>(seed),
-                random_stream(purpose) + kGolden * static_cast<std::uint64_t>(iteration));
-}
 
 /// Draws rows by weight.
 class RowDraw {
@@ -40,39 +31,6 @@ class RowDraw {
   std::vector<double> sums_;
 };
 
-template <class T>
-void copy_row(std::vector<T>& values, Index from, Index to, Index columns) {
-  std::copy_n(values.begin() + from * columns, columns, values.begin() + to * columns);
-}
-
-/// Room for more rows at the end.
-void grow(ScanState& state, Index rows) {
-  Gaussians& g = state.gaussians;
-  const auto columns = state.columns();
-  std::size_t i = 0;
-  for (std::vector<float>* values : {&g.means, &g.quats, &g.log_scales, &g.opacity_logits, &g.sh})
-    values->resize(static_cast<std::size_t>(rows * columns[i++]));
-  for (i = 0; i < kScanGroups; ++i) {
-    if (!state.moments[i].steps.empty()) state.moments[i].resize(rows, columns[i]);
-  }
-}
-
-/// Row `to` becomes what row `from` is.
-void join(ScanState& state, Index from, Index to) {
-  Gaussians& g = state.gaussians;
-  const auto columns = state.columns();
-  std::size_t i = 0;
-  for (std::vector<float>* values : {&g.means, &g.quats, &g.log_scales, &g.opacity_logits, &g.sh})
-    copy_row(*values, from, to, columns[i++]);
-}
-
-void forget_moments(ScanState& state, Index row) {
-  const auto columns = state.columns();
-  for (std::size_t i = 0; i < kScanGroups; ++i) {
-    if (!state.moments[i].steps.empty()) state.moments[i].clear_row(row, columns[i]);
-  }
-}
-
 /// Puts the rows `joining` where rows drawn by `weights` are.
 /// @return  how many found a place
 Index let_join(const std::vector<Index>& joining, const std::vector<double>& weights, const Random& random,
@@ -89,13 +47,13 @@ Index let_join(const std::vector<Index>& joining, const std::vector<double>& wei
   Gaussians& g = state.gaussians;
   for (std::size_t row = 0; row < copies.size(); ++row) {
     if (copies[row] == 1) continue;
-    const SharedShape shape = shared_shape(opacity_of(g.opacity_logits[row]), copies[row]);
-    g.opacity_logits[row] = logit_of(std::clamp(shape.opacity, std::max(least_opacity, 1e-6), 1 - 1e-6));
+    const SharedShape shape = shared_shape(opacity_of_logit(g.opacity_logits[row]), copies[row]);
+    g.opacity_logits[row] = logit_of_opacity(std::clamp(shape.opacity, std::max(least_opacity, 1e-6), 1 - 1e-6));
     for (std::size_t k = 0; k < 3; ++k) g.log_scales[3 * row + k] += static_cast<float>(std::log(shape.scale));
     forget_moments(state, static_cast<Index>(row));
   }
   for (std::size_t i = 0; i < joining.size(); ++i) {
-    join(state, host[i], joining[i]);
+    copy_row(state, host[i], joining[i]);
     forget_moments(state, joining[i]);
   }
   return std::ssize(joining);
@@ -103,7 +61,7 @@ Index let_join(const std::vector<Index>& joining, const std::vector<double>& wei
 
 std::vector<double> opacities_of(const Gaussians& gaussians) {
   std::vector<double> opacities;
-  for (const float logit : gaussians.opacity_logits) opacities.push_back(opacity_of(logit));
+  for (const float logit : gaussians.opacity_logits) opacities.push_back(opacity_of_logit(logit));
   return opacities;
 }
 
@@ -115,7 +73,7 @@ Index move_faint(const DensitySettings& settings, std::int64_t seed, ScanState& 
     faint.push_back(static_cast<Index>(row));
     weights[row] = 0;
   }
-  return let_join(faint, weights, random_of(seed, "scan.moved", state.iteration), settings.least_opacity, state);
+  return let_join(faint, weights, density_random(seed, "scan.moved", state.iteration), settings.least_opacity, state);
 }
 
 Index add_some(const DensitySettings& settings, std::int64_t seed, ScanState& state) {
@@ -125,15 +83,16 @@ Index add_some(const DensitySettings& settings, std::int64_t seed, ScanState& st
   if (after == before) return 0;
   const std::vector<double> weights = opacities_of(state.gaussians);
   if (!RowDraw(weights).is_possible()) return 0;
-  grow(state, after);
+  resize_rows(state, after);
   std::vector<Index> added(static_cast<std::size_t>(after - before));
   std::iota(added.begin(), added.end(), before);
-  return let_join(added, weights, random_of(seed, "scan.added", state.iteration), settings.least_opacity, state);
+  return let_join(added, weights, density_random(seed, "scan.added", state.iteration), settings.least_opacity, state);
 }
 
 }  // namespace
 
-DensityChange change_density(const DensitySettings& settings, std::int64_t seed, ScanState& state) {
+DensityChange change_density(const DensitySettings& settings, std::int64_t seed, double extent, ScanState& state) {
+  if (settings.method == DensityMethod::kAdc) return split_and_prune(settings, seed, extent, state);
   DensityChange change;
   change.moved = move_faint(settings, seed, state);
   change.added = add_some(settings, seed, state);
@@ -142,7 +101,7 @@ DensityChange change_density(const DensitySettings& settings, std::int64_t seed,
 
 bool changes_density_after(const DensitySettings& settings, Index iteration) {
   const Index done = iteration + 1;
-  return settings.method == DensityMethod::kMcmc && done > settings.from && done < settings.until &&
+  return settings.method != DensityMethod::kNone && done > settings.from && done < settings.until &&
          done % settings.every == 0;
 }
 
@@ -150,15 +109,16 @@ void add_noise(const DensitySettings& settings, std::int64_t seed, Index iterati
                const Gaussians& shapes, float* means) {
   if (settings.method != DensityMethod::kMcmc || settings.noise == 0) return;
   constexpr double kSteepness = 100, kFaint = 0.005;
-  constexpr double kStill = 1e-5;                                                // shares of noise below: none
-  const float still = logit_of(kFaint + std::log(1 / kStill - 1) / kSteepness);  // what is as opaque stands still
+  constexpr double kStill = 1e-5;  // shares of noise below: none
+  const float still =
+      logit_of_opacity(kFaint + std::log(1 / kStill - 1) / kSteepness);  // what is as opaque stands still
   const double scale = settings.noise * rate;
-  const Random random = random_of(seed, "scan.noise", iteration);
+  const Random random = density_random(seed, "scan.noise", iteration);
   parallel_for(shapes.count(), 4096, [&](Index begin, Index end) {
     for (Index row = begin; row < end; ++row) {
       const auto at = static_cast<std::size_t>(row);
       if (!(shapes.opacity_logits[at] < still)) continue;
-      const double share = 1 / (1 + std::exp(kSteepness * (opacity_of(shapes.opacity_logits[at]) - kFaint)));
+      const double share = 1 / (1 + std::exp(kSteepness * (opacity_of_logit(shapes.opacity_logits[at]) - kFaint)));
       const auto [first, second] = random.normal_pair(2 * at);
       const Vector3<double> normal(first, second, random.normal(2 * at + 1));
       const Matrix3<double> axes =

@@ -1,5 +1,6 @@
-// Where Gaussians are, and how many: the scheme of "3D Gaussian splatting as Markov chain Monte Carlo" [Kheradmand et
-// al. 2024]. Nothing is cut away; what has become faint goes to where something is seen, and shares its place.
+// Where Gaussians are, and how many: by the scheme of "3D Gaussian splatting as Markov chain Monte Carlo" [Kheradmand
+// et al. 2024], in which nothing is cut away, and what has become faint goes to where something is seen and shares its
+// place; or by adaptive density control (pipelines/scan/density_adc.h).
 #pragma once
 
 #include "pipelines/scan/settings.h"
@@ -11,14 +12,16 @@ namespace hsi4d {
 struct DensityChange {
   Index moved = 0;  ///< faint Gaussians that share another's place now
   Index added = 0;
+  Index removed = 0;
 };
 
-/// Moves Gaussians of at most settings.least_opacity to others, and adds settings.growth − 1 of all, up to
+/// With mcmc moves Gaussians of at most settings.least_opacity to others, and adds settings.growth − 1 of all, up to
 /// settings.most. Whom they join is drawn by opacity; those at one place share its opacity and size (splat/density.h),
 /// so that the image hardly changes. They begin with no moments. A function of the arguments alone.
 ///
-/// @param seed  and state.iteration: of the draws
-DensityChange change_density(const DensitySettings& settings, std::int64_t seed, ScanState& state);
+/// @param seed    and state.iteration: of the draws
+/// @param extent  of the scene, metres; with adc sizes are shares of it
+DensityChange change_density(const DensitySettings& settings, std::int64_t seed, double extent, ScanState& state);
 
 /// Whether the density changes after an iteration, counted from 0.
 bool changes_density_after(const DensitySettings& settings, Index iteration);

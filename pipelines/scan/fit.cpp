@@ -4,19 +4,14 @@
 #include <cmath>
 
 #include "core/check.h"
-#include "core/parallel.h"
 #include "core/random.h"
-#include "core/rotation.h"
 #include "core/text.h"
 #include "optim/adam.h"
 #include "optim/metrics.h"
 #include "optim/stage_loss.h"
-#include "pipelines/draw/tape_image.h"
 #include "pipelines/scan/density.h"
-#include "splat/render/covariance.h"
-#include "splat/render/opacity.h"
-#include "splat/render/render.h"
-#include "splat/render/sh.h"
+#include "pipelines/scan/density_adc.h"
+#include "pipelines/scan/scan_graph.h"
 
 namespace hsi4d {
 
@@ -25,113 +20,6 @@ namespace {
 using S = float;
 
 constexpr const char* kStage = "reconstruct";
-
-/// Gaussians on a tape, seen by whichever camera is written into its leaves.
-class ScanGraph {
- public:
-  /// @param degree  of the harmonics that are used
-  ScanGraph(const Gaussians& g, const Camera& camera, const RenderSettings& settings, int degree, bool has_weight)
-      : view_{camera, g.origin_world, settings} {
-    view_.settings.sh_degree = std::min(degree, settings.sh_degree);
-    groups_ = {{"means", {leaf("means", g.means, 3)}},
-               {"quats", {leaf("quats", g.quats, 4)}},
-               {"log_scales", {leaf("log_scales", g.log_scales, 3)}},
-               {"opacity_logits", {leaf("opacity_logits", g.opacity_logits, 1)}},
-               {"sh", {leaf("sh", g.sh, 3 * g.sh_coefficients())}}};
-    xi_ = tape_.constant("xi", shape_of(1, 6));
-    intrinsics_ = tape_.constant("intrinsics", shape_of(1, 4));
-    background_ = tape_.constant("background", shape_of(1, 3));
-    inputs_.gaussian_opacities = gaussian_opacities(group(3));
-    inputs_.gaussian_log_scales = group(2);
-    const SplatInputs<S> splats = {group(0), gaussian_axes(group(1), group(2)), inputs_.gaussian_opacities,
-                                   sh_colors(group(4), group(0), xi_, view_)};
-    inputs_.rendered = render(splats, xi_, background_, view_, {}, intrinsics_).image;
-    inputs_.target = tape_.constant("target", inputs_.rendered.shape());
-    if (!has_weight) return;
-    const Shape& image = inputs_.rendered.shape();
-    inputs_.weight = tape_.constant("weight", image_shape<S>(1, image.rows, image.cols));
-  }
-
-  void show(const Photo& photo, const Vector3<double>& background) {
-    const Camera& camera = photo.camera;
-    const Vector6<double> xi = se3_log(compose(camera.camera_from_world, inverse(view_.camera.camera_from_world)));
-    const Array<S> xi_array = tape_.write(xi_), background_array = tape_.write(background_);
-    for (Index i = 0; i < 6; ++i) xi_array(0, i) = static_cast<S>(xi[i]);
-    for (Index i = 0; i < 3; ++i) background_array(0, i) = static_cast<S>(background[i]);
-    tape_.set(intrinsics_, std::array<S, 4>{static_cast<S>(camera.fx), static_cast<S>(camera.fy),
-                                            static_cast<S>(camera.cx), static_cast<S>(camera.cy)});
-    if (photo.alpha.empty()) {
-      write_image(inputs_.target, photo.color);  // no copy of it
-    } else {
-      write_image(inputs_.target, before_color(photo, background));
-    }
-    if (inputs_.weight.tape == nullptr) return;
-    if (photo.weight.empty()) {
-      fill(inputs_.weight, S(1));
-    } else {
-      write_image(inputs_.weight, photo.weight);
-    }
-  }
-
-  Image picture() {
-    tape_.forward(inputs_.rendered);
-    return held_image(tape_.value(inputs_.rendered), 0, 3);
-  }
-  /// Of the last forward run, not clamped, of the pixels that count.
-  double psnr() const {
-    const ConstArray<S> image = tape_.value(inputs_.rendered), target = tape_.value(inputs_.target);
-    const bool has_weight = inputs_.weight.tape != nullptr;
-    const Index rows = image.shape.rows, cols = image.shape.cols;
-    const auto sum_of = [&](bool of_squares) {
-      return parallel_sum(rows, 16, [&](Index begin, Index end) {
-        double sum = 0;
-        for (Index r = begin; r < end; ++r) {
-          const S* const w = has_weight ? tape_.value(inputs_.weight).row(r) : nullptr;
-          for (Index plane = 0; plane < image.shape.planes; ++plane) {
-            const S *a = image.row(plane * rows + r), *b = target.row(plane * rows + r);
-            for (Index c = 0; c < cols; ++c) {
-              const double weight = w == nullptr ? 1 : static_cast<double>(w[c]);
-              sum += of_squares ? weight * static_cast<double>((a[c] - b[c]) * (a[c] - b[c])) : weight;
-            }
-          }
-        }
-        return sum;
-      });
-    };
-    const double weights = has_weight ? sum_of(false) : static_cast<double>(image.shape.count());
-    return weights > 0 ? std::min(kLargestPsnrDb, -10 * std::log10(sum_of(true) / weights)) : kLargestPsnrDb;
-  }
-
-  /// What the leaves of the first groups hold, back into the Gaussians.
-  void read(Gaussians& g, std::size_t groups = kScanGroups) const {
-    const std::array<std::vector<float>*, kScanGroups> arrays = {&g.means, &g.quats, &g.log_scales, &g.opacity_logits,
-                                                                 &g.sh};
-    for (std::size_t i = 0; i < groups; ++i) {
-      std::vector<float>* const values = arrays[i];
-      const ConstArray<S> leaf = tape_.value(group(i));
-      for (Index r = 0; r < leaf.total_rows(); ++r)
-        std::copy_n(leaf.row(r), leaf.shape.cols, values->begin() + r * leaf.shape.cols);
-    }
-  }
-
-  Tape<S>& tape() { return tape_; }
-  const LossInputs<S>& inputs() const { return inputs_; }
-  const std::vector<ParameterGroup<S>>& groups() const { return groups_; }
-  Var<S> group(std::size_t i) const { return groups_[i].blocks.front(); }
-
- private:
-  Var<S> leaf(const char* name, const std::vector<float>& values, Index cols) {
-    const Var<S> var = tape_.parameter(name, shape_of(static_cast<Index>(values.size()) / cols, cols));
-    tape_.set(var, values);
-    return var;
-  }
-
-  Tape<S> tape_;
-  SplatView view_;
-  Var<S> xi_, intrinsics_, background_;
-  LossInputs<S> inputs_;
-  std::vector<ParameterGroup<S>> groups_;
-};
 
 /// The picture of an iteration: all that are learnt from, in an order that is new each time that all were seen.
 class PhotoOrder {
@@ -172,8 +60,13 @@ Image weighted(Image image, const Image& weight) {
   return image;
 }
 
-bool any_weight(const std::vector<Photo>& photos) {
-  return std::any_of(photos.begin(), photos.end(), [](const Photo& photo) { return !photo.weight.empty(); });
+/// What the stage's terms read of the pictures.
+ScanExtras extras_of(const StageSettings& stage, const std::vector<Photo>& photos) {
+  const auto any = [&photos](Image Photo::*plane) {
+    return std::any_of(photos.begin(), photos.end(), [plane](const Photo& photo) { return !(photo.*plane).empty(); });
+  };
+  return {any(&Photo::weight), reads_depths(stage) && any(&Photo::depth),
+          find_entry(stage.optimize, std::string(kExposures)) != nullptr};
 }
 
 /// A fit in the course of its iterations.
@@ -196,6 +89,10 @@ class ScanFit {
     for (std::size_t i = 0; i < kScanGroups; ++i) {
       if (rule_of(i) != nullptr) state.moments[i].resize(state.gaussians.count(), columns[i]);
     }
+    if (exposure_rule() == nullptr) return;
+    state.exposures.resize(photos.size() * kExposureNumbers);
+    state.exposure_moments.resize(photos.size());
+    for (RowMoments<float>& moments : state.exposure_moments) moments.resize(kExposureNumbers, 1);
   }
 
   void run() {
@@ -205,7 +102,7 @@ class ScanFit {
     while (state_.iteration < settings_.stage.iterations) {
       run_segment(progress);
       if (changes_density_after(settings_.density, state_.iteration - 1))
-        change_density(settings_.density, settings_.seed, state_);
+        change_density(settings_.density, settings_.seed, extent_, state_);
       if (state_.iteration % settings_.save_every == 0) save();
       if (state_.iteration < settings_.stage.iterations && watch_.observer.wants_stop()) {
         save();
@@ -219,6 +116,14 @@ class ScanFit {
  private:
   const ParameterGroupSettings* rule_of(std::size_t group) const {
     return find_entry(settings_.stage.optimize, scan_groups()[group]);
+  }
+
+  const ParameterGroupSettings* exposure_rule() const {
+    return find_entry(settings_.stage.optimize, std::string(kExposures));
+  }
+  /// Of one picture, in the state.
+  std::span<float> exposure_of(std::size_t photo) const {
+    return std::span(state_.exposures).subspan(photo * kExposureNumbers, kExposureNumbers);
   }
 
   std::vector<std::size_t> learnt() const {
@@ -243,7 +148,7 @@ class ScanFit {
 
   void run_segment(Progress& progress) {
     ScanGraph graph(state_.gaussians, photos_.front().camera, settings_.render, degree_at(state_.iteration),
-                    any_weight(photos_));
+                    extras_of(settings_.stage, photos_));
     for (std::size_t i = 0; i < kScanGroups; ++i) set_frozen(graph.tape(), graph.groups()[i], rule_of(i) == nullptr);
     RecordedLoss<S> loss = record_loss(settings_.stage, terms_, graph.inputs(), kStage);
     try {
@@ -262,7 +167,9 @@ class ScanFit {
 
   void iterate(ScanGraph& graph, RecordedLoss<S>& loss, Progress& progress) {
     const Index i = state_.iteration;
-    const Photo& photo = photos_[order_.at(i)];
+    const std::size_t shown = order_.at(i);
+    const Photo& photo = photos_[shown];
+    if (exposure_rule() != nullptr) graph.set_exposure(exposure_of(shown));
     graph.show(photo, photo.alpha.empty() ? Vector3<double>(settings_.background.data()) : background_at(i));
     Tape<S>& tape = graph.tape();
     tape.forward(loss.total);
@@ -270,21 +177,39 @@ class ScanFit {
     const auto value = static_cast<double>(tape.value(loss.total).scalar());
     if (!std::isfinite(value)) throw_not_finite(i, loss.values);
     tape.backward(loss.total);
+    if (counts_gradients(i) && tape.has_gradient(graph.means_px()))
+      add_image_gradients(tape.gradient(graph.means_px()), photo.camera, state_);
     const double psnr = graph.psnr();
     for (std::size_t g = 0; g < kScanGroups; ++g) move(graph, g);
+    move_exposure(graph, shown);
     tremble(graph);
     add_to_curve(psnr);
     progress.step_with("PSNR", psnr);
   }
 
+  /// Of adaptive density control, as long as it changes anything.
+  bool counts_gradients(Index iteration) const {
+    return settings_.density.method == DensityMethod::kAdc && iteration < settings_.density.until;
+  }
+
+  RowAdamRule rule_with(double rate) const {
+    const OptimizerSettings& optimizer = settings_.stage.optimizer;
+    return {rate, optimizer.beta1, optimizer.beta2, optimizer.eps};
+  }
+
+  void move_exposure(ScanGraph& graph, std::size_t photo) {
+    const ParameterGroupSettings* const settings = exposure_rule();
+    if (settings == nullptr || !moves_in(*settings, state_.iteration)) return;
+    const double rate = scheduled_rate(*settings, state_.iteration, settings_.stage.iterations);
+    state_.refused +=
+        step_rows(graph.exposure(), state_.exposure_moments[photo], rule_with(rate), first_, second_).refused;
+    std::ranges::copy(graph.exposure_numbers(), exposure_of(photo).begin());
+  }
+
   void move(ScanGraph& graph, std::size_t group) {
     const ParameterGroupSettings* const settings = rule_of(group);
     if (settings == nullptr || !moves_in(*settings, state_.iteration)) return;
-    RowAdamRule rule;
-    rule.rate = rate_of(group);
-    rule.beta1 = settings_.stage.optimizer.beta1;
-    rule.beta2 = settings_.stage.optimizer.beta2;
-    rule.eps = settings_.stage.optimizer.eps;
+    RowAdamRule rule = rule_with(rate_of(group));
     if (group + 1 == kScanGroups) rule.column_shares = column_shares_;
     state_.refused += step_rows(graph.group(group), state_.moments[group], rule, first_, second_).refused;
   }
@@ -349,20 +274,27 @@ class ScanFit {
   std::vector<float> column_shares_;
 };
 
+/// Numbers of one picture.
+std::span<const float> exposure_of(const ScanState& state, std::size_t photo) {
+  return std::span(state.exposures).subspan(photo * kExposureNumbers, kExposureNumbers);
+}
+
+/// Of all pictures that were learnt from: what the others are shown by.
+std::vector<float> mean_exposure(const ScanState& state, const std::vector<bool>& held) {
+  std::vector<float> mean(kExposureNumbers, 0);
+  const auto learnt = static_cast<float>(std::max<Index>(1, std::count(held.begin(), held.end(), false)));
+  for (std::size_t photo = 0; !state.exposures.empty() && photo < held.size(); ++photo) {
+    if (held[photo]) continue;
+    for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += exposure_of(state, photo)[i] / learnt;
+  }
+  return mean;
+}
+
 }  // namespace
 
-Image before_color(const Photo& photo, const Vector3<double>& background) {
-  Image result = photo.color;
-  if (photo.alpha.empty()) return result;
-  for (int c = 0; c < 3; ++c) {
-    const auto behind = static_cast<float>(background[c]);
-    for (int y = 0; y < result.height(); ++y) {
-      float* const row = result.row(c, y);
-      const float* const alpha = photo.alpha.row(0, y);
-      for (int x = 0; x < result.width(); ++x) row[x] = alpha[x] * row[x] + (1 - alpha[x]) * behind;
-    }
-  }
-  return result;
+bool reads_depths(const StageSettings& stage) {
+  return std::any_of(stage.losses.begin(), stage.losses.end(),
+                     [](const auto& loss) { return needs_input(loss.second, LossInput::kDepths); });
 }
 
 std::vector<bool> held_photos(const ScanPhotos& settings, std::size_t count) {
@@ -380,15 +312,19 @@ void fit_scan(const ScanSettings& settings, const std::vector<Photo>& photos, do
 }
 
 std::vector<ScanPicture> score_scan(const ScanSettings& settings, const std::vector<Photo>& photos,
-                                    const Gaussians& gaussians,
+                                    const ScanState& state,
                                     const std::function<void(const ScanPicture&, const Image&)>& take) {
   check_sizes_of(photos);
-  ScanGraph graph(gaussians, photos.front().camera, settings.render, settings.sh_degree, false);
+  const bool has_exposures = !state.exposures.empty();
+  ScanGraph graph(state.gaussians, photos.front().camera, settings.render, settings.sh_degree,
+                  {.exposure = has_exposures});
   const Vector3<double> background(settings.background.data());
   const std::vector<bool> held = held_photos(settings.photos, photos.size());
+  const std::vector<float> usual = mean_exposure(state, held);
   std::vector<ScanPicture> pictures;
   for (std::size_t i = 0; i < photos.size(); ++i) {
     graph.show(photos[i], background);
+    if (has_exposures) graph.set_exposure(held[i] ? usual : exposure_of(state, i));
     Image image = graph.picture();
     const Image target = before_color(photos[i], background);
     ScanPicture& picture = pictures.emplace_back();

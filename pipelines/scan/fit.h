@@ -21,6 +21,9 @@ namespace hsi4d {
 /// Which of `count` pictures are held back.
 std::vector<bool> held_photos(const ScanPhotos& settings, std::size_t count);
 
+/// Whether a term of the stage reads depths.
+bool reads_depths(const StageSettings& stage);
+
 /// How well pictures are shown: a mean.
 struct ScanScore {
   Index pictures = 0;
@@ -48,16 +51,14 @@ struct ScanWatch {
 void fit_scan(const ScanSettings& settings, const std::vector<Photo>& photos, double extent,
               std::span<const LossTerm> terms, const ScanWatch& watch, ScanState& state);
 
-/// All pictures of which something counts, before settings.background, and how near they are to what was seen.
+/// All pictures of which something counts, before settings.background, and how near they are to what was seen. Where
+/// exposures are learnt, pictures that were held back are shown by the mean of the others'.
 /// @param take  called with each picture's image; may be empty
 std::vector<ScanPicture> score_scan(const ScanSettings& settings, const std::vector<Photo>& photos,
-                                    const Gaussians& gaussians,
+                                    const ScanState& state,
                                     const std::function<void(const ScanPicture&, const Image&)>& take = {});
 
 /// Means over the held pictures, or over the others.
 ScanScore mean_score(const std::vector<ScanPicture>& pictures, bool held);
-
-/// What a picture shows before a colour: alpha · colour + (1 − alpha) · background.
-Image before_color(const Photo& photo, const Vector3<double>& background);
 
 }  // namespace hsi4d

@@ -117,6 +117,10 @@ void check_what_counts(const ScanSettings& settings, const PosedImages& set, con
   if (empty.size() == photos.size())
     throw UserError(text + "show nothing that counts: masks or alpha are black everywhere. White is what counts");
   if (!empty.empty()) log_warning(text + "show nothing that counts, by mask or alpha: " + few_names(empty));
+  const bool any_depth =
+      std::any_of(photos.begin(), photos.end(), [](const Photo& photo) { return !photo.depth.empty(); });
+  if (reads_depths(settings.stage) && !any_depth)
+    log_info(set.file.string() + ": has no depths; losses that read them are off");
   if (settings.kind != ScanKind::kObject) return;
   const auto without =
       std::count_if(photos.begin(), photos.end(), [](const Photo& photo) { return photo.alpha.empty(); });

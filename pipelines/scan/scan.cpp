@@ -17,6 +17,7 @@
 #include "pipelines/rig/mesh_photos.h"
 #include "pipelines/scan/photo_checks.h"
 #include "pipelines/scan/report.h"
+#include "pipelines/scan/scan_graph.h"
 #include "pipelines/scan/start.h"
 #include "splat/files/splat_file.h"
 
@@ -101,7 +102,7 @@ ScanSummary write_result(const ScanSettings& settings, const PosedImages& set, c
   write_splats(scan_result(settings, folder).string(), state.gaussians);
   write_cameras((folder / "cameras.json").string(), cameras_of(photos));
   const Vector3<double> background(settings.background.data());
-  summary.pictures = score_scan(settings, photos, state.gaussians, [&](const ScanPicture& picture, const Image& image) {
+  summary.pictures = score_scan(settings, photos, state, [&](const ScanPicture& picture, const Image& image) {
     if (!picture.held) return;
     const std::string& name = summary.names[picture.photo];
     write_image((folder / "views" / view_file(picture.photo, name)).string(), image);

@@ -42,7 +42,7 @@ void add_stage_faults(const ConfigValue& tree, const ScanSettings& settings, Con
 }
 
 void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProblems& problems) {
-  constexpr std::array<LossInput, 2> kInputs = {LossInput::kImage, LossInput::kGaussians};
+  constexpr std::array<LossInput, 3> kInputs = {LossInput::kImage, LossInput::kGaussians, LossInput::kDepths};
   std::vector<LossFault> faults = losses_without_inputs(stage, kInputs, "a reconstruction");
   for (LossFault& fault : prepare_losses(stage)) faults.push_back(std::move(fault));
   for (const LossFault& fault : faults) {
@@ -109,17 +109,36 @@ void describe(ConfigFields& f, ScanStart& s) {
 
 void describe(ConfigFields& f, DensitySettings& s) {
   const IntegerRange iterations = {.min = 0, .max = kMostIterations};
-  f.choice("method", s.method, kDensityMethods,
-           "mcmc: faint Gaussians move to where others are, new ones come, places tremble; none: all stay");
+  f.choice(
+      "method", s.method, kDensityMethods,
+      "mcmc: faint Gaussians move to where others are, new ones come, places tremble; adc: those that move much in "
+      "the pictures become two, faint and large ones go; none: all stay");
   f.integer("most", s.most, {.min = 1, .max = kMostGaussians}, "Gaussians at most");
   f.integer("from", s.from, iterations, "First iteration in which the number changes");
   f.integer("until", s.until, iterations, "First in which it no longer does");
   f.integer("every", s.every, {.min = 1, .max = kMostIterations}, "It changes after every n-th iteration");
+  f.number("least_opacity", s.least_opacity, {.min = 0, .below = 0.5}, "Fainter ones move to where others are, or go");
   f.number("growth", s.growth, {.min = 1, .max = 10},
-           "Factor of the number each time, until there are as many as allowed");
-  f.number("least_opacity", s.least_opacity, {.min = 0, .max = 0.5}, "Fainter ones move to where others are");
-  f.number("noise", s.noise, {.min = 0}, "How much places of faint ones tremble, in rates of the means");
+           "mcmc: factor of the number each time, until there are as many as allowed");
+  f.number("noise", s.noise, {.min = 0}, "mcmc: how much places of faint ones tremble, in rates of the means");
+  f.number("gradient", s.gradient, {.min = 0},
+           "adc: mean gradient by places in halves of the picture, above which one becomes two");
+  f.number("split_size", s.split_size, {.min = 0},
+           "adc: what is larger, of the scene's extent, is split; what is not is doubled");
+  f.number("most_size", s.most_size, {.above = 0}, "adc: what is larger, of the extent, goes after the first reset");
+  f.integer("reset_every", s.reset_every, {.min = 1, .max = kMostIterations},
+            "adc: after so many iterations opacities become at most twice least_opacity");
 }
+
+namespace {
+
+std::vector<std::string> moving_groups() {
+  std::vector<std::string> names = scan_groups();
+  names.emplace_back(kExposures);
+  return names;
+}
+
+}  // namespace
 
 std::vector<std::string> scan_groups() { return {"means", "quats", "log_scales", "opacity_logits", "sh"}; }
 
@@ -173,7 +192,7 @@ ScanSettings read_scan(const ConfigValue& tree, const std::filesystem::path& fil
     add_loss_faults(tree, settings.stage, problems);
   }
   problems.throw_if_any();
-  check_groups(settings.stage, scan_groups(), file.string() + ": /stage/optimize");
+  check_groups(settings.stage, moving_groups(), file.string() + ": /stage/optimize");
   return settings;
 }
 

@@ -49,18 +49,21 @@ struct ScanStart {
 };
 
 /// How the number of Gaussians changes.
-enum class DensityMethod { kMcmc, kNone };
-inline constexpr std::array<ConfigChoice<DensityMethod>, 2> kDensityMethods = {
-    {{DensityMethod::kMcmc, "mcmc"}, {DensityMethod::kNone, "none"}}};
+enum class DensityMethod { kMcmc, kAdc, kNone };
+inline constexpr std::array<ConfigChoice<DensityMethod>, 3> kDensityMethods = {
+    {{DensityMethod::kMcmc, "mcmc"}, {DensityMethod::kAdc, "adc"}, {DensityMethod::kNone, "none"}}};
 
 struct DensitySettings {
   DensityMethod method = DensityMethod::kMcmc;
   Index most = 300000;            ///< Gaussians
   int from = 500, until = 15000;  ///< iterations
   int every = 100;
-  double growth = 1.05;
-  double least_opacity = 0.005;  ///< fainter ones move to where others are
+  double least_opacity = 0.005;  ///< fainter ones move to where others are, or go
+  double growth = 1.05;          ///< of mcmc, as the next
   double noise = 5e5;            ///< times the rate of the means and the covariance
+  double gradient = 2e-4;        ///< of adc (pipelines/scan/density_adc.h), as the next
+  double split_size = 0.01, most_size = 0.1;
+  int reset_every = 3000;
 };
 
 /// A config of `hsi4d reconstruct`.
@@ -82,7 +85,10 @@ struct ScanSettings {
   StageSettings stage;
 };
 
-/// Names of the groups that the stage may move.
+/// The group of each picture's gains and offsets, which the stage may move beside those of the Gaussians.
+inline constexpr const char* kExposures = "exposures";
+
+/// Names of the groups of the Gaussians.
 std::vector<std::string> scan_groups();
 
 /// Describe the sections.

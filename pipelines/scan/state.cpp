@@ -10,6 +10,33 @@ namespace {
 
 std::string moments_name(std::size_t group, const char* what) { return scan_groups()[group] + "." + what; }
 
+void set_exposures(const ScanState& state, Checkpoint& checkpoint) {
+  std::vector<float> mean, square;
+  std::vector<std::int64_t> steps;
+  for (const RowMoments<float>& moments : state.exposure_moments) {
+    mean.insert(mean.end(), moments.mean.begin(), moments.mean.end());
+    square.insert(square.end(), moments.square.begin(), moments.square.end());
+    steps.insert(steps.end(), moments.steps.begin(), moments.steps.end());
+  }
+  checkpoint.set("exposures", state.exposures);
+  checkpoint.set("exposures.mean", mean);
+  checkpoint.set("exposures.square", square);
+  checkpoint.set("exposures.steps", steps);
+}
+
+void read_exposures(const Checkpoint& checkpoint, ScanState& state) {
+  state.exposures = checkpoint.floats("exposures");
+  const std::vector<float>&mean = checkpoint.floats("exposures.mean"), &square = checkpoint.floats("exposures.square");
+  const std::vector<std::int64_t>& steps = checkpoint.integers("exposures.steps");
+  for (Index i = 0; i < std::ssize(state.exposures); i += kExposureNumbers) {
+    const Index end = i + kExposureNumbers;
+    RowMoments<float>& moments = state.exposure_moments.emplace_back();
+    moments.mean.assign(mean.begin() + i, mean.begin() + end);
+    moments.square.assign(square.begin() + i, square.begin() + end);
+    moments.steps.assign(steps.begin() + i, steps.begin() + end);
+  }
+}
+
 }  // namespace
 
 std::array<Index, kScanGroups> ScanState::columns() const { return {3, 4, 3, 1, 3 * gaussians.sh_coefficients()}; }
@@ -26,6 +53,10 @@ void save_scan_state(const std::string& file, const ScanState& state, const std:
   checkpoint.set("log_scales", g.log_scales);
   checkpoint.set("opacity_logits", g.opacity_logits);
   checkpoint.set("sh", g.sh);
+  set_exposures(state, checkpoint);
+  checkpoint.set("gradient_sums", state.gradient_sums);
+  checkpoint.set("gradient_counts",
+                 std::vector<std::int64_t>(state.gradient_counts.begin(), state.gradient_counts.end()));
   for (std::size_t i = 0; i < kScanGroups; ++i) {
     const RowMoments<float>& moments = state.moments[i];
     checkpoint.set(moments_name(i, "mean"), moments.mean);
@@ -54,6 +85,10 @@ ScanState load_scan_state(const std::string& file, const std::string& identity) 
   g.log_scales = checkpoint.floats("log_scales");
   g.opacity_logits = checkpoint.floats("opacity_logits");
   g.sh = checkpoint.floats("sh");
+  read_exposures(checkpoint, state);
+  state.gradient_sums = checkpoint.floats("gradient_sums");
+  const std::vector<std::int64_t>& counts = checkpoint.integers("gradient_counts");
+  state.gradient_counts.assign(counts.begin(), counts.end());
   for (std::size_t i = 0; i < kScanGroups; ++i) {
     RowMoments<float>& moments = state.moments[i];
     moments.mean = checkpoint.floats(moments_name(i, "mean"));

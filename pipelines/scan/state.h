@@ -13,6 +13,9 @@ namespace hsi4d {
 /// Groups, in the order of scan_groups().
 inline constexpr std::size_t kScanGroups = 5;
 
+/// Of the exposure of one picture: logarithms of gains of three channels, and offsets.
+inline constexpr Index kExposureNumbers = 6;
+
 /// Iterations that make one point of the curve.
 inline constexpr Index kCurveEvery = 20;
 
@@ -21,6 +24,10 @@ struct ScanState {
   Index iteration = 0;  ///< that comes next
   Gaussians gaussians;
   std::array<RowMoments<float>, kScanGroups> moments;  ///< by group; none yet of one that does not move
+  std::vector<float> exposures;                        ///< of all pictures; empty where they are not learnt
+  std::vector<RowMoments<float>> exposure_moments;     ///< by picture, kExposureNumbers rows each
+  std::vector<float> gradient_sums;                    ///< density_adc.h, since the last change; empty: none yet
+  std::vector<std::int32_t> gradient_counts;           ///< of pictures that they are of
   Index refused = 0;                                   ///< rows of gradients that were no numbers, so far
   std::vector<double> curve;                           ///< mean PSNR of each kCurveEvery iterations, dB
   double curve_sum = 0;                                ///< of the PSNRs since the last of them

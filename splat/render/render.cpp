@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "core/parallel.h"
 #include "splat/limits.h"
@@ -64,7 +65,7 @@ struct NormalizedDepth {
   }
 };
 
-/// [N,1+G]: ones, and for each group 1 in its rows; without the ones when there is no depth.
+/// [N,1+G]: ones, and for each group 1 in its rows; without the ones when no mean depth is wanted.
 ///
 /// @param first_row  what groups call row 0
 template <class S>
@@ -90,7 +91,8 @@ SplatSet<S> project_set(const SplatInputs<S>& inputs, Index first_row, Var<S> xi
   HSI4D_CHECK_EQ(inputs.colors.shape(), shape_of(rows, kColors));
   const Projected<S> projected = project(inputs.means, inputs.axes, xi, view, intrinsics, where);
   std::vector<Var<S>> features = {inputs.colors};
-  if (request.depth) features.push_back(projected.depths);
+  if (request.depth || request.depth_moments) features.push_back(projected.depths);
+  if (request.depth_moments) features.push_back(square(projected.depths, where));
   if (request.depth || !request.groups.empty()) {
     features.push_back(indicators(inputs.means.owner(), first_row, rows, request, where));
   }
@@ -123,13 +125,17 @@ Rendered<S> render_sets(const SplatInputs<S>* still, const SplatInputs<S>& movin
   result.counters = composited.counters;
   result.image = composited.channels;
   result.transmittance = composited.transmittance;
-  if (request.depth) {
-    result.depth = tape.record(NormalizedDepth<S>{0, 1}, {composited.more_channels}, one, where);
-    if (groups == 0) return result;
-    result.group_opacity = slice_planes(composited.more_channels, 2, groups, where);
-  } else if (groups > 0) {
-    result.group_opacity = composited.more_channels;
-  }
+  const Index moments = request.depth_moments ? 2
+                        : request.depth       ? 1
+                                              : 0,
+              first_group = moments + (request.depth ? 1 : 0);
+  if (request.depth) result.depth = tape.record(NormalizedDepth<S>{0, moments}, {composited.more_channels}, one, where);
+  const auto planes = [&](Index begin, Index count) {
+    const Var<S> all = composited.more_channels;
+    return count == all.shape().planes ? all : slice_planes(all, begin, count, where);
+  };
+  if (request.depth_moments) result.depth_moments = planes(0, moments);
+  if (groups > 0) result.group_opacity = planes(first_group, groups);
   return result;
 }
 

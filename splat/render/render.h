@@ -20,6 +20,7 @@ struct SplatInputs {
 /// What is wanted beside image and transmittance; what is not asked for costs nothing.
 struct RenderRequest {
   bool depth = false;
+  bool depth_moments = false;
   std::vector<std::pair<Index, Index>> groups = {};  ///< rows [begin, end) whose opacity is wanted, each
 };
 
@@ -28,6 +29,7 @@ struct Rendered {
   Var<S> image;            ///< [3,H,W] Σ w c + T background, not clamped
   Var<S> transmittance;    ///< [1,H,W]
   Var<S> depth;            ///< [1,H,W] Σ w z / Σ w, metres, 0 where Σ w = 0; empty unless asked for
+  Var<S> depth_moments;    ///< [2,H,W] Σ w z, metres, and Σ w z²; empty unless asked for
   Var<S> group_opacity;    ///< [G,H,W] Σ w over each group; empty unless asked for
   Projected<S> projected;  ///< what was composited, for losses on depths and positions
   std::shared_ptr<const RenderCounters> counters;  ///< of the last forward run

@@ -12,7 +12,6 @@
 #include "autodiff/mlp.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
-#include "autodiff/seam.h"
 #include "autodiff/ssim.h"
 #include "autodiff/weighted_image.h"
 #include "core/rotation.h"
@@ -196,19 +195,6 @@ TEST_CASE("operators of arrays have the gradients of complex steps") {
       {{"x", image_shape<double>(3, 2, 2)}}, [](const Vars& in) { return slice_planes(in[0], 1, 1); },
       [](const ComplexInputs& in) {
         return picked(in[0], {4, 5, 6, 7});
-      });
-  const SeamMode ordinary;
-  check_complex_step(
-      x, [&](const Vars& in) { return seam(in[0], ordinary); }, [](const ComplexInputs& in) { return in[0]; });
-  check_complex_step(
-      x,
-      [&](const Vars& in) {
-        return reweighted_l1(in[0], in[0].owner().constant("target", in[0].shape()), 0.3, ordinary);
-      },
-      [](const ComplexInputs& in) {
-        Complex sum = 0;
-        for (const Complex d : in[0]) sum += std::fabs(d.real()) < 0.3 ? d * d / 0.6 : complex_abs(d) - 0.15;
-        return Complexes{sum / static_cast<double>(in[0].size())};
       });
   check_complex_step(
       x,

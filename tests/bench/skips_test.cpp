@@ -300,10 +300,6 @@ TEST_CASE("settings of an optimiser that the stage does not have are told, and l
   CHECK(told(R"({"kind": "bfgs", "beta1": 0.8, "eps": 1e-9})") ==
         Notes{"warning: stages.camera.optimizer: beta1, eps do nothing with kind bfgs"});
   CHECK(told(R"({"beta1": 0.8, "eps": 1e-9})").empty());
-  const std::string gauss_newton = R"({"kind": "gauss_newton", "products": 6, "beta2": 0.9})";
-  CHECK(told(gauss_newton) == Notes{"warning: stages.camera.optimizer: beta2 does nothing with kind gauss_newton"});
-  CHECK(told(gauss_newton, {"stages.camera.optimizer.kind=bfgs"}) ==
-        Notes{"warning: stages.camera.optimizer: beta2, products do nothing with kind bfgs"});
 }
 
 }  // namespace skips_test

@@ -341,6 +341,27 @@ TEST_CASE("loss terms of Gaussians have the gradients of complex steps") {
   });
 }
 
+TEST_CASE("the loss of depths has the gradients of complex steps") {
+  const std::vector<OperatorInput> inputs = {{"depth_moments", image_shape<double>(2, 3, 4), 0.2, 0.3},
+                                             {"transmittance", image_shape<double>(1, 3, 4), 0, 0.5},
+                                             {"depth_target", image_shape<double>(1, 3, 4), 1, 2}};
+  const auto fill = [](Inputs& given, const Vars& in) {
+    given.depth_moments = in[0];
+    given.transmittance = in[1];
+    given.depth_target = in[2];
+  };
+  check_loss("depth_spread", inputs, fill, [](const ComplexInputs& in) {
+    constexpr float kFloor = 0.002F;
+    Complex sum = 0;
+    for (std::size_t i = 0; i < 12; ++i) {
+      const Complex &z = in[0][i], &zz = in[0][12 + i], &t = in[1][i], &d = in[2][i];
+      sum += std::sqrt(zz / (d * d) - 2.0 * z / d + 1.0 - t + static_cast<double>(kFloor * kFloor)) -
+             static_cast<double>(kFloor);
+    }
+    return sum / 12.0;
+  });
+}
+
 TEST_CASE("loss terms of poses have the gradients of complex steps") {
   std::vector<double> matrices;
   for (int j = 0; j < 21; ++j) {

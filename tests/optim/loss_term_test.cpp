@@ -53,7 +53,10 @@ std::vector<OperatorInput> all_inputs() {
           {"human_seen", kScalarShape, 0, 0, {1}},
           {"object_seen", {kObjects, 1, 1, 1}, 0, 0, {1, 1, 0}},
           {"gaussian_opacities", shape_of(9, 1), 0, 1},
-          {"gaussian_log_scales", shape_of(9, 3), -4, 0}};
+          {"gaussian_log_scales", shape_of(9, 3), -4, 0},
+          {"depth_moments", image_shape<double>(2, kHeight, kWidth), 0.2, 0.3},
+          {"transmittance", mask, 0, 0.5},
+          {"depth_target", mask, 1, 2}};
 }
 
 template <class S>
@@ -76,6 +79,9 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.object_seen = in[16];
   inputs.gaussian_opacities = in[17];
   inputs.gaussian_log_scales = in[18];
+  inputs.depth_moments = in[19];
+  inputs.transmittance = in[20];
+  inputs.depth_target = in[21];
   inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;

@@ -107,59 +107,6 @@ std::vector<LossTerm> cliff_terms() {
 
 }  // namespace
 
-TEST_CASE("a stage by gauss_newton makes squares, absolute differences and others small", "[parallel]") {
-  struct Case {
-    const char* term;
-    double left;  // of the loss
-  };
-  for (const auto& [term, left] : {Case{"masked_l2", 1e-4}, Case{"photometric", 0.1}}) {
-    INFO(term);
-    StageSettings settings = usual_stage();
-    settings.iterations = 60;
-    settings.optimize = {{"base", moving(1)}, {"tint", moving(1)}};
-    settings.losses = {{term, weighted(1)}};
-    settings.optimizer.kind = OptimizerKind::kGaussNewton;
-    std::vector<double> losses;
-    for (const int threads : {1, 3}) {
-      with_threads(threads, [&] {
-        Picture<float> picture;
-        double first = 0;
-        const StageResult result = run(picture, settings, [&](const IterationReport& report) {
-          if (report.iteration == 0) first = report.loss;
-        });
-        CHECK(result.iterations <= 60);
-        CHECK(result.loss < left * first);
-        losses.push_back(result.loss);
-        picture.tape.forward(picture.inputs.rendered);
-        CHECK(picture.tape.value(picture.tint).scalar() != 0);
-      });
-    }
-    CHECK(losses.front() == losses.back());
-  }
-}
-
-TEST_CASE("a stage by gauss_newton gets over evaluations that are not finite", "[parallel]") {
-  Picture<double> picture;
-  StageSettings settings = usual_stage();
-  settings.iterations = 30;
-  settings.optimize = {{"base", moving(1)}, {"tint", moving(1)}};
-  settings.losses = {{"fault", weighted(1)}};
-  settings.optimizer.kind = OptimizerKind::kGaussNewton;
-  Fault::evaluations = 0;
-  Fault::at = 4;
-  Fault::until = 6;
-  Fault::value = std::numeric_limits<double>::quiet_NaN();
-  double first = 0;
-  const StageResult result = run(
-      picture, settings,
-      [&](const IterationReport& report) {
-        if (report.iteration == 0) first = report.loss;
-      },
-      {}, fault_terms());
-  CHECK(result.rollbacks > 0);
-  CHECK(result.loss < 0.1 * first);
-}
-
 TEST_CASE("a stage keeps axis-angles within half a turn, and forgets the direction of the old numbers") {
   // Pulled along one axis, past half a turn: the loss is linear in the angle that was added up, so it goes on falling
   // while the row jumps from pi to -pi.

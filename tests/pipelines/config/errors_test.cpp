@@ -152,19 +152,6 @@ TEST_CASE("missing keys and contradictions") {
                                                     "lr_final_share of \"root\" have no meaning"));
 }
 
-TEST_CASE("gauss_newton refuses what has no meaning for it") {
-  const auto with = [](const std::string& more) {
-    return fault(stage(R"("iterations": 9, "optimizer": {"kind": "gauss_newton"}, )" + more));
-  };
-  CHECK_THAT(with(R"("optimize": {"root": {"lr": 0.1, "every": 2}})"),
-             Contains("/stages/camera") && Contains("gauss_newton moves all numbers in every step: from, until, every "
-                                                    "and lr_final_share of \"root\" have no meaning"));
-  CHECK_THAT(with(R"("gradient_shares": 3)"), Contains("of which terms have no shares; allowed: 0"));
-
-  CHECK_THAT(fault(stage(R"("iterations": 9, "optimizer": {"kind": "gauss_newton", "products": 0})")),
-             Equals("a.json:2: /stages/camera/optimizer/products: 0 is out of range; allowed: 1 to 100"));
-}
-
 TEST_CASE("a curvature is kept from frame to frame alone") {
   CHECK_THAT(
       fault(stage(R"("iterations": 9, "over": "sequence", "optimizer": {"kind": "bfgs", "keep_curvature": true})")),

@@ -7,12 +7,14 @@
 
 #include "core/check.h"
 #include "core/file.h"
+#include "core/image_io.h"
 #include "core/parallel.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/draw/image_of_scene.h"
 #include "pipelines/scan/density.h"
 #include "pipelines/scan/photo_checks.h"
 #include "pipelines/scan/report.h"
+#include "pipelines/scan/scan_graph.h"
 #include "pipelines/scan/start.h"
 #include "pipelines/synthetic/dataset.h"
 #include "pipelines/synthetic/photos.h"
@@ -343,7 +345,7 @@ TEST_CASE("the picture stays when faint Gaussians go to others") {
   const Image before = render_picture({state.gaussians, {}}, view).image;
   DensitySettings settings;
   settings.growth = 1;
-  CHECK(change_density(settings, 3, state).moved > 100);
+  CHECK(change_density(settings, 3, 1, state).moved > 100);
   const Image after = render_picture({state.gaussians, {}}, view).image;
   float largest = 0;
   double sum = 0;
@@ -373,7 +375,7 @@ TEST_CASE("faint Gaussians share places of others, and the number grows to its b
   }
   DensitySettings settings;
   settings.most = 103;
-  const DensityChange change = change_density(settings, 1, state);
+  const DensityChange change = change_density(settings, 1, 1, state);
   CHECK(change.moved == 30);
   CHECK(change.added == 3);
   CHECK(state.gaussians.count() == 103);
@@ -392,6 +394,204 @@ TEST_CASE("faint Gaussians share places of others, and the number grows to its b
     }
     CHECK(transmitted == Approx(0.5).epsilon(1e-5));
   }
+}
+
+namespace {
+
+/// Gaussians in a row, each alike: opacity one half, and their gradients in the image.
+ScanState row_of(int count, double scale, const std::vector<float>& gradients) {
+  ScanState state;
+  std::vector<ColoredPoint> points(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) points[static_cast<std::size_t>(i)].place = Vector3<double>(i, 0, 0);
+  state.gaussians = gaussians_at(points, {}, 0, Vector3<double>::Zero());
+  std::fill(state.gaussians.log_scales.begin(), state.gaussians.log_scales.end(), static_cast<float>(std::log(scale)));
+  std::fill(state.gaussians.opacity_logits.begin(), state.gaussians.opacity_logits.end(), 0.0F);
+  const auto columns = state.columns();
+  for (std::size_t g = 0; g < kScanGroups; ++g) {
+    state.moments[g].resize(count, columns[g]);
+    std::fill(state.moments[g].steps.begin(), state.moments[g].steps.end(), 7);
+  }
+  state.gradient_sums = gradients;
+  state.gradient_counts.assign(gradients.size(), 2);
+  return state;
+}
+
+DensitySettings adc_settings() {
+  DensitySettings settings;
+  settings.method = DensityMethod::kAdc;
+  return settings;
+}
+
+}  // namespace
+
+TEST_CASE("what moves in the image becomes two: small ones are doubled, large ones split") {
+  const DensitySettings settings = adc_settings();  // sums of two pictures: 5e-4 is above the bound, 3e-4 is not
+  for (const double scale : {0.005, 0.05}) {
+    ScanState state = row_of(3, scale, {3e-4F, 5e-4F, 0});
+    state.iteration = 600;
+    const Gaussians before = state.gaussians;
+    const DensityChange change = change_density(settings, 1, 1.0, state);
+    CHECK(change.added == 1);
+    CHECK(change.removed == 0);
+    REQUIRE(state.gaussians.count() == 4);
+    check_sizes(state.gaussians);
+    CHECK(state.gradient_sums.empty());
+    CHECK(state.moments[0].steps == std::vector<std::int32_t>{7, scale < 0.01 ? 7 : 0, 7, 0});
+    const auto x = [&](std::size_t row) { return state.gaussians.means[3 * row]; };
+    const auto size = [&](std::size_t row) { return std::exp(state.gaussians.log_scales[3 * row]); };
+    CHECK((x(0) == 0 && x(2) == 2));
+    if (scale < 0.01) {
+      CHECK((x(1) == 1 && x(3) == 1));
+      CHECK(size(3) == Approx(scale));
+    } else {
+      for (const std::size_t row : {1, 3}) {
+        CHECK(x(row) != 1);
+        CHECK(x(row) == Approx(1).margin(5 * scale));
+        CHECK(size(row) == Approx(scale / 1.6));
+      }
+      CHECK(x(1) != x(3));
+    }
+    CHECK(state.gaussians.opacity_logits == std::vector<float>(4, 0.0F));
+  }
+}
+
+TEST_CASE("adaptive density control keeps the bound, and the largest gradients go first") {
+  DensitySettings settings = adc_settings();
+  settings.most = 6;
+  ScanState state = row_of(4, 0.001, {1, 4, 2, 3});
+  state.iteration = 600;
+  CHECK(change_density(settings, 1, 1.0, state).added == 2);
+  REQUIRE(state.gaussians.count() == 6);
+  CHECK(state.gaussians.means[3 * 4] == 1);
+  CHECK(state.gaussians.means[3 * 5] == 3);
+}
+
+TEST_CASE("faint Gaussians go, large ones after the first reset, which makes all faint") {
+  const DensitySettings settings = adc_settings();
+  ScanState state = row_of(5, 0.001, std::vector<float>(5, 0));
+  state.gaussians.opacity_logits[1] = -6;  // 0.0025
+  state.gaussians.log_scales[3 * 3 + 2] = std::log(0.2F);
+  state.gaussians.opacity_logits[4] = 3;
+  ScanState later = state;
+  state.iteration = 3000;
+  CHECK(change_density(settings, 1, 1.0, state).removed == 1);
+  REQUIRE(state.gaussians.count() == 4);
+  CHECK(state.gaussians.means[3 * 1] == 2);
+  for (const float logit : state.gaussians.opacity_logits)  // this was the reset
+    CHECK(1 / (1 + std::exp(-logit)) == Approx(0.01));
+  CHECK(state.moments[3].steps == std::vector<std::int32_t>(4, 0));
+  CHECK(state.moments[0].steps == std::vector<std::int32_t>(4, 7));
+  later.iteration = 3100;
+  CHECK(change_density(settings, 1, 1.0, later).removed == 2);
+  CHECK(later.gaussians.opacity_logits == std::vector<float>{0, 0, 3});
+
+  ScanState all_faint = row_of(2, 0.001, {0, 0});
+  all_faint.iteration = 700;
+  std::fill(all_faint.gaussians.opacity_logits.begin(), all_faint.gaussians.opacity_logits.end(), -9.0F);
+  CHECK(change_density(settings, 1, 1.0, all_faint).removed == 0);
+}
+
+TEST_CASE("a reconstruction by adaptive density control grows, learns, and goes on with the same bits") {
+  ScanSettings settings = quick_scan(240);
+  settings.density = adc_settings();
+  settings.density.most = 2000;
+  settings.density.from = 20;
+  settings.density.every = 20;
+  settings.density.reset_every = 60;
+  settings.density.until = 80;
+  const ScanSummary summary = run_scan(settings, folder_named("adc"), false, loss_terms());
+  CHECK(summary.gaussians > 700);
+  CHECK(summary.gaussians <= 2000);
+  CHECK(summary.learnt.psnr_db > 22);
+  const fs::path stopped = folder_named("adc_stopped");
+  Impatient impatient{50};
+  CHECK_THROWS_AS(run_scan(settings, stopped, false, loss_terms(), impatient.observer()), Interrupted);
+  with_threads(1, [&] { run_scan(settings, stopped, true, loss_terms()); });
+  CHECK(bytes_of(settings, stopped) == bytes_of(settings, folder_named("adc")));
+}
+
+TEST_CASE("pictures that were exposed otherwise are explained by their exposures") {
+  const fs::path folder = folder_named("exposed_photos");
+  fs::copy(made_photos().parent_path(), folder, fs::copy_options::recursive);
+  const PosedImages set = read_posed_images(folder);
+  for (std::size_t i = 0; i < set.images.size(); ++i) {
+    if (i % 6 == 0) continue;  // held back
+    Photo photo = read_photo(set.images[i], {});
+    Image image(4, photo.camera.height, photo.camera.width);
+    const float gain = i % 2 == 0 ? 0.7F : 1.0F;
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) {
+        for (int c = 0; c < 3; ++c) image(c, y, x) = gain * photo.color(c, y, x);
+        image(3, y, x) = photo.alpha(0, y, x);
+      }
+    }
+    write_image(set.images[i].image.string(), image);
+  }
+  ScanSettings settings = quick_scan(240);
+  settings.random_background = false;
+  settings.photos.path = folder / "transforms.json";
+  const double without = run_scan(settings, folder_named("not_exposed"), false, loss_terms()).learnt.psnr_db;
+  ParameterGroupSettings exposures;
+  exposures.lr = 0.02;
+  settings.stage.optimize.emplace_back(kExposures, exposures);
+  const ScanSummary with = run_scan(settings, folder_named("exposed"), false, loss_terms());
+  CAPTURE(without, with.learnt.psnr_db, with.held.psnr_db);
+  CHECK(with.learnt.psnr_db > without + 2);
+  const fs::path stopped = folder_named("exposed_stopped");
+  Impatient impatient{100};
+  CHECK_THROWS_AS(run_scan(settings, stopped, false, loss_terms(), impatient.observer()), Interrupted);
+  run_scan(settings, stopped, true, loss_terms());
+  CHECK(bytes_of(settings, stopped) == bytes_of(settings, folder_named("exposed")));
+}
+
+namespace {
+
+/// Mean over pixels of photos whose depths count of how far from them what is seen there is, of the depth.
+double mean_spread(const Gaussians& made) {
+  double sum = 0, count = 0;
+  for (const PosedImage& posed : read_posed_images(made_photos()).images) {
+    const Photo photo = read_photo(posed, {});
+    ScanGraph graph(made, photo.camera, {}, 0, {.depth = true});
+    graph.show(photo, Vector3<double>::Zero());
+    graph.picture();
+    Tape<float>& tape = graph.tape();
+    tape.forward(graph.inputs().depth_moments);
+    tape.forward(graph.inputs().transmittance);
+    const ConstArray<float> moments = tape.value(graph.inputs().depth_moments),
+                            transmittance = tape.value(graph.inputs().transmittance),
+                            target = tape.value(graph.inputs().depth_target);
+    for (Index y = 0; y < target.shape.rows; ++y) {
+      for (Index x = 0; x < target.shape.cols; ++x) {
+        const double d = target(y, x);
+        if (d == 0) continue;
+        const double spread = (moments(1, y, x) / d - 2 * moments(0, y, x)) / d + 1 - transmittance(y, x);
+        sum += std::sqrt(std::max(0.0, spread));
+        ++count;
+      }
+    }
+  }
+  REQUIRE(count > 1000);
+  return sum / count;
+}
+
+}  // namespace
+
+TEST_CASE("a loss of depths makes what is seen lie where the depths are") {
+  ScanSettings settings = quick_scan(300);
+  std::vector<double> spreads;
+  for (const bool by_depths : {false, true}) {
+    if (by_depths) {
+      for (const LossDescription& loss : descriptions_of(loss_terms())) {
+        if (loss.name == "depth_spread") settings.stage.losses.emplace_back(loss.name, default_settings(loss));
+      }
+    }
+    const fs::path folder = folder_named(by_depths ? "by_depths" : "by_colours");
+    const ScanSummary summary = run_scan(settings, folder, false, loss_terms());
+    CHECK(summary.held.psnr_db > 24);
+    spreads.push_back(mean_spread(read_splats(scan_result(settings, folder).string()).gaussians));
+  }
+  CAPTURE(spreads[0], spreads[1]);
+  CHECK(spreads[1] < 0.85 * spreads[0]);  // what is left is mostly the size of 800 Gaussians
 }
 
 }  // namespace scan_test

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
 #include "core/parallel.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/operator_check.h"
@@ -38,7 +39,7 @@ TEST_CASE("the renderer passes the operator checks, all outputs at once", "[para
   SplatView view{scene.camera, Vector3<double>::Zero(), scene.settings};
   view.settings.blur = 30;  // wide enough that the depth has a gradient in every pixel
   RenderRequest request;
-  request.depth = true;
+  request.depth = request.depth_moments = true;
   request.groups = {{0, 5}, {3, 12}, {4, 4}};
   const std::vector<OperatorInput> inputs = {{"means", shape_of(n, 3), 0, 1, wide(scene.means)},
                                              {"quats", shape_of(n, 4), 0, 1, wide(scene.quats)},
@@ -55,7 +56,9 @@ TEST_CASE("the renderer passes the operator checks, all outputs at once", "[para
       "render", inputs,
       [&](const auto& in) {
         const auto out = render({in[0], gaussian_axes(in[1], in[2]), in[3], in[4]}, in[5], in[6], view, request);
-        return out.image * 0.7 + out.transmittance * 0.3 + out.depth + out.group_opacity;  // broadcast to 3 planes
+        const auto first = slice_planes(out.depth_moments, 0, 1), second = slice_planes(out.depth_moments, 1, 1);
+        return out.image * 0.7 + out.transmittance * 0.3 + out.depth + out.group_opacity +
+               (first * 0.4 - second * 0.1);  // broadcast to 3 planes
       },
       options);
 }
@@ -238,6 +241,49 @@ TEST_CASE("a weight too small to divide by passes no gradient of the depth, one 
     taped.run();
     CHECK(taped.value(taped.rendered.depth)[0] == Approx(2.5));
     CHECK(taped.gradient(taped.means)[2] == Approx(factor < 1 ? 0.0 : 1.0));
+  }
+}
+
+TEST_CASE("moments of the depth are what colours z and z² give, whatever else is asked for") {
+  const SplatScene scene = smooth_scene(30, {19, 17});
+  const Index n = scene.count();
+  const SplatView view{scene.camera, Vector3<double>::Zero(), scene.settings};
+  Tape<double> tape;
+  const auto constant = [&](const char* name, Index cols, const std::vector<double>& numbers) {
+    const Var<double> var = tape.constant(name, shape_of(std::ssize(numbers) / cols, cols));
+    tape.set(var, numbers);
+    return var;
+  };
+  std::vector<double> powers;
+  for (Index i = 0; i < n; ++i) {
+    const Vector3<float> mean(scene.means.data() + 3 * i);
+    const double z = transform_point(scene.camera.camera_from_world, Vector3<double>(mean.cast<double>())).z();
+    powers.insert(powers.end(), {z, z * z, 1});
+  }
+  const Var<double> axes = gaussian_axes(constant("q", 4, wide(scene.quats)), constant("l", 3, wide(scene.log_scales)));
+  const SplatInputs<double> splats = {constant("m", 3, wide(scene.means)), axes,
+                                      constant("o", 1, std::vector<double>(static_cast<std::size_t>(n), 0.6)),
+                                      constant("c", 3, powers)};
+  const Var<double> xi = constant("xi", 6, std::vector<double>(6, 0)), black = constant("b", 3, {0, 0, 0});
+  for (const int asked : {0, 1, 2, 3}) {
+    RenderRequest request;
+    request.depth_moments = true;
+    request.depth = asked % 2 == 1;
+    if (asked > 1) request.groups = {{0, n}, {0, 0}};
+    const Rendered<double> out = render(splats, xi, black, view, request);
+    const Var<double> moments = out.depth_moments;
+    REQUIRE(moments.shape().planes == 2);
+    CHECK(out.depth.tape == (asked % 2 == 1 ? &tape : nullptr));
+    for (const Var<double> var : {out.image, moments, out.transmittance}) tape.forward(var);
+    if (asked > 1) tape.forward(out.group_opacity);
+    const ConstArray<double> image = tape.value(out.image), m = tape.value(moments);
+    for (Index y = 0; y < 17; ++y) {
+      for (Index x = 0; x < 19; ++x) {
+        CHECK(m(0, y, x) == Approx(image(0, y, x)).margin(1e-12));
+        CHECK(m(1, y, x) == Approx(image(1, y, x)).margin(1e-12));
+        if (asked > 1) CHECK(tape.value(out.group_opacity)(0, y, x) == Approx(image(2, y, x)).margin(1e-12));
+      }
+    }
   }
 }
 
