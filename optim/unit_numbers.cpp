@@ -88,8 +88,8 @@ void UnitNumbers<S>::write(VectorX& z) {
 }
 
 template <class S>
-double UnitNumbers<S>::share_within(const VectorX& point, const VectorX& step, double way) const {
-  const double inside = way * (1 - 1e-6);  // numbers are rounded when they are written
+double UnitNumbers<S>::share_within(const VectorX& point, const VectorX& step) const {
+  const double inside = kLongestUnitWay * (1 - 1e-6);  // numbers are rounded when they are written
   double share = 1;
   for (Index i = 0; i < step.size(); ++i) {
     if (step[i] == 0) continue;

@@ -44,8 +44,9 @@ class UnitNumbers {
   /// Moves the numbers to z, which is then as it was rounded.
   void write(VectorX& z);
 
-  /// The share of a step from `point` that may be taken until the first number is as far from its start as `way`.
-  double share_within(const VectorX& point, const VectorX& step, double way = kLongestUnitWay) const;
+  /// The share of a step from `point` that may be taken until the first number is as far from its start as
+  /// kLongestUnitWay.
+  double share_within(const VectorX& point, const VectorX& step) const;
 
   /// What the last read_gradient met, by group; `moved`: it has a gradient, and no number was bad.
   std::span<const GroupStep> reports() const { return reports_; }

@@ -237,7 +237,7 @@ std::shared_ptr<const MeshDistance> read_mesh_distance(const std::string& path, 
         " edges are not between two triangles that agree on their side: the mesh is not closed. Its open pieces " +
         "count as solid only near their backs");
   } else if (signed_volume(mesh) < 0) {
-    log_warning(path + ": the mesh is turned inwards: what lies outside of it counts as solid");
+    log_info(path + ": the mesh is turned inwards, as a room is: what lies outside of it counts as solid");
   }
   return std::make_shared<const MeshDistance>(mesh, thickness);
 }

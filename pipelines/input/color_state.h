@@ -17,7 +17,7 @@ namespace hsi4d {
 struct ColorState {
   std::optional<ColorNet> net;
   AdamState moments;  ///< of the groups color_net and avatar_features; without blocks until a stage moves them
-  /// What bfgs or gauss_newton has learnt of the curvature, by stage, where optimizer.keep_curvature asks for it;
+  /// What bfgs has learnt of the curvature, by stage, where optimizer.keep_curvature asks for it;
   /// empty: nothing yet.
   std::map<std::string, std::vector<double>, std::less<>> curvature = {};
 };

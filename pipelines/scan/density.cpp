@@ -99,10 +99,10 @@ DensityChange change_density(const DensitySettings& settings, std::int64_t seed,
   return change;
 }
 
-bool changes_density_after(const DensitySettings& settings, Index iteration) {
+bool changes_density_after(const DensitySettings& settings, Index iteration, Index iterations) {
   const Index done = iteration + 1;
   return settings.method != DensityMethod::kNone && done > settings.from && done < settings.until &&
-         done % settings.every == 0;
+         done < iterations && done % settings.every == 0;
 }
 
 void add_noise(const DensitySettings& settings, std::int64_t seed, Index iteration, double rate,

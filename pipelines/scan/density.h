@@ -23,8 +23,9 @@ struct DensityChange {
 /// @param extent  of the scene, metres; with adc sizes are shares of it
 DensityChange change_density(const DensitySettings& settings, std::int64_t seed, double extent, ScanState& state);
 
-/// Whether the density changes after an iteration, counted from 0.
-bool changes_density_after(const DensitySettings& settings, Index iteration);
+/// Whether the density changes after an iteration, counted from 0: not after the last one, for what is new is to be
+/// fitted.
+bool changes_density_after(const DensitySettings& settings, Index iteration, Index iterations);
 
 /// How far places tremble: N(0, Σ²) · noise · rate · σ(100 (0.005 − o)), so that what is faint looks around and what is
 /// seen stands still [the paper's noise, as its code has it].

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "autodiff/array.h"
+#include "core/camera.h"
 #include "pipelines/scan/density.h"
 
 namespace hsi4d {

@@ -51,15 +51,15 @@ void keep_rows(ScanState& state, const std::vector<bool>& keeps) {
   Index kept = 0;
   for (Index row = 0; row < std::ssize(keeps); ++row) {
     if (!keeps[static_cast<std::size_t>(row)]) continue;
-    copy_row(state, row, kept);
+    if (row == kept++) continue;
+    copy_row(state, row, kept - 1);
     for (std::size_t i = 0; i < kScanGroups; ++i) {
       RowMoments<float>& moments = state.moments[i];
       if (moments.steps.empty()) continue;
-      copy_numbers(moments.mean, row, kept, columns[i]);
-      copy_numbers(moments.square, row, kept, columns[i]);
-      copy_numbers(moments.steps, row, kept, 1);
+      copy_numbers(moments.mean, row, kept - 1, columns[i]);
+      copy_numbers(moments.square, row, kept - 1, columns[i]);
+      copy_numbers(moments.steps, row, kept - 1, 1);
     }
-    ++kept;
   }
   resize_rows(state, kept);
 }

@@ -11,6 +11,7 @@
 #include "optim/stage_loss.h"
 #include "pipelines/scan/density.h"
 #include "pipelines/scan/density_adc.h"
+#include "pipelines/scan/exposure.h"
 #include "pipelines/scan/scan_graph.h"
 
 namespace hsi4d {
@@ -90,7 +91,8 @@ class ScanFit {
       if (rule_of(i) != nullptr) state.moments[i].resize(state.gaussians.count(), columns[i]);
     }
     if (exposure_rule() == nullptr) return;
-    state.exposures.resize(photos.size() * kExposureNumbers);
+    if (state.exposures.empty()) state.exposures.resize(photos.size() * kExposureNumbers);
+    HSI4D_CHECK_EQ(state.exposures.size(), photos.size() * kExposureNumbers);
     state.exposure_moments.resize(photos.size());
     for (RowMoments<float>& moments : state.exposure_moments) moments.resize(kExposureNumbers, 1);
   }
@@ -101,7 +103,7 @@ class ScanFit {
     progress.skip(state_.iteration);
     while (state_.iteration < settings_.stage.iterations) {
       run_segment(progress);
-      if (changes_density_after(settings_.density, state_.iteration - 1))
+      if (changes_density_after(settings_.density, state_.iteration - 1, settings_.stage.iterations))
         change_density(settings_.density, settings_.seed, extent_, state_);
       if (state_.iteration % settings_.save_every == 0) save();
       if (state_.iteration < settings_.stage.iterations && watch_.observer.wants_stop()) {
@@ -121,10 +123,6 @@ class ScanFit {
   const ParameterGroupSettings* exposure_rule() const {
     return find_entry(settings_.stage.optimize, std::string(kExposures));
   }
-  /// Of one picture, in the state.
-  std::span<float> exposure_of(std::size_t photo) const {
-    return std::span(state_.exposures).subspan(photo * kExposureNumbers, kExposureNumbers);
-  }
 
   std::vector<std::size_t> learnt() const {
     const std::vector<bool> held = held_photos(settings_.photos, photos_.size());
@@ -143,7 +141,8 @@ class ScanFit {
   bool ends_segment_after(Index iteration) const {
     const Index done = iteration + 1;
     return done == settings_.stage.iterations || done % settings_.save_every == 0 ||
-           changes_density_after(settings_.density, iteration) || degree_at(done) != degree_at(iteration);
+           changes_density_after(settings_.density, iteration, settings_.stage.iterations) ||
+           degree_at(done) != degree_at(iteration);
   }
 
   void run_segment(Progress& progress) {
@@ -169,7 +168,7 @@ class ScanFit {
     const Index i = state_.iteration;
     const std::size_t shown = order_.at(i);
     const Photo& photo = photos_[shown];
-    if (exposure_rule() != nullptr) graph.set_exposure(exposure_of(shown));
+    if (exposure_rule() != nullptr) graph.set_exposure(exposure_of(state_, shown));
     graph.show(photo, photo.alpha.empty() ? Vector3<double>(settings_.background.data()) : background_at(i));
     Tape<S>& tape = graph.tape();
     tape.forward(loss.total);
@@ -203,7 +202,7 @@ class ScanFit {
     const double rate = scheduled_rate(*settings, state_.iteration, settings_.stage.iterations);
     state_.refused +=
         step_rows(graph.exposure(), state_.exposure_moments[photo], rule_with(rate), first_, second_).refused;
-    std::ranges::copy(graph.exposure_numbers(), exposure_of(photo).begin());
+    std::ranges::copy(graph.exposure_numbers(), exposure_of(state_, photo).begin());
   }
 
   void move(ScanGraph& graph, std::size_t group) {
@@ -274,22 +273,6 @@ class ScanFit {
   std::vector<float> column_shares_;
 };
 
-/// Numbers of one picture.
-std::span<const float> exposure_of(const ScanState& state, std::size_t photo) {
-  return std::span(state.exposures).subspan(photo * kExposureNumbers, kExposureNumbers);
-}
-
-/// Of all pictures that were learnt from: what the others are shown by.
-std::vector<float> mean_exposure(const ScanState& state, const std::vector<bool>& held) {
-  std::vector<float> mean(kExposureNumbers, 0);
-  const auto learnt = static_cast<float>(std::max<Index>(1, std::count(held.begin(), held.end(), false)));
-  for (std::size_t photo = 0; !state.exposures.empty() && photo < held.size(); ++photo) {
-    if (held[photo]) continue;
-    for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += exposure_of(state, photo)[i] / learnt;
-  }
-  return mean;
-}
-
 }  // namespace
 
 bool reads_depths(const StageSettings& stage) {
@@ -320,11 +303,10 @@ std::vector<ScanPicture> score_scan(const ScanSettings& settings, const std::vec
                   {.exposure = has_exposures});
   const Vector3<double> background(settings.background.data());
   const std::vector<bool> held = held_photos(settings.photos, photos.size());
-  const std::vector<float> usual = mean_exposure(state, held);
   std::vector<ScanPicture> pictures;
   for (std::size_t i = 0; i < photos.size(); ++i) {
     graph.show(photos[i], background);
-    if (has_exposures) graph.set_exposure(held[i] ? usual : exposure_of(state, i));
+    if (has_exposures) graph.set_exposure(exposure_of(state, i));
     Image image = graph.picture();
     const Image target = before_color(photos[i], background);
     ScanPicture& picture = pictures.emplace_back();

@@ -51,8 +51,8 @@ struct ScanWatch {
 void fit_scan(const ScanSettings& settings, const std::vector<Photo>& photos, double extent,
               std::span<const LossTerm> terms, const ScanWatch& watch, ScanState& state);
 
-/// All pictures of which something counts, before settings.background, and how near they are to what was seen. Where
-/// exposures are learnt, pictures that were held back are shown by the mean of the others'.
+/// All pictures of which something counts, before settings.background, and how near they are to what was seen. Each is
+/// shown with its exposure, where the state has some.
 /// @param take  called with each picture's image; may be empty
 std::vector<ScanPicture> score_scan(const ScanSettings& settings, const std::vector<Photo>& photos,
                                     const ScanState& state,

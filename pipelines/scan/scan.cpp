@@ -15,6 +15,7 @@
 #include "core/text.h"
 #include "pipelines/config/config_kind.h"
 #include "pipelines/rig/mesh_photos.h"
+#include "pipelines/scan/exposure.h"
 #include "pipelines/scan/photo_checks.h"
 #include "pipelines/scan/report.h"
 #include "pipelines/scan/scan_graph.h"
@@ -149,6 +150,7 @@ ScanSummary run_scan(const ScanSettings& settings, const fs::path& folder, bool 
   if (state.refused > 0)
     log_warning(std::to_string(state.refused) +
                 " rows of gradients were no numbers, or too large; these Gaussians stood still then");
+  give_mean_exposure(held_photos(settings.photos, photos.size()), state);
   ScanSummary summary = write_result(settings, set, photos, state, folder, seconds_since(begin));
   fs::remove(checkpoint);
   return summary;

@@ -21,10 +21,12 @@ namespace {
 
 using S = float;
 
-/// Gain and offset of each channel. @param exposure  six planes of one number
-Var<S> exposed(Var<S> image, Var<S> exposure) {
+/// Gain and offset of each channel of what the Gaussians show, not of what is behind them.
+/// @param exposure, background  six planes and three, of one number
+Var<S> exposed(const Rendered<S>& rendered, Var<S> exposure, Var<S> background) {
   const Var<S> gains = slice_planes(exposure, 0, 3), offsets = slice_planes(exposure, 3, 3);
-  return image * exp(gains) + offsets;
+  const Var<S> behind = rendered.transmittance * background;
+  return (rendered.image - behind) * exp(gains) + (1 - rendered.transmittance) * offsets + behind;
 }
 
 }  // namespace
@@ -57,7 +59,8 @@ void ScanGraph::record(const SplatInputs<S>& splats, const ScanExtras& extras) {
   inputs_.target = tape_.constant("target", inputs_.rendered.shape());
   if (extras.exposure) {
     exposure_ = tape_.parameter("exposure", {kExposureNumbers, 1, 1, 1});
-    inputs_.rendered = exposed(inputs_.rendered, exposure_);
+    background_planes_ = tape_.constant("background_planes", {3, 1, 1, 1});
+    inputs_.rendered = exposed(rendered, exposure_, background_planes_);
   }
   const Shape plane = image_shape<S>(1, view_.camera.height, view_.camera.width);
   if (extras.weight) inputs_.weight = tape_.constant("weight", plane);
@@ -79,6 +82,9 @@ void ScanGraph::show(const Photo& photo, const Vector3<double>& background) {
   const Array<S> xi_array = tape_.write(xi_), background_array = tape_.write(background_);
   for (Index i = 0; i < 6; ++i) xi_array(0, i) = static_cast<S>(xi[i]);
   for (Index i = 0; i < 3; ++i) background_array(0, i) = static_cast<S>(background[i]);
+  if (LossInputs<S>::given(background_planes_))
+    tape_.set(background_planes_,
+              std::array<S, 3>{background_array(0, 0), background_array(0, 1), background_array(0, 2)});
   tape_.set(intrinsics_, std::array<S, 4>{static_cast<S>(camera.fx), static_cast<S>(camera.fy),
                                           static_cast<S>(camera.cx), static_cast<S>(camera.cy)});
   if (photo.alpha.empty()) {
@@ -111,7 +117,7 @@ Image ScanGraph::picture() {
 
 double ScanGraph::psnr() const {
   const ConstArray<S> image = tape_.value(inputs_.rendered), target = tape_.value(inputs_.target);
-  const bool has_weight = inputs_.weight.tape != nullptr;
+  const bool has_weight = LossInputs<S>::given(inputs_.weight);
   const Index rows = image.shape.rows, cols = image.shape.cols;
   const auto sum_of = [&](bool of_squares) {
     return parallel_sum(rows, 16, [&](Index begin, Index end) {

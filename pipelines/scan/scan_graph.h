@@ -17,7 +17,7 @@ namespace hsi4d {
 struct ScanExtras {
   bool weight = false;    ///< of pixels
   bool depth = false;     ///< moments of the depth, and what the picture knows of it
-  bool exposure = false;  ///< of each picture: what is rendered times e^gain, plus an offset, by channel
+  bool exposure = false;  ///< of each picture: pipelines/scan/exposure.h
 };
 
 /// The graph. All pictures have the size of one camera.
@@ -57,7 +57,7 @@ class ScanGraph {
 
   Tape<float> tape_;
   SplatView view_;
-  Var<float> xi_, intrinsics_, background_, means_px_, exposure_;
+  Var<float> xi_, intrinsics_, background_, background_planes_, means_px_, exposure_;
   LossInputs<float> inputs_;
   std::vector<ParameterGroup<float>> groups_;
 };

@@ -117,7 +117,8 @@ void describe(ConfigFields& f, DensitySettings& s) {
   f.integer("from", s.from, iterations, "First iteration in which the number changes");
   f.integer("until", s.until, iterations, "First in which it no longer does");
   f.integer("every", s.every, {.min = 1, .max = kMostIterations}, "It changes after every n-th iteration");
-  f.number("least_opacity", s.least_opacity, {.min = 0, .below = 0.5}, "Fainter ones move to where others are, or go");
+  f.number("least_opacity", s.least_opacity, {.above = 0, .below = 0.5},
+           "Fainter ones move to where others are, or go");
   f.number("growth", s.growth, {.min = 1, .max = 10},
            "mcmc: factor of the number each time, until there are as many as allowed");
   f.number("noise", s.noise, {.min = 0}, "mcmc: how much places of faint ones tremble, in rates of the means");

@@ -1,5 +1,8 @@
 #include "pipelines/scan/state.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "core/check.h"
 #include "optim/checkpoint.h"
 #include "pipelines/scan/settings.h"
@@ -7,6 +10,8 @@
 namespace hsi4d {
 
 namespace {
+
+std::string checkpoint_fault(const std::string& file) { return file + ": is no checkpoint of a reconstruction"; }
 
 std::string moments_name(std::size_t group, const char* what) { return scan_groups()[group] + "." + what; }
 
@@ -24,10 +29,37 @@ void set_exposures(const ScanState& state, Checkpoint& checkpoint) {
   checkpoint.set("exposures.steps", steps);
 }
 
-void read_exposures(const Checkpoint& checkpoint, ScanState& state) {
+bool all_count(const std::vector<std::int64_t>& numbers) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
+  return std::all_of(numbers.begin(), numbers.end(), [](std::int64_t n) { return n >= 0 && n <= kMost; });
+}
+
+/// Whether moments are of so many rows, or of none.
+bool fits(const RowMoments<float>& moments, Index rows, Index columns) {
+  if (moments.mean.empty() && moments.square.empty() && moments.steps.empty()) return true;
+  return std::ssize(moments.steps) == rows && std::ssize(moments.mean) == rows * columns &&
+         std::ssize(moments.square) == rows * columns;
+}
+
+/// Whether all parts of a state are as large as they say.
+bool fits_together(const ScanState& state) {
+  const Index rows = state.gaussians.count();
+  const auto columns = state.columns();
+  for (std::size_t i = 0; i < kScanGroups; ++i) {
+    if (!fits(state.moments[i], rows, columns[i])) return false;
+  }
+  return state.gradient_sums.size() == state.gradient_counts.size() &&
+         (state.gradient_sums.empty() || std::ssize(state.gradient_sums) == rows);
+}
+
+void read_exposures(const std::string& file, const Checkpoint& checkpoint, ScanState& state) {
   state.exposures = checkpoint.floats("exposures");
   const std::vector<float>&mean = checkpoint.floats("exposures.mean"), &square = checkpoint.floats("exposures.square");
   const std::vector<std::int64_t>& steps = checkpoint.integers("exposures.steps");
+  const std::size_t count = state.exposures.size();
+  if (count % kExposureNumbers != 0 || mean.size() != count || square.size() != count || steps.size() != count ||
+      !all_count(steps))
+    throw DataError(checkpoint_fault(file));
   for (Index i = 0; i < std::ssize(state.exposures); i += kExposureNumbers) {
     const Index end = i + kExposureNumbers;
     RowMoments<float>& moments = state.exposure_moments.emplace_back();
@@ -71,8 +103,7 @@ ScanState load_scan_state(const std::string& file, const std::string& identity) 
   ScanState state;
   const std::vector<std::int64_t>& numbers = checkpoint.integers("state");
   const std::vector<double>&origin = checkpoint.doubles("origin"), &sum = checkpoint.doubles("curve_sum");
-  if (numbers.size() != 3 || origin.size() != 3 || sum.size() != 1)
-    throw DataError(file + ": is no checkpoint of a reconstruction");
+  if (numbers.size() != 3 || origin.size() != 3 || sum.size() != 1) throw DataError(checkpoint_fault(file));
   state.iteration = numbers[0];
   state.refused = numbers[1];
   state.curve = checkpoint.doubles("curve");
@@ -85,18 +116,21 @@ ScanState load_scan_state(const std::string& file, const std::string& identity) 
   g.log_scales = checkpoint.floats("log_scales");
   g.opacity_logits = checkpoint.floats("opacity_logits");
   g.sh = checkpoint.floats("sh");
-  read_exposures(checkpoint, state);
+  read_exposures(file, checkpoint, state);
   state.gradient_sums = checkpoint.floats("gradient_sums");
   const std::vector<std::int64_t>& counts = checkpoint.integers("gradient_counts");
   state.gradient_counts.assign(counts.begin(), counts.end());
+  bool are_counts = all_count(counts);
   for (std::size_t i = 0; i < kScanGroups; ++i) {
     RowMoments<float>& moments = state.moments[i];
     moments.mean = checkpoint.floats(moments_name(i, "mean"));
     moments.square = checkpoint.floats(moments_name(i, "square"));
     const std::vector<std::int64_t>& steps = checkpoint.integers(moments_name(i, "steps"));
     moments.steps.assign(steps.begin(), steps.end());
+    are_counts = are_counts && all_count(steps);
   }
   check_sizes(g);
+  if (!are_counts || !fits_together(state)) throw DataError(checkpoint_fault(file));
   return state;
 }
 

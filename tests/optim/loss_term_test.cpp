@@ -113,6 +113,36 @@ TEST_CASE("every registered loss term passes the gradient check", "[parallel]") 
   }
 }
 
+TEST_CASE("depth_spread counts known depths alone, and what rounding made less than nothing as nothing") {
+  const auto term = std::find_if(loss_terms().begin(), loss_terms().end(),
+                                 [](const LossTerm& t) { return t.description.name == "depth_spread"; });
+  REQUIRE(term != loss_terms().end());
+  Tape<double> tape;
+  const auto leaf = [&](const char* name, Index planes, const std::vector<double>& numbers) {
+    const Var<double> var = tape.parameter(name, {planes, 1, 2, 2});
+    tape.set(var, numbers);
+    return var;
+  };
+  // One Gaussian of weight 0.64 a hundredth behind a depth of 2 m; a pixel whose depth is not known.
+  LossInputs<double> in;
+  const double z = 2.02, w = 0.64, floor = static_cast<double>(0.002F);
+  in.depth_moments = leaf("moments", 2, {w * z, 5, w * z * z, 90});
+  in.transmittance = leaf("transmittance", 1, {1 - w, 0.3});
+  in.depth_target = leaf("target", 1, {2, 0});
+  const Var<double> loss = term->record(in);
+  tape.forward(loss);
+  CHECK(tape.value(loss).scalar() == Approx((std::hypot(0.8 * 0.01, floor) - floor) / 2).epsilon(1e-6));
+  tape.backward(loss);
+  CHECK(tape.gradient(in.depth_moments)(0, 0, 0) < 0);
+  CHECK(tape.gradient(in.depth_moments)(0, 0, 1) == 0);
+  CHECK(tape.gradient(in.transmittance)(0, 1) == 0);
+  tape.set(in.depth_moments, {w * 2, 5, w * 4 - 1e-9, 90});
+  tape.forward(loss);
+  CHECK(std::abs(tape.value(loss).scalar()) < 1e-9);
+  tape.backward(loss);
+  CHECK(std::isfinite(tape.gradient(in.depth_moments)(0, 0, 0)));
+}
+
 TEST_CASE("a registered loss term whose inputs are not given is off") {
   for (const LossTerm& term : loss_terms()) {
     INFO(term.description.name);
