@@ -35,6 +35,7 @@ rest_of(config "${config}" "```json\n")
 until(config "${config}" "```")
 file(WRITE ${SCRATCH}/runs/made.json "${config}")
 
+string(REGEX REPLACE " *\\\\\n +" " " text "${text}")  # commands of several lines
 string(REGEX MATCHALL "\n    hsi4d [^\n]+" commands "${text}")
 foreach(command IN LISTS commands)
   string(STRIP "${command}" command)
