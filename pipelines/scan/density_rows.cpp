@@ -1,15 +1,10 @@
 #include "pipelines/scan/density_rows.h"
 
 #include <algorithm>
-#include <array>
 
 namespace hsi4d {
 
 namespace {
-
-std::array<std::vector<float>*, kScanGroups> arrays_of(Gaussians& g) {
-  return {&g.means, &g.quats, &g.log_scales, &g.opacity_logits, &g.sh};
-}
 
 template <class T>
 void copy_numbers(std::vector<T>& values, Index from, Index to, Index columns) {

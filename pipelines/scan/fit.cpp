@@ -61,13 +61,17 @@ Image weighted(Image image, const Image& weight) {
   return image;
 }
 
+/// How exposures move; null: they are not learnt.
+const ParameterGroupSettings* exposure_rule(const StageSettings& stage) {
+  return find_entry(stage.optimize, std::string(kExposures));
+}
+
 /// What the stage's terms read of the pictures.
 ScanExtras extras_of(const StageSettings& stage, const std::vector<Photo>& photos) {
   const auto any = [&photos](Image Photo::*plane) {
     return std::any_of(photos.begin(), photos.end(), [plane](const Photo& photo) { return !(photo.*plane).empty(); });
   };
-  return {any(&Photo::weight), reads_depths(stage) && any(&Photo::depth),
-          find_entry(stage.optimize, std::string(kExposures)) != nullptr};
+  return {any(&Photo::weight), reads_depths(stage) && any(&Photo::depth), exposure_rule(stage) != nullptr};
 }
 
 /// A fit in the course of its iterations.
@@ -90,7 +94,7 @@ class ScanFit {
     for (std::size_t i = 0; i < kScanGroups; ++i) {
       if (rule_of(i) != nullptr) state.moments[i].resize(state.gaussians.count(), columns[i]);
     }
-    if (exposure_rule() == nullptr) return;
+    if (exposure_rule(settings.stage) == nullptr) return;
     if (state.exposures.empty()) state.exposures.resize(photos.size() * kExposureNumbers);
     HSI4D_CHECK_EQ(state.exposures.size(), photos.size() * kExposureNumbers);
     state.exposure_moments.resize(photos.size());
@@ -118,10 +122,6 @@ class ScanFit {
  private:
   const ParameterGroupSettings* rule_of(std::size_t group) const {
     return find_entry(settings_.stage.optimize, scan_groups()[group]);
-  }
-
-  const ParameterGroupSettings* exposure_rule() const {
-    return find_entry(settings_.stage.optimize, std::string(kExposures));
   }
 
   std::vector<std::size_t> learnt() const {
@@ -168,7 +168,7 @@ class ScanFit {
     const Index i = state_.iteration;
     const std::size_t shown = order_.at(i);
     const Photo& photo = photos_[shown];
-    if (exposure_rule() != nullptr) graph.set_exposure(exposure_of(state_, shown));
+    if (exposure_rule(settings_.stage) != nullptr) graph.set_exposure(exposure_of(state_, shown));
     graph.show(photo, photo.alpha.empty() ? Vector3<double>(settings_.background.data()) : background_at(i));
     Tape<S>& tape = graph.tape();
     tape.forward(loss.total);
@@ -197,7 +197,7 @@ class ScanFit {
   }
 
   void move_exposure(ScanGraph& graph, std::size_t photo) {
-    const ParameterGroupSettings* const settings = exposure_rule();
+    const ParameterGroupSettings* const settings = exposure_rule(settings_.stage);
     if (settings == nullptr || !moves_in(*settings, state_.iteration)) return;
     const double rate = scheduled_rate(*settings, state_.iteration, settings_.stage.iterations);
     state_.refused +=

@@ -140,8 +140,7 @@ double ScanGraph::psnr() const {
 }
 
 void ScanGraph::read(Gaussians& g, std::size_t groups) const {
-  const std::array<std::vector<float>*, kScanGroups> arrays = {&g.means, &g.quats, &g.log_scales, &g.opacity_logits,
-                                                               &g.sh};
+  const auto arrays = arrays_of(g);
   for (std::size_t i = 0; i < groups; ++i) {
     std::vector<float>* const values = arrays[i];
     const ConstArray<S> leaf = tape_.value(group(i));

@@ -71,6 +71,10 @@ void read_exposures(const std::string& file, const Checkpoint& checkpoint, ScanS
 
 }  // namespace
 
+std::array<std::vector<float>*, kScanGroups> arrays_of(Gaussians& g) {
+  return {&g.means, &g.quats, &g.log_scales, &g.opacity_logits, &g.sh};
+}
+
 std::array<Index, kScanGroups> ScanState::columns() const { return {3, 4, 3, 1, 3 * gaussians.sh_coefficients()}; }
 
 void save_scan_state(const std::string& file, const ScanState& state, const std::string& identity) {

@@ -19,6 +19,9 @@ inline constexpr Index kExposureNumbers = 6;
 /// Iterations that make one point of the curve.
 inline constexpr Index kCurveEvery = 20;
 
+/// The numbers of each group.
+std::array<std::vector<float>*, kScanGroups> arrays_of(Gaussians& g);
+
 /// Gaussians on their way.
 struct ScanState {
   Index iteration = 0;  ///< that comes next
