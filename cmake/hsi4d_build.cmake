@@ -78,37 +78,45 @@ if(HSI4D_BUILD_FUZZERS)
   set_source_files_properties(${kernels} PROPERTIES COMPILE_OPTIONS -fno-sanitize=all)
 endif()
 
-# Files with vector code are compiled with -O3 and each by itself; all others with -O2 and, where unity builds are on,
-# a room at once, so that a header is read once a room. AddressSanitizer does not watch scopes there: vectors are many
-# short-lived variables, and block_kernel.cpp took 92 s to compile instead of 42. The precompiled header stays away from -O3:
-# after it, g++ gives every function of another target the level that the header was compiled with (rasterize was 1.2 to 1.5
-# times slower).
+# The level of optimisation of the rooms that are added next. It counts in Release alone.
+set(hsi4d_level O2)
+
+# Files with vector code are compiled with -O3 and each by itself; all others with the level of their room and, where unity
+# builds are on, a room at once, so that a header is read once a room. AddressSanitizer does not watch scopes there: vectors
+# are many short-lived variables, and block_kernel.cpp took 92 s to compile instead of 42.
 set(hsi4d_vector_code "foreach_target|on_best_isa|with_best_lanes|autodiff/map\\.h")
 
-# hsi4d_use_headers(TARGET): the target reads cmake/headers.h as it was compiled once for all.
-if(hsi4d_precompile)
-  add_library(hsi4d_headers OBJECT ${PROJECT_SOURCE_DIR}/cmake/headers.cpp)
-  set_target_properties(hsi4d_headers PROPERTIES POSITION_INDEPENDENT_CODE ON)
-endif()
-function(hsi4d_use_headers target)
-  if(hsi4d_precompile)
-    target_precompile_headers(${target} REUSE_FROM hsi4d_headers)
-  endif()
+# cmake/headers.h is compiled once a level: g++ gives functions of other targets, and all others of a file, the level that
+# the precompiled header was made with (with that of -O2, rasterize was 1.2 to 1.5 times slower).
+function(hsi4d_add_headers level)
+  set(target hsi4d_headers_${level})
+  add_library(${target} OBJECT ${PROJECT_SOURCE_DIR}/cmake/headers.cpp)
+  target_link_libraries(${target} PRIVATE hsi4d::arithmetic hsi4d_warnings Eigen3::Eigen)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-${level}>)
+  target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/cmake/headers.h)
 endfunction()
 
-# hsi4d_set_sources(TARGET SOURCE...): how the source files of a library or program are compiled.
+# hsi4d_set_sources(TARGET SOURCE...): how the source files of a library are compiled.
 function(hsi4d_set_sources target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${HSI4D_UNITY} UNITY_BUILD_BATCH_SIZE 0)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-${hsi4d_level}>)
+  if(hsi4d_precompile)
+    target_precompile_headers(${target} REUSE_FROM hsi4d_headers_${hsi4d_level})
+  endif()
+  set(header ${PROJECT_BINARY_DIR}/CMakeFiles/hsi4d_headers_O3.dir/cmake_pch.hxx)
   foreach(source ${ARGN})
     file(STRINGS ${source} found REGEX "${hsi4d_vector_code}" LIMIT_COUNT 1)
     if(found)
+      set_property(SOURCE ${source} PROPERTY SKIP_UNITY_BUILD_INCLUSION ON)
       set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
       if("${HSI4D_SANITIZE}" MATCHES "address")
         set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS -fno-sanitize-address-use-after-scope)
       endif()
-      set_property(SOURCE ${source} PROPERTY SKIP_UNITY_BUILD_INCLUSION ON)
-      if(NOT HSI4D_SANITIZE)
+      if(hsi4d_precompile AND NOT HSI4D_SANITIZE)
         set_property(SOURCE ${source} PROPERTY SKIP_PRECOMPILE_HEADERS ON)
+        set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS -include ${header})
+        set_property(SOURCE ${source} APPEND PROPERTY OBJECT_DEPENDS ${header}.gch)
       endif()
     endif()
   endforeach()
@@ -140,7 +148,6 @@ function(hsi4d_add_room path)
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/hsi4d>)
   hsi4d_set_sources(hsi4d_${name} ${sources})
-  hsi4d_use_headers(hsi4d_${name})
   if(arg_APART)
     set_target_properties(hsi4d_${name} PROPERTIES UNITY_BUILD OFF)
   endif()

@@ -391,7 +391,7 @@ TEST_CASE("every shipped config runs", "[run]") {
   CHECK(without == std::set<std::string>{"accurate", "compare_gsplat", "default", "synthetic"});
 }
 
-TEST_CASE("every shipped config of a generated dataset runs", "[run]") {
+TEST_CASE("every shipped config of a generated dataset runs", "[run][full]") {
   const TemporaryFolder here;
   std::set<std::string> with_stages;
   for (const std::string& name : names_in(shipped_configs() / "synthetic")) {
@@ -512,7 +512,7 @@ TEST_CASE("the ablation of the refinement is the best config without it") {
         resolved_config(without, descriptions_of(loss_terms())));
 }
 
-TEST_CASE("every shipped clip of the accuracy table runs", "[run][release]") {
+TEST_CASE("every shipped clip of the accuracy table runs", "[run][full]") {
   const TemporaryFolder here;
   for (const std::string& name : names_in(shipped_configs() / "synthetic" / "clips")) {
     const fs::path file = shipped_configs() / "synthetic" / "clips" / name;
