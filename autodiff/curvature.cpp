@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 
 namespace hsi4d {
 
@@ -26,11 +27,18 @@ const Eigen::MatrixXd& Curvature<S>::compute() {
   std::fill(seen_.begin(), seen_.end(), std::uint8_t(0));
   left_out_.clear();
   matrix_.setZero();
-  pass_weights(plan);
-  push_twists(plan);
-  collect();
-  for (const std::uint32_t array : residuals_) add_residuals(array);
-  add_movers();
+  const auto timed = [](double& seconds, const auto& work) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    seconds = seconds_since(start);
+  };
+  timed(times_.weights, [&] { pass_weights(plan); });
+  timed(times_.twists, [&] { push_twists(plan); });
+  timed(times_.renders, [&] { collect(); });
+  timed(times_.residuals, [&] {
+    for (const std::uint32_t array : residuals_) add_residuals(array);
+  });
+  timed(times_.movers, [&] { add_movers(); });
   return matrix_;
 }
 

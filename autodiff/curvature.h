@@ -34,6 +34,17 @@
 
 namespace hsi4d {
 
+/// Seconds of the steps of one curvature.
+struct CurvatureTimes {
+  double weights = 0;    ///< from the loss to pixels
+  double twists = 0;     ///< from movers to renders
+  double renders = 0;    ///< Σ w a aᵀ over pixels
+  double residuals = 0;  ///< of all that is no pixel
+  double movers = 0;     ///< K, and the product with it
+
+  double sum() const { return weights + twists + renders + residuals + movers; }
+};
+
 /// The curvature of one loss. A term whose operators have no `weigh`, and a sum over lambdas of which several operands
 /// move, have no part in it: they are followed by their gradient alone. Computed in an order that does not depend on
 /// the number of threads.
@@ -62,6 +73,7 @@ class Curvature {
   const std::vector<std::string>& left_out() const { return left_out_; }
   /// Of the last H.
   Index movers() const { return movers_.count(); }
+  const CurvatureTimes& times() const { return times_; }
 
  private:
   using Plan = typename Tape<S>::Plan;
@@ -84,6 +96,7 @@ class Curvature {
   std::vector<std::uint32_t> residuals_, collectors_;  // arrays; nodes
   std::vector<std::string> left_out_;
   Eigen::MatrixXd of_movers_, rows_, product_, matrix_;
+  CurvatureTimes times_;
   std::vector<S> cotangent_;
 };
 

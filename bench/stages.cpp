@@ -121,6 +121,37 @@ std::string composite_line(const StageCost& cost) {
   return text + "\n";
 }
 
+/// Steps of one curvature, by name; ms, medians over the frames.
+std::vector<std::pair<std::string, double>> curvature_steps(const StageCost& cost) {
+  std::vector<std::pair<std::string, double>> steps;
+  for (const auto& [name, step] : {std::pair{"weights", &CurvatureTimes::weights},
+                                   {"twists", &CurvatureTimes::twists},
+                                   {"renders", &CurvatureTimes::renders},
+                                   {"residuals", &CurvatureTimes::residuals},
+                                   {"movers", &CurvatureTimes::movers}}) {
+    std::vector<double> ms;
+    for (const CurvatureCost& one : cost.curvatures) ms.push_back(1e3 * one.times.*step);
+    steps.emplace_back(name, median_of(ms));
+  }
+  return steps;
+}
+
+double curvature_ms(const StageCost& cost) {
+  std::vector<double> ms;
+  for (const CurvatureCost& one : cost.curvatures) ms.push_back(1e3 * one.times.sum());
+  return median_of(ms);
+}
+
+std::string curvature_line(const StageCost& cost) {
+  if (cost.curvatures.empty()) return "";
+  const CurvatureCost& last = cost.curvatures.back();
+  std::string text = formatted("  one curvature of %lld numbers by %lld movers: %.2f ms, %.1f times forward and back:",
+                               static_cast<long long>(last.numbers), static_cast<long long>(last.movers),
+                               curvature_ms(cost), curvature_ms(cost) / cost.evaluation_ms());
+  for (const auto& [name, ms] : curvature_steps(cost)) text += formatted(" %s %.2f", name.c_str(), ms);
+  return text + "\n";
+}
+
 }  // namespace
 
 double StageCost::ms_each() const { return per_iteration(sum.iteration_seconds, *this); }
@@ -139,6 +170,8 @@ double StageCost::min_ms() const {
   return ms_an_iteration.empty() ? 0 : *std::min_element(ms_an_iteration.begin(), ms_an_iteration.end());
 }
 
+double StageCost::evaluation_ms() const { return per_iteration(sum.times.forward + sum.times.backward, *this); }
+
 void add_profile(const StageProfile& profile, std::vector<StageCost>& stages) {
   const auto is_it = [&profile](const StageCost& known) { return known.stage == profile.stage; };
   auto place = std::find_if(stages.begin(), stages.end(), is_it);
@@ -151,6 +184,7 @@ void add_profile(const StageProfile& profile, std::vector<StageCost>& stages) {
   place->frames += profile.frame ? 1 : 0;
   if (profile.iterations > 0)
     place->ms_an_iteration.push_back(1e3 * profile.iteration_seconds / static_cast<double>(profile.iterations));
+  if (profile.curvature) place->curvatures.push_back(*profile.curvature);
   sum.iterations += profile.iterations;
   sum.seconds += profile.seconds;
   sum.iteration_seconds += profile.iteration_seconds;
@@ -181,7 +215,8 @@ std::string cost_table(const RunCost& cost) {
       .align = "lr"};
   for (const StageCost& stage : cost.stages) add_stage(stage, table);
   std::string text = table_text(table);
-  for (const StageCost& stage : cost.stages) text += "\n" + part_lines(stage) + composite_line(stage);
+  for (const StageCost& stage : cost.stages)
+    text += "\n" + part_lines(stage) + composite_line(stage) + curvature_line(stage);
   return text + formatted("\noptimisation %.1f s of %.1f s on %d threads (%s), at most %.0f MB\n",
                           optimisation_seconds(cost), cost.seconds, cost.threads, isa_name(best_isa()),
                           1e-6 * static_cast<double>(cost.peak_memory_bytes));
@@ -218,6 +253,11 @@ std::string cost_json(const RunCost& cost) {
                     {"layers", per_iteration(sum.counters.layers, stage)},
                     {"dirty_tiles", per_iteration(sum.counters.dirty_tiles, stage)},
                     {"composite_ms", composite_steps(stage)}});
+    if (!stage.curvatures.empty())
+      entry.update({{"curvature_numbers", stage.curvatures.back().numbers},
+                    {"curvature_movers", stage.curvatures.back().movers},
+                    {"curvature_ms", curvature_ms(stage)},
+                    {"curvature_steps_ms", curvature_steps(stage)}});
     if (sum.counted > 0) entry["allocations"] = allocations_each(stage);
     text += bench_line(entry.dump());
     for (const CostPart& part : parts_of(stage)) {

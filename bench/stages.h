@@ -11,14 +11,16 @@ namespace hsi4d {
 /// One stage in all frames, or over the sequence.
 struct StageCost {
   std::string stage;
-  Index frames = 0;                     ///< in which it ran; 0: over the sequence
-  StageProfile sum;                     ///< counts and seconds of all of them; of tape_bytes and nodes the most
-  std::vector<double> ms_an_iteration;  ///< by frame
+  Index frames = 0;                       ///< in which it ran; 0: over the sequence
+  StageProfile sum;                       ///< counts and seconds of all of them; of tape_bytes and nodes the most
+  std::vector<double> ms_an_iteration;    ///< by frame
+  std::vector<CurvatureCost> curvatures;  ///< of one evaluation a frame
 
   double ms_each() const;                      ///< an iteration, on average
   double ms_each_of(double iterations) const;  ///< the same, had each frame as many: the first is another than the rest
   double median_ms() const;                    ///< of the frames' averages
   double min_ms() const;                       ///< the least of them
+  double evaluation_ms() const;                ///< forward and backward, on average
 };
 
 /// What a run took.

@@ -18,6 +18,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// Groups of more numbers than this have no part in a curvature that is measured: nets, features of Gaussians.
+constexpr Index kMostNumbers = 512;
+
 template <class S>
 void release(Tape<S>& tape, const std::vector<HeldOutput>& outputs) {
   for (const HeldOutput& held : outputs) tape.release(TapeInspector<S>(tape).handle(held.id));
@@ -57,6 +60,7 @@ class StageRun {
     evaluate_the_end();
     keep_moments();
     keep_curvature();
+    const std::vector<NodeStatistics> nodes = options_.profile ? tape_.statistics() : std::vector<NodeStatistics>();
     return {iterations,
             evaluated_loss(),
             loss_.values,
@@ -66,7 +70,8 @@ class StageRun {
             times_,
             left_out_objects(),
             loss_.notes,
-            options_.profile ? tape_.statistics() : std::vector<NodeStatistics>()};
+            nodes,
+            options_.profile ? curvature_cost() : std::nullopt};
   }
 
  private:
@@ -271,6 +276,32 @@ class StageRun {
     if (options_.curvature == nullptr) return;
     std::vector<double> learnt = optimizer_.curvature();
     if (!learnt.empty()) *options_.curvature = std::move(learnt);
+  }
+
+  /// Made twice: the first meets its memory for the first time.
+  std::optional<CurvatureCost> curvature_cost() {
+    std::vector<Var<S>> leaves;
+    Index numbers = 0;
+    for (const OptimizerGroup<S>& group : groups_) {
+      Index count = 0;
+      for (const Var<S> block : group.parameters.blocks) count += tape_.shape(block).count();
+      set_frozen(tape_, group.parameters, count > kMostNumbers);
+      if (count > kMostNumbers) continue;
+      leaves.insert(leaves.end(), group.parameters.blocks.begin(), group.parameters.blocks.end());
+      numbers += count;
+    }
+    if (leaves.empty()) return std::nullopt;
+    try {
+      Curvature<S> curvature(tape_, loss_.total, leaves);
+      for (int i = 0; i < 2; ++i) {
+        tape_.forward(loss_.total);
+        tape_.backward(loss_.total);
+        curvature.compute();
+      }
+      return CurvatureCost{curvature.times(), numbers, curvature.movers()};
+    } catch (const InternalError&) {
+      return std::nullopt;
+    }
   }
 
   Tape<S>& tape_;

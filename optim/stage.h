@@ -2,11 +2,13 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "autodiff/curvature.h"
 #include "optim/adam.h"
 #include "optim/gradient_shares.h"
 #include "optim/loss_term.h"
@@ -55,6 +57,13 @@ struct StageTimes {
   double step = 0;      ///< looking at every number, moving the parameters
 };
 
+/// What one Gauss-Newton matrix of a stage would take.
+struct CurvatureCost {
+  CurvatureTimes times;
+  Index numbers = 0;  ///< its rows
+  Index movers = 0;
+};
+
 /// What a stage has done.
 struct StageResult {
   Index iterations = 0;
@@ -64,9 +73,10 @@ struct StageResult {
   Index rollbacks = 0;
   double seconds = 0;
   StageTimes times;
-  std::vector<LeftOutObject> left_out;  ///< by term and object, in order
-  std::vector<LossNote> notes;          ///< in the order of the terms
-  std::vector<NodeStatistics> nodes;    ///< of the tape, losses included, with StageOptions::profile
+  std::vector<LeftOutObject> left_out;     ///< by term and object, in order
+  std::vector<LossNote> notes;             ///< in the order of the terms
+  std::vector<NodeStatistics> nodes;       ///< of the tape, losses included, with StageOptions::profile
+  std::optional<CurvatureCost> curvature;  ///< with StageOptions::profile; none where a render moves in another way
 };
 
 /// An operator's output that follows its inputs in iterations in which one of the groups moves, and is held in all
@@ -84,7 +94,7 @@ struct StageOptions {
   AdamState* kept = nullptr;
   /// bfgs goes on from this curvature (none yet: empty), and leaves there what it has learnt. Null: it starts afresh.
   std::vector<double>* curvature = nullptr;
-  bool profile = false;  ///< measure the time of every node
+  bool profile = false;  ///< measure the time of every node, and of one curvature where the stage ends
   std::vector<HeldOutput> held = {};
 };
 

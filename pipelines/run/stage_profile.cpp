@@ -69,6 +69,7 @@ void StageProbe::stage_ended(const StageResult& result, StageProfile profile) co
   profile.tape = tape_;
   profile.allocations = allocations_;
   profile.counted = counted_;
+  profile.curvature = result.curvature;
   watch_->done(profile);
 }
 

@@ -38,6 +38,7 @@ struct StageProfile {
   std::int64_t allocations = 0;  ///< by iterations in the second half of those that the stage may have
   Index counted = 0;             ///< how many these are; 0: allocations are not counted, or it ended before
   Index tape_bytes = 0;
+  std::optional<CurvatureCost> curvature = {};  ///< of one more evaluation
 };
 
 /// Who wants to know.

@@ -51,8 +51,8 @@ TEST_CASE("bench stages tells where the time of every stage goes", "[run]") {
   const ProgramResult first = run_hsi4d(small_bench());
   INFO(first.err);
   REQUIRE(first.status == 0);
-  for (const char* part :
-       {"camera, ms an iteration", "d_ssim", "image_difference", "of composite:", "optimisation", "world MPJPE"})
+  for (const char* part : {"camera, ms an iteration", "d_ssim", "image_difference", "of composite:", "one curvature of",
+                           "optimisation", "world MPJPE"})
     CHECK_THAT(first.out, Contains(part));
 
   std::map<std::string, nlohmann::json> stages;
@@ -86,6 +86,14 @@ TEST_CASE("bench stages tells where the time of every stage goes", "[run]") {
   CHECK(stages["interaction"]["tiles"].get<double>() <= 9);
   CHECK(stages["interaction"]["dirty_tiles"].get<double>() <= 9);
   CHECK_FALSE(stages["refinement"].contains("tiles"));
+  CHECK(stages["camera"]["curvature_numbers"] == 6);
+  CHECK(stages["camera"]["curvature_movers"] == 1);
+  CHECK(stages["interaction"]["curvature_movers"] > 10);
+  for (const char* stage : {"camera", "interaction"}) {
+    double steps = 0;
+    for (const auto& [name, ms] : stages[stage]["curvature_steps_ms"].items()) steps += ms[1].get<double>();
+    CHECK(steps > 0);
+  }
   CHECK(lines.back()["peak_memory_bytes"] > 0);
   CHECK(lines.back()["name"] == "stages");
   CHECK_THAT(lines.back()["machine"]["cpu"].get<std::string>(), !Equals(""));
