@@ -26,6 +26,7 @@ struct BenchStagesOptions : BenchConfigOptions {
   std::string out;       ///< folder of dataset and run; empty: runs/bench/NAME
   int threads = 0;       ///< 0: what the config says
   bool compare = false;  ///< run again without skips, and tell the ratio
+  bool curvature = false;
 };
 
 /// Iterations of a stage in the run without skips, at most.
@@ -63,7 +64,7 @@ MeasuredRun measured_run(const RunConfig& config, const BenchStagesOptions& opti
                          const std::vector<LossTerm>& losses, const fs::path& out) {
   RunCost cost;
   const StageWatch watch{[&cost](const StageProfile& profile) { add_profile(profile, cost.stages); },
-                         heap_allocation_counter()};
+                         heap_allocation_counter(), options.curvature};
   cost.threads = options.threads > 0 ? options.threads : config.threads > 0 ? config.threads : thread_count();
   RunOptions run;
   run.folder = free_folder(out).string();
@@ -102,6 +103,8 @@ void add_stages(CLI::App& command, Program& program) {
   add_thread_count(command, stages.threads, "what the config says");
   command.add_option("--out", stages.out, "Folder of dataset and runs; default: runs/bench/CONFIG")->type_name("DIR");
   command.add_flag("--compare", stages.compare, "Run again without skips, and tell the ratio");
+  command.add_flag("--curvature", stages.curvature,
+                   "Also time one Gauss-Newton matrix a frame; its time and memory are the run's too");
   run_when_chosen(command, program, [&] { return bench_stages_command(stages, program.terms); });
 }
 

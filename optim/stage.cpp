@@ -60,7 +60,7 @@ class StageRun {
     evaluate_the_end();
     keep_moments();
     keep_curvature();
-    const std::vector<NodeStatistics> nodes = options_.profile ? tape_.statistics() : std::vector<NodeStatistics>();
+    std::vector<NodeStatistics> nodes = options_.profile ? tape_.statistics() : std::vector<NodeStatistics>();
     return {iterations,
             evaluated_loss(),
             loss_.values,
@@ -70,8 +70,8 @@ class StageRun {
             times_,
             left_out_objects(),
             loss_.notes,
-            nodes,
-            options_.profile ? curvature_cost() : std::nullopt};
+            std::move(nodes),
+            options_.time_curvature ? curvature_cost() : std::nullopt};
   }
 
  private:

@@ -76,7 +76,7 @@ struct StageResult {
   std::vector<LeftOutObject> left_out;     ///< by term and object, in order
   std::vector<LossNote> notes;             ///< in the order of the terms
   std::vector<NodeStatistics> nodes;       ///< of the tape, losses included, with StageOptions::profile
-  std::optional<CurvatureCost> curvature;  ///< with StageOptions::profile; none where a render moves in another way
+  std::optional<CurvatureCost> curvature;  ///< with time_curvature; none where a render moves in another way
 };
 
 /// An operator's output that follows its inputs in iterations in which one of the groups moves, and is held in all
@@ -94,7 +94,8 @@ struct StageOptions {
   AdamState* kept = nullptr;
   /// bfgs goes on from this curvature (none yet: empty), and leaves there what it has learnt. Null: it starts afresh.
   std::vector<double>* curvature = nullptr;
-  bool profile = false;  ///< measure the time of every node, and of one curvature where the stage ends
+  bool profile = false;         ///< measure the time of every node
+  bool time_curvature = false;  ///< measure one more evaluation and its curvature where the stage ends
   std::vector<HeldOutput> held = {};
 };
 

@@ -166,6 +166,7 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
                            .kept = &colors.moments,
                            .curvature = stage.optimizer.keep_curvature ? &colors.curvature[name] : nullptr,
                            .profile = probe.is_on(),
+                           .time_curvature = probe.times_curvature(),
                            .held = graph.held()});
     graph.read_state(stage.optimize, state);
     if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
@@ -196,13 +197,14 @@ StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>
   StageProbe probe(task.watch);
   Tape<S> tape;
   const SequenceGraph<S> graph = sequence_graph<S>(tape, task, states);
-  const StageResult result = run_stage<S>(tape, stage, task.losses, graph.loss_inputs(), graph.groups(),
-                                          [&](const IterationReport& report) {
-                                            probe.iteration_ended(report, nullptr);
-                                            callback(report);
-                                            probe.iteration_begins();
-                                          },
-                                          {.name = name, .kept = nullptr, .profile = probe.is_on()});
+  const StageResult result = run_stage<S>(
+      tape, stage, task.losses, graph.loss_inputs(), graph.groups(),
+      [&](const IterationReport& report) {
+        probe.iteration_ended(report, nullptr);
+        callback(report);
+        probe.iteration_begins();
+      },
+      {.name = name, .kept = nullptr, .profile = probe.is_on(), .time_curvature = probe.times_curvature()});
   graph.read_states(stage.optimize, states);
   probe.stage_ended(result, {.stage = name, .tape_bytes = tape.memory_bytes()});
   return result;

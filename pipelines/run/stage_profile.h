@@ -45,6 +45,7 @@ struct StageProfile {
 struct StageWatch {
   std::function<void(const StageProfile&)> done;
   std::function<std::int64_t()> allocation_count;  ///< heap allocations of the process so far; empty: not counted
+  bool curvature = false;  ///< also time one curvature a stage; its seconds and memory are the run's too
 };
 
 /// Measures one stage: made before its tape is recorded, asked around each iteration, ended after it. Does nothing
@@ -54,6 +55,7 @@ class StageProbe {
   explicit StageProbe(const StageWatch* watch);
 
   bool is_on() const { return watch_ != nullptr; }
+  bool times_curvature() const { return watch_ != nullptr && watch_->curvature; }
   /// An iteration is over, nothing has been made of its report yet.
   /// @param counters  null: nothing was drawn
   void iteration_ended(const IterationReport& report, const RenderCounters* counters);
