@@ -92,17 +92,17 @@ void describe(ConfigFields& f, SourceSettings& s) {
 }
 
 const std::vector<std::string>& video_placeholders() {
-  static const std::vector<std::string> names = {"first_frame", "prompt", "out"};
+  static const std::vector<std::string> names = {"first_frame", "prompt", "seed", "out"};
   return names;
 }
 
 const std::vector<std::string>& mask_placeholders() {
-  static const std::vector<std::string> names = {"video", "objects", "first_masks", "prompt", "out"};
+  static const std::vector<std::string> names = {"video", "objects", "first_masks", "prompt", "seed", "out"};
   return names;
 }
 
 const std::vector<std::string>& motion_placeholders() {
-  static const std::vector<std::string> names = {"video", "video_rate", "camera", "prompt", "out"};
+  static const std::vector<std::string> names = {"video", "video_rate", "camera", "prompt", "seed", "out"};
   return names;
 }
 

@@ -52,6 +52,7 @@ ConfigValue command_record(const RunConfig& config, const std::vector<std::strin
   record.add("command", strings(command));
   record.add("files", ConfigValue::make_string(command_hashes(command)));
   if (uses_placeholder(command, "prompt")) record.add("prompt", ConfigValue::make_string(config.sources.prompt));
+  if (uses_placeholder(command, "seed")) record.add("seed", ConfigValue::make_number(static_cast<double>(config.seed)));
   return record;
 }
 

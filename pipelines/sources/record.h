@@ -5,6 +5,7 @@
 //   command      as the config has it, placeholders and all
 //   files        "HASH NAME" a line: the program, where it is named by its path, and files that arguments name
 //   prompt       where the command has {prompt}
+//   seed         where the command has {seed}
 //   first_frame  where it has {first_frame} (or first_masks): content of scene, objects, avatar, camera and initial
 //                state, background and render settings
 //   video        of masks and motion: its content

@@ -262,8 +262,10 @@ void make_video(const RunConfig& config, const SourceOutput& output, const Obser
                  out = work.member("video" + ending_of(config.sources.video.output));
   const bool has_first_frame = uses_placeholder(output.command, "first_frame");
   if (has_first_frame) write_image(first.string(), first_frame_image(config));
-  const std::vector<std::string> command = filled_in(
-      output.command, {{"first_frame", first.string()}, {"prompt", config.sources.prompt}, {"out", out.string()}});
+  const std::vector<std::string> command = filled_in(output.command, {{"first_frame", first.string()},
+                                                                      {"prompt", config.sources.prompt},
+                                                                      {"seed", std::to_string(config.seed)},
+                                                                      {"out", out.string()}});
   make(Job{output, config.sources.video, command, out, observer},
        [&config](const fs::path& made) { check_video(config, made); });
   if (has_first_frame) put(first, first_frame_file(output));
@@ -288,6 +290,7 @@ void make_masks(const RunConfig& config, const DataSettings& data, const SourceO
                                                                       {"first_masks", first.string()},
                                                                       {"objects", names},
                                                                       {"prompt", config.sources.prompt},
+                                                                      {"seed", std::to_string(config.seed)},
                                                                       {"out", out.string()}});
   make(Job{output, config.sources.masks, command, out, observer},
        [&data](const fs::path& made) { check_masks(data, made); });
@@ -302,6 +305,7 @@ void make_motion(const RunConfig& config, const DataSettings& data, const Source
                                  {"video_rate", number_text(frames_of(data).video_rate())},
                                  {"camera", data.camera.string()},
                                  {"prompt", config.sources.prompt},
+                                 {"seed", std::to_string(config.seed)},
                                  {"out", out.string()}});
   make(Job{output, config.sources.motion, command, out, observer},
        [&data](const fs::path& made) { check_motion(data, made); });

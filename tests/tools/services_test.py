@@ -1,5 +1,6 @@
-"""The programs in tools/services: they compile, explain themselves, and tell what they would run; KLING's is used with a
-stand-in of the service on this machine.
+"""The programs in tools/services: they compile, explain themselves, and tell what they would run; those of KLING and Sora
+are used with stand-ins of the services on this machine, SAM 2's with one of the package (stubs/; skipped without NumPy
+and Pillow).
 
     python3 tests/tools/services_test.py TOOLS        # the folder tools/
 
@@ -7,6 +8,8 @@ Exit status 77 (skipped) without ffmpeg, with which videos are made and looked a
 """
 
 import base64
+import email
+import email.policy
 import hashlib
 import hmac
 import http.server
@@ -22,7 +25,7 @@ import tempfile
 import threading
 
 services = pathlib.Path(sys.argv[1]).resolve() / "services"
-PROGRAMS = ["kling.py", "wan.py", "sam2_masks.py", "poses.py", "stand_in/video.py", "stand_in/masks.py", "stand_in/poses.py"]
+PROGRAMS = ["kling.py", "sora.py", "wan.py", "sam2_masks.py", "poses.py", "stand_in/video.py", "stand_in/masks.py", "stand_in/poses.py"]
 
 if shutil.which("ffmpeg") is None or shutil.which("ffprobe") is None:
     print("skipped: there is no ffmpeg")
@@ -275,7 +278,7 @@ def test_kling(folder):
                    tasks, *more, **{**keys, **environment})
 
     check(kling("sits", KLING_ACCESS_KEY=""), 2, "have to be in the environment")
-    check(kling("sits", "--dry-run"), 0, "POST", '"prompt": "sits"')
+    check(kling("sits", "--dry-run"), 0, "POST", '"prompt": "sits"', '"model_name": "kling-v1"')
     assert not StandIn.requests
     check(kling("sits"), 0)
     assert size_of(out) == "64,48", size_of(out)  # of the image: what was made is larger
@@ -291,10 +294,16 @@ def test_kling(folder):
     paid = len(StandIn.requests)
     StandIn.tasks["paid"] = "succeed"
     body = StandIn.requests[0]
-    name = hashlib.sha256(json.dumps(body).encode()).hexdigest()[:16] + ".task"
+    name = hashlib.sha256(json.dumps([body, 0]).encode()).hexdigest()[:16] + ".task"
     (tasks / name).write_text("paid\n")
     check(kling("sits"), 0)
     assert len(StandIn.requests) == paid and StandIn.looks["paid"] == 3
+    # Another seed is another task, of the same request.
+    (tasks / name).write_text("paid\n")
+    check(kling("sits", "--seed", 1), 0)
+    assert len(StandIn.requests) == paid + 1 and StandIn.requests[-1] == body
+    paid += 1
+    (tasks / name).unlink()
     # An answer that breaks off is no video; the next time the same task is asked for.
     StandIn.breaks = [True]
     check(kling("breaks"), 75, "no connection")
@@ -310,6 +319,98 @@ def test_kling(folder):
     check(kling("sits"), 75, "no connection")
 
 
+class SoraStandIn(http.server.BaseHTTPRequestHandler):
+    """OpenAI's service as its description has it: a task is accepted by a form, is looked at twice, and has a video."""
+
+    forms, looks = [], {}
+
+    def log_message(self, *_):
+        pass
+
+    def answer(self, status, content, kind="application/json"):
+        body = content if isinstance(content, bytes) else json.dumps(content).encode()
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def do_POST(self):
+        content = self.rfile.read(int(self.headers["Content-Length"]))
+        if self.headers["Authorization"] != "Bearer key":
+            return self.answer(401, {"error": {"message": "no such key"}})
+        told = email.message_from_bytes(f"Content-Type: {self.headers['Content-Type']}\n\n".encode() + content, policy=email.policy.HTTP)
+        SoraStandIn.forms.append({part.get_param("name", header="Content-Disposition"): part.get_payload(decode=True)
+                                  for part in told.iter_parts()})
+        self.answer(200, {"id": f"video_{len(SoraStandIn.forms)}", "status": "queued"})
+
+    def do_GET(self):
+        name = self.path.split("/")[3]
+        if not name.startswith("video_"):
+            return self.answer(404, {"error": {"message": "no such video"}})
+        if self.path.endswith("/content"):
+            return self.answer(200, SoraStandIn.video, "video/mp4")
+        SoraStandIn.looks[name] = SoraStandIn.looks.get(name, 0) + 1
+        if SoraStandIn.looks[name] < 3:
+            return self.answer(200, {"id": name, "status": "in_progress"})
+        if SoraStandIn.forms[-1]["prompt"] == b"forbidden":
+            return self.answer(200, {"id": name, "status": "failed", "error": {"message": "it may not be shown"}})
+        self.answer(200, {"id": name, "status": "completed"})
+
+
+def test_sora(folder):
+    image, out, tasks = folder / "image.png", folder / "sora.mp4", folder / "sora_tasks"
+    SoraStandIn.video = (folder / "large.mp4").read_bytes()
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), SoraStandIn)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+
+    def sora(prompt, *more, **environment):
+        url = f"http://127.0.0.1:{server.server_port}"
+        return run("sora.py", "--image", image, "--prompt", prompt, "--out", out, "--url", url, "--poll", 0.05, "--tasks", tasks,
+                   *more, **{"OPENAI_API_KEY": "key", **environment})
+
+    check(sora("sits", OPENAI_API_KEY=""), 2, "OPENAI_API_KEY has to be in the environment")
+    check(sora("sits", "--dry-run"), 0, "POST", '"prompt": "sits"', '"size": "64x48"')
+    check(sora("sits", OPENAI_API_KEY="wrong"), 1, "answers 401", "no such key")
+    assert not SoraStandIn.forms
+    check(sora("sits"), 0)
+    assert size_of(out) == "64,48", size_of(out)
+    assert SoraStandIn.forms == [{"model": b"sora-2", "prompt": b"sits", "seconds": b"4", "size": b"64x48",
+                                  "input_reference": image.read_bytes()}], SoraStandIn.forms
+    check(sora("forbidden"), 1, "has failed: it may not be shown")
+    assert not list(tasks.iterdir())
+    server.shutdown()
+    server.server_close()
+
+
+def test_sam2(folder):
+    """The script's own code, from a film and two masks to folders of masks."""
+    try:
+        import numpy as np
+        from PIL import Image
+    except ImportError as missing:
+        print(f"SAM 2's script is not tried: there is no {missing.name}")
+        return
+    first, out = folder / "first", folder / "sam2"
+    first.mkdir()
+    for name, (left, top) in {"human": (4, 6), "can": (30, 20)}.items():
+        mask = np.zeros((24, 32), np.uint8)  # half as large as the film
+        mask[top // 2:top // 2 + 5, left // 2:left // 2 + 5] = 255
+        Image.fromarray(mask).save(first / f"{name}.png")
+    picture(folder / "film.mp4", "64x48", 4)
+    masks = ["--video", folder / "film.mp4", "--objects", "human,can", "--first", first, "--out", out, "--device", "cpu"]
+    stubs = pathlib.Path(__file__).resolve().parent / "stubs"
+    check(run("sam2_masks.py", *masks), 2, "module")
+    check(run("sam2_masks.py", *masks, PYTHONPATH=str(stubs)), 0)
+    for name, left in {"human": 4, "can": 30}.items():
+        assert sorted(path.name for path in (out / name).iterdir()) == [f"{frame:04d}.png" for frame in range(4)]
+        for frame in range(4):
+            seen = np.asarray(Image.open(out / name / f"{frame:04d}.png"))
+            assert seen.shape == (48, 64) and set(np.unique(seen)) == {0, 255}, (seen.shape, np.unique(seen))
+            columns = np.flatnonzero(seen.any(axis=0))
+            assert abs(columns[0] - left - frame) <= 1 and 9 <= len(columns) <= 11, (name, frame, columns)
+
+
 with tempfile.TemporaryDirectory() as temporary:
     test_programs()
     test_dry_runs(pathlib.Path(temporary))
@@ -319,4 +420,6 @@ with tempfile.TemporaryDirectory() as temporary:
     test_end(pathlib.Path(temporary))
     test_example(pathlib.Path(temporary))
     test_kling(pathlib.Path(temporary))
+    test_sora(pathlib.Path(temporary))
+    test_sam2(pathlib.Path(temporary))
 print("all hold")

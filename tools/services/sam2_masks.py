@@ -5,8 +5,8 @@
                 "--objects", "{objects}", "--first", "{first_masks}", "--out", "{out}"]
 
 To be run by the Python in which sam2 is installed. What of the human and of each object is seen in frame 0 is given to
-it as masks, which it follows through the video. Writes OUT/NAME/NNNN.png, 255 where NAME is seen. Its arguments are
-checked by a dry run only; the model itself was not run.
+it as masks, which it follows through the video. Writes OUT/NAME/NNNN.png, 255 where NAME is seen. Tried against a
+stand-in of the package only; the model itself was not run.
 """
 
 import pathlib
@@ -20,6 +20,38 @@ def jpeg_frames(video, folder):
     words, place = service.input_of(video)
     service.run(["ffmpeg", "-v", "error", *words, "-fps_mode", "passthrough", "-q:v", "2", "-start_number", "0",
                  pathlib.Path(folder).resolve() / "%05d.jpg"], place)
+
+
+def read_mask(path, width, height):
+    """Where a grey image of any size is at least 128, [height,width]."""
+    import numpy as np
+    from PIL import Image
+
+    return np.asarray(Image.open(path).convert("L").resize((width, height))) >= 128
+
+
+def write_mask(path, seen):
+    import numpy as np
+    from PIL import Image
+
+    Image.fromarray(seen.astype(np.uint8) * 255).save(path)
+
+
+def followed(predictor, folder, first):
+    """Where each name is seen, frame by frame.
+
+    @param folder  of the video's frames, as jpeg_frames writes them
+    @param first   the file of a mask in frame 0 by name
+    @return        (frame, name, [height,width]) of every frame and name
+    """
+    names = list(first)
+    state = predictor.init_state(folder)
+    for number, name in enumerate(names):
+        mask = read_mask(first[name], state["video_width"], state["video_height"])
+        predictor.add_new_mask(state, frame_idx=0, obj_id=number, mask=mask)
+    for frame, numbers, logits in predictor.propagate_in_video(state):
+        for number, logit in zip(numbers, logits):
+            yield frame, names[number], (logit[0] > 0).cpu().numpy()
 
 
 def main():
@@ -39,27 +71,20 @@ def main():
         print(f"{a.model} on {a.device}: follows {', '.join(names)} through {a.video} into {a.out}")
         return
     try:
-        import numpy as np
         import torch
-        from PIL import Image
         from sam2.sam2_video_predictor import SAM2VideoPredictor
     except ImportError as missing:
         service.fail(f"Python's module {missing.name} is not there; run this by the Python of SAM 2", service.ASKED_WRONGLY)
 
     files = service.frame_names(a.video)
+    for name in names:
+        (pathlib.Path(a.out) / name).mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         jpeg_frames(a.video, folder)
         predictor = SAM2VideoPredictor.from_pretrained(a.model, device=a.device)
         with torch.inference_mode(), torch.autocast(a.device, dtype=torch.bfloat16):
-            state = predictor.init_state(folder)
-            for number, name in enumerate(names):
-                (pathlib.Path(a.out) / name).mkdir(parents=True, exist_ok=True)
-                image = Image.open(first[name]).convert("L").resize((state["video_width"], state["video_height"]))
-                predictor.add_new_mask(state, frame_idx=0, obj_id=number, mask=np.asarray(image) >= 128)
-            for frame, numbers, logits in predictor.propagate_in_video(state):
-                for number, logit in zip(numbers, logits):
-                    seen = (logit[0] > 0).cpu().numpy().astype(np.uint8) * 255
-                    Image.fromarray(seen).save(pathlib.Path(a.out) / names[number] / files[frame])
+            for frame, name, seen in followed(predictor, folder, first):
+                write_mask(pathlib.Path(a.out) / name / files[frame], seen)
 
 
 if __name__ == "__main__":

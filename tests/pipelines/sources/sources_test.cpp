@@ -148,11 +148,11 @@ TEST_CASE("commands that cannot work are told with their places") {
     CHECK(told ==
           Names{"/data/masks: given, and /sources/masks makes it too; remove one",
                 "/sources/masks/command/1: there is no placeholder {first_frame}; known here: {video}, {objects}, "
-                "{first_masks}, {prompt}, {out}; {{first_frame}} is that text",
+                "{first_masks}, {prompt}, {seed}, {out}; {{first_frame}} is that text",
                 "/sources/prompt: not given; /sources/video/command has {prompt}",
                 "/sources/video/command/0: there is no program \"no_such_program\" that can be executed in PATH",
                 "/sources/video/command/2: there is no placeholder {first_fram}; known here: {first_frame}, "
-                "{prompt}, {out}; did you mean \"first_frame\"?; {{first_fram}} is that text",
+                "{prompt}, {seed}, {out}; did you mean \"first_frame\"?; {{first_fram}} is that text",
                 "/sources/video/command: {out} is missing: the program has to be told where to write"});
   }
   CHECK(made().empty());
@@ -180,7 +180,7 @@ TEST_CASE("the shipped templates lack nothing but data and installations") {
                                       descriptions_of(loss_terms()), ConfigUse::kStages),
                       Contains("there is no program \"no_such\" that can be executed in PATH"));
   }
-  CHECK(count == 3);
+  CHECK(count == 4);
 }
 
 TEST_CASE("the first frame is what the state of frame 0 looks like") {
@@ -257,6 +257,21 @@ TEST_CASE("a run makes its video and masks by programs, once for what they are m
   CHECK(Workshop::run("lost").status == 0);
   CHECK(lines_of("mask.txt").size() == 2);
   CHECK(temporaries_in("generated").empty());
+}
+
+TEST_CASE("a command with {seed} makes a video a seed", "[run]") {
+  Workshop workshop;
+  workshop.config["sources"]["video"]["command"] = {"./film", "{first_frame}", "seed {seed}", "{out}"};
+  workshop.write();
+  for (const auto& [out, seed] : {std::pair{"a", "5"}, {"b", "7"}, {"c", "5"}}) {
+    const ProgramResult result = Workshop::run(out, {"--seed", seed});
+    INFO(result.err);
+    CHECK(result.status == 0);
+  }
+  CHECK(lines_of("film.txt") == Names{"seed 5", "seed 7"});
+  CHECK(lines_of("mask.txt").size() == 1);  // the frames are the same
+  const Names all = made();
+  CHECK(std::count(all.begin(), all.end(), "video-KEY.json") == 2);
 }
 
 TEST_CASE("what was made before is held to what is asked for now", "[run]") {
