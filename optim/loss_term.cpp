@@ -19,6 +19,8 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(joints) && motion;
     case LossInput::kObjectMotion:
       return object_points && motion && !motion->objects.empty();
+    case LossInput::kBodyVertices:
+      return motion && motion->mesh != nullptr;
     case LossInput::kDepths:
       return given(depth_moments) && given(transmittance) && given(depth_target);
     case LossInput::kGaussians:

@@ -58,7 +58,8 @@ struct LossInputs {
   Var<S> joints;          ///< [F,66] places of joints 0 to 21, metres, world, a frame a row
   Var<S> joints_start;    ///< [F,66] what they were when the stage began
   std::shared_ptr<const MotionStart> motion;  ///< what was where when the stage began; null: not given
-  /// Record places of some of the human's and the objects' Gaussians, [P,3] metres, world, in frames that move.
+  /// Record places of some points of the human, all of one set, and of some of the objects' Gaussians, [P,3] metres,
+  /// world, in frames that move.
   std::function<Var<S>(const std::vector<BodyPoint>& points)> body_points;
   std::function<Var<S>(const std::vector<ObjectPoint>& points)> object_points;
 

@@ -5,6 +5,7 @@
 
 #include "body/body_model.h"
 #include "body/pose_layout.h"
+#include "core/check.h"
 
 namespace hsi4d {
 
@@ -16,10 +17,17 @@ Vector3<double> mean_at(const std::vector<float>& means, Index row) {
 
 }  // namespace
 
+RestPoints MotionStart::rest_points(BodySet of) const {
+  if (of == BodySet::kGaussians) return {&avatar->means, &avatar->weights};
+  HSI4D_CHECK(mesh != nullptr, "vertices of a body that is not known");
+  return {&mesh->vertices, &mesh->weights};
+}
+
 Vector3<double> MotionStart::place(const BodyPoint& point) const {
-  const SparseWeights& weights = avatar->weights;
+  const RestPoints points = rest_points(point.of);
+  const SparseWeights& weights = *points.weights;
   const PosedJoints& posed = body_in(point.frame);
-  const Vector3<double> rest = mean_at(avatar->means, point.row);
+  const Vector3<double> rest = mean_at(*points.places, point.row);
   Vector3<double> place = Vector3<double>::Zero();
   for (Index k = 0; k < weights.per_vertex; ++k) {
     const auto at = static_cast<std::size_t>(point.row * weights.per_vertex + k);
@@ -50,8 +58,7 @@ bool is_foot_joint(Index joint) {
   return std::find(feet.begin(), feet.end(), joint) != feet.end();
 }
 
-std::vector<Index> rows_of_joints(const Avatar& avatar, bool (*is_part)(Index joint)) {
-  const SparseWeights& weights = avatar.weights;
+std::vector<Index> rows_of_joints(const SparseWeights& weights, bool (*is_part)(Index joint)) {
   std::vector<Index> rows;
   for (Index v = 0; v < weights.vertices; ++v) {
     const auto first = weights.weights.begin() + v * weights.per_vertex;

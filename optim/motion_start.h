@@ -13,9 +13,19 @@ namespace hsi4d {
 /// In place of a frame: the clip's first, which may be long before those that a stage sees.
 inline constexpr Index kFirstFrame = -1;
 
-/// A Gaussian of the human in a frame.
+/// The points of a human: the avatar's Gaussians, or the vertices of the body that it was made on.
+enum class BodySet { kGaussians, kVertices };
+
+/// A point of the human in a frame.
 struct BodyPoint {
   Index frame = 0, row = 0;
+  BodySet of = BodySet::kGaussians;
+};
+
+/// Points at rest, and the joints that they follow.
+struct RestPoints {
+  const std::vector<float>* places = nullptr;  ///< [N,3] metres
+  const SparseWeights* weights = nullptr;
 };
 
 /// A Gaussian of an object in a frame.
@@ -26,6 +36,8 @@ struct ObjectPoint {
 /// F frames: the first `still_frames` are behind the stage and stay as they are, the others move.
 struct MotionStart {
   const Avatar* avatar = nullptr;
+  const BodyModel* mesh =
+      nullptr;  ///< the body that the avatar was made on, with its joints; null: not known, or not asked for
   std::vector<const Gaussians*> objects;                          ///< relative to their centroids
   const Gaussians* scene = nullptr;                               ///< null: none is known
   Vector3<double> first_camera_center = Vector3<double>::Zero();  ///< of the clip's first frame, metres, world
@@ -41,7 +53,9 @@ struct MotionStart {
   const PosedJoints& body_in(Index frame) const {
     return frame == kFirstFrame ? first_body : body[static_cast<std::size_t>(frame)];
   }
-  /// Where the Gaussian's centre was, metres, world.
+  /// Throws InternalError for vertices of a body that is not there.
+  RestPoints rest_points(BodySet of) const;
+  /// Where the point was, metres, world: a Gaussian's centre, or a vertex.
   Vector3<double> place(const BodyPoint& point) const;
   Vector3<double> place(const ObjectPoint& point) const;
 };
@@ -50,8 +64,8 @@ struct MotionStart {
 bool is_hand_joint(Index joint);
 bool is_foot_joint(Index joint);
 
-/// Gaussians whose largest weight (of equal ones the first) is that of such a joint, ascending: a part of the human
-/// on any mesh.   [method.md, stage 3: hand vertices]
-std::vector<Index> rows_of_joints(const Avatar& avatar, bool (*is_part)(Index joint));
+/// Points whose largest weight (of equal ones the first) is that of such a joint, ascending: a part of the human on any
+/// mesh.   [method.md, stage 3: hand vertices]
+std::vector<Index> rows_of_joints(const SparseWeights& weights, bool (*is_part)(Index joint));
 
 }  // namespace hsi4d

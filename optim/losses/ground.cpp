@@ -51,7 +51,7 @@ LossTerm ground_loss() {
                      [](const auto& in, const GroundSettings& settings) {
                        using Value = decltype(in.joints);
                        const MotionStart& motion = *in.motion;
-                       const std::vector<Index> feet = rows_of_joints(*motion.avatar, is_foot_joint);
+                       const std::vector<Index> feet = rows_of_joints(motion.avatar->weights, is_foot_joint);
                        if (feet.empty()) return Value{};
                        const Index count = std::min(settings.points, std::ssize(feet));
                        std::vector<BodyPoint> points;

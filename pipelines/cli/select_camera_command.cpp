@@ -50,12 +50,14 @@ void check_camera_inputs(const DataSettings& data) {
 }
 
 std::string table_of(const CameraChoice& choice) {
-  Table table{.head = {"VISIBLE", "COVERED [%]", "RADIUS [m]", "AZIMUTH [°]", "ELEVATION [°]"}};
+  const bool has_cover = choice.candidates.front().cover.has_value();
+  Table table{.head = {"VISIBLE", "RADIUS [m]", "AZIMUTH [°]", "ELEVATION [°]"}};
+  if (has_cover) table.head.emplace_back("COVERED [%]");
   for (std::size_t i = 0; i < std::min(kMostTold, choice.candidates.size()); ++i) {
     const CandidateView& view = choice.candidates[i];
-    table.rows.push_back({std::to_string(view.visible) + " of 22",
-                          view.cover ? fixed_number(100 * *view.cover, 0) : "-", rounded(view.radius_m, 4),
+    table.rows.push_back({std::to_string(view.visible) + " of 22", rounded(view.radius_m, 4),
                           rounded(view.azimuth_deg, 4), rounded(view.elevation_deg, 4)});
+    if (has_cover) table.rows.back().push_back(view.cover ? fixed_number(100 * *view.cover, 0) : "-");
   }
   const std::size_t others = choice.candidates.size() - std::min(kMostTold, choice.candidates.size());
   return table_text(table) + (others > 0 ? "and " + std::to_string(others) + " more candidates\n" : "");

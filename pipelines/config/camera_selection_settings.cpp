@@ -15,6 +15,10 @@ void describe(ConfigFields& f, CameraSelectionSettings& s) {
            "Height of that point above the pelvis, metres");
   f.number("tolerance_m", s.tolerance_m, {.above = 0, .max = 10},
            "A joint is visible if the depth of everything is within this of the human's, metres");
+  f.boolean(
+      "by_cover", s.by_cover,
+      "Of views with as many visible joints, take one whose image is covered most, in steps of 5 %; else, as in the "
+      "paper, the nearest to the horizon");
 }
 
 }  // namespace hsi4d

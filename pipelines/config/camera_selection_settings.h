@@ -15,6 +15,7 @@ struct CameraSelectionSettings {
   double frontal_deg = 20;  ///< views nearer to the human's heading than this are left out
   double above_pelvis_m = 0.1;
   double tolerance_m = 0.05;
+  bool by_cover = false;  ///< of views with as many joints, those whose image is covered most come first
   // Not for configs:
   int azimuths = 24;  ///< around a whole circle, of which those that face the human are tried
   std::vector<double> elevations_deg = {0, 15, 30};

@@ -13,7 +13,7 @@ struct RemovedKey {
   const char* instead;  ///< what replaces it
 };
 
-constexpr std::array<RemovedKey, 12> kRemovedKeys = {{
+constexpr auto kRemovedKeys = std::to_array<RemovedKey>({
     {"/approx/camera_pixel_share", "0.1.0", "1", "every pixel counts; approx.longest_side_px reduces images"},
     {"/approx/collapse_suffix", "0.1.0", "false", "skip.static_layer leaves out what costs most, and is exact"},
     {"/camera_selection/at_objects", "0.1.0", "true", "candidates look between the human and what it faces"},
@@ -22,11 +22,10 @@ constexpr std::array<RemovedKey, 12> kRemovedKeys = {{
     {"/camera_selection/trial_px", "0.1.0", "256", "joints are counted in images of 256 px"},
     {"/color_net/pose_gradient", "0.1.0", "true", "colours have a gradient in the pose"},
     {"/stages/*/longest_side_px", "0.1.0", "0", "approx.longest_side_px reduces the images of all stages"},
-    {"/stages/*/losses/center/unit", "0.1.0", "\"pixels\"", "distances are in pixels, and weight scales them"},
     {"/stages/*/losses/penetration/memory_mib", "0.1.0", "256", "at most 256 MiB are taken; a larger cell takes less"},
     {"/stages/*/optimizer/products", "0.1.0", "10", "gauss_newton, which had it, lost to adam and bfgs"},
     {"/stages/*/plateau", "0.1.0", "{\"iterations\": 0, \"gain\": 0.01}", "a stage ends after its iterations"},
-}};
+});
 
 /// A pointer as the table has it: names of stages as *, the one stage of an avatar's fit too.
 std::string general(const std::string& pointer) {

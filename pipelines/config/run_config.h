@@ -42,7 +42,7 @@ inline constexpr std::array<ConfigChoice<RotationParameters>, 2> kRotationParame
 
 /// How cameras are optimised.
 struct CameraSettings {
-  CameraIncrement increment = CameraIncrement::kCamera;
+  CameraIncrement increment = CameraIncrement::kScene;
 };
 
 /// What is not computed because the result does not need it: config section `skip`.

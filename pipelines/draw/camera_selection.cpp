@@ -177,7 +177,7 @@ CameraChoice select_camera(const SceneSetup& setup, const CameraSelectionSetting
       })->visible;
   for (CandidateView& candidate : choice.candidates) {
     if (observer.wants_stop()) throw Interrupted("interrupted while cameras were tried; nothing is written");
-    if (candidate.visible < most) continue;
+    if (!settings.by_cover || candidate.visible < most) continue;
     choice.camera.camera_from_world = candidate.camera_from_world;
     candidate.cover = cover_of(frame, choice.camera, settings, render);
   }

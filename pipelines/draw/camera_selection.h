@@ -22,7 +22,7 @@ struct CandidateView {
   double radius_m = 0, azimuth_deg = 0, elevation_deg = 0;  ///< about the centre; azimuth from the human's heading
   Rigid<double> camera_from_world;
   Index visible = 0;  ///< of the first 22 joints
-  /// Mean opacity of the image; measured of those with the most visible joints alone.
+  /// Mean opacity of the image; measured with by_cover alone, of those with the most visible joints.
   std::optional<double> cover = {};
 };
 
@@ -50,8 +50,9 @@ std::vector<CandidateView> candidate_views(const SceneSetup& setup, const Camera
 Index count_visible(const SceneSetup& setup, const Camera& camera, const CameraSelectionSettings& settings,
                     const RenderSettings& render);
 
-/// Tries all candidates. The best one has the most visible joints; of equals it is one whose image is covered most, in
-/// steps of kCoverStep; of these it is the nearest to the horizon, and of these the first.
+/// Tries all candidates. The best one has the most visible joints; of equals it is, with by_cover, one whose image is
+/// covered most, in steps of kCoverStep; of these it is the nearest to the horizon, and of these the first.
+/// [paper, C.3, without by_cover]
 ///
 /// @param intrinsics  whose size and focal lengths the camera has; none: those of the settings
 /// Throws UserError when no joint is visible from anywhere, Interrupted when asked to stop.

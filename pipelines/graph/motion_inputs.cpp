@@ -20,6 +20,7 @@ std::shared_ptr<const MotionStart> start_of(const Clip& clip, const SceneState& 
                                             const std::vector<SceneState>& frames, Index moving) {
   auto start = std::make_shared<MotionStart>();
   start->avatar = &clip.avatar;
+  start->mesh = clip.body ? &*clip.body : nullptr;
   for (const ClipObject& object : clip.objects) start->objects.push_back(&object.gaussians);
   start->scene = &clip.scene;
   start->first_camera_center = inverse(first.camera_from_world).translation;
@@ -91,17 +92,19 @@ Index moving_frame(const MotionStart& motion, Index frame) {
 
 template <class S>
 Var<S> record_body_points(Var<S> transforms, const MotionStart& motion, const std::vector<BodyPoint>& points) {
-  const SparseWeights& all = motion.avatar->weights;
+  const RestPoints rest = motion.rest_points(points.front().of);
+  const SparseWeights& all = *rest.weights;
   FollowingPoints<S> chosen;
   chosen.weights.per_vertex = all.per_vertex;
   for (const BodyPoint& point : points) {
+    HSI4D_CHECK(point.of == points.front().of, "points of Gaussians and of vertices at once");
     const Index first_joint = moving_frame(motion, point.frame) * all.joints;
     for (Index k = 0; k < all.per_vertex; ++k) {
       const auto at = static_cast<std::size_t>(point.row * all.per_vertex + k);
       chosen.weights.indices.push_back(static_cast<std::int32_t>(first_joint + all.indices[at]));
       chosen.weights.weights.push_back(all.weights[at]);
     }
-    chosen.add_rest(motion.avatar->means, point.row);
+    chosen.add_rest(*rest.places, point.row);
   }
   return chosen.record(transforms);
 }

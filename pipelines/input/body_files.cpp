@@ -1,6 +1,7 @@
 #include "pipelines/input/body_files.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "body/motion_edit.h"
@@ -12,6 +13,12 @@
 #include "core/text.h"
 
 namespace hsi4d {
+
+namespace {
+
+constexpr double kSameJoints = 0.01;  // metres that joints of the same body may be apart
+
+}  // namespace
 
 void warn_of_repairs(const SmplxModel& model) {
   if (model.rescaled_weights == 0) return;
@@ -86,6 +93,16 @@ BodyModel rest_body(const BodySettings& settings) {
   std::vector<double> betas = settings.shape;
   betas.resize(static_cast<std::size_t>(settings.betas));
   return rest_body(body_model_of(settings), betas);
+}
+
+std::string difference_from(const BodyModel& body, const Avatar& avatar) {
+  if (!avatar.body.empty() && avatar.body != body.name)
+    return "the avatar is of the body \"" + avatar.body + "\", and `body` says \"" + body.name + "\"";
+  double largest = 0;
+  for (std::size_t i = 0; i < body.joints.size(); ++i)
+    largest = std::max(largest, std::fabs(body.joints[i] - avatar.joints[i]));
+  if (largest <= kSameJoints) return "";
+  return "joints of the avatar are " + rounded(100 * largest, 2) + " cm from those of `body`: of another shape";
 }
 
 }  // namespace hsi4d

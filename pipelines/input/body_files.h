@@ -32,6 +32,10 @@ SmplxModel body_model_of(const BodySettings& settings);
 /// The body in its rest pose and its shape, whatever its kind. Throws as body_model_of.
 BodyModel rest_body(const BodySettings& settings);
 
+/// Why a body is not the one that the avatar was made on, in words: another name, or joints elsewhere; empty where it
+/// is.
+std::string difference_from(const BodyModel& body, const Avatar& avatar);
+
 /// Reads a body model with as many directions of shape as a motion has numbers for, as far as the file has them: the
 /// first `betas` numbers are those of the model that is returned. Tells what is repaired or left out. Throws as
 /// read_smplx.

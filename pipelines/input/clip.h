@@ -34,6 +34,7 @@ struct Clip {
   Gaussians scene;
   std::vector<ClipObject> objects;
   Avatar avatar;
+  std::optional<BodyModel> body;                         ///< that the avatar was made on, where a loss asks for it
   Camera camera;                                         ///< of frame 0; size and intrinsics of all frames
   SceneState first;                                      ///< state of frame 0, given; poses are of the avatar's body
   std::vector<BodyPose> estimate;                        ///< estimated poses by frame; empty: none

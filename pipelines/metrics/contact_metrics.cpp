@@ -58,7 +58,7 @@ std::vector<MetricValues> contact_by_frame(const Avatar& avatar, const std::vect
   std::vector<MetricValues> by_frame(states.size());
   if (objects.empty()) return by_frame;
   const ObjectCentres centres(objects);
-  const std::vector<Index> hands = rows_of_joints(avatar, is_hand_joint);
+  const std::vector<Index> hands = rows_of_joints(avatar.weights, is_hand_joint);
   for (std::size_t t = 0; t < states.size(); ++t) {
     MotionStart motion;
     motion.avatar = &avatar;

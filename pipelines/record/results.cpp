@@ -20,21 +20,9 @@ namespace hsi4d {
 
 namespace {
 
-constexpr double kSameJoints = 0.01;  // metres that joints of the same body may be apart
 constexpr std::array<double, 8> kOtherSides = {45, -45, 30, -30, 60, -60, 20, -20};  // degrees
 constexpr double kFreeView = 0.1;                                                    // metres around the line of sight
 constexpr int kPanelWidth = 480;                                                     // pixels, at most
-
-/// Why the body is not the one that the avatar was made on; empty where it is.
-std::string difference_of(const BodyModel& body, const Avatar& avatar) {
-  if (!avatar.body.empty() && avatar.body != body.name)
-    return "the avatar is of the body \"" + avatar.body + "\", and `body` says \"" + body.name + "\"";
-  double largest = 0;
-  for (std::size_t i = 0; i < body.joints.size(); ++i)
-    largest = std::max(largest, std::fabs(body.joints[i] - avatar.joints[i]));
-  if (largest <= kSameJoints) return "";
-  return "joints of the avatar are " + rounded(100 * largest, 2) + " cm from those of `body`: of another shape";
-}
 
 /// How many Gaussians of the scene are in the way between a camera and what it looks at.
 Index count_between(const Gaussians& scene, const Vector3<double>& eye, const Vector3<double>& target) {
@@ -171,7 +159,7 @@ std::optional<BodyModel> write_body(const RunPaths& paths, const BodySettings& s
   std::optional<BodyModel> body;
   try {
     body = rest_body(settings);
-    const std::string difference = difference_of(*body, avatar);
+    const std::string difference = difference_from(*body, avatar);
     if (difference.empty()) {
       write_glb(paths.body(), *body, motion);
     } else {

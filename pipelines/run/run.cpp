@@ -114,6 +114,17 @@ void set_image_size(Clip& clip, const RunConfig& config) {
   if (config.approx.longest_side_px > 0) clip.camera = reduced_camera(clip.camera, config.approx.longest_side_px);
 }
 
+namespace {
+
+bool some_loss_needs(const RunConfig& config, LossInput input) {
+  return std::any_of(config.stages.begin(), config.stages.end(), [input](const auto& stage) {
+    return std::any_of(stage.second.losses.begin(), stage.second.losses.end(),
+                       [input](const auto& loss) { return needs_input(loss.second, input); });
+  });
+}
+
+}  // namespace
+
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
   Clip clip = read_clip(config.data);
   warn_of_antialiasing(clip.antialiased, config.render.antialias);
@@ -121,6 +132,10 @@ Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses)
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});
   if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});
+  if (some_loss_needs(config, LossInput::kBodyVertices)) {
+    BodyModel body = rest_body(config.body);
+    if (difference_from(body, clip.avatar).empty()) clip.body = std::move(body);
+  }
   return clip;
 }
 

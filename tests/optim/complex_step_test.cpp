@@ -86,7 +86,8 @@ Complex steps_between(const Complexes& joints, std::size_t from, std::size_t to)
 
 constexpr Index kMoving = kFrames - kStill;
 
-std::size_t body_row(Index frame, Index row) { return static_cast<std::size_t>((frame - kStill) * kBodyRows + row); }
+/// The row of a Gaussian or vertex of the human, of which there are more.
+std::size_t body_row(Index frame, Index row) { return static_cast<std::size_t>((frame - kStill) * kVertexRows + row); }
 std::size_t object_row(const ObjectPoint& p) {
   return static_cast<std::size_t>(((p.frame - kStill) * 2 + p.object) * kObjectRows + p.row);
 }
@@ -109,7 +110,7 @@ std::function<V(const std::vector<ObjectPoint>&)> object_points_of(V places) {
   };
 }
 
-const OperatorInput kBodyPlaces = {"body_places", shape_of(kMoving* kBodyRows, 3)};
+const OperatorInput kBodyPlaces = {"body_places", shape_of(kMoving* kVertexRows, 3)};
 
 /// Trilinear between the nodes of a grid, where the numbers are floats; nothing where one is not known.
 /// @param distance  of a place, metres
@@ -214,6 +215,34 @@ TEST_CASE("loss terms of objects have the gradients of complex steps") {
         return Complexes{sum / static_cast<double>(kObjects)};
       },
       {.loss = "center"});
+  // What a pixel of the 7 x 5 is, along x and y.
+  for (const auto& [unit, pixel] : {std::pair{"pixels", std::array{1.0, 1.0}},
+                                    {"widths", std::array{1.0 / kWidth, 1.0 / kWidth}},
+                                    {"ndc", std::array{2.0 / kWidth, 2.0 / kHeight}}}) {
+    for (const bool is_l1 : {false, true}) {
+      const std::string settings =
+          std::string(R"({"unit": ")") + unit + R"(", "norm": ")" + (is_l1 ? "l1" : "squared") + R"("})";
+      check_complex_step(
+          {image("object_opacity", kObjects),
+           {"object_center_target", shape_of(kObjects, 3), 0, 0, {4.5, 2, 1, 1.25, 3.5, 1, 0, 0, 0}}},
+          [&](const Vars& in) {
+            Inputs given;
+            given.object_opacity = in[0], given.object_center_target = in[1];
+            return record_term("center", given, settings);
+          },
+          [&, size = pixel](const ComplexInputs& in) {
+            Complex sum = 0;
+            for (std::size_t o = 0; o + 1 < kObjects; ++o) {
+              const auto [x, y] = centre_of(plane_of(in[0], o));
+              const Complex right = size[0] * (x - in[1][3 * o]), down = size[1] * (y - in[1][3 * o + 1]);
+              const auto length = [](Complex z) { return z.real() < 0 ? -z : z; };
+              sum += is_l1 ? length(right) + length(down) : square(right) + square(down);
+            }
+            return Complexes{sum / static_cast<double>(kObjects)};
+          },
+          {.loss = "center"});
+    }
+  }
   check_loss(
       "depth", {{"object_depth", shape_of(3, 1), 1, 3}, {"object_depth_target", shape_of(3, 1), 1, 3}},
       [](Inputs& given, const Vars& in) { given.object_depth = in[0], given.object_depth_target = in[1]; },
@@ -232,14 +261,14 @@ TEST_CASE("loss terms of objects have the gradients of complex steps") {
         for (Index t = kStill; t < kFrames; ++t) {
           Complex sum = 0;
           double pairs = 0;
-          for (Index row = 0; row < kBodyRows; ++row) {
+          for (Index row = 0; row < kVertexRows; ++row) {
             if (!is_hand_joint(row % kSmplxJoints)) continue;
             ObjectPoint nearest;
             double least = 0.05;
             for (const Index object : {0, 1}) {
               for (Index r = 0; r < kObjectRows; ++r) {
                 const ObjectPoint p{t, object, r};
-                const double distance = (motion.place(p) - motion.place(BodyPoint{t, row})).norm();
+                const double distance = (motion.place(p) - motion.place(BodyPoint{t, row, BodySet::kVertices})).norm();
                 if (distance < least) least = distance, nearest = p;
               }
             }
@@ -310,7 +339,8 @@ TEST_CASE("loss terms of joints have the gradients of complex steps") {
       "ground", {joints[0], kBodyPlaces},
       [](Inputs& given, const Vars& in) { given.joints = in[0], given.body_points = points_of(in[1]); },
       [](const ComplexInputs& in) {
-        const std::vector<Index> feet = rows_of_joints(motion_of_test().avatar, is_foot_joint);  // fewer than count
+        const std::vector<Index> feet =
+            rows_of_joints(motion_of_test().avatar.weights, is_foot_joint);  // fewer than count
         Complex sum = 0;
         for (Index t = kStill; t < kFrames; ++t) {
           Complex rise = 0;
@@ -423,11 +453,12 @@ TEST_CASE("distances have the gradients of complex steps") {
       [&floor](const ComplexInputs& in) {
         Complex sum = 0;
         for (std::size_t n = 0; n < in[1].size() / 3; ++n) {
+          if (static_cast<Index>(n) % kVertexRows >= kBodyRows) continue;  // no Gaussian
           const auto at = [&floor](const Vector3<double>& place) { return floor.at(place); };
           const Complex distance = trilinear(at, 0.02, &in[1][3 * n]);
           if (distance.real() < 0) sum += square(distance);
         }
-        return sum / static_cast<double>(in[1].size() / 3);
+        return sum / static_cast<double>(kMoving * kBodyRows);
       });
 }
 

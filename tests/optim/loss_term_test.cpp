@@ -48,7 +48,7 @@ std::vector<OperatorInput> all_inputs() {
           {"object_masks", image_shape<double>(kObjects, kHeight, kWidth), 0, 1},
           {"joints", shape_of(kFrames, 66)},
           {"joints_start", shape_of(kFrames, 66)},
-          {"body_places", shape_of((kFrames - kStill) * kBodyRows, 3)},
+          {"body_places", shape_of((kFrames - kStill) * kVertexRows, 3)},
           {"object_places", shape_of((kFrames - kStill) * 2 * kObjectRows, 3)},
           {"human_seen", kScalarShape, 0, 0, {1}},
           {"object_seen", {kObjects, 1, 1, 1}, 0, 0, {1, 1, 0}},
@@ -86,7 +86,7 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;
     for (const BodyPoint& p : points)
-      rows.push_back(static_cast<std::uint32_t>((p.frame - kStill) * kBodyRows + p.row));
+      rows.push_back(static_cast<std::uint32_t>((p.frame - kStill) * kVertexRows + p.row));
     return gather_rows(places, rows);
   };
   inputs.object_points = [places = in[14]](const std::vector<ObjectPoint>& points) {
@@ -170,7 +170,7 @@ TEST_CASE("a registered loss term says whether it needs the body or objects") {
                          [&some](LossInput need) { return std::find(some.begin(), some.end(), need) != some.end(); });
     };
     CHECK((term.record(no_body).tape == nullptr) ==
-          needs_one_of({LossInput::kPose, LossInput::kMotion, LossInput::kObjectMotion}));
+          needs_one_of({LossInput::kPose, LossInput::kMotion, LossInput::kObjectMotion, LossInput::kBodyVertices}));
     CHECK((term.record(no_objects).tape == nullptr) ==
           needs_one_of({LossInput::kObjectDepth, LossInput::kObjectOpacity}));
   }

@@ -9,13 +9,14 @@
 
 namespace hsi4d::test {
 
-/// Frames, of which the first stand; Gaussians of the body and of each object.
-inline constexpr Index kFrames = 5, kStill = 2, kBodyRows = 60, kObjectRows = 30;
+/// Frames, of which the first stand; Gaussians of the human and of each object; vertices of its body.
+inline constexpr Index kFrames = 5, kStill = 2, kBodyRows = 60, kObjectRows = 30, kVertexRows = 110;
 
-/// A human of a few Gaussians, each on one joint (every joint has one at least), and two objects: the first is at its
-/// right hand.
+/// A human of a few Gaussians, each on one joint (every joint has one at least), on a body of which each vertex follows
+/// two, and two objects: the first is at its right hand.
 struct MotionOfTest {
   Avatar avatar;
+  BodyModel body;
   std::array<Gaussians, 2> objects;
   Gaussians scene;  // a floor
   MotionStart start;
@@ -31,6 +32,14 @@ struct MotionOfTest {
       weights.weights.push_back(1);
       for (int i = 0; i < 3; ++i) avatar.means.push_back(static_cast<float>(random.uniform(-0.04, 0.04)));
     }
+    body.weights = {.vertices = kVertexRows, .joints = kSmplxJoints, .per_vertex = 2, .indices = {}, .weights = {}};
+    RandomSequence of_vertices(6);
+    for (Index v = 0; v < kVertexRows; ++v) {
+      for (const Index joint : {v % kSmplxJoints, (v + 1) % kSmplxJoints})
+        body.weights.indices.push_back(static_cast<std::int32_t>(joint));
+      for (const double weight : {0.75, 0.25}) body.weights.weights.push_back(weight);
+      for (int i = 0; i < 3; ++i) body.vertices.push_back(static_cast<float>(of_vertices.uniform(-0.04, 0.04)));
+    }
     for (std::size_t o = 0; o < objects.size(); ++o) {
       objects[o].opacity_logits.resize(kObjectRows);
       for (Index i = 0; i < 3 * kObjectRows; ++i)
@@ -41,6 +50,7 @@ struct MotionOfTest {
     start.scene = &scene;
     start.first_camera_center = {0, 0, 1.5};
     start.avatar = &avatar;
+    start.mesh = &body;
     start.still_frames = kStill;
     for (Index t = 0; t < kFrames; ++t) {
       start.body.push_back(shifted(0.01 * static_cast<double>(t)));

@@ -114,14 +114,16 @@ TEST_CASE("object_smooth is the mean square of the differences of what lies furt
 
 TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain search") {
   const MotionOfTest& test = motion_of_test();
+  const bool of_vertices = GENERATE(false, true);
+  const BodySet of = of_vertices ? BodySet::kVertices : BodySet::kGaussians;
   for (const double distance : {0.02, 0.03, 10.0}) {
     double expected = 0;
     for (Index t = kStill; t < kFrames; ++t) {
       double sum = 0;
       Index pairs = 0;
-      for (Index row = 0; row < kBodyRows; ++row) {
+      for (Index row = 0; row < (of_vertices ? kVertexRows : kBodyRows); ++row) {
         if (!is_hand_joint(row % kSmplxJoints)) continue;
-        const Vector3<double> hand = test.start.place(BodyPoint{t, row});
+        const Vector3<double> hand = test.start.place(BodyPoint{t, row, of});
         double least = distance;
         for (Index o = 0; o < 2; ++o) {
           for (Index g = 0; g < kObjectRows; ++g)
@@ -134,8 +136,10 @@ TEST_CASE("contact pairs hands with the nearest Gaussian of an object, by plain 
       if (pairs > 0) expected += sum / static_cast<double>(pairs) / static_cast<double>(kFrames - kStill);
     }
     CHECK(expected > 0);
-    const double loss = motion_loss("contact", R"({"distance": )" + std::to_string(distance) + "}", no_joint,
-                                    [&](const BodyPoint& p) { return test.start.place(p); });
+    const std::string settings = std::string(R"({"points": ")") + (of_vertices ? "vertices" : "gaussians") +
+                                 R"(", "distance": )" + std::to_string(distance) + "}";
+    const double loss =
+        motion_loss("contact", settings, no_joint, [&](const BodyPoint& p) { return test.start.place(p); });
     CHECK(loss == Approx(expected).epsilon(1e-12));
   }
 }
@@ -205,6 +209,15 @@ TEST_CASE("contact is zero where no hand is near an object, and tells in how man
         std::pair<std::string, bool>{"hands are within 0.05 m of an object's Gaussian in 2 of 3 frames", false});
   CHECK(note(apart.start, R"({"distance": 1e-9})") ==
         std::pair<std::string, bool>{"no hand is within 1e-09 m of an object's Gaussian in any of 3 frames", true});
+  // An avatar of another body: its Gaussians stand for the vertices, which is told.
+  MotionOfTest without;
+  without.start.mesh = nullptr;
+  CHECK(note(without.start, R"({"distance": 1e-9})").first ==
+        "no hand is within 1e-09 m of an object's Gaussian in any of 3 frames; hands are the avatar's Gaussians, as it "
+        "is "
+        "of another body than `body`");
+  const auto place = [&](const BodyPoint& p) { return without.start.place(p); };
+  CHECK(motion_loss("contact", R"({"points": "gaussians"})", no_joint, place) > 0);
 }
 
 TEST_CASE("ground is the squared change of the height of the lowest points of the feet") {

@@ -163,8 +163,9 @@ TEST_CASE("a removed key is refused with what stands in its place, unless it say
   CHECK_THAT(fault(stage(R"("iterations": 3, "plateau": {"iterations": 5, "gain": 0.01})")), Contains(plateau));
   CHECK_THAT(fault(stage(R"("iterations": 3)"), {"stages.camera.plateau.gain=0.5"}),
              Contains("--set stages.camera.plateau.gain=0.5: " + plateau));
-  CHECK_THAT(fault(stage(R"("iterations": 3, "losses": {"center": {"unit": "width"}})")),
-             Contains("/stages/camera/losses/center/unit: no setting since 0.1.0: distances are in pixels"));
+  CHECK_THAT(
+      fault(stage(R"("iterations": 3, "losses": {"penetration": {"memory_mib": 9}})")),
+      Contains("/stages/camera/losses/penetration/memory_mib: no setting since 0.1.0: at most 256 MiB are taken"));
   CHECK_THAT(fault(R"({"camera_selection": {"elevations_deg": [5]}})"),
              Equals("a.json:1: /camera_selection/elevations_deg: no setting since 0.1.0: 0, 15 and 30 degrees above "
                     "the horizon are tried"));

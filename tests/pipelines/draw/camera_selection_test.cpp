@@ -115,11 +115,13 @@ TEST_CASE("joints behind a wall are not counted, and the view with most of them 
   }
 }
 
-TEST_CASE("of views with as many joints one is taken whose image is covered") {
+TEST_CASE("of views with as many joints one is taken whose image is covered, where that is asked for") {
   SceneSetup setup = standing();
   setup.scene = {};
   add_wall(setup.scene, {-6, 2, -2}, {8, 0, 0}, {0, 0, 8});  // behind the human as it is seen from +x
-  const CameraChoice choice = select_camera(setup, few_candidates(), {});
+  CameraSelectionSettings settings = few_candidates();
+  settings.by_cover = true;
+  const CameraChoice choice = select_camera(setup, settings, {});
   const CandidateView& best = choice.candidates.front();
   REQUIRE(best.visible == 22);
   CHECK(center_of(best.camera_from_world)[0] > 0);
@@ -127,6 +129,15 @@ TEST_CASE("of views with as many joints one is taken whose image is covered") {
   const auto is_empty = [](const CandidateView& view) { return view.visible == 22 && view.cover.value() < 0.7; };
   CHECK(std::any_of(choice.candidates.begin(), choice.candidates.end(), is_empty));
   for (const CandidateView& view : choice.candidates) CHECK(view.cover.has_value() == (view.visible == 22));
+  // By the paper's rule alone the view nearest to the horizon is taken, and the first of these.
+  const CameraChoice plain = select_camera(setup, few_candidates(), {});
+  CHECK(plain.candidates.front().elevation_deg == 0);
+  for (const CandidateView& view : plain.candidates) CHECK_FALSE(view.cover.has_value());
+  setup.scene = {};
+  add_wall(setup.scene, {-2, 2, -2}, {8, 0, 0}, {0, 0, 8});  // behind it as it is seen from -x
+  CHECK(center_of(select_camera(setup, settings, {}).camera.camera_from_world)[0] < 0);
+  CHECK(center_of(select_camera(setup, few_candidates(), {}).camera.camera_from_world) ==
+        center_of(plain.camera.camera_from_world));
 }
 
 TEST_CASE("a human that nobody can see, or that lies, is told") {
