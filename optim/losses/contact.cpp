@@ -39,15 +39,7 @@ struct ContactPairs {
   Index frames = 0;             // that have some
 };
 
-/// The points of the hands in a frame.
-std::vector<BodyPoint> hand_points(const MotionStart& motion, Index frame, BodySet of) {
-  std::vector<BodyPoint> hands;
-  for (const Index row : rows_of_joints(*motion.rest_points(of).weights, is_hand_joint))
-    hands.push_back({frame, row, of});
-  return hands;
-}
-
-/// For each of them the nearest Gaussian among all objects, if it is near enough.
+/// For each point of a hand in a frame the nearest Gaussian among all objects, if it is near enough.
 void add_pairs(const MotionStart& motion, const std::vector<BodyPoint>& hands, const ObjectCentres& centres,
                double distance, ContactPairs& pairs) {
   const std::size_t before = pairs.hands.size();
@@ -65,22 +57,22 @@ void add_pairs(const MotionStart& motion, const std::vector<BodyPoint>& hands, c
 
 ContactPairs contact_pairs(const MotionStart& motion, BodySet of, double distance) {
   const ObjectCentres centres(motion.objects);
+  const std::vector<Index> rows = rows_of_joints(*motion.rest_points(of).weights, is_hand_joint);
   ContactPairs pairs;
-  for (Index t = motion.still_frames; t < motion.frames(); ++t)
-    add_pairs(motion, hand_points(motion, t, of), centres, distance, pairs);
+  for (Index t = motion.still_frames; t < motion.frames(); ++t) {
+    std::vector<BodyPoint> hands;
+    for (const Index row : rows) hands.push_back({t, row, of});
+    add_pairs(motion, hands, centres, distance, pairs);
+  }
   return pairs;
 }
 
-/// @param lacks_body  vertices are asked for and there are none
-LossNote note_of(const ContactPairs& pairs, const MotionStart& motion, double distance, bool lacks_body) {
+LossNote note_of(const ContactPairs& pairs, const MotionStart& motion, double distance) {
   const std::string within = number_text(distance) + " m of an object's Gaussian in ",
-                    frames = std::to_string(motion.moving_frames()) + " frames",
-                    instead =
-                        lacks_body ? "; hands are the avatar's Gaussians, as it is of another body than `body`" : "";
+                    frames = std::to_string(motion.moving_frames()) + " frames";
   return {"contact",
           (pairs.frames == 0 ? "no hand is within " + within + "any of " + frames
-                             : "hands are within " + within + std::to_string(pairs.frames) + " of " + frames) +
-              instead,
+                             : "hands are within " + within + std::to_string(pairs.frames) + " of " + frames),
           pairs.frames == 0};
 }
 
@@ -99,10 +91,10 @@ LossTerm contact_loss() {
             using Value = decltype(in.joints);
             if (!in.gives(LossInput::kObjectMotion)) return Value{};
             auto& tape = in.joints.owner();
-            const bool lacks_body = settings.points == BodySet::kVertices && in.motion->mesh == nullptr;
-            const BodySet of = lacks_body ? BodySet::kGaussians : settings.points;
+            // Of an avatar that was made on another body the Gaussians stand for the vertices; a run warns of it.
+            const BodySet of = in.motion->mesh == nullptr ? BodySet::kGaussians : settings.points;
             const ContactPairs pairs = contact_pairs(*in.motion, of, settings.distance);
-            if (in.notes != nullptr) in.notes->push_back(note_of(pairs, *in.motion, settings.distance, lacks_body));
+            if (in.notes != nullptr) in.notes->push_back(note_of(pairs, *in.motion, settings.distance));
             if (pairs.hands.empty()) return sum(in.joints) * 0.0;  // depends on what the term does, and moves nothing
             const Value hands = in.body_points(pairs.hands), objects = in.object_points(pairs.objects);
             const Value weights =

@@ -72,7 +72,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
                : json_string(s.name) + " cannot be the name of a folder; allowed: " + kFileNameText;
   });
   f.integer("seed", s.seed, {.min = 0, .max = kLargestSeed},
-            "Seed of a new color net; generated datasets have synthetic.seed");
+            "Seed of a new color net, and {seed} in commands of sources; generated datasets have synthetic.seed");
   f.integer("threads", s.threads, {.min = 0, .max = kMostThreads},
             "Threads; 0: one a core. Results do not depend on it");
   f.choice("precision", s.precision, kRunPrecisions, "Number type of the computation");
@@ -88,7 +88,8 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.object("data", s.data, "The files that the run reads");
   f.object("sources", s.sources, "Programs outside that make the video, the masks and the estimated motion of `data`");
   f.list("chain", s.chain, "Clips that follow one another, each from the last state of the one before");
-  f.object("body", s.body, "The body model of whom `hsi4d synth` and `hsi4d demo` make an avatar");
+  f.object("body", s.body,
+           "The body model of which `hsi4d synth` and `hsi4d demo` make an avatar, and whose hands `contact` draws");
   f.object("color_net", s.color_net, "How the human's colours follow its pose");
   f.object("synthetic", s.synthetic, "The dataset that `hsi4d synth` and `hsi4d demo` make");
   f.object("render", s.render, "How Gaussians become pixels", [&s](ConfigFields& inner, RenderSettings& render) {

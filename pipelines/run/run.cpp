@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/config_value.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/progress.h"
@@ -116,11 +117,25 @@ void set_image_size(Clip& clip, const RunConfig& config) {
 
 namespace {
 
-bool some_loss_needs(const RunConfig& config, LossInput input) {
-  return std::any_of(config.stages.begin(), config.stages.end(), [input](const auto& stage) {
-    return std::any_of(stage.second.losses.begin(), stage.second.losses.end(),
-                       [input](const auto& loss) { return needs_input(loss.second, input); });
-  });
+/// The first loss that is on and needs an input, as a JSON pointer; empty: none.
+std::string loss_with(const RunConfig& config, LossInput input) {
+  for (const auto& [name, stage] : config.stages) {
+    for (const auto& [term, loss] : stage.losses) {
+      if (needs_input(loss, input)) return child_pointer(child_pointer("/stages", name) + "/losses", term);
+    }
+  }
+  return "";
+}
+
+/// Reads the body whose vertices a loss asks for. One that the avatar was not made on is left out, which is told.
+void give_body(const RunConfig& config, const std::string& loss, Clip& clip) {
+  BodyModel body = rest_body(config.body);
+  const std::string difference = difference_from(body, clip.avatar);
+  if (difference.empty()) {
+    clip.body = std::move(body);
+  } else {
+    log_warning(loss + "/points: the avatar's Gaussians stand for the vertices of `body`: " + difference);
+  }
 }
 
 }  // namespace
@@ -132,10 +147,8 @@ Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses)
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
     clip.files.push_back({file.pointer, file.path});
   if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});
-  if (some_loss_needs(config, LossInput::kBodyVertices)) {
-    BodyModel body = rest_body(config.body);
-    if (difference_from(body, clip.avatar).empty()) clip.body = std::move(body);
-  }
+  const std::string loss = loss_with(config, LossInput::kBodyVertices);
+  if (!loss.empty()) give_body(config, loss, clip);
   return clip;
 }
 
@@ -159,8 +172,8 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
     look_at_run_folder(options.folder, identity.config, options.resume);  // before anything is made for nothing
     config.data = make_sources(config, options.observer);
   });
-  const Clip clip = read_run_clip(config, losses);                       // before anything is written
-  if (config.body.kind == BodyKind::kSmplx) body_model_of(config.body);  // what is wrong with it shows now
+  const Clip clip = read_run_clip(config, losses);                                     // before anything is written
+  if (config.body.kind == BodyKind::kSmplx && !clip.body) body_model_of(config.body);  // what is wrong shows now
   check_run_clip(config, clip);
   std::string blur;
   on_threads(threads, [&] { blur = estimate_blur(config, clip); });

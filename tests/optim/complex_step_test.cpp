@@ -247,28 +247,37 @@ TEST_CASE("loss terms of objects have the gradients of complex steps") {
       "depth", {{"object_depth", shape_of(3, 1), 1, 3}, {"object_depth_target", shape_of(3, 1), 1, 3}},
       [](Inputs& given, const Vars& in) { given.object_depth = in[0], given.object_depth_target = in[1]; },
       [](const ComplexInputs& in) { return sum_of_squares(in[0], in[1]) / 3.0; });
+}
+
+TEST_CASE("contact has the gradients of complex steps, of vertices and of Gaussians") {
   const MotionStart& motion = motion_of_test().start;
-  check_loss(
-      "contact",
+  const BodySet of = GENERATE(BodySet::kVertices, BodySet::kGaussians);
+  const Index rows = of == BodySet::kVertices ? kVertexRows : kBodyRows;
+  const std::string settings =
+      std::string(R"({"points": ")") + (of == BodySet::kVertices ? "vertices" : "gaussians") + R"("})";
+  check_complex_step(
       {{"joints", shape_of(kFrames, 66)}, kBodyPlaces, {"object_places", shape_of(kMoving * 2 * kObjectRows, 3)}},
-      [](Inputs& given, const Vars& in) {
+      [&settings](const Vars& in) {
+        Inputs given;
+        given.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
         given.joints = in[0];
         given.body_points = points_of(in[1]);
         given.object_points = object_points_of(in[2]);
+        return record_term("contact", given, settings);
       },
-      [&motion](const ComplexInputs& in) {
+      [&motion, of, rows](const ComplexInputs& in) {
         Complex total = 0;
         for (Index t = kStill; t < kFrames; ++t) {
           Complex sum = 0;
           double pairs = 0;
-          for (Index row = 0; row < kVertexRows; ++row) {
+          for (Index row = 0; row < rows; ++row) {
             if (!is_hand_joint(row % kSmplxJoints)) continue;
             ObjectPoint nearest;
             double least = 0.05;
             for (const Index object : {0, 1}) {
               for (Index r = 0; r < kObjectRows; ++r) {
                 const ObjectPoint p{t, object, r};
-                const double distance = (motion.place(p) - motion.place(BodyPoint{t, row, BodySet::kVertices})).norm();
+                const double distance = (motion.place(p) - motion.place(BodyPoint{t, row, of})).norm();
                 if (distance < least) least = distance, nearest = p;
               }
             }
@@ -279,8 +288,9 @@ TEST_CASE("loss terms of objects have the gradients of complex steps") {
           }
           if (pairs > 0) total += sum / pairs / static_cast<double>(kMoving);
         }
-        return total;
-      });
+        return Complexes{total};
+      },
+      {.loss = "contact"});
 }
 
 TEST_CASE("a loss term of the objects' motion has the gradients of complex steps") {

@@ -261,7 +261,7 @@ class StandIn(http.server.BaseHTTPRequestHandler):
             return self.answer(200, {"code": 0, "data": {"task_id": name, "task_status": "processing"}})
         url = f"http://127.0.0.1:{self.server.server_port}/video.mp4"
         self.answer(200, {"code": 0, "data": {"task_id": name, "task_status": StandIn.tasks[name],
-                                              "task_result": {"videos": [{"url": url}]}}})
+                                              "task_status_msg": "it may not be shown", "task_result": {"videos": [{"url": url}]}}})
 
 
 def test_kling(folder):
@@ -272,8 +272,9 @@ def test_kling(folder):
     threading.Thread(target=server.serve_forever, daemon=True).start()
     keys = {"KLING_ACCESS_KEY": "access", "KLING_SECRET_KEY": "secret"}
 
+    url = f"http://127.0.0.1:{server.server_port}"
+
     def kling(prompt, *more, **environment):
-        url = f"http://127.0.0.1:{server.server_port}"
         return run("kling.py", "--image", image, "--prompt", prompt, "--out", out, "--url", url, "--poll", 0.05, "--tasks",
                    tasks, *more, **{**keys, **environment})
 
@@ -289,12 +290,17 @@ def test_kling(folder):
     check(kling("sits"), 75, "answers 429")
     check(kling("sits"), 75, "answers 503")
     check(kling("sits"), 1, "no credit")
-    check(kling("forbidden"), 1, "has failed")
+    check(kling("forbidden"), 1, "has failed: it may not be shown")
+    StandIn.refuse = [(200, {"code": 0, "data": {}}), (200, {"code": 0, "data": {"task_id": "none"}})]
+    check(kling("sits"), 1, "not as its description has it: KeyError('task_id')")
+    check(kling("sits"), 1, "answers 404")  # of the number that it has just given
+    assert [path.suffix for path in tasks.iterdir()] == [".task"]
+    next(tasks.iterdir()).unlink()
     # A task that is paid for is gone on with: this one was accepted before the run was ended.
     paid = len(StandIn.requests)
     StandIn.tasks["paid"] = "succeed"
     body = StandIn.requests[0]
-    name = hashlib.sha256(json.dumps([body, 0]).encode()).hexdigest()[:16] + ".task"
+    name = hashlib.sha256(json.dumps([url, body, 0]).encode()).hexdigest()[:16] + ".task"
     (tasks / name).write_text("paid\n")
     check(kling("sits"), 0)
     assert len(StandIn.requests) == paid and StandIn.looks["paid"] == 3
@@ -314,9 +320,11 @@ def test_kling(folder):
     (tasks / name).write_text("lost\n")
     check(kling("sits"), 0, "task lost, which was paid for, is gone, and a new one is asked for: the service answers 404")
     assert len(StandIn.requests) == paid + 2 and not list(tasks.iterdir())
+    (tasks / name).write_text("paid\n")
     server.shutdown()
     server.server_close()
     check(kling("sits"), 75, "no connection")
+    assert (tasks / name).read_text() == "paid\n"  # which is paid for, and not lost with a connection
 
 
 class SoraStandIn(http.server.BaseHTTPRequestHandler):
@@ -364,8 +372,9 @@ def test_sora(folder):
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), SoraStandIn)
     threading.Thread(target=server.serve_forever, daemon=True).start()
 
+    url = f"http://127.0.0.1:{server.server_port}"
+
     def sora(prompt, *more, **environment):
-        url = f"http://127.0.0.1:{server.server_port}"
         return run("sora.py", "--image", image, "--prompt", prompt, "--out", out, "--url", url, "--poll", 0.05, "--tasks", tasks,
                    *more, **{"OPENAI_API_KEY": "key", **environment})
 
@@ -379,6 +388,17 @@ def test_sora(folder):
                                   "input_reference": image.read_bytes()}], SoraStandIn.forms
     check(sora("forbidden"), 1, "has failed: it may not be shown")
     assert not list(tasks.iterdir())
+    # A task that is paid for is gone on with; one that the service does not know is asked for anew.
+    request = [{"model": "sora-2", "prompt": "sits", "seconds": "4", "size": "64x48"}, hashlib.sha256(image.read_bytes()).hexdigest()]
+    kept = tasks / (hashlib.sha256(json.dumps([url, request, 7]).encode()).hexdigest()[:16] + ".task")
+    SoraStandIn.forms[-1]["prompt"] = b"sits"
+    asked = len(SoraStandIn.forms)
+    kept.write_text("video_9\n")
+    check(sora("sits", "--seed", 7), 0)
+    assert len(SoraStandIn.forms) == asked and SoraStandIn.looks["video_9"] == 3
+    kept.write_text("lost\n")
+    check(sora("sits", "--seed", 7), 0, "task lost, which was paid for, is gone")
+    assert len(SoraStandIn.forms) == asked + 1 and not list(tasks.iterdir())
     server.shutdown()
     server.server_close()
 

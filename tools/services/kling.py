@@ -41,7 +41,7 @@ def token(access_key, secret_key, now):
 
 
 class Kling:
-    reason = ""  # of a failure: the service says none
+    reason = ""
 
     def __init__(self, url, body):
         self.url, self.body, self.videos = url.rstrip("/") + "/v1/videos/image2video", body, {}
@@ -49,9 +49,9 @@ class Kling:
 
     def ask(self, place="", body=None):
         """The member `data` of an answer."""
-        head = {"Authorization": "Bearer " + token(*self.keys, int(time.time())), "Content-Type": "application/json"}
         content = None if body is None else json.dumps(body).encode()
-        told = web_task.fetched_json(urllib.request.Request(self.url + place, data=content, headers=head))
+        bearer = token(*self.keys, int(time.time()))
+        told = web_task.fetched_json(web_task.with_key(self.url + place, bearer, content, "application/json"))
         if told.get("code") != 0:
             service.fail(f"the service refuses: {told.get('code')} {told.get('message')}")
         return told["data"]
@@ -61,10 +61,13 @@ class Kling:
 
     def look(self, task):
         told = self.ask("/" + task)
-        if told["task_status"] == "succeed":
-            self.videos[task] = told["task_result"]["videos"][0]["url"]
-            return "done"
-        return told["task_status"]
+        if told["task_status"] in ("submitted", "processing"):
+            return web_task.RUNNING
+        if told["task_status"] != "succeed":
+            self.reason = told.get("task_status_msg") or told["task_status"]
+            return web_task.FAILED
+        self.videos[task] = told["task_result"]["videos"][0]["url"]
+        return web_task.DONE
 
     def content(self, task):
         return web_task.fetched(urllib.request.Request(self.videos[task]))

@@ -9,6 +9,7 @@ it as masks, which it follows through the video. Writes OUT/NAME/NNNN.png, 255 w
 stand-in of the package only; the model itself was not run.
 """
 
+import importlib
 import pathlib
 import tempfile
 
@@ -22,18 +23,22 @@ def jpeg_frames(video, folder):
                  pathlib.Path(folder).resolve() / "%05d.jpg"], place)
 
 
+def modules(*names):
+    """Modules that SAM 2 and what it stands on bring: this is to be run by their Python."""
+    try:
+        return [importlib.import_module(name) for name in names]
+    except ImportError as missing:
+        service.fail(f"Python's module {missing.name} is not there; run this by the Python of SAM 2", service.ASKED_WRONGLY)
+
+
 def read_mask(path, width, height):
     """Where a grey image of any size is at least 128, [height,width]."""
-    import numpy as np
-    from PIL import Image
-
+    np, Image = modules("numpy", "PIL.Image")
     return np.asarray(Image.open(path).convert("L").resize((width, height))) >= 128
 
 
 def write_mask(path, seen):
-    import numpy as np
-    from PIL import Image
-
+    np, Image = modules("numpy", "PIL.Image")
     Image.fromarray(seen.astype(np.uint8) * 255).save(path)
 
 
@@ -70,18 +75,13 @@ def main():
     if a.dry_run:
         print(f"{a.model} on {a.device}: follows {', '.join(names)} through {a.video} into {a.out}")
         return
-    try:
-        import torch
-        from sam2.sam2_video_predictor import SAM2VideoPredictor
-    except ImportError as missing:
-        service.fail(f"Python's module {missing.name} is not there; run this by the Python of SAM 2", service.ASKED_WRONGLY)
-
+    torch, sam2 = modules("torch", "sam2.sam2_video_predictor")
     files = service.frame_names(a.video)
     for name in names:
         (pathlib.Path(a.out) / name).mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         jpeg_frames(a.video, folder)
-        predictor = SAM2VideoPredictor.from_pretrained(a.model, device=a.device)
+        predictor = sam2.SAM2VideoPredictor.from_pretrained(a.model, device=a.device)
         with torch.inference_mode(), torch.autocast(a.device, dtype=torch.bfloat16):
             for frame, name, seen in followed(predictor, folder, first):
                 write_mask(pathlib.Path(a.out) / name / files[frame], seen)

@@ -15,7 +15,6 @@ it only.
 
 import hashlib
 import json
-import urllib.request
 
 import service
 import web_task
@@ -38,8 +37,7 @@ class Sora:
         (self.key,) = web_task.keys_of("OPENAI_API_KEY")
 
     def request(self, place="", body=None, kind=None):
-        head = {"Authorization": "Bearer " + self.key, **({"Content-Type": kind} if kind else {})}
-        return urllib.request.Request(self.url + place, data=body, headers=head)
+        return web_task.with_key(self.url + place, self.key, body, kind)
 
     def begin(self):
         kind, body = form(self.fields, self.image)
@@ -47,8 +45,10 @@ class Sora:
 
     def look(self, task):
         told = web_task.fetched_json(self.request("/" + task))
-        self.reason = (told.get("error") or {}).get("message", "")
-        return "done" if told["status"] == "completed" else told["status"]
+        if told["status"] in ("queued", "in_progress"):
+            return web_task.RUNNING
+        self.reason = (told.get("error") or {}).get("message") or told["status"]
+        return web_task.DONE if told["status"] == "completed" else web_task.FAILED
 
     def content(self, task):
         return web_task.fetched(self.request(f"/{task}/content"))

@@ -18,6 +18,9 @@ import urllib.request
 import service
 
 
+RUNNING, DONE, FAILED = "running", "done", "failed"  # states of a task
+
+
 class Gone(Exception):
     """The service does not know what it is asked for, or no more."""
 
@@ -43,6 +46,13 @@ def fetched_json(request):
         return json.loads(fetched(request))
     except ValueError:
         service.fail("the service's answer is no JSON", service.TRY_AGAIN)
+
+
+def with_key(url, bearer, data=None, kind=None):
+    """A request with a key, which does not follow to another address that the service names."""
+    request = urllib.request.Request(url, data=data, headers={"Content-Type": kind} if kind else {})
+    request.add_unredirected_header("Authorization", "Bearer " + bearer)
+    return request
 
 
 def keys_of(*names):
@@ -93,9 +103,9 @@ def waited_for(web, task, kept, seconds):
     """What a task has made, MP4. Raises Gone."""
     while True:
         state = web.look(task)
-        if state == "done":
+        if state == DONE:
             return web.content(task)
-        if state == "failed":
+        if state == FAILED:
             kept.forget()
             service.fail(f"task {task} has failed" + (f": {web.reason}" if web.reason else ""))
         time.sleep(seconds)
@@ -104,8 +114,8 @@ def waited_for(web, task, kept, seconds):
 def made_video(web, kept, seconds):
     """The video of a task that is under way, or of a new one.
 
-    @param web  the service: begin() gives a task's number, look(task) "done", "failed" or another word, then `reason` or
-                content(task)
+    @param web  the service: begin() gives a task's number, look(task) its state; then content(task) the video, `reason`
+                why it failed
     """
     task = kept.read()
     if task:
@@ -125,8 +135,11 @@ def made_video(web, kept, seconds):
 
 def write_video(web, arguments, request):
     """Makes the video, as large as the image, and forgets the task."""
-    kept = KeptTask(arguments.tasks, [request, arguments.seed])
-    video = made_video(web, kept, arguments.poll)
+    kept = KeptTask(arguments.tasks, [arguments.url, request, arguments.seed])
+    try:
+        video = made_video(web, kept, arguments.poll)
+    except (KeyError, IndexError, TypeError, AttributeError, ValueError) as error:
+        service.fail(f"the service's answer is not as its description has it: {error!r}")
     with tempfile.TemporaryDirectory() as folder:
         made = pathlib.Path(folder) / "video.mp4"
         made.write_bytes(video)

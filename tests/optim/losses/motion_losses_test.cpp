@@ -209,15 +209,26 @@ TEST_CASE("contact is zero where no hand is near an object, and tells in how man
         std::pair<std::string, bool>{"hands are within 0.05 m of an object's Gaussian in 2 of 3 frames", false});
   CHECK(note(apart.start, R"({"distance": 1e-9})") ==
         std::pair<std::string, bool>{"no hand is within 1e-09 m of an object's Gaussian in any of 3 frames", true});
-  // An avatar of another body: its Gaussians stand for the vertices, which is told.
+}
+
+TEST_CASE("of an avatar that was made on another body contact draws the Gaussians in place of vertices") {
   MotionOfTest without;
   without.start.mesh = nullptr;
-  CHECK(note(without.start, R"({"distance": 1e-9})").first ==
-        "no hand is within 1e-09 m of an object's Gaussian in any of 3 frames; hands are the avatar's Gaussians, as it "
-        "is "
-        "of another body than `body`");
-  const auto place = [&](const BodyPoint& p) { return without.start.place(p); };
-  CHECK(motion_loss("contact", R"({"points": "gaussians"})", no_joint, place) > 0);
+  for (const MotionOfTest* test : {static_cast<const MotionOfTest*>(&without), &motion_of_test()}) {
+    Tape<double> tape;
+    LossInputs<double> inputs;
+    inputs.motion = std::shared_ptr<const MotionStart>(&test->start, [](const MotionStart*) {});
+    inputs.joints = tape.parameter("joints", shape_of(kFrames, 66));
+    std::vector<BodyPoint> hands;
+    inputs.body_points = [&](const std::vector<BodyPoint>& points) {
+      hands = points;
+      return tape.parameter("hands", shape_of(std::ssize(points), 3));
+    };
+    inputs.object_points = [&](const auto& points) { return tape.parameter("them", shape_of(std::ssize(points), 3)); };
+    REQUIRE(record_term("contact", inputs, R"({"distance": 10})").tape != nullptr);
+    REQUIRE_FALSE(hands.empty());
+    for (const BodyPoint& hand : hands) CHECK(hand.of == (test == &without ? BodySet::kGaussians : BodySet::kVertices));
+  }
 }
 
 TEST_CASE("ground is the squared change of the height of the lowest points of the feet") {

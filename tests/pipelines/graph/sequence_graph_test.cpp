@@ -8,6 +8,7 @@
 #include "autodiff/gradcheck.h"
 #include "autodiff/reduce.h"
 #include "body/motion_edit.h"
+#include "body/procedural_body.h"
 #include "core/config_file.h"
 #include "core/rotation.h"
 #include "optim/metrics.h"
@@ -94,14 +95,16 @@ TEST_CASE("a sequence graph has the joints of its states, frame by frame") {
 }
 
 TEST_CASE("points of body and objects of a sequence are where the states have them") {
-  const Clip clip = small_clip(16, 14, 100);
+  Clip clip = small_clip(16, 14, 100);
+  const BodySet of = GENERATE(BodySet::kGaussians, BodySet::kVertices);
+  if (of == BodySet::kVertices) clip.body = procedural_body();
   const std::vector<SceneState> states = some_states(clip);
   Tape<double> tape;
   const SequenceGraph<double> graph(tape, clip, states, nullptr, RotationParameters::kAxisAngle);
   std::vector<BodyPoint> body;
   std::vector<ObjectPoint> objects;
   for (Index t = 1; t < kFrames; ++t) {
-    body.push_back({t, 7 * t});
+    body.push_back({t, 7 * t, of});
     objects.push_back({t, t % 2, t});
   }
   const LossInputs<double>& in = graph.loss_inputs();
@@ -118,7 +121,8 @@ TEST_CASE("points of body and objects of a sequence are where the states have th
 
 TEST_CASE("gradients of a sequence are right for every group and term") {
   const RotationParameters rotations = GENERATE(RotationParameters::kSixD, RotationParameters::kAxisAngle);
-  const Clip clip = small_clip(16, 14, 100);
+  Clip clip = small_clip(16, 14, 100);
+  if (rotations == RotationParameters::kAxisAngle) clip.body = procedural_body();  // whose vertices contact draws
   const std::vector<SceneState> states = some_states(clip);
   const PosePrior prior = natural_pose_prior();
   Tape<double> tape;

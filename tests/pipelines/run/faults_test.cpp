@@ -70,6 +70,8 @@ TEST_CASE("hands that vanish for some frames leave the body where it is", "[run]
   const double seen = last_number(clean, "world_mpjpe_mm"), unseen = last_number(vanishing, "world_mpjpe_mm");
   WARN("world MPJPE " << seen << " mm with hands, " << unseen << " mm where they vanish");
   CHECK(unseen < 1.2 * seen);
+  const double drop = last_number(clean, "psnr_foreground_db") - last_number(vanishing, "psnr_foreground_db");
+  CHECK(drop > 0.05);  // the hands are gone from the video, and not from the avatar
 }
 
 }  // namespace faults_test

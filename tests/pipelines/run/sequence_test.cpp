@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "body/motion_io.h"
+#include "body/procedural_body.h"
 #include "core/camera_file.h"
 #include "core/check.h"
 #include "core/image_io.h"
@@ -19,6 +20,7 @@ namespace sequence_test {
 
 using namespace hsi4d;
 using namespace hsi4d::test;
+using Catch::Matchers::Contains;
 using Catch::Matchers::Message;
 namespace fs = std::filesystem;
 
@@ -234,6 +236,23 @@ TEST_CASE("images after a stage over the sequence have each frame's own color ne
   CHECK_THROWS_AS(execute_tiny(config, "again", 1, false, [&] { return ++count == kInFrames + 3; }), Interrupted);
   execute_tiny(config, "again", 2, true);
   CHECK(differences("run", "again") == kNone);
+}
+
+TEST_CASE("contact draws vertices of the body that the avatar was made on, else Gaussians, which is told",
+          "[run][sequence]") {
+  const Clip clip = read_run_clip(refined_config(), loss_terms());
+  REQUIRE(clip.body.has_value());
+  CHECK(clip.body->vertex_count() == procedural_body().vertex_count());
+  CHECK_FALSE(read_run_clip(refined_config({"stages.refinement.losses.contact.points=gaussians"}), loss_terms()).body);
+  CHECK_FALSE(read_run_clip(refined_config({"stages.refinement.losses.contact.weight=0"}), loss_terms()).body);
+  const TemporaryFolder here;
+  const RunConfig taller = refined_config({"body.shape=[3]"});
+  CHECK_FALSE(read_run_clip(taller, loss_terms()).body);
+  execute_tiny(taller, "taller");
+  CHECK_THAT(
+      file_text("taller/log.txt"),
+      Contains("/stages/refinement/losses/contact/points: the avatar's Gaussians stand for the vertices of `body`: "
+               "joints of the avatar are "));
 }
 
 TEST_CASE("a run whose stage over the sequence has VPoser's weights moves in its latents", "[run][sequence]") {
