@@ -36,8 +36,8 @@ struct ObjectPoint {
 /// F frames: the first `still_frames` are behind the stage and stay as they are, the others move.
 struct MotionStart {
   const Avatar* avatar = nullptr;
-  const BodyModel* mesh =
-      nullptr;  ///< the body that the avatar was made on, with its joints; null: not known, or not asked for
+  /// The body that the avatar was made on, with its joints; null: not known, or not asked for.
+  const BodyModel* mesh = nullptr;
   std::vector<const Gaussians*> objects;                          ///< relative to their centroids
   const Gaussians* scene = nullptr;                               ///< null: none is known
   Vector3<double> first_camera_center = Vector3<double>::Zero();  ///< of the clip's first frame, metres, world

@@ -23,7 +23,9 @@ void note_end(RunFolder& folder, RunState state, const std::string& message) noe
 /// The images of a run are of at most approx.longest_side_px pixels: the camera of its clip becomes one of these.
 void set_image_size(Clip& clip, const RunConfig& config);
 
-/// The clip of a run, and in `files` all that is read of it, the files that stages and body name included.
+/// The clip of a run, and in `files` all that is read of it, the files that stages and body name included. `body` is
+/// read where a loss asks for its vertices; one that the avatar was not made on is left out, which the log tells.
+/// Throws as read_clip and rest_body.
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses);
 
 /// What can be told of a clip before it runs. Throws UserError for a start or frames that cannot be; warns of what is
