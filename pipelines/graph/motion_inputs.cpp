@@ -92,12 +92,13 @@ Index moving_frame(const MotionStart& motion, Index frame) {
 
 template <class S>
 Var<S> record_body_points(Var<S> transforms, const MotionStart& motion, const std::vector<BodyPoint>& points) {
-  const RestPoints rest = motion.rest_points(points.front().of);
+  const BodySet of = points.empty() ? BodySet::kGaussians : points.front().of;
+  const RestPoints rest = motion.rest_points(of);
   const SparseWeights& all = *rest.weights;
   FollowingPoints<S> chosen;
   chosen.weights.per_vertex = all.per_vertex;
   for (const BodyPoint& point : points) {
-    HSI4D_CHECK(point.of == points.front().of, "points of Gaussians and of vertices at once");
+    HSI4D_CHECK(point.of == of, "points of Gaussians and of vertices at once");
     const Index first_joint = moving_frame(motion, point.frame) * all.joints;
     for (Index k = 0; k < all.per_vertex; ++k) {
       const auto at = static_cast<std::size_t>(point.row * all.per_vertex + k);

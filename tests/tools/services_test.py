@@ -211,11 +211,7 @@ def test_example(folder):
     check(example("p"), 75)
 
 
-class StandIn(http.server.BaseHTTPRequestHandler):
-    """KLING as its description has it: a task is accepted, is looked at twice, and has a video."""
-
-    tasks, looks, requests, refuse, breaks = {}, {}, [], [], []
-
+class QuietServer(http.server.BaseHTTPRequestHandler):
     def log_message(self, *_):
         pass
 
@@ -226,6 +222,12 @@ class StandIn(http.server.BaseHTTPRequestHandler):
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)
+
+
+class StandIn(QuietServer):
+    """KLING as its description has it: a task is accepted, is looked at twice, and has a video."""
+
+    tasks, looks, requests, refuse, breaks = {}, {}, [], [], []
 
     def is_signed(self):
         head, claims, signature = self.headers["Authorization"].removeprefix("Bearer ").split(".")
@@ -327,21 +329,10 @@ def test_kling(folder):
     assert (tasks / name).read_text() == "paid\n"  # which is paid for, and not lost with a connection
 
 
-class SoraStandIn(http.server.BaseHTTPRequestHandler):
+class SoraStandIn(QuietServer):
     """OpenAI's service as its description has it: a task is accepted by a form, is looked at twice, and has a video."""
 
     forms, looks = [], {}
-
-    def log_message(self, *_):
-        pass
-
-    def answer(self, status, content, kind="application/json"):
-        body = content if isinstance(content, bytes) else json.dumps(content).encode()
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
 
     def do_POST(self):
         content = self.rfile.read(int(self.headers["Content-Length"]))
