@@ -93,6 +93,11 @@ inline RunConfig tiny_config(const std::vector<std::string>& overrides = {}) {
   return load_run_config(tiny_config_file(), overrides, descriptions_of(loss_terms()));
 }
 
+/// The config of another dataset, likewise.
+inline RunConfig config_in(const std::filesystem::path& dataset, const std::vector<std::string>& overrides) {
+  return load_run_config(dataset / "config.json", overrides, descriptions_of(loss_terms()));
+}
+
 /// A run in this process.
 inline RunSummary execute_tiny(const RunConfig& config, const std::string& folder, int threads = 1, bool resume = false,
                                std::function<bool()> stop_requested = {}) {
@@ -194,6 +199,11 @@ inline double number_in(const MetricValues& values, const std::string& name) {
   INFO("metric " << name);
   REQUIRE(value != nullptr);
   return *value;
+}
+
+/// A figure after a run's last stage.
+inline double last_number(const RunSummary& summary, const std::string& name) {
+  return number_in(summary.metrics.back().values, name);
 }
 
 /// A copy of the dataset, to be changed.

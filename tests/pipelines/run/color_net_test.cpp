@@ -65,21 +65,13 @@ void move_group(RunConfig& config, const std::string& group, double lr) {
   }
 }
 
-RunConfig config_of(const fs::path& dataset, const std::vector<std::string>& overrides) {
-  return load_run_config(dataset / "config.json", overrides, descriptions_of(loss_terms()));
-}
-
 /// The same with a color net that a stage moves.
 RunConfig config_with_net(const fs::path& dataset, int iterations, double lr, std::vector<std::string> overrides = {}) {
   overrides.insert(overrides.end(), {"color_net.use=on", "color_net.features=8", "color_net.hidden_width=16",
                                      "stages.interaction.iterations=" + std::to_string(iterations)});
-  RunConfig config = config_of(dataset, overrides);
+  RunConfig config = config_in(dataset, overrides);
   move_group(config, "color_net", lr);
   return config;
-}
-
-double last_number(const RunSummary& summary, const std::string& name) {
-  return number_in(summary.metrics.back().values, name);
 }
 
 }  // namespace
@@ -87,7 +79,7 @@ double last_number(const RunSummary& summary, const std::string& name) {
 TEST_CASE("where the human's appearance changes, a color net beats none", "[run][color_net]") {
   const TemporaryFolder here;
   write_changing_dataset("changing");
-  const RunSummary off = execute_tiny(config_of("changing", {"stages.interaction.iterations=60"}), "off");
+  const RunSummary off = execute_tiny(config_in("changing", {"stages.interaction.iterations=60"}), "off");
   const RunSummary on = execute_tiny(config_with_net("changing", 60, 0.01), "on");
   const double psnr_off = last_number(off, "psnr_foreground_db"), psnr_on = last_number(on, "psnr_foreground_db");
   const double joints_off = last_number(off, "world_mpjpe_mm"), joints_on = last_number(on, "world_mpjpe_mm");
@@ -107,14 +99,14 @@ TEST_CASE("the gain of a color net by learning rate and width", "[full][color_ne
   settings.object_gaussians = 500;
   write_changing_dataset("changing", settings);
   const std::string iterations = "stages.interaction.iterations=300";
-  const RunSummary off = execute_tiny(config_of("changing", {iterations}), "off", 2);
+  const RunSummary off = execute_tiny(config_in("changing", {iterations}), "off", 2);
   const double without = last_number(off, "psnr_foreground_db");
   WARN("without: " << without << " dB, " << last_number(off, "world_mpjpe_mm") << " mm");
   int count = 0;
   for (const double lr : {1e-5, 1e-4, 1e-3, 1e-2}) {
     for (const int width : {16, 32, 64}) {
       if (width != 32 && lr != 1e-2) continue;
-      RunConfig config = config_of("changing", {"color_net.use=on", iterations});
+      RunConfig config = config_in("changing", {"color_net.use=on", iterations});
       config.color_net.hidden_width = width;
       move_group(config, "color_net", lr);
       const RunSummary on = execute_tiny(config, "on" + std::to_string(++count), 2);
@@ -192,10 +184,10 @@ TEST_CASE("a run goes on with the network of the avatar's file", "[run][color_ne
   avatar.color_net->layers.back().bias = {2, -2, 0.5};  // everything turns red
   write_avatar(file, avatar);
   CHECK(*read_avatar(file).color_net == *avatar.color_net);
-  const RunSummary own = execute_tiny(config_of("data", {}), "own");
-  const RunSummary off = execute_tiny(config_of("data", {"color_net.use=off"}), "off");
+  const RunSummary own = execute_tiny(config_in("data", {}), "own");
+  const RunSummary off = execute_tiny(config_in("data", {"color_net.use=off"}), "off");
   CHECK(last_number(off, "psnr_foreground_db") > last_number(own, "psnr_foreground_db") + 3);
-  const RunSummary on = execute_tiny(config_of("data", {"color_net.use=on"}), "on");
+  const RunSummary on = execute_tiny(config_in("data", {"color_net.use=on"}), "on");
   CHECK(last_number(on, "psnr_db") == last_number(own, "psnr_db"));
 }
 

@@ -29,17 +29,9 @@ void write_faulty(const fs::path& folder, const SyntheticFaults& faults, Synthet
                 load_config_text(kTinyStages, "tiny.json", folder.parent_path(), {}, problems));
 }
 
-RunConfig config_of(const fs::path& dataset, const std::vector<std::string>& overrides) {
-  return load_run_config(dataset / "config.json", overrides, descriptions_of(loss_terms()));
-}
-
-double last_number(const RunSummary& summary, const std::string& name) {
-  return number_in(summary.metrics.back().values, name);
-}
-
 /// Of a run of the camera's stage alone, centimetres.
 double camera_error(const fs::path& dataset, const std::string& weight, const std::string& out) {
-  RunConfig config = config_of(dataset, {"stages.camera.weight=" + weight, "stages.camera.iterations=30"});
+  RunConfig config = config_in(dataset, {"stages.camera.weight=" + weight, "stages.camera.iterations=30"});
   std::erase_if(config.stages, [](const auto& stage) { return stage.first != "camera"; });
   return last_number(execute_tiny(config, out), "camera_translation_cm");
 }
@@ -65,8 +57,8 @@ TEST_CASE("hands that vanish for some frames leave the body where it is", "[run]
   write_faulty("clean", {}, SyntheticMotionKind::kWave, 7);
   write_faulty("vanishing", {.hands_fade = 1}, SyntheticMotionKind::kWave, 7);
   const std::vector<std::string> more = {"stages.interaction.iterations=40"};
-  const RunSummary clean = execute_tiny(config_of("clean", more), "a"),
-                   vanishing = execute_tiny(config_of("vanishing", more), "b");
+  const RunSummary clean = execute_tiny(config_in("clean", more), "a"),
+                   vanishing = execute_tiny(config_in("vanishing", more), "b");
   const double seen = last_number(clean, "world_mpjpe_mm"), unseen = last_number(vanishing, "world_mpjpe_mm");
   WARN("world MPJPE " << seen << " mm with hands, " << unseen << " mm where they vanish");
   CHECK(unseen < 1.2 * seen);
