@@ -39,7 +39,7 @@ set_tests_properties("the commit of a build" PROPERTIES LABELS quick)
 # Exporters of other programs' files, with NumPy and stand-ins for PyTorch and joblib.
 find_program(HSI4D_PYTHON python3 HINTS /usr/bin)  # the one that Debian's NumPy belongs to
 if(HSI4D_PYTHON)
-  add_test(NAME "exporters of VPoser, WHAM, GVHMR and TRAM"
+  add_test(NAME "exporters of VPoser, WHAM, GVHMR, TRAM and WHAC"
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/exporters_test.py ${PROJECT_SOURCE_DIR}/tools
                    $<TARGET_FILE:hsi4d>)
   add_test(NAME "embeddings by CLIP"
@@ -48,7 +48,7 @@ if(HSI4D_PYTHON)
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "the gate of time and error"
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/bench_test.py ${PROJECT_SOURCE_DIR}/tools)
-  set_tests_properties("exporters of VPoser, WHAM, GVHMR and TRAM" "services for video, masks and poses" "embeddings by CLIP"
+  set_tests_properties("exporters of VPoser, WHAM, GVHMR, TRAM and WHAC" "services for video, masks and poses" "embeddings by CLIP"
                        "the gate of time and error" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
 else()
   message(STATUS "There is no python3: the exporters and services in tools/ are not tested")

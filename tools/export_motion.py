@@ -4,7 +4,8 @@
     tools/export_motion.py wham_output.pkl motion.npz --person 0 --fps 30            # WHAM
     tools/export_motion.py hmr4d_results.pt motion.npz --fps 30                      # GVHMR
     tools/export_motion.py results/clip/hps/hps_track_0.npy motion.npz --fps 30      # TRAM, beside results/clip/camera.npy
-    tools/export_motion.py output__demo-21__0.pkl motion.npz --from lingo --fps 30   # LINGO, or TRUMANS, which writes the same
+    tools/export_motion.py demo/clip/mesh motion.npz --body-model SMPLX_NEUTRAL.npz --fps 30   # WHAC, run with --save_mesh
+    tools/export_motion.py output__demo-21__0.pkl motion.npz --from lingo --fps 30   # LINGO
 
 The motion is in the world of whatever made it, turned so that z is up, for a body of SMPL-X; rotations as axis-angle, metres.
 With --in-camera it is in the camera's frame of every frame (x right, y down, z forward) and not turned.
@@ -16,8 +17,10 @@ With --in-camera it is in the camera's frame of every frame (x right, y down, z 
 | TRAM      | SMPL   | y up where its camera.npy has world_cam_R and world_cam_T, aligned   |
 |           |        | with an estimate of gravity. Older versions have the first camera's  |
 |           |        | world alone, y down: z is then up only as far as it was level        |
-| LINGO,    | SMPL-X | y up; a dictionary of transl, global_orient and body_pose, at 30     |
-| TRUMANS   |        | frames a second (10 that are made, interpolated). Hands are flat, or |
+| WHAC      | SMPL-X | y up as far as the first camera was level. It writes meshes alone;   |
+|           |        | poses are those whose vertices are nearest, in the least squares     |
+| LINGO     | SMPL-X | y up; a dictionary of transl, global_orient and body_pose, at 30     |
+|           |        | frames a second (10 that are made, interpolated). Hands are flat, or |
 |           |        | left_hand_pose and right_hand_pose, taken as turns of a flat hand    |
 
 A body turns about its pelvis, so turning a motion needs the pelvis of the estimator's body at rest: by default that of
@@ -26,7 +29,15 @@ is corrected, so that the pelvis stays where the estimator has it; the file says
 where that is known. Frames that an estimator left out are interpolated. A motion that begins with a later frame of the
 video says which (first_frame, from 0). Other people of the input, and what of it is not read, are printed.
 
-Needs Python with NumPy, and joblib for WHAM or PyTorch for GVHMR and TRAM (for LINGO where its arrays are tensors).
+WHAC numbers its meshes one after the other, also where it saw nobody. The frames they are of are in
+detection_results.pth beside the folder, which is read where it is there; else they are taken for frames 0, 1, 2, ...
+Shape, expression, hands and jaw are fitted too; the largest distance of a vertex is printed.
+
+TRUMANS's sample_hsi.py saves no motion: it returns vertices, and its lines that write a pickle are comments. Where they
+are made to run, their file is read as LINGO's.
+
+Needs Python with NumPy, and joblib for WHAM (and WHAC's frames) or PyTorch for GVHMR and TRAM (for LINGO where its arrays
+are tensors).
 CHOIS writes no such file: save trans, root_orient, pose_body, obj_rot_mat and obj_com_pos of its results with
 numpy.savez, which hsi4d reads as it is. The inputs are pickles, which can run code
 when they are read: only read files whose origin you trust.
@@ -235,7 +246,157 @@ def read_lingo(np, path, arguments):
     return np.concatenate(parts, axis=1), trans, np.zeros((1, 10)), range(len(root)), True, "y up"
 
 
-READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram, "lingo": read_lingo}
+# --- WHAC: meshes of SMPL-X to poses ------------------------------------------------------------------------------------
+
+
+class SmplxMesh:
+    """A body model as a function of pose [55,3], shape and expression [S], and translation to vertices [V,3]."""
+
+    def __init__(self, np, path):
+        with np.load(path, allow_pickle=True) as file:
+            model = {name: file[name] for name in file.files}
+        self.rest = array(np, need(model, "v_template", path), f"{path}: v_template", 3)
+        count = len(self.rest)
+        self.weights = array(np, need(model, "weights", path), f"{path}: weights", 55)
+        self.parents = np.asarray(need(model, "kintree_table", path))[0].astype(np.int64)
+        self.parents[0] = -1
+        regressor = need(model, "J_regressor", path)
+        self.regressor = array(np, regressor, f"{path}: J_regressor", count)
+        shapes = np.asarray(need(model, "shapedirs", path), dtype=np.float64)
+        first = 300 if shapes.shape[2] >= 400 else 10  # of the expression
+        self.shapes = np.concatenate([shapes[..., :10], shapes[..., first:first + 10]], axis=2)
+        self.correctives = np.asarray(need(model, "posedirs", path), dtype=np.float64) if "posedirs" in model else None
+        self.below = np.zeros((55, 55))  # [a, b]: b is a or hangs on it
+        for joint in range(55):
+            above = joint
+            while above >= 0:
+                self.below[above, joint] = 1
+                above = self.parents[above]
+
+    def posed(self, np, pose, shape, place):
+        """Vertices, and what their derivatives need: joints [55,3], rotations [55,3,3], vertices by joint's motion [55,V,3]."""
+        rest = self.rest + self.shapes @ shape
+        joints = self.regressor @ rest
+        local = matrix_of_vector(np, pose)
+        if self.correctives is not None:
+            rest = rest + self.correctives @ (local[1:] - np.eye(3)).reshape(-1)
+        turns, places = local.copy(), joints.copy()
+        for joint in range(1, 55):
+            parent = self.parents[joint]
+            turns[joint] = turns[parent] @ local[joint]
+            places[joint] = places[parent] + turns[parent] @ (joints[joint] - joints[parent])
+        moved_rest = np.einsum("jab,jvb->jva", turns, rest[None] - joints[:, None]) + places[:, None]
+        parts = self.weights.T[:, :, None] * moved_rest
+        return parts.sum(axis=0) + place, places, turns, parts
+
+    def derivatives(self, np, places, turns, parts):
+        """[V,3,188]: of 55 rotations (turned from the left, in the world), 20 of shape and expression, and translation.
+
+        The correctives' own change by the pose is left out: it only slows the last steps.
+        """
+        count = parts.shape[1]
+        moving = np.einsum("ab,bvc->avc", self.below, parts) - (self.below @ self.weights.T)[:, :, None] * places[:, None]
+        rows = np.zeros((count, 3, 188))
+        for axis in range(3):
+            unit = np.zeros(3)
+            unit[axis] = 1
+            rows[:, :, axis:165:3] = np.cross(unit, moving).transpose(1, 2, 0)
+        shapes = np.einsum("vj,jab->vab", self.weights, turns) @ self.shapes
+        bones = np.einsum("jv,vcs->jcs", self.regressor, self.shapes)
+        shift = np.zeros_like(bones)  # of where joints are
+        shift[0] = bones[0]
+        for joint in range(1, 55):
+            parent = self.parents[joint]
+            shift[joint] = shift[parent] + turns[parent] @ (bones[joint] - bones[parent])
+        rows[:, :, 165:185] = shapes + np.einsum("vj,jcs->vcs", self.weights, shift - np.einsum("jab,jbs->jas", turns, bones))
+        rows[:, :, 185:] = np.eye(3)
+        return rows
+
+    def start(self, np, vertices):
+        """Rotations that turn the vertices of each joint at rest into those of the mesh, and where the pelvis then is."""
+        turns = np.tile(np.eye(3), (55, 1, 1))
+        for joint in range(55):
+            weight = self.weights[:, joint] ** 2 if joint else np.ones(len(vertices))
+            if weight.sum() < 1e-3:
+                turns[joint] = turns[self.parents[joint]]
+                continue
+            weight = weight / weight.sum()
+            a, b = self.rest - weight @ self.rest, vertices - weight @ vertices
+            u, _, v = np.linalg.svd((b * weight[:, None]).T @ a)
+            turns[joint] = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
+        local = turns.copy()
+        for joint in range(1, 55):
+            local[joint] = turns[self.parents[joint]].T @ turns[joint]
+        return vector_of_matrix(np, local)
+
+
+def fitted_mesh(np, body, vertices):
+    """Pose [55,3], shape and expression [20], translation, and the largest distance of a vertex: Gauss-Newton."""
+    pose, shape, place = body.start(np, vertices), np.zeros(20), np.zeros(3)
+    place = (vertices - body.posed(np, pose, shape, place)[0]).mean(axis=0)
+    for _ in range(30):
+        mesh, places, turns, parts = body.posed(np, pose, shape, place)
+        rows = body.derivatives(np, places, turns, parts).reshape(-1, 188)
+        curvature = rows.T @ rows
+        # What no vertex tells (an eye's turn about its axis) stays.
+        curvature[np.diag_indices(188)] += 1e-6 * np.trace(curvature) / 188
+        step = np.linalg.solve(curvature, rows.T @ (vertices - mesh).reshape(-1))
+        above = np.concatenate([np.eye(3)[None], turns[body.parents[1:]]])  # a turn of the world, in the parent's frame
+        turn = np.einsum("jba,jb->ja", above, step[:165].reshape(55, 3))
+        pose = vector_of_matrix(np, matrix_of_vector(np, turn) @ matrix_of_vector(np, pose))
+        shape, place = shape + step[165:185], place + step[185:]
+        if np.abs(step).max() < 1e-7:
+            break
+    mesh = body.posed(np, pose, shape, place)[0]
+    return pose, shape, place, np.linalg.norm(mesh - vertices, axis=1).max()
+
+
+def vertices_in(np, path, count):
+    lines = [line[2:] for line in path.read_text().splitlines() if line.startswith("v ")]
+    vertices = array(np, np.array([line.split()[:3] for line in lines], dtype=np.float64).reshape(-1, 3), str(path), 3)
+    if len(vertices) != count:
+        fail(f"{path}: has {len(vertices)} vertices, the body model {count}")
+    return vertices
+
+
+def frames_of_meshes(np, folder, count):
+    """Which frames of the video WHAC saw its person in: the one that it saw in most."""
+    path = folder.parent / "detection_results.pth"
+    if not path.exists():
+        print(f"{folder}: its meshes are taken for frames 0 to {count - 1}, as there is no {path}")
+        return range(count)
+    people = module("joblib").load(path)
+    if not hasattr(people, "values") or not len(people):
+        fail(f"{path}: holds no people; it is not what WHAC writes")
+    frames = max((need(person, "frame_id", path) for person in people.values()), key=len)  # of equals the first
+    if len(frames) != count:
+        fail(f"{folder}: has {count} meshes, {path} {len(frames)} frames of the person")
+    return [int(frame) for frame in frames]
+
+
+def read_whac(np, path, arguments):
+    if arguments.body_model is None:
+        fail("--body-model names the file of SMPL-X (SMPLX_NEUTRAL.npz), by which meshes are read")
+    if arguments.in_camera:
+        fail(f"{path}: its meshes are in the world; there is no camera")
+    files = sorted(path.glob("whac_results_*.obj")) if path.is_dir() else []
+    if not files:
+        fail(f"{path}: holds no whac_results_*.obj; WHAC writes them into demo/NAME/mesh with --save_mesh")
+    body = SmplxMesh(np, arguments.body_model)
+    fits = [fitted_mesh(np, body, vertices_in(np, file, len(body.rest))) for file in files]
+    print(f"{path}: the farthest vertex is {1000 * max(fit[3] for fit in fits):.2f} mm from that of its pose")
+    shapes = np.stack([fit[1] for fit in fits])
+    pelvis = lambda shape: body.regressor[0] @ (body.rest + body.shapes @ shape)  # noqa: E731
+    betas = np.concatenate([shapes[:, :10].mean(axis=0), np.zeros(10)])
+    arguments.pelvis = tuple(pelvis(betas))
+    # The pelvis stays where it is: shapes differ from mesh to mesh, the motion has one.
+    trans = np.stack([place + pelvis(shape) - arguments.pelvis for _, shape, place, _ in fits])
+    poses = np.stack([fit[0] for fit in fits])
+    pose = np.concatenate([poses[:, :22], poses[:, 25:]], axis=1).reshape(len(fits), -1)  # without jaw and eyes
+    return pose, trans, betas[None, :10], frames_of_meshes(np, path, len(files)), True, "y up"
+
+
+READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram, "whac": read_whac, "lingo": read_lingo}
 ENDINGS = {".pkl": "wham", ".pickle": "wham", ".pt": "gvhmr", ".npy": "tram"}
 
 
@@ -298,6 +459,7 @@ def main():
     parser.add_argument("--person", type=int, default=0, help="which of WHAM's people, from 0")
     parser.add_argument("--camera", type=pathlib.Path, help="TRAM's camera.npy; default: beside the folder of IN")
     parser.add_argument("--in-camera", action="store_true", help="in the camera's frame, not turned")
+    parser.add_argument("--body-model", type=pathlib.Path, help="WHAC: the SMPL-X model (.npz) that its meshes are of")
     parser.add_argument("--pelvis", type=parsed_pelvis, help="x,y,z of the estimator's body at rest, metres")
     parser.add_argument("--trust", action="store_true", help="GVHMR: unpickle everything in IN, which can run code")
     arguments = parser.parse_args()
@@ -310,9 +472,9 @@ def main():
         fail(f"--fps: {arguments.fps} is out of range; allowed: above 0")
     if arguments.person < 0:
         fail(f"--person: {arguments.person} is out of range; allowed: 0 or more")
-    source = arguments.source or ENDINGS.get(arguments.input.suffix)
+    source = arguments.source or ("whac" if arguments.input.is_dir() else ENDINGS.get(arguments.input.suffix))
     if source is None:
-        fail(f"{arguments.input}: known endings are {', '.join(ENDINGS)}; --from names the estimator")
+        fail(f"{arguments.input}: known endings are {', '.join(ENDINGS)}, and folders of meshes; --from names the estimator")
     if not arguments.input.exists():
         fail(f"{arguments.input}: there is no such file")
     np = module("numpy")

@@ -3,6 +3,7 @@
 #include <exception>
 
 #include "body/motion_edit.h"
+#include "core/camera_file.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/file.h"
@@ -12,10 +13,13 @@
 #include "pipelines/chain/report.h"
 #include "pipelines/chain/results.h"
 #include "pipelines/config/run_problems.h"
+#include "pipelines/draw/camera_selection.h"
 #include "pipelines/draw/visibility.h"
 #include "pipelines/input/body_files.h"
+#include "pipelines/input/frame_cameras.h"
 #include "pipelines/report/report.h"
 #include "pipelines/run/frame_start.h"
+#include "pipelines/sources/sources.h"
 #include "splat/files/splat_file.h"
 
 namespace hsi4d {
@@ -41,13 +45,27 @@ SceneSetup setup_of(const RunConfig& chain, const DataSettings& data) {
   return setup;
 }
 
-ClipFacts check_clip(const RunConfig& chain, std::size_t index) {
-  const DataSettings& data = chain.chain[index].data;
-  SceneSetup setup = setup_of(chain, data);
+/// Whether nothing of a clip's video, masks, motion and camera waits for the clips before it.
+bool has_all_inputs(const RunConfig& chain, std::size_t index) {
+  const ChainClip& clip = chain.chain[index];
+  return !clip.select_camera && !has_sources(sources_of(chain.sources, clip));
+}
+
+/// What the scene tells that a clip begins in.
+ClipFacts facts_of_setup(const std::string& name, const SceneSetup& setup) {
   ClipFacts facts;
-  facts.name = chain.chain[index].name;
+  facts.name = name;
   facts.motion = setup.motion;
   facts.object_tracks = setup.object_tracks;
+  facts.avatar = setup.avatar;
+  return facts;
+}
+
+/// What all inputs of a clip tell.
+/// @param data  with all that programs make
+ClipFacts facts_of_inputs(const RunConfig& chain, std::size_t index, const DataSettings& data) {
+  SceneSetup setup = setup_of(chain, data);
+  ClipFacts facts = facts_of_setup(chain.chain[index].name, setup);
   Clip clip = make_clip(data, std::move(setup));
   warn_of_antialiasing(clip.antialiased, chain.render.antialias);
   set_image_size(clip, chain);
@@ -56,12 +74,19 @@ ClipFacts check_clip(const RunConfig& chain, std::size_t index) {
   check_frames(data, clip, losses_over_masks(chain));
   facts.frames = clip.frames();
   facts.frame_rate = clip.frame_rate;
-  facts.avatar = clip.avatar;
   if (clip.truth) facts.true_first = clip.truth->front();
   return facts;
 }
 
-/// The human's joints and the frame rate are those of the first clip.
+ClipFacts check_clip(const RunConfig& chain, std::size_t index) {
+  const ChainClip& clip = chain.chain[index];
+  if (has_all_inputs(chain, index)) return facts_of_inputs(chain, index, clip.data);
+  const SceneSetup setup = setup_of(chain, clip.data);
+  warn_of_antialiasing(setup.antialiased, chain.render.antialias);
+  return facts_of_setup(clip.name, setup);
+}
+
+/// The human's joints, and where it is known the frame rate, are those of the first clip.
 void check_alike(const std::vector<ClipFacts>& clips, const RunConfig& config) {
   const ClipFacts& first = clips.front();
   for (std::size_t i = 1; i < clips.size(); ++i) {
@@ -70,7 +95,7 @@ void check_alike(const std::vector<ClipFacts>& clips, const RunConfig& config) {
       throw UserError(place + "avatar: " + config.chain[i].data.avatar.string() +
                       ": the human's joints are not those of " + config.chain[0].data.avatar.string() +
                       "; the clips of a chain have one body");
-    if (clips[i].frame_rate != first.frame_rate)
+    if (clips[i].frames > 0 && first.frames > 0 && clips[i].frame_rate != first.frame_rate)
       throw UserError(place + "frame_rate: the clip \"" + clips[i].name + "\" has " +
                       to_json_line(ConfigValue::make_number(clips[i].frame_rate)) + " frames a second, \"" +
                       first.name + "\" has " + to_json_line(ConfigValue::make_number(first.frame_rate)) +
@@ -105,11 +130,34 @@ void write_start(const ChainPaths& paths, const ClipFacts& clip, const std::vect
   write_text_file(paths.start(clip.name), to_json(root));
 }
 
+/// Chooses the camera of a clip in its first state.
+void write_chosen_camera(const RunConfig& clip, const std::string& file, const Observer& observer) {
+  std::optional<Camera> intrinsics;
+  if (!clip.data.camera.empty()) intrinsics = camera_for_size(clip.data.camera);
+  const CameraChoice choice =
+      select_camera(read_scene_setup(clip.data), clip.camera_selection, clip.render, intrinsics, observer);
+  fs::create_directories(fs::path(file).parent_path());
+  write_camera(file, choice.camera);
+  log_info("camera: " + file + ", chosen of " + std::to_string(choice.candidates.size()) + ", sees " +
+           std::to_string(choice.candidates.front().visible) + " of 22 joints");
+}
+
 /// The config of a clip, which begins with the state that the one before left.
 RunConfig started_config(const RunConfig& chain, std::size_t index, const ChainPaths& paths) {
   RunConfig clip = clip_config(chain, index);
   if (index > 0) clip.data.initial = fs::absolute(paths.start(chain.chain[index].name));
+  if (chain.chain[index].select_camera) clip.data.camera = fs::absolute(paths.camera(chain.chain[index].name));
   return clip;
+}
+
+/// Takes over into `clip.data` what programs have made already. @return  whether nothing is left to make
+bool take_made(RunConfig& clip) {
+  bool is_all = true;
+  for (const SourceOutput& output : planned_sources(clip)) {
+    is_all = is_all && output.is_there;
+    take_output(output, clip.data);
+  }
+  return is_all;
 }
 
 /// Whether a clip is done, with the inputs that it has now.
@@ -118,6 +166,7 @@ bool is_done(const RunConfig& clip, const std::string& folder, const std::vector
   if (look_at_run_folder(folder, resolved_config(clip, descriptions_of(losses)), true) != RunState::kDone) return false;
   RunConfig prepared = clip;
   prepare_run(prepared);
+  if (!take_made(prepared)) return false;
   const Clip inputs = read_run_clip(prepared, losses);
   return finished_frames(folder, prepared, inputs, losses) + 1 == inputs.frames();  // not without a checkpoint
 }
@@ -140,8 +189,12 @@ auto with_clip_named(const RunConfig& chain, std::size_t index, const F& work) {
 class Chain {
  public:
   Chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options,
-        const std::vector<ClipFacts>& clips)
-      : config_(config), losses_(losses), options_(options), clips_(clips), paths_{fs::path(options.folder)} {
+        std::vector<ClipFacts> clips)
+      : config_(config),
+        losses_(losses),
+        options_(options),
+        clips_(std::move(clips)),
+        paths_{fs::path(options.folder)} {
     for (const auto& [name, object] : config.chain.front().data.objects) objects_.push_back(name);
   }
 
@@ -149,31 +202,48 @@ class Chain {
     std::vector<ClipResult> results;
     for (std::size_t i = 0; i < clips_.size(); ++i) {
       if (i > 0) write_start(paths_, clips_[i], objects_, results.back().states.back());
-      run_clip(i, folder);
+      with_clip_named(config_, i, [&] {
+        if (!has_all_inputs(config_, i)) make_inputs(i);
+        run_clip(i, folder);
+      });
       results.push_back(read_clip_result(clips_[i].name, paths_.clip(clips_[i].name), objects_));
     }
     return write_chain_results(folder.paths(), config_, {clips_, results, objects_});
   }
 
  private:
+  /// Chooses the camera and runs programs where the clip needs it, and completes what is known of the clip.
+  void make_inputs(std::size_t i) {
+    RunConfig clip = started_config(config_, i, paths_);
+    const int threads = options_.threads > 0 ? options_.threads : config_.threads;
+    with_threads(threads > 0 ? threads : thread_count(), [&] {
+      if (config_.chain[i].select_camera) {
+        RunConfig before = clip;
+        before.data.camera = config_.chain[i].data.camera;
+        write_chosen_camera(before, paths_.camera(clips_[i].name), options_.observer);
+      }
+      clip.data = make_sources(clip, options_.observer);
+    });
+    clips_[i] = facts_of_inputs(config_, i, clip.data);
+    check_alike(clips_, config_);
+  }
+
   void run_clip(std::size_t i, const RunFolder& folder) const {
     const RunConfig clip = started_config(config_, i, paths_);
     RunOptions options = options_;
     options.folder = paths_.clip(clips_[i].name);
-    with_clip_named(config_, i, [&] {
-      if (options.resume && is_done(clip, options.folder, losses_)) {
-        if (!fs::exists(RunPaths{options.folder}.report())) write_report(options.folder);  // killed before that
-        return;
-      }
-      folder.note("begins " + clip_in_words(config_, i));
-      execute_run(clip, losses_, options);
-    });
+    if (options.resume && is_done(clip, options.folder, losses_)) {
+      if (!fs::exists(RunPaths{options.folder}.report())) write_report(options.folder);  // killed before that
+      return;
+    }
+    folder.note("begins " + clip_in_words(config_, i));
+    execute_run(clip, losses_, options);
   }
 
   const RunConfig& config_;
   const std::vector<LossTerm>& losses_;
   const RunOptions& options_;
-  const std::vector<ClipFacts>& clips_;
+  std::vector<ClipFacts> clips_;  // of those that programs make all is known once they begin
   ChainPaths paths_;
   std::vector<std::string> objects_;
 };
@@ -196,6 +266,7 @@ RunConfig clip_config(const RunConfig& chain, std::size_t index) {
   clip.chain.clear();
   clip.name = (chain.name.empty() ? "" : chain.name + ": ") + clip_in_words(chain, index);
   clip.data = chain.chain.at(index).data;
+  clip.sources = sources_of(chain.sources, chain.chain[index]);
   return clip;
 }
 

@@ -110,6 +110,21 @@ std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, co
   return text + stages_text(config);
 }
 
+/// "clip b: 51 frames", or what is to be done for it first.
+std::string clip_plan(const RunConfig& chain, std::size_t index, const ClipFacts& clip) {
+  const std::string name = "  clip " + clip.name + ": ";
+  if (clip.frames > 0) return name + count_text(clip.frames, "frame") + "\n";
+  std::string text = name + (index == 0 ? "" : "in the state in which " + chain.chain[index - 1].name + " ends\n");
+  if (index == 0) text += "in its initial state\n";
+  if (chain.chain[index].select_camera) text += "    would choose its camera\n";
+  const SourceSettings sources = clip_config(chain, index).sources;
+  for (const ProgramSettings* program :
+       {static_cast<const ProgramSettings*>(&sources.video), &sources.masks, &sources.motion})
+    if (!program->command.empty())
+      text += "    would run " + joined(program->command) + ", unless its output is there\n";
+  return text;
+}
+
 /// As plan, of a chain: all its clips.
 std::string chain_plan(const RunConfig& config, const std::vector<LossTerm>& losses, const std::string& folder,
                        bool resume) {
@@ -120,7 +135,7 @@ std::string chain_plan(const RunConfig& config, const std::vector<LossTerm>& los
     text = "would go on with " + folder + " (" + std::string(run_state_name(*state)) +
            "): " + std::to_string(finished_clips(config, folder, losses)) + " of " + std::to_string(clips.size()) +
            " clips are finished\n";
-  for (const ClipFacts& clip : clips) text += "  clip " + clip.name + ": " + count_text(clip.frames, "frame") + "\n";
+  for (std::size_t i = 0; i < clips.size(); ++i) text += clip_plan(config, i, clips[i]);
   return text + stages_text(config);
 }
 

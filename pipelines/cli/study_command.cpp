@@ -35,6 +35,7 @@ struct StudyOptions {
   std::vector<std::string> answers;   ///< --answers F.json...
   std::string key;                    ///< --key F.json
   std::string csv, json;              ///< --csv F, --json F; of answers
+  std::string collect, completion;    ///< --collect URL, --completion CODE
 };
 
 namespace fs = std::filesystem;
@@ -61,9 +62,15 @@ std::string make_page(const StudyOptions& o) {
                     std::to_string(o.runs.size()) + " given); --answers tells what people chose");
   if (o.out.empty()) throw UserError(kStudyCommand + "--out says where the page goes: a new or empty folder");
   const InterruptWatch watch;
-  const Study study =
-      make_study({o.runs[0], o.runs[1], o.out, o.texts, o.pairs.value_or(kPairsPerPerson), o.seed, o.embed},
-                 observer_on_terminal(o.quiet));
+  const Study study = make_study({o.runs[0],
+                                  o.runs[1],
+                                  o.out,
+                                  o.texts,
+                                  o.pairs.value_or(kPairsPerPerson),
+                                  o.seed,
+                                  o.embed,
+                                  {o.collect, o.completion}},
+                                 observer_on_terminal(o.quiet));
   return study.page.generic_string() + ": " + count_text(std::ssize(study.key.pairs), "pair") +
          ", of which a person is shown " + std::to_string(study.key.shown_pairs()) +
          (o.embed ? "; one file" : "; goes with videos/") + "\n" + study.key_file.generic_string() +
@@ -107,6 +114,8 @@ std::string tell_results(const StudyOptions& o) {
   check_absent({{"--out", !o.out.empty()},
                 {"--texts", !o.texts.empty()},
                 {"--embed", o.embed},
+                {"--collect", !o.collect.empty()},
+                {"--completion", !o.completion.empty()},
                 {"--pairs", o.pairs.has_value()},
                 {"--seed", o.seed.has_value()}},
                "is for making a study, not for --answers");
@@ -161,6 +170,15 @@ void add_study(CLI::App& app, Program& program) {
       ->check(whole_number())
       ->type_name("N");
   command->add_flag("--embed", o.embed, "One file: the videos are in the page");
+  command
+      ->add_option("--collect", o.collect,
+                   "Where the page sends answers (HTTP POST); default: nowhere, people save them as a file")
+      ->type_name("URL");
+  command
+      ->add_option(
+          "--completion", o.completion,
+          "Shown to who has answered all and sent (or saved) it: a code, or an address to go to, as Prolific's")
+      ->type_name("CODE");
   command->add_flag("--quiet", o.quiet, "No progress on stderr");
   command->add_option("--answers", o.answers, "Files that people saved, or folders of them; A and B are then left out")
       ->type_name("F.json");

@@ -28,6 +28,10 @@ ConfigValue whole_data(const ConfigValue& shared, const ConfigValue& clip, bool 
 
 void describe(ConfigFields& f, ChainClip& s) {
   f.string("name", s.name, "Name of the clip and of its run folder").required();
+  f.string("prompt", s.prompt, "What happens in its video: {prompt}; empty: sources.prompt");
+  f.boolean(
+      "select_camera", s.select_camera,
+      "Choose its camera in its first state, as camera_selection says; size and focal lengths: data.camera, if given");
   f.object("data", s.data, "Its inputs, laid over those of the config");
 }
 
@@ -43,6 +47,18 @@ void lay_over_data(const ConfigValue& tree, std::vector<ChainClip>& chain, Confi
     read_config(whole_data(shared, clips->items[i], i == 0), fields, problems, pointer);
     chain[i].data = std::move(data);
   }
+}
+
+SourceSettings sources_of(const SourceSettings& shared, const ChainClip& clip) {
+  SourceSettings sources = shared;
+  if (!clip.prompt.empty()) sources.prompt = clip.prompt;
+  const auto leave_out = [](const std::filesystem::path& given, ProgramSettings& program) {
+    if (!given.empty()) program.command.clear();
+  };
+  leave_out(clip.data.frames, sources.video);
+  leave_out(clip.data.masks, sources.masks);
+  leave_out(clip.data.motion, sources.motion);
+  return sources;
 }
 
 }  // namespace hsi4d

@@ -134,33 +134,54 @@ void add_name_problems(const DataSettings& data, const std::string& in, std::vec
   }
 }
 
+/// A program of `sources`, and the input that it makes.
+struct Maker {
+  const char* name;
+  const std::vector<std::string>& command;
+  const std::vector<std::string>& placeholders;
+  std::filesystem::path DataSettings::*input;
+  const char* key;
+
+  std::string section() const { return std::string("/sources/") + name; }
+};
+
+std::array<Maker, 3> makers_in(const SourceSettings& sources) {
+  return {Maker{"video", sources.video.command, video_placeholders(), &DataSettings::frames, "frames"},
+          Maker{"masks", sources.masks.command, mask_placeholders(), &DataSettings::masks, "masks"},
+          Maker{"motion", sources.motion.command, motion_placeholders(), &DataSettings::motion, "motion"}};
+}
+
+void add_command_problems(const SourceSettings& sources, std::vector<RunProblem>& found) {
+  for (const Maker& maker : makers_in(sources)) {
+    for (CommandFault& fault : command_faults(maker.command, maker.placeholders))
+      found.push_back({maker.section() + fault.pointer, std::move(fault.text), {maker.section() + "/command"}});
+  }
+}
+
+/// @param pointer  of the prompt
+void add_prompt_problems(const SourceSettings& sources, const std::string& pointer, std::vector<RunProblem>& found) {
+  if (!sources.prompt.empty()) return;
+  for (const Maker& maker : makers_in(sources)) {
+    if (uses_placeholder(maker.command, "prompt"))
+      found.push_back({pointer, "not given; " + maker.section() + "/command has {prompt}", {"/sources"}, true});
+  }
+}
+
 /// What is wrong with the programs that make video, masks and motion.
 void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found) {
-  struct Program {
-    const char* name;
-    const std::vector<std::string>& command;
-    const std::vector<std::string>& placeholders;
-    const std::filesystem::path& given;
-    const char* key;
-  };
-  const SourceSettings& sources = config.sources;
-  for (const Program& program :
-       {Program{"video", sources.video.command, video_placeholders(), config.data.frames, "frames"},
-        Program{"masks", sources.masks.command, mask_placeholders(), config.data.masks, "masks"},
-        Program{"motion", sources.motion.command, motion_placeholders(), config.data.motion, "motion"}}) {
-    const std::string section = std::string("/sources/") + program.name, key = std::string("/data/") + program.key;
-    for (CommandFault& fault : command_faults(program.command, program.placeholders))
-      found.push_back({section + fault.pointer, std::move(fault.text), {section + "/command"}});
-    if (!program.command.empty() && !program.given.empty())
-      found.push_back({key, "given, and " + section + " makes it too; remove one", {key, section}});
-    if (sources.prompt.empty() && uses_placeholder(program.command, "prompt"))
-      found.push_back({"/sources/prompt", "not given; " + section + "/command has {prompt}", {"/sources"}, true});
+  add_command_problems(config.sources, found);
+  for (const Maker& maker : makers_in(config.sources)) {
+    const std::string key = std::string("/data/") + maker.key;
+    if (!maker.command.empty() && !(config.data.*maker.input).empty())
+      found.push_back({key, "given, and " + maker.section() + " makes it too; remove one", {key, maker.section()}});
   }
+  add_prompt_problems(config.sources, "/sources/prompt", found);
 }
 
 /// What of the inputs need not be given.
 struct KnownInputs {
   bool video = false, masks = false;  ///< a program outside makes them
+  bool camera = false;                ///< it is chosen
   bool state = false;                 ///< frame 0 is that in which another clip ended
 };
 
@@ -177,7 +198,7 @@ void add_input_problems(const DataSettings& data, const std::string& in, const K
                              Input{data.avatar, "avatar", "an avatar"},
                              Input{data.frames, "frames", "the frames of a video", known.video},
                              Input{data.masks, "masks", "masks of the human and the objects", known.masks},
-                             Input{data.camera, "camera", "the camera of frame 0"},
+                             Input{data.camera, "camera", "the camera of frame 0", known.camera},
                              Input{data.initial, "initial", "the state of frame 0", known.state}};
   const auto is_missing = [](const Input& input) { return input.path.empty() && !input.is_known; };
   if (std::all_of(inputs.begin(), inputs.end(), is_missing)) {
@@ -211,7 +232,26 @@ std::string object_names(const DataSettings& data) {
   return names.empty() ? "none" : joined(names);
 }
 
-void add_chain_problems(const std::vector<ChainClip>& chain, ConfigUse use, std::vector<RunProblem>& found) {
+KnownInputs known_inputs(const SourceSettings& sources, const ChainClip& clip, std::size_t index) {
+  return {.video = !sources.video.command.empty(),
+          .masks = !sources.masks.command.empty(),
+          .camera = clip.select_camera,
+          .state = index > 0};
+}
+
+/// A program whose output every clip names makes nothing.
+void add_idle_source_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  for (const Maker& maker : makers_in(config.sources)) {
+    const auto names_it = [&maker](const ChainClip& clip) { return !(clip.data.*maker.input).empty(); };
+    if (!maker.command.empty() && std::all_of(config.chain.begin(), config.chain.end(), names_it))
+      found.push_back({maker.section(),
+                       "makes nothing: every clip of the chain has data/" + std::string(maker.key) + "; remove one",
+                       {maker.section(), "/chain", "/data"}});
+  }
+}
+
+void add_chain_problems(const RunConfig& config, ConfigUse use, std::vector<RunProblem>& found) {
+  const std::vector<ChainClip>& chain = config.chain;
   for (std::size_t i = 0; i < chain.size(); ++i) {
     const ChainClip& clip = chain[i];
     const std::string where = child_pointer("/chain", std::to_string(i));
@@ -228,7 +268,9 @@ void add_chain_problems(const std::vector<ChainClip>& chain, ConfigUse use, std:
                            object_names(chain.front().data) + "; the clips of a chain have the same, in one order",
                        {}});
     add_name_problems(clip.data, where + "/data", found);
-    if (use == ConfigUse::kRun) add_input_problems(clip.data, where + "/data", {.state = i > 0}, found);
+    const SourceSettings sources = sources_of(config.sources, clip);
+    add_prompt_problems(sources, where + "/prompt", found);
+    if (use == ConfigUse::kRun) add_input_problems(clip.data, where + "/data", known_inputs(sources, clip, i), found);
   }
 }
 
@@ -301,12 +343,9 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_start_problems(config, found);
   add_given_frame_problems(config, found);
   if (!config.chain.empty()) {
-    if (has_sources(config.sources))
-      found.push_back({"/sources",
-                       "programs make video and masks of one clip, and this config is a chain; make those of each clip "
-                       "by a config of its own, and name them in the clip's data",
-                       {"/sources", "/chain"}});
-    add_chain_problems(config.chain, use, found);
+    add_command_problems(config.sources, found);
+    add_idle_source_problems(config, found);
+    add_chain_problems(config, use, found);
     return found;
   }
   add_name_problems(config.data, "/data", found);

@@ -42,7 +42,7 @@ ConfigValue blinded_pairs(std::vector<StudyPair> pairs) {
   return array;
 }
 
-ConfigValue page_data(const StudyKey& key, const std::map<std::string, Bytes>& videos) {
+ConfigValue page_data(const StudyKey& key, const StudyEnd& end, const std::map<std::string, Bytes>& videos) {
   ConfigValue data = ConfigValue::make_object(), questions = ConfigValue::make_object(),
               embedded = ConfigValue::make_object();
   for (const StudyQuestion& question : kStudyQuestions)
@@ -50,6 +50,8 @@ ConfigValue page_data(const StudyKey& key, const std::map<std::string, Bytes>& v
   for (const auto& [name, video] : videos) embedded.add(name, ConfigValue::make_string(base64(video)));
   data.add("study", ConfigValue::make_string(key.study));
   data.add("shown", ConfigValue::make_integer(key.shown_pairs()));
+  data.add("collect", ConfigValue::make_string(end.collect));
+  data.add("completion", ConfigValue::make_string(end.completion));
   data.add("questions", std::move(questions));
   data.add("pairs", blinded_pairs(key.pairs));
   data.add("embedded", std::move(embedded));
@@ -58,12 +60,12 @@ ConfigValue page_data(const StudyKey& key, const std::map<std::string, Bytes>& v
 
 }  // namespace
 
-std::string study_page(const StudyKey& key, const std::map<std::string, Bytes>& videos) {
+std::string study_page(const StudyKey& key, const StudyEnd& end, const std::map<std::string, Bytes>& videos) {
   return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
          "content=\"width=device-width, initial-scale=1\"/>\n<meta name=\"robots\" content=\"noindex\"/>\n"
          "<title>Which video is better?</title>\n<style>" +
          std::string(study_style()) + "</style>\n</head>\n<body>\n" + std::string(study_body()) +
-         "<script type=\"application/json\" id=\"study-data\">" + script_json(page_data(key, videos)) +
+         "<script type=\"application/json\" id=\"study-data\">" + script_json(page_data(key, end, videos)) +
          "</script>\n<script>" + std::string(study_script()) + "</script>\n</body>\n</html>\n";
 }
 

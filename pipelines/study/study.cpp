@@ -147,6 +147,22 @@ const fs::file_time_type kTimeOfVideos =
     std::chrono::file_clock::from_sys(std::chrono::sys_seconds(std::chrono::sys_days(std::chrono::year(2020) / 1 / 1)));
 
 /// Sixteen random hexadecimal digits, by the system's generator.
+bool is_web_address(const std::string& text) {
+  return (text.starts_with("https://") && text.size() > 8) || (text.starts_with("http://") && text.size() > 7);
+}
+
+void check_end(const StudyEnd& end) {
+  const auto is_printable = [](const std::string& text) {
+    return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; });
+  };
+  if (!end.collect.empty() && (!is_web_address(end.collect) || !is_printable(end.collect)))
+    throw UserError("hsi4d study: --collect: " + json_string(end.collect) +
+                    " is no address; allowed: https://... or http://..., without spaces");
+  if (!is_printable(end.completion))
+    throw UserError("hsi4d study: --completion: " + json_string(end.completion) +
+                    " is neither a code nor an address; allowed: characters of ASCII without spaces");
+}
+
 std::string random_digits() {
   std::random_device device;
   std::string digits;
@@ -234,6 +250,7 @@ fs::path study_key_file(const fs::path& folder) {
 
 Study make_study(const StudySettings& settings, const Observer& observer) {
   check_is_new(settings);
+  check_end(settings.end);
   const std::string salt = settings.seed ? "" : random_digits() + random_digits();
   Study study{{"", settings.a, settings.b, salt, settings.pairs_per_person, {}},
               settings.out / "index.html",
@@ -252,7 +269,7 @@ Study make_study(const StudySettings& settings, const Observer& observer) {
   const std::map<std::string, Bytes> videos =
       settings.embed ? embedded_videos(study.key, folder) : std::map<std::string, Bytes>{};
   write_text_file(study.key_file.string(), study_key_json(study.key));
-  write_text_file(study.page.string(), study_page(study.key, videos));
+  write_text_file(study.page.string(), study_page(study.key, settings.end, videos));
   folder.keep();
   return study;
 }

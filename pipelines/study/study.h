@@ -13,6 +13,7 @@
 
 #include "core/observer.h"
 #include "pipelines/study/key.h"
+#include "pipelines/study/page.h"
 
 namespace hsi4d {
 
@@ -23,6 +24,7 @@ struct StudySettings {
   Index pairs_per_person = kPairsPerPerson;
   std::optional<std::uint64_t> seed;  ///< of the names of videos and pairs; without it they are random
   bool embed = false;                 ///< videos go into the page
+  StudyEnd end;                       ///< no answer and no key depends on it
 };
 
 /// A study that was made.
@@ -41,7 +43,8 @@ std::filesystem::path study_key_file(const std::filesystem::path& folder);
 /// they follow from it and from the runs, so that the same study can be made again, and someone who has the runs and
 /// guesses the seed can tell A from B. The key comes before the page, the page last.
 ///
-/// Throws as study_runs; UserError where `out` is not a new or empty folder, or its key is there; UserError or
+/// Throws as study_runs; UserError where `out` is not a new or empty folder, its key is there, or an address or code of
+/// `end` is none; UserError or
 /// DataError of reading and writing videos; Interrupted when asked to stop, with nothing left.
 Study make_study(const StudySettings& settings, const Observer& observer);
 

@@ -214,6 +214,78 @@ def tram():
     refused("has 4 frames", "export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
 
 
+def body_model(vertices=330):
+    """A body of SMPL-X's skeleton with six vertices about each joint, each of which follows its parent a little."""
+    parents = np.array([-1] + [int(rng.integers(max(0, j - 6), j)) for j in range(1, 55)])
+    joints = np.zeros((55, 3))
+    for j in range(1, 55):
+        joints[j] = joints[parents[j]] + rng.normal(size=3) * 0.15
+    of = np.arange(vertices) % 55
+    weights = np.zeros((vertices, 55))
+    weights[np.arange(vertices), of] = 0.8
+    weights[np.arange(vertices), np.maximum(parents[of], 0)] += 0.2
+    template = joints[of] + rng.normal(size=(vertices, 3)) * 0.05
+    regressor = np.zeros((55, vertices))
+    regressor[of, np.arange(vertices)] = 55 / vertices
+    table = np.stack([np.where(parents < 0, 2**32 - 1, parents), np.arange(55)])
+    shapes = rng.normal(size=(vertices, 3, 20)) * 0.004
+    correctives = rng.normal(size=(vertices, 3, 486)) * 0.0005
+    np.savez("body.npz", v_template=template, weights=weights, J_regressor=regressor, kintree_table=table, shapedirs=shapes,
+             posedirs=correctives)
+    return em.SmplxMesh(np, "body.npz")
+
+
+def whac():
+    body = body_model()
+    poses, shapes = rng.normal(size=(3, 55, 3)) * 0.4, rng.normal(size=(3, 20))
+    poses[:, 0] *= 4  # the root, any way round
+    places = rng.normal(size=(3, 3))
+
+    # The derivatives of the fit, by differences, in a body without correctives.
+    correctives, body.correctives = body.correctives, None
+    mesh, *parts = body.posed(np, poses[0], shapes[0], places[0])
+    rows = body.derivatives(np, *parts)
+    step = 1e-6
+    for joint in (0, 4, 20, 54):
+        above = parts[1][body.parents[joint]] if joint else np.eye(3)
+        for axis in range(3):
+            turn = em.matrix_of_vector(np, above.T @ (np.eye(3)[axis] * step))
+            pose = poses[0].copy()
+            pose[joint] = em.vector_of_matrix(np, turn @ em.matrix_of_vector(np, pose[joint]))
+            difference = (body.posed(np, pose, shapes[0], places[0])[0] - mesh) / step
+            close(rows[:, :, 3 * joint + axis], difference, 1e-5)
+    for number in range(20):
+        shape = shapes[0] + step * np.eye(20)[number]
+        close(rows[:, :, 165 + number], (body.posed(np, poses[0], shape, places[0])[0] - mesh) / step, 1e-6)
+    body.correctives = correctives
+
+    for t in range(3):
+        mesh = body.posed(np, poses[t], shapes[t], places[t])[0]
+        text = "".join("v %.9g %.9g %.9g\n" % tuple(v) for v in mesh) + "f 1 2 3\n"
+        pathlib.Path("city/mesh").mkdir(parents=True, exist_ok=True)
+        pathlib.Path(f"city/mesh/whac_results_{t:06}.obj").write_text(text)
+    refused("--body-model names the file", "export_motion.py", "city/mesh", "w.npz")
+    said = export("export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz")
+    assert "taken for frames 0 to 2" in said and "the farthest vertex is 0.00 mm" in said, said
+    out = np.load("w.npz")
+    close(em.matrix_of_vector(np, out["pose_body"].reshape(3, 21, 3)), em.matrix_of_vector(np, poses[:, 1:22]), 1e-4)
+    close(em.matrix_of_vector(np, out["pose_hand"].reshape(3, 30, 3)), em.matrix_of_vector(np, poses[:, 25:]), 1e-4)
+    close(em.matrix_of_vector(np, out["root_orient"]), Z_UP @ em.matrix_of_vector(np, poses[:, 0]), 1e-4)
+    close(out["betas"][:10], shapes[:, :10].mean(axis=0), 1e-3)
+    pelvis = np.stack([body.regressor[0] @ (body.rest + body.shapes @ shape) for shape in shapes]) + places
+    close(out["trans"] + out["pelvis_rest"], pelvis @ Z_UP.T, 1e-5)
+    reads("w.npz")
+    save("city/detection_results.pth", {1: {"frame_id": [0, 1]}, 7: {"frame_id": [2, 3, 5]}})
+    said = export("export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz", "--fps", 30)
+    assert "4 frames, 1 of them interpolated, from frame 2 of the video, whac" in said, said
+    save("city/detection_results.pth", {1: {"frame_id": [0, 1]}})
+    refused("has 3 meshes", "export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz")
+    pathlib.Path("city/mesh/whac_results_000001.obj").write_text("v 0 0 0\n")
+    refused("has 1 vertices, the body model 330", "export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz")
+    pathlib.Path("empty").mkdir()
+    refused("holds no whac_results_*.obj", "export_motion.py", "empty", "w.npz", "--body-model", "body.npz")
+
+
 def vposer():
     net = {}
 
@@ -249,7 +321,7 @@ def vposer():
 
 folder = tempfile.TemporaryDirectory()
 os.chdir(folder.name)
-for test in (rotations, gvhmr, wham, lingo, tram, vposer):
+for test in (rotations, gvhmr, wham, lingo, tram, whac, vposer):
     test()
     print(test.__name__, "passed")
 refused("there is no such file", "export_motion.py", "nowhere.pkl", "w.npz")

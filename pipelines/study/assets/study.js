@@ -49,10 +49,12 @@ function newPerson() {
 
 // ---- What is kept ----
 
-const givenPerson = new URLSearchParams(location.search).get("person") ?? "";  // of a page opened as index.html?person=NAME
+// Of a page opened as index.html?person=NAME, or by Prolific.
+const asked = new URLSearchParams(location.search);
+const givenPerson = asked.get("person") ?? asked.get("PROLIFIC_PID") ?? "";
 const place = "hsi4d study " + study.study + (givenPerson ? " of " + givenPerson : "");
 
-const fresh = () => ({ person: givenPerson || newPerson(), begun: "", finished: "", saved: true, at: -1, pairs: {} });
+const fresh = () => ({ person: givenPerson || newPerson(), begun: "", finished: "", saved: true, handedIn: false, at: -1, pairs: {} });
 
 let isKept = true;  // whether the browser keeps what is answered
 let kept = null;    // what it keeps as far as this window knows, JSON
@@ -255,10 +257,21 @@ function showTrial() {
 function showEnd() {
   const left = trials.length - answered().length;
   get("done").textContent = left === 0 ? "All pairs are answered." : answered().length + " of " + count(trials.length, "pair") + " are answered.";
+  get("what-now").textContent = study.collect ? "Please send your answers." : "Please save your answers and send the file to whoever asked you.";
   get("answers").value = answersText();
   get("another").hidden = givenPerson !== "";
-  get("saved").textContent = "";
+  get("saved").textContent = get("sent").textContent = "";
+  get("send").disabled = false;
+  showCompletion();
   showSection("end");
+}
+
+// The code is for who has answered all, and has sent or saved it.
+function showCompletion() {
+  const isDue = study.completion !== "" && state.handedIn && answered().length === trials.length;
+  const isAddress = study.completion.includes("://");
+  get("completion").hidden = !isDue || isAddress;
+  get("onward").hidden = !isDue || !isAddress;
 }
 
 function showReturn() {
@@ -277,7 +290,7 @@ function show() {
 function choose(id, side) {
   if (!areLoaded()) return;
   const trial = trials[state.at];
-  state.saved = false;
+  state.saved = state.handedIn = false;
   recordOf(trial).chosen[id] = side;
   get("question-" + id).querySelector("[value=" + side + "]").checked = true;
   markOpen(trial);
@@ -347,7 +360,27 @@ function save() {
   setTimeout(() => URL.revokeObjectURL(url), 60_000);
   get("saved").textContent = "Saved as " + name;
   state.saved = true;
+  if (!study.collect) state.handedIn = true;
   keep();
+  showCompletion();
+}
+
+// Sent as text, which a browser lets a page send anywhere without asking the server first; the server's answer must
+// allow to be read (Access-Control-Allow-Origin).
+async function send() {
+  get("send").disabled = true;
+  get("sent").textContent = "Sending…";
+  try {
+    const reply = await fetch(study.collect, { method: "POST", body: answersText(), signal: AbortSignal.timeout(30_000) });
+    if (!reply.ok) throw new Error("status " + reply.status);
+    get("sent").textContent = "Your answers have arrived.";
+    state.saved = state.handedIn = true;
+    keep();
+    showCompletion();
+  } catch (error) {
+    get("sent").textContent = "Your answers have not arrived (" + error.message + "). Please try again, or save them and send the file to whoever asked you.";
+    get("send").disabled = false;
+  }
 }
 
 function beginAnew() {
@@ -367,6 +400,15 @@ setInterval(() => {
 
 const most = Math.max(...study.pairs.map(pair => pair.questions.length));
 get("shown").textContent = count(trials.length, "pair");
+if (study.collect) {
+  get("stays").hidden = true;
+  get("goes").hidden = get("sending").hidden = false;
+  get("receiver").textContent = new URL(study.collect).host;
+  get("stop").textContent = "Stop here and send";
+  get("save").classList.remove("main");
+}
+get("code").textContent = study.completion;
+get("onward-link").href = study.completion;
 get("asked").textContent = most === 1 ? "one question" : "two questions";
 get("begin").addEventListener("click", () => {
   state.begun = new Date().toISOString();
@@ -379,6 +421,7 @@ get("again").addEventListener("click", playFromStart);
 get("back").addEventListener("click", () => goTo(state.at - 1));
 get("next").addEventListener("click", next);
 get("save").addEventListener("click", save);
+get("send").addEventListener("click", send);
 get("stop").addEventListener("click", () => goTo(trials.length));
 get("review").addEventListener("click", review);
 get("another").addEventListener("click", beginAnew);

@@ -14,7 +14,7 @@
 #include "pipelines/chain/report.h"
 #include "pipelines/input/state.h"
 #include "tests/support/program.h"
-#include "tests/support/tiny_run.h"
+#include "tests/support/tiny_chain.h"
 
 namespace chain_test {
 
@@ -26,63 +26,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kClips = 2, kClipFrames = 3;
 constexpr int kAllFrames = kClips * (kClipFrames - 1) + 1;
-constexpr int kPerClip = kPerFrame * (kClipFrames - 1);  // iterations
-const std::vector<std::string> kNone;
-
-/// Two clips of three frames with a camera each, made when a test first asks for it; removed when the program ends.
-class TinyChain {
- public:
-  static const fs::path& folder() {
-    static const TinyChain chain;
-    return chain.folder_;
-  }
-
- private:
-  TinyChain() {
-    std::string pattern = (fs::temp_directory_path() / "hsi4d_chain_XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder can be made");
-    base_ = pattern;
-    folder_ = base_ / "data";
-    SyntheticSettings settings = TinyDataset::settings();
-    settings.frames = kClipFrames;
-    settings.clips = kClips;
-    ConfigProblems problems;
-    const ConfigValue stages = load_config_text(kTinyStages, "tiny.json", base_, {}, problems);
-    write_dataset(settings, video_render_settings(), folder_, {}, stages);
-  }
-  ~TinyChain() {
-    std::error_code error;
-    fs::remove_all(base_, error);
-  }
-
-  fs::path base_, folder_;
-};
-
-std::string chain_file() { return (TinyChain::folder() / "config.json").string(); }
-
-RunConfig chain_config(const std::vector<std::string>& overrides = {}) {
-  return load_run_config(chain_file(), overrides, descriptions_of(loss_terms()), ConfigUse::kRun);
-}
-
-ChainSummary execute_tiny_chain(const RunConfig& config, const std::string& folder, int threads = 1,
-                                bool resume = false, std::function<bool()> stop_requested = {}) {
-  RunOptions options;
-  options.folder = folder;
-  options.resume = resume;
-  options.threads = threads;
-  options.observer.stop_requested = std::move(stop_requested);
-  return execute_chain(config, loss_terms(), options);
-}
-
-/// A config beside the dataset's own, changed.
-template <class F>
-RunConfig changed_config(F&& change) {
-  const fs::path file = TinyChain::folder() / "changed.json";
-  write_changed(chain_file(), file, change);
-  return load_run_config(file, {}, descriptions_of(loss_terms()), ConfigUse::kRun);
-}
 
 template <class F>
 std::string fault_of(F&& change) {
@@ -94,21 +38,6 @@ std::string fault_of(F&& change) {
     return error.what();
   }
   return "no fault";
-}
-
-/// What must be the same of the folder of a chain, however it came about.
-std::map<std::string, std::string> result_of_chain(const fs::path& chain) {
-  std::map<std::string, std::string> result;
-  for (const char* name : {"config.resolved.json", "motion.npz", "motion_30fps.npz", "objects.npz", "cameras.json",
-                           "body.glb", "preview.mp4"})
-    result[name] = file_text(chain / name);
-  result["summary.json"] = without_seconds(nlohmann::ordered_json::parse(file_text(chain / "summary.json"))).dump();
-  return result;
-}
-
-void check_same_chains(const fs::path& a, const fs::path& b) {
-  CHECK(result_of_chain(a) == result_of_chain(b));
-  for (const char* clip : {"clip1", "clip2"}) CHECK(differences(a / "clips" / clip, b / "clips" / clip) == kNone);
 }
 
 const Motion motion_in(const fs::path& run) { return read_motion((run / "motion.npz").string()); }
@@ -369,11 +298,6 @@ TEST_CASE("what is wrong with a chain shows before anything is written", "[chain
       fault_of([](Json& c) { c["chain"][1]["data"]["video_rate"] = 25; }),
       Contains("/chain/1/data/frame_rate: the clip \"clip2\" has 25 frames a second, \"clip1\" has 10; the clips "
                "of a chain have one frame rate"));
-  CHECK_THAT(fault_of([](Json& c) {
-               c["sources"]["video"]["command"] = {"cp", "{first_frame}", "{out}"};
-             }),
-             Contains("/sources: programs make video and masks of one clip, and this config is a chain; make those of "
-                      "each clip by a config of its own, and name them in the clip's data"));
   CHECK_THAT(fault_of([](Json& c) { c["chain"][1]["data"]["scen"] = "a"; }),
              Contains("/chain/1/data/scen: unknown key; did you mean \"scene\"?"));
   Avatar other = read_avatar((data / "avatar.safetensors").string());

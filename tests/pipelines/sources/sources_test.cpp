@@ -180,7 +180,7 @@ TEST_CASE("the shipped templates lack nothing but data and installations") {
                                       descriptions_of(loss_terms()), ConfigUse::kStages),
                       Contains("there is no program \"no_such\" that can be executed in PATH"));
   }
-  CHECK(count == 4);
+  CHECK(count == 6);
 }
 
 TEST_CASE("the first frame is what the state of frame 0 looks like") {

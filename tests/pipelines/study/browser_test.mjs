@@ -6,6 +6,7 @@
 // Exit status 77 (skipped) without playwright-core or Chromium. CHROMIUM names another Chromium than that in PATH.
 import { execFileSync } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:http';
 import { join, resolve } from 'node:path';
 import { tmpdir } from 'node:os';
 import { pathToFileURL } from 'node:url';
@@ -55,7 +56,8 @@ function watchVideos() {
   }
 }
 
-async function open(context, url) {
+// @param receiver  the only address elsewhere that may be asked
+async function open(context, url, receiver = '') {
   const page = await context.newPage();
   await page.addInitScript(watchVideos);
   page.setDefaultTimeout(60_000);
@@ -64,7 +66,7 @@ async function open(context, url) {
   page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) faults.push(message.text()); });
   page.on('pageerror', (error) => faults.push(error.message));
   page.on('request', (request) => {
-    if (!/^(data|blob):/.test(request.url()) && !request.url().startsWith(folder)) faults.push(`asks for ${request.url()}`);
+    if (!/^(data|blob):/.test(request.url()) && !request.url().startsWith(folder) && request.url() !== receiver) faults.push(`asks for ${request.url()}`);
   });
   await page.goto(url);
   return { page, faults };
@@ -154,19 +156,21 @@ async function checkWidths(page) {
 // What the page refuses and keeps.
 async function testCare(browser, url) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 720 } });
-  const { page, faults } = await open(context, url);
+  const { page, faults } = await open(context, `${url}?person=care`);
   await page.locator('#begin').click();
   await loaded(page);
   await checkPlays(page);
   const first = await trialOf(page);
+  check('this person begins with a pair of two questions', first.questions.length === 2);
   await page.locator('#next').click();
   check('an unanswered pair cannot be left', (await trialOf(page)).place === first.place);
   check('which is told', /Please answer/.test(await page.locator('#missing').textContent()));
   await page.locator(`#question-${first.questions[0]} label`).first().click();
   await page.locator('#next').click();
-  check('nor one that is answered in half', first.questions.length === 1 || (await trialOf(page)).place === first.place);
+  check('nor one that is answered in half', (await trialOf(page)).place === first.place);
   await page.reload();
-  check('a reload shows the same pair', JSON.stringify(await trialOf(page)) === JSON.stringify(first));
+  const again = await trialOf(page);
+  check('a reload shows the same pair', JSON.stringify(again) === JSON.stringify(first), `${JSON.stringify(again)}, before ${JSON.stringify(first)}`);
   await loaded(page);
   check('with what was chosen', await page.locator(`#question-${first.questions[0]} input`).first().isChecked());
   await checkWidths(page);
@@ -302,6 +306,87 @@ async function testPhone(browser, url, file) {
   return { chosen, ...saved };
 }
 
+// A server that takes answers; the first time it is busy.
+async function receiverOf() {
+  const bodies = [];
+  let times = 0;
+  const server = createServer((request, response) => {
+    let body = '';
+    request.on('data', (part) => { body += part; });
+    request.on('end', () => {
+      const isBusy = ++times === 1;
+      if (!isBusy) bodies.push({ method: request.method, body });
+      response.writeHead(isBusy ? 503 : 204, { 'Access-Control-Allow-Origin': '*' }).end();
+    });
+  });
+  await new Promise((done) => { server.listen(0, '127.0.0.1', done); });
+  return { bodies, server, url: `http://127.0.0.1:${server.address().port}/answers?study=1` };
+}
+
+// Answers that are sent, by a person whom Prolific sends: the code is shown once they have arrived.
+async function testSend(browser, folder) {
+  const receiver = await receiverOf();
+  const url = makeStudy(folder, 'sent', '--collect', receiver.url, '--completion', 'C0DE42');
+  const context = await browser.newContext({ viewport: { width: 1000, height: 700 }, acceptDownloads: true });
+  const { page, faults } = await open(context, `${url}?PROLIFIC_PID=p123&STUDY_ID=s`, receiver.url);
+  check('where answers go is told before', await page.locator('#stays').isHidden() && await page.locator('#receiver').textContent() === new URL(receiver.url).host);
+  await goThrough(page, () => 0, (question) => page.locator(`#question-${question} label`).first().click(), () => page.locator('#next').click());
+  check('nothing is sent unasked', receiver.bodies.length === 0 && await page.locator('#completion').isHidden());
+  const arrived = (words) => page.waitForFunction((text) => document.getElementById('sent').textContent.startsWith(text), words);
+  await page.locator('#send').click();
+  await arrived('Your answers have not arrived (status 503)');
+  check('without an arrival there is no code', await page.locator('#completion').isHidden());
+  const { answers } = await save(page, join(folder, 'sent.json'));
+  check('nor for a file', await page.locator('#completion').isHidden());
+  await page.locator('#send').click();
+  await arrived('Your answers have arrived');
+  check('with it there is', await page.locator('#completion').isVisible() && await page.locator('#code').textContent() === 'C0DE42');
+  check('what arrives is the file', receiver.bodies.length === 1 && receiver.bodies[0].method === 'POST' && receiver.bodies[0].body === readFileSync(join(folder, 'sent.json'), 'utf8'));
+  check('of the person whom Prolific sent', answers.person === 'p123', answers.person);
+  check('that is read', /1 person/.test(hsi4d(folder, 'study', '--answers', 'sent.json', '--key', 'sent-key.json')));
+  await page.reload();
+  check('a reload still has the code', await page.locator('#completion').isVisible());
+  await page.locator('#review').click();
+  await loaded(page);
+  await page.keyboard.press('2');
+  await page.locator('#next').click();
+  check('what is changed is to be sent again', await page.locator('#completion').isHidden() && await page.locator('#send').isEnabled());
+  const unexpected = faults.filter((fault) => !fault.includes('503'));
+  check('sent without a fault', unexpected.length === 0, unexpected.join('; '));
+  receiver.server.close();
+  receiver.server.closeAllConnections();
+  await page.locator('#send').click();
+  await arrived('Your answers have not arrived');
+  check('a server that is gone is told', await page.locator('#completion').isHidden());
+  await context.close();
+}
+
+// An address to go on to, for who has saved the file.
+async function testOnward(browser, folder) {
+  const url = makeStudy(folder, 'onward', '--completion', 'https://app.prolific.com/submissions/complete?cc=C0DE42');
+  const context = await browser.newContext({ viewport: { width: 1000, height: 700 }, acceptDownloads: true });
+  const { page } = await open(context, `${url}?person=onward`);
+  await page.locator('#begin').click();
+  await loaded(page);
+  await page.keyboard.press('1');
+  await page.keyboard.press('1');
+  await page.locator('#stop').click();
+  await save(page, join(folder, 'some.json'));
+  check('who stops early is not sent on', await page.locator('#onward').isHidden());
+  await page.locator('#review').click();
+  for (let i = 0; i < kShown; ++i) {
+    if (await page.locator('#end').isVisible()) break;
+    await loaded(page);
+    await page.keyboard.press('1');
+    await page.keyboard.press('1');
+    await page.locator('#next').click();
+  }
+  check('nor who has not saved', await page.locator('#onward').isHidden());
+  await save(page, join(folder, 'all.json'));
+  check('who has answered all is', await page.locator('#onward-link').getAttribute('href') === 'https://app.prolific.com/submissions/complete?cc=C0DE42' && await page.locator('#onward').isVisible());
+  await context.close();
+}
+
 function chosenIn(answers) {
   return answers.answers.flatMap(({ chosen }) => Object.entries(chosen).map(([question, video]) => ({ question, video })));
 }
@@ -369,6 +454,8 @@ try {
   await testHalf(browser, url, folder);
   await testBroken(browser, url);
   await testUnkept(browser, url);
+  await testSend(browser, folder);
+  await testOnward(browser, folder);
   const jane = await testMouse(browser, url, join(folder, 'answers0.json'), isA);
   const keys = await testKeys(browser, url, join(folder, 'answers1.json'));
   const phone = await testPhone(browser, single, join(folder, 'answers2.json'));

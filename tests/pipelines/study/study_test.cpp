@@ -289,6 +289,13 @@ TEST_CASE("what no study can be made of is told, and leaves nothing") {
       "hsi4d study: compares two runs, or two folders of runs: A and B (1 given); --answers tells what people chose\n");
   CHECK(refused({"a", "c"}) == "hsi4d study: --out says where the page goes: a new or empty folder\n");
   CHECK(refused({"a", "c", "--out", "b"}) == "b: is not a new or empty folder\n");
+  CHECK(refused({"a", "c", "--out", "page", "--collect", "study.org"}) ==
+        "hsi4d study: --collect: \"study.org\" is no address; allowed: https://... or http://..., without spaces\n");
+  CHECK(refused({"a", "c", "--out", "page", "--collect", "https://"}) ==
+        "hsi4d study: --collect: \"https://\" is no address; allowed: https://... or http://..., without spaces\n");
+  CHECK(refused({"a", "c", "--out", "page", "--completion", "my code"}) ==
+        "hsi4d study: --completion: \"my code\" is neither a code nor an address; allowed: characters of ASCII without "
+        "spaces\n");
   CHECK(refused({"a", "c", "--out", "page", "--csv", "x.csv"}) == "hsi4d study: --csv is for --answers\n");
   std::ofstream("texts.json") << "{\n \"z\": \"sits\"}";
   CHECK(refused({"a", "c", "--out", "page", "--texts", "texts.json"}) ==
@@ -391,6 +398,7 @@ TEST_CASE("what is written of a study replaces nothing that was read") {
   CHECK(refusal({"--csv", "o.txt", "--json", "in/../o.txt"}) ==
         "hsi4d study: --csv and --json are the same file, in/../o.txt\n");
   CHECK(refusal({"--seed", "3"}) == "hsi4d study: --seed is for making a study, not for --answers\n");
+  CHECK(refusal({"--collect", "https://a.org"}) == "hsi4d study: --collect is for making a study, not for --answers\n");
   CHECK(refusal({"--pairs", "3"}) == "hsi4d study: --pairs is for making a study, not for --answers\n");
   CHECK(file_text("in/1.json") == before);
   CHECK_FALSE(fs::exists("o.txt"));

@@ -188,7 +188,7 @@ TEST_CASE("a million Gaussians on one pixel") {
   }
 }
 
-TEST_CASE("the time for Gaussians on one pixel grows with their number, not its square") {
+TEST_CASE("the time for Gaussians on one pixel grows with their number, not its square", "[release]") {
   const auto seconds = [](Index n) {
     SplatScene scene = stack(n, 0.004, 7, {8, 8});
     scene.settings.transmittance_stop = 0;

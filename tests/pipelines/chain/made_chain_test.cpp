@@ -1,0 +1,247 @@
+// Chains whose videos, masks and cameras are made as they go: each clip's first frame shows how the clip before ended.
+#include <algorithm>
+#include <fstream>
+
+#include <catch2/catch.hpp>
+
+#include "core/camera_file.h"
+#include "core/check.h"
+#include "core/image_io.h"
+#include "pipelines/chain/chain.h"
+#include "pipelines/draw/camera_selection.h"
+#include "pipelines/sources/sources.h"
+#include "tests/support/program.h"
+#include "tests/support/tiny_chain.h"
+
+namespace made_chain_test {
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+namespace {
+
+using Names = std::vector<std::string>;
+
+void script(const std::string& name, const std::string& text) {
+  std::ofstream(name) << "#!/bin/sh\n" << text << "\n";
+  fs::permissions(name, fs::perms::owner_all);
+}
+
+std::string text_of(const std::string& file) { return fs::exists(file) ? file_text(file) : ""; }
+
+/// Changes the config of the tiny chain: programs give the frames and masks of the clip that the prompt names, and note
+/// for which clips they were run.
+void make_all(Json& c) {
+  for (auto& clip : c["chain"]) {
+    clip["data"].erase("frames");
+    clip["data"].erase("masks");
+    clip["prompt"] = clip["name"];
+  }
+  c["stages"]["camera"]["iterations"] = 3;
+  c["stages"]["interaction"]["iterations"] = 3;
+  c["sources"] = {{"folder", fs::absolute("generated").string()},
+                  {"video", {{"command", {"./film", "{first_frame}", "{prompt}", "{out}"}}, {"output", "frames"}}},
+                  {"masks", {{"command", {"./mask", "{video}", "{prompt}", "{out}"}}}}};
+}
+
+/// A folder with the programs. Where a file of the name "fail-film" or "fail-mask" is, they fail for the clip that it
+/// names.
+struct Workshop {
+  TemporaryFolder here;
+
+  Workshop() {
+    const std::string clips = (TinyChain::folder() / "clips").string();
+    for (const auto& [name, part] : {std::pair{"film", "frames"}, {"mask", "masks"}}) {
+      const std::string file = name;
+      script(file, "test -e \"$1\" || exit 9; if [ \"$(cat fail-" + file +
+                       " 2> /dev/null)\" = \"$2\" ]; then exit 3; fi\n" + "echo \"$2\" >> " + file + ".txt; cp -r " +
+                       clips + "/$2/" + part + " \"$3\"");
+    }
+  }
+  static RunConfig config() { return changed_config(make_all); }
+  /// Programs that film the first frame standing still.
+  static RunConfig standing_still() {
+    script("film", "mkdir \"$3\"; for i in 0000 0001 0002; do cp \"$1\" \"$3/$i.png\"; done");
+    script("mask",
+           "for name in human watering_can; do mkdir -p \"$3/$name\"; for i in 0000 0001 0002; do "
+           "cp \"$2/$name.png\" \"$3/$name/$i.png\"; done; done");
+    return changed_config([](Json& c) {
+      make_all(c);
+      c["sources"]["masks"]["command"] = {"./mask", "{video}", "{first_masks}", "{out}"};
+      c["chain"][1]["select_camera"] = true;
+      c["camera_selection"]["radii_m"] = {2};
+      c["chain"][1]["data"].erase("truth");
+    });
+  }
+};
+
+double largest_difference(const Image& a, const Image& b) {
+  REQUIRE(a.data().size() == b.data().size());
+  double largest = 0;
+  for (std::size_t i = 0; i < a.data().size(); ++i)
+    largest = std::max(largest, std::abs(static_cast<double>(a.data()[i]) - static_cast<double>(b.data()[i])));
+  return largest;
+}
+
+}  // namespace
+
+TEST_CASE("a chain whose programs give what another names has its result", "[run][chain]") {
+  const Workshop workshop;
+  execute_tiny_chain(Workshop::config(), "made");
+  execute_tiny_chain(chain_config({"stages.camera.iterations=3", "stages.interaction.iterations=3"}), "given");
+  for (const char* name : {"motion.npz", "objects.npz", "cameras.json"})
+    CHECK(file_text(fs::path("made") / name) == file_text(fs::path("given") / name));
+  CHECK(json_of("made/summary.json")["joins"] == json_of("given/summary.json")["joins"]);  // the drift by truth too
+  CHECK(text_of("film.txt") == "clip1\nclip2\n");
+  CHECK(text_of("mask.txt") == "clip1\nclip2\n");
+  const nlohmann::json of_clip = json_of("made/clips/clip2/config.resolved.json");
+  CHECK(of_clip["sources"]["prompt"] == "clip2");  // a run of its own, with its own programs
+  CHECK(of_clip["sources"]["video"]["command"][0] == "./film");
+}
+
+TEST_CASE("a chain with programs goes on from wherever it was stopped", "[run][chain]") {
+  const Workshop workshop;
+  const RunConfig config = Workshop::config();
+  execute_tiny_chain(config, "run");
+  fs::rename("run", "whole");
+  fs::rename("generated", "generated-whole");
+  for (const auto& [program, clip] : {std::pair{"film", "clip1"}, {"film", "clip2"}, {"mask", "clip2"}}) {
+    INFO(program << " fails for " << clip);
+    for (const char* notes : {"film.txt", "mask.txt"}) fs::remove(notes);
+    const std::string fails = std::string("fail-") + program;
+    std::ofstream(fails) << clip;
+    CHECK_THROWS_WITH(
+        execute_tiny_chain(config, "run"),
+        Contains(std::string("clip ") + clip[4] + " of 2, " + clip + ": /sources/") && Contains("ended with status 3"));
+    CHECK(json_of("run/status.json")["state"] == "failed");
+    CHECK(finished_clips(config, "run", loss_terms()) == (std::string(clip) == "clip1" ? 0 : 1));
+    fs::remove(fails);
+    execute_tiny_chain(config, "run", 2, true);
+    check_same_chains("run", "whole");
+    CHECK(text_of("film.txt") == "clip1\nclip2\n");  // each was made once
+    CHECK(text_of("mask.txt") == "clip1\nclip2\n");
+    fs::remove_all("run");
+    fs::remove_all("generated");
+  }
+  int asked = 0;
+  CHECK_THROWS_AS(execute_tiny_chain(config, "run", 1, false,
+                                     [&] { return fs::exists("run/clips/clip2/status.json") && ++asked == 8; }),
+                  Interrupted);
+  CHECK(finished_clips(config, "run", loss_terms()) == 1);
+  execute_tiny_chain(config, "run", 1, true);
+  check_same_chains("run", "whole");
+  CHECK(text_of("film.txt") == "clip1\nclip2\nclip1\nclip2\n");
+  execute_tiny_chain(config, "run", 1, true);  // all is done: nothing is run
+  check_same_chains("run", "whole");
+}
+
+TEST_CASE("a later clip is filmed from the state in which the one before ended, by a camera chosen there",
+          "[run][chain]") {
+  const Workshop workshop;
+  const RunConfig config = Workshop::standing_still();
+  execute_tiny_chain(config, "run");
+  RunConfig second = clip_config(config, 1);
+  second.data.initial = fs::absolute("run/starts/clip2.json");
+  const SceneSetup setup = read_scene_setup(second.data);
+  const Camera given = read_camera(config.chain[1].data.camera.string()),
+               chosen = read_camera("run/starts/clip2.camera.json");
+  const Camera best = select_camera(setup, config.camera_selection, config.render, given).camera;
+  CHECK(chosen.camera_from_world.rotation == best.camera_from_world.rotation);
+  CHECK(chosen.camera_from_world.translation == best.camera_from_world.translation);
+  CHECK(chosen.width == given.width);
+  CHECK(chosen.fx == given.fx);
+  CHECK(read_cameras("run/clips/clip2/cameras.json").front().camera_from_world.rotation ==
+        chosen.camera_from_world.rotation);
+
+  // What the program was given shows the end of the first clip through that camera; nothing moved after it.
+  second.data.camera = fs::absolute("run/starts/clip2.camera.json");
+  const Image wanted = first_frame_image(second);
+  double nearest = 1;
+  for (const auto& file : fs::directory_iterator("generated")) {
+    if (!file.path().string().ends_with(".first_frame.png")) continue;
+    nearest = std::min(nearest, largest_difference(read_image(file.path().string()), wanted));
+  }
+  CHECK(nearest <= 0.5 / 255 + 1e-6);
+  const Motion motion = read_motion("run/motion.npz");
+  REQUIRE(motion.poses.size() == 2 * (kClipFrames - 1) + 1);
+  const Motion first = read_motion("run/clips/clip1/motion.npz");
+  CHECK(motion.poses[kClipFrames - 1].transl == first.poses.back().transl);
+  CHECK((motion.poses.back().transl - first.poses.back().transl).norm() < 0.05);
+  fs::rename("run", "whole");
+  execute_tiny_chain(config, "run", 2);
+  check_same_chains("run", "whole");
+}
+
+TEST_CASE("an input that a clip of a chain names is not made", "[run][chain]") {
+  const Workshop workshop;
+  const RunConfig config = changed_config([](Json& c) {
+    const Json frames = c["chain"][0]["data"]["frames"], masks = c["chain"][0]["data"]["masks"];
+    make_all(c);
+    c["chain"][0]["data"]["frames"] = frames;
+    c["chain"][0]["data"]["masks"] = masks;
+  });
+  execute_tiny_chain(config, "run");
+  CHECK(text_of("film.txt") == "clip2\n");
+  CHECK(text_of("mask.txt") == "clip2\n");
+  CHECK(json_of("run/clips/clip1/config.resolved.json")["sources"]["video"]["command"].empty());
+}
+
+TEST_CASE("the plan of a chain tells what is yet to be made", "[chain]") {
+  const Workshop workshop;
+  changed_config([](Json& c) {
+    make_all(c);
+    c["chain"][1]["select_camera"] = true;
+  });
+  const ProgramResult plan =
+      run_hsi4d({"run", (TinyChain::folder() / "changed.json").string(), "--out", "run", "--dry-run"});
+  INFO(plan.err);
+  CHECK(plan.status == 0);
+  CHECK_THAT(plan.out, Contains("  clip clip1: in its initial state\n"
+                                "    would run ./film, {first_frame}, {prompt}, {out}, unless its output is there\n"
+                                "    would run ./mask, {video}, {prompt}, {out}, unless its output is there\n"
+                                "  clip clip2: in the state in which clip1 ends\n"
+                                "    would choose its camera\n"));
+  CHECK_FALSE(fs::exists("run"));
+  CHECK_FALSE(fs::exists("generated"));
+}
+
+TEST_CASE("what is wrong with a chain of programs is told with its place", "[chain]") {
+  const Workshop workshop;
+  const auto fault_of = [](auto change) {
+    try {
+      check_chain(changed_config([&change](Json& c) {
+        make_all(c);
+        change(c);
+      }));
+    } catch (const UserError& error) {
+      return std::string(error.what());
+    }
+    return std::string("no fault");
+  };
+  CHECK(fault_of([](Json&) {}) == "no fault");
+  CHECK_THAT(fault_of([](Json& c) { c["chain"][1].erase("prompt"); }),
+             Contains("/chain/1/prompt: not given; /sources/video/command has {prompt}"));
+  CHECK(fault_of([](Json& c) {
+          c["chain"][1].erase("prompt");
+          c["sources"]["prompt"] = "clip2";
+        }) == "no fault");
+  CHECK_THAT(fault_of([](Json& c) { c["data"]["frames"] = "clips/clip1/frames"; }),
+             Contains("/sources/video: makes nothing: every clip of the chain has data/frames; remove one"));
+  CHECK_THAT(fault_of([](Json& c) {
+               c["sources"]["video"]["command"] = {"./film", "{first_fram}", "{out}"};
+             }),
+             Contains("/sources/video/command/1: there is no placeholder {first_fram}"));
+  CHECK_THAT(fault_of([](Json& c) { c["sources"].erase("masks"); }),
+             Contains("/chain/1/data/masks: not given; a run needs masks of the human and the objects"));
+  CHECK_THAT(fault_of([](Json& c) { c["chain"][1]["data"].erase("camera"); }),
+             Contains("/chain/1/data/camera: not given; a run needs the camera of frame 0"));
+  CHECK(fault_of([](Json& c) {
+          c["chain"][1]["data"].erase("camera");
+          c["chain"][1]["select_camera"] = true;
+        }) == "no fault");
+}
+
+}  // namespace made_chain_test
