@@ -22,6 +22,7 @@ enum class LossInput {
   kObjectDepth,    ///< object_depth, object_depth_target
   kObjectOpacity,  ///< object_opacity, and what the frame says of the objects; a channel of the render each, on demand
   kHumanOpacity,   ///< human_opacity, human_mask, human_seen; likewise
+  kKeypoints,      ///< keypoints, keypoints_target: where data.keypoints is given; likewise
   kPose,           ///< body_rotations
   kMotion,         ///< joints, joints_start, motion, body_points
   kObjectMotion,   ///< object_points, and motion with objects

@@ -13,6 +13,8 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(object_opacity) && object_opacity.shape().planes > 0;
     case LossInput::kHumanOpacity:
       return given(human_opacity);
+    case LossInput::kKeypoints:
+      return given(keypoints) && given(keypoints_target);
     case LossInput::kPose:
       return given(body_rotations);
     case LossInput::kMotion:

@@ -51,6 +51,12 @@ struct LossInputs {
   Var<S> human_mask;     ///< [1,H,W] what of the frame shows the human, 0 to 1
   Var<S> human_seen;     ///< [1,1] 1, or 0 where the frame shows none of the human
 
+  Var<S> keypoints;  ///< [K,2] where points of the body are in the image, x px, y px, whatever is before them;
+                     ///< zeros without gradient where a point is not before the camera; only for terms that need
+                     ///< kKeypoints, as the next one
+  Var<S>
+      keypoints_target;  ///< [K,3] where a detector found them, x px, y px, and its confidence, 0 to 1; 0: it did not
+
   /// The body over the F frames that the stage sees: those before, which stand still, and those that it moves. A stage
   /// of one frame sees up to three before it, one of the whole sequence frame 0.
   Var<S> body_rotations;  ///< [21M,9] rotation matrices, by rows, of joints 1 to 21 relative to their parents in the M
@@ -86,6 +92,7 @@ LossInputs<S> only_declared(LossInputs<S> inputs, const std::vector<LossInput>& 
   if (lacks(LossInput::kObjectDepth)) inputs.object_depth = inputs.object_depth_target = {};
   if (lacks(LossInput::kObjectOpacity)) inputs.object_opacity = {};
   if (lacks(LossInput::kHumanOpacity)) inputs.human_opacity = {};
+  if (lacks(LossInput::kKeypoints)) inputs.keypoints = inputs.keypoints_target = {};
   if (lacks(LossInput::kDepths)) inputs.depth_moments = inputs.transmittance = inputs.depth_target = {};
   if (lacks(LossInput::kGaussians)) inputs.gaussian_opacities = inputs.gaussian_log_scales = {};
   return inputs;

@@ -32,6 +32,7 @@ const char* words_of(LossInput need) {
     case LossInput::kObjectOpacity:
       return "objects";
     case LossInput::kHumanOpacity:
+    case LossInput::kKeypoints:
       return "the body in an image";
     case LossInput::kDepths:
       return "depths of pictures";

@@ -131,6 +131,8 @@ LossLeaves<S> loss_leaves(Tape<S>& tape) {
   in.depth_moments = leaf("depth_moments", image(2), 0.2, 0.3);
   in.transmittance = leaf("transmittance", image(1), 0, 0.5);
   in.depth_target = leaf("depth_target", image(1), 1, 2);
+  in.keypoints = leaf("keypoints", shape_of(3, 2), 0, 60);
+  in.keypoints_target = leaf("keypoints_target", shape_of(3, 3), {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8});
   in.body_rotations = leaf("body_rotations", shape_of(21, 9), some_pose());
   in.joints = leaf("joints", shape_of(kLossFrames, 66), -1, 1);
   in.joints_start = leaf("joints_start", shape_of(kLossFrames, 66), -1, 1);

@@ -50,6 +50,7 @@ import sys
 SMPL_PELVIS = (-0.00217368, -0.24078917, 0.02858379)
 SMPLX_PELVIS = (0.00312326, -0.35140747, 0.01203655)
 USUAL_RATE = 30  # frames a second
+MOST_MISFIT = 0.03  # metres, of a vertex of a mesh: expressions beyond the ten that are fitted move lips and brows
 
 
 def fail(message):
@@ -253,8 +254,11 @@ class SmplxMesh:
     """A body model as a function of pose [55,3], shape and expression [S], and translation to vertices [V,3]."""
 
     def __init__(self, np, path):
-        with np.load(path, allow_pickle=True) as file:
-            model = {name: file[name] for name in file.files}
+        try:
+            with np.load(path, allow_pickle=True) as file:
+                model = {name: file[name] for name in file.files}
+        except (OSError, ValueError, AttributeError, TypeError) as fault:
+            fail(f"{path}: is no body model (.npz): {fault}")
         self.rest = array(np, need(model, "v_template", path), f"{path}: v_template", 3)
         count = len(self.rest)
         self.weights = array(np, need(model, "weights", path), f"{path}: weights", 55)
@@ -264,8 +268,14 @@ class SmplxMesh:
         self.regressor = array(np, regressor, f"{path}: J_regressor", count)
         shapes = np.asarray(need(model, "shapedirs", path), dtype=np.float64)
         first = 300 if shapes.shape[2] >= 400 else 10  # of the expression
+        if shapes.shape[:2] != (count, 3) or shapes.shape[2] < 20:
+            fail(f"{path}: shapedirs: has shape {list(shapes.shape)}; [{count},3,20] or more is needed")
         self.shapes = np.concatenate([shapes[..., :10], shapes[..., first:first + 10]], axis=2)
-        self.correctives = np.asarray(need(model, "posedirs", path), dtype=np.float64) if "posedirs" in model else None
+        self.correctives = np.asarray(model["posedirs"], dtype=np.float64) if "posedirs" in model else None
+        if self.correctives is not None and self.correctives.shape != (count, 3, 486):
+            fail(f"{path}: posedirs: has shape {list(self.correctives.shape)}; [{count},3,486] is needed")
+        if len(self.weights) != count or len(self.regressor) != 55 or len(self.parents) != 55:
+            fail(f"{path}: v_template, weights, J_regressor and kintree_table do not fit each other")
         self.below = np.zeros((55, 55))  # [a, b]: b is a or hangs on it
         for joint in range(55):
             above = joint
@@ -331,7 +341,10 @@ class SmplxMesh:
 
 
 def fitted_mesh(np, body, vertices):
-    """Pose [55,3], shape and expression [20], translation, and the largest distance of a vertex: Gauss-Newton."""
+    """Pose [55,3], shape and expression [20], translation, the largest distance of a vertex: Gauss-Newton.
+
+    The distance is infinite where it does not come to an end.
+    """
     pose, shape, place = body.start(np, vertices), np.zeros(20), np.zeros(3)
     place = (vertices - body.posed(np, pose, shape, place)[0]).mean(axis=0)
     for _ in range(30):
@@ -345,10 +358,10 @@ def fitted_mesh(np, body, vertices):
         turn = np.einsum("jba,jb->ja", above, step[:165].reshape(55, 3))
         pose = vector_of_matrix(np, matrix_of_vector(np, turn) @ matrix_of_vector(np, pose))
         shape, place = shape + step[165:185], place + step[185:]
-        if np.abs(step).max() < 1e-7:
-            break
-    mesh = body.posed(np, pose, shape, place)[0]
-    return pose, shape, place, np.linalg.norm(mesh - vertices, axis=1).max()
+        if np.abs(step).max() < 1e-6:
+            mesh = body.posed(np, pose, shape, place)[0]
+            return pose, shape, place, np.linalg.norm(mesh - vertices, axis=1).max()
+    return pose, shape, place, np.inf
 
 
 def vertices_in(np, path, count):
@@ -366,9 +379,14 @@ def frames_of_meshes(np, folder, count):
         print(f"{folder}: its meshes are taken for frames 0 to {count - 1}, as there is no {path}")
         return range(count)
     people = module("joblib").load(path)
-    if not hasattr(people, "values") or not len(people):
+    if not hasattr(people, "items") or not len(people):
         fail(f"{path}: holds no people; it is not what WHAC writes")
-    frames = max((need(person, "frame_id", path) for person in people.values()), key=len)  # of equals the first
+    seen = {key: need(person, "frame_id", path) for key, person in people.items()}
+    of = max(seen, key=lambda key: len(seen[key]))  # of equals the first
+    frames = seen[of]
+    others = [f"{key} ({len(seen[key])} frames)" for key in seen if key != of]
+    if others:
+        print(f"{path}: the meshes are of person {of} ({len(frames)} frames), not of {', '.join(others)}")
     if len(frames) != count:
         fail(f"{folder}: has {count} meshes, {path} {len(frames)} frames of the person")
     return [int(frame) for frame in frames]
@@ -379,12 +397,21 @@ def read_whac(np, path, arguments):
         fail("--body-model names the file of SMPL-X (SMPLX_NEUTRAL.npz), by which meshes are read")
     if arguments.in_camera:
         fail(f"{path}: its meshes are in the world; there is no camera")
+    if arguments.pelvis:
+        fail("--pelvis: the pelvis is that of --body-model in the shape of the meshes")
     files = sorted(path.glob("whac_results_*.obj")) if path.is_dir() else []
     if not files:
         fail(f"{path}: holds no whac_results_*.obj; WHAC writes them into demo/NAME/mesh with --save_mesh")
+    if [file.stem for file in files] != [f"whac_results_{number:06}" for number in range(len(files))]:
+        fail(f"{path}: its meshes are not numbered from 000000 on without a gap")
     body = SmplxMesh(np, arguments.body_model)
     fits = [fitted_mesh(np, body, vertices_in(np, file, len(body.rest))) for file in files]
-    print(f"{path}: the farthest vertex is {1000 * max(fit[3] for fit in fits):.2f} mm from that of its pose")
+    farthest = max(fit[3] for fit in fits)
+    if farthest > MOST_MISFIT:
+        names = ", ".join(file.name for file, fit in zip(files, fits) if fit[3] > MOST_MISFIT)
+        fail(f"{path}: no pose of {arguments.body_model} has the vertices of {names}: they miss by more than "
+             f"{1000 * MOST_MISFIT:.0f} mm, or the fit came to no end; is it the model that WHAC was run with?")
+    print(f"{path}: the farthest vertex is {1000 * farthest:.2f} mm from that of its pose")
     shapes = np.stack([fit[1] for fit in fits])
     pelvis = lambda shape: body.regressor[0] @ (body.rest + body.shapes @ shape)  # noqa: E731
     betas = np.concatenate([shapes[:, :10].mean(axis=0), np.zeros(10)])
@@ -472,9 +499,12 @@ def main():
         fail(f"--fps: {arguments.fps} is out of range; allowed: above 0")
     if arguments.person < 0:
         fail(f"--person: {arguments.person} is out of range; allowed: 0 or more")
-    source = arguments.source or ("whac" if arguments.input.is_dir() else ENDINGS.get(arguments.input.suffix))
+    is_whac = arguments.input.is_dir() and any(arguments.input.glob("whac_results_*.obj"))
+    source = arguments.source or ("whac" if is_whac else ENDINGS.get(arguments.input.suffix))
     if source is None:
-        fail(f"{arguments.input}: known endings are {', '.join(ENDINGS)}, and folders of meshes; --from names the estimator")
+        fail(f"{arguments.input}: known endings are {', '.join(ENDINGS)}, and folders of whac_results_*.obj; --from names the estimator")
+    if arguments.body_model and source != "whac":
+        fail(f"--body-model: nothing reads it of {source}")
     if not arguments.input.exists():
         fail(f"{arguments.input}: there is no such file")
     np = module("numpy")

@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/version.h"
+#include "optim/metrics.h"
 #include "pipelines/chain/report.h"
 #include "pipelines/chain/results.h"
 #include "pipelines/config/run_problems.h"
@@ -81,6 +82,7 @@ ClipFacts facts_of_inputs(const RunConfig& chain, std::size_t index, const DataS
 ClipFacts check_clip(const RunConfig& chain, std::size_t index) {
   const ChainClip& clip = chain.chain[index];
   if (has_all_inputs(chain, index)) return facts_of_inputs(chain, index, clip.data);
+  if (!clip.data.camera.empty()) clip.select_camera ? camera_for_size(clip.data.camera) : only_camera(clip.data.camera);
   const SceneSetup setup = setup_of(chain, clip.data);
   warn_of_antialiasing(setup.antialiased, chain.render.antialias);
   return facts_of_setup(clip.name, setup);
@@ -131,15 +133,19 @@ void write_start(const ChainPaths& paths, const ClipFacts& clip, const std::vect
 }
 
 /// Chooses the camera of a clip in its first state.
-void write_chosen_camera(const RunConfig& clip, const std::string& file, const Observer& observer) {
-  std::optional<Camera> intrinsics;
-  if (!clip.data.camera.empty()) intrinsics = camera_for_size(clip.data.camera);
-  const CameraChoice choice =
-      select_camera(read_scene_setup(clip.data), clip.camera_selection, clip.render, intrinsics, observer);
-  fs::create_directories(fs::path(file).parent_path());
-  write_camera(file, choice.camera);
-  log_info("camera: " + file + ", chosen of " + std::to_string(choice.candidates.size()) + ", sees " +
-           std::to_string(choice.candidates.front().visible) + " of 22 joints");
+/// @param pointer  the clip's, for messages
+void write_chosen_camera(const RunConfig& clip, const std::string& pointer, const std::string& file,
+                         const Observer& observer) {
+  try {
+    const CameraChoice choice = select_camera(read_scene_setup(clip.data), clip.camera_selection, clip.render,
+                                              intrinsics_of(clip.data.camera), observer);
+    fs::create_directories(fs::path(file).parent_path());
+    write_camera(file, choice.camera);
+    log_info("camera: " + file + ", chosen of " + std::to_string(choice.candidates.size()) + ", sees " +
+             std::to_string(choice.candidates.front().visible) + " of " + std::to_string(kMetricJoints) + " joints");
+  } catch (const UserError& error) {
+    throw UserError(pointer + "/select_camera: " + error.what());
+  }
 }
 
 /// The config of a clip, which begins with the state that the one before left.
@@ -150,23 +156,31 @@ RunConfig started_config(const RunConfig& chain, std::size_t index, const ChainP
   return clip;
 }
 
-/// Takes over into `clip.data` what programs have made already. @return  whether nothing is left to make
-bool take_made(RunConfig& clip) {
-  bool is_all = true;
+bool says_done(const RunConfig& clip, const std::string& folder, const std::vector<LossTerm>& losses) {
+  return look_at_run_folder(folder, resolved_config(clip, descriptions_of(losses)), true) == RunState::kDone;
+}
+
+/// The inputs of a clip that is done, with what programs made for it. Throws DataError for what is not there any more:
+/// to make it anew may cost something, and would not give the same.
+DataSettings made_inputs(const RunConfig& clip) {
+  DataSettings data = clip.data;
   for (const SourceOutput& output : planned_sources(clip)) {
-    is_all = is_all && output.is_there;
-    take_output(output, clip.data);
+    if (!output.is_there)
+      throw DataError("/sources/" + output.what + ": " + (output.path.empty() ? "its output" : output.path.string()) +
+                      ", of which the clip that is done was made, is not there, or its first frame is another by now; "
+                      "without the clip's folder it is made anew");
+    take_output(output, data);
   }
-  return is_all;
+  return data;
 }
 
 /// Whether a clip is done, with the inputs that it has now.
 /// Throws DataError naming an input that has changed since.
 bool is_done(const RunConfig& clip, const std::string& folder, const std::vector<LossTerm>& losses) {
-  if (look_at_run_folder(folder, resolved_config(clip, descriptions_of(losses)), true) != RunState::kDone) return false;
+  if (!says_done(clip, folder, losses)) return false;
   RunConfig prepared = clip;
   prepare_run(prepared);
-  if (!take_made(prepared)) return false;
+  prepared.data = made_inputs(prepared);
   const Clip inputs = read_run_clip(prepared, losses);
   return finished_frames(folder, prepared, inputs, losses) + 1 == inputs.frames();  // not without a checkpoint
 }
@@ -212,20 +226,30 @@ class Chain {
   }
 
  private:
-  /// Chooses the camera and runs programs where the clip needs it, and completes what is known of the clip.
+  /// Chooses the camera and runs programs where the clip needs it, and completes what is known of the clip. One that
+  /// has begun keeps its camera, one that is done all that was made for it.
   void make_inputs(std::size_t i) {
     RunConfig clip = started_config(config_, i, paths_);
-    const int threads = options_.threads > 0 ? options_.threads : config_.threads;
-    with_threads(threads > 0 ? threads : thread_count(), [&] {
-      if (config_.chain[i].select_camera) {
-        RunConfig before = clip;
-        before.data.camera = config_.chain[i].data.camera;
-        write_chosen_camera(before, paths_.camera(clips_[i].name), options_.observer);
-      }
-      clip.data = make_sources(clip, options_.observer);
-    });
+    const std::string folder = paths_.clip(clips_[i].name), camera = paths_.camera(clips_[i].name);
+    const bool has_begun = options_.resume && fs::exists(folder);
+    if (config_.chain[i].select_camera && !(has_begun && fs::exists(camera))) {
+      RunConfig before = clip;
+      before.data.camera = config_.chain[i].data.camera;
+      on_threads(
+          [&] { write_chosen_camera(before, child_pointer("/chain", std::to_string(i)), camera, options_.observer); });
+    }
+    if (has_begun && says_done(clip, folder, losses_)) {
+      clip.data = made_inputs(clip);
+    } else {
+      on_threads([&] { clip.data = make_sources(clip, options_.observer); });
+    }
     clips_[i] = facts_of_inputs(config_, i, clip.data);
     check_alike(clips_, config_);
+  }
+
+  void on_threads(FunctionRef<void()> work) const {
+    const int threads = options_.threads > 0 ? options_.threads : config_.threads;
+    with_threads(threads > 0 ? threads : thread_count(), work);
   }
 
   void run_clip(std::size_t i, const RunFolder& folder) const {
@@ -294,14 +318,14 @@ std::size_t finished_clips(const RunConfig& config, const std::string& folder, c
 }
 
 ChainSummary execute_chain(const RunConfig& config, const std::vector<LossTerm>& losses, const RunOptions& options) {
-  const WarningsOnce once;  // inputs are looked at here, and again when their clip begins
-  const std::vector<ClipFacts> clips = check_chain(config);  // before anything is written
+  const WarningsOnce once;                             // inputs are looked at here, and again when their clip begins
+  std::vector<ClipFacts> clips = check_chain(config);  // before anything is written
   RunFolder folder(options.folder, identity_of(config, losses, options.threads), options.resume);
   folder.take_over_config();
   folder.note("hsi4d " + std::string(version()) + " (" + git_commit() + "), chain '" + config.name + "' of " +
               std::to_string(clips.size()) + " clips");
   try {
-    ChainSummary summary = Chain(config, losses, options, clips).run(folder);
+    ChainSummary summary = Chain(config, losses, options, std::move(clips)).run(folder);
     folder.set_state(RunState::kDone);
     write_chain_report(options.folder);
     folder.note("done: " + std::to_string(summary.all.frames) + " frames");

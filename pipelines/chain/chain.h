@@ -28,7 +28,7 @@ struct ChainPaths {
   std::string start_motion(const std::string& name) const { return (folder / "starts" / (name + ".npz")).string(); }
 };
 
-/// What is known of a clip before it runs. Where a program has yet to make its video, or its camera is yet to be
+/// What is known of a clip before it runs. Where a program has yet to make an input, or the camera is yet to be
 /// chosen, frames is 0 and no truth is known.
 struct ClipFacts {
   std::string name;
@@ -49,7 +49,7 @@ RunConfig clip_config(const RunConfig& chain, std::size_t index);
 std::vector<ClipFacts> check_chain(const RunConfig& config);
 
 /// How many clips of the chain in a folder are done. Throws DataError naming the clip and its inputs that have changed
-/// since.
+/// since, or are not there any more.
 std::size_t finished_clips(const RunConfig& config, const std::string& folder, const std::vector<LossTerm>& losses);
 
 /// Carries out the clips of `config.chain` one after the other, and joins what they found. With options.resume clips

@@ -114,8 +114,8 @@ std::string plan(const RunConfig& asked, const std::vector<LossTerm>& losses, co
 std::string clip_plan(const RunConfig& chain, std::size_t index, const ClipFacts& clip) {
   const std::string name = "  clip " + clip.name + ": ";
   if (clip.frames > 0) return name + count_text(clip.frames, "frame") + "\n";
-  std::string text = name + (index == 0 ? "" : "in the state in which " + chain.chain[index - 1].name + " ends\n");
-  if (index == 0) text += "in its initial state\n";
+  std::string text = name + (index == 0 ? "in its initial state\n"
+                                        : "in the state in which " + chain.chain[index - 1].name + " ends\n");
   if (chain.chain[index].select_camera) text += "    would choose its camera\n";
   const SourceSettings sources = clip_config(chain, index).sources;
   for (const ProgramSettings* program :

@@ -81,10 +81,8 @@ std::string select_camera_command(const SelectCameraOptions& options, const std:
   CameraChoice choice;
   with_threads(config.threads > 0 ? config.threads : thread_count(), [&] {
     const SceneSetup setup = read_scene_setup(config.data);
-    std::optional<Camera> intrinsics;
-    if (!config.data.camera.empty()) intrinsics = camera_for_size(config.data.camera);
-    choice =
-        select_camera(setup, config.camera_selection, config.render, intrinsics, observer_on_terminal(options.quiet));
+    choice = select_camera(setup, config.camera_selection, config.render, intrinsics_of(config.data.camera),
+                           observer_on_terminal(options.quiet));
     if (!options.image.empty()) write_view(options.image, setup, choice.camera, config);
   });
   if (!options.out.empty()) write_camera(options.out, choice.camera);

@@ -49,6 +49,14 @@ void lay_over_data(const ConfigValue& tree, std::vector<ChainClip>& chain, Confi
   }
 }
 
+bool selects_camera(const ConfigValue& tree) {
+  const ConfigValue* const clips = find_member(tree, "chain");
+  return clips != nullptr && std::any_of(clips->items.begin(), clips->items.end(), [](const ConfigValue& clip) {
+           const ConfigValue* const selects = find_member(clip, "select_camera");
+           return selects != nullptr && selects->boolean;
+         });
+}
+
 SourceSettings sources_of(const SourceSettings& shared, const ChainClip& clip) {
   SourceSettings sources = shared;
   if (!clip.prompt.empty()) sources.prompt = clip.prompt;

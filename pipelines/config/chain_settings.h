@@ -27,6 +27,9 @@ void describe(ConfigFields& fields, ChainClip& clip);
 /// @param tree  the config, in which everything that is written was found right
 void lay_over_data(const ConfigValue& tree, std::vector<ChainClip>& chain, ConfigProblems& problems);
 
+/// Whether the config, a tree, has a clip whose camera is chosen: section `camera_selection` then decides the result.
+bool selects_camera(const ConfigValue& tree);
+
 /// The programs that make what the clip's data do not name, with its prompt.
 SourceSettings sources_of(const SourceSettings& shared, const ChainClip& clip);
 

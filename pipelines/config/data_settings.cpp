@@ -18,6 +18,7 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
   data.masks = base / "masks";
   data.camera = base / "camera.json";
   data.initial = base / "initial.json";
+  if (fs::exists(base / "keypoints.json")) data.keypoints = base / "keypoints.json";
   if (fs::exists(base / "truth")) data.truth = base / "truth";
   if (fs::exists(base / "truth" / "surface.ply")) data.surface = base / "truth" / "surface.ply";
   std::error_code error;  // no such folder: no objects
@@ -53,6 +54,10 @@ void describe(ConfigFields& f, DataSettings& s) {
          "Motion estimated from the video (.npz); replaces the poses of `initial` after frame 0");
   f.choice("motion_align", s.motion_align, kMotionAligns,
            "How `motion` is aligned with frame 0: moved and turned about the vertical (heading), or freely (rotation)");
+  f.path("keypoints", s.keypoints, {.must_exist = true},
+         "2D keypoints of the human by frame, for the loss keypoints_2d: a .json file, or OpenPose's folder");
+  f.path("keypoint_joints", s.keypoint_joints, {.must_exist = true},
+         "List of the joints that the detector's points stand for (.json); empty: of a known set of points");
   f.path("truth", s.truth, {},
          "Folder with motion.npz, objects.npz, cameras.json to compare the result with; may be missing");
   f.path("surface", s.surface, {},

@@ -30,6 +30,8 @@ struct DataSettings {
   std::filesystem::path initial;
   std::filesystem::path motion;  ///< poses estimated from the video; empty: those of `initial`, if it has some
   MotionAlign motion_align = MotionAlign::kHeading;
+  std::filesystem::path keypoints;        ///< points of the human that a detector found; empty: none
+  std::filesystem::path keypoint_joints;  ///< which joints these stand for; empty: as the file says
   std::filesystem::path truth;
   std::filesystem::path surface;  ///< a mesh of what is solid, to measure penetration by; empty: not measured
   double video_rate = 0;          ///< frames a second of the video; 0: what its file says
@@ -42,8 +44,8 @@ struct DataSettings {
 inline constexpr const char* kDatasetVideo = "video.mp4";
 
 /// The inputs in a dataset's folder, as `hsi4d synth` lays them out: scene.ply, objects/NAME.ply, avatar.safetensors,
-/// video.mp4 (or frames/ where there is none), masks/, camera.json, initial.json, truth/ and truth/surface.ply (none
-/// where they are missing). Paths are absolute.
+/// video.mp4 (or frames/ where there is none), masks/, camera.json, initial.json, keypoints.json, truth/ and
+/// truth/surface.ply (none where they are missing). Paths are absolute.
 DataSettings dataset_inputs(const std::filesystem::path& folder);
 
 /// Describe the sections: every setting with its range.

@@ -82,7 +82,8 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   f.boolean("remove_depth_bias", s.remove_depth_bias,
             "Fit frame 0 too, and move human and objects of all others by what that does to their given distance");
   f.object("camera", s.camera, "How cameras are optimised");
-  f.object("camera_selection", s.camera_selection, "How `hsi4d select-camera` chooses the camera of frame 0");
+  f.object("camera_selection", s.camera_selection,
+           "How `hsi4d select-camera`, and `select_camera` of a clip of a chain, choose the camera of frame 0");
   f.object("start", s.start, "Where the stages of a frame begin");
   f.object("instance", s.instance, "The instance of a benchmark that the config is about");
   f.object("data", s.data, "The files that the run reads");
@@ -158,9 +159,10 @@ void drop_files(ConfigValue& data) {
 }  // namespace
 
 ConfigValue without_data(ConfigValue tree) {
-  std::erase_if(tree.members, [](const ConfigMember& member) {
+  const bool selects = selects_camera(tree);
+  std::erase_if(tree.members, [selects](const ConfigMember& member) {
     return member.key == "synthetic" || member.key == "instance" || member.key == "threads" ||
-           member.key == "camera_selection" || (member.key == "chain" && member.value.items.empty());
+           (member.key == "camera_selection" && !selects) || (member.key == "chain" && member.value.items.empty());
   });
   for (ConfigMember& member : tree.members) {
     std::vector<ConfigMember>& own = member.value.members;

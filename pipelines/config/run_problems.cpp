@@ -134,6 +134,12 @@ void add_name_problems(const DataSettings& data, const std::string& in, std::vec
   }
 }
 
+/// @param in  the section, "/data"
+void add_keypoint_problems(const DataSettings& data, const std::string& in, std::vector<RunProblem>& found) {
+  if (data.keypoints.empty() && !data.keypoint_joints.empty())
+    found.push_back({in + "/keypoint_joints", "given without " + in + "/keypoints, whose points it tells of", {in}});
+}
+
 /// A program of `sources`, and the input that it makes.
 struct Maker {
   const char* name;
@@ -250,6 +256,24 @@ void add_idle_source_problems(const RunConfig& config, std::vector<RunProblem>& 
   }
 }
 
+/// What is wrong with how a clip comes to its video.
+void add_made_clip_problems(const SourceSettings& sources, const ChainClip& clip, const std::string& in,
+                            std::vector<RunProblem>& found) {
+  add_prompt_problems(sources, in + "/prompt", found);
+  if (clip.select_camera && sources.video.command.empty())
+    found.push_back({in + "/select_camera",
+                     "the clip's video is given, and was filmed by a camera of its own; a camera is chosen for a video "
+                     "that /sources/video makes",
+                     {in, "/sources"}});
+}
+
+/// A clip begins where the one before ended, which its video's program must see.
+void add_first_frame_problem(const SourceSettings& sources, std::vector<RunProblem>& found) {
+  const std::string place = "/sources/video/command";
+  if (!sources.video.command.empty() && !uses_placeholder(sources.video.command, "first_frame"))
+    found.push_back({place, "{first_frame} is missing: clips of a chain begin where the ones before ended", {place}});
+}
+
 void add_chain_problems(const RunConfig& config, ConfigUse use, std::vector<RunProblem>& found) {
   const std::vector<ChainClip>& chain = config.chain;
   for (std::size_t i = 0; i < chain.size(); ++i) {
@@ -268,8 +292,9 @@ void add_chain_problems(const RunConfig& config, ConfigUse use, std::vector<RunP
                            object_names(chain.front().data) + "; the clips of a chain have the same, in one order",
                        {}});
     add_name_problems(clip.data, where + "/data", found);
+    add_keypoint_problems(clip.data, where + "/data", found);
     const SourceSettings sources = sources_of(config.sources, clip);
-    add_prompt_problems(sources, where + "/prompt", found);
+    add_made_clip_problems(sources, clip, where, found);
     if (use == ConfigUse::kRun) add_input_problems(clip.data, where + "/data", known_inputs(sources, clip, i), found);
   }
 }
@@ -344,11 +369,13 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_given_frame_problems(config, found);
   if (!config.chain.empty()) {
     add_command_problems(config.sources, found);
+    add_first_frame_problem(config.sources, found);
     add_idle_source_problems(config, found);
     add_chain_problems(config, use, found);
     return found;
   }
   add_name_problems(config.data, "/data", found);
+  add_keypoint_problems(config.data, "/data", found);
   add_source_problems(config, found);
   if (use == ConfigUse::kRun) {
     const SourceSettings& sources = config.sources;

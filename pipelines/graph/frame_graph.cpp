@@ -230,6 +230,7 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
   }
   if (draws_objects()) record_object_masks();
   if (settings_.human_opacity) record_human_inputs();
+  if (settings_.keypoints && clip_.keypoints) record_keypoints();
 }
 
 /// Opacities are those of the objects, and last of the human.
@@ -283,16 +284,35 @@ void FrameGraph<S>::record_object_depths(const std::vector<Part>& parts, std::si
   inputs_.object_depth_target = tape_.constant("object_depth_target", shape_of(count, 1));
 }
 
+/// Where points [N,3] of the world are in the image, [N,2] pixels.
+template <class S>
+Var<S> FrameGraph<S>::places_in_image(Var<S> points) const {
+  const Var<S> axes = tape_.constant("unit_axes", shape_of(points.shape().rows, 9));
+  for (Index i = 0; i < points.shape().rows; ++i) {  // without extent they would not be drawn, and have no gradient
+    for (const Index diagonal : {0, 4, 8}) tape_.write(axes)(i, diagonal) = 1;
+  }
+  return project(points, axes, xi_, view_).means_px;
+}
+
 /// A pose's translation is where the object's centroid is.
 template <class S>
 void FrameGraph<S>::record_object_places() {
   std::vector<Var<S>> centroids;
   for (const Object& object : objects_) centroids.push_back(object.transl);
-  const Var<S> axes = tape_.constant("unit_axes", shape_of(std::ssize(objects_), 9));
-  for (Index o = 0; o < std::ssize(objects_); ++o) {  // without extent they would not be drawn, and have no gradient
-    for (const Index diagonal : {0, 4, 8}) tape_.write(axes)(o, diagonal) = 1;
+  inputs_.object_place = places_in_image(concat_rows<S>(centroids));
+}
+
+/// A point is a mean of joints.
+template <class S>
+void FrameGraph<S>::record_keypoints() {
+  const std::vector<KeypointJoints>& points = clip_.keypoints->joints;
+  const Var<S> weights = tape_.constant("keypoint_joints", shape_of(std::ssize(points), kJoints));
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    for (const auto& [joint, weight] : points[k])
+      tape_.write(weights)(static_cast<Index>(k), joint) = static_cast<S>(weight);
   }
-  inputs_.object_place = project(concat_rows<S>(centroids), axes, xi_, view_).means_px;
+  inputs_.keypoints = places_in_image(matmul(weights, skeleton_.joints));
+  inputs_.keypoints_target = tape_.constant("keypoints_target", shape_of(std::ssize(points), 3));
 }
 
 template <class S>
@@ -381,10 +401,21 @@ void FrameGraph<S>::set_targets(const FrameTargets& targets) {
     write_image(inputs_.human_mask, *targets.human_mask);
     fill(inputs_.human_seen, S(targets.human_seen ? 1 : 0));
   }
+  if (inputs_.given(inputs_.keypoints_target)) set_keypoints(*targets.keypoints);
   if (!inputs_.given(inputs_.object_depth)) return;
   HSI4D_CHECK_EQ(targets.depths.size(), objects_.size());
   write_numbers(tape_, inputs_.object_depth_target, targets.depths.data());
   if (inputs_.given(inputs_.object_masks)) set_object_masks(targets);
+}
+
+template <class S>
+void FrameGraph<S>::set_keypoints(const std::vector<Keypoint>& found) {
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    S* row = tape_.write(inputs_.keypoints_target).row(static_cast<Index>(k));
+    row[0] = static_cast<S>(found[k].x * view_.camera.width);
+    row[1] = static_cast<S>(found[k].y * view_.camera.height);
+    row[2] = static_cast<S>(found[k].confidence);
+  }
 }
 
 template <class S>

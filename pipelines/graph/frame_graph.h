@@ -38,6 +38,7 @@ struct FrameGraphSettings {
   bool color_camera_gradient = false;   ///< colours of the net have a gradient in the camera, by the direction of view
   bool human_opacity = false;           ///< the losses read the human's opacity, which costs a channel of the render
   bool object_opacity = false;          ///< likewise of the objects, a channel each
+  bool keypoints = false;               ///< the losses read the clip's keypoints
   /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
   /// out, and the groups of the scene then hold the others alone. None: all are kept.
   std::optional<double> camera_reach = {};
@@ -55,6 +56,7 @@ struct FrameTargets {
   const Image* human_mask = nullptr;            ///< [1,H,W] coverage; needed with settings.human_opacity
   bool human_seen = true;                       ///< the frame shows some of the human
   std::vector<const Image*> object_masks = {};  ///< coverage by object; needed with settings.object_opacity
+  const std::vector<Keypoint>* keypoints = nullptr;  ///< of the frame; needed with settings.keypoints
 };
 
 /// The frame graph. The tape and the clip must outlive it.
@@ -110,11 +112,14 @@ class FrameGraph {
   Var<S> record_rotations(Var<S> parameters) const;
   void record_render(const std::vector<Part>& parts, std::size_t first_object);
   void record_human_inputs();
+  void record_keypoints();
   Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
   void record_object_depths(const std::vector<Part>& parts, std::size_t first_object);
   void record_object_places();
+  Var<S> places_in_image(Var<S> points) const;
   void record_object_masks();
   void set_object_masks(const FrameTargets& targets);
+  void set_keypoints(const std::vector<Keypoint>& found);
   bool draws_objects() const { return settings_.object_opacity && !objects_.empty(); }
   void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
   Vector3<double> read_rotation(Var<S> leaf, Index row) const;

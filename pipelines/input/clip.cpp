@@ -246,6 +246,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   clip.video = video;
   clip.estimate = estimate_of(data, setup, clip.avatar, video->frames);
   clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
+  if (!data.keypoints.empty()) clip.keypoints = read_keypoints(data, video->frames);
   clip.first.body = setup.motion.poses.front();
   clip.frame_rate = rate_of(video->frames, setup);
   clip.betas = setup.motion.betas;
@@ -262,6 +263,9 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
                 {"/data/initial", data.initial},
                 {"/data/initial: /motion", setup.motion_file}};
   if (!data.motion.empty()) clip.files.push_back({"/data/motion", data.motion});
+  if (!data.keypoint_joints.empty()) clip.files.push_back({"/data/keypoint_joints", data.keypoint_joints});
+  for (const fs::path& file : keypoint_files(data.keypoints))
+    clip.files.push_back({"/data/keypoints: " + file.filename().string(), file});
   if (!setup.object_tracks.empty()) clip.files.push_back({"/data/initial: /object_tracks", setup.object_tracks});
   for (const auto& [name, object] : data.objects)
     clip.files.push_back({"/data/objects/" + name + "/gaussians", object.gaussians});

@@ -13,6 +13,7 @@
 #include "pipelines/config/data_settings.h"
 #include "pipelines/config/masks.h"
 #include "pipelines/input/frame_source.h"
+#include "pipelines/input/keypoints.h"
 #include "pipelines/input/scene_setup.h"
 
 namespace hsi4d {
@@ -39,6 +40,7 @@ struct Clip {
   SceneState first;                                      ///< state of frame 0, given; poses are of the avatar's body
   std::vector<BodyPose> estimate;                        ///< estimated poses by frame; empty: none
   std::vector<std::vector<ObjectPose>> object_estimate;  ///< estimated poses [frame][object]; empty: none
+  std::optional<Keypoints> keypoints;                    ///< of data.keypoints
   std::vector<double> betas;                             ///< of the person, as the motion file says; empty: not known
   std::string gender = "neutral";                        ///< of the body model, likewise
   double frame_rate = 10;                                ///< frames a second

@@ -131,4 +131,9 @@ Camera camera_for_size(const fs::path& file) {
   return cameras.front().camera;
 }
 
+std::optional<Camera> intrinsics_of(const fs::path& file) {
+  if (file.empty()) return {};
+  return camera_for_size(file);
+}
+
 }  // namespace hsi4d

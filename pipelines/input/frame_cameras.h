@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,5 +28,8 @@ Camera only_camera(const std::filesystem::path& file);
 
 /// A camera for its size and focal lengths. Throws DataError for a file whose cameras differ in these.
 Camera camera_for_size(const std::filesystem::path& file);
+
+/// The same; none for an empty path.
+std::optional<Camera> intrinsics_of(const std::filesystem::path& file);
 
 }  // namespace hsi4d

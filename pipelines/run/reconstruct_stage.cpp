@@ -104,6 +104,7 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   targets.weight = weight.empty() ? nullptr : &weight;
   targets.human_mask = &frame.human_mask;
   targets.human_seen = mask_center(frame.human_mask, task.config.data.mask_threshold)[2] != 0;
+  if (clip.keypoints) targets.keypoints = &clip.keypoints->frames.at(static_cast<std::size_t>(frame_task.index));
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
     if (are_objects_read) {
       targets.object_masks.push_back(&frame.object_masks[o]);
@@ -128,6 +129,7 @@ void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& fra
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
   settings.human_opacity = some_loss_needs(stage, LossInput::kHumanOpacity);
   settings.object_opacity = some_loss_needs(stage, LossInput::kObjectOpacity);
+  settings.keypoints = some_loss_needs(stage, LossInput::kKeypoints);
   settings.camera_reach = camera_reach;
   settings.seen = rows_to_draw(task, state);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);

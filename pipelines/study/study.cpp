@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <regex>
 
 #include "core/check.h"
 #include "core/config_value.h"
@@ -146,23 +147,27 @@ class NewFolder {
 const fs::file_time_type kTimeOfVideos =
     std::chrono::file_clock::from_sys(std::chrono::sys_seconds(std::chrono::sys_days(std::chrono::year(2020) / 1 / 1)));
 
-/// Sixteen random hexadecimal digits, by the system's generator.
+/// Whether a browser takes it for the address of a server: http(s)://HOST[:PORT][/...].
 bool is_web_address(const std::string& text) {
-  return (text.starts_with("https://") && text.size() > 8) || (text.starts_with("http://") && text.size() > 7);
+  static const std::regex address("https?://[A-Za-z0-9.-]+(:([0-9]{1,5}))?([/?#][!-~]*)?");
+  std::smatch found;
+  return std::regex_match(text, found, address) && (!found[2].matched || std::stoi(found[2]) <= 65535);
 }
 
+/// Throws UserError for an address or a code that the page could not use.
 void check_end(const StudyEnd& end) {
   const auto is_printable = [](const std::string& text) {
     return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; });
   };
-  if (!end.collect.empty() && (!is_web_address(end.collect) || !is_printable(end.collect)))
+  if (!end.collect.empty() && !is_web_address(end.collect))
     throw UserError("hsi4d study: --collect: " + json_string(end.collect) +
-                    " is no address; allowed: https://... or http://..., without spaces");
+                    " is no address; allowed: https://HOST, http://HOST:PORT/PATH and the like");
   if (!is_printable(end.completion))
     throw UserError("hsi4d study: --completion: " + json_string(end.completion) +
                     " is neither a code nor an address; allowed: characters of ASCII without spaces");
 }
 
+/// Sixteen random hexadecimal digits, by the system's generator.
 std::string random_digits() {
   std::random_device device;
   std::string digits;

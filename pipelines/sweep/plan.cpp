@@ -13,6 +13,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "optim/checkpoint.h"
+#include "pipelines/config/chain_settings.h"
 #include "pipelines/config/config_kind.h"
 #include "pipelines/config/source_settings.h"
 #include "pipelines/config/synthetic_settings.h"
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 using Kind = ConfigValue::Kind;
 
 /// Sections of a clip's config that say what is reconstructed, not how.
-constexpr std::array kClipSections = {"instance", "data", "chain", "sources", "body", "synthetic"};
+constexpr std::array kClipSections = {"instance", "data", "chain", "sources", "camera_selection", "body", "synthetic"};
 /// Settings of section `data` that say how.
 constexpr std::array kMaskSettings = {"mask_threshold", "mask_margin_px"};
 
@@ -235,8 +236,9 @@ std::string recipe_of(const Combination& c) {
 
 /// What two configs have in common that give the same result.
 ConfigValue identity_of(ConfigValue tree, bool is_made) {
+  const bool selects = selects_camera(tree);
   std::erase_if(tree.members, [&](const ConfigMember& member) {
-    return member.key == "name" || member.key == "threads" || member.key == "camera_selection" ||
+    return member.key == "name" || member.key == "threads" || (member.key == "camera_selection" && !selects) ||
            (member.key == "synthetic" && !is_made);
   });
   return tree;

@@ -56,7 +56,9 @@ std::vector<OperatorInput> all_inputs() {
           {"gaussian_log_scales", shape_of(9, 3), -4, 0},
           {"depth_moments", image_shape<double>(2, kHeight, kWidth), 0.2, 0.3},
           {"transmittance", mask, 0, 0.5},
-          {"depth_target", mask, 1, 2}};
+          {"depth_target", mask, 1, 2},
+          {"keypoints", shape_of(4, 2), 0, 60},
+          {"keypoints_target", shape_of(4, 3), 0, 0, {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8, 8, 8, 0.1}}};
 }
 
 template <class S>
@@ -82,6 +84,8 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.depth_moments = in[19];
   inputs.transmittance = in[20];
   inputs.depth_target = in[21];
+  inputs.keypoints = in[22];
+  inputs.keypoints_target = in[23];
   inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;
@@ -111,6 +115,33 @@ TEST_CASE("every registered loss term passes the gradient check", "[parallel]") 
     check_operator(
         term.description.name, all_inputs(), [&](const auto& in) { return term.record(inputs_of(in)); }, check);
   }
+}
+
+TEST_CASE("keypoints_2d weighs by confidence, and its kernels agree with their formulas") {
+  const LossTerm& term = *std::find_if(loss_terms().begin(), loss_terms().end(),
+                                       [](const LossTerm& t) { return t.description.name == "keypoints_2d"; });
+  const auto value_of = [&term](const std::string& kernel) {
+    LossSettings settings = default_settings(term.description);
+    ConfigFields fields;
+    describe(fields, settings);
+    ConfigProblems problems;
+    const ConfigValue tree = load_config_text(
+        R"({"kernel": ")" + kernel + R"(", "scale_px": 5, "min_confidence": 0.2})", "t.json", "", {}, problems);
+    read_config(tree, fields, problems);
+    problems.throw_if_any();
+    Tape<double> tape;
+    LossInputs<double> in;
+    in.keypoints = tape.parameter("p", shape_of(3, 2));
+    tape.set(in.keypoints, {3, 4, 30, 50, 7, 7});
+    in.keypoints_target = tape.parameter("q", shape_of(3, 3));
+    tape.set(in.keypoints_target, {0, 0, 0.5, 0, 10, 1, 90, 90, 0.1});  // 5 and 50 px off; the last is not sure enough
+    const Var<double> loss = term.record(in, prepared_loss(term.description.prepare, settings.own));
+    tape.forward(loss);
+    return tape.value(loss).scalar();
+  };
+  CHECK(value_of("squared") == Approx((0.5 * 25 + 2500) / 3));
+  CHECK(value_of("huber") == Approx((0.5 * 25 + 2 * 5 * 50 - 25) / 3));
+  CHECK(value_of("geman_mcclure") == Approx((0.5 * 25 * 25 / 50.0 + 25 * 2500 / 2525.0) / 3));
 }
 
 TEST_CASE("depth_spread counts known depths alone, and what rounding made less than nothing as nothing") {

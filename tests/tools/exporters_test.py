@@ -214,7 +214,7 @@ def tram():
     refused("has 4 frames", "export_motion.py", "clip/hps/hps_track_0.npy", "t.npz")
 
 
-def body_model(vertices=330):
+def body_model(file="body.npz", vertices=330, columns=20):
     """A body of SMPL-X's skeleton with six vertices about each joint, each of which follows its parent a little."""
     parents = np.array([-1] + [int(rng.integers(max(0, j - 6), j)) for j in range(1, 55)])
     joints = np.zeros((55, 3))
@@ -228,14 +228,17 @@ def body_model(vertices=330):
     regressor = np.zeros((55, vertices))
     regressor[of, np.arange(vertices)] = 55 / vertices
     table = np.stack([np.where(parents < 0, 2**32 - 1, parents), np.arange(55)])
-    shapes = rng.normal(size=(vertices, 3, 20)) * 0.004
+    shapes = rng.normal(size=(vertices, 3, columns)) * 0.004
     correctives = rng.normal(size=(vertices, 3, 486)) * 0.0005
-    np.savez("body.npz", v_template=template, weights=weights, J_regressor=regressor, kintree_table=table, shapedirs=shapes,
+    np.savez(file, v_template=template, weights=weights, J_regressor=regressor, kintree_table=table, shapedirs=shapes,
              posedirs=correctives)
-    return em.SmplxMesh(np, "body.npz")
+    return em.SmplxMesh(np, file)
 
 
 def whac():
+    body = body_model(columns=400)
+    with np.load("body.npz") as file:
+        close(body.shapes[..., 10:], file["shapedirs"][..., 300:310], 0)  # the expression of SMPL-X 1.1
     body = body_model()
     poses, shapes = rng.normal(size=(3, 55, 3)) * 0.4, rng.normal(size=(3, 20))
     poses[:, 0] *= 4  # the root, any way round
@@ -278,12 +281,21 @@ def whac():
     save("city/detection_results.pth", {1: {"frame_id": [0, 1]}, 7: {"frame_id": [2, 3, 5]}})
     said = export("export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz", "--fps", 30)
     assert "4 frames, 1 of them interpolated, from frame 2 of the video, whac" in said, said
+    assert "the meshes are of person 7 (3 frames), not of 1 (2 frames)" in said, said
+    refused("--pelvis: the pelvis is that", "export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz", "--pelvis", "0,0,0")
+    refused("nothing reads it of wham", "export_motion.py", "wham_output.pkl", "w.npz", "--body-model", "body.npz")
+    refused("is no body model", "export_motion.py", "city/mesh", "w.npz", "--body-model", "wham_output.pkl")
+    body_model("other.npz")
+    refused("they miss by more than 30 mm", "export_motion.py", "city/mesh", "w.npz", "--body-model", "other.npz")
     save("city/detection_results.pth", {1: {"frame_id": [0, 1]}})
     refused("has 3 meshes", "export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz")
     pathlib.Path("city/mesh/whac_results_000001.obj").write_text("v 0 0 0\n")
     refused("has 1 vertices, the body model 330", "export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz")
     pathlib.Path("empty").mkdir()
-    refused("holds no whac_results_*.obj", "export_motion.py", "empty", "w.npz", "--body-model", "body.npz")
+    refused("known endings are", "export_motion.py", "empty", "w.npz", "--body-model", "body.npz")
+    refused("holds no whac_results_*.obj", "export_motion.py", "empty", "w.npz", "--body-model", "body.npz", "--from", "whac")
+    pathlib.Path("city/mesh/whac_results_000001.obj").unlink()
+    refused("without a gap", "export_motion.py", "city/mesh", "w.npz", "--body-model", "body.npz")
 
 
 def vposer():

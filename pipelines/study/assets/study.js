@@ -1,4 +1,4 @@
-// What a person does with the page: a welcome, the pairs one after the other, and the answers as a file.
+// What a person does with the page: a welcome, the pairs one after the other, and the answers, sent or as a file.
 //
 // Which pairs, their order and their sides follow from study and person alone, so that a reload shows the same. What is
 // kept in the browser are the person, what was chosen, and for each pair the seconds it was looked at and how often its
@@ -368,7 +368,8 @@ function save() {
 // Sent as text, which a browser lets a page send anywhere without asking the server first; the server's answer must
 // allow to be read (Access-Control-Allow-Origin).
 async function send() {
-  get("send").disabled = true;
+  const waiting = ["send", "review", "another"].map(get);  // what arrives is what is shown
+  for (const button of waiting) button.disabled = true;
   get("sent").textContent = "Sending…";
   try {
     const reply = await fetch(study.collect, { method: "POST", body: answersText(), signal: AbortSignal.timeout(30_000) });
@@ -381,10 +382,11 @@ async function send() {
     get("sent").textContent = "Your answers have not arrived (" + error.message + "). Please try again, or save them and send the file to whoever asked you.";
     get("send").disabled = false;
   }
+  get("review").disabled = get("another").disabled = false;
 }
 
 function beginAnew() {
-  if (answered().length > 0 && !confirm("Have these answers been saved? They are removed from this browser.")) return;
+  if (answered().length > 0 && !confirm("Have these answers been " + (study.collect ? "sent" : "saved") + "? They are removed from this browser.")) return;
   state = fresh();
   trials = trialsOf(state.person);
   if (keep()) show();
@@ -422,7 +424,10 @@ get("back").addEventListener("click", () => goTo(state.at - 1));
 get("next").addEventListener("click", next);
 get("save").addEventListener("click", save);
 get("send").addEventListener("click", send);
-get("stop").addEventListener("click", () => goTo(trials.length));
+get("stop").addEventListener("click", () => {
+  if (answered().length === trials.length) state.finished = new Date().toISOString();
+  goTo(trials.length);
+});
 get("review").addEventListener("click", review);
 get("another").addEventListener("click", beginAnew);
 get("not-me").addEventListener("click", () => {
@@ -436,7 +441,8 @@ get("go-on").addEventListener("click", () => {
 get("here").addEventListener("click", () => location.reload());
 document.addEventListener("keydown", onKey);
 addEventListener("beforeunload", event => {
-  if (!state.saved && (!isKept || !get("end").hidden)) event.preventDefault();
+  const isSafe = study.collect ? state.handedIn || answered().length === 0 : state.saved;
+  if (!isSafe && (!isKept || !get("end").hidden)) event.preventDefault();
 });
 if (areOfUnknown()) showReturn();
 else show();

@@ -136,6 +136,16 @@ TEST_CASE("a chain with programs goes on from wherever it was stopped", "[run][c
   CHECK(text_of("film.txt") == "clip1\nclip2\nclip1\nclip2\n");
   execute_tiny_chain(config, "run", 1, true);  // all is done: nothing is run
   check_same_chains("run", "whole");
+  CHECK(text_of("film.txt") == "clip1\nclip2\nclip1\nclip2\n");
+  CHECK(text_of("mask.txt") == "clip1\nclip2\nclip1\nclip2\n");
+
+  // What a clip that is done was made of is not made again: that may cost something.
+  fs::remove_all("generated");
+  const std::string told = ", of which the clip that is done was made, is not there";
+  CHECK_THROWS_WITH(finished_clips(config, "run", loss_terms()), Contains(told));
+  CHECK_THROWS_WITH(execute_tiny_chain(config, "run", 1, true),
+                    Contains("clip 1 of 2, clip1: /sources/video: ") && Contains(told));
+  CHECK(text_of("film.txt") == "clip1\nclip2\nclip1\nclip2\n");
 }
 
 TEST_CASE("a later clip is filmed from the state in which the one before ended, by a camera chosen there",
@@ -171,8 +181,37 @@ TEST_CASE("a later clip is filmed from the state in which the one before ended, 
   CHECK(motion.poses[kClipFrames - 1].transl == first.poses.back().transl);
   CHECK((motion.poses.back().transl - first.poses.back().transl).norm() < 0.05);
   fs::rename("run", "whole");
-  execute_tiny_chain(config, "run", 2);
+  int asked = 0;
+  CHECK_THROWS_AS(execute_tiny_chain(config, "run", 2, false,
+                                     [&] { return fs::exists("run/clips/clip2/status.json") && ++asked == 8; }),
+                  Interrupted);
+  const std::string camera = file_text("run/starts/clip2.camera.json");
+  execute_tiny_chain(config, "run", 2, true);
   check_same_chains("run", "whole");
+  CHECK(file_text("run/starts/clip2.camera.json") == camera);
+
+  // What chooses a camera decides the result.
+  RunConfig other = config;
+  other.camera_selection.radii_m = {1.5};
+  CHECK_THROWS_WITH(execute_tiny_chain(other, "run", 2, true), Contains("camera_selection"));
+}
+
+TEST_CASE("the first clip's camera can be chosen too, and programs estimate the motion of each clip", "[run][chain]") {
+  const Workshop workshop;
+  script("poses", "cp " + (TinyChain::folder() / "clips").string() + "/$1/truth/motion.npz \"$2\"");
+  const RunConfig config = changed_config([](Json& c) {
+    make_all(c);
+    c["chain"][0]["select_camera"] = true;
+    c["camera_selection"]["radii_m"] = {2};
+    c["sources"]["motion"]["command"] = {"./poses", "{prompt}", "{out}"};
+  });
+  execute_tiny_chain(config, "run");
+  CHECK(fs::exists("run/starts/clip1.camera.json"));
+  CHECK_FALSE(fs::exists("run/starts/clip2.camera.json"));
+  CHECK(json_of("run/status.json")["state"] == "done");
+  int motions = 0;
+  for (const auto& file : fs::directory_iterator("generated")) motions += file.path().extension() == ".npz" ? 1 : 0;
+  CHECK(motions == 2);
 }
 
 TEST_CASE("an input that a clip of a chain names is not made", "[run][chain]") {
@@ -228,6 +267,15 @@ TEST_CASE("what is wrong with a chain of programs is told with its place", "[cha
           c["chain"][1].erase("prompt");
           c["sources"]["prompt"] = "clip2";
         }) == "no fault");
+  CHECK_THAT(fault_of([](Json& c) {
+               c["chain"][1]["data"]["frames"] = "clips/clip2/frames";
+               c["chain"][1]["select_camera"] = true;
+             }),
+             Contains("/chain/1/select_camera: the clip's video is given, and was filmed by a camera of its own"));
+  CHECK_THAT(fault_of([](Json& c) {
+               c["sources"]["video"]["command"] = {"./film", "{prompt}", "{out}"};
+             }),
+             Contains("/sources/video/command: {first_frame} is missing"));
   CHECK_THAT(fault_of([](Json& c) { c["data"]["frames"] = "clips/clip1/frames"; }),
              Contains("/sources/video: makes nothing: every clip of the chain has data/frames; remove one"));
   CHECK_THAT(fault_of([](Json& c) {

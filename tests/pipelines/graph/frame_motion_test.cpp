@@ -165,6 +165,64 @@ TEST_CASE("gradients of terms over masks and motion are right for body and objec
   }
 }
 
+TEST_CASE("keypoints are where the camera sees the joints, with the gradients of differences", "[frame_graph]") {
+  Clip clip = small_clip(kWidth, kHeight, 400);
+  const auto joint = [](const char* name) { return smplx_joint(name); };
+  clip.keypoints = Keypoints{{{{joint("left_wrist"), 1.0}},
+                              {{joint("left_hip"), 0.5}, {joint("right_hip"), 0.5}},
+                              {{joint("head"), 1.0}},
+                              {{joint("right_ankle"), 1.0}}},
+                             {{}, {{0.3, 0.4, 1}, {0.5, 0.5, 0.5}, {0.9, 0.1, 0.8}, {1.4, -0.2, 0.1}}}};
+  FrameGraphSettings settings = settings_with_human();
+  settings.keypoints = true;
+  Tape<double> tape;
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);
+  graph.set_state(clip.first);
+  graph.give_motion(clip.first, frames_before(clip));
+  const Image image(3, kHeight, kWidth), human = random_mask(6);
+  FrameTargets targets{&image, nullptr, {{14.5, 11.25, 1}, {6.5, 14.5, 1}}, {2.5, 3.5}};
+  targets.human_mask = &human;
+  targets.object_masks = {&human, &human};
+  targets.keypoints = &clip.keypoints->frames[1];
+  graph.set_targets(targets);
+  const LossInputs<double>& inputs = graph.loss_inputs();
+  const Var<double> loss = term_named("keypoints_2d").record(inputs);
+  REQUIRE(loss.tape != nullptr);
+  tape.forward(loss);
+
+  const PosedJoints body = pose_skeleton(clip.avatar, clip.first.body);
+  for (Index k = 0; k < 4; ++k) {
+    INFO("point " << k);
+    Vector3<double> place = Vector3<double>::Zero();
+    for (const auto& [j, weight] : clip.keypoints->joints[static_cast<std::size_t>(k)])
+      place += weight * Vector3<double>(body.joints.data() + 3 * j);
+    const Vector3<double> seen =
+        clip.first.camera_from_world.rotation * place + clip.first.camera_from_world.translation;
+    CHECK(tape.value(inputs.keypoints)(k, 0) ==
+          Approx(clip.camera.fx * seen[0] / seen[2] + clip.camera.cx).epsilon(1e-9));
+    CHECK(tape.value(inputs.keypoints)(k, 1) ==
+          Approx(clip.camera.fy * seen[1] / seen[2] + clip.camera.cy).epsilon(1e-9));
+    const Keypoint& found = clip.keypoints->frames[1][static_cast<std::size_t>(k)];
+    CHECK(tape.value(inputs.keypoints_target)(k, 0) == Approx(found.x * kWidth));
+    CHECK(tape.value(inputs.keypoints_target)(k, 1) == Approx(found.y * kHeight));
+    CHECK(tape.value(inputs.keypoints_target)(k, 2) == found.confidence);
+  }
+  for (const char* name : {"camera", "transl", "global_orient", "body_pose"}) {
+    INFO("group " << name);
+    for (const Var<double> block : group_named(graph, name).blocks) tape.unfreeze(block);
+    GradcheckOptions options;
+    options.tolerance = 1e-6;
+    options.each_node = false;
+    const GradcheckReport report = gradcheck(tape, loss, options);
+    INFO(report.text());
+    CHECK(report.ok());
+  }
+  settings.keypoints = false;
+  Tape<double> other;
+  const FrameGraph<double> without(other, clip, clip.first.camera_from_world, settings);
+  CHECK_FALSE(without.loss_inputs().gives(LossInput::kKeypoints));
+}
+
 TEST_CASE("an object is drawn to the hand as the hand is to it", "[frame_graph]") {
   Clip clip = small_clip(kWidth, kHeight, 2000);
   const PosedJoints body = pose_skeleton(clip.avatar, clip.first.body);

@@ -289,10 +289,11 @@ TEST_CASE("what no study can be made of is told, and leaves nothing") {
       "hsi4d study: compares two runs, or two folders of runs: A and B (1 given); --answers tells what people chose\n");
   CHECK(refused({"a", "c"}) == "hsi4d study: --out says where the page goes: a new or empty folder\n");
   CHECK(refused({"a", "c", "--out", "b"}) == "b: is not a new or empty folder\n");
-  CHECK(refused({"a", "c", "--out", "page", "--collect", "study.org"}) ==
-        "hsi4d study: --collect: \"study.org\" is no address; allowed: https://... or http://..., without spaces\n");
-  CHECK(refused({"a", "c", "--out", "page", "--collect", "https://"}) ==
-        "hsi4d study: --collect: \"https://\" is no address; allowed: https://... or http://..., without spaces\n");
+  for (const char* address : {"study.org", "https://", "https://?x", "http://[", "https://a:99999",
+                              "https://me:pw@a.org", "https://a.org/my answers"})
+    CHECK(refused({"a", "c", "--out", "page", "--collect", address}) ==
+          "hsi4d study: --collect: \"" + std::string(address) +
+              "\" is no address; allowed: https://HOST, http://HOST:PORT/PATH and the like\n");
   CHECK(refused({"a", "c", "--out", "page", "--completion", "my code"}) ==
         "hsi4d study: --completion: \"my code\" is neither a code nor an address; allowed: characters of ASCII without "
         "spaces\n");

@@ -1,0 +1,66 @@
+// Points of the human that a detector found in the pictures of a video, and the joints that they stand for.
+//
+// Read are, as docs/formats.md has them:
+//   F.json  {"format": "hsi4d keypoints", ...}, one person
+//   F.json  results of COCO: [{"image_id": 3, "keypoints": [x, y, c, ...]}...]
+//   DIR/    of OpenPose: NAME_keypoints.json a frame, {"people": [{"pose_keypoints_2d": [x, y, c, ...]}...]}
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pipelines/config/data_settings.h"
+#include "pipelines/input/frame_source.h"
+
+namespace hsi4d {
+
+/// A point as a detector found it.
+struct Keypoint {
+  double x = 0, y = 0;    ///< shares of the image's width and height, from its upper left corner
+  double confidence = 0;  ///< 0 to 1; 0: it was not found
+};
+
+/// Joints (smplx_joint_names) with weights that sum to 1: the point is their mean.
+using KeypointJoints = std::vector<std::pair<int, double>>;
+
+/// Points of one person. Those that stand for no joint (a nose, an ear) are left out.
+struct Keypoints {
+  std::vector<KeypointJoints> joints;         ///< by point
+  std::vector<std::vector<Keypoint>> frames;  ///< [frame][point], of the frames that the clip keeps
+};
+
+/// A person in one picture as the file has it: (x, y, confidence) by point, pixels. Empty: nobody.
+using FoundPerson = std::vector<std::array<double, 3>>;
+
+/// What a file of keypoints holds.
+struct FoundKeypoints {
+  std::vector<std::vector<FoundPerson>> frames;  ///< [frame][person], all persons with the same points
+  std::vector<KeypointJoints> joints;            ///< by point, empty where it stands for no joint
+  std::array<double, 2> size = {0, 0};           ///< of the pictures, pixels; 0: that of the video's
+  bool lacks_empty_frames = false;               ///< frames without persons are not in the file
+};
+
+/// Reads text in one of the formats that are one file.
+/// @param name    what messages call it
+/// @param joints  by point, in place of those that the format or the number of points says; empty: none given
+/// Throws DataError naming line and position: no such format, numbers that are missing or out of range, frames twice,
+/// a set of points that is not known.
+FoundKeypoints parse_keypoints(const std::string& text, const std::string& name,
+                               const std::vector<KeypointJoints>& joints = {});
+
+/// Reads a file that says for each point of a detector which joints it stands for: a list of names of joints, of
+/// {"NAME": weight, ...}, and null. Throws DataError naming line and position.
+std::vector<KeypointJoints> parse_keypoint_joints(const std::string& text, const std::string& name);
+
+/// The files of data.keypoints: itself, or of a folder OpenPose's, by name. Empty: none.
+std::vector<std::filesystem::path> keypoint_files(const std::filesystem::path& keypoints);
+
+/// Reads data.keypoints. Of several persons the one is followed whom the detector is surest of in the first picture
+/// that has some, then the nearest to where that one was, which the log tells.
+/// Throws UserError or DataError naming the file: missing, damaged, as above, another number of frames than the video.
+Keypoints read_keypoints(const DataSettings& data, const FrameSource& frames);
+
+}  // namespace hsi4d
