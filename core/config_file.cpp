@@ -187,6 +187,7 @@ void apply_override(ConfigValue& tree, const std::string& text, int order, Confi
     return;
   }
   forget_lines(*value);
+  if (value->kind == Kind::kNull && take_out_object(tree, keys)) return;
   ConfigValue* const place = config_place(tree, keys, origin, problems);
   if (place == nullptr) return;
   *place = std::move(*value);

@@ -18,8 +18,9 @@ inline constexpr int64_t kLargestConfig = int64_t{8} << 20;
 /// Reads `file` and lays it over the file that its "extends" names, and so on; then applies the overrides in their
 /// order.
 ///
-/// "extends" is relative to the file that holds it. Objects merge key by key; arrays, null and all other values
-/// replace. An override is KEY=VALUE with KEY a dotted path ("stages.camera.iterations") or a JSON pointer
+/// "extends" is relative to the file that holds it. Objects merge key by key; null takes an object of the extended file
+/// out; arrays and all other values replace. An override is KEY=VALUE with KEY a dotted path
+/// ("stages.camera.iterations") or a JSON pointer
 /// ("/stages/camera/iterations"), and VALUE JSON, or else a string. A "$schema" string at the top of a file is for
 /// editors and is dropped.
 /// @param problems  receives what is wrong: a missing or cyclic base, syntax errors, duplicate keys, unusable overrides

@@ -51,15 +51,6 @@ ConfigValue* find_holder(ConfigValue& tree, const std::vector<std::string>& keys
   return node;
 }
 
-/// Takes the object out that the keys name. False where there is none.
-bool take_out(ConfigValue& tree, const std::vector<std::string>& keys) {
-  ConfigValue* const holder = find_holder(tree, keys);
-  if (holder == nullptr) return false;
-  return std::erase_if(holder->members, [&](const ConfigMember& member) {
-           return member.key == keys.back() && member.value.kind == Kind::kObject;
-         }) > 0;
-}
-
 /// The objects on the way to `keys` are there by intent, and not by a mistaken key.
 void unmark(ConfigValue& tree, const std::vector<std::string>& keys) {
   ConfigValue* node = &tree;
@@ -106,6 +97,14 @@ ConfigValue* config_place(ConfigValue& tree, const std::vector<std::string>& key
   return node;
 }
 
+bool take_out_object(ConfigValue& tree, const std::vector<std::string>& keys) {
+  ConfigValue* const holder = find_holder(tree, keys);
+  if (holder == nullptr) return false;
+  return std::erase_if(holder->members, [&](const ConfigMember& member) {
+           return member.key == keys.back() && member.value.kind == Kind::kObject;
+         }) > 0;
+}
+
 void lay_into_config(ConfigValue& tree, const std::string& key, const ConfigValue& value, const ConfigOrigin& origin,
                      ConfigProblems& problems) {
   const std::vector<std::string> keys = config_keys(key);
@@ -113,7 +112,7 @@ void lay_into_config(ConfigValue& tree, const std::string& key, const ConfigValu
     problems.add(origin, "", json_string(key) + " is no key; write stages.camera.iterations, with dots between keys");
     return;
   }
-  if (value.kind == Kind::kNull && take_out(tree, keys)) return;
+  if (value.kind == Kind::kNull && take_out_object(tree, keys)) return;
   ConfigValue* const place = config_place(tree, keys, origin, problems);
   if (place == nullptr) return;
   *place = merged(std::move(*place), value);

@@ -20,6 +20,9 @@ std::vector<std::string> config_keys(const std::string& path);
 ConfigValue* config_place(ConfigValue& tree, const std::vector<std::string>& keys, const ConfigOrigin& origin,
                           ConfigProblems& problems);
 
+/// Takes the object out that `keys` name. False where there is none.
+bool take_out_object(ConfigValue& tree, const std::vector<std::string>& keys);
+
 /// Lays a value over the place of a key as a file that extends another one does: objects merge, and may add to what is
 /// there; everything else replaces. null takes an object out that is there: a stage, a loss.
 /// @param key     as config_keys takes it

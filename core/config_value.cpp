@@ -187,6 +187,7 @@ ConfigValue merged(ConfigValue base, ConfigValue overlay) {
   base.members.reserve(base.members.size() + overlay.members.size());  // keeps the keys in place for the views below
   std::unordered_map<std::string_view, std::size_t> place;
   for (std::size_t i = 0; i < base.members.size(); ++i) place.emplace(base.members[i].key, i);
+  std::vector<std::size_t> taken_out;
   for (ConfigMember& member : overlay.members) {
     const auto found = place.find(member.key);
     if (found == place.end()) {
@@ -194,9 +195,12 @@ ConfigValue merged(ConfigValue base, ConfigValue overlay) {
       continue;
     }
     ConfigMember& target = base.members[found->second];
+    if (member.value.kind == Kind::kNull && target.value.kind == Kind::kObject) taken_out.push_back(found->second);
     target.value = merged(std::move(target.value), std::move(member.value));
     target.key_origin = member.key_origin;
   }
+  std::sort(taken_out.begin(), taken_out.end(), std::greater<>());
+  for (const std::size_t i : taken_out) base.members.erase(base.members.begin() + static_cast<std::ptrdiff_t>(i));
   return base;
 }
 

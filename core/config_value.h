@@ -65,7 +65,8 @@ const ConfigValue* find_member(const ConfigValue& object, std::string_view key);
 /// Where the value at a JSON pointer was written; where it was not, the object or array that it would be in.
 const ConfigOrigin& origin_at(const ConfigValue& tree, std::string_view pointer);
 
-/// `base` with `overlay` laid over it: objects merge key by key, everything else (arrays and null included) replaces.
+/// `base` with `overlay` laid over it: objects merge key by key, null takes out an object that the base has under its
+/// key, everything else replaces.
 ConfigValue merged(ConfigValue base, ConfigValue overlay);
 
 /// JSON text in lines of two-space indentation, arrays of plain values on one line, ending with a newline.

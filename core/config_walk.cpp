@@ -51,8 +51,10 @@ class Reader {
   bool expect_object(const ConfigValue& value, const std::string& pointer) {
     if (value.kind == Kind::kObject) return true;
     problems_.add(value.origin, pointer,
-                  value.kind == Kind::kNull ? "null is not an object: write {...}, or leave the key out"
-                                            : shown(value) + " is " + kind_name(value) + ", not an object");
+                  value.kind == Kind::kNull
+                      ? "null is not an object, and takes none out: the file that is extended has none here; write "
+                        "{...}, or leave the key out"
+                      : shown(value) + " is " + kind_name(value) + ", not an object");
     return false;
   }
 
@@ -189,6 +191,14 @@ ConfigValue write_field(const ConfigField& field) {
   throw InternalError("a step or rule of a config description cannot be written");
 }
 
+/// Of an object's schema: null takes one out that a config inherits.
+void allow_null(ConfigValue& schema) {
+  for (ConfigMember& member : schema.members) {
+    if (member.key == "type")
+      member.value = ConfigValue::make_array({ConfigValue::make_string("object"), ConfigValue::make_string("null")});
+  }
+}
+
 ConfigValue object_schema(const ConfigFields& fields);
 
 ConfigValue field_schema(const ConfigField& field) {
@@ -204,13 +214,14 @@ ConfigValue field_schema(const ConfigField& field) {
     content.add("type", ConfigValue::make_string("object"));
     content.add("propertyNames", ConfigValue::make_object())
         .add("pattern", ConfigValue::make_string("^[A-Za-z0-9_-]+$"));
-    content.add("additionalProperties", object_schema(*field.children));
+    allow_null(content.add("additionalProperties", object_schema(*field.children)));
   } else if (field.kind == FieldKind::kList) {
     content = ConfigValue::make_object();
     content.add("type", ConfigValue::make_string("array"));
     content.add("items", object_schema(*field.children));
   }
   for (ConfigMember& member : content.members) schema.add(member.key, std::move(member.value));
+  if (field.kind == FieldKind::kObject || field.kind == FieldKind::kMap) allow_null(schema);
   if (field.kind == FieldKind::kValue && !field.is_required) schema.add("default", field.write());
   return schema;
 }

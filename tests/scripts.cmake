@@ -62,6 +62,14 @@ if(HSI4D_PYTHON AND NOT HSI4D_SANITIZE)
   set_tests_properties("sweeps by Slurm" PROPERTIES LABELS full SKIP_RETURN_CODE 77 TIMEOUT 1500)
 endif()
 
+# The person in a video by BlazePose: it says so where its packages or Chromium are missing.
+if(HSI4D_PYTHON AND NOT HSI4D_SANITIZE)
+  add_test(NAME "the front end finds a person"
+           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/frontend_test.py ${PROJECT_SOURCE_DIR}/tools
+                   $<TARGET_FILE:hsi4d> ${PROJECT_SOURCE_DIR}/build/frontend)
+  set_tests_properties("the front end finds a person" PROPERTIES LABELS full SKIP_RETURN_CODE 77 TIMEOUT 900)
+endif()
+
 # The report and a study in a browser; they say so where playwright-core or Chromium is missing (tools/test_report installs them).
 find_program(HSI4D_NODE node)
 if(HSI4D_SANITIZE)  # the pages are the same, and the program takes longer to make one

@@ -60,6 +60,8 @@ std::string summary(const std::filesystem::path& file, const RunConfig& config) 
   for (const auto& [name, stage] : config.stages) text += stage_summary(name, stage);
   if (config.stages.empty()) text += "  no stages\n";
   text += "  the config alone is checked; `hsi4d run " + file.generic_string() + " --dry-run` reads its inputs\n";
+  for (const RunProblem& problem : run_problems(config, ConfigUse::kRun))
+    text += "  note: no run yet: " + problem.pointer + ": " + problem.text + "\n";
   for (const RunNote& note : run_notes(config)) text += "  note: " + note.text + "\n";
   return text;
 }

@@ -175,8 +175,10 @@ TEST_CASE("every kind of value is read") {
 TEST_CASE("null empties an optional value and is refused elsewhere") {
   CHECK_FALSE(read(R"({"limit": 3})", {"limit=null"}).limit.has_value());
   CHECK_THAT(fault(R"({"share": null})"), Equals("a.json:1: /share: null is not a number; allowed: 0 to 1"));
-  CHECK_THAT(fault(R"({"inner": null})"),
-             Equals("a.json:1: /inner: null is not an object: write {...}, or leave the key out"));
+  CHECK_THAT(
+      fault(R"({"inner": null})"),
+      Equals("a.json:1: /inner: null is not an object, and takes none out: the file that is extended has none here; "
+             "write {...}, or leave the key out"));
 }
 
 TEST_CASE("a wrong value is named with what is allowed") {

@@ -90,17 +90,20 @@ TEST_CASE("a million random floats and doubles survive writing and reading, bit 
   CHECK(failures == 0);
 }
 
-TEST_CASE("merging goes key by key, arrays and null replace") {
+TEST_CASE("merging goes key by key, arrays replace, null takes objects out") {
   const auto parse = [](const std::string& text) {
     ConfigProblems problems;
     ConfigValue value;
     REQUIRE(parse_config_text(text, nullptr, problems, value));
     return value;
   };
-  const ConfigValue base = parse(R"({"a": {"x": 1, "y": [1, 2, 3]}, "b": 2, "c": {"z": 1}})");
-  const ConfigValue overlay = parse(R"({"c": null, "a": {"y": [4], "n": 5}, "d": {}})");
+  const ConfigValue base =
+      parse(R"({"a": {"x": 1, "y": [1, 2, 3]}, "b": 2, "c": {"z": 1}, "e": {"f": {}, "g": {"h": 3}}})");
+  const ConfigValue overlay =
+      parse(R"({"c": null, "a": {"y": [4], "n": 5, "m": null}, "b": null, "e": {"f": null}, "d": {}})");
   const std::string text = to_json(merged(base, overlay));
-  CHECK(text == to_json(parse(R"({"a": {"x": 1, "y": [4], "n": 5}, "b": 2, "c": null, "d": {}})")));
+  CHECK(text ==
+        to_json(parse(R"({"a": {"x": 1, "y": [4], "n": 5, "m": null}, "b": null, "e": {"g": {"h": 3}}, "d": {}})")));
 }
 
 TEST_CASE("problems come in the order of sources and lines, in one message") {

@@ -59,6 +59,15 @@ TEST_CASE("a sweep without axes is its base") {
   CHECK(plan.runs[0].dataset.size() == 16);
 }
 
+TEST_CASE("the base of a sweep may leave out by null what it inherits") {
+  const TemporaryFolder here;
+  write_tiny_base();
+  here.write("mine.json", R"({"extends": "base.json", "stages": {"camera": null}})");
+  const SweepPlan plan = plan_of({{"base", "mine.json"}, {"grid", {{"stages.interaction.iterations", {1, 2}}}}});
+  REQUIRE(plan.runs.size() == 2);
+  for (const SweepRun& run : plan.runs) CHECK_FALSE(at(run, "/stages").contains("camera"));
+}
+
 TEST_CASE("what a sweep sets of a dataset that is not made is told") {
   const TemporaryFolder here;
   write_tiny_base();

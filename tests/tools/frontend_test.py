@@ -1,0 +1,64 @@
+"""tools/frontend on a generated clip: a person is found where the truth has one.
+
+    python3 tests/tools/frontend_test.py TOOLS HSI4D PACKAGES      # the folder tools/, the program, where npm's packages are
+
+Exit status 77 (skipped) where the packages or Chromium are missing: tools/frontend --install installs them.
+"""
+
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+tools, program, packages = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+if not (packages / "node_modules/@mediapipe/pose/pose.js").exists() or not shutil.which("chromium"):
+    print("skipped: there is no BlazePose or no Chromium; tools/frontend --install installs them")
+    sys.exit(77)
+
+
+def run(*words, status=0):
+    result = subprocess.run([str(word) for word in words], capture_output=True, text=True)
+    assert result.returncode == status, result.stdout + result.stderr
+    return result.stdout + result.stderr
+
+
+with tempfile.TemporaryDirectory() as name:
+    here = pathlib.Path(name)
+    config = tools.parent / "configs/synthetic/clips/terrace_walk_box.json"
+    clip = here / "clip"
+    run(program, "synth", config, "--out", clip, "--quiet", "--set", "synthetic.frames=3")
+    frontend = [tools / "frontend", "--packages", packages]
+    said = run(*frontend, clip / "video.mp4", "--out", here / "found")
+    found = json.loads((here / "found/keypoints.json").read_text())
+    assert found["joints"] == "blazepose33" and len(found["frames"]) == 3 and found["size"] == [512, 512], said
+    assert all(len(frame) == 33 for frame in found["frames"])
+    masks = sorted(path.name for path in (here / "found/masks/human").iterdir())
+    assert masks == ["0000.png", "0001.png", "0002.png"], masks
+    assert len(json.loads((here / "found/landmarks.json").read_text())["frames"]) == 3
+
+    # The program reads them, and the term that does ends near them: the points are the person's.
+    (here / "run.json").write_text(json.dumps({
+        "extends": str(clip / "config.json"),
+        "data": {"keypoints": str(here / "found/keypoints.json")},
+        "stages": {"refinement": None, "camera": {"iterations": 1}, "interaction": {
+            "iterations": 60,
+            "losses": {"photometric": None, "center": None, "depth": None, "keypoints_2d": {"weight": 1e-3}, "pose_prior": {}}}},
+    }))
+    run(program, "run", here / "run.json", "--out", here / "run", "--quiet", "--set", "remove_depth_bias=false")
+    lines = [json.loads(line) for line in (here / "run/metrics.jsonl").read_text().splitlines()]
+    last = [line for line in lines if line["stage"] == "interaction"][-1]["losses"]["keypoints_2d"]
+    print(f"keypoints_2d at the end: {last:.1f} px^2")
+    assert last < 8**2, last
+
+    assert "is there already" in run(*frontend, clip / "video.mp4", "--out", here / "found", status=1)
+    assert "there is no such file" in run(*frontend, here / "none.mp4", "--out", here / "x", status=1)
+    assert "allowed: lite, full, heavy" in run(*frontend, clip / "video.mp4", "--out", here / "x", "--model", "best", status=1)
+    (here / "text.mp4").write_text("no video")
+    assert "is no video" in run(*frontend, here / "text.mp4", "--out", here / "x", status=1)
+    (here / "black").mkdir()
+    run("ffmpeg", "-v", "error", "-f", "lavfi", "-i", "color=black:size=64x64:rate=1:duration=2", here / "black/%04d.png")
+    assert "nobody is found in any frame" in run(*frontend, here / "black", "--out", here / "x", status=1)
+    assert not (here / "x").exists()
+print("passed")

@@ -1,0 +1,144 @@
+// Finds a person in pictures by BlazePose in headless Chromium: what tools/frontend runs.
+//
+//     node tools/services/blazepose.mjs NODE_MODULES FRAMES MODEL OUT
+//
+// The packages are served to the page by a server of this process on the loopback interface. Chromium draws by its
+// processor. Exits with 1 and a message where the pictures are unusable or show nobody.
+import { spawn } from 'node:child_process';
+import { once } from 'node:events';
+import { createReadStream, existsSync, mkdirSync, readdirSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { createRequire } from 'node:module';
+import { basename, join } from 'node:path';
+
+const [modules, frames, model, out] = process.argv.slice(2);
+const kComplexity = { lite: 0, full: 1, heavy: 2 };
+const kLimbs = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28]; // shoulders to wrists, hips to ankles
+const kDoubtful = 0.5; // mean visibility of the limbs below which a frame is told
+
+function fail(message) {
+  console.error(`frontend: ${message}`);
+  process.exit(1);
+}
+
+const kTypes = { html: 'text/html', js: 'text/javascript', wasm: 'application/wasm', png: 'image/png' };
+
+// What the page may ask for: itself, the package, the frames.
+function fileOf(path) {
+  const [, room, name] = decodeURIComponent(path).split('/');
+  if (room === 'pose') return join(modules, '@mediapipe', 'pose', basename(name));
+  return room === 'frames' ? join(frames, basename(name)) : undefined;
+}
+
+async function served() {
+  const server = createServer((request, response) => {
+    const path = request.url.split('?')[0];
+    if (path === '/') {
+      response.writeHead(200, { 'Content-Type': 'text/html' }).end('<script src="/pose/pose.js"></script>');
+      return;
+    }
+    const file = fileOf(path);
+    if (file === undefined || !existsSync(file)) {
+      response.writeHead(404).end();
+      return;
+    }
+    response.writeHead(200, { 'Content-Type': kTypes[file.split('.').pop()] ?? 'application/octet-stream' });
+    createReadStream(file).pipe(response);
+  });
+  server.listen(0, '127.0.0.1');
+  await once(server, 'listening');
+  return { server, url: `http://127.0.0.1:${server.address().port}/` };
+}
+
+// In the page.
+async function begin(complexity) {
+  const pose = new Pose({ locateFile: (file) => `/pose/${file}` });
+  pose.setOptions({ modelComplexity: complexity, smoothLandmarks: false, enableSegmentation: true, smoothSegmentation: false });
+  pose.onResults((results) => { window.found = results; });
+  await pose.initialize();
+  window.pose = pose;
+}
+
+// In the page: the points of a picture, and its mask as letters of base64, a byte a pixel.
+async function look(name) {
+  const picture = new Image();
+  picture.src = `/frames/${encodeURIComponent(name)}`;
+  await picture.decode();
+  await window.pose.send({ image: picture });
+  const { poseLandmarks, poseWorldLandmarks, segmentationMask } = window.found;
+  const canvas = new OffscreenCanvas(picture.width, picture.height), context = canvas.getContext('2d');
+  if (segmentationMask) context.drawImage(segmentationMask, 0, 0, picture.width, picture.height);
+  const { data } = context.getImageData(0, 0, picture.width, picture.height);
+  let letters = '';
+  for (let i = 3; i < data.length; i += 4) letters += String.fromCharCode(data[i]);
+  return { width: picture.width, height: picture.height, points: poseLandmarks, places: poseWorldLandmarks, mask: btoa(letters) };
+}
+
+// Writes grey pictures by ffmpeg.
+class MaskWriter {
+  constructor(names) {
+    this.folder = join(out, 'masks', 'human');
+    mkdirSync(this.folder, { recursive: true });
+    this.names = names;
+  }
+  async write(index, width, height, bytes) {
+    const file = join(this.folder, this.names[index]);
+    const words = ['-v', 'error', '-f', 'rawvideo', '-pix_fmt', 'gray', '-s', `${width}x${height}`, '-i', '-', '-frames:v', '1', file];
+    const ffmpeg = spawn('ffmpeg', words, { stdio: ['pipe', 'inherit', 'inherit'] });
+    ffmpeg.stdin.end(bytes);
+    const [status] = await once(ffmpeg, 'close');
+    if (status !== 0) fail(`${file}: cannot be written`);
+  }
+}
+
+const rounded = (number) => Math.round(number * 1000) / 1000;
+const meanOf = (numbers) => numbers.reduce((sum, number) => sum + number, 0) / numbers.length;
+
+function ranges(numbers) {
+  const parts = [];
+  for (const number of numbers) {
+    const last = parts.at(-1);
+    if (last !== undefined && last[1] === number - 1) last[1] = number;
+    else parts.push([number, number]);
+  }
+  return parts.map(([a, b]) => (a === b ? `${a}` : `${a}-${b}`)).join(', ');
+}
+
+const names = readdirSync(frames).filter((name) => name.endsWith('.png') && !name.startsWith('.')).sort();
+if (names.length === 0) fail(`${frames}: holds no .png frames`);
+const { chromium } = createRequire(import.meta.url)(join(modules, 'playwright-core'));
+const { server, url } = await served();
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM,
+  args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
+});
+try {
+  const page = await browser.newPage();
+  page.on('pageerror', (error) => fail(`BlazePose: ${error.message}`));
+  await page.goto(url);
+  await page.evaluate(begin, kComplexity[model]);
+  const masks = new MaskWriter(names), points = [], places = [], empty = [], doubtful = [];
+  let size, began = Date.now();
+  for (const [index, name] of names.entries()) {
+    const found = await page.evaluate(look, name);
+    size ??= [found.width, found.height];
+    if (found.width !== size[0] || found.height !== size[1])
+      fail(`${name}: is ${found.width}x${found.height} pixels, the first frame ${size.join('x')}`);
+    await masks.write(index, found.width, found.height, Buffer.from(found.mask, 'base64'));
+    points.push((found.points ?? []).map(({ x, y, visibility }) => [rounded(x * size[0]), rounded(y * size[1]), rounded(Math.min(Math.max(visibility, 0), 1))]));
+    places.push((found.places ?? []).map(({ x, y, z, visibility }) => [x, y, z, visibility].map((number) => rounded(number))));
+    if (!found.points) empty.push(index);
+    else if (meanOf(kLimbs.map((i) => found.points[i].visibility)) < kDoubtful) doubtful.push(index);
+    process.stderr.write(`\rframe ${index + 1} of ${names.length}, ${((Date.now() - began) / 1000 / (index + 1)).toFixed(1)} s each `);
+  }
+  process.stderr.write('\n');
+  if (empty.length === names.length) fail('nobody is found in any frame');
+  if (empty.length > 0) console.error(`frontend: nobody is found in frames ${ranges(empty)}; their masks are black`);
+  if (doubtful.length > 0) console.error(`frontend: less than half of the limbs is seen in frames ${ranges(doubtful)}`);
+  const file = { format: 'hsi4d keypoints', version: 1, joints: 'blazepose33', size, frames: points };
+  writeFileSync(join(out, 'keypoints.json'), `${JSON.stringify(file)}\n`);
+  writeFileSync(join(out, 'landmarks.json'), `${JSON.stringify({ points: 'blazepose33', frames: places })}\n`);
+} finally {
+  await browser.close();
+  server.close();
+}
