@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 using Kind = ConfigValue::Kind;
 
 /// Sections of a clip's config that say what is reconstructed, not how.
-constexpr std::array kClipSections = {"instance", "data", "chain", "sources", "camera_selection", "body", "synthetic"};
+constexpr std::array kClipSections = {"instance", "data", "chain", "sources", "body", "synthetic"};
 /// Settings of section `data` that say how.
 constexpr std::array kMaskSettings = {"mask_threshold", "mask_margin_px"};
 

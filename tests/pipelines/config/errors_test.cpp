@@ -105,8 +105,10 @@ TEST_CASE("wrong types") {
   CHECK_THAT(fault(R"({"render": {"antialias": 0}})"),
              Equals("a.json:1: /render/antialias: 0 is a number, not a boolean; allowed: true or false"));
   CHECK_THAT(fault(R"({"render": []})"), Equals("a.json:1: /render: [] is an array, not an object"));
-  CHECK_THAT(fault(R"({"stages": null})"),
-             Equals("a.json:1: /stages: null is not an object: write {...}, or leave the key out"));
+  CHECK_THAT(
+      fault(R"({"stages": null})"),
+      Equals("a.json:1: /stages: null is not an object, and takes none out: the file that is extended has none here; "
+             "write {...}, or leave the key out"));
   CHECK_THAT(fault(R"({"seed": null})"),
              Equals("a.json:1: /seed: null is not a whole number; allowed: 0 to 9007199254740991"));
   CHECK_THAT(fault(R"({"render": {"quality": "fats"}})"),

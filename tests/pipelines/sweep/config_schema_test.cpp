@@ -134,7 +134,7 @@ TEST_CASE("the schema accepts and refuses what the reader does") {
                                           R"({"render": {"quality": "best"}})",
                                           R"({"render": {"depth_key": 1}})",
                                           R"({"render": {"antialias": 1}})",
-                                          R"({"render": null})",
+                                          R"({"render": 1})",
                                           stage(R"("losses": {"depth": {}})"),
                                           stage(R"("losses": {"centre": {"masked": true}})"),
                                           stage(R"("optimize": {"a b": {"lr": 1}})"),
@@ -149,6 +149,11 @@ TEST_CASE("the schema accepts and refuses what the reader does") {
   for (const std::string& text : wrong) {
     INFO(text);
     CHECK_FALSE(validates(json::parse(text), schema));
+    CHECK_FALSE(reader_accepts(text));
+  }
+  // Whether null takes something out only the file tells that is extended.
+  for (const std::string text : {R"({"render": null})", R"({"stages": {"camera": null}})"}) {
+    CHECK(validates(json::parse(text), schema));
     CHECK_FALSE(reader_accepts(text));
   }
 }
