@@ -100,11 +100,18 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
            "those inside");
   f.map("optimize", s.optimize, "What moves: parameter groups by name");
   f.map("losses", s.losses, loss_keys(losses), "What is made small: loss terms by name; their weighted sum counts");
+  f.integer("headings", s.headings, {.min = 1, .max = 72},
+            "Over the first frame: headings of the human, evenly around from the given one, from which the stage is "
+            "tried; the one that ends with the least loss is kept");
   f.integer("gradient_shares", s.gradient_shares, {.min = 0, .max = kMostIterations},
             "Measure each loss's share of the gradient in every n-th iteration, a backward pass per loss; 0: never");
   f.path("pose_weights", s.pose_weights, {.must_exist = true},
          "VPoser's weights (tools/export_vposer.py), for a stage over the sequence; empty: natural poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
+  f.rule({"headings", "over"}, [&s]() -> std::string {
+    if (s.headings == 1 || s.over == StageScope::kFirst) return "";
+    return std::to_string(s.headings) + " headings are tried by a stage over \"first_frame\"; allowed here: 1";
+  });
   f.rule({"optimizer", "optimize"}, [&s]() -> std::string {
     if (s.optimizer.kind == OptimizerKind::kAdam) return "";
     for (const auto& [name, group] : s.optimize) {

@@ -71,6 +71,7 @@ struct StageSettings {
   PixelWeight weight = PixelWeight::kAll;
   ConfigMap<ParameterGroupSettings> optimize;  ///< by parameter group
   ConfigMap<LossSettings> losses;              ///< by loss term
+  int headings = 1;                            ///< over the first frame: of the human, tried as starts
   int gradient_shares = 0;                     ///< every so many iterations (optim/gradient_shares.h); 0: never
   std::optional<PosePrior> pose_prior;         ///< with pose_weights, by prepare_losses; empty before
   std::filesystem::path pose_weights;          ///< over the sequence: VPoser's weights; empty: natural poses

@@ -34,6 +34,8 @@ const std::vector<MetricFacts>& metric_facts() {
       {"psnr_db", "PSNR", "dB", "Peak signal-to-noise ratio, at most 100", 2, 1},
       {"psnr_foreground_db", "PSNR, foreground", "dB", "Peak signal-to-noise ratio of human and objects", 2, 1},
       {"ssim", "SSIM", "", "Structural similarity", 4, 1},
+      {"keypoints_px", "2D keypoints", "px", "Mean distance of the body in the image from where a detector found it", 1,
+       -1},
       {"contact_share", "contact", "", "Share of frames in which a hand joint is nearer than 5 cm to an object", 3, 0},
       {"contact_distance_mm", "contact distance", "mm",
        "How far from it the hands' Gaussians that near are, on average", 1, 0},

@@ -20,6 +20,7 @@
 #include "pipelines/run/checkpoint.h"
 #include "pipelines/run/depth_bias.h"
 #include "pipelines/run/frame_start.h"
+#include "pipelines/run/heading_starts.h"
 #include "pipelines/run/reconstruct_stage.h"
 #include "pipelines/run/stage_log.h"
 #include "pipelines/run/start_choice.h"
@@ -178,11 +179,26 @@ class Reconstruction {
     write_start_image(0, frame);
     SceneState state = clip_.first;
     for (std::size_t s = 0; s < first_stages_; ++s) {
+      if (config_.stages[s].second.headings > 1) state = chosen_heading(s, frame, state);
       StageTotals totals;
       run_in_frame(s, {0, frame, progress_.covered, {}}, state, progress_.colors, totals);
       progress_.first_frame.push_back({state, totals});
     }
     end_frame(0, frame, std::vector(frame_stages_, state), begin);
+  }
+
+  /// Where a stage over the first frame begins that is tried from several headings, told in the log.
+  SceneState chosen_heading(std::size_t s, const ClipFrame& frame, const SceneState& state) {
+    const auto& [name, stage] = config_.stages[s];
+    const HeadingStart chosen = best_heading(state, stage.headings, [&](const SceneState& start) {
+      SceneState tried = start;
+      ColorState colors = progress_.colors;
+      return run_frame_stage({config_, clip_, losses_, s, nullptr}, {0, frame, progress_.covered, {}}, tried, colors,
+                             [this](const IterationReport&, const RenderCounters&) { stop_if_asked(0); })
+          .loss;
+    });
+    folder_.note("frame 0, start of stage " + name + ": " + chosen.text);
+    return chosen.state;
   }
 
   void run_frame(Index index) {

@@ -6,6 +6,7 @@
 #include "core/file.h"
 #include "core/rotation.h"
 #include "pipelines/metrics/contact_metrics.h"
+#include "pipelines/metrics/keypoint_errors.h"
 #include "pipelines/metrics/penetration.h"
 #include "pipelines/record/gradient_table.h"
 #include "pipelines/run/frame_start.h"
@@ -176,8 +177,8 @@ class ObjectPenetration {
   bool is_known_ = false;
 };
 
-/// Contact of the hands, what is inside of objects and sliding of the feet, which need no truth: of the baselines, of
-/// what every stage that moves the body left, and of the result's frames.
+/// Contact of the hands, what is inside of objects, sliding of the feet and distances from keypoints, which need no
+/// truth: of the baselines, of what every stage that moves the body left, and of the result's frames.
 void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& progress,
                  const RefinementProgress& refinement, RunSummary& summary) {
   const std::vector<const Gaussians*> objects = objects_of(clip);
@@ -187,7 +188,11 @@ void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& p
     std::vector<std::vector<double>> joints;
     for (const SceneState& state : states) joints.push_back(pose_joints(clip.avatar, state.body));
     const std::vector<MetricValues> sliding = sliding_by_frame(joints, clip.frame_rate);
-    for (std::size_t t = 0; t < all.size(); ++t) append_values(sliding[t], all[t]);
+    const std::vector<MetricValues> seen = keypoint_errors_by_frame(clip, states);
+    for (std::size_t t = 0; t < all.size(); ++t) {
+      append_values(sliding[t], all[t]);
+      append_values(seen[t], all[t]);
+    }
     return all;
   };
   const auto add_all = [&](const std::vector<SceneState>& states, MetricValues& means,
