@@ -108,9 +108,10 @@ void describe(ConfigFields& f, StageSettings& s, const std::vector<LossDescripti
   f.path("pose_weights", s.pose_weights, {.must_exist = true},
          "VPoser's weights (tools/export_vposer.py), for a stage over the sequence; empty: natural poses by anatomy");
   f.object("optimizer", s.optimizer, "How gradients become steps");
-  f.rule({"headings", "over"}, [&s]() -> std::string {
-    if (s.headings == 1 || s.over == StageScope::kFirst) return "";
-    return std::to_string(s.headings) + " headings are tried by a stage over \"first_frame\"; allowed here: 1";
+  f.rule({"headings", "over", "draw"}, [&s]() -> std::string {
+    if (s.headings == 1 || (s.over == StageScope::kFirst && s.draw == Draw::kAll)) return "";
+    return std::to_string(s.headings) +
+           " headings are tried by a stage over \"first_frame\" that draws \"all\"; allowed here: 1";
   });
   f.rule({"optimizer", "optimize"}, [&s]() -> std::string {
     if (s.optimizer.kind == OptimizerKind::kAdam) return "";

@@ -257,7 +257,7 @@ class SmplxMesh:
         try:
             with np.load(path, allow_pickle=True) as file:
                 model = {name: file[name] for name in file.files}
-        except (OSError, ValueError, AttributeError, TypeError) as fault:
+        except Exception as fault:  # whatever an unpickler or an archive raises
             fail(f"{path}: is no body model (.npz): {fault}")
         self.rest = array(np, need(model, "v_template", path), f"{path}: v_template", 3)
         count = len(self.rest)
@@ -267,9 +267,9 @@ class SmplxMesh:
         regressor = need(model, "J_regressor", path)
         self.regressor = array(np, regressor, f"{path}: J_regressor", count)
         shapes = np.asarray(need(model, "shapedirs", path), dtype=np.float64)
-        first = 300 if shapes.shape[2] >= 400 else 10  # of the expression
-        if shapes.shape[:2] != (count, 3) or shapes.shape[2] < 20:
+        if shapes.ndim != 3 or shapes.shape[:2] != (count, 3) or shapes.shape[2] < 20:
             fail(f"{path}: shapedirs: has shape {list(shapes.shape)}; [{count},3,20] or more is needed")
+        first = 300 if shapes.shape[2] >= 400 else 10  # of the expression
         self.shapes = np.concatenate([shapes[..., :10], shapes[..., first:first + 10]], axis=2)
         self.correctives = np.asarray(model["posedirs"], dtype=np.float64) if "posedirs" in model else None
         if self.correctives is not None and self.correctives.shape != (count, 3, 486):

@@ -1,6 +1,6 @@
-// L = (1/K) Σ c ρ(|p − q|²): p a point of the body as the camera sees it, q where a detector found it, pixels, c how
-// sure the detector is.   ρ: squared r²; huber r² up to the scale s, then 2 s |r| − s²; geman_mcclure s² r² / (s² + r²)
-// [Geman and McClure 1987; SMPLify uses it for keypoints].
+// L = (1/K) Σ c ρ(|p − q|²), 0 for what is not before the camera: p a point of the body as the camera sees it, q where
+// a detector found it, pixels, c how sure the detector is.   ρ: squared r²; huber r² up to the scale s, then 2 s |r| −
+// s²; geman_mcclure s² r² / (s² + r²) [Geman and McClure 1987; SMPLify uses it for keypoints].
 #include "autodiff/elementwise.h"
 #include "autodiff/map.h"
 #include "autodiff/matrix.h"
@@ -29,7 +29,7 @@ void describe(ConfigFields& fields, KeypointsSettings& settings) {
                 "Of a distance: geman_mcclure, by which one far beyond scale_px no longer pulls; huber, constant "
                 "pull; its square");
   fields.number("scale_px", settings.scale_px, {.above = 0, .max = 1e6},
-                "Distance up to which the kernel is nearly the square, pixels");
+                "Distance up to which the kernel is nearly the square, pixels of the image that is drawn");
   fields.number("min_confidence", settings.min_confidence, {.min = 0, .max = 1},
                 "Confidence below which a point does not count");
 }
@@ -48,25 +48,27 @@ T kernel_of(T squared, Kernel kernel, float scale) {
 }  // namespace
 
 LossTerm keypoints_2d_loss() {
-  LossTerm term = needing(
-      {LossInput::kKeypoints},
-      make_loss_term<KeypointsSettings>(
-          "keypoints_2d", "Distance between points of the body in the image and those that a detector found",
-          [](const auto& in, const KeypointsSettings& settings) {
-            const auto p = in.keypoints, q = in.keypoints_target;
-            const auto column = [](auto x, Index c) { return slice_cols(x, c, 1); };
-            const auto scale = static_cast<float>(settings.scale_px),
-                       least = static_cast<float>(settings.min_confidence);
-            const Kernel kernel = settings.kernel;
-            const auto total = sum_over(
-                {column(p, 0), column(p, 1), column(q, 0), column(q, 1), column(q, 2)},
-                [kernel, scale, least](auto x, auto y, auto target_x, auto target_y, auto confidence) {
-                  const auto squared = square(x - target_x) + square(y - target_y);
-                  const auto zero = confidence * 0.0F;
-                  return select(value_of(confidence) >= least, confidence * kernel_of(squared, kernel, scale), zero);
-                });
-            return total * (1 / static_cast<double>(p.shape().rows));
-          }));
+  LossTerm term =
+      needing({LossInput::kKeypoints},
+              make_loss_term<KeypointsSettings>(
+                  "keypoints_2d", "Distance between points of the body in the image and those that a detector found",
+                  [](const auto& in, const KeypointsSettings& settings) {
+                    const auto p = in.keypoints, q = in.keypoints_target;
+                    const auto column = [](auto x, Index c) { return slice_cols(x, c, 1); };
+                    const auto scale = static_cast<float>(settings.scale_px),
+                               least = static_cast<float>(settings.min_confidence);
+                    const Kernel kernel = settings.kernel;
+                    const auto total =
+                        sum_over({column(p, 0), column(p, 1), column(q, 0), column(q, 1), column(q, 2)},
+                                 [kernel, scale, least](auto x, auto y, auto target_x, auto target_y, auto confidence) {
+                                   const auto squared = square(x - target_x) + square(y - target_y);
+                                   const auto zero = confidence * 0.0F;
+                                   const bool is_before = value_of(x) != 0.0F || value_of(y) != 0.0F;  // the camera
+                                   return select(is_before && value_of(confidence) >= least,
+                                                 confidence * kernel_of(squared, kernel, scale), zero);
+                                 });
+                    return total * (1 / static_cast<double>(p.shape().rows));
+                  }));
   term.description.weight = kWeight;
   return term;
 }

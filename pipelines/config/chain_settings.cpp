@@ -8,7 +8,7 @@ namespace hsi4d {
 namespace {
 
 /// Inputs that a later clip does not take over.
-constexpr std::array<const char*, 2> kOfOneClip = {"initial", "truth"};
+constexpr std::array<const char*, 3> kOfOneClip = {"initial", "keypoints", "truth"};
 
 ConfigValue data_of(const ConfigValue& object) {
   const ConfigValue* const data = find_member(object, "data");

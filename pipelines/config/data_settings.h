@@ -44,8 +44,8 @@ struct DataSettings {
 inline constexpr const char* kDatasetVideo = "video.mp4";
 
 /// The inputs in a dataset's folder, as `hsi4d synth` lays them out: scene.ply, objects/NAME.ply, avatar.safetensors,
-/// video.mp4 (or frames/ where there is none), masks/, camera.json, initial.json, keypoints.json, truth/ and
-/// truth/surface.ply (none where they are missing). Paths are absolute.
+/// video.mp4 (or frames/ where there is none), masks/, camera.json, initial.json, truth/ and
+/// truth/surface.ply (none where they are missing), and keypoints.json where that has been added. Paths are absolute.
 DataSettings dataset_inputs(const std::filesystem::path& folder);
 
 /// Describe the sections: every setting with its range.

@@ -22,7 +22,7 @@ void take_instance_data(const InstanceSettings& instance, DataSettings& data) {
   DataSettings found = dataset_inputs(instance.folder);
   for (std::filesystem::path DataSettings::*file :
        {&DataSettings::scene, &DataSettings::avatar, &DataSettings::frames, &DataSettings::masks, &DataSettings::camera,
-        &DataSettings::initial, &DataSettings::truth, &DataSettings::surface})
+        &DataSettings::initial, &DataSettings::keypoints, &DataSettings::truth, &DataSettings::surface})
     if ((data.*file).empty()) data.*file = found.*file;
   if (data.objects.empty()) data.objects = std::move(found.objects);
 }

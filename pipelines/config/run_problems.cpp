@@ -134,10 +134,13 @@ void add_name_problems(const DataSettings& data, const std::string& in, std::vec
   }
 }
 
-/// @param in  the section, "/data"
-void add_keypoint_problems(const DataSettings& data, const std::string& in, std::vector<RunProblem>& found) {
-  if (data.keypoints.empty() && !data.keypoint_joints.empty())
-    found.push_back({in + "/keypoint_joints", "given without " + in + "/keypoints, whose points it tells of", {in}});
+/// Of the run, or of all clips of a chain, which may have one list of joints in common.
+void add_keypoint_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  const auto has_keypoints = [](const ChainClip& clip) { return !clip.data.keypoints.empty(); };
+  if (config.data.keypoint_joints.empty() || !config.data.keypoints.empty() ||
+      std::any_of(config.chain.begin(), config.chain.end(), has_keypoints))
+    return;
+  found.push_back({"/data/keypoint_joints", "given without /data/keypoints, whose points it tells of", {"/data"}});
 }
 
 /// A program of `sources`, and the input that it makes.
@@ -292,7 +295,6 @@ void add_chain_problems(const RunConfig& config, ConfigUse use, std::vector<RunP
                            object_names(chain.front().data) + "; the clips of a chain have the same, in one order",
                        {}});
     add_name_problems(clip.data, where + "/data", found);
-    add_keypoint_problems(clip.data, where + "/data", found);
     const SourceSettings sources = sources_of(config.sources, clip);
     add_made_clip_problems(sources, clip, where, found);
     if (use == ConfigUse::kRun) add_input_problems(clip.data, where + "/data", known_inputs(sources, clip, i), found);
@@ -314,6 +316,18 @@ std::vector<RunNote> optimizer_notes(const RunConfig& config) {
                                    std::string(choice_name<OptimizerKind>(kOptimizerKinds, stage.optimizer.kind))});
   }
   return notes;
+}
+
+/// Headings that nothing tells apart.
+void add_keypoint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
+  if (!config.data.keypoints.empty() || !config.chain.empty()) return;
+  for (const auto& [name, stage] : config.stages) {
+    const LossSettings* const loss = find_entry(stage.losses, "keypoints_2d");
+    if (stage.headings > 1 && loss != nullptr && loss->weight > 0)
+      notes.push_back({LogLevel::kWarning, "stages." + name +
+                                               ": without data.keypoints its loss keypoints_2d is off, "
+                                               "and its headings are compared by the others alone"});
+  }
 }
 
 /// Whether `problem` may be one only because of another, at the pointer `other`.
@@ -367,6 +381,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_order_problems(config.stages, found);
   add_start_problems(config, found);
   add_given_frame_problems(config, found);
+  add_keypoint_problems(config, found);
   if (!config.chain.empty()) {
     add_command_problems(config.sources, found);
     add_first_frame_problem(config.sources, found);
@@ -375,7 +390,6 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
     return found;
   }
   add_name_problems(config.data, "/data", found);
-  add_keypoint_problems(config.data, "/data", found);
   add_source_problems(config, found);
   if (use == ConfigUse::kRun) {
     const SourceSettings& sources = config.sources;
@@ -398,6 +412,7 @@ void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use,
 
 std::vector<RunNote> run_notes(const RunConfig& config) {
   std::vector<RunNote> notes = optimizer_notes(config);
+  add_keypoint_notes(config, notes);
   const auto inform = [&notes](const char* text) { notes.push_back({LogLevel::kInfo, text}); };
   const RenderSkips& render = config.skip.render;
   if (!render.static_tiles && render.static_layer) inform("skip.static_tiles=false switches skip.static_layer off too");

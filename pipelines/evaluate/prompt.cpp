@@ -17,11 +17,12 @@ std::string prompt_in(const ConfigValue& tree, const char* section) {
 /// Those of a chain's clips, one after the other; one that says nothing has that of `sources`.
 std::string prompt_of_clips(const ConfigValue& tree) {
   const ConfigValue* const clips = find_member(tree, "chain");
-  std::string text;
+  std::string text, before;
   for (std::size_t i = 0; clips != nullptr && i < clips->items.size(); ++i) {
     std::string prompt = string_member(clips->items[i], "prompt");
     if (prompt.empty()) prompt = prompt_in(tree, "sources");
-    if (!prompt.empty() && !text.ends_with(prompt)) text += (text.empty() ? "" : " ") + prompt;
+    if (!prompt.empty() && prompt != before) text += (text.empty() ? "" : " ") + prompt;
+    before = prompt;
   }
   return text;
 }

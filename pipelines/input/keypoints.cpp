@@ -171,6 +171,8 @@ std::vector<KeypointJoints> joints_in_list(const ConfigValue& list, const std::s
   std::vector<KeypointJoints> joints;
   for (std::size_t i = 0; i < list.items.size(); ++i)
     joints.push_back(joints_at(list.items[i], child_pointer(pointer, std::to_string(i))));
+  const auto has_joint = [](const KeypointJoints& point) { return !point.empty(); };
+  if (std::none_of(joints.begin(), joints.end(), has_joint)) fail_at(list, pointer, "names no joint");
   return joints;
 }
 
@@ -244,7 +246,8 @@ std::array<double, 2> own_size(const ConfigValue& tree) {
   for (std::size_t i = 0; i < 2; ++i) {
     pixels[i] = number_of(size->items[i], "/size/" + std::to_string(i));
     if (!(pixels[i] >= 1))
-      fail_at(size->items[i], "/size/" + std::to_string(i), "is out of range; allowed: at least 1");
+      fail_at(size->items[i], "/size/" + std::to_string(i),
+              size->items[i].text + " is out of range; allowed: at least 1");
   }
   return pixels;
 }
@@ -350,13 +353,17 @@ std::vector<const FoundPerson*> followed(const FoundKeypoints& found, const std:
   std::vector<const FoundPerson*> persons;
   const FoundPerson* last = nullptr;
   Index crowded = 0;
-  for (const std::vector<FoundPerson>& frame : found.frames) {
-    const auto is_better = [&last](const FoundPerson& a, const FoundPerson& b) {
-      return last == nullptr ? confidence_of(a) > confidence_of(b) : distance_of(a, *last) < distance_of(b, *last);
+  for (const std::vector<FoundPerson>& all : found.frames) {
+    std::vector<const FoundPerson*> frame;
+    for (const FoundPerson& person : all) {
+      if (confidence_of(person) > 0) frame.push_back(&person);
+    }
+    const auto is_better = [&last](const FoundPerson* a, const FoundPerson* b) {
+      return last == nullptr ? confidence_of(*a) > confidence_of(*b) : distance_of(*a, *last) < distance_of(*b, *last);
     };
     const auto best = std::min_element(frame.begin(), frame.end(), is_better);
-    persons.push_back(best == frame.end() ? nullptr : &*best);
-    if (best != frame.end()) last = &*best;
+    persons.push_back(best == frame.end() ? nullptr : *best);
+    if (best != frame.end()) last = *best;
     crowded += frame.size() > 1 ? 1 : 0;
   }
   if (last == nullptr) throw DataError(file + ": shows nobody in any frame");
@@ -387,20 +394,27 @@ FoundKeypoints parse_keypoints(const std::string& text, const std::string& name,
 std::vector<KeypointJoints> parse_keypoint_joints(const std::string& text, const std::string& name) {
   const ConfigValue tree = parse_json_text(text, name);
   check_kind(tree, Kind::kArray, "");
-  std::vector<KeypointJoints> joints = joints_in_list(tree, "");
-  const auto has_joint = [](const KeypointJoints& point) { return !point.empty(); };
-  if (std::none_of(joints.begin(), joints.end(), has_joint)) fail_at(tree, "", "names no joint");
-  return joints;
+  return joints_in_list(tree, "");
 }
 
 std::vector<fs::path> keypoint_files(const fs::path& keypoints) {
   if (keypoints.empty()) return {};
   if (!fs::is_directory(keypoints)) return {keypoints};
   std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(keypoints)) {
-    if (entry.path().filename().string().ends_with(kOpenPoseEnding)) files.push_back(entry.path());
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(keypoints, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.ends_with(kOpenPoseEnding) && !is_hidden(name)) files.push_back(entry.path());
   }
+  if (error) throw UserError(keypoints.string() + ": cannot be read: " + error.message());
   std::sort(files.begin(), files.end());
+  for (const fs::path& file : files) {
+    const std::string name = file.filename().string(), first = files.front().filename().string();
+    if (name.size() != first.size())
+      throw DataError(keypoints.string() + ": the names " + first + " and " + name +
+                      " have different lengths; files are taken in the order of their names, so fill numbers up with "
+                      "zeros");
+  }
   return files;
 }
 
@@ -413,10 +427,13 @@ Keypoints read_keypoints(const DataSettings& data, const FrameSource& frames) {
   FoundKeypoints found = read_found(data.keypoints, given);
   if (found.lacks_empty_frames && std::ssize(found.frames) < frames.video_count())
     found.frames.resize(static_cast<std::size_t>(frames.video_count()));
-  if (found.size[0] == 0) {
-    const Image first = frames.read(0);
-    found.size = {static_cast<double>(first.width()), static_cast<double>(first.height())};
-  }
+  const Image first = frames.read(0);
+  const double width = first.width(), height = first.height();
+  if (found.size[0] == 0) found.size = {width, height};
+  if (std::abs(found.size[0] / width / (found.size[1] / height) - 1) > 1 / std::min(width, height))
+    throw DataError(file + ": is of pictures of " + number_text(found.size[0]) + "x" + number_text(found.size[1]) +
+                    " pixels, the video's frames are of " + number_text(width) + "x" + number_text(height) +
+                    "; allowed: pictures of their shape");
   const std::vector<const FoundPerson*> persons =
       kept_frames(followed(found, file), frames, file, "frames of keypoints");
   Keypoints keypoints;

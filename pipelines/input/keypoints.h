@@ -46,8 +46,8 @@ struct FoundKeypoints {
 /// Reads text in one of the formats that are one file.
 /// @param name    what messages call it
 /// @param joints  by point, in place of those that the format or the number of points says; empty: none given
-/// Throws DataError naming line and position: no such format, numbers that are missing or out of range, frames twice,
-/// a set of points that is not known.
+/// Throws DataError naming line and position: no such format, numbers that are missing or out of range, a set of points
+/// that is not known.
 FoundKeypoints parse_keypoints(const std::string& text, const std::string& name,
                                const std::vector<KeypointJoints>& joints = {});
 
@@ -55,12 +55,14 @@ FoundKeypoints parse_keypoints(const std::string& text, const std::string& name,
 /// {"NAME": weight, ...}, and null. Throws DataError naming line and position.
 std::vector<KeypointJoints> parse_keypoint_joints(const std::string& text, const std::string& name);
 
-/// The files of data.keypoints: itself, or of a folder OpenPose's, by name. Empty: none.
+/// The files of data.keypoints: itself, or of a folder OpenPose's, by name. Empty: none. Throws UserError for a folder
+/// that cannot be read, DataError for names of different lengths, whose order is not that of their numbers.
 std::vector<std::filesystem::path> keypoint_files(const std::filesystem::path& keypoints);
 
 /// Reads data.keypoints. Of several persons the one is followed whom the detector is surest of in the first picture
 /// that has some, then the nearest to where that one was, which the log tells.
-/// Throws UserError or DataError naming the file: missing, damaged, as above, another number of frames than the video.
+/// Throws UserError or DataError naming the file: missing, damaged, as above, another number of frames than the video,
+/// pictures of another shape.
 Keypoints read_keypoints(const DataSettings& data, const FrameSource& frames);
 
 }  // namespace hsi4d

@@ -14,7 +14,7 @@ Vector2<double> seen_point(const KeypointJoints& point, const std::vector<double
   for (const auto& [joint, weight] : point) place += weight * Vector3<double>(joints.data() + 3 * joint);
   const Vector3<double> seen = camera.camera_from_world.rotation * place + camera.camera_from_world.translation;
   if (!(seen[2] > 0)) return Vector2<double>::Constant(std::nan(""));
-  return {camera.fx * seen[0] / seen[2] + camera.cx, camera.fy * seen[1] / seen[2] + camera.cy};
+  return project_point(camera, seen);
 }
 
 MetricValues errors_of(const Clip& clip, const std::vector<Keypoint>& found, const SceneState& state) {

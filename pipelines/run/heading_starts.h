@@ -20,7 +20,7 @@ struct HeadingStart {
 
 /// Tries `headings` starts, evenly around from the state's own, and keeps the one with the least loss; of equals, and
 /// where no loss is finite, the first.
-/// @param loss_from  what a stage that begins there ends with
+/// @param loss_from  what a stage that begins there ends with; infinite where it comes to no end
 HeadingStart best_heading(const SceneState& state, int headings,
                           const std::function<double(const SceneState& start)>& loss_from);
 

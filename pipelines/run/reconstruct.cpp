@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <limits>
 #include <optional>
 
 #include "core/image_io.h"
@@ -193,9 +194,13 @@ class Reconstruction {
     const HeadingStart chosen = best_heading(state, stage.headings, [&](const SceneState& start) {
       SceneState tried = start;
       ColorState colors = progress_.colors;
-      return run_frame_stage({config_, clip_, losses_, s, nullptr}, {0, frame, progress_.covered, {}}, tried, colors,
-                             [this](const IterationReport&, const RenderCounters&) { stop_if_asked(0); })
-          .loss;
+      try {
+        return run_frame_stage({config_, clip_, losses_, s, nullptr}, {0, frame, progress_.covered, {}}, tried, colors,
+                               [this](const IterationReport&, const RenderCounters&) { stop_if_asked(0); })
+            .loss;
+      } catch (const StageDivergedError&) {
+        return std::numeric_limits<double>::infinity();
+      }
     });
     folder_.note("frame 0, start of stage " + name + ": " + chosen.text);
     return chosen.state;

@@ -64,7 +64,9 @@ async function look(name) {
   const picture = new Image();
   picture.src = `/frames/${encodeURIComponent(name)}`;
   await picture.decode();
+  window.found = undefined;
   await window.pose.send({ image: picture });
+  if (window.found === undefined) throw new Error(`no answer for ${name}`);
   const { poseLandmarks, poseWorldLandmarks, segmentationMask } = window.found;
   const canvas = new OffscreenCanvas(picture.width, picture.height), context = canvas.getContext('2d');
   if (segmentationMask) context.drawImage(segmentationMask, 0, 0, picture.width, picture.height);
@@ -104,7 +106,8 @@ function ranges(numbers) {
   return parts.map(([a, b]) => (a === b ? `${a}` : `${a}-${b}`)).join(', ');
 }
 
-const names = readdirSync(frames).filter((name) => name.endsWith('.png') && !name.startsWith('.')).sort();
+const names = readdirSync(frames).filter((name) => name.endsWith('.png') && !name.startsWith('.'))
+  .sort((a, b) => a.length - b.length || (a < b ? -1 : 1)); // beyond 9999 numbers have a digit more
 if (names.length === 0) fail(`${frames}: holds no .png frames`);
 const { chromium } = createRequire(import.meta.url)(join(modules, 'playwright-core'));
 const { server, url } = await served();
@@ -116,11 +119,11 @@ try {
   const page = await browser.newPage();
   page.on('pageerror', (error) => fail(`BlazePose: ${error.message}`));
   await page.goto(url);
-  await page.evaluate(begin, kComplexity[model]);
+  await page.evaluate(begin, kComplexity[model]).catch((error) => fail(`BlazePose does not begin: ${error.message}`));
   const masks = new MaskWriter(names), points = [], places = [], empty = [], doubtful = [];
   let size, began = Date.now();
   for (const [index, name] of names.entries()) {
-    const found = await page.evaluate(look, name);
+    const found = await page.evaluate(look, name).catch((error) => fail(`${name}: ${error.message}`));
     size ??= [found.width, found.height];
     if (found.width !== size[0] || found.height !== size[1])
       fail(`${name}: is ${found.width}x${found.height} pixels, the first frame ${size.join('x')}`);

@@ -121,7 +121,11 @@ TEST_CASE("OpenPose's folder has a file a frame") {
   CHECK(found.frames[1][0].confidence == 0);
   CHECK(found.frames[2][0].x == 3.0 / kWidth);
   CHECK(keypoint_files("pose").size() == kFrames);
-  fs::remove("pose/clip_000000000002_keypoints.json");
+  std::ofstream("pose/._clip_000000000000_keypoints.json") << "of another system";
+  CHECK(keypoint_files("pose").size() == kFrames);
+  fs::rename("pose/clip_000000000002_keypoints.json", "pose/clip_10_keypoints.json");
+  CHECK_THAT(Workshop::fault("pose"), Contains("have different lengths; files are taken in the order of their names"));
+  fs::remove("pose/clip_10_keypoints.json");
   CHECK(Workshop::fault("pose") == "pose: holds 2 frames of keypoints, the video has 3 frames; allowed: that many");
 }
 
@@ -147,8 +151,8 @@ TEST_CASE("of several persons the surest one is followed, which is told") {
   const auto entry = [](int frame, double x, double confidence) {
     return Json{{"image_id", frame}, {"keypoints", row_of(17, x, 0, confidence)}};
   };
-  write("coco.json",
-        Json::array({entry(0, 1, 0.5), entry(0, 20, 0.9), entry(1, 2, 1), entry(1, 18, 0.2), entry(2, 17, 0.3)}));
+  write("coco.json", Json::array({entry(0, 1, 0.5), entry(0, 20, 0.9), entry(1, 2, 1), entry(1, 18, 0.2),
+                                  entry(2, 17, 0.3), entry(2, 3, 0)}));  // the last is nobody
   std::string told;
   const LogSink sink = log_to([&told](LogLevel, std::string_view text) { told += text; });
   const Keypoints found = Workshop::read("coco.json");
@@ -206,9 +210,14 @@ TEST_CASE("what is no file of keypoints is refused with its place") {
   CHECK_THAT(fault_of(Json::array({{{"image_id", 2000000}, {"keypoints", row_of(17, 0, 0)}}})),
              Contains("/0/image_id: 2000000 is no frame's number"));
   CHECK_THAT(fault_of(Json::array({{{"keypoints", row_of(17, 0, 0)}}})), Contains("/0: lacks image_id or keypoints"));
+  CHECK_THAT(fault_of(own(Json::array({nullptr}), {frame, frame, frame})), Contains("/joints: names no joint"));
+  CHECK_THAT(fault_of(own(Json::array(), {frame, frame, frame})), Contains("/joints: names no joint"));
+  Json turned = own({"pelvis"}, {frame, frame, frame});
+  turned["size"] = {kHeight, kWidth};
+  CHECK_THAT(fault_of(turned), Contains("is of pictures of 20x40 pixels, the video's frames are of 40x20"));
   Json sized = own({"pelvis"}, {frame, frame, frame});
   sized["size"] = {0, 4};
-  CHECK_THAT(fault_of(sized), Contains("/size/0: is out of range; allowed: at least 1"));
+  CHECK_THAT(fault_of(sized), Contains("/size/0: 0 is out of range; allowed: at least 1"));
   sized["size"] = {4};
   CHECK_THAT(fault_of(sized), Contains("/size: is not [width, height]"));
   fs::create_directory("empty");
