@@ -39,12 +39,15 @@ with tempfile.TemporaryDirectory() as name:
     assert len(json.loads((here / "found/landmarks.json").read_text())["frames"]) == 3
 
     # The program reads them, and the term that does ends near them: the points are the person's.
+    stages = json.loads((clip / "config.json").read_text())["stages"]
+    losses = {name: None for name in stages["interaction"]["losses"]}
     (here / "run.json").write_text(json.dumps({
         "extends": str(clip / "config.json"),
         "data": {"keypoints": str(here / "found/keypoints.json")},
         "stages": {"refinement": None, "camera": {"iterations": 1}, "interaction": {
             "iterations": 60,
-            "losses": {"photometric": None, "center": None, "depth": None, "keypoints_2d": {"weight": 1e-3}, "pose_prior": {}}}},
+            "optimize": {"color_net": None, "object_orient": None, "object_transl": None},
+            "losses": {**losses, "keypoints_2d": {"weight": 1e-3}, "pose_prior": {}}}},
     }))
     run(program, "run", here / "run.json", "--out", here / "run", "--quiet", "--set", "remove_depth_bias=false")
     lines = [json.loads(line) for line in (here / "run/metrics.jsonl").read_text().splitlines()]
