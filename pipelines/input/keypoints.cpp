@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <sstream>
 #include <string_view>
 
 #include "body/body_model.h"
@@ -28,110 +28,57 @@ constexpr double kWeightSlack = 1e-6;  // by which weights may miss a sum of 1
 
 // ---- Sets of points ----
 
-/// A set that detectors have: what each of its points stands for; "": no joint of the body; "a+b": their middle.
+/// A set that detectors have: a word a point, the joint that it stands for; "-": none; "a+b": the middle of two.
 struct KeypointSet {
-  std::string_view name;
-  std::vector<std::string_view> joints;
+  std::string_view name, joints;
 };
 
-std::vector<std::string_view> smplx_names() { return {smplx_joint_names().begin(), smplx_joint_names().end()}; }
+constexpr std::array kKeypointSets = {
+    // nose, eyes, ears, then from the shoulders down  [COCO]
+    KeypointSet{"coco17",
+                "- left_eye_smplhf right_eye_smplhf - - left_shoulder right_shoulder left_elbow right_elbow "
+                "left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle right_ankle"},
+    // nose, neck, the arms, the middle of the hips, the legs, eyes, ears, toes and heels  [OpenPose]
+    KeypointSet{"body25",
+                "- left_shoulder+right_shoulder right_shoulder right_elbow right_wrist left_shoulder left_elbow "
+                "left_wrist left_hip+right_hip right_hip right_knee right_ankle left_hip left_knee left_ankle "
+                "right_eye_smplhf left_eye_smplhf - - - - - - - -"},
+    // nose, three points an eye, ears, mouth; then left and right in turn; heels and toes  [MediaPipe]
+    KeypointSet{"blazepose33",
+                "- - left_eye_smplhf - - right_eye_smplhf - - - - - left_shoulder right_shoulder left_elbow "
+                "right_elbow left_wrist right_wrist left_pinky1 right_pinky1 left_index1 right_index1 left_thumb2 "
+                "right_thumb2 left_hip right_hip left_knee right_knee left_ankle right_ankle - - - -"},
+    KeypointSet{"smplx55", ""},  // the joints themselves
+};
 
-const std::vector<KeypointSet>& keypoint_sets() {
-  static const std::vector<KeypointSet> sets = {
-      // nose, eyes, ears, then from the shoulders down  [COCO]
-      {"coco17",
-       {"", "left_eye_smplhf", "right_eye_smplhf", "", "", "left_shoulder", "right_shoulder", "left_elbow",
-        "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle",
-        "right_ankle"}},
-      // [OpenPose]; toes and heels are no joints
-      {"body25",
-       {"",
-        "left_shoulder+right_shoulder",
-        "right_shoulder",
-        "right_elbow",
-        "right_wrist",
-        "left_shoulder",
-        "left_elbow",
-        "left_wrist",
-        "left_hip+right_hip",
-        "right_hip",
-        "right_knee",
-        "right_ankle",
-        "left_hip",
-        "left_knee",
-        "left_ankle",
-        "right_eye_smplhf",
-        "left_eye_smplhf",
-        "",
-        "",
-        "",
-        "",
-        "",
-        "",
-        "",
-        ""}},
-      // nose, three points an eye, ears, mouth; then left and right in turn  [MediaPipe]
-      {"blazepose33",
-       {"",
-        "",
-        "left_eye_smplhf",
-        "",
-        "",
-        "right_eye_smplhf",
-        "",
-        "",
-        "",
-        "",
-        "",
-        "left_shoulder",
-        "right_shoulder",
-        "left_elbow",
-        "right_elbow",
-        "left_wrist",
-        "right_wrist",
-        "left_pinky1",
-        "right_pinky1",
-        "left_index1",
-        "right_index1",
-        "left_thumb2",
-        "right_thumb2",
-        "left_hip",
-        "right_hip",
-        "left_knee",
-        "right_knee",
-        "left_ankle",
-        "right_ankle",
-        "",
-        "",
-        "",
-        ""}},
-      {"smplx55", smplx_names()}};
-  return sets;
-}
-
-KeypointJoints joints_named(std::string_view text) {
-  if (text.empty()) return {};
-  const std::size_t plus = text.find('+');
-  if (plus == std::string_view::npos) return {{smplx_joint(text), 1.0}};
-  return {{smplx_joint(text.substr(0, plus)), 0.5}, {smplx_joint(text.substr(plus + 1)), 0.5}};
+KeypointJoints joints_named(const std::string& word) {
+  if (word == "-") return {};
+  const std::size_t plus = word.find('+');
+  if (plus == std::string::npos) return {{smplx_joint(word), 1.0}};
+  return {{smplx_joint(word.substr(0, plus)), 0.5}, {smplx_joint(word.substr(plus + 1)), 0.5}};
 }
 
 std::vector<KeypointJoints> joints_of(const KeypointSet& set) {
   std::vector<KeypointJoints> joints;
-  for (const std::string_view text : set.joints) joints.push_back(joints_named(text));
+  if (set.joints.empty()) {
+    for (int joint = 0; joint < kSmplxJoints; ++joint) joints.push_back({{joint, 1.0}});
+  }
+  std::istringstream words{std::string(set.joints)};
+  for (std::string word; words >> word;) joints.push_back(joints_named(word));
   return joints;
 }
 
 std::string set_names() {
   std::vector<std::string> names;
-  for (const KeypointSet& set : keypoint_sets()) names.push_back("\"" + std::string(set.name) + "\"");
+  for (const KeypointSet& set : kKeypointSets) names.push_back("\"" + std::string(set.name) + "\"");
   return joined(names);
 }
 
 /// The set with that many points. Throws DataError at `value` where there is none.
 std::vector<KeypointJoints> joints_by_count(std::size_t count, const ConfigValue& value, const std::string& pointer) {
-  for (const KeypointSet& set : keypoint_sets()) {
-    if (set.joints.size() == count) return joints_of(set);
+  for (const KeypointSet& set : kKeypointSets) {
+    std::vector<KeypointJoints> joints = joints_of(set);
+    if (joints.size() == count) return joints;
   }
   fail_at(value, pointer,
           "has " + std::to_string(count) +
@@ -230,7 +177,7 @@ std::vector<KeypointJoints> own_joints(const ConfigValue& tree) {
   if (joints == nullptr) fail_at(tree, "", "there is no \"joints\"; allowed: " + set_names() + ", or a list of joints");
   if (joints->kind == Kind::kArray) return joints_in_list(*joints, "/joints");
   check_kind(*joints, Kind::kString, "/joints");
-  for (const KeypointSet& set : keypoint_sets()) {
+  for (const KeypointSet& set : kKeypointSets) {
     if (set.name == joints->text) return joints_of(set);
   }
   fail_at(*joints, "/joints",
