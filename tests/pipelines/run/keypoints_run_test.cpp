@@ -215,7 +215,7 @@ TEST_CASE("without keypoints the term is off, which is told", "[run]") {
       run_hsi4d({"run", config, "--threads", "1", "--out", (dataset.folder.path() / "run").string()});
   INFO(result.err);
   CHECK(result.status == 0);
-  CHECK_THAT(result.err, Contains("keypoints_2d") && Contains("off"));
+  CHECK_THAT(result.err, Contains("the loss \"keypoints_2d\" is off: "));
   CHECK_THAT(run_hsi4d({"check", config, "--set", "data.keypoint_joints=" + config}).err,
              Contains("/data/keypoint_joints: given without /data/keypoints, whose points it tells of"));
 }
