@@ -62,5 +62,17 @@ compile() {
     cmake --build --preset "$preset" --parallel "$jobs" ${1:+--target "$@"}
 }
 
+# find_chromium: prints where a Chromium is, or nothing; the variable CHROMIUM names another than that in PATH.
+find_chromium() { command -v "${CHROMIUM:-}" chromium chromium-browser google-chrome 2>/dev/null | head -n 1; }
+
+# install_chromium [PACKAGE]...: Debian's, where there is none, with these packages; as root or through sudo.
+install_chromium() {
+  local as_root=()
+  [[ -z $(find_chromium) ]] || return 0
+  if [[ $EUID -ne 0 ]]; then as_root=(sudo); fi
+  timed "install chromium" "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get -q -y install --no-install-recommends chromium "$@"
+}
+
 # print_usage FILE: the comment at the top of a command.
 print_usage() { sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$1"; }
