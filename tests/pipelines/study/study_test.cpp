@@ -160,6 +160,25 @@ TEST_CASE("a study has the reconstructions of runs by name, and tells nobody who
   CHECK(times.size() == 1);
 }
 
+TEST_CASE("a page knows where answers go and what its person gets, which changes neither study nor key") {
+  const TemporaryFolder here;
+  two_methods();
+  const auto data_of = [](const std::string& folder) {
+    const std::string page = file_text(fs::path(folder) / "index.html"), begin = "id=\"study-data\">";
+    const std::size_t from = page.find(begin) + begin.size();
+    return nlohmann::json::parse(page.substr(from, page.find("</script>", from) - from));
+  };
+  REQUIRE(study({"a", "b", "--out", "plain", "--seed", "0"}).status == 0);
+  REQUIRE(study({"a", "b", "--out", "sent", "--seed", "0", "--collect", "https://a.org:8080/x?y=1", "--completion",
+                 "C0DE42"})
+              .status == 0);
+  CHECK(data_of("plain")["collect"] == "");
+  CHECK(data_of("plain")["completion"] == "");
+  CHECK(data_of("sent")["collect"] == "https://a.org:8080/x?y=1");
+  CHECK(data_of("sent")["completion"] == "C0DE42");
+  CHECK(file_text("sent-key.json") == file_text("plain-key.json"));
+}
+
 TEST_CASE("names of a study without a seed follow from nothing that people could have") {
   const TemporaryFolder here;
   two_methods();
