@@ -194,17 +194,17 @@ function(hsi4d_add_program name main room)
   target_link_libraries(${name} PRIVATE ${room} hsi4d_warnings)
 endfunction()
 
-# The demo's configs become part of the program, so that it runs from anywhere.
-function(hsi4d_embed_demo_configs)
-  set(best ${PROJECT_SOURCE_DIR}/configs/best.json)
-  set(demo ${PROJECT_SOURCE_DIR}/configs/demo.json)
-  set(quick ${PROJECT_SOURCE_DIR}/configs/demo_quick.json)
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${best} ${demo} ${quick})
-  file(READ ${best} HSI4D_BEST_CONFIG)
-  file(READ ${demo} HSI4D_DEMO_CONFIG)
-  file(READ ${quick} HSI4D_DEMO_QUICK_CONFIG)
-  configure_file(${PROJECT_SOURCE_DIR}/cmake/demo_configs.cpp.in ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp @ONLY)
-  target_sources(hsi4d_pipelines_cli PRIVATE ${PROJECT_BINARY_DIR}/generated/demo_configs.cpp)
+# Configs that commands write or begin with become part of the program, so that it runs from anywhere.
+function(hsi4d_embed_configs)
+  set(HSI4D_SHIPPED_CONFIGS "")
+  foreach(name best demo demo_quick from_video)
+    set(file ${PROJECT_SOURCE_DIR}/configs/${name}.json)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+    file(READ ${file} text)
+    string(APPEND HSI4D_SHIPPED_CONFIGS "{\"${name}.json\", R\"json(${text})json\"},\n          ")
+  endforeach()
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/shipped_configs.cpp.in ${PROJECT_BINARY_DIR}/generated/shipped_configs.cpp @ONLY)
+  target_sources(hsi4d_pipelines_cli PRIVATE ${PROJECT_BINARY_DIR}/generated/shipped_configs.cpp)
 endfunction()
 
 # The report's style and scripts, in the order in which they need each other, become part of the library.

@@ -182,6 +182,14 @@ Image mask_of(const Image& image, const std::string& name) {
   throw DataError(name + ": both its colours and its alpha vary, and either could be the mask" + kAllowed);
 }
 
+Image complement(const Image& mask) {
+  Image result(1, mask.height(), mask.width());
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) result(0, y, x) = 1 - mask(0, y, x);
+  }
+  return result;
+}
+
 std::vector<int> label_greys(const Image& mask) {
   constexpr int kWhite = 255, kNear = 16, kMostGreys = 8;
   std::array<Index, kWhite + 1> pixels{};

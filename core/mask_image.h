@@ -24,6 +24,9 @@ Image read_mask_image(const std::string& path, const ImageLimits& limits = {});
 /// @param name  what error messages call it
 Image mask_of(const Image& image, const std::string& name);
 
+/// 1 − mask.
+Image complement(const Image& mask);
+
 /// The greys of a mask, 1 to 255 and ascending, where they look like numbers of labels and not like shares of pixels:
 /// at most eight, and a quarter of all that is not black neither nearly black nor nearly white. Else nothing.
 std::vector<int> label_greys(const Image& mask);

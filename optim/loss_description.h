@@ -23,6 +23,7 @@ enum class LossInput {
   kObjectOpacity,  ///< object_opacity, and what the frame says of the objects; a channel of the render each, on demand
   kHumanOpacity,   ///< human_opacity, human_mask, human_seen; likewise
   kKeypoints,      ///< keypoints, keypoints_target: where data.keypoints is given; likewise
+  kBones,          ///< bones, bones_target: where data.keypoints has landmarks; likewise
   kPose,           ///< body_rotations
   kMotion,         ///< joints, joints_start, motion, body_points
   kObjectMotion,   ///< object_points, and motion with objects

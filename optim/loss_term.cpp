@@ -15,6 +15,8 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(human_opacity);
     case LossInput::kKeypoints:
       return given(keypoints) && given(keypoints_target);
+    case LossInput::kBones:
+      return given(bones) && given(bones_target);
     case LossInput::kPose:
       return given(body_rotations);
     case LossInput::kMotion:

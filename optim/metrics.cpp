@@ -189,6 +189,23 @@ std::optional<double> psnr_db(const Image& image, const Image& target, const Ima
   return psnr_of(sum.squares / sum.weights);
 }
 
+std::optional<double> mask_iou(const Image& mask, const Image& truth) {
+  HSI4D_CHECK_EQ(mask.width(), truth.width());
+  HSI4D_CHECK_EQ(mask.height(), truth.height());
+  constexpr float kCovered = 0.5F;
+  Index both = 0, either = 0, all = 0;
+  for (int y = 0; y < truth.height(); ++y) {
+    for (int x = 0; x < truth.width(); ++x) {
+      const bool is_in_mask = mask(0, y, x) >= kCovered, is_in_truth = truth(0, y, x) >= kCovered;
+      both += is_in_mask && is_in_truth ? 1 : 0;
+      either += is_in_mask || is_in_truth ? 1 : 0;
+      all += is_in_truth ? 1 : 0;
+    }
+  }
+  if (all == 0) return std::nullopt;
+  return static_cast<double>(both) / static_cast<double>(either);
+}
+
 double image_ssim(const Image& image, const Image& target) {
   check_images(image, target);
   return mean_ssim(view_of_image(image), view_of_image(target));

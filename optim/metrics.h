@@ -100,6 +100,12 @@ double psnr_db(const Image& image, const Image& target);
 /// @return        nothing where the weights are all zero
 std::optional<double> psnr_db(const Image& image, const Image& target, const Image& weight);
 
+/// Intersection over union of what two masks cover from ½ on.
+///
+/// @param mask, truth  [1,H,W]
+/// @return             nothing where `truth` covers nothing
+std::optional<double> mask_iou(const Image& mask, const Image& truth);
+
 /// Mean structural similarity, of all channels and pixels (autodiff/ssim.h), for values in [0, 1].
 ///
 /// @param image, target  [C,H,W]

@@ -33,6 +33,7 @@ const char* words_of(LossInput need) {
       return "objects";
     case LossInput::kHumanOpacity:
     case LossInput::kKeypoints:
+    case LossInput::kBones:
       return "the body in an image";
     case LossInput::kDepths:
       return "depths of pictures";

@@ -10,14 +10,14 @@ set(stands_on
     "optim/losses: optim optim/solid"
     "pipelines/config: optim/losses" "pipelines/input: pipelines/config" "pipelines/draw: pipelines/input"
     "pipelines/metrics: pipelines/input" "pipelines/record: pipelines/metrics" "pipelines/graph: pipelines/draw"
-    "pipelines/sources: pipelines/draw" "pipelines/avatar: pipelines/draw"
+    "pipelines/sources: pipelines/draw" "pipelines/avatar: pipelines/draw" "pipelines/footage: pipelines/draw"
     "pipelines/photos: core" "pipelines/synthetic: pipelines/draw pipelines/photos"
     "pipelines/report: pipelines/draw pipelines/record" "pipelines/evaluate: pipelines/record"
     "pipelines/rig: pipelines/photos optim/solid"
     "pipelines/scan: pipelines/rig pipelines/report"
     "pipelines/run: pipelines/graph pipelines/sources pipelines/report" "pipelines/chain: pipelines/run"
     "pipelines/sweep: pipelines/chain pipelines/synthetic" "pipelines/study: pipelines/sweep pipelines/evaluate"
-    "pipelines/cli: pipelines/study pipelines/avatar pipelines/scan"
+    "pipelines/cli: pipelines/study pipelines/avatar pipelines/footage pipelines/scan"
     "bench: pipelines/cli" "stress: pipelines/cli")
 
 set(rooms "")

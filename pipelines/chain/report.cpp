@@ -51,7 +51,8 @@ std::string page_of(const ChainSummary& summary) {
       "<header><h1>" + html_escape(summary.all.name) + "</h1><span class=\"badge done\">done</span></header>\n<p>" +
           std::to_string(summary.clips.size()) + " clips, " + std::to_string(summary.all.frames) + " frames, " +
           html_escape(duration_text(summary.all.seconds)) + "</p>\n" + clips_section(summary) +
-          table_section(clip_table(summary)) + table_section(join_table(summary)) + errors_by_frame(summary));
+          table_section(clip_table(summary)) + table_section(join_table(summary)) +
+          table_section(quality_table(summary.all.quality)) + errors_by_frame(summary));
 }
 
 }  // namespace

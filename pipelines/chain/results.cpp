@@ -93,6 +93,7 @@ ChainSummary summary_of(const RunConfig& config, const ChainResult& result, cons
   }
   summary.all = joined_summary(config.name, summary.clips);
   set_jitter(result.facts.front().avatar, motion, summary.all.metrics.back().values);
+  summary.all.quality = quality_of(summary.all.metrics.back().values, motion.frame_rate);
   summary.joins = joins_of(result);
   return summary;
 }

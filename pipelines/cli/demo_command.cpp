@@ -10,10 +10,10 @@
 #include "core/config_file.h"
 #include "optim/loss_term.h"
 #include "pipelines/cli/dataset.h"
-#include "pipelines/cli/demo_configs.h"
 #include "pipelines/cli/list.h"
 #include "pipelines/cli/options.h"
 #include "pipelines/cli/run_command.h"
+#include "pipelines/cli/shipped_configs.h"
 #include "pipelines/cli/terminal.h"
 #include "pipelines/config/run_problems.h"
 
@@ -35,7 +35,7 @@ namespace fs = std::filesystem;
 RunConfig demo_config(const DemoArguments& arguments, const std::vector<LossTerm>& losses) {
   ConfigProblems problems;
   const std::string name = arguments.quick ? "demo_quick.json" : "demo.json";
-  const std::map<std::string, std::string> texts = demo_config_texts();
+  const std::map<std::string, std::string> texts = shipped_config_texts();
   const ConfigValue tree =
       load_config_text(texts.at(name), name, fs::current_path(), arguments.overrides, problems, texts);
   return read_run_config(tree, descriptions_of(losses), problems, ConfigUse::kStages);

@@ -7,13 +7,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "body/body_model.h"
-#include "body/motion_edit.h"
 #include "core/check.h"
 #include "core/config_value.h"
-#include "core/file.h"
 #include "core/folder_in_making.h"
 #include "core/text.h"
+#include "pipelines/cli/first_state.h"
 #include "pipelines/cli/list.h"
 #include "pipelines/cli/options.h"
 #include "pipelines/cli/text.h"
@@ -68,7 +66,7 @@ ConfigValue vector_value(const Vector3<double>& vector) {
   return value;
 }
 
-std::string initial_json(const std::vector<PlacedObject>& objects) {
+ConfigValue poses_of(const std::vector<PlacedObject>& objects) {
   ConfigValue poses = ConfigValue::make_object();
   for (const PlacedObject& object : objects) {
     const ObjectPose pose = standing_object(read_object(object.file), object.place);
@@ -77,10 +75,7 @@ std::string initial_json(const std::vector<PlacedObject>& objects) {
     value.add("translation", vector_value(pose.translation));
     poses.add(object.name, std::move(value));
   }
-  ConfigValue file = ConfigValue::make_object();
-  file.add("motion", ConfigValue::make_string("initial_motion.npz"));
-  if (!objects.empty()) file.add("objects", std::move(poses));
-  return to_json(file);
+  return poses;
 }
 
 /// Writes initial.json and initial_motion.npz. Returns what the command prints.
@@ -95,15 +90,9 @@ std::string place_command(const PlaceArguments& a) {
   }
   check_rate(a.frame_rate, kPlaceCommand + "--frame-rate");
   const StandingPlace place = parse_place(a.at, "--at");
-  const Avatar avatar = read_avatar(a.avatar);
-  if (avatar.joint_count() != kSmplxJoints)
-    throw DataError(a.avatar + ": has " + std::to_string(avatar.joint_count()) + " joints; a person has the " +
-                    std::to_string(kSmplxJoints) + " of SMPL-X");
-  Motion motion{a.frame_rate, {standing_pose(avatar, place)}};
-  motion.pelvis_rest = pelvis_of(avatar.joints);
+  const Avatar avatar = read_person(a.avatar);
   FolderInMaking out(a.out);
-  write_motion(out.file("initial_motion.npz"), motion);
-  write_text_file(out.file("initial.json"), initial_json(objects));
+  write_first_state(out, avatar, place, a.frame_rate, poses_of(objects));
   out.commit();
   return (std::filesystem::path(a.out) / "initial.json").generic_string() + ": a person at " + short_number(place.x) +
          ", " + short_number(place.y) + " m" +

@@ -26,7 +26,8 @@ std::string report_of_run(const std::string& run) {
   const std::string path = RunPaths{run}.report();
   write_text_file(path, report_page(data));
   std::string text = path + "\n";
-  if (data.summary) text += error_text(*data.summary) + gradient_table(*data.summary);
+  if (data.summary)
+    text += error_text(*data.summary) + quality_text(data.summary->quality) + gradient_table(*data.summary);
   for (const std::string& note : data.notes) text += "note: " + note + "\n";
   return text;
 }

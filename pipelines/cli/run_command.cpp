@@ -176,8 +176,8 @@ std::string result_text(const RunSummary& summary, const std::string& folder) {
   const std::string shares = gradient_table(summary);
   const std::string note =
       summary.has_truth ? "" : "no ground truth: errors of body, objects and camera are not measured\n";
-  return error_text(summary) + note + (shares.empty() ? "" : "\n" + shares) + "\n" + std::to_string(summary.frames) +
-         " frames in " + duration_text(summary.seconds) +
+  return error_text(summary) + note + quality_text(summary.quality) + (shares.empty() ? "" : "\n" + shares) + "\n" +
+         std::to_string(summary.frames) + " frames in " + duration_text(summary.seconds) +
          "; report: " + (std::filesystem::path(folder) / "report.html").string() + "\n";
 }
 

@@ -55,7 +55,8 @@ void describe(ConfigFields& f, DataSettings& s) {
   f.choice("motion_align", s.motion_align, kMotionAligns,
            "How `motion` is aligned with frame 0: moved and turned about the vertical (heading), or freely (rotation)");
   f.path("keypoints", s.keypoints, {.must_exist = true},
-         "2D keypoints of the human by frame, for the loss keypoints_2d: a .json file, or OpenPose's folder");
+         "2D keypoints of the human by frame, for the losses keypoints_2d and bone_directions: a .json file, or "
+         "OpenPose's folder");
   f.path("keypoint_joints", s.keypoint_joints, {.must_exist = true},
          "List of the joints that the detector's points stand for (.json); empty: of a known set of points");
   f.path("truth", s.truth, {},

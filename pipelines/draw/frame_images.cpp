@@ -30,14 +30,6 @@ void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covere
   for (const Image& mask : frame.object_masks) add_covered(mask, data.mask_threshold, data.mask_margin_px, covered);
 }
 
-Image complement(const Image& mask) {
-  Image result(1, mask.height(), mask.width());
-  for (int y = 0; y < mask.height(); ++y) {
-    for (int x = 0; x < mask.width(); ++x) result(0, y, x) = 1 - mask(0, y, x);
-  }
-  return result;
-}
-
 Image foreground_of(const ClipFrame& frame) {
   Image result = frame.human_mask;
   for (const Image& mask : frame.object_masks) {

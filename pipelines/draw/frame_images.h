@@ -12,9 +12,6 @@ namespace hsi4d {
 /// sides, are set in `covered` [1,H,W].
 void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covered);
 
-/// 1 − mask.
-Image complement(const Image& mask);
-
 /// The larger of all masks of the frame, pixel by pixel.
 Image foreground_of(const ClipFrame& frame);
 

@@ -253,6 +253,8 @@ void begin_without_truth(Measurement& m) {
 void measure_feet_and_hands(Measurement& m) {
   const std::vector<MetricValues> sliding = sliding_by_frame(m.result.joints, m.tracks.frame_rate);
   add(mean_after_first(sliding), sliding, m.result);
+  const std::vector<MetricValues> drift = floor_drift_by_frame(m.result.joints);
+  add(mean_after_first(drift), drift, m.result);
   if (m.objects.empty()) return;
   const std::vector<MetricValues> contact =
       m.body->avatar() != nullptr ? contact_by_frame(*m.body->avatar(), m.object_pointers(), m.tracks.states)
@@ -351,7 +353,7 @@ void take_image_errors(Measurement& m) {
   const RunSummary summary = parse_summary(read_text_file(file), file);
   if (summary.metrics.empty() || std::ssize(summary.per_frame) != std::ssize(m.result.per_frame)) return;
   const auto take = [](const MetricValues& from, MetricValues& to) {
-    for (const char* const name : {"psnr_db", "psnr_foreground_db", "ssim"}) {
+    for (const char* const name : kImageMetrics) {
       if (const double* const value = find_metric(from, name)) to.emplace_back(name, *value);
     }
   };

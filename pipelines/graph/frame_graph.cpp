@@ -230,7 +230,7 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
   }
   if (draws_objects()) record_object_masks();
   if (settings_.human_opacity) record_human_inputs();
-  if (settings_.keypoints && clip_.keypoints) record_keypoints();
+  if ((settings_.keypoints || settings_.bones) && clip_.keypoints) record_keypoints();
 }
 
 /// Opacities are those of the objects, and last of the human.
@@ -311,8 +311,31 @@ void FrameGraph<S>::record_keypoints() {
     for (const auto& [joint, weight] : points[k])
       tape_.write(weights)(static_cast<Index>(k), joint) = static_cast<S>(weight);
   }
-  inputs_.keypoints = places_in_image(matmul(weights, skeleton_.joints));
+  const Var<S> places = matmul(weights, skeleton_.joints);
+  if (settings_.bones && clip_.keypoints->has_landmarks()) record_bones(places);
+  if (!settings_.keypoints) return;
+  inputs_.keypoints = places_in_image(places);
   inputs_.keypoints_target = tape_.constant("keypoints_target", shape_of(std::ssize(points), 3));
+}
+
+/// Ways between points, in the axes of the camera Exp(ξ) T: rows wᵀ Rᵀ Exp(−ω), ω the rotation of ξ.
+template <class S>
+void FrameGraph<S>::record_bones(Var<S> points) {
+  bones_ = bones_of(clip_.keypoints->joints);
+  if (bones_.empty()) return;
+  const auto count = std::ssize(bones_);
+  const Var<S> ends = tape_.constant("bone_ends", shape_of(count, points.shape().rows));
+  for (Index b = 0; b < count; ++b) {
+    for (const auto& [point, weight] : bones_[static_cast<std::size_t>(b)])
+      tape_.write(ends)(b, point) = static_cast<S>(weight);
+  }
+  const Var<S> axes = tape_.constant("camera_axes", shape_of(3, 3));           // transposed: it multiplies rows
+  write_numbers(tape_, axes, view_.camera.camera_from_world.rotation.data());  // column-major: so its memory is
+  const Var<S> turn = rotations_from_axis_angle(-slice_cols(xi_, 3, 3));
+  const Var<S> rows =
+      concat_rows<S>(std::array{slice_cols(turn, 0, 3), slice_cols(turn, 3, 3), slice_cols(turn, 6, 3)});
+  inputs_.bones = matmul(matmul(matmul(ends, points), axes), rows);
+  inputs_.bones_target = tape_.constant("bones_target", shape_of(count, 4));
 }
 
 template <class S>
@@ -402,6 +425,7 @@ void FrameGraph<S>::set_targets(const FrameTargets& targets) {
     fill(inputs_.human_seen, S(targets.human_seen ? 1 : 0));
   }
   if (inputs_.given(inputs_.keypoints_target)) set_keypoints(*targets.keypoints);
+  if (inputs_.given(inputs_.bones_target)) set_bones(*targets.keypoints);
   if (!inputs_.given(inputs_.object_depth)) return;
   HSI4D_CHECK_EQ(targets.depths.size(), objects_.size());
   write_numbers(tape_, inputs_.object_depth_target, targets.depths.data());
@@ -415,6 +439,25 @@ void FrameGraph<S>::set_keypoints(const std::vector<Keypoint>& found) {
     row[0] = static_cast<S>(found[k].x * view_.camera.width);
     row[1] = static_cast<S>(found[k].y * view_.camera.height);
     row[2] = static_cast<S>(found[k].confidence);
+  }
+}
+
+/// Confidence 0 where an end is not known, or both are one.
+template <class S>
+void FrameGraph<S>::set_bones(const std::vector<Keypoint>& found) {
+  for (std::size_t b = 0; b < bones_.size(); ++b) {
+    Vector3<double> way = Vector3<double>::Zero();
+    double confidence = 1;
+    for (const auto& [point, weight] : bones_[b]) {
+      const Keypoint& end = found[static_cast<std::size_t>(point)];
+      confidence = end.landmark ? std::min(confidence, end.confidence) : 0;
+      way += weight * end.landmark.value_or(Vector3<double>::Zero());
+      if (confidence == 0) break;
+    }
+    if (!(way.norm() > 0)) confidence = 0;
+    S* row = tape_.write(inputs_.bones_target).row(static_cast<Index>(b));
+    for (Index i = 0; i < 3; ++i) row[i] = static_cast<S>(confidence > 0 ? way.normalized()[i] : 0);
+    row[3] = static_cast<S>(confidence);
   }
 }
 

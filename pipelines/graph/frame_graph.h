@@ -39,6 +39,7 @@ struct FrameGraphSettings {
   bool human_opacity = false;           ///< the losses read the human's opacity, which costs a channel of the render
   bool object_opacity = false;          ///< likewise of the objects, a channel each
   bool keypoints = false;               ///< the losses read the clip's keypoints
+  bool bones = false;                   ///< the losses read directions of bones, where the clip's keypoints have them
   /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
   /// out, and the groups of the scene then hold the others alone. None: all are kept.
   std::optional<double> camera_reach = {};
@@ -56,7 +57,7 @@ struct FrameTargets {
   const Image* human_mask = nullptr;            ///< [1,H,W] coverage; needed with settings.human_opacity
   bool human_seen = true;                       ///< the frame shows some of the human
   std::vector<const Image*> object_masks = {};  ///< coverage by object; needed with settings.object_opacity
-  const std::vector<Keypoint>* keypoints = nullptr;  ///< of the frame; needed with settings.keypoints
+  const std::vector<Keypoint>* keypoints = nullptr;  ///< of the frame; needed with settings.keypoints and bones
 };
 
 /// The frame graph. The tape and the clip must outlive it.
@@ -113,6 +114,7 @@ class FrameGraph {
   void record_render(const std::vector<Part>& parts, std::size_t first_object);
   void record_human_inputs();
   void record_keypoints();
+  void record_bones(Var<S> points);
   Rendered<S> render_parts(const std::vector<Part>& parts, const RenderRequest& request) const;
   void record_object_depths(const std::vector<Part>& parts, std::size_t first_object);
   void record_object_places();
@@ -120,6 +122,7 @@ class FrameGraph {
   void record_object_masks();
   void set_object_masks(const FrameTargets& targets);
   void set_keypoints(const std::vector<Keypoint>& found);
+  void set_bones(const std::vector<Keypoint>& found);
   bool draws_objects() const { return settings_.object_opacity && !objects_.empty(); }
   void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
   Vector3<double> read_rotation(Var<S> leaf, Index row) const;
@@ -140,6 +143,7 @@ class FrameGraph {
   PosedSkeleton<S> skeleton_;
   ColorNetVars<S> color_net_;  // empty without a color net
   Rendered<S> rendered_;
+  std::vector<Bone> bones_;  // between the clip's keypoints
   LossInputs<S> inputs_;
 };
 

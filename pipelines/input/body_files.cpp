@@ -61,6 +61,13 @@ void check_begins_with_frame_0(const Motion& motion, const std::string& file, co
   throw DataError(file + ": begins with frame " + number_text(motion.first_frame) + " of its video; " + needed);
 }
 
+Avatar read_person(const std::string& file) {
+  Avatar avatar = read_avatar(file);
+  if (avatar.joint_count() == kSmplxJoints) return avatar;
+  throw DataError(file + ": has " + std::to_string(avatar.joint_count()) + " joints; a person has the " +
+                  std::to_string(kSmplxJoints) + " of SMPL-X");
+}
+
 PoseFolder read_pose_folder_with_warnings(const std::string& folder, double frame_rate, int person) {
   PoseFolder read = read_pose_folder(folder, frame_rate, person);
   if (read.filled > 0) log_warning(folder + ": frames without a file, interpolated: " + std::to_string(read.filled));

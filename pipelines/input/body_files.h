@@ -51,6 +51,9 @@ Motion read_motion_with_warnings(const std::string& path);
 /// @param needed  what it is read for, and what is allowed instead
 void check_begins_with_frame_0(const Motion& motion, const std::string& file, const std::string& needed);
 
+/// As read_avatar, of a person. Throws DataError naming the file where its joints are not as many as SMPL-X has.
+Avatar read_person(const std::string& file);
+
 /// As read_pose_folder; frames that are filled in, where it begins and people that are not read are told in the log.
 PoseFolder read_pose_folder_with_warnings(const std::string& folder, double frame_rate, int person);
 

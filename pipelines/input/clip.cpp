@@ -116,32 +116,33 @@ void check_finite(const Image& image, const std::string& place) {
 using MaskLook = std::function<void(std::size_t mask, const Image& image)>;
 
 /// A mask that is as large as the frame of the video, in the camera's size; empty where there is none.
-Image read_mask(std::size_t m, const Clip& clip, Index index, const Image& frame, const MaskLook& look) {
-  const MaskSource& source = clip.video->masks[m];
-  const Image mask = source.read(clip.video->frames, index);
-  if (mask.width() == 0) return Image(1, clip.camera.height, clip.camera.width);
-  check_finite(mask, source.place(clip.video->frames, index));
+Image read_mask(std::size_t m, const ClipVideo& video, const Camera& camera, Index index, const Image& frame,
+                const MaskLook& look) {
+  const MaskSource& source = video.masks[m];
+  const Image mask = source.read(video.frames, index);
+  if (mask.width() == 0) return Image(1, camera.height, camera.width);
+  check_finite(mask, source.place(video.frames, index));
   if (look) look(m, mask);
-  if (mask.height() == frame.height() && mask.width() == frame.width()) return reduced(mask, clip.camera);
-  throw DataError(source.place(clip.video->frames, index) + ": is " + size_text(mask) + " pixels, " +
-                  (has_size_of(frame, clip.camera) ? "the camera's image " : "the video's frame ") + size_text(frame));
+  if (mask.height() == frame.height() && mask.width() == frame.width()) return reduced(mask, camera);
+  throw DataError(source.place(video.frames, index) + ": is " + size_text(mask) + " pixels, " +
+                  (has_size_of(frame, camera) ? "the camera's image " : "the video's frame ") + size_text(frame));
 }
 
 /// As read_frame.
-ClipFrame read_looking(const Clip& clip, Index index, const MaskLook& look) {
-  const FrameSource& frames = clip.video->frames;
+ClipFrame read_looking(const ClipVideo& video, const Camera& camera, Index index, const MaskLook& look) {
+  const FrameSource& frames = video.frames;
   const Image read = frames.read(index);
-  if (read.channels() < 3 || !fits_camera(read, clip.camera)) {
+  if (read.channels() < 3 || !fits_camera(read, camera)) {
     throw DataError(frames.place(index) + ": is " + size_text(read) + " with " + std::to_string(read.channels()) +
-                    " channels; the camera's image is " + size_text(clip.camera) + " with 3");
+                    " channels; the camera's image is " + size_text(camera) + " with 3");
   }
   ClipFrame frame;
   const Image colors = take_channels(read, 0, 3);
   check_finite(colors, frames.place(index));
-  frame.target = reduced(colors, clip.camera);
-  frame.human_mask = read_mask(0, clip, index, read, look);
-  for (std::size_t m = 1; m < clip.video->masks.size(); ++m)
-    frame.object_masks.push_back(read_mask(m, clip, index, read, look));
+  frame.target = reduced(colors, camera);
+  frame.human_mask = read_mask(0, video, camera, index, read, look);
+  for (std::size_t m = 1; m < video.masks.size(); ++m)
+    frame.object_masks.push_back(read_mask(m, video, camera, index, read, look));
   return frame;
 }
 
@@ -223,6 +224,13 @@ std::string off_text(const std::vector<std::string>& losses) {
 
 }  // namespace
 
+ClipVideo open_video(const DataSettings& data, const std::vector<std::string>& objects) {
+  ClipVideo video{{data.frames, {data.video_rate, data.frame_rate}}, {}};
+  video.masks.push_back(open_masks(data.masks, kHumanMasks, video.frames));
+  for (const std::string& name : objects) video.masks.push_back(open_masks(data.masks, name, video.frames));
+  return video;
+}
+
 Clip read_clip(const DataSettings& data) {
   check_inputs(data);
   return make_clip(data, read_scene_setup(data));
@@ -230,7 +238,9 @@ Clip read_clip(const DataSettings& data) {
 
 Clip make_clip(const DataSettings& data, SceneSetup setup) {
   Clip clip;
-  auto video = std::make_shared<ClipVideo>(ClipVideo{{data.frames, {data.video_rate, data.frame_rate}}, {}});
+  std::vector<std::string> names;
+  for (const ClipObject& object : setup.objects) names.push_back(object.name);
+  const auto video = std::make_shared<const ClipVideo>(open_video(data, names));
   clip.frame_files = video->frames.names();
   clip.camera = first_camera(data.camera, video->frames);
   clip.scene = std::move(setup.scene);
@@ -239,10 +249,6 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   clip.antialiased = std::move(setup.antialiased);
   clip.first.camera_from_world = clip.camera.camera_from_world;
   clip.first.objects = setup.poses;
-  std::vector<std::string> names;
-  for (const ClipObject& object : clip.objects) names.push_back(object.name);
-  video->masks.push_back(open_masks(data.masks, kHumanMasks, video->frames));
-  for (const std::string& name : names) video->masks.push_back(open_masks(data.masks, name, video->frames));
   clip.video = video;
   clip.estimate = estimate_of(data, setup, clip.avatar, video->frames);
   clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
@@ -288,8 +294,8 @@ void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMa
     for (Index index = begin; index < end; ++index) {
       const auto t = static_cast<std::size_t>(index);
       std::vector<float>& of_frame = largest[t];
-      const ClipFrame frame =
-          read_looking(clip, index, [&](std::size_t m, const Image& mask) { greys[m][t] = label_greys(mask); });
+      const ClipFrame frame = read_looking(*clip.video, clip.camera, index,
+                                           [&](std::size_t m, const Image& mask) { greys[m][t] = label_greys(mask); });
       of_frame.push_back(largest_value(frame.human_mask));
       for (const Image& mask : frame.object_masks) of_frame.push_back(largest_value(mask));
     }
@@ -345,6 +351,10 @@ std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, In
   return files;
 }
 
-ClipFrame read_frame(const Clip& clip, Index index) { return read_looking(clip, index, {}); }
+ClipFrame read_frame(const Clip& clip, Index index) { return read_frame(*clip.video, clip.camera, index); }
+
+ClipFrame read_frame(const ClipVideo& video, const Camera& size, Index index) {
+  return read_looking(video, size, index, {});
+}
 
 }  // namespace hsi4d

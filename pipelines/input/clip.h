@@ -62,6 +62,11 @@ struct ClipFrame {
   std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
 };
 
+/// Opens the frames and masks that `data` names. What masks lack or have too much is told in the log. Throws as
+/// FrameSource and MaskSource; DataError for masks with names that are not those of frames.
+/// @param objects  names, in order
+ClipVideo open_video(const DataSettings& data, const std::vector<std::string>& objects);
+
 /// Reads everything but the frames. Throws UserError or DataError naming the file: missing, damaged, sizes that do not
 /// fit each other.
 Clip read_clip(const DataSettings& data);
@@ -82,6 +87,10 @@ bool fits_camera(const Image& frame, const Camera& camera);
 /// Reads frame `index` and its masks, and reduces larger ones to the camera's size. A mask that has no file counts as
 /// empty. Throws as read_clip; a number that is not finite too, with its row and column.
 ClipFrame read_frame(const Clip& clip, Index index);
+
+/// As above, before there is a clip.
+/// @param size  of the result
+ClipFrame read_frame(const ClipVideo& video, const Camera& size, Index index);
 
 /// The files of a frame: the image, and the masks of human and objects, which may be missing. None of those that are in
 /// videos.

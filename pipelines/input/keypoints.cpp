@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "body/body_model.h"
+#include "body/pose_layout.h"
 #include "core/check.h"
 #include "core/file.h"
 #include "core/json_text.h"
@@ -170,6 +171,15 @@ void check_count(const FoundPerson& person, std::vector<KeypointJoints>& joints,
             "has " + std::to_string(person.size()) + " points; " + std::to_string(joints.size()) + " are needed");
 }
 
+/// [x, y, z]
+std::array<double, 3> place_at(const ConfigValue& value, const std::string& pointer) {
+  check_kind(value, Kind::kArray, pointer);
+  if (value.items.size() != 3) fail_at(value, pointer, "is no place [x, y, z]");
+  std::array<double, 3> place{};
+  for (std::size_t i = 0; i < 3; ++i) place[i] = number_of(value.items[i], child_pointer(pointer, std::to_string(i)));
+  return place;
+}
+
 // ---- The formats ----
 
 std::vector<KeypointJoints> own_joints(const ConfigValue& tree) {
@@ -199,6 +209,31 @@ std::array<double, 2> own_size(const ConfigValue& tree) {
   return pixels;
 }
 
+/// [[[x, y, z], ...], ...]: as many frames as of points, each with as many places as it has points, or none.
+std::vector<FoundPerson> own_landmarks(const ConfigValue& tree, const FoundKeypoints& found) {
+  const ConfigValue* const landmarks = find_member(tree, "landmarks");
+  if (landmarks == nullptr) return {};
+  check_kind(*landmarks, Kind::kArray, "/landmarks");
+  if (landmarks->items.size() != found.frames.size())
+    fail_at(*landmarks, "/landmarks",
+            "has " + std::to_string(landmarks->items.size()) + " frames; /frames has " +
+                std::to_string(found.frames.size()));
+  std::vector<FoundPerson> all;
+  for (std::size_t t = 0; t < landmarks->items.size(); ++t) {
+    const std::string pointer = "/landmarks/" + std::to_string(t);
+    const ConfigValue& frame = landmarks->items[t];
+    check_kind(frame, Kind::kArray, pointer);
+    if (!frame.items.empty() && frame.items.size() != found.joints.size())
+      fail_at(frame, pointer,
+              "has " + std::to_string(frame.items.size()) + " points; " + std::to_string(found.joints.size()) +
+                  " or none are needed");
+    FoundPerson& places = all.emplace_back();
+    for (std::size_t k = 0; k < frame.items.size(); ++k)
+      places.push_back(place_at(frame.items[k], child_pointer(pointer, std::to_string(k))));
+  }
+  return all;
+}
+
 FoundKeypoints read_own(const ConfigValue& tree, const std::vector<KeypointJoints>& joints) {
   const ConfigValue* const version = find_member(tree, "version");
   if (version != nullptr && number_of(*version, "/version") != 1)
@@ -217,6 +252,7 @@ FoundKeypoints read_own(const ConfigValue& tree, const std::vector<KeypointJoint
     check_count(person, found.joints, frames->items[t], pointer);
     found.frames.back().push_back(person);
   }
+  found.landmarks = own_landmarks(tree, found);
   return found;
 }
 
@@ -328,6 +364,37 @@ FoundKeypoints read_found(const fs::path& path, const std::vector<KeypointJoints
 
 }  // namespace
 
+bool Keypoints::has_landmarks() const {
+  const auto has_some = [](const std::vector<Keypoint>& frame) {
+    return std::any_of(frame.begin(), frame.end(), [](const Keypoint& point) { return point.landmark.has_value(); });
+  };
+  return std::any_of(frames.begin(), frames.end(), has_some);
+}
+
+std::vector<Bone> bones_of(const std::vector<KeypointJoints>& joints) {
+  std::vector<int> points(kSmplxJoints, -1);  // by joint
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    if (joints[k].size() == 1) points[static_cast<std::size_t>(joints[k].front().first)] = static_cast<int>(k);
+  }
+  const auto point_of = [&points](const char* name) { return points[static_cast<std::size_t>(smplx_joint(name))]; };
+  std::vector<Bone> bones;
+  for (int joint = 1; joint < kBodyJoints; ++joint) {
+    const int point = points[static_cast<std::size_t>(joint)];
+    int above = smplx_parents()[static_cast<std::size_t>(joint)];
+    while (above >= 0 && points[static_cast<std::size_t>(above)] < 0)
+      above = smplx_parents()[static_cast<std::size_t>(above)];
+    if (point >= 0 && above >= 0) bones.push_back({{point, 1.0}, {points[static_cast<std::size_t>(above)], -1.0}});
+  }
+  const int left_hip = point_of("left_hip"), right_hip = point_of("right_hip"),
+            left_shoulder = point_of("left_shoulder"), right_shoulder = point_of("right_shoulder");
+  const bool has_hips = left_hip >= 0 && right_hip >= 0, has_shoulders = left_shoulder >= 0 && right_shoulder >= 0;
+  if (has_hips) bones.push_back({{left_hip, 1.0}, {right_hip, -1.0}});
+  if (has_shoulders) bones.push_back({{left_shoulder, 1.0}, {right_shoulder, -1.0}});
+  if (has_hips && has_shoulders)
+    bones.push_back({{left_shoulder, 0.5}, {right_shoulder, 0.5}, {left_hip, -0.5}, {right_hip, -0.5}});
+  return bones;
+}
+
 FoundKeypoints parse_keypoints(const std::string& text, const std::string& name,
                                const std::vector<KeypointJoints>& joints) {
   const ConfigValue tree = parse_json_text(text, name);
@@ -383,17 +450,22 @@ Keypoints read_keypoints(const DataSettings& data, const FrameSource& frames) {
                     "; allowed: pictures of their shape");
   const std::vector<const FoundPerson*> persons =
       kept_frames(followed(found, file), frames, file, "frames of keypoints");
+  const std::vector<FoundPerson> landmarks =
+      found.landmarks.empty() ? found.landmarks : kept_frames(found.landmarks, frames, file, "frames of landmarks");
   Keypoints keypoints;
   std::vector<std::size_t> used;
   for (std::size_t i = 0; i < found.joints.size(); ++i) {
     if (!found.joints[i].empty()) used.push_back(i);
   }
   for (const std::size_t i : used) keypoints.joints.push_back(found.joints[i]);
-  for (const FoundPerson* const person : persons) {
+  for (std::size_t t = 0; t < persons.size(); ++t) {
+    const FoundPerson* const person = persons[t];
     std::vector<Keypoint>& points = keypoints.frames.emplace_back(used.size());
     for (std::size_t k = 0; person != nullptr && k < used.size(); ++k) {
       const auto& [x, y, confidence] = (*person)[used[k]];
       points[k] = {x / found.size[0], y / found.size[1], confidence};
+      if (landmarks.empty() || landmarks[t].empty()) continue;
+      points[k].landmark = Vector3<double>(landmarks[t][used[k]].data());
     }
   }
   return keypoints;

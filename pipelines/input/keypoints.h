@@ -8,29 +8,45 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/linear.h"
 #include "pipelines/config/data_settings.h"
 #include "pipelines/input/frame_source.h"
 
 namespace hsi4d {
 
+/// Confidence from which a point counts as found.
+inline constexpr double kFoundConfidence = 0.5;
+
 /// A point as a detector found it.
 struct Keypoint {
   double x = 0, y = 0;    ///< shares of the image's width and height, from its upper left corner
   double confidence = 0;  ///< 0 to 1; 0: it was not found
+  /// Where it is in space, metres, in the camera's axes from any origin; none: the file does not say.
+  std::optional<Vector3<double>> landmark = {};
 };
 
 /// Joints (smplx_joint_names) with weights that sum to 1: the point is their mean.
 using KeypointJoints = std::vector<std::pair<int, double>>;
 
+/// The way from one point to another, or between middles of points: points with weights that sum to 0.
+using Bone = std::vector<std::pair<int, double>>;
+
 /// Points of one person. Those that stand for no joint (a nose, an ear) are left out.
 struct Keypoints {
   std::vector<KeypointJoints> joints;         ///< by point
   std::vector<std::vector<Keypoint>> frames;  ///< [frame][point], of the frames that the clip keeps
+
+  bool has_landmarks() const;
 };
+
+/// Bones of the body between points that stand for one joint each: from each of joints 1 to 21 to the next one up the
+/// skeleton that there is, across hips and shoulders, and from the middle of the hips to that of the shoulders.
+std::vector<Bone> bones_of(const std::vector<KeypointJoints>& joints);
 
 /// A person in one picture as the file has it: (x, y, confidence) by point, pixels. Empty: nobody.
 using FoundPerson = std::vector<std::array<double, 3>>;
@@ -38,6 +54,7 @@ using FoundPerson = std::vector<std::array<double, 3>>;
 /// What a file of keypoints holds.
 struct FoundKeypoints {
   std::vector<std::vector<FoundPerson>> frames;  ///< [frame][person], all persons with the same points
+  std::vector<FoundPerson> landmarks;            ///< [frame] of the one person, (x, y, z); empty: there are none
   std::vector<KeypointJoints> joints;            ///< by point, empty where it stands for no joint
   std::array<double, 2> size = {0, 0};           ///< of the pictures, pixels; 0: that of the video's
   bool lacks_empty_frames = false;               ///< frames without persons are not in the file

@@ -1,6 +1,8 @@
 #include "pipelines/metrics/contact_metrics.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "body/kinematics.h"
 #include "core/check.h"
@@ -51,6 +53,15 @@ std::vector<double> hand_distances(const MotionStart& motion, const std::vector<
   return distances;
 }
 
+/// z of the lowest ankle or ball of a foot, metres.
+double lowest_foot(const std::vector<double>& joints) {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (Index joint = 0; 3 * joint + 2 < std::ssize(joints); ++joint) {
+    if (is_foot_joint(joint)) lowest = std::min(lowest, joints[static_cast<std::size_t>(3 * joint + 2)]);
+  }
+  return lowest;
+}
+
 }  // namespace
 
 std::vector<MetricValues> contact_by_frame(const Avatar& avatar, const std::vector<const Gaussians*>& objects,
@@ -95,6 +106,14 @@ std::vector<MetricValues> sliding_by_frame(const std::vector<std::vector<double>
     const std::optional<double> sliding = foot_sliding_mm(joints[t - 1], joints[t], joints.front(), frame_rate);
     if (sliding) by_frame[t].emplace_back("foot_sliding_mm", *sliding);
   }
+  return by_frame;
+}
+
+std::vector<MetricValues> floor_drift_by_frame(const std::vector<std::vector<double>>& joints) {
+  std::vector<MetricValues> by_frame(joints.size());
+  for (std::size_t t = 1; t < joints.size(); ++t)
+    by_frame[t].emplace_back("floor_drift_mm",
+                             kMillimetres * std::abs(lowest_foot(joints[t]) - lowest_foot(joints[0])));
   return by_frame;
 }
 

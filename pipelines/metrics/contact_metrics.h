@@ -35,6 +35,11 @@ std::vector<MetricValues> contact_share_by_frame(const std::vector<std::vector<d
 /// @param frame_rate  frames a second
 std::vector<MetricValues> sliding_by_frame(const std::vector<std::vector<double>>& joints, double frame_rate);
 
+/// floor_drift_mm of each frame: 1000 · |z of the lowest ankle or ball of a foot − the same in frame 0|; none in frame
+/// 0. Large where the floor is lost, or feet leave it on purpose.
+/// @param joints  [T][J,3] metres, world
+std::vector<MetricValues> floor_drift_by_frame(const std::vector<std::vector<double>>& joints);
+
 /// The mean of each metric over those frames after the first that have it.
 MetricValues mean_after_first(const std::vector<MetricValues>& by_frame);
 

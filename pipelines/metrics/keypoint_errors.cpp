@@ -17,20 +17,39 @@ Vector2<double> seen_point(const KeypointJoints& point, const std::vector<double
   return project_point(camera, seen);
 }
 
+Vector2<double> target_of(const Keypoint& found, const Camera& camera) {
+  return {found.x * camera.width, found.y * camera.height};
+}
+
+/// The longer side of the box around the points that were found, pixels.
+double extent_of(const std::vector<Keypoint>& found, const Camera& camera) {
+  Vector2<double> low = Vector2<double>::Constant(INFINITY), high = -low;
+  for (const Keypoint& point : found) {
+    if (point.confidence < kFoundConfidence) continue;
+    low = low.cwiseMin(target_of(point, camera));
+    high = high.cwiseMax(target_of(point, camera));
+  }
+  return (high - low).maxCoeff();
+}
+
 MetricValues errors_of(const Clip& clip, const std::vector<Keypoint>& found, const SceneState& state) {
   const std::vector<double> joints = pose_joints(clip.avatar.parents, clip.avatar.joints, state.body);
   Camera camera = clip.camera;
   camera.camera_from_world = state.camera_from_world;
-  double sum = 0;
-  int count = 0;
+  const double extent = extent_of(found, camera);
+  double sum = 0, near = 0, count = 0;
   for (std::size_t k = 0; k < found.size(); ++k) {
     if (found[k].confidence < kFoundConfidence) continue;
-    const Vector2<double> target(found[k].x * camera.width, found[k].y * camera.height);
-    sum += (seen_point(clip.keypoints->joints[k], joints, camera) - target).norm();
+    const double distance =
+        (seen_point(clip.keypoints->joints[k], joints, camera) - target_of(found[k], camera)).norm();
+    sum += distance;
+    near += distance < kPckShare * extent ? 1 : 0;
     ++count;
   }
   if (count == 0 || !std::isfinite(sum)) return {};
-  return {{"keypoints_px", sum / count}};
+  MetricValues errors = {{"keypoints_px", sum / count}};
+  if (extent > 0) errors.emplace_back("keypoints_pck", near / count);
+  return errors;
 }
 
 }  // namespace

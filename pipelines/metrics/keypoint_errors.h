@@ -8,12 +8,14 @@
 
 namespace hsi4d {
 
-/// Confidence from which a point counts as found.
-inline constexpr double kFoundConfidence = 0.5;
+/// How near a point must be for `keypoints_pck`, of the box around them. [Andriluka et al. 2014, of the
+/// head's size there]
+inline constexpr double kPckShare = 0.05;
 
 /// `keypoints_px` by frame: the mean distance of the points that were found from where the state's camera sees them,
-/// pixels of the clip's image. Nothing of a frame in which none was found, or one is not before the camera; nothing at
-/// all of a clip without keypoints.
+/// pixels of the clip's image; and `keypoints_pck`, the share of them that are nearer than kPckShare of the longer side
+/// of the box around all that were found, where that has one. Nothing of a frame in which none was found, or one is not
+/// before the camera; nothing at all of a clip without keypoints.
 /// @param states  of frames 0, 1, ... of the clip
 std::vector<MetricValues> keypoint_errors_by_frame(const Clip& clip, const std::vector<SceneState>& states);
 

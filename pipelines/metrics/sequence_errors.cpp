@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/check.h"
+#include "core/mask_image.h"
 #include "optim/metrics.h"
 #include "optim/motion_metrics.h"
 
@@ -85,6 +86,8 @@ MetricValues image_errors(const Image& image, const Image& target, const Image* 
   if (foreground != nullptr) {
     const std::optional<double> part = psnr_db(image, target, *foreground);
     if (part) errors.emplace_back("psnr_foreground_db", *part);
+    const std::optional<double> rest = psnr_db(image, target, complement(*foreground));
+    if (rest) errors.emplace_back("psnr_background_db", *rest);
   }
   errors.emplace_back("ssim", image_ssim(image, target));
   return errors;

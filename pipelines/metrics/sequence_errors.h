@@ -1,6 +1,7 @@
 // Errors of a whole sequence against the truth, with the names that summary.json has.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,10 +29,15 @@ struct FrameState {
 /// @param points  of the objects, in their order; null: not known
 MetricValues frame_errors(const FrameState& estimate, const FrameState& truth, const ObjectPoints* points = nullptr);
 
-/// psnr_db, ssim, and psnr_foreground_db where a foreground is given and not empty.
+/// Metrics of a frame's images, in order.
+inline constexpr std::array<const char*, 5> kImageMetrics = {"psnr_db", "psnr_foreground_db", "psnr_background_db",
+                                                             "ssim", "silhouette_iou"};
+
+/// psnr_db, ssim, and psnr_foreground_db and psnr_background_db where a foreground is given that leaves something to
+/// each.
 ///
 /// @param image, target  [3,H,W]
-/// @param foreground     [1,H,W] weights, or null
+/// @param foreground     [1,H,W] weights, 0 to 1, or null
 MetricValues image_errors(const Image& image, const Image& target, const Image* foreground = nullptr);
 
 /// frame_errors of frames 1 to T, with the acceleration_error of those of them that have a frame on either side; frame

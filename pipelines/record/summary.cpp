@@ -62,6 +62,20 @@ ConfigValue start_json(const StartSummary& start) {
   return object;
 }
 
+ConfigValue quality_json(const std::vector<QualityGate>& gates) {
+  ConfigValue object = ConfigValue::make_object();
+  for (const QualityGate& gate : gates) {
+    const std::string place = child_pointer("/quality", gate.metric);
+    ConfigValue of_gate = ConfigValue::make_object();
+    add_number(of_gate, place, "value", gate.value);
+    of_gate.add("word", ConfigValue::make_string(word_of(gate)));
+    add_number(of_gate, place, "pass", gate.pass);
+    add_number(of_gate, place, "check", gate.check);
+    object.add(gate.metric, std::move(of_gate));
+  }
+  return object;
+}
+
 // ---- Reading ----
 
 /// Every number of an object but those named in `taken`; null (a gap) and other kinds are passed over.
@@ -154,6 +168,20 @@ StartSummary read_start(const ConfigValue& value) {
   return start;
 }
 
+/// Gates of metrics that are not known are passed over.
+std::vector<QualityGate> read_quality(const ConfigValue& value) {
+  check_kind(value, Kind::kObject, "/quality");
+  std::vector<QualityGate> gates;
+  for (const ConfigMember& member : value.members) {
+    const std::string place = child_pointer("/quality", member.key);
+    check_kind(member.value, Kind::kObject, place);
+    if (find_metric_facts(member.key) == nullptr) continue;
+    gates.push_back({member.key, read_number(member.value, place, "value"), read_number(member.value, place, "pass"),
+                     read_number(member.value, place, "check")});
+  }
+  return gates;
+}
+
 // ---- The table ----
 
 }  // namespace
@@ -170,6 +198,7 @@ std::string summary_json(const RunSummary& summary) {
     stages.items.push_back(stage_json(summary.metrics[i], child_pointer("/metrics", std::to_string(i))));
   tree.add("metrics", std::move(stages));
   if (!summary.start.parts.empty()) tree.add("start", start_json(summary.start));
+  if (!summary.quality.empty()) tree.add("quality", quality_json(summary.quality));
   ConfigValue means = ConfigValue::make_object(), by_frame = ConfigValue::make_object();
   for (const Baseline& baseline : summary.baselines) {
     const std::string place = child_pointer("/baselines", baseline.name);
@@ -206,6 +235,7 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
       summary.metrics.push_back(read_stage(stages->items[i], child_pointer("/metrics", std::to_string(i))));
   }
   if (const ConfigValue* const start = find_member(tree, "start")) summary.start = read_start(*start);
+  if (const ConfigValue* const quality = find_member(tree, "quality")) summary.quality = read_quality(*quality);
   read_baselines(tree, summary);
   if (const ConfigValue* const frames = find_member(tree, "per_frame"))
     summary.per_frame = read_frames(*frames, "/per_frame");

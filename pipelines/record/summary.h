@@ -8,6 +8,7 @@
 
 #include "core/types.h"
 #include "pipelines/metrics/metric_facts.h"
+#include "pipelines/metrics/quality.h"
 
 namespace hsi4d {
 
@@ -61,6 +62,7 @@ struct RunSummary {
   StartSummary start;
   std::vector<Baseline> baselines;
   std::vector<FrameMetrics> per_frame;  ///< of the result
+  std::vector<QualityGate> quality;     ///< of the result; may be empty
 };
 
 /// The text of summary.json:
@@ -69,9 +71,10 @@ struct RunSummary {
 ///    "metrics": [{"stage", "frame"?, "seconds", "iterations", NAME: NUMBER...,
 ///                 "gradient_shares": {GROUP: {TERM: {"share", "cosine", "evaluations"}...}...}}...],
 ///    "start": {"seconds", PART: {START: FRAMES...}...},
+///    "quality": {NAME: {"value", "word", "pass", "check"}...},
 ///    "baselines": {NAME: {"frame"?, NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
-///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface", "start" and
-///    "gradient_shares" only where there are any)
+///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface", "start", "quality"
+///    and "gradient_shares" only where there are any)
 ///
 /// with "frame": 0 where errors are those of frame 0 alone.
 /// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and

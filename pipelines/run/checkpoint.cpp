@@ -8,6 +8,7 @@
 #include "core/check.h"
 #include "core/simd.h"
 #include "optim/checkpoint.h"
+#include "pipelines/metrics/sequence_errors.h"
 
 namespace hsi4d {
 
@@ -16,8 +17,6 @@ namespace {
 constexpr Index kPoseNumbers = 3 * kSmplxJoints;
 constexpr Index kRigidNumbers = 12;
 constexpr std::size_t kCounts = 5;  // whole numbers of a stage's totals
-constexpr std::array<const char*, 3> kImageErrors = {"psnr_db", "psnr_foreground_db",
-                                                     "ssim"};  // as image_errors orders
 
 /// Errors of images, frame by frame: as "KIND/FRAME/NAME".
 std::string error_name(const char* kind, std::size_t frame, const std::string& name) {
@@ -33,7 +32,7 @@ void store_errors(const char* kind, const std::vector<MetricValues>& errors, Che
 std::vector<MetricValues> stored_errors(const char* kind, std::size_t frames, const Checkpoint& checkpoint) {
   std::vector<MetricValues> errors(frames);
   for (std::size_t t = 0; t < frames; ++t) {
-    for (const char* name : kImageErrors) {
+    for (const char* name : kImageMetrics) {
       const std::string entry = error_name(kind, t, name);
       if (!checkpoint.has(entry)) continue;
       const std::vector<double>& error = checkpoint.doubles(entry);

@@ -433,22 +433,29 @@ class Reconstruction {
     }
   }
 
+  static MetricValues picture_errors(const StatePicture& picture, const ClipFrame& frame) {
+    const Image foreground = foreground_of(frame);
+    MetricValues errors = image_errors(picture.image, frame.target, &foreground);
+    const std::optional<double> iou = mask_iou(picture.silhouette, frame.human_mask);
+    if (iou) errors.emplace_back("silhouette_iou", *iou);
+    return errors;
+  }
+
   /// Writes images of a frame's result and notes how far it is from the video.
   void write_result(Index index, const ClipFrame& frame, const SceneState& state, const ColorState& colors,
                     std::vector<MetricValues>& errors) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
-    const Image image = render_state(config_, clip_, state, colors), foreground = foreground_of(frame);
-    write_image(paths.frame_image(number, "render"), image);
-    write_image(paths.frame_image(number, "difference"), difference_image(image, frame.target));
-    errors.push_back(image_errors(image, frame.target, &foreground));
+    const StatePicture picture = picture_of_state(config_, clip_, state, colors);
+    write_image(paths.frame_image(number, "render"), picture.image);
+    write_image(paths.frame_image(number, "difference"), difference_image(picture.image, frame.target));
+    errors.push_back(picture_errors(picture, frame));
   }
 
   void write_start_image(Index index, const ClipFrame& frame) {
-    const Image start = render_state(config_, clip_, given_start(clip_, index), start_colors_);
-    const Image foreground = foreground_of(frame);
-    write_image(folder_.paths().frame_image(static_cast<int>(index), "start"), start);
-    progress_.start_errors.push_back(image_errors(start, frame.target, &foreground));
+    const StatePicture start = picture_of_state(config_, clip_, given_start(clip_, index), start_colors_);
+    write_image(folder_.paths().frame_image(static_cast<int>(index), "start"), start.image);
+    progress_.start_errors.push_back(picture_errors(start, frame));
   }
 
   const RunConfig& config_;

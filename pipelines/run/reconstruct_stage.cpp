@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "body/pose_prior.h"
+#include "core/mask_image.h"
 #include "optim/optimizer.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/posed_avatar.h"
@@ -130,6 +131,7 @@ void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& fra
   settings.human_opacity = some_loss_needs(stage, LossInput::kHumanOpacity);
   settings.object_opacity = some_loss_needs(stage, LossInput::kObjectOpacity);
   settings.keypoints = some_loss_needs(stage, LossInput::kKeypoints);
+  settings.bones = some_loss_needs(stage, LossInput::kBones);
   settings.camera_reach = camera_reach;
   settings.seen = rows_to_draw(task, state);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
@@ -213,14 +215,26 @@ StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>
 }
 
 template <class S>
-Image render_state_in(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {
+StatePicture picture_in(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors,
+                        bool has_silhouette) {
   Tape<S> tape;
   FrameGraphSettings settings = graph_settings(config, Draw::kAll, colors);
   settings.camera_reach = 0;
+  settings.human_opacity = has_silhouette;
   FrameGraph<S> graph(tape, clip, state.camera_from_world, settings);
   graph.set_state(state);
   tape.forward(graph.rendered().image);
-  return to_image(tape.value(graph.rendered().image));
+  StatePicture picture{to_image(tape.value(graph.rendered().image)), {}};
+  if (!has_silhouette) return picture;
+  tape.forward(graph.loss_inputs().human_opacity);
+  picture.silhouette = to_image(tape.value(graph.loss_inputs().human_opacity));
+  return picture;
+}
+
+StatePicture picture(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors,
+                     bool has_silhouette) {
+  return config.precision == RunPrecision::kFloat ? picture_in<float>(config, clip, state, colors, has_silhouette)
+                                                  : picture_in<double>(config, clip, state, colors, has_silhouette);
 }
 
 }  // namespace
@@ -261,8 +275,12 @@ std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
 }
 
 Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors) {
-  return config.precision == RunPrecision::kFloat ? render_state_in<float>(config, clip, state, colors)
-                                                  : render_state_in<double>(config, clip, state, colors);
+  return picture(config, clip, state, colors, false).image;
+}
+
+StatePicture picture_of_state(const RunConfig& config, const Clip& clip, const SceneState& state,
+                              const ColorState& colors) {
+  return picture(config, clip, state, colors, true);
 }
 
 }  // namespace hsi4d

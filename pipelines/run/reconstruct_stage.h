@@ -66,7 +66,15 @@ StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<Sce
 /// The color net that a run begins with, if it has one.
 std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip);
 
-/// The image [3,H,W] of a state, from its own camera.
+/// A state as its own camera sees it.
+struct StatePicture {
+  Image image;       ///< [3,H,W]
+  Image silhouette;  ///< [1,H,W] the human's opacity
+};
+StatePicture picture_of_state(const RunConfig& config, const Clip& clip, const SceneState& state,
+                              const ColorState& colors);
+
+/// The image alone, which costs less.
 Image render_state(const RunConfig& config, const Clip& clip, const SceneState& state, const ColorState& colors);
 
 }  // namespace hsi4d

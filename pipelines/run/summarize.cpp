@@ -177,8 +177,8 @@ class ObjectPenetration {
   bool is_known_ = false;
 };
 
-/// Contact of the hands, what is inside of objects, sliding of the feet and distances from keypoints, which need no
-/// truth: of the baselines, of what every stage that moves the body left, and of the result's frames.
+/// Contact of the hands, what is inside of objects, height and sliding of the feet and distances from keypoints, which
+/// need no truth: of the baselines, of what every stage that moves the body left, and of the result's frames.
 void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& progress,
                  const RefinementProgress& refinement, RunSummary& summary) {
   const std::vector<const Gaussians*> objects = objects_of(clip);
@@ -188,8 +188,10 @@ void add_contact(const RunConfig& config, const Clip& clip, const RunProgress& p
     std::vector<std::vector<double>> joints;
     for (const SceneState& state : states) joints.push_back(pose_joints(clip.avatar, state.body));
     const std::vector<MetricValues> sliding = sliding_by_frame(joints, clip.frame_rate);
+    const std::vector<MetricValues> drift = floor_drift_by_frame(joints);
     const std::vector<MetricValues> seen = keypoint_errors_by_frame(clip, states);
     for (std::size_t t = 0; t < all.size(); ++t) {
+      append_values(drift[t], all[t]);
       append_values(sliding[t], all[t]);
       append_values(seen[t], all[t]);
     }
@@ -245,13 +247,16 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   const ObjectPoints points(objects_of(clip));
   const auto add_stage = [&](const std::vector<SceneState>& states, const StageTotals& totals) {
     const auto& [name, stage] = config.stages[summary.metrics.size()];
-    summary.metrics.push_back(
-        summarize_stage(name, clip.truth ? errors_of(clip, states, stage.draw, points) : MetricValues{}, totals));
+    summary.metrics.push_back(summarize_stage(name,
+                                              clip.truth
+                                                  ? errors_of(clip, states, stage.draw, points)
+                                                  : motion_jitter(placed(clip, states, stage.draw), clip.frame_rate),
+                                              totals));
   };
   if (clip.truth) {
     add_errors(clip, result_of(progress, refinement), points, summary);
   } else {
-    summary.baselines = {{"start", {}, {}}};
+    summary.baselines = {{"start", motion_jitter(placed(clip, start_of(clip), Draw::kAll), clip.frame_rate), {}}};
   }
   add_first_frame(config, clip, progress, summary);
   for (std::size_t s = 0; s < progress.after_stage.size(); ++s) add_stage(progress.after_stage[s], progress.totals[s]);
@@ -267,6 +272,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   add_image_errors(progress.start_errors, summary.baselines[0].values, summary.baselines[0].per_frame);
   add_contact(config, clip, progress, refinement, summary);
   if (clip.surface) add_penetration(config, clip, progress, refinement, summary);
+  summary.quality = quality_of(summary.metrics.back().values, clip.frame_rate);
   return summary;
 }
 

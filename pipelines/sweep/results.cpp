@@ -86,6 +86,9 @@ SweepRow read_row(const SweepPaths& paths, std::size_t index, const SweepRun& ru
   for (const auto& [name, value] : summary.metrics.back().values) {
     if (find_metric_facts(name) != nullptr) row.values.emplace_back(name, value);
   }
+  if (!summary.quality.empty())
+    row.values.emplace_back(gates_facts().name, static_cast<double>(passed_count(summary.quality)) /
+                                                    static_cast<double>(summary.quality.size()));
   row.values.emplace_back(seconds_facts().name, summary.seconds);
   return row;
 }
@@ -117,6 +120,7 @@ std::vector<const MetricFacts*> metrics_of(const std::vector<SweepRow>& rows) {
       metrics.push_back(&facts);
   };
   for (const MetricFacts& facts : metric_facts()) add(facts);
+  add(gates_facts());
   add(seconds_facts());
   return metrics;
 }
@@ -126,6 +130,11 @@ std::vector<const MetricFacts*> metrics_of(const std::vector<SweepRow>& rows) {
 std::size_t SweepResults::count(SweepRunState state) const {
   return static_cast<std::size_t>(
       std::count_if(rows.begin(), rows.end(), [state](const SweepRow& row) { return row.state == state; }));
+}
+
+const MetricFacts& gates_facts() {
+  static const MetricFacts facts{"gates_passed", "quality gates", "", "Share of the quality gates that pass", 2, 1};
+  return facts;
 }
 
 const MetricFacts& seconds_facts() {

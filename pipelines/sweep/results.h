@@ -46,7 +46,8 @@ struct SweepResults {
   std::size_t count(SweepRunState state) const;
 };
 
-/// Facts of the time of a run, which is a metric here.
+/// Facts of the share of quality gates that a run passes, and of its time, which are metrics here.
+const MetricFacts& gates_facts();
 const MetricFacts& seconds_facts();
 
 /// Results of runs as they stand: their groups, clips and metrics. @param rows  by index, of all runs of the plan

@@ -58,7 +58,9 @@ std::vector<OperatorInput> all_inputs() {
           {"transmittance", mask, 0, 0.5},
           {"depth_target", mask, 1, 2},
           {"keypoints", shape_of(4, 2), 0, 60},
-          {"keypoints_target", shape_of(4, 3), 0, 0, {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8, 8, 8, 0.1}}};
+          {"keypoints_target", shape_of(4, 3), 0, 0, {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8, 8, 8, 0.1}},
+          {"bones", shape_of(3, 3), 0, 0, {0.1, -0.3, 0.05, 0, 0.4, 0.2, -0.3, 0, 0.1}},
+          {"bones_target", shape_of(3, 4), 0, 0, {0, -1, 0, 1, 0, 0.6, 0.8, 0.7, 1, 0, 0, 0.1}}};
 }
 
 template <class S>
@@ -86,6 +88,8 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.depth_target = in[21];
   inputs.keypoints = in[22];
   inputs.keypoints_target = in[23];
+  inputs.bones = in[24];
+  inputs.bones_target = in[25];
   inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;
@@ -142,6 +146,29 @@ TEST_CASE("keypoints_2d weighs by confidence, and its kernels agree with their f
   CHECK(value_of("squared") == Approx((0.5 * 25 + 2500) / 3));
   CHECK(value_of("huber") == Approx((0.5 * 25 + 2 * 5 * 50 - 25) / 3));
   CHECK(value_of("geman_mcclure") == Approx((0.5 * 25 * 25 / 50.0 + 25 * 2500 / 2525.0) / 3));
+}
+
+TEST_CASE("bone_directions does not depend on lengths, and lets go of what points the other way") {
+  const LossTerm& term = *std::find_if(loss_terms().begin(), loss_terms().end(),
+                                       [](const LossTerm& t) { return t.description.name == "bone_directions"; });
+  const auto value_of = [&term](const std::vector<double>& bones, const std::vector<double>& targets) {
+    Tape<double> tape;
+    LossInputs<double> in;
+    in.bones = tape.parameter("b", shape_of(std::ssize(bones) / 3, 3));
+    tape.set(in.bones, bones);
+    in.bones_target = tape.parameter("t", shape_of(std::ssize(targets) / 4, 4));
+    tape.set(in.bones_target, targets);
+    const Var<double> loss = term.record(in);
+    tape.forward(loss);
+    return tape.value(loss).scalar();
+  };
+  const double right_angle = 0.25 * 2 / (0.25 + 2);  // chord² 2, scale 0.5
+  CHECK(value_of({2, 0, 0}, {0, 1, 0, 1}) == Approx(right_angle));
+  CHECK(value_of({0.01, 0, 0}, {0, 1, 0, 1}) == Approx(right_angle));
+  CHECK(value_of({0, 3, 0}, {0, 1, 0, 1}) == Approx(0).margin(1e-12));
+  CHECK(value_of({0, -3, 0}, {0, 1, 0, 0.5}) == Approx(0.5 * 0.25 * 4 / 4.25));
+  CHECK(value_of({2, 0, 0, 1, 1, 1}, {0, 1, 0, 1, 0, 0, 1, 0.2}) == Approx(right_angle / 2));  // the other is not sure
+  CHECK(value_of({0, 0, 0}, {0, 1, 0, 1}) == Approx(right_angle));  // no direction: as one across
 }
 
 TEST_CASE("depth_spread counts known depths alone, and what rounding made less than nothing as nothing") {

@@ -50,6 +50,18 @@ Image filled(int channels, int height, int width, float value) {
 
 }  // namespace
 
+TEST_CASE("masks are compared where they cover half of a pixel") {
+  Image mask(1, 4, 5), truth(1, 4, 5);
+  CHECK_FALSE(mask_iou(mask, truth));
+  for (int x = 0; x < 4; ++x) truth(0, 1, x) = 1;
+  CHECK(*mask_iou(mask, truth) == 0);
+  for (int x = 2; x < 5; ++x) mask(0, 1, x) = 0.5F;
+  mask(0, 3, 0) = 0.49F;
+  CHECK(*mask_iou(mask, truth) == Approx(2.0 / 5));
+  CHECK(*mask_iou(truth, truth) == 1);
+  CHECK_THROWS_AS(mask_iou(Image(1, 4, 4), truth), InternalError);
+}
+
 TEST_CASE("joint errors have the values of a pencil and paper") {
   // Pelvis off by (0.3, 0, 0.4), the second joint by (0.3, 0, 0.4) + (0, 0.06, 0).
   const Points truth = {0, 0, 1, 0, 0, 2};

@@ -36,7 +36,8 @@ with tempfile.TemporaryDirectory() as name:
     assert all(len(frame) == 33 for frame in found["frames"])
     masks = sorted(path.name for path in (here / "found/masks/human").iterdir())
     assert masks == ["0000.png", "0001.png", "0002.png"], masks
-    assert len(json.loads((here / "found/landmarks.json").read_text())["frames"]) == 3
+    landmarks = json.loads((here / "found/keypoints.json").read_text())["landmarks"]
+    assert len(landmarks) == 3 and len(landmarks[0]) == 33
 
     # The program reads them, and the term that does ends near them: the points are the person's.
     stages = json.loads((clip / "config.json").read_text())["stages"]

@@ -129,7 +129,7 @@ try {
       fail(`${name}: is ${found.width}x${found.height} pixels, the first frame ${size.join('x')}`);
     await masks.write(index, found.width, found.height, Buffer.from(found.mask, 'base64'));
     points.push((found.points ?? []).map(({ x, y, visibility }) => [rounded(x * size[0]), rounded(y * size[1]), rounded(Math.min(Math.max(visibility, 0), 1))]));
-    places.push((found.places ?? []).map(({ x, y, z, visibility }) => [x, y, z, visibility].map((number) => rounded(number))));
+    places.push((found.places ?? []).map(({ x, y, z }) => [rounded(x), rounded(y), rounded(z)]));
     if (!found.points) empty.push(index);
     else if (meanOf(kLimbs.map((i) => found.points[i].visibility)) < kDoubtful) doubtful.push(index);
     process.stderr.write(`\rframe ${index + 1} of ${names.length}, ${((Date.now() - began) / 1000 / (index + 1)).toFixed(1)} s each `);
@@ -138,9 +138,8 @@ try {
   if (empty.length === names.length) fail('nobody is found in any frame');
   if (empty.length > 0) console.error(`frontend: nobody is found in frames ${ranges(empty)}; their masks are black`);
   if (doubtful.length > 0) console.error(`frontend: less than half of the limbs is seen in frames ${ranges(doubtful)}`);
-  const file = { format: 'hsi4d keypoints', version: 1, joints: 'blazepose33', size, frames: points };
+  const file = { format: 'hsi4d keypoints', version: 1, joints: 'blazepose33', size, frames: points, landmarks: places };
   writeFileSync(join(out, 'keypoints.json'), `${JSON.stringify(file)}\n`);
-  writeFileSync(join(out, 'landmarks.json'), `${JSON.stringify({ points: 'blazepose33', frames: places })}\n`);
 } finally {
   await browser.close();
   server.close();

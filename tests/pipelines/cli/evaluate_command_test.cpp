@@ -68,13 +68,14 @@ TEST_CASE("evaluate finds what the summary of a run has", "[run]") {
   }
   for (const char* name :
        {"contact_share", "foot_sliding_mm", "penetration_share", "penetration_depth_mm", "object_penetration_share",
-        "object_add_cm", "object_add_s_cm", "acceleration_error", "psnr_db", "psnr_foreground_db", "ssim"})
+        "object_add_cm", "object_add_s_cm", "acceleration_error", "psnr_db", "psnr_foreground_db", "psnr_background_db",
+        "silhouette_iou", "floor_drift_mm", "ssim"})
     CHECK(one.contains(name));
   for (const auto& [name, value] : summary["metrics"].back().items()) {
     INFO(name);
     CHECK((find_metric_facts(name) == nullptr || one.contains(name)));
   }
-  CHECK(count == 23 + (one.contains("contact_distance_mm") ? 1 : 0));
+  CHECK(count == 26 + (one.contains("contact_distance_mm") ? 1 : 0));
   CHECK(one["per_frame"].size() == kTinyFrames - 1);
   CHECK(one["per_frame"][0]["frame"] == 1);
   CHECK(one["per_frame"][2]["mpjpe_mm"].get<double>() ==

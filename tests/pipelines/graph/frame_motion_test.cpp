@@ -8,6 +8,7 @@
 #include "autodiff/elementwise.h"
 #include "autodiff/gradcheck.h"
 #include "autodiff/reduce.h"
+#include "core/random.h"
 #include "optim/loss_term.h"
 #include "pipelines/draw/tape_image.h"
 #include "pipelines/graph/frame_graph.h"
@@ -221,6 +222,64 @@ TEST_CASE("keypoints are where the camera sees the joints, with the gradients of
   Tape<double> other;
   const FrameGraph<double> without(other, clip, clip.first.camera_from_world, settings);
   CHECK_FALSE(without.loss_inputs().gives(LossInput::kKeypoints));
+}
+
+TEST_CASE("bones are in the camera's axes, with the gradients of differences", "[frame_graph]") {
+  Clip clip = small_clip(kWidth, kHeight, 400);
+  Keypoints keypoints;
+  for (const char* name : {"left_shoulder", "right_shoulder", "left_elbow", "left_hip", "right_hip", "left_knee"})
+    keypoints.joints.push_back({{smplx_joint(name), 1.0}});
+  const Random random(4);
+  for (std::uint64_t t = 0; t < 2; ++t) {
+    std::vector<Keypoint>& points = keypoints.frames.emplace_back();
+    for (std::uint64_t k = 0; k < 6; ++k) {
+      const std::uint64_t i = 10 * (6 * t + k);
+      points.push_back({0.5, 0.5, k == 2 ? 0.6 : 0.9,
+                        Vector3<double>(random.normal(i), random.normal(i + 1), random.normal(i + 2))});
+    }
+  }
+  keypoints.frames[1][5].landmark.reset();
+  clip.keypoints = keypoints;
+  FrameGraphSettings settings = settings_with_human();
+  settings.bones = true;
+  Tape<double> tape;
+  FrameGraph<double> graph(tape, clip, clip.first.camera_from_world, settings);
+  graph.set_state(clip.first);
+  const Image image(3, kHeight, kWidth), human = random_mask(6);
+  FrameTargets targets{&image, nullptr, {{14.5, 11.25, 1}, {6.5, 14.5, 1}}, {2.5, 3.5}};
+  targets.human_mask = &human;
+  targets.object_masks = {&human, &human};
+  targets.keypoints = &clip.keypoints->frames[1];
+  graph.set_targets(targets);
+  const LossInputs<double>& inputs = graph.loss_inputs();
+  CHECK_FALSE(inputs.gives(LossInput::kKeypoints));
+  REQUIRE(inputs.gives(LossInput::kBones));
+  REQUIRE(inputs.bones.shape().rows == 5);  // knee, elbow, hips, shoulders, back
+  const Var<double> loss = term_named("bone_directions").record(inputs);
+  tape.forward(loss);
+  const PosedJoints body = pose_skeleton(clip.avatar, clip.first.body);
+  const auto joint = [&](const char* name) { return Vector3<double>(body.joints.data() + 3 * smplx_joint(name)); };
+  const auto check_bone = [&](Index row, const Vector3<double>& world) {
+    const Vector3<double> seen = clip.first.camera_from_world.rotation * world;
+    for (Index i = 0; i < 3; ++i) CHECK(tape.value(inputs.bones)(row, i) == Approx(seen[i]).margin(1e-9));
+  };
+  check_bone(0, joint("left_knee") - joint("left_hip"));
+  check_bone(1, joint("left_elbow") - joint("left_shoulder"));
+  check_bone(4, (joint("left_shoulder") + joint("right_shoulder") - joint("left_hip") - joint("right_hip")) / 2);
+  CHECK(tape.value(inputs.bones_target)(0, 3) == 0);  // the knee's landmark is not known
+  CHECK(tape.value(inputs.bones_target)(1, 3) == 0.6);
+  const Vector3<double> way = *keypoints.frames[1][2].landmark - *keypoints.frames[1][0].landmark;
+  CHECK(tape.value(inputs.bones_target)(1, 0) == Approx(way.normalized()[0]));
+  for (const char* name : {"camera", "global_orient", "body_pose"}) {
+    INFO("group " << name);
+    for (const Var<double> block : group_named(graph, name).blocks) tape.unfreeze(block);
+    GradcheckOptions options;
+    options.tolerance = 1e-6;
+    options.each_node = false;
+    const GradcheckReport report = gradcheck(tape, loss, options);
+    INFO(report.text());
+    CHECK(report.ok());
+  }
 }
 
 TEST_CASE("an object is drawn to the hand as the hand is to it", "[frame_graph]") {

@@ -90,6 +90,46 @@ TEST_CASE("keypoints of the project's own format are shares of the image, and th
   CHECK(Workshop::read("k.json").frames[0][0].x == 0.125);
 }
 
+TEST_CASE("landmarks are in the same file, a place a point or none a frame") {
+  const Workshop workshop;
+  Json content = own({"pelvis", nullptr, "head"}, {{{1, 1, 1}, {2, 2, 1}, {3, 3, 1}}, Json::array(), Json::array()});
+  write("plain.json", content);
+  CHECK_FALSE(Workshop::read("plain.json").has_landmarks());
+  content["landmarks"] = {{{0, 0, 0}, {9, 9, 9}, {0.1, -0.6, 0.2}}, Json::array(), Json::array()};
+  write("k.json", content);
+  const Keypoints keypoints = Workshop::read("k.json");
+  REQUIRE(keypoints.has_landmarks());
+  REQUIRE(keypoints.frames[0].size() == 2);
+  CHECK(*keypoints.frames[0][1].landmark == Vector3<double>(0.1, -0.6, 0.2));
+  CHECK_FALSE(keypoints.frames[1][0].landmark);
+
+  const auto fault = [&](const Json& landmarks) {
+    content["landmarks"] = landmarks;
+    write("bad.json", content);
+    return Workshop::fault("bad.json");
+  };
+  CHECK_THAT(fault(Json::array()), Contains("/landmarks: has 0 frames; /frames has 3"));
+  CHECK_THAT(fault({{{0, 0, 0}}, Json::array(), Json::array()}), Contains("/landmarks/0: has 1 points; 3 or none"));
+  CHECK_THAT(fault({{{0, 0, 0}, {0, 0}, {0, 0, 0}}, Json::array(), Json::array()}),
+             Contains("/landmarks/0/1: is no place [x, y, z]"));
+  CHECK_THAT(fault("here"), Contains("/landmarks"));
+}
+
+TEST_CASE("bones lie between points that stand for one joint") {
+  const auto bones = [](const std::vector<std::string>& names) {
+    std::vector<KeypointJoints> joints;
+    for (const std::string& name : names) joints.push_back({{smplx_joint(name), 1.0}});
+    return bones_of(joints);
+  };
+  CHECK(bones({"left_wrist", "left_shoulder"}) == std::vector<Bone>{{{0, 1.0}, {1, -1.0}}});  // over the elbow
+  CHECK(bones({"left_knee", "right_knee"}).empty());
+  CHECK(bones({"left_wrist", "left_index1"}).empty());  // fingers do not count
+  CHECK(bones({"left_hip", "right_hip", "left_shoulder", "right_shoulder"}).size() == 3);
+  std::vector<std::string> all(smplx_joint_names().begin(), smplx_joint_names().begin() + 22);
+  CHECK(bones(all).size() == 21 + 3);
+  CHECK(bones_of({{{1, 0.5}, {2, 0.5}}, {{4, 1.0}}}).empty());
+}
+
 TEST_CASE("COCO's results are of the frames that they name, and those of nobody need not be there") {
   const Workshop workshop;
   write("coco.json", Json::array({{{"image_id", 1}, {"keypoints", row_of(17, 4, 6, 0.75)}}}));

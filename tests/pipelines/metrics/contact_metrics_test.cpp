@@ -116,6 +116,20 @@ TEST_CASE("contact has the same bits for any number of threads") {
   for (const int threads : {2, 3, 8}) CHECK(values(threads) == expected);
 }
 
+TEST_CASE("the floor drifts by the lowest foot") {
+  std::vector<double> first(66, 1.0), up = first, one = first;
+  for (const char* name : {"left_ankle", "right_ankle", "left_foot", "right_foot"}) {
+    up[static_cast<std::size_t>(3 * smplx_joint(name) + 2)] = 1.03;
+    one[static_cast<std::size_t>(3 * smplx_joint(name) + 2)] = std::string(name) == "right_foot" ? 0.98 : 1.5;
+  }
+  const auto values = floor_drift_by_frame({first, up, one, first});
+  REQUIRE(values.size() == 4);
+  CHECK(values[0].empty());
+  CHECK(*find_metric(values[1], "floor_drift_mm") == Approx(30));
+  CHECK(*find_metric(values[2], "floor_drift_mm") == Approx(20));
+  CHECK(*find_metric(values[3], "floor_drift_mm") == 0);
+}
+
 TEST_CASE("sliding by frame is since the frame before, by the heights of frame 0") {
   std::vector<double> first(66, 0.0), second = first, third = first;
   for (const char* name : {"left_ankle", "right_ankle", "left_foot", "right_foot"}) {

@@ -7,6 +7,7 @@
 
 #include "core/camera.h"
 #include "core/check.h"
+#include "optim/metrics.h"
 
 namespace sequence_errors_test {
 
@@ -111,8 +112,11 @@ TEST_CASE("the errors of images leave out a foreground that is not there") {
   const MetricValues plain = image_errors(image, target);
   CHECK(plain.size() == 2);
   CHECK(value(plain, "psnr_db") == Approx(-10 * std::log10(0.25 / (3 * 256))));
-  CHECK(image_errors(image, target, &mask).size() == 2);
+  const MetricValues of_nothing = image_errors(image, target, &mask);
+  CHECK(of_nothing.size() == 3);
+  CHECK(value(of_nothing, "psnr_background_db") == value(plain, "psnr_db"));
   mask(0, 3, 3) = 1;
+  CHECK(value(image_errors(image, target, &mask), "psnr_background_db") == kLargestPsnrDb);
   CHECK(value(image_errors(image, target, &mask), "psnr_foreground_db") == Approx(-10 * std::log10(0.25 / 3)));
 }
 

@@ -25,6 +25,7 @@ RunSummary small_summary() {
                        {"copy_frame_0", {{"mpjpe_mm", 20.01}}, {}}};
   summary.start = {0.25, {{"objects", {{"previous", 3}, {"estimate", 0}, {"velocity", 4}}}}};
   summary.per_frame = {{1, {{"mpjpe_mm", 10}}}, {2, {{"mpjpe_mm", 30.1}}}};
+  summary.quality = {{"silhouette_iou", 0.75, 0.85, 0.7}, {"jitter", 3, 165, 330}};
   return summary;
 }
 
@@ -47,6 +48,12 @@ TEST_CASE("a summary reads back as it was written") {
   CHECK(back.baselines[0].per_frame.size() == 2);
   CHECK(*find_metric(back.per_frame[1].values, "mpjpe_mm") == 30.1);
   CHECK(find_metric(back.per_frame[1].values, "ssim") == nullptr);
+  REQUIRE(back.quality.size() == 2);
+  CHECK(back.quality[0].metric == "silhouette_iou");
+  CHECK(back.quality[0].value == 0.75);
+  CHECK(word_of(back.quality[0]) == "check");
+  CHECK(back.quality[1].check == 330);
+  CHECK_THAT(text, Contains("\"word\": \"check\""));
   CHECK_THAT(text, Contains("\"stage\": \"interaction\",\n      \"seconds\": 10,\n      \"iterations\": 600"));
 }
 
@@ -122,11 +129,30 @@ TEST_CASE("the table of errors has baselines, then stages, and marks the best") 
 }
 
 TEST_CASE("every metric of the contract is known") {
-  for (const char* name :
-       {"mpjpe_mm", "pa_mpjpe_mm", "world_mpjpe_mm", "world_mpjpe_image_mm", "world_mpjpe_depth_mm",
-        "root_translation_mm", "object_translation_cm", "object_rotation_deg", "camera_translation_cm",
-        "camera_rotation_deg", "psnr_db", "psnr_foreground_db", "ssim", "contact_share", "contact_distance_mm",
-        "penetration_share", "penetration_depth_mm", "foot_sliding_mm", "jitter"}) {
+  for (const char* name : {"mpjpe_mm",
+                           "pa_mpjpe_mm",
+                           "world_mpjpe_mm",
+                           "world_mpjpe_image_mm",
+                           "world_mpjpe_depth_mm",
+                           "root_translation_mm",
+                           "object_translation_cm",
+                           "object_rotation_deg",
+                           "camera_translation_cm",
+                           "camera_rotation_deg",
+                           "psnr_db",
+                           "psnr_foreground_db",
+                           "psnr_background_db",
+                           "ssim",
+                           "silhouette_iou",
+                           "keypoints_px",
+                           "keypoints_pck",
+                           "floor_drift_mm",
+                           "contact_share",
+                           "contact_distance_mm",
+                           "penetration_share",
+                           "penetration_depth_mm",
+                           "foot_sliding_mm",
+                           "jitter"}) {
     INFO(name);
     CHECK(find_metric_facts(name) != nullptr);
   }

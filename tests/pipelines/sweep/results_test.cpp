@@ -38,6 +38,23 @@ TEST_CASE("means are over seeds, of each seed over its clips") {
   CHECK(results.metrics.size() == 2);  // and the time
 }
 
+TEST_CASE("the share of quality gates that pass is a metric of a sweep") {
+  MadeSweep sweep;
+  sweep.finish(0, 10);
+  CHECK(find_metric(sweep.read().rows[0].values, "gates_passed") == nullptr);
+  sweep.here().write(RunPaths{sweep.paths().run(sweep.id(0))}.summary(), R"({"name": "x", "frames": 4, "seconds": 2,
+      "metrics": [{"stage": "s", "seconds": 1, "iterations": 5, "mpjpe_mm": 10}], "quality": {
+      "silhouette_iou": {"value": 0.9, "word": "pass", "pass": 0.85, "check": 0.7},
+      "foot_sliding_mm": {"value": 12, "word": "check", "pass": 10, "check": 25},
+      "a_gate_of_later": {"value": 12, "word": "fail", "pass": 10, "check": 11}}})");
+  const SweepResults results = sweep.read();
+  const double* const passed = find_metric(results.rows[0].values, "gates_passed");
+  REQUIRE(passed != nullptr);
+  CHECK(*passed == 0.5);
+  CHECK(mean_table(results).head.back().text == "time, s ↓");
+  CHECK(mean_table(results).head[mean_table(results).head.size() - 2].text == "quality gates ↑");
+}
+
 TEST_CASE("differences are between runs of the same clip and seed") {
   MadeSweep sweep;
   sweep.finish_all();

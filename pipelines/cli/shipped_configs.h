@@ -1,0 +1,12 @@
+// Configs that are part of the program, so that it runs from anywhere.
+#pragma once
+
+#include <map>
+#include <string>
+
+namespace hsi4d::cli {
+
+/// Texts of configs/ by name: those of `hsi4d demo` and `hsi4d init`, and what they extend.
+std::map<std::string, std::string> shipped_config_texts();
+
+}  // namespace hsi4d::cli

@@ -1,0 +1,141 @@
+// `hsi4d init` as a user runs it.
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "body/kinematics.h"
+#include "core/camera_file.h"
+#include "core/image_io.h"
+#include "tests/support/program.h"
+#include "tests/support/tiny_run.h"
+
+namespace init_command_test {
+
+using namespace hsi4d;
+using namespace hsi4d::test;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Writes what a perfect detector would find in the tiny dataset.
+void write_keypoints(const std::string& file) {
+  const Clip clip = read_clip(tiny_config().data);
+  nlohmann::json joints = nlohmann::json::array(), frames = nlohmann::json::array();
+  for (Index j = 0; j < 22; ++j) joints.push_back(smplx_joint_names()[static_cast<std::size_t>(j)]);
+  for (const SceneState& state : *clip.truth) {
+    const std::vector<double> places = pose_joints(clip.avatar.parents, clip.avatar.joints, state.body);
+    nlohmann::json frame = nlohmann::json::array();
+    for (Index j = 0; j < 22; ++j) {
+      const Vector3<double> at = state.camera_from_world.rotation * Vector3<double>(places.data() + 3 * j) +
+                                 state.camera_from_world.translation;
+      const Vector2<double> pixel = project_point(clip.camera, at);
+      frame.push_back({pixel[0], pixel[1], 1});
+    }
+    frames.push_back(frame);
+  }
+  std::ofstream(file) << nlohmann::json(
+      {{"format", "hsi4d keypoints"}, {"version", 1}, {"joints", joints}, {"frames", frames}});
+}
+
+struct Footage {
+  TemporaryFolder folder;
+  std::string frames = (TinyDataset::folder() / "frames").string(), masks = (TinyDataset::folder() / "masks").string(),
+              avatar = (TinyDataset::folder() / "avatar.safetensors").string();
+  Footage() { write_keypoints("keypoints.json"); }
+
+  ProgramResult init(std::vector<std::string> more) const {
+    std::vector<std::string> arguments = {"init",    frames, "--keypoints", "keypoints.json",
+                                          "--masks", masks,  "--avatar",    avatar};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_hsi4d(arguments);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("hsi4d init makes a dataset of a video without a scene, which runs") {
+  const Footage footage;
+  const Camera truth = read_camera((TinyDataset::folder() / "camera.json").string());
+  const ProgramResult init =
+      footage.init({"--focal-px", std::to_string(truth.fx), "--video-rate", "10", "--out", "clip"});
+  CAPTURE(init.err);
+  REQUIRE(init.status == 0);
+  CHECK_THAT(init.out, Contains("clip/config.json: the camera is ") && Contains("of the background"));
+  const Camera camera = read_camera("clip/camera.json");
+  CHECK(camera.width == kTinyPixels);
+  CHECK(camera.fx == Approx(truth.fx));
+  CHECK(camera_center_world(camera)[2] == Approx(camera_center_world(truth)[2]).margin(0.4));
+  const auto down = [](const Camera& c) { return std::asin(-c.camera_from_world.rotation(2, 2)); };
+  CHECK(down(camera) == Approx(down(truth)).margin(0.15));
+  CHECK(read_image("clip/plate.png").width() == kTinyPixels);
+  CHECK(json_of("clip/config.json")["data"]["frames"].get<std::string>().starts_with(".."));  // relative, to be moved
+
+  std::vector<std::string> run = {"run", "clip/config.json", "--out", "run", "--quiet"};
+  for (const char* const setting :
+       {"stages.fit_first_pose.iterations=80", "stages.fit_first_frame.iterations=2", "stages.pose.iterations=10",
+        "stages.pose.losses.keypoints_2d.weight=0.1", "stages.fit_first_pose.losses.keypoints_2d.weight=0.1",
+        "stages.interaction.iterations=2", "stages.refinement.iterations=2"})
+    run.insert(run.end(), {"--set", setting});
+  const ProgramResult result = run_hsi4d(run);
+  CAPTURE(result.err);
+  REQUIRE(result.status == 0);
+  CHECK_THAT(result.out, Contains("quality: "));
+  const nlohmann::json summary = json_of("run/summary.json");
+  CHECK(summary["quality"]["silhouette_iou"]["word"].is_string());
+  CHECK(summary["metrics"].back()["keypoints_pck"].get<double>() >
+        summary["baselines"]["start"]["keypoints_pck"].get<double>());
+  CHECK(file_text("run/report.html").find("<h2>Quality</h2>") != std::string::npos);
+}
+
+TEST_CASE("hsi4d init makes a person where none is given, and leaves out what it cannot use") {
+  const Footage footage;
+  const ProgramResult init =
+      run_hsi4d({"init", footage.frames, "--keypoints", "keypoints.json", "--masks", footage.masks, "--out", "clip"});
+  CAPTURE(init.err);
+  REQUIRE(init.status == 0);
+  CHECK(fs::exists("clip/avatar.safetensors"));
+  const nlohmann::json stages = json_of("clip/config.json")["stages"];
+  CHECK(stages.contains("camera") == (init.out.find(" it moves (") != std::string::npos));
+  CHECK_FALSE(stages["pose"]["losses"].contains("bone_directions"));  // without landmarks
+  CHECK(stages["pose"]["losses"].contains("keypoints_2d"));
+}
+
+TEST_CASE("hsi4d init takes a camera that is known") {
+  const Footage footage;
+  const std::string camera = (TinyDataset::folder() / "camera.json").string();
+  const ProgramResult init = footage.init({"--camera", camera, "--out", "clip"});
+  CAPTURE(init.err);
+  REQUIRE(init.status == 0);
+  CHECK(read_camera("clip/camera.json").camera_from_world.translation ==
+        read_camera(camera).camera_from_world.translation);
+}
+
+TEST_CASE("hsi4d init refuses what it cannot do, and leaves nothing") {
+  const Footage footage;
+  const auto error = [&](std::vector<std::string> more) {
+    more.insert(more.end(), {"--out", "clip"});
+    const ProgramResult run = footage.init(more);
+    CHECK(run.status == 2);
+    CHECK_FALSE(fs::exists("clip"));
+    return run.err;
+  };
+  CHECK_THAT(error({"--focal-px", "-3"}), Contains("hsi4d init: --focal-px: -3 is out of range; allowed: 1 to "));
+  CHECK_THAT(error({"--camera-height", "0"}), Contains("--camera-height: 0 is out of range"));
+  CHECK_THAT(error({"--longest-side-px", "8"}), Contains("--longest-side-px: 8 is out of range; allowed: 64 to 4096"));
+  CHECK_THAT(error({"--frame-rate", "-1"}), Contains("--frame-rate: -1"));
+  const std::string camera = (TinyDataset::folder() / "camera.json").string();
+  CHECK_THAT(error({"--camera", camera, "--focal-px", "500"}), Contains("leave out --focal-px"));
+  write_changed(camera, "other.json", [](auto& c) { c["width"] = 80; });
+  CHECK_THAT(error({"--camera", "other.json"}), Contains("the camera's image is 80x48"));
+  write_changed("keypoints.json", "keypoints.json", [](auto& k) {
+    for (auto& frame : k["frames"]) {
+      for (auto& point : frame) point[2] = 0.1;
+    }
+  });
+  CHECK_THAT(error({}), Contains("keypoints.json: no frame shows both ankles"));
+  write_changed("keypoints.json", "keypoints.json", [](auto& k) { k["frames"].erase(0); });
+  CHECK_THAT(error({}), Contains("holds 3 frames of keypoints, the video has 4 frames"));
+}
+
+}  // namespace init_command_test
