@@ -6,6 +6,7 @@ Exit status 77 (skipped) where the packages or Chromium are missing: tools/front
 """
 
 import json
+import os
 import pathlib
 import shutil
 import subprocess
@@ -18,8 +19,8 @@ if not (packages / "node_modules/@mediapipe/pose/pose.js").exists() or not shuti
     sys.exit(77)
 
 
-def run(*words, status=0):
-    result = subprocess.run([str(word) for word in words], capture_output=True, text=True)
+def run(*words, status=0, env=None):
+    result = subprocess.run([str(word) for word in words], capture_output=True, text=True, env=env)
     assert result.returncode == status, result.stdout + result.stderr
     return result.stdout + result.stderr
 
@@ -55,6 +56,12 @@ with tempfile.TemporaryDirectory() as name:
     last = [line for line in lines if line["stage"] == "interaction"][-1]["losses"]["keypoints_2d"]
     print(f"keypoints_2d at the end: {last:.1f} px^2")
     assert last < 8**2, last
+
+    environment = dict(os.environ, HSI4D=str(program))
+    all_of_it = [tools / "from_video", clip / "video.mp4", "--out", here / "all", "--packages", packages, "--longest-side-px", 256]
+    assert "quality: " in run(*all_of_it, env=environment)
+    assert (here / "all/run/report.html").exists() and (here / "all/clip/plate.png").exists()
+    assert "there is no such file" in run(tools / "from_video", here / "none.mp4", "--out", here / "x", status=1)
 
     assert "is there already" in run(*frontend, clip / "video.mp4", "--out", here / "found", status=1)
     assert "there is no such file" in run(*frontend, here / "none.mp4", "--out", here / "x", status=1)
