@@ -16,13 +16,13 @@ constexpr float kShortest = 1e-12F;  // m², so that a bone without length has a
 constexpr double kWeight = 0.1;
 
 struct BoneSettings {
-  double scale = 0.5;
+  double scale = 1;
   double min_confidence = 0.5;
 };
 
 void describe(ConfigFields& fields, BoneSettings& settings) {
   fields.number("scale", settings.scale, {.above = 0, .max = 2},
-                "Difference of two directions of length 1 far beyond which a bone no longer pulls; 0.5 is 29 degrees");
+                "Difference of two directions of length 1 far beyond which a bone no longer pulls; 1 is 60 degrees");
   fields.number("min_confidence", settings.min_confidence, {.min = 0, .max = 1},
                 "Confidence below which a bone does not count");
 }

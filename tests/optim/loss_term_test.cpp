@@ -162,11 +162,11 @@ TEST_CASE("bone_directions does not depend on lengths, and lets go of what point
     tape.forward(loss);
     return tape.value(loss).scalar();
   };
-  const double right_angle = 0.25 * 2 / (0.25 + 2);  // chord² 2, scale 0.5
+  const double right_angle = 2.0 / (1 + 2);  // chord² 2, scale 1
   CHECK(value_of({2, 0, 0}, {0, 1, 0, 1}) == Approx(right_angle));
   CHECK(value_of({0.01, 0, 0}, {0, 1, 0, 1}) == Approx(right_angle));
   CHECK(value_of({0, 3, 0}, {0, 1, 0, 1}) == Approx(0).margin(1e-12));
-  CHECK(value_of({0, -3, 0}, {0, 1, 0, 0.5}) == Approx(0.5 * 0.25 * 4 / 4.25));
+  CHECK(value_of({0, -3, 0}, {0, 1, 0, 0.5}) == Approx(0.5 * 4 / (1 + 4.0)));
   CHECK(value_of({2, 0, 0, 1, 1, 1}, {0, 1, 0, 1, 0, 0, 1, 0.2}) == Approx(right_angle / 2));  // the other is not sure
   CHECK(value_of({0, 0, 0}, {0, 1, 0, 1}) == Approx(right_angle));  // no direction: as one across
 }
