@@ -101,6 +101,21 @@ void paint(Tape<double>& tape, Var<double> sh, bool is_white) {
   }
 }
 
+/// Compares the loss's gradients with differences, of one group after the other, which then all move.
+void check_gradients(Tape<double>& tape, const FrameGraph<double>& graph, Var<double> loss,
+                     std::initializer_list<const char*> groups) {
+  for (const char* name : groups) {
+    INFO("group " << name);
+    for (const Var<double> block : group_named(graph, name).blocks) tape.unfreeze(block);
+    GradcheckOptions options;
+    options.tolerance = 1e-6;
+    options.each_node = false;
+    const GradcheckReport report = gradcheck(tape, loss, options);
+    INFO(report.text());
+    CHECK(report.ok());
+  }
+}
+
 }  // namespace
 
 TEST_CASE("gradients of terms over masks and motion are right for body and objects", "[frame_graph][release]") {
@@ -208,16 +223,7 @@ TEST_CASE("keypoints are where the camera sees the joints, with the gradients of
     CHECK(tape.value(inputs.keypoints_target)(k, 1) == Approx(found.y * kHeight));
     CHECK(tape.value(inputs.keypoints_target)(k, 2) == found.confidence);
   }
-  for (const char* name : {"camera", "transl", "global_orient", "body_pose"}) {
-    INFO("group " << name);
-    for (const Var<double> block : group_named(graph, name).blocks) tape.unfreeze(block);
-    GradcheckOptions options;
-    options.tolerance = 1e-6;
-    options.each_node = false;
-    const GradcheckReport report = gradcheck(tape, loss, options);
-    INFO(report.text());
-    CHECK(report.ok());
-  }
+  check_gradients(tape, graph, loss, {"camera", "transl", "global_orient", "body_pose"});
   settings.keypoints = false;
   Tape<double> other;
   const FrameGraph<double> without(other, clip, clip.first.camera_from_world, settings);
@@ -270,16 +276,7 @@ TEST_CASE("bones are in the camera's axes, with the gradients of differences", "
   CHECK(tape.value(inputs.bones_target)(1, 3) == 0.6);
   const Vector3<double> way = *keypoints.frames[1][2].landmark - *keypoints.frames[1][0].landmark;
   CHECK(tape.value(inputs.bones_target)(1, 0) == Approx(way.normalized()[0]));
-  for (const char* name : {"camera", "global_orient", "body_pose"}) {
-    INFO("group " << name);
-    for (const Var<double> block : group_named(graph, name).blocks) tape.unfreeze(block);
-    GradcheckOptions options;
-    options.tolerance = 1e-6;
-    options.each_node = false;
-    const GradcheckReport report = gradcheck(tape, loss, options);
-    INFO(report.text());
-    CHECK(report.ok());
-  }
+  check_gradients(tape, graph, loss, {"camera", "global_orient", "body_pose"});
 }
 
 TEST_CASE("an object is drawn to the hand as the hand is to it", "[frame_graph]") {
