@@ -77,10 +77,10 @@ Rigid<double> pose_of(double height, double pitch) {
   return look_at(eye, eye + Vector3<double>(0, std::cos(pitch), -std::sin(pitch)));
 }
 
-/// What an upright person's points say of a height and a pitch.
-class UprightPerson {
+/// What the points of somebody who stands or sits on the ground say of a camera.
+class PersonOnGround {
  public:
-  UprightPerson(const Keypoints& keypoints, const Avatar& avatar, const Camera& intrinsics)
+  PersonOnGround(const Keypoints& keypoints, const Avatar& avatar, const Camera& intrinsics)
       : camera_(intrinsics), heights_(pair_heights(avatar)), middles_(middles_of(keypoints, intrinsics)) {
     std::vector<std::size_t> telling;
     for (std::size_t t = 0; t < middles_.size(); ++t) {
@@ -143,9 +143,12 @@ class UprightPerson {
   /// Of the person's heights above the feet, standing to sitting on the ground, the one that fits best.
   Fit best_fit(std::size_t frame) const {
     const std::optional<Vector2<double>> at = place(frame);
+    double extent = 0;  // of the person, pixels
+    for (const auto& middle : middles_[frame])
+      extent = std::max(extent, middle && at ? (*middle - *middles_[frame][0]).norm() : 0);
     Fit best;
-    for (int step = 0; at && step <= kDrops; ++step) {
-      const Fit fit = fit_of(middles_[frame], *at, step * kDropStep);
+    for (int step = 0; extent > 0 && step <= kDrops; ++step) {
+      const Fit fit = fit_of(middles_[frame], extent, *at, step * kDropStep);
       if (fit.cost < best.cost) best = fit;
     }
     return best;
@@ -154,15 +157,13 @@ class UprightPerson {
   /// Mean over the points of a robust function of their distances from where they are expected, which are shares of the
   /// person's height in the image.
   /// @param drop  by which all above the knees is lower than of somebody upright
-  Fit fit_of(const Middles& middles, const Vector2<double>& at, double drop) const {
-    double extent = 0, sum = 0, agreeing = 0, count = 0;
-    for (const auto& middle : middles) extent = std::max(extent, middle ? (*middle - *middles[0]).norm() : 0);
+  Fit fit_of(const Middles& middles, double extent, const Vector2<double>& at, double drop) const {
+    double sum = 0, agreeing = 0, count = 0;
     for (std::size_t p = 1; p < kPairs.size(); ++p) {
       if (!middles[p]) continue;
       const Vector3<double> point(at[0], at[1], heights_[p] - (p >= kFirstAboveKnees ? drop : 0));
       const Vector3<double> seen = transform_point(camera_.camera_from_world, point);
-      const double error =
-          seen[2] > 0 && extent > 0 ? (project_point(camera_, seen) - *middles[p]).norm() / extent : kNowhere;
+      const double error = seen[2] > 0 ? (project_point(camera_, seen) - *middles[p]).norm() / extent : kNowhere;
       sum += error * error / (error * error + kKernel * kKernel);
       agreeing += error < kKernel ? 1 : 0;
       ++count;
@@ -181,7 +182,7 @@ struct HeightAndPitch {
 };
 
 /// The least cost of a grid.
-HeightAndPitch best_of_grid(UprightPerson& person, std::optional<double> known) {
+HeightAndPitch best_of_grid(PersonOnGround& person, std::optional<double> known) {
   constexpr double kLowest = 0.2, kHeightStep = 0.1;                // metres
   constexpr int kHeights = 59, kLeastPitch = -40, kMostPitch = 80;  // degrees
   HeightAndPitch best{};
@@ -200,7 +201,7 @@ HeightAndPitch best_of_grid(UprightPerson& person, std::optional<double> known) 
 }
 
 /// Goes down in steps that halve when none of them helps.
-HeightAndPitch refined(UprightPerson& person, HeightAndPitch at, bool is_height_known) {
+HeightAndPitch refined(PersonOnGround& person, HeightAndPitch at, bool is_height_known) {
   double least = person.cost(at.height, at.pitch);
   for (double step = 0.1; step > 1e-5;) {
     const HeightAndPitch before = at;
@@ -221,13 +222,14 @@ HeightAndPitch refined(UprightPerson& person, HeightAndPitch at, bool is_height_
   return at;
 }
 
-UprightPerson upright_person(const Keypoints& keypoints, const Avatar& avatar, const Camera& camera,
-                             const std::string& file) {
-  UprightPerson person(keypoints, avatar, camera);
+PersonOnGround person_on_ground(const Keypoints& keypoints, const Avatar& avatar, const Camera& camera,
+                                const std::string& file) {
+  PersonOnGround person(keypoints, avatar, camera);
   if (person.is_seen()) return person;
   throw DataError(file +
                   ": no frame shows both ankles and two other pairs of knees, hips, shoulders and eyes with a "
-                  "confidence of at least 0.5; without them nothing tells where the ground is");
+                  "confidence of at least " +
+                  number_text(kFoundConfidence) + "; without them nothing tells where the ground is");
 }
 
 }  // namespace
@@ -236,7 +238,7 @@ double usual_focal_length(int width, int height) { return std::hypot(width, heig
 
 PersonCamera camera_of_person(const Keypoints& keypoints, const Avatar& avatar, const Camera& intrinsics,
                               std::optional<double> height, const std::string& file) {
-  UprightPerson person = upright_person(keypoints, avatar, intrinsics, file);
+  PersonOnGround person = person_on_ground(keypoints, avatar, intrinsics, file);
   const HeightAndPitch found = refined(person, best_of_grid(person, height), height.has_value());
   person.set_pose(pose_of(found.height, found.pitch));
   return person.result();
@@ -244,7 +246,7 @@ PersonCamera camera_of_person(const Keypoints& keypoints, const Avatar& avatar, 
 
 PersonCamera placed_person(const Keypoints& keypoints, const Avatar& avatar, const Camera& camera,
                            const std::string& file) {
-  return upright_person(keypoints, avatar, camera, file).result();
+  return person_on_ground(keypoints, avatar, camera, file).result();
 }
 
 }  // namespace hsi4d
