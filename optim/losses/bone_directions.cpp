@@ -5,6 +5,7 @@
 #include "autodiff/map.h"
 #include "autodiff/matrix.h"
 #include "optim/losses/list.h"
+#include "optim/losses/robust.h"
 
 namespace hsi4d {
 
@@ -44,7 +45,7 @@ LossTerm bone_directions_loss() {
                 [limit, least](auto x, auto y, auto z, auto to_x, auto to_y, auto to_z, auto confidence) {
                   const auto length = sqrt(square(x) + square(y) + square(z) + kShortest);
                   const auto squared = 2.0F - 2.0F * (x * to_x + y * to_y + z * to_z) / length;
-                  return select(value_of(confidence) >= least, confidence * (limit * squared / (limit + squared)),
+                  return select(value_of(confidence) >= least, confidence * geman_mcclure(squared, limit),
                                 confidence * 0.0F);
                 });
             return total * (1 / static_cast<double>(b.shape().rows));

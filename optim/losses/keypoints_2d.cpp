@@ -5,6 +5,7 @@
 #include "autodiff/map.h"
 #include "autodiff/matrix.h"
 #include "optim/losses/list.h"
+#include "optim/losses/robust.h"
 
 namespace hsi4d {
 
@@ -39,7 +40,7 @@ template <class T>
 T kernel_of(T squared, Kernel kernel, float scale) {
   const float limit = scale * scale;
   if (kernel == Kernel::kSquared) return squared;
-  if (kernel == Kernel::kGemanMcClure) return limit * squared / (limit + squared);
+  if (kernel == Kernel::kGemanMcClure) return geman_mcclure(squared, limit);
   const T far = max(squared, limit);  // at least the limit: the root has a slope
   return select(value_of(squared) <= static_cast<std::decay_t<decltype(value_of(squared))>>(limit), squared,
                 2.0F * scale * sqrt(far) - limit);
