@@ -58,8 +58,11 @@ RunProgress random_progress(const Clip& clip) {
   progress.after_stage[1][1].body.axis_angle[7] = -0.0;
   progress.after_stage[1][1].body.axis_angle[8] = 5e-324;
   progress.totals = {{30, 1, 0.1, 9, 2065, 67984}, {150, 0, 1.0 / 3, 10, 3000, 80000}};
-  progress.image_errors.push_back({{"psnr_db", 30.123456789012345}, {"psnr_foreground_db", 20.5}, {"psnr_background_db", 31},
-                                   {"ssim", 0.9}, {"silhouette_iou", 0.875}});
+  progress.image_errors.push_back({{"psnr_db", 30.123456789012345},
+                                   {"psnr_foreground_db", 20.5},
+                                   {"psnr_background_db", 31},
+                                   {"ssim", 0.9},
+                                   {"silhouette_iou", 0.875}});
   progress.start_errors.push_back({{"psnr_db", 18.5}, {"ssim", 0.25}});
   progress.inputs = "cbf29ce484222325 /data/scene\n- masks/human/0001.png\n";
   progress.covered(0, 3, 4) = 1;
