@@ -24,6 +24,7 @@ enum class LossInput {
   kHumanOpacity,   ///< human_opacity, human_mask, human_seen; likewise
   kKeypoints,      ///< keypoints, keypoints_target: where data.keypoints is given; likewise
   kBones,          ///< bones, bones_target: where data.keypoints has landmarks; likewise
+  kUnknowns,       ///< unknowns: in a stage over the first frame that moves some
   kPose,           ///< body_rotations
   kMotion,         ///< joints, joints_start, motion, body_points
   kObjectMotion,   ///< object_points, and motion with objects

@@ -17,6 +17,8 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(keypoints) && given(keypoints_target);
     case LossInput::kBones:
       return given(bones) && given(bones_target);
+    case LossInput::kUnknowns:
+      return given(unknowns);
     case LossInput::kPose:
       return given(body_rotations);
     case LossInput::kMotion:

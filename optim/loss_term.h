@@ -61,6 +61,8 @@ struct LossInputs {
                  ///< kBones, as the next one
   Var<S> bones_target;  ///< [B,4] the directions that a detector found, of length 1, and its confidence, 0 to 1
 
+  Var<S> unknowns;  ///< [1,K] what the stage looks for of the clip: logarithms of factors, metres, betas; 0: as given
+
   /// The body over the F frames that the stage sees: those before, which stand still, and those that it moves. A stage
   /// of one frame sees up to three before it, one of the whole sequence frame 0.
   Var<S> body_rotations;  ///< [21M,9] rotation matrices, by rows, of joints 1 to 21 relative to their parents in the M
@@ -98,6 +100,7 @@ LossInputs<S> only_declared(LossInputs<S> inputs, const std::vector<LossInput>& 
   if (lacks(LossInput::kHumanOpacity)) inputs.human_opacity = {};
   if (lacks(LossInput::kKeypoints)) inputs.keypoints = inputs.keypoints_target = {};
   if (lacks(LossInput::kBones)) inputs.bones = inputs.bones_target = {};
+  if (lacks(LossInput::kUnknowns)) inputs.unknowns = {};
   if (lacks(LossInput::kDepths)) inputs.depth_moments = inputs.transmittance = inputs.depth_target = {};
   if (lacks(LossInput::kGaussians)) inputs.gaussian_opacities = inputs.gaussian_log_scales = {};
   return inputs;

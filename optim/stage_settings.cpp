@@ -39,6 +39,8 @@ const char* words_of(LossInput need) {
       return "depths of pictures";
     case LossInput::kGaussians:
       return "Gaussians that are made";
+    case LossInput::kUnknowns:
+      return "a group of the clip, such as focal_length";
     case LossInput::kPose:
     case LossInput::kMotion:
     case LossInput::kObjectMotion:

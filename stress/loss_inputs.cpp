@@ -135,6 +135,7 @@ LossLeaves<S> loss_leaves(Tape<S>& tape) {
   in.keypoints_target = leaf("keypoints_target", shape_of(3, 3), {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8});
   in.bones = leaf("bones", shape_of(3, 3), {0.1, -0.3, 0.05, 0, 0.4, 0.2, -0.3, 0, 0.1});
   in.bones_target = leaf("bones_target", shape_of(3, 4), {0, -1, 0, 1, 0, 0.6, 0.8, 0.7, 1, 0, 0, 0.9});
+  in.unknowns = leaf("unknowns", shape_of(1, 3), -0.2, 0.2);
   in.body_rotations = leaf("body_rotations", shape_of(21, 9), some_pose());
   in.joints = leaf("joints", shape_of(kLossFrames, 66), -1, 1);
   in.joints_start = leaf("joints_start", shape_of(kLossFrames, 66), -1, 1);

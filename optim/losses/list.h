@@ -22,6 +22,7 @@
   HSI4D_LOSS(penetration)      \
   HSI4D_LOSS(joint_limits)     \
   HSI4D_LOSS(pose_prior)       \
+  HSI4D_LOSS(unknowns_prior)   \
   HSI4D_LOSS(gaussian_opacity) \
   HSI4D_LOSS(gaussian_scale)   \
   HSI4D_LOSS(depth_spread)

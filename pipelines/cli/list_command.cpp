@@ -45,6 +45,10 @@ std::string list_stages() {
         table.rows.push_back({over, draw.name, group, state_group_summary(group)});
     }
   }
+  for (const ConfigChoice<Draw>& draw : kDraws) {
+    for (const std::string& group : unknown_group_names(draw.value))
+      table.rows.push_back({"first_frame", draw.name, group, state_group_summary(group)});
+  }
   for (const std::string& group : sequence_group_names())
     table.rows.push_back({"sequence", "", group, sequence_group_summary(group)});
   return table_text(table);

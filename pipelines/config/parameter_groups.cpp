@@ -18,6 +18,19 @@ std::vector<std::string> state_group_names(Draw draw) {
   return names;
 }
 
+std::vector<std::string> unknown_group_names(Draw draw) {
+  if (draw == Draw::kScene) return {kFocalGroup};
+  return {kFocalGroup, kObjectScaleGroup, kSceneScaleGroup, kSceneHeightGroup, kBetasGroup};
+}
+
+std::vector<std::string> unknown_groups_of(const StageSettings& stage) {
+  std::vector<std::string> names;
+  for (const std::string& name : unknown_group_names(stage.draw)) {
+    if (find_entry(stage.optimize, name) != nullptr) names.push_back(name);
+  }
+  return names;
+}
+
 std::string state_group_summary(const std::string& name) {
   if (name == "camera") return "Six numbers of the camera, translation and rotation";
   if (name == "object_orient") return "Rotations of the objects";
@@ -25,6 +38,12 @@ std::string state_group_summary(const std::string& name) {
   if (name == "transl") return "Place of the body";
   if (name == kColorNetGroup) return "Weights of the network that colours the human, which all frames share";
   if (name == kFeaturesGroup) return "That network's features of each Gaussian, which all frames share";
+  if (name == kFocalGroup) return "Logarithm of the factor of the focal length";
+  if (name == kObjectScaleGroup) return "Logarithms of the factors of the objects' sizes";
+  if (name == kSceneScaleGroup)
+    return "Logarithm of the factor of the scene, with its camera, about the world's origin";
+  if (name == kSceneHeightGroup) return "Metres by which the scene, with its camera, rises";
+  if (name == kBetasGroup) return "What is added to the betas of the avatar's body, `body`";
   for (const JointGroup& joints : kJointGroups) {
     if (name == joints.name) return joints.summary;
   }

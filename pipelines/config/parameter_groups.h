@@ -39,7 +39,20 @@ std::vector<std::string> parameter_group_names(Draw draw);
 /// Those of them that a stage may move: what read_state brings back. The Gaussians' own numbers and the background are
 /// groups for gradient checks.
 std::vector<std::string> state_group_names(Draw draw);
-/// One of them in words: "Place of the body". Throws InternalError for another name.
+/// Groups of what the files of a clip do not know: one number, or one an object, or the betas, for all frames. Stages
+/// over the first frame alone may move them.
+inline constexpr const char* kFocalGroup = "focal_length";
+inline constexpr const char* kObjectScaleGroup = "object_scale";
+inline constexpr const char* kSceneScaleGroup = "scene_scale";
+inline constexpr const char* kSceneHeightGroup = "scene_height";
+inline constexpr const char* kBetasGroup = "betas";
+
+/// Their names, by what the stage draws.
+std::vector<std::string> unknown_group_names(Draw draw);
+/// Those of them that a stage moves.
+std::vector<std::string> unknown_groups_of(const StageSettings& stage);
+
+/// A group of the state, or an unknown one, in words: "Place of the body". Throws InternalError for another name.
 std::string state_group_summary(const std::string& name);
 
 /// Names of the groups that a stage over the sequence may move.

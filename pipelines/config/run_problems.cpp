@@ -16,13 +16,21 @@ namespace {
 
 void add_group_problems(const StageSettings& stage, const std::string& in, std::vector<RunProblem>& found) {
   const std::string where = in + "/optimize";
-  const bool is_of_frame = stage.over != StageScope::kSequence;
-  const std::vector<std::string> known = is_of_frame ? state_group_names(stage.draw) : sequence_group_names();
+  const std::vector<std::string> unknowns = unknown_group_names(stage.draw);
+  std::vector<std::string> known =
+      stage.over == StageScope::kSequence ? sequence_group_names() : state_group_names(stage.draw);
+  if (stage.over == StageScope::kFirst) known.insert(known.end(), unknowns.begin(), unknowns.end());
   if (stage.optimize.empty())
     found.push_back({where, "no parameter group is named; known here: " + joined(known), {where}, true});
   for (const auto& [name, group] : stage.optimize) {
     const std::string place = child_pointer(where, name), hint = did_you_mean(name, known);
-    if (std::find(known.begin(), known.end(), name) == known.end())
+    const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
+    if (!is_known && std::find(unknowns.begin(), unknowns.end(), name) != unknowns.end())
+      found.push_back({place,
+                       "is one for the whole clip, which a stage over the first frame finds; allowed: \"over\": "
+                       "\"first_frame\"",
+                       {in + "/over"}});
+    else if (!is_known)
       found.push_back({place,
                        "there is no such parameter group" + (hint.empty() ? "; known here: " + joined(known) : hint),
                        {in + "/draw", in + "/over"}});
@@ -351,6 +359,24 @@ void throw_if_any(const std::vector<RunProblem>& found) {
   throw UserError(text);
 }
 
+/// What is found of a clip holds for that clip, and for what moves with its scene.
+void add_unknown_problems(const RunConfig& config, std::vector<RunProblem>& found) {
+  for (const auto& [name, stage] : config.stages) {
+    for (const std::string& group : unknown_groups_of(stage)) {
+      const std::string place = child_pointer(child_pointer("/stages", name) + "/optimize", group);
+      if (!config.chain.empty())
+        found.push_back({place,
+                         "the clips of a chain share what this group finds; find it in a run of the first clip, and "
+                         "give it in `data`",
+                         {place, "/chain"}});
+      if ((group == kSceneScaleGroup || group == kSceneHeightGroup) && !config.data.surface.empty())
+        found.push_back({place,
+                         "the mesh of /data/surface does not move with the scene; leave one of the two out",
+                         {place, "/data/surface"}});
+    }
+  }
+}
+
 /// What compares with frame 0 as it is given.
 void add_given_frame_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   for (const auto& [name, stage] : config.stages) {
@@ -359,10 +385,12 @@ void add_given_frame_problems(const RunConfig& config, std::vector<RunProblem>& 
         " frame 0 as it is given, which stage " + json_string(name) + " has yet to find; allowed: ";
     if (config.estimate_blur)
       found.push_back({"/render/blur", "\"estimate\" looks at" + given + "a number", {"/render/blur", "/stages"}});
-    if (config.remove_depth_bias)
+    const std::size_t unknowns = unknown_groups_of(stage).size();
+    if (config.remove_depth_bias && stage.optimize.size() > unknowns) {
       found.push_back(
           {"/remove_depth_bias", "the bias is that of" + given + "false", {"/remove_depth_bias", "/stages"}});
-    return;
+      return;
+    }
   }
 }
 
@@ -380,6 +408,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   }
   add_order_problems(config.stages, found);
   add_start_problems(config, found);
+  add_unknown_problems(config, found);
   add_given_frame_problems(config, found);
   add_keypoint_problems(config, found);
   if (!config.chain.empty()) {

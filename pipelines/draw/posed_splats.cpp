@@ -62,11 +62,17 @@ template <class S>
 SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<S> transl, Var<S> xi,
                             const SplatView& view) {
   const Var<S> transform = rigid_rows(rotation, transl);
+  return moved_splats(object, transform, transform, xi, view);
+}
+
+template <class S>
+SplatInputs<S> moved_splats(const GaussianVars<S>& object, Var<S> transform, Var<S> turn, Var<S> xi,
+                            const SplatView& view) {
   const Index rows = object.means.shape().rows;
   const SkinnedFrames<S> posed = skin_frames(weights_of_one_joint<S>(rows), transform, object.means,
                                              gaussian_axes(object.quats, object.log_scales));
   return {posed.points, posed.frames, gaussian_opacities(object.opacity_logits),
-          sh_colors(object.colors, posed.points, xi, view, transform)};
+          sh_colors(object.colors, posed.points, xi, view, turn)};
 }
 
 template <class S>
@@ -96,6 +102,7 @@ SplatInputs<S> stacked_splats(const std::vector<SplatInputs<S>>& parts) {
 #define HSI4D_INSTANTIATE(S)                                                                                     \
   template SplatInputs<S> standing_splats(const GaussianVars<S>&, Var<S>, const SplatView&);                     \
   template SplatInputs<S> rigid_splats(const GaussianVars<S>&, Var<S>, Var<S>, Var<S>, const SplatView&);        \
+  template SplatInputs<S> moved_splats(const GaussianVars<S>&, Var<S>, Var<S>, Var<S>, const SplatView&);        \
   template Var<S> rigid_rows(Var<S>, Var<S>);                                                                    \
   template SplatInputs<S> skinned_splats(const GaussianVars<S>&, Var<S>, const PosedSkeleton<S>&, const Avatar&, \
                                          const HumanColors<S>*);                                                 \

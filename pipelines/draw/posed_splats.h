@@ -34,6 +34,13 @@ template <class S>
 SplatInputs<S> rigid_splats(const GaussianVars<S>& object, Var<S> rotation, Var<S> transl, Var<S> xi,
                             const SplatView& view);
 
+/// The same, by the rows of a transform [1,12] that may scale too.
+/// @param turn  [1,12] without the scale: harmonics turn by its linear part
+/// Adjoint: all numbers, both transforms, xi.
+template <class S>
+SplatInputs<S> moved_splats(const GaussianVars<S>& object, Var<S> transform, Var<S> turn, Var<S> xi,
+                            const SplatView& view);
+
 /// [1,12], the rows of [R | t], of rotation [1,9] and translation [1,3]. Adjoint: both.
 template <class S>
 Var<S> rigid_rows(Var<S> rotation, Var<S> translation);

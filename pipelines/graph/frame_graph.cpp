@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "autodiff/elementwise.h"
 #include "autodiff/matrix.h"
 #include "autodiff/reduce.h"
 #include "autodiff/rotations.h"
+#include "body/blend_shapes.h"
 #include "core/check.h"
 #include "core/rotation.h"
 #include "core/rotation_6d.h"
@@ -22,6 +24,8 @@ namespace hsi4d {
 namespace {
 
 constexpr Index kJoints = kSmplxJoints;
+constexpr Index kHeightOfPoint = 2, kHeightOfTransform = 11;  // columns of z in a row x y z, and in one of [R | t]
+
 /// What of the scene the camera may see that moves no further than settings.camera_reach; one Gaussian where that is
 /// nothing.
 Gaussians seen_scene(const Gaussians& scene, const SplatView& view, const Matrix6<double>& xi_from_update,
@@ -66,15 +70,17 @@ FrameGraph<S>::FrameGraph(Tape<S>& tape, const Clip& clip, const Rigid<double>& 
     write_numbers(tape_, map, transposed.data());
     xi_ = matmul(camera_update_, map);
   }
+  record_unknowns();
   const Vector3<float> background = settings.background.cast<float>();
   background_ = leaf("background", "background", 1, 3, background.data());
-  const bool is_part_seen = settings.camera_reach && settings.skip.unseen_gaussians;
+  const bool is_part_seen = settings.camera_reach && settings.skip.unseen_gaussians && intrinsics_.tape == nullptr;
   std::vector<Part> parts = {is_part_seen ? record_scene(seen_scene(clip.scene, view_, xi_from_update_, settings))
                                           : record_scene(clip.scene)};
   if (settings_.draw == Draw::kAll) {
     record_moving(parts);
   }
   record_render(parts, 1);
+  give_unknowns();
   for (const std::string& name : parameter_group_names(settings_.draw)) {  // without objects some have no leaves
     const auto known = [&name](const ParameterGroup<S>& group) { return group.name == name; };
     if (std::none_of(groups_.begin(), groups_.end(), known)) groups_.push_back({name, {}});
@@ -127,6 +133,64 @@ GaussianVars<S> FrameGraph<S>::gaussian_leaves(const std::string& part, const st
 }
 
 template <class S>
+bool FrameGraph<S>::is_unknown(const char* group) const {
+  return std::find(settings_.unknowns.begin(), settings_.unknowns.end(), group) != settings_.unknowns.end();
+}
+
+template <class S>
+void FrameGraph<S>::record_unknowns() {
+  const auto number = [this](const char* group) {
+    return is_unknown(group) ? leaf(group, group, 1, 1, nullptr) : Var<S>{};
+  };
+  unknown_.focal_length = number(kFocalGroup);
+  unknown_.scene_scale = number(kSceneScaleGroup);
+  unknown_.scene_height = number(kSceneHeightGroup);
+  if (is_unknown(kBetasGroup)) {
+    HSI4D_CHECK(clip_.shape.has_value(), "betas are a group of a clip whose avatar has a shape");
+    unknown_.betas = leaf(kBetasGroup, kBetasGroup, 1, clip_.shape->betas, nullptr);
+  }
+  intrinsics_ = intrinsics();
+}
+
+template <class S>
+void FrameGraph<S>::give_unknowns() {
+  std::vector<Var<S>> leaves;
+  for (const ParameterGroup<S>& group : groups_) {
+    if (is_unknown(group.name.c_str())) leaves.insert(leaves.end(), group.blocks.begin(), group.blocks.end());
+  }
+  if (!leaves.empty()) inputs_.unknowns = leaves.size() == 1 ? leaves.front() : concat_cols<S>(leaves);
+}
+
+/// fx and fy times their factor.
+template <class S>
+Var<S> FrameGraph<S>::intrinsics() const {
+  if (unknown_.focal_length.tape == nullptr) return {};
+  const Var<S> focal = tape_.constant("focal_px", shape_of(1, 2)), center = tape_.constant("center_px", shape_of(1, 2));
+  write_numbers(tape_, focal, std::array{view_.camera.fx, view_.camera.fy}.data());
+  write_numbers(tape_, center, std::array{view_.camera.cx, view_.camera.cy}.data());
+  return concat_cols<S>(std::array{focal * exp(unknown_.focal_length), center});
+}
+
+/// [1,1] e⁻ˢ, by which what moves is scaled where it is drawn; empty where that is 1.
+template <class S>
+Var<S> FrameGraph<S>::drawn_size() const {
+  return unknown_.scene_scale.tape == nullptr ? Var<S>{} : exp(-unknown_.scene_scale);
+}
+
+/// Rows of the world's coordinates in the scene's units, see UnknownVars.
+/// @param height_column  of z, if a row is a point or [R | t]
+template <class S>
+Var<S> FrameGraph<S>::in_scene(Var<S> points, Index height_column) const {
+  if (unknown_.scene_height.tape != nullptr) {
+    const Var<S> up = tape_.constant("up", shape_of(1, points.shape().cols));
+    tape_.write(up)(0, height_column) = 1;
+    points = points - up * unknown_.scene_height;
+  }
+  const Var<S> size = drawn_size();
+  return size.tape == nullptr ? points : points * size;
+}
+
+template <class S>
 typename FrameGraph<S>::Part FrameGraph<S>::record_scene(const Gaussians& scene) {
   const SplatInputs<S> splats = standing_splats(gaussian_leaves("scene", "scene", scene), xi_, view_);
   hold_colors(splats.colors, {"scene_sh"});
@@ -149,9 +213,16 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_object(const ClipObject& obje
   const GaussianVars<S> vars = gaussian_leaves("object", object.name, object.gaussians);
   const Var<S> orient = rotation_leaf("object_orient", object.name + " orient", 1);
   const Var<S> transl = leaf("object_transl", object.name + " transl", 1, 3, nullptr);
-  const Var<S> rotation = record_rotations(orient);
+  Var<S> rotation = record_rotations(orient);
+  const Var<S> turn = rigid_rows(rotation, transl);
+  Var<S> transform = turn;
+  if (is_unknown(kObjectScaleGroup)) {
+    unknown_.object_scale.push_back(leaf(kObjectScaleGroup, object.name + " scale", 1, 1, nullptr));
+    rotation = rotation * exp(unknown_.object_scale.back());
+    transform = rigid_rows(rotation, transl);
+  }
   objects_.push_back({orient, transl, rotation});
-  const SplatInputs<S> splats = rigid_splats(vars, rotation, transl, xi_, view_);
+  const SplatInputs<S> splats = moved_splats(vars, in_scene(transform, kHeightOfTransform), turn, xi_, view_);
   hold_colors(splats.colors, {"object_sh"});
   return {splats, object.gaussians.count()};
 }
@@ -171,14 +242,31 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
   }
   transl_ = leaf("transl", "transl", 1, 3, nullptr);
   rotations_ = record_rotations(concat_rows<S>(joint_rotations_));
-  skeleton_ = kinematic_chain(rotations_, transl_, avatar.parents, avatar.joints);
-  if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations_, skeleton_, avatar), n};
+  skeleton_ = record_skeleton(avatar);
+  if (rest_offsets_.tape != nullptr) vars.means = vars.means + rest_offsets_;
+  const PosedSkeleton<S> drawn = {in_scene(skeleton_.transforms, kHeightOfTransform), skeleton_.joints};
+  if (settings_.color_net == nullptr) return {skinned_splats(vars, rotations_, drawn, avatar), n};
   const HumanColors<S> colors =
       record_color_net(settings_.seen ? selected(*settings_.color_net, settings_.seen->human) : *settings_.color_net);
   HSI4D_CHECK_EQ(colors.net.features.shape().rows, n);
-  const SplatInputs<S> splats = skinned_splats(vars, rotations_, skeleton_, avatar, &colors);
+  const SplatInputs<S> splats = skinned_splats(vars, rotations_, drawn, avatar, &colors);
   hold_colors(splats.colors, {kColorNetGroup, kFeaturesGroup});
   return {splats, n};
+}
+
+/// The skeleton, and how betas that are looked for move means and joints in the rest pose.
+template <class S>
+PosedSkeleton<S> FrameGraph<S>::record_skeleton(const Avatar& avatar) {
+  if (unknown_.betas.tape == nullptr) return kinematic_chain(rotations_, transl_, avatar.parents, avatar.joints);
+  const auto moved = [this](const std::vector<double>& rest, const std::vector<double>& directions) {
+    const Index betas = clip_.shape->betas;
+    return blend_shapes<S>(
+        rest,
+        std::array{BlendTerm<S>{Directions<S>({directions, std::ssize(rest) / 3, betas, {0}, betas}), unknown_.betas}});
+  };
+  HSI4D_CHECK_EQ(avatar.count(), clip_.avatar.count());
+  rest_offsets_ = moved(std::vector<double>(avatar.means.size()), clip_.shape->means);
+  return kinematic_chain(rotations_, transl_, avatar.parents, moved(avatar.joints, clip_.shape->joints));
 }
 
 /// Colours that are computed anew only where one of the groups moves, if that is wanted.
@@ -256,10 +344,10 @@ void FrameGraph<S>::record_object_masks() {
 /// The scene is the first part; it stands still while the camera does.
 template <class S>
 Rendered<S> FrameGraph<S>::render_parts(const std::vector<Part>& parts, const RenderRequest& request) const {
-  if (parts.size() == 1) return render(parts.front().splats, xi_, background_, view_, request);
+  if (parts.size() == 1) return render(parts.front().splats, xi_, background_, view_, request, intrinsics_);
   std::vector<SplatInputs<S>> moving;
   for (std::size_t p = 1; p < parts.size(); ++p) moving.push_back(parts[p].splats);
-  return render(parts.front().splats, stacked_splats(moving), xi_, background_, view_, request);
+  return render(parts.front().splats, stacked_splats(moving), xi_, background_, view_, request, intrinsics_);
 }
 
 template <class S>
@@ -268,7 +356,7 @@ void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<Scene
   std::vector<Var<S>> transforms;
   for (const Object& object : objects_) transforms.push_back(rigid_rows(object.rotation, object.transl));
   const Var<S> objects = transforms.empty() ? Var<S>{} : concat_rows<S>(transforms);
-  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects}, clip_, first, frames, inputs_);
+  hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects, rest_offsets_}, clip_, first, frames, inputs_);
 }
 
 template <class S>
@@ -281,6 +369,7 @@ void FrameGraph<S>::record_object_depths(const std::vector<Part>& parts, std::si
     row += parts[p].count;
   }
   inputs_.object_depth = concat_rows<S>(depths);
+  if (unknown_.scene_scale.tape != nullptr) inputs_.object_depth = inputs_.object_depth * exp(unknown_.scene_scale);
   inputs_.object_depth_target = tape_.constant("object_depth_target", shape_of(count, 1));
 }
 
@@ -291,7 +380,7 @@ Var<S> FrameGraph<S>::places_in_image(Var<S> points) const {
   for (Index i = 0; i < points.shape().rows; ++i) {  // without extent they would not be drawn, and have no gradient
     for (const Index diagonal : {0, 4, 8}) tape_.write(axes)(i, diagonal) = 1;
   }
-  return project(points, axes, xi_, view_).means_px;
+  return project(in_scene(points, kHeightOfPoint), axes, xi_, view_, intrinsics_).means_px;
 }
 
 /// A pose's translation is where the object's centroid is.
@@ -366,6 +455,10 @@ template <class S>
 void FrameGraph<S>::set_state(const SceneState& state) {
   const std::array<double, 6> no_update{};
   write_numbers(tape_, camera_update_, no_update.data());
+  for (const ParameterGroup<S>& group : groups_) {
+    const bool is_unknown_one = is_unknown(group.name.c_str());
+    for (std::size_t b = 0; is_unknown_one && b < group.blocks.size(); ++b) fill(group.blocks[b], S(0));
+  }
   if (settings_.draw == Draw::kScene) return;
   HSI4D_CHECK_EQ(state.objects.size(), objects_.size());
   for (std::size_t o = 0; o < objects_.size(); ++o) {
@@ -402,6 +495,22 @@ void FrameGraph<S>::read_state(const ConfigMap<ParameterGroupSettings>& moved, S
       std::copy_n(axis_angle.data(), 3, state.body.axis_angle.data() + 3 * (kJointGroups[g].first + j));
     }
   }
+}
+
+template <class S>
+ClipUnknowns FrameGraph<S>::unknowns() const {
+  const auto number = [this](Var<S> leaf) {
+    return leaf.tape == nullptr ? 0.0 : static_cast<double>(tape_.value(leaf).data[0]);
+  };
+  ClipUnknowns found;
+  found.focal_length = std::exp(number(unknown_.focal_length));
+  found.scene_scale = std::exp(number(unknown_.scene_scale));
+  found.scene_height = number(unknown_.scene_height);
+  for (const Var<S> scale : unknown_.object_scale) found.object_scales.push_back(std::exp(number(scale)));
+  if (unknown_.betas.tape == nullptr) return found;
+  const ConstArray<S> betas = tape_.value(unknown_.betas);
+  found.betas.assign(betas.data, betas.data + betas.shape.count());
+  return found;
 }
 
 template <class S>

@@ -20,6 +20,7 @@
 #include "pipelines/draw/posed_splats.h"
 #include "pipelines/draw/seen_rows.h"
 #include "pipelines/input/clip.h"
+#include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/state.h"
 #include "splat/render/render.h"
 
@@ -40,12 +41,26 @@ struct FrameGraphSettings {
   bool object_opacity = false;          ///< likewise of the objects, a channel each
   bool keypoints = false;               ///< the losses read the clip's keypoints
   bool bones = false;                   ///< the losses read directions of bones, where the clip's keypoints have them
+  std::vector<std::string> unknowns = {};  ///< groups of what the clip's files do not know that are leaves: see below
   /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
   /// out, and the groups of the scene then hold the others alone. None: all are kept.
   std::optional<double> camera_reach = {};
   /// What is drawn of objects and human; the groups of their Gaussians then hold that alone, and `object_depth` is its
   /// mean. None: all of it.
   std::optional<SeenRows> seen = {};
+};
+
+/// The leaves of the unknown groups, each empty unless settings.unknowns names it. All are 0 for a clip as it is.
+///
+/// The scene and its camera keep their size on the tape: what moves is brought into the scene's units, p ↦ (p − h) e⁻ˢ,
+/// to be drawn, and stays in metres for the losses.
+template <class S>
+struct UnknownVars {
+  Var<S> focal_length;               ///< [1,1] log of a factor
+  std::vector<Var<S>> object_scale;  ///< [1,1] by object, log of a factor
+  Var<S> scene_scale;                ///< [1,1] s, log of a factor
+  Var<S> scene_height;               ///< [1,1] h, metres
+  Var<S> betas;                      ///< [1,B]
 };
 
 /// What a frame is compared with.
@@ -76,6 +91,8 @@ class FrameGraph {
   void read_state(const ConfigMap<ParameterGroupSettings>& moved, SceneState& state) const;
   /// Reads features and layers of the color net back, those of them that are named in `moved`.
   void read_color_net(const ConfigMap<ParameterGroupSettings>& moved, ColorNet& net) const;
+  /// What the unknown groups say, beside the clip.
+  ClipUnknowns unknowns() const;
   /// Records what terms over the body's motion read. For graphs that draw all, once, after set_state.
   /// @param first   the clip's first frame
   /// @param frames  the states before this frame that such terms see, and last the one that was set
@@ -97,17 +114,24 @@ class FrameGraph {
   };
   struct Object {
     Var<S> orient, transl;
-    Var<S> rotation;  // [1,9] that orient gives
+    Var<S> rotation;  // [1,9] that orient gives, times the object's factor where that is unknown
   };
 
   Var<S> leaf(const std::string& group, const std::string& name, Index rows, Index cols, const float* values);
   ParameterGroup<S>& add_to_group(const std::string& group, Var<S> leaf);
   Var<S> rotation_leaf(const std::string& group, const std::string& name, Index rows);
   GaussianVars<S> gaussian_leaves(const std::string& part, const std::string& name, const Gaussians& g);
+  bool is_unknown(const char* group) const;
+  void record_unknowns();
+  void give_unknowns();
+  Var<S> intrinsics() const;
+  Var<S> drawn_size() const;
+  Var<S> in_scene(Var<S> points, Index height_column) const;
   Part record_scene(const Gaussians& scene);
   void record_moving(std::vector<Part>& parts);
   Part record_object(const ClipObject& object);
   Part record_human(const Avatar& avatar);
+  PosedSkeleton<S> record_skeleton(const Avatar& avatar);
   HumanColors<S> record_color_net(const ColorNet& net);
   void hold_colors(Var<S> colors, const std::vector<std::string>& groups);
   Var<S> record_rotations(Var<S> parameters) const;
@@ -136,8 +160,11 @@ class FrameGraph {
   Matrix6<double> xi_from_update_;
   Var<S> camera_update_;  // the leaf: numbers in the frame of settings.increment
   Var<S> xi_, background_;
+  UnknownVars<S> unknown_;
+  Var<S> intrinsics_;  // [1,4], or empty: the clip's
   std::vector<Object> objects_;
   Var<S> transl_;
+  Var<S> rest_offsets_;                  // [N,3] of the human's means by unknown betas, or empty
   std::vector<Var<S>> joint_rotations_;  // by kJointGroups
   Var<S> rotations_;                     // [55,9] that they give
   PosedSkeleton<S> skeleton_;

@@ -74,14 +74,19 @@ struct FollowingPoints {
   SparseWeights weights;
   std::vector<double> rest;
 
-  Var<S> record(Var<S> transforms) {
+  std::vector<std::uint32_t> rows = {};
+
+  /// @param offsets  of all rows in the rest pose; empty: none
+  Var<S> record(Var<S> transforms, Var<S> offsets) {
     weights.joints = transforms.shape().rows;
-    const Var<S> points = constant_rows<S>(transforms.owner(), "points_at_rest", rest, 3);
+    Var<S> points = constant_rows<S>(transforms.owner(), "points_at_rest", rest, 3);
+    if (offsets.tape != nullptr) points = points + gather_rows(offsets, rows);
     return skin_points(SkinWeights<S>(weights), transforms, points);
   }
   void add_rest(const std::vector<float>& means, Index row) {
     for (Index i = 0; i < 3; ++i) rest.push_back(static_cast<double>(means[static_cast<std::size_t>(3 * row + i)]));
     ++weights.vertices;
+    rows.push_back(static_cast<std::uint32_t>(row));
   }
 };
 
@@ -91,7 +96,8 @@ Index moving_frame(const MotionStart& motion, Index frame) {
 }
 
 template <class S>
-Var<S> record_body_points(Var<S> transforms, const MotionStart& motion, const std::vector<BodyPoint>& points) {
+Var<S> record_body_points(Var<S> transforms, Var<S> offsets, const MotionStart& motion,
+                          const std::vector<BodyPoint>& points) {
   const BodySet of = points.empty() ? BodySet::kGaussians : points.front().of;
   const RestPoints rest = motion.rest_points(of);
   const SparseWeights& all = *rest.weights;
@@ -107,7 +113,7 @@ Var<S> record_body_points(Var<S> transforms, const MotionStart& motion, const st
     }
     chosen.add_rest(*rest.places, point.row);
   }
-  return chosen.record(transforms);
+  return chosen.record(transforms, of == BodySet::kGaussians ? offsets : Var<S>{});
 }
 
 template <class S>
@@ -129,7 +135,7 @@ Var<S> record_object_points(Tape<S>& tape, Var<S> transforms, const MotionStart&
     chosen.weights.weights.push_back(1);
     chosen.add_rest(motion.objects[static_cast<std::size_t>(point.object)]->means, point.row);
   }
-  return chosen.record(transforms);
+  return chosen.record(transforms, {});
 }
 
 }  // namespace
@@ -146,8 +152,8 @@ void give_motion(const MovingFrames<S>& moving, const Clip& clip, const SceneSta
   inputs.joints_start =
       constant_rows<S>(tape, "joints_start", start_joints(*motion, 0, motion->frames()), kCoordinates);
   const Var<S> transforms = moving.skeleton.transforms, objects = moving.object_transforms;
-  inputs.body_points = [transforms, motion](const std::vector<BodyPoint>& points) {
-    return record_body_points(transforms, *motion, points);
+  inputs.body_points = [transforms, offsets = moving.rest_offsets, motion](const std::vector<BodyPoint>& points) {
+    return record_body_points(transforms, offsets, *motion, points);
   };
   inputs.object_points = [&tape, objects, motion](const std::vector<ObjectPoint>& points) {
     return record_object_points(tape, objects, *motion, points);

@@ -13,6 +13,7 @@ struct MovingFrames {
   Var<S> rotations;           ///< [M·55,9] of all joints, relative to their parents
   PosedSkeleton<S> skeleton;  ///< of the frames
   Var<S> object_transforms;   ///< [O,12] rows [3,4] of world_from_object, of one frame; empty: the objects stand
+  Var<S> rest_offsets;        ///< [N,3] of the avatar's means in the rest pose, which betas move; empty: none
 };
 
 /// Fills in body_rotations, joints, joints_start, motion, body_points and object_points.

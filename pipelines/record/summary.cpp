@@ -198,6 +198,11 @@ std::string summary_json(const RunSummary& summary) {
     stages.items.push_back(stage_json(summary.metrics[i], child_pointer("/metrics", std::to_string(i))));
   tree.add("metrics", std::move(stages));
   if (!summary.start.parts.empty()) tree.add("start", start_json(summary.start));
+  if (!summary.found.empty()) {
+    ConfigValue found = ConfigValue::make_object();
+    for (const auto& [name, value] : summary.found) add_number(found, "/found", name, value);
+    tree.add("found", std::move(found));
+  }
   if (!summary.quality.empty()) tree.add("quality", quality_json(summary.quality));
   ConfigValue means = ConfigValue::make_object(), by_frame = ConfigValue::make_object();
   for (const Baseline& baseline : summary.baselines) {
@@ -235,6 +240,11 @@ RunSummary parse_summary(const std::string& text, const std::string& name) {
       summary.metrics.push_back(read_stage(stages->items[i], child_pointer("/metrics", std::to_string(i))));
   }
   if (const ConfigValue* const start = find_member(tree, "start")) summary.start = read_start(*start);
+  if (const ConfigValue* const found = find_member(tree, "found")) {
+    check_kind(*found, Kind::kObject, "/found");
+    for (const ConfigMember& member : found->members)
+      summary.found.emplace_back(member.key, read_number(*found, "/found", member.key));
+  }
   if (const ConfigValue* const quality = find_member(tree, "quality")) summary.quality = read_quality(*quality);
   read_baselines(tree, summary);
   if (const ConfigValue* const frames = find_member(tree, "per_frame"))

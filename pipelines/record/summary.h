@@ -60,6 +60,7 @@ struct RunSummary {
   std::string surface;                ///< the mesh by which penetration was measured; empty: it was not
   std::vector<StageSummary> metrics;  ///< in order, the last one is the final one
   StartSummary start;
+  MetricValues found;  ///< of the clip, by stages over the first frame: "focal_length_px", "object_scale_vase", …
   std::vector<Baseline> baselines;
   std::vector<FrameMetrics> per_frame;  ///< of the result
   std::vector<QualityGate> quality;     ///< of the result; may be empty
@@ -70,11 +71,11 @@ struct RunSummary {
 ///   {"name", "frames", "seconds", "truth": BOOL, "surface",
 ///    "metrics": [{"stage", "frame"?, "seconds", "iterations", NAME: NUMBER...,
 ///                 "gradient_shares": {GROUP: {TERM: {"share", "cosine", "evaluations"}...}...}}...],
-///    "start": {"seconds", PART: {START: FRAMES...}...},
+///    "start": {"seconds", PART: {START: FRAMES...}...}, "found": {NAME: NUMBER...},
 ///    "quality": {NAME: {"value", "word", "pass", "check"}...},
 ///    "baselines": {NAME: {"frame"?, NAME: NUMBER...}}, "per_frame": [{"frame", NAME: NUMBER...}...],
-///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface", "start", "quality"
-///    and "gradient_shares" only where there are any)
+///    "baselines_per_frame": {NAME: [{"frame", NAME: NUMBER...}...]}}       (the last, "surface", "start", "found",
+///    "quality" and "gradient_shares" only where there are any)
 ///
 /// with "frame": 0 where errors are those of frame 0 alone.
 /// Throws InternalError naming the member (a JSON pointer) for a number that is not finite, which JSON cannot hold, and

@@ -247,6 +247,25 @@ StartTotals stored_start(const Checkpoint& checkpoint) {
   return start;
 }
 
+void store_unknowns(const ClipUnknowns& unknowns, Checkpoint& checkpoint) {
+  if (unknowns == ClipUnknowns{}) return;
+  checkpoint.set("unknowns/numbers",
+                 std::vector<double>{unknowns.focal_length, unknowns.scene_scale, unknowns.scene_height});
+  checkpoint.set("unknowns/object_scales", unknowns.object_scales);
+  checkpoint.set("unknowns/betas", unknowns.betas);
+}
+
+ClipUnknowns stored_unknowns(const Checkpoint& checkpoint, const Clip& clip) {
+  if (!checkpoint.has("unknowns/numbers")) return {};
+  const std::vector<double>& numbers = stored_states(checkpoint, "unknowns/numbers", 3);
+  const std::vector<double>& scales = checkpoint.doubles("unknowns/object_scales");
+  if (!scales.empty()) stored_states(checkpoint, "unknowns/object_scales", clip.objects.size());
+  const std::vector<double>& betas = checkpoint.doubles("unknowns/betas");
+  if (!betas.empty())
+    stored_states(checkpoint, "unknowns/betas", clip.shape ? static_cast<std::size_t>(clip.shape->betas) : 0);
+  return {numbers[0], numbers[1], numbers[2], scales, betas};
+}
+
 }  // namespace
 
 const std::vector<SceneState>& result_of(const RunProgress& progress, const RefinementProgress& refinement) {
@@ -278,6 +297,7 @@ void save_progress(const std::string& file, const std::string& config, const Run
   checkpoint.set("counts", std::move(totals.counts));
   checkpoint.set("seconds", std::move(totals.seconds));
   store_first_frame(progress.first_frame, checkpoint);
+  store_unknowns(progress.unknowns, checkpoint);
   checkpoint.set("size_px", std::vector<std::int64_t>{progress.covered.width(), progress.covered.height()});
   checkpoint.set("covered", pixels_of(progress.covered));
   checkpoint.set("inputs", progress.inputs);
@@ -327,6 +347,7 @@ RunProgress load_progress(const std::string& file, const std::string& config, co
   }
   progress.seconds = seconds.back();
   progress.first_frame = stored_first_frame(checkpoint, clip, first_stages);
+  progress.unknowns = stored_unknowns(checkpoint, clip);
   const std::vector<float>& covered = checkpoint.floats("covered");
   expect("covered", covered.size(), pixels_of(progress.covered).size());
   set_pixels(covered, progress.covered);

@@ -6,6 +6,7 @@
 
 #include "core/image.h"
 #include "pipelines/input/clip.h"
+#include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/color_state.h"
 #include "pipelines/input/state.h"
 #include "pipelines/record/summary.h"
@@ -63,6 +64,7 @@ struct RunProgress {
   std::vector<LeftRange> left_ranges;                ///< likewise
   StartTotals start;                                 ///< where the best start was chosen
   ColorState colors;                                 ///< after the last frame done
+  ClipUnknowns unknowns;                             ///< what stages over the first frame found of the clip
   double seconds = 0;                                ///< of the frames done
   std::string isa;  ///< isa_name of who wrote the checkpoint; empty: not read from one, or from an older one
 

@@ -11,9 +11,12 @@
 #include "core/simd.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "optim/metrics.h"
+#include "pipelines/config/parameter_groups.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/view_turn.h"
 #include "pipelines/draw/visibility.h"
+#include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/input_hashes.h"
 #include "pipelines/metrics/sequence_errors.h"
 #include "pipelines/record/results.h"
@@ -86,7 +89,7 @@ std::string stop_message(Index frame, Index frames, Index first) {
 
 class Reconstruction {
  public:
-  Reconstruction(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
+  Reconstruction(const RunConfig& config, Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
                  const Observer& observer)
       : config_(config),
         losses_(losses),
@@ -116,7 +119,7 @@ class Reconstruction {
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
     folder_.write_summary(summary);
     const std::optional<BodyModel> body =
-        write_body(folder_.paths(), config_.body, clip_.avatar, motion_of(clip_, result()));
+        write_body(folder_.paths(), found_body(), clip_.avatar, motion_of(clip_, result()));
     view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
     write_views(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
       stop_if_asked(clip_.frames());
@@ -155,6 +158,7 @@ class Reconstruction {
     const std::string file = checkpoint_file(folder_.paths());
     if (folder_.resumed_from() && std::filesystem::exists(file)) {
       progress_ = read_checkpoint(file, identity_, config_, clip_);
+      apply_unknowns(progress_.unknowns, clip_);
       warn_of_other_isa(progress_.isa);
     } else {
       if (first_stages_ > 0) progress_.after_stage.assign(frame_stages_, {});  // frame 0 is yet to be found
@@ -182,10 +186,33 @@ class Reconstruction {
     for (std::size_t s = 0; s < first_stages_; ++s) {
       if (config_.stages[s].second.headings > 1) state = chosen_heading(s, frame, state);
       StageTotals totals;
-      run_in_frame(s, {0, frame, progress_.covered, {}}, state, progress_.colors, totals);
+      ClipUnknowns found;
+      run_in_frame(s, {0, frame, progress_.covered, {}}, state, progress_.colors, totals, &found);
+      take_unknowns(s, found, state);
       progress_.first_frame.push_back({state, totals});
     }
     end_frame(0, frame, std::vector(frame_stages_, state), begin);
+  }
+
+  /// The body in the shape that was found.
+  BodySettings found_body() const {
+    BodySettings body = config_.body;
+    const std::vector<double>& betas = progress_.unknowns.betas;
+    body.shape.resize(std::max(body.shape.size(), betas.size()));
+    for (std::size_t b = 0; b < betas.size(); ++b) body.shape[b] += betas[b];
+    return body;
+  }
+
+  /// What a stage over the first frame has found of the clip is known from then on, which is told in the log.
+  void take_unknowns(std::size_t s, const ClipUnknowns& found, SceneState& state) {
+    if (unknown_groups_of(config_.stages[s].second).empty()) return;
+    apply_unknowns(found, clip_);
+    state.camera_from_world = camera_in_world(found, state.camera_from_world);
+    progress_.unknowns = compose(progress_.unknowns, found);
+    folder_.note("found by stage " + config_.stages[s].first + ": " + unknowns_text(found, clip_));
+    for (const std::string& doubtful : doubtful_unknowns(found, clip_))
+      log_warning("stage " + config_.stages[s].first + " finds " + doubtful +
+                  "; frame 0 hardly tells this; give a better start, or leave the group out");
   }
 
   /// Where a stage over the first frame begins that is tried from several headings, told in the log.
@@ -334,7 +361,9 @@ class Reconstruction {
   Index first_worked_on() const { return first_stages_ > 0 ? 0 : 1; }
 
   /// @param totals  of the stage, to which this is added
-  void run_in_frame(std::size_t s, const FrameTask& frame, SceneState& state, ColorState& colors, StageTotals& totals) {
+  /// @param found   as StageTask has it
+  void run_in_frame(std::size_t s, const FrameTask& frame, SceneState& state, ColorState& colors, StageTotals& totals,
+                    ClipUnknowns* found = nullptr) {
     const auto& [name, stage] = config_.stages[s];
     std::string begin;  // of the loss, for the log
     GradientWatch gradients;
@@ -345,7 +374,7 @@ class Reconstruction {
     };
     const SceneState before = state;
     const StageResult result =
-        run_frame_stage({config_, clip_, losses_, s, observer_.stages}, frame, state, colors, note_iteration);
+        run_frame_stage({config_, clip_, losses_, s, observer_.stages, found}, frame, state, colors, note_iteration);
     drop_what_is_left(s, result);
     if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;
@@ -463,7 +492,7 @@ class Reconstruction {
   RunFolder& folder_;
   const Observer& observer_;
   std::string identity_;  // the text that a checkpoint of this run belongs to
-  const Clip& clip_;
+  Clip& clip_;
   std::size_t first_stages_, frame_stages_;
   RunProgress progress_;
   RefinementProgress refinement_;
@@ -481,8 +510,8 @@ Index finished_frames(const std::string& folder, const RunConfig& config, const 
   return read_checkpoint(file, checkpoint_identity(config, losses), config, clip).frames_done() - 1;
 }
 
-RunSummary reconstruct(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses,
-                       RunFolder& folder, const Observer& observer) {
+RunSummary reconstruct(const RunConfig& config, Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
+                       const Observer& observer) {
   return Reconstruction(config, clip, losses, folder, observer).run();
 }
 

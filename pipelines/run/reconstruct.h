@@ -22,11 +22,11 @@ Index finished_frames(const std::string& folder, const RunConfig& config, const 
 /// cameras.json, summary.json, checkpoint/. Results do not depend on the number of threads, nor on having been
 /// interrupted: a run that is resumed gives the same bits.
 ///
-/// @param clip  what read_clip gave for config.data
+/// @param clip  what read_clip gave for config.data; what stages over the first frame find of it is put into it
 /// Throws UserError and DataError for its inputs, Interrupted when asked to stop: what was done up to the last whole
 /// frame is then in the checkpoint.
 /// @return  what summary.json holds
-RunSummary reconstruct(const RunConfig& config, const Clip& clip, const std::vector<LossTerm>& losses,
-                       RunFolder& folder, const Observer& observer);
+RunSummary reconstruct(const RunConfig& config, Clip& clip, const std::vector<LossTerm>& losses, RunFolder& folder,
+                       const Observer& observer);
 
 }  // namespace hsi4d

@@ -57,7 +57,7 @@ const SceneState& first_state(const StageTask& task, const FrameTask& frame) {
 }
 
 /// What a stage draws of objects and human, where approx.seen_within_deg asks for less than all. What the stage needs
-/// wholly is kept: objects for their mean depth, the human for features that move.
+/// wholly is kept: objects for their mean depth, the human for features or a shape that move.
 std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& state) {
   const auto& stage = task.config.stages[task.stage].second;
   const double within_deg = task.config.approx.seen_within_deg;
@@ -69,7 +69,8 @@ std::optional<SeenRows> rows_to_draw(const StageTask& task, const SceneState& st
     const std::vector<LossInput> needs = needs_of(entry.second);
     return std::find(needs.begin(), needs.end(), LossInput::kObjectDepth) != needs.end();
   });
-  const bool needs_human = find_entry(stage.optimize, "avatar_features") != nullptr;
+  const bool needs_human =
+      find_entry(stage.optimize, kFeaturesGroup) != nullptr || find_entry(stage.optimize, kBetasGroup) != nullptr;
   SeenRows rows;
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
     const Gaussians& object = clip.objects[o].gaussians;
@@ -132,6 +133,7 @@ void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& fra
   settings.object_opacity = some_loss_needs(stage, LossInput::kObjectOpacity);
   settings.keypoints = some_loss_needs(stage, LossInput::kKeypoints);
   settings.bones = some_loss_needs(stage, LossInput::kBones);
+  settings.unknowns = unknown_groups_of(stage);
   settings.camera_reach = camera_reach;
   settings.seen = rows_to_draw(task, state);
   FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
@@ -173,6 +175,7 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
                            .time_curvature = probe.times_curvature(),
                            .held = graph.held()});
     graph.read_state(stage.optimize, state);
+    if (task.found != nullptr) *task.found = graph.unknowns();
     if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
   });
   const Camera& drawn = task.clip.camera;

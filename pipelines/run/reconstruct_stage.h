@@ -12,6 +12,7 @@
 #include "optim/stage_gradcheck.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/input/clip.h"
+#include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/color_state.h"
 #include "pipelines/input/state.h"
 #include "pipelines/run/stage_profile.h"
@@ -26,6 +27,7 @@ struct StageTask {
   const std::vector<LossTerm>& losses;  ///< that the config may name
   std::size_t stage = 0;                ///< in config.stages
   const StageWatch* watch = nullptr;    ///< null: nobody wants to know where time goes
+  ClipUnknowns* found = nullptr;        ///< where to put what a stage of a frame finds of the clip; null: nowhere
 };
 
 /// A frame that stages work on.
@@ -43,7 +45,7 @@ inline constexpr std::ptrdiff_t kFramesBefore = 3;
 using FrameStageCallback = std::function<void(const IterationReport&, const RenderCounters&)>;
 
 /// Runs a stage of a frame.
-/// @param state   from where it starts; what the stage moves is written back
+/// @param state   from where it starts; what the stage moves is written back, the camera in the scene's units
 /// @param colors  likewise
 /// Throws what run_stage throws.
 StageResult run_frame_stage(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,

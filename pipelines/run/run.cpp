@@ -11,6 +11,7 @@
 #include "core/progress.h"
 #include "core/text.h"
 #include "core/version.h"
+#include "pipelines/config/parameter_groups.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/draw/visibility.h"
 #include "pipelines/input/body_files.h"
@@ -80,8 +81,8 @@ std::string estimate_blur(RunConfig& config, const Clip& clip) {
          rounded(filter.psnr_db, 4) + " dB)";
 }
 
-RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, const Clip& clip,
-                            const std::vector<LossTerm>& losses, const RunOptions& options) {
+RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, Clip& clip, const std::vector<LossTerm>& losses,
+                            const RunOptions& options) {
   try {
     RunSummary summary;
     on_threads(options.threads > 0 ? options.threads : config.threads,
@@ -138,6 +139,26 @@ void give_body(const RunConfig& config, const std::string& loss, Clip& clip) {
   }
 }
 
+/// Where a stage moves the betas, as a JSON pointer; empty: nowhere.
+std::string betas_group(const RunConfig& config) {
+  for (const auto& [name, stage] : config.stages) {
+    if (find_entry(stage.optimize, kBetasGroup) != nullptr)
+      return child_pointer(child_pointer("/stages", name) + "/optimize", kBetasGroup);
+  }
+  return "";
+}
+
+/// Reads how the avatar follows the betas of its body. @param group  that asks for it
+void give_shape(const RunConfig& config, const std::string& group, Clip& clip) {
+  const std::string difference = difference_from(rest_body(config.body), clip.avatar);
+  if (!difference.empty())
+    throw UserError(group + ": which body the avatar was made on must be known: " + difference +
+                    "; set `body`, or leave the group out");
+  std::vector<double> betas = config.body.shape;
+  betas.resize(static_cast<std::size_t>(config.body.betas));
+  clip.shape = avatar_shape(clip.avatar, body_model_of(config.body), betas);
+}
+
 }  // namespace
 
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
@@ -149,6 +170,8 @@ Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses)
   if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});
   const std::string loss = loss_with(config, LossInput::kBodyVertices);
   if (!loss.empty()) give_body(config, loss, clip);
+  const std::string betas = betas_group(config);
+  if (!betas.empty()) give_shape(config, betas, clip);
   return clip;
 }
 
@@ -172,7 +195,7 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
     look_at_run_folder(options.folder, identity.config, options.resume);  // before anything is made for nothing
     config.data = make_sources(config, options.observer);
   });
-  const Clip clip = read_run_clip(config, losses);                                     // before anything is written
+  Clip clip = read_run_clip(config, losses);                                           // before anything is written
   if (config.body.kind == BodyKind::kSmplx && !clip.body) body_model_of(config.body);  // what is wrong shows now
   check_run_clip(config, clip);
   std::string blur;

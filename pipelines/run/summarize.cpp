@@ -243,6 +243,7 @@ RunSummary summarize_run(const RunConfig& config, const Clip& clip, const RunPro
   summary.frames = static_cast<int>(clip.frames());
   summary.seconds = progress.seconds + refinement.seconds;
   summary.has_truth = clip.truth.has_value();
+  summary.found = unknowns_by_name(progress.unknowns, clip);
   summary.start = summarize_start(progress.start);
   const ObjectPoints points(objects_of(clip));
   const auto add_stage = [&](const std::vector<SceneState>& states, const StageTotals& totals) {

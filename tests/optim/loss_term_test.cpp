@@ -60,7 +60,8 @@ std::vector<OperatorInput> all_inputs() {
           {"keypoints", shape_of(4, 2), 0, 60},
           {"keypoints_target", shape_of(4, 3), 0, 0, {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8, 8, 8, 0.1}},
           {"bones", shape_of(3, 3), 0, 0, {0.1, -0.3, 0.05, 0, 0.4, 0.2, -0.3, 0, 0.1}},
-          {"bones_target", shape_of(3, 4), 0, 0, {0, -1, 0, 1, 0, 0.6, 0.8, 0.7, 1, 0, 0, 0.1}}};
+          {"bones_target", shape_of(3, 4), 0, 0, {0, -1, 0, 1, 0, 0.6, 0.8, 0.7, 1, 0, 0, 0.1}},
+          {"unknowns", shape_of(1, 3), -0.2, 0.2}};
 }
 
 template <class S>
@@ -90,6 +91,7 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.keypoints_target = in[23];
   inputs.bones = in[24];
   inputs.bones_target = in[25];
+  inputs.unknowns = in[26];
   inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;

@@ -1,0 +1,104 @@
+#include "pipelines/input/clip_unknowns.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+#include "core/text.h"
+#include "splat/files/transform.h"
+
+namespace hsi4d {
+
+namespace {
+
+std::vector<double> products(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.empty() || b.empty()) return a.empty() ? b : a;
+  std::vector<double> all = a;
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] *= b.at(i);
+  return all;
+}
+
+std::vector<double> sums(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.empty() || b.empty()) return a.empty() ? b : a;
+  std::vector<double> all = a;
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] += b.at(i);
+  return all;
+}
+
+Similarity world_from_scene(const ClipUnknowns& unknowns) {
+  return {unknowns.scene_scale, Matrix3<double>::Identity(), {0, 0, unknowns.scene_height}};
+}
+
+bool moves_scene(const ClipUnknowns& unknowns) { return unknowns.scene_scale != 1 || unknowns.scene_height != 0; }
+
+/// Calls see(name, factor, value): a factor of what the file says, and the value that is told.
+template <class F>
+void for_factors(const ClipUnknowns& unknowns, const Clip& clip, const F& see) {
+  if (unknowns.focal_length != 1) see("focal_length_px", unknowns.focal_length, clip.camera.fx);
+  if (unknowns.scene_scale != 1) see("scene_scale", unknowns.scene_scale, unknowns.scene_scale);
+  for (std::size_t o = 0; o < unknowns.object_scales.size(); ++o) {
+    const double scale = unknowns.object_scales[o];
+    if (scale != 1) see("object_scale_" + clip.objects[o].name, scale, scale);
+  }
+}
+
+}  // namespace
+
+ClipUnknowns compose(const ClipUnknowns& first, const ClipUnknowns& second) {
+  return {first.focal_length * second.focal_length, first.scene_scale * second.scene_scale,
+          second.scene_scale * first.scene_height + second.scene_height,
+          products(first.object_scales, second.object_scales), sums(first.betas, second.betas)};
+}
+
+void apply_unknowns(const ClipUnknowns& unknowns, Clip& clip) {
+  clip.camera.fx *= unknowns.focal_length;
+  clip.camera.fy *= unknowns.focal_length;
+  if (moves_scene(unknowns)) {
+    clip.scene = transformed(clip.scene, world_from_scene(unknowns));
+    for (std::size_t i = 0; i < clip.scene.means.size(); ++i)  // graphs want means in the world
+      clip.scene.means[i] += static_cast<float>(clip.scene.origin_world[static_cast<Index>(i % 3)]);
+    clip.scene.origin_world.setZero();
+    for (Rigid<double>* camera : {&clip.camera.camera_from_world, &clip.first.camera_from_world})
+      *camera = camera_in_world(unknowns, *camera);
+  }
+  for (std::size_t o = 0; o < unknowns.object_scales.size(); ++o) {
+    if (unknowns.object_scales[o] != 1)
+      clip.objects[o].gaussians = transformed(clip.objects[o].gaussians, {.scale = unknowns.object_scales[o]});
+  }
+  if (unknowns.betas.empty()) return;
+  HSI4D_CHECK(clip.shape.has_value(), "an avatar without a shape cannot follow betas");
+  add_betas(*clip.shape, unknowns.betas, clip.avatar);
+}
+
+/// p = s x + h: camera coordinates, which scale along, are s (R x + t) = R (p − h) + s t.
+Rigid<double> camera_in_world(const ClipUnknowns& unknowns, const Rigid<double>& camera_from_scene) {
+  const Vector3<double> rise(0, 0, unknowns.scene_height);
+  return {camera_from_scene.rotation,
+          unknowns.scene_scale * camera_from_scene.translation - camera_from_scene.rotation * rise};
+}
+
+std::vector<std::pair<std::string, double>> unknowns_by_name(const ClipUnknowns& unknowns, const Clip& clip) {
+  std::vector<std::pair<std::string, double>> values;
+  for_factors(unknowns, clip, [&](const std::string& name, double, double value) { values.emplace_back(name, value); });
+  if (unknowns.scene_height != 0) values.emplace_back("scene_height_m", unknowns.scene_height);
+  for (std::size_t b = 0; b < unknowns.betas.size(); ++b)
+    values.emplace_back("beta_" + std::to_string(b), unknowns.betas[b]);
+  return values;
+}
+
+std::string unknowns_text(const ClipUnknowns& unknowns, const Clip& clip) {
+  std::vector<std::string> parts;
+  for (const auto& [name, value] : unknowns_by_name(unknowns, clip)) parts.push_back(name + " " + rounded(value, 5));
+  return joined(parts);
+}
+
+std::vector<std::string> doubtful_unknowns(const ClipUnknowns& unknowns, const Clip& clip) {
+  std::vector<std::string> names;
+  for_factors(unknowns, clip, [&](const std::string& name, double factor, double) {
+    if (!(std::abs(std::log(factor)) <= std::log(kLargestUnknownFactor)))
+      names.push_back(name + ", " + rounded(factor, 3) + " times what was given");
+  });
+  return names;
+}
+
+}  // namespace hsi4d
