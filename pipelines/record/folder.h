@@ -58,6 +58,7 @@ struct RunPaths {
   std::string motion() const { return member("motion.npz"); }
   std::string motion_at_30() const { return member("motion_30fps.npz"); }
   std::string body() const { return member("body.glb"); }
+  std::string avatar() const { return member("avatar.safetensors"); }
   std::string view3d() const { return member("view3d.safetensors"); }
   std::string preview() const { return member("preview.mp4"); }
   std::string objects() const { return member("objects.npz"); }

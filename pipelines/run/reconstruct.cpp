@@ -115,6 +115,7 @@ class Reconstruction {
     warn_of_left_ranges(progress_.left_ranges, config_);
     warn_of_what_is_out_of_view(clip_, result());
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
+    if (!progress_.unknowns.betas.empty()) write_avatar(folder_.paths().avatar(), clip_.avatar);
     RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
     folder_.write_summary(summary);
