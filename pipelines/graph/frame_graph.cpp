@@ -15,6 +15,7 @@
 #include "pipelines/draw/tape_image.h"
 #include "pipelines/graph/camera_increment.h"
 #include "pipelines/graph/motion_inputs.h"
+#include "pipelines/graph/tape_rows.h"
 #include "splat/render/camera_center.h"
 #include "splat/render/project.h"
 #include "splat/render/reachable.h"
@@ -254,19 +255,22 @@ typename FrameGraph<S>::Part FrameGraph<S>::record_human(const Avatar& avatar) {
   return {splats, n};
 }
 
-/// The skeleton, and how betas that are looked for move means and joints in the rest pose.
+/// The skeleton, and how betas that are looked for move means and joints in the rest pose. The pelvis stays where it is
+/// in the world.
 template <class S>
 PosedSkeleton<S> FrameGraph<S>::record_skeleton(const Avatar& avatar) {
   if (unknown_.betas.tape == nullptr) return kinematic_chain(rotations_, transl_, avatar.parents, avatar.joints);
-  const auto moved = [this](const std::vector<double>& rest, const std::vector<double>& directions) {
-    const Index betas = clip_.shape->betas;
-    return blend_shapes<S>(
-        rest,
-        std::array{BlendTerm<S>{Directions<S>({directions, std::ssize(rest) / 3, betas, {0}, betas}), unknown_.betas}});
-  };
   HSI4D_CHECK_EQ(avatar.count(), clip_.avatar.count());
-  rest_offsets_ = moved(std::vector<double>(avatar.means.size()), clip_.shape->means);
-  return kinematic_chain(rotations_, transl_, avatar.parents, moved(avatar.joints, clip_.shape->joints));
+  const auto offsets = [this](const std::vector<double>& directions) {
+    const Index betas = clip_.shape->betas, points = std::ssize(directions) / (3 * betas);
+    const Directions<S> prepared({directions, points, betas, {0}, betas});
+    return blend_shapes<S>(std::vector<double>(static_cast<std::size_t>(3 * points)),
+                           std::array{BlendTerm<S>{prepared, unknown_.betas}});
+  };
+  rest_offsets_ = offsets(clip_.shape->means);
+  const Var<S> joint_offsets = offsets(clip_.shape->joints);
+  const Var<S> joints = constant_rows<S>(tape_, "rest_joints", avatar.joints, 3) + joint_offsets;
+  return kinematic_chain(rotations_, transl_ - slice_rows(joint_offsets, 0, 1), avatar.parents, joints);
 }
 
 /// Colours that are computed anew only where one of the groups moves, if that is wanted.

@@ -29,6 +29,24 @@ Similarity world_from_scene(const ClipUnknowns& unknowns) {
   return {unknowns.scene_scale, Matrix3<double>::Identity(), {0, 0, unknowns.scene_height}};
 }
 
+/// p = s x + h: camera coordinates, which scale along, are s (R x + t) = R (p − h) + s t.
+Rigid<double> camera_in_world(const ClipUnknowns& unknowns, const Rigid<double>& camera_from_scene) {
+  const Vector3<double> rise(0, 0, unknowns.scene_height);
+  return {camera_from_scene.rotation,
+          unknowns.scene_scale * camera_from_scene.translation - camera_from_scene.rotation * rise};
+}
+
+/// How far the pelvis, joint 0, moves in the rest pose.
+Vector3<double> rise_of_pelvis(const ClipUnknowns& unknowns, const Clip& clip) {
+  HSI4D_CHECK(clip.shape.has_value(), "an avatar without a shape cannot follow betas");
+  Vector3<double> rise = Vector3<double>::Zero();
+  for (std::size_t b = 0; b < unknowns.betas.size(); ++b) {
+    for (std::size_t i = 0; i < 3; ++i)
+      rise[static_cast<Index>(i)] += clip.shape->joints[i * unknowns.betas.size() + b] * unknowns.betas[b];
+  }
+  return rise;
+}
+
 bool moves_scene(const ClipUnknowns& unknowns) { return unknowns.scene_scale != 1 || unknowns.scene_height != 0; }
 
 /// Calls see(name, factor, value): a factor of what the file says, and the value that is told.
@@ -58,9 +76,9 @@ void apply_unknowns(const ClipUnknowns& unknowns, Clip& clip) {
     for (std::size_t i = 0; i < clip.scene.means.size(); ++i)  // graphs want means in the world
       clip.scene.means[i] += static_cast<float>(clip.scene.origin_world[static_cast<Index>(i % 3)]);
     clip.scene.origin_world.setZero();
-    for (Rigid<double>* camera : {&clip.camera.camera_from_world, &clip.first.camera_from_world})
-      *camera = camera_in_world(unknowns, *camera);
+    clip.camera.camera_from_world = camera_in_world(unknowns, clip.camera.camera_from_world);
   }
+  apply_unknowns(unknowns, clip, clip.first);
   for (std::size_t o = 0; o < unknowns.object_scales.size(); ++o) {
     if (unknowns.object_scales[o] != 1)
       clip.objects[o].gaussians = transformed(clip.objects[o].gaussians, {.scale = unknowns.object_scales[o]});
@@ -68,13 +86,15 @@ void apply_unknowns(const ClipUnknowns& unknowns, Clip& clip) {
   if (unknowns.betas.empty()) return;
   HSI4D_CHECK(clip.shape.has_value(), "an avatar without a shape cannot follow betas");
   add_betas(*clip.shape, unknowns.betas, clip.avatar);
+  const Vector3<double> rise = rise_of_pelvis(unknowns, clip);
+  for (BodyPose& pose : clip.estimate) pose.transl -= rise;
+  if (!clip.truth) return;
+  for (SceneState& state : *clip.truth) state.body.transl -= rise;
 }
 
-/// p = s x + h: camera coordinates, which scale along, are s (R x + t) = R (p − h) + s t.
-Rigid<double> camera_in_world(const ClipUnknowns& unknowns, const Rigid<double>& camera_from_scene) {
-  const Vector3<double> rise(0, 0, unknowns.scene_height);
-  return {camera_from_scene.rotation,
-          unknowns.scene_scale * camera_from_scene.translation - camera_from_scene.rotation * rise};
+void apply_unknowns(const ClipUnknowns& unknowns, const Clip& clip, SceneState& state) {
+  state.camera_from_world = camera_in_world(unknowns, state.camera_from_world);
+  if (!unknowns.betas.empty()) state.body.transl -= rise_of_pelvis(unknowns, clip);
 }
 
 std::vector<std::pair<std::string, double>> unknowns_by_name(const ClipUnknowns& unknowns, const Clip& clip) {

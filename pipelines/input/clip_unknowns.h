@@ -22,11 +22,14 @@ struct ClipUnknowns {
 /// Both, one after the other.
 ClipUnknowns compose(const ClipUnknowns& first, const ClipUnknowns& second);
 
-/// The clip as it is with what was found. Its truth stays. With betas it needs a shape.
+/// The clip as it is with what was found; with betas it needs a shape. The pelvis of first state, estimates and truth
+/// stays where it is in the world. The truth's camera stays.
 void apply_unknowns(const ClipUnknowns& unknowns, Clip& clip);
 
-/// The camera of a scene, where that has another scale and height.
-Rigid<double> camera_in_world(const ClipUnknowns& unknowns, const Rigid<double>& camera_from_scene);
+/// A state that was found together with them: its camera is that of a scene of another scale and height, its body is at
+/// the same place with another shape.
+/// @param clip  before or after apply_unknowns
+void apply_unknowns(const ClipUnknowns& unknowns, const Clip& clip, SceneState& state);
 
 /// By name, as summaries have it: focal_length_px, scene_scale, scene_height_m, object_scale_NAME, beta_0, …; those
 /// that are as the files say are left out.

@@ -208,7 +208,7 @@ class Reconstruction {
   void take_unknowns(std::size_t s, const ClipUnknowns& found, SceneState& state) {
     if (unknown_groups_of(config_.stages[s].second).empty()) return;
     apply_unknowns(found, clip_);
-    state.camera_from_world = camera_in_world(found, state.camera_from_world);
+    apply_unknowns(found, clip_, state);
     progress_.unknowns = compose(progress_.unknowns, found);
     folder_.note("found by stage " + config_.stages[s].first + ": " + unknowns_text(found, clip_));
     for (const std::string& doubtful : doubtful_unknowns(found, clip_))
