@@ -386,8 +386,9 @@ TEST_CASE("every shipped config runs", "[run]") {
     const std::string stem = fs::path(name).stem().string();
     (check_shipped_config(shipped_configs() / name, stem, false) ? with_stages : without).insert(stem);
   }
-  CHECK(with_stages == std::set<std::string>{"best", "demo", "demo_quick", "fast", "fit_first_frame", "from_keypoints",
-                                             "from_video", "paper", "paper_static"});
+  CHECK(with_stages == std::set<std::string>{"best", "demo", "demo_quick", "fast", "find_focal_length",
+                                             "fit_first_frame", "from_keypoints", "from_video", "paper",
+                                             "paper_static"});
   CHECK(without == std::set<std::string>{"accurate", "compare_gsplat", "default", "synthetic"});
 }
 
