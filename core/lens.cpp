@@ -40,6 +40,36 @@ Vector2<double> bent_by(const Lens& lens, const Vector2<double>& point) {
           y * s + lens.p1 * (r2 + 2 * y * y) + 2 * lens.p2 * x * y};
 }
 
+namespace {
+
+/// One step of Newton's method; the derivative is symmetric.
+Vector2<double> newton_step(const Lens& lens, const Vector2<double>& point, const Vector2<double>& miss) {
+  const double x = point[0], y = point[1], q = x * x + y * y;
+  const double s = 1 + q * (lens.k1 + q * (lens.k2 + q * lens.k3));
+  const double ds = lens.k1 + q * (2 * lens.k2 + 3 * q * lens.k3);  // ds/dq, and dq = 2 (x dx + y dy)
+  const double xx = s + 2 * x * x * ds + 2 * lens.p1 * y + 6 * lens.p2 * x;
+  const double xy = 2 * x * y * ds + 2 * lens.p1 * x + 2 * lens.p2 * y;
+  const double yy = s + 2 * y * y * ds + 6 * lens.p1 * y + 2 * lens.p2 * x;
+  return Vector2<double>(yy * miss[0] - xy * miss[1], xx * miss[1] - xy * miss[0]) / (xx * yy - xy * xy);
+}
+
+}  // namespace
+
+/// Newton's method; a step that leads away is halved.
+Vector2<double> straight_of(const Lens& lens, const Vector2<double>& bent) {
+  constexpr int kMostSteps = 40, kMostHalvings = 10;
+  Vector2<double> point = bent;
+  for (int i = 0; i < kMostSteps; ++i) {
+    const Vector2<double> miss = bent_by(lens, point) - bent;
+    Vector2<double> step = newton_step(lens, point, miss);
+    const auto is_nearer = [&] { return (bent_by(lens, point - step) - bent).norm() < miss.norm(); };
+    for (int half = 0; half < kMostHalvings && !is_nearer(); ++half) step /= 2;
+    if (!is_nearer()) break;
+    point -= step;
+  }
+  return point;
+}
+
 double valid_radius_squared(const Lens& lens) {
   // d(r s)/dr = 1 + 3 k1 q + 5 k2 q² + 7 k3 q³ with q = r²: looked for in steps finer than a picture's pixels, up to
   // half angles of 84 degrees.

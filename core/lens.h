@@ -25,6 +25,10 @@ struct Lens {
 /// Where the lens shows a direction. @param point  (x, y) at depth 1
 Vector2<double> bent_by(const Lens& lens, const Vector2<double>& point);
 
+/// The direction that the lens shows at a place: the inverse of bent_by, to rounding, within the valid radius. Beyond
+/// it the nearest that it finds, which is shown elsewhere.
+Vector2<double> straight_of(const Lens& lens, const Vector2<double>& bent);
+
 /// Squared radius within which the radial part grows, so that each place of a picture is shown once; infinite for
 /// lenses that never turn back.
 double valid_radius_squared(const Lens& lens);

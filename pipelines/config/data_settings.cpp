@@ -36,6 +36,16 @@ void describe(ConfigFields& f, ObjectSettings& s) {
       .required();
 }
 
+void describe(ConfigFields& f, LensSettings& s) {
+  constexpr double kMost = 10;
+  f.number("k1", s.lens.k1, {.min = -kMost, .max = kMost}, "Radial, of the squared radius at depth 1");
+  f.or_word("k1", "estimate", s.estimate_k1);
+  f.number("k2", s.lens.k2, {.min = -kMost, .max = kMost}, "Radial, of its second power");
+  f.number("k3", s.lens.k3, {.min = -kMost, .max = kMost}, "Radial, of its third power");
+  f.number("p1", s.lens.p1, {.min = -kMost, .max = kMost}, "Tangential");
+  f.number("p2", s.lens.p2, {.min = -kMost, .max = kMost}, "Tangential");
+}
+
 void describe(ConfigFields& f, DataSettings& s) {
   f.path("scene", s.scene, {.must_exist = true},
          "The static scene (" + joined(splat_endings(), " or ") + "), metres, z up");
@@ -49,6 +59,8 @@ void describe(ConfigFields& f, DataSettings& s) {
   f.number("frame_rate", s.frame_rate, {.min = 0, .max = 1e4},
            "Frames per second that are kept; estimated poses are resampled; 0: all");
   f.path("camera", s.camera, {.must_exist = true}, "Camera of frame 0 (.json)");
+  f.object("lens", s.lens,
+           "How the lens of the video bends, as OpenCV has it: frames, masks and keypoints are straightened");
   f.path("initial", s.initial, {.must_exist = true}, "State of frame 0 and estimated poses (.json)");
   f.path("motion", s.motion, {.must_exist = true},
          "Motion estimated from the video (.npz); replaces the poses of `initial` after frame 0");

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/config.h"
+#include "core/lens.h"
 
 namespace hsi4d {
 
@@ -19,6 +20,12 @@ enum class MotionAlign { kHeading, kRotation, kNone };
 inline constexpr std::array<ConfigChoice<MotionAlign>, 3> kMotionAligns = {
     {{MotionAlign::kHeading, "heading"}, {MotionAlign::kRotation, "rotation"}, {MotionAlign::kNone, "none"}}};
 
+/// How the lens of the video bends.
+struct LensSettings {
+  Lens lens;
+  bool estimate_k1 = false;  ///< k1 is what frame 0 says, found as the run begins
+};
+
 /// The inputs of a run. Relative paths are relative to the file that names them.
 struct DataSettings {
   std::filesystem::path scene;
@@ -27,6 +34,7 @@ struct DataSettings {
   std::filesystem::path frames;
   std::filesystem::path masks;
   std::filesystem::path camera;
+  LensSettings lens;
   std::filesystem::path initial;
   std::filesystem::path motion;  ///< poses estimated from the video; empty: those of `initial`, if it has some
   MotionAlign motion_align = MotionAlign::kHeading;
@@ -50,6 +58,7 @@ DataSettings dataset_inputs(const std::filesystem::path& folder);
 
 /// Describe the sections: every setting with its range.
 void describe(ConfigFields& fields, ObjectSettings& settings);
+void describe(ConfigFields& fields, LensSettings& settings);
 void describe(ConfigFields& fields, DataSettings& settings);
 
 }  // namespace hsi4d

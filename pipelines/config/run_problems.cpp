@@ -385,6 +385,8 @@ void add_given_frame_problems(const RunConfig& config, std::vector<RunProblem>& 
         " frame 0 as it is given, which stage " + json_string(name) + " has yet to find; allowed: ";
     if (config.estimate_blur)
       found.push_back({"/render/blur", "\"estimate\" looks at" + given + "a number", {"/render/blur", "/stages"}});
+    if (config.data.lens.estimate_k1)
+      found.push_back({"/data/lens/k1", "\"estimate\" looks at" + given + "a number", {"/data/lens/k1", "/stages"}});
     const std::size_t unknowns = unknown_groups_of(stage).size();
     if (config.remove_depth_bias && stage.optimize.size() > unknowns) {
       found.push_back(

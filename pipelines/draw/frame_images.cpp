@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "pipelines/draw/report_images.h"
 
@@ -38,6 +39,16 @@ Image foreground_of(const ClipFrame& frame) {
     }
   }
   return result;
+}
+
+void hide_unseen(const ClipFrame& frame, Image& image) {
+  if (frame.seen.empty()) return;
+  for (int c = 0; c < image.channels(); ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      const float* const seen = frame.seen.row(0, y);
+      std::transform(image.row(c, y), image.row(c, y) + image.width(), seen, image.row(c, y), std::multiplies());
+    }
+  }
 }
 
 Image difference_image(const Image& a, const Image& b) {

@@ -15,6 +15,9 @@ void add_covered(const ClipFrame& frame, const DataSettings& data, Image& covere
 /// The larger of all masks of the frame, pixel by pixel.
 Image foreground_of(const ClipFrame& frame);
 
+/// Sets to 0 what the frame does not see, as its lens bends.
+void hide_unseen(const ClipFrame& frame, Image& image);
+
 /// kDifferenceGain |a − b|.
 Image difference_image(const Image& a, const Image& b);
 

@@ -128,6 +128,16 @@ Image read_mask(std::size_t m, const ClipVideo& video, const Camera& camera, Ind
                   (has_size_of(frame, camera) ? "the camera's image " : "the video's frame ") + size_text(frame));
 }
 
+/// What a pinhole would have seen.
+void straighten(const ClipVideo& video, ClipFrame& frame) {
+  const Camera through = resized(video.camera, frame.target.width(), frame.target.height());
+  StraightImage straight = straightened(frame.target, through, video.lens);
+  frame.target = std::move(straight.image);
+  frame.seen = std::move(straight.seen);
+  frame.human_mask = straightened(frame.human_mask, through, video.lens).image;
+  for (Image& mask : frame.object_masks) mask = straightened(mask, through, video.lens).image;
+}
+
 /// As read_frame.
 ClipFrame read_looking(const ClipVideo& video, const Camera& camera, Index index, const MaskLook& look) {
   const FrameSource& frames = video.frames;
@@ -143,6 +153,7 @@ ClipFrame read_looking(const ClipVideo& video, const Camera& camera, Index index
   frame.human_mask = read_mask(0, video, camera, index, read, look);
   for (std::size_t m = 1; m < video.masks.size(); ++m)
     frame.object_masks.push_back(read_mask(m, video, camera, index, read, look));
+  if (!video.lens.is_straight()) straighten(video, frame);
   return frame;
 }
 
@@ -253,6 +264,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   clip.estimate = estimate_of(data, setup, clip.avatar, video->frames);
   clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
   if (!data.keypoints.empty()) clip.keypoints = read_keypoints(data, video->frames);
+  if (!data.lens.estimate_k1) set_lens(data.lens.lens, clip);
   clip.first.body = setup.motion.poses.front();
   clip.frame_rate = rate_of(video->frames, setup);
   clip.betas = setup.motion.betas;
@@ -280,6 +292,25 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
     if (masks.is_video()) clip.files.push_back({"masks/" + masks.path().filename().string(), masks.path()});
   }
   return clip;
+}
+
+void set_lens(const Lens& lens, Clip& clip) {
+  if (lens.is_straight()) return;
+  ClipVideo video = *clip.video;
+  HSI4D_CHECK(video.lens.is_straight(), "a clip is filmed through one lens");
+  video.lens = lens;
+  video.camera = clip.camera;
+  clip.video = std::make_shared<const ClipVideo>(std::move(video));
+  if (!clip.keypoints) return;
+  const Camera& camera = clip.camera;
+  for (std::vector<Keypoint>& frame : clip.keypoints->frames) {
+    for (Keypoint& point : frame) {
+      const Vector2<double> place = straight_of(
+          lens, {(point.x * camera.width - camera.cx) / camera.fx, (point.y * camera.height - camera.cy) / camera.fy});
+      point.x = (place[0] * camera.fx + camera.cx) / camera.width;
+      point.y = (place[1] * camera.fy + camera.cy) / camera.height;
+    }
+  }
 }
 
 bool fits_camera(const Image& frame, const Camera& camera) {

@@ -10,6 +10,7 @@
 #include "body/avatar_shape.h"
 #include "core/camera.h"
 #include "core/image.h"
+#include "core/lens.h"
 #include "optim/solid/mesh_distance.h"
 #include "pipelines/config/data_settings.h"
 #include "pipelines/config/masks.h"
@@ -29,6 +30,8 @@ struct ClipFile {
 struct ClipVideo {
   FrameSource frames;
   std::vector<MaskSource> masks;  ///< of the human, then of each object
+  Lens lens = {};                 ///< through which it was filmed
+  Camera camera = {};             ///< whose intrinsics the lens goes with, where it bends
 };
 
 /// All that stays the same over the clip. Frames are read one by one (read_frame).
@@ -62,6 +65,7 @@ struct ClipFrame {
   Image target;                     ///< [3,H,W]
   Image human_mask;                 ///< [1,H,W] coverage
   std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
+  Image seen = {};                  ///< [1,H,W] 1, or 0 where a lens shows nothing of the frame; empty: 1 everywhere
 };
 
 /// Opens the frames and masks that `data` names. What masks lack or have too much is told in the log. Throws as
@@ -75,6 +79,10 @@ Clip read_clip(const DataSettings& data);
 
 /// As read_clip, of a scene that is read. data.initial is of no meaning.
 Clip make_clip(const DataSettings& data, SceneSetup setup);
+
+/// The clip as filmed through this lens: frames and masks are straightened as they are read, and keypoints here. Of a
+/// clip without a lens.
+void set_lens(const Lens& lens, Clip& clip);
 
 /// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on.
 /// A human or an object that some masks after frame 0 show nothing of is told in the log, each with its frames. Throws

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "core/golden_section.h"
 #include "optim/metrics.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/run/reconstruct_stage.h"
@@ -54,31 +54,11 @@ class Comparison {
 
 }  // namespace
 
-/// All widths in steps, then golden sections about the best [Kiefer 1953].
 PixelFilter estimated_pixel_filter(const RunConfig& config, const Clip& clip) {
   Comparison comparison(config, clip);
-  const auto width_of = [](int step) { return kWidestFilter * step / kSteps; };
-  int best = 0;
-  double most = -HUGE_VAL;
-  for (int step = 0; step <= kSteps; ++step) {
-    const double psnr = comparison.psnr_db(width_of(step));
-    if (psnr > most) best = step, most = psnr;
-  }
-  double low = width_of(std::max(0, best - 1)), high = width_of(std::min(kSteps, best + 1));
-  constexpr double kGolden = 1 / std::numbers::phi;
-  double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
-  double at_left = comparison.psnr_db(left), at_right = comparison.psnr_db(right);
-  while (high * high - low * low > kFinest) {
-    if (at_left > at_right) {
-      high = right, right = left, at_right = at_left;
-      left = high - kGolden * (high - low);
-      at_left = comparison.psnr_db(left);
-    } else {
-      low = left, left = right, at_left = at_right;
-      right = low + kGolden * (high - low);
-      at_right = comparison.psnr_db(right);
-    }
-  }
+  const auto [low, high] = bracket_of_largest(
+      {0, kWidestFilter}, kSteps, [&](double width) { return comparison.psnr_db(width); },
+      [](const Bracket& b) { return b.high * b.high - b.low * b.low <= kFinest; });
   const double width = 0.5 * (low + high), blur = std::round(width * width * kFineness) / kFineness;
   return {blur, comparison.psnr_db(std::sqrt(blur)), high >= kWidestFilter};
 }

@@ -476,14 +476,16 @@ class Reconstruction {
                     std::vector<MetricValues>& errors) {
     const RunPaths& paths = folder_.paths();
     const auto number = static_cast<int>(index);
-    const StatePicture picture = picture_of_state(config_, clip_, state, colors);
+    StatePicture picture = picture_of_state(config_, clip_, state, colors);
+    hide_unseen(frame, picture.image);
     write_image(paths.frame_image(number, "render"), picture.image);
     write_image(paths.frame_image(number, "difference"), difference_image(picture.image, frame.target));
     errors.push_back(picture_errors(picture, frame));
   }
 
   void write_start_image(Index index, const ClipFrame& frame) {
-    const StatePicture start = picture_of_state(config_, clip_, given_start(clip_, index), start_colors_);
+    StatePicture start = picture_of_state(config_, clip_, given_start(clip_, index), start_colors_);
+    hide_unseen(frame, start.image);
     write_image(folder_.paths().frame_image(static_cast<int>(index), "start"), start.image);
     progress_.start_errors.push_back(picture_errors(start, frame));
   }

@@ -42,13 +42,22 @@ std::vector<SceneState> seen_frames(std::span<const SceneState> done, const Scen
 }
 
 /// Empty where every pixel counts.
-Image pixel_weights(const StageSettings& stage, const FrameTask& task, const RunConfig& config) {
+Image weights_of_setting(const StageSettings& stage, const FrameTask& task, const RunConfig& config) {
   if (stage.weight == PixelWeight::kAll) return {};
   Image covered(1, task.covered.height(), task.covered.width());
   if (stage.weight == PixelWeight::kUnoccluded) covered = task.covered;
   if (stage.weight == PixelWeight::kBackground || stage.weight == PixelWeight::kForeground)
     add_covered(task.frame, config.data, covered);
   return stage.weight == PixelWeight::kForeground ? std::move(covered) : complement(covered);
+}
+
+/// Those of the stage, where the frame is seen. Empty where every pixel counts.
+Image pixel_weights(const StageSettings& stage, const FrameTask& task, const RunConfig& config) {
+  Image weights = weights_of_setting(stage, task, config);
+  if (task.frame.seen.empty()) return weights;
+  if (weights.empty()) return task.frame.seen;
+  hide_unseen(task.frame, weights);
+  return weights;
 }
 
 /// Frame 0 as the stages of a frame see it: as it was found, or, while it is looked for, as it was given.

@@ -17,6 +17,7 @@
 #include "pipelines/input/body_files.h"
 #include "pipelines/report/report.h"
 #include "pipelines/run/frame_start.h"
+#include "pipelines/run/lens_estimate.h"
 #include "pipelines/run/pixel_filter.h"
 #include "pipelines/sources/sources.h"
 #include "splat/files/splat_file.h"
@@ -79,6 +80,23 @@ std::string estimate_blur(RunConfig& config, const Clip& clip) {
   config.render.blur = filter.blur;
   return "render.blur estimated from frame 0: " + number_text(filter.blur) + " px^2 (PSNR of its foreground " +
          rounded(filter.psnr_db, 4) + " dB)";
+}
+
+/// Sets the lens where the config asks for an estimate. Returns what the log tells of it.
+std::string estimate_lens(const RunConfig& config, Clip& clip) {
+  if (!config.data.lens.estimate_k1) return "";
+  const LensEstimate found = estimated_lens(config, clip);
+  Lens lens = config.data.lens.lens;
+  lens.k1 = found.is_widest ? 0 : found.k1;
+  set_lens(lens, clip);
+  if (found.is_widest) {
+    log_warning(
+        "data.lens.k1 \"estimate\": frame 0 is the nearer to the scene the more it is bent, so it tells no lens; "
+        "scene or camera may not be the video's. Used: 0");
+    return "";
+  }
+  return "data.lens.k1 estimated from frame 0: " + number_text(lens.k1) + " (PSNR of its background " +
+         rounded(found.psnr_db, 4) + " dB)";
 }
 
 RunSummary reconstruct_into(RunFolder& folder, const RunConfig& config, Clip& clip, const std::vector<LossTerm>& losses,
@@ -198,14 +216,18 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   Clip clip = read_run_clip(config, losses);                                           // before anything is written
   if (config.body.kind == BodyKind::kSmplx && !clip.body) body_model_of(config.body);  // what is wrong shows now
   check_run_clip(config, clip);
-  std::string blur;
-  on_threads(threads, [&] { blur = estimate_blur(config, clip); });
+  std::string lens, blur;
+  on_threads(threads, [&] {
+    lens = estimate_lens(config, clip);
+    blur = estimate_blur(config, clip);
+  });
   identity.seed = config.seed;
   identity.threads = threads > 0 ? threads : thread_count();
   identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
   RunFolder folder(options.folder, identity, options.resume);
   folder.note(opening(config, clip, identity));
   early.move_to(folder);
+  if (!lens.empty()) folder.note(lens);
   if (!blur.empty()) folder.note(blur);
   return reconstruct_into(folder, config, clip, losses, options);
 }

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "core/random.h"
 
 namespace lens_test {
 
@@ -75,6 +76,22 @@ TEST_CASE("a picture through a lens becomes that of a pinhole") {
     if (lens.is_straight()) CHECK(result.image == taken);
     if (lens.k1 > 0) CHECK(seen < camera.width * camera.height);
   }
+}
+
+TEST_CASE("a place shows the direction that the lens bends to it") {
+  RandomSequence random(8);
+  for (int i = 0; i < 2000; ++i) {
+    const Lens lens{random.uniform(-0.4, 0.4), random.uniform(-0.1, 0.1), random.uniform(-0.02, 0.02),
+                    random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01)};
+    const double reach = 0.9 * std::sqrt(std::min(1.5, valid_radius_squared(lens))), turn = random.uniform(0, 6.3);
+    const double radius = random.uniform(0, reach);
+    const Vector2<double> point(radius * std::cos(turn), radius * std::sin(turn)), bent = bent_by(lens, point);
+    INFO("k1 " << lens.k1 << ", radius " << radius);
+    CHECK((straight_of(lens, bent) - point).norm() < 1e-9);
+    if (std::abs(lens.k1) < 0.15 && radius < 0.8) CHECK((straight_of(lens, bent) - straight(lens, bent)).norm() < 1e-9);
+  }
+  CHECK(straight_of({}, {0.3, -0.2}) == Vector2<double>(0.3, -0.2));
+  CHECK(straight_of({.k1 = -0.4}, {5, 5}).allFinite());  // shown nowhere
 }
 
 TEST_CASE("beyond where a lens turns back nothing is seen") {
