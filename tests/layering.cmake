@@ -17,7 +17,8 @@ set(stands_on
     "pipelines/scan: pipelines/rig pipelines/report"
     "pipelines/run: pipelines/graph pipelines/sources pipelines/report" "pipelines/chain: pipelines/run"
     "pipelines/sweep: pipelines/chain pipelines/synthetic" "pipelines/study: pipelines/sweep pipelines/evaluate"
-    "pipelines/cli: pipelines/study pipelines/avatar pipelines/footage pipelines/scan"
+    "pipelines/locate: pipelines/graph pipelines/scan"
+    "pipelines/cli: pipelines/study pipelines/avatar pipelines/footage pipelines/locate"
     "bench: pipelines/cli" "stress: pipelines/cli")
 
 set(rooms "")
