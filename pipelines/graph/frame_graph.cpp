@@ -147,8 +147,8 @@ void FrameGraph<S>::record_unknowns() {
   unknown_.scene_scale = number(kSceneScaleGroup);
   unknown_.scene_height = number(kSceneHeightGroup);
   if (is_unknown(kBetasGroup)) {
-    HSI4D_CHECK(clip_.shape.has_value(), "betas are a group of a clip whose avatar has a shape");
-    unknown_.betas = leaf(kBetasGroup, kBetasGroup, 1, clip_.shape->betas, nullptr);
+    HSI4D_CHECK(clip_.directions.has_value(), "betas are a group of a clip whose avatar has a shape");
+    unknown_.betas = leaf(kBetasGroup, kBetasGroup, 1, clip_.directions->betas, nullptr);
   }
   intrinsics_ = intrinsics();
 }
@@ -262,13 +262,13 @@ PosedSkeleton<S> FrameGraph<S>::record_skeleton(const Avatar& avatar) {
   if (unknown_.betas.tape == nullptr) return kinematic_chain(rotations_, transl_, avatar.parents, avatar.joints);
   HSI4D_CHECK_EQ(avatar.count(), clip_.avatar.count());
   const auto offsets = [this](const std::vector<double>& directions) {
-    const Index betas = clip_.shape->betas, points = std::ssize(directions) / (3 * betas);
+    const Index betas = clip_.directions->betas, points = std::ssize(directions) / (3 * betas);
     const Directions<S> prepared({directions, points, betas, {0}, betas});
     return blend_shapes<S>(std::vector<double>(static_cast<std::size_t>(3 * points)),
                            std::array{BlendTerm<S>{prepared, unknown_.betas}});
   };
-  rest_offsets_ = offsets(clip_.shape->means);
-  const Var<S> joint_offsets = offsets(clip_.shape->joints);
+  rest_offsets_ = offsets(clip_.directions->means);
+  const Var<S> joint_offsets = offsets(clip_.directions->joints);
   const Var<S> joints = constant_rows<S>(tape_, "rest_joints", avatar.joints, 3) + joint_offsets;
   return kinematic_chain(rotations_, transl_ - slice_rows(joint_offsets, 0, 1), avatar.parents, joints);
 }

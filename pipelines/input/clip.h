@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "body/avatar_shape.h"
+#include "body/avatar_directions.h"
 #include "core/camera.h"
 #include "core/image.h"
 #include "core/lens.h"
@@ -40,7 +40,7 @@ struct Clip {
   std::vector<ClipObject> objects;
   Avatar avatar;
   std::optional<BodyModel> body;                         ///< that the avatar was made on, where a loss asks for it
-  std::optional<AvatarShape> shape;                      ///< how the avatar follows betas, where a stage moves them
+  std::optional<AvatarDirections> directions;            ///< how the avatar follows betas, where a stage moves them
   Camera camera;                                         ///< of frame 0; size and intrinsics of all frames
   SceneState first;                                      ///< state of frame 0, given; poses are of the avatar's body
   std::vector<BodyPose> estimate;                        ///< estimated poses by frame; empty: none

@@ -38,11 +38,11 @@ Rigid<double> camera_in_world(const ClipUnknowns& unknowns, const Rigid<double>&
 
 /// How far the pelvis, joint 0, moves in the rest pose.
 Vector3<double> rise_of_pelvis(const ClipUnknowns& unknowns, const Clip& clip) {
-  HSI4D_CHECK(clip.shape.has_value(), "an avatar without a shape cannot follow betas");
+  HSI4D_CHECK(clip.directions.has_value(), "an avatar without a shape cannot follow betas");
   Vector3<double> rise = Vector3<double>::Zero();
   for (std::size_t b = 0; b < unknowns.betas.size(); ++b) {
     for (std::size_t i = 0; i < 3; ++i)
-      rise[static_cast<Index>(i)] += clip.shape->joints[i * unknowns.betas.size() + b] * unknowns.betas[b];
+      rise[static_cast<Index>(i)] += clip.directions->joints[i * unknowns.betas.size() + b] * unknowns.betas[b];
   }
   return rise;
 }
@@ -84,8 +84,8 @@ void apply_unknowns(const ClipUnknowns& unknowns, Clip& clip) {
       clip.objects[o].gaussians = transformed(clip.objects[o].gaussians, {.scale = unknowns.object_scales[o]});
   }
   if (unknowns.betas.empty()) return;
-  HSI4D_CHECK(clip.shape.has_value(), "an avatar without a shape cannot follow betas");
-  add_betas(*clip.shape, unknowns.betas, clip.avatar);
+  HSI4D_CHECK(clip.directions.has_value(), "an avatar without a shape cannot follow betas");
+  add_betas(*clip.directions, unknowns.betas, clip.avatar);
   const Vector3<double> rise = rise_of_pelvis(unknowns, clip);
   for (BodyPose& pose : clip.estimate) pose.transl -= rise;
   if (!clip.truth) return;

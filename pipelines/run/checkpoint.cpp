@@ -262,7 +262,7 @@ ClipUnknowns stored_unknowns(const Checkpoint& checkpoint, const Clip& clip) {
   if (!scales.empty()) stored_states(checkpoint, "unknowns/object_scales", clip.objects.size());
   const std::vector<double>& betas = checkpoint.doubles("unknowns/betas");
   if (!betas.empty())
-    stored_states(checkpoint, "unknowns/betas", clip.shape ? static_cast<std::size_t>(clip.shape->betas) : 0);
+    stored_states(checkpoint, "unknowns/betas", clip.directions ? static_cast<std::size_t>(clip.directions->betas) : 0);
   return {numbers[0], numbers[1], numbers[2], scales, betas};
 }
 

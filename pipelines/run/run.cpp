@@ -174,7 +174,7 @@ void give_shape(const RunConfig& config, const std::string& group, Clip& clip) {
                     "; set `body`, or leave the group out");
   std::vector<double> betas = config.body.shape;
   betas.resize(static_cast<std::size_t>(config.body.betas));
-  clip.shape = avatar_shape(clip.avatar, body_model_of(config.body), betas);
+  clip.directions = avatar_directions(clip.avatar, body_model_of(config.body), betas);
 }
 
 }  // namespace

@@ -26,11 +26,11 @@ constexpr Index kBetas = 3;
 Clip clip_with_shape() {
   Clip clip = test::small_clip(kWidth, kHeight, 400);
   RandomSequence random(31);
-  AvatarShape shape{kBetas, std::vector<double>(clip.avatar.means.size() * kBetas),
-                    std::vector<double>(clip.avatar.joints.size() * kBetas)};
+  AvatarDirections shape{kBetas, std::vector<double>(clip.avatar.means.size() * kBetas),
+                         std::vector<double>(clip.avatar.joints.size() * kBetas)};
   for (double& x : shape.means) x = random.uniform(-0.03, 0.03);
   for (double& x : shape.joints) x = random.uniform(-0.03, 0.03);
-  clip.shape = shape;
+  clip.directions = shape;
   return clip;
 }
 

@@ -1,9 +1,8 @@
 // Clips that were filmed through a lens that bends.
-#include "core/lens.h"
-
 #include <catch2/catch.hpp>
 
 #include "core/image_io.h"
+#include "core/lens.h"
 #include "core/parallel.h"
 #include "pipelines/config/run_problems.h"
 #include "pipelines/input/keypoints.h"

@@ -1,11 +1,11 @@
-#include "body/avatar_shape.h"
+#include "body/avatar_directions.h"
 
 #include <catch2/catch.hpp>
 
 #include "body/procedural_body.h"
 #include "core/random.h"
 
-namespace avatar_shape_test {
+namespace avatar_directions_test {
 
 using namespace hsi4d;
 
@@ -41,7 +41,7 @@ TEST_CASE("an avatar on the vertices of a body follows its betas as the body doe
     both[b] = made[b] + more[b];
   }
   Avatar avatar = avatar_on_vertices(rest_body(model, made));
-  const AvatarShape shape = avatar_shape(avatar, model, made);
+  const AvatarDirections shape = avatar_directions(avatar, model, made);
   CHECK(shape.betas == kBetas);
   const BodyModel expected = rest_body(model, both);
   const std::vector<double> joints_before = avatar.joints;
@@ -55,4 +55,4 @@ TEST_CASE("an avatar on the vertices of a body follows its betas as the body doe
   CHECK(avatar.means == before);
 }
 
-}  // namespace avatar_shape_test
+}  // namespace avatar_directions_test

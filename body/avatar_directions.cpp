@@ -1,4 +1,4 @@
-#include "body/avatar_shape.h"
+#include "body/avatar_directions.h"
 
 #include "body/surface_index.h"
 #include "core/check.h"
@@ -20,12 +20,12 @@ void add_directions_to(std::vector<T>& numbers, std::span<const double> directio
 
 }  // namespace
 
-AvatarShape avatar_shape(const Avatar& avatar, const SmplxModel& body, std::span<const double> betas) {
+AvatarDirections avatar_directions(const Avatar& avatar, const SmplxModel& body, std::span<const double> betas) {
   HSI4D_CHECK_EQ(body.joint_count(), avatar.joint_count());
   const BodyModel rest = rest_body(body, betas);
   const SurfaceIndex surface(rest);
   const auto width = static_cast<std::size_t>(body.betas);
-  AvatarShape shape{body.betas, std::vector<double>(avatar.means.size() * width), body.joint_shape};
+  AvatarDirections shape{body.betas, std::vector<double>(avatar.means.size() * width), body.joint_shape};
   for (Index n = 0; n < avatar.count(); ++n) {
     const SurfacePlace place = surface.nearest(Vector3<float>(avatar.means.data() + 3 * n).cast<double>());
     double* const rows = shape.means.data() + 3 * static_cast<std::size_t>(n) * width;
@@ -38,7 +38,7 @@ AvatarShape avatar_shape(const Avatar& avatar, const SmplxModel& body, std::span
   return shape;
 }
 
-void add_betas(const AvatarShape& shape, std::span<const double> betas, Avatar& avatar) {
+void add_betas(const AvatarDirections& shape, std::span<const double> betas, Avatar& avatar) {
   HSI4D_CHECK_EQ(std::ssize(betas), shape.betas);
   add_directions_to(avatar.means, shape.means, betas);
   add_directions_to(avatar.joints, shape.joints, betas);
