@@ -39,6 +39,8 @@ const char* words_of(LossInput need) {
       return "depths of pictures";
     case LossInput::kGaussians:
       return "Gaussians that are made";
+    case LossInput::kLook:
+      return "a look that is learnt";
     case LossInput::kPose:
     case LossInput::kMotion:
     case LossInput::kObjectMotion:

@@ -14,6 +14,7 @@
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/view_turn.h"
 #include "pipelines/draw/visibility.h"
+#include "pipelines/input/body_files.h"
 #include "pipelines/input/input_hashes.h"
 #include "pipelines/metrics/sequence_errors.h"
 #include "pipelines/record/results.h"
@@ -116,11 +117,14 @@ class Reconstruction {
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
     folder_.write_summary(summary);
     const std::optional<BodyModel> body =
-        write_body(folder_.paths(), config_.body, clip_.avatar, motion_of(clip_, result()));
+        write_body(folder_.paths(), body_of_avatar(config_.body, config_.data.avatar.string()), clip_.avatar,
+                   motion_of(clip_, result()));
     view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
-    write_views(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
+    RunConfig other_side = config_;
+    write_views(folder_.paths(), clip_, result(), [&](Index frame, const SceneState& state, const auto& background) {
       stop_if_asked(clip_.frames());
-      return render_state(config_, clip_, state, colors_after(frame));
+      if (background) other_side.background = *background;
+      return render_state(background ? other_side : config_, clip_, state, colors_after(frame));
     });
     return summary;
   }

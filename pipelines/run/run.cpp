@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "body/avatar_shape.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/log.h"
@@ -129,7 +130,7 @@ std::string loss_with(const RunConfig& config, LossInput input) {
 
 /// Reads the body whose vertices a loss asks for. One that the avatar was not made on is left out, which is told.
 void give_body(const RunConfig& config, const std::string& loss, Clip& clip) {
-  BodyModel body = rest_body(config.body);
+  BodyModel body = rest_body(body_of_avatar(config.body, config.data.avatar.string()));
   const std::string difference = difference_from(body, clip.avatar);
   if (difference.empty()) {
     clip.body = std::move(body);
@@ -138,10 +139,20 @@ void give_body(const RunConfig& config, const std::string& loss, Clip& clip) {
   }
 }
 
+/// A motion of SMPL-X tells other programs of whom it is; that of the program's own body has betas that mean nothing to
+/// them.
+void give_shape(const RunConfig& config, Clip& clip) {
+  const std::optional<AvatarShape> shape = read_avatar_shape(config.data.avatar.string());
+  if (!shape || shape->body != kSmplxName || !clip.betas.empty()) return;
+  clip.betas = shape->betas;
+  clip.gender = shape->gender;
+}
+
 }  // namespace
 
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
   Clip clip = read_clip(config.data);
+  body_of_avatar(config.body, config.data.avatar.string());  // what they contradict each other in shows now
   warn_of_antialiasing(clip.antialiased, config.render.antialias);
   set_image_size(clip, config);
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
@@ -149,6 +160,7 @@ Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses)
   if (config.body.kind == BodyKind::kSmplx) clip.files.push_back({"/body/path", config.body.path});
   const std::string loss = loss_with(config, LossInput::kBodyVertices);
   if (!loss.empty()) give_body(config, loss, clip);
+  give_shape(config, clip);
   return clip;
 }
 
