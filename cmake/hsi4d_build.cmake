@@ -197,7 +197,7 @@ endfunction()
 # Configs that commands write or begin with become part of the program, so that it runs from anywhere.
 function(hsi4d_embed_configs)
   set(HSI4D_SHIPPED_CONFIGS "")
-  foreach(name best demo demo_quick from_video)
+  foreach(name best demo demo_quick from_video avatar/from_run)
     set(file ${PROJECT_SOURCE_DIR}/configs/${name}.json)
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
     file(READ ${file} text)

@@ -31,6 +31,7 @@ enum class LossInput {
   kBodyVertices,   ///< motion->mesh, where the avatar was made on it; on demand
   kDepths,         ///< depth_moments, transmittance, depth_target: where pictures come with depths
   kGaussians,      ///< gaussian_opacities, gaussian_log_scales: where Gaussians themselves are made
+  kLook,           ///< color_change, shape_change: where the look of an avatar is learnt
 };
 
 /// What a term reads once from its settings; see LossDescription::prepare.

@@ -31,6 +31,8 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(depth_moments) && given(transmittance) && given(depth_target);
     case LossInput::kGaussians:
       return given(gaussian_opacities) && given(gaussian_log_scales);
+    case LossInput::kLook:
+      return given(color_change) && given(shape_change);
   }
   return false;
 }

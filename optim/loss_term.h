@@ -83,6 +83,9 @@ struct LossInputs {
   Var<S> gaussian_opacities;   ///< [N,1] of all Gaussians that are made, 0 to 1
   Var<S> gaussian_log_scales;  ///< [N,3] natural logarithm of metres
 
+  Var<S> color_change;  ///< [N,3] by how much the avatar's own colours are others than where a fit of it began
+  Var<S> shape_change;  ///< [N,7] likewise places, cm, log-scales and logits of the opacity
+
   std::vector<LeftOut>* left_out = nullptr;  ///< where a term tells of what it may leave out; null: nobody asks
   std::vector<LossNote>* notes = nullptr;    ///< where it tells what it found; null: nobody asks
 
@@ -103,6 +106,7 @@ LossInputs<S> only_declared(LossInputs<S> inputs, const std::vector<LossInput>& 
   if (lacks(LossInput::kUnknowns)) inputs.unknowns = {};
   if (lacks(LossInput::kDepths)) inputs.depth_moments = inputs.transmittance = inputs.depth_target = {};
   if (lacks(LossInput::kGaussians)) inputs.gaussian_opacities = inputs.gaussian_log_scales = {};
+  if (lacks(LossInput::kLook)) inputs.color_change = inputs.shape_change = {};
   return inputs;
 }
 

@@ -41,6 +41,8 @@ const char* words_of(LossInput need) {
       return "Gaussians that are made";
     case LossInput::kUnknowns:
       return "a group of the clip, such as focal_length";
+    case LossInput::kLook:
+      return "a look that is learnt";
     case LossInput::kPose:
     case LossInput::kMotion:
     case LossInput::kObjectMotion:

@@ -128,6 +128,8 @@ LossLeaves<S> loss_leaves(Tape<S>& tape) {
   in.human_seen = leaf("human_seen", kScalarShape, {1});
   in.gaussian_opacities = leaf("gaussian_opacities", shape_of(9, 1), 0, 1);
   in.gaussian_log_scales = leaf("gaussian_log_scales", shape_of(9, 3), -4, 0);
+  in.color_change = leaf("color_change", shape_of(9, 3), -0.5, 0.5);
+  in.shape_change = leaf("shape_change", shape_of(9, 7), -1, 1);
   in.depth_moments = leaf("depth_moments", image(2), 0.2, 0.3);
   in.transmittance = leaf("transmittance", image(1), 0, 0.5);
   in.depth_target = leaf("depth_target", image(1), 1, 2);

@@ -48,6 +48,9 @@ if(HSI4D_PYTHON)
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "the gate of time and error"
            COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/bench_test.py ${PROJECT_SOURCE_DIR}/tools)
+  add_test(NAME "what the front end says of wrong input"
+           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/frontend_input_test.py ${PROJECT_SOURCE_DIR}/tools)
+  set_tests_properties("what the front end says of wrong input" PROPERTIES LABELS quick)
   set_tests_properties("exporters of VPoser, WHAM, GVHMR, TRAM and WHAC" "services for video, masks and poses" "embeddings by CLIP"
                        "the gate of time and error" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
 else()

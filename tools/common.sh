@@ -71,7 +71,8 @@ install_chromium() {
   [[ -z $(find_chromium) ]] || return 0
   if [[ $EUID -ne 0 ]]; then as_root=(sudo); fi
   timed "install chromium" "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-    apt-get -q -y install --no-install-recommends chromium "$@"
+    apt-get -q -y install --no-install-recommends chromium "$@" ||
+    fail "there is no Chromium, and it cannot be installed (Debian package chromium); the variable CHROMIUM names one"
 }
 
 # print_usage FILE: the comment at the top of a command.

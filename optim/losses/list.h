@@ -25,7 +25,8 @@
   HSI4D_LOSS(unknowns_prior)   \
   HSI4D_LOSS(gaussian_opacity) \
   HSI4D_LOSS(gaussian_scale)   \
-  HSI4D_LOSS(depth_spread)
+  HSI4D_LOSS(depth_spread)     \
+  HSI4D_LOSS(look)
 // clang-format on
 
 namespace hsi4d {

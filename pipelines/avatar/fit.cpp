@@ -4,12 +4,15 @@
 #include <cmath>
 #include <optional>
 
+#include "autodiff/elementwise.h"
+#include "autodiff/matrix.h"
 #include "body/motion_edit.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/rotation.h"
 #include "core/text.h"
 #include "optim/metrics.h"
+#include "pipelines/avatar/offsets.h"
 #include "pipelines/draw/posed_splats.h"
 #include "pipelines/draw/tape_image.h"
 #include "pipelines/input/body_files.h"
@@ -24,14 +27,44 @@ using S = float;
 /// Colour of a new avatar, before it has learnt anything.
 constexpr float kFirstColor = 0.5F;
 
+constexpr double kLargeMove = 0.01;  // metres that count as 1 in LossInputs::shape_change
+constexpr float kSeenFrom = 0.5F;    // of a mask: what it reaches nowhere shows nobody
+
 /// A view in memory.
 struct LoadedView {
   Vector6<double> xi;
   std::array<S, 4> intrinsics;
   BodyPose pose;
   ViewImage image;
+  Image weight;  ///< [1,H,W] how much a pixel counts; no pixels: all do
+  bool is_seen = false;
   bool held = false;
 };
+
+/// The least number within `margin` pixels to all sides, those outside of the image left out.
+Image inset(const Image& mask, int margin) {
+  Image across = mask, result = mask;
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) {
+      const float* const row = mask.row(0, y);
+      across(0, y, x) = *std::min_element(row + std::max(0, x - margin), row + std::min(mask.width(), x + margin + 1));
+    }
+  }
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int i = std::max(0, y - margin); i < std::min(mask.height(), y + margin + 1); ++i) {
+      for (int x = 0; x < mask.width(); ++x) result(0, y, x) = std::min(result(0, y, x), across(0, i, x));
+    }
+  }
+  return result;
+}
+
+bool shows_somebody(const Image& mask) {
+  for (int y = 0; y < mask.height(); ++y) {
+    if (std::any_of(mask.row(0, y), mask.row(0, y) + mask.width(), [](float share) { return share >= kSeenFrom; }))
+      return true;
+  }
+  return false;
+}
 
 std::vector<LoadedView> load_views(const AvatarFitSettings& settings, const ViewSet& set, const Avatar& avatar) {
   const Camera& first = set.cameras[static_cast<std::size_t>(set.views.front().camera)];
@@ -55,6 +88,10 @@ std::vector<LoadedView> load_views(const AvatarFitSettings& settings, const View
                       " joints; the avatar has " + std::to_string(avatar.joint_count()));
     }
     loaded.image = view_image(set, view, background);
+    if (!loaded.image.mask.empty()) {
+      loaded.weight = inset(loaded.image.mask, settings.mask_inset_px);
+      loaded.is_seen = shows_somebody(loaded.image.mask);
+    }
     loaded.held = is_held(settings, view);
   }
   return views;
@@ -80,11 +117,18 @@ class FitGraph {
       tape.write(background)(0, i) = static_cast<S>(settings.background[static_cast<std::size_t>(i)]);
     }
     const HumanColors<S> colors = color_net(avatar);
+    GaussianVars<S> placed = human_;
+    placed.means = placed_means(avatar, settings.stage);
     const SplatInputs<S> splats =
-        skinned_splats(human_, rotations_, transl_, avatar, avatar.color_net ? &colors : nullptr);
-    inputs_.rendered = render(splats, xi_, background, view_, {}, intrinsics_).image;
+        skinned_splats(placed, rotations_, transl_, avatar, avatar.color_net ? &colors : nullptr);
+    const Rendered<S> rendered = render(splats, xi_, background, view_, {}, intrinsics_);
+    inputs_.rendered = rendered.image;
     inputs_.target = tape.constant("target", inputs_.rendered.shape());
-    inputs_.weight = tape.constant("weight", shape_of_image(inputs_.rendered));
+    inputs_.weight = tape.constant("weight", rendered.transmittance.shape());
+    inputs_.human_opacity = 1 - rendered.transmittance;
+    inputs_.human_mask = tape.constant("human_mask", rendered.transmittance.shape());
+    inputs_.human_seen = tape.constant("human_seen", kScalarShape);
+    record_changes(avatar, placed);
     for (const ParameterGroup<S>& group : groups_) {
       for (const Var<S> var : group.blocks) tape.freeze(var);
     }
@@ -101,25 +145,30 @@ class FitGraph {
     }
     write_image(inputs_.target, view.image.color);
     if (!view.image.mask.empty()) {
-      write_image(inputs_.weight, view.image.mask);
+      write_image(inputs_.weight, view.weight);
+      write_image(inputs_.human_mask, view.image.mask);
     } else {
       fill(inputs_.weight, S(1));
     }
+    fill(inputs_.human_seen, view.is_seen ? S(1) : S(0));
   }
 
-  Image picture() {
-    tape_.forward(inputs_.rendered);
-    return held_image(tape_.value(inputs_.rendered), 0, 3);
-  }
+  Image picture() { return drawn(inputs_.rendered); }
+  Image silhouette() { return drawn(inputs_.human_opacity); }
 
   /// What has been learnt, back into the avatar.
-  void read(const ConfigMap<ParameterGroupSettings>& moved, Avatar& avatar) const {
+  void read(const ConfigMap<ParameterGroupSettings>& moved, Avatar& avatar) {
     const auto read_leaf = [&](const char* group, Var<S> var, std::vector<float>& to) {
       if (find_entry(moved, group) == nullptr) return;
       const ConstArray<S> values = tape_.value(var);
       std::copy_n(values.data, to.size(), to.begin());
     };
-    read_leaf("means", human_.means, avatar.means);
+    if (LossInputs<S>::given(offsets_)) {
+      tape_.forward(means_);
+      read_leaf("offsets", means_, avatar.means);
+    } else {
+      read_leaf("means", human_.means, avatar.means);
+    }
     read_leaf("quats", human_.quats, avatar.quats);
     read_leaf("log_scales", human_.log_scales, avatar.log_scales);
     read_leaf("opacity_logits", human_.opacity_logits, avatar.opacity_logits);
@@ -133,7 +182,35 @@ class FitGraph {
   const std::vector<ParameterGroup<S>>& groups() const { return groups_; }
 
  private:
-  static Shape shape_of_image(Var<S> image) { return image_shape<S>(1, image.shape().rows, image.shape().cols); }
+  Image drawn(Var<S> image) {
+    tape_.forward(image);
+    return held_image(tape_.value(image), 0, static_cast<int>(image.shape().planes));
+  }
+
+  /// The means, moved by a field where the stage moves one.
+  Var<S> placed_means(const Avatar& avatar, const StageSettings& stage) {
+    groups_.push_back({"offsets", {}});
+    means_ = human_.means;
+    if (find_entry(stage.optimize, "offsets") == nullptr) return means_;
+    const OffsetField field = offset_field(avatar);
+    offsets_ = tape_.parameter("offsets", shape_of(field.controls, 1));
+    groups_.back().blocks.push_back(offsets_);
+    return means_ = offset_means(field, human_.means, offsets_);
+  }
+
+  Var<S> change(const char* name, Var<S> now, const std::vector<float>& first) {
+    const Var<S> before = tape_.constant(name, now.shape());
+    tape_.set(before, first);
+    return now - before;
+  }
+
+  void record_changes(const Avatar& first, const GaussianVars<S>& now) {
+    inputs_.color_change = change("first_colors", now.colors, first.colors);
+    const std::array<Var<S>, 3> shape = {change("first_means", now.means, first.means) * (1 / kLargeMove),
+                                         change("first_log_scales", now.log_scales, first.log_scales),
+                                         change("first_opacity_logits", now.opacity_logits, first.opacity_logits)};
+    inputs_.shape_change = concat_cols(std::span<const Var<S>>(shape));
+  }
 
   Var<S> leaf(const char* name, const std::vector<float>& values, Index cols) {
     const Var<S> var = tape_.parameter(name, shape_of(static_cast<Index>(values.size()) / cols, cols));
@@ -164,6 +241,7 @@ class FitGraph {
   GaussianVars<S> human_;
   ColorNetVars<S> net_;
   Var<S> xi_, intrinsics_, rotations_, transl_;
+  Var<S> offsets_, means_;  // offsets_ is empty where the stage moves none
   LossInputs<S> inputs_;
   std::vector<ParameterGroup<S>> groups_;
 };
@@ -210,13 +288,15 @@ ViewScore score_of(FitGraph& graph, const std::vector<LoadedView>& views, bool h
     ++score.views;
     score.psnr_db += psnr_db(picture, view.image.color);
     const std::optional<double> foreground =
-        view.image.mask.empty() ? std::nullopt : psnr_db(picture, view.image.color, view.image.mask);
+        view.is_seen ? psnr_db(picture, view.image.color, view.image.mask) : std::nullopt;
     if (!foreground) continue;
     score.psnr_foreground_db = score.psnr_foreground_db.value_or(0) + *foreground;
+    score.silhouette_iou = score.silhouette_iou.value_or(0) + mask_iou(graph.silhouette(), view.image.mask).value_or(0);
     ++masked;
   }
   if (score.views > 0) score.psnr_db /= static_cast<double>(score.views);
   if (score.psnr_foreground_db) *score.psnr_foreground_db /= static_cast<double>(masked);
+  if (score.silhouette_iou) *score.silhouette_iou /= static_cast<double>(masked);
   return score;
 }
 
@@ -256,6 +336,8 @@ AvatarFitResult fit_avatar(const AvatarFitSettings& settings, const Avatar& firs
   if (learnt.empty()) throw UserError(set.file.string() + ": all views are held back; nothing is left to learn from");
   Tape<S> tape;
   FitGraph graph(tape, first, settings, set.cameras[static_cast<std::size_t>(set.views.front().camera)]);
+  AvatarFitResult result;
+  result.before = score_of(graph, views, false);
   ViewOrder order(std::move(learnt), settings.seed);
   graph.show(views[order.next()]);
   Progress progress("fit", settings.stage.iterations, observer.progress, observer.progress_interval);
@@ -264,7 +346,6 @@ AvatarFitResult fit_avatar(const AvatarFitSettings& settings, const Avatar& firs
     progress.step_with("loss", report.loss);
     graph.show(views[order.next()]);
   };
-  AvatarFitResult result;
   result.stage = run_stage(tape, settings.stage, terms, graph.inputs(), graph.groups(), after, {"avatar fit"});
   progress.finish();
   result.avatar = first;

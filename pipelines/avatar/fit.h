@@ -5,10 +5,11 @@
 // (optim/stage.h) moves what its settings name:
 //
 //   colors, opacity_logits, log_scales, quats, means    numbers of the avatar's Gaussians in the rest pose
+//   offsets                                             a smooth field of offsets along the normal (offsets.h)
 //   color_net, avatar_features                          of its color net, if it has one
 //
-// Colours stay from 0 to 1, or where the color net can see them (kLeastColor), so that what is measured is what a file
-// of the avatar shows.
+// The loss `look` holds Gaussians to what the fit begins with. Colours stay from 0 to 1, or where the color net can see
+// them (kLeastColor), so that what is measured is what a file of the avatar shows.
 #pragma once
 
 #include <array>
@@ -39,6 +40,7 @@ struct AvatarFitSettings {
   int threads = 0;               ///< 0: one a core
   Index gaussians = 20000;       ///< of a new avatar
   std::array<double, 3> background = {0.5, 0.5, 0.5};
+  int mask_inset_px = 0;             ///< pixels this near to what is not the human do not count for colours
   std::vector<double> held_cameras;  ///< views of these cameras are not learnt from, but measured
   std::vector<double> held_frames;   ///< nor those of these frames
   BodySettings body;
@@ -77,12 +79,14 @@ struct ViewScore {
   Index views = 0;
   double psnr_db = 0;                        ///< mean over views, of whole pictures
   std::optional<double> psnr_foreground_db;  ///< weighted by masks; mean over the views that have one and show somebody
+  std::optional<double> silhouette_iou;      ///< of what is drawn with the mask; mean over the same views
 };
 
 /// What a fit has learnt.
 struct AvatarFitResult {
   Avatar avatar;      ///< as its file will be
   StageResult stage;  ///< of the last view that was seen
+  ViewScore before;   ///< of the avatar that the fit began with, over the views that were learnt from
   ViewScore learnt;   ///< of that avatar, over the views that were learnt from
   ViewScore held;     ///< and over those that were held back
 };
@@ -97,7 +101,7 @@ Avatar first_avatar(const AvatarFitSettings& settings);
 /// Learns an avatar. A function of the arguments alone, for any number of threads.
 ///
 /// @param first  where it starts
-/// @param terms  that the stage may name; those that read `rendered`, `target` and `weight` have their inputs
+/// @param terms  that the stage may name; those that read the image, the human's opacity or the look have their inputs
 /// Throws UserError: a held camera or frame of no view, cameras of different sizes, no view to learn from, poses of
 /// another skeleton; DataError for images as view_image; as run_stage; Interrupted.
 AvatarFitResult fit_avatar(const AvatarFitSettings& settings, const Avatar& first, const ViewSet& set,

@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 
 #include "core/config_file.h"
@@ -63,7 +64,8 @@ void add_stage_faults(const ConfigValue& tree, const StageSettings& stage, Confi
 }
 
 void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProblems& problems) {
-  std::vector<LossFault> faults = losses_without_inputs(stage, kImageInputs, "a fit of an avatar");
+  constexpr std::array<LossInput, 3> kInputs = {LossInput::kImage, LossInput::kHumanOpacity, LossInput::kLook};
+  std::vector<LossFault> faults = losses_without_inputs(stage, kInputs, "a fit of an avatar");
   for (LossFault& fault : prepare_losses(stage)) faults.push_back(std::move(fault));
   for (const LossFault& fault : faults) {
     const std::string pointer = "/stage" + fault.pointer;
@@ -74,7 +76,7 @@ void add_loss_faults(const ConfigValue& tree, StageSettings& stage, ConfigProble
 }  // namespace
 
 std::vector<std::string> avatar_fit_groups() {
-  return {"colors", "opacity_logits", "log_scales", "quats", "means", "color_net", "avatar_features"};
+  return {"colors", "opacity_logits", "log_scales", "quats", "means", "offsets", "color_net", "avatar_features"};
 }
 
 void describe(ConfigFields& f, AvatarFitSettings& s, const std::vector<LossDescription>& losses) {
@@ -85,6 +87,8 @@ void describe(ConfigFields& f, AvatarFitSettings& s, const std::vector<LossDescr
             "Threads; 0: one a core. Results do not depend on it");
   f.integer("gaussians", s.gaussians, {.min = 100, .max = 2000000}, "Gaussians of a new avatar");
   f.numbers("background", s.background, {.min = 0, .max = 1}, "Colour behind the human");
+  f.integer("mask_inset_px", s.mask_inset_px, {.min = 0, .max = 100},
+            "Pixels this near to one that is not the human's do not count for the colours");
   f.numbers("held_cameras", s.held_cameras, {.min = 0}, "Cameras whose views are not learnt from, but measured");
   f.numbers("held_frames", s.held_frames, {.min = 0}, "Frames whose views are not learnt from, but measured");
   f.object("body", s.body, "The body of a new avatar");

@@ -11,6 +11,7 @@
 #include "core/log.h"
 #include "core/video.h"
 #include "optim/metrics.h"
+#include "pipelines/input/body_files.h"
 #include "pipelines/metrics/sequence_errors.h"
 #include "pipelines/record/results.h"
 #include "pipelines/run/summarize.h"
@@ -159,7 +160,8 @@ ChainSummary write_chain_results(const RunPaths& paths, const RunConfig& config,
                                      result.clips, [](const ClipResult& clip) -> auto& { return clip.cameras; }));
   ChainSummary summary = summary_of(config, result, motion);
   write_text_file(paths.summary(), chain_summary_json(summary));
-  write_body(paths, config.body, result.facts.front().avatar, motion);
+  write_body(paths, body_of_avatar(config.body, config.chain.front().data.avatar.string()), result.facts.front().avatar,
+             motion);
   if (have_one_size(result.clips)) {
     join_previews(paths, result, motion.frame_rate);
   } else {

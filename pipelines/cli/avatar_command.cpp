@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "body/avatar_shape.h"
 #include "body/motion_edit.h"
 #include "body/pose_layout.h"
 #include "body/procedural_body.h"
@@ -28,15 +29,17 @@
 namespace hsi4d::cli {
 namespace {
 
-BodyModel body_of(const AvatarOptions& o, const std::string& command) {
-  std::vector<double> betas;
-  if (!o.betas.empty()) {
-    betas = parse_numbers(o.betas, 0, command + "--betas", "apart by commas, as in 0.5,-1");
-    for (const double beta : betas) {
-      if (std::abs(beta) <= kLargestBeta) continue;
-      throw UserError(command + "--betas: " + number_text(beta) + " is out of range; allowed: " + kBetasText);
-    }
+std::vector<double> betas_of(const AvatarOptions& o, const std::string& command) {
+  if (o.betas.empty()) return {};
+  const std::vector<double> betas = parse_numbers(o.betas, 0, command + "--betas", "apart by commas, as in 0.5,-1");
+  for (const double beta : betas) {
+    if (std::abs(beta) <= kLargestBeta) continue;
+    throw UserError(command + "--betas: " + number_text(beta) + " is out of range; allowed: " + kBetasText);
   }
+  return betas;
+}
+
+BodyModel body_of(const AvatarOptions& o, const std::vector<double>& betas, const std::string& command) {
   if (o.body_model.empty()) {
     if (std::ssize(betas) > kProceduralBetas) {
       throw UserError(command + "--betas: " + std::to_string(betas.size()) + " numbers; the program's body has " +
@@ -56,6 +59,14 @@ void check_out(const AvatarOptions& o, const std::string& command) {
   check_ending(o.out, command + "--out", {".safetensors"});
   check_no_input(o.out, command + "--out", {o.in, o.body_model});
   check_writable(o.out);
+  if (!is_gender(o.gender))
+    throw UserError(command + "--gender: " + with_escapes(o.gender) + " is not known; allowed: " + kGendersText);
+}
+
+void write_shaped(const AvatarOptions& o, const Avatar& avatar, const std::vector<double>& betas) {
+  SafetensorsWriter file = avatar_file(avatar);
+  add_avatar_shape({avatar.body, betas, o.gender}, file);
+  file.write(o.out);
 }
 
 /// To the micrometre.
@@ -108,6 +119,12 @@ std::string body_text(const Avatar& avatar) {
          short_number(pelvis[2]) + ") m";
 }
 
+std::string person_text(const AvatarShape& shape) {
+  std::vector<std::string> numbers;
+  for (const double beta : shape.betas) numbers.push_back(short_number(beta));
+  return (numbers.empty() ? "the mean one" : "betas " + joined(numbers)) + "; " + shape.gender;
+}
+
 std::string skeleton_text(const Avatar& avatar) {
   return count_text(avatar.joint_count(), "joint") +
          (avatar.joint_names == smplx_joint_names() && avatar.parents == smplx_parents() ? " of SMPL-X" : "");
@@ -118,22 +135,24 @@ std::string skeleton_text(const Avatar& avatar) {
 std::string avatar_make_command(const AvatarOptions& o) {
   const std::string command = "hsi4d avatar make: ";
   check_out(o, command);
-  const Avatar avatar = surface_avatar(body_of(o, command), o.settings);
-  write_avatar(o.out, avatar);
+  const std::vector<double> betas = betas_of(o, command);
+  const Avatar avatar = surface_avatar(body_of(o, betas, command), o.settings);
+  write_shaped(o, avatar, betas);
   return o.out + ": " + count_text(avatar.count(), "Gaussian") + ", " + skeleton_text(avatar) + "\n";
 }
 
 std::string avatar_import_command(const AvatarOptions& o) {
   const std::string command = "hsi4d avatar import: ";
   check_out(o, command);
-  const BodyModel body = body_of(o, command);
+  const std::vector<double> betas = betas_of(o, command);
+  const BodyModel body = body_of(o, betas, command);
   const SplatFile file = read_splats_with_warnings(o.in);
   if (file.report.antialiased)
     log_warning(o.in +
                 ": its Gaussians were trained with antialiasing, which an avatar's file cannot say; "
                 "render.antialias=true draws them as they were trained");
   const AvatarImport import = import_avatar(file.gaussians, body, o.in);
-  write_avatar(o.out, import.avatar);
+  write_shaped(o, import.avatar, betas);
   if (import.far > 0)
     log_warning(o.in + ": " + std::to_string(import.far) + " of " + count_text(import.avatar.count(), "Gaussian") +
                 " are more than " + short_number(kFarFromBody) + " m from the body, and follow its nearest part");
@@ -154,6 +173,8 @@ std::string avatar_info_command(const std::string& path) {
   std::string text = path + ": avatar of " + count_text(s.count, "Gaussian") + ", " + skeleton_text(avatar) + "\n";
   if (s.count == 0) return text + "  notice   the file holds no Gaussians\n";
   text += "  body     " + body_text(avatar) + "\n";
+  if (const std::optional<AvatarShape> shape = read_avatar_shape(path))
+    text += "  shape    " + person_text(*shape) + "\n";
   text += "  weights  " + weights_text(avatar) + "\n  colors   " + colors_text(avatar.color_net) + "\n";
   return text + statistics_text(s);
 }
@@ -165,6 +186,9 @@ void add_avatar(CLI::App& app, Program& program) {
   const auto add_body = [&o](CLI::App& sub) {
     sub.add_option("--betas", o.betas, "Shape of the body model: the first betas; the mean shape without")
         ->type_name("B,B,...");
+    sub.add_option("--gender", o.gender, "Of the body model, for the file: " + std::string(kGendersText))
+        ->capture_default_str()
+        ->type_name("WORD");
     sub.add_option("--out", o.out, "The avatar's file")->type_name("F.safetensors")->required();
   };
 

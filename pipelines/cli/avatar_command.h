@@ -9,9 +9,10 @@ namespace hsi4d::cli {
 
 /// `hsi4d avatar make` and `import`.
 struct AvatarOptions {
-  std::string in;          ///< of import: the Gaussians
-  std::string body_model;  ///< SMPL-X file; empty (of make): the body that comes with the program
-  std::string betas;       ///< its shape: numbers apart by commas; empty: the mean shape
+  std::string in;                  ///< of import: the Gaussians
+  std::string body_model;          ///< SMPL-X file; empty (of make): the body that comes with the program
+  std::string betas;               ///< its shape: numbers apart by commas; empty: the mean shape
+  std::string gender = "neutral";  ///< of the body model
   AvatarSettings settings = {.gaussians = 50000};  ///< of make
   std::string out;
 };

@@ -6,7 +6,8 @@
 
 namespace hsi4d::cli {
 
-/// Texts of configs/ by name: those of `hsi4d demo` and `hsi4d init`, and what they extend.
+/// Texts of configs/ by name: those of `hsi4d demo`, `hsi4d init` and `hsi4d avatar fit
+/// --run`, and what they extend.
 std::map<std::string, std::string> shipped_config_texts();
 
 }  // namespace hsi4d::cli

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "body/avatar_shape.h"
 #include "body/motion_edit.h"
 #include "body/pose_layout.h"
 #include "body/procedural_body.h"
@@ -17,6 +18,21 @@ namespace hsi4d {
 namespace {
 
 constexpr double kSameJoints = 0.01;  // metres that joints of the same body may be apart
+
+const char* name_of(BodyKind kind) { return kind == BodyKind::kProcedural ? kProceduralName : kSmplxName; }
+
+/// Those beyond the end of one are 0.
+bool are_same_betas(std::vector<double> a, std::vector<double> b) {
+  a.resize(std::max(a.size(), b.size()));
+  b.resize(a.size());
+  return a == b;
+}
+
+std::string numbers_text(const std::vector<double>& numbers) {
+  std::vector<std::string> texts;
+  for (const double x : numbers) texts.push_back(number_text(x));
+  return "[" + joined(texts) + "]";
+}
 
 }  // namespace
 
@@ -100,6 +116,18 @@ BodyModel rest_body(const BodySettings& settings) {
   std::vector<double> betas = settings.shape;
   betas.resize(static_cast<std::size_t>(settings.betas));
   return rest_body(body_model_of(settings), betas);
+}
+
+BodySettings body_of_avatar(const BodySettings& settings, const std::string& avatar) {
+  const std::optional<AvatarShape> shape = read_avatar_shape(avatar);
+  if (!shape || shape->body != name_of(settings.kind)) return settings;
+  BodySettings result = settings;
+  result.betas = std::max(settings.betas, static_cast<Index>(shape->betas.size()));
+  if (settings.shape.empty()) result.shape = shape->betas;
+  if (are_same_betas(result.shape, shape->betas)) return result;
+  throw UserError("/body/shape: is " + numbers_text(settings.shape) + "; the avatar " + avatar +
+                  " was made in the shape " + numbers_text(shape->betas) +
+                  "; leave body.shape out, or take an avatar " + "of that shape");
 }
 
 std::string difference_from(const BodyModel& body, const Avatar& avatar) {

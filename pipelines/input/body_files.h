@@ -32,6 +32,12 @@ SmplxModel body_model_of(const BodySettings& settings);
 /// The body in its rest pose and its shape, whatever its kind. Throws as body_model_of.
 BodyModel rest_body(const BodySettings& settings);
 
+/// The settings of the body that an avatar was made on: in the shape that its file says, unless the settings say one.
+/// Where they name another kind of body, or the file says no shape, they stay as they are.
+/// Throws UserError where both say a shape and these differ; DataError as read_avatar_shape.
+/// @param avatar  a file
+BodySettings body_of_avatar(const BodySettings& settings, const std::string& avatar);
+
 /// Why a body is not the one that the avatar was made on, in words: another name, or joints elsewhere; empty where it
 /// is.
 std::string difference_from(const BodyModel& body, const Avatar& avatar);

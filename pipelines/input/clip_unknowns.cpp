@@ -18,11 +18,11 @@ std::vector<double> products(const std::vector<double>& a, const std::vector<dou
   return all;
 }
 
-std::vector<double> sums(const std::vector<double>& a, const std::vector<double>& b) {
-  if (a.empty() || b.empty()) return a.empty() ? b : a;
-  std::vector<double> all = a;
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] += b.at(i);
-  return all;
+/// Numbers beyond the end are 0.
+std::vector<double> sums(std::vector<double> a, const std::vector<double>& b) {
+  a.resize(std::max(a.size(), b.size()));
+  for (std::size_t i = 0; i < b.size(); ++i) a[i] += b[i];
+  return a;
 }
 
 Similarity world_from_scene(const ClipUnknowns& unknowns) {
@@ -86,6 +86,7 @@ void apply_unknowns(const ClipUnknowns& unknowns, Clip& clip) {
   if (unknowns.betas.empty()) return;
   HSI4D_CHECK(clip.directions.has_value(), "an avatar without a shape cannot follow betas");
   add_betas(*clip.directions, unknowns.betas, clip.avatar);
+  if (!clip.betas.empty()) clip.betas = sums(clip.betas, unknowns.betas);
   const Vector3<double> rise = rise_of_pelvis(unknowns, clip);
   for (BodyPose& pose : clip.estimate) pose.transl -= rise;
   if (!clip.truth) return;

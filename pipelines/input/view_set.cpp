@@ -58,12 +58,30 @@ Image sized(Image image, const fs::path& file, const Camera& camera) {
                   " pixels; its camera has " + std::to_string(camera.width) + "x" + std::to_string(camera.height));
 }
 
+ViewImage image_of_frame(const ClipVideo& video, const PosedView& view, const Camera& camera) {
+  ClipFrame frame = read_frame(video, camera, view.frame);
+  return {std::move(frame.target), std::move(frame.human_mask)};
+}
+
+ViewImage image_of_file(const PosedView& view, const Camera& camera) {
+  const Image image = sized(read_image(view.image.string()), view.image, camera);
+  if (image.channels() < 3) throw DataError(view.image.string() + ": is grey; a picture has three channels");
+  ViewImage result{take_channels(image, 0, 3), {}};
+  if (!view.mask.empty()) {
+    result.mask = sized(read_mask_image(view.mask.string()), view.mask, camera);
+  } else if (image.channels() == 4) {
+    result.mask = take_channels(image, 3, 1);
+  }
+  return result;
+}
+
 }  // namespace
 
 std::vector<fs::path> ViewSet::files() const {
   std::vector<fs::path> all = {file, motion_file, cameras_file};
+  if (video) all.push_back(video->frames.file());
   for (const PosedView& view : views) {
-    all.push_back(view.image);
+    if (!view.image.empty()) all.push_back(view.image);
     if (!view.mask.empty()) all.push_back(view.mask);
   }
   return all;
@@ -106,21 +124,14 @@ std::string view_set_json(const std::string& motion, const std::string& cameras,
 
 ViewImage view_image(const ViewSet& set, const PosedView& view, const Vector3<double>& background) {
   const Camera& camera = set.cameras[static_cast<std::size_t>(view.camera)];
-  const Image image = sized(read_image(view.image.string()), view.image, camera);
-  if (image.channels() < 3) throw DataError(view.image.string() + ": is grey; a picture has three channels");
-  ViewImage result{take_channels(image, 0, 3), {}};
-  if (!view.mask.empty()) {
-    result.mask = sized(read_mask_image(view.mask.string()), view.mask, camera);
-  } else if (image.channels() == 4) {
-    result.mask = take_channels(image, 3, 1);
-  }
+  ViewImage result = set.video ? image_of_frame(*set.video, view, camera) : image_of_file(view, camera);
   if (result.mask.empty()) return result;
   for (int c = 0; c < 3; ++c) {
     const auto behind = static_cast<float>(background[c]);
-    for (int y = 0; y < image.height(); ++y) {
+    for (int y = 0; y < result.color.height(); ++y) {
       const float* const share = result.mask.row(0, y);
       float* const color = result.color.row(c, y);
-      for (int x = 0; x < image.width(); ++x) color[x] = share[x] * color[x] + (1 - share[x]) * behind;
+      for (int x = 0; x < result.color.width(); ++x) color[x] = share[x] * color[x] + (1 - share[x]) * behind;
     }
   }
   return result;

@@ -11,12 +11,14 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "body/motion_io.h"
 #include "core/camera.h"
 #include "core/image.h"
+#include "pipelines/input/clip.h"
 
 namespace hsi4d {
 
@@ -33,11 +35,14 @@ struct PosedView {
 
 /// A set of views; its images stay in their files.
 struct ViewSet {
-  std::filesystem::path file;  ///< views.json itself, for messages
+  std::filesystem::path file;  ///< views.json itself, or another one that views are of, for messages
   Motion motion;
   std::vector<Camera> cameras;
   std::vector<PosedView> views;
   std::filesystem::path motion_file, cameras_file;
+  /// Whose frames and masks of the human the views are, by PosedView::frame, reduced to the camera's size; null: the
+  /// pictures are files.
+  std::shared_ptr<const ClipVideo> video = {};
 
   /// All files of the set.
   std::vector<std::filesystem::path> files() const;
@@ -55,7 +60,7 @@ struct ViewImage {
 };
 
 /// What a view shows of the human before one colour: mask · image + (1 − mask) · background, and the mask.
-/// Throws DataError naming the file when an image or mask has another size than the camera.
+/// Throws DataError naming the file when an image or mask has another size than the camera; of a video as read_frame.
 ViewImage view_image(const ViewSet& set, const PosedView& view, const Vector3<double>& background);
 
 }  // namespace hsi4d

@@ -64,6 +64,17 @@ Image mean_of(const Image& a, const Image& b) {
   return mean;
 }
 
+std::array<double, 3> mean_color(const Image& image) {
+  std::array<double, 3> mean{};
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) mean[static_cast<std::size_t>(c)] += static_cast<double>(image(c, y, x));
+    }
+    mean[static_cast<std::size_t>(c)] /= static_cast<double>(image.height()) * image.width();
+  }
+  return mean;
+}
+
 /// No wider than a panel.
 Image panel_of(const Image& image) {
   if (image.width() <= kPanelWidth) return image;
@@ -175,17 +186,19 @@ std::optional<BodyModel> write_body(const RunPaths& paths, const BodySettings& s
 }
 
 void write_views(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
-                 const std::function<Image(Index frame, const SceneState& state)>& render) {
+                 const StateRenderer& render) {
   const Rigid<double> other_side = camera_of_other_side(clip, states.front());
   Preview preview(paths.preview(), clip.frame_rate);
+  std::array<double, 3> beyond{};
   for (std::size_t t = 0; t < states.size(); ++t) {
     const auto index = static_cast<Index>(t);
     const auto number = static_cast<int>(t);
     const ClipFrame frame = read_frame(clip, index);
-    const Image image = render(index, states[t]);
+    const Image image = render(index, states[t], {});
     SceneState other = states[t];
     other.camera_from_world = other_side;
-    const Image side = render(index, other);
+    if (t == 0) beyond = mean_color(frame.target);
+    const Image side = render(index, other, beyond);
     if (t == 0) {
       write_image(paths.frame_image(number, "target"), frame.target);
       write_image(paths.frame_image(number, "render"), image);

@@ -1,6 +1,7 @@
 // The files in which a run leaves its result.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 
@@ -32,13 +33,18 @@ Motion motion_of(const Clip& clip, const std::vector<SceneState>& states);
 std::optional<BodyModel> write_body(const RunPaths& paths, const BodySettings& body, const Avatar& avatar,
                                     const Motion& motion);
 
+using StateRenderer =
+    std::function<Image(Index frame, const SceneState& state, const std::optional<std::array<double, 3>>& background)>;
+
 /// Writes what a viewer shows: frames/NNNN_side.png of every frame, the reconstruction from another side; frame 0 as it
 /// was given, frames/0000_{target,render}.png; and preview.mp4: video, reconstruction, both one over the other, and the
-/// other side, next to each other. Where ffmpeg fails the log says so, and no video is written.
+/// other side, next to each other. The other side has the mean colour of the video's frame 0 behind everything, as a
+/// scene that was made of one view ends soon beside it. Where ffmpeg fails the log says so, and no video is written.
 ///
-/// @param render  the image of a state of a frame, from the state's camera
+/// @param render  the image of a state of a frame, from the state's camera, before the colour that is given; none: that
+///                of the config
 void write_views(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
-                 const std::function<Image(Index frame, const SceneState& state)>& render);
+                 const StateRenderer& render);
 
 /// A camera that looks from another side: turned about the vertical axis through `pivot`.
 ///

@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "body/avatar_shape.h"
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/simd.h"
@@ -16,6 +17,7 @@
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/view_turn.h"
 #include "pipelines/draw/visibility.h"
+#include "pipelines/input/body_files.h"
 #include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/input_hashes.h"
 #include "pipelines/metrics/sequence_errors.h"
@@ -115,16 +117,18 @@ class Reconstruction {
     warn_of_left_ranges(progress_.left_ranges, config_);
     warn_of_what_is_out_of_view(clip_, result());
     write_results(folder_.paths(), config_, clip_, result(), progress_.colors);
-    if (!progress_.unknowns.betas.empty()) write_avatar(folder_.paths().avatar(), clip_.avatar);
+    if (!progress_.unknowns.betas.empty()) write_found_avatar();
     RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
     folder_.write_summary(summary);
     const std::optional<BodyModel> body =
         write_body(folder_.paths(), found_body(), clip_.avatar, motion_of(clip_, result()));
     view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
-    write_views(folder_.paths(), clip_, result(), [this](Index frame, const SceneState& state) {
+    RunConfig other_side = config_;
+    write_views(folder_.paths(), clip_, result(), [&](Index frame, const SceneState& state, const auto& background) {
       stop_if_asked(clip_.frames());
-      return render_state(config_, clip_, state, colors_after(frame));
+      if (background) other_side.background = *background;
+      return render_state(background ? other_side : config_, clip_, state, colors_after(frame));
     });
     return summary;
   }
@@ -195,9 +199,15 @@ class Reconstruction {
     end_frame(0, frame, std::vector(frame_stages_, state), begin);
   }
 
+  void write_found_avatar() const {
+    SafetensorsWriter file = avatar_file(clip_.avatar);
+    add_avatar_shape({clip_.avatar.body, found_body().shape, clip_.gender}, file);
+    file.write(folder_.paths().avatar());
+  }
+
   /// The body in the shape that was found.
   BodySettings found_body() const {
-    BodySettings body = config_.body;
+    BodySettings body = body_of_avatar(config_.body, config_.data.avatar.string());
     const std::vector<double>& betas = progress_.unknowns.betas;
     body.shape.resize(std::max(body.shape.size(), betas.size()));
     for (std::size_t b = 0; b < betas.size(); ++b) body.shape[b] += betas[b];

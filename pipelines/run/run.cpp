@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "body/avatar_shape.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/log.h"
@@ -148,7 +149,7 @@ std::string loss_with(const RunConfig& config, LossInput input) {
 
 /// Reads the body whose vertices a loss asks for. One that the avatar was not made on is left out, which is told.
 void give_body(const RunConfig& config, const std::string& loss, Clip& clip) {
-  BodyModel body = rest_body(config.body);
+  BodyModel body = rest_body(body_of_avatar(config.body, config.data.avatar.string()));
   const std::string difference = difference_from(body, clip.avatar);
   if (difference.empty()) {
     clip.body = std::move(body);
@@ -167,20 +168,31 @@ std::string betas_group(const RunConfig& config) {
 }
 
 /// Reads how the avatar follows the betas of its body. @param group  that asks for it
-void give_shape(const RunConfig& config, const std::string& group, Clip& clip) {
-  const std::string difference = difference_from(rest_body(config.body), clip.avatar);
+void give_directions(const RunConfig& config, const std::string& group, Clip& clip) {
+  const BodySettings body = body_of_avatar(config.body, config.data.avatar.string());
+  const std::string difference = difference_from(rest_body(body), clip.avatar);
   if (!difference.empty())
     throw UserError(group + ": which body the avatar was made on must be known: " + difference +
                     "; set `body`, or leave the group out");
-  std::vector<double> betas = config.body.shape;
-  betas.resize(static_cast<std::size_t>(config.body.betas));
-  clip.directions = avatar_directions(clip.avatar, body_model_of(config.body), betas);
+  std::vector<double> betas = body.shape;
+  betas.resize(static_cast<std::size_t>(body.betas));
+  clip.directions = avatar_directions(clip.avatar, body_model_of(body), betas);
+}
+
+/// A motion of SMPL-X tells other programs of whom it is; that of the program's own body has betas that mean nothing to
+/// them.
+void give_shape(const RunConfig& config, Clip& clip) {
+  const std::optional<AvatarShape> shape = read_avatar_shape(config.data.avatar.string());
+  if (!shape || shape->body != kSmplxName || !clip.betas.empty()) return;
+  clip.betas = shape->betas;
+  clip.gender = shape->gender;
 }
 
 }  // namespace
 
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses) {
   Clip clip = read_clip(config.data);
+  body_of_avatar(config.body, config.data.avatar.string());  // what they contradict each other in shows now
   warn_of_antialiasing(clip.antialiased, config.render.antialias);
   set_image_size(clip, config);
   for (const ConfigPath& file : stage_files(config, descriptions_of(losses)))
@@ -189,7 +201,8 @@ Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses)
   const std::string loss = loss_with(config, LossInput::kBodyVertices);
   if (!loss.empty()) give_body(config, loss, clip);
   const std::string betas = betas_group(config);
-  if (!betas.empty()) give_shape(config, betas, clip);
+  if (!betas.empty()) give_directions(config, betas, clip);
+  give_shape(config, clip);
   return clip;
 }
 

@@ -25,7 +25,7 @@ void set_image_size(Clip& clip, const RunConfig& config);
 
 /// The clip of a run, and in `files` all that is read of it, the files that stages and body name included. `body` is
 /// read where a loss asks for its vertices; one that the avatar was not made on is left out, which the log tells.
-/// Throws as read_clip and rest_body.
+/// Throws as read_clip, rest_body and body_of_avatar.
 Clip read_run_clip(const RunConfig& config, const std::vector<LossTerm>& losses);
 
 /// What can be told of a clip before it runs. Throws UserError for a start or frames that cannot be; warns of what is

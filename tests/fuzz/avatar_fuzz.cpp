@@ -1,5 +1,6 @@
 // Files of avatars, in both formats, and of color nets.
 #include "body/avatar.h"
+#include "body/avatar_shape.h"
 #include "core/npz.h"
 #include "tests/fuzz/archive_list.h"
 
@@ -19,6 +20,14 @@ Avatar small_avatar() {
   a.joints = {0, 0, 0, 0, 1, 0};
   a.joint_names = {"root", "tip"};
   return a;
+}
+
+Bytes avatar_with_shape() {
+  Avatar a = small_avatar();
+  a.body = "smplx";
+  SafetensorsWriter file = avatar_file(a);
+  add_avatar_shape({a.body, {0.5, -1}, "female"}, file);
+  return file.encode();
 }
 
 Bytes avatar_with_net() {
@@ -49,11 +58,16 @@ Bytes first_avatar() {
 }  // namespace
 
 std::vector<Bytes> corpus() {
-  return {avatar_file(small_avatar()).encode(), avatar_with_net(), first_avatar(), list_of(first_avatar())};
+  return {avatar_file(small_avatar()).encode(), avatar_with_net(), avatar_with_shape(), first_avatar(),
+          list_of(first_avatar())};
 }
 
 bool accepts(std::span<const uint8_t> file) {
-  return is_read([&] { check_sizes(decode_avatar(archive_of(file), "fuzz")); });
+  return is_read([&] {
+    const auto bytes = archive_of(file);
+    check_sizes(decode_avatar(bytes, "fuzz"));
+    if (looks_like_safetensors(bytes)) avatar_shape_of(Safetensors::decode(bytes, "fuzz"));
+  });
 }
 
 const Target target("avatar", corpus, accepts);

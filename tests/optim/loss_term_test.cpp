@@ -61,7 +61,9 @@ std::vector<OperatorInput> all_inputs() {
           {"keypoints_target", shape_of(4, 3), 0, 0, {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8, 8, 8, 0.1}},
           {"bones", shape_of(3, 3), 0, 0, {0.1, -0.3, 0.05, 0, 0.4, 0.2, -0.3, 0, 0.1}},
           {"bones_target", shape_of(3, 4), 0, 0, {0, -1, 0, 1, 0, 0.6, 0.8, 0.7, 1, 0, 0, 0.1}},
-          {"unknowns", shape_of(1, 3), -0.2, 0.2}};
+          {"unknowns", shape_of(1, 3), -0.2, 0.2},
+          {"color_change", shape_of(9, 3), -0.5, 0.5},
+          {"shape_change", shape_of(9, 7), -1, 1}};
 }
 
 template <class S>
@@ -92,6 +94,8 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.bones = in[24];
   inputs.bones_target = in[25];
   inputs.unknowns = in[26];
+  inputs.color_change = in[27];
+  inputs.shape_change = in[28];
   inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;
@@ -201,6 +205,22 @@ TEST_CASE("depth_spread counts known depths alone, and what rounding made less t
   CHECK(std::abs(tape.value(loss).scalar()) < 1e-9);
   tape.backward(loss);
   CHECK(std::isfinite(tape.gradient(in.depth_moments)(0, 0, 0)));
+}
+
+TEST_CASE("look is the mean square of what has changed, and pulls all Gaussians alike") {
+  Tape<double> tape;
+  LossInputs<double> in;
+  in.color_change = tape.parameter("colors", shape_of(2, 3));
+  in.shape_change = tape.parameter("shape", shape_of(2, 7));
+  tape.set(in.color_change, {0.3, 0, 0, 0, 0, 0.4});
+  tape.set(in.shape_change, {1, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0});
+  const Var<double> loss = record_term("look", in, R"({"shape": 0.1})");
+  tape.forward(loss);
+  CHECK(tape.value(loss).scalar() == Approx((0.09 + 0.16) / 2 + 0.1 * (1 + 4) / 2).epsilon(1e-14));
+  tape.backward(loss);
+  CHECK(tape.gradient(in.color_change)(0, 0) == Approx(0.3));
+  CHECK(tape.gradient(in.color_change)(1, 2) == Approx(0.4));
+  CHECK(tape.gradient(in.color_change)(1, 0) == 0);
 }
 
 TEST_CASE("a registered loss term whose inputs are not given is off") {

@@ -57,6 +57,35 @@ with tempfile.TemporaryDirectory() as name:
     print(f"keypoints_2d at the end: {last:.1f} px^2")
     assert last < 8**2, last
 
+    # What telephones and viewers do to a video: two persons, upright, lying with a note that it is to be turned.
+    def look(name, words, source="video.mp4"):
+        made = here / f"{name}.mp4"
+        run("ffmpeg", "-v", "error", "-i", clip / source if isinstance(source, str) else source, *words, made)
+        said = run(*frontend, made, "--out", here / name)
+        return made, said, json.loads((here / name / "keypoints.json").read_text())
+
+    def hips(found):
+        return [(frame[23][0] + frame[24][0]) / 2 / found["size"][0] for frame in found["frames"]]
+
+    _, said, two = look("two", ["-filter_complex", "[0:v]split[a][b];[a][b]hstack"])
+    assert two["size"] == [1024, 512] and all(two["frames"]), said
+    sides = {x < 0.5 for x in hips(two)}
+    assert len(sides) == 1 or "suddenly elsewhere" in said, (hips(two), said)  # one person is followed
+    upright, said, portrait = look("portrait", ["-vf", "crop=300:512"])
+    assert portrait["size"] == [300, 512] and all(portrait["frames"]), said
+    lying, _, _ = look("lying", ["-vf", "transpose=clock"], upright)
+    _, said, turned = look("turned", ["-c", "copy", "-metadata:s:v", "rotate=90"], lying)
+    assert turned["size"] == [300, 512], said
+    assert all(abs(a - b) < 0.05 for a, b in zip(hips(turned), hips(portrait))), (hips(turned), hips(portrait))
+
+    # Somebody else from one frame to the next is told.
+    (here / "cut").mkdir()
+    for frame, left in enumerate([0, 0, 512, 512]):
+        run("ffmpeg", "-v", "error", "-i", clip / "video.mp4", "-vf", f"pad=1024:512:{left}:0", "-frames:v", "1",
+            here / f"cut/{frame}.png")
+    said = run(*frontend, here / "cut", "--out", here / "found_cut")
+    assert "the person is suddenly elsewhere in frames " in said, said
+
     environment = dict(os.environ, HSI4D=str(program))
     all_of_it = [tools / "from_video", clip / "video.mp4", "--out", here / "all", "--packages", packages, "--longest-side-px", 256]
     assert "quality: " in run(*all_of_it, env=environment)

@@ -15,6 +15,7 @@ const [modules, frames, model, out] = process.argv.slice(2);
 const kComplexity = { lite: 0, full: 1, heavy: 2 };
 const kLimbs = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28]; // shoulders to wrists, hips to ankles
 const kDoubtful = 0.5; // mean visibility of the limbs below which a frame is told
+const kJump = 0.5; // of the person's height in the picture: by more the middle of shoulders and hips moves from another
 
 function fail(message) {
   console.error(`frontend: ${message}`);
@@ -93,6 +94,25 @@ class MaskWriter {
   }
 }
 
+// Middle of shoulders and hips, and the height of what is found; pixels.
+function whereabouts(points) {
+  const trunk = [11, 12, 23, 24].map((i) => points[i]), ys = points.map(([, y]) => y);
+  return { x: meanOf(trunk.map(([x]) => x)), y: meanOf(trunk.map(([, y]) => y)), height: Math.max(...ys) - Math.min(...ys) };
+}
+
+// Frames in which somebody is found elsewhere than in the last one before in which somebody was.
+function jumps(frames) {
+  const found = [];
+  let last;
+  for (const [t, points] of frames.entries()) {
+    if (points.length === 0) continue;
+    const now = whereabouts(points);
+    if (last !== undefined && Math.hypot(now.x - last.x, now.y - last.y) > kJump * last.height) found.push(t);
+    last = now;
+  }
+  return found;
+}
+
 const rounded = (number) => Math.round(number * 1000) / 1000;
 const meanOf = (numbers) => numbers.reduce((sum, number) => sum + number, 0) / numbers.length;
 
@@ -138,6 +158,9 @@ try {
   if (empty.length === names.length) fail('nobody is found in any frame');
   if (empty.length > 0) console.error(`frontend: nobody is found in frames ${ranges(empty)}; their masks are black`);
   if (doubtful.length > 0) console.error(`frontend: less than half of the limbs is seen in frames ${ranges(doubtful)}`);
+  const jumping = jumps(points);
+  if (jumping.length > 0)
+    console.error(`frontend: the person is suddenly elsewhere in frames ${ranges(jumping)}: somebody else, or a cut?`);
   const file = { format: 'hsi4d keypoints', version: 1, joints: 'blazepose33', size, frames: points, landmarks: places };
   writeFileSync(join(out, 'keypoints.json'), `${JSON.stringify(file)}\n`);
 } finally {

@@ -10,6 +10,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/parallel.h"
+#include "pipelines/avatar/offsets.h"
 #include "pipelines/config/run_config.h"
 #include "pipelines/draw/posed_avatar.h"
 #include "pipelines/input/body_files.h"
@@ -65,6 +66,12 @@ const fs::path& made_views() {
     return fs::path(folder.path()) / "views" / "views.json";
   }();
   return file;
+}
+
+const LossDescription& loss_named(const std::string& name) {
+  return std::find_if(loss_terms().begin(), loss_terms().end(),
+                      [&](const LossTerm& term) { return term.description.name == name; })
+      ->description;
 }
 
 AvatarFitResult fitted(const AvatarFitSettings& settings, const Observer& observer = {}) {
@@ -256,6 +263,75 @@ TEST_CASE("the config of an avatar fit is checked") {
   CHECK_THROWS_WITH(load("{" + views + R"(, "held_cameras": [0.5]})"), Catch::Contains("whole numbers"));
   CHECK_THROWS_WITH(load("{" + views + R"(, "stage": {"iterations": 1, "optimize": {"colours": {"lr": 1}}}})"),
                     Catch::Contains("colors"));
+}
+
+TEST_CASE("what pictures show is learnt, and what they hardly show keeps the look that it began with") {
+  // Learnt is from a camera before the person alone, beginning with colours that are far from the pictures'.
+  ViewSet set = read_view_set(made_views());
+  std::erase_if(set.views, [](const PosedView& view) { return view.camera != 0; });
+  AvatarFitSettings settings = quick_fit(made_views(), 80);
+  settings.held_cameras = {};
+  settings.color_net.use = ColorNetUse::kOff;
+  settings.stage.optimize = {{"colors", {.lr = 0.03, .lr_final_share = 0.1, .until = {}}}};
+  Avatar first = surface_avatar(procedural_body(), {.gaussians = 2500});
+  for (float& color : first.colors) color = 1 - color;
+  const std::vector<float> normals = outward_normals(first);
+  const auto changes = [&](double weight) {  // mean, of Gaussians on the front and on the back
+    settings.stage.losses = {{"photometric", LossSettings{}}, {"look", default_settings(loss_named("look"))}};
+    settings.stage.losses.back().second.weight = weight;
+    const AvatarFitResult result = fit_avatar(settings, first, set, loss_terms());
+    CHECK(result.learnt.psnr_foreground_db.value() > result.before.psnr_foreground_db.value() + 6);
+    std::array<double, 2> change{}, count{};
+    for (std::size_t n = 0; n < first.opacity_logits.size(); ++n) {
+      if (std::abs(normals[3 * n + 2]) < 0.7F) continue;
+      const std::size_t side = normals[3 * n + 2] > 0 ? 0 : 1;
+      ++count[side];
+      for (std::size_t i = 3 * n; i < 3 * n + 3; ++i)
+        change[side] += std::abs(static_cast<double>(result.avatar.colors[i] - first.colors[i])) / 3;
+    }
+    return std::array{change[0] / count[0], change[1] / count[1]};
+  };
+  const auto free = changes(0), held = changes(0.01);
+  WARN("mean change of a colour on the front " << free[0] << " without look, " << held[0] << " with; on the back "
+                                               << free[1] << ", " << held[1]);
+  CHECK(held[0] > 0.1);
+  CHECK(held[1] < 0.2 * held[0]);
+  CHECK(free[1] > 3 * held[1]);  // what shimmers through from behind is enough for whole steps
+}
+
+TEST_CASE("a body that stands out from the one that it began with is learnt as offsets along the normal") {
+  const ScratchFolder folder;
+  const fs::path truth_file = made_views().parent_path() / "truth" / "avatar.safetensors";
+  // The pictures are of the truth; it begins a centimetre and a half inside of it.
+  Avatar first = read_avatar(truth_file.string());
+  const std::vector<float> truth = first.means, normals = outward_normals(first);
+  for (std::size_t i = 0; i < first.means.size(); ++i) first.means[i] -= 0.015F * normals[i];
+  AvatarFitSettings settings = quick_fit(made_views(), 150);
+  settings.color_net.use = ColorNetUse::kOff;
+  settings.stage.optimize = {{"offsets", {.lr = 0.001, .lr_final_share = 0.1, .until = {}}}};
+  settings.stage.losses = {{"mask", default_settings(loss_named("mask"))}};
+  const AvatarFitResult result = fit_avatar(settings, first, read_view_set(made_views()), loss_terms());
+  const auto outside = [&](const std::vector<float>& means) {  // metres along the normal, mean
+    double sum = 0;
+    for (std::size_t i = 0; i < means.size(); ++i) sum += static_cast<double>((means[i] - truth[i]) * normals[i]);
+    return sum / static_cast<double>(first.count());
+  };
+  WARN("mean offset from the truth " << outside(first.means) << " before, " << outside(result.avatar.means)
+                                     << " after; silhouette IoU " << result.before.silhouette_iou.value() << ", "
+                                     << result.learnt.silhouette_iou.value());
+  CHECK(outside(first.means) == Approx(-0.015).margin(1e-4));
+  CHECK(std::abs(outside(result.avatar.means)) < 0.007);
+  CHECK(result.learnt.silhouette_iou.value() > result.before.silhouette_iou.value() + 0.03);
+  CHECK(result.avatar.colors == first.colors);
+}
+
+TEST_CASE("pixels near the border of a mask do not count where the settings say so") {
+  AvatarFitSettings settings = quick_fit(made_views(), 1);
+  const AvatarFitResult all = fitted(settings);
+  settings.mask_inset_px = 4;
+  const AvatarFitResult inner = fitted(settings);
+  CHECK(inner.stage.loss < 0.9 * all.stage.loss);  // fewer pixels are other than black
+  CHECK(inner.before.psnr_foreground_db == all.before.psnr_foreground_db);
 }
 
 TEST_CASE("the shipped views are learnt by the shipped fit") {

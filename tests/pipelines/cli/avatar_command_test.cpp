@@ -2,6 +2,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "body/avatar.h"
+#include "body/avatar_shape.h"
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "core/file.h"
@@ -29,12 +31,13 @@ TEST_CASE("hsi4d avatar makes an avatar, tells of it and imports it again") {
   CHECK_THAT(told.out, Contains("\n  colors   the avatar's own, without a color net\n"));
   CHECK_THAT(told.out,
              Contains("a.safetensors: avatar of 2000 Gaussians, 55 joints of SMPL-X\n  body     the program's own "
-                      "(procedural); its pelvis rests at (0, -0.35, -0.005) m\n  weights  up to 4 a "
+                      "(procedural); its pelvis rests at (0, -0.35, -0.005) m\n  shape    the mean one; neutral\n  "
+                      "weights  up to 4 a "
                       "Gaussian (1: ") &&
                  Contains("\n  bounds   x -") && Contains("\n  opacity  0.98, 0.98, 0.98, 0.98, 0.98\n") &&
                  Contains("\n  scale    "));
   const ProgramResult arrays = run_hsi4d({"info", "a.safetensors"});
-  CHECK_THAT(arrays.out, Contains("a.safetensors: 9 arrays\n") && Contains("\n  means  [2000,3]  <f4\n") &&
+  CHECK_THAT(arrays.out, Contains("a.safetensors: 10 arrays\n") && Contains("\n  means  [2000,3]  <f4\n") &&
                              Contains("\n  format  hsi4d avatar\n") && Contains("\n  version  2\n"));
 
   write_ply("a.ply", rest_gaussians(avatar));
@@ -44,6 +47,18 @@ TEST_CASE("hsi4d avatar makes an avatar, tells of it and imports it again") {
   CHECK_THAT(imported.out, Contains("b.safetensors: 2000 Gaussians, 55 joints of SMPL-X; from the surface 0 mm on "
                                     "average, 0 mm at most\n"));
   CHECK(read_avatar("b.safetensors").means == avatar.means);
+}
+
+TEST_CASE("hsi4d avatar make keeps the shape of the body in the file") {
+  const TemporaryFolder folder;
+  REQUIRE(run_hsi4d({"avatar", "make", "--gaussians", "300", "--betas", "1.5,-0.5", "--gender", "female", "--out",
+                     "a.safetensors"})
+              .status == 0);
+  CHECK(read_avatar_shape("a.safetensors") == AvatarShape{"procedural", {1.5, -0.5}, "female"});
+  CHECK_THAT(run_hsi4d({"avatar", "info", "a.safetensors"}).out, Contains("\n  shape    betas 1.5, -0.5; female\n"));
+  const ProgramResult odd = run_hsi4d({"avatar", "make", "--gender", "tall", "--out", "b.safetensors"});
+  CHECK(odd.status == 2);
+  CHECK(odd.err == "hsi4d avatar make: --gender: tall is not known; allowed: neutral, female, male\n");
 }
 
 TEST_CASE("hsi4d avatar make gives an avatar as many Gaussians as are useful, unless asked for fewer") {
@@ -62,7 +77,7 @@ TEST_CASE("hsi4d avatar names what is wrong") {
         "hsi4d avatar: there is no command \"inf\"; known: make, import, fit, info; did you mean \"info\"?\n");
   CHECK(error({"avatar", "make", "--gaussian", "3"}) ==
         "hsi4d avatar make: there is no option \"--gaussian\"; known: --help, --body-model, --gaussians, --detail, "
-        "--cover, --texture, --seed, --betas, --out; did you mean \"--gaussians\"?\n");
+        "--cover, --texture, --seed, --betas, --gender, --out; did you mean \"--gaussians\"?\n");
   CHECK_THAT(error({"avatar", "make"}), Contains("hsi4d avatar make: --out is required"));
   CHECK_THAT(error({"avatar", "make", "--out", "a.npz"}), Contains("--out") && Contains(".safetensors"));
   CHECK(error({"avatar", "make", "--out", "a.safetensors", "--gaussians", "0"}) ==

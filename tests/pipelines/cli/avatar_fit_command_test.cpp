@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "body/avatar.h"
+#include "body/avatar_shape.h"
 #include "body/procedural_body.h"
 #include "core/check.h"
 #include "core/file.h"
@@ -12,6 +13,7 @@
 #include "pipelines/input/view_set.h"
 #include "pipelines/synthetic/views.h"
 #include "tests/support/program.h"
+#include "tests/support/tiny_run.h"
 
 namespace avatar_fit_command_test {
 
@@ -44,7 +46,8 @@ void write_inputs() {
 }
 
 std::string fit(const std::string& out, const std::vector<std::string>& overrides = {}) {
-  return cli::avatar_fit_command("fit.json", overrides, out, true, loss_terms());
+  return cli::avatar_fit_command({.config = "fit.json", .run = {}, .overrides = overrides, .out = out, .quiet = true},
+                                 loss_terms());
 }
 
 std::string refusal(const std::string& out, const std::vector<std::string>& overrides = {}) {
@@ -78,6 +81,14 @@ TEST_CASE("hsi4d avatar fit learns an avatar, writes it and tells how well it sh
   // It goes on from there.
   const std::string again = fit("b.safetensors", {"avatar=a.safetensors", "stage.iterations=1"});
   CHECK_THAT(again, Contains("b.safetensors: 200 Gaussians, 1 iteration, loss "));
+  CHECK(read_avatar_shape("a.safetensors") == AvatarShape{"procedural", {}});
+  cli::AvatarOptions tall;
+  tall.settings.gaussians = 200;
+  tall.betas = "1.5";
+  tall.out = "tall.safetensors";
+  cli::avatar_make_command(tall);
+  fit("c.safetensors", {"avatar=tall.safetensors", "stage.iterations=1"});
+  CHECK(read_avatar_shape("c.safetensors") == AvatarShape{"procedural", {1.5}});
 }
 
 TEST_CASE("configs of avatar fit are known to the other commands") {
@@ -181,6 +192,52 @@ TEST_CASE("hsi4d avatar fit looks where it writes before it learns, and replaces
   CHECK_THAT(refusal("views/mask.png/a.safetensors"), Contains("views/mask.png/a.safetensors: cannot be written"));
   CHECK_THROWS_WITH(fit("a.safetensors"), Contains("is 5x5 pixels"));
   CHECK_FALSE(fs::exists("a.safetensors"));
+}
+
+TEST_CASE("hsi4d avatar fit learns from the frames of a run, beginning with its avatar") {
+  const TemporaryFolder folder;
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "run");
+  const ProgramResult fitted = run_hsi4d({"avatar", "fit", "--run", "run", "--set", "stage.iterations=4", "--set",
+                                          "held_frames=[2]", "--quiet", "--out", "a.safetensors"});
+  CAPTURE(fitted.err);
+  REQUIRE(fitted.status == 0);
+  CHECK_THAT(fitted.out, Contains("a.safetensors: 500 Gaussians, 4 iterations, loss ") &&
+                             Contains("\n  before: 3 views, PSNR ") && Contains("\n  learnt: 3 views, PSNR ") &&
+                             Contains(", silhouette IoU ") && Contains("\n  held back: 1 view, PSNR "));
+  const Avatar first = read_avatar(tiny_config().data.avatar.string()), learnt = read_avatar("a.safetensors");
+  CHECK(learnt.colors != first.colors);
+  CHECK(learnt.means != first.means);
+  CHECK(learnt.log_scales == first.log_scales);
+  CHECK(learnt.joints == first.joints);
+
+  // As views that are files, with a config of its own.
+  write_text_file("own.json", R"({"stage": {"iterations": 2, "optimize": {"opacity_logits": {"lr": 0.1}},
+                                            "losses": {"photometric": {}}}, "color_net": {"use": "off"}})");
+  CHECK_THAT(run_hsi4d({"avatar", "fit", "own.json", "--run", "run", "--quiet", "--out", "b.safetensors"}).out,
+             Contains("b.safetensors: 500 Gaussians, 2 iterations"));
+  CHECK(read_avatar("b.safetensors").colors == first.colors);
+}
+
+TEST_CASE("hsi4d avatar fit refuses what is no run that is done") {
+  const TemporaryFolder folder;
+  write_inputs();
+  const auto error = [](std::vector<std::string> more) {
+    more.insert(more.begin(), {"avatar", "fit", "--quiet", "--out", "a.safetensors"});
+    const ProgramResult result = run_hsi4d(more);
+    CHECK(result.status == 2);
+    return result.err;
+  };
+  CHECK_THAT(error({}), Contains("hsi4d avatar fit: neither a config nor --run"));
+  CHECK_THAT(error({"--run", "none"}), Contains("none: holds no config.resolved.json; allowed: the folder of a run"));
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"}), "run");
+  CHECK_THAT(error({"fit.json", "--run", "run"}), Contains("views.json; with --run the views are the run's frames"));
+  CHECK_THAT(error({"--run", "run", "--set", "gaussians=30"}), Contains("/gaussians: is of a new avatar"));
+  Motion motion = read_motion("run/motion.npz");
+  motion.poses.pop_back();
+  write_motion("run/motion.npz", motion);
+  CHECK_THAT(error({"--run", "run"}), Contains("run: has 3 poses and 4 cameras, its video 4 frames"));
+  fs::remove("run/motion.npz");
+  CHECK_THAT(error({"--run", "run"}), Contains("run: holds no motion.npz"));
 }
 
 TEST_CASE("hsi4d avatar fit refuses to hold back what is not there") {

@@ -1,4 +1,5 @@
 // `hsi4d init` as a user runs it.
+#include <algorithm>
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -6,6 +7,7 @@
 #include "body/kinematics.h"
 #include "core/camera_file.h"
 #include "core/image_io.h"
+#include "core/process.h"
 #include "tests/support/program.h"
 #include "tests/support/tiny_run.h"
 
@@ -109,6 +111,80 @@ TEST_CASE("hsi4d init takes a camera that is known") {
   REQUIRE(init.status == 0);
   CHECK(read_camera("clip/camera.json").camera_from_world.translation ==
         read_camera(camera).camera_from_world.translation);
+}
+
+TEST_CASE("hsi4d init takes a portrait video that its file says to turn") {
+  const Footage footage;
+  // The middle of the tiny frames, upright; as a telephone writes it: lying, with a note that it is to be turned.
+  constexpr int kCut = 8;
+  const auto middle = [](const fs::path& file) {
+    const Image whole = read_image(file.string());
+    Image part(whole.channels(), whole.height(), whole.width() - 2 * kCut);
+    for (int c = 0; c < part.channels(); ++c) {
+      for (int y = 0; y < part.height(); ++y) std::copy_n(whole.row(c, y) + kCut, part.width(), part.row(c, y));
+    }
+    return part;
+  };
+  fs::create_directories("upright");
+  fs::create_directories("masks/human");
+  for (int t = 0; t < kTinyFrames; ++t) {
+    const std::string name = "000" + std::to_string(t) + ".png";
+    write_image("upright/" + name, middle(fs::path(footage.frames) / name));
+    write_image("masks/human/" + name, middle(fs::path(footage.masks) / "human" / name));
+  }
+  run_process({"ffmpeg", "-v", "error", "-nostdin", "-framerate", "10", "-i", "upright/%04d.png", "-vf",
+               "transpose=clock", "-pix_fmt", "yuv444p", "-colorspace", "bt709", "lying.mp4"});
+  run_process({"ffmpeg", "-v", "error", "-nostdin", "-i", "lying.mp4", "-c", "copy", "-metadata:s:v", "rotate=90",
+               "turned.mp4"});
+  write_changed("keypoints.json", "keypoints.json", [](auto& k) {
+    for (auto& frame : k["frames"]) {
+      for (auto& point : frame) point[0] = point[0].template get<double>() - kCut;
+    }
+  });
+  const ProgramResult init = run_hsi4d({"init", "turned.mp4", "--keypoints", "keypoints.json", "--masks", "masks",
+                                        "--avatar", footage.avatar, "--out", "clip"});
+  CAPTURE(init.err);
+  REQUIRE(init.status == 0);
+  const Camera camera = read_camera("clip/camera.json");
+  CHECK(camera.width == kTinyPixels - 2 * kCut);
+  CHECK(camera.height == kTinyPixels);
+  const Image plate = read_image("clip/plate.png"), frame = read_image("upright/0000.png");
+  double difference = 0;  // along the upper border, where nobody is
+  for (int x = 0; x < camera.width; ++x)
+    difference += std::abs(static_cast<double>(plate(1, 1, x)) - static_cast<double>(frame(1, 1, x))) / camera.width;
+  CHECK(difference < 0.1);
+}
+
+TEST_CASE("hsi4d init keeps some of the frames of a fast video, with the keypoints of all") {
+  const Footage footage;
+  const ProgramResult init = footage.init({"--video-rate", "60", "--frame-rate", "30", "--out", "clip"});
+  CAPTURE(init.err);
+  REQUIRE(init.status == 0);
+  CHECK(json_of("clip/config.json")["data"]["frame_rate"] == 30);
+  const ProgramResult dry = run_hsi4d({"run", "clip/config.json", "--out", "run", "--dry-run"});
+  CAPTURE(dry.err);
+  CHECK(dry.status == 0);
+  CHECK_THAT(dry.out, Contains("2 frames of "));
+}
+
+TEST_CASE("hsi4d init takes a person whose feet are out of the picture in some frames, not in all") {
+  const Footage footage;
+  const auto without_feet = [](std::size_t from) {
+    write_changed("keypoints.json", "cut.json", [from](auto& k) {
+      for (std::size_t t = from; t < k["frames"].size(); ++t) {
+        for (const std::size_t ankle : {7U, 8U}) k["frames"][t][ankle] = {20, 60, 0.2};  // below the border, a guess
+      }
+    });
+    return run_hsi4d({"init", (TinyDataset::folder() / "frames").string(), "--keypoints", "cut.json", "--masks",
+                      (TinyDataset::folder() / "masks").string(), "--video-rate", "10", "--out", "clip"});
+  };
+  const ProgramResult all = without_feet(0);
+  CHECK(all.status == 2);
+  CHECK_THAT(all.err, Contains("cut.json: no frame shows both ankles and two other pairs of knees, hips, shoulders and "
+                               "eyes with a confidence of at least 0.5"));
+  const ProgramResult some = without_feet(1);
+  CAPTURE(some.err);
+  CHECK(some.status == 0);
 }
 
 TEST_CASE("hsi4d init refuses what it cannot do, and leaves nothing") {

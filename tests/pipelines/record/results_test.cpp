@@ -6,10 +6,13 @@
 
 #include <catch2/catch.hpp>
 
+#include "body/avatar_shape.h"
 #include "body/motion_io.h"
 #include "core/image_io.h"
 #include "core/rotation.h"
 #include "core/video.h"
+#include "pipelines/input/body_files.h"
+#include "splat/files/splat_file.h"
 #include "tests/support/tiny_run.h"
 
 namespace results_test {
@@ -99,6 +102,29 @@ TEST_CASE("the body of another avatar is not written, and the log says so", "[ru
   CHECK(read_text_file("run/log.txt").find("body.glb is not written: joints of the avatar are ") != std::string::npos);
 }
 
+TEST_CASE("a run takes the shape of its body from the avatar, and refuses another one", "[run]") {
+  const TemporaryFolder here;
+  Avatar tall;
+  RunConfig config = tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"});
+  const std::vector<double> betas = {1.5, -0.5};
+  BodySettings body;
+  body.shape = betas;
+  tall = surface_avatar(rest_body(body), {.gaussians = 500});
+  SafetensorsWriter file = avatar_file(tall);
+  add_avatar_shape({tall.body, betas}, file);
+  file.write("tall.safetensors");
+  config.data.avatar = "tall.safetensors";
+  execute_tiny(config, "run");
+  CHECK(std::filesystem::exists(RunPaths{"run"}.body()));
+  config.body.shape = {1.5, -0.5, 0};  // the same
+  execute_tiny(config, "same");
+  config.body.shape = {1.5};
+  CHECK_THROWS_WITH(execute_tiny(config, "other"),
+                    "/body/shape: is [1.5]; the avatar tall.safetensors was made in the shape [1.5, -0.5]; leave "
+                    "body.shape out, or take an avatar of that shape");
+  CHECK_FALSE(std::filesystem::exists("other"));
+}
+
 TEST_CASE("a preview shows the video, the reconstruction, both, and another side", "[run]") {
   const TemporaryFolder here;
   // A wide pixel filter makes the reconstruction another picture than the video.
@@ -123,6 +149,28 @@ TEST_CASE("a preview shows the video, the reconstruction, both, and another side
     INFO("both " << both << ", another side " << side);
     CHECK(both < 0.03);
     CHECK(side > 0.1);
+  }
+}
+
+TEST_CASE("beside a scene that ends, another side has the colour of the video", "[run]") {
+  const TemporaryFolder here;
+  RunConfig config = tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"});
+  const std::vector<Index> first = {0};
+  Gaussians dot = selected(read_splats(config.data.scene.string()).gaussians, first);
+  dot.log_scales = {-7, -7, -7};
+  write_splats("dot.ply", dot);
+  config.data.scene = "dot.ply";
+  execute_tiny(config, "run");
+  const RunPaths paths{"run"};
+  const Image video = read_image(paths.frame_image(0, "target")), side = read_image(paths.frame_image(2, "side")),
+              front = read_image(paths.frame_image(2, "render"));
+  for (int c = 0; c < 3; ++c) {
+    double mean = 0;
+    for (int y = 0; y < video.height(); ++y) {
+      for (int x = 0; x < video.width(); ++x) mean += static_cast<double>(video(c, y, x));
+    }
+    CHECK(static_cast<double>(side(c, 0, 0)) == Approx(mean / (video.height() * video.width())).margin(0.005));
+    CHECK(front(c, 0, 0) == 0);
   }
 }
 
