@@ -18,6 +18,7 @@ set(stands_on
     "pipelines/run: pipelines/graph pipelines/sources pipelines/report" "pipelines/chain: pipelines/run"
     "pipelines/sweep: pipelines/chain pipelines/synthetic" "pipelines/study: pipelines/sweep pipelines/evaluate"
     "pipelines/cli: pipelines/study pipelines/avatar pipelines/footage pipelines/scan"
+    "python: pipelines/sweep"
     "bench: pipelines/cli" "stress: pipelines/cli")
 
 set(rooms "")
