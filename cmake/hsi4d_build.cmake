@@ -194,6 +194,29 @@ function(hsi4d_add_program name main room)
   target_link_libraries(${name} PRIVATE ${room} hsi4d_warnings)
 endfunction()
 
+# The Python module hsi4d, from folder python/, in python/ of the build. It is left out, which is told, where something
+# that it needs is missing: the python3 of the system, its headers, pybind11.
+function(hsi4d_add_python)
+  find_program(HSI4D_PYTHON3 python3 HINTS /usr/bin)  # the one that Debian's NumPy belongs to
+  mark_as_advanced(HSI4D_PYTHON3)
+  set(Python_EXECUTABLE ${HSI4D_PYTHON3})
+  find_package(Python 3.9 COMPONENTS Interpreter Development.Module QUIET)
+  find_package(pybind11 2.10 CONFIG QUIET)
+  if(NOT Python_FOUND OR NOT pybind11_FOUND)
+    message(STATUS "Python's headers or pybind11 are missing: the Python module is not built")
+    return()
+  endif()
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/*.cpp)
+  pybind11_add_module(hsi4d_python MODULE NO_EXTRAS ${sources})
+  target_link_libraries(hsi4d_python PRIVATE hsi4d::pipelines_sweep hsi4d_warnings)
+  target_compile_options(hsi4d_python PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_link_options(hsi4d_python PRIVATE LINKER:--exclude-libs,ALL)
+  set_target_properties(hsi4d_python PROPERTIES OUTPUT_NAME hsi4d LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python
+                                                UNITY_BUILD ${HSI4D_UNITY} UNITY_BUILD_BATCH_SIZE 0
+                                                INSTALL_RPATH "$ORIGIN/..")
+  configure_file(${PROJECT_SOURCE_DIR}/python/hsi4d.pyi ${PROJECT_BINARY_DIR}/python/hsi4d.pyi COPYONLY)
+endfunction()
+
 # Configs that commands write or begin with become part of the program, so that it runs from anywhere.
 function(hsi4d_embed_configs)
   set(HSI4D_SHIPPED_CONFIGS "")

@@ -1,4 +1,4 @@
-# cmake -DBUILD=build folder -DSCRATCH=folder -DGENERATOR=… -DCOMPILER=… -DVERSION=… -DROOT=source tree
+# cmake -DBUILD=build folder -DSCRATCH=folder -DGENERATOR=… -DCOMPILER=… -DVERSION=… -DROOT=source tree -DPYTHON=…
 #       -P install_test.cmake
 # Installs the build into a fresh prefix, moves that prefix, and builds and runs the outside project of tests/install
 # against it.
@@ -55,5 +55,14 @@ endforeach()
 run("The installed program" ${SCRATCH}/prefix/bin/hsi4d --version)
 if(NOT output MATCHES "^hsi4d ${VERSION} \\(([0-9a-f]+(-modified)?|unknown)\\)\n$")
   message(FATAL_ERROR "The installed program prints \"${output}\" and not its version and commit")
+endif()
+# The module, with an image that a library of its own reads; without PYTHON it was not built.
+if(PYTHON)
+  file(GLOB_RECURSE stubs ${SCRATCH}/prefix/hsi4d.pyi)
+  cmake_path(GET stubs PARENT_PATH folder)
+  file(WRITE ${SCRATCH}/image.ppm "P3\n1 1\n255\n255 0 51\n")
+  run("The installed Python module" ${CMAKE_COMMAND} -E env PYTHONPATH=${folder} ${PYTHON} -B -c
+      "import hsi4d; print(hsi4d.__version__, (255 * hsi4d.read_image('${SCRATCH}/image.ppm')).round().tolist())")
+  check_equal("What the installed Python module prints" "${output}" "${VERSION} [[[255.0, 0.0, 51.0]]]\n")
 endif()
 file(REMOVE_RECURSE ${SCRATCH})

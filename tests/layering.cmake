@@ -19,6 +19,7 @@ set(stands_on
     "pipelines/sweep: pipelines/chain pipelines/synthetic" "pipelines/study: pipelines/sweep pipelines/evaluate"
     "pipelines/locate: pipelines/graph pipelines/scan"
     "pipelines/cli: pipelines/study pipelines/avatar pipelines/footage pipelines/locate"
+    "python: pipelines/sweep"
     "bench: pipelines/cli" "stress: pipelines/cli")
 
 set(rooms "")

@@ -11,10 +11,13 @@ add_test(NAME gradient_audit
 set_tests_properties(layering test_names gradient_audit PROPERTIES LABELS quick TIMEOUT 300)
 
 if(NOT HSI4D_SANITIZE)  # sanitized libraries are not installed
+  if(TARGET hsi4d_python)
+    set(python ${HSI4D_PYTHON3})
+  endif()
   add_test(NAME install
     COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DBUILD=${PROJECT_BINARY_DIR}
                              -DSCRATCH=${CMAKE_CURRENT_BINARY_DIR}/install -DGENERATOR=${CMAKE_GENERATOR}
-                             -DCOMPILER=${CMAKE_CXX_COMPILER} -DVERSION=${PROJECT_VERSION}
+                             -DCOMPILER=${CMAKE_CXX_COMPILER} -DVERSION=${PROJECT_VERSION} -DPYTHON=${python}
                              -P ${CMAKE_CURRENT_SOURCE_DIR}/install_test.cmake)
   set_tests_properties(install PROPERTIES LABELS quick TIMEOUT 300)
 endif()
@@ -37,19 +40,19 @@ add_test(NAME "the commit of a build"
 set_tests_properties("the commit of a build" PROPERTIES LABELS quick)
 
 # Exporters of other programs' files, with NumPy and stand-ins for PyTorch and joblib.
-find_program(HSI4D_PYTHON python3 HINTS /usr/bin)  # the one that Debian's NumPy belongs to
-if(HSI4D_PYTHON)
+find_program(HSI4D_PYTHON3 python3 HINTS /usr/bin)  # the one that Debian's NumPy belongs to
+if(HSI4D_PYTHON3)
   add_test(NAME "exporters of VPoser, WHAM, GVHMR, TRAM and WHAC"
-           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/exporters_test.py ${PROJECT_SOURCE_DIR}/tools
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/exporters_test.py ${PROJECT_SOURCE_DIR}/tools
                    $<TARGET_FILE:hsi4d>)
   add_test(NAME "embeddings by CLIP"
-           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/clip_embeddings_test.py ${PROJECT_SOURCE_DIR}/tools)
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/clip_embeddings_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "services for video, masks and poses"
-           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/services_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "the gate of time and error"
-           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/bench_test.py ${PROJECT_SOURCE_DIR}/tools)
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/bench_test.py ${PROJECT_SOURCE_DIR}/tools)
   add_test(NAME "what the front end says of wrong input"
-           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/frontend_input_test.py ${PROJECT_SOURCE_DIR}/tools)
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/frontend_input_test.py ${PROJECT_SOURCE_DIR}/tools)
   set_tests_properties("what the front end says of wrong input" PROPERTIES LABELS quick)
   set_tests_properties("exporters of VPoser, WHAM, GVHMR, TRAM and WHAC" "services for video, masks and poses" "embeddings by CLIP"
                        "the gate of time and error" PROPERTIES LABELS quick SKIP_RETURN_CODE 77)
@@ -58,17 +61,17 @@ else()
 endif()
 
 # Sweeps on a cluster of Slurm on this machine: it says so where Slurm is missing (tools/slurm-local install installs it).
-if(HSI4D_PYTHON AND NOT HSI4D_SANITIZE)
+if(HSI4D_PYTHON3 AND NOT HSI4D_SANITIZE)
   add_test(NAME "sweeps by Slurm"
-           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/slurm_sweep_test.py ${PROJECT_SOURCE_DIR}/tools
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/slurm_sweep_test.py ${PROJECT_SOURCE_DIR}/tools
                    $<TARGET_FILE:hsi4d> ${PROJECT_SOURCE_DIR}/configs)
   set_tests_properties("sweeps by Slurm" PROPERTIES LABELS full SKIP_RETURN_CODE 77 TIMEOUT 1500)
 endif()
 
 # The person in a video by BlazePose: it says so where its packages or Chromium are missing.
-if(HSI4D_PYTHON AND NOT HSI4D_SANITIZE)
+if(HSI4D_PYTHON3 AND NOT HSI4D_SANITIZE)
   add_test(NAME "the front end finds a person"
-           COMMAND ${HSI4D_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/frontend_test.py ${PROJECT_SOURCE_DIR}/tools
+           COMMAND ${HSI4D_PYTHON3} -B ${CMAKE_CURRENT_SOURCE_DIR}/tools/frontend_test.py ${PROJECT_SOURCE_DIR}/tools
                    $<TARGET_FILE:hsi4d> ${PROJECT_SOURCE_DIR}/build/frontend)
   set_tests_properties("the front end finds a person" PROPERTIES LABELS full SKIP_RETURN_CODE 77 TIMEOUT 900)
 endif()
@@ -87,4 +90,11 @@ elseif(HSI4D_NODE)
                        PROPERTIES LABELS quick SKIP_RETURN_CODE 77 TIMEOUT 600)
 else()
   message(STATUS "There is no node: the report and a study are not tested in a browser")
+endif()
+
+# The Python module, and its page, docs/python.md.
+if(TARGET hsi4d_python)
+  add_test(NAME python COMMAND ${HSI4D_PYTHON3} -B -m unittest discover -s ${CMAKE_CURRENT_SOURCE_DIR}/python -p "*_test.py")
+  set_tests_properties(python PROPERTIES LABELS quick TIMEOUT 600
+    ENVIRONMENT "PYTHONPATH=${PROJECT_BINARY_DIR}/python;HSI4D_PROGRAM=$<TARGET_FILE:hsi4d>")
 endif()

@@ -4,6 +4,7 @@
 
 #include "core/check.h"
 #include "core/parallel.h"
+#include "pipelines/draw/image_cotangent.h"
 #include "pipelines/draw/reference_render.h"
 #include "pipelines/draw/taped_scene.h"
 
@@ -89,26 +90,54 @@ SceneImage render_taped(const PosedGaussians& posed, const SceneView& view, std:
   return result;
 }
 
+/// Σ over the pixels of T · cotangent.
+std::array<double, 3> background_gradient(std::span<const double> transmittance, std::span<const double> cotangent) {
+  std::array<double, 3> gradient{};
+  std::vector<double> terms(transmittance.size());
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < terms.size(); ++i) terms[i] = transmittance[i] * cotangent[3 * i + c];
+    gradient[c] = pairwise_sum(terms.data(), static_cast<Index>(terms.size()));
+  }
+  return gradient;
+}
+
 template <class S>
-SceneGradients gradients_taped(const Gaussians& gaussians, const SceneView& view, std::span<const double> target) {
+ImageAdjoint adjoint_taped(const Gaussians& gaussians, const SceneView& view, const CotangentOf& cotangent_of) {
   TapedScene<S> scene({gaussians, {}}, view, false);
   scene.tape.forward(scene.rendered.transmittance);
   scene.tape.forward(scene.rendered.image);
-  SceneGradients result;
-  result.rendered = image_of(scene, view.camera);
-  std::vector<double> cotangent;
-  result.loss = squared_loss(result.rendered.image, target, cotangent);
+  ImageAdjoint result;
+  result.numbers.rendered = image_of(scene, view.camera);
+  const std::vector<double> cotangent = cotangent_of(result.numbers);
   scene.tape.backward(scene.rendered.image, planar<S>(cotangent));
-  scene.copy_gradients(result);
+  scene.copy_gradients(result.numbers);
+  result.background = background_gradient(interleaved(scene.tape.value(scene.rendered.transmittance)), cotangent);
   return result;
 }
 
-SceneGradients gradients_reference(const Gaussians& gaussians, const SceneView& view, std::span<const double> target) {
-  return adjoint_reference(gaussians, view, [&target](SceneGradients& result) {
-    std::vector<double> cotangent;
-    result.loss = squared_loss(result.rendered.image, target, cotangent);
+ImageAdjoint adjoint_by_reference(const Gaussians& gaussians, const SceneView& view, const CotangentOf& cotangent_of) {
+  ImageAdjoint result;
+  std::vector<double> cotangent;
+  result.numbers = adjoint_reference(gaussians, view, [&](SceneGradients& gradients) {
+    cotangent = cotangent_of(gradients);
     return cotangent;
   });
+  std::vector<double> transmittance = result.numbers.rendered.alpha;
+  for (double& t : transmittance) t = 1 - t;
+  result.background = background_gradient(transmittance, cotangent);
+  return result;
+}
+
+ImageAdjoint adjoint_of(const Gaussians& gaussians, const SceneView& view, const CotangentOf& cotangent_of) {
+  switch (view.precision) {
+    case Precision::kFloat:
+      return adjoint_taped<float>(gaussians, view, cotangent_of);
+    case Precision::kDouble:
+      return adjoint_taped<double>(gaussians, view, cotangent_of);
+    case Precision::kReference:
+      break;
+  }
+  return adjoint_by_reference(gaussians, view, cotangent_of);
 }
 
 }  // namespace
@@ -148,15 +177,24 @@ ScenePicture render_picture(const PosedGaussians& scene, const SceneView& view) 
 SceneGradients scene_gradients(const Gaussians& scene, const SceneView& view, std::span<const double> target) {
   check_sizes(scene);
   HSI4D_CHECK_EQ(target.size(), 3 * pixels_of(view.camera));
-  switch (view.precision) {
-    case Precision::kFloat:
-      return gradients_taped<float>(scene, view, target);
-    case Precision::kDouble:
-      return gradients_taped<double>(scene, view, target);
-    case Precision::kReference:
-      break;
-  }
-  return gradients_reference(scene, view, target);
+  return adjoint_of(scene, view,
+                    [target](SceneGradients& result) {
+                      std::vector<double> cotangent;
+                      result.loss = squared_loss(result.rendered.image, target, cotangent);
+                      return cotangent;
+                    })
+      .numbers;
+}
+
+ImageAdjoint image_adjoint(const Gaussians& gaussians, const SceneView& view, std::span<const double> cotangent) {
+  check_sizes(gaussians);
+  HSI4D_CHECK_EQ(cotangent.size(), 3 * pixels_of(view.camera));
+  return adjoint_of(gaussians, view, [cotangent](SceneGradients& result) {
+    std::vector<double> products(cotangent.size());
+    for (std::size_t i = 0; i < products.size(); ++i) products[i] = cotangent[i] * result.rendered.image[i];
+    result.loss = pairwise_sum(products.data(), static_cast<Index>(products.size()));
+    return std::vector<double>(cotangent.begin(), cotangent.end());
+  });
 }
 
 }  // namespace hsi4d

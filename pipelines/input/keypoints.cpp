@@ -14,6 +14,7 @@
 #include "core/log.h"
 #include "core/suggest.h"
 #include "core/text.h"
+#include "pipelines/input/found_keypoints.h"
 
 namespace hsi4d {
 
@@ -357,12 +358,12 @@ std::vector<const FoundPerson*> followed(const FoundKeypoints& found, const std:
   return persons;
 }
 
-FoundKeypoints read_found(const fs::path& path, const std::vector<KeypointJoints>& joints) {
+}  // namespace
+
+FoundKeypoints read_found_keypoints(const fs::path& path, const std::vector<KeypointJoints>& joints) {
   if (fs::is_directory(path)) return read_openpose(path, joints);
   return parse_keypoints(read_text_file(path.string()), path.string(), joints);
 }
-
-}  // namespace
 
 bool Keypoints::has_landmarks() const {
   const auto has_some = [](const std::vector<Keypoint>& frame) {
@@ -438,7 +439,7 @@ Keypoints read_keypoints(const DataSettings& data, const FrameSource& frames) {
       data.keypoint_joints.empty()
           ? std::vector<KeypointJoints>()
           : parse_keypoint_joints(read_text_file(data.keypoint_joints.string()), data.keypoint_joints.string());
-  FoundKeypoints found = read_found(data.keypoints, given);
+  FoundKeypoints found = read_found_keypoints(data.keypoints, given);
   if (found.lacks_empty_frames && std::ssize(found.frames) < frames.video_count())
     found.frames.resize(static_cast<std::size_t>(frames.video_count()));
   const Image first = frames.read(0);

@@ -7,9 +7,8 @@
 #include "optim/optimizer.h"
 #include "pipelines/draw/frame_images.h"
 #include "pipelines/draw/posed_avatar.h"
-#include "pipelines/graph/frame_graph.h"
 #include "pipelines/graph/frame_masks.h"
-#include "pipelines/graph/sequence_graph.h"
+#include "pipelines/run/recorded_stage.h"
 
 namespace hsi4d {
 
@@ -130,11 +129,11 @@ Index tiles_in_image(const Camera& camera, int tile) {
   return Index{(camera.width + tile - 1) / tile} * ((camera.height + tile - 1) / tile);
 }
 
-/// Records a frame as a stage has it, beside what it is compared with, and calls use(graph, inputs of the losses).
-/// @param camera_reach  as FrameGraphSettings has it
-template <class S, class F>
-void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& frame, const SceneState& state,
-                      const ColorState& colors, std::optional<double> camera_reach, F use) {
+}  // namespace
+
+template <class S>
+RecordedFrame<S> record_frame(Tape<S>& tape, const StageTask& task, const FrameTask& frame, const SceneState& state,
+                              const ColorState& colors, std::optional<double> camera_reach) {
   const StageSettings& stage = task.config.stages[task.stage].second;
   tape.set_skips(task.config.skip.tape);
   FrameGraphSettings settings = graph_settings(task.config, stage.draw, colors);
@@ -145,19 +144,27 @@ void with_frame_graph(Tape<S>& tape, const StageTask& task, const FrameTask& fra
   settings.unknowns = unknown_groups_of(stage);
   settings.camera_reach = camera_reach;
   settings.seen = rows_to_draw(task, state);
-  FrameGraph<S> graph(tape, task.clip, state.camera_from_world, settings);
+  auto recorded = std::make_unique<FrameGraph<S>>(tape, task.clip, state.camera_from_world, settings);
+  FrameGraph<S>& graph = *recorded;
   graph.set_state(state);
   if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));
   const Image weight = pixel_weights(stage, frame, task.config);
   graph.set_targets(targets_of(task, frame, state, weight));
   LossInputs<S> inputs = graph.loss_inputs();
   if (weight.empty()) inputs.weight = {};
-  use(graph, inputs);
+  return {std::move(recorded), inputs};
+}
+
+double camera_reach_of(const StageSettings& stage) {
+  const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");
+  return camera != nullptr ? longest_way(*camera, stage.iterations, stage.optimizer) : 0;
 }
 
 std::string name_in_frame(const StageTask& task, const FrameTask& frame) {
   return task.config.stages[task.stage].first + ", frame " + std::to_string(frame.index);
 }
+
+namespace {
 
 template <class S>
 StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, SceneState& state, ColorState& colors,
@@ -166,27 +173,23 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   const StageSettings& stage = task.config.stages[task.stage].second;
   StageProbe probe(task.watch);
   Tape<S> tape;
-  const ParameterGroupSettings* const camera = find_entry(stage.optimize, "camera");
-  const double reach = camera != nullptr ? longest_way(*camera, stage.iterations, stage.optimizer) : 0;
-  StageResult result;
-  with_frame_graph<S>(tape, task, frame, state, colors, reach, [&](FrameGraph<S>& graph, const LossInputs<S>& inputs) {
-    result = run_stage<S>(tape, stage, task.losses, inputs, graph.groups(),
-                          [&](const IterationReport& report) {
-                            const RenderCounters& counters = *graph.rendered().counters;
-                            probe.iteration_ended(report, &counters);
-                            callback(report, counters);
-                            probe.iteration_begins();
-                          },
-                          {.name = name_in_frame(task, frame),
-                           .kept = &colors.moments,
-                           .curvature = stage.optimizer.keep_curvature ? &colors.curvature[name] : nullptr,
-                           .profile = probe.is_on(),
-                           .time_curvature = probe.times_curvature(),
-                           .held = graph.held()});
-    graph.read_state(stage.optimize, state);
-    if (task.found != nullptr) *task.found = graph.unknowns();
-    if (colors.net) graph.read_color_net(stage.optimize, *colors.net);
-  });
+  const auto [graph, inputs] = record_frame<S>(tape, task, frame, state, colors, camera_reach_of(stage));
+  const StageResult result =
+      run_stage<S>(tape, stage, task.losses, inputs, graph->groups(),
+                   [&probe, &callback, &counters = *graph->rendered().counters](const IterationReport& report) {
+                     probe.iteration_ended(report, &counters);
+                     callback(report, counters);
+                     probe.iteration_begins();
+                   },
+                   {.name = name_in_frame(task, frame),
+                    .kept = &colors.moments,
+                    .curvature = stage.optimizer.keep_curvature ? &colors.curvature[name] : nullptr,
+                    .profile = probe.is_on(),
+                    .time_curvature = probe.times_curvature(),
+                    .held = graph->held()});
+  graph->read_state(stage.optimize, state);
+  if (task.found != nullptr) *task.found = graph->unknowns();
+  if (colors.net) graph->read_color_net(stage.optimize, *colors.net);
   const Camera& drawn = task.clip.camera;
   probe.stage_ended(result, {.stage = name,
                              .frame = frame.index,
@@ -196,9 +199,10 @@ StageResult run_frame_stage_in(const StageTask& task, const FrameTask& frame, Sc
   return result;
 }
 
-/// Records the sequence as a stage has it.
+}  // namespace
+
 template <class S>
-SequenceGraph<S> sequence_graph(Tape<S>& tape, const StageTask& task, const std::vector<SceneState>& states) {
+SequenceGraph<S> record_sequence(Tape<S>& tape, const StageTask& task, const std::vector<SceneState>& states) {
   const StageSettings& stage = task.config.stages[task.stage].second;
   tape.set_skips(task.config.skip.tape);
   const bool moves_pose = find_entry(stage.optimize, kPoseLatents) != nullptr;
@@ -206,13 +210,15 @@ SequenceGraph<S> sequence_graph(Tape<S>& tape, const StageTask& task, const std:
   return SequenceGraph<S>(tape, task.clip, states, moves_pose ? &prior : nullptr, task.config.rotations);
 }
 
+namespace {
+
 template <class S>
 StageResult run_sequence_stage_in(const StageTask& task, std::vector<SceneState>& states,
                                   const StageCallback& callback) {
   const auto& [name, stage] = task.config.stages[task.stage];
   StageProbe probe(task.watch);
   Tape<S> tape;
-  const SequenceGraph<S> graph = sequence_graph<S>(tape, task, states);
+  const SequenceGraph<S> graph = record_sequence<S>(tape, task, states);
   const StageResult result = run_stage<S>(
       tape, stage, task.losses, graph.loss_inputs(), graph.groups(),
       [&](const IterationReport& report) {
@@ -266,21 +272,25 @@ StageResult run_sequence_stage(const StageTask& task, std::vector<SceneState>& s
 StageGradcheck check_frame_stage(const StageTask& task, const FrameTask& frame, const SceneState& state,
                                  const ColorState& colors, const StageGradcheckOptions& options) {
   Tape<double> tape;
-  StageGradcheck found;
-  with_frame_graph<double>(tape, task, frame, state, colors, std::nullopt, [&](const auto& graph, const auto& inputs) {
-    found = check_stage_gradient(tape, task.config.stages[task.stage].second, task.losses, inputs, graph.groups(),
-                                 name_in_frame(task, frame), options);
-  });
-  return found;
+  const auto [graph, inputs] = record_frame<double>(tape, task, frame, state, colors, std::nullopt);
+  return check_stage_gradient(tape, task.config.stages[task.stage].second, task.losses, inputs, graph->groups(),
+                              name_in_frame(task, frame), options);
 }
 
 StageGradcheck check_sequence_stage(const StageTask& task, const std::vector<SceneState>& states,
                                     const StageGradcheckOptions& options) {
   const auto& [name, stage] = task.config.stages[task.stage];
   Tape<double> tape;
-  const SequenceGraph<double> graph = sequence_graph<double>(tape, task, states);
+  const SequenceGraph<double> graph = record_sequence<double>(tape, task, states);
   return check_stage_gradient(tape, stage, task.losses, graph.loss_inputs(), graph.groups(), name, options);
 }
+
+template RecordedFrame<float> record_frame(Tape<float>&, const StageTask&, const FrameTask&, const SceneState&,
+                                           const ColorState&, std::optional<double>);
+template RecordedFrame<double> record_frame(Tape<double>&, const StageTask&, const FrameTask&, const SceneState&,
+                                            const ColorState&, std::optional<double>);
+template SequenceGraph<float> record_sequence(Tape<float>&, const StageTask&, const std::vector<SceneState>&);
+template SequenceGraph<double> record_sequence(Tape<double>&, const StageTask&, const std::vector<SceneState>&);
 
 std::optional<ColorNet> first_net(const RunConfig& config, const Clip& clip) {
   return first_color_net(config.color_net, clip.avatar, config.seed);

@@ -1,0 +1,203 @@
+"""Configs and runs: progress, stops, the log, the folder."""
+
+import json
+import logging
+import os
+import signal
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import hsi4d
+from support import config, dataset, program, scratch
+
+
+class Configs(unittest.TestCase):
+    def test_settings(self):
+        settings = config({"seed": 5, "stages.camera.iterations": 3})
+        self.assertEqual((settings.name, settings.stages), ("tiny", ["camera", "interaction"]))
+        self.assertEqual(settings.settings["seed"], 5)
+        self.assertEqual(settings.settings["stages"]["camera"]["iterations"], 3)
+        self.assertEqual(config(["seed=5"]).settings["seed"], 5)
+
+    def test_from_a_dict(self):
+        made = hsi4d.make_config({"extends": "config.json", "seed": 7}, dataset().parent)
+        self.assertEqual(made.settings, {**config().settings, "seed": 7})
+
+    def test_all_that_is_wrong_is_told(self):
+        with self.assertRaises(hsi4d.UserError) as caught:
+            config({"seeed": 1, "stages.camera.iterations": -1, "stages.camera.losses.nothing": {}})
+        for part in ["seeed", "/stages/camera/iterations", "nothing"]:
+            self.assertIn(part, str(caught.exception))
+        with self.assertRaisesRegex(hsi4d.UserError, "none.json"):
+            hsi4d.load_config("none.json")
+        with self.assertRaisesRegex(hsi4d.UserError, "overrides: a int"):
+            config(7)
+        with self.assertRaisesRegex(hsi4d.UserError, "overrides: a int; allowed: texts KEY=VALUE"):
+            config([7])
+
+
+class Runs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.run_ = hsi4d.run(config(), scratch() / "run", threads=2)
+
+    def test_the_folder(self):
+        run = self.run_
+        self.assertEqual(run.status["state"], "done")
+        self.assertEqual(run.config["name"], "tiny")
+        self.assertEqual(len(run.metrics), 3 * 18)
+        self.assertEqual(run.metrics[0]["stage"], "camera")
+        self.assertEqual([stage["stage"] for stage in run.summary["metrics"]], ["camera", "interaction"])
+        self.assertEqual(len(run.motion), 4)
+        self.assertEqual(len(run.cameras), 4)
+        self.assertEqual(list(run.objects), ["watering_can"])
+        self.assertEqual(run.image(2).shape, (48, 48, 3))
+        self.assertEqual(run.image(2, "target").shape, (48, 48, 3))
+        np.testing.assert_array_equal(run.states[2].objects[0][1], run.objects["watering_can"][1][2])
+        self.assertEqual(hsi4d.Run(run.folder).summary, run.summary)
+
+    def test_it_is_the_program_s(self):
+        folder = scratch() / "run"
+        program("run", dataset(), "--out", folder, "--quiet")
+        other = hsi4d.Run(folder)
+        np.testing.assert_array_equal(other.motion.rotations, self.run_.motion.rotations)
+        self.assertEqual([line["loss"] for line in other.metrics], [line["loss"] for line in self.run_.metrics])
+
+    def test_the_image_of_a_frame_again(self):
+        run = self.run_
+        data = dataset().parent
+        state, camera = run.states[2], run.cameras[2]
+        avatar = hsi4d.read_avatar(data / "avatar.safetensors")
+        image = hsi4d.render([hsi4d.read_gaussians(data / "scene.ply"), avatar.pose(state.body)], camera, blur=0.13)
+        self.assertLess(np.abs(np.clip(image, 0, 1) - run.image(2)).mean(), 0.05)  # the object is missing
+
+    def test_no_run(self):
+        with self.assertRaisesRegex(hsi4d.UserError, "holds no run"):
+            hsi4d.Run(scratch())
+        with self.assertRaisesRegex(hsi4d.UserError, "threads: -1"):
+            hsi4d.run(config(), scratch() / "run", threads=-1)
+        with self.assertRaisesRegex(hsi4d.UserError, "holds a run"):
+            hsi4d.run(config(), self.run_.folder)
+
+
+class Stops(unittest.TestCase):
+    def check_resumed(self, folder, whole):
+        self.assertEqual(hsi4d.Run(folder).status["state"], "interrupted")
+        resumed = hsi4d.run(config(), folder, resume=True)
+        np.testing.assert_array_equal(resumed.motion.rotations, whole.motion.rotations)
+
+    @classmethod
+    def setUpClass(cls):
+        cls.whole = hsi4d.run(config(), scratch() / "run")
+
+    def test_progress(self):
+        seen = []
+        hsi4d.run(config(), scratch() / "run", progress=seen.append, progress_interval=0)
+        self.assertEqual([seen[0]["done"], seen[-1]["done"], seen[-1]["is_finished"]], [1, 54, True])
+        self.assertEqual((seen[3]["task"], seen[3]["total"]), ("tiny", 54))
+        self.assertEqual(set(seen[-2]["terms"]), {"photometric", "center", "depth"})
+        self.assertIsInstance(seen[-2]["loss"], float)
+
+    def test_false_stops(self):
+        folder = scratch() / "run"
+        with self.assertRaisesRegex(hsi4d.Interrupted, "interrupted in frame 2; frame 1 is finished and kept"):
+            hsi4d.run(config(), folder, progress=lambda state: state["done"] < 25, progress_interval=0)
+        self.check_resumed(folder, self.whole)
+
+    def test_an_exception_stops(self):
+        def stop(state):
+            if state["done"] == 30:
+                raise LookupError("enough")
+
+        folder = scratch() / "run"
+        with self.assertRaisesRegex(LookupError, "enough"):
+            hsi4d.run(config(), folder, progress=stop, progress_interval=0)
+        self.check_resumed(folder, self.whole)
+
+    def test_ctrl_c_stops(self):
+        def press(state):
+            if state["done"] == 30:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        folder = scratch() / "run"
+        with self.assertRaises(KeyboardInterrupt):
+            hsi4d.run(config(), folder, progress=press, progress_interval=0)
+        self.check_resumed(folder, self.whole)
+
+    def test_other_threads_go_on(self):
+        counts = {"loops": 0, "stop": False}
+
+        def count():
+            while not counts["stop"]:
+                counts["loops"] += 1
+                time.sleep(0.001)
+
+        thread = threading.Thread(target=count)
+        thread.start()
+        try:
+            hsi4d.run(config(), scratch() / "run")
+        finally:
+            counts["stop"] = True
+            thread.join()
+        self.assertGreater(counts["loops"], 20)
+
+
+class Log(unittest.TestCase):
+    def test_a_function(self):
+        lines = []
+        with hsi4d.log_to(lambda level, text: lines.append((level, text))):
+            hsi4d.run(config({"start.pose": "previous", "approx.hold_colors": True}), scratch() / "run")
+        self.assertTrue(lines)
+        self.assertTrue(all(level in {"info", "warning"} for level, _ in lines), lines)
+        count = len(lines)
+        hsi4d.run(config({"approx.hold_colors": True}), scratch() / "run")
+        self.assertEqual(len(lines), count)
+
+    def test_logging(self):
+        with self.assertLogs("hsi4d.test", "INFO") as caught:
+            sink = hsi4d.log_to(logging.getLogger("hsi4d.test"), level="info")
+            hsi4d.run(config({"approx.hold_colors": True}), scratch() / "run")
+            sink.close()
+        self.assertTrue(any("hold_colors" in line for line in caught.output), caught.output)
+
+    def test_from_several_threads(self):
+        """Sinks take the interpreter from work that waits for the log, and the other way round."""
+        lines = []
+        bad = scratch() / "m.npz"
+        np.savez(bad, poses=np.zeros((2, 156)), trans=np.zeros((2, 3)), betas=np.ones(10))  # SMPL-H: betas are left out
+        with hsi4d.log_to(lambda level, text: lines.append(text), level="warning"):
+            threads = [threading.Thread(target=lambda: [hsi4d.read_motion(bad) for _ in range(20)]) for _ in range(4)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+        self.assertEqual(len(lines), 80)
+
+    def test_bad_input(self):
+        with self.assertRaisesRegex(hsi4d.UserError, 'level: "loud" is not known; allowed: trace, debug'):
+            hsi4d.log_to(print, level="loud")
+        with self.assertRaisesRegex(hsi4d.UserError, "target: a int; allowed: a function"):
+            hsi4d.log_to(7)
+
+
+class Sweeps(unittest.TestCase):
+    def test_the_table_of_runs(self):
+        folder = scratch()
+        (folder / "sweep.json").write_text(json.dumps({
+            "name": "few", "base": str(dataset()), "grid": {"stages.camera.iterations": [1, 2]}, "seeds": [0]}))
+        program("sweep", folder / "sweep.json", "--out", folder / "sweep", "--quiet")
+        rows = hsi4d.read_sweep(folder / "sweep")
+        self.assertEqual([row["values"] for row in rows],
+                         [{"stages.camera.iterations": 1}, {"stages.camera.iterations": 2}])
+        self.assertEqual([row["state"] for row in rows], ["done", "done"])
+        self.assertGreater(rows[0]["metrics"]["psnr_db"], 5)
+        self.assertEqual(hsi4d.Run(rows[1]["folder"]).config["stages"]["camera"]["iterations"], 2)
+        with self.assertRaises(hsi4d.UserError):
+            hsi4d.read_sweep(scratch())
+
+
+if __name__ == "__main__":
+    unittest.main()
