@@ -34,8 +34,9 @@ constexpr int kSmallestSide = 48;  // pixels of the first picture, at least
 constexpr double kSsimShare = 0.5;
 constexpr double kFirstRate = 0.01;  // of BFGS in the smallest picture: metres and radians; half in the next one
 constexpr int kIterations = 25, kLastIterations = 40;
-constexpr double kSamePlace_m = 0.03, kSameTurn_deg = 1;     // within which two ends are one
-constexpr std::array<std::size_t, 3> kGoingOn = {12, 4, 2};  // cameras that are fitted in each picture, then 1
+constexpr double kSamePlace_m = 0.03, kSameTurn_deg = 1;  // within which two ends are one
+constexpr std::array<Index, 3> kGoingOn = {12, 4, 2};     // cameras that are fitted in each picture, then 1
+constexpr Index kStartsOfAFit = 32;  // of many starts one of so many is fitted in the first picture
 
 /// A picture of one size.
 struct Level {
@@ -244,7 +245,7 @@ class Search {
     std::vector<Candidate> candidates = tried_starts();
     FoundCamera found;
     for (std::size_t i = 0; i < levels_.size(); ++i) {
-      candidates.resize(std::min(candidates.size(), going_on(i)));
+      candidates.resize(std::min(candidates.size(), static_cast<std::size_t>(going_on(i))));
       for (Candidate& candidate : candidates) candidate = fitted(candidate.camera, i);
       sort_by_loss(candidates);
       if (i == 0) count_agreeing(candidates, found);
@@ -259,11 +260,14 @@ class Search {
  private:
   static constexpr std::int64_t kStepsOfFit = 8;  // about as long as that many starts
 
-  std::size_t going_on(std::size_t level) const { return level < kGoingOn.size() ? kGoingOn[level] : 1; }
+  Index going_on(std::size_t level) const {
+    if (level == 0) return std::max(kGoingOn.front(), search_.starts / kStartsOfAFit);
+    return level < kGoingOn.size() ? kGoingOn.at(level) : 1;
+  }
 
   std::int64_t steps() const {
     std::int64_t fits = 0;
-    for (std::size_t i = 0; i < levels_.size(); ++i) fits += static_cast<std::int64_t>(going_on(i));
+    for (std::size_t i = 0; i < levels_.size(); ++i) fits += going_on(i);
     return search_.starts + kStepsOfFit * fits;
   }
 
