@@ -25,11 +25,13 @@ using MatrixX = Eigen::MatrixXd;
 
 constexpr std::size_t kMostTriples = 2000, kMostTriplesOfAFocal = 300;
 constexpr double kShortestFocal = 0.35, kLongestFocal = 5, kFocalStep = 1.1;  // of the longer side
-constexpr double kFocalSlack = 2;    // tolerances that a focal length between two steps may cost
-constexpr double kThinnest = 1e-3;   // width of points over their length, below which they are a line
-constexpr double kOpenFocal = 0.3;   // standard deviation of the focal length's logarithm
-constexpr double kLeastError = 0.5;  // pixels: nobody picks better
-constexpr double kSingular = 1e-13;  // eigenvalue of the normal equations, whose diagonal is 1
+constexpr double kSlack = 2;  // tolerances that a camera of three picks may cost
+constexpr std::size_t kMostSettled = 40,
+                      kMostSettledOfAFocal = 4;  // cameras of triples that least squares goes on from
+constexpr double kThinnest = 1e-3;               // width of points over their length, below which they are a line
+constexpr double kOpenFocal = 0.3;               // standard deviation of the focal length's logarithm
+constexpr double kLeastError = 0.5;              // pixels: nobody picks better
+constexpr double kSingular = 1e-13;              // eigenvalue of the normal equations, whose diagonal is 1
 constexpr int kMostRounds = 20, kMostSteps = 50;
 
 double cosine(const Vector3<double>& a, const Vector3<double>& b) { return std::clamp(a.dot(b), -1.0, 1.0); }
@@ -213,9 +215,10 @@ void keep_better(ScoredCamera& best, const Problem& problem, const Camera& camer
   if (cost < best.cost) best = {camera, cost};
 }
 
-/// The best camera of the triples, as they give it.
-ScoredCamera best_of_triples(const Problem& problem, const std::vector<Triple>& triples, double tolerance) {
-  ScoredCamera best;
+/// The best cameras of the triples, as they give them, the best first.
+std::vector<ScoredCamera> best_of_triples(const Problem& problem, const std::vector<Triple>& triples, double tolerance,
+                                          std::size_t most) {
+  std::vector<ScoredCamera> all;
   for (const Triple& triple : triples) {
     std::array<Vector3<double>, 3> rays, points;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -226,10 +229,18 @@ ScoredCamera best_of_triples(const Problem& problem, const std::vector<Triple>& 
     for (const Rigid<double>& pose : poses_of_three(rays, points)) {
       Camera camera = problem.camera;
       camera.camera_from_world = pose;
-      keep_better(best, problem, camera, tolerance);
+      all.push_back({camera, cost_of(problem, camera, tolerance)});
     }
   }
-  return best;
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.cost < b.cost; });
+  all.resize(std::min(all.size(), most));
+  return all;
+}
+
+/// Settles a camera within a wider tolerance, then within that of the problem, and keeps it where it is the best.
+void settle_and_keep(const Problem& problem, const Camera& camera, ScoredCamera& best) {
+  const Camera rough = settled(problem, camera, kSlack * problem.tolerance);
+  keep_better(best, problem, settled(problem, rough, problem.tolerance), problem.tolerance);
 }
 
 ScoredCamera best_camera(const Problem& problem) {
@@ -237,9 +248,8 @@ ScoredCamera best_camera(const Problem& problem) {
       triples_of(problem.picks.size(), problem.moves_focal ? kMostTriplesOfAFocal : kMostTriples);
   ScoredCamera best;
   if (!problem.moves_focal) {
-    const ScoredCamera found = best_of_triples(problem, triples, problem.tolerance);
-    if (std::isfinite(found.cost))
-      keep_better(best, problem, settled(problem, found.camera, problem.tolerance), problem.tolerance);
+    for (const ScoredCamera& found : best_of_triples(problem, triples, kSlack * problem.tolerance, kMostSettled))
+      settle_and_keep(problem, found.camera, best);
     return best;
   }
   const double side = std::max(problem.camera.width, problem.camera.height),
@@ -248,10 +258,8 @@ ScoredCamera best_camera(const Problem& problem) {
     Problem trial = problem;
     trial.camera.fx = share * side;
     trial.camera.fy = share * side * aspect;
-    const ScoredCamera found = best_of_triples(trial, triples, kFocalSlack * problem.tolerance);
-    if (!std::isfinite(found.cost)) continue;
-    const Camera rough = settled(problem, found.camera, kFocalSlack * problem.tolerance);
-    keep_better(best, problem, settled(problem, rough, problem.tolerance), problem.tolerance);
+    for (const ScoredCamera& found : best_of_triples(trial, triples, kSlack * problem.tolerance, kMostSettledOfAFocal))
+      settle_and_keep(problem, found.camera, best);
   }
   return best;
 }

@@ -1,8 +1,9 @@
 // A camera from places that were picked in its picture and whose points in the world are known, some of them wrongly.
 //
 //   triples of picks → up to eight poses each [Grunert 1841, as in Haralick et al. 1994, section 3.1] → the pose with
-//   the least Σ min(e², tolerance²) over all picks, e the distance in the picture [MSAC: Torr and Zisserman 2000] →
-//   least squares over the picks within the tolerance (Gauss and Newton, damped), until these stay the same
+//   the least Σ min(e², tolerance²) over all picks, e the distance in the picture [MSAC: Torr and Zisserman 2000]; of
+//   the best of these, least squares over the picks within the tolerance (Gauss and Newton, damped), until these stay
+//   the same; and the best of what they come to [locally optimised: Chum, Matas and Kittler 2003]
 //
 // All triples are tried where they are few. Without a focal length, one after the other of a geometric row is tried
 // so, and least squares finds it with the pose [as Sattler et al. 2014 sample it]. A function of its arguments alone.

@@ -34,8 +34,10 @@ constexpr int kSmallestSide = 48;  // pixels of the first picture, at least
 constexpr double kSsimShare = 0.5;
 constexpr double kFirstRate = 0.01;  // of BFGS in the smallest picture: metres and radians; half in the next one
 constexpr int kIterations = 25, kLastIterations = 40;
-constexpr double kSamePlace_m = 0.03, kSameTurn_deg = 1;     // within which two ends are one
-constexpr std::array<std::size_t, 3> kGoingOn = {12, 4, 2};  // cameras that are fitted in each picture, then 1
+constexpr int kMostLastFits = 4;  // BFGS goes no further than kLongestUnitWay: where it went far it begins anew
+constexpr double kSamePlace_m = 0.03, kSameTurn_deg = 1;  // within which two ends are one
+constexpr std::array<Index, 3> kGoingOn = {12, 4, 2};     // cameras that are fitted in each picture, then 1
+constexpr Index kStartsOfAFit = 32;  // of many starts one of so many is fitted in the first picture
 
 /// A picture of one size.
 struct Level {
@@ -244,7 +246,7 @@ class Search {
     std::vector<Candidate> candidates = tried_starts();
     FoundCamera found;
     for (std::size_t i = 0; i < levels_.size(); ++i) {
-      candidates.resize(std::min(candidates.size(), going_on(i)));
+      candidates.resize(std::min(candidates.size(), static_cast<std::size_t>(going_on(i))));
       for (Candidate& candidate : candidates) candidate = fitted(candidate.camera, i);
       sort_by_loss(candidates);
       if (i == 0) count_agreeing(candidates, found);
@@ -259,11 +261,14 @@ class Search {
  private:
   static constexpr std::int64_t kStepsOfFit = 8;  // about as long as that many starts
 
-  std::size_t going_on(std::size_t level) const { return level < kGoingOn.size() ? kGoingOn[level] : 1; }
+  Index going_on(std::size_t level) const {
+    if (level == 0) return std::max(kGoingOn.front(), search_.starts / kStartsOfAFit);
+    return level < kGoingOn.size() ? kGoingOn.at(level) : 1;
+  }
 
   std::int64_t steps() const {
     std::int64_t fits = 0;
-    for (std::size_t i = 0; i < levels_.size(); ++i) fits += static_cast<std::int64_t>(going_on(i));
+    for (std::size_t i = 0; i < levels_.size(); ++i) fits += going_on(i);
     return search_.starts + kStepsOfFit * fits;
   }
 
@@ -292,10 +297,16 @@ class Search {
   Candidate fitted(const Camera& camera, std::size_t level) {
     stop_if_asked();
     const bool is_last = level + 1 == levels_.size();
-    const double rate = kFirstRate * levels_.front().side / levels_[level].side;
-    const double way = kLongestUnitWay * rate;
-    const Candidate result = CameraGraph(scene_, camera, levels_[level], search_, {way, search_.moves_focal ? way : 0})
-                                 .fit(rate, is_last ? kLastIterations : kIterations, search_);
+    const double rate = kFirstRate * levels_.front().side / levels_[level].side, way = kLongestUnitWay * rate;
+    Candidate result{camera, 0};
+    for (int fit = 0; fit < (is_last ? kMostLastFits : 1); ++fit) {
+      const Camera before = result.camera;
+      result = CameraGraph(scene_, before, levels_[level], search_, {way, search_.moves_focal ? way : 0})
+                   .fit(rate, is_last ? kLastIterations : kIterations, search_);
+      if (camera_error(before.camera_from_world, result.camera.camera_from_world).translation_cm <
+          kCentimetres * way / 4)
+        break;
+    }
     progress_.step(kStepsOfFit);
     return result;
   }
