@@ -2,7 +2,6 @@
 #include "splat/gaussians.h"
 
 #include <algorithm>
-
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
