@@ -1,6 +1,7 @@
 // Gaussians as arrays, and their files.
 #include "splat/gaussians.h"
 
+#include <algorithm>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 

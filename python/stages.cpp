@@ -5,9 +5,8 @@
 #include <pybind11/stl.h>
 #include <variant>
 
+#include "core/check.h"
 #include "core/parallel.h"
-#include "core/suggest.h"
-#include "core/text.h"
 #include "pipelines/run/pixel_filter.h"
 #include "pipelines/run/stage_session.h"
 #include "python/arrays.h"

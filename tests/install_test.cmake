@@ -61,8 +61,9 @@ if(PYTHON)
   file(GLOB_RECURSE stubs ${SCRATCH}/prefix/hsi4d.pyi)
   cmake_path(GET stubs PARENT_PATH folder)
   file(WRITE ${SCRATCH}/image.ppm "P3\n1 1\n255\n255 0 51\n")
-  run("The installed Python module" ${CMAKE_COMMAND} -E env PYTHONPATH=${folder} ${PYTHON} -B -c
-      "import hsi4d; print(hsi4d.__version__, (255 * hsi4d.read_image('${SCRATCH}/image.ppm')).round().tolist())")
+  file(WRITE ${SCRATCH}/image.py "import hsi4d\nimage = 255 * hsi4d.read_image('${SCRATCH}/image.ppm')\n"
+                                 "print(hsi4d.__version__, image.round().tolist())\n")
+  run("The installed Python module" ${CMAKE_COMMAND} -E env PYTHONPATH=${folder} ${PYTHON} -B ${SCRATCH}/image.py)
   check_equal("What the installed Python module prints" "${output}" "${VERSION} [[[255.0, 0.0, 51.0]]]\n")
 endif()
 file(REMOVE_RECURSE ${SCRATCH})

@@ -25,12 +25,12 @@ class Twins(unittest.TestCase):
     def setUpClass(cls):
         hsi4d.register_loss("l2_in_python", "Squared difference", masked_l2, ["rendered", "target", "weight"])
 
-    def check(self, stage, overrides):
+    def check(self, stage, overrides, threads=0):
         known = {"camera": ["masked_l2"], "interaction": ["photometric", "center", "depth"]}[stage]
         both = []
         for name in ["masked_l2", "l2_in_python"]:
             only = {f"stages.{stage}.losses.{other}.weight": 0 for other in known if other != name}
-            both.append(hsi4d.Stage(config_with_loss(stage, name, {**overrides, **only}), stage, 1))
+            both.append(hsi4d.Stage(config_with_loss(stage, name, {**overrides, **only}), stage, 1, threads=threads))
         for _ in range(5):
             (loss, gradients), (twin_loss, twin_gradients) = [each.evaluate() for each in both]
             self.assertLessEqual(abs(twin_loss - loss), 1.3e-7 * loss)
@@ -47,7 +47,7 @@ class Twins(unittest.TestCase):
         self.check("camera", {})
 
     def test_the_whole_image(self):
-        self.check("interaction", {})
+        self.check("interaction", {}, threads=2)
 
     def test_in_double(self):
         self.check("interaction", {"precision": "double"})
@@ -101,6 +101,18 @@ class Wrong(unittest.TestCase):
         with self.assertRaisesRegex(KeyError, "mine"):
             hsi4d.run(config_with_loss("camera", "wrong"), folder)
         self.assertEqual(hsi4d.Run(folder).status["state"], "failed")
+
+    def test_a_value_that_is_no_number(self):
+        def broken(rendered):
+            return float("nan"), {"rendered": np.zeros_like(rendered)}
+
+        hsi4d.register_loss("broken", "No number", broken, ["rendered"])
+        settings = config_with_loss("camera", "broken", {"stages.camera.optimizer.max_rollbacks": 2})
+        stage = hsi4d.Stage(settings, "camera", 1)
+        with self.assertRaisesRegex(hsi4d.StageDivergedError, "max_rollbacks is 2.*nan") as caught:
+            while not stage.is_done:
+                self.assertTrue(stage.step()["rolled_back"])
+        self.assertIsInstance(caught.exception, hsi4d.UserError)
 
     def test_registration(self):
         cases = [
