@@ -10,7 +10,7 @@ set(stands_on
     "optim/losses: optim optim/solid"
     "pipelines/config: optim/losses" "pipelines/input: pipelines/config" "pipelines/draw: pipelines/input"
     "pipelines/metrics: pipelines/input" "pipelines/record: pipelines/metrics" "pipelines/graph: pipelines/draw"
-    "pipelines/sources: pipelines/draw" "pipelines/avatar: pipelines/draw" "pipelines/footage: pipelines/draw"
+    "pipelines/follow: pipelines/input" "pipelines/sources: pipelines/draw pipelines/follow" "pipelines/avatar: pipelines/draw" "pipelines/footage: pipelines/draw"
     "pipelines/photos: core" "pipelines/synthetic: pipelines/draw pipelines/photos"
     "pipelines/report: pipelines/draw pipelines/record" "pipelines/evaluate: pipelines/record"
     "pipelines/rig: pipelines/photos optim/solid"

@@ -14,6 +14,7 @@
   HSI4D_COMMAND(align)          \
   HSI4D_COMMAND(init)           \
   HSI4D_COMMAND(locate)         \
+  HSI4D_COMMAND(follow)         \
   HSI4D_COMMAND(place)          \
   HSI4D_COMMAND(mesh)           \
   HSI4D_COMMAND(select_camera)  \

@@ -76,8 +76,9 @@ std::string sources_plan(RunConfig& config) {
   for (const SourceOutput& output : planned_sources(config)) {
     take_output(output, config.data);
     if (output.is_there) continue;
-    text += output.path.empty() ? "  would then run " + joined(output.command) + "\n"
-                                : "  would run " + joined(output.command) + "\n    for " + output.path.string() + "\n";
+    const std::string what = output.command.empty() ? "follow the objects" : "run " + joined(output.command);
+    text += output.path.empty() ? "  would then " + what + "\n"
+                                : "  would " + what + "\n    for " + output.path.string() + "\n";
   }
   return text;
 }
@@ -118,10 +119,11 @@ std::string clip_plan(const RunConfig& chain, std::size_t index, const ClipFacts
                                         : "in the state in which " + chain.chain[index - 1].name + " ends\n");
   if (chain.chain[index].select_camera) text += "    would choose its camera\n";
   const SourceSettings sources = clip_config(chain, index).sources;
-  for (const ProgramSettings* program :
-       {static_cast<const ProgramSettings*>(&sources.video), &sources.masks, &sources.motion})
+  for (const ProgramSettings* program : {static_cast<const ProgramSettings*>(&sources.video),
+                                         static_cast<const ProgramSettings*>(&sources.masks), &sources.motion})
     if (!program->command.empty())
       text += "    would run " + joined(program->command) + ", unless its output is there\n";
+  if (sources.masks.is_embedded()) text += "    would follow the objects, unless their masks are there\n";
   return text;
 }
 

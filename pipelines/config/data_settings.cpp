@@ -24,16 +24,33 @@ DataSettings dataset_inputs(const std::filesystem::path& folder) {
   std::error_code error;  // no such folder: no objects
   for (const fs::directory_entry& entry : fs::directory_iterator(base / "objects", error)) {
     if (has_splat_ending(entry.path().string()) && !is_hidden(entry.path().string()))
-      data.objects.push_back({entry.path().stem().string(), {entry.path()}});
+      data.objects.push_back({entry.path().stem().string(), {.gaussians = entry.path()}});
   }
   std::sort(data.objects.begin(), data.objects.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   return data;
+}
+
+bool has_hint(const ObjectSettings& object) {
+  return !object.first_mask.empty() || !object.first_box.empty() || !object.first_clicks.empty();
 }
 
 void describe(ConfigFields& f, ObjectSettings& s) {
   f.path("gaussians", s.gaussians, {.must_exist = true},
          "Its Gaussians (" + joined(splat_endings(), " or ") + "), relative to the centroid of their means")
       .required();
+  f.path("first_mask", s.first_mask, {.must_exist = true},
+         "Its mask in frame 0, for sources.masks.program \"embedded\"; empty: as the state of frame 0 shows it");
+  f.numbers("first_box", s.first_box, {}, "Instead: x0, y0, x1, y1 of a box around it, pixels of the video");
+  f.numbers("first_clicks", s.first_clicks, {}, "Instead: x, y of a pixel on it, or of several, pixels of the video");
+  f.rule({"first_mask", "first_box", "first_clicks"}, [&s]() -> std::string {
+    const int given = (s.first_mask.empty() ? 0 : 1) + (s.first_box.empty() ? 0 : 1) + (s.first_clicks.empty() ? 0 : 1);
+    return given > 1 ? "first_mask, first_box and first_clicks say the same; give one of them" : "";
+  });
+  f.rule({"first_box"}, [&s]() -> std::string {
+    return s.first_box.empty() || s.first_box.size() == 4 ? "" : "a box has four numbers: x0, y0, x1, y1";
+  });
+  f.rule({"first_clicks"},
+         [&s]() -> std::string { return s.first_clicks.size() % 2 == 0 ? "" : "a click has two numbers, x and y"; });
 }
 
 void describe(ConfigFields& f, LensSettings& s) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <vector>
 
 #include "core/config.h"
 #include "core/lens.h"
@@ -12,7 +13,13 @@ namespace hsi4d {
 /// One rigid object.
 struct ObjectSettings {
   std::filesystem::path gaussians;
+  /// What is known of it in frame 0 where hsi4d makes its masks; at most one. Empty: what the state of frame 0 shows.
+  std::filesystem::path first_mask = {};
+  std::vector<double> first_box = {}, first_clicks = {};  ///< x0, y0, x1, y1; x, y of each; pixels of the video
 };
+
+/// Whether something is said of where an object is in frame 0.
+bool has_hint(const ObjectSettings& object);
 
 /// How an estimated motion is laid on the human of frame 0.
 enum class MotionAlign { kHeading, kRotation, kNone };

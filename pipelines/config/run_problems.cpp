@@ -173,6 +173,10 @@ void add_command_problems(const SourceSettings& sources, std::vector<RunProblem>
     for (CommandFault& fault : command_faults(maker.command, maker.placeholders))
       found.push_back({maker.section() + fault.pointer, std::move(fault.text), {maker.section() + "/command"}});
   }
+  if (sources.masks.is_embedded() && !sources.masks.command.empty())
+    found.push_back({"/sources/masks/command",
+                     "given, and /sources/masks/program is \"embedded\", which makes the masks too; remove one",
+                     {"/sources/masks"}});
 }
 
 /// @param pointer  of the prompt
@@ -193,6 +197,10 @@ void add_source_problems(const RunConfig& config, std::vector<RunProblem>& found
       found.push_back({key, "given, and " + maker.section() + " makes it too; remove one", {key, maker.section()}});
   }
   add_prompt_problems(config.sources, "/sources/prompt", found);
+  if (config.sources.masks.is_embedded() && config.data.objects.empty() && !config.data.masks.empty())
+    found.push_back({"/sources/masks/program",
+                     "\"embedded\" makes nothing: data.masks has the human's masks, and there are no objects",
+                     {"/sources/masks/program", "/data/objects", "/data/masks"}});
 }
 
 /// What of the inputs need not be given.
@@ -251,7 +259,7 @@ std::string object_names(const DataSettings& data) {
 
 KnownInputs known_inputs(const SourceSettings& sources, const ChainClip& clip, std::size_t index) {
   return {.video = !sources.video.command.empty(),
-          .masks = !sources.masks.command.empty(),
+          .masks = makes_masks(sources),
           .camera = clip.select_camera,
           .state = index > 0};
 }
@@ -324,6 +332,17 @@ std::vector<RunNote> optimizer_notes(const RunConfig& config) {
                                    std::string(choice_name<OptimizerKind>(kOptimizerKinds, stage.optimizer.kind))});
   }
   return notes;
+}
+
+/// What is said of objects in frame 0 counts where their masks are made here.
+void add_hint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
+  if (config.sources.masks.is_embedded()) return;
+  for (const auto& [name, object] : config.data.objects) {
+    if (!has_hint(object)) continue;
+    notes.push_back({LogLevel::kWarning, "data.objects." + name +
+                                             ": first_mask, first_box and first_clicks do nothing unless "
+                                             "sources.masks.program is \"embedded\""});
+  }
 }
 
 /// Headings that nothing tells apart.
@@ -424,8 +443,8 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_source_problems(config, found);
   if (use == ConfigUse::kRun) {
     const SourceSettings& sources = config.sources;
-    add_input_problems(config.data, "/data",
-                       {.video = !sources.video.command.empty(), .masks = !sources.masks.command.empty()}, found);
+    add_input_problems(config.data, "/data", {.video = !sources.video.command.empty(), .masks = makes_masks(sources)},
+                       found);
   }
   return found;
 }
@@ -444,6 +463,7 @@ void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use,
 std::vector<RunNote> run_notes(const RunConfig& config) {
   std::vector<RunNote> notes = optimizer_notes(config);
   add_keypoint_notes(config, notes);
+  add_hint_notes(config, notes);
   const auto inform = [&notes](const char* text) { notes.push_back({LogLevel::kInfo, text}); };
   const RenderSkips& render = config.skip.render;
   if (!render.static_tiles && render.static_layer) inform("skip.static_tiles=false switches skip.static_layer off too");

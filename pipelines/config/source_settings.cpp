@@ -68,8 +68,12 @@ void describe_program(ConfigFields& f, ProgramSettings& s, const std::vector<std
 
 }  // namespace
 
+bool makes_masks(const SourceSettings& sources) {
+  return sources.masks.is_embedded() || !sources.masks.command.empty();
+}
+
 bool has_sources(const SourceSettings& sources) {
-  return !sources.video.command.empty() || !sources.masks.command.empty() || !sources.motion.command.empty();
+  return !sources.video.command.empty() || makes_masks(sources) || !sources.motion.command.empty();
 }
 
 void describe(ConfigFields& f, VideoSourceSettings& s) {
@@ -79,16 +83,21 @@ void describe(ConfigFields& f, VideoSourceSettings& s) {
   f.integer("frames", s.frames, {.min = 0, .max = 1000000}, "Frames that the video must have; 0: any number");
 }
 
+void describe(ConfigFields& f, MaskSourceSettings& s) {
+  describe_program(f, s, mask_placeholders());
+  f.choice("program", s.program, kMaskPrograms,
+           "Who makes them: `command`, or hsi4d itself, from frame 0 on (embedded); data.masks, if given, then has the "
+           "human's");
+}
+
 void describe(ConfigFields& f, SourceSettings& s) {
-  const auto with = [](const std::vector<std::string>& known) {
-    return [known](ConfigFields& fields, ProgramSettings& program) { describe_program(fields, program, known); };
-  };
   f.path("folder", s.folder, {}, "Where videos, masks and motions are kept; empty: generated/ beside the config");
   f.string("prompt", s.prompt, "What happens in the video: {prompt}");
   f.object("video", s.video, "The program that makes the video of an image and a text");
-  f.object("masks", s.masks, "The program that makes the masks of the video", with(mask_placeholders()));
-  f.object("motion", s.motion, "The program that estimates the human's poses in the video",
-           with(motion_placeholders()));
+  f.object("masks", s.masks, "The program that makes the masks of the video");
+  f.object(
+      "motion", s.motion, "The program that estimates the human's poses in the video",
+      [](ConfigFields& fields, ProgramSettings& program) { describe_program(fields, program, motion_placeholders()); });
 }
 
 const std::vector<std::string>& video_placeholders() {

@@ -50,20 +50,38 @@ struct VideoSourceSettings : ProgramSettings {
   Index frames = 0;  ///< that the video must have; 0: any number
 };
 
+/// Who makes the masks.
+enum class MaskProgram { kCommand, kEmbedded };
+
+inline constexpr std::array<ConfigChoice<MaskProgram>, 2> kMaskPrograms = {
+    {{MaskProgram::kCommand, "command"}, {MaskProgram::kEmbedded, "embedded"}}};
+
+/// The program that makes the masks of the video: a command, or this one (pipelines/follow), which makes those of the
+/// objects.
+struct MaskSourceSettings : ProgramSettings {
+  MaskProgram program = MaskProgram::kCommand;  ///< embedded: data.masks, if given, has the human's
+
+  bool is_embedded() const { return program == MaskProgram::kEmbedded; }
+};
+
 /// Config section `sources`.
 struct SourceSettings {
   std::filesystem::path folder;  ///< of what was made; empty: "generated" beside the config
   std::string prompt;            ///< what happens in the video
   VideoSourceSettings video;
-  ProgramSettings masks;   ///< of the video
-  ProgramSettings motion;  ///< poses of the human in the video
+  MaskSourceSettings masks;  ///< of the video
+  ProgramSettings motion;    ///< poses of the human in the video
 };
+
+/// Whether a command, or this program, makes the masks.
+bool makes_masks(const SourceSettings& sources);
 
 /// Whether some program makes a part of the data.
 bool has_sources(const SourceSettings& sources);
 
 /// Describe the sections: every setting with its range.
 void describe(ConfigFields& fields, VideoSourceSettings& settings);
+void describe(ConfigFields& fields, MaskSourceSettings& settings);
 void describe(ConfigFields& fields, SourceSettings& settings);
 
 /// Settings of a program that its output does not depend on.

@@ -7,6 +7,8 @@
 #include "core/file.h"
 #include "core/process.h"
 #include "optim/checkpoint.h"
+#include "pipelines/config/masks.h"
+#include "pipelines/follow/follow.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/input/input_hashes.h"
 #include "splat/render_settings.h"
@@ -71,6 +73,33 @@ std::string video_hashes(const FrameSource& frames, const fs::path& path) {
   std::vector<ClipFile> files;
   for (const std::string& name : frames.names()) files.push_back({name, path / name});
   return input_hashes(files);
+}
+
+/// The content of a folder or video of masks.
+std::string mask_hashes(const MaskSource& masks, const FrameSource& frames) {
+  if (masks.is_video()) return input_hashes({{kHumanMasks, masks.path()}});
+  std::vector<ClipFile> files;
+  for (Index t = 0; t < frames.count(); ++t) {
+    const fs::path file = masks.file(frames, t);
+    if (fs::exists(file)) files.push_back({file.filename().string(), file});
+  }
+  return input_hashes(files);
+}
+
+ConfigValue numbers(const std::vector<double>& values) {
+  ConfigValue array = ConfigValue::make_array();
+  for (const double value : values) array.items.push_back(ConfigValue::make_number(value));
+  return array;
+}
+
+/// What is said of an object in frame 0.
+ConfigValue hint_record(const ObjectSettings& object) {
+  ConfigValue record = ConfigValue::make_object();
+  if (!object.first_mask.empty())
+    record.add("mask", ConfigValue::make_string(input_hashes({{"first_mask", object.first_mask}})));
+  if (!object.first_box.empty()) record.add("box", numbers(object.first_box));
+  if (!object.first_clicks.empty()) record.add("clicks", numbers(object.first_clicks));
+  return record;
 }
 
 /// A video that was made before has as many frames as are asked for now.
@@ -165,6 +194,25 @@ SourceOutput mask_output(const RunConfig& config, const DataSettings& data) {
   const SourceOutput output = output_of(config, "masks", command, record, "");
   if (output.is_there) check_cached_masks(data, output.path);
   return output;
+}
+
+SourceOutput embedded_mask_output(const RunConfig& config, const DataSettings& data) {
+  const FrameSource frames = frames_of(data);
+  ConfigValue record = ConfigValue::make_object(), first = ConfigValue::make_object();
+  record.add("method", ConfigValue::make_integer(kFollowMethod));
+  record.add("video", ConfigValue::make_string(video_hashes(frames, data.frames)));
+  record.add("video_rate", ConfigValue::make_number(data.video_rate));
+  record.add("frame_rate", ConfigValue::make_number(data.frame_rate));
+  if (!data.masks.empty())
+    record.add("human", ConfigValue::make_string(mask_hashes(MaskSource(data.masks, kHumanMasks), frames)));
+  bool is_rendered = data.masks.empty();
+  for (const auto& [name, object] : data.objects) {
+    first.add(name, hint_record(object));
+    is_rendered |= !has_hint(object);
+  }
+  record.add("first", std::move(first));
+  if (is_rendered) record.add("first_frame", first_frame_record(config));
+  return output_of(config, "masks", {}, record, "");
 }
 
 fs::path record_file(const SourceOutput& output) { return output.path.string() + ".json"; }

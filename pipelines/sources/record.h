@@ -11,6 +11,13 @@
 //   video        of masks and motion: its content
 //   masks_of, camera, video_rate
 //
+// Of masks that this program makes itself (pipelines/follow) it has, beside the video and masks_of:
+//
+//   method       kFollowMethod: other ones make other masks
+//   human        content of the human's masks, where they are given
+//   first        what is known of objects in frame 0; first_frame where some first mask is rendered
+//   frame_rate, video_rate
+//
 // KEY in a name is the record's hash.
 #pragma once
 
@@ -26,7 +33,7 @@ namespace hsi4d {
 /// One thing that a program makes.
 struct SourceOutput {
   std::string what;                  ///< "video", "masks" or "motion"
-  std::vector<std::string> command;  ///< as in the config
+  std::vector<std::string> command;  ///< as in the config; empty: this program makes it
   std::filesystem::path path;        ///< where it is, or will be; empty: not known before the video is there
   std::string record;                ///< what it is made of, JSON
   bool is_there = false;             ///< made before, of the same
@@ -47,6 +54,7 @@ std::string command_hashes(const std::vector<std::string>& command);
 /// that is there and does not hold what is asked for now.
 SourceOutput video_output(const RunConfig& config);
 SourceOutput mask_output(const RunConfig& config, const DataSettings& data);
+SourceOutput embedded_mask_output(const RunConfig& config, const DataSettings& data);
 SourceOutput motion_output(const RunConfig& config, const DataSettings& data);
 
 /// Where an output's record is kept.

@@ -14,8 +14,11 @@
 #include "core/process.h"
 #include "core/progress.h"
 #include "core/text.h"
+#include "pipelines/config/masks.h"
 #include "pipelines/draw/camera_selection.h"
 #include "pipelines/draw/image_of_scene.h"
+#include "pipelines/follow/follow.h"
+#include "pipelines/follow/pictures.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/input/frame_cameras.h"
 #include "pipelines/input/pose_estimate.h"
@@ -296,6 +299,61 @@ void make_masks(const RunConfig& config, const DataSettings& data, const SourceO
        [&data](const fs::path& made) { check_masks(data, made); });
 }
 
+ObjectHint hint_of(const ObjectSettings& object) {
+  ObjectHint hint{object.first_mask, object.first_box, {}};
+  for (std::size_t i = 0; i + 1 < object.first_clicks.size(); i += 2)
+    hint.clicks.push_back({object.first_clicks[i], object.first_clicks[i + 1]});
+  return hint;
+}
+
+/// Each object's mask in frame 0: as the config says it, or as the state of frame 0 shows it; likewise the human's,
+/// where it is not known.
+std::vector<ObjectToFollow> objects_to_follow(const RunConfig& config, const FrameSource& frames, const Image& human) {
+  const Image frame = read_rgb(frames, 0);
+  const auto& objects = config.data.objects;
+  const bool all_hinted =
+      std::all_of(objects.begin(), objects.end(), [](const auto& one) { return has_hint(one.second); });
+  const std::vector<Image> rendered = all_hinted && !human.empty() ? std::vector<Image>{} : first_masks(config);
+  const auto shown = [&](std::size_t part, const std::string& what) {
+    Image mask = enlarged_mask(rendered[part], frame.height(), frame.width());
+    if (!shows_something(mask)) throw UserError(what + " is seen in frame 0 in the state that data.initial says");
+    return mask;
+  };
+  std::vector<ObjectToFollow> found;
+  if (human.empty()) found.push_back({kHumanMasks, shown(0, "/sources/masks: nothing of the human")});
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const auto& [name, object] = objects[i];
+    const std::string where = child_pointer("/data/objects", name);
+    if (has_hint(object)) {
+      found.push_back({name, first_mask(hint_of(object), frame, human, kFollowSide, where)});
+      continue;
+    }
+    found.push_back({name, shown(i + 1, where + ": without first_mask, first_box and first_clicks it is followed from "
+                                                "where it is, and nothing of it")});
+  }
+  return found;
+}
+
+void make_embedded_masks(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
+                         const Observer& observer) {
+  const WorkFolder work(work_folder_of(output.path));
+  const fs::path out = work.member("masks");
+  const FrameSource frames = frames_of(data);
+  std::optional<MaskSource> human;
+  if (!data.masks.empty()) human.emplace(data.masks, kHumanMasks);
+  const std::vector<ObjectToFollow> objects = objects_to_follow(config, frames, human_mask(human, frames, 0));
+  const auto path_of = [&out](const fs::path& file) {
+    fs::create_directories((out / file).parent_path());
+    return (out / file).string();
+  };
+  for (const FollowedTrack& track : follow_objects(frames, human, objects, kFollowSide, path_of, observer))
+    log_message(is_whole(track) ? LogLevel::kInfo : LogLevel::kWarning, "masks: " + track_text(track, frames));
+  check_masks(data, out);
+  write_text_file(record_file(output).string(), output.record);
+  put(out, output.path);
+  log_info("masks: " + output.path.string() + "; " + (output.path / kSheetFile).string() + " shows them");
+}
+
 void make_motion(const RunConfig& config, const DataSettings& data, const SourceOutput& output,
                  const Observer& observer) {
   const WorkFolder work(work_folder_of(output.path));
@@ -362,7 +420,11 @@ std::vector<SourceOutput> planned_sources(const RunConfig& config) {
     if (!command.empty())
       outputs.push_back(has_video ? output(config, data) : SourceOutput{what, command, {}, "", false});
   };
-  plan("masks", config.sources.masks.command, mask_output);
+  if (config.sources.masks.is_embedded()) {
+    outputs.push_back(has_video ? embedded_mask_output(config, data) : SourceOutput{"masks", {}, {}, "", false});
+  } else {
+    plan("masks", config.sources.masks.command, mask_output);
+  }
   plan("motion", config.sources.motion.command, motion_output);
   return outputs;
 }
@@ -377,7 +439,10 @@ DataSettings make_sources(const RunConfig& config, const Observer& observer) {
     data.frames = made([&] { return video_output(config); }, observer,
                        [&](const SourceOutput& video) { make_video(config, video, observer); });
   }
-  if (!config.sources.masks.command.empty()) {
+  if (config.sources.masks.is_embedded()) {
+    data.masks = made([&] { return embedded_mask_output(config, data); }, observer,
+                      [&](const SourceOutput& masks) { make_embedded_masks(config, data, masks, observer); });
+  } else if (!config.sources.masks.command.empty()) {
     data.masks = made([&] { return mask_output(config, data); }, observer,
                       [&](const SourceOutput& masks) { make_masks(config, data, masks, observer); });
   }

@@ -259,6 +259,65 @@ TEST_CASE("a run makes its video and masks by programs, once for what they are m
   CHECK(temporaries_in("generated").empty());
 }
 
+TEST_CASE("hsi4d makes the masks of objects itself where it is told to, once", "[run]") {
+  Workshop workshop;
+  workshop.config.erase("data");
+  workshop.config["sources"] = {{"masks", {{"program", "embedded"}}}};
+  workshop.write();
+  CHECK_THAT(Workshop::run("dry", {"--dry-run"}).out, Contains("  would follow the objects\n    for "));
+  const ProgramResult first = Workshop::run("run");
+  INFO(first.err);
+  REQUIRE(first.status == 0);
+  CHECK(made() == Names{"masks-KEY", "masks-KEY.json"});
+  CHECK_THAT(file_text("run/log.txt"), Contains("masks: " + kTinyObject + ": seen in "));
+  const fs::path masks = made_file("masks", ".json").replace_extension(), given = TinyDataset::folder() / "masks";
+  CHECK(read_image((masks / "human" / "0002.png").string()) == read_image((given / "human" / "0002.png").string()));
+  const Image truth = read_image((given / kTinyObject / "0000.png").string());
+  CHECK(mask_iou(read_image((masks / kTinyObject / "0000.png").string()), truth).value() > 0.6);
+  CHECK(fs::exists(masks / kTinyObject / "0003.png"));
+
+  // What is there is used, by a run that goes on too.
+  const auto made_at = fs::last_write_time(masks);
+  CHECK(Workshop::run("run", {"--resume"}).status == 0);
+  CHECK(Workshop::run("other").status == 0);
+  CHECK(file_text("other/objects.npz") == file_text("run/objects.npz"));
+  CHECK(fs::last_write_time(masks) == made_at);
+
+  // Another box makes other masks.
+  auto& object = workshop.config["data"]["objects"][kTinyObject];
+  object["first_box"] = {10, 10, 40, 40};
+  workshop.write();
+  CHECK_THAT(Workshop::run("dry", {"--dry-run"}).out, Contains("  would follow the objects\n"));
+  object["first_clicks"] = {10, 10};
+  workshop.write();
+  fs::remove_all("run");
+  CHECK_THAT(Workshop::refusal(), Contains("first_mask, first_box and first_clicks say the same; give one of them"));
+  object.erase("first_box");
+  object["first_clicks"] = {100, 10};
+  workshop.write();
+  CHECK_THAT(Workshop::refusal(), Contains("/data/objects/" + kTinyObject + ": 100,10 is outside of the first frame"));
+  object.erase("first_clicks");
+  workshop.config["sources"]["masks"]["command"] = {"./mask", "{out}"};
+  workshop.write();
+  CHECK_THAT(Workshop::refusal(),
+             Contains("/sources/masks/command: given, and /sources/masks/program is \"embedded\""));
+
+  // Without the human's masks these are made too.
+  workshop.config["sources"]["masks"].erase("command");
+  workshop.config["data"]["masks"] = "";
+  workshop.write();
+  const ProgramResult alone = Workshop::run("alone");
+  INFO(alone.err);
+  REQUIRE(alone.status == 0);
+  CHECK_THAT(file_text("alone/log.txt"), Contains("masks: human: seen in "));
+  for (const auto& entry : fs::directory_iterator("generated")) {
+    if (!entry.is_directory()) continue;
+    const Image mask = read_image((entry.path() / "human" / "0003.png").string()),
+                human = read_image((given / "human" / "0003.png").string());
+    CHECK(mask_iou(mask, human).value() > 0.5);
+  }
+}
+
 TEST_CASE("a command with {seed} makes a video a seed", "[run]") {
   Workshop workshop;
   workshop.config["sources"]["video"]["command"] = {"./film", "{first_frame}", "seed {seed}", "{out}"};
