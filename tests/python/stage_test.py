@@ -232,8 +232,8 @@ class Threads(unittest.TestCase):
                 messages.append(str(error))
             return 0.0, {"rendered": np.zeros_like(rendered)}
 
-        hsi4d.register_loss("look", "Looks at the stage", look, ["rendered"])
-        self.stage = hsi4d.Stage(config_with_loss("camera", "look"), "camera", 1)
+        hsi4d.register_loss("watch", "Looks at the stage", look, ["rendered"])
+        self.stage = hsi4d.Stage(config_with_loss("camera", "watch"), "camera", 1)
         self.stage.step()
         self.assertEqual(messages, ["the stage is at work in another call; allowed: one call at a time, a stage for each "
                                     "thread"])
