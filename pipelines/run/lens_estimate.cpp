@@ -22,7 +22,9 @@ LensEstimate estimated_lens(const RunConfig& config, const Clip& clip) {
   colors.net = first_net(config, clip);
   const Image drawn = render_state(config, clip, clip.first, colors);
   const auto psnr_with = [&](double k1) {
-    Clip bent = clip;
+    Clip bent;  // of the video alone: Gaussians are not copied
+    bent.camera = clip.camera;
+    bent.video = clip.video;
     Lens lens = config.data.lens.lens;
     lens.k1 = k1;
     set_lens(lens, bent);
