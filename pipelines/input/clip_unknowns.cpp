@@ -84,7 +84,6 @@ void apply_unknowns(const ClipUnknowns& unknowns, Clip& clip) {
       clip.objects[o].gaussians = transformed(clip.objects[o].gaussians, {.scale = unknowns.object_scales[o]});
   }
   if (unknowns.betas.empty()) return;
-  HSI4D_CHECK(clip.directions.has_value(), "an avatar without a shape cannot follow betas");
   add_betas(*clip.directions, unknowns.betas, clip.avatar);
   if (!clip.betas.empty()) clip.betas = sums(clip.betas, unknowns.betas);
   const Vector3<double> rise = rise_of_pelvis(unknowns, clip);
