@@ -24,6 +24,8 @@ enum class LossInput {
   kHumanOpacity,   ///< human_opacity, human_mask, human_seen; likewise
   kKeypoints,      ///< keypoints, keypoints_target: where data.keypoints is given; likewise
   kBones,          ///< bones, bones_target: where data.keypoints has landmarks; likewise
+  kDepthMap,       ///< depth, transmittance, depth_map, depth_map_weight: where data.depth_maps is given; likewise
+  kTracks,         ///< tracks, tracks_target: where data.tracks has some on what moves; likewise
   kUnknowns,       ///< unknowns: in a stage over the first frame that moves some
   kPose,           ///< body_rotations
   kMotion,         ///< joints, joints_start, motion, body_points

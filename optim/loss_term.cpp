@@ -17,6 +17,10 @@ bool LossInputs<S>::gives(LossInput need) const {
       return given(keypoints) && given(keypoints_target);
     case LossInput::kBones:
       return given(bones) && given(bones_target);
+    case LossInput::kTracks:
+      return given(tracks) && given(tracks_target);
+    case LossInput::kDepthMap:
+      return given(depth) && given(transmittance) && given(depth_map) && given(depth_map_weight);
     case LossInput::kUnknowns:
       return given(unknowns);
     case LossInput::kPose:

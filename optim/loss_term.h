@@ -17,9 +17,9 @@ namespace hsi4d {
 struct LeftOut {
   std::string term;
   std::string reason;                             ///< empty: its mask is, of which a run warns before it begins
-  Index objects = 0;                              ///< 1 of the human
+  Index objects = 0;                              ///< 1 of the human, or of everything
   std::function<bool(Index object)> is_left_out;  ///< in the tape's last forward run
-  bool of_human = false;
+  bool of_human = false;                          ///< with a reason: of everything
 };
 
 /// What a term tells of what it found when it was recorded.
@@ -61,6 +61,15 @@ struct LossInputs {
                  ///< kBones, as the next one
   Var<S> bones_target;  ///< [B,4] the directions that a detector found, of length 1, and its confidence, 0 to 1
 
+  Var<S> tracks;  ///< [P,2] where points of the human and the objects are in the image, x px, y px, as keypoints; only
+                  ///< for terms that need kTracks, as the next one
+  Var<S> tracks_target;  ///< [P,3] where a tracker has followed them to, x px, y px, and whether it sees them, 0 to 1
+
+  Var<S> depth;  ///< [1,H,W] mean camera z of the Gaussians in a pixel, metres, 0 where there is none; only for terms
+                 ///< that need kDepthMap, as the next two and transmittance
+  Var<S> depth_map;  ///< [1,H,W] depths or disparities that an estimator found, of mean 0 and standard deviation 1
+                     ///< where they are known
+  Var<S> depth_map_weight;  ///< [1,H,W] how sure it was, 0 to 1; 0 where they are not known
   Var<S> unknowns;  ///< [1,K] what the stage looks for of the clip: logarithms of factors, metres, betas; 0: as given
 
   /// The body over the F frames that the stage sees: those before, which stand still, and those that it moves. A stage
@@ -77,7 +86,7 @@ struct LossInputs {
 
   Var<S> depth_moments;  ///< [2,H,W] Σ w z and Σ w z² of the Gaussians in a pixel, camera z, metres; for terms that
                          ///< need kDepths, as the next two
-  Var<S> transmittance;  ///< [1,H,W] 1 − Σ w
+  Var<S> transmittance;  ///< [1,H,W] 1 − Σ w; of kDepthMap too
   Var<S> depth_target;   ///< [1,H,W] camera z of what the picture shows, metres; 0 where it is not known
 
   Var<S> gaussian_opacities;   ///< [N,1] of all Gaussians that are made, 0 to 1
@@ -103,8 +112,11 @@ LossInputs<S> only_declared(LossInputs<S> inputs, const std::vector<LossInput>& 
   if (lacks(LossInput::kHumanOpacity)) inputs.human_opacity = {};
   if (lacks(LossInput::kKeypoints)) inputs.keypoints = inputs.keypoints_target = {};
   if (lacks(LossInput::kBones)) inputs.bones = inputs.bones_target = {};
+  if (lacks(LossInput::kTracks)) inputs.tracks = inputs.tracks_target = {};
+  if (lacks(LossInput::kDepths)) inputs.depth_moments = inputs.depth_target = {};
+  if (lacks(LossInput::kDepthMap)) inputs.depth = inputs.depth_map = inputs.depth_map_weight = {};
+  if (lacks(LossInput::kDepths) && lacks(LossInput::kDepthMap)) inputs.transmittance = {};
   if (lacks(LossInput::kUnknowns)) inputs.unknowns = {};
-  if (lacks(LossInput::kDepths)) inputs.depth_moments = inputs.transmittance = inputs.depth_target = {};
   if (lacks(LossInput::kGaussians)) inputs.gaussian_opacities = inputs.gaussian_log_scales = {};
   if (lacks(LossInput::kLook)) inputs.color_change = inputs.shape_change = {};
   return inputs;

@@ -27,7 +27,7 @@ Vector3<double> MotionStart::place(const BodyPoint& point) const {
   const RestPoints points = rest_points(point.of);
   const SparseWeights& weights = *points.weights;
   const PosedJoints& posed = body_in(point.frame);
-  const Vector3<double> rest = mean_at(*points.places, point.row);
+  const Vector3<double> rest = mean_at(*points.places, point.row) + point.offset;
   Vector3<double> place = Vector3<double>::Zero();
   for (Index k = 0; k < weights.per_vertex; ++k) {
     const auto at = static_cast<std::size_t>(point.row * weights.per_vertex + k);
@@ -42,8 +42,8 @@ Vector3<double> MotionStart::place(const BodyPoint& point) const {
 
 Vector3<double> MotionStart::place(const ObjectPoint& point) const {
   const auto object = static_cast<std::size_t>(point.object);
-  return transform_point(world_from_object[static_cast<std::size_t>(point.frame)][object],
-                         mean_at(objects[object]->means, point.row));
+  const Vector3<double> at = mean_at(objects[object]->means, point.row) + point.offset;
+  return transform_point(world_from_object[static_cast<std::size_t>(point.frame)][object], at);
 }
 
 bool is_hand_joint(Index joint) {

@@ -20,6 +20,7 @@ enum class BodySet { kGaussians, kVertices };
 struct BodyPoint {
   Index frame = 0, row = 0;
   BodySet of = BodySet::kGaussians;
+  Vector3<double> offset = Vector3<double>::Zero();  ///< from the point, at rest, metres
 };
 
 /// Points at rest, and the joints that they follow.
@@ -31,6 +32,7 @@ struct RestPoints {
 /// A Gaussian of an object in a frame.
 struct ObjectPoint {
   Index frame = 0, object = 0, row = 0;
+  Vector3<double> offset = Vector3<double>::Zero();  ///< from its centre, in the object's frame, metres
 };
 
 /// F frames: the first `still_frames` are behind the stage and stay as they are, the others move.

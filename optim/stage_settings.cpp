@@ -35,6 +35,9 @@ const char* words_of(LossInput need) {
     case LossInput::kKeypoints:
     case LossInput::kBones:
       return "the body in an image";
+    case LossInput::kTracks:
+    case LossInput::kDepthMap:
+      return "everything in an image";
     case LossInput::kDepths:
       return "depths of pictures";
     case LossInput::kGaussians:

@@ -96,6 +96,16 @@ struct LeafMaker {
   }
 };
 
+/// Depths of pixels, metres, and a map that is not far from them.
+std::vector<double> some_depths(double scale, double shift, double noise) {
+  std::vector<double> depths;
+  for (Index i = 0; i < kLossHeight * kLossWidth; ++i) {
+    const auto at = static_cast<double>(i);
+    depths.push_back(scale * (2 + std::sin(0.7 * at)) + shift + noise * std::sin(0.9 * at * at));
+  }
+  return depths;
+}
+
 std::vector<double> some_pose() {
   std::vector<double> rows;
   for (int j = 0; j < 21; ++j) {
@@ -137,6 +147,11 @@ LossLeaves<S> loss_leaves(Tape<S>& tape) {
   in.keypoints_target = leaf("keypoints_target", shape_of(3, 3), {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8});
   in.bones = leaf("bones", shape_of(3, 3), {0.1, -0.3, 0.05, 0, 0.4, 0.2, -0.3, 0, 0.1});
   in.bones_target = leaf("bones_target", shape_of(3, 4), {0, -1, 0, 1, 0, 0.6, 0.8, 0.7, 1, 0, 0, 0.9});
+  in.tracks = leaf("tracks", shape_of(3, 2), 0, 20);
+  in.tracks_target = leaf("tracks_target", shape_of(3, 3), {3, 5, 1, 14, 9, 0.6, 12, 3, 0.8});
+  in.depth = leaf("depth", image(1), some_depths(1, 0, 0));
+  in.depth_map = leaf("depth_map", image(1), some_depths(1.3, -2.7, 0.5));
+  in.depth_map_weight = leaf("depth_map_weight", image(1), 0.2, 1);
   in.unknowns = leaf("unknowns", shape_of(1, 3), -0.2, 0.2);
   in.body_rotations = leaf("body_rotations", shape_of(21, 9), some_pose());
   in.joints = leaf("joints", shape_of(kLossFrames, 66), -1, 1);

@@ -13,6 +13,8 @@
   HSI4D_LOSS(mask)             \
   HSI4D_LOSS(keypoints_2d)     \
   HSI4D_LOSS(bone_directions)  \
+  HSI4D_LOSS(depth_map)        \
+  HSI4D_LOSS(tracks)           \
   HSI4D_LOSS(fit)              \
   HSI4D_LOSS(contact)          \
   HSI4D_LOSS(smooth)           \

@@ -1,13 +1,42 @@
 // Robust functions of squared distances that terms share.
 #pragma once
 
+#include <cmath>
+#include <type_traits>
+
+#include "autodiff/dual.h"
+
 namespace hsi4d {
+
+/// What a distance counts for that is far from 0.
+enum class RobustKernel {
+  kNone,         ///< as much as the term has it without a kernel
+  kHuber,        ///< constant pull
+  kGemanMcClure  ///< it no longer pulls
+};
+
+/// r² up to the scale s, then 2 s |r| − s². [Huber 1964]
+/// @param squared  r²
+template <class T>
+T huber(T squared, float scale) {
+  const float limit = scale * scale;
+  const T far = max(squared, limit);  // at least the limit: the root has a slope
+  return select(value_of(squared) <= static_cast<std::decay_t<decltype(value_of(squared))>>(limit), squared,
+                2.0F * scale * sqrt(far) - limit);
+}
 
 /// s² r² / (s² + r²): nearly r² where that is small, never more than s². [Geman and McClure 1987]
 /// @param limit  s²
 template <class T>
 T geman_mcclure(T squared, float limit) {
   return limit * squared / (limit + squared);
+}
+
+/// The kernel of r², by the scale s; r² of none.
+template <class T>
+T robust(T squared, RobustKernel kernel, float scale) {
+  if (kernel == RobustKernel::kHuber) return huber(squared, scale);
+  return kernel == RobustKernel::kGemanMcClure ? geman_mcclure(squared, scale * scale) : squared;
 }
 
 }  // namespace hsi4d

@@ -88,6 +88,14 @@ void describe(ConfigFields& f, DataSettings& s) {
          "OpenPose's folder");
   f.path("keypoint_joints", s.keypoint_joints, {.must_exist = true},
          "List of the joints that the detector's points stand for (.json); empty: of a known set of points");
+  f.path("tracks", s.tracks, {.must_exist = true},
+         "Points that a tracker followed through the video, for the loss tracks (.npz)");
+  f.path(
+      "depth_maps", s.depth_maps, {.must_exist = true},
+      "Folder of depths or disparities of any scale and shift, for the loss depth_map: a .png, .exr, .npy or .npz file "
+      "with the name of each frame");
+  f.path("depth_confidence", s.depth_confidence, {.must_exist = true},
+         "Folder of how sure the depth maps are, likewise: a pixel with twice the number counts twice; empty: alike");
   f.path("truth", s.truth, {},
          "Folder with motion.npz, objects.npz, cameras.json to compare the result with; may be missing");
   f.path("surface", s.surface, {},

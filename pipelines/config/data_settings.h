@@ -45,8 +45,11 @@ struct DataSettings {
   std::filesystem::path initial;
   std::filesystem::path motion;  ///< poses estimated from the video; empty: those of `initial`, if it has some
   MotionAlign motion_align = MotionAlign::kHeading;
-  std::filesystem::path keypoints;        ///< points of the human that a detector found; empty: none
-  std::filesystem::path keypoint_joints;  ///< which joints these stand for; empty: as the file says
+  std::filesystem::path keypoints;         ///< points of the human that a detector found; empty: none
+  std::filesystem::path keypoint_joints;   ///< which joints these stand for; empty: as the file says
+  std::filesystem::path tracks;            ///< points that a tracker followed through the video; empty: none
+  std::filesystem::path depth_maps;        ///< depths that an estimator found, a file for each frame; empty: none
+  std::filesystem::path depth_confidence;  ///< how sure it was, likewise; empty: alike everywhere
   std::filesystem::path truth;
   std::filesystem::path surface;  ///< a mesh of what is solid, to measure penetration by; empty: not measured
   double video_rate = 0;          ///< frames a second of the video; 0: what its file says

@@ -396,6 +396,17 @@ void add_unknown_problems(const RunConfig& config, std::vector<RunProblem>& foun
   }
 }
 
+/// What is given in pictures that the lens has bent.
+void add_lens_problems(const DataSettings& data, std::vector<RunProblem>& found) {
+  if (data.lens.lens.is_straight() && !data.lens.estimate_k1) return;
+  for (const auto& [key, path] : {std::pair{"/data/depth_maps", data.depth_maps}, {"/data/tracks", data.tracks}}) {
+    if (!path.empty())
+      found.push_back({key,
+                       "is not straightened with a lens that bends (/data/lens); give frames and these straightened",
+                       {key, "/data/lens"}});
+  }
+}
+
 /// What compares with frame 0 as it is given.
 void add_given_frame_problems(const RunConfig& config, std::vector<RunProblem>& found) {
   for (const auto& [name, stage] : config.stages) {
@@ -430,6 +441,7 @@ std::vector<RunProblem> run_problems(const RunConfig& config, ConfigUse use) {
   add_order_problems(config.stages, found);
   add_start_problems(config, found);
   add_unknown_problems(config, found);
+  add_lens_problems(config.data, found);
   add_given_frame_problems(config, found);
   add_keypoint_problems(config, found);
   if (!config.chain.empty()) {

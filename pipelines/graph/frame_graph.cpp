@@ -311,10 +311,17 @@ void FrameGraph<S>::record_render(const std::vector<Part>& parts, std::size_t fi
       request.groups.emplace_back(row, row + parts[p].count);
     row += parts[p].count;
   }
+  request.depth = settings_.depth_map;
   rendered_ = render_parts(parts, request);
   inputs_.rendered = rendered_.image;
   inputs_.target = tape_.constant("target", rendered_.image.shape());
   inputs_.weight = tape_.constant("weight", rendered_.transmittance.shape());
+  if (settings_.depth_map) {
+    inputs_.depth = rendered_.depth;
+    inputs_.transmittance = rendered_.transmittance;
+    inputs_.depth_map = tape_.constant("depth_map", rendered_.depth.shape());
+    inputs_.depth_map_weight = tape_.constant("depth_map_weight", rendered_.depth.shape());
+  }
   if (settings_.draw == Draw::kScene) return;
   if (!objects_.empty()) {
     record_object_depths(parts, first_object);
@@ -361,6 +368,30 @@ void FrameGraph<S>::give_motion(const SceneState& first, const std::vector<Scene
   for (const Object& object : objects_) transforms.push_back(rigid_rows(object.rotation, object.transl));
   const Var<S> objects = transforms.empty() ? Var<S>{} : concat_rows<S>(transforms);
   hsi4d::give_motion(MovingFrames<S>{rotations_, skeleton_, objects, rest_offsets_}, clip_, first, frames, inputs_);
+}
+
+/// The human's points first, then those of the objects.
+template <class S>
+void FrameGraph<S>::give_tracks(const std::vector<TrackPoint>& points, const std::vector<TrackPlace>& places) {
+  const Index frame = inputs_.motion->still_frames;  // the one that moves
+  std::vector<BodyPoint> of_body;
+  std::vector<ObjectPoint> of_objects;
+  std::vector<double> body_targets, object_targets;
+  for (const TrackPoint& point : points) {
+    const bool is_of_body = point.object == std::ssize(objects_);
+    if (is_of_body) of_body.push_back({frame, point.row, BodySet::kGaussians, point.offset});
+    if (!is_of_body) of_objects.push_back({frame, point.object, point.row, point.offset});
+    const TrackPlace& place = places[static_cast<std::size_t>(point.track)];
+    std::vector<double>& targets = is_of_body ? body_targets : object_targets;
+    targets.insert(targets.end(), {place.x * view_.camera.width, place.y * view_.camera.height, place.visible});
+  }
+  std::vector<Var<S>> parts;
+  if (!of_body.empty()) parts.push_back(inputs_.body_points(of_body));
+  if (!of_objects.empty()) parts.push_back(inputs_.object_points(of_objects));
+  inputs_.tracks = places_in_image(parts.size() == 1 ? parts.front() : concat_rows<S>(parts));
+  inputs_.tracks_target = tape_.constant("tracks_target", shape_of(std::ssize(points), 3));
+  body_targets.insert(body_targets.end(), object_targets.begin(), object_targets.end());
+  write_numbers(tape_, inputs_.tracks_target, body_targets.data());
 }
 
 template <class S>
@@ -539,6 +570,7 @@ void FrameGraph<S>::set_targets(const FrameTargets& targets) {
   }
   if (inputs_.given(inputs_.keypoints_target)) set_keypoints(*targets.keypoints);
   if (inputs_.given(inputs_.bones_target)) set_bones(*targets.keypoints);
+  if (inputs_.given(inputs_.depth_map)) set_depth_map(targets.depth_map != nullptr ? *targets.depth_map : DepthMap());
   if (!inputs_.given(inputs_.object_depth)) return;
   HSI4D_CHECK_EQ(targets.depths.size(), objects_.size());
   write_numbers(tape_, inputs_.object_depth_target, targets.depths.data());
@@ -572,6 +604,17 @@ void FrameGraph<S>::set_bones(const std::vector<Keypoint>& found) {
     for (Index i = 0; i < 3; ++i) row[i] = static_cast<S>(confidence > 0 ? way.normalized()[i] : 0);
     row[3] = static_cast<S>(confidence);
   }
+}
+
+template <class S>
+void FrameGraph<S>::set_depth_map(const DepthMap& map) {
+  if (map.values.empty()) {
+    fill(inputs_.depth_map, S(0));
+    fill(inputs_.depth_map_weight, S(0));
+    return;
+  }
+  write_image(inputs_.depth_map, map.values);
+  write_image(inputs_.depth_map_weight, map.weights);
 }
 
 template <class S>

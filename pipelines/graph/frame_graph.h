@@ -19,6 +19,7 @@
 #include "pipelines/config/run_config.h"
 #include "pipelines/draw/posed_splats.h"
 #include "pipelines/draw/seen_rows.h"
+#include "pipelines/draw/track_points.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/state.h"
@@ -41,6 +42,7 @@ struct FrameGraphSettings {
   bool object_opacity = false;          ///< likewise of the objects, a channel each
   bool keypoints = false;               ///< the losses read the clip's keypoints
   bool bones = false;                   ///< the losses read directions of bones, where the clip's keypoints have them
+  bool depth_map = false;               ///< the losses read depths of pixels, which cost two channels of the render
   std::vector<std::string> unknowns = {};  ///< groups of what the clip's files do not know that are leaves: see below
   /// How far each of the camera's six numbers may go from 0; Gaussians of the scene that no such camera sees are left
   /// out, and the groups of the scene then hold the others alone. None: all are kept.
@@ -73,6 +75,7 @@ struct FrameTargets {
   bool human_seen = true;                       ///< the frame shows some of the human
   std::vector<const Image*> object_masks = {};  ///< coverage by object; needed with settings.object_opacity
   const std::vector<Keypoint>* keypoints = nullptr;  ///< of the frame; needed with settings.keypoints and bones
+  const DepthMap* depth_map = nullptr;               ///< of the frame; null, or empty: nothing is known
 };
 
 /// The frame graph. The tape and the clip must outlive it.
@@ -97,6 +100,10 @@ class FrameGraph {
   /// @param first   the clip's first frame
   /// @param frames  the states before this frame that such terms see, and last the one that was set
   void give_motion(const SceneState& first, const std::vector<SceneState>& frames);
+  /// Records points that tracks follow, and where these are in the frame. After give_motion, once.
+  /// @param points  some at least
+  /// @param places  by track
+  void give_tracks(const std::vector<TrackPoint>& points, const std::vector<TrackPlace>& places);
   /// Writes the frame: target, the weight of pixels, centres of the objects' masks. See FrameTargets.
   void set_targets(const FrameTargets& targets);
 
@@ -147,6 +154,7 @@ class FrameGraph {
   void set_object_masks(const FrameTargets& targets);
   void set_keypoints(const std::vector<Keypoint>& found);
   void set_bones(const std::vector<Keypoint>& found);
+  void set_depth_map(const DepthMap& map);
   bool draws_objects() const { return settings_.object_opacity && !objects_.empty(); }
   void write_rotation(Var<S> leaf, Index row, const Vector3<double>& axis_angle);
   Vector3<double> read_rotation(Var<S> leaf, Index row) const;

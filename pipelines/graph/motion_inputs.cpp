@@ -83,8 +83,9 @@ struct FollowingPoints {
     if (offsets.tape != nullptr) points = points + gather_rows(offsets, rows);
     return skin_points(SkinWeights<S>(weights), transforms, points);
   }
-  void add_rest(const std::vector<float>& means, Index row) {
-    for (Index i = 0; i < 3; ++i) rest.push_back(static_cast<double>(means[static_cast<std::size_t>(3 * row + i)]));
+  void add_rest(const std::vector<float>& means, Index row, const Vector3<double>& offset) {
+    for (Index i = 0; i < 3; ++i)
+      rest.push_back(static_cast<double>(means[static_cast<std::size_t>(3 * row + i)]) + offset[i]);
     ++weights.vertices;
     rows.push_back(static_cast<std::uint32_t>(row));
   }
@@ -111,7 +112,7 @@ Var<S> record_body_points(Var<S> transforms, Var<S> offsets, const MotionStart& 
       chosen.weights.indices.push_back(static_cast<std::int32_t>(first_joint + all.indices[at]));
       chosen.weights.weights.push_back(all.weights[at]);
     }
-    chosen.add_rest(*rest.places, point.row);
+    chosen.add_rest(*rest.places, point.row, point.offset);
   }
   return chosen.record(transforms, of == BodySet::kGaussians ? offsets : Var<S>{});
 }
@@ -133,7 +134,7 @@ Var<S> record_object_points(Tape<S>& tape, Var<S> transforms, const MotionStart&
     moving_frame(motion, point.frame);
     chosen.weights.indices.push_back(static_cast<std::int32_t>(point.object));
     chosen.weights.weights.push_back(1);
-    chosen.add_rest(motion.objects[static_cast<std::size_t>(point.object)]->means, point.row);
+    chosen.add_rest(motion.objects[static_cast<std::size_t>(point.object)]->means, point.row, point.offset);
   }
   return chosen.record(transforms, {});
 }

@@ -264,6 +264,8 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
   clip.estimate = estimate_of(data, setup, clip.avatar, video->frames);
   clip.object_estimate = object_estimate_of(setup.object_tracks, clip);
   if (!data.keypoints.empty()) clip.keypoints = read_keypoints(data, video->frames);
+  if (!data.tracks.empty()) clip.tracks = read_point_tracks(data, video->frames);
+  if (!data.depth_maps.empty()) clip.depth_maps = find_depth_maps(data, video->frames);
   if (!data.lens.estimate_k1) set_lens(data.lens.lens, clip);
   clip.first.body = setup.motion.poses.front();
   clip.frame_rate = rate_of(video->frames, setup);
@@ -281,6 +283,7 @@ Clip make_clip(const DataSettings& data, SceneSetup setup) {
                 {"/data/initial", data.initial},
                 {"/data/initial: /motion", setup.motion_file}};
   if (!data.motion.empty()) clip.files.push_back({"/data/motion", data.motion});
+  if (!data.tracks.empty()) clip.files.push_back({"/data/tracks", data.tracks});
   if (!data.keypoint_joints.empty()) clip.files.push_back({"/data/keypoint_joints", data.keypoint_joints});
   for (const fs::path& file : keypoint_files(data.keypoints))
     clip.files.push_back({"/data/keypoints: " + file.filename().string(), file});
@@ -318,6 +321,7 @@ bool fits_camera(const Image& frame, const Camera& camera) {
 }
 
 void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses) {
+  if (clip.depth_maps) check_depth_maps(*clip.depth_maps, clip.camera);
   std::vector<std::vector<float>> largest(static_cast<std::size_t>(clip.frames()));  // [frame][human, then objects]
   std::vector<std::vector<std::vector<int>>> greys(clip.video->masks.size(),
                                                    std::vector<std::vector<int>>(largest.size()));  // [mask][frame]
@@ -379,10 +383,21 @@ std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, In
     if (!masks.is_video())
       files.push_back({"masks/" + masks.path().filename().string() + "/" + name, masks.file(frames, index)});
   }
+  if (!clip.depth_maps) return files;
+  for (const auto& [kind, paths] : {std::pair{"depth_maps/", &clip.depth_maps->files},
+                                    std::pair{"depth_confidence/", &clip.depth_maps->confidences}}) {
+    if (paths->empty()) continue;
+    const fs::path& file = (*paths)[static_cast<std::size_t>(index)];
+    if (!file.empty()) files.push_back({kind + file.filename().string(), file});
+  }
   return files;
 }
 
-ClipFrame read_frame(const Clip& clip, Index index) { return read_frame(*clip.video, clip.camera, index); }
+ClipFrame read_frame(const Clip& clip, Index index) {
+  ClipFrame frame = read_frame(*clip.video, clip.camera, index);
+  if (clip.depth_maps) frame.depth_map = read_depth_map(*clip.depth_maps, clip.camera, index);
+  return frame;
+}
 
 ClipFrame read_frame(const ClipVideo& video, const Camera& size, Index index) {
   return read_looking(video, size, index, {});

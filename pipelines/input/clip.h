@@ -14,8 +14,10 @@
 #include "optim/solid/mesh_distance.h"
 #include "pipelines/config/data_settings.h"
 #include "pipelines/config/masks.h"
+#include "pipelines/input/depth_maps.h"
 #include "pipelines/input/frame_source.h"
 #include "pipelines/input/keypoints.h"
+#include "pipelines/input/point_tracks.h"
 #include "pipelines/input/scene_setup.h"
 
 namespace hsi4d {
@@ -46,6 +48,8 @@ struct Clip {
   std::vector<BodyPose> estimate;                        ///< estimated poses by frame; empty: none
   std::vector<std::vector<ObjectPose>> object_estimate;  ///< estimated poses [frame][object]; empty: none
   std::optional<Keypoints> keypoints;                    ///< of data.keypoints
+  std::optional<PointTracks> tracks;                     ///< of data.tracks
+  std::optional<DepthMaps> depth_maps;                   ///< of data.depth_maps
   std::vector<double> betas;                             ///< of the person, as the motion file says; empty: not known
   std::string gender = "neutral";                        ///< of the body model, likewise
   double frame_rate = 10;                                ///< frames a second
@@ -65,6 +69,7 @@ struct ClipFrame {
   Image target;                     ///< [3,H,W]
   Image human_mask;                 ///< [1,H,W] coverage
   std::vector<Image> object_masks;  ///< [1,H,W] coverage, by object
+  DepthMap depth_map = {};          ///< empty where there is none
   Image seen = {};                  ///< [1,H,W] 1, or 0 where a lens shows nothing of the frame; empty: 1 everywhere
 };
 
@@ -85,8 +90,8 @@ Clip make_clip(const DataSettings& data, SceneSetup setup);
 void set_lens(const Lens& lens, Clip& clip);
 
 /// Reads every frame and mask once, so that what is wrong with the last one shows before the first is worked on.
-/// A human or an object that some masks after frame 0 show nothing of is told in the log, each with its frames. Throws
-/// as read_frame.
+/// A human or an object that some masks after frame 0 show nothing of is told in the log, each with its frames, and so
+/// are depth maps that say nothing. Throws as read_frame; DataError where no depth map says anything.
 /// @param losses  those of the run that such masks switch off
 void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMasks& losses);
 
@@ -94,16 +99,16 @@ void check_frames(const DataSettings& data, const Clip& clip, const LossesOverMa
 /// sizes.
 bool fits_camera(const Image& frame, const Camera& camera);
 
-/// Reads frame `index` and its masks, and reduces larger ones to the camera's size. A mask that has no file counts as
-/// empty. Throws as read_clip; a number that is not finite too, with its row and column.
+/// Reads frame `index`, its masks and its depth map, and reduces larger ones to the camera's size. A mask that has no
+/// file counts as empty. Throws as read_clip; a number that is not finite too, with its row and column.
 ClipFrame read_frame(const Clip& clip, Index index);
 
-/// As above, before there is a clip.
+/// As above, before there is a clip: without a depth map.
 /// @param size  of the result
 ClipFrame read_frame(const ClipVideo& video, const Camera& size, Index index);
 
-/// The files of a frame: the image, and the masks of human and objects, which may be missing. None of those that are in
-/// videos.
+/// The files of a frame: the image, the masks of human and objects, which may be missing, the depth map. None of those
+/// that are in videos.
 std::vector<ClipFile> frame_files(const DataSettings& data, const Clip& clip, Index index);
 
 /// Frames in words: "3", "2-4, 9".

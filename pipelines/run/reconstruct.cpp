@@ -385,7 +385,7 @@ class Reconstruction {
     };
     const SceneState before = state;
     const StageResult result =
-        run_frame_stage({config_, clip_, losses_, s, observer_.stages, found}, frame, state, colors, note_iteration);
+        run_frame_stage({config_, clip_, losses_, s, observer_.stages, &tracks_, found}, frame, state, colors, note_iteration);
     drop_what_is_left(s, result);
     if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;
@@ -395,6 +395,9 @@ class Reconstruction {
     if (frame.index == std::min<Index>(kFramesBefore, clip_.frames() - 1) || stage.over == StageScope::kFirst)
       warn_of_terms_off(result.off, name, stage);
     for (const LeftOutObject& object : result.left_out) {
+      if (!object.reason.empty() && object.of_human && frame.index <= 1)
+        log_warning("stage " + name + ": the loss \"" + object.term + "\" has no effect in frame " +
+                    std::to_string(frame.index) + ", in some iterations at least: " + object.reason);
       if (!object.reason.empty() && !object.of_human)
         progress_.left_out.push_back({s, frame.index, object.object, object.term, object.reason});
     }
@@ -509,6 +512,7 @@ class Reconstruction {
   std::size_t first_stages_, frame_stages_;
   RunProgress progress_;
   RefinementProgress refinement_;
+  TrackPoints tracks_;  // of the frames that are done
   const ColorState start_colors_;
   Progress bar_;
   std::vector<ProgressPart> terms_;  // of the iteration at hand

@@ -115,6 +115,7 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
   targets.human_mask = &frame.human_mask;
   targets.human_seen = mask_center(frame.human_mask, task.config.data.mask_threshold)[2] != 0;
   if (clip.keypoints) targets.keypoints = &clip.keypoints->frames.at(static_cast<std::size_t>(frame_task.index));
+  targets.depth_map = &frame.depth_map;
   for (std::size_t o = 0; o < clip.objects.size(); ++o) {
     if (are_objects_read) {
       targets.object_masks.push_back(&frame.object_masks[o]);
@@ -123,6 +124,16 @@ FrameTargets targets_of(const StageTask& task, const FrameTask& frame_task, cons
     targets.depths.push_back(mean_depth(clip.objects[o].gaussians, first.objects[o], first.camera_from_world));
   }
   return targets;
+}
+
+/// Points of tracks that begin in frames before, where the stage asks for them.
+template <class S>
+void give_tracks(FrameGraph<S>& graph, const StageTask& task, const FrameTask& frame) {
+  if (!task.clip.tracks || !some_loss_needs(task.config.stages[task.stage].second, LossInput::kTracks)) return;
+  TrackPoints found;
+  TrackPoints& known = task.tracks != nullptr ? *task.tracks : found;
+  const std::vector<TrackPoint>& points = known.of(task.clip, task.config.render, frame.done);
+  if (!points.empty()) graph.give_tracks(points, task.clip.tracks->frames[static_cast<std::size_t>(frame.index)]);
 }
 
 Index tiles_in_image(const Camera& camera, int tile) {
@@ -141,6 +152,7 @@ RecordedFrame<S> record_frame(Tape<S>& tape, const StageTask& task, const FrameT
   settings.object_opacity = some_loss_needs(stage, LossInput::kObjectOpacity);
   settings.keypoints = some_loss_needs(stage, LossInput::kKeypoints);
   settings.bones = some_loss_needs(stage, LossInput::kBones);
+  settings.depth_map = task.clip.depth_maps && some_loss_needs(stage, LossInput::kDepthMap);
   settings.unknowns = unknown_groups_of(stage);
   settings.camera_reach = camera_reach;
   settings.seen = rows_to_draw(task, state);
@@ -148,6 +160,7 @@ RecordedFrame<S> record_frame(Tape<S>& tape, const StageTask& task, const FrameT
   FrameGraph<S>& graph = *recorded;
   graph.set_state(state);
   if (stage.draw == Draw::kAll) graph.give_motion(first_state(task, frame), seen_frames(frame.done, state));
+  give_tracks(graph, task, frame);
   const Image weight = pixel_weights(stage, frame, task.config);
   graph.set_targets(targets_of(task, frame, state, weight));
   LossInputs<S> inputs = graph.loss_inputs();

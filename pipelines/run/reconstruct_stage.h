@@ -11,6 +11,7 @@
 #include "optim/stage.h"
 #include "optim/stage_gradcheck.h"
 #include "pipelines/config/run_config.h"
+#include "pipelines/draw/track_points.h"
 #include "pipelines/input/clip.h"
 #include "pipelines/input/clip_unknowns.h"
 #include "pipelines/input/color_state.h"
@@ -27,6 +28,7 @@ struct StageTask {
   const std::vector<LossTerm>& losses;  ///< that the config may name
   std::size_t stage = 0;                ///< in config.stages
   const StageWatch* watch = nullptr;    ///< null: nobody wants to know where time goes
+  TrackPoints* tracks = nullptr;        ///< what was found of them in the run so far; null: found anew
   ClipUnknowns* found = nullptr;        ///< where to put what a stage of a frame finds of the clip; null: nowhere
 };
 

@@ -13,7 +13,10 @@ namespace {
 std::string left_out_line(const StageResult& result, const Clip& clip) {
   std::string text;
   for (const LeftOutObject& object : result.left_out) {
-    const std::string name = object.of_human ? "the human" : clip.objects[static_cast<std::size_t>(object.object)].name;
+    const bool is_of_all = object.of_human && !object.reason.empty();
+    const std::string name = is_of_all         ? "effect"
+                             : object.of_human ? "the human"
+                                               : clip.objects[static_cast<std::size_t>(object.object)].name;
     text += ", " + object.term + " without " + name + " in " + std::to_string(object.evaluations) + " of " +
             std::to_string(result.iterations + 1) + " evaluations";
   }

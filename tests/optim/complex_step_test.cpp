@@ -402,6 +402,53 @@ TEST_CASE("the loss of depths has the gradients of complex steps") {
   });
 }
 
+TEST_CASE("the loss of depth maps has the gradients of complex steps") {
+  std::vector<double> depths, map;
+  for (int i = 0; i < 12; ++i) {
+    depths.push_back(2 + std::sin(0.7 * i));
+    map.push_back(1.3 * depths.back() - 2.7 + 0.4 * std::sin(0.9 * i * i));
+  }
+  const std::vector<OperatorInput> inputs = {{"depth", image_shape<double>(1, 3, 4), 0, 0, depths},
+                                             {"transmittance", image_shape<double>(1, 3, 4), 0, 0.5},
+                                             {"depth_map", image_shape<double>(1, 3, 4), 0, 0, map},
+                                             {"depth_map_weight", image_shape<double>(1, 3, 4), 0.2, 1}};
+  const auto fill = [](Inputs& given, const Vars& in) {
+    given.depth = in[0], given.transmittance = in[1], given.depth_map = in[2], given.depth_map_weight = in[3];
+  };
+  check_loss("depth_map", inputs, fill, [](const ComplexInputs& in) {
+    const auto sum_of = [&in](const auto& term) {  // Σ v term(q, p)
+      Complex sum = 0;
+      for (std::size_t i = 0; i < 12; ++i) sum += in[3][i] * (1.0 - in[1][i]) * term(in[0][i], in[2][i]);
+      return sum;
+    };
+    const Complex total = sum_of([](Complex, Complex) { return 1.0; }) + 1e-6,
+                  q = sum_of([](Complex z, Complex) { return z; }) / total,
+                  p = sum_of([](Complex, Complex m) { return m; }) / total,
+                  scale = sum_of([&](Complex z, Complex m) { return (z - q) * (m - p); }) /
+                          (sum_of([&](Complex z, Complex) { return square(z - q); }) + 1e-8 * total);
+    constexpr double kScale = static_cast<double>(0.1F), kLimit = static_cast<double>(0.1F * 0.1F);
+    return sum_of([&](Complex z, Complex m) {
+             const Complex r = scale * (z - q) + p - m;
+             return r.real() * r.real() <= kLimit ? r * r : 2.0 * kScale * complex_abs(r) - kLimit;
+           }) /
+           total;
+  });
+}
+
+TEST_CASE("the loss of tracks has the gradients of complex steps") {
+  const std::vector<OperatorInput> inputs = {
+      {"tracks", shape_of(3, 2), 1, 20}, {"tracks_target", shape_of(3, 3), 0, 0, {3, 5, 1, 14, 9, 0.6, 12, 3, 0.8}}};
+  const auto fill = [](Inputs& given, const Vars& in) { given.tracks = in[0], given.tracks_target = in[1]; };
+  check_loss("tracks", inputs, fill, [](const ComplexInputs& in) {
+    Complex sum = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Complex squared = square(in[0][2 * i] - in[1][3 * i]) + square(in[0][2 * i + 1] - in[1][3 * i + 1]);
+      sum += in[1][3 * i + 2] * 100.0 * squared / (100.0 + squared);
+    }
+    return sum / 3.0;
+  });
+}
+
 TEST_CASE("loss terms of poses have the gradients of complex steps") {
   std::vector<double> matrices;
   for (int j = 0; j < 21; ++j) {

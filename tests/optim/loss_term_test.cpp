@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Dense>
+
 #include "autodiff/matrix.h"
 #include "autodiff/rotations.h"
 #include "core/rotation.h"
@@ -29,6 +31,16 @@ std::vector<double> some_rotations() {
     for (int i = 0; i < 9; ++i) rows.push_back(r(i / 3, i % 3));
   }
   return rows;
+}
+
+/// Depths of pixels, metres, and a map that is not far from them.
+std::vector<double> some_depths(double scale, double shift, double noise) {
+  std::vector<double> depths;
+  for (Index i = 0; i < kHeight * kWidth; ++i) {
+    const auto at = static_cast<double>(i);
+    depths.push_back(scale * (2 + std::sin(0.7 * at)) + shift + noise * std::sin(0.9 * at * at));
+  }
+  return depths;
 }
 
 /// One of every input that a term may read, in the order of inputs_of. The third object is not to be seen in the frame.
@@ -61,6 +73,11 @@ std::vector<OperatorInput> all_inputs() {
           {"keypoints_target", shape_of(4, 3), 0, 0, {3, 5, 1, 40, 9, 0.5, 22, 31, 0.8, 8, 8, 0.1}},
           {"bones", shape_of(3, 3), 0, 0, {0.1, -0.3, 0.05, 0, 0.4, 0.2, -0.3, 0, 0.1}},
           {"bones_target", shape_of(3, 4), 0, 0, {0, -1, 0, 1, 0, 0.6, 0.8, 0.7, 1, 0, 0, 0.1}},
+          {"depth", mask, 0, 0, some_depths(1, 0, 0)},
+          {"depth_map", mask, 0, 0, some_depths(1.3, -2.7, 0.5)},
+          {"depth_map_weight", mask, 0.2, 1},
+          {"tracks", shape_of(4, 2), 0, 20},
+          {"tracks_target", shape_of(4, 3), 0, 0, {3, 5, 1, 14, 9, 0.6, 12, 3, 0.8, 8, 8, 0.1}},
           {"unknowns", shape_of(1, 3), -0.2, 0.2},
           {"color_change", shape_of(9, 3), -0.5, 0.5},
           {"shape_change", shape_of(9, 7), -1, 1}};
@@ -93,9 +110,14 @@ LossInputs<S> inputs_of(const std::vector<Var<S>>& in) {
   inputs.keypoints_target = in[23];
   inputs.bones = in[24];
   inputs.bones_target = in[25];
-  inputs.unknowns = in[26];
-  inputs.color_change = in[27];
-  inputs.shape_change = in[28];
+  inputs.depth = in[26];
+  inputs.depth_map = in[27];
+  inputs.depth_map_weight = in[28];
+  inputs.tracks = in[29];
+  inputs.tracks_target = in[30];
+  inputs.unknowns = in[31];
+  inputs.color_change = in[32];
+  inputs.shape_change = in[33];
   inputs.motion = std::shared_ptr<const MotionStart>(&motion_of_test().start, [](const MotionStart*) {});
   inputs.body_points = [places = in[13]](const std::vector<BodyPoint>& points) {
     std::vector<std::uint32_t> rows;
@@ -152,6 +174,165 @@ TEST_CASE("keypoints_2d weighs by confidence, and its kernels agree with their f
   CHECK(value_of("squared") == Approx((0.5 * 25 + 2500) / 3));
   CHECK(value_of("huber") == Approx((0.5 * 25 + 2 * 5 * 50 - 25) / 3));
   CHECK(value_of("geman_mcclure") == Approx((0.5 * 25 * 25 / 50.0 + 25 * 2500 / 2525.0) / 3));
+}
+
+TEST_CASE("kernels of terms pass the gradient check", "[parallel]") {
+  const std::vector<std::pair<std::string, std::string>> terms = {
+      {"photometric", R"("scale": 0.2)"},
+      {"mask", R"("scale": 0.4)"},
+      {"depth_map", R"("scale": 0.3)"},
+      {"depth_map", R"("scale": 0.3, "kind": "disparity")"},
+  };
+  for (const auto& [name, settings] : terms) {
+    for (const char* kernel : {"huber", "geman_mcclure"}) {
+      const std::string text = R"({"kernel": ")" + std::string(kernel) + R"(", )" + settings + "}";
+      INFO(name << " " << text);
+      check_operator(name, all_inputs(), [&](const auto& in) { return record_term(name, inputs_of(in), text); },
+                     {.entries = 24});
+    }
+  }
+}
+
+namespace {
+
+/// Images of one row for depth_map: depths that are rendered, what is seen through them, the map and how sure it is.
+struct MappedDepths {
+  std::vector<double> depth, transmittance, map, weight;
+
+  /// The loss; the gradient by the depths goes into `slopes`.
+  double value(const std::string& settings, std::vector<double>* slopes = nullptr) const {
+    Tape<double> tape;
+    const auto leaf = [&](const char* name, const std::vector<double>& numbers) {
+      const Var<double> var = tape.parameter(name, {1, 1, std::ssize(numbers), std::ssize(numbers)});
+      tape.set(var, numbers);
+      return var;
+    };
+    LossInputs<double> in;
+    in.depth = leaf("depth", depth);
+    in.transmittance = leaf("transmittance", transmittance);
+    in.depth_map = leaf("map", map);
+    in.depth_map_weight = leaf("weight", weight);
+    const Var<double> loss = record_term("depth_map", in, settings);
+    tape.forward(loss);
+    tape.backward(loss);
+    if (slopes != nullptr) {
+      slopes->clear();
+      for (Index i = 0; i < std::ssize(depth); ++i) slopes->push_back(tape.gradient(in.depth)(0, i));
+    }
+    return tape.value(loss).scalar();
+  }
+  /// The same by the normal equations of a q + b = p, plainly.
+  template <class Kernel>
+  double plainly(bool is_disparity, const Kernel& kernel) const {
+    Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    const auto each = [&](const auto& use) {
+      for (std::size_t i = 0; i < depth.size(); ++i)
+        use(weight[i] * (1 - transmittance[i]), depth[i] <= 0 ? 0 : is_disparity ? 1 / depth[i] : depth[i], map[i]);
+    };
+    each([&](double v, double q, double p) {
+      const Eigen::Vector2d row(q, 1);
+      normal += v * row * row.transpose();
+      right += v * row * p;
+    });
+    const Eigen::Vector2d found = normal.ldlt().solve(right);
+    double sum = 0, total = 0;
+    each([&](double v, double q, double p) {
+      sum += v * kernel(std::abs(found[0] * q + found[1] - p));
+      total += v;
+    });
+    return sum / total;
+  }
+};
+
+MappedDepths some_mapped_depths() {
+  return {{2, 2.5, 3.1, 4, 2.2, 0, 5, 3.3},
+          {0, 0.1, 0, 0.3, 0, 1, 0.05, 0},
+          {-1.2, -0.4, 0.1, 1.3, -0.7, 0.9, 0.8, 2.5},
+          {1, 0.5, 1, 1, 0, 1, 0.7, 0.9}};
+}
+
+}  // namespace
+
+TEST_CASE("depth_map compares with a map after the least squares of scale and shift, by the kernel") {
+  const MappedDepths depths = some_mapped_depths();
+  MappedDepths turned = depths;
+  for (double& p : turned.map) p = -p;
+  for (const bool is_disparity : {false, true}) {
+    const MappedDepths& given = is_disparity ? turned : depths;
+    const auto value = [&](const std::string& kernel) {
+      return given.value(R"({"scale": 0.4, "kind": ")" + std::string(is_disparity ? "disparity" : "depth") +
+                         R"(", "kernel": ")" + kernel + R"("})");
+    };
+    const double s = static_cast<double>(0.4F);
+    CHECK(value("squared") == Approx(given.plainly(is_disparity, [](double r) { return r * r; })).epsilon(1e-6));
+    CHECK(value("huber") == Approx(given.plainly(is_disparity, [s](double r) {
+                              return r < s ? r * r : 2 * s * r - s * s;
+                            })).epsilon(1e-6));
+    CHECK(value("geman_mcclure") ==
+          Approx(given.plainly(is_disparity, [s](double r) { return s * s * r * r / (s * s + r * r); })).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("depth_map knows nothing of the map's scale and shift, nor of the render's") {
+  const MappedDepths depths = some_mapped_depths();
+  const double value = depths.value("{}");
+  CHECK(value > 0.01);
+  MappedDepths other = depths;
+  for (double& z : other.depth) z = z == 0 ? 0 : 1.7 * z + 0.6;
+  CHECK(other.value("{}") == Approx(value).epsilon(1e-6));
+  other = depths;
+  for (double& p : other.map) p += 3;
+  CHECK(other.value("{}") == Approx(value).epsilon(1e-6));
+  // A map of the same depths leaves nothing, and pulls nothing.
+  for (std::size_t i = 0; i < other.map.size(); ++i) other.map[i] = 0.8 * depths.depth[i] - 2;
+  std::vector<double> slopes;
+  CHECK(other.value("{}", &slopes) < 1e-12);
+  for (const double slope : slopes) CHECK(std::abs(slope) < 1e-7);
+  for (std::size_t i = 0; i < other.map.size(); ++i)
+    other.map[i] = depths.depth[i] > 0 ? 0.8 / depths.depth[i] - 2 : 7;  // where nothing is seen it may say anything
+  CHECK(other.value(R"({"kind": "disparity"})") < 1e-10);
+}
+
+TEST_CASE("depth_map pulls nothing where the map says nothing, or the opposite") {
+  MappedDepths depths = some_mapped_depths();
+  std::vector<double> slopes;
+  depths.weight.assign(depths.weight.size(), 0);
+  CHECK(depths.value("{}", &slopes) == 0);
+  CHECK(slopes == std::vector<double>(slopes.size(), 0));
+  depths = some_mapped_depths();
+  for (double& p : depths.map) p = -p;
+  CHECK(depths.value(R"({"kernel": "squared"})", &slopes) > 0.5);  // all that the map has
+  CHECK(slopes == std::vector<double>(slopes.size(), 0));
+  CHECK(depths.value(R"({"kind": "disparity"})", &slopes) > 0);
+  CHECK(slopes != std::vector<double>(slopes.size(), 0));
+  depths.depth.assign(depths.depth.size(), 3);  // a wall
+  CHECK(std::isfinite(depths.value("{}", &slopes)));
+  for (const double slope : slopes) CHECK(std::isfinite(slope));
+}
+
+TEST_CASE("kernels of photometric and mask agree with their formulas") {
+  const auto flat = [](double value, const std::string& settings) {
+    Tape<double> tape;
+    LossInputs<double> in;
+    in.rendered = tape.parameter("rendered", image_shape<double>(3, kHeight, kWidth));
+    in.target = tape.constant("target", image_shape<double>(3, kHeight, kWidth));
+    const Array<double> image = tape.write(in.rendered);
+    for (Index r = 0; r < image.total_rows(); ++r) std::fill_n(image.row(r), kWidth, value);
+    const Var<double> loss = record_term("photometric", in, settings);
+    tape.forward(loss);
+    return tape.value(loss).scalar();
+  };
+  const std::string huber = R"({"kernel": "huber", "scale": 0.125, "ssim_share": 0})",
+                    geman = R"({"kernel": "geman_mcclure", "scale": 0.125, "ssim_share": 0})";
+  CHECK(flat(0.5, huber) == Approx(0.5 - 0.0625));
+  CHECK(flat(-0.0625, huber) == Approx(0.0625 * 0.0625 / 0.25));
+  CHECK(flat(0.5, geman) == Approx(0.125 * 0.25 / (0.125 * 0.125 + 0.25)));
+  const double structure = flat(0.5, R"({"ssim_share": 1})");
+  CHECK(flat(0.5, R"({"kernel": "geman_mcclure", "scale": 0.125, "ssim_share": 0.25})") ==
+        Approx(0.75 * flat(0.5, geman) + 0.25 * structure));
+  CHECK_THROWS_WITH(flat(0.5, R"({"kernel": "huber", "ssim_share": 1})"),
+                    Catch::Contains("there is nothing that a kernel counts: ssim_share is 1"));
 }
 
 TEST_CASE("bone_directions does not depend on lengths, and lets go of what points the other way") {
@@ -522,6 +703,17 @@ TEST_CASE("mask compares the silhouettes of the human and of each object") {
   CHECK(all.value(R"({"objects": false})") == Approx(0.25).epsilon(1e-13));
   all.inputs.object_opacity = all.inputs.object_masks = all.inputs.object_seen = {};
   CHECK(all.value() == Approx(0.25).epsilon(1e-13));
+}
+
+TEST_CASE("mask by a kernel lets go of pixels far off, and leaves out what the frame does not show") {
+  Silhouettes some;
+  CHECK(some.value(R"({"kernel": "huber", "scale": 0.25})") == Approx((0.1875 + 0.04 + 0.1375) / 3).epsilon(1e-13));
+  CHECK(some.value(R"({"kernel": "geman_mcclure", "scale": 0.5})") ==
+        Approx((0.25 * 0.25 / 0.5 + 0.25 * 0.04 / 0.29 + 0.25 * 0.16 / 0.41) / 3).epsilon(1e-13));
+  some.see(true, true, false);
+  some.tape.write(some.inputs.object_masks)(1, 2, 3) = std::nan("");  // of what is not seen
+  CHECK(some.value(R"({"kernel": "huber", "scale": 0.25})") == Approx((0.1875 + 0.04) / 3).epsilon(1e-13));
+  CHECK(std::isfinite(some.slope(some.inputs.human_opacity, 0)));
 }
 
 TEST_CASE("mask leaves out what the frame does not show, and leaves the others as they are") {
