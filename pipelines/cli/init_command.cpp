@@ -1,4 +1,4 @@
-// `hsi4d init`: a dataset of a video of which no scene is known.
+// `hsi4d init`: a dataset of a video of a person, in a scene or without one.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -23,6 +23,7 @@
 #include "pipelines/cli/first_state.h"
 #include "pipelines/cli/list.h"
 #include "pipelines/cli/options.h"
+#include "pipelines/cli/scene_options.h"
 #include "pipelines/cli/shipped_configs.h"
 #include "pipelines/cli/text.h"
 #include "pipelines/config/run_config.h"
@@ -40,6 +41,7 @@ namespace fs = std::filesystem;
 
 struct InitArguments {
   std::string video, keypoints, masks, out;
+  std::string scene;   ///< empty: of the video's background
   std::string avatar;  ///< empty: made
   std::string camera;  ///< empty: from the keypoints
   std::optional<double> focal_px, camera_height, video_rate, frame_rate;
@@ -115,7 +117,7 @@ ConfigValue data_section(const InitArguments& a) {
     return ConfigValue::make_string(fs::proximate(fs::absolute(file), fs::absolute(a.out)).generic_string());
   };
   ConfigValue data = ConfigValue::make_object();
-  data.add("scene", ConfigValue::make_string("scene.ply"));
+  data.add("scene", a.scene.empty() ? ConfigValue::make_string("scene.ply") : from_out(a.scene));
   data.add("avatar", a.avatar.empty() ? ConfigValue::make_string("avatar.safetensors") : from_out(a.avatar));
   data.add("frames", from_out(a.video));
   data.add("masks", from_out(a.masks));
@@ -156,12 +158,16 @@ StandingPlace first_standing(const Vector2<double>& at, const Camera& camera) {
 }
 
 std::string told(const InitArguments& a, const PersonCamera& found, const Plate& plate) {
+  const std::string unrest = rounded(plate.unrest_px, 2) + " px";
+  if (!a.scene.empty())
+    return (fs::path(a.out) / "config.json").generic_string() + ": the camera " +
+           (plate.is_still ? "stands still (" : "moves (") + unrest + ")" +
+           (plate.is_still ? "" : " and is followed in the scene") + "\n";
   const std::string camera = (fs::path(a.out) / "config.json").generic_string() + ": the camera is " +
                              rounded(found.height, 3) + " m above the ground and looks " +
                              rounded(std::abs(found.pitch_deg), 2) + " degrees " +
                              (found.pitch_deg < 0 ? "up" : "down");
   const std::string share = rounded(100 * plate.seen, 3) + " % of the background";
-  const std::string unrest = rounded(plate.unrest_px, 2) + " px";
   if (plate.is_still) return camera + "; it stands still (" + unrest + "). " + share + " is seen\n";
   return camera + " in frame 0; it moves (" + unrest + ") and is followed against frame 0, which shows " + share + "\n";
 }
@@ -180,6 +186,17 @@ void check_options(const InitArguments& a) {
   if (!a.camera.empty() && (a.focal_px || a.camera_height))
     throw UserError(kInitCommand +
                     "--camera says the focal length and the height; leave out --focal-px and --camera-height");
+  if (!a.scene.empty() && a.camera.empty())
+    throw UserError(kInitCommand + "--scene needs --camera: where the camera of frame 0 is in it, as hsi4d locate says");
+}
+
+/// Writes the background, and a scene of it.
+void write_plate(const Plate& plate, const PersonCamera& found, const RenderSettings& render,
+                 const FolderInMaking& out) {
+  const PlateScene walls{.wall_distance = std::max(kNearestWall, kWallBehind * farthest_place(found)),
+                         .margin = plate.is_still ? 0 : kMarginOfMoving};
+  write_image(out.file("plate.png"), plate.image);
+  write_splats(out.file("scene.ply"), scene_of_plate(plate.image, found.camera, walls, render));
 }
 
 /// Writes the dataset. Returns what the command prints.
@@ -194,12 +211,10 @@ std::string write_footage(const InitArguments& a, const std::vector<LossDescript
       a.avatar.empty() ? surface_avatar(procedural_body(), AvatarOptions().settings) : read_person(a.avatar);
   const RunConfig shipped = shipped_config(losses);
   const Camera images = camera_of_images(a, video.frames);
+  if (!a.scene.empty()) read_drawn(a.scene, shipped.render);  // a wrong file is refused before the work
   const Plate plate = plate_of(video, images);
   const PersonCamera found = look_for_person(a, keypoints, avatar, images, plate.is_still);
-  const PlateScene walls{.wall_distance = std::max(kNearestWall, kWallBehind * farthest_place(found)),
-                         .margin = plate.is_still ? 0 : kMarginOfMoving};
-  write_image(out.file("plate.png"), plate.image);
-  write_splats(out.file("scene.ply"), scene_of_plate(plate.image, found.camera, walls, shipped.render));
+  if (a.scene.empty()) write_plate(plate, found, shipped.render, out);
   write_camera(out.file("camera.json"), found.camera);
   if (a.avatar.empty()) write_avatar(out.file("avatar.safetensors"), avatar);
   const double rate = video.frames.frame_rate();
@@ -224,12 +239,14 @@ std::string init_command(const InitArguments& a, const std::vector<LossDescripti
 void add_init(CLI::App& app, Program& program) {
   InitArguments& a = program.options<InitArguments>();
   CLI::App& command = *app.add_subcommand(
-      "init", "A dataset of a person's video without a scene: camera, background, first state, config");
+      "init", "A dataset of a person's video, with a scene or without: camera, background, first state, config");
   command.add_option("VIDEO", a.video, "A video, or a folder of frames")->required();
   command.add_option("--keypoints", a.keypoints, "Of the person, in all frames, as for data.keypoints")
       ->type_name("F")
       ->required();
   command.add_option("--masks", a.masks, "A folder with human/, as for data.masks")->type_name("DIR")->required();
+  command.add_option("--scene", a.scene, "Gaussians, metres, z up, the ground at z = 0; default: of the background")
+      ->type_name("F");
   command.add_option("--avatar", a.avatar, "Gaussians of the person; default: made, 1.72 m tall")
       ->type_name("F.safetensors");
   command.add_option("--camera", a.camera, "Where the camera is, z up, the ground at z = 0; default: by the keypoints")

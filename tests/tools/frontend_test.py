@@ -90,6 +90,17 @@ with tempfile.TemporaryDirectory() as name:
     all_of_it = [tools / "from_video", clip / "video.mp4", "--out", here / "all", "--packages", packages, "--longest-side-px", 256]
     assert "quality: " in run(*all_of_it, env=environment)
     assert (here / "all/run/report.html").exists() and (here / "all/clip/plate.png").exists()
+    # The same person in the scene, by a camera that is known roughly.
+    guess = json.loads((clip / "camera.json").read_text())
+    guess["camera_from_world"][0][3] += 0.05
+    (here / "guess.json").write_text(json.dumps(guess))
+    in_scene = [tools / "from_video", clip / "video.mp4", "--scene", clip / "scene.ply", "--guess", here / "guess.json",
+                "--packages", packages, "--longest-side-px", 256, "--look", "kept", "--out", here / "in_scene"]
+    assert "quality: " in run(*in_scene, env=environment)
+    assert (here / "in_scene/camera.png").exists() and not (here / "in_scene/clip/plate.png").exists()
+    says_where = "says where a camera is in a scene"
+    assert says_where in run(tools / "from_video", clip / "video.mp4", "--fov", 60, "--out", here / "x", status=1)
+
     assert "there is no such file" in run(tools / "from_video", here / "none.mp4", "--out", here / "x", status=1)
 
     assert "is there already" in run(*frontend, clip / "video.mp4", "--out", here / "found", status=1)

@@ -113,6 +113,23 @@ TEST_CASE("hsi4d init takes a camera that is known") {
         read_camera(camera).camera_from_world.translation);
 }
 
+TEST_CASE("hsi4d init puts a person into a scene that is known") {
+  const Footage footage;
+  const std::string camera = (TinyDataset::folder() / "camera.json").string(),
+                    scene = (TinyDataset::folder() / "scene.ply").string();
+  const ProgramResult init =
+      footage.init({"--scene", scene, "--camera", camera, "--video-rate", "10", "--out", "clip"});
+  CAPTURE(init.err);
+  REQUIRE(init.status == 0);
+  CHECK_THAT(init.out, Contains("clip/config.json: the camera ") && !Contains("background"));
+  for (const char* const of_plate : {"clip/plate.png", "clip/scene.ply"}) CHECK_FALSE(fs::exists(of_plate));
+  const nlohmann::json config = json_of("clip/config.json");
+  CHECK(fs::equivalent(fs::path("clip") / config["data"]["scene"].get<std::string>(), scene));
+  const ProgramResult dry = run_hsi4d({"run", "clip/config.json", "--out", "run", "--dry-run"});
+  CAPTURE(dry.err);
+  CHECK(dry.status == 0);
+}
+
 TEST_CASE("hsi4d init takes a portrait video that its file says to turn") {
   const Footage footage;
   // The middle of the tiny frames, upright; as a telephone writes it: lying, with a note that it is to be turned.
@@ -204,6 +221,8 @@ TEST_CASE("hsi4d init refuses what it cannot do, and leaves nothing") {
   CHECK_THAT(error({"--camera", camera, "--focal-px", "500"}), Contains("leave out --focal-px"));
   write_changed(camera, "other.json", [](auto& c) { c["width"] = 80; });
   CHECK_THAT(error({"--camera", "other.json"}), Contains("the camera's image is 80x48"));
+  CHECK_THAT(error({"--scene", camera}), Contains("hsi4d init: --scene needs --camera: "));
+  CHECK_THAT(error({"--scene", camera, "--camera", camera}), Contains(camera));
   write_changed("keypoints.json", "keypoints.json", [](auto& k) {
     for (auto& frame : k["frames"]) {
       for (auto& point : frame) point[2] = 0.1;
