@@ -92,7 +92,7 @@ with tempfile.TemporaryDirectory() as name:
     assert (here / "all/run/report.html").exists() and (here / "all/clip/plate.png").exists()
     # The same person in the scene, by a camera that is known roughly.
     guess = json.loads((clip / "camera.json").read_text())
-    guess["camera_from_world"][0][3] += 0.05
+    guess["world_to_camera"][0][3] += 0.05
     (here / "guess.json").write_text(json.dumps(guess))
     in_scene = [tools / "from_video", clip / "video.mp4", "--scene", clip / "scene.ply", "--guess", here / "guess.json",
                 "--packages", packages, "--longest-side-px", 256, "--look", "kept", "--out", here / "in_scene"]
