@@ -7,7 +7,7 @@ namespace {
 
 using namespace stress;
 
-constexpr const char* kNoSplitting = "Gaussians are neither relocated nor split: their number never changes";
+constexpr const char* kNoSplitting = "tests/splat/density_test.cpp holds what relocates and splits Gaussians";
 constexpr const char* kNoLikelihood = "no prior is a mixture: the energies are sums of squares, with no exponential";
 constexpr const char* kByIndex = "rows are taken by index, not by a product with ones and zeros";
 

@@ -187,7 +187,8 @@ void check_options(const InitArguments& a) {
     throw UserError(kInitCommand +
                     "--camera says the focal length and the height; leave out --focal-px and --camera-height");
   if (!a.scene.empty() && a.camera.empty())
-    throw UserError(kInitCommand + "--scene needs --camera: where the camera of frame 0 is in it, as hsi4d locate says");
+    throw UserError(kInitCommand +
+                    "--scene needs --camera: where the camera of frame 0 is in it, as hsi4d locate says");
 }
 
 /// Writes the background, and a scene of it.

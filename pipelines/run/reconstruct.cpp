@@ -384,8 +384,8 @@ class Reconstruction {
       note(frame.index, s, report, &counters, &totals);
     };
     const SceneState before = state;
-    const StageResult result =
-        run_frame_stage({config_, clip_, losses_, s, observer_.stages, &tracks_, found}, frame, state, colors, note_iteration);
+    const StageResult result = run_frame_stage({config_, clip_, losses_, s, observer_.stages, &tracks_, found}, frame,
+                                               state, colors, note_iteration);
     drop_what_is_left(s, result);
     if (stage.draw == Draw::kAll) note_left_ranges(s, frame.index, before, state);
     totals.iterations += result.iterations;

@@ -12,7 +12,7 @@
 #include "core/npz.h"
 #include "core/random.h"
 #include "stress/scratch_folder.h"
-#include "tests/zip_archive.h"
+#include "tests/support/zip_archive.h"
 
 namespace motion_io_test {
 

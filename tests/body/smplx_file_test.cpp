@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/smplx_reference.h"
-#include "tests/zip_archive.h"
+#include "tests/support/zip_archive.h"
 
 namespace smplx_file_test {
 

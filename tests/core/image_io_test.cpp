@@ -14,7 +14,7 @@
 #include "core/check.h"
 #include "core/png.h"
 #include "stress/scratch_folder.h"
-#include "tests/crc32.h"
+#include "tests/support/crc32.h"
 #include "tests/support/measures.h"
 #include "tests/support/png_chunk.h"
 

@@ -8,7 +8,7 @@
 
 #include "core/check.h"
 #include "stress/scratch_folder.h"
-#include "tests/zip_archive.h"
+#include "tests/support/zip_archive.h"
 
 namespace npz_test {
 

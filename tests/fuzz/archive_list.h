@@ -9,7 +9,7 @@
 #include <string>
 
 #include "tests/fuzz/fuzz.h"
-#include "tests/zip_archive.h"
+#include "tests/support/zip_archive.h"
 
 namespace hsi4d::fuzz {
 

@@ -1,8 +1,8 @@
 // PNG and JPEG.
 #include "core/image_io.h"
 #include "core/png.h"
-#include "tests/crc32.h"
 #include "tests/fuzz/fuzz.h"
+#include "tests/support/crc32.h"
 #include "tests/support/palette_png.h"
 
 namespace hsi4d::fuzz::image_fuzz {

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "core/file.h"
-#include "tests/crc32.h"
+#include "tests/support/crc32.h"
 
 namespace hsi4d::test {
 

@@ -389,7 +389,7 @@ TEST_CASE("every shipped config runs", "[run]") {
   CHECK(with_stages == std::set<std::string>{"best", "demo", "demo_quick", "fast", "find_focal_length",
                                              "fit_first_frame", "from_keypoints", "from_video", "paper",
                                              "paper_static"});
-  CHECK(without == std::set<std::string>{"accurate", "compare_gsplat", "default", "synthetic"});
+  CHECK(without == std::set<std::string>{"default"});
 }
 
 TEST_CASE("every shipped config of a generated dataset runs", "[run][full]") {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/file.h"
-#include "tests/crc32.h"
+#include "tests/support/crc32.h"
 
 namespace hsi4d::test {
 
