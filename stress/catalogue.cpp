@@ -7,7 +7,6 @@ namespace {
 
 using namespace stress;
 
-constexpr const char* kNoSplitting = "tests/splat/density_test.cpp holds what relocates and splits Gaussians";
 constexpr const char* kNoLikelihood = "no prior is a mixture: the energies are sums of squares, with no exponential";
 constexpr const char* kByIndex = "rows are taken by index, not by a product with ones and zeros";
 
@@ -112,8 +111,8 @@ constexpr StressCase kCases[] = {
     {"F11", "files of Gaussians that are broken", "every count and number is checked", broken_ply},
     {"F12", "JSON with NaN, 1e999, or numbers cut short", "refused; the shortest text that reads back",
      numbers_in_json},
-    {"F13", "opacities after a split, 1 - (1 - o)^(1/n)", "", nullptr, "", kNoSplitting},
-    {"F14", "binomial sums of alternating sign", "", nullptr, "", kNoSplitting},
+    {"F13", "opacities after a split, 1 - (1 - o)^(1/n)", "-expm1(log1p(-o)/n)", opacities_of_copies},
+    {"F14", "binomial sums of alternating sign", "one sum in place of two, in double", scales_of_copies},
     {"F15", "rows of culled Gaussians hold what memory held", "they are filled with zeros", rows_not_drawn,
      "60 Gaussians, 32 x 24 px"},
     {"F16", "gradients that are finite and wrong pass a test", "errors relative to the gradient", wrong_but_finite},

@@ -26,6 +26,7 @@ Row masks_and_borders;                                                          
 Row fast_math, contraction;                                                          // arithmetic
 Row bad_gradients, place_of_eps, bias_corrections, fading_moments;                   // optimiser
 Row sums_by_threads, sums_over_pixels, half_precision;                               // sums
+Row opacities_of_copies, scales_of_copies;                                           // copies
 Row products_with_vectors, rows_not_drawn, wrong_but_finite;                         // tape_faults
 Row broken_ply, numbers_in_json;                                                     // files
 Row unusual_sequences, two_results, transmittance_through_layers;                    // lists_and_layers
