@@ -116,6 +116,6 @@ TEST_CASE("rows F hold, and would not without their remedies", "[release]") { ch
 TEST_CASE("rows G hold, and would not without their remedies", "[release]") { check_group('G'); }
 TEST_CASE("what is not a number is caught in every slot", "[release]") { check_group('P'); }
 TEST_CASE("relations of renders hold", "[release]") { check_group('R'); }
-TEST_CASE("10,000 steps end well", "[release]") { check_group('L'); }
+TEST_CASE("10,000 steps end well", "[full]") { check_group('L'); }
 
 }  // namespace stress_test

@@ -102,7 +102,7 @@ TEST_CASE("a chain whose programs give what another names has its result", "[run
   CHECK(of_clip["sources"]["video"]["command"][0] == "./film");
 }
 
-TEST_CASE("a chain with programs goes on from wherever it was stopped", "[run][chain]") {
+TEST_CASE("a chain with programs goes on from wherever it was stopped", "[run][chain][full]") {
   const Workshop workshop;
   const RunConfig config = Workshop::config();
   execute_tiny_chain(config, "run");

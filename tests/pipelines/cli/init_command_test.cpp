@@ -193,7 +193,8 @@ TEST_CASE("hsi4d init takes a person whose feet are out of the picture in some f
       }
     });
     return run_hsi4d({"init", (TinyDataset::folder() / "frames").string(), "--keypoints", "cut.json", "--masks",
-                      (TinyDataset::folder() / "masks").string(), "--video-rate", "10", "--out", "clip"});
+                      (TinyDataset::folder() / "masks").string(), "--avatar",
+                      (TinyDataset::folder() / "avatar.safetensors").string(), "--video-rate", "10", "--out", "clip"});
   };
   const ProgramResult all = without_feet(0);
   CHECK(all.status == 2);

@@ -267,7 +267,7 @@ TEST_CASE("a run that fails in the middle goes on once the cause is gone", "[run
   CHECK(differences("whole", "run") == kNone);
 }
 
-TEST_CASE("a demo that was killed and resumed has the bits of one that never was", "[run][demo]") {
+TEST_CASE("a demo that was killed and resumed has the bits of one that never was", "[run][demo][full]") {
   const TemporaryFolder here;
   const auto arguments = [](const std::string& out) {
     std::vector<std::string> words = {"demo", "--quick", "--quiet", "--threads", "1", "--out", out};

@@ -206,7 +206,7 @@ void show_runs(const MadeSweep& sweep, std::size_t first, std::size_t end) {
 
 }  // namespace
 
-TEST_CASE("two methods of a sweep are compared by clip and seed") {
+TEST_CASE("two methods of a sweep are compared by clip and seed", "[full]") {
   MadeSweep sweep;
   sweep.finish_all();
   show_runs(sweep, 0, 11);
