@@ -1,36 +1,31 @@
 # The rule of the layers and of the rooms in them, read from the #include lines. A room may include what it stands on, and
-# what that stands on; CMakeLists.txt has the same table for the linker.
-
-# ROOM: what it stands on. A file belongs to the innermost room whose folder it is in.
-set(stands_on
-    "core:" "autodiff: core"
-    "splat: autodiff" "splat/files: splat" "splat/render: splat" "splat/reference: splat/render"
-    "body: autodiff"
-    "optim: splat/files splat/reference body" "optim/solid: splat/files splat/reference body"
-    "optim/losses: optim optim/solid"
-    "pipelines/config: optim/losses" "pipelines/input: pipelines/config" "pipelines/draw: pipelines/input"
-    "pipelines/metrics: pipelines/input" "pipelines/record: pipelines/metrics" "pipelines/graph: pipelines/draw"
-    "pipelines/follow: pipelines/input" "pipelines/sources: pipelines/draw pipelines/follow" "pipelines/avatar: pipelines/draw" "pipelines/footage: pipelines/draw"
-    "pipelines/photos: core" "pipelines/synthetic: pipelines/draw pipelines/photos"
-    "pipelines/report: pipelines/draw pipelines/record" "pipelines/evaluate: pipelines/record"
-    "pipelines/rig: pipelines/photos optim/solid"
-    "pipelines/scan: pipelines/rig pipelines/report"
-    "pipelines/run: pipelines/graph pipelines/sources pipelines/report" "pipelines/chain: pipelines/run"
-    "pipelines/sweep: pipelines/chain pipelines/synthetic" "pipelines/study: pipelines/sweep pipelines/evaluate"
-    "pipelines/locate: pipelines/graph pipelines/scan"
-    "pipelines/cli: pipelines/study pipelines/avatar pipelines/footage pipelines/locate"
-    "python: pipelines/sweep"
-    "bench: pipelines/cli" "stress: pipelines/cli")
+# what that stands on: the DEPENDS of its hsi4d_add_room in CMakeLists.txt. There X_top is the room X, and the name of a
+# layer stands for its uppermost rooms (hsi4d_add_layer). A file belongs to the innermost room whose folder it is in.
+file(STRINGS ${CMAKE_CURRENT_LIST_DIR}/../CMakeLists.txt lines REGEX "^hsi4d_add_(room|layer)\\(")
+list(APPEND lines "hsi4d_add_room(python DEPENDS pipelines/sweep)")  # hsi4d_add_python makes it
 
 set(rooms "")
 set(layers "")
-foreach(row ${stands_on})
-  string(REGEX MATCH "^([^:]+):(.*)$" row "${row}")
-  set(room ${CMAKE_MATCH_1})
-  string(REGEX MATCHALL "[^ ]+" below "${CMAKE_MATCH_2}")
+foreach(line ${lines})
+  string(REGEX MATCHALL "[A-Za-z0-9_/]+" words "${line}")
+  list(POP_FRONT words kind room)
+  if(kind STREQUAL hsi4d_add_layer)
+    set(uppermost_${room} ${words})
+    continue()
+  endif()
+  set(below "")
+  if(line MATCHES "DEPENDS ([a-z_/ ]+)")
+    string(REGEX MATCHALL "[^ ]+" below "${CMAKE_MATCH_1}")
+  endif()
   set(may_include_${room} "")
-  foreach(lower ${below})
-    list(APPEND may_include_${room} ${may_include_${lower}})
+  foreach(name ${below})
+    string(REGEX REPLACE "_top$" "" lower ${name})
+    if(uppermost_${name})
+      set(lower ${uppermost_${name}})
+    endif()
+    foreach(one ${lower})
+      list(APPEND may_include_${room} ${may_include_${one}})
+    endforeach()
   endforeach()
   list(APPEND may_include_${room} ${room})
   list(REMOVE_DUPLICATES may_include_${room})

@@ -205,7 +205,7 @@ TEST_CASE("frames without a depth map, and maps that say nothing, are counted") 
 TEST_CASE("what is no depth map is refused by name") {
   const Workshop workshop;
   CHECK_THAT(Workshop::fault(), Contains("maps: has no depth map for any of 3 frames; allowed: a file has the name of "
-                                         "its frame, the first \"0000\", and ends in .png or .exr or .npy or .npz"));
+                                         "its frame, the first \"0000\", and ends in .png, .exr, .npy or .npz"));
   Image colored(3, kHeight, kWidth);
   colored(1, 2, 3) = 1;
   write_image("maps/0000.png", colored);

@@ -91,7 +91,7 @@ TEST_CASE("what is no file of tracks is refused by name") {
   workshop.visible = {0, 1, 1, 1.5, 1, 0};
   CHECK_THAT(workshop.fault(), Contains("tracks.npz: array 'visible': holds 1.5; allowed: 0 to 1"));
   workshop.visible = {0, 1};
-  CHECK_THAT(workshop.fault(), Contains("array 'visible' has shape [1,2]; [3,2] is needed"));
+  CHECK_THAT(workshop.fault(), Contains("array 'visible': has shape [1,2]; [3,2] is needed"));
   workshop.visible.clear();
   workshop.size = {30, 30};
   CHECK_THAT(workshop.fault(), Contains("tracks.npz: is of pictures of 30x30 pixels, the video's frames are of 40x20; "

@@ -116,7 +116,10 @@ TEST_CASE("without depth maps the term is off, which is told", "[run]") {
   INFO(result.err);
   CHECK(result.status == 0);
   CHECK_THAT(result.err, Contains("the loss \"depth_map\" is off: "));
-  CHECK_THAT(run_hsi4d({"check", config, "--set", "stages.camera.losses.depth_map.weight=1"}).err,
+  write_changed(dataset.path / "changed.json", dataset.path / "scene.json", [](auto& c) {
+    c["stages"]["camera"]["losses"]["depth_map"] = {{"weight", 1}};
+  });
+  CHECK_THAT(run_hsi4d({"check", (dataset.path / "scene.json").string()}).err,
              Contains("/stages/camera/losses/depth_map: this loss needs everything in an image, which a stage with "
                       "\"draw\": \"scene\" does not have"));
 }
