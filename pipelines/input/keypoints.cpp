@@ -33,7 +33,20 @@ constexpr double kWeightSlack = 1e-6;  // by which weights may miss a sum of 1
 /// A set that detectors have: a word a point, the joint that it stands for; "-": none; "a+b": the middle of two.
 struct KeypointSet {
   std::string_view name, joints;
+  bool has_hands = false;  ///< then the points of the left hand follow, and those of the right one
 };
+
+/// Of a hand, the joint without its side: wrist, thumb, and fingers, from the palm to the tip. The body has the wrist.
+/// [MediaPipe]
+constexpr std::string_view kHandJointWords =
+    "- thumb1 thumb2 thumb3 - index1 index2 index3 - middle1 middle2 middle3 - ring1 ring2 ring3 - "
+    "pinky1 pinky2 pinky3 -";
+
+/// Nose, three points an eye, ears, mouth; then left and right in turn; heels and toes.  [MediaPipe]
+constexpr std::string_view kBlazePoseJoints =
+    "- - left_eye_smplhf - - right_eye_smplhf - - - - - left_shoulder right_shoulder left_elbow right_elbow left_wrist "
+    "right_wrist left_pinky1 right_pinky1 left_index1 right_index1 left_thumb2 right_thumb2 left_hip right_hip "
+    "left_knee right_knee left_ankle right_ankle - - - -";
 
 constexpr std::array kKeypointSets = {
     // nose, eyes, ears, then from the shoulders down  [COCO]
@@ -45,11 +58,7 @@ constexpr std::array kKeypointSets = {
                 "- left_shoulder+right_shoulder right_shoulder right_elbow right_wrist left_shoulder left_elbow "
                 "left_wrist left_hip+right_hip right_hip right_knee right_ankle left_hip left_knee left_ankle "
                 "right_eye_smplhf left_eye_smplhf - - - - - - - -"},
-    // nose, three points an eye, ears, mouth; then left and right in turn; heels and toes  [MediaPipe]
-    KeypointSet{"blazepose33",
-                "- - left_eye_smplhf - - right_eye_smplhf - - - - - left_shoulder right_shoulder left_elbow "
-                "right_elbow left_wrist right_wrist left_pinky1 right_pinky1 left_index1 right_index1 left_thumb2 "
-                "right_thumb2 left_hip right_hip left_knee right_knee left_ankle right_ankle - - - -"},
+    KeypointSet{"blazepose33", kBlazePoseJoints}, KeypointSet{"blazepose33_hands", kBlazePoseJoints, true},
     KeypointSet{"smplx55", ""},  // the joints themselves
 };
 
@@ -65,8 +74,14 @@ std::vector<KeypointJoints> joints_of(const KeypointSet& set) {
   if (set.joints.empty()) {
     for (int joint = 0; joint < kSmplxJoints; ++joint) joints.push_back({{joint, 1.0}});
   }
-  std::istringstream words{std::string(set.joints)};
-  for (std::string word; words >> word;) joints.push_back(joints_named(word));
+  const auto add = [&joints](std::string_view words, const std::string& side) {
+    std::istringstream stream{std::string(words)};
+    for (std::string word; stream >> word;) joints.push_back(joints_named(word == "-" ? word : side + word));
+  };
+  add(set.joints, "");
+  for (const char* side : {"left_", "right_"}) {
+    if (set.has_hands) add(kHandJointWords, side);
+  }
   return joints;
 }
 
@@ -84,8 +99,8 @@ std::vector<KeypointJoints> joints_by_count(std::size_t count, const ConfigValue
   }
   fail_at(value, pointer,
           "has " + std::to_string(count) +
-              " points; known sets have 17 (COCO), 25 (OpenPose), 33 (BlazePose) and 55 "
-              "(SMPL-X); data.keypoint_joints says what those of another stand for");
+              " points; known sets have 17 (COCO), 25 (OpenPose), 33 (BlazePose), 55 "
+              "(SMPL-X) and 75 (BlazePose with hands); data.keypoint_joints says what those of another stand for");
 }
 
 int joint_at(const ConfigValue& value, const std::string& pointer) {

@@ -36,6 +36,32 @@ def path_with(folder, programs):
     return dict(os.environ, PATH=str(folder), CHROMIUM="")
 
 
+def run_node(script):
+    result = subprocess.run(["node", "--input-type=module", "-e", script], capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+# A person of 100 px to a metre, whose left wrist is at (50, 80), the roots of the fingers 8 px to the right of it.
+HANDS = """
+import assert from 'node:assert';
+import { squareOf, handIn } from '%s';
+const left = { wrist: 0, fingers: [1, 2, 3] };
+const places = [[0.5, 0.8, 0.1], [0.58, 0.8, 0.1], [0.58, 0.78, 0.1], [0.58, 0.82, 0.1], [0, 0, 0], [0, 1, 0]];
+const points = places.map(([x, y]) => [100 * x, 100 * y, 0.5]);
+const square = squareOf(left, points, places);
+assert(Math.abs(square.x - 58) < 1e-9 && Math.abs(square.y - 80) < 1e-9 && Math.abs(square.side - 45) < 1e-9);
+const hand = (x, y, score) => ({ score, points: Array(21).fill({ x, y, z: 0 }), places: Array(21).fill({ x, y, z: 0.01 }) });
+const own = [0.5 - 8 / 45, 0.5]; // where BlazePose's wrist is in the square
+const near = handIn(square, [hand(own[0] + 0.2, 0.5, 1), hand(...own, 0.8)], points[0], places[0]);
+assert(near.points.length === 21 && near.places.length === 21);
+assert(Math.abs(near.points[0][0] - 50) < 1e-9 && Math.abs(near.points[0][1] - 80) < 1e-9);
+assert(Math.abs(near.points[20][2] - 0.4) < 1e-9); // score times visibility
+assert.deepStrictEqual(near.places[0], places[0]);
+const far = handIn(square, [hand(own[0] + 0.3, 0.5, 1)], points[0], places[0]);
+assert.deepStrictEqual(far.points[7], [50, 80, 0]);
+assert.strictEqual(far.places.length, 21);
+"""
+
 with tempfile.TemporaryDirectory() as name:
     here = pathlib.Path(name)
     video = here / "video.mp4"
@@ -57,7 +83,18 @@ with tempfile.TemporaryDirectory() as name:
     assert "pose_landmark_heavy.tflite is missing; remove " in said and "--install" in said, said
     (pose / "pose_web.binarypb").write_text("")
     assert "pose_web.binarypb is missing" in run(*frontend, env=whole)
+    (pose / "pose_web.binarypb").write_text("something")
+    hands = here / "packages/node_modules/@mediapipe/hands"
+    hands.mkdir()
+    for file in ["hands.js", "hands.binarypb", "hands_solution_packed_assets.data"]:
+        (hands / file).write_text("something")
+    said = run(*frontend, "--hands", env=whole)
+    assert "hands/hand_landmark_full.tflite is missing; remove " in said and "--install --hands" in said, said
     assert not (here / "found").exists()
+
+    # A hand is that at BlazePose's wrist, in pixels of the frame.
+    if shutil.which("node"):
+        run_node(HANDS % (tools / "services/hands.mjs").as_uri())
 
     assert "allowed: lite, full, heavy" in run(*frontend, "--model", "best")
     assert "there is no such file" in run(tools / "frontend", here / "none.mp4", "--out", here / "x")

@@ -6,6 +6,7 @@ Exit status 77 (skipped) where the packages or Chromium are missing: tools/front
 """
 
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -56,6 +57,23 @@ with tempfile.TemporaryDirectory() as name:
     last = [line for line in lines if line["stage"] == "interaction"][-1]["losses"]["keypoints_2d"]
     print(f"keypoints_2d at the end: {last:.1f} px^2")
     assert last < 8**2, last
+
+    # Hands: the one that is raised is found, at BlazePose's wrist and with its fingers in their order.
+    if (packages / "node_modules/@mediapipe/hands/hands.js").exists():
+        wave = here / "wave"
+        run(program, "synth", tools.parent / "configs/synthetic/alone.json", "--out", wave, "--quiet", "--set",
+            "synthetic.frames=8")
+        said = run(*frontend, "--hands", wave / "video.mp4", "--out", here / "hands")
+        hands = json.loads((here / "hands/keypoints.json").read_text())
+        assert hands["joints"] == "blazepose33_hands", said
+        assert all(len(frame) == 75 for part in ["frames", "landmarks"] for frame in hands[part])
+        seen = [frame for frame in hands["frames"] if frame[33][2] > 0]
+        assert len(seen) >= 4 and f"frontend: the left hand is found in {len(seen)} frames" in said, said
+        for frame in seen:  # the root of the index finger, by both; tips are farther from the wrist
+            assert math.dist(frame[19][:2], frame[33 + 5][:2]) < 20, frame
+            assert math.dist(frame[33][:2], frame[33 + 12][:2]) > math.dist(frame[33][:2], frame[33 + 9][:2]), frame
+    else:
+        print("there is no MediaPipe Hands; tools/frontend --install --hands installs it")
 
     # What telephones and viewers do to a video: two persons, upright, lying with a note that it is to be turned.
     def look(name, words, source="video.mp4"):

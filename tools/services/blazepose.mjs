@@ -1,6 +1,6 @@
 // Finds a person in pictures by BlazePose in headless Chromium: what tools/frontend runs.
 //
-//     node tools/services/blazepose.mjs NODE_MODULES FRAMES MODEL OUT
+//     node tools/services/blazepose.mjs NODE_MODULES FRAMES MODEL OUT [hands]
 //
 // The packages are served to the page by a server of this process on the loopback interface. Chromium draws by its
 // processor. Exits with 1 and a message where the pictures are unusable or show nobody.
@@ -10,8 +10,9 @@ import { createReadStream, existsSync, mkdirSync, readdirSync, writeFileSync } f
 import { createServer } from 'node:http';
 import { createRequire } from 'node:module';
 import { basename, join } from 'node:path';
+import { HandFinder, meanOf } from './hands.mjs';
 
-const [modules, frames, model, out] = process.argv.slice(2);
+const [modules, frames, model, out, hands] = process.argv.slice(2);
 const kComplexity = { lite: 0, full: 1, heavy: 2 };
 const kLimbs = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28]; // shoulders to wrists, hips to ankles
 const kDoubtful = 0.5; // mean visibility of the limbs below which a frame is told
@@ -22,20 +23,21 @@ function fail(message) {
   process.exit(1);
 }
 
+const kPackages = ['pose', 'hands']; // of MediaPipe, each with a page
 const kTypes = { html: 'text/html', js: 'text/javascript', wasm: 'application/wasm', png: 'image/png' };
 
-// What the page may ask for: itself, the package, the frames.
+// What a page may ask for: itself, its package, the frames.
 function fileOf(path) {
   const [, room, name] = decodeURIComponent(path).split('/');
-  if (room === 'pose') return join(modules, '@mediapipe', 'pose', basename(name));
+  if (kPackages.includes(room)) return join(modules, '@mediapipe', room, basename(name));
   return room === 'frames' ? join(frames, basename(name)) : undefined;
 }
 
 async function served() {
   const server = createServer((request, response) => {
     const path = request.url.split('?')[0];
-    if (path === '/') {
-      response.writeHead(200, { 'Content-Type': 'text/html' }).end('<script src="/pose/pose.js"></script>');
+    if (kPackages.includes(path.slice(1))) {
+      response.writeHead(200, { 'Content-Type': 'text/html' }).end(`<script src="${path}${path}.js"></script>`);
       return;
     }
     const file = fileOf(path);
@@ -114,7 +116,6 @@ function jumps(frames) {
 }
 
 const rounded = (number) => Math.round(number * 1000) / 1000;
-const meanOf = (numbers) => numbers.reduce((sum, number) => sum + number, 0) / numbers.length;
 
 function ranges(numbers) {
   const parts = [];
@@ -135,12 +136,18 @@ const browser = await chromium.launch({
   executablePath: process.env.CHROMIUM,
   args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
 });
-try {
+const opened = async (name, title) => {
   const page = await browser.newPage();
-  page.on('pageerror', (error) => fail(`BlazePose: ${error.message}`));
-  await page.goto(url);
+  page.on('pageerror', (error) => fail(`${title}: ${error.message}`));
+  await page.goto(url + name);
+  return page;
+};
+try {
+  const page = await opened('pose', 'BlazePose');
   await page.evaluate(begin, kComplexity[model]).catch((error) => fail(`BlazePose does not begin: ${error.message}`));
-  const masks = new MaskWriter(names), points = [], places = [], empty = [], doubtful = [];
+  const finder = hands && new HandFinder(await opened('hands', 'MediaPipe Hands'));
+  await finder?.begin().catch((error) => fail(`MediaPipe Hands does not begin: ${error.message}`));
+  const masks = new MaskWriter(names), points = [], places = [], empty = [], doubtful = [], handed = [0, 0];
   let size, began = Date.now();
   for (const [index, name] of names.entries()) {
     const found = await page.evaluate(look, name).catch((error) => fail(`${name}: ${error.message}`));
@@ -148,8 +155,16 @@ try {
     if (found.width !== size[0] || found.height !== size[1])
       fail(`${name}: is ${found.width}x${found.height} pixels, the first frame ${size.join('x')}`);
     await masks.write(index, found.width, found.height, Buffer.from(found.mask, 'base64'));
-    points.push((found.points ?? []).map(({ x, y, visibility }) => [rounded(x * size[0]), rounded(y * size[1]), rounded(Math.min(Math.max(visibility, 0), 1))]));
-    places.push((found.places ?? []).map(({ x, y, z }) => [rounded(x), rounded(y), rounded(z)]));
+    const seen = (found.points ?? []).map(({ x, y, visibility }) => [x * size[0], y * size[1], Math.min(Math.max(visibility, 0), 1)]);
+    const spots = (found.places ?? []).map(({ x, y, z }) => [x, y, z]);
+    const both = finder && found.points ? await finder.find(name, seen, spots).catch((error) => fail(`${name}: ${error.message}`)) : [];
+    for (const [side, hand] of both.entries()) {
+      seen.push(...hand.points);
+      spots.push(...hand.places);
+      if (hand.points[0][2] > 0) handed[side] += 1;
+    }
+    points.push(seen.map((point) => point.map(rounded)));
+    places.push(spots.map((place) => place.map(rounded)));
     if (!found.points) empty.push(index);
     else if (meanOf(kLimbs.map((i) => found.points[i].visibility)) < kDoubtful) doubtful.push(index);
     process.stderr.write(`\rframe ${index + 1} of ${names.length}, ${((Date.now() - began) / 1000 / (index + 1)).toFixed(1)} s each `);
@@ -158,10 +173,11 @@ try {
   if (empty.length === names.length) fail('nobody is found in any frame');
   if (empty.length > 0) console.error(`frontend: nobody is found in frames ${ranges(empty)}; their masks are black`);
   if (doubtful.length > 0) console.error(`frontend: less than half of the limbs is seen in frames ${ranges(doubtful)}`);
+  if (finder) console.error(`frontend: the left hand is found in ${handed[0]} frames, the right one in ${handed[1]}, of ${names.length}`);
   const jumping = jumps(points);
   if (jumping.length > 0)
     console.error(`frontend: the person is suddenly elsewhere in frames ${ranges(jumping)}: somebody else, or a cut?`);
-  const file = { format: 'hsi4d keypoints', version: 1, joints: 'blazepose33', size, frames: points, landmarks: places };
+  const file = { format: 'hsi4d keypoints', version: 1, joints: finder ? 'blazepose33_hands' : 'blazepose33', size, frames: points, landmarks: places };
   writeFileSync(join(out, 'keypoints.json'), `${JSON.stringify(file)}\n`);
 } finally {
   await browser.close();

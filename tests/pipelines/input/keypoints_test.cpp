@@ -2,12 +2,14 @@
 #include "pipelines/input/keypoints.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
 #include "body/body_model.h"
+#include "body/pose_layout.h"
 #include "core/check.h"
 #include "core/image_io.h"
 #include "core/log.h"
@@ -171,7 +173,8 @@ TEST_CASE("OpenPose's folder has a file a frame") {
 
 TEST_CASE("every known set has a joint for its limbs, left on the left") {
   const Workshop workshop;
-  for (const auto& [name, count] : {std::pair{"coco17", 17}, {"body25", 25}, {"blazepose33", 33}, {"smplx55", 55}}) {
+  for (const auto& [name, count] :
+       {std::pair{"coco17", 17}, {"body25", 25}, {"blazepose33", 33}, {"blazepose33_hands", 75}, {"smplx55", 55}}) {
     INFO(name);
     Json frame = Json::array();
     for (int i = 0; i < count; ++i) frame.push_back({i, 0, 1});
@@ -184,6 +187,33 @@ TEST_CASE("every known set has a joint for its limbs, left on the left") {
       CHECK(std::count(found.joints.begin(), found.joints.end(), wanted) == 1);
     }
   }
+}
+
+TEST_CASE("BlazePose with hands has the joints of each finger behind those of the body") {
+  const Workshop workshop;
+  Json frame = Json::array();
+  for (int i = 0; i < 75; ++i) frame.push_back({i, 0, 1});
+  write("k.json", own("blazepose33_hands", {frame, frame, frame}));
+  const Keypoints found = Workshop::read("k.json");
+  const auto point_of = [&found](const char* joint, int nth) {  // of those of the joint
+    const KeypointJoints wanted = {{smplx_joint(joint), 1.0}};
+    for (std::size_t k = 0; k < found.joints.size(); ++k) {
+      if (found.joints[k] == wanted && nth-- == 0) return static_cast<int>(std::lround(found.frames[0][k].x * kWidth));
+    }
+    return -1;
+  };
+  CHECK(point_of("left_thumb1", 0) == 33 + 1);
+  CHECK(point_of("left_index3", 0) == 33 + 7);
+  CHECK(point_of("left_middle1", 0) == 33 + 9);
+  CHECK(point_of("left_ring2", 0) == 33 + 14);
+  CHECK(point_of("right_thumb3", 0) == 54 + 3);
+  CHECK(point_of("right_pinky3", 0) == 54 + 19);
+  CHECK(point_of("right_pinky1", 0) == 18);  // BlazePose's own
+  CHECK(point_of("right_pinky1", 1) == 54 + 17);
+  CHECK(point_of("left_wrist", 0) == 15);
+  CHECK(point_of("left_wrist", 1) == -1);  // the hand's counts no second time
+  for (int joint = smplx_joint("left_index1"); joint < kSmplxJoints; ++joint)
+    CHECK(point_of(smplx_joint_names()[static_cast<std::size_t>(joint)].c_str(), 0) >= 0);
 }
 
 TEST_CASE("of several persons the surest one is followed, which is told") {
