@@ -53,12 +53,12 @@ void warn_of_rest(const Motion& motion, const fs::path& file, const FrameSource&
 }
 
 /// Tells of poses that are taken one a frame although their rate says otherwise.
-void warn_of_rate(const Motion& motion, const fs::path& file, const FrameSource& frames) {
+/// @param rate  of the frames that there are as many of
+void warn_of_rate(const Motion& motion, const fs::path& file, double rate) {
   constexpr double kAlike = 0.01;
-  const double rate = frames.video_rate();
   if (!motion.says_frame_rate || rate <= 0 || std::abs(motion.frame_rate - rate) <= kAlike * rate) return;
   log_warning(file.string() + ": its poses, " + rounded(motion.frame_rate, 4) +
-              " a second as it says, are taken one a frame of the video, which has " + rounded(rate, 4) +
+              " a second as it says, are taken one a frame, of which there are " + rounded(rate, 4) +
               " a second, as they are as many");
 }
 
@@ -101,9 +101,10 @@ Motion from_first_frame(const Motion& motion, const fs::path& file) {
 std::vector<BodyPose> poses_of_frames(const Motion& read, const fs::path& file, const FrameSource& frames,
                                       const char* or_else) {
   const double count = read.first_frame + static_cast<double>(read.poses.size());
-  const bool is_by_frame =
-      count == static_cast<double>(frames.count()) || count == static_cast<double>(frames.video_count());
-  is_by_frame ? warn_of_rate(read, file, frames) : check_begin(read, file, frames);
+  const bool is_of_clip = count == static_cast<double>(frames.count());
+  const bool is_by_frame = is_of_clip || count == static_cast<double>(frames.video_count());
+  is_by_frame ? warn_of_rate(read, file, is_of_clip ? frames.frame_rate() : frames.video_rate())
+              : check_begin(read, file, frames);
   const Motion motion = from_first_frame(read, file);
   if (is_by_frame || !covers(motion, frames)) {
     if (motion.first_frame != 0)

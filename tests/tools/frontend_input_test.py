@@ -97,6 +97,7 @@ with tempfile.TemporaryDirectory() as name:
         run_node(HANDS % (tools / "services/hands.mjs").as_uri())
 
     assert "allowed: lite, full, heavy" in run(*frontend, "--model", "best")
+    assert "allowed: X0,Y0,X1,Y1, whole pixels of the first frame" in run(*frontend, "--person", "1,2,3")
     assert "there is no such file" in run(tools / "frontend", here / "none.mp4", "--out", here / "x")
     from_video = [tools / "from_video", video, "--out", here / "x"]
     assert "allowed: learnt, kept" in run(*from_video, "--look", "found")

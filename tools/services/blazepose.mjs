@@ -1,7 +1,8 @@
 // Finds a person in pictures by BlazePose in headless Chromium: what tools/frontend runs.
 //
-//     node tools/services/blazepose.mjs NODE_MODULES FRAMES MODEL OUT [hands]
+//     node tools/services/blazepose.mjs NODE_MODULES FRAMES MODEL OUT [X0,Y0,X1,Y1 [hands]]
 //
+// The box, pixels of the first picture, says which person is followed.
 // The packages are served to the page by a server of this process on the loopback interface. Chromium draws by its
 // processor. Exits with 1 and a message where the pictures are unusable or show nobody.
 import { spawn } from 'node:child_process';
@@ -12,7 +13,7 @@ import { createRequire } from 'node:module';
 import { basename, join } from 'node:path';
 import { HandFinder, meanOf } from './hands.mjs';
 
-const [modules, frames, model, out, hands] = process.argv.slice(2);
+const [modules, frames, model, out, person, hands] = process.argv.slice(2);
 const kComplexity = { lite: 0, full: 1, heavy: 2 };
 const kLimbs = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28]; // shoulders to wrists, hips to ankles
 const kDoubtful = 0.5; // mean visibility of the limbs below which a frame is told
@@ -60,6 +61,23 @@ async function begin(complexity) {
   pose.onResults((results) => { window.found = results; });
   await pose.initialize();
   window.pose = pose;
+}
+
+// In the page: shows BlazePose the first picture with nothing but what is in the box. It looks for a person only where
+// it has lost one, else it goes on where that one was. Returns whether there is one, and the picture's size.
+async function lookIntoBox({ name, box: [left, top, right, bottom] }) {
+  const picture = new Image();
+  picture.src = `/frames/${encodeURIComponent(name)}`;
+  await picture.decode();
+  const canvas = document.createElement('canvas'), context = canvas.getContext('2d');
+  [canvas.width, canvas.height] = [picture.width, picture.height];
+  context.fillStyle = 'grey';
+  context.fillRect(0, 0, picture.width, picture.height);
+  const place = [left, top, right - left, bottom - top];
+  context.drawImage(picture, ...place, ...place);
+  window.found = undefined;
+  await window.pose.send({ image: canvas });
+  return { isFound: !!window.found?.poseLandmarks, width: picture.width, height: picture.height };
 }
 
 // In the page: the points of a picture, and its mask as letters of base64, a byte a pixel.
@@ -115,6 +133,14 @@ function jumps(frames) {
   return found;
 }
 
+async function beginWith(page, name) {
+  const box = person.split(',').map(Number), [left, top, right, bottom] = box;
+  const seen = await page.evaluate(lookIntoBox, { name, box }).catch((error) => fail(`${name}: ${error.message}`));
+  if (!(left < right && top < bottom && right <= seen.width && bottom <= seen.height))
+    fail(`--person ${person}: is no box in ${name}; allowed: X0 < X1 up to ${seen.width}, Y0 < Y1 up to ${seen.height}`);
+  if (!seen.isFound) fail(`--person ${person}: nobody is found in that box of ${name}`);
+}
+
 const rounded = (number) => Math.round(number * 1000) / 1000;
 
 function ranges(numbers) {
@@ -147,6 +173,7 @@ try {
   await page.evaluate(begin, kComplexity[model]).catch((error) => fail(`BlazePose does not begin: ${error.message}`));
   const finder = hands && new HandFinder(await opened('hands', 'MediaPipe Hands'));
   await finder?.begin().catch((error) => fail(`MediaPipe Hands does not begin: ${error.message}`));
+  if (person) await beginWith(page, names[0]);
   const masks = new MaskWriter(names), points = [], places = [], empty = [], doubtful = [], handed = [0, 0];
   let size, began = Date.now();
   for (const [index, name] of names.entries()) {

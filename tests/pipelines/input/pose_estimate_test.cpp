@@ -107,12 +107,29 @@ TEST_CASE("as many poses as frames are taken one a frame, and another rate is to
   const std::vector<double> all = {0, 1, 2, 3, 4, 5};
   CHECK(places(estimated_poses(motion, "m.npz", here.frames)) == all);
   CHECK(here.told == std::vector<std::string>{
-                         "m.npz: its poses, 30 a second as it says, are taken one a frame of the video, which has 10 a "
+                         "m.npz: its poses, 30 a second as it says, are taken one a frame, of which there are 10 a "
                          "second, as they are as many"});
   here.told.clear();
   motion.says_frame_rate = false;
   CHECK(places(estimated_poses(motion, "m.npz", here.frames)) == all);
   CHECK(here.told.empty());
+}
+
+TEST_CASE("as many poses as kept frames have the rate of these") {
+  Here here;
+  const FrameSource kept("frames", {.video = 10, .kept = 5});
+  Motion motion = walk(0, 3);
+  motion.frame_rate = 5;
+  CHECK(places(estimated_poses(motion, "m.npz", kept)) == std::vector<double>{0, 1, 2});
+  CHECK(here.told.empty());
+  motion.frame_rate = 10;
+  CHECK(places(estimated_poses(motion, "m.npz", kept)) == std::vector<double>{0, 1, 2});
+  CHECK(here.told == std::vector<std::string>{
+                         "m.npz: its poses, 10 a second as it says, are taken one a frame, of which there are 5 a "
+                         "second, as they are as many"});
+  motion = walk(0, 6);
+  CHECK(places(estimated_poses(motion, "m.npz", kept)) == std::vector<double>{0, 2, 4});
+  CHECK(here.told.size() == 1);
 }
 
 TEST_CASE("which way is up in an estimate the human of frame 0 tells") {
