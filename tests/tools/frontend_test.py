@@ -76,10 +76,10 @@ with tempfile.TemporaryDirectory() as name:
         print("there is no MediaPipe Hands; tools/frontend --install --hands installs it")
 
     # What telephones and viewers do to a video: two persons, upright, lying with a note that it is to be turned.
-    def look(name, words, source="video.mp4"):
+    def look(name, words, source="video.mp4", options=()):
         made = here / f"{name}.mp4"
         run("ffmpeg", "-v", "error", "-i", clip / source if isinstance(source, str) else source, *words, made)
-        said = run(*frontend, made, "--out", here / name)
+        said = run(*frontend, made, *options, "--out", here / name)
         return made, said, json.loads((here / name / "keypoints.json").read_text())
 
     def hips(found):
@@ -89,6 +89,13 @@ with tempfile.TemporaryDirectory() as name:
     assert two["size"] == [1024, 512] and all(two["frames"]), said
     sides = {x < 0.5 for x in hips(two)}
     assert len(sides) == 1 or "suddenly elsewhere" in said, (hips(two), said)  # one person is followed
+    for side, left in enumerate([0, 512]):  # the one in the box
+        box = f"{left},0,{left + 512},512"
+        _, said, chosen = look(f"side_{side}", ["-c", "copy"], here / "two.mp4", ["--person", box])
+        assert all((x > 0.5) == side for x in hips(chosen)), (side, hips(chosen), said)
+    refused = [*frontend, here / "two.mp4", "--out", here / "x", "--person"]
+    assert "nobody is found in that box of 0000.png" in run(*refused, "0,0,40,40", status=1)
+    assert "X0 < X1 up to 1024, Y0 < Y1 up to 512" in run(*refused, "0,0,1025,512", status=1)
     upright, said, portrait = look("portrait", ["-vf", "crop=300:512"])
     assert portrait["size"] == [300, 512] and all(portrait["frames"]), said
     lying, _, _ = look("lying", ["-vf", "transpose=clock"], upright)
