@@ -60,12 +60,12 @@ void forget_generated_folder(ConfigValue& data) {
   }
 }
 
-/// The config of a run without what may differ between repetitions: its name, its seeds, its threads.
+/// The config of a run without what may differ between repetitions: its name, its seeds, its threads, its log.
 std::optional<std::string> config_without_seed(const std::string& run) {
   const std::string file = RunPaths{run}.config();
   if (!is_run_folder(run) || !std::filesystem::exists(file)) return std::nullopt;
   ConfigValue tree = parse_json_text(read_text_file(file), file);
-  for (const char* const key : {"name", "seed", "threads"}) remove_member(tree, key);
+  for (const char* const key : {"name", "seed", "threads", "log"}) remove_member(tree, key);
   for (ConfigMember& member : tree.members) {
     if (member.key == "synthetic") remove_member(member.value, "seed");
     if (member.key == "data") forget_generated_folder(member.value);

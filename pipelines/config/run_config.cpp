@@ -99,6 +99,7 @@ void describe(ConfigFields& f, RunConfig& s, const std::vector<LossDescription>&
   });
   f.object("skip", s.skip, "What is not computed because the result does not need it; for measuring what that saves");
   f.object("approx", s.approx, "What may be computed nearly, and faster");
+  f.object("log", s.log, "What is noted for other programs; results do not depend on it");
   f.map("stages", s.stages,
         "The stages of the run by name, in the order in which they run; those over the first frame run first",
         [losses](ConfigFields& inner, StageSettings& stage) { describe(inner, stage, losses); });
@@ -161,7 +162,7 @@ void drop_files(ConfigValue& data) {
 ConfigValue without_data(ConfigValue tree) {
   const bool selects = selects_camera(tree);
   std::erase_if(tree.members, [selects](const ConfigMember& member) {
-    return member.key == "synthetic" || member.key == "instance" || member.key == "threads" ||
+    return member.key == "synthetic" || member.key == "instance" || member.key == "threads" || member.key == "log" ||
            (member.key == "camera_selection" && !selects) || (member.key == "chain" && member.value.items.empty());
   });
   for (ConfigMember& member : tree.members) {

@@ -16,6 +16,7 @@
 #include "pipelines/config/color_net_settings.h"
 #include "pipelines/config/data_settings.h"
 #include "pipelines/config/instance_settings.h"
+#include "pipelines/config/log_settings.h"
 #include "pipelines/config/masks.h"
 #include "pipelines/config/source_settings.h"
 #include "pipelines/config/start_settings.h"
@@ -90,6 +91,7 @@ struct RunConfig {
   bool estimate_blur = false;      ///< render.blur is what frame 0 says, found as the run begins
   SkipSettings skip;
   ApproxSettings approx;
+  LogSettings log;
   ConfigMap<StageSettings> stages;  ///< in the order written
 };
 
@@ -125,7 +127,7 @@ std::string resolved_config(const RunConfig& config, const std::vector<LossDescr
 LossesOverMasks losses_over_masks(const RunConfig& config);
 
 /// A tree of a config without what another dataset or machine would change: the files of data, chain and body,
-/// synthetic, threads. Two runs of the same data with equal trees have the same result.
+/// synthetic, threads, log. Two runs of the same data with equal trees have the same result.
 ConfigValue without_data(ConfigValue tree);
 
 /// The config as such a tree.

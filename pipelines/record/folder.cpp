@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <fcntl.h>
-#include <unistd.h>
 
+#include "core/appended_file.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/disk.h"
@@ -15,7 +13,6 @@
 #include "core/file_lock.h"
 #include "core/host.h"
 #include "core/json_text.h"
-#include "core/system_message.h"
 #include "core/text.h"
 #include "core/version.h"
 #include "pipelines/config/run_config.h"
@@ -238,29 +235,6 @@ struct RunFolder::Lock {
   FileLock lock;
 };
 
-/// metrics.jsonl, open for appending.
-struct RunFolder::Appender {
-  explicit Appender(std::string file)
-      : path(std::move(file)), descriptor(::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666)) {
-    if (descriptor < 0) throw UserError(path + ": cannot be written: " + system_message(errno));
-  }
-  ~Appender() { ::close(descriptor); }
-  Appender(const Appender&) = delete;
-  Appender& operator=(const Appender&) = delete;
-
-  void append(std::string_view text) const {
-    while (!text.empty()) {
-      const ssize_t done = ::write(descriptor, text.data(), text.size());
-      if (done < 0 && errno == EINTR) continue;
-      if (done < 0) throw UserError(path + ": cannot be written: " + system_message(errno));
-      text.remove_prefix(static_cast<size_t>(done));
-    }
-  }
-
-  std::string path;
-  int descriptor;
-};
-
 namespace {
 
 /// What a folder holds, as far as a new run is concerned.
@@ -339,7 +313,7 @@ RunFolder::RunFolder(const std::string& path, RunIdentity identity, bool resume)
   }
   if (!identity_.is_chain) {
     for (const std::string& folder : {paths_.frames(), paths_.checkpoint()}) make_folder(folder);
-    metrics_ = std::make_unique<Appender>(paths_.metrics());
+    metrics_ = std::make_unique<AppendedFile>(paths_.metrics());
   }
   remove_all_temporaries(paths_);
   log_.emplace(log_to_file(paths_.log()));
@@ -392,7 +366,7 @@ void RunFolder::truncate_metrics_after(int frame) {
   if (kept.size() == text.size()) return;
   metrics_.reset();
   write_text_file(paths_.metrics(), kept);
-  metrics_ = std::make_unique<Appender>(paths_.metrics());
+  metrics_ = std::make_unique<AppendedFile>(paths_.metrics());
 }
 
 void RunFolder::write_summary(const RunSummary& summary) { write_text_file(paths_.summary(), summary_json(summary)); }

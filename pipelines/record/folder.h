@@ -11,12 +11,15 @@
 #include <utility>
 #include <vector>
 
+#include "core/config_value.h"
 #include "core/log.h"
 #include "core/types.h"
 #include "optim/gradient_shares.h"
 #include "pipelines/record/summary.h"
 
 namespace hsi4d {
+
+class AppendedFile;
 
 /// How a run stands, the `state` of status.json. A run that was killed still says "running".
 enum class RunState { kRunning, kDone, kFailed, kInterrupted };
@@ -31,6 +34,7 @@ struct RunIdentity {
   int threads = 0;
   std::string precision = "float";
   bool is_chain = false;  ///< of clips with folders of their own: without frames, checkpoint and metrics.jsonl
+  ConfigValue sweep_axes = ConfigValue::make_object();  ///< what tells it from other runs of its sweep, by name
 };
 
 /// One iteration, a line of metrics.jsonl.
@@ -65,6 +69,7 @@ struct RunPaths {
   std::string cameras() const { return member("cameras.json"); }
   std::string color_net() const { return member("color_net.safetensors"); }
   std::string report() const { return member("report.html"); }
+  std::string tensorboard() const { return member("tensorboard"); }
   std::string frames() const { return member("frames"); }
   std::string checkpoint() const { return member("checkpoint"); }
   std::string lock() const { return member(".lock"); }
@@ -91,14 +96,18 @@ class RunFolder {
   /// @param path    UTF-8; made with its parents
   /// @param resume  go on with the run that is there. Where there is none (no folder, or an empty one) it starts anew.
   /// Throws UserError naming the folder: another process writes to it; it holds a run and `resume` is false; it holds
-  /// something else; the config of the run in it differs in more than threads and places of files (the settings that do
-  /// are told); it cannot be written.
+  /// something else; the config of the run in it differs in more than threads, log and places of files (the settings
+  /// that do are told); it cannot be written.
   RunFolder(const std::string& path, RunIdentity identity, bool resume);
   ~RunFolder();
   RunFolder(const RunFolder&) = delete;
   RunFolder& operator=(const RunFolder&) = delete;
 
   const RunPaths& paths() const { return paths_; }
+  const RunIdentity& identity() const { return identity_; }
+
+  /// When the run began, the one that is resumed: as utc_now_text tells it.
+  const std::string& started() const { return started_; }
 
   /// Replaces the config.resolved.json of a run that is resumed by that of now: its data may have been moved since.
   void take_over_config();
@@ -127,7 +136,6 @@ class RunFolder {
 
  private:
   struct Lock;
-  struct Appender;
 
   void write_status();
 
@@ -137,7 +145,7 @@ class RunFolder {
   std::optional<RunState> resumed_from_;
   RunState state_ = RunState::kRunning;
   std::string started_, resumed_, message_;
-  std::unique_ptr<Appender> metrics_;
+  std::unique_ptr<AppendedFile> metrics_;
   std::optional<LogSink> log_;
 };
 

@@ -22,6 +22,7 @@
 #include "pipelines/input/input_hashes.h"
 #include "pipelines/metrics/sequence_errors.h"
 #include "pipelines/record/results.h"
+#include "pipelines/record/run_events.h"
 #include "pipelines/report/view3d.h"
 #include "pipelines/run/checkpoint.h"
 #include "pipelines/run/depth_bias.h"
@@ -121,6 +122,7 @@ class Reconstruction {
     RunSummary summary = summarize_run(config_, clip_, progress_, refinement_);
     add_gradient_shares(config_, folder_.paths().metrics(), summary);
     folder_.write_summary(summary);
+    if (events_) events_->add_result(summary);
     const std::optional<BodyModel> body =
         write_body(folder_.paths(), found_body(), clip_.avatar, motion_of(clip_, result()));
     view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
@@ -177,7 +179,16 @@ class Reconstruction {
       folder_.note("resumed with frame " + std::to_string(progress_.frames_done()) + " of " +
                    std::to_string(clip_.frames() - 1));
     folder_.truncate_metrics_after(static_cast<int>(progress_.frames_done()) - 1);
+    begin_events();
     bar_.skip(steps_before(progress_.frames_done()));
+  }
+
+  /// Shows the frames that are done, and from then on what comes.
+  void begin_events() {
+    if (!config_.log.tensorboard) return remove_run_events(folder_.paths());
+    const bool are_drawn_again = config_.remove_depth_bias || sequence_stage() < config_.stages.size();
+    events_.emplace(folder_, ShownImages{config_.log.images_every, are_drawn_again}, first_worked_on(),
+                    progress_.frames_done());
   }
 
   /// The stages over frame 0, from the given state on. What they find stands in its place from then on.
@@ -291,6 +302,7 @@ class Reconstruction {
     for (std::size_t s = 0; s < after.size(); ++s) progress_.after_stage[s].push_back(after[s]);
     progress_.seconds += seconds_since(begin);
     save_progress(checkpoint_file(folder_.paths()), identity_, progress_);
+    if (events_) events_->end_frame(index);
   }
 
   /// Takes what a fit of frame 0 does to the given distances from all later frames. The checkpoint keeps these as they
@@ -326,6 +338,7 @@ class Reconstruction {
       stop_if_asked(clip_.frames());
       const ClipFrame frame = read_frame(clip_, t);
       write_result(t, frame, result()[static_cast<std::size_t>(t)], colors_after(t), errors);
+      if (events_) events_->add_images(t);
     }
   }
 
@@ -439,6 +452,7 @@ class Reconstruction {
                                       {"adjoint_numbers", report.tape.adjoint_numbers}})
       record.counters.emplace_back(name, static_cast<double>(count));
     folder_.append_metrics(record);
+    if (events_) events_->add(record);
     show(report);
     stop_if_asked(frame.value_or(clip_.frames()));
   }
@@ -506,6 +520,7 @@ class Reconstruction {
   const RunConfig& config_;
   const std::vector<LossTerm>& losses_;
   RunFolder& folder_;
+  std::optional<RunEvents> events_;
   const Observer& observer_;
   std::string identity_;  // the text that a checkpoint of this run belongs to
   Clip& clip_;

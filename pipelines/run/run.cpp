@@ -236,6 +236,7 @@ RunSummary execute_run(const RunConfig& asked, const std::vector<LossTerm>& loss
   });
   identity.seed = config.seed;
   identity.threads = threads > 0 ? threads : thread_count();
+  identity.sweep_axes = options.sweep_axes;
   identity.precision = choice_name<RunPrecision>(kRunPrecisions, config.precision);
   RunFolder folder(options.folder, identity, options.resume);
   folder.note(opening(config, clip, identity));

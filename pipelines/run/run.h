@@ -13,6 +13,7 @@ struct RunOptions {
   std::string folder;   ///< UTF-8
   bool resume = false;  ///< go on with the run that is in the folder; starts anew where there is none
   int threads = 0;      ///< 0: what the config says
+  ConfigValue sweep_axes = ConfigValue::make_object();  ///< as RunIdentity has them
   Observer observer;
 };
 

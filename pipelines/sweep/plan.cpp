@@ -238,8 +238,8 @@ std::string recipe_of(const Combination& c) {
 ConfigValue identity_of(ConfigValue tree, bool is_made) {
   const bool selects = selects_camera(tree);
   std::erase_if(tree.members, [&](const ConfigMember& member) {
-    return member.key == "name" || member.key == "threads" || (member.key == "camera_selection" && !selects) ||
-           (member.key == "synthetic" && !is_made);
+    return member.key == "name" || member.key == "threads" || member.key == "log" ||
+           (member.key == "camera_selection" && !selects) || (member.key == "synthetic" && !is_made);
   });
   return tree;
 }

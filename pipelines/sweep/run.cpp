@@ -114,10 +114,21 @@ void keep_name(const RunPaths& paths, RunConfig& config) {
   }
 }
 
+/// What tells a run from others of its sweep, by name.
+ConfigValue axes_of(const SweepRun& run) {
+  ConfigValue axes = ConfigValue::make_object();
+  for (const auto& [name, text] :
+       {std::pair{"block", &run.block}, {"clip", &run.clip}, {"ablation", &run.ablation}, {"seed", &run.seed}}) {
+    if (!text->empty()) axes.add(name, ConfigValue::make_string(*text));
+  }
+  for (const auto& [key, value] : run.values) axes.add(key, parse_json_text(value, key));
+  return axes;
+}
+
 RunSummary compute(const SweepPaths& paths, const SweepRun& run, const std::vector<LossTerm>& losses, int threads,
                    const Observer& observer) {
   RunConfig config = config_of(paths, run, losses);
-  RunOptions options{paths.run(run.id), true, threads, observer};
+  RunOptions options{paths.run(run.id), true, threads, axes_of(run), observer};
   keep_name({options.folder}, config);
   if (!run.dataset.empty()) {
     const fs::path dataset = paths.dataset(run.dataset);

@@ -39,7 +39,7 @@ const std::string kSections =
     "color_net, "
     "synthetic, render, "
     "skip, "
-    "approx, stages";
+    "approx, log, stages";
 
 // A config with one stage, `inside` its braces.
 std::string stage(const std::string& inside) { return "{\"stages\": {\"camera\": {\n" + inside + "}}}"; }

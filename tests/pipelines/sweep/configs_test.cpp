@@ -26,7 +26,8 @@ fs::path shipped(const std::string& name) { return fs::path(HSI4D_SOURCE_DIR) / 
 /// one that is not named does.
 nlohmann::json method_of(const std::string& resolved) {
   nlohmann::json config = nlohmann::json::parse(resolved);
-  for (const char* section : {"name", "seed", "threads", "data", "chain", "sources", "body", "synthetic", "instance"})
+  for (const char* section :
+       {"name", "seed", "threads", "log", "data", "chain", "sources", "body", "synthetic", "instance"})
     config.erase(section);
   for (auto& stage : config["stages"]) {
     nlohmann::json moving = nlohmann::json::object();

@@ -119,6 +119,7 @@ TEST_CASE("a run is told by what changes its result") {
   const auto id = [](const Json& set) { return plan_of({{"set", set}}).runs[0].id; };
   const std::string plain = id(Json::object());
   CHECK(id({{"threads", 3}}) == plain);
+  CHECK(id({{"log.tensorboard", true}}) == plain);
   CHECK(id({{"name", "other"}}) == plain);
   CHECK(id({{"stages.camera.iterations", 8}}) == plain);
   CHECK(id({{"stages.camera.iterations", 9}}) != plain);

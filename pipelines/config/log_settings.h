@@ -1,0 +1,17 @@
+// Config section `log`: what a run notes beside its results for other programs.
+#pragma once
+
+#include "core/config.h"
+
+namespace hsi4d {
+
+/// Config section `log`. No result depends on it, so that a run is resumed with another one too.
+struct LogSettings {
+  bool tensorboard = false;  ///< see pipelines/record/run_events.h
+  int images_every = 0;      ///< frames; 0: no images
+};
+
+/// Describes the section: every setting with its range.
+void describe(ConfigFields& fields, LogSettings& settings);
+
+}  // namespace hsi4d
