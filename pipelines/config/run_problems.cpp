@@ -357,6 +357,26 @@ void add_keypoint_notes(const RunConfig& config, std::vector<RunNote>& notes) {
   }
 }
 
+/// Losses without their files, and files without a loss that reads them.
+void add_file_notes(const RunConfig& config, std::vector<RunNote>& notes) {
+  if (!config.chain.empty()) return;
+  const auto warn = [&notes](const std::string& text) { notes.push_back({LogLevel::kWarning, text}); };
+  const auto look = [&](const char* loss, LossInput input, const char* key, const std::filesystem::path& file) {
+    bool is_read = false;
+    for (const auto& [name, stage] : config.stages) {
+      for (const auto& [term, settings] : stage.losses) {
+        if (!needs_input(settings, input)) continue;
+        is_read = true;
+        if (file.empty()) warn("stages." + name + ": without " + key + " its loss " + term + " is off");
+      }
+    }
+    if (!file.empty() && !is_read)
+      warn(std::string(key) + " does nothing: no stage has the loss " + loss + ", with a weight above 0");
+  };
+  look("depth_map", LossInput::kDepthMap, "data.depth_maps", config.data.depth_maps);
+  look("tracks", LossInput::kTracks, "data.tracks", config.data.tracks);
+}
+
 /// Whether `problem` may be one only because of another, at the pointer `other`.
 bool may_follow(const RunProblem& problem, const std::string& other) {
   for (const std::string& need : problem.needs) {
@@ -475,6 +495,7 @@ void add_run_problems(const ConfigValue& tree, RunConfig& config, ConfigUse use,
 std::vector<RunNote> run_notes(const RunConfig& config) {
   std::vector<RunNote> notes = optimizer_notes(config);
   add_keypoint_notes(config, notes);
+  add_file_notes(config, notes);
   add_hint_notes(config, notes);
   if (config.log.images_every > 0 && !config.log.tensorboard)
     notes.push_back({LogLevel::kWarning, "log.images_every does nothing without log.tensorboard"});

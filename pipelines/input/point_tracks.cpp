@@ -32,6 +32,20 @@ std::vector<double> visible_in(const Npz& file, std::int64_t frames, std::int64_
   return visible;
 }
 
+/// Tracks of pictures of another size lie outside of the video's.
+void check_some_inside(const PointTracks& tracks, const std::string& name, const Vector2<double>& size) {
+  bool is_seen = false;
+  for (const std::vector<TrackPlace>& frame : tracks.frames) {
+    for (const TrackPlace& place : frame) {
+      if (place.visible > 0 && place.x >= 0 && place.x < 1 && place.y >= 0 && place.y < 1) return;
+      is_seen = is_seen || place.visible > 0;
+    }
+  }
+  if (!is_seen) return;
+  throw DataError(name + ": no point that is seen lies in the pictures of " + number_text(size[0]) + "x" +
+                  number_text(size[1]) + " pixels; are they of pictures of another size? The array \"size\" says it");
+}
+
 }  // namespace
 
 Index PointTracks::begin(Index track) const {
@@ -71,6 +85,7 @@ PointTracks read_point_tracks(const DataSettings& data, const FrameSource& frame
                     " pixels, the video's frames are of " + number_text(video[0]) + "x" + number_text(video[1]) +
                     "; allowed: pictures of their shape, or 1x1 for shares of the image");
   PointTracks tracks = decode_point_tracks(file, video);
+  check_some_inside(tracks, name, size);
   tracks.frames = kept_frames(std::move(tracks.frames), frames, name, "frames of tracks");
   return tracks;
 }

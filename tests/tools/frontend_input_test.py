@@ -100,6 +100,12 @@ with tempfile.TemporaryDirectory() as name:
     assert "allowed: X0,Y0,X1,Y1, whole pixels of the first frame" in run(*frontend, "--person", "1,2,3")
     assert "there is no such file" in run(tools / "frontend", here / "none.mp4", "--out", here / "x")
     from_video = [tools / "from_video", video, "--out", here / "x"]
+    assert "--fov needs --scene" in run(*from_video, "--fov", "60")
+    assert "there is no option --gues" in run(*from_video, "--gues", "60")
+    in_scene = [*from_video, "--scene", video]
+    assert "where is the camera of frame 0 in it?" in run(*in_scene)
+    assert "both say where the camera is" in run(*in_scene, "--guess", video, "--camera", video)
+    assert "none.json: there is no such file" in run(*in_scene, "--guess", here / "none.json")
     assert "allowed: learnt, kept" in run(*from_video, "--look", "found")
     assert "tools/frontend makes them" in run(*from_video, "--masks", here)
     assert "there is no such file" in run(tools / "from_video", here / "none.mp4", "--out", here / "x")

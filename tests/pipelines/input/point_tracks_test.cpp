@@ -99,6 +99,11 @@ TEST_CASE("what is no file of tracks is refused by name") {
   workshop.size = {40, 0};
   CHECK_THAT(workshop.fault(), Contains("array 'size': a side of 0; allowed: above 0"));
   workshop.size.clear();
+  const std::vector<double> within = workshop.points;
+  for (double& x : workshop.points) x += 100;
+  CHECK_THAT(workshop.fault(), Contains("tracks.npz: no point that is seen lies in the pictures of 40x20 pixels; are "
+                                        "they of pictures of another size? The array \"size\" says it"));
+  workshop.points = within;
   const std::vector<double> points = std::exchange(workshop.points, {});
   CHECK_THAT(workshop.fault(), Contains("array 'points': holds 0 tracks in 3 frames; allowed: at least one"));
   workshop.points = points;
