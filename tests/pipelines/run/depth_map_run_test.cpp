@@ -119,8 +119,8 @@ TEST_CASE("without depth maps the term is off, which is told", "[run]") {
   CHECK_THAT(result.err, Contains("stages.interaction: without data.depth_maps its loss depth_map is off"));
   write_changed(dataset.path / "config.json", dataset.path / "unread.json",
                 [](auto& c) { c["data"]["depth_maps"] = "frames"; });
-  CHECK_THAT(run_hsi4d({"run", (dataset.path / "unread.json").string(), "--dry-run"}).err,
-             Contains("data.depth_maps does nothing: no stage has the loss depth_map"));
+  CHECK_THAT(run_hsi4d({"check", (dataset.path / "unread.json").string()}).out,
+             Contains("note: data.depth_maps does nothing: no stage has the loss depth_map"));
   write_changed(dataset.path / "changed.json", dataset.path / "scene.json", [](auto& c) {
     c["stages"]["camera"]["losses"]["depth_map"] = {{"weight", 1}};
   });
