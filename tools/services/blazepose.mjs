@@ -171,7 +171,7 @@ const opened = async (name, title) => {
 try {
   const page = await opened('pose', 'BlazePose');
   await page.evaluate(begin, kComplexity[model]).catch((error) => fail(`BlazePose does not begin: ${error.message}`));
-  const finder = hands && new HandFinder(await opened('hands', 'MediaPipe Hands'));
+  const finder = hands ? new HandFinder(await opened('hands', 'MediaPipe Hands')) : undefined;
   await finder?.begin().catch((error) => fail(`MediaPipe Hands does not begin: ${error.message}`));
   if (person) await beginWith(page, names[0]);
   const masks = new MaskWriter(names), points = [], places = [], empty = [], doubtful = [], handed = [0, 0];
