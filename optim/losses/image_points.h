@@ -1,12 +1,23 @@
 // Points in the image against where something found them: what terms over points share.
 #pragma once
 
+#include <array>
+
 #include "autodiff/elementwise.h"
 #include "autodiff/map.h"
 #include "autodiff/matrix.h"
+#include "core/config.h"
 #include "optim/losses/robust.h"
 
 namespace hsi4d {
+
+inline constexpr std::array<ConfigChoice<RobustKernel>, 3> kPointKernels = {
+    {{RobustKernel::kGemanMcClure, "geman_mcclure"},
+     {RobustKernel::kHuber, "huber"},
+     {RobustKernel::kNone, "squared"}}};
+
+/// As of `center`: an error of 5 px is worth 0.025, as much as a photometric difference of 6 grey levels.
+inline constexpr double kPointWeight = 1e-3;
 
 /// (1/K) Σ c ρ(|p − q|²), 0 for what is not before the camera, or has a confidence c below `least`.
 /// @param points   [K,2] x px, y px; zeros where a point is not before the camera

@@ -9,13 +9,6 @@ namespace hsi4d {
 
 namespace {
 
-constexpr std::array<ConfigChoice<RobustKernel>, 3> kKernels = {{{RobustKernel::kGemanMcClure, "geman_mcclure"},
-                                                                 {RobustKernel::kHuber, "huber"},
-                                                                 {RobustKernel::kNone, "squared"}}};
-
-/// As of `center`: an error of 5 px is worth 0.025, as much as a photometric difference of 6 grey levels.
-constexpr double kWeight = 1e-3;
-
 struct KeypointsSettings {
   RobustKernel kernel = RobustKernel::kGemanMcClure;
   double scale_px = 30;
@@ -23,7 +16,7 @@ struct KeypointsSettings {
 };
 
 void describe(ConfigFields& fields, KeypointsSettings& settings) {
-  fields.choice("kernel", settings.kernel, kKernels,
+  fields.choice("kernel", settings.kernel, kPointKernels,
                 "Of a distance: geman_mcclure, by which one far beyond scale_px no longer pulls; huber, constant "
                 "pull; its square");
   fields.number("scale_px", settings.scale_px, {.above = 0, .max = 1e6},
@@ -44,7 +37,7 @@ LossTerm keypoints_2d_loss() {
                                                 static_cast<float>(settings.scale_px),
                                                 static_cast<float>(settings.min_confidence));
                   }));
-  term.description.weight = kWeight;
+  term.description.weight = kPointWeight;
   return term;
 }
 
