@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/appended_file.h"
 #include "core/check.h"
 #include "core/config_value.h"
 #include "core/disk.h"
@@ -16,6 +15,7 @@
 #include "core/text.h"
 #include "core/version.h"
 #include "pipelines/config/run_config.h"
+#include "pipelines/record/appended_file.h"
 #include "pipelines/record/gradient_table.h"
 
 namespace hsi4d {

@@ -1,4 +1,5 @@
-// What TensorBoard shows of a run: losses, images and metrics as events (core/event_file.h) beside metrics.jsonl.
+// What TensorBoard shows of a run: losses, images and metrics as events (pipelines/record/event_file.h) beside
+// metrics.jsonl.
 //
 //   loss/STAGE, loss_STAGE/TERM    by line of metrics.jsonl, from 0; terms without their weights
 //   frame_loss/STAGE               by frame: the last loss of a stage
@@ -15,9 +16,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/appended_file.h"
-#include "core/event_file.h"
 #include "core/types.h"
+#include "pipelines/record/appended_file.h"
+#include "pipelines/record/event_file.h"
 #include "pipelines/record/folder.h"
 #include "pipelines/record/summary.h"
 

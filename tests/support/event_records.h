@@ -1,4 +1,4 @@
-// What is in a file of events (core/event_file.h), as far as tests that compare such files need to know.
+// What is in a file of events (pipelines/record/event_file.h), as far as tests that compare such files need to know.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "core/event_file.h"
+#include "pipelines/record/event_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace hsi4d::test {

@@ -1,4 +1,4 @@
-#include "core/event_file.h"
+#include "pipelines/record/event_file.h"
 
 #include <bit>
 

@@ -1,4 +1,4 @@
-#include "core/appended_file.h"
+#include "pipelines/record/appended_file.h"
 
 #include <cerrno>
 #include <fcntl.h>
