@@ -86,7 +86,7 @@ SceneImage render_taped(const PosedGaussians& posed, const SceneView& view, std:
   scene.tape.forward(scene.rendered.image);
   scene.tape.forward(scene.rendered.transmittance);
   SceneImage result = image_of(scene, view.camera);
-  for (const PixelPlace place : traced) result.traces.push_back(scene.trace(place));
+  result.traces = scene.traces(traced);
   return result;
 }
 

@@ -89,8 +89,8 @@ struct TapedScene {
     std::copy(of_camera.begin(), of_camera.end(), result.camera.begin());
   }
 
-  PixelTrace trace(PixelPlace place) const {
-    return trace_pixel(tape, rendered.projected, inputs.opacities, inputs.colors, view, place);
+  std::vector<PixelTrace> traces(std::span<const PixelPlace> places) const {
+    return trace_pixels(tape, rendered.projected, inputs.opacities, inputs.colors, view, places);
   }
 
   Tape<S> tape;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "splat/render/composite.h"
@@ -61,5 +62,10 @@ struct PixelTrace {
 template <class S>
 PixelTrace trace_pixel(const Tape<S>& tape, const Projected<S>& projected, Var<S> opacities, Var<S> features,
                        const SplatView& view, PixelPlace place);
+
+/// trace_pixel of several pixels: the Gaussians are prepared once.
+template <class S>
+std::vector<PixelTrace> trace_pixels(const Tape<S>& tape, const Projected<S>& projected, Var<S> opacities,
+                                     Var<S> features, const SplatView& view, std::span<const PixelPlace> places);
 
 }  // namespace hsi4d

@@ -32,14 +32,15 @@ Index check_scene(const SplatScene& scene) {
   const Projected<S>& projected = taped.rendered.projected;
   const std::vector<std::int32_t> rows = median_rows(taped.tape, projected, taped.opacities, taped.view);
   REQUIRE(std::ssize(rows) == Index{scene.camera.width} * scene.camera.height);
+  std::vector<PixelPlace> places;
+  for (int y = 0; y < scene.camera.height; ++y)
+    for (int x = 0; x < scene.camera.width; ++x) places.push_back({x, y});
+  const std::vector<PixelTrace> traces =
+      trace_pixels<S>(taped.tape, projected, taped.opacities, taped.colors, taped.view, places);
   Index found = 0, wrong = 0;
-  for (int y = 0; y < scene.camera.height; ++y) {
-    for (int x = 0; x < scene.camera.width; ++x) {
-      const std::int32_t row = rows[static_cast<std::size_t>(y * scene.camera.width + x)];
-      const PixelTrace trace = trace_pixel(taped.tape, projected, taped.opacities, taped.colors, taped.view, {x, y});
-      wrong += row == traced_row(trace) ? 0 : 1;
-      found += row >= 0 ? 1 : 0;
-    }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    wrong += rows[i] == traced_row(traces[i]) ? 0 : 1;
+    found += rows[i] >= 0 ? 1 : 0;
   }
   CHECK(wrong == 0);
   return found;
