@@ -162,6 +162,7 @@ ChainSummary write_chain_results(const RunPaths& paths, const RunConfig& config,
   write_text_file(paths.summary(), chain_summary_json(summary));
   write_body(paths, body_of_avatar(config.body, config.chain.front().data.avatar.string()), result.facts.front().avatar,
              motion);
+  if (!config.log.preview) return summary;
   if (have_one_size(result.clips)) {
     join_previews(paths, result, motion.frame_rate);
   } else {

@@ -1,4 +1,4 @@
-// Config section `log`: what a run notes beside its results for other programs.
+// Config section `log`: what a run writes beside its results, for people and for other programs.
 #pragma once
 
 #include "core/config.h"
@@ -7,6 +7,7 @@ namespace hsi4d {
 
 /// Config section `log`. No result depends on it, so that a run is resumed with another one too.
 struct LogSettings {
+  bool preview = true;       ///< preview.mp4
   bool tensorboard = false;  ///< see pipelines/record/run_events.h
   int images_every = 0;      ///< frames; 0: no images
 };

@@ -186,9 +186,10 @@ std::optional<BodyModel> write_body(const RunPaths& paths, const BodySettings& s
 }
 
 void write_views(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
-                 const StateRenderer& render) {
+                 const StateRenderer& render, bool preview) {
   const Rigid<double> other_side = camera_of_other_side(clip, states.front());
-  Preview preview(paths.preview(), clip.frame_rate);
+  std::optional<Preview> video;
+  if (preview) video.emplace(paths.preview(), clip.frame_rate);
   std::array<double, 3> beyond{};
   for (std::size_t t = 0; t < states.size(); ++t) {
     const auto index = static_cast<Index>(t);
@@ -204,9 +205,9 @@ void write_views(const RunPaths& paths, const Clip& clip, const std::vector<Scen
       write_image(paths.frame_image(number, "render"), image);
     }
     write_image(paths.frame_image(number, "side"), side);
-    preview.add({frame.target, image, mean_of(frame.target, image), side});
+    if (video) video->add({frame.target, image, mean_of(frame.target, image), side});
   }
-  preview.commit();
+  if (video) video->commit();
 }
 
 Rigid<double> turned_camera(const Rigid<double>& camera_from_world, const Vector3<double>& pivot, double angle) {

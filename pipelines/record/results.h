@@ -41,10 +41,11 @@ using StateRenderer =
 /// other side, next to each other. The other side has the mean colour of the video's frame 0 behind everything, as a
 /// scene that was made of one view ends soon beside it. Where ffmpeg fails the log says so, and no video is written.
 ///
+/// @param preview  whether there is to be a preview.mp4
 /// @param render  the image of a state of a frame, from the state's camera, before the colour that is given; none: that
 ///                of the config
 void write_views(const RunPaths& paths, const Clip& clip, const std::vector<SceneState>& states,
-                 const StateRenderer& render);
+                 const StateRenderer& render, bool preview);
 
 /// A camera that looks from another side: turned about the vertical axis through `pivot`.
 ///

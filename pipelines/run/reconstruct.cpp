@@ -127,11 +127,12 @@ class Reconstruction {
         write_body(folder_.paths(), found_body(), clip_.avatar, motion_of(clip_, result()));
     view3d_file(clip_, result(), body ? &*body : nullptr).write(folder_.paths().view3d());
     RunConfig other_side = config_;
-    write_views(folder_.paths(), clip_, result(), [&](Index frame, const SceneState& state, const auto& background) {
+    const auto render = [&](Index frame, const SceneState& state, const auto& background) {
       stop_if_asked(clip_.frames());
       if (background) other_side.background = *background;
       return render_state(background ? other_side : config_, clip_, state, colors_after(frame));
-    });
+    };
+    write_views(folder_.paths(), clip_, result(), render, config_.log.preview);
     return summary;
   }
 

@@ -67,7 +67,8 @@ Runs runs_of_sweep(const SweepSelection& selection, const std::set<std::string>&
     whole_names[name] = whole;
   }
   if (runs.empty())
-    throw UserError(selection.text + ": no run has a preview.mp4, which is made where ffmpeg is installed");
+    throw UserError(selection.text +
+                    ": no run has a preview.mp4, which is made where ffmpeg is installed and log.preview is on");
   const auto tell = [&](std::size_t count, const char* why) {
     if (count > 0)
       notes.push_back(selection.text + ": " + std::to_string(count) + (count == 1 ? " run is" : " runs are") +
@@ -87,7 +88,7 @@ Runs runs_in(const std::string& folder) {
   if (runs.empty())
     throw UserError(folder +
                     ": holds no run with a preview.mp4, in it or in its folders; a run that has come to its "
-                    "end has one where ffmpeg is installed");
+                    "end has one where ffmpeg is installed and log.preview is on");
   return runs;
 }
 

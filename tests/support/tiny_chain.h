@@ -70,9 +70,10 @@ RunConfig changed_config(F&& change) {
 /// What must be the same of the folder of a chain, however it came about.
 inline std::map<std::string, std::string> result_of_chain(const std::filesystem::path& chain) {
   std::map<std::string, std::string> result;
-  for (const char* name : {"config.resolved.json", "motion.npz", "motion_30fps.npz", "objects.npz", "cameras.json",
-                           "body.glb", "preview.mp4"})
+  for (const char* name :
+       {"config.resolved.json", "motion.npz", "motion_30fps.npz", "objects.npz", "cameras.json", "body.glb"})
     result[name] = file_text(chain / name);
+  if (std::filesystem::exists(chain / "preview.mp4")) result["preview.mp4"] = file_text(chain / "preview.mp4");
   result["summary.json"] = without_seconds(nlohmann::ordered_json::parse(file_text(chain / "summary.json"))).dump();
   return result;
 }

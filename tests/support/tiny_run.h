@@ -19,9 +19,10 @@
 
 namespace hsi4d::test {
 
-/// The stages of the shipped demo with few iterations and no fingers.
+/// The stages of the shipped demo with few iterations and no fingers; without the video, whose programs take longest.
 inline const char* const kTinyStages = R"({
   "name": "tiny",
+  "log": {"preview": false},
   "camera": {"increment": "scene"},
   "render": {"blur": 0.13},
   "stages": {

@@ -48,7 +48,7 @@ bool same(const BodyPose& a, const BodyPose& b) { return a.transl == b.transl &&
 
 TEST_CASE("a chain of clips is one motion, and each of its clips a whole run", "[run][chain]") {
   const TemporaryFolder here;
-  const RunConfig config = chain_config();
+  const RunConfig config = chain_config({"log.preview=true"});
   REQUIRE(config.chain.size() == kClips);
   CHECK(config.chain[1].data.scene == config.chain[0].data.scene);
   const ChainSummary summary = execute_tiny_chain(config, "run");

@@ -76,7 +76,7 @@ TEST_CASE("a camera turned about a pivot sees it at the same place, from another
 
 TEST_CASE("a run leaves its result in forms that other programs take", "[run]") {
   const TemporaryFolder here;
-  execute_tiny(tiny_config(), "run");
+  execute_tiny(tiny_config({"log.preview=true"}), "run");
   const RunPaths paths{"run"};
   const Motion motion = read_motion(paths.motion()), dense = read_motion(paths.motion_at_30());
   CHECK(dense.frame_rate == 30);
@@ -128,7 +128,9 @@ TEST_CASE("a run takes the shape of its body from the avatar, and refuses anothe
 TEST_CASE("a preview shows the video, the reconstruction, both, and another side", "[run]") {
   const TemporaryFolder here;
   // A wide pixel filter makes the reconstruction another picture than the video.
-  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1", "render.blur=3"}), "run");
+  execute_tiny(tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1", "render.blur=3",
+                            "log.preview=true"}),
+               "run");
   const RunPaths paths{"run"};
   VideoReader preview(paths.preview());
   REQUIRE(preview.frames() == kTinyFrames);
@@ -176,7 +178,8 @@ TEST_CASE("beside a scene that ends, another side has the colour of the video", 
 
 TEST_CASE("without ffmpeg a run is done all the same, and its log says what is not there", "[run]") {
   const TemporaryFolder here;
-  const RunConfig config = tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1"});
+  const RunConfig config =
+      tiny_config({"stages.camera.iterations=1", "stages.interaction.iterations=1", "log.preview=true"});
   {
     const ChangedVariable nowhere("PATH", here.path().c_str());
     execute_tiny(config, "run");

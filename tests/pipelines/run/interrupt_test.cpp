@@ -38,10 +38,11 @@ int steps_of(const std::string& run) {
   return steps;
 }
 
-/// The config of the tiny dataset with a color net that moves, and a stage over the sequence.
+/// The config of the tiny dataset with a preview, a color net that moves, and a stage over the sequence.
 std::string write_every_kind_of_stage() {
   const fs::path file = TinyDataset::folder() / "every_stage.json";
   write_changed(tiny_config_file(), file, [](nlohmann::ordered_json& config) {
+    config["log"]["preview"] = true;
     config["color_net"]["use"] = "on";
     config["stages"]["interaction"]["optimize"]["color_net"] = {{"lr", 0.003}, {"every", 2}};
     config["stages"]["refinement"] = nlohmann::ordered_json::parse(R"({

@@ -130,8 +130,8 @@ TEST_CASE("a run leaves a whole run folder, and a result better than its baselin
   const fs::path run = "run";
   CHECK(names_in(run) == std::set<std::string>{".lock", "body.glb", "cameras.json", "checkpoint",
                                                "config.resolved.json", "frames", "log.txt", "metrics.jsonl",
-                                               "motion.npz", "motion_30fps.npz", "objects.npz", "preview.mp4",
-                                               "report.html", "status.json", "summary.json", "view3d.safetensors"});
+                                               "motion.npz", "motion_30fps.npz", "objects.npz", "report.html",
+                                               "status.json", "summary.json", "view3d.safetensors"});
   CHECK(temporaries_in(run).empty());
   CHECK(json_of(run / "status.json")["state"] == "done");
   CHECK(json_of(run / "status.json")["threads"] == 1);

@@ -28,10 +28,10 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-/// A Python with NumPy, the first one of PATH or Debian's. Fails the test where there is none.
+/// A Python with NumPy, Debian's or the first one of PATH. Fails the test where there is none.
 std::string python() {
   setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
-  for (const char* const program : {"python3", "/usr/bin/python3"}) {
+  for (const char* const program : {"/usr/bin/python3", "python3"}) {
     if (std::system((std::string(program) + " -c 'import numpy' 2> /dev/null").c_str()) == 0) return program;
   }
   FAIL("there is no python3 with NumPy; python3-numpy of tools/packages.txt has it");

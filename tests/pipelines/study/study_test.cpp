@@ -300,7 +300,7 @@ TEST_CASE("what no study can be made of is told, and leaves nothing") {
         "b/y is one run, a a folder of runs; a study compares two runs, or runs of the same names in two folders\n");
   CHECK(refused({"a", "empty", "--out", "page"}) ==
         "empty: holds no run with a preview.mp4, in it or in its folders; a run that has come to its end has one where "
-        "ffmpeg is installed\n");
+        "ffmpeg is installed and log.preview is on\n");
   CHECK(refused({"a", "no", "--out", "page"}) == "no: there is no such folder\n");
   CHECK(refused({"a", "a/../a", "--out", "page"}) == "a/x, a/../a/x: are the same run; there is nothing to choose\n");
   CHECK(
