@@ -33,12 +33,12 @@ using Triangles = std::vector<std::array<std::int32_t, 3>>;
 /// Points of a person and of all that they move, in T frames: those of the same place in estimate and truth are the
 /// same point of the body or the object.
 struct HumanObjectMotion {
-  std::vector<std::vector<double>> human, object;  ///< [T][V,3], [T][P,3] metres
+  std::vector<std::vector<double>> human = {}, object = {};  ///< [T][V,3], [T][P,3] metres
 };
 
 /// The surfaces that these are the vertices of. Without triangles the points are compared as they are.
 struct HumanObjectSurfaces {
-  Triangles human, object;
+  Triangles human = {}, object = {};
 };
 
 /// What is measured. Centimetres; accelerations of a frame² .
