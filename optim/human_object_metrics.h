@@ -1,6 +1,6 @@
 // Metrics of a person and what they hold together, as CHORE, VisTracker and those after them measure them on BEHAVE and
 // InterCap: both are laid on the truth in one piece, and then compared as surfaces.
-// [Xie et al. 2022, CHORE, section 4; Xie et al. 2023, VisTracker, section 4; their public evaluation]
+// [Xie et al. 2022, CHORE; Xie et al. 2023, VisTracker; their public evaluation]
 #pragma once
 
 #include <array>
@@ -41,7 +41,7 @@ struct HumanObjectSurfaces {
   Triangles human = {}, object = {};
 };
 
-/// What is measured. Centimetres; accelerations of a frame² .
+/// What is measured. Centimetres; accelerations a frame².
 struct HumanObjectErrors {
   double cd_human = 0, cd_object = 0, cd_both = 0;
   std::optional<double> acceleration_human = {}, acceleration_object = {};  ///< nothing for fewer than three frames

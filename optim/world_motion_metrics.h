@@ -1,5 +1,5 @@
 // Metrics of a person's way through the world as WHAM and those after it measure them on EMDB-2 and RICH: the estimate
-// is laid on the truth first, in pieces. [Shin et al. 2024, WHAM, section 4.1; its public evaluation and that of GVHMR]
+// is laid on the truth first, in pieces. [Shin et al. 2024, WHAM; its public evaluation and that of GVHMR]
 //
 // Joints are those of optim/metrics.h: arrays [J,3] in metres, of which the first kMetricJoints count. All frames do,
 // the first too. A number that is not finite gives NaN; sizes that differ throw InternalError.

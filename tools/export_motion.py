@@ -8,6 +8,7 @@
     tools/export_motion.py output__demo-21__0.pkl motion.npz --from lingo --fps 30   # LINGO
     tools/export_motion.py P0_09_outdoor_walk_data.pkl truth.npz --from emdb --fps 30       # truth of EMDB
     tools/export_motion.py test_body/Gym_010_dips2 truth.npz --from rich --fps 30           # truth of RICH
+    tools/export_motion.py Res/01/07/Seg_0/res.pkl truth.npz --from intercap --fps 30       # truth of InterCap
 
 The motion is in the world of whatever made it, turned so that z is up, for a body of SMPL-X; rotations as axis-angle, metres.
 With --in-camera it is in the camera's frame of every frame (x right, y down, z forward) and not turned.
@@ -37,11 +38,12 @@ Shape, expression, hands and jaw are fitted too; the largest distance of a verte
 
 | EMDB      | SMPL   | y up; good_frames_mask, the frames that its evaluations count, is kept |
 | RICH      | SMPL-X | its first camera's, y down: z is then up only as far as it was level |
+| InterCap  | SMPL-X | a camera's, as RICH; its object is kept, obj_rot_mat and obj_trans   |
 
-Of EMDB and RICH only arrays are unpickled, which runs no code; what else is in a file is refused. The bodies of EMDB are
-of a gender and shape of SMPL, which are left out as all shapes of SMPL. RICH is a folder of folders, one a frame, with a
-file a person, which --person chooses by its number; hands, which are given by components, and jaw are left out. Frames
-that it leaves out are interpolated and no good ones.
+Of EMDB, RICH and InterCap only arrays are unpickled, which runs no code; what else is in a file is refused. The bodies
+of EMDB are of a gender and shape of SMPL, which are left out as all shapes of SMPL. RICH is a folder of folders, one a
+frame, with a file a person, which --person chooses by its number; frames that it leaves out are interpolated and no good
+ones. Hands of RICH and InterCap, which are given by components, and jaws are left out.
 
 TRUMANS's sample_hsi.py saves no motion: it returns vertices, and its lines that write a pickle are comments. Where they
 are made to run, their file is read as LINGO's.
@@ -502,8 +504,23 @@ def read_rich(np, path, arguments):
     return pose, np.stack(rows["transl"]), np.stack(rows["betas"]), frames - frames.min(), True, "y down"
 
 
+def read_intercap(np, path, arguments):
+    if arguments.in_camera:
+        fail(f"{path}: the truth of InterCap is in the world of a camera already")
+    one = arrays_of(path)
+    widths = {"global_orient": 3, "body_pose": 63, "transl": 3, "betas": 10, "ob_pose": 3, "ob_trans": 3}
+    rows = {name: array(np, need(one, name, path), f"{path}: {name}", width) for name, width in widths.items()}
+    for name in rows:
+        if len(rows[name]) != len(rows["transl"]) and not (name == "betas" and len(rows[name]) == 1):
+            fail(f"{path}: transl has {len(rows['transl'])} frames, {name} {len(rows[name])}")
+    tell_unread(path, one, widths)
+    arguments.object = (matrix_of_vector(np, rows["ob_pose"]), rows["ob_trans"])
+    pose = np.concatenate([rows["global_orient"], rows["body_pose"]], axis=1)
+    return pose, rows["transl"], rows["betas"], range(len(pose)), True, "y down"
+
+
 READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram, "whac": read_whac, "lingo": read_lingo,
-           "emdb": read_emdb, "rich": read_rich}
+           "emdb": read_emdb, "rich": read_rich, "intercap": read_intercap}
 ENDINGS = {".pkl": "wham", ".pickle": "wham", ".pt": "gvhmr", ".npy": "tram"}
 
 
@@ -571,6 +588,7 @@ def main():
     parser.add_argument("--trust", action="store_true", help="GVHMR: unpickle everything in IN, which can run code")
     arguments = parser.parse_args()
     arguments.more = {}  # arrays of the input that the motion keeps
+    arguments.object = None  # rotations and places of an object's origin, in the input's world
     if arguments.output.suffix != ".npz":
         fail(f"{arguments.output}: allowed ending: .npz")
     if arguments.fps is None:
@@ -601,6 +619,9 @@ def main():
         sign = 1 if world == "y up" else -1
         turn = np.array([[1, 0, 0], [0, 0, -sign], [0, sign, 0]], dtype=np.float64)
         pose, trans = moved(np, pose, trans, np.tile(turn, (len(pose), 1, 1)), np.zeros(3), pelvis)
+        if arguments.object:
+            turns, places = arguments.object
+            arguments.more.update(obj_rot_mat=turn @ turns, obj_trans=places @ turn.T)
     if not is_smplx:
         trans = trans + pelvis - np.array(SMPLX_PELVIS)
     # SMPL's shape is not SMPL-X's: its numbers are left out.

@@ -151,6 +151,7 @@ Track read_behave_sequence(const std::string& folder, const std::string& object)
   track.motion.says_frame_rate = true;
   track.motion = transformed(track.motion, z_up_from_camera(), motion.pelvis_rest.value_or(kSmplxPelvis));
   if (has_object) track.objects = {object};
+  track.objects_are_of_meshes = has_object;
   track.world = "a sequence of BEHAVE, in its camera's frame: z is up as far as the camera was level";
   const auto filled = std::count(track.good_frames.begin(), track.good_frames.end(), false);
   if (filled > 0) track.world += "; " + std::to_string(filled) + " frames that it leaves out are interpolated";

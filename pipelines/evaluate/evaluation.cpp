@@ -183,9 +183,28 @@ std::optional<Vector3<double>> centroid_of_object(const EvaluationSettings& sett
   return surface.empty() ? std::nullopt : std::optional(mesh_centroid(surface));
 }
 
+/// Objects whose poses act about the mean m of their meshes' vertices, where Gaussians have another centroid c in the
+/// same file's frame: t' = R (c − m) + t. Without a mesh nobody knows m, and it is taken for c.
+void place_about_centroids(const std::vector<std::string>& folders, Measurement& m, Track& track) {
+  for (std::size_t o = 0; o < track.objects.size(); ++o) {
+    const std::string surface = surface_of_object(m.settings, track.objects[o]);
+    if (surface.empty()) {
+      m.result.notes.push_back("the poses of " + track.objects[o] + " in " + track.name +
+                               " act about the middle of its mesh, which is not known and taken for that of its "
+                               "Gaussians (--object-surface " +
+                               track.objects[o] + "=F says it)");
+      continue;
+    }
+    const Vector3<double> between = *centroid_of_object(m.settings, folders, track.objects[o]) - mesh_centroid(surface);
+    for (std::vector<ObjectPose>& poses : track.object_poses)
+      poses[o].translation += so3_exp(poses[o].rotation) * between;
+  }
+}
+
 /// Objects whose translations are of the origins of their files get those of their centroids c: t' = R c + t. Where a
 /// centroid is not known, objects are left out.
 void place_objects(const std::vector<std::string>& folders, Measurement& m, Track& track) {
+  if (track.objects_are_of_meshes) place_about_centroids(folders, m, track);
   if (!track.objects_are_of_origins) return;
   for (std::size_t o = 0; o < track.objects.size(); ++o) {
     const auto centroid = centroid_of_object(m.settings, folders, track.objects[o]);

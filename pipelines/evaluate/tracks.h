@@ -29,6 +29,7 @@ struct Track {
   UpAxis up = UpAxis::kZ;
   bool objects_stay = false;  ///< the objects' poses are in the scene's world, z up, and do not move with the track's
   bool objects_are_of_origins = false;  ///< their translations are those of the origins of the objects' files
+  bool objects_are_of_meshes = false;   ///< their poses act about the mean of the vertices of the objects' meshes
 
   Index frames() const { return std::ssize(motion.poses); }
 };

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/check.h"
+#include "core/parallel.h"
 #include "core/random.h"
 #include "optim/surface_points.h"
 #include "tests/optim/protocol_reference.h"
@@ -190,6 +191,21 @@ TEST_CASE("surfaces are compared by points that are drawn from them") {
   CHECK(floor.cd_object == Approx(1).epsilon(0.05));
   CHECK(floor.cd_both == Approx(std::sqrt(0.5)).epsilon(0.05));
   CHECK(human_object_errors(still, still, {}).cd_both == Approx(0).margin(1e-9));
+}
+
+TEST_CASE("humans and objects have the same bits for any number of threads", "[parallel]") {
+  const Scenes scenes = some_scenes(9, 61);
+  const Triangles faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  std::vector<double> one;
+  for (const int threads : {1, 2, 3, 8}) {
+    with_threads(threads, [&] {
+      const HumanObjectErrors e =
+          human_object_errors(motion_of(scenes.estimate), motion_of(scenes.truth), {{}, faces}, 4);
+      const std::vector<double> all = {e.cd_human, e.cd_object, e.cd_both, *e.acceleration_human};
+      if (one.empty()) one = all;
+      CHECK(all == one);
+    });
+  }
 }
 
 TEST_CASE("humans and objects whose sizes differ are mistakes") {

@@ -240,6 +240,34 @@ def rich():
     refused("holds no FRAME/PERSON.pkl", "export_motion.py", "stills", "r.npz", "--from", "rich")
 
 
+def intercap():
+    one = {"global_orient": rng.normal(size=(4, 3)) * 0.5, "body_pose": rng.normal(size=(4, 21, 3)) * 0.3,
+           "transl": rng.normal(size=(4, 3)), "betas": np.tile(rng.normal(size=10) * 0.1, (4, 1)),
+           "left_hand_pose": np.zeros((4, 12)), "right_hand_pose": np.zeros((4, 12)),
+           "ob_pose": rng.normal(size=(4, 3)), "ob_trans": rng.normal(size=(4, 3))}
+    save("res.pkl", one)
+    arguments = ("export_motion.py", "res.pkl", "i.npz", "--from", "intercap", "--fps", 30)
+    said = export(*arguments)
+    assert "not read: left_hand_pose, right_hand_pose" in said and "4 frames, intercap" in said, said
+    out = np.load("i.npz")
+    z_up = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], dtype=float)
+    close(out["obj_rot_mat"], z_up @ em.matrix_of_vector(np, one["ob_pose"]))
+    close(out["obj_trans"], one["ob_trans"] @ z_up.T)
+    close(out["trans"] + em.SMPLX_PELVIS, (one["transl"] + em.SMPLX_PELVIS) @ z_up.T)
+    close(out["pose_body"], one["body_pose"].reshape(4, 63))
+    reads("i.npz")
+    for changed, expected in (({"ob_pose": one["ob_pose"][:3]}, "transl has 4 frames, ob_pose 3"),
+                              ({"ob_trans": np.zeros((4, 4))}, "ob_trans: has shape [4, 4]"),
+                              ({"ob_pose": np.full((4, 3), np.nan)}, "ob_pose: frame 0 has a number that is not finite"),
+                              ({"betas": print}, "holds builtins.print")):
+        save("res.pkl", {**one, **changed})
+        refused(expected, *arguments)
+    save("res.pkl", {name: rows for name, rows in one.items() if name != "ob_pose"})
+    refused("there is no 'ob_pose'", *arguments)
+    save("res.pkl", [1, 2])
+    refused("there is no 'global_orient'", *arguments)
+
+
 def tram():
     turns = em.matrix_of_vector(np, rng.normal(size=(6, 3)) * 0.2)
     places = rng.normal(size=(6, 3))
@@ -396,7 +424,7 @@ def vposer():
 
 folder = tempfile.TemporaryDirectory()
 os.chdir(folder.name)
-for test in (rotations, gvhmr, wham, lingo, emdb, rich, tram, whac, vposer):
+for test in (rotations, gvhmr, wham, lingo, emdb, rich, intercap, tram, whac, vposer):
     test()
     print(test.__name__, "passed")
 refused("there is no such file", "export_motion.py", "nowhere.pkl", "w.npz")

@@ -9,7 +9,11 @@
 #include "core/check.h"
 #include "core/npz.h"
 #include "core/rotation.h"
-#include "tests/support/temporary_folder.h"
+#include "core/text.h"
+#include "pipelines/evaluate/evaluation.h"
+#include "splat/files/splat_file.h"
+#include "tests/optim/solid/meshes.h"
+#include "tests/support/tiny_run.h"
 
 namespace behave_sequence_test {
 
@@ -110,6 +114,51 @@ TEST_CASE("frames that one of the files leaves out are interpolated and not good
   CHECK(alone.objects.empty());
   CHECK(alone.object_poses.empty());
   CHECK(alone.good_frames == std::vector<bool>{true, true, true, false, true});
+}
+
+TEST_CASE("a sequence of BEHAVE is the truth of a motion with an object") {
+  const TemporaryFolder here;
+  write_human(kTimes);
+  write_object(kTimes);
+  write_mesh("can.ply", box_mesh({-0.3, 0, 0}, {0.1, 0.4, 0.2}));
+  const Vector3<double> middle(-0.1, 0.2, 0.1);
+  const Track track = read_behave_sequence("seq", kTinyObject);
+  // The estimate is the same; its object's poses act about the centroid of the Gaussians.
+  EvaluationSettings settings;
+  settings.data = TinyDataset::folder().string();
+  settings.truth = "seq";
+  const Gaussians can = read_splats(object_file_of_track(settings.data, kTinyObject)).gaussians;
+  Vector3<double> centroid = can.origin_world;
+  for (Index g = 0; g < can.count(); ++g)
+    centroid += Vector3<float>(can.means.data() + 3 * g).cast<double>() / static_cast<double>(can.count());
+  write_motion("m.npz", track.motion);
+  NpzWriter objects;
+  std::vector<double> turns, places;
+  for (const std::vector<ObjectPose>& poses : track.object_poses) {
+    const Vector3<double> place = poses[0].translation + so3_exp(poses[0].rotation) * (centroid - middle);
+    turns.insert(turns.end(), poses[0].rotation.data(), poses[0].rotation.data() + 3);
+    places.insert(places.end(), place.data(), place.data() + 3);
+  }
+  objects.add<double>(kTinyObject + "/rotation", {4, 3}, turns);
+  objects.add<double>(kTinyObject + "/translation", {4, 3}, places);
+  objects.write("objects.npz");
+  settings.objects = "objects.npz";
+  settings.protocol = Protocol::kBehave;
+  const auto value = [](const Evaluation& evaluation, const char* name) {
+    const double* const found = find_metric(evaluation.values, name);
+    REQUIRE(found != nullptr);
+    return *found;
+  };
+  const Evaluation apart = evaluate(settings, "m.npz", "");
+  CHECK(value(apart, "object_translation_cm") == Approx(100 * (centroid - middle).norm()));
+  CHECK_THAT(joined(apart.notes), Contains("(--object-surface watering_can=F says it)") &&
+                                      Contains("the truth: a sequence of BEHAVE, in its camera's frame"));
+  settings.object_surfaces = {{kTinyObject, "can.ply"}};
+  const Evaluation same = evaluate(settings, "m.npz", "");
+  CHECK(value(same, "object_translation_cm") < 1e-6);
+  CHECK(value(same, "world_mpjpe_mm") < 1e-3);
+  CHECK(value(same, "acceleration_object_cm") < 1e-6);
+  CHECK(value(same, "cd_human_cm") < 1e-4);  // the avatar's points as they are
 }
 
 TEST_CASE("what is wrong with a sequence of BEHAVE is told") {
