@@ -78,18 +78,33 @@ struct CommonFrame {
   std::size_t human = 0, object = 0;
 };
 
-/// @param objects  null: there is none
-std::vector<CommonFrame> common_frames(const std::map<Index, std::size_t>& humans,
-                                       const std::map<Index, std::size_t>* objects) {
-  std::vector<CommonFrame> frames;
-  for (const auto& [frame, row] : humans) {
-    if (objects == nullptr) {
-      frames.push_back({frame, row, 0});
-    } else if (const auto found = objects->find(frame); found != objects->end()) {
-      frames.push_back({frame, row, found->second});
-    }
+/// What the files hold.
+struct BehaveRows {
+  Motion motion;
+  std::vector<Rigid<double>> objects = {};  // empty: there is none
+  std::vector<CommonFrame> frames = {};
+
+  Rigid<double> object_at(const CommonFrame& at) const {
+    return objects.empty() ? Rigid<double>() : objects[at.object];
   }
-  return frames;
+};
+
+BehaveRows read_rows(const std::string& human_file, const std::string& object_file) {
+  BehaveRows rows{.motion = read_motion_with_warnings(human_file)};
+  const std::map<Index, std::size_t> humans = read_frame_rows(Npz::read(human_file), rows.motion.poses.size());
+  if (!std::filesystem::exists(object_file)) {
+    for (const auto& [frame, row] : humans) rows.frames.push_back({frame, row, 0});
+    return rows;
+  }
+  const Npz file = Npz::read(object_file);
+  rows.objects = object_rows(file);
+  const std::map<Index, std::size_t> objects = read_frame_rows(file, rows.objects.size());
+  for (const auto& [frame, row] : humans) {
+    if (const auto found = objects.find(frame); found != objects.end())
+      rows.frames.push_back({frame, row, found->second});
+  }
+  if (rows.frames.empty()) throw DataError(object_file + ": has no frame_times in common with " + kHumanFile);
+  return rows;
 }
 
 ObjectPose as_pose(const Rigid<double>& pose) { return {so3_log(pose.rotation), pose.translation}; }
@@ -101,6 +116,12 @@ Rigid<double> z_up_from_camera() {
   return turn;
 }
 
+void add_frame(const BodyPose& body, const Rigid<double>& object, bool is_good, Track& track) {
+  track.motion.poses.push_back(body);
+  track.object_poses.push_back({as_pose(compose(z_up_from_camera(), object))});
+  track.good_frames.push_back(is_good);
+}
+
 }  // namespace
 
 bool is_behave_sequence(const std::string& folder) {
@@ -108,50 +129,35 @@ bool is_behave_sequence(const std::string& folder) {
 }
 
 Track read_behave_sequence(const std::string& folder, const std::string& object) {
-  const std::string human_file = (std::filesystem::path(folder) / kHumanFile).string(),
-                    object_file = (std::filesystem::path(folder) / kObjectFile).string();
-  Motion motion = read_motion_with_warnings(human_file);
-  const std::map<Index, std::size_t> humans = read_frame_rows(Npz::read(human_file), motion.poses.size());
-  std::map<Index, std::size_t> objects;
-  std::vector<Rigid<double>> poses;
-  const bool has_object = std::filesystem::exists(object_file);
-  if (has_object) {
-    const Npz file = Npz::read(object_file);
-    poses = object_rows(file);
-    objects = read_frame_rows(file, poses.size());
-  }
-  const std::vector<CommonFrame> frames = common_frames(humans, has_object ? &objects : nullptr);
-  if (frames.empty()) throw DataError(object_file + ": has no frame_times in common with " + kHumanFile);
-
+  const std::filesystem::path path = folder;
+  const std::string human_file = (path / kHumanFile).string();
+  const BehaveRows rows = read_rows(human_file, (path / kObjectFile).string());
   Track track;
   track.name = folder;
-  const auto add = [&](const BodyPose& body, const Rigid<double>& pose, bool is_good) {
-    track.motion.poses.push_back(body);
-    if (has_object) track.object_poses.push_back({as_pose(compose(z_up_from_camera(), pose))});
-    track.good_frames.push_back(is_good);
-  };
-  const auto pose_at = [&](const CommonFrame& at) { return has_object ? poses[at.object] : Rigid<double>(); };
-  track.motion = motion;
+  track.motion = rows.motion;
   track.motion.poses.clear();
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const CommonFrame& to = frames[i];
-    const CommonFrame& from = frames[i == 0 ? 0 : i - 1];
+  add_frame(rows.motion.poses[rows.frames[0].human], rows.object_at(rows.frames[0]), true, track);
+  for (std::size_t i = 1; i < rows.frames.size(); ++i) {
+    const CommonFrame &from = rows.frames[i - 1], &to = rows.frames[i];
     const Index steps = to.frame - from.frame;
     if (steps > kLongestGap + 1)
       throw DataError(human_file + ": " + std::to_string(steps - 1) + " frames in a row are missing after frame " +
                       std::to_string(from.frame) + "; allowed: " + std::to_string(kLongestGap));
-    for (Index k = 1; k < steps; ++k) {
+    for (Index k = 1; k <= steps; ++k) {
       const double u = static_cast<double>(k) / static_cast<double>(steps);
-      add(interpolated(motion.poses[from.human], motion.poses[to.human], u),
-          between_poses(pose_at(from), pose_at(to), u), false);
+      add_frame(interpolated(rows.motion.poses[from.human], rows.motion.poses[to.human], u),
+                between_poses(rows.object_at(from), rows.object_at(to), u), k == steps, track);
     }
-    add(motion.poses[to.human], pose_at(to), true);
   }
   track.motion.frame_rate = kBehaveRate;
   track.motion.says_frame_rate = true;
-  track.motion = transformed(track.motion, z_up_from_camera(), motion.pelvis_rest.value_or(kSmplxPelvis));
-  if (has_object) track.objects = {object};
-  track.objects_are_of_meshes = has_object;
+  track.motion = transformed(track.motion, z_up_from_camera(), rows.motion.pelvis_rest.value_or(kSmplxPelvis));
+  if (rows.objects.empty()) {
+    track.object_poses.clear();
+  } else {
+    track.objects = {object};
+    track.objects_are_of_meshes = true;
+  }
   track.world = "a sequence of BEHAVE, in its camera's frame: z is up as far as the camera was level";
   const auto filled = std::count(track.good_frames.begin(), track.good_frames.end(), false);
   if (filled > 0) track.world += "; " + std::to_string(filled) + " frames that it leaves out are interpolated";

@@ -56,9 +56,8 @@ std::vector<double> chosen_points(std::span<const double> all, std::span<const I
   return points;
 }
 
-// Ankles and balls of the feet of the SMPL-X layout.
-bool is_left_foot(Index joint) { return joint == 7 || joint == 10; }
-bool is_right_foot(Index joint) { return joint == 8 || joint == 11; }
+bool is_left_foot(Index joint) { return joint == smplx_joint("left_ankle") || joint == smplx_joint("left_foot"); }
+bool is_right_foot(Index joint) { return joint == smplx_joint("right_ankle") || joint == smplx_joint("right_foot"); }
 
 }  // namespace
 
