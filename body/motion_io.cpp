@@ -322,6 +322,8 @@ double read_first_frame(const Npz& file, int64_t frames) {
 constexpr const char* kSaidAgain[] = {"mocap_time_length", "num_betas"};
 // Poses of the object of CHOIS and OMOMO, which `hsi4d evaluate` reads.
 constexpr const char* kOfObjects[] = {"obj_rot_mat", "obj_rot", "obj_com_pos", "window_obj_com_pos", "obj_trans"};
+// Of EMDB and BEHAVE, which it reads too: frames that count, and when they were.
+constexpr const char* kOfProtocols[] = {"good_frames_mask", "frame_times"};
 
 bool is_among(std::string_view name, std::span<const char* const> names) {
   return std::any_of(names.begin(), names.end(), [&](const char* one) { return one != nullptr && name == one; });
@@ -331,7 +333,7 @@ bool is_read(const std::string& name) {
   constexpr const char* kSingle[] = {"first_frame", "betas", "gender", "pelvis_rest", "surface_model_type"};
   return is_among(name, kTranslationNames) || is_among(name, kPosesNames) || is_among(name, kFrameNames) ||
          is_among(name, kRateNames) || is_among(name, kSingle) || is_among(name, kSaidAgain) ||
-         is_among(name, kOfObjects) ||
+         is_among(name, kOfObjects) || is_among(name, kOfProtocols) ||
          std::any_of(std::begin(kParts), std::end(kParts), [&](const Part& p) { return is_among(name, p.names); }) ||
          std::any_of(std::begin(kHalves), std::end(kHalves), [&](const Half& half) { return name == half.name; });
 }

@@ -1,15 +1,14 @@
 #include "optim/metrics.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
-
 #include "autodiff/ssim.h"
 #include "core/check.h"
+#include "optim/similarity.h"
 
 namespace hsi4d {
 namespace {
@@ -27,26 +26,6 @@ Index counted_joints(std::span<const double> joints, std::span<const double> tru
   HSI4D_CHECK(!joints.empty() && joints.size() % 3 == 0,
               "joints are [J,3], not " + std::to_string(joints.size()) + " numbers");
   return std::min(kMetricJoints, static_cast<Index>(joints.size()) / 3);
-}
-
-Vector3<double> mean_of(std::span<const double> points, Index count) {
-  Vector3<double> sum = Vector3<double>::Zero();
-  for (Index j = 0; j < count; ++j) sum += point(points, j);
-  return sum / static_cast<double>(count);
-}
-
-/// The rotation that takes `estimate` to `truth` best, and the sum of singular values with the sign that makes it one.
-struct BestRotation {
-  Matrix3<double> rotation;
-  double trace;
-};
-
-/// @param covariance  Σ y xᵀ, finite
-BestRotation best_rotation(const Matrix3<double>& covariance) {
-  const Eigen::JacobiSVD<Matrix3<double>> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Vector3<double> signs(1, 1, sign);  // the smallest singular value gives way
-  return {svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose(), svd.singularValues().dot(signs)};
 }
 
 void check_images(const Image& image, const Image& target) {
@@ -105,26 +84,13 @@ double mpjpe_mm(std::span<const double> joints, std::span<const double> truth) {
 
 double pa_mpjpe_mm(std::span<const double> joints, std::span<const double> truth) {
   const Index count = counted_joints(joints, truth);
-  const Vector3<double> joints_mean = mean_of(joints, count), truth_mean = mean_of(truth, count);
-  double joints_square = 0, truth_square = 0;
-  Matrix3<double> covariance = Matrix3<double>::Zero();
-  for (Index j = 0; j < count; ++j) {
-    const Vector3<double> x = point(joints, j) - joints_mean, y = point(truth, j) - truth_mean;
-    joints_square += x.squaredNorm();
-    truth_square += y.squaredNorm();
-    covariance += y * x.transpose();
-  }
-  if (!std::isfinite(joints_square) || !std::isfinite(truth_square)) return kNotANumber;
-  // Of unit size whatever the points' extent, so that the decomposition is as accurate for a hand as for a crowd.
-  const double size = std::sqrt(joints_square) * std::sqrt(truth_square);
-  BestRotation best = {Matrix3<double>::Identity(), 0};
-  if (size > 0) best = best_rotation(covariance / size);
-  // tr(D S) / Σ|x|²; never negative, since the one singular value that may be subtracted is the smallest.
-  const double scale = size > 0 ? best.trace * (std::sqrt(truth_square) / std::sqrt(joints_square)) : 0;
+  const auto numbers = static_cast<std::size_t>(3 * count);
+  const std::array from = {joints.first(numbers)}, to = {truth.first(numbers)};
+  const Similarity fit = fit_similarity(from, to, FitScale::kFree);
   double sum = 0;
   for (Index j = 0; j < count; ++j) {
-    const Vector3<double> aligned = best.rotation * (point(joints, j) - joints_mean) * scale;
-    sum += (aligned - (point(truth, j) - truth_mean)).norm();
+    const Vector3<double> aligned = fit.rotation * (point(joints, j) - fit.from_mean) * fit.scale;
+    sum += (aligned - (point(truth, j) - fit.to_mean)).norm();
   }
   return kMillimetres * sum / static_cast<double>(count);
 }

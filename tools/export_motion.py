@@ -6,6 +6,9 @@
     tools/export_motion.py results/clip/hps/hps_track_0.npy motion.npz --fps 30      # TRAM, beside results/clip/camera.npy
     tools/export_motion.py demo/clip/mesh motion.npz --body-model SMPLX_NEUTRAL.npz --fps 30   # WHAC, run with --save_mesh
     tools/export_motion.py output__demo-21__0.pkl motion.npz --from lingo --fps 30   # LINGO
+    tools/export_motion.py P0_09_outdoor_walk_data.pkl truth.npz --from emdb --fps 30       # truth of EMDB
+    tools/export_motion.py test_body/Gym_010_dips2 truth.npz --from rich --fps 30           # truth of RICH
+    tools/export_motion.py Res/01/07/Seg_0/res.pkl truth.npz --from intercap --fps 30       # truth of InterCap
 
 The motion is in the world of whatever made it, turned so that z is up, for a body of SMPL-X; rotations as axis-angle, metres.
 With --in-camera it is in the camera's frame of every frame (x right, y down, z forward) and not turned.
@@ -32,6 +35,15 @@ video says which (first_frame, from 0). Other people of the input, and what of i
 WHAC numbers its meshes one after the other, also where it saw nobody. The frames they are of are in
 detection_results.pth beside the folder, which is read where it is there; else they are taken for frames 0, 1, 2, ...
 Shape, expression, hands and jaw are fitted too; the largest distance of a vertex is printed.
+
+| EMDB      | SMPL   | y up; good_frames_mask, the frames that its evaluations count, is kept |
+| RICH      | SMPL-X | its first camera's, y down: z is then up only as far as it was level |
+| InterCap  | SMPL-X | a camera's, as RICH; its object is kept, obj_rot_mat and obj_trans   |
+
+Of EMDB, RICH and InterCap only arrays are unpickled, which runs no code; what else is in a file is refused. The bodies
+of EMDB are of a gender and shape of SMPL, which are left out as all shapes of SMPL. RICH is a folder of folders, one a
+frame, with a file a person, which --person chooses by its number; frames that it leaves out are interpolated and no good
+ones. Hands of RICH and InterCap, which are given by components, and jaws are left out.
 
 TRUMANS's sample_hsi.py saves no motion: it returns vertices, and its lines that write a pickle are comments. Where they
 are made to run, their file is read as LINGO's.
@@ -423,7 +435,92 @@ def read_whac(np, path, arguments):
     return pose, trans, betas[None, :10], frames_of_meshes(np, path, len(files)), True, "y up"
 
 
-READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram, "whac": read_whac, "lingo": read_lingo}
+# --- data sets --------------------------------------------------------------------------------------------------------
+
+
+def arrays_of(path):
+    """What a pickle holds, if that is numbers, texts and arrays of NumPy in tables and lists alone."""
+    pickle = __import__("pickle")
+    known = {"_reconstruct", "ndarray", "dtype", "scalar", "_frombuffer", "OrderedDict", "encode"}
+    homes = ("numpy", "numpy.core.multiarray", "numpy._core.multiarray", "numpy.core.numeric", "numpy._core.numeric",
+             "collections", "_codecs")
+
+    class ArraysAlone(pickle.Unpickler):
+        def find_class(self, home, name):
+            if home not in homes or name not in known:
+                fail(f"{path}: holds {home}.{name}, which is no array and is not unpickled")
+            return super().find_class(home, name)
+
+    with open(path, "rb") as file:
+        return ArraysAlone(file).load()
+
+
+def read_emdb(np, path, arguments):
+    if arguments.in_camera:
+        fail(f"{path}: the truth of EMDB is in the world")
+    one = arrays_of(path)
+    smpl, what = need(one, "smpl", path), f"{path}: smpl"
+    root = array(np, need(smpl, "poses_root", what), f"{what}: poses_root", 3)
+    body = array(np, need(smpl, "poses_body", what), f"{what}: poses_body", 69)
+    trans = array(np, need(smpl, "trans", what), f"{what}: trans", 3)
+    if not len(root) == len(body) == len(trans):
+        fail(f"{what}: poses_root has {len(root)} frames, poses_body {len(body)}, trans {len(trans)}")
+    good = np.asarray(need(one, "good_frames_mask", path)).reshape(-1)
+    if len(good) != len(root) or not np.isin(good, (0, 1)).all():
+        fail(f"{path}: good_frames_mask: is no mask of {len(root)} frames")
+    arguments.more = {"good_frames_mask": good.astype(np.uint8)}
+    return np.concatenate([root, body], axis=1), trans, np.zeros((1, 10)), range(len(root)), False, "y up"
+
+
+def read_rich(np, path, arguments):
+    if arguments.in_camera:
+        fail(f"{path}: the truth of RICH is in the world of its first camera already")
+    files = sorted(path.glob("*/*.pkl")) if path.is_dir() else []
+    if not files:
+        fail(f"{path}: holds no FRAME/PERSON.pkl; a sequence's folder in the bodies of RICH is needed")
+    if not all(file.stem.isdecimal() and file.parent.name.isdecimal() for file in files):
+        odd = next(file for file in files if not (file.stem.isdecimal() and file.parent.name.isdecimal()))
+        fail(f"{odd}: is not called FRAME/PERSON.pkl, by numbers")
+    people = sorted({int(file.stem) for file in files})
+    person = people[0] if len(people) == 1 and not arguments.person else arguments.person
+    if person not in people:
+        fail(f"{path}: has no person {person}; --person can be {', '.join(map(str, people))}")
+    if len(people) > 1:
+        print(f"{path}: person {person} is read, not {', '.join(str(one) for one in people if one != person)}")
+    rows = {"global_orient": [], "body_pose": [], "transl": [], "betas": []}
+    widths = {"global_orient": 3, "body_pose": 63, "transl": 3, "betas": 10}
+    files = [file for file in files if int(file.stem) == person]
+    for file in files:
+        one = arrays_of(file)
+        for name, width in widths.items():
+            row = array(np, np.asarray(need(one, name, file)).reshape(1, -1), f"{file}: {name}", width)
+            rows[name].append(row[0])
+    pose = np.concatenate([np.stack(rows["global_orient"]), np.stack(rows["body_pose"])], axis=1)
+    frames = np.array([int(file.parent.name) for file in files])
+    print(f"{path}: frames {frames.min()} to {frames.max()} of the sequence are counted from 0")
+    good = np.zeros(frames.max() - frames.min() + 1, dtype=np.uint8)
+    good[frames - frames.min()] = 1
+    arguments.more = {"good_frames_mask": good}
+    return pose, np.stack(rows["transl"]), np.stack(rows["betas"]), frames - frames.min(), True, "y down"
+
+
+def read_intercap(np, path, arguments):
+    if arguments.in_camera:
+        fail(f"{path}: the truth of InterCap is in the world of a camera already")
+    one = arrays_of(path)
+    widths = {"global_orient": 3, "body_pose": 63, "transl": 3, "betas": 10, "ob_pose": 3, "ob_trans": 3}
+    rows = {name: array(np, need(one, name, path), f"{path}: {name}", width) for name, width in widths.items()}
+    for name in rows:
+        if len(rows[name]) != len(rows["transl"]) and not (name == "betas" and len(rows[name]) == 1):
+            fail(f"{path}: transl has {len(rows['transl'])} frames, {name} {len(rows[name])}")
+    tell_unread(path, one, widths)
+    arguments.object = (matrix_of_vector(np, rows["ob_pose"]), rows["ob_trans"])
+    pose = np.concatenate([rows["global_orient"], rows["body_pose"]], axis=1)
+    return pose, rows["transl"], rows["betas"], range(len(pose)), True, "y down"
+
+
+READERS = {"wham": read_wham, "gvhmr": read_gvhmr, "tram": read_tram, "whac": read_whac, "lingo": read_lingo,
+           "emdb": read_emdb, "rich": read_rich, "intercap": read_intercap}
 ENDINGS = {".pkl": "wham", ".pickle": "wham", ".pt": "gvhmr", ".npy": "tram"}
 
 
@@ -483,13 +580,15 @@ def main():
     parser.add_argument("output", metavar="OUT.npz", type=pathlib.Path)
     parser.add_argument("--from", dest="source", choices=READERS, help="the estimator; default: by IN's ending")
     parser.add_argument("--fps", type=float, help=f"frames a second of the video; default: {USUAL_RATE}, which is told")
-    parser.add_argument("--person", type=int, default=0, help="which of WHAM's people, from 0")
+    parser.add_argument("--person", type=int, default=0, help="which of WHAM's people, from 0; of RICH's by its number")
     parser.add_argument("--camera", type=pathlib.Path, help="TRAM's camera.npy; default: beside the folder of IN")
     parser.add_argument("--in-camera", action="store_true", help="in the camera's frame, not turned")
     parser.add_argument("--body-model", type=pathlib.Path, help="WHAC: the SMPL-X model (.npz) that its meshes are of")
     parser.add_argument("--pelvis", type=parsed_pelvis, help="x,y,z of the estimator's body at rest, metres")
     parser.add_argument("--trust", action="store_true", help="GVHMR: unpickle everything in IN, which can run code")
     arguments = parser.parse_args()
+    arguments.more = {}  # arrays of the input that the motion keeps
+    arguments.object = None  # rotations and places of an object's origin, in the input's world
     if arguments.output.suffix != ".npz":
         fail(f"{arguments.output}: allowed ending: .npz")
     if arguments.fps is None:
@@ -520,6 +619,9 @@ def main():
         sign = 1 if world == "y up" else -1
         turn = np.array([[1, 0, 0], [0, 0, -sign], [0, sign, 0]], dtype=np.float64)
         pose, trans = moved(np, pose, trans, np.tile(turn, (len(pose), 1, 1)), np.zeros(3), pelvis)
+        if arguments.object:
+            turns, places = arguments.object
+            arguments.more.update(obj_rot_mat=turn @ turns, obj_trans=places @ turn.T)
     if not is_smplx:
         trans = trans + pelvis - np.array(SMPLX_PELVIS)
     # SMPL's shape is not SMPL-X's: its numbers are left out.
@@ -532,6 +634,7 @@ def main():
         arguments.output,
         **rest,
         **hands,
+        **arguments.more,
         **({"first_frame": np.array(float(first))} if first else {}),
         trans=trans,
         root_orient=pose[:, :3],

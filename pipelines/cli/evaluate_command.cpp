@@ -1,5 +1,6 @@
 // `hsi4d evaluate`: errors of runs and motions against the truth, and what of them needs none.
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -35,6 +36,9 @@ struct EvaluateOptions {
   std::vector<std::string> object_surfaces;  ///< --object-surface NAME=F
   std::string align = "none";                ///< --align none|heading|rotation
   std::string up;                            ///< --up y|z; empty: to be found
+  std::string protocol;                      ///< --protocol NAME; empty: none
+  std::string foot_points;                   ///< --foot-points A,B,C,D; empty: those of the body
+  std::optional<int> aligned_frames;         ///< --align-frames N
   std::vector<std::string> clips;            ///< --clip F.npz, one for each input; none: RUN/clip.npz where it is there
   std::string json;                          ///< --json F; empty: none
   std::string export_folder;                 ///< --export DIR; empty: none
@@ -114,6 +118,7 @@ ConfigValue json_of(const Evaluation& result) {
   object.add("name", ConfigValue::make_string(result.name));
   if (!result.truth.empty()) object.add("truth", ConfigValue::make_string(result.truth));
   if (!result.surface.empty()) object.add("surface", ConfigValue::make_string(result.surface));
+  if (!result.protocol.empty()) object.add("protocol", ConfigValue::make_string(result.protocol));
   object.add("clip", ConfigValue::make_string(result.has_objects ? "dynamic" : "static"));
   object.add("frames", ConfigValue::make_integer(result.frames));
   object.add("frame_rate", ConfigValue::make_number(result.frame_rate));
@@ -186,6 +191,52 @@ MotionAlign parse_align(const std::string& text) {
   throw UserError("hsi4d evaluate: --align: \"" + text + "\" is not known; allowed: " + joined(known));
 }
 
+Protocol parse_protocol(const std::string& text) {
+  if (text.empty()) return Protocol::kNone;
+  std::vector<std::string> known;
+  for (const auto& choice : kProtocols) {
+    if (choice.name == text) return choice.value;
+    known.emplace_back(choice.name);
+  }
+  throw UserError("hsi4d evaluate: --protocol: \"" + text + "\" is not known; allowed: " + joined(known));
+}
+
+/// Four whole numbers.
+std::vector<Index> parse_foot_points(const std::string& text) {
+  std::vector<Index> points;
+  if (text.empty()) return points;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (at < end) {
+    Index point = 0;
+    const auto [after, error] = std::from_chars(at, end, point);
+    if (error != std::errc() || point < 0 || (after != end && *after != ',')) break;
+    points.push_back(point);
+    at = after == end ? end : after + 1;
+  }
+  if (at != end || text.back() == ',' || points.size() != 4)
+    throw UserError(
+        "hsi4d evaluate: --foot-points: \"" + text +
+        "\"; allowed: four numbers of points, left toe, left heel, right toe, right heel: 5770,8846,8463,8635");
+  return points;
+}
+
+/// What options of protocols say. Throws UserError for one that nothing reads.
+void take_protocol(const EvaluateOptions& options, EvaluationSettings& settings) {
+  settings.protocol = parse_protocol(options.protocol);
+  settings.foot_points = parse_foot_points(options.foot_points);
+  if (!settings.foot_points.empty() && !is_of_world(settings.protocol))
+    throw UserError("hsi4d evaluate: --foot-points: only --protocol emdb2 and rich measure feet by points");
+  if (options.aligned_frames && !is_of_objects(settings.protocol))
+    throw UserError(
+        "hsi4d evaluate: --align-frames: only --protocol behave and intercap lay frames on the truth by it");
+  if (options.aligned_frames && *options.aligned_frames < 1)
+    throw UserError("hsi4d evaluate: --align-frames: 0 is out of range; allowed: 1 or more");
+  settings.aligned_frames = options.aligned_frames.value_or(static_cast<int>(kAlignedFrames));
+  if (!settings.truth_body_model.empty() && settings.body_model.empty())
+    throw UserError("hsi4d evaluate: --truth-body-model is given without --body-model, the body of the other motions");
+}
+
 std::vector<std::pair<std::string, std::string>> parse_object_surfaces(const std::vector<std::string>& texts) {
   std::vector<std::pair<std::string, std::string>> surfaces;
   for (const std::string& text : texts) {
@@ -202,6 +253,7 @@ EvaluationSettings settings_of(const EvaluateOptions& options) {
   settings.up = parse_up(options.up);
   settings.align = parse_align(options.align);
   settings.object_surfaces = parse_object_surfaces(options.object_surfaces);
+  take_protocol(options, settings);
   if (!settings.body_model.empty() && !settings.avatar.empty())
     throw UserError("hsi4d evaluate: --body-model and --avatar both say of what body the joints are; give one");
   if (!settings.surface.empty() + !settings.occupancy.empty() + !settings.scene.empty() > 1)
@@ -245,8 +297,9 @@ void check_outputs(const EvaluateOptions& options) {
   check_export(options);
   if (options.json.empty()) return;
   const EvaluationSettings& s = options.settings;
-  check_no_input(options.json, "hsi4d evaluate: --json",
-                 {s.truth, s.data, s.body_model, s.avatar, s.surface, s.occupancy, s.scene, s.objects});
+  check_no_input(
+      options.json, "hsi4d evaluate: --json",
+      {s.truth, s.data, s.body_model, s.truth_body_model, s.avatar, s.surface, s.occupancy, s.scene, s.objects});
   check_no_input(options.json, "hsi4d evaluate: --json", options.inputs);
   check_no_input(options.json, "hsi4d evaluate: --json", options.clips);
   check_writable(options.json);
@@ -315,6 +368,30 @@ void add_evaluate_scene(CLI::App& command, EvaluateOptions& o) {
       ->allow_extra_args(false);
 }
 
+/// Public benchmarks.
+void add_evaluate_protocol(CLI::App& command, EvaluateOptions& o) {
+  command
+      .add_option("--protocol", o.protocol,
+                  "Measure as on a public benchmark too: emdb2 or rich (WA-MPJPE-100, W-MPJPE-100, RTE, jitter, foot "
+                  "sliding), behave or intercap (chamfer distances and accelerations of human and objects)")
+      ->type_name("NAME");
+  command
+      .add_option("--truth-body-model", o.settings.truth_body_model,
+                  "A SMPL-X file of the truth's body, where it is another than --body-model: a gender's")
+      ->type_name("M.npz");
+  command
+      .add_option(
+          "--foot-points", o.foot_points,
+          "By which points of the body feet slide in emdb2 and rich, left toe, left heel, right toe, right heel; "
+          "without, big toes and heels")
+      ->type_name("A,B,C,D");
+  command
+      .add_option("--align-frames", o.aligned_frames,
+                  "How many frames behave and intercap lay on the truth together, 300 without; 1: each by itself")
+      ->check(whole_number())
+      ->type_name("N");
+}
+
 }  // namespace
 
 void add_evaluate(CLI::App& app, Program& program) {
@@ -345,6 +422,7 @@ void add_evaluate(CLI::App& app, Program& program) {
                    "Joints are those of this avatar; without either, of the avatar of the run or dataset")
       ->type_name("F.safetensors");
   add_evaluate_scene(*command, o);
+  add_evaluate_protocol(*command, o);
   command
       ->add_option("--from-rate", s.from_rate,
                    "Frames a second of the motions, instead of what they say; of a truth that does not say it too")

@@ -6,6 +6,8 @@
 #include "body/pose_layout.h"
 #include "body/smplx_sequence.h"
 #include "core/check.h"
+#include "core/text.h"
+#include "optim/motion_start.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/metrics/penetration.h"
 
@@ -45,6 +47,18 @@ SmplxSequence sequence_of(std::span<const SceneState> states, const std::vector<
   return sequence;
 }
 
+std::vector<double> chosen_points(std::span<const double> all, std::span<const Index> rows) {
+  std::vector<double> points;
+  for (const Index row : rows) {
+    const auto place = all.subspan(static_cast<std::size_t>(3 * row), 3);
+    points.insert(points.end(), place.begin(), place.end());
+  }
+  return points;
+}
+
+bool is_left_foot(Index joint) { return joint == smplx_joint("left_ankle") || joint == smplx_joint("left_foot"); }
+bool is_right_foot(Index joint) { return joint == smplx_joint("right_ankle") || joint == smplx_joint("right_foot"); }
+
 }  // namespace
 
 EvaluatedBody EvaluatedBody::of_avatar(const std::string& file, Track& track) {
@@ -68,23 +82,67 @@ EvaluatedBody EvaluatedBody::of_model(const std::string& file, Track& track) {
   return body;
 }
 
-std::vector<std::vector<double>> EvaluatedBody::points(const std::vector<SceneState>& states) const {
+template <class F>
+std::vector<std::vector<double>> EvaluatedBody::of_vertices(const std::vector<SceneState>& states, const F& of) const {
   std::vector<std::vector<double>> points;
-  if (avatar_) {
-    for (const SceneState& state : states) points.push_back(measured_points(*avatar_, state.body));
-    return points;
-  }
   for (std::size_t first = 0; first < states.size(); first += kPosedTogether) {
     const std::size_t count = std::min(kPosedTogether, states.size() - first);
     const SmplxFrames<double> posed = pose_frames<double>(
         *model_, sequence_of(std::span(states).subspan(first, count), betas_), SmplxHands::kFull, true);
     const std::size_t numbers = posed.vertices.size() / count;
-    for (std::size_t t = 0; t < count; ++t) {
-      const auto begin = posed.vertices.begin() + static_cast<std::ptrdiff_t>(t * numbers);
-      points.emplace_back(begin, begin + static_cast<std::ptrdiff_t>(numbers));
-    }
+    for (std::size_t t = 0; t < count; ++t)
+      points.push_back(of(std::span(posed.vertices).subspan(t * numbers, numbers)));
   }
   return points;
+}
+
+std::vector<std::vector<double>> EvaluatedBody::points(const std::vector<SceneState>& states) const {
+  if (!avatar_)
+    return of_vertices(states, [](std::span<const double> all) { return std::vector<double>(all.begin(), all.end()); });
+  std::vector<std::vector<double>> points;
+  for (const SceneState& state : states) points.push_back(measured_points(*avatar_, state.body));
+  return points;
+}
+
+Triangles EvaluatedBody::faces() const {
+  Triangles faces;
+  if (avatar_) return faces;
+  for (std::size_t i = 0; i < model_->faces.size(); i += 3)
+    faces.push_back({model_->faces[i], model_->faces[i + 1], model_->faces[i + 2]});
+  return faces;
+}
+
+Index EvaluatedBody::point_count() const { return avatar_ ? avatar_->weights.vertices : model_->vertex_count(); }
+
+std::vector<std::vector<double>> EvaluatedBody::points(const std::vector<SceneState>& states,
+                                                       std::span<const Index> rows) const {
+  for (const Index row : rows) HSI4D_CHECK(row >= 0 && row < point_count(), "there is no point " + std::to_string(row));
+  if (!avatar_) return of_vertices(states, [rows](std::span<const double> all) { return chosen_points(all, rows); });
+  std::vector<std::vector<double>> points;
+  for (const SceneState& state : states) points.push_back(posed_gaussians(*avatar_, state.body, rows));
+  return points;
+}
+
+FootPoints EvaluatedBody::foot_points() const {
+  if (!avatar_ && model_->vertex_count() == kSmplxVertices) return {kSmplxFeet, "the big toes and heels of SMPL-X"};
+  const BodyModel rest = avatar_ ? BodyModel() : rest_body(*model_, betas_);
+  const RestPoints points =
+      avatar_ ? RestPoints{&avatar_->means, &avatar_->weights} : RestPoints{&rest.vertices, &rest.weights};
+  FootPoints feet;
+  const std::array parts = {rows_of_joints(*points.weights, is_left_foot),
+                            rows_of_joints(*points.weights, is_right_foot)};
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (parts[side].empty())
+      throw UserError("hsi4d evaluate: --protocol: no point of the body follows its " +
+                      std::string(side == 0 ? "left" : "right") + " foot; --foot-points names four");
+    const auto forward = [&points](Index row) { return (*points.places)[static_cast<std::size_t>(3 * row + 2)]; };
+    const auto [heel, toe] = std::minmax_element(parts[side].begin(), parts[side].end(),
+                                                 [&](Index a, Index b) { return forward(a) < forward(b); });
+    feet.rows[2 * side] = *toe;
+    feet.rows[2 * side + 1] = *heel;
+  }
+  feet.words = "the foremost and hindmost points of its feet";
+  return feet;
 }
 
 }  // namespace hsi4d

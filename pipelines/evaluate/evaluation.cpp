@@ -1,6 +1,7 @@
 #include "pipelines/evaluate/evaluation.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 
@@ -10,6 +11,7 @@
 #include "core/rotation.h"
 #include "core/text.h"
 #include "optim/object_points.h"
+#include "optim/solid/mesh_file.h"
 #include "pipelines/evaluate/evaluated_body.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/pose_estimate.h"
@@ -181,9 +183,28 @@ std::optional<Vector3<double>> centroid_of_object(const EvaluationSettings& sett
   return surface.empty() ? std::nullopt : std::optional(mesh_centroid(surface));
 }
 
+/// Objects whose poses act about the mean m of their meshes' vertices, where Gaussians have another centroid c in the
+/// same file's frame: t' = R (c − m) + t. Without a mesh nobody knows m, and it is taken for c.
+void place_about_centroids(const std::vector<std::string>& folders, Measurement& m, Track& track) {
+  for (std::size_t o = 0; o < track.objects.size(); ++o) {
+    const std::string surface = surface_of_object(m.settings, track.objects[o]);
+    if (surface.empty()) {
+      m.result.notes.push_back("the poses of " + track.objects[o] + " in " + track.name +
+                               " act about the middle of its mesh, which is not known and taken for that of its "
+                               "Gaussians (--object-surface " +
+                               track.objects[o] + "=F says it)");
+      continue;
+    }
+    const Vector3<double> between = *centroid_of_object(m.settings, folders, track.objects[o]) - mesh_centroid(surface);
+    for (std::vector<ObjectPose>& poses : track.object_poses)
+      poses[o].translation += so3_exp(poses[o].rotation) * between;
+  }
+}
+
 /// Objects whose translations are of the origins of their files get those of their centroids c: t' = R c + t. Where a
 /// centroid is not known, objects are left out.
 void place_objects(const std::vector<std::string>& folders, Measurement& m, Track& track) {
+  if (track.objects_are_of_meshes) place_about_centroids(folders, m, track);
   if (!track.objects_are_of_origins) return;
   for (std::size_t o = 0; o < track.objects.size(); ++o) {
     const auto centroid = centroid_of_object(m.settings, folders, track.objects[o]);
@@ -373,6 +394,83 @@ void measure_clip(const std::string& file, Evaluation& result) {
   result.notes.push_back(std::move(note));
 }
 
+// ---- Protocols ----
+
+/// Points of the feet that are asked for, or those that the body itself has.
+std::array<Index, 4> foot_points_for(Measurement& m) {
+  const std::vector<Index>& wanted = m.settings.foot_points;
+  if (wanted.empty()) {
+    const FootPoints feet = m.body->foot_points();
+    std::vector<std::string> numbers;
+    for (const Index row : feet.rows) numbers.push_back(std::to_string(row));
+    m.result.notes.push_back("feet slide by points " + joined(numbers) + ", " + feet.words +
+                             "; the protocol has four vertices of SMPL");
+    return feet.rows;
+  }
+  for (const Index point : wanted) {
+    if (point >= m.body->point_count())
+      throw UserError("hsi4d evaluate: --foot-points: there is no point " + std::to_string(point) +
+                      "; the body has 0 to " + std::to_string(m.body->point_count() - 1));
+  }
+  HSI4D_CHECK_EQ(wanted.size(), std::size_t{4});
+  return {wanted[0], wanted[1], wanted[2], wanted[3]};
+}
+
+/// The shape of an object that is compared: a mesh, else the centres of its Gaussians.
+ObjectShape shape_of_object(const std::vector<std::string>& folders, const std::string& name, const Measurement& m) {
+  ObjectShape shape;
+  const std::string surface = surface_of_object(m.settings, name);
+  if (!surface.empty()) {
+    const Vector3<double> centroid = *centroid_of_object(m.settings, folders, name);
+    const TriangleMesh mesh = read_mesh(surface);
+    shape.source = "the mesh " + surface;
+    shape.faces = mesh.faces;
+    for (const Vector3<double>& vertex : mesh.vertices) {
+      const Vector3<double> place = vertex - centroid;
+      shape.points.insert(shape.points.end(), place.data(), place.data() + 3);
+    }
+    return shape;
+  }
+  const auto at = std::find(m.object_names.begin(), m.object_names.end(), name);
+  if (at == m.object_names.end())
+    throw UserError("hsi4d evaluate: --protocol: the shape of " + name + " is not known; --object-surface " + name +
+                    "=F or --data says it");
+  const Gaussians& object = m.objects[static_cast<std::size_t>(at - m.object_names.begin())];
+  const Index count = std::min(kSurfacePoints, object.count());
+  for (Index i = 0; i < count; ++i) {
+    const Vector3<double> place = Vector3<float>(object.means.data() + 3 * (i * object.count() / count)).cast<double>();
+    shape.points.insert(shape.points.end(), place.data(), place.data() + 3);
+  }
+  shape.source = "the Gaussians of " + name;
+  return shape;
+}
+
+void measure_protocol(const std::optional<Track>& truth, const std::vector<std::string>& folders, Measurement& m) {
+  const Protocol protocol = m.settings.protocol;
+  if (protocol == Protocol::kNone) return;
+  if (!truth)
+    throw UserError("hsi4d evaluate: --protocol: " + m.input +
+                    ": there is no truth to compare with; --truth names one");
+  if (m.body->point_count() != m.truth_body->point_count())
+    throw UserError("hsi4d evaluate: --truth-body-model: has " + std::to_string(m.truth_body->point_count()) +
+                    " vertices, --body-model " + std::to_string(m.body->point_count()) + "; allowed: as many");
+  ProtocolSides sides{.tracks = m.tracks, .body = *m.body, .true_body = *m.truth_body};
+  sides.aligned_frames = m.settings.aligned_frames;
+  if (is_of_world(protocol)) {
+    sides.foot_points = foot_points_for(m);
+  } else {
+    if (m.tracks.truth.front().world_from_object.empty())
+      throw UserError("hsi4d evaluate: --protocol: " + m.input +
+                      ": estimate and truth have no object in common, which the protocol measures");
+    for (const std::string& name : truth->objects) sides.objects.push_back(shape_of_object(folders, name, m));
+  }
+  const ProtocolResult result = is_of_world(protocol) ? world_protocol(sides) : object_protocol(sides);
+  m.result.values.insert(m.result.values.end(), result.values.begin(), result.values.end());
+  const std::string name(choice_name(std::span<const ConfigChoice<Protocol>>(kProtocols), protocol));
+  m.result.protocol = name;
+  for (const std::string& note : result.notes) m.result.notes.push_back("protocol " + name + ": " + note);
+}
+
 void check_object_surfaces(const Measurement& m) {
   for (const auto& [name, file] : m.settings.object_surfaces) {
     if (std::find(m.estimate.objects.begin(), m.estimate.objects.end(), name) == m.estimate.objects.end())
@@ -390,7 +488,8 @@ std::optional<Track> take_truth(const std::vector<std::string>& truths, const st
                                 const std::string& avatar, Measurement& m) {
   if (truths.empty()) return std::nullopt;
   Track truth = read_joined_tracks(truths, truth_options(m.settings, folders));
-  m.truth_body = put_on_body(m.settings, avatar, truth);
+  m.truth_body = m.settings.truth_body_model.empty() ? put_on_body(m.settings, avatar, truth)
+                                                     : EvaluatedBody::of_model(m.settings.truth_body_model, truth);
   note_world(truth, m, "the truth: ");
   place_objects(folders, m, truth);
   return truth;
@@ -428,6 +527,7 @@ void read_tracks(const std::vector<std::string>& truths, const std::vector<std::
   m.result.has_objects = !m.estimate.objects.empty() || (truth && !truth->objects.empty()) ||
                          !first_of(folders, object_names_of_track).empty();
   if (!truth) {
+    measure_protocol(truth, folders, m);
     m.tracks = by_itself(m.estimate, m.body->skeleton(), m.settings.frame_rate);
     read_objects(folders, m);
     begin_without_truth(m);
@@ -440,6 +540,7 @@ void read_tracks(const std::vector<std::string>& truths, const std::vector<std::
                              " of the video on, the first that both motions have");
   read_objects(folders, m);
   measure_errors(*truth, m);
+  measure_protocol(truth, folders, m);
 }
 
 /// Looks whether all paths hold what they should, and finds the truths.

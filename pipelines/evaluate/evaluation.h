@@ -8,6 +8,7 @@
 
 #include "pipelines/config/data_settings.h"
 #include "pipelines/evaluate/foreign_motion.h"
+#include "pipelines/evaluate/protocols.h"
 #include "pipelines/evaluate/tracks.h"
 #include "pipelines/metrics/solid.h"
 #include "pipelines/record/summary.h"
@@ -17,9 +18,10 @@ namespace hsi4d {
 
 /// What is measured, and by what. Paths; empty: not given.
 struct EvaluationSettings {
-  std::string truth;       ///< what a motion is compared with; empty: what the run's config names, if anything
-  std::string data;        ///< a dataset or run in whose scene the motions are, with its objects and avatar
-  std::string body_model;  ///< joints and vertices are those of this body, in each motion's own shape
+  std::string truth;             ///< what a motion is compared with; empty: what the run's config names, if anything
+  std::string data;              ///< a dataset or run in whose scene the motions are, with its objects and avatar
+  std::string body_model;        ///< joints and vertices are those of this body, in each motion's own shape
+  std::string truth_body_model;  ///< of the truth, where it is another one with the same vertices
   std::string avatar;
   std::string surface, occupancy, scene;  ///< what is solid: a mesh, a grid, what Gaussians show; one at most
   std::string objects;                    ///< poses of objects in the scene, beside a motion
@@ -30,6 +32,9 @@ struct EvaluationSettings {
   std::optional<UpAxis> up = {};
   int person = 0;
   std::optional<double> frame_rate = {};  ///< to measure at
+  Protocol protocol = Protocol::kNone;
+  std::vector<Index> foot_points = {};  ///< four points of the body by their numbers; empty: EvaluatedBody::foot_points
+  Index aligned_frames = kAlignedFrames;  ///< that a protocol with objects lays on the truth together
 };
 
 /// What one input came to.
@@ -42,6 +47,7 @@ struct Evaluation {
   std::vector<FrameMetrics> per_frame;      ///< of frames 1 to T
   std::vector<std::string> notes;           ///< what was found or taken, for people
   std::string surface;                      ///< by what penetration was measured; empty: it was not
+  std::string protocol;                     ///< that was followed beside; empty: none
   std::vector<std::vector<double>> joints;  ///< [T+1][J,3] metres, world
 };
 

@@ -12,9 +12,11 @@
 #include "core/file.h"
 #include "core/json_text.h"
 #include "core/log.h"
+#include "core/npz.h"
 #include "core/rotation.h"
 #include "core/text.h"
 #include "pipelines/config/data_settings.h"
+#include "pipelines/evaluate/behave_sequence.h"
 #include "pipelines/input/body_files.h"
 #include "pipelines/input/scene_setup.h"
 #include "pipelines/record/folder.h"
@@ -26,6 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kSameMoment = 1e-6;  // frames
+constexpr const char* kGoodFrames = "good_frames_mask";
 
 // ---- Files ----
 
@@ -72,11 +75,27 @@ Track read_pose_track(const std::string& path, const TrackOptions& options) {
   return track;
 }
 
+/// Which frames are good ones, where a motion's file says it; else empty.
+std::vector<bool> read_good_frames(const std::string& path, Index frames) {
+  const Npz file = Npz::read(path);
+  if (!file.has(kGoodFrames)) return {};
+  const NpyArray& array = file.array(kGoodFrames);
+  std::vector<bool> good;
+  for (const double number : array.require_shape({frames}).as<double>()) {
+    if (number != 0 && number != 1)
+      throw DataError(array.source() + ": frame " + std::to_string(good.size()) + " is " + number_text(number) +
+                      "; allowed: 0 and 1");
+    good.push_back(number == 1);
+  }
+  return good;
+}
+
 /// A motion (.npz), with its objects.
 Track read_motion_track(const std::string& path, const TrackOptions& options) {
   Track track;
   track.name = path;
   track.motion = read_motion_with_warnings(path);
+  track.good_frames = read_good_frames(path, track.frames());
   if (options.frame_rate && !(options.fills_in && track.motion.says_frame_rate)) {
     track.motion.frame_rate = *options.frame_rate;
     track.motion.says_frame_rate = true;
@@ -122,14 +141,16 @@ fs::path common_data_path(const std::string& run, std::string_view key) {
 /// Puts a track behind another whose last frame is its first.
 void append_track(const Track& more, Track& track) {
   if (more.objects != track.objects || more.camera_from_world.empty() != track.camera_from_world.empty() ||
-      more.motion.frame_rate != track.motion.frame_rate || more.up != track.up)
-    throw DataError(more.name + ": has other objects, cameras or another frame rate than " + track.name);
+      more.good_frames.empty() != track.good_frames.empty() || more.motion.frame_rate != track.motion.frame_rate ||
+      more.up != track.up)
+    throw DataError(more.name + ": has other objects, cameras, good frames or another frame rate than " + track.name);
   const auto append = [](const auto& from, auto& to) {
     if (!from.empty()) to.insert(to.end(), from.begin() + 1, from.end());
   };
   append(more.motion.poses, track.motion.poses);
   append(more.object_poses, track.object_poses);
   append(more.camera_from_world, track.camera_from_world);
+  append(more.good_frames, track.good_frames);
 }
 
 /// The file of an object's Gaussians in the config of a run; empty where it names none.
@@ -167,12 +188,6 @@ auto at_place(Index count, double place, Value value, Between between) {
   const double before = std::floor(place);
   const auto index = static_cast<std::size_t>(before);
   return between(value(index), value(index + 1), place - before);
-}
-
-/// Turns at constant speed, moves on a line.
-Rigid<double> between_poses(const Rigid<double>& a, const Rigid<double>& b, double u) {
-  return {a.rotation * so3_exp(Vector3<double>(u * so3_log(Matrix3<double>(a.rotation.transpose() * b.rotation)))),
-          (1 - u) * a.translation + u * b.translation};
 }
 
 /// The camera's centre moves on a line.
@@ -214,6 +229,14 @@ std::vector<ObjectPose> objects_at(const Track& track, double place) {
     objects.push_back({so3_log(pose.rotation), pose.translation});
   }
   return objects;
+}
+
+/// Whether the frames about a place are good ones.
+bool is_good_at(const Track& track, double place) {
+  if (track.good_frames.empty()) return true;
+  return at_place(
+      track.frames(), place, [&track](std::size_t t) -> bool { return track.good_frames[t]; },
+      [](bool a, bool b, double) { return a && b; });
 }
 
 /// Body and all objects of a track, as far as they are known.
@@ -292,6 +315,7 @@ Track read_track(const std::string& path, const TrackOptions& options) {
     if (fs::exists(folder / "truth" / "motion.npz")) return read_track_folder(folder / "truth", path);
     if (fs::exists(folder / "initial.json"))
       throw UserError(path + ": is a dataset without truth/motion.npz, which errors are measured against");
+    if (is_behave_sequence(path)) return read_behave_sequence(path, options.object_name);
     return read_pose_track(path, options);
   }
   if (!path.ends_with(".npz")) throw UserError(path + ": is neither a folder of a run or dataset nor a motion (.npz)");
@@ -398,6 +422,11 @@ std::string initial_of_track(const std::string& path) {
   return !data.initial.empty() && fs::exists(data.initial) ? initial_motion_file(data).string() : "";
 }
 
+Rigid<double> between_poses(const Rigid<double>& a, const Rigid<double>& b, double u) {
+  return {a.rotation * so3_exp(Vector3<double>(u * so3_log(Matrix3<double>(a.rotation.transpose() * b.rotation)))),
+          (1 - u) * a.translation + u * b.translation};
+}
+
 BodyPose body_at(const Track& track, double seconds) {
   return at_place(
       track.frames(), seconds * track.motion.frame_rate - track.motion.first_frame,
@@ -465,6 +494,8 @@ AlignedTracks aligned(const Track& estimate, const RestSkeleton& estimate_body, 
     tracks.estimate.push_back(state_at(estimate, estimate_body, objects, place));
     tracks.states.push_back(all_at(estimate, place));
     tracks.truth.push_back(state_at(truth, truth_body, true_objects, true_place));
+    tracks.true_states.push_back(all_at(truth, true_place));
+    tracks.good.push_back(is_good_at(truth, true_place));
   }
   return tracks;
 }

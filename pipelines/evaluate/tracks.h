@@ -22,12 +22,14 @@ struct Track {
   std::vector<std::string> objects;                   ///< names, in the order of object_poses
   std::vector<std::vector<ObjectPose>> object_poses;  ///< [frame][object]; empty: none are known
   std::vector<Rigid<double>> camera_from_world;       ///< by frame; empty: none are known
+  std::vector<bool> good_frames;                      ///< those that are measured by protocols; empty: all
   std::string world;  ///< what was found of its world, for people; empty: nothing to say
   /// Which axis of its world is up. A body turns about its pelvis, so that z is only then up when its body is known:
   /// see turn_z_up.
   UpAxis up = UpAxis::kZ;
   bool objects_stay = false;  ///< the objects' poses are in the scene's world, z up, and do not move with the track's
   bool objects_are_of_origins = false;  ///< their translations are those of the origins of the objects' files
+  bool objects_are_of_meshes = false;   ///< their poses act about the mean of the vertices of the objects' meshes
 
   Index frames() const { return std::ssize(motion.poses); }
 };
@@ -52,7 +54,8 @@ bool is_run_folder(const std::string& path);
 void check_holds_track(const std::string& path, const std::string& member);
 
 /// Reads what a path holds: a run folder (motion.npz, objects.npz, cameras.json), a dataset with truth/, such a truth/
-/// itself, a motion (.npz), or a folder of SMPLer-X (read_pose_folder).
+/// itself, a motion (.npz), a sequence of BEHAVE (behave_sequence.h), or a folder of SMPLer-X (read_pose_folder). Of a
+/// motion `good_frames_mask` [T], booleans or 0 and 1, is Track::good_frames, as EMDB calls it.
 ///
 /// Throws UserError naming the path for anything else, a run that has not come to its end, and a dataset without truth;
 /// UserError and DataError of the readers; DataError where counts of frames differ, or a file of object poses has none.
@@ -94,6 +97,9 @@ std::string initial_of_track(const std::string& path);
 /// The body of a track at a moment of its video, seconds; where it has begun, and not ended.
 BodyPose body_at(const Track& track, double seconds);
 
+/// Between two poses: turns at constant speed, moves on a line.
+Rigid<double> between_poses(const Rigid<double>& a, const Rigid<double>& b, double u);
+
 /// A skeleton in its rest pose.
 struct RestSkeleton {
   std::vector<int> parents;
@@ -109,7 +115,9 @@ struct AlignedTracks {
   double frame_rate = 0;  ///< frames a second of both
   Index first = 0;        ///< the frame, at this rate, that both have first
   std::vector<FrameState> estimate, truth;
-  std::vector<SceneState> states;  ///< the estimate's bodies and all of its objects; no cameras
+  std::vector<SceneState> states;       ///< the estimate's bodies and all of its objects; no cameras
+  std::vector<SceneState> true_states;  ///< the truth's; empty without one
+  std::vector<bool> good;  ///< whether both frames of the truth about a moment are good ones; as true_states
 };
 
 /// Both tracks at the frames of the slower one, from the first frame that both have on, as long as both last. Between

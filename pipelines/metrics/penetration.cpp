@@ -38,17 +38,23 @@ MetricValues values_of(const Penetration& counts, const std::string& before) {
 
 }  // namespace
 
-std::vector<double> measured_points(const Avatar& avatar, const BodyPose& pose) {
+std::vector<double> posed_gaussians(const Avatar& avatar, const BodyPose& pose, std::span<const Index> rows) {
   MotionStart motion;
   motion.avatar = &avatar;
   motion.first_body = pose_skeleton(avatar, pose);
-  const Index rows = avatar.weights.vertices, count = std::min(kMeasuredPoints, rows);
   std::vector<double> points;
-  for (Index i = 0; i < count; ++i) {
-    const Vector3<double> place = motion.place(BodyPoint{kFirstFrame, i * rows / count});
+  for (const Index row : rows) {
+    const Vector3<double> place = motion.place(BodyPoint{kFirstFrame, row});
     points.insert(points.end(), place.data(), place.data() + 3);
   }
   return points;
+}
+
+std::vector<double> measured_points(const Avatar& avatar, const BodyPose& pose) {
+  const Index all = avatar.weights.vertices, count = std::min(kMeasuredPoints, all);
+  std::vector<Index> rows;
+  for (Index i = 0; i < count; ++i) rows.push_back(i * all / count);
+  return posed_gaussians(avatar, pose, rows);
 }
 
 Penetration penetration_of(const SignedDistance& distance, std::span<const double> points) {

@@ -21,6 +21,9 @@ struct Penetration {
   double depth = 0;  ///< sum over those inside, metres
 };
 
+/// Some Gaussians of the human in a pose, [P,3] metres, world.
+std::vector<double> posed_gaussians(const Avatar& avatar, const BodyPose& pose, std::span<const Index> rows);
+
 /// The chosen Gaussians of the human in a pose, [P,3] metres, world.
 std::vector<double> measured_points(const Avatar& avatar, const BodyPose& pose);
 

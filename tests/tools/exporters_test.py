@@ -181,6 +181,93 @@ def lingo():
     refused("global_orient has 6 frames, body_pose 6, transl 5", "export_motion.py", "short.pkl", "n.npz", "--from", "lingo")
 
 
+def emdb():
+    smpl = {"poses_root": rng.normal(size=(5, 3)) * 0.5, "poses_body": rng.normal(size=(5, 69)) * 0.3,
+            "trans": rng.normal(size=(5, 3)), "betas": rng.normal(size=10)}
+    one = {"name": "P0_09", "gender": "male", "emdb2": np.bool_(True), "n_frames": 5, "smpl": smpl,
+           "good_frames_mask": np.array([True, True, False, True, True]), "camera": {"intrinsics": np.eye(3)}}
+    save("P0_data.pkl", one)
+    assert "5 frames, emdb" in export("export_motion.py", "P0_data.pkl", "e.npz", "--from", "emdb", "--fps", 30)
+    out = np.load("e.npz")
+    close(out["trans"] + em.SMPLX_PELVIS, (smpl["trans"] + em.SMPL_PELVIS) @ Z_UP.T)
+    close(em.matrix_of_vector(np, out["root_orient"]), Z_UP @ em.matrix_of_vector(np, smpl["poses_root"]))
+    close(out["pose_body"], smpl["poses_body"][:, :63])
+    close(out["good_frames_mask"], [1, 1, 0, 1, 1], 0)
+    reads("e.npz")
+    arguments = ("export_motion.py", "P0_data.pkl", "e.npz", "--from", "emdb")
+    refused("the truth of EMDB is in the world", *arguments, "--in-camera")
+    for changed, expected in (({"good_frames_mask": np.ones(4, dtype=bool)}, "good_frames_mask: is no mask of 5 frames"),
+                              ({"good_frames_mask": np.full(5, 2)}, "good_frames_mask: is no mask of 5 frames"),
+                              ({"smpl": {**smpl, "trans": smpl["trans"][:4]}}, "poses_root has 5 frames, poses_body 5, trans 4"),
+                              ({"smpl": {**smpl, "poses_body": np.zeros((5, 63))}}, "poses_body: has shape [5, 63]"),
+                              ({"smpl": 3}, "there is no 'poses_root'"),
+                              ({"camera": pathlib.PurePosixPath("x")}, "PurePosixPath, which is no array and is not unpickled"),
+                              ({"camera": print}, "holds builtins.print, which is no array and is not unpickled")):
+        save("P0_data.pkl", {**one, **changed})
+        refused(expected, *arguments)
+    pathlib.Path("P0_data.pkl").write_bytes(b"text")
+    refused("P0_data.pkl: cannot be read", *arguments)
+
+
+def rich():
+    def body(scale):
+        return {"global_orient": np.full((1, 3), 0.1 * scale), "body_pose": np.full((1, 63), 0.01 * scale),
+                "transl": np.array([[0.5 * scale, 1, 3]]), "betas": np.full((1, 10), 0.25),
+                "left_hand_pose": np.zeros((1, 12)), "gender": "female"}
+
+    for frame, scale in ((7, 1), (8, 2), (10, 4)):
+        save(f"dips/{frame:05}/003.pkl", body(scale))
+    said = export("export_motion.py", "dips", "r.npz", "--from", "rich", "--fps", 30)
+    assert "frames 7 to 10 of the sequence are counted from 0" in said, said
+    assert "4 frames, 1 of them interpolated, rich" in said, said
+    out = np.load("r.npz")
+    close(out["pose_body"][:, 0], [0.01, 0.02, 0.03, 0.04])
+    close(out["good_frames_mask"], [1, 1, 0, 1], 0)
+    close(out["betas"], np.full(10, 0.25))
+    pelvis = np.array([[0.5, 1, 3], [1, 1, 3], [1.5, 1, 3], [2, 1, 3]]) + em.SMPLX_PELVIS
+    close(out["trans"] + em.SMPLX_PELVIS, np.stack([pelvis[:, 0], pelvis[:, 2], -pelvis[:, 1]], axis=1))
+    reads("r.npz")
+    save("dips/00007/001.pkl", body(3))
+    assert "person 3 is read, not 1" in export("export_motion.py", "dips", "r.npz", "--from", "rich", "--person", 3)
+    refused("has no person 0; --person can be 1, 3", "export_motion.py", "dips", "r.npz", "--from", "rich")
+    save("dips/00008/003.pkl", {"global_orient": np.zeros((1, 3))})
+    refused("there is no 'body_pose'", "export_motion.py", "dips", "r.npz", "--from", "rich", "--person", 3)
+    save("dips/00008/003.pkl", print)
+    refused("holds builtins.print", "export_motion.py", "dips", "r.npz", "--from", "rich", "--person", 3)
+    save("dips/last/003.pkl", body(1))
+    refused("is not called FRAME/PERSON.pkl", "export_motion.py", "dips", "r.npz", "--from", "rich", "--person", 3)
+    pathlib.Path("stills").mkdir()
+    refused("holds no FRAME/PERSON.pkl", "export_motion.py", "stills", "r.npz", "--from", "rich")
+
+
+def intercap():
+    one = {"global_orient": rng.normal(size=(4, 3)) * 0.5, "body_pose": rng.normal(size=(4, 21, 3)) * 0.3,
+           "transl": rng.normal(size=(4, 3)), "betas": np.tile(rng.normal(size=10) * 0.1, (4, 1)),
+           "left_hand_pose": np.zeros((4, 12)), "right_hand_pose": np.zeros((4, 12)),
+           "ob_pose": rng.normal(size=(4, 3)), "ob_trans": rng.normal(size=(4, 3))}
+    save("res.pkl", one)
+    arguments = ("export_motion.py", "res.pkl", "i.npz", "--from", "intercap", "--fps", 30)
+    said = export(*arguments)
+    assert "not read: left_hand_pose, right_hand_pose" in said and "4 frames, intercap" in said, said
+    out = np.load("i.npz")
+    z_up = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], dtype=float)
+    close(out["obj_rot_mat"], z_up @ em.matrix_of_vector(np, one["ob_pose"]))
+    close(out["obj_trans"], one["ob_trans"] @ z_up.T)
+    close(out["trans"] + em.SMPLX_PELVIS, (one["transl"] + em.SMPLX_PELVIS) @ z_up.T)
+    close(out["pose_body"], one["body_pose"].reshape(4, 63))
+    reads("i.npz")
+    for changed, expected in (({"ob_pose": one["ob_pose"][:3]}, "transl has 4 frames, ob_pose 3"),
+                              ({"ob_trans": np.zeros((4, 4))}, "ob_trans: has shape [4, 4]"),
+                              ({"ob_pose": np.full((4, 3), np.nan)}, "ob_pose: frame 0 has a number that is not finite"),
+                              ({"betas": print}, "holds builtins.print")):
+        save("res.pkl", {**one, **changed})
+        refused(expected, *arguments)
+    save("res.pkl", {name: rows for name, rows in one.items() if name != "ob_pose"})
+    refused("there is no 'ob_pose'", *arguments)
+    save("res.pkl", [1, 2])
+    refused("there is no 'global_orient'", *arguments)
+
+
 def tram():
     turns = em.matrix_of_vector(np, rng.normal(size=(6, 3)) * 0.2)
     places = rng.normal(size=(6, 3))
@@ -337,7 +424,7 @@ def vposer():
 
 folder = tempfile.TemporaryDirectory()
 os.chdir(folder.name)
-for test in (rotations, gvhmr, wham, lingo, tram, whac, vposer):
+for test in (rotations, gvhmr, wham, lingo, emdb, rich, intercap, tram, whac, vposer):
     test()
     print(test.__name__, "passed")
 refused("there is no such file", "export_motion.py", "nowhere.pkl", "w.npz")

@@ -231,6 +231,61 @@ TEST_CASE("what evaluate cannot compare is told") {
         "hsi4d evaluate: --object-surface: " + truth + " has no object \"vase\"; there is watering_can\n");
 }
 
+TEST_CASE("evaluate follows the protocols of public benchmarks") {
+  const TemporaryFolder here;
+  const std::string truth = TinyDataset::folder().string();
+  const nlohmann::json world = evaluated({truth, "--truth", truth, "--protocol", "emdb2"})["results"][0];
+  CHECK(world["protocol"] == "emdb2");
+  for (const char* name : {"wa_mpjpe_100_mm", "w_mpjpe_100_mm", "rte_percent"})
+    CHECK(world[name].get<double>() == Approx(0).margin(1e-6));
+  CHECK(world["protocol_jitter"].get<double>() == Approx(world["jitter"].get<double>() / 10));
+  CHECK_FALSE(world.contains("cd_both_cm"));
+  const nlohmann::json objects =
+      evaluated({truth, "--truth", truth, "--protocol", "behave", "--align-frames", "1"})["results"][0];
+  for (const char* name : {"cd_human_cm", "cd_object_cm", "cd_both_cm"})  // of points as they are
+    CHECK(objects[name].get<double>() == Approx(0).margin(1e-6));
+  CHECK_FALSE(objects.contains("acceleration_human_cm"));
+  CHECK_FALSE(objects.contains("wa_mpjpe_100_mm"));
+  const std::string table = run_hsi4d({"evaluate", truth, "--truth", truth, "--protocol", "rich"}).out;
+  CHECK_THAT(table,
+             Contains("\nWA-MPJPE-100 [mm] ") && Contains("\nRTE [%] ") &&
+                 Contains(": protocol rich: 4 frames in pieces of 100, 22 joints\n") &&
+                 Contains(": protocol rich: the protocol is for 30 frames a second, this is at 10: its pieces and "
+                          "steps are counted in frames") &&
+                 Contains(": feet slide by points "));
+  CHECK_FALSE(evaluated({truth, "--truth", truth})["results"][0].contains("protocol"));
+
+  const auto told = [&truth](std::vector<std::string> options) {
+    options.insert(options.begin(), {truth, "--truth", truth});
+    return refused(std::move(options));
+  };
+  CHECK(told({"--protocol", "emdb"}) ==
+        "hsi4d evaluate: --protocol: \"emdb\" is not known; allowed: emdb2, rich, behave, intercap\n");
+  for (const char* text : {"1,2,3", "1,2,3,4,5", "1,2,3,", "1,2,3,4,", "a", "1,2,3,-4", "1,2,3,4.5", "1;2;3;4",
+                           "1,2,3,99999999999999999999"}) {
+    INFO(text);
+    CHECK_THAT(
+        told({"--protocol", "emdb2", "--foot-points", text}),
+        StartsWith("hsi4d evaluate: --foot-points: \"" + std::string(text) + "\"; allowed: four numbers of points"));
+  }
+  CHECK_THAT(told({"--protocol", "emdb2", "--foot-points", "0,1,2,99999"}),
+             StartsWith("hsi4d evaluate: --foot-points: there is no point 99999; the body has 0 to "));
+  CHECK(told({"--protocol", "behave", "--foot-points", "0,1,2,3"}) ==
+        "hsi4d evaluate: --foot-points: only --protocol emdb2 and rich measure feet by points\n");
+  CHECK(told({"--align-frames", "2"}) ==
+        "hsi4d evaluate: --align-frames: only --protocol behave and intercap lay frames on the truth by it\n");
+  CHECK(told({"--protocol", "intercap", "--align-frames", "0"}) ==
+        "hsi4d evaluate: --align-frames: 0 is out of range; allowed: 1 or more\n");
+  CHECK_THAT(told({"--protocol", "intercap", "--align-frames", "-1"}), Contains("--align-frames"));
+  CHECK(told({"--truth-body-model", "m.npz"}) ==
+        "hsi4d evaluate: --truth-body-model is given without --body-model, the body of the other motions\n");
+  procedural_file().write("body.npz");
+  CHECK_THAT(told({"--body-model", "body.npz", "--truth-body-model", "none.npz"}), Contains("none.npz"));
+  CHECK(refused({data("truth/motion.npz"), "--protocol", "rich", "--avatar", data("avatar.safetensors")}) ==
+        "hsi4d evaluate: --protocol: " + data("truth/motion.npz") +
+            ": there is no truth to compare with; --truth names one\n");
+}
+
 TEST_CASE("what is solid is told by a mesh, by voxels or by Gaussians", "[run]") {
   const TemporaryFolder here;
   const std::string truth = TinyDataset::folder().string();
