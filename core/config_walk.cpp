@@ -4,6 +4,7 @@
 #include "core/check.h"
 #include "core/config.h"
 #include "core/suggest.h"
+#include "core/text.h"
 
 namespace hsi4d {
 namespace {
@@ -11,8 +12,9 @@ namespace {
 using Kind = ConfigValue::Kind;
 using FieldKind = ConfigField::Kind;
 
-constexpr std::size_t kMostSuggested = 50;  // problems after which nobody reads suggestions any more
-constexpr std::size_t kMostListed = 24;     // keys that a message lists
+constexpr std::size_t kMostSuggested = 50;    // problems after which nobody reads suggestions any more
+constexpr std::size_t kMostListed = 24;       // keys that a message lists
+constexpr std::size_t kMostSectionsTold = 4;  // that have a key which is unknown where it stands
 
 bool is_free_key(const std::string& key) {
   return !key.empty() && std::all_of(key.begin(), key.end(), [](char c) {
@@ -126,15 +128,21 @@ class Reader {
     problems_.add(member.key_origin, child_pointer(pointer, member.key), "unknown key" + hint);
   }
 
-  /// The hint that a key exists in another section.
+  /// The hint that a key exists in other sections.
   std::string elsewhere(const std::string& key) {
     if (settings_.empty()) settings_ = list_settings(root_);
+    std::vector<std::string> sections;
     for (const ConfigSetting& setting : settings_) {
       const std::size_t slash = setting.pointer.rfind('/');
       if (setting.pointer.substr(slash + 1) != key) continue;
-      return slash == 0 ? "; it belongs at the top level" : "; it belongs in " + setting.pointer.substr(0, slash);
+      if (slash == 0) return "; it belongs at the top level";
+      sections.push_back(setting.pointer.substr(0, slash));
     }
-    return {};
+    if (sections.empty()) return {};
+    const std::size_t told = std::min<std::size_t>(sections.size(), kMostSectionsTold);
+    const bool are_all = told == sections.size();
+    return "; it belongs in " + joined(std::span(sections).first(told), are_all ? " or " : ", ") +
+           (are_all ? "" : " or others");
   }
 
   void report_new_entry(const ConfigMember& member, const ConfigValue& map, const std::string& pointer) {
@@ -145,7 +153,7 @@ class Reader {
     const std::string hint = did_you_mean(member.key, present);
     problems_.add(member.key_origin, child_pointer(pointer, member.key),
                   std::string(member.key_origin.source && member.key_origin.source->is_command_line
-                                  ? "no such entry in the config, and --set adds none"
+                                  ? "no such entry in the config, and --set adds none; a config that extends it can"
                                   : "no such entry in the config; an object in its place, {...}, adds one") +
                       (hint.empty() ? listed(present) : hint));
   }

@@ -198,13 +198,13 @@ TEST_CASE("overrides name the command line") {
       Equals("--set stages.camera.iteration=10: /stages/camera/iteration: unknown key; did you mean \"iterations\"?"));
   CHECK_THAT(
       fault(good, {"stages.camara.iterations=10"}),
-      Equals("--set stages.camara.iterations=10: /stages/camara: no such entry in the config, and --set adds none; did "
-             "you mean \"camera\"?"));
+      Equals("--set stages.camara.iterations=10: /stages/camara: no such entry in the config, and --set adds none; a "
+             "config that extends it can; did you mean \"camera\"?"));
   CHECK_THAT(
       fault(good, {"stages.camera.losses.centre.weight=0"}),
       Equals(
           "--set stages.camera.losses.centre.weight=0: /stages/camera/losses/centre: no such entry in the config, and "
-          "--set adds none; known here: photo"));
+          "--set adds none; a config that extends it can; known here: photo"));
   CHECK_THAT(
       fault(good, {"stages.camera.iterations=2.7"}),
       Equals("--set stages.camera.iterations=2.7: /stages/camera/iterations: 2.7 is not a whole number; allowed: 1 to "
