@@ -14,7 +14,7 @@ using FieldKind = ConfigField::Kind;
 
 constexpr std::size_t kMostSuggested = 50;    // problems after which nobody reads suggestions any more
 constexpr std::size_t kMostListed = 24;       // keys that a message lists
-constexpr std::size_t kMostSectionsTold = 4;  // that have a key which is unknown where it stands
+constexpr std::size_t kMostSectionsTold = 6;  // that have a key which is unknown where it stands
 
 bool is_free_key(const std::string& key) {
   return !key.empty() && std::all_of(key.begin(), key.end(), [](char c) {
